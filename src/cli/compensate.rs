@@ -592,7 +592,11 @@ fn rewritten(
     worked: impl FnOnce(),
     report: Report<'_>,
 ) -> anyhow::Result<Done> {
-    let program = programs.task(&shop.setup);
+    let mut program = programs.task(&shop.setup);
+    let loads = shop.arguments.cell.loads(&program);
+    // Listed, a program needs its trees no more: they are larger than the file.
+    program.forget_trees();
+    let program = program;
     let listing = program.listing();
     let known = programs.files.iter().any(|(path, _)| Language::by_name(&files::name(path)).is_some());
     if listing.motions.is_empty() && !known && shop.corrector.is_some() {
@@ -636,7 +640,7 @@ fn rewritten(
         }
     }
     let used = Some(Used::by(listing, &shop.cell));
-    let options = Options { loads: shop.arguments.cell.loads(&program), ..shop.options.clone() };
+    let options = Options { loads, ..shop.options.clone() };
     let Compensated { plan: mut planned, rewritten } = match shop.corrector {
         Some(corrector) => {
             let mark = Mark {

@@ -36,7 +36,8 @@ pub(super) struct Start {
     pub(super) mounted: usize,
     pub(super) meant: Pose,
     pub(super) joints: Joints,
-    pub(super) conf: Configuration,
+    /// The branch of the arm.
+    pub(super) cfx: i32,
     /// [`Solved::margins`](super::solved::Solved::margins) before.
     pub(super) margins: [f64; 3],
     pub(super) guess: Guess,
@@ -291,9 +292,9 @@ fn together(told: &[Told<'_>], last: &mut Near, arms: &Arms<'_>, out: &mut [Resu
         if told.monitored != Switch::Off && !reached.is_of(&wanted(told.target)) {
             break;
         }
-        let (joints, conf, margins) = (reached.joints, reached.configuration, reached.margins());
+        let (joints, cfx, margins) = (reached.joints, reached.configuration.cfx, reached.margins());
         let guess = last.guess(told.monitored);
-        let start = Start { mounted: told.mounted, meant: told.meant, joints, conf, margins, guess };
+        let start = Start { mounted: told.mounted, meant: told.meant, joints, cfx, margins, guess };
         *last = Near::of(&start);
         out[taken] = Ok(start);
         taken += 1;
@@ -320,14 +321,14 @@ fn start(
             let flange = told.flange_for(&meant);
             let monitored = monitored(asked.motion);
             let joints = configured(&arms.nominal, &flange, &t, monitored, near.map(|near| &near.joints))?;
-            let conf = arms.nominal.configuration(&joints);
+            let cfx = arms.nominal.configuration(&joints).cfx;
             let guess = match near {
                 Some(near) => near.guess(monitored),
                 None if monitored == Switch::Off && arms.nominal.all(&flange).len() > 1 => Guess::Here,
                 None => Guess::No,
             };
             let margins = arms.nominal.branch_margins(&joints);
-            Ok(Start { mounted, meant, joints, conf, margins, guess })
+            Ok(Start { mounted, meant, joints, cfx, margins, guess })
         }
         TargetValue::Joint(t) => {
             let joints = Joints::from_fn(|i, _| t.robot_deg[i].to_radians());
@@ -336,9 +337,9 @@ fn start(
                 return Err(Why::OutsideLimits { joint });
             }
             let meant = told.target_of(&nominal.forward(&joints));
-            let conf = arms.nominal.configuration(&joints);
+            let cfx = arms.nominal.configuration(&joints).cfx;
             let margins = arms.nominal.branch_margins(&joints);
-            Ok(Start { mounted, meant, joints, conf, margins, guess: Guess::No })
+            Ok(Start { mounted, meant, joints, cfx, margins, guess: Guess::No })
         }
     }
 }

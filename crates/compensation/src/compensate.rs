@@ -78,20 +78,19 @@ pub fn compensate(
     let play =
         arm.model.effects.iter().any(|effect| matches!(effect, Effect::Backlash(_)) && !effect.is_still());
     loop {
-        let mut planned = targets.plan(&refused);
+        let planned = targets.plan(&refused);
+        if program.takes(&planned.changes) {
+            // No second plan: what was worked out of the targets makes room for the edits.
+            drop(targets);
+            let rewritten = program.rewrite(&planned.changes, &rewrite)?;
+            return Ok(agreed(planned, rewritten, &BTreeMap::new(), program));
+        }
         let rewritten = program.rewrite(&planned.changes, &rewrite)?;
         let found = refusals(&planned, &rewritten, listing);
         // What is judged motion by motion needs no second plan, unless what stays changes from which sides joints with play
         // come to what follows; nor does a program of which nothing else could change.
         if found.is_empty() || options.cuts == Cuts::Single && !play {
-            reconcile(&mut planned, &rewritten, &found);
-            planned.notes.extend(undeclared::notes(listing, program.language()));
-            if program.language() == Language::Rapid
-                && let Some(off) = single_precision(&planned.changes)
-            {
-                planned.notes.push(off.text());
-            }
-            return Ok(Compensated { plan: planned, rewritten });
+            return Ok(agreed(planned, rewritten, &found, program));
         }
         for (motion, why) in found {
             refused.entry(motion).or_insert(why);
@@ -112,6 +111,23 @@ pub fn compensate(
 
 /// Rounds of plan and writing before all that is still open is refused.
 const MOST_ROUNDS: usize = 16;
+
+/// The plan as it was written.
+fn agreed(
+    mut planned: Plan,
+    rewritten: Rewritten,
+    refused: &BTreeMap<u32, Why>,
+    program: &Program<'_>,
+) -> Compensated {
+    reconcile(&mut planned, &rewritten, refused);
+    planned.notes.extend(undeclared::notes(program.listing(), program.language()));
+    if program.language() == Language::Rapid
+        && let Some(off) = single_precision(&planned.changes)
+    {
+        planned.notes.push(off.text());
+    }
+    Compensated { plan: planned, rewritten }
+}
 
 /// What the writer refused.
 fn refusals(planned: &Plan, rewritten: &Rewritten, listing: &Listing) -> BTreeMap<u32, Why> {

@@ -18,16 +18,26 @@ pub(super) fn shared_out<T: Send>(
     pieces: usize,
     work: impl Fn(usize, &mut Allowance) -> T + Sync,
 ) -> Vec<T> {
-    let one = |piece: usize| {
+    shared_out_into(whole, &mut vec![(); pieces], |piece, (), allowance| work(piece, allowance))
+}
+
+/// The same where each piece has a place of its own that its work fills.
+pub(super) fn shared_out_into<P: Send, T: Send>(
+    whole: Allowance,
+    places: &mut [P],
+    work: impl Fn(usize, &mut P, &mut Allowance) -> T + Sync,
+) -> Vec<T> {
+    let pieces = places.len();
+    let one = |(piece, place): (usize, &mut P)| {
         checkpoint();
         let mut allowance = whole.part(piece, pieces);
-        (work(piece, &mut allowance), allowance)
+        (work(piece, place, &mut allowance), allowance)
     };
-    let done: Vec<(T, Allowance)> = (0..pieces).into_par_iter().map(one).collect();
+    let done: Vec<(T, Allowance)> = places.par_iter_mut().enumerate().map(one).collect();
     let mut rest = Allowance::of(done.iter().map(|(_, left)| left.evaluations).sum())
         .with_steps(done.iter().fold(0, |sum, (_, left)| sum.saturating_add(left.steps)));
     let again = |(piece, (done, left)): (usize, (T, Allowance))| {
-        if left.short { work(piece, &mut rest) } else { done }
+        if left.short { work(piece, &mut places[piece], &mut rest) } else { done }
     };
     done.into_iter().enumerate().map(again).collect()
 }

@@ -5,8 +5,13 @@ use super::options::Options;
 use super::solved::Solved;
 use super::why::Why;
 
-/// Why a corrected target must not be written.
-pub(super) fn forbidden(solved: &Solved, arms: &Arms<'_>, options: &Options) -> Option<Why> {
+/// Why a corrected target must not be written. `singularity`: how far its joints are from one.
+pub(super) fn forbidden(
+    solved: &Solved,
+    singularity: f64,
+    arms: &Arms<'_>,
+    options: &Options,
+) -> Option<Why> {
     let shift = solved.shift_mm();
     if !(shift <= options.max_correction_mm) {
         return Some(Why::TooFar { mm: shift });
@@ -18,11 +23,11 @@ pub(super) fn forbidden(solved: &Solved, arms: &Arms<'_>, options: &Options) -> 
     if let Some(joint) = arms.nominal.arm().model.limits.violated(&solved.after) {
         return Some(Why::OutsideLimits { joint });
     }
-    if solved.singularity < options.min_singularity {
+    if singularity < options.min_singularity {
         return Some(Why::NearSingularity);
     }
     // Without branches cfx is 0 everywhere.
-    if solved.conf_before.cfx != solved.conf.cfx {
+    if solved.cfx_before != solved.conf.cfx {
         return Some(Why::OtherBranch);
     }
     None

@@ -29,6 +29,23 @@ pub struct MotionOutcome {
     pub inserted: usize,
 }
 
+impl MotionOutcome {
+    /// A motion of which nothing is worked out.
+    pub(super) fn left(motion: u32) -> Self {
+        Self {
+            motion,
+            status: Status::Left,
+            reason: None,
+            before_mm: None,
+            after_mm: None,
+            sigma_mm: None,
+            shape_sigma_mm: None,
+            bend_mm: None,
+            inserted: 0,
+        }
+    }
+}
+
 /// A planned rewrite.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Plan {

@@ -55,7 +55,8 @@ pub(super) struct Targets<'a> {
     options: &'a Options,
     arms: Arms<'a>,
     mountings: Mountings,
-    program: AsItIs<'a>,
+    /// The program as it is, where joints have play: only then targets are worked out once more.
+    program: Option<AsItIs<'a>>,
     assessment: Assessment,
     solved: SolvedTargets,
     /// The motions that stay as they are in `solved`.
@@ -76,6 +77,7 @@ impl<'a> Targets<'a> {
         let solved_without = assessment.risky();
         let solved =
             solve_all(listing, &program, &mut arms, &mountings, &assessment, options, &solved_without);
+        let program = arms.acting.has_play().then_some(program);
         Self { listing, options, arms, mountings, program, assessment, solved, solved_without }
     }
 
@@ -109,7 +111,9 @@ impl<'a> Targets<'a> {
             refused.entry(motion).or_insert(why);
         }
         for _ in 0..MOST_SETTLING {
-            if arms.acting.has_play() && refused != *solved_without {
+            if let Some(program) = program
+                && refused != *solved_without
+            {
                 *solved = solve_all(listing, program, arms, mountings, assessment, options, &refused);
                 solved_without.clone_from(&refused);
             } else {
@@ -176,9 +180,13 @@ fn planned(job: &Job<'_>) -> Plan {
     let Job { listing, solved, mountings, arms, options, .. } = *job;
     let count = listing.motions.len();
     let whole = Allowance::of(effort::PATHS).with_steps(effort::path_steps(count));
-    let portions: Vec<Portion> = effort::shared_out(whole, count.div_ceil(PORTION), |portion, allowance| {
+    // Filled where they stay: lists of portions, put together, would be there twice.
+    let mut outcomes: Vec<MotionOutcome> = (0..count as u32).map(MotionOutcome::left).collect();
+    let mut changes: Vec<Option<Change>> = (0..count).map(|_| None).collect();
+    let mut places: Vec<Places<'_>> = outcomes.chunks_mut(PORTION).zip(changes.chunks_mut(PORTION)).collect();
+    let portions: Vec<Portion> = effort::shared_out_into(whole, &mut places, |portion, places, allowance| {
         let first = portion * PORTION;
-        job.portion(first..(first + PORTION).min(count), allowance)
+        job.portion(first..(first + PORTION).min(count), places, allowance)
     });
     let mut notes = mountings.notes();
     notes.extend(play_note(arms, solved));
@@ -186,13 +194,10 @@ fn planned(job: &Job<'_>) -> Plan {
     notes.extend(load_notes(listing, arms, options));
     let unchecked: Vec<u32> = portions.iter().flat_map(|portion| portion.unchecked.iter().copied()).collect();
     notes.extend(open_notes(listing, solved, &unchecked));
-    let mut plan = Plan { notes, ..Plan::default() };
-    plan.changes.reserve_exact(portions.iter().map(|p| p.changes.len()).sum());
-    plan.outcomes.reserve_exact(listing.motions.len());
+    let changes = changes.into_iter().flatten().collect();
+    let mut plan = Plan { notes, changes, outcomes, ..Plan::default() };
     plan.points.reserve_exact(portions.iter().map(|p| p.points.len()).sum());
     for mut portion in portions {
-        plan.changes.append(&mut portion.changes);
-        plan.outcomes.append(&mut portion.outcomes);
         plan.points.append(&mut portion.points);
     }
     plan.points.iter_mut().enumerate().for_each(|(index, point)| point.index = index);
@@ -214,12 +219,13 @@ struct Job<'a> {
     options: &'a Options,
 }
 
-/// What became of some motions that follow each other.
+/// Where what becomes of some motions that follow each other goes.
+type Places<'p> = (&'p mut [MotionOutcome], &'p mut [Option<Change>]);
+
+/// What else became of them.
 struct Portion {
     /// Lines and arcs that are written without their path having been checked.
     unchecked: Vec<u32>,
-    changes: Vec<Change>,
-    outcomes: Vec<MotionOutcome>,
     points: Vec<PathPoint>,
 }
 
@@ -264,7 +270,12 @@ impl Worked {
 }
 
 impl<'a> Job<'a> {
-    fn portion(&self, motions: std::ops::Range<usize>, allowance: &mut Allowance) -> Portion {
+    fn portion(
+        &self,
+        motions: std::ops::Range<usize>,
+        (outcomes, changes): &mut Places<'_>,
+        allowance: &mut Allowance,
+    ) -> Portion {
         take_room();
         let count = motions.len();
         let paths: Vec<Option<Path<'a>>> = motions.clone().map(|index| self.path(index)).collect();
@@ -282,11 +293,10 @@ impl<'a> Job<'a> {
         let mut last: Option<(u32, Passage)> = None;
         let mut out = Portion {
             unchecked: Vec::new(),
-            changes: Vec::with_capacity(count),
-            outcomes: Vec::with_capacity(count),
             points: Vec::with_capacity(if self.options.points { count } else { 0 }),
         };
-        for (index, path) in motions.zip(&paths) {
+        let places = outcomes.iter_mut().zip(changes.iter_mut());
+        for ((index, path), (outcome, change)) in motions.zip(&paths).zip(places) {
             let middle = if straight(index) && path.is_some() { middles.next() } else { None };
             let middle = middle.unwrap_or(f64::INFINITY);
             let mut worked = within(allowance, || self.work(index, path.as_ref(), middle, last.as_ref()));
@@ -299,8 +309,7 @@ impl<'a> Job<'a> {
             if curve && path.is_none() && worked.change.is_some() {
                 out.unchecked.push(index as u32);
             }
-            out.changes.extend(worked.change);
-            out.outcomes.push(worked.outcome);
+            (*outcome, *change) = (worked.outcome, worked.change);
             out.points.extend(worked.point);
         }
         out
@@ -393,17 +402,7 @@ fn work<'a>(
 ) -> Worked {
     let Job { listing, solved, arms, options, .. } = *job;
     let motion = &listing.motions[index];
-    let mut outcome = MotionOutcome {
-        motion: index as u32,
-        status: Status::Left,
-        reason: None,
-        before_mm: None,
-        after_mm: None,
-        sigma_mm: None,
-        shape_sigma_mm: None,
-        bend_mm: None,
-        inserted: 0,
-    };
+    let mut outcome = MotionOutcome::left(index as u32);
     let finish = |mut outcome: MotionOutcome, status, reason, change, point: Option<PathPoint>| {
         outcome.status = status;
         outcome.reason = reason;
@@ -420,7 +419,7 @@ fn work<'a>(
     let targets = solved.of(index);
     let point = match targets.last() {
         Some(Ok(to)) => {
-            outcome.before_mm = Some(to.deviation_before.norm_mm());
+            outcome.before_mm = Some(to.off_mm[0]);
             outcome.after_mm = outcome.before_mm;
             outcome.sigma_mm = Some(to.sigma_mm);
             outcome.shape_sigma_mm = to.shape_sigma_mm;
@@ -454,7 +453,7 @@ fn work<'a>(
         _ => new_target(target, solved, motion, options),
     };
     let new_targets: Vec<NewTarget> = motion.targets.iter().zip(&good).map(new).collect();
-    outcome.after_mm = good.last().map(|s| s.deviation_after.norm_mm());
+    outcome.after_mm = good.last().map(|s| s.off_mm[1]);
     let change = Change { motion: index as u32, targets: new_targets, before: passage.before.clone() };
     let status = if flag.is_some() { Status::Flagged } else { Status::Changed };
     Worked { passage: Some(passage), ..finish(outcome, status, flag, Some(change), point) }
@@ -529,8 +528,8 @@ fn path_point(motion: &Motion, solved: &Solved, real: &Mounting, shape_alone: bo
         normal: None,
         joints_before: Some(solved.before),
         joints_after: Some(solved.after),
-        before: Some(solved.deviation_before),
-        after: Some(solved.deviation_after),
+        before: solved.deviations.as_ref().map(|deviations| deviations[0]),
+        after: solved.deviations.as_ref().map(|deviations| deviations[1]),
         sigma_mm: Some(of_shape.unwrap_or(solved.sigma_mm)),
         shape_sigma_mm: solved.shape_sigma_mm,
         outside: solved.outside,

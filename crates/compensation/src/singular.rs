@@ -72,9 +72,11 @@ pub(super) struct Replay<'a> {
     pub(super) stated: Option<&'a RobTarget>,
 }
 
-/// Why a target must not be corrected, for what its joints do or because the controller takes others.
+/// Why a target must not be corrected, for what its joints do or because the controller takes others. `singularity`: how far
+/// the joints after are from one.
 pub(super) fn at_target(
     solved: &Solved,
+    singularity: f64,
     replay: &Replay<'_>,
     arms: &Arms<'_>,
     options: &Options,
@@ -84,7 +86,7 @@ pub(super) fn at_target(
     if let Some(jump) = jump([from, to], joints, &arms.nominal, options) {
         return Some(jump);
     }
-    if solved.singularity < WATCHED * options.min_singularity
+    if singularity < WATCHED * options.min_singularity
         && arms.nominal.singularity(&solved.before) < options.min_singularity
     {
         return Some(Why::NearSingularity);

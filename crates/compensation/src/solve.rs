@@ -10,6 +10,8 @@
 
 use std::collections::BTreeMap;
 
+use rayon::prelude::*;
+
 use super::arms::Arms;
 use super::as_it_is::{AsItIs, Asked, Guess, Start};
 use super::assessment::Assessment;
@@ -88,24 +90,26 @@ impl Work<'_> {
                 let motions = (0..count).flat_map(|m| (self.first[m]..self.first[m + 1]).map(move |_| m));
                 motions.map(|m| arms.acting.place([0; 6], load(m))).collect()
             };
-            let portions = self.portions(arms, &places, &places, None);
-            return self.solved(portions, Vec::new());
+            let mut targets = self.unsolved();
+            self.fill(&mut targets, arms, &places, &places, None);
+            return self.solved(targets, Vec::new());
         }
         let mut doubted: Vec<[bool; 6]> = vec![[false; 6]; count];
         let as_is = self.sides(arms, None, &doubted);
         let before = self.places(arms, &as_is, &load);
         let mut sides = as_is;
         let mut places = before.clone();
-        let mut portions = self.portions(arms, &before, &places, None);
+        let mut targets = self.unsolved();
+        self.fill(&mut targets, arms, &before, &places, None);
         for round in 1..=MOST_ROUNDS {
-            let next = self.sides(arms, Some(&portions), &doubted);
+            let next = self.sides(arms, Some(&targets), &doubted);
             if round > ROUNDS {
                 // What still goes to and fro is not known.
                 for (doubted, (next, last)) in doubted.iter_mut().zip(next.iter().zip(&sides)) {
                     (0..6).for_each(|j| doubted[j] |= next.end[j] != last.end[j]);
                 }
             }
-            sides = if round > ROUNDS { self.sides(arms, Some(&portions), &doubted) } else { next };
+            sides = if round > ROUNDS { self.sides(arms, Some(&targets), &doubted) } else { next };
             let new = self.places(arms, &sides, &load);
             if new == places {
                 break;
@@ -118,12 +122,7 @@ impl Work<'_> {
                 })
                 .collect();
             places = new;
-            let fresh = self.portions(arms, &before, &places, Some(&stale));
-            for ((portion, fresh), stale) in portions.iter_mut().zip(fresh).zip(stale) {
-                if stale {
-                    *portion = fresh;
-                }
-            }
+            self.fill(&mut targets, arms, &before, &places, Some(&stale));
         }
         let ways = sides.iter().enumerate().map(|(m, course)| {
             let mut later =
@@ -133,34 +132,24 @@ impl Work<'_> {
             Way { first: first.unwrap_or_else(|| arms.acting.place(course.end, load(m))), later }
         });
         let ways = ways.collect();
-        self.solved(portions, ways)
+        self.solved(targets, ways)
     }
 
-    fn solved(&self, portions: Vec<Vec<Result<Solved, Why>>>, ways: Vec<Way>) -> SolvedTargets {
-        let unreached = self.unreached(&portions);
+    fn solved(&self, targets: Vec<Result<Solved, Why>>, ways: Vec<Way>) -> SolvedTargets {
+        let unreached = self.unreached(&targets);
         let guessed = self.guessed();
-        SolvedTargets { forbade: Vec::new(), first: self.first.to_vec(), portions, ways, unreached, guessed }
+        SolvedTargets { forbade: Vec::new(), first: self.first.to_vec(), targets, ways, unreached, guessed }
     }
 
     /// The starts of motions of which a target failed though all are known as the program is.
-    fn unreached(&self, portions: &[Vec<Result<Solved, Why>>]) -> BTreeMap<u32, Vec<Start>> {
-        let mut out = BTreeMap::new();
-        for (portion, solved) in portions.iter().enumerate() {
-            if solved.iter().all(Result::is_ok) {
-                continue;
-            }
-            let first = portion * PORTION;
-            let begin = self.first[first];
-            for motion in first..(first + PORTION).min(self.listing.motions.len()) {
-                let targets = self.first[motion]..self.first[motion + 1];
-                if solved[targets.start - begin..targets.end - begin].iter().any(Result::is_err)
-                    && let Ok(starts) = self.starts[targets].iter().cloned().collect()
-                {
-                    out.insert(motion as u32, starts);
-                }
-            }
-        }
-        out
+    fn unreached(&self, solved: &[Result<Solved, Why>]) -> BTreeMap<u32, Vec<Start>> {
+        let starts = |motion: usize| {
+            let targets = self.first[motion]..self.first[motion + 1];
+            let failed = solved[targets.clone()].iter().any(Result::is_err);
+            let starts = || self.starts[targets].iter().cloned().collect::<Result<_, _>>().ok();
+            Some((motion as u32, failed.then(starts)??))
+        };
+        (0..self.listing.motions.len()).filter_map(starts).collect()
     }
 
     /// Motions of which a target was reached by guess.
@@ -179,32 +168,45 @@ impl Work<'_> {
         self.first[begin]..self.first[(begin + PORTION).min(self.listing.motions.len())]
     }
 
+    /// A place for each target.
+    fn unsolved(&self) -> Vec<Result<Solved, Why>> {
+        self.asked.par_iter().map(|_| Err(Why::JointTarget)).collect()
+    }
+
     /// All targets, `before` under the conditions of the program as it is, or those portions that are `stale`.
-    fn portions(
+    fn fill(
         &self,
+        solved: &mut [Result<Solved, Why>],
         arms: &Arms<'_>,
         before: &[usize],
         places: &[usize],
         stale: Option<&[bool]>,
-    ) -> Vec<Vec<Result<Solved, Why>>> {
+    ) {
+        let mut rest = solved;
+        let mut portions: Vec<&mut [Result<Solved, Why>]> = Vec::new();
+        for begin in (0..self.listing.motions.len()).step_by(PORTION) {
+            let (here, after) = rest.split_at_mut(self.targets(begin).len());
+            portions.push(here);
+            rest = after;
+        }
         let whole = Allowance::of(effort::TARGETS);
-        effort::shared_out(whole, self.listing.motions.len().div_ceil(PORTION), |portion, allowance| {
+        effort::shared_out_into(whole, &mut portions, |portion, solved, allowance| {
             if stale.is_some_and(|stale| !stale[portion]) {
-                return Vec::new();
+                return;
             }
             take_room();
             let targets = self.targets(portion * PORTION);
             let places = [&before[targets.clone()], &places[targets.clone()]];
             let (asked, starts) = (&self.asked[targets.clone()], &self.starts[targets]);
-            within(allowance, || finish(asked, starts, places, arms, self))
-        })
+            within(allowance, || finish(asked, starts, places, arms, self, solved));
+        });
     }
 
     /// The sides along the program: as it is, or as rewritten.
     fn sides(
         &self,
         arms: &Arms<'_>,
-        solved: Option<&[Vec<Result<Solved, Why>>]>,
+        solved: Option<&[Result<Solved, Why>]>,
         doubted: &[[bool; 6]],
     ) -> Vec<Course> {
         let motions = &self.listing.motions;
@@ -215,9 +217,8 @@ impl Work<'_> {
             }
             let stays = self.stays.contains_key(&(m as u32));
             let rewritten = solved.filter(|_| may_change(motion, self.options) && !stays);
-            let begin = self.first[m / PORTION * PORTION];
             let targets = self.first[m]..self.first[m + 1];
-            let solved = |target: usize| match rewritten?[m / PORTION].get(target - begin)? {
+            let solved = |target: usize| match &rewritten?[target] {
                 Ok(solved) if solved.forbidden.is_none() => Some(solved),
                 _ => None,
             };
@@ -276,20 +277,21 @@ impl Work<'_> {
     }
 }
 
-/// The rest of the work on one portion of targets.
+/// The rest of the work on one portion of targets, into `out`.
 fn finish(
     asked: &[Asked<'_>],
     starts: &[Result<Start, Why>],
     places: [&[usize]; 2],
     arms: &Arms<'_>,
     work: &Work<'_>,
-) -> Vec<Result<Solved, Why>> {
+    out: &mut [Result<Solved, Why>],
+) {
     let Work { mountings, assessment, options, .. } = *work;
     let acting = &arms.acting;
     // A place holder for those on their way.
     let waiting = |start: &Result<Start, Why>| Err(start.as_ref().err().copied().unwrap_or(Why::JointTarget));
-    let mut out: Vec<Result<Solved, Why>> = starts.iter().map(waiting).collect();
-    let way = on_their_way(starts, places, arms, mountings, &mut out);
+    out.iter_mut().zip(starts).for_each(|(out, start)| *out = waiting(start));
+    let way = on_their_way(starts, places, arms, mountings, out);
     let joint_form = |w: &OnItsWay| as_joints(asked[w.index].motion, asked[w.index].target, options.emit);
     let Replayed { told_flanges, told, heard, branches, last, failed } =
         replayed(&way, &joint_form, arms, mountings, options);
@@ -311,6 +313,8 @@ fn finish(
         let real = real(&w.start);
         let meant = w.start.meant;
         let in_object = |reached: &Pose| Deviation::between(&meant, reached, &Pose::identity(), None);
+        let deviations =
+            [w.reached_before, real.target_of(&reached_after[k])].map(|reached| in_object(&reached));
         let in_play_mm = acting.in_play_mm(w.place, &w.after, &tools[k]);
         let (conf, margins) = branches[k];
         let mut solved = Solved {
@@ -319,11 +323,11 @@ fn finish(
             before: w.start.joints,
             after: w.after,
             told: told[k],
-            conf_before: w.start.conf,
+            cfx_before: w.start.cfx,
             conf,
             margins: [w.start.margins, margins],
-            deviation_before: in_object(&w.reached_before),
-            deviation_after: in_object(&real.target_of(&reached_after[k])),
+            off_mm: deviations.map(|deviation| deviation.norm_mm()),
+            deviations: options.points.then(|| Box::new(deviations)),
             sigma_mm: absolute[k].unwrap_or(0.0).hypot(in_play_mm),
             shape_sigma_mm: of_shape[k]
                 .or_else(|| assessment.sigma_of_cut_mm(cut_of(w)))
@@ -332,19 +336,17 @@ fn finish(
             place: w.place,
             guess: w.start.guess,
             outside: arms.knowledge.and_then(|k| k.region.outside_near(&w.after, &mut near)),
-            singularity: w.singularity,
             forbidden: None,
         };
-        solved.forbidden = forbidden(&solved, arms, options).or_else(|| {
+        solved.forbidden = forbidden(&solved, w.singularity, arms, options).or_else(|| {
             let told = &mountings.list[solved.mounted].told;
             let flanges = [told.flange_for(&meant), told_flanges[k]];
             let stated = if joint_form(w) { None } else { stated(&asked[w.index]) };
             let replay = Replay { flanges, heard: &heard[k], joints: &last[k], stated };
-            at_target(&solved, &replay, arms, options)
+            at_target(&solved, w.singularity, &replay, arms, options)
         });
         out[w.index] = Ok(solved);
     }
-    out
 }
 
 /// The targets for which joints were found that reach what was meant; the others say in `out` why not.

@@ -24,17 +24,19 @@ pub(super) struct Solved {
     pub(super) before: Joints,
     pub(super) after: Joints,
     pub(super) told: Pose,
-    pub(super) conf_before: Configuration,
+    /// The branch before.
+    pub(super) cfx_before: i32,
     pub(super) conf: Configuration,
-    pub(super) deviation_before: Deviation,
-    pub(super) deviation_after: Deviation,
+    /// How far the tool is off before and after (mm).
+    pub(super) off_mm: [f64; 2],
+    /// The same with its direction and the turn; only where points are asked for.
+    pub(super) deviations: Option<Box<[Deviation; 2]>>,
     pub(super) sigma_mm: f64,
     /// The same of the shape of its cut, after the best rigid registration; absent outside cuts.
     pub(super) shape_sigma_mm: Option<f64>,
     /// What of either comes from joints whose side is not known (mm).
     pub(super) in_play_mm: f64,
     pub(super) outside: Option<Outside>,
-    pub(super) singularity: f64,
     /// [`Inverse::branch_margins`](truegrind_arm::inverse::Inverse::branch_margins) of the nominal arm, before and after.
     pub(super) margins: [[f64; 3]; 2],
     /// Why it must not be written.
@@ -57,7 +59,7 @@ impl Solved {
             mounted: self.mounted,
             meant: self.meant,
             joints: self.before,
-            conf: self.conf_before,
+            cfx: self.cfx_before,
             margins: self.margins[0],
             guess: self.guess,
         }
@@ -66,12 +68,12 @@ impl Solved {
 
 /// The targets of all motions.
 pub(super) struct SolvedTargets {
-    /// What [`SolvedTargets::forbid`] did: portion and place in it, and what was forbidden there before.
-    pub(super) forbade: Vec<(usize, usize, Option<Why>)>,
+    /// What [`SolvedTargets::forbid`] did: at which target, and what was forbidden there before.
+    pub(super) forbade: Vec<(usize, Option<Why>)>,
     /// Where the targets of each motion begin, and the end of the last.
     pub(super) first: Vec<usize>,
-    /// The targets of so many motions each: one list of all would be copied together once more.
-    pub(super) portions: Vec<Vec<Result<Solved, Why>>>,
+    /// All of them, in one list: it goes back to the system as a whole.
+    pub(super) targets: Vec<Result<Solved, Why>>,
     /// The conditions on the way to the end of each motion; empty where no joint has play.
     pub(super) ways: Vec<Way>,
     /// Where the targets of motions lead of which one is not reached on the actual arm: as the program is.
@@ -83,20 +85,19 @@ pub(super) struct SolvedTargets {
 impl SolvedTargets {
     /// Forbids that a motion is changed; of no effect where its last target was not worked out.
     pub(super) fn forbid(&mut self, motion: usize, why: Why) {
-        let portion = motion / PORTION;
-        let end = self.first[motion + 1] - self.first[portion * PORTION];
-        if end > 0
-            && let Some(Ok(solved)) = self.portions[portion].get_mut(end - 1)
+        let targets = self.first[motion]..self.first[motion + 1];
+        if let Some(last) = targets.last()
+            && let Ok(solved) = &mut self.targets[last]
         {
-            self.forbade.push((portion, end - 1, solved.forbidden));
+            self.forbade.push((last, solved.forbidden));
             solved.forbidden = Some(why);
         }
     }
 
     /// Takes back all that [`SolvedTargets::forbid`] did: what was worked out serves another round.
     pub(super) fn allow_again(&mut self) {
-        for (portion, place, before) in self.forbade.drain(..).rev() {
-            if let Ok(solved) = &mut self.portions[portion][place] {
+        for (target, before) in self.forbade.drain(..).rev() {
+            if let Ok(solved) = &mut self.targets[target] {
                 solved.forbidden = before;
             }
         }
@@ -104,9 +105,7 @@ impl SolvedTargets {
 
     /// The targets of one motion; none where the motion must be left.
     pub(super) fn of(&self, motion: usize) -> &[Result<Solved, Why>] {
-        let portion = motion / PORTION;
-        let begin = self.first[portion * PORTION];
-        &self.portions[portion][self.first[motion] - begin..self.first[motion + 1] - begin]
+        &self.targets[self.first[motion]..self.first[motion + 1]]
     }
 
     /// Where the targets of a motion lead as the program is; none where that is not known.
@@ -132,7 +131,7 @@ impl SolvedTargets {
 
     /// At how many targets a side is not known, and how far the tool may be off for it at most (mm).
     pub(super) fn in_play(&self) -> (usize, f64) {
-        let open = self.portions.iter().flatten().flatten().map(|s| s.in_play_mm).filter(|mm| *mm > 0.0);
+        let open = self.targets.iter().flatten().map(|s| s.in_play_mm).filter(|mm| *mm > 0.0);
         open.fold((0, 0.0), |(count, most), mm| (count + 1, f64::max(most, mm)))
     }
 }

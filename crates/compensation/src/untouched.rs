@@ -1,6 +1,5 @@
 //! A program without an arm to correct it for: nothing changes, and each motion says what the text tells of it.
 
-use super::deviation::Status;
 use super::options::{Options, may_change};
 use super::outcome::{MotionOutcome, Plan};
 use super::why::Why;
@@ -10,15 +9,8 @@ use truegrind_programs::motion::{Listing, Motion, Reason};
 /// would have with a model too.
 pub fn untouched(listing: &Listing, options: &Options) -> Plan {
     let outcomes = (0..).zip(&listing.motions).map(|(index, motion)| MotionOutcome {
-        motion: index,
-        status: Status::Left,
         reason: Some(why(listing, motion, options)),
-        before_mm: None,
-        after_mm: None,
-        sigma_mm: None,
-        shape_sigma_mm: None,
-        bend_mm: None,
-        inserted: 0,
+        ..MotionOutcome::left(index)
     });
     Plan { outcomes: outcomes.collect(), ..Plan::default() }
 }

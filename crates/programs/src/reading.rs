@@ -111,11 +111,27 @@ impl<'s> Program<'s> {
         }
     }
 
+    /// Lets go of what only reading and walking through the statements ask for; listing and rewrites stay as they are.
+    pub fn forget_trees(&mut self) {
+        if let Program::Rapid(task) = self {
+            task.forget_trees();
+        }
+    }
+
     /// What it tells the robot to do.
     pub fn listing(&self) -> &Listing {
         match self {
             Program::Rapid(task) => &task.listing,
             Program::Nc(task) => &task.listing,
+        }
+    }
+
+    /// Whether it is known before they are written that none of the changes will be refused.
+    pub fn takes(&self, changes: &[Change]) -> bool {
+        match self {
+            Program::Rapid(task) => task.takes(changes),
+            // Of an NC block that shows only in the text that comes of it.
+            Program::Nc(_) => false,
         }
     }
 

@@ -38,6 +38,11 @@ pub fn lex(source: &[u8]) -> Tree<'_, Token, Syntax> {
         tree.push(Token::Unknown, 0);
         return tree;
     }
+    lex_text(source)
+}
+
+/// Splits what is known to be text of a program into tokens.
+pub(super) fn lex_text(source: &[u8]) -> Tree<'_, Token, Syntax> {
     let mut tree = Tree::new(source, source.len() / 2);
     let cuts = cuts(source);
     let Some(&first) = cuts.first() else {

@@ -7,21 +7,93 @@ use std::ops::Range;
 
 use super::syntax::{RapidTree, Syntax, node_kind, parts, token_kind, tokens_of};
 use super::token::Token;
+use crate::edit::Edits;
 use crate::motion::{Mark, says_uncorrected};
 use crate::tree::whole_line;
 
-/// The mark of a file, where it has one: the first comment of this form.
-pub fn find(tree: &RapidTree<'_>) -> Option<Mark> {
-    read(tree.text(token(tree)?))
+/// Where the marks of one file stand and go: all that is asked of its tree once its motions are listed.
+#[derive(Debug, Clone)]
+pub(super) struct Places {
+    modules: Vec<Module>,
+    /// The mark of the file.
+    old: Option<Range<usize>>,
 }
 
-/// The token of the mark.
-pub fn token(tree: &RapidTree<'_>) -> Option<u32> {
-    token_in(tree, 0..tree.len() as u32)
+/// One module.
+#[derive(Debug, Clone)]
+struct Module {
+    bytes: Range<usize>,
+    /// The mark that it has; that of the file, where it is the only module.
+    old: Option<Range<usize>>,
+    /// Where a mark goes, and whether a line begins there.
+    place: (usize, bool),
+    /// The lines that say that the program is still to be corrected.
+    uncorrected: Vec<Range<usize>>,
+}
+
+impl Places {
+    /// Those of a file.
+    pub(super) fn of(tree: &RapidTree<'_>) -> Self {
+        let whole = 0..tree.len() as u32;
+        let modules = modules(tree);
+        let alone = modules.len() == 1;
+        let range = |token: u32| tree.range(token, token + 1);
+        let module = |module: u32| {
+            let node = tree.nodes[module as usize];
+            let tokens = if alone { whole.clone() } else { node.first..node.end };
+            Module {
+                bytes: tree.range(node.first, node.end),
+                old: token_in(tree, tokens.clone()).map(range),
+                place: place(tree, module),
+                uncorrected: uncorrected(tree, tokens),
+            }
+        };
+        let modules: Vec<Module> = modules.into_iter().map(module).collect();
+        let old = match modules.as_slice() {
+            [module] => module.old.clone(),
+            _ => token_in(tree, whole).map(range),
+        };
+        Self { modules, old }
+    }
+
+    /// The marks of the modules in which something changed, `comment` being what they say.
+    pub(super) fn edits(&self, source: &[u8], edits: &Edits, comment: &[u8]) -> Edits {
+        let mut changed = vec![self.modules.len() == 1; self.modules.len()];
+        if self.modules.len() > 1 {
+            for (range, _) in edits.iter() {
+                let at = self.modules.partition_point(|module| module.bytes.start <= range.start);
+                if at > 0 && range.start < self.modules[at - 1].bytes.end {
+                    changed[at - 1] = true;
+                }
+            }
+        }
+        let mut marks = Edits::new();
+        let end = line_end(source);
+        for (module, _) in self.modules.iter().zip(&changed).filter(|(_, changed)| **changed) {
+            let (place, begins_line) = module.place;
+            match &module.old {
+                Some(old) => marks.replace(old.clone(), comment),
+                None if begins_line => marks.insert(place, &[comment, end].concat()),
+                None => marks.insert(place, &[end, comment, end].concat()),
+            }
+            module.uncorrected.iter().for_each(|line| marks.replace(line.clone(), b""));
+        }
+        if marks.is_empty()
+            && let Some(old) = &self.old
+        {
+            marks.replace(old.clone(), comment);
+        }
+        marks
+    }
+}
+
+/// The mark of a file, where it has one: the first comment of this form.
+pub fn find(tree: &RapidTree<'_>) -> Option<Mark> {
+    read(tree.text(token_in(tree, 0..tree.len() as u32)?))
 }
 
 /// The token of the mark among some tokens.
-pub fn token_in(tree: &RapidTree<'_>, tokens: Range<u32>) -> Option<u32> {
+fn token_in(tree: &RapidTree<'_>, tokens: Range<u32>) -> Option<u32> {
     // Long stretches hold no comment: that is told without looking at each token by itself.
     const STRETCH: usize = 128;
     let is_comment = |kind: &Token| *kind == Token::Comment;
@@ -41,7 +113,7 @@ pub fn token_in(tree: &RapidTree<'_>, tokens: Range<u32>) -> Option<u32> {
 
 /// The lines among some tokens that say that the program is still to be corrected: the comment with the blanks before it
 /// and its line end, where it has the line to itself.
-pub(super) fn uncorrected(tree: &RapidTree<'_>, tokens: Range<u32>) -> Vec<Range<usize>> {
+fn uncorrected(tree: &RapidTree<'_>, tokens: Range<u32>) -> Vec<Range<usize>> {
     let first = tokens.start as usize;
     let kinds = (first..).zip(&tree.kinds()[first..tokens.end as usize]);
     let comments = kinds.filter(|(_, kind)| **kind == Token::Comment).map(|(token, _)| token as u32);
@@ -74,13 +146,13 @@ pub fn text(mark: &Mark) -> String {
 }
 
 /// The modules of a file; a fragment has none.
-pub fn modules(tree: &RapidTree<'_>) -> Vec<u32> {
+fn modules(tree: &RapidTree<'_>) -> Vec<u32> {
     tree.child_nodes(0).filter(|&node| tree.nodes[node as usize].kind == Syntax::Module).collect()
 }
 
 /// Where the mark of a module goes, and whether a line begins there: after the line on which its head ends, or, where it
 /// has no other line, behind its head.
-pub fn place(tree: &RapidTree<'_>, module: u32) -> (usize, bool) {
+fn place(tree: &RapidTree<'_>, module: u32) -> (usize, bool) {
     let node = tree.nodes[module as usize];
     let mut head = node.first + 1;
     for part in parts(tree, module).skip(1) {

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use self::statement::Parser;
 use self::statement::ahead::{Ahead, cuts};
-use super::lexer::lex;
+use super::lexer::{lex, lex_text};
 use super::syntax::Syntax;
 use super::token::Token;
 use crate::tree::Tree;
@@ -29,6 +29,11 @@ pub fn parse(source: &[u8]) -> Tree<'_, Token, Syntax> {
 /// The same with a stated number of parts that are read side by side: the tree does not depend on it.
 pub fn parse_in_parts(source: &[u8], parts: usize) -> Tree<'_, Token, Syntax> {
     nodes_of(lex(source), parts)
+}
+
+/// Reads one statement of a file that was read.
+pub(super) fn parse_statement(statement: &[u8]) -> Tree<'_, Token, Syntax> {
+    nodes_of(lex_text(statement), 0)
 }
 
 fn nodes_of(mut tree: Tree<'_, Token, Syntax>, parts: usize) -> Tree<'_, Token, Syntax> {

@@ -11,9 +11,9 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use rayon::prelude::*;
 
 use super::instruction::{self, Between, INSTRUCTIONS, Instruction};
+use super::lexer::lex;
 use super::mark;
 use super::print::{self, Fresh};
-use super::syntax::RapidTree;
 use super::task::Task;
 use super::token::{Token, folded, keyword, same_name};
 use crate::edit::{EditError, Edits};
@@ -34,12 +34,12 @@ impl Task<'_> {
     pub fn rewrite(&self, changes: &[Change], options: &RewriteOptions) -> Result<Rewritten, EditError> {
         let mut rewriter = Rewriter::new(self, options);
         let outcomes = rewriter.all(changes);
-        let mut files = Vec::with_capacity(self.trees.len());
-        for (edits, tree) in rewriter.edits.into_iter().zip(&self.trees) {
+        let mut files = Vec::with_capacity(self.sources.len());
+        for ((edits, source), places) in rewriter.edits.into_iter().zip(&self.sources).zip(&self.marks) {
             let mut file = FileEdits { edits, unmarked: false };
             if let Some(mark) = options.mark.as_ref().filter(|_| !file.edits.is_empty()) {
                 // Before the others, so that the list stays in order.
-                let mut marked = marks(tree, &file.edits, mark::text(mark).as_bytes());
+                let mut marked = places.edits(source, &file.edits, mark::text(mark).as_bytes());
                 file.unmarked = marked.is_empty();
                 marked.append(std::mem::take(&mut file.edits));
                 file.edits = marked;
@@ -49,41 +49,63 @@ impl Task<'_> {
         }
         Ok(Rewritten { files, outcomes })
     }
-}
 
-/// The marks of the modules in which something changed.
-fn marks(tree: &RapidTree<'_>, edits: &Edits, comment: &[u8]) -> Edits {
-    let modules = mark::modules(tree);
-    let mut changed = vec![modules.len() == 1; modules.len()];
-    if modules.len() > 1 {
-        let spans: Vec<_> = modules.iter().map(|&module| tree.node_span(module).range()).collect();
-        for (range, _) in edits.iter() {
-            let at = spans.partition_point(|span| span.start <= range.start);
-            if at > 0 && range.start < spans[at - 1].end {
-                changed[at - 1] = true;
+    /// Whether none of the changes would be refused.
+    pub fn takes(&self, changes: &[Change]) -> bool {
+        changes.par_iter().with_min_len(PORTION).all(|change| {
+            let motion = self.listing.motions.get(change.motion as usize);
+            motion.is_some_and(|motion| self.refusal(motion, change).is_none())
+        })
+    }
+
+    /// Why a change cannot be made.
+    fn refusal(&self, motion: &Motion, change: &Change) -> Option<Reason> {
+        if let Some(reason) = motion.reason() {
+            return Some(reason);
+        }
+        if !change.is_held() {
+            return Some(Reason::NumberRange);
+        }
+        let instruction = instruction_of(motion);
+        for (target, new) in motion.targets.iter().zip(&change.targets) {
+            let Ok(value) = &target.value else { continue };
+            match (new, value) {
+                (NewTarget::Cartesian { .. }, TargetValue::Joint(_)) => return Some(Reason::WrongKind),
+                (NewTarget::Joint { .. }, TargetValue::Cartesian(_))
+                    if instruction.is_none_or(|instruction| instruction.joint_form.is_none()) =>
+                {
+                    return Some(Reason::NoJointForm);
+                }
+                _ => {}
             }
         }
-    }
-    let mut marks = Edits::new();
-    let replace = |marks: &mut Edits, old: u32| marks.replace(tree.range(old, old + 1), comment);
-    for (&module, _) in modules.iter().zip(&changed).filter(|&(_, &changed)| changed) {
-        let node = tree.nodes[module as usize];
-        let tokens = if modules.len() == 1 { 0..tree.len() as u32 } else { node.first..node.end };
-        let (place, begins_line) = mark::place(tree, module);
-        let end = mark::line_end(tree.source());
-        match mark::token_in(tree, tokens.clone()) {
-            Some(old) => replace(&mut marks, old),
-            None if begins_line => marks.insert(place, &[comment, end].concat()),
-            None => marks.insert(place, &[end, comment, end].concat()),
+        if change.straightens() && !motion.straightens {
+            return Some(Reason::NoInsertion);
         }
-        mark::uncorrected(tree, tokens).into_iter().for_each(|line| marks.replace(line, b""));
+        if change.before.is_empty() {
+            return None;
+        }
+        let guarded = self.guarded[change.motion as usize];
+        let written = instruction.and_then(|instruction| written_as(instruction, change));
+        let between = written.map_or(Between::Nothing, |instruction| instruction.between);
+        if guarded || motion.timed || between == Between::Nothing {
+            return Some(Reason::NoInsertion);
+        }
+        for extra in &change.before {
+            match (extra.kind, &extra.target) {
+                (MotionKind::Linear | MotionKind::Joint, NewTarget::Cartesian { .. }) => {}
+                (MotionKind::AbsoluteJoint, NewTarget::Joint { .. }) if between == Between::Plain => {}
+                (MotionKind::AbsoluteJoint, NewTarget::Joint { .. }) => return Some(Reason::NoJointForm),
+                _ => return Some(Reason::WrongKind),
+            }
+        }
+        None
     }
-    if marks.is_empty()
-        && let Some(old) = mark::token(tree)
-    {
-        replace(&mut marks, old);
-    }
-    marks
+}
+
+/// The instruction of a motion as the source has it.
+fn instruction_of(motion: &Motion) -> Option<&'static Instruction> {
+    instruction::find(motion.instruction.as_bytes()).map(|index| &INSTRUCTIONS[index])
 }
 
 /// One wish for a declared target: which change, which motion and target, which value.
@@ -147,7 +169,7 @@ struct Rewriter<'r, 's> {
 
 impl<'r, 's> Rewriter<'r, 's> {
     fn new(task: &'r Task<'s>, options: &'r RewriteOptions) -> Self {
-        let edits = vec![Edits::new(); task.trees.len()];
+        let edits = vec![Edits::new(); task.sources.len()];
         Rewriter { task, options, edits, names: None, moved_bases: HashSet::new() }
     }
 
@@ -191,7 +213,7 @@ impl<'r, 's> Rewriter<'r, 's> {
                     .zip(changes)
                     .map(|(index, change)| match task.listing.motions.get(change.motion as usize) {
                         None => Outcome::Refused(Reason::MissingArgument),
-                        Some(motion) => match part.refusal(motion, change) {
+                        Some(motion) => match task.refusal(motion, change) {
                             Some(reason) => Outcome::Refused(reason),
                             None => part.one(index, motion, change, &mut wishes, &mut computed),
                         },
@@ -211,55 +233,6 @@ impl<'r, 's> Rewriter<'r, 's> {
             computed.append(&mut left);
         }
         (outcomes, wishes, computed)
-    }
-
-    /// Why a change cannot be made.
-    fn refusal(&self, motion: &Motion, change: &Change) -> Option<Reason> {
-        if let Some(reason) = motion.reason() {
-            return Some(reason);
-        }
-        if !change.is_held() {
-            return Some(Reason::NumberRange);
-        }
-        let instruction = self.instruction(motion);
-        for (target, new) in motion.targets.iter().zip(&change.targets) {
-            let Ok(value) = &target.value else { continue };
-            match (new, value) {
-                (NewTarget::Cartesian { .. }, TargetValue::Joint(_)) => return Some(Reason::WrongKind),
-                (NewTarget::Joint { .. }, TargetValue::Cartesian(_))
-                    if instruction.is_none_or(|instruction| instruction.joint_form.is_none()) =>
-                {
-                    return Some(Reason::NoJointForm);
-                }
-                _ => {}
-            }
-        }
-        if change.straightens() && !motion.straightens {
-            return Some(Reason::NoInsertion);
-        }
-        if change.before.is_empty() {
-            return None;
-        }
-        let guarded = self.task.statements[change.motion as usize].guarded;
-        let written = instruction.and_then(|instruction| written_as(instruction, change));
-        let between = written.map_or(Between::Nothing, |instruction| instruction.between);
-        if guarded || motion.timed || between == Between::Nothing {
-            return Some(Reason::NoInsertion);
-        }
-        for extra in &change.before {
-            match (extra.kind, &extra.target) {
-                (MotionKind::Linear | MotionKind::Joint, NewTarget::Cartesian { .. }) => {}
-                (MotionKind::AbsoluteJoint, NewTarget::Joint { .. }) if between == Between::Plain => {}
-                (MotionKind::AbsoluteJoint, NewTarget::Joint { .. }) => return Some(Reason::NoJointForm),
-                _ => return Some(Reason::WrongKind),
-            }
-        }
-        None
-    }
-
-    /// The instruction of a motion as the source has it.
-    fn instruction(&self, motion: &Motion) -> Option<&'static Instruction> {
-        instruction::find(motion.instruction.as_bytes()).map(|index| &INSTRUCTIONS[index])
     }
 
     /// The targets of one motion: what stands in the instruction at once, the rest for later.
@@ -307,7 +280,7 @@ impl<'r, 's> Rewriter<'r, 's> {
 
     /// Numbers of a literal in place, or the whole literal where it is not made of plain numbers. `plain`: it is.
     fn literal(&mut self, file: u32, span: Span, (old, plain): (&TargetValue, bool), fresh: &Fresh) -> bool {
-        let text = &self.task.trees[file as usize].source()[span.range()];
+        let text = &self.task.sources[file as usize][span.range()];
         let edits = &mut self.edits[file as usize];
         let known = Some(old).filter(|_| plain);
         match print::replace_numbers(text, span.start as usize, known, fresh, self.options, edits) {
@@ -330,11 +303,11 @@ impl<'r, 's> Rewriter<'r, 's> {
     /// The instruction becomes the one on a line, and its circle point goes with the comma behind it; a comment between
     /// them stays.
     fn straighten(&mut self, motion: &Motion) {
-        let Some(line) = self.instruction(motion).and_then(Instruction::line_form) else { return };
+        let Some(line) = instruction_of(motion).and_then(Instruction::line_form) else { return };
         let start = motion.statement.start as usize;
         let edits = &mut self.edits[motion.place.file as usize];
         edits.replace(start..start + motion.instruction.len(), line.name.as_bytes());
-        let source = self.task.trees[motion.place.file as usize].source();
+        let source = self.task.sources[motion.place.file as usize];
         for range in circle_point(source, motion).into_iter().flatten() {
             edits.replace(range, b"");
         }
@@ -342,11 +315,11 @@ impl<'r, 's> Rewriter<'r, 's> {
 
     /// The instruction becomes the one that takes joints.
     fn take_joint_form(&mut self, motion: &Motion, span: Span, old: &TargetValue, fresh: &Fresh) {
-        let Some(name) = self.instruction(motion).and_then(|instruction| instruction.joint_form) else {
+        let Some(name) = instruction_of(motion).and_then(|instruction| instruction.joint_form) else {
             return;
         };
         let start = motion.statement.start as usize;
-        let source = self.task.trees[motion.place.file as usize].source();
+        let source = self.task.sources[motion.place.file as usize];
         let edits = &mut self.edits[motion.place.file as usize];
         edits.replace(start..start + motion.instruction.len(), name.as_bytes());
         if let Some(argument) = named_before(source, span.start as usize) {
@@ -377,7 +350,7 @@ impl<'r, 's> Rewriter<'r, 's> {
         // Wishes that come to the same text.
         let mut groups: Vec<(Vec<u8>, Vec<&Wish>)> = Vec::new();
         let mut group_of: HashMap<Vec<u8>, usize> = HashMap::new();
-        let source = task.trees[declaration.place.file as usize].source();
+        let source = task.sources[declaration.place.file as usize];
         let original = source[literal.range()].to_vec();
         for wish in wishes {
             let text = self.written(&original, &old, &wish.fresh);
@@ -443,8 +416,7 @@ impl<'r, 's> Rewriter<'r, 's> {
     fn clone_of(&mut self, index: u32, literal: &[u8]) -> String {
         let declaration = &self.task.listing.declarations[index as usize];
         let file = declaration.place.file as usize;
-        let tree = &self.task.trees[file];
-        let source = tree.source();
+        let source = self.task.sources[file];
         let name = self.new_name(&declaration.name);
         let statement = &source[declaration.statement.range()];
         let local = statement.len() >= 5 && same_name(&statement[..5], b"LOCAL");
@@ -475,7 +447,8 @@ impl<'r, 's> Rewriter<'r, 's> {
         let task = self.task;
         let names = self.names.get_or_insert_with(|| {
             let mut names: HashSet<Vec<u8>> = task.symbols.names().map(<[u8]>::to_vec).collect();
-            for tree in &task.trees {
+            for source in &task.sources {
+                let tree = lex(source);
                 for token in 0..tree.len() as u32 {
                     if tree.kind(token) == Some(Token::Ident) {
                         names.insert(folded(tree.text(token)));

@@ -32,23 +32,18 @@ use literals::Literals;
 pub struct Task<'s> {
     /// The names of the files, as given.
     pub names: Vec<String>,
-    /// The files, as trees.
+    /// Their bytes.
+    pub sources: Vec<&'s [u8]>,
+    /// The files, as trees; none any more after [`Task::forget_trees`].
     pub trees: Vec<RapidTree<'s>>,
     /// Their names.
     pub symbols: Box<Symbols>,
     /// What they tell the robot to do.
     pub listing: Listing,
-    /// The statement of each motion.
-    pub(super) statements: Vec<Statement>,
-}
-
-/// Where a motion stands in the tree.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Statement {
-    /// Its node.
-    pub(super) node: u32,
-    /// Whether a compact IF guards it alone.
-    pub(super) guarded: bool,
+    /// Whether a compact IF guards each motion alone.
+    pub(super) guarded: Vec<bool>,
+    /// Where the marks of each file stand and go.
+    pub(super) marks: Vec<mark::Places>,
 }
 
 impl<'s> Task<'s> {
@@ -56,14 +51,22 @@ impl<'s> Task<'s> {
     pub fn read(files: &[(&str, &'s [u8])]) -> Task<'s> {
         let trees: Vec<_> = files.par_iter().map(|(_, bytes)| parse(bytes)).collect();
         let symbols = Box::new(Symbols::gather(&trees));
-        let (listing, statements) = listing(&trees, &symbols);
+        let (listing, guarded) = listing(&trees, &symbols);
+        let marks = trees.iter().map(mark::Places::of).collect();
         let names = files.iter().map(|(name, _)| (*name).to_owned()).collect();
-        Task { names, trees, symbols, listing, statements }
+        let sources = files.iter().map(|(_, bytes)| *bytes).collect();
+        Task { names, sources, trees, symbols, listing, guarded, marks }
+    }
+
+    /// Lets go of the trees, which are larger than the files: a rewrite asks for them no more. What walks through the
+    /// statements does (`truegrind-compensation`'s `Loads`), so it comes first.
+    pub fn forget_trees(&mut self) {
+        self.trees = Vec::new();
     }
 }
 
-/// What the files tell the robot to do, and the statement of each motion.
-fn listing(trees: &[RapidTree<'_>], symbols: &Symbols) -> (Listing, Vec<Statement>) {
+/// What the files tell the robot to do, and whether a compact IF guards each motion alone.
+fn listing(trees: &[RapidTree<'_>], symbols: &Symbols) -> (Listing, Vec<bool>) {
     let mut lister = Lister::new(trees, symbols);
     // The statements in their order on one thread, what does not depend on it on the others.
     let (mut lister, literals) = rayon::join(
@@ -73,12 +76,12 @@ fn listing(trees: &[RapidTree<'_>], symbols: &Symbols) -> (Listing, Vec<Statemen
         },
         || Literals::of(trees, symbols),
     );
-    lister.put_literals(&literals);
+    lister.put_literals(literals);
     lister.settle_modal();
     lister.settle_placed();
     lister.other_uses();
     lister.declared_tools();
-    (lister.listing, lister.statements)
+    (lister.listing, lister.guarded)
 }
 
 /// What is looked up by name again and again.
@@ -112,7 +115,7 @@ struct Lister<'a, 's> {
     symbols: &'a Symbols,
     evaluator: Evaluator<'a, 's>,
     listing: Listing,
-    statements: Vec<Statement>,
+    guarded: Vec<bool>,
     /// The switches at each motion, "as at the entry" included.
     modal: Vec<States>,
     /// Whether the program displacement of each motion is known, and stands in its work object.
@@ -164,9 +167,6 @@ struct Literal {
     joints: bool,
 }
 
-/// Motions that one thread takes at a time.
-const PORTION: usize = 1024;
-
 /// How deeply exits of routines are followed through calls; beyond, anything that they set may be set.
 const CALL_DEPTH: u32 = 12;
 
@@ -177,7 +177,7 @@ impl<'a, 's> Lister<'a, 's> {
             symbols,
             evaluator: Evaluator::new(trees, symbols),
             listing: Listing::default(),
-            statements: Vec::new(),
+            guarded: Vec::new(),
             modal: Vec::new(),
             displaced: Vec::new(),
             units: Vec::new(),
@@ -250,26 +250,25 @@ impl<'a, 's> Lister<'a, 's> {
         }
     }
 
-    /// The values of the targets that stand in the instructions as numbers.
-    fn put_literals(&mut self, read: &Literals) {
-        let (trees, symbols, literals) = (self.trees, self.symbols, &self.literals);
-        self.listing.motions.par_chunks_mut(PORTION).enumerate().for_each(|(portion, motions)| {
-            let first = (portion * PORTION) as u32;
-            let begin = literals.partition_point(|literal| literal.motion < first);
-            let end = first + motions.len() as u32;
-            let here = literals[begin..].iter().take_while(|literal| literal.motion < end);
-            for literal in here {
-                let Literal { role, file, call, node, joints, .. } = *literal;
-                let found = read.get(file, call, node, joints);
-                let (value, origin) = found
-                    .unwrap_or_else(|| literals::value(&Evaluator::new(trees, symbols), file, node, joints));
-                let argument = trees[file as usize].node_span(node);
-                let targets = &mut motions[(literal.motion - first) as usize].targets;
+    /// The targets that stand in the instructions as numbers.
+    fn put_literals(&mut self, mut read: Literals) {
+        let evaluator = Evaluator::new(self.trees, self.symbols);
+        for literal in std::mem::take(&mut self.literals) {
+            let Literal { motion, target, role, file, call, node, joints } = literal;
+            let mut found = read
+                .take(file, call, node, joints)
+                .unwrap_or_else(|| vec![literals::target(&evaluator, file, node, joints)]);
+            found.iter_mut().for_each(|target| target.role = role);
+            let targets = &mut self.listing.motions[motion as usize].targets;
+            if targets.is_empty() {
+                *targets = found;
+            } else {
                 // A hundred thousand motions: no room for targets that never come.
                 targets.reserve_exact(1);
-                targets.insert(literal.target as usize, MotionTarget { role, value, origin, argument });
+                let target = target as usize;
+                targets.splice(target..target, found);
             }
-        });
+        }
     }
 
     // ---- switches ----
@@ -753,7 +752,7 @@ impl Visitor for Lister<'_, '_> {
             None => self.other(unit, node, state, place)?,
         };
         self.listing.motions.push(motion);
-        self.statements.push(Statement { node, guarded: place.guarded });
+        self.guarded.push(place.guarded);
         self.modal.push(state.modal);
         self.displaced.push(matches!(state.displacement(), Some(Ok(_))));
         self.units.push(self.unit);

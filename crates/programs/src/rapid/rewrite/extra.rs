@@ -1,12 +1,13 @@
 //! Motions that are put in before another: they take its speed, tool, work object and process.
 
-use super::{Rewriter, circle_point, fresh, indent, written_as};
+use super::{Rewriter, circle_point, fresh, indent, instruction_of, written_as};
 use crate::edit::Edits;
 use crate::motion::{Motion, MotionKind, Role, Span, TargetValue};
 use crate::rapid::instruction::{Between, Instruction, Slot};
 use crate::rapid::mark;
+use crate::rapid::parser::parse_statement;
 use crate::rapid::print;
-use crate::rapid::syntax::{RapidTree, arguments, tokens_of};
+use crate::rapid::syntax::{RapidTree, Syntax, arguments, tokens_of};
 use crate::rapid::token::{Token, same_name};
 use crate::rewrite::{Change, Extra};
 use crate::tree::Child;
@@ -15,15 +16,15 @@ impl Rewriter<'_, '_> {
     /// Puts in what a change asks for.
     pub(super) fn extras(&mut self, change: &Change) {
         let motion = &self.task.listing.motions[change.motion as usize];
-        let Some(instruction) = self.instruction(motion) else { return };
-        let tree = &self.task.trees[motion.place.file as usize];
-        let source = tree.source();
+        let Some(instruction) = instruction_of(motion) else { return };
+        let source = self.task.sources[motion.place.file as usize];
         let start = motion.statement.start as usize;
-        let parts = Parts::of(tree, self.task.statements[change.motion as usize].node, instruction);
+        let statement = &source[motion.statement.range()];
+        let parts = Parts::of(&parse_statement(statement), instruction);
         let mut text = Vec::new();
         for extra in &change.before {
             let Some(written) = written_as(instruction, change) else { return };
-            self.extra(&mut text, motion, written, tree, &parts, extra);
+            self.extra(&mut text, motion, written, source, &parts, extra);
             text.extend_from_slice(mark::line_end(source));
             text.extend_from_slice(indent(source, start));
         }
@@ -35,7 +36,7 @@ impl Rewriter<'_, '_> {
         out: &mut Vec<u8>,
         motion: &Motion,
         instruction: &Instruction,
-        tree: &RapidTree<'_>,
+        source: &[u8],
         parts: &Parts,
         extra: &Extra,
     ) {
@@ -50,7 +51,7 @@ impl Rewriter<'_, '_> {
                 TargetValue::Joint(target) => target.external = external,
             }
         }
-        let source = tree.source();
+        let statement = &source[motion.statement.range()];
         let mut target = Vec::new();
         print::literal(&mut target, &value, self.options);
         let same = match instruction.between {
@@ -59,11 +60,10 @@ impl Rewriter<'_, '_> {
             Between::Plain | Between::Nothing => None,
         };
         let Some(name) = same else {
-            self.plain(out, extra.kind, &target, source, parts);
+            self.plain(out, extra.kind, &target, statement, parts);
             return;
         };
         // The same instruction, with another target and a fly-by zone.
-        let statement = &source[motion.statement.range()];
         let base = motion.statement.start as usize;
         let mut edits = Edits::new();
         edits.replace(0..motion.instruction.len(), name.as_bytes());
@@ -75,12 +75,10 @@ impl Rewriter<'_, '_> {
             edits.replace(range.start - base..range.end - base, &target);
         }
         if let Some(zone) = parts.zone {
-            let range = zone.range();
-            edits.replace(range.start - base..range.end - base, self.options.extra_zone.as_bytes());
+            edits.replace(zone.range(), self.options.extra_zone.as_bytes());
         }
         for option in &parts.stop_options {
-            let range = option.range();
-            edits.replace(range.start - base..range.end - base, b"");
+            edits.replace(option.range(), b"");
         }
         if let Ok(copy) = edits.apply(statement) {
             out.extend_from_slice(&copy);
@@ -88,7 +86,7 @@ impl Rewriter<'_, '_> {
     }
 
     /// A motion without process: speed, tool and work object are those of the motion, the zone is a fly-by.
-    fn plain(&self, out: &mut Vec<u8>, kind: MotionKind, target: &[u8], source: &[u8], parts: &Parts) {
+    fn plain(&self, out: &mut Vec<u8>, kind: MotionKind, target: &[u8], statement: &[u8], parts: &Parts) {
         out.extend_from_slice(match kind {
             MotionKind::Joint => b"MoveJ ",
             MotionKind::AbsoluteJoint => b"MoveAbsJ ",
@@ -98,20 +96,20 @@ impl Rewriter<'_, '_> {
         out.push(b',');
         if let Some(speed) = &parts.speed {
             for part in [speed].into_iter().chain(&parts.speed_options) {
-                out.extend_from_slice(&source[part.range()]);
+                out.extend_from_slice(&statement[part.range()]);
             }
             out.push(b',');
         }
         out.extend_from_slice(self.options.extra_zone.as_bytes());
         out.push(b',');
         for part in parts.tool.iter().chain(&parts.tool_options) {
-            out.extend_from_slice(&source[part.range()]);
+            out.extend_from_slice(&statement[part.range()]);
         }
         out.push(b';');
     }
 }
 
-/// The arguments of an instruction that extra motions take over.
+/// The arguments of an instruction that extra motions take over, as bytes of its statement.
 #[derive(Default)]
 struct Parts {
     speed: Option<Span>,
@@ -126,8 +124,10 @@ struct Parts {
 }
 
 impl Parts {
-    fn of(tree: &RapidTree<'_>, node: u32, instruction: &Instruction) -> Parts {
+    fn of(tree: &RapidTree<'_>, instruction: &Instruction) -> Parts {
         let mut parts = Parts::default();
+        let mut nodes = (0_u32..).zip(&tree.nodes);
+        let Some((node, _)) = nodes.find(|(_, node)| node.kind == Syntax::Call) else { return parts };
         let count = arguments(tree, node).filter(|argument| !argument.optional).count();
         let span = |child: Child| {
             let (first, end) = tokens_of(tree, child);

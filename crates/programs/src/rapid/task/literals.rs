@@ -8,7 +8,7 @@ use super::super::instruction::{self, INSTRUCTIONS};
 use super::super::symbol::Symbols;
 use super::super::syntax::{RapidTree, Syntax, arguments};
 use super::super::token::Token;
-use crate::motion::{Origin, Reason, TargetValue};
+use crate::motion::{MotionTarget, Origin, Role};
 use crate::tree::Child;
 
 /// Nodes that one thread looks at at a time.
@@ -17,15 +17,13 @@ const PORTION: u32 = 1 << 14;
 /// The values, by file and by the portion in which the call stands, in the order of nodes.
 pub(super) struct Literals(Vec<Vec<Vec<Read>>>);
 
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug)]
 struct Read {
     node: u32,
     joints: bool,
-    found: Found,
+    /// One target, as the list of a motion will hold it: a million of them are not copied.
+    target: Vec<MotionTarget>,
 }
-
-/// What a literal says, and where its numbers stand.
-pub(super) type Found = (Result<TargetValue, Reason>, Origin);
 
 impl Literals {
     /// Reads the literals in motion instructions.
@@ -37,11 +35,18 @@ impl Literals {
         Literals(files.collect())
     }
 
-    /// What the literal at `node` in the call at `call` says; `None` where it was not read.
-    pub(super) fn get(&self, file: u32, call: u32, node: u32, joints: bool) -> Option<Found> {
-        let portion = self.0.get(file as usize)?.get((call / PORTION) as usize)?;
+    /// The one target that the literal at `node` in the call at `call` is; `None` where it was not read, or handed out before.
+    pub(super) fn take(
+        &mut self,
+        file: u32,
+        call: u32,
+        node: u32,
+        joints: bool,
+    ) -> Option<Vec<MotionTarget>> {
+        let portion = self.0.get_mut(file as usize)?.get_mut((call / PORTION) as usize)?;
         let at = portion.binary_search_by_key(&node, |read| read.node).ok()?;
-        Some(portion[at]).filter(|read| read.joints == joints).map(|read| read.found)
+        let read = Some(&mut portion[at]).filter(|read| read.joints == joints)?;
+        Some(std::mem::take(&mut read.target)).filter(|target| !target.is_empty())
     }
 }
 
@@ -60,15 +65,15 @@ fn read(trees: &[RapidTree<'_>], symbols: &Symbols, file: u32, portion: u32) -> 
         let joints = INSTRUCTIONS[known].takes_joints();
         for argument in arguments(tree, call).filter(|argument| !argument.optional) {
             if let Some(node) = argument.value.and_then(|value| plain(tree, value)) {
-                out.push(Read { node, joints, found: value(&evaluator, file, node, joints) });
+                out.push(Read { node, joints, target: vec![target(&evaluator, file, node, joints)] });
             }
         }
     }
     out
 }
 
-/// What an aggregate of numbers says as a target.
-pub(super) fn value(evaluator: &Evaluator<'_, '_>, file: u32, node: u32, joints: bool) -> Found {
+/// An aggregate of numbers as a target to which a motion goes.
+pub(super) fn target(evaluator: &Evaluator<'_, '_>, file: u32, node: u32, joints: bool) -> MotionTarget {
     let nothing = Known::new();
     // No name stands in it: any scope will do.
     let (value, source) = evaluator.target(Context::new(file, 0, &nothing), Child::Node(node), joints);
@@ -77,7 +82,8 @@ pub(super) fn value(evaluator: &Evaluator<'_, '_>, file: u32, node: u32, joints:
         Source::Computed => Origin::Computed,
         _ => Origin::Unknown,
     };
-    (value, origin)
+    let argument = evaluator.trees[file as usize].node_span(node);
+    MotionTarget { role: Role::To, value, origin, argument }
 }
 
 /// The node of an argument that is an aggregate of nothing but numbers.
