@@ -319,7 +319,8 @@ fn cuts(text: &str, estimated: &Estimated, actual: &Model, arm: u64, out: &mut O
         max_turn_rad: 0.2,
         ..CompensateOptions::default()
     };
-    let auto = compensate(&program, estimated, &cell, &options(Placement::Auto, 1.0), None).unwrap();
+    // With the default chance, below which a place is corrected and above which the shape is.
+    let auto = compensate(&program, estimated, &cell, &options(Placement::Auto, 0.1), None).unwrap();
     for placement in [Placement::Shape, Placement::Absolute] {
         let done = compensate(&program, estimated, &cell, &options(placement, 1.0), None).unwrap();
         let ([cut], Ok(bytes)) =
