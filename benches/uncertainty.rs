@@ -5,8 +5,10 @@
 //! cable or a tracker with the target on the axis of joint 6 or beside it, and corrected for as a user would: rows → model →
 //! program → program. The true arm then runs the corrected program. Programs lie inside the measured region.
 //!
-//! `cargo bench --no-default-features --bench uncertainty [-- ARMS [CAUSES]]`: so many arms without causes (identified), and
-//! so many with (diagnosed). With `TRUEGRIND_SWEEP=FILE` every arm as a line of CSV in that file, and every cut in `FILE.cuts`.
+//! `cargo bench --no-default-features --bench uncertainty [-- ARMS [CAUSES [SEEDS]]]`: so many arms without causes (identified), and
+//! so many with (diagnosed), their seeds counted from SEEDS on. With `TRUEGRIND_DRAWN=1` arms without causes are identified under
+//! the very tolerances that they were drawn with: what one would say who knows them.
+//! With `TRUEGRIND_SWEEP=FILE` every arm as a line of CSV in that file, and every cut in `FILE.cuts`.
 //!
 //! Cuts of one arm share its model's error, so they get worse together. Whether as many get worse as was said is therefore asked
 //! arm by arm: z is the sum of (found − said) over the root of the sum of its squares by arm. Beside it stands the z that would
@@ -38,6 +40,10 @@ const ROBOTS: [&str; 3] = ["abb-irb-120", "universal-robots-ur10", "fanuc-m-20ia
 const PROGRAMS: usize = 4;
 const TOOL_MM: [f64; 3] = [20.0, -10.0, 150.0];
 
+fn widths(within: &mut dyn FnMut(f64, f64) -> f64) -> [f64; 3] {
+    [within(0.1, 1.0), within(0.02, 0.2), within(0.03, 0.3)]
+}
+
 /// One arm, and how it is measured.
 #[derive(Debug, Clone, Copy)]
 struct Case {
@@ -49,22 +55,29 @@ struct Case {
 }
 
 impl Case {
-    fn all(arms: usize, causes: bool) -> Vec<Self> {
+    fn all(arms: usize, causes: bool, from: u64) -> Vec<Self> {
         (0..arms)
             .map(|k| Self {
                 robot: ROBOTS[k % 3],
                 cable: k / 3 % 2 == 0,
                 beside: k / 6 % 2 == 0,
                 causes,
-                seed: k as u64 + if causes { 100_000 } else { 0 },
+                seed: from + k as u64 + if causes { 100_000 } else { 0 },
             })
             .collect()
+    }
+
+    /// Standard deviations of lengths (mm), twists and joint zeros [°] that the arm is drawn with.
+    fn widths(&self) -> [f64; 3] {
+        let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
+        let mut within = |low: f64, high: f64| low * (high / low).powf(rng.random::<f64>());
+        widths(&mut within)
     }
 
     fn recipe(&self) -> String {
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
         let mut within = |low: f64, high: f64| low * (high / low).powf(rng.random::<f64>());
-        let (length, twist, zero) = (within(0.1, 1.0), within(0.02, 0.2), within(0.03, 0.3));
+        let [length, twist, zero] = widths(&mut within);
         let rows = within(120.0, 400.0).round();
         let noise = within(0.02, 0.1);
         let target = if self.beside { "38.2, 12.6, 61.3" } else { "0.0, 0.0, 61.3" };
@@ -109,7 +122,17 @@ fn model_of(case: &Case, simulation: &Simulation) -> Option<Estimated> {
         let found = diagnose(&rows, case.robot, nominal, frames, &DiagnoseOptions::default(), &|_| {});
         return found.ok().map(|d| d.estimated);
     }
-    let options = IdentifyOptions::default();
+    let mut options = IdentifyOptions::default();
+    if std::env::var_os("TRUEGRIND_DRAWN").is_some() {
+        let [length, twist, zero] = case.widths();
+        options.tolerance = truegrind::Tolerance {
+            length_mm: length,
+            angle_rad: twist.to_radians(),
+            zero_rad: zero.to_radians(),
+            learned: false,
+            ..options.tolerance
+        };
+    }
     let share = |rows: &truegrind::Dataset| split::random(rows, options.held_out, options.seed);
     frames
         .iter()
@@ -296,7 +319,8 @@ fn cuts(text: &str, estimated: &Estimated, actual: &Model, arm: u64, out: &mut O
         max_turn_rad: 0.2,
         ..CompensateOptions::default()
     };
-    let auto = compensate(&program, estimated, &cell, &options(Placement::Auto, 1.0), None).unwrap();
+    // With the default chance, below which a place is corrected and above which the shape is.
+    let auto = compensate(&program, estimated, &cell, &options(Placement::Auto, 0.1), None).unwrap();
     for placement in [Placement::Shape, Placement::Absolute] {
         let done = compensate(&program, estimated, &cell, &options(placement, 1.0), None).unwrap();
         let ([cut], Ok(bytes)) =
@@ -345,7 +369,9 @@ fn cuts(text: &str, estimated: &Estimated, actual: &Model, arm: u64, out: &mut O
 fn main() {
     let mut numbers = std::env::args().skip(1).filter_map(|a| a.parse::<usize>().ok());
     let (arms, with) = (numbers.next().unwrap_or(60), numbers.next().unwrap_or(0));
-    let cases: Vec<Case> = Case::all(arms, false).into_iter().chain(Case::all(with, true)).collect();
+    let from = numbers.next().unwrap_or(0) as u64;
+    let cases: Vec<Case> =
+        Case::all(arms, false, from).into_iter().chain(Case::all(with, true, from)).collect();
     if let Some(folder) = std::env::var_os("TRUEGRIND_RECIPES") {
         let folder = std::path::Path::new(&folder);
         for case in &cases {
@@ -490,9 +516,12 @@ fn risks(key: &str, cuts: &[Cut]) {
     }
     let auto: Vec<&Cut> = cuts.iter().filter(|c| c.auto_takes && c.chance <= 0.1).collect();
     let worse = auto.iter().filter(|c| c.off_mm[1] > c.off_mm[0]).count();
+    let share = |count: f64| 100.0 * count / auto.len().max(1) as f64;
+    let said: f64 = auto.iter().map(|c| c.chance).sum();
     println!(
-        "  auto: {} written, {worse} worse ({:.1} %)",
+        "  auto: {} written, {worse} worse ({:.1} %), said {said:.1} ({:.1} %)",
         auto.len(),
-        100.0 * worse as f64 / auto.len().max(1) as f64
+        share(worse as f64),
+        share(said)
     );
 }

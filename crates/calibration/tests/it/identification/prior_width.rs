@@ -1,6 +1,9 @@
 //! The tolerances of an arm as its own rows tell them.
 
 use nalgebra::DMatrix;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
 use truegrind_arm::parameter::{LinkCoordinate, Parameter};
 use truegrind_calibration::identification::identify::Identification;
 use truegrind_calibration::identification::prior_width::learned;
@@ -92,4 +95,83 @@ fn small_lengths_that_are_seen_narrow_lengths_and_leave_zeros() {
     let found = learned(&catalogue, &parameters, &priors, &seen);
     assert!((0.1..0.5).contains(&found.length_mm), "{found:?}");
     assert!((found.zero_rad / catalogue.zero_rad - 1.0).abs() < 1e-3, "{found:?}");
+}
+
+/// ½ ln E (τ² | rows) by a fine sum over ln τ, for readings of parameters that are made alike and read one by one.
+fn summed(readings: &[f64], sigma: f64, catalogue: f64) -> f64 {
+    let spread = 1.1_f64;
+    let (mut sum, mut squares) = (0.0, 0.0);
+    for k in -4000..4000 {
+        let log = f64::from(k) * 0.002;
+        let width = catalogue * log.exp();
+        let variance = width * width + sigma * sigma;
+        let rows: f64 = readings.iter().map(|y| -0.5 * (y * y / variance + variance.ln())).sum();
+        let weight = (rows - 0.5 * (log / spread + spread).powi(2)).exp();
+        sum += weight;
+        squares += weight * width * width;
+    }
+    (squares / sum).sqrt()
+}
+
+#[test]
+fn a_width_is_the_root_of_the_mean_square_under_what_the_rows_say() {
+    let catalogue = Tolerance::default();
+    for (length, zero) in
+        [([0.1, -0.1], [2e-4, 6e-4]), ([0.02, 0.3], [1e-2, -1e-2]), ([2.0, 3.0], [0.0, 0.0])]
+    {
+        let sigma = [0.02, 0.02, 1e-4, 1e-4];
+        let x = [length[0], length[1], zero[0], zero[1]];
+        let (parameters, priors, seen) = estimate(x, sigma, &catalogue);
+        let found = learned(&catalogue, &parameters, &priors, &seen);
+        let meant =
+            [summed(&length, sigma[0], catalogue.length_mm), summed(&zero, sigma[2], catalogue.zero_rad)];
+        assert!(
+            (found.length_mm / meant[0]).ln().abs() < 0.03,
+            "{x:?}: {} for {}",
+            found.length_mm,
+            meant[0]
+        );
+        assert!((found.zero_rad / meant[1]).ln().abs() < 0.03, "{x:?}: {} for {}", found.zero_rad, meant[1]);
+        // Of the twists nothing is said.
+        assert!((found.angle_rad / catalogue.angle_rad - 1.0).abs() < 1e-3, "{found:?}");
+    }
+}
+
+/// Arms that are made as differently as arms are, of which five lengths are read and a sixth is not: it lies as far off as is said.
+#[test]
+fn what_the_rows_do_not_see_lies_as_far_off_as_the_width_says() {
+    let catalogue = Tolerance { length_mm: 0.4, ..Tolerance::default() };
+    let (mut rng, sigma, arms) = (ChaCha8Rng::seed_from_u64(41), 0.05_f64, 1500);
+    let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+    let (mut square, mut within) = (0.0, [0; 3]);
+    for _ in 0..arms {
+        let width = catalogue.length_mm * (1.1 * normal() - 1.21).exp();
+        let drawn: [f64; 6] = std::array::from_fn(|_| width * normal());
+        let prior = catalogue.length_mm;
+        let variance = (sigma.powi(-2) + prior.powi(-2)).recip();
+        let x = (0..6)
+            .map(|k| if k < 5 { (drawn[k] + sigma * normal()) * variance / sigma.powi(2) } else { 0.0 });
+        let estimate = Estimate {
+            x: x.collect(),
+            covariance: Some(DMatrix::from_fn(6, 6, |i, j| match (i == j, i < 5) {
+                (false, _) => 0.0,
+                (true, true) => variance,
+                (true, false) => prior * prior,
+            })),
+            cost: 0.0,
+            evaluations: Evaluations::default(),
+            termination: Termination::Cost,
+            trace: Vec::new(),
+        };
+        let parameters: Vec<Parameter> =
+            (0..6).map(|joint| Parameter::Link { joint, coordinate: LinkCoordinate::A }).collect();
+        let found = learned(&catalogue, &parameters, &[Prior { mean: 0.0, sigma: prior }; 6], &estimate);
+        let off = (drawn[5] / found.length_mm).abs();
+        square += off * off / f64::from(arms);
+        (0..3).for_each(|k| within[k] += i32::from(off <= (k + 1) as f64));
+    }
+    let share = within.map(|count| 100.0 * f64::from(count) / f64::from(arms));
+    assert!((square - 1.0).abs() < 0.15, "mean square {square:.2}");
+    assert!((66.0..77.0).contains(&share[0]) && (92.0..98.0).contains(&share[1]), "{share:?}");
+    assert!((98.5..=100.0).contains(&share[2]), "{share:?}");
 }
