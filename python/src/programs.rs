@@ -393,7 +393,11 @@ fn corrected(
     agreed(&sources, &cell, arm)?;
     tell(&format!("reading {}", sources.name()));
     let setup = nc_setup(&cell, &arm.robot);
-    let program = sources.task(&setup);
+    let mut program = sources.task(&setup);
+    let loads = own_loads.then(|| Loads::of(&program));
+    // Listed, a program needs its trees no more: they are larger than the file.
+    program.forget_trees();
+    let program = program;
     let listing = program.listing();
     let marked = marked(listing, &sources, &model.hash, again)?;
     if let Some(done) = marked.iter().position(|marked| *marked) {
@@ -405,7 +409,7 @@ fn corrected(
     if !found.is_empty() {
         return Err(Refusal::new(Kind::Cell, format!("{}: {}", sources.name(), found.join("; "))));
     }
-    let options = CompensateOptions { loads: own_loads.then(|| Loads::of(&program)), ..options };
+    let options = CompensateOptions { loads, ..options };
     let mark = Mark { version: env!("CARGO_PKG_VERSION").into(), model: model.hash.clone(), partial: false };
     tell(&format!("rewriting {}", sources.name()));
     let Compensated { mut plan, rewritten } = compensate(&program, arm, &cell, &options, Some(mark))?;
