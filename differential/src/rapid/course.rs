@@ -281,6 +281,14 @@ impl<'a> Course<'a> {
             }
             out.push((s, near));
         }
+        // The circle point by itself: where the tool turns far, joints between two samples lead beside the path.
+        let passing = self.passing(motion, points);
+        let before = out.iter().rposition(|(s, _)| *s < passing);
+        if let (true, Some(before)) = (circle.is_some() && out.len() + 1 == pieces && passing < 1.0, before)
+            && let Some(q) = joints(passing, &out[before].1)
+        {
+            out.insert(before + 1, (passing, q));
+        }
         out
     }
 
