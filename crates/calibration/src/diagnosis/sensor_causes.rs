@@ -6,7 +6,7 @@
 //!
 //! Φ(−½ δᵀMδ / √(δᵀM C Mδ)),
 //!
-//! since the projection of the error on δ is normal. It is the rule by which a cut is corrected or left (`compensation::chance`), here for
+//! since the projection of the error on δ is normal. It is the rule by which a cut is corrected or left (`truegrind-compensation`, `probability`), here for
 //! the arm itself.
 
 use super::extension::Extended;
