@@ -6,8 +6,8 @@
 //!
 //! Φ(−½ δᵀMδ / √(δᵀM C Mδ)),
 //!
-//! since the projection of the error on δ is normal. It is the rule by which a cut is corrected or left (`truegrind-compensation`, `probability`), here for
-//! the arm itself.
+//! since the projection of the error on δ is normal. It is the rule by which a cut is corrected or left (`truegrind-compensation`,
+//! `probability`), here for the arm itself.
 
 use super::extension::Extended;
 use crate::identification::benefit::{below, shape_weights};
