@@ -27,7 +27,7 @@ use rayon::prelude::*;
 use truegrind::arm::inverse::Inverse;
 use truegrind::calibration::identification::start::starts;
 use truegrind::calibration::measurement::import;
-use truegrind::compensation::placement::Placement;
+use truegrind::compensation::risk::placement::Placement;
 use truegrind::compensation::verify::{Acting, Judged, judge};
 use truegrind::programs::rapid::Task;
 use truegrind::{

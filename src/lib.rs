@@ -133,11 +133,10 @@ pub use truegrind_compensation::cell::{Cell, CellError, CellFrame, FrameOrigin, 
 pub use truegrind_compensation::compensate::{CompensateError, Compensated, compensate};
 pub use truegrind_compensation::cut::Cuts;
 pub use truegrind_compensation::deviation::{After, Deviation, PathPoint, PathReport, Status};
-pub use truegrind_compensation::rewrite::{
-    Circles, Emit, MotionOutcome, Options as CompensateOptions, Plan as CompensatePlan,
-};
+pub use truegrind_compensation::options::{Circles, Emit, Options as CompensateOptions};
+pub use truegrind_compensation::plan::reason::Why;
+pub use truegrind_compensation::plan::{MotionOutcome, Plan as CompensatePlan};
 pub use truegrind_compensation::verify::{Acting, Judged, judge};
-pub use truegrind_compensation::why::Why;
 
 // How it is told.
 pub use truegrind_report::document::{Block, Document, Figure};

@@ -6,11 +6,11 @@ use nalgebra::Point3;
 use truegrind::arm::estimated::Estimated;
 use truegrind::compensation::cell::Cell;
 use truegrind::compensation::compensate::{CompensateError, Compensated, compensate};
+use truegrind::compensation::condition::payload::Loads;
 use truegrind::compensation::cut::Cuts;
 use truegrind::compensation::deviation::Status as Became;
-use truegrind::compensation::payload::Loads;
-use truegrind::compensation::rewrite::{self, Circles, Emit};
-use truegrind::compensation::why::Why;
+use truegrind::compensation::options::{self, Circles, Emit};
+use truegrind::compensation::plan::reason::Why;
 use truegrind::programs::motion::Mark;
 use truegrind::programs::nc::setup::Setup;
 use truegrind::programs::reading::Program;
@@ -147,7 +147,7 @@ pub fn corrected_task(
         condition.payload_kg = Some(kg);
         condition.payload_centre_mm = (estimated.model.flange * Point3::from(centre)).coords.into();
     }
-    let wanted = rewrite::Options {
+    let wanted = options::Options {
         emit: if options.emit_joints { Emit::Joints } else { Emit::Targets },
         circles: if options.segments { Circles::Segments } else { Circles::Keep },
         tolerance_mm: options.tolerance_mm,
@@ -157,7 +157,7 @@ pub fn corrected_task(
         open_starts: true,
         points: false,
         cuts: if case.whole_cuts { Cuts::Whole } else { Cuts::Single },
-        ..rewrite::Options::default()
+        ..options::Options::default()
     };
     let mark = Some(Mark { version: "0".to_owned(), model: "test".to_owned(), partial: false });
     let Compensated { plan: planned, rewritten } =

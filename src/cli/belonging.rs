@@ -2,8 +2,8 @@
 
 use anyhow::bail;
 use truegrind::arm::model::Model;
-use truegrind::compensation::belonging::{cell_of_another, program_of_another};
 use truegrind::compensation::cell::Cell;
+use truegrind::compensation::cell::robot_match::{cell_of_another, program_of_another};
 
 use super::files;
 use super::programs::Programs;

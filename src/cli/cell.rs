@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::bail;
 use clap::Args;
 use truegrind::compensation::cell::Cell;
-use truegrind::compensation::skeleton::{Asking, skeleton};
+use truegrind::compensation::cell::template::{Asking, skeleton};
 use truegrind::programs::reading::Program;
 
 use super::ending::Ending;

@@ -18,7 +18,7 @@ use truegrind::calibration::measurement::import;
 use truegrind::compensation::cell::Cell;
 use truegrind::compensation::compensate::compensate;
 use truegrind::compensation::deviation::{After, Deviation, PathPoint, PathReport};
-use truegrind::compensation::rewrite::Options as RewriteBounds;
+use truegrind::compensation::options::Options as RewriteBounds;
 use truegrind::compensation::verify::{Acting, Judged, judge};
 use truegrind::planning::taught_cell::taught_cell;
 use truegrind::planning::toolpath::toolpath;

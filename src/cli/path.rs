@@ -18,7 +18,7 @@ use super::files::{self, Batch};
 use super::inputs;
 use super::naming;
 use super::terminal::tell;
-use truegrind::compensation::setup::angles;
+use truegrind::compensation::cell::nc_setup::angles;
 
 /// Arguments of `path`.
 #[derive(Debug, Args)]

@@ -334,5 +334,5 @@ impl Programs {
 pub(super) fn setup(cell: &Cell, robot: Option<&str>) -> Setup {
     let orientation =
         robot.and_then(|name| inputs::robot(name).ok()).and_then(|robot| robot.sheet.orientation());
-    compensation::setup::setup(cell, orientation)
+    compensation::cell::nc_setup::setup(cell, orientation)
 }

@@ -12,7 +12,7 @@ use truegrind::arm::model::Joints;
 use truegrind::calibration::measurement::simulation::recipe::Recipe;
 use truegrind::compensation::cell::Cell;
 use truegrind::compensation::compensate::compensate;
-use truegrind::compensation::rewrite::Options;
+use truegrind::compensation::options::Options;
 use truegrind::planning::toolpath::toolpath;
 use truegrind::programs::rapid::{self, writer};
 use truegrind::programs::reading::Program;

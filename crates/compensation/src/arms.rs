@@ -1,7 +1,7 @@
 //! The arm as the controller believes it to be and the better one, with what all targets share of them.
 
-use super::circumstance::Circumstances;
-use super::payload::{Load, Loads};
+use crate::condition::arm_conditions::Circumstances;
+use crate::condition::payload::{Load, Loads};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::estimated::Estimated;
@@ -10,27 +10,27 @@ use truegrind_arm::model::Model;
 use truegrind_programs::motion::Listing;
 
 /// Whether an effect moves the arm by what it carries.
-pub(super) fn yields(effect: &Effect) -> bool {
+pub(crate) fn yields(effect: &Effect) -> bool {
     effect.needs_torque() && !effect.is_still()
 }
 
 /// The two arms and their inverses, shared by all targets.
-pub(super) struct Arms<'a> {
-    pub(super) nominal: Inverse<'a>,
+pub(crate) struct Arms<'a> {
+    pub(crate) nominal: Inverse<'a>,
     /// The arm in the middle of every play, under the stated condition.
-    pub(super) estimated: Inverse<'a>,
+    pub(crate) estimated: Inverse<'a>,
     /// The same under each condition that the program brings about.
-    pub(super) acting: Circumstances<'a>,
-    pub(super) knowledge: Option<&'a Estimated>,
+    pub(crate) acting: Circumstances<'a>,
+    pub(crate) knowledge: Option<&'a Estimated>,
 }
 
 impl<'a> Arms<'a> {
-    pub(super) fn of(estimated: &'a Estimated, condition: &Condition) -> Self {
+    pub(crate) fn of(estimated: &'a Estimated, condition: &Condition) -> Self {
         let arms = Self::simulated(&estimated.nominal, &estimated.model, condition);
         Self { knowledge: Some(estimated), ..arms }
     }
 
-    pub(super) fn simulated(nominal: &'a Model, actual: &'a Model, condition: &Condition) -> Self {
+    pub(crate) fn simulated(nominal: &'a Model, actual: &'a Model, condition: &Condition) -> Self {
         let condition = Condition { approach: [0; 6], ..*condition };
         Self {
             nominal: Inverse::new(nominal, &Condition::default(), nominal),
@@ -41,7 +41,7 @@ impl<'a> Arms<'a> {
     }
 
     /// What the arm carries at each motion, where the program says so and the arm yields under it; empty elsewhere.
-    pub(super) fn loads(&self, listing: &Listing, loads: Option<&Loads>) -> Vec<Option<Load>> {
+    pub(crate) fn loads(&self, listing: &Listing, loads: Option<&Loads>) -> Vec<Option<Load>> {
         let model = self.estimated.arm().model;
         let Some(loads) = loads.filter(|_| model.effects.iter().any(yields)) else {
             return Vec::new();

@@ -2,7 +2,7 @@
 //!
 //! A frame from *metrology* (CAD, a measuring machine, a tracker) is true as it stands. A frame that was *taught* with
 //! the uncalibrated arm stands where the nominal model put it; the estimated model, given the same joint angles, says
-//! where it truly is ([`super::taught`]). A taught frame without its teaching points cannot be moved: the difference is
+//! where it truly is ([`crate::frames::taught`]). A taught frame without its teaching points cannot be moved: the difference is
 //! estimated and stated instead.
 //!
 //! ```toml
@@ -27,7 +27,10 @@
 //! `angles = "wpr"`, what A, B and C of NC programs mean. A value may be `"?"`: it is still to
 //! be filled in, and nothing is corrected before it is ([`Cell::open`]).
 
-mod open;
+pub mod nc_setup;
+mod placeholders;
+pub mod robot_match;
+pub mod template;
 
 use std::collections::{BTreeSet, HashMap};
 
@@ -342,7 +345,7 @@ impl Cell {
     /// # Errors
     /// [`CellError`], with key and reason.
     pub fn from_toml(text: &str) -> Result<Self, CellError> {
-        let (cell, open) = open::read::<Cell>(text).map_err(|e| CellError::Syntax(e.to_string()))?;
+        let (cell, open) = placeholders::read::<Cell>(text).map_err(|e| CellError::Syntax(e.to_string()))?;
         let cell = Cell { open, ..cell };
         if let Some(found) = cell.angles.as_ref().filter(|word| Angles::of(word).is_none()) {
             return Err(CellError::Angles { found: found.clone() });
@@ -418,8 +421,8 @@ impl Cell {
 
 /// A cell file beside a program, by names: which of its frames mean one of the program.
 #[derive(Debug)]
-pub(super) struct Stated<'a> {
-    pub(super) cell: &'a Cell,
+pub(crate) struct Stated<'a> {
+    pub(crate) cell: &'a Cell,
     tools: Names<'a>,
     objects: Names<'a>,
     /// How comments of an NC program call a tool or frame, by its plain name.
@@ -465,7 +468,7 @@ impl<'a> Names<'a> {
 }
 
 impl<'a> Stated<'a> {
-    pub(super) fn of(cell: &'a Cell, listing: &'a Listing) -> Self {
+    pub(crate) fn of(cell: &'a Cell, listing: &'a Listing) -> Self {
         let mut labels: HashMap<String, Vec<&str>> = HashMap::new();
         for (number, label) in &listing.labels {
             labels.entry(setup::plain(number)).or_default().push(label);
@@ -474,7 +477,7 @@ impl<'a> Stated<'a> {
     }
 
     /// How comments call what the program's text does not declare.
-    pub(super) fn labels_of(&self, name: &str) -> &[&'a str] {
+    pub(crate) fn labels_of(&self, name: &str) -> &[&'a str] {
         if self.labels.is_empty() {
             return &[];
         }
@@ -482,24 +485,24 @@ impl<'a> Stated<'a> {
     }
 
     /// The frames that mean a tool of the program.
-    pub(super) fn tools(&self, tool: &Tool) -> Vec<&'a CellFrame> {
+    pub(crate) fn tools(&self, tool: &Tool) -> Vec<&'a CellFrame> {
         let in_text = tool.place.is_some();
         self.tools.meaning(&tool.name, in_text, if in_text { &[] } else { self.labels_of(&tool.name) })
     }
 
     /// The frames that mean a work object of the program.
-    pub(super) fn objects(&self, object: &WorkObject) -> Vec<&'a CellFrame> {
+    pub(crate) fn objects(&self, object: &WorkObject) -> Vec<&'a CellFrame> {
         let in_text = object.place.is_some();
         self.objects.meaning(&object.name, in_text, if in_text { &[] } else { self.labels_of(&object.name) })
     }
 
     /// What is known of a tool of the program.
-    pub(super) fn tool(&self, tool: &Tool) -> Option<&'a CellFrame> {
+    pub(crate) fn tool(&self, tool: &Tool) -> Option<&'a CellFrame> {
         self.tools(tool).first().copied()
     }
 
     /// What is known of a work object of the program.
-    pub(super) fn object(&self, object: &WorkObject) -> Option<&'a CellFrame> {
+    pub(crate) fn object(&self, object: &WorkObject) -> Option<&'a CellFrame> {
         self.objects(object).first().copied()
     }
 }
@@ -587,6 +590,6 @@ impl Used {
 }
 
 /// Whether a name of a program is one of the cell file. NC programs declare no names: there T08 is T8.
-pub(super) fn same_name(name: &str, stated: &str, in_text: bool) -> bool {
+pub(crate) fn same_name(name: &str, stated: &str, in_text: bool) -> bool {
     name.eq_ignore_ascii_case(stated) || (!in_text && setup::same(name, stated))
 }

@@ -8,16 +8,16 @@ use std::collections::BTreeMap;
 
 use thiserror::Error;
 
-use super::cell::Cell;
-use super::cut::Cuts;
-use super::deviation::Status;
-use super::options::Options;
-use super::outcome::Plan;
-use super::precision::single_precision;
-use super::rewrite::Targets;
-use super::taught::contradictions;
-use super::undeclared;
-use super::why::Why;
+use crate::cell::Cell;
+use crate::cut::Cuts;
+use crate::deviation::Status;
+use crate::frames::taught::contradictions;
+use crate::frames::undeclared;
+use crate::options::Options;
+use crate::plan::Plan;
+use crate::plan::planner::Targets;
+use crate::plan::reason::Why;
+use crate::plan::single_precision::single_precision;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::estimated::Estimated;
 use truegrind_programs::edit::EditError;

@@ -10,8 +10,8 @@
 //! parts a cut; so do instructions whose path is not in the text (calls with targets, cycles), since the motions behind
 //! them are cuts of their own.
 
-use super::deviation::Status;
-use super::why::Why;
+use crate::deviation::Status;
+use crate::plan::reason::Why;
 use truegrind_programs::motion::{Listing, Motion, MotionKind, Reason};
 
 /// What becomes of a cut of which not every motion can be corrected.
@@ -28,7 +28,7 @@ pub enum Cuts {
 }
 
 /// The cut that each motion belongs to, as the index of one of its motions, and which motions run into each other.
-pub(super) struct CutsOf {
+pub(crate) struct CutsOf {
     /// By motion; `None` outside cuts.
     of: Vec<Option<u32>>,
     /// Pairs of motions of one cut, the second starting where the first ends.
@@ -37,13 +37,13 @@ pub(super) struct CutsOf {
 
 impl CutsOf {
     /// The cut of a motion, as the index of one of its motions; `None` outside cuts.
-    pub(super) fn root(&self, motion: u32) -> Option<u32> {
+    pub(crate) fn root(&self, motion: u32) -> Option<u32> {
         self.of[motion as usize]
     }
 }
 
 /// The cuts of a listing.
-pub(super) fn of(listing: &Listing) -> CutsOf {
+pub(crate) fn of(listing: &Listing) -> CutsOf {
     let motions = &listing.motions;
     let mut root: Vec<u32> = (0..motions.len() as u32).collect();
     let mut runs_into = Vec::new();
@@ -101,7 +101,7 @@ fn one_cut(before: &Motion, motion: &Motion, listing: &Listing) -> bool {
 type Obstacle<'a> = &'a dyn Fn(u32) -> Option<(Status, Why)>;
 
 /// The motions that could be corrected but stay with the rest of their cut.
-pub(super) fn rest_of_cuts(listing: &Listing, cuts: &CutsOf, obstacle: Obstacle<'_>) -> Vec<(u32, Why)> {
+pub(crate) fn rest_of_cuts(listing: &Listing, cuts: &CutsOf, obstacle: Obstacle<'_>) -> Vec<(u32, Why)> {
     // The first motion of each cut that stays for a reason of its own.
     let mut cause: Vec<Option<Why>> = vec![None; cuts.of.len()];
     for (index, cut) in (0_u32..).zip(&cuts.of) {
@@ -123,7 +123,7 @@ pub(super) fn rest_of_cuts(listing: &Listing, cuts: &CutsOf, obstacle: Obstacle<
 /// The motions that must not be corrected since the one that they run into, or that runs into them, is not: the step
 /// between them, which is the whole correction (`shift_mm`), would exceed `tolerance_mm`. What stays for this makes its
 /// own neighbours stay in turn.
-pub(super) fn steps(
+pub(crate) fn steps(
     listing: &Listing,
     cuts: &CutsOf,
     obstacle: Obstacle<'_>,

@@ -1,70 +1,37 @@
-//! From an estimated arm and a program to a program that the real arm runs right.
+//! Corrects a robot program so that the estimated arm follows the intended path.
 //!
-//! - [`cell`]: where tools and work objects come from; [`taught`]: those that were taught, under a better arm;
-//!   [`mounting`]: the two of a motion, as told and as they are; [`placed`]: where a surface file puts them; [`reach`]: whether the
-//!   arm is the program's at all; [`skeleton`]: the cell file that programs ask for.
-//! - [`setup`]: what cell and robot say that NC programs do not; [`belonging`]: whether all of them are of one robot.
-//! - [`payload`]: what the arm carries at each motion, as the program says.
-//! - [`compensate`]: the main job, from a program that was read to its new bytes.
-//! - [`rewrite`]: plans the rewrite of a program; [`cut`]: which motions are corrected together or not at all; [`why`]: the closed list of reasons.
-//! - [`placement`]: whether the place of a path is corrected or its shape alone; [`risk`]: the chance that a cut gets worse.
-//! - [`remedy`]: the cheapest measurement that would make a place known.
-//! - [`undeclared`]: tools and work objects that no file declares, and what to give.
-//! - [`untouched`]: the plan that changes nothing, for the nominal arm.
-//! - [`curve`]: the way from target to target as the controller interpolates it; [`corner`]: how it rounds a point.
-//! - [`verify`]: runs a program on an arm; [`precision`]: what single precision makes of its numbers.
-//! - [`deviation`]: the points of a path and how far an arm is off at each, before and after.
+//! [`compensate::compensate`] is the main job. The data flow, in order:
+//!
+//! - [`options`]: bounds and choices of a correction.
+//! - [`cell`]: the cell file: robot, angle convention, origins of tools and work objects, external axes.
+//! - [`frames`]: each pair of tool and work object, as programmed and as the estimated arm makes it.
+//! - `arms`, `configuration`, `search_budget`: nominal and estimated arm, which solution a configuration selects, and how
+//!   many evaluations a program may cost.
+//! - [`condition`]: payload and backlash sides under which the estimated arm reaches each target.
+//! - `target`: original joints, intended pose, corrected joints and commanded pose of every target.
+//! - `backlash`: from which side each joint arrives, and the links within their play along a segment.
+//! - [`segment`]: the path between two targets: interpolation, corners, deviation, inserted targets, joint speed.
+//! - [`cut`]: motions that are corrected together or not at all.
+//! - `feasibility`: which motions must stay unchanged: bounds, joint limits, singularities, arcs, the rest of a cut.
+//! - [`risk`]: whether place or only shape of a path is corrected, the probability of harm, and the cheapest remedy.
+//! - [`plan`]: the planned changes, with outcome and reason of every motion.
+//! - [`compensate`]: plan and writer, repeated until both agree.
+//! - [`verify`]: runs a program on an arm; [`deviation`]: the resulting path deviations.
 
-pub mod deviation;
-pub mod cell;
-pub mod mounting;
-pub mod taught;
-pub mod placed;
-pub mod reach;
-pub mod skeleton;
-pub mod payload;
-pub mod why;
-mod options;
-mod outcome;
 mod arms;
-mod configured;
-pub mod rewrite;
-pub mod cut;
+mod backlash;
+pub mod cell;
 pub mod compensate;
-pub mod untouched;
-pub mod setup;
-pub mod belonging;
-mod normals;
-pub mod undeclared;
-pub mod placement;
+pub mod condition;
+mod configuration;
+pub mod cut;
+pub mod deviation;
+mod feasibility;
+pub mod frames;
+pub mod options;
+pub mod plan;
 pub mod risk;
-mod registration;
-pub mod remedy;
-mod information;
-mod foreseen;
-mod assessment;
-mod probability;
-mod effort;
-mod circumstance;
-mod wrist;
-mod course;
-mod as_it_is;
-mod way;
-mod solved;
-mod forbidden;
-mod solve;
-mod mountings;
+mod search_budget;
+pub mod segment;
+mod target;
 pub mod verify;
-pub mod precision;
-pub mod curve;
-pub mod corner;
-mod slack;
-mod segment;
-mod circle;
-mod strayed;
-mod staying;
-mod range;
-mod singular;
-mod notes;
-mod passage;
-mod speed;

@@ -1,8 +1,8 @@
 //! What a rewrite may do.
 
-use super::cut::Cuts;
-use super::payload::Loads;
-use super::placement::Placement;
+use crate::condition::payload::Loads;
+use crate::cut::Cuts;
+use crate::risk::placement::Placement;
 use truegrind_arm::condition::Condition;
 use truegrind_programs::motion::{Motion, MotionKind};
 
@@ -64,13 +64,13 @@ pub struct Options {
     pub placement: Placement,
     /// A cut that the correction makes worse with a larger probability is left.
     pub max_risk: f64,
-    /// Whether motions are flagged one by one ([`Why::OpenStart`](super::why::Why::OpenStart)) that rest on a configuration which the
+    /// Whether motions are flagged one by one ([`Why::OpenStart`](crate::plan::reason::Why::OpenStart)) that rest on a configuration which the
     /// controller does not check, from a start that the text does not tell. Otherwise a note says where such a way begins.
     pub open_starts: bool,
-    /// Whether [`Plan::points`](super::outcome::Plan::points) are filled: tables and pictures of the path need them, the rewrite itself
+    /// Whether [`Plan::points`](crate::plan::Plan::points) are filled: tables and pictures of the path need them, the rewrite itself
     /// does not.
     pub points: bool,
-    /// Whether [`ObjectPlacement::remedy`](super::placement::ObjectPlacement::remedy) is worked out, which takes longer than a small
+    /// Whether [`ObjectPlacement::remedy`](crate::risk::placement::ObjectPlacement::remedy) is worked out, which takes longer than a small
     /// program: who reads of many programs at once does not see it.
     pub remedies: bool,
 }
@@ -101,6 +101,6 @@ impl Default for Options {
 }
 
 /// Whether a motion is of a kind that is rewritten at all.
-pub(super) fn may_change(motion: &Motion, options: &Options) -> bool {
+pub(crate) fn may_change(motion: &Motion, options: &Options) -> bool {
     motion.left.is_none() && (motion.kind != MotionKind::AbsoluteJoint || options.joint_targets)
 }

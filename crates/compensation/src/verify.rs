@@ -5,14 +5,14 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::arms::Arms;
-use super::cell::Cell;
-use super::configured::{configured, monitored};
-use super::course::{Reached, Stop, courses};
-use super::deviation::{After, Deviation, PathPoint, PathReport, Status};
-use super::mountings::Mountings;
-use super::payload::Loads;
-use super::why::Why;
+use crate::arms::Arms;
+use crate::backlash::sides::{Reached, Stop, courses};
+use crate::cell::Cell;
+use crate::condition::payload::Loads;
+use crate::configuration::{configured, monitored};
+use crate::deviation::{After, Deviation, PathPoint, PathReport, Status};
+use crate::frames::frame_table::Mountings;
+use crate::plan::reason::Why;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::estimated::{Carried, Estimated};
 use truegrind_arm::model::{Joints, Model};

@@ -11,9 +11,9 @@ use super::placement;
 use super::status::Status;
 use super::table::{Cell, Column, Table};
 use truegrind_compensation::deviation::Status as Fate;
-use truegrind_compensation::rewrite::Plan;
-use truegrind_compensation::undeclared::undeclared;
-use truegrind_compensation::why::Why;
+use truegrind_compensation::frames::undeclared::undeclared;
+use truegrind_compensation::plan::Plan;
+use truegrind_compensation::plan::reason::Why;
 use truegrind_programs::motion::Listing;
 
 /// What became of one program.

@@ -11,8 +11,8 @@ use super::placement;
 use super::table::{Cell, Column, Table};
 use truegrind_arm::inverse::InverseError;
 use truegrind_compensation::deviation::{PathReport, Status as Fate};
-use truegrind_compensation::rewrite::{MotionOutcome, Plan};
-use truegrind_compensation::why::Why;
+use truegrind_compensation::plan::reason::Why;
+use truegrind_compensation::plan::{MotionOutcome, Plan};
 use truegrind_programs::motion::{Listing, Place};
 
 pub use self::first::{coverage, verdict};

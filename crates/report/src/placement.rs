@@ -5,10 +5,10 @@ use serde_json::{Value, json};
 use super::table::{Column, Table};
 use truegrind_calibration::identification::verdict::percent_of;
 use truegrind_compensation::deviation::Status;
-use truegrind_compensation::placement::{ObjectPlacement, Placement};
-use truegrind_compensation::remedy::Remedy;
-use truegrind_compensation::rewrite::{MotionOutcome, Plan};
-use truegrind_compensation::risk::CutRisk;
+use truegrind_compensation::plan::{MotionOutcome, Plan};
+use truegrind_compensation::risk::cut_risk::CutRisk;
+use truegrind_compensation::risk::placement::{ObjectPlacement, Placement};
+use truegrind_compensation::risk::remedy::Remedy;
 use truegrind_programs::motion::Listing;
 
 /// Cuts that are named one by one.

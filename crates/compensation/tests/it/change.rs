@@ -5,7 +5,7 @@ use truegrind_arm::condition::Condition;
 use truegrind_arm::estimated::Estimated;
 use truegrind_arm::inverse::Inverse;
 use truegrind_arm::model::Joints;
-use truegrind_compensation::rewrite::Options;
+use truegrind_compensation::options::Options;
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{Listing, Motion};
 use truegrind_programs::rapid::Task;

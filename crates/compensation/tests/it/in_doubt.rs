@@ -7,8 +7,8 @@ use truegrind_arm::effect::compliance::Compliance;
 use truegrind_arm::effect::harmonic::Harmonic;
 use truegrind_arm::parameter::arm_parameters;
 use truegrind_compensation::cell::Cell;
-use truegrind_compensation::payload::Loads;
-use truegrind_compensation::placement::Placement;
+use truegrind_compensation::condition::payload::Loads;
+use truegrind_compensation::risk::placement::Placement;
 use truegrind_programs::rapid::Task;
 
 use super::{Options, blade, estimated, perturbed, rewritten};

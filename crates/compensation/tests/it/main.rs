@@ -26,10 +26,12 @@ use truegrind_arm::parameter::link_parameters;
 use truegrind_arm::region::Region;
 use truegrind_compensation::cell::{Cell, CellFrame, FrameOrigin};
 use truegrind_compensation::deviation::{After, PathReport, Status};
-use truegrind_compensation::rewrite::{Emit, Options, Plan, plan};
-use truegrind_compensation::taught::{taught_frame, taught_tcp};
+use truegrind_compensation::frames::taught::{taught_frame, taught_tcp};
+use truegrind_compensation::options::{Emit, Options};
+use truegrind_compensation::plan::Plan;
+use truegrind_compensation::plan::planner::plan;
+use truegrind_compensation::plan::reason::Why;
 use truegrind_compensation::verify::{Acting, Judged, judge};
-use truegrind_compensation::why::Why;
 use truegrind_math::se3::Pose;
 use truegrind_math::statistics::ErrorSummary;
 use truegrind_planning::toolpath::toolpath;
@@ -323,7 +325,7 @@ fn the_quick_sigma_equals_the_covariance() {
 
 #[test]
 fn single_precision_is_stated_at_its_known_spacing() {
-    use truegrind_compensation::precision::single_precision;
+    use truegrind_compensation::plan::single_precision::single_precision;
     use truegrind_programs::rewrite::{Change, NewTarget};
     assert_eq!(single_precision(&[]), None);
     // Between 1024 and 2048 single precision has a spacing of 2^-13 mm: half of it is the most a number is off.

@@ -1,6 +1,6 @@
 //! What programs say that the arm carries.
 
-use truegrind_compensation::payload::{Grip, Load, Loads};
+use truegrind_compensation::condition::payload::{Grip, Load, Loads};
 use truegrind_programs::rapid::Task;
 
 const HEAD: &str = "MODULE M\n PERS tooldata t := [TRUE,[[0,0,100],[1,0,0,0]],[2,[0,0,50],[1,0,0,0],0,0,0]];\n \

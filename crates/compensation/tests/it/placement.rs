@@ -9,10 +9,11 @@ use truegrind_arm::model::{Joints, Model};
 use truegrind_arm::parameter::{LinkCoordinate, Parameter};
 use truegrind_compensation::cell::Cell;
 use truegrind_compensation::deviation::{PathPoint, PathReport, Status};
-use truegrind_compensation::placement::Placement;
-use truegrind_compensation::rewrite::{Options, Plan};
-use truegrind_compensation::risk::CutRisk;
-use truegrind_compensation::why::Why;
+use truegrind_compensation::options::Options;
+use truegrind_compensation::plan::Plan;
+use truegrind_compensation::plan::reason::Why;
+use truegrind_compensation::risk::cut_risk::CutRisk;
+use truegrind_compensation::risk::placement::Placement;
 
 use super::{blade, estimated, nominal, perturbed, rewritten, run_on, worst};
 

@@ -76,7 +76,7 @@ fn no_joint_leaves_its_range_on_a_corrected_way() {
         let options = Options {
             tolerance_mm: 5.0,
             cuts: truegrind_compensation::cut::Cuts::Single,
-            placement: truegrind_compensation::placement::Placement::Absolute,
+            placement: truegrind_compensation::risk::placement::Placement::Absolute,
             max_risk: 1.0,
             ..Options::default()
         };

@@ -8,8 +8,10 @@ use truegrind_arm::model::Joints;
 use truegrind_compensation::cell::Cell;
 use truegrind_compensation::cut::Cuts;
 use truegrind_compensation::deviation::Status;
-use truegrind_compensation::rewrite::{Circles, Options, Plan, plan};
-use truegrind_compensation::why::Why;
+use truegrind_compensation::options::{Circles, Options};
+use truegrind_compensation::plan::Plan;
+use truegrind_compensation::plan::planner::plan;
+use truegrind_compensation::plan::reason::Why;
 use truegrind_programs::rapid::Task;
 
 use super::{estimated, nominal, perturbed};

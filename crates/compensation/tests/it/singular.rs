@@ -9,8 +9,8 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use nalgebra::{Matrix6, Vector6};
 use truegrind_arm::inverse::Inverse;
-use truegrind_compensation::placement::Placement;
-use truegrind_compensation::rewrite::MotionOutcome;
+use truegrind_compensation::plan::MotionOutcome;
+use truegrind_compensation::risk::placement::Placement;
 use truegrind_programs::motion::{MotionKind, TargetValue};
 
 use super::*;

@@ -5,8 +5,8 @@ use crate::document::{KeyFigure, Verdict};
 use crate::placement;
 use crate::status::Status;
 use truegrind_compensation::deviation::Status as Fate;
-use truegrind_compensation::rewrite::Plan;
-use truegrind_compensation::why::Why;
+use truegrind_compensation::plan::Plan;
+use truegrind_compensation::plan::reason::Why;
 use truegrind_programs::motion::Listing;
 
 /// All, in the order in which a reader wants them.

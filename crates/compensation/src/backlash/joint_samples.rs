@@ -1,0 +1,217 @@
+//! Samples of the joints between the ends of motions.
+
+use crate::backlash::motion_end::{Reached, Sampled, Stop};
+use crate::backlash::reversals::agrees;
+use crate::frames::frame_pair::Mounting;
+use crate::search_budget;
+use crate::segment::curve::Curve;
+use crate::segment::wrist_interpolation;
+use truegrind_arm::inverse::Inverse;
+use truegrind_arm::inverse::effort::{Allowance, within};
+use truegrind_arm::model::Joints;
+use truegrind_math::se3::Pose;
+use truegrind_programs::motion::{MotionKind, Switch};
+
+/// Samples on a path are no farther apart than this (mm, rad).
+const SAMPLE_MM: f64 = 25.0;
+const SAMPLE_RAD: f64 = 0.1;
+/// No path has more samples.
+const MOST_SAMPLES: usize = 64;
+/// A path that is shorter has one sample (mm, rad): its joints hardly depart from a parabola.
+const SHORT_MM: f64 = 5.0;
+const SHORT_RAD: f64 = 0.02;
+/// How often a path is sampled four times as densely, where its samples do not agree on where a joint turns.
+const REFINEMENTS: u32 = 3;
+/// No path that is sampled so has more samples.
+const MOST_REFINED: usize = 256;
+
+/// A joint that goes farther between neighbouring samples comes past a singularity (rad).
+const MOST_STEP_RAD: f64 = 0.6;
+
+/// The samples of all motions, none where the arm cannot go along, and at which share each circle point is passed. Where
+/// every other sample tells of other turns than all of them there are too few, and more are taken.
+pub(crate) fn sampled(
+    stops: &[Stop<'_>],
+    before: &[Option<u32>],
+    nominal: &Inverse<'_>,
+    half: &[f64; 6],
+    mounting: &dyn Fn(usize) -> Mounting,
+) -> (Vec<Option<Sampled>>, Vec<f64>) {
+    let start = |m: usize| before[m].and_then(|from| stops.get(from as usize));
+    let mut samples = Samples::default();
+    for (m, stop) in stops.iter().enumerate() {
+        samples.of(start(m), stop, 1, mounting);
+    }
+    let mut ways = samples.passed(nominal);
+    let settled = |m: &usize, way: &Option<Sampled>| match (start(*m), &stops[*m], way) {
+        (Some(Stop::At(from)), Stop::At(to), Some(way)) => agrees(&from.joints, way, &to.joints, half),
+        _ => true,
+    };
+    let mut rough: Vec<usize> = (0..stops.len()).filter(|m| !settled(m, &ways[*m])).collect();
+    for refinement in 1..=REFINEMENTS {
+        let mut finer = Samples::default();
+        for &m in &rough {
+            finer.of(start(m), &stops[m], 4_usize.pow(refinement), mounting);
+        }
+        for (&m, way) in rough.iter().zip(finer.passed(nominal)) {
+            ways[m] = way;
+        }
+        rough.retain(|m| !settled(m, &ways[*m]));
+    }
+    (ways, samples.passes)
+}
+
+/// The samples of motions on which the wrist may be interpolated by itself, nothing for all others; none where the arm cannot
+/// go so.
+pub(crate) fn by_wrist(
+    stops: &[Stop<'_>],
+    before: &[Option<u32>],
+    nominal: &Inverse<'_>,
+    half: &[f64; 6],
+    mounting: &dyn Fn(usize) -> Mounting,
+) -> Vec<Option<Option<Sampled>>> {
+    let of = |(stop, before): (&Stop<'_>, &Option<u32>)| {
+        let (Some(Stop::At(from)), Stop::At(to)) = (before.and_then(|from| stops.get(from as usize)), stop)
+        else {
+            return None;
+        };
+        let wrist = to.motion.modal.wrist_interpolation != Switch::Off;
+        let (curve, within) = Some((from, to)).filter(|_| wrist).and_then(|_| path(from, to, mounting))?;
+        let ends = [&from.joints, &to.joints];
+        let mut count = pieces_of(&curve);
+        loop {
+            let way = wrist_interpolation::along(nominal.arm(), &within, &curve, ends, count, MOST_STEP_RAD);
+            let settled = |way: &Sampled| agrees(&from.joints, way, &to.joints, half);
+            if count >= MOST_REFINED || way.as_ref().is_some_and(settled) {
+                return Some(way);
+            }
+            count = (4 * count).min(MOST_REFINED);
+        }
+    };
+    stops.iter().zip(before).map(of).collect()
+}
+
+/// The path of a motion that goes along one, in its object, with its tool and object.
+fn path(
+    from: &Reached<'_>,
+    to: &Reached<'_>,
+    mounting: &dyn Fn(usize) -> Mounting,
+) -> Option<(Curve, Mounting)> {
+    if !to.ways().0 {
+        return None;
+    }
+    // The path is one of the tool and in the object of the motion, also where it begins under others.
+    let within = mounting(to.mounted);
+    let mut begin = from.told;
+    if from.mounted != to.mounted {
+        begin = within.target_of(&mounting(from.mounted).flange_for(&from.told));
+    }
+    let curve = match (to.motion.kind, to.via) {
+        (MotionKind::Circular, Some(via)) => Curve::round(begin, &via, to.told, to.motion),
+        (MotionKind::Circular, None) => None,
+        _ => Some(Curve::line(begin, to.told)),
+    };
+    Some((curve?, within))
+}
+
+/// Motions that one thread takes at a time.
+const PORTION: usize = 64;
+
+/// Points between the ends of all motions.
+#[derive(Default)]
+struct Samples {
+    /// Where those of each motion end.
+    ends: Vec<usize>,
+    shares: Vec<f64>,
+    flanges: Vec<Pose>,
+    /// The joints at the start of each motion, and at its end.
+    ends_rad: Vec<[Joints; 2]>,
+    /// At which share of each motion its circle point is passed.
+    passes: Vec<f64>,
+}
+
+impl Samples {
+    fn range(&self, motion: usize) -> std::ops::Range<usize> {
+        let begin = motion.checked_sub(1).map_or(0, |m| self.ends[m]);
+        begin..self.ends[motion]
+    }
+
+    /// The samples of one motion, so many times as densely as motions are sampled at first.
+    fn of(
+        &mut self,
+        from: Option<&Stop<'_>>,
+        stop: &Stop<'_>,
+        density: usize,
+        mounting: &dyn Fn(usize) -> Mounting,
+    ) {
+        let mut passes = 0.5;
+        if let (Some(Stop::At(from)), Stop::At(to)) = (from, stop)
+            && let Some((curve, within)) = path(from, to, mounting)
+        {
+            passes = to.via.map_or(passes, |via| curve.passes(&via));
+            let pieces = (density * pieces_of(&curve)).min(MOST_REFINED);
+            for k in 1..pieces {
+                let s = k as f64 / pieces as f64;
+                self.shares.push(s);
+                self.flanges.push(within.flange_for(&curve.at(s)));
+            }
+        }
+        let joints = |stop: Option<&Stop<'_>>| match stop {
+            Some(Stop::At(reached)) => reached.joints,
+            _ => Joints::zeros(),
+        };
+        self.ends_rad.push([joints(from), joints(Some(stop))]);
+        self.ends.push(self.shares.len());
+        self.passes.push(passes);
+    }
+
+    /// The joints at the samples of each motion, each reached from the one before; `None` where the arm cannot go along: a joint would
+    /// leap, or the way crosses a singularity, as between solutions of two branches it must, however near they lie.
+    fn passed(&self, nominal: &Inverse<'_>) -> Vec<Option<Sampled>> {
+        let of = |motion: usize| {
+            let [start, end] = &self.ends_rad[motion];
+            let flanges = &self.flanges[self.range(motion)];
+            if flanges.is_empty() {
+                return Some(Vec::new());
+            }
+            let mut out = Vec::with_capacity(flanges.len());
+            let mut last = *start;
+            if nominal.branch(start) != nominal.branch(end) {
+                return None;
+            }
+            for (k, reached) in self.range(motion).zip(nominal.reach_path(flanges, start)) {
+                let joints = reached.ok()?.joints;
+                let steady = (joints - last).amax() < MOST_STEP_RAD;
+                last = joints;
+                steady.then(|| out.push((self.shares[k], joints)))?;
+            }
+            ((end - last).amax() < MOST_STEP_RAD).then_some(out)
+        };
+        let motions = self.ends.len();
+        let portions = search_budget::shared_out(
+            Allowance::of(search_budget::SIDES),
+            motions.div_ceil(PORTION),
+            |portion, allowance| {
+                let first = portion * PORTION;
+                let here = first..(first + PORTION).min(motions);
+                within(allowance, || here.map(of).collect::<Vec<_>>())
+            },
+        );
+        portions.into_iter().flatten().collect()
+    }
+}
+
+fn pieces_of(curve: &Curve) -> usize {
+    let turn = curve.turn_rad().max(curve.arc().map_or(0.0, |arc| arc.sweep));
+    pieces(curve.length_mm(), turn)
+}
+
+/// Pieces of a path: at least two, so that one sample tells of a joint that turns half way; four and an even number where
+/// every other sample must tell the same.
+fn pieces(length_mm: f64, turn_rad: f64) -> usize {
+    if length_mm < SHORT_MM && turn_rad < SHORT_RAD {
+        return 2;
+    }
+    let wanted = (length_mm / SAMPLE_MM).max(turn_rad / SAMPLE_RAD).ceil();
+    (wanted as usize).next_multiple_of(2).clamp(4, MOST_SAMPLES)
+}

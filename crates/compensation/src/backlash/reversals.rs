@@ -1,0 +1,73 @@
+//! Where a joint turns on its way, by a parabola through neighbouring samples.
+
+use truegrind_arm::model::Joints;
+
+/// A motor that comes back by less on a way has not turned (rad): what a drive at rest may stray by.
+pub(crate) const DEAD_BAND_RAD: f64 = 1e-5;
+
+/// Where between samples k − 1 and k a joint turns: the vertex of a parabola through these two and a neighbour.
+pub(crate) fn turning_point(way: &[(f64, f64)], k: usize) -> Option<(f64, f64)> {
+    let first = match k {
+        _ if way.len() < 3 || k == 0 => return None,
+        1 => 0,
+        _ => k - 2,
+    };
+    let [a, b, c] = [way[first], way[first + 1], way[first + 2]];
+    // Newton's form: f(s) = f(a) + d1 (s − a) + d2 (s − a)(s − b).
+    let d1 = (b.1 - a.1) / (b.0 - a.0);
+    let d2 = ((c.1 - b.1) / (c.0 - b.0) - d1) / (c.0 - a.0);
+    let vertex = 0.5 * (a.0 + b.0) - 0.5 * d1 / d2;
+    let within = vertex > way[k - 1].0 && vertex < way[k].0;
+    within.then_some((vertex, a.1 + d1 * (vertex - a.0) + d2 * (vertex - a.0) * (vertex - b.0)))
+}
+
+/// Whether every other sample of a way tells of the same turns as all of them, for joints with play, and of none near its
+/// end.
+pub(crate) fn agrees(start: &Joints, way: &[(f64, Joints)], end: &Joints, half: &[f64; 6]) -> bool {
+    if way.len() < 3 {
+        return true;
+    }
+    (0..6).filter(|&joint| half[joint] > 0.0).all(|joint| {
+        let inner = way.iter().map(|(share, joints)| (*share, joints[joint]));
+        let all: Vec<(f64, f64)> =
+            [(0.0, start[joint])].into_iter().chain(inner).chain([(1.0, end[joint])]).collect();
+        let other: Vec<(f64, f64)> = all.iter().copied().step_by(2).collect();
+        let [fine, coarse] = [last_slope(&all), last_slope(&other)];
+        // What a turn could come to that lies between the last two samples.
+        let hidden = 0.5 * (fine - coarse).abs() * (1.0 - all[all.len() - 2].0);
+        let certain = (fine - coarse).abs() < 0.5 * fine.abs() || hidden < 0.1 * DEAD_BAND_RAD;
+        let [all, other] = [turns(&all), turns(&other)];
+        let alike = |((one, at), (other, near)): (&(i8, f64), &(i8, f64))| {
+            one == other && (at - near).abs() < 0.5 * DEAD_BAND_RAD
+        };
+        certain && all.len() == other.len() && all.iter().zip(&other).all(alike)
+    })
+}
+
+/// How fast a joint goes at the end of a way (rad per share), by the parabola through its last three samples.
+fn last_slope(way: &[(f64, f64)]) -> f64 {
+    let [.., a, b, c] = way else { return 0.0 };
+    let (first, last) = ((b.1 - a.1) / (b.0 - a.0), (c.1 - b.1) / (c.0 - b.0));
+    last + (last - first) / (c.0 - a.0) * (c.0 - b.0)
+}
+
+/// In which directions a joint goes in turn, and how far each time.
+fn turns(way: &[(f64, f64)]) -> Vec<(i8, f64)> {
+    let mut out: Vec<(i8, f64)> = Vec::new();
+    let mut farthest = way[0].1;
+    for k in 1..way.len() {
+        for (_, angle) in turning_point(way, k).into_iter().chain([way[k]]) {
+            let gone = angle - farthest;
+            let direction = if gone > 0.0 { 1 } else { -1 };
+            match out.last_mut() {
+                Some((last, at)) if *last == direction => (*at, farthest) = (angle, angle),
+                _ if gone.abs() > DEAD_BAND_RAD => {
+                    out.push((direction, angle));
+                    farthest = angle;
+                }
+                _ => {}
+            }
+        }
+    }
+    out
+}

@@ -1,0 +1,244 @@
+//! The cell file that programs ask for, with what they say filled in and the rest marked `"?"`.
+//!
+//! It loads as it is; nothing is corrected with it before every `"?"` is replaced ([`Cell::open`](crate::cell::Cell::open)).
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+use truegrind_math::se3::Pose;
+use truegrind_programs::motion::{Frame, Listing, Motion, Reason};
+use truegrind_programs::nc::orientation::Angles;
+use truegrind_programs::nc::setup;
+use truegrind_programs::reading::Language;
+
+/// A program whose cell is asked for.
+#[derive(Debug, Clone, Copy)]
+pub struct Asking<'a> {
+    /// Its name, for comments.
+    pub name: &'a str,
+    /// Its language.
+    pub language: Language,
+    /// What it does.
+    pub listing: &'a Listing,
+}
+
+/// A cell file to fill in.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Skeleton {
+    /// The file.
+    pub text: String,
+    /// How many values a person has to fill in.
+    pub open: usize,
+}
+
+/// What programs say of a tool or work object.
+struct Named {
+    name: String,
+    /// How comments call it.
+    label: Option<String>,
+    language: Language,
+    /// Where it lies, as the program says it, or why that is not known.
+    told: Result<Pose, Reason>,
+    motions: usize,
+    /// The program and the line that use it first.
+    first: (String, u32),
+}
+
+/// Kind, and the name as programs may vary it.
+type Key = (bool, String);
+
+/// The cell file of these programs. `robot`, where it is known, is written into it.
+pub fn skeleton(programs: &[Asking<'_>], robot: Option<&str>) -> Skeleton {
+    let mut found: BTreeMap<Key, Named> = BTreeMap::new();
+    let mut axes = [false; 6];
+    for program in programs {
+        for motion in &program.listing.motions {
+            note(program, motion, &mut found);
+        }
+        moved_axes(program.listing, &mut axes);
+    }
+    let convention = programs.iter().any(|program| {
+        let targets = program.listing.motions.iter().flat_map(|motion| &motion.targets);
+        targets.map(|target| &target.value).any(|value| *value == Err(Reason::Convention))
+    });
+    let mut out = Writer { text: String::new(), open: 0 };
+    out.head(programs, robot, convention);
+    for is_tool in [true, false] {
+        found
+            .iter()
+            .filter(|((kind, _), _)| *kind == is_tool)
+            .for_each(|(_, named)| out.frame(is_tool, named));
+    }
+    for (_, letter) in ('a'..='f').enumerate().filter(|(axis, _)| axes[*axis]) {
+        out.line("", "");
+        out.line("[[external]]", "an external axis that targets move");
+        out.line(&format!("axis = \"{letter}\""), "");
+        out.ask("carries", "base (it carries the robot: a track, a gantry) | other");
+    }
+    Skeleton { text: out.text, open: out.open }
+}
+
+/// Takes down tool and work object of a motion.
+fn note(program: &Asking<'_>, motion: &Motion, found: &mut BTreeMap<Key, Named>) {
+    let listing = program.listing;
+    let tool = listing.tool(motion).map(|tool| {
+        let told = tool.value.as_ref().map(|value| value.frame.pose()).map_err(|reason| *reason);
+        (true, tool.name.as_str(), told)
+    });
+    let object = listing.work_object(motion).map(|object| {
+        let told = object.value.as_ref().map(|value| value.user_frame.pose()).map_err(|reason| *reason);
+        (false, object.name.as_str(), told)
+    });
+    for (is_tool, name, told) in tool.into_iter().chain(object) {
+        // The controller's own, and what a control calls no tool (G49).
+        let own = ["tool0", "wobj0"].iter().any(|own| name.eq_ignore_ascii_case(own));
+        if own || is_tool && program.language == Language::Nc && !name.starts_with(['T', 't']) {
+            continue;
+        }
+        let key = match program.language {
+            Language::Rapid => name.to_ascii_lowercase(),
+            Language::Nc => setup::plain(name),
+        };
+        let new = || Named {
+            name: name.to_owned(),
+            label: listing.labels_of(name).next().map(str::to_owned),
+            language: program.language,
+            told,
+            motions: 0,
+            first: (program.name.to_owned(), motion.place.line),
+        };
+        let named = found.entry((is_tool, key)).or_insert_with(new);
+        named.motions += 1;
+        if named.told.is_err() && told.is_ok() {
+            named.told = told;
+        }
+    }
+}
+
+/// External axes whose value changes from target to target.
+fn moved_axes(listing: &Listing, axes: &mut [bool; 6]) {
+    let mut first = [None; 6];
+    for target in listing.motions.iter().flat_map(|motion| &motion.targets) {
+        let Ok(value) = &target.value else { continue };
+        for (axis, value) in value.external().iter().enumerate() {
+            let Some(value) = value else { continue };
+            axes[axis] |= *first[axis].get_or_insert(*value) != *value;
+        }
+    }
+}
+
+struct Writer {
+    text: String,
+    open: usize,
+}
+
+/// Where the comments of a line begin.
+const COLUMN: usize = 32;
+
+impl Writer {
+    fn line(&mut self, key: &str, comment: &str) {
+        let _ = match comment {
+            "" => writeln!(self.text, "{key}"),
+            comment => writeln!(self.text, "{key:COLUMN$}  # {comment}"),
+        };
+    }
+
+    /// A key that a person has to fill in.
+    fn ask(&mut self, key: &str, comment: &str) {
+        self.open += 1;
+        self.line(&format!("{key} = \"?\""), comment);
+    }
+
+    fn head(&mut self, programs: &[Asking<'_>], robot: Option<&str>, convention: bool) {
+        let names = match programs {
+            [] => "no program".to_owned(),
+            [one] => one.name.to_owned(),
+            [one, rest @ ..] => format!("{} and {} more", one.name, rest.len()),
+        };
+        let _ = writeln!(
+            self.text,
+            "# The cell of {}: where its tools and work objects lie, and how that is known.\n\
+             # Replace every \"?\"; before that nothing is corrected with this file. What stands behind # is optional.\n\
+             # An origin is \"metrology\" where the numbers are true as they stand (CAD, measured), and \"taught\" where\n\
+             # they come from points that the arm touched before it was calibrated.\n",
+            names.replace(['\n', '\r'], " ")
+        );
+        match robot {
+            Some(robot) => {
+                self.line(&format!("robot = {}", quoted(robot)), "a model of another robot is refused")
+            }
+            None => self.line("# robot = \"abb-irb-120\"", "with it a model of another robot is refused"),
+        }
+        if convention {
+            let words = Angles::words().replace(", ", " | ");
+            self.ask("angles", &format!("what A, B and C mean: {words}"));
+        }
+    }
+
+    fn frame(&mut self, is_tool: bool, named: &Named) {
+        let (kind, what) = match (is_tool, named.language) {
+            (true, _) => ("tool", "tool"),
+            (false, Language::Rapid) => ("wobj", "work object"),
+            (false, Language::Nc) => ("wobj", "work offset"),
+        };
+        let motions =
+            if named.motions == 1 { "1 motion".to_owned() } else { format!("{} motions", named.motions) };
+        let uses = format!("{motions}, first in {}, line {}", named.first.0, named.first.1)
+            .replace(['\n', '\r'], " ");
+        self.line("", "");
+        if let (Language::Rapid, Err(reason)) = (named.language, named.told) {
+            let remedy = match reason {
+                Reason::Undeclared => "give the module that declares it, too",
+                _ => "a cell file cannot say it",
+            };
+            self.line(&format!("# {what} {}: {reason}: {remedy} ({uses})", named.name), "");
+            return;
+        }
+        self.line(&format!("[[{kind}]]"), &uses);
+        let called =
+            named.label.as_ref().map_or_else(String::new, |label| format!("a comment calls it {label}"));
+        self.line(&format!("name = {}", quoted(&named.name)), &called.replace(['\n', '\r'], " "));
+        self.ask("origin", "metrology | taught");
+        let place = if is_tool { "the tool's tip on the flange" } else { "its zero in the robot's base" };
+        match named.told {
+            Ok(told) => {
+                let Frame { position_mm: p, quaternion: q } = Frame::from_pose(&told);
+                self.line(
+                    &format!(
+                        "# the program has it at [{}, {}, {}] mm, turned by [{}, {}, {}, {}]",
+                        short(p[0], 3),
+                        short(p[1], 3),
+                        short(p[2], 3),
+                        short(q[0], 6),
+                        short(q[1], 6),
+                        short(q[2], 6),
+                        short(q[3], 6)
+                    ),
+                    "",
+                );
+            }
+            Err(_) => {
+                self.ask("position_mm", &format!("{place}: [x, y, z] in mm"));
+                self.line("# quaternion_wxyz = [1, 0, 0, 0]", "where it is turned: w, x, y, z");
+            }
+        }
+        if is_tool {
+            self.line("# teaching_deg = [[…], […], […], […]]", "taught: 4 or more poses about one point (°)");
+        } else {
+            self.line("# taught_with = \"NAME\"", "taught: the tool that touched its points");
+            self.line("# teaching_deg = [[…], […], […]]", "taught: two points on x, one on y (°)");
+        }
+    }
+}
+
+/// A number without the zeros that say nothing.
+fn short(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    if text == "-0" { "0".to_owned() } else { text.to_owned() }
+}
+
+/// A basic string of TOML.
+fn quoted(text: &str) -> String {
+    toml::Value::String(text.to_owned()).to_string()
+}

@@ -1,0 +1,4 @@
+//! The condition of the arm at each target: what it carries and from which side its joints arrive.
+
+pub(crate) mod arm_conditions;
+pub mod payload;

@@ -1,0 +1,112 @@
+//! Which motions stay as they are, and why: each for a reason of its own, or since another one stays.
+
+use std::collections::BTreeMap;
+
+use crate::arms::Arms;
+use crate::cut::{self, Cuts};
+use crate::deviation::Status;
+use crate::feasibility::arc_feasibility::strayed;
+use crate::feasibility::singularity::forbid_ways;
+use crate::frames::frame_table::Mountings;
+use crate::options::Options;
+use crate::plan::reason::Why;
+use crate::search_budget;
+use crate::target::solved_target::{Solved, SolvedTargets};
+use truegrind_arm::inverse::InverseError;
+use truegrind_arm::inverse::effort::Allowance;
+use truegrind_programs::motion::{Listing, MotionKind, Reason};
+
+/// The motions whose targets could be corrected and that stay all the same, with the reason: what the writer refused,
+/// circles that would become others, and the rest of a cut of which a part stays; ways past a singularity are forbidden
+/// among the targets. What stays moves the start of what follows, so each may bring about another, until none does.
+pub(crate) fn staying(
+    listing: &Listing,
+    solved: &mut SolvedTargets,
+    mountings: &Mountings,
+    arms: &Arms<'_>,
+    options: &Options,
+    refused: &BTreeMap<u32, Why>,
+) -> BTreeMap<u32, Why> {
+    let mut stays = refused.clone();
+    let cuts = cut::of(listing);
+    // For ways that start where another motion stays, over all rounds.
+    let mut allowance = Allowance::of(search_budget::WAYS);
+    let mut forbidden = forbid_ways(listing, solved, mountings, arms, options, None, &mut allowance);
+    let mut rounds = (MOST_VISITS / listing.motions.len().max(1)).clamp(FEWEST_ROUNDS, MOST_ROUNDS);
+    loop {
+        let before = stays.len();
+        stays.extend(strayed(listing, solved, mountings, options, &stays));
+        let solved_so_far = &*solved;
+        let kept = |motion: u32| obstacle(motion, listing, solved_so_far, options, &stays);
+        let more = match options.cuts {
+            Cuts::Whole => cut::rest_of_cuts(listing, &cuts, &kept),
+            Cuts::Partial => cut::steps(listing, &cuts, &kept, options.tolerance_mm, &|motion| {
+                solved
+                    .of(motion as usize)
+                    .last()
+                    .and_then(|to| to.as_ref().ok())
+                    .map_or(0.0, Solved::shift_mm)
+            }),
+            Cuts::Single => Vec::new(),
+        };
+        stays.extend(more);
+        if stays.len() == before && !forbidden {
+            return stays;
+        }
+        rounds -= 1;
+        if rounds == 0 {
+            // A program of which every round takes away another piece is left as it is.
+            let all = 0..listing.motions.len() as u32;
+            stays.extend(all.filter(|m| !stays.contains_key(m)).map(|m| (m, ABANDONED)).collect::<Vec<_>>());
+            return stays;
+        }
+        forbidden = forbid_ways(listing, solved, mountings, arms, options, Some(&stays), &mut allowance);
+    }
+}
+
+/// Motions that are looked at again, over all rounds, for what stays because another one does.
+const MOST_VISITS: usize = 4_000_000;
+/// So many rounds are always made.
+const FEWEST_ROUNDS: usize = 16;
+/// More are never made: cut after cut would stay, each for the one before it.
+const MOST_ROUNDS: usize = 1000;
+const ABANDONED: Why = Why::Inverse(InverseError::Abandoned);
+
+/// Why a motion stays as it is, first what the text does not tell, then what no arm reaches; `None` where it is corrected.
+pub(crate) fn obstacle(
+    index: u32,
+    listing: &Listing,
+    solved: &SolvedTargets,
+    options: &Options,
+    stays: &BTreeMap<u32, Why>,
+) -> Option<(Status, Why)> {
+    let motion = &listing.motions[index as usize];
+    if let Some(reason) = motion.left {
+        let why = Why::Program(reason);
+        return Some((unchanged(why), why));
+    }
+    let targets = solved.of(index as usize);
+    let errors = || targets.iter().filter_map(|target| target.as_ref().err().copied());
+    let unknown = errors().find(|why| matches!(why, Why::Program(_)));
+    if let Some(why) = unknown.or_else(|| errors().next()) {
+        return Some((unchanged(why), why));
+    }
+    if targets.is_empty() {
+        return Some((Status::Left, Why::Program(Reason::ExternalOnly)));
+    }
+    if motion.kind == MotionKind::AbsoluteJoint && !options.joint_targets {
+        return Some((Status::Left, Why::JointTarget));
+    }
+    let forbidden = targets.iter().find_map(|target| target.as_ref().ok().and_then(|s| s.forbidden));
+    let why = forbidden.or_else(|| stays.get(&index).copied())?;
+    Some((if matches!(why, Why::Risk { .. }) { Status::Left } else { Status::Refused }, why))
+}
+
+/// What a motion is that stays as it is: left where the text does not tell enough, refused where what it says cannot be.
+fn unchanged(why: Why) -> Status {
+    match why {
+        Why::Program(Reason::BeyondReach | Reason::NumberRange) => Status::Refused,
+        Why::Program(_) => Status::Left,
+        _ => Status::Refused,
+    }
+}

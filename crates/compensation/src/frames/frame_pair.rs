@@ -1,0 +1,249 @@
+//! Tool and work object of a motion: as the controller holds them, and as they truly are.
+
+use nalgebra::{Point3, Vector3};
+
+use crate::cell::FrameOrigin;
+use crate::frames::taught::{RealObject, RealTool, TaughtFrame, Teaching, taught_frame, taught_tcp};
+use truegrind_arm::estimated::{Carried, Estimated};
+use truegrind_arm::inverse::Inverse;
+use truegrind_arm::model::{Joints, PreparedModel};
+use truegrind_math::se3::{Pose, difference};
+use truegrind_programs::motion::{Tool, ToolValue, WorkObject, WorkObjectValue};
+
+/// Frames between flange and target, for either kind of cell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Mounting {
+    /// The tool on the flange, or in the world for a tool that stands.
+    pub(crate) tool: Pose,
+    /// The work object in the base, or on the flange where the robot holds the part.
+    pub(crate) object: Pose,
+    /// Whether the robot holds the part and the tool stands.
+    pub(crate) holds_part: bool,
+}
+
+impl Mounting {
+    /// Where the flange must be for a target in the work object.
+    pub(crate) fn flange_for(&self, object_from_tool: &Pose) -> Pose {
+        if self.holds_part {
+            self.tool * (self.object * object_from_tool).inverse()
+        } else {
+            self.object * object_from_tool * self.tool.inverse()
+        }
+    }
+
+    /// The target in the work object at which a flange stands.
+    pub(crate) fn target_of(&self, base_from_flange: &Pose) -> Pose {
+        if self.holds_part {
+            self.object.inverse() * base_from_flange.inverse() * self.tool
+        } else {
+            self.object.inverse() * base_from_flange * self.tool
+        }
+    }
+
+    /// The work object in the base, for a flange pose.
+    pub(crate) fn base_from_object(&self, base_from_flange: &Pose) -> Pose {
+        if self.holds_part { base_from_flange * self.object } else { self.object }
+    }
+
+    /// The tool on the flange, where the robot holds it; the inverse path through the part otherwise.
+    pub(crate) fn flange_from_tool(&self, base_from_flange: &Pose) -> Pose {
+        if self.holds_part { base_from_flange.inverse() * self.tool } else { self.tool }
+    }
+}
+
+/// A mounting as told and as true, with what was assumed.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Mounted {
+    /// As the controller holds it.
+    pub told: Mounting,
+    /// As it is, as far as is known.
+    pub real: Mounting,
+    /// How a taught work object moves with the arm's parameters; absent for any other.
+    pub carried: Option<Carried>,
+    /// What was assumed, one sentence each.
+    pub notes: Vec<String>,
+}
+
+/// What a mounting is worked out from.
+pub(crate) struct Mounts<'a> {
+    pub(crate) teaching: &'a Teaching<'a>,
+    pub(crate) knowledge: Option<&'a Estimated>,
+    /// The inverse of the nominal arm.
+    pub(crate) inverse: &'a Inverse<'a>,
+    /// A typical joint vector, at which the effect of an unknown origin is estimated.
+    pub(crate) usual: Joints,
+}
+
+/// Works out a mounting from the program's values and the cell's knowledge.
+///
+/// # Errors
+/// What the cell file says and the program does not bear out.
+pub(crate) fn mount(
+    (tool, tool_value): (&Tool, &ToolValue),
+    (object, object_value): (&WorkObject, &WorkObjectValue),
+    with: &Mounts<'_>,
+) -> Result<Mounted, String> {
+    let told = Mounting {
+        tool: tool_value.frame.pose(),
+        object: object_value.user_frame.pose() * object_value.object_frame.pose(),
+        holds_part: object_value.robhold,
+    };
+    let teaching = with.teaching;
+    let real_tool = teaching.tool(tool, tool_value)?;
+    let real_object = teaching.object(object, object_value)?;
+    let real = Mounting { tool: real_tool.pose, object: real_object.pose, ..told };
+    let notes =
+        [tool_note(tool, &real_tool, &told, with), object_note(object, &real, &told, &real_object, with)];
+    // A frame on the flange stays with the arm: it has no place of its own in the base.
+    let taught = real_object.taught.filter(|_| !told.holds_part);
+    let carried = taught.zip(with.knowledge).and_then(|(t, k)| carried_frame(k, teaching.estimated, &t));
+    Ok(Mounted { told, real, carried, notes: notes.into_iter().flatten().collect() })
+}
+
+fn built_in(name: &str) -> bool {
+    name.eq_ignore_ascii_case("tool0") || name.eq_ignore_ascii_case("wobj0")
+}
+
+/// What was assumed of a tool.
+fn tool_note(tool: &Tool, real: &RealTool, told: &Mounting, with: &Mounts<'_>) -> Option<String> {
+    let name = &tool.name;
+    match with.teaching.stated.tool(tool) {
+        Some(frame) if frame.origin == FrameOrigin::Metrology => None,
+        Some(_) => Some(match real.moved_mm {
+            Some(shift) => format!("tool {name} was taught: re-evaluated, its TCP moves by {shift:.3} mm"),
+            None => format!(
+                "tool {name} was taught, but its teaching points are not given: taken as it stands; {}",
+                tool_estimate(told, with)
+            ),
+        }),
+        None if built_in(name) => None,
+        None => Some(format!(
+            "tool {name}: origin not stated, taken as metrology (true as it stands); {}",
+            tool_estimate(told, with)
+        )),
+    }
+}
+
+/// What was assumed of a work object.
+fn object_note(
+    object: &WorkObject,
+    real: &Mounting,
+    told: &Mounting,
+    found: &RealObject,
+    with: &Mounts<'_>,
+) -> Option<String> {
+    let name = &object.name;
+    let what = if with.teaching.listing.numbered { "work offset" } else { "work object" };
+    match with.teaching.stated.object(object) {
+        Some(frame) if frame.origin == FrameOrigin::Metrology => None,
+        Some(_) if found.taught.is_some() => {
+            let shift = (real.object.translation.vector - told.object.translation.vector).norm();
+            let turn = real.object.rotation.angle_to(&told.object.rotation).to_degrees();
+            Some(format!("{what} {name} was taught: re-evaluated, it moves by {shift:.3} mm and {turn:.4}°"))
+        }
+        Some(_) => Some(format!(
+            "{what} {name} was taught, but its teaching points are not given: taken as it stands; {}",
+            object_estimate(told, with)
+        )),
+        None if built_in(name) => None,
+        None => Some(format!(
+            "{what} {name}: origin not stated, taken as metrology (true as it stands in the robot's base); {}",
+            object_estimate(told, with)
+        )),
+    }
+}
+
+/// How the frame of a work object that was taught moves with each parameter of the arm.
+fn carried_frame(
+    knowledge: &Estimated,
+    estimated: &PreparedModel<'_>,
+    taught: &TaughtFrame,
+) -> Option<Carried> {
+    let TaughtFrame { pointer, joints, points, frame } = taught;
+    carried_through(knowledge, estimated, &pointer.real, joints, points, frame)
+}
+
+/// How a frame through three points, touched with `tip`, moves with each parameter of the arm: the points' velocities, carried
+/// through the construction of the frame by a central difference over ± 1 unit of 1e-4.
+pub(crate) fn carried_through(
+    knowledge: &Estimated,
+    estimated: &PreparedModel<'_>,
+    tip: &Vector3<f64>,
+    joints: &[Joints; 3],
+    points: &[Point3<f64>; 3],
+    frame: &Pose,
+) -> Option<Carried> {
+    const STEP: f64 = 1e-4;
+    let tip = Pose::translation(tip.x, tip.y, tip.z);
+    let jacobians = joints.map(|q| knowledge.position_jacobian(estimated, &q, &tip));
+    let twists = (0..knowledge.order.len())
+        .map(|k| {
+            let moved_by = |step: f64| {
+                taught_frame(&std::array::from_fn(|i| {
+                    let j = &jacobians[i];
+                    points[i] + Vector3::new(j[(0, k)], j[(1, k)], j[(2, k)]) * step
+                }))
+            };
+            Some(difference(&moved_by(-STEP)?, &moved_by(STEP)?) / (2.0 * STEP))
+        })
+        .collect::<Option<Vec<_>>>()?;
+    Some(Carried { origin_mm: frame.translation.vector, twists })
+}
+
+/// Said where no typical pose shows it.
+const NOT_TOLD: &str = "how far it would move had it been taught cannot be told here";
+
+/// How far a taught TCP would move: four orientations about a typical pose, TCP fixed under the nominal model. A tool that
+/// stands is touched once with the middle of the flange.
+fn tool_estimate(told: &Mounting, with: &Mounts<'_>) -> String {
+    let Teaching { nominal, estimated, .. } = with.teaching;
+    let usual = &with.usual;
+    if told.holds_part {
+        let flange = |arm: &PreparedModel<'_>| arm.forward(usual).translation.vector;
+        let shift = (flange(estimated) - flange(nominal)).norm();
+        return format!("had it been taught with this arm, its TCP would move by about {shift:.2} mm");
+    }
+    let turns = [[0.0, 0.0, 0.0], [0.5, 0.3, 0.0], [-0.5, 0.3, 0.6], [0.0, -0.5, -0.6]];
+    let inverse = with.inverse;
+    let at = nominal.forward(usual) * told.tool;
+    let teaching: Vec<Joints> = turns
+        .iter()
+        .filter_map(|w| {
+            let turned = at * Pose::new(Vector3::zeros(), Vector3::from(*w));
+            inverse.solve_near(&(turned * told.tool.inverse()), usual).ok().map(|s| s.joints)
+        })
+        .collect();
+    match taught_tcp(estimated, &teaching) {
+        Some(tcp) => {
+            let shift = (tcp - told.tool.translation.vector).norm();
+            format!("had it been taught with this arm, its TCP would move by about {shift:.2} mm")
+        }
+        None => NOT_TOLD.to_owned(),
+    }
+}
+
+/// How far a taught work object would move: its origin and 100 mm along x and y, touched near a typical pose.
+fn object_estimate(told: &Mounting, with: &Mounts<'_>) -> String {
+    let Teaching { nominal, estimated, .. } = with.teaching;
+    let usual = &with.usual;
+    let inverse = with.inverse;
+    let orientation = told.target_of(&nominal.forward(usual)).rotation;
+    let touched: Vec<Point3<f64>> = [[0.0, 0.0], [100.0, 0.0], [0.0, 100.0]]
+        .iter()
+        .filter_map(|[x, y]| {
+            let target = Pose::from_parts(Vector3::new(*x, *y, 0.0).into(), orientation);
+            let joints = inverse.solve_near(&told.flange_for(&target), usual).ok()?.joints;
+            let tip = Point3::from(told.tool.translation.vector);
+            let flange = estimated.forward(&joints);
+            Some(if told.holds_part { flange.inverse() * tip } else { flange * tip })
+        })
+        .collect();
+    match <[Point3<f64>; 3]>::try_from(touched).ok().and_then(|p| taught_frame(&p)) {
+        Some(pose) => {
+            let shift = (pose.translation.vector - told.object.translation.vector).norm();
+            let turn = pose.rotation.angle_to(&told.object.rotation).to_degrees();
+            format!("had it been taught with this arm, it would move by about {shift:.2} mm and {turn:.3}°")
+        }
+        None => NOT_TOLD.to_owned(),
+    }
+}

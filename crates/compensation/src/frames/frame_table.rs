@@ -1,0 +1,179 @@
+//! The mountings that a program uses: every pair of tool and work object once, and what external axes carry.
+
+use std::collections::{HashMap, HashSet};
+
+use crate::arms::Arms;
+use crate::cell::{Carries, Cell};
+use crate::configuration::configured;
+use crate::frames::frame_pair::{Mounted, Mounting, Mounts, mount};
+use crate::frames::taught::Teaching;
+use crate::plan::reason::Why;
+use crate::search_budget;
+use truegrind_arm::inverse::effort::{Allowance, within};
+use truegrind_arm::model::Joints;
+use truegrind_math::se3::Pose;
+use truegrind_programs::motion::{Listing, Motion, Reason, RobTarget, Switch, WorkObjectValue};
+
+/// Mountings by (tool, work object) as motions use them.
+pub(crate) struct Mountings {
+    /// The place of each in the list, or why there is none.
+    places: HashMap<(u32, u32), Result<usize, Why>>,
+    pub(crate) list: Vec<Mounted>,
+    /// The work object of each.
+    objects: Vec<u32>,
+    /// External axes that carry the base.
+    base: [bool; 6],
+    /// What was assumed of external axes, and what the cell file contradicts.
+    assumed: Vec<String>,
+}
+
+impl Mountings {
+    pub(crate) fn of(listing: &Listing, arms: &Arms<'_>, cell: &Cell) -> Self {
+        let mut out = Self {
+            places: HashMap::new(),
+            list: Vec::new(),
+            objects: Vec::new(),
+            base: [false; 6],
+            assumed: Vec::new(),
+        };
+        let teaching = Teaching::of(arms.nominal.arm(), arms.estimated.arm(), cell, listing);
+        let typical = typical(listing);
+        let mut allowance = Allowance::of(search_budget::FRAMES);
+        let mut last = None;
+        for motion in &listing.motions {
+            let (Some(tool), Some(object)) = (motion.tool, motion.work_object) else { continue };
+            // Nearly always that of the motion before.
+            if last.replace((tool, object)) == Some((tool, object))
+                || out.places.contains_key(&(tool, object))
+            {
+                continue;
+            }
+            let (Some(t), Some(o)) = (listing.tool(motion), listing.work_object(motion)) else { continue };
+            let (Ok(tv), Ok(ov)) = (&t.value, &o.value) else {
+                let reason = listing.left_by_frames(motion).unwrap_or(Reason::ToolUnknown);
+                out.places.insert((tool, object), Err(Why::Program(reason)));
+                continue;
+            };
+            let here = typical.get(&(tool, object)).map_or(&[][..], Vec::as_slice);
+            let found = within(&mut allowance, || {
+                let usual = usual_joints(here, tv.frame.pose(), ov, arms);
+                let (teaching, inverse) = (&teaching, &arms.nominal);
+                mount((t, tv), (o, ov), &Mounts { teaching, knowledge: arms.knowledge, inverse, usual })
+            });
+            let found = match found {
+                Ok(mounted) => {
+                    out.list.push(mounted);
+                    out.objects.push(object);
+                    Ok(out.list.len() - 1)
+                }
+                Err(fault) => {
+                    out.assumed.push(fault);
+                    Err(Why::Contradicted)
+                }
+            };
+            out.places.insert((tool, object), found);
+        }
+        out.external_axes(listing, arms, cell);
+        out
+    }
+
+    /// Which external axes carry the base: those of which the cell file says so, and those of targets that lie farther
+    /// away than the arm is long, where the file says nothing.
+    fn external_axes(&mut self, listing: &Listing, arms: &Arms<'_>, cell: &Cell) {
+        let links = &arms.nominal.arm().model.links;
+        let flange = arms.nominal.arm().model.flange.translation.vector.norm();
+        let longest = flange + links.iter().map(|link| link.a_mm.abs() + link.d_mm.abs()).sum::<f64>();
+        let (mut first, mut moves) = ([None; 6], [false; 6]);
+        for motion in &listing.motions {
+            let targets = motion.targets.iter().filter_map(|target| target.value.ok());
+            for target in targets.filter_map(|value| value.cartesian().copied()) {
+                if target.external == [None; 6] {
+                    continue;
+                }
+                let far = self.of_motion(motion).is_ok_and(|mounted| {
+                    let flange = self.list[mounted].told.flange_for(&target.pose());
+                    !(flange.translation.vector.norm() <= longest)
+                });
+                for (axis, value) in target.external.iter().enumerate() {
+                    let Some(value) = value else { continue };
+                    moves[axis] |= *first[axis].get_or_insert(*value) != *value;
+                    self.base[axis] |= far && cell.carries(axis).is_none();
+                }
+            }
+        }
+        for (axis, letter) in ('a'..='f').enumerate() {
+            self.base[axis] |= cell.carries(axis) == Some(Carries::Base);
+            if !moves[axis] || cell.carries(axis).is_some() {
+                continue;
+            }
+            self.assumed.push(if self.base[axis] {
+                format!(
+                    "external axis {letter}: targets lie farther away than the arm is long, so it is taken to carry the \
+                     robot's base (cell file, [[external]])"
+                )
+            } else {
+                format!("external axis {letter} moves: taken not to carry the robot's base (cell file, [[external]])")
+            });
+        }
+    }
+
+    /// The external axis of a target that carries the base.
+    pub(crate) fn moving_base(&self, target: &RobTarget) -> Option<Why> {
+        let axis = (0..6).find(|&axis| self.base[axis] && target.external[axis].is_some())?;
+        Some(Why::MovingBase { axis })
+    }
+
+    /// The mounting of a motion, or why its tool or work object tells none.
+    pub(crate) fn of_motion(&self, motion: &Motion) -> Result<usize, Why> {
+        let missing = Err(Why::Program(Reason::MissingArgument));
+        let (Some(tool), Some(object)) = (motion.tool, motion.work_object) else { return missing };
+        self.places.get(&(tool, object)).copied().unwrap_or(missing)
+    }
+
+    /// The work object of each mounting of the list.
+    pub(crate) fn objects(&self) -> Vec<u32> {
+        self.objects.clone()
+    }
+
+    pub(crate) fn notes(&self) -> Vec<String> {
+        let mut said = HashSet::new();
+        let all = self.assumed.iter().chain(self.list.iter().flat_map(|m| &m.notes));
+        all.filter(|note| said.insert(note.as_str())).cloned().collect()
+    }
+}
+
+/// Motions of each pair of tool and work object: the first of them, which are asked for typical joints.
+fn typical(listing: &Listing) -> HashMap<(u32, u32), Vec<&Motion>> {
+    const ASKED: usize = 50;
+    let mut out: HashMap<(u32, u32), Vec<&Motion>> = HashMap::new();
+    for motion in &listing.motions {
+        let (Some(tool), Some(object)) = (motion.tool, motion.work_object) else { continue };
+        let here = out.entry((tool, object)).or_default();
+        if here.len() < ASKED {
+            here.push(motion);
+        }
+    }
+    out
+}
+
+/// Joints of the first target of these motions that is reached, at which the effect of unknown origins is estimated.
+fn usual_joints(motions: &[&Motion], tool: Pose, object: &WorkObjectValue, arms: &Arms<'_>) -> Joints {
+    let mounting = Mounting {
+        tool,
+        object: object.user_frame.pose() * object.object_frame.pose(),
+        holds_part: object.robhold,
+    };
+    let middle = Joints::from_fn(|i, _| {
+        let limits = &arms.nominal.arm().model.limits;
+        0.5 * (limits.min_rad[i] + limits.max_rad[i])
+    });
+    motions
+        .iter()
+        .filter_map(|m| m.to())
+        .filter_map(|t| t.value.ok().and_then(|v| v.cartesian().copied()))
+        .find_map(|t| {
+            let flange = mounting.flange_for(&t.pose());
+            configured(&arms.nominal, &flange, &t, Switch::Off, None).ok()
+        })
+        .unwrap_or(middle)
+}

@@ -1,0 +1,61 @@
+//! Where a surface file says that tool and work object lie, against what a program tells the controller.
+//!
+//! A place from metrology is true as it stands: a program whose frame lies elsewhere grinds elsewhere, and one of the two is
+//! wrong. A place that was taught may differ, since the controller's is what was taught.
+
+use crate::frames::taught::{Apart, WRITTEN, list};
+use truegrind_math::se3::Pose;
+use truegrind_programs::motion::{Listing, Tool, WorkObject};
+use truegrind_programs::nc::setup;
+use truegrind_surfaces::SurfaceFile;
+use truegrind_surfaces::file::Origin;
+
+/// What a surface file says from metrology and this program contradicts, one sentence each.
+pub fn misplaced(listing: &Listing, surface: &SurfaceFile) -> Vec<String> {
+    let mut out: Vec<String> = Vec::new();
+    let mut add = |fault: Option<String>| out.extend(fault);
+    if surface.tool.origin == Some(Origin::Metrology) {
+        let means = |tool: &&Tool| named(listing, &tool.name, tool.place.is_some(), &surface.tool.name);
+        let told = listing.tools.iter().filter(means).filter_map(|tool| tool.value.as_ref().ok());
+        let places: Vec<Pose> = told.map(|value| value.frame.pose()).collect();
+        add(fault("tool", &surface.tool.name, &surface.tool.flange_from_tool, &places));
+    }
+    if surface.work_object.origin == Some(Origin::Metrology) {
+        let stated = &surface.work_object;
+        let means = |object: &&WorkObject| named(listing, &object.name, object.place.is_some(), &stated.name);
+        // A displacement was never part of the place.
+        let undisplaced = |object: &WorkObject| {
+            let value = object.value.as_ref().ok()?;
+            let whole = value.user_frame.pose() * value.object_frame.pose();
+            Some(object.displacement.map_or(whole, |frame| whole * frame.pose().inverse()))
+        };
+        let places: Vec<Pose> = listing.work_objects.iter().filter(means).filter_map(undisplaced).collect();
+        add(fault("work_object", &stated.name, &stated.base_from_work_object, &places));
+    }
+    out
+}
+
+/// Whether a frame of the program goes by a name, as the text or its comments call it.
+fn named(listing: &Listing, name: &str, in_text: bool, stated: &str) -> bool {
+    name.eq_ignore_ascii_case(stated)
+        || !in_text
+            && (setup::same(name, stated)
+                || listing.labels_of(name).any(|label| label.eq_ignore_ascii_case(stated)))
+}
+
+/// The sentence for a place that no frame of the program bears out.
+fn fault(kind: &str, name: &str, stated: &Pose, told: &[Pose]) -> Option<String> {
+    let apart = |place: &&Pose| Apart::of(stated, place);
+    if told.iter().any(|place| apart(&place).within(WRITTEN)) {
+        return None;
+    }
+    let nearest = told.iter().min_by(|a, b| apart(a).mm.total_cmp(&apart(b).mm))?;
+    let Apart { mm, rad } = Apart::of(stated, nearest);
+    Some(format!(
+        "surface file: {kind} \"{name}\" lies at {} with origin = \"metrology\", {mm:.2} mm and {:.3}° away from where the program \
+         tells it, {}: correct the one that is wrong, or write origin = \"taught\" where the controller's was taught",
+        list(&stated.translation.vector),
+        rad.to_degrees(),
+        list(&nearest.translation.vector)
+    ))
+}

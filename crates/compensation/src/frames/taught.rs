@@ -1,0 +1,460 @@
+//! Frames that were taught with the arm: what the teaching joints say under the nominal and under a better arm.
+//!
+//! The controller worked out a taught frame from joints with the nominal arm N. Under N the teaching joints therefore give
+//! the frame that the program tells, but for rounding; where they do not, another tool touched the points, another frame
+//! was taught, or the joints are another arm's, and the frame must not be moved ([`contradictions`]). Where they do, the
+//! frame moves by what the better arm E makes of the same joints: F* = F_E F_N⁻¹ F. What rounding leaves between F_N and
+//! the told F is kept, so that angles of two decimals do as well as those of ten.
+
+pub(crate) use crate::frames::teaching_geometry::{Apart, WRITTEN, list};
+pub use crate::frames::teaching_geometry::{taught_frame, taught_tcp};
+
+use std::cell::OnceCell;
+use std::collections::HashSet;
+
+use nalgebra::{Point3, Vector3};
+
+use crate::cell::{Cell, CellFrame, FrameOrigin, Stated, Teaches};
+use crate::frames::known_tools::{Known, MOST_NAMES, Tools};
+use crate::frames::teaching_geometry::{
+    FixedPoint, explained, fixed_point, frame_of, half_step_rad, radians, rounded, touched,
+};
+use truegrind_arm::condition::Condition;
+use truegrind_arm::model::{Joints, Model, PreparedModel};
+use truegrind_math::se3::Pose;
+use truegrind_programs::motion::{Listing, Tool, ToolValue, WorkObject, WorkObjectValue};
+
+/// A tool that touched teaching points.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Pointer {
+    pub(crate) name: String,
+    /// Whether the robot holds it; otherwise it stands.
+    pub(crate) held: bool,
+    /// Its tip as the controller holds it (mm), on the flange or in the base.
+    told: Vector3<f64>,
+    /// As it is.
+    pub(crate) real: Vector3<f64>,
+}
+
+/// A tool as it is.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct RealTool {
+    pub(crate) pose: Pose,
+    /// By how much its TCP moved (mm), where it was re-evaluated.
+    pub(crate) moved_mm: Option<f64>,
+}
+
+/// A work object as it is.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct RealObject {
+    /// Where targets stand.
+    pub(crate) pose: Pose,
+    /// The taught points under the better arm, and their frame; absent where it was not re-evaluated.
+    pub(crate) taught: Option<TaughtFrame>,
+}
+
+/// The re-evaluated frame of a work object.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct TaughtFrame {
+    pub(crate) pointer: Pointer,
+    pub(crate) joints: [Joints; 3],
+    pub(crate) points: [Point3<f64>; 3],
+    pub(crate) frame: Pose,
+}
+
+/// What teaching points are judged by: the two arms, the cell, and the tools that are known.
+#[derive(Debug)]
+pub(crate) struct Teaching<'a> {
+    pub(crate) nominal: &'a PreparedModel<'a>,
+    pub(crate) estimated: &'a PreparedModel<'a>,
+    pub(crate) stated: Stated<'a>,
+    pub(crate) listing: &'a Listing,
+    /// [`Teaching::tools`], once they were asked for.
+    known: OnceCell<Tools<'a>>,
+}
+
+/// What the cell file says of tools and work objects and this program does not bear out, what it leaves open, and what the
+/// program's own comments on them misstate, one sentence each; nothing may be corrected before it is put right. `nominal` is the arm that the controller computes with.
+pub fn contradictions(listing: &Listing, cell: &Cell, nominal: &Model) -> Vec<String> {
+    let told = listing.misstated.iter().map(ToString::to_string);
+    let unusable: Vec<String> =
+        cell.open.iter().map(|entry| format!("cell file: {entry}")).chain(told).collect();
+    if !unusable.is_empty() {
+        return unusable;
+    }
+    let condition = Condition::default();
+    let arm = nominal.at_condition(&condition);
+    let teaching = Teaching::of(&arm, &arm, cell, listing);
+    let (mut seen, mut said) = (HashSet::new(), HashSet::new());
+    let mut out: Vec<String> = Vec::new();
+    for motion in &listing.motions {
+        let (Some(tool), Some(object)) = (listing.tool(motion), listing.work_object(motion)) else {
+            continue;
+        };
+        if !seen.insert((motion.tool, motion.work_object)) || listing.left_by_frames(motion).is_some() {
+            continue;
+        }
+        let (Ok(value), Ok(place)) = (&tool.value, &object.value) else { continue };
+        let found = [
+            twice("tool", &teaching.stated.tools(tool), &tool.name),
+            twice("wobj", &teaching.stated.objects(object), &object.name),
+            teaching.tool(tool, value).err(),
+            teaching.object(object, place).err(),
+        ];
+        for fault in found.into_iter().flatten() {
+            if said.insert(fault.clone()) {
+                out.push(fault);
+            }
+        }
+    }
+    out
+}
+
+/// Two entries of the cell file that mean one frame of the program.
+fn twice(kind: &str, found: &[&CellFrame], name: &str) -> Option<String> {
+    let mut found = found.iter().copied();
+    let first = found.next()?;
+    // Saying the same again contradicts nothing.
+    let second = found.find(|other| **other != CellFrame::of(&other.name, first.origin))?;
+    Some(format!(
+        "cell file: {kind} \"{}\" and {kind} \"{}\" are both {name} of the program: keep one of the two",
+        first.name, second.name
+    ))
+}
+
+fn at(position: &Vector3<f64>) -> Pose {
+    Pose::from_parts((*position).into(), nalgebra::UnitQuaternion::identity())
+}
+
+impl<'a> Teaching<'a> {
+    pub(crate) fn of(
+        nominal: &'a PreparedModel<'a>,
+        estimated: &'a PreparedModel<'a>,
+        cell: &'a Cell,
+        listing: &'a Listing,
+    ) -> Self {
+        Self { nominal, estimated, stated: Stated::of(cell, listing), listing, known: OnceCell::new() }
+    }
+
+    /// A tool as it is.
+    ///
+    /// # Errors
+    /// What the cell file says of it and cannot be.
+    pub(crate) fn tool(&self, tool: &Tool, value: &ToolValue) -> Result<RealTool, String> {
+        let told = value.frame.pose();
+        let stands = RealTool { pose: told, moved_mm: None };
+        let Some(stated) = self.stated.tool(tool) else { return Ok(stands) };
+        if tool.place.is_some() {
+            agrees("tool", stated, &told)?;
+        }
+        self.told_tool(stated, &told, value.robhold)
+    }
+
+    /// A tool of the cell file that the controller holds as `told`.
+    fn told_tool(&self, stated: &CellFrame, told: &Pose, held: bool) -> Result<RealTool, String> {
+        if stated.origin == FrameOrigin::Metrology || stated.teaching_deg.is_empty() {
+            return Ok(RealTool { pose: *told, moved_mm: None });
+        }
+        let name = &stated.name;
+        let joints = radians(&stated.teaching_deg);
+        let half = half_step_rad(&stated.teaching_deg);
+        let told_tip = told.translation.vector;
+        let (nominal, estimated, bound) = match (&stated.taught_with, held) {
+            (Some(pointer), true) => {
+                return Err(format!(
+                    "cell file: tool \"{name}\": taught_with = \"{pointer}\", but the robot holds {name}: its own poses about \
+                     one point tell its TCP; remove taught_with (it is for work objects, and for tools that stand)"
+                ));
+            }
+            (Some(_), false) => {
+                let pointer = self.pointer("tool", stated, true)?;
+                let tip = |arm: &PreparedModel<'_>, joints: &[Joints], tcp: &Vector3<f64>| {
+                    let touched = joints.iter().map(|q| (arm.forward(q) * Point3::from(*tcp)).coords);
+                    touched.sum::<Vector3<f64>>() / joints.len() as f64
+                };
+                let nominal = tip(self.nominal, &joints, &pointer.told);
+                let off = |q: &Joints| {
+                    ((self.nominal.forward(q) * Point3::from(pointer.told)).coords - nominal).norm_squared()
+                };
+                let scatter = 3.0 * joints.iter().map(off).sum::<f64>().sqrt() / joints.len() as f64;
+                let round = rounded(&joints, half, |q| Some(at(&tip(self.nominal, q, &pointer.told))));
+                (nominal, tip(self.estimated, &joints, &pointer.real), explained(round, scatter))
+            }
+            (None, _) => {
+                let pick = |found: FixedPoint| if held { found.on_flange } else { found.in_base };
+                let alike = || {
+                    format!(
+                        "cell file: tool \"{name}\": its {} teaching points are too much alike to tell the TCP: give four or \
+                         more with the tool turned by 30° and more between them",
+                        joints.len()
+                    )
+                };
+                if joints.len() < 4 {
+                    return Err(format!(
+                        "cell file: tool \"{name}\": {} teaching points, expected at least 4 (a tool that stands needs fewer \
+                         with taught_with)",
+                        joints.len()
+                    ));
+                }
+                let nominal = fixed_point(self.nominal, &joints).ok_or_else(alike)?;
+                let estimated = fixed_point(self.estimated, &joints).ok_or_else(alike)?;
+                let round =
+                    rounded(&joints, half, |q| fixed_point(self.nominal, q).map(|found| at(&pick(found))));
+                let scatter = 3.0 * nominal.sigma_mm[usize::from(!held)];
+                (pick(nominal), pick(estimated), explained(round, scatter))
+            }
+        };
+        let apart = (nominal - told_tip).norm();
+        if !(apart <= bound.mm) {
+            return Err(format!(
+                "cell file: tool \"{name}\": with the arm of the data sheet its teaching points put the TCP at {}, {apart:.2} mm \
+                 and 0° away from what the program tells, {} (up to {:.2} mm is explained by rounding and by the scatter of the \
+                 points): these are the joint angles of another tool or another arm, or the TCP was changed since; teach it \
+                 anew, or write origin = \"metrology\" without teaching_deg where its numbers are true",
+                list(&nominal),
+                list(&told_tip),
+                bound.mm
+            ));
+        }
+        let shift = estimated - nominal;
+        let mut pose = *told;
+        pose.translation.vector += shift;
+        Ok(RealTool { pose, moved_mm: Some(shift.norm()) })
+    }
+
+    /// A work object as it is.
+    ///
+    /// # Errors
+    /// What the cell file says of it and cannot be.
+    pub(crate) fn object(&self, object: &WorkObject, value: &WorkObjectValue) -> Result<RealObject, String> {
+        let user = value.user_frame.pose();
+        let within = value.object_frame.pose();
+        let as_told = RealObject { pose: user * within, taught: None };
+        let Some(stated) = self.stated.object(object) else { return Ok(as_told) };
+        // A displacement was not taught: it is on top of what was.
+        let displaced = object.displacement.map_or_else(Pose::identity, |frame| frame.pose());
+        let undisplaced = user * within * displaced.inverse();
+        if object.place.is_some() {
+            agrees("wobj", stated, &user)?;
+        }
+        if stated.origin == FrameOrigin::Metrology || stated.teaching_deg.is_empty() {
+            return Ok(as_told);
+        }
+        let Ok(joints) = <[Joints; 3]>::try_from(radians(&stated.teaching_deg)) else {
+            return Err(format!(
+                "cell file: wobj \"{}\": {} teaching points, expected 3: two on x, one on y",
+                stated.name,
+                stated.teaching_deg.len()
+            ));
+        };
+        let teaches = stated.teaches.unwrap_or_default();
+        let (told, on_top) = match teaches {
+            Teaches::Uframe => (user, within),
+            Teaches::Oframe => (undisplaced, displaced),
+        };
+        let part = value.robhold;
+        let pointer = self.pointer("wobj", stated, !part)?;
+        let in_line = || {
+            format!(
+                "cell file: wobj \"{}\": its three teaching points are in line: the third must lie beside the x axis",
+                stated.name
+            )
+        };
+        let nominal = frame_of(self.nominal, &joints, &pointer.told, part).ok_or_else(in_line)?;
+        let half = half_step_rad(&stated.teaching_deg);
+        let round = rounded(&joints, half, |q| frame_of(self.nominal, q, &pointer.told, part));
+        let bound = explained(round, 0.0);
+        if !Apart::of(&nominal, &told).within(bound) {
+            let other = match teaches {
+                Teaches::Uframe => undisplaced,
+                Teaches::Oframe => user,
+            };
+            return Err(self.other_frame(stated, &joints, part, (&nominal, &told, &other), bound, &pointer));
+        }
+        let points = touched(self.estimated, &joints, &pointer.real, part);
+        let frame = taught_frame(&points).ok_or_else(in_line)?;
+        let pose = frame * nominal.inverse() * told * on_top;
+        Ok(RealObject { pose, taught: Some(TaughtFrame { pointer, joints, points, frame }) })
+    }
+
+    /// The sentence for teaching points that make another frame than the one that is told, with the cause that explains
+    /// it, where one does.
+    fn other_frame(
+        &self,
+        stated: &CellFrame,
+        joints: &[Joints; 3],
+        part: bool,
+        (nominal, told, other): (&Pose, &Pose, &Pose),
+        bound: Apart,
+        pointer: &Pointer,
+    ) -> String {
+        let teaches = stated.teaches.unwrap_or_default();
+        let (frame, instead) = match teaches {
+            Teaches::Uframe => ("user frame (uframe)", "oframe"),
+            Teaches::Oframe => ("user frame with its object frame (uframe · oframe)", "uframe"),
+        };
+        let fits = |known: &&Known| {
+            known.held != part
+                && frame_of(self.nominal, joints, &known.frame.translation.vector, part)
+                    .is_some_and(|found| Apart::of(&found, told).within(bound))
+        };
+        let known = &self.tools().list;
+        let cause = if Apart::of(nominal, other).within(bound) {
+            let place =
+                if instead == "oframe" { "with its object frame" } else { "without its object frame" };
+            format!("they make the frame {place}: write teaches = \"{instead}\"")
+        } else if let Some(tool) = known.iter().find(fits) {
+            format!("they fit tool {}: write taught_with = \"{}\"", tool.name, tool.name)
+        } else {
+            "another tool touched them, they are the joint angles of another arm, or the frame was changed since: correct \
+             taught_with or teaching_deg, or write origin = \"metrology\" without them where the frame's numbers are true"
+                .to_owned()
+        };
+        let apart = Apart::of(nominal, told);
+        format!(
+            "cell file: wobj \"{}\": with the arm of the data sheet and tool {} its teaching points make a frame at {}, {:.2} mm \
+             and {:.3}° away from the {frame} that the program tells, at {} (up to {:.2} mm and {:.3}° is explained by rounding): \
+             {cause}",
+            stated.name,
+            pointer.name,
+            list(&nominal.translation.vector),
+            apart.mm,
+            apart.rad.to_degrees(),
+            list(&told.translation.vector),
+            bound.mm,
+            bound.rad.to_degrees()
+        )
+    }
+
+    /// The tool that touched the teaching points of `stated`; `held`: the robot must have held it.
+    fn pointer(&self, kind: &str, stated: &CellFrame, held: bool) -> Result<Pointer, String> {
+        let here = format!("cell file: {kind} \"{}\"", stated.name);
+        let known = self.tools();
+        let holds = if held { "that the robot holds" } else { "that stands" };
+        let found = match &stated.taught_with {
+            Some(name) => {
+                let mut same = known.called(name);
+                let Some(found) = same.next() else {
+                    return Err(format!(
+                        "{here}: taught_with = \"{name}\": no such tool has a known value, neither in the program nor in the \
+                         cell file: declare it in a module that is given, or write [[tool]] name = \"{name}\" with origin and \
+                         position_mm"
+                    ));
+                };
+                if same.any(|other| !Apart::of(&other.frame, &found.frame).within(WRITTEN)) {
+                    return Err(format!(
+                        "{here}: taught_with = \"{name}\": the program has several tools of that name with different values: \
+                         give the module of the one that touched the points alone"
+                    ));
+                }
+                if found.held != held {
+                    return Err(format!(
+                        "{here}: taught_with = \"{name}\": its points are touched by a tool {holds}, and {name} is none"
+                    ));
+                }
+                found
+            }
+            None => {
+                let fit = |known: &&Known| known.held == held && !known.name.eq_ignore_ascii_case("tool0");
+                let mut fitting: Vec<&Known> = known.list.iter().filter(fit).collect();
+                fitting.dedup_by(|a, b| a.is(&b.name));
+                match fitting[..] {
+                    [only] => only,
+                    [] => {
+                        return Err(format!(
+                            "{here}: which tool touched its teaching points is not said, and no tool {holds} is known: write \
+                             taught_with = \"NAME\""
+                        ));
+                    }
+                    _ => {
+                        let names = fitting.iter().map(|known| known.name.as_str()).take(MOST_NAMES);
+                        let more = match fitting.len().saturating_sub(MOST_NAMES) {
+                            0 => String::new(),
+                            more => format!(" and {more} more"),
+                        };
+                        return Err(format!(
+                            "{here}: which tool touched its teaching points is not said, and it may have been any of {}{more}: \
+                             write taught_with = \"NAME\"",
+                            names.collect::<Vec<_>>().join(", ")
+                        ));
+                    }
+                }
+            }
+        };
+        let real = match found.stated {
+            Some(stated) => self.told_tool(stated, &found.frame, found.held)?.pose,
+            None => found.frame,
+        };
+        Ok(Pointer {
+            name: found.name.clone(),
+            held,
+            told: found.frame.translation.vector,
+            real: real.translation.vector,
+        })
+    }
+
+    /// Every tool whose value is known, in the order of names: those of the program, those that the cell file places,
+    /// and tool0.
+    fn tools(&self) -> &Tools<'a> {
+        self.known.get_or_init(|| Tools::of(self.known()))
+    }
+
+    fn known(&self) -> Vec<Known<'a>> {
+        let mut out: Vec<Known<'a>> = Vec::new();
+        let mut seen = HashSet::new();
+        let tools = self.listing.declared_tools.iter().chain(&self.listing.tools);
+        for tool in tools {
+            let Ok(value) = &tool.value else { continue };
+            let (in_text, held, frame) = (tool.place.is_some(), value.robhold, value.frame.pose());
+            let place = frame.translation.vector.iter().chain(frame.rotation.coords.iter());
+            // Adding 0 makes −0 and 0 one.
+            let bits: Vec<u64> = place.map(|v| (v + 0.0).to_bits()).collect();
+            if seen.insert((tool.name.as_str(), in_text, held, bits)) {
+                let labels = self.stated.labels_of(&tool.name).to_vec();
+                let stated = self.stated.tool(tool);
+                out.push(Known { name: tool.name.clone(), in_text, frame, held, labels, stated });
+            }
+        }
+        let declared = Tools::of(std::mem::take(&mut out));
+        for stated in &self.stated.cell.tool {
+            if let Some(frame) = stated.pose()
+                && declared.called(&stated.name).next().is_none()
+            {
+                let name = stated.name.clone();
+                out.push(Known {
+                    name,
+                    in_text: false,
+                    frame,
+                    held: true,
+                    labels: Vec::new(),
+                    stated: Some(stated),
+                });
+            }
+        }
+        out.splice(..0, declared.list);
+        if !out.iter().any(|known| known.is("tool0")) {
+            let (name, frame) = ("tool0".to_owned(), Pose::identity());
+            out.push(Known { name, in_text: true, frame, held: true, labels: Vec::new(), stated: None });
+        }
+        out.sort_by_key(|known| known.name.to_ascii_lowercase());
+        out
+    }
+}
+
+/// Whether the cell file places a frame where the program does, if it places it at all.
+fn agrees(kind: &str, stated: &CellFrame, told: &Pose) -> Result<(), String> {
+    let Some(placed) = stated.pose() else { return Ok(()) };
+    let apart = Apart::of(&placed, told);
+    if apart.within(WRITTEN) {
+        return Ok(());
+    }
+    let what = if kind == "tool" { "frame" } else { "user frame" };
+    Err(format!(
+        "cell file: {kind} \"{}\": position_mm and quaternion_wxyz are {:.2} mm and {:.3}° away from the {what} that the program \
+         declares, at {}: a RAPID program says where it is; remove them, or correct the one that is wrong",
+        stated.name,
+        apart.mm,
+        apart.rad.to_degrees(),
+        list(&told.translation.vector)
+    ))
+}

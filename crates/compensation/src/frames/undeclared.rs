@@ -1,0 +1,88 @@
+//! Tools and work objects that motions use and no file declares: their names, and what to give so that they are known.
+
+use std::collections::BTreeMap;
+
+use truegrind_programs::motion::{Listing, Motion, Reason};
+use truegrind_programs::reading::Language;
+
+/// A tool or work object without a value.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Undeclared {
+    /// Whether it is a tool; else a work object or work offset.
+    pub tool: bool,
+    /// Its name as the program writes it.
+    pub name: String,
+    /// Motions that use it.
+    pub motions: usize,
+    /// The line of the first of them, from 1.
+    pub line: u32,
+}
+
+/// The tools and work objects of a listing that are declared in none of its files, in the order of their first use.
+pub fn undeclared(listing: &Listing) -> Vec<Undeclared> {
+    let mut found: BTreeMap<(bool, &str), Undeclared> = BTreeMap::new();
+    for motion in &listing.motions {
+        for (tool, name) in names(listing, motion) {
+            let line = motion.place.line;
+            let new = || Undeclared { tool, name: name.to_owned(), motions: 0, line };
+            found.entry((tool, name)).or_insert_with(new).motions += 1;
+        }
+    }
+    let mut found: Vec<Undeclared> = found.into_values().collect();
+    found.sort_by_key(|one| (one.line, !one.tool));
+    found
+}
+
+/// What a motion uses that is declared nowhere, and whether it is a tool.
+fn names<'a>(listing: &'a Listing, motion: &Motion) -> impl Iterator<Item = (bool, &'a str)> {
+    let nowhere = |reason: Option<&Reason>| {
+        matches!(reason, Some(Reason::Undeclared | Reason::ToolUnknown | Reason::WorkObjectUnknown))
+    };
+    let tool = listing.tool(motion).filter(|tool| nowhere(tool.value.as_ref().err()));
+    let object = listing.work_object(motion).filter(|object| nowhere(object.value.as_ref().err()));
+    let tool = tool.map(|tool| (true, tool.name.as_str()));
+    tool.into_iter().chain(object.map(|object| (false, object.name.as_str())))
+}
+
+/// One sentence for each, with what to give.
+pub(crate) fn notes(listing: &Listing, language: Language) -> Vec<String> {
+    let sentence = |one: &Undeclared| {
+        let (what, key) = match (one.tool, language) {
+            (true, _) => ("tool", "tool"),
+            (false, Language::Rapid) => ("work object", "wobj"),
+            (false, Language::Nc) => ("work offset", "wobj"),
+        };
+        let uses = if one.motions == 1 {
+            "1 motion uses".to_owned()
+        } else {
+            format!("{} motions use", one.motions)
+        };
+        let remedy = match language {
+            Language::Rapid => {
+                "give the module that declares it beside this one, or the whole folder with --together"
+                    .to_owned()
+            }
+            Language::Nc => format!(
+                "say where it is in a cell file (--cell): [[{key}]] name = \"{}\", origin = \"metrology\", position_mm = [x, y, z], \
+                 quaternion_wxyz = [w, x, y, z]",
+                one.name
+            ),
+        };
+        format!(
+            "{what} {} is declared in none of the files, and {uses} it (first: line {}): {remedy}",
+            one.name, one.line
+        )
+    };
+    let all = undeclared(listing);
+    let mut out: Vec<String> = all.iter().take(NAMED).map(sentence).collect();
+    if all.len() > NAMED {
+        out.push(format!(
+            "and {} more tools and work objects are declared in none of the files",
+            all.len() - NAMED
+        ));
+    }
+    out
+}
+
+/// How many are named.
+const NAMED: usize = 12;

@@ -1,0 +1,146 @@
+//! What a plan says beside its motions: what was not looked at or taken on trust, what backlash and loads mean here.
+
+use crate::arms::{Arms, yields};
+use crate::options::Options;
+use crate::target::solved_target::SolvedTargets;
+use truegrind_arm::effect::Effect;
+use truegrind_programs::motion::{Listing, Motion, MotionKind, Switch};
+
+/// What backlash means for this program.
+pub(crate) fn play_note(arms: &Arms<'_>, solved: &SolvedTargets) -> Option<String> {
+    let plays = arms.acting.play_rad.iter().enumerate().filter(|(_, play)| **play != 0.0);
+    let plays: Vec<String> =
+        plays.map(|(j, play)| format!("joint {}: {:.4}°", j + 1, play.abs().to_degrees())).collect();
+    if plays.is_empty() {
+        return None;
+    }
+    let unknown = match solved.in_play() {
+        (0, _) => String::new(),
+        (count, most) => format!(
+            "; at {count} targets the side of a joint cannot be told from the text (nothing moved it yet, or the motion \
+             before is not known): the middle of its play is taken, and half of it is in their σ (up to {most:.3} mm)"
+        ),
+    };
+    Some(format!(
+        "backlash ({}): the side from which each joint comes follows from the program's own motion{unknown}",
+        plays.join(", ")
+    ))
+}
+
+/// What may be wrong with the arm besides what is corrected.
+pub(crate) fn doubt_note(arms: &Arms<'_>) -> Option<String> {
+    let still = arms.estimated.arm().model.effects.iter().filter(|effect| effect.is_still());
+    let named: Vec<String> = still
+        .map(|effect| match effect.joint() {
+            Some(joint) => format!("{} of joint {}", effect.name(), joint + 1),
+            None => effect.name().to_owned(),
+        })
+        .collect();
+    (!named.is_empty())
+        .then(|| format!("in doubt, so not corrected for, but counted in every σ: {}", named.join(", ")))
+}
+
+/// What was not looked at, or taken on trust, and where.
+pub(crate) fn open_notes(listing: &Listing, solved: &SolvedTargets, unchecked: &[u32]) -> Vec<String> {
+    let mut out = Vec::new();
+    if let Some(lines) = lines_of(listing, unchecked) {
+        out.push(format!(
+            "{} of the lines and arcs start where the text alone does not tell, or where the program was not corrected: their \
+             ends are right, the path between is not checked ({lines})",
+            unchecked.len()
+        ));
+    }
+    if let Some(lines) = lines_of(listing, &listing.outside) {
+        out.push(format!(
+            "{} of the blocks call programs that do not stand in their file: these are taken to leave work offset, shifts, tool, \
+             units and tool centre point control as they are ({lines})",
+            listing.outside.len()
+        ));
+    }
+    let curve = |m: &u32| {
+        let motion = &listing.motions[*m as usize];
+        motion.left.is_none()
+            && motion.modal.wrist_interpolation == Switch::On
+            && matches!(motion.kind, MotionKind::Linear | MotionKind::Circular)
+    };
+    let wrist: Vec<u32> = (0..listing.motions.len() as u32).filter(curve).collect();
+    if let Some(lines) = lines_of(listing, &wrist) {
+        out.push(format!(
+            "on {} of the lines and arcs the controller turns the wrist joint by joint (SingArea \\Wrist): their paths are \
+             checked as if the tool turned evenly, and no targets are put in ({lines})",
+            wrist.len()
+        ));
+    }
+    if let Some(lines) = lines_of(listing, &solved.guessed) {
+        let count = solved.guessed.len();
+        out.push(if listing.numbered {
+            format!(
+                "where the arm stands before {count} of the motions the text does not tell, and no NC word states the \
+                 configuration: the most usual one is taken, unchecked ({lines})"
+            )
+        } else {
+            format!(
+                "{count} of the motions go, unchecked, to the configuration next to where the arm stands (ConfL \\Off, ConfJ \\Off), \
+                 which the text does not tell there: the one that keeps to the stated quarters best is taken ({lines})"
+            )
+        });
+    }
+    out
+}
+
+/// The lines of motions, the first few; `None` where there are none.
+fn lines_of(listing: &Listing, motions: &[u32]) -> Option<String> {
+    /// How many lines are named.
+    const NAMED: usize = 8;
+    let mut lines: Vec<String> =
+        motions.iter().map(|m| listing.motions[*m as usize].place.line.to_string()).take(4 * NAMED).collect();
+    lines.dedup();
+    let word = match lines.as_slice() {
+        [] => return None,
+        [_] => "line",
+        _ => "lines",
+    };
+    let more = if lines.len() > NAMED { " and more" } else { "" };
+    lines.truncate(NAMED);
+    Some(format!("{word} {}{more}", lines.join(", ")))
+}
+
+/// What was taken for the load of the arm.
+pub(crate) fn load_notes(listing: &Listing, arms: &Arms<'_>, options: &Options) -> Vec<String> {
+    let model = arms.estimated.arm().model;
+    let yields = model.effects.iter().any(yields);
+    let lumped = model.effects.iter().any(|e| matches!(e, Effect::LumpedCompliance(_)) && !e.is_still());
+    let Some(loads) = options.loads.as_ref().filter(|_| yields || lumped) else { return Vec::new() };
+    let mut out = Vec::new();
+    let motions = || listing.motions.iter().enumerate().filter(|(_, m)| m.left.is_none() && m.tool.is_some());
+    let at = |(index, motion): (usize, &Motion)| loads.at(index, motion, listing, model);
+    let stated: Vec<f64> = motions().filter_map(at).map(|load| load.mass_kg).collect();
+    let silent = motions().count() - stated.len();
+    let base = options.condition.payload_kg.map_or("no payload".to_owned(), |kg| format!("{kg} kg"));
+    if yields && let Some(&first) = stated.first() {
+        let (low, high) = stated.iter().fold((first, first), |(a, b), kg| (a.min(*kg), b.max(*kg)));
+        let range = if low == high { format!("{low} kg") } else { format!("{low} to {high} kg") };
+        out.push(format!(
+            "payload: {range}, as the program's tools and loads say (--payload states another)"
+        ));
+    }
+    if yields && silent > 0 {
+        out.push(format!(
+            "payload: at {silent} motions the tool states no mass, and that of the measurement is taken ({base}); \
+             --payload states it"
+        ));
+    }
+    if loads.unknown() > 0 {
+        out.push(format!(
+            "payload: at {} motions what GripLoad sets is not known from the text; the tool alone is counted",
+            loads.unknown()
+        ));
+    }
+    if lumped {
+        out.push(format!(
+            "compliance was found without the masses of the arm: it holds for the load of the measurement ({base}) and does \
+             not follow that of the program"
+        ));
+    }
+    out
+}

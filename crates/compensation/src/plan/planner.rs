@@ -1,0 +1,538 @@
+//! Rewriting: for every target what was meant, which joints make the estimated arm reach it, and what the controller
+//! must be told.
+//!
+//! With P the target in the work object, T and W tool and work object (as told t, w; as real t*, w*), N the nominal and
+//! E the estimated forward map: the program as it is reaches E(N⁻¹(w P t⁻¹)); meant is w* P in the base; the joints that
+//! reach it are q = E⁻¹(w* P t*⁻¹); the controller goes there when it is told P′ = w⁻¹ N(q) t, or q itself.
+//!
+//! Between two ends of a straight line the told path is a straight line of the *nominal* arm; the estimated arm bends
+//! it a little. The bend is sampled, and where it exceeds the tolerance targets are put in, by bisection.
+
+use std::collections::BTreeMap;
+
+use crate::arms::Arms;
+use crate::cell::Cell;
+use crate::configuration::monitored;
+use crate::cut::Cuts;
+use crate::deviation::{PathPoint, Status};
+use crate::feasibility::unchanged::{obstacle, staying};
+use crate::frames::frame_pair::Mounting;
+use crate::frames::frame_table::Mountings;
+use crate::options::{Options, may_change};
+use crate::plan::notes::{doubt_note, load_notes, open_notes, play_note};
+use crate::plan::reason::Why;
+use crate::plan::{MotionOutcome, Plan};
+use crate::risk::assessment::{Assessment, Chosen, Knowing, assessed};
+use crate::risk::placement::{Commanded, Wanted};
+use crate::search_budget;
+use crate::segment::corner::{CUT_MM, cut_of_lines};
+use crate::segment::joint_speed::{Pace, fastest};
+use crate::segment::line::{Ends, Path, middles_off};
+use crate::segment::segment_plan::{Passage, corner};
+use crate::target::original_joints::{AsItIs, Guess};
+use crate::target::solve::{solve_all, take_room};
+use crate::target::solved_target::{Solved, SolvedTargets, as_joints};
+use truegrind_arm::estimated::Estimated;
+use truegrind_arm::inverse::InverseError;
+use truegrind_arm::inverse::effort::{Allowance, within};
+use truegrind_arm::region::Outside;
+use truegrind_programs::motion::{Listing, Motion, MotionKind, MotionTarget, Role, Switch, TargetValue};
+use truegrind_programs::rewrite::{Change, NewTarget};
+
+/// Plans the rewrite of a program.
+///
+/// Motions are independent but for those without monitored configuration (ConfL\Off), which go from the motion
+/// before; the result does not depend on the number of threads.
+pub fn plan(listing: &Listing, estimated: &Estimated, cell: &Cell, options: &Options) -> Plan {
+    Targets::of(listing, estimated, cell, options).plan(&BTreeMap::new())
+}
+
+/// The targets of a program, worked out once for any number of plans.
+pub(crate) struct Targets<'a> {
+    listing: &'a Listing,
+    options: &'a Options,
+    arms: Arms<'a>,
+    mountings: Mountings,
+    /// The program as it is, where joints have play: only then targets are worked out once more.
+    program: Option<AsItIs<'a>>,
+    assessment: Assessment,
+    solved: SolvedTargets,
+    /// The motions that stay as they are in `solved`.
+    solved_without: BTreeMap<u32, Why>,
+}
+
+impl<'a> Targets<'a> {
+    pub(crate) fn of(
+        listing: &'a Listing,
+        estimated: &'a Estimated,
+        cell: &Cell,
+        options: &'a Options,
+    ) -> Self {
+        let mut arms = Arms::of(estimated, &options.condition);
+        let mut mountings = Mountings::of(listing, &arms, cell);
+        let program = AsItIs::of(listing, &arms, &mountings);
+        let assessment = assess(listing, &program, &mut arms, &mut mountings, options);
+        let solved_without = assessment.risky();
+        let solved =
+            solve_all(listing, &program, &mut arms, &mountings, &assessment, options, &solved_without);
+        let program = arms.acting.has_play().then_some(program);
+        Self { listing, options, arms, mountings, program, assessment, solved, solved_without }
+    }
+
+    /// The plan where some motions must stay as they are for reasons of the writer (`refused`, by index), and with them the
+    /// cuts that they are part of.
+    pub(crate) fn plan(&mut self, refused: &BTreeMap<u32, Why>) -> Plan {
+        let stays = self.settled(refused);
+        let Self { listing, options, arms, mountings, assessment, solved, .. } = self;
+        let mut plan = planned(&Job { listing, solved, stays: &stays, mountings, assessment, arms, options });
+        plan.placements.clone_from(&assessment.placements);
+        plan.cuts.clone_from(&assessment.cuts);
+        let rewritten = |motion: &u32| {
+            let outcome = plan.outcomes.get(*motion as usize);
+            outcome.is_some_and(|outcome| matches!(outcome.status, Status::Changed | Status::Flagged))
+        };
+        for cut in &mut plan.cuts {
+            cut.corrected = cut.motions.iter().any(rewritten);
+        }
+        let corrected = plan.cuts.iter().filter(|cut| cut.corrected);
+        plan.chance_of_worse =
+            arms.knowledge.and_then(|knowledge| assessment.chance_of(knowledge, corrected));
+        plan
+    }
+
+    /// The motions that stay. Where joints have play, what stays changes the sides from which the joints come to what
+    /// follows: then all targets are worked out again.
+    fn settled(&mut self, refused: &BTreeMap<u32, Why>) -> BTreeMap<u32, Why> {
+        let Self { listing, options, arms, mountings, program, assessment, solved, solved_without } = self;
+        let mut refused = refused.clone();
+        for (motion, why) in assessment.risky() {
+            refused.entry(motion).or_insert(why);
+        }
+        for _ in 0..MOST_SETTLING {
+            if let Some(program) = program
+                && refused != *solved_without
+            {
+                *solved = solve_all(listing, program, arms, mountings, assessment, options, &refused);
+                solved_without.clone_from(&refused);
+            } else {
+                solved.allow_again();
+            }
+            let stays = staying(listing, solved, mountings, arms, options, &refused);
+            if !arms.acting.has_play() {
+                return stays;
+            }
+            let more: Vec<(u32, Why)> = (0..listing.motions.len() as u32)
+                .filter(|motion| !refused.contains_key(motion))
+                .filter(|motion| !solved.of(*motion as usize).is_empty())
+                .filter(|motion| solved.of(*motion as usize).iter().all(Result::is_ok))
+                .filter_map(|motion| match obstacle(motion, listing, solved, options, &stays) {
+                    Some((Status::Refused, why)) => Some((motion, why)),
+                    _ => None,
+                })
+                .collect();
+            if more.is_empty() {
+                return stays;
+            }
+            refused.extend(more);
+        }
+        // A program of which every round takes away another piece is left as it is.
+        for motion in 0..listing.motions.len() as u32 {
+            refused.entry(motion).or_insert(Why::Inverse(InverseError::Abandoned));
+        }
+        refused
+    }
+}
+
+/// What the model knows of the program. Work objects of which the shape alone is corrected are displaced to where the
+/// path lies.
+fn assess(
+    listing: &Listing,
+    program: &AsItIs<'_>,
+    arms: &mut Arms<'_>,
+    mountings: &mut Mountings,
+    options: &Options,
+) -> Assessment {
+    let Some(knowledge) = arms.knowledge else { return Assessment::default() };
+    let chosen = Chosen::of(listing, |motion| program.knows(motion));
+    let loads = arms.loads(listing, options.loads.as_ref());
+    let at: BTreeMap<u32, Commanded> = chosen
+        .motions()
+        .into_iter()
+        .filter_map(|motion| {
+            let load = loads.get(motion as usize).and_then(Option::as_ref);
+            Some((motion, program.commanded(motion, arms.acting.place([0; 6], load))?))
+        })
+        .collect();
+    let objects = mountings.objects();
+    let with = Knowing { acting: &arms.acting, knowledge };
+    // Experiments take every motion as it is.
+    let max_risk = if options.cuts == Cuts::Single { 1.0 } else { options.max_risk };
+    let wanted = Wanted { placement: options.placement, max_risk, remedies: options.remedies };
+    assessed(listing, &chosen, &at, &mut mountings.list, &objects, &with, wanted)
+}
+
+/// Rounds in which what stays changes the sides of what follows; more are never made.
+const MOST_SETTLING: usize = 64;
+
+fn planned(job: &Job<'_>) -> Plan {
+    let Job { listing, solved, mountings, arms, options, .. } = *job;
+    let count = listing.motions.len();
+    let whole = Allowance::of(search_budget::PATHS).with_steps(search_budget::path_steps(count));
+    // Filled where they stay: lists of portions, put together, would be there twice.
+    let mut outcomes: Vec<MotionOutcome> = (0..count as u32).map(MotionOutcome::left).collect();
+    let mut changes: Vec<Option<Change>> = (0..count).map(|_| None).collect();
+    let mut places: Vec<Places<'_>> = outcomes.chunks_mut(PORTION).zip(changes.chunks_mut(PORTION)).collect();
+    let portions: Vec<Portion> =
+        search_budget::shared_out_into(whole, &mut places, |portion, places, allowance| {
+            let first = portion * PORTION;
+            job.portion(first..(first + PORTION).min(count), places, allowance)
+        });
+    let mut notes = mountings.notes();
+    notes.extend(play_note(arms, solved));
+    notes.extend(doubt_note(arms));
+    notes.extend(load_notes(listing, arms, options));
+    let unchecked: Vec<u32> = portions.iter().flat_map(|portion| portion.unchecked.iter().copied()).collect();
+    notes.extend(open_notes(listing, solved, &unchecked));
+    let changes = changes.into_iter().flatten().collect();
+    let mut plan = Plan { notes, changes, outcomes, ..Plan::default() };
+    plan.points.reserve_exact(portions.iter().map(|p| p.points.len()).sum());
+    for mut portion in portions {
+        plan.points.append(&mut portion.points);
+    }
+    plan.points.iter_mut().enumerate().for_each(|(index, point)| point.index = index);
+    plan
+}
+
+/// Motions that one thread takes at a time.
+const PORTION: usize = 64;
+
+/// What the motions of a program are worked out from.
+struct Job<'a> {
+    listing: &'a Listing,
+    solved: &'a SolvedTargets,
+    /// Motions that stay though their targets could be corrected.
+    stays: &'a BTreeMap<u32, Why>,
+    mountings: &'a Mountings,
+    assessment: &'a Assessment,
+    arms: &'a Arms<'a>,
+    options: &'a Options,
+}
+
+/// Where what becomes of some motions that follow each other goes.
+type Places<'p> = (&'p mut [MotionOutcome], &'p mut [Option<Change>]);
+
+/// What else became of them.
+struct Portion {
+    /// Lines and arcs that are written without their path having been checked.
+    unchecked: Vec<u32>,
+    points: Vec<PathPoint>,
+}
+
+/// The corrected end of a motion, where its last target was worked out.
+fn ends_of<'a>(
+    motion: &'a Motion,
+    targets: &[Result<Solved, Why>],
+    mountings: &'a Mountings,
+) -> Option<Ends<'a>> {
+    let Some(Ok(to)) = targets.last() else { return None };
+    let stated = motion.to().and_then(|target| target.value.as_ref().ok());
+    let cartesian = stated.and_then(TargetValue::cartesian);
+    Some(Ends {
+        mounted: &mountings.list[to.mounted],
+        index: to.mounted,
+        meant: to.meant,
+        told: to.told,
+        joints: to.after,
+        place: to.place,
+        before: to.before,
+        conf: cartesian.filter(|_| monitored(motion) != Switch::Off).map(|target| target.conf),
+        external: stated.map(TargetValue::external),
+    })
+}
+
+struct Worked {
+    change: Option<Change>,
+    outcome: MotionOutcome,
+    point: Option<PathPoint>,
+    /// Its way, where its targets are all corrected.
+    passage: Option<Passage>,
+}
+
+impl Worked {
+    /// Flags a motion that is written.
+    fn flag(&mut self, why: Why) {
+        (self.outcome.status, self.outcome.reason) = (Status::Flagged, Some(why));
+        if let Some(point) = &mut self.point {
+            (point.status, point.reason) = (Status::Flagged, Some(why.to_string()));
+        }
+    }
+}
+
+impl<'a> Job<'a> {
+    fn portion(
+        &self,
+        motions: std::ops::Range<usize>,
+        (outcomes, changes): &mut Places<'_>,
+        allowance: &mut Allowance,
+    ) -> Portion {
+        take_room();
+        let count = motions.len();
+        let paths: Vec<Option<Path<'a>>> = motions.clone().map(|index| self.path(index)).collect();
+        // Whether lines are straight shows in their middles, which are worked out together.
+        let straight = |index: usize| self.listing.motions[index].kind == MotionKind::Linear;
+        let lines: Vec<&Path<'a>> = motions
+            .clone()
+            .zip(&paths)
+            .filter(|(i, _)| straight(*i))
+            .filter_map(|(_, p)| p.as_ref())
+            .collect();
+        let middles = within(allowance, || middles_off(&lines, self.arms, self.options.emit));
+        let mut middles = middles.into_iter();
+        // The way of the motion before, which a corner asks for.
+        let mut last: Option<(u32, Passage)> = None;
+        let mut out = Portion {
+            unchecked: Vec::new(),
+            points: Vec::with_capacity(if self.options.points { count } else { 0 }),
+        };
+        let places = outcomes.iter_mut().zip(changes.iter_mut());
+        for ((index, path), (outcome, change)) in motions.zip(&paths).zip(places) {
+            let middle = if straight(index) && path.is_some() { middles.next() } else { None };
+            let middle = middle.unwrap_or(f64::INFINITY);
+            let mut worked = within(allowance, || self.work(index, path.as_ref(), middle, last.as_ref()));
+            if allowance.ran_out && worked.change.is_some() {
+                worked.flag(Why::Inverse(InverseError::Abandoned));
+            }
+            last = worked.passage.map(|passage| (index as u32, passage));
+            let motion = &self.listing.motions[index];
+            let curve = matches!(motion.kind, MotionKind::Linear | MotionKind::Circular);
+            if curve && path.is_none() && worked.change.is_some() {
+                out.unchecked.push(index as u32);
+            }
+            (*outcome, *change) = (worked.outcome, worked.change);
+            out.points.extend(worked.point);
+        }
+        out
+    }
+
+    /// The path to the end of a motion, as one of its tool in its work object; `None` where it is not one between two corrected
+    /// ends.
+    fn path(&self, index: usize) -> Option<Path<'a>> {
+        let motion = &self.listing.motions[index];
+        if !matches!(motion.kind, MotionKind::Linear | MotionKind::Circular | MotionKind::Joint) {
+            return None;
+        }
+        let previous = motion.previous? as usize;
+        let before = &self.listing.motions[previous];
+        let targets = self.solved.of(previous);
+        let changes =
+            |target: &Result<Solved, Why>| target.as_ref().is_ok_and(|solved| solved.forbidden.is_none());
+        if !may_change(before, self.options)
+            || !targets.iter().all(changes)
+            || self.stays.contains_key(&(previous as u32))
+        {
+            return None;
+        }
+        let from = ends_of(before, targets, self.mountings)?;
+        let to = ends_of(motion, self.solved.of(index), self.mountings)?;
+        let way = self.solved.way(index, to.place);
+        let from = if from.index == to.index { from } else { from.under(&to) };
+        Some(Path { from, to, way })
+    }
+
+    /// How far the corner at the start of a motion leaves the intended one, where the robot rounds it. `last`: the way of
+    /// the motion that was worked out before this one.
+    fn corner(
+        &self,
+        motion: &Motion,
+        path: Option<&Path<'a>>,
+        passage: &Passage,
+        last: Option<&(u32, Passage)>,
+    ) -> Option<f64> {
+        let Path { from: point, to, way } = path?;
+        passage.courses.as_ref()?;
+        let previous = motion.previous? as usize;
+        let before = &self.listing.motions[previous];
+        let zone_mm = self.listing.zone(before)?.value.as_ref().ok().filter(|zone| !zone.fine)?.tcp_mm;
+        // How a corner goes on under another tool or work object is not told.
+        if self.solved.of(previous).last()?.as_ref().ok()?.mounted != point.index {
+            return None;
+        }
+        if before.kind == MotionKind::Linear && motion.kind == MotionKind::Linear {
+            // Nearly all lines go on nearly straight: that is told by three points.
+            let first = self.solved.of(before.previous? as usize).last()?.as_ref().ok()?;
+            let points = [&first.meant, &point.meant, &to.meant].map(|pose| pose.translation.vector);
+            if !(cut_of_lines(&points, zone_mm) > CUT_MM) {
+                return None;
+            }
+        }
+        let places = [point.place, way.at(0.0)];
+        let bend =
+            |way_in: &Passage| corner(point, way_in, passage, zone_mm, places, self.arms, self.options.emit);
+        if let Some((index, way_in)) = last
+            && Some(*index) == motion.previous
+        {
+            return bend(way_in);
+        }
+        let path = self.path(previous)?;
+        let middle = middles_off(&[&path], self.arms, self.options.emit)[0];
+        let good: Vec<&Solved> = self.solved.of(previous).iter().filter_map(|t| t.as_ref().ok()).collect();
+        bend(&Passage::of(before, Some(&path), &good, middle, self.arms, self.options))
+    }
+
+    /// What becomes of one motion. `middle_mm`: how far its told line bends in the middle. `last`: the way of the motion
+    /// that was worked out before this one.
+    fn work(
+        &self,
+        index: usize,
+        path: Option<&Path<'a>>,
+        middle_mm: f64,
+        last: Option<&(u32, Passage)>,
+    ) -> Worked {
+        work(index, self, path, middle_mm, last)
+    }
+}
+
+fn work<'a>(
+    index: usize,
+    job: &Job<'a>,
+    path: Option<&Path<'a>>,
+    middle_mm: f64,
+    last: Option<&(u32, Passage)>,
+) -> Worked {
+    let Job { listing, solved, arms, options, .. } = *job;
+    let motion = &listing.motions[index];
+    let mut outcome = MotionOutcome::left(index as u32);
+    let finish = |mut outcome: MotionOutcome, status, reason, change, point: Option<PathPoint>| {
+        outcome.status = status;
+        outcome.reason = reason;
+        let point = point.map(|mut p| {
+            p.status = status;
+            p.reason = reason.map(|r| r.to_string());
+            if !matches!(status, Status::Changed | Status::Flagged) {
+                (p.after, p.joints_after) = (p.before, p.joints_before);
+            }
+            p
+        });
+        Worked { change, outcome, point, passage: None }
+    };
+    let targets = solved.of(index);
+    let point = match targets.last() {
+        Some(Ok(to)) => {
+            outcome.before_mm = Some(to.off_mm[0]);
+            outcome.after_mm = outcome.before_mm;
+            outcome.sigma_mm = Some(to.sigma_mm);
+            outcome.shape_sigma_mm = to.shape_sigma_mm;
+            options.points.then(|| {
+                let real = &job.mountings.list[to.mounted].real;
+                path_point(motion, to, real, job.assessment.shape_alone(index as u32))
+            })
+        }
+        _ => None,
+    };
+    if let Some((status, why)) = obstacle(index as u32, listing, solved, options, job.stays) {
+        return finish(outcome, status, Some(why), None, point);
+    }
+    let good: Vec<&Solved> = targets.iter().filter_map(|t| t.as_ref().ok()).collect();
+    // Then the path from the motion before.
+    let passage = Passage::of(motion, path, &good, middle_mm, arms, options);
+    (outcome.bend_mm, outcome.inserted) = (passage.bend_mm, passage.before.len());
+    // What is said of the motion beside this holds for the configuration that was guessed.
+    let guessed = options.open_starts && motion.configures && good.iter().any(|s| s.guess != Guess::No);
+    let mut flag = if guessed { Some(Why::OpenStart) } else { passage.flag };
+    if let Some(corner) = job.corner(motion, path, &passage, last) {
+        outcome.bend_mm = Some(outcome.bend_mm.map_or(corner, |bend| bend.max(corner)));
+        if !(corner <= options.tolerance_mm) {
+            flag = flag.or(Some(Why::Corner { mm: corner }));
+        }
+    }
+    let flag = flag.or_else(|| path.and_then(|path| too_fast(index, motion, listing, path, &passage, arms)));
+    let flag = flag.or_else(|| good.iter().find_map(|s| doubtful(s, arms)));
+    let new = |(target, solved): (&MotionTarget, &&Solved)| match target.role {
+        Role::Via if passage.straight => NewTarget::Drop,
+        _ => new_target(target, solved, motion, options),
+    };
+    let new_targets: Vec<NewTarget> = motion.targets.iter().zip(&good).map(new).collect();
+    outcome.after_mm = good.last().map(|s| s.off_mm[1]);
+    let change = Change { motion: index as u32, targets: new_targets, before: passage.before.clone() };
+    let status = if flag.is_some() { Status::Flagged } else { Status::Changed };
+    Worked { passage: Some(passage), ..finish(outcome, status, flag, Some(change), point) }
+}
+
+/// A joint that would turn faster than it can at the programmed speed: the controller slows down there, or stops.
+fn too_fast(
+    index: usize,
+    motion: &Motion,
+    listing: &Listing,
+    Path { from, to, .. }: &Path<'_>,
+    passage: &Passage,
+    arms: &Arms<'_>,
+) -> Option<Why> {
+    let pace = if motion.timed {
+        Pace::Duration(*listing.durations_s.get(&(index as u32))?.as_ref().ok()?)
+    } else {
+        Pace::Speed(listing.speed(motion)?.value.as_ref().ok()?)
+    };
+    let [_, told] = passage.courses.as_ref()?;
+    let (joint, ratio) = fastest(from, to, told, &pace, arms)?;
+    (ratio > 1.0).then_some(Why::TooFast { joint, ratio })
+}
+
+fn doubtful(solved: &Solved, arms: &Arms<'_>) -> Option<Why> {
+    match solved.outside {
+        Some(Outside::Joint { joint, by_deg }) => return Some(Why::JointNotMeasured { joint, by_deg }),
+        Some(Outside::Coverage { ratio }) => return Some(Why::NotCovered { ratio }),
+        None => {}
+    }
+    let reference = arms.knowledge.map_or(f64::INFINITY, |k| k.region.sigma_mm);
+    (solved.sigma_mm > SIGMA_GROWTH * reference).then_some(Why::Uncertain { sigma_mm: solved.sigma_mm })
+}
+
+/// A pose whose predicted σ exceeds the worst measured pose's by this factor is flagged.
+const SIGMA_GROWTH: f64 = 2.0;
+
+fn new_target(target: &MotionTarget, solved: &Solved, motion: &Motion, options: &Options) -> NewTarget {
+    if as_joints(motion, target, options.emit) {
+        return NewTarget::Joint { robot_deg: std::array::from_fn(|i| solved.after[i].to_degrees()) };
+    }
+    let q = solved.told.rotation.quaternion();
+    let old = target.value.ok().and_then(|v| v.cartesian().map(|t| t.conf));
+    let new = [solved.conf.cf1, solved.conf.cf4, solved.conf.cf6, solved.conf.cfx];
+    // A dummy configuration that nobody monitors stays as it is; cfx stays where only the quarters are used.
+    let conf = match old {
+        Some(old) if monitored(motion) != Switch::Off && old[..3] != new[..3] => {
+            Some([new[0], new[1], new[2], old[3]])
+        }
+        _ => None,
+    };
+    NewTarget::Cartesian {
+        position_mm: solved.told.translation.vector.into(),
+        quaternion: [q.w, q.i, q.j, q.k],
+        conf,
+    }
+}
+
+fn path_point(motion: &Motion, solved: &Solved, real: &Mounting, shape_alone: bool) -> PathPoint {
+    let of_shape = solved.shape_sigma_mm.filter(|_| shape_alone);
+    let flange = real.flange_for(&solved.meant);
+    let base_from_object = real.base_from_object(&flange);
+    PathPoint {
+        index: 0,
+        line: motion.place.line,
+        instruction: motion.instruction.to_string(),
+        kind: motion.kind,
+        cutting: matches!(motion.kind, MotionKind::Linear | MotionKind::Circular),
+        base_from_object,
+        flange_from_tool: real.flange_from_tool(&flange),
+        intended: base_from_object * solved.meant,
+        normal: None,
+        joints_before: Some(solved.before),
+        joints_after: Some(solved.after),
+        before: solved.deviations.as_ref().map(|deviations| deviations[0]),
+        after: solved.deviations.as_ref().map(|deviations| deviations[1]),
+        sigma_mm: Some(of_shape.unwrap_or(solved.sigma_mm)),
+        shape_sigma_mm: solved.shape_sigma_mm,
+        outside: solved.outside,
+        status: Status::Changed,
+        reason: None,
+    }
+}

@@ -1,0 +1,28 @@
+//! Deviations along the normal of the surface that is ground.
+
+use nalgebra::Point3;
+
+use crate::plan::Plan;
+use truegrind_surfaces::SurfaceFile;
+
+/// A point this close to the surface is on it (mm).
+const ON_MM: f64 = 0.5;
+
+impl Plan {
+    /// Adds the normal of the surface to every point that stands over it, and what each is off along it. Points that stand away
+    /// from the surface cut nothing.
+    pub fn add_normals(&mut self, surface: &SurfaceFile) {
+        for point in &mut self.points {
+            let in_object = point.base_from_object.inverse() * point.intended;
+            let Some(foot) = surface.surface.foot(&Point3::from(in_object.translation.vector)) else {
+                continue;
+            };
+            let normal = foot.contact.normal.into_inner();
+            point.cutting &= foot.normal_mm.abs() < ON_MM;
+            point.normal = Some(normal);
+            for deviation in [&mut point.before, &mut point.after].into_iter().flatten() {
+                deviation.normal_mm = Some(normal.dot(&deviation.vector_mm));
+            }
+        }
+    }
+}

@@ -1,0 +1,244 @@
+//! What the model knows of a program before anything is corrected: where the path over each work object lies, how likely
+//! each cut gets worse, and the best registration of each cut, against which the sigma of its shape is stated.
+//!
+//! All of it follows from some targets of the program as it is, evenly spread, with every joint in the middle of its play.
+
+use std::collections::BTreeMap;
+
+use nalgebra::DVector;
+use rayon::prelude::*;
+
+use crate::condition::arm_conditions::Circumstances;
+use crate::cut::{self, CutsOf};
+use crate::frames::frame_pair::Mounted;
+use crate::plan::reason::Why;
+use crate::risk::cut_risk::{self, CutRisk, Judgement};
+use crate::risk::placement::{self, Commanded, ObjectPlacement, Off, Placement, Wanted, placed, spread};
+use crate::risk::probability::chance;
+use crate::risk::remedy_search::{self, Place};
+use truegrind_arm::estimated::{Carried, Estimated};
+use truegrind_programs::motion::Listing;
+
+/// What is known of a program.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Assessment {
+    /// One for each work object.
+    pub(crate) placements: Vec<ObjectPlacement>,
+    /// One for each cut.
+    pub(crate) cuts: Vec<CutRisk>,
+    /// What each cut has a part in, taken together.
+    shares: Vec<Share>,
+    /// The cut of each motion, as its place in `cuts`; empty without any.
+    cut_of: Vec<Option<u32>>,
+    /// The best registration of each cut, in the base; absent where the robot holds the part.
+    registered: Vec<Option<Carried>>,
+}
+
+impl Assessment {
+    /// The motions that stay since their cut would too likely get worse.
+    pub(crate) fn risky(&self) -> BTreeMap<u32, Why> {
+        let left = self.cuts.iter().filter(|cut| cut.left);
+        left.flat_map(|cut| cut.motions.iter().map(|motion| (*motion, Why::Risk { chance: cut.chance })))
+            .collect()
+    }
+
+    /// Against what the shape of a motion's cut is known: a frame that moves with the arm's parameters as the cut does.
+    pub(crate) fn registered(&self, motion: u32) -> Option<&Carried> {
+        self.registered[self.place(motion)?].as_ref()
+    }
+
+    /// The sigma of the shape of a motion's cut (RMS, mm), for parts that the robot holds.
+    pub(crate) fn sigma_of_cut_mm(&self, motion: u32) -> Option<f64> {
+        let place = self.place(motion)?;
+        (self.registered[place].is_none()).then_some(self.cuts[place].shape_sigma_mm)
+    }
+
+    /// Whether the shape of a motion's cut is corrected, and its place not.
+    pub(crate) fn shape_alone(&self, motion: u32) -> bool {
+        self.place(motion).is_some_and(|place| self.cuts[place].judged == Placement::Shape)
+    }
+
+    /// Probability that these cuts get worse, taken together; absent without any.
+    pub(crate) fn chance_of<'c>(
+        &self,
+        knowledge: &Estimated,
+        cuts: impl IntoIterator<Item = &'c CutRisk>,
+    ) -> Option<f64> {
+        let mut whole = Whole::of(knowledge);
+        let places = cuts.into_iter().filter_map(|cut| self.place(*cut.motions.first()?));
+        places.filter_map(|place| self.shares.get(place)).for_each(|share| whole.add(share));
+        whole.chance(knowledge)
+    }
+
+    fn place(&self, motion: u32) -> Option<usize> {
+        self.cut_of.get(motion as usize).copied().flatten().map(|place| place as usize)
+    }
+}
+
+/// What is asked: the estimated arm, under each condition that the targets were given.
+pub(crate) struct Knowing<'a, 'm> {
+    pub(crate) acting: &'a Circumstances<'m>,
+    pub(crate) knowledge: &'a Estimated,
+}
+
+/// The targets that are looked at: of each work object and of each cut, the point included at which it begins.
+pub(crate) struct Chosen {
+    objects: Vec<(u32, Vec<u32>)>,
+    cuts: Vec<(Vec<u32>, Vec<u32>)>,
+}
+
+impl Chosen {
+    /// Those of the motions that `reached` says something of.
+    pub(crate) fn of(listing: &Listing, reached: impl Fn(usize) -> bool) -> Self {
+        let cuts: CutsOf = cut::of(listing);
+        let mut of_object: BTreeMap<u32, [Vec<u32>; 2]> = BTreeMap::new();
+        // Its motions, and the ends of others at which it begins.
+        let mut of_cut: BTreeMap<u32, [Vec<u32>; 2]> = BTreeMap::new();
+        for (index, motion) in (0_u32..).zip(&listing.motions) {
+            let cut = cuts.root(index);
+            if let Some(root) = cut {
+                let begins = motion.previous.filter(|before| {
+                    let before_that = &listing.motions[*before as usize];
+                    cuts.root(*before) != cut
+                        && (before_that.tool, before_that.work_object) == (motion.tool, motion.work_object)
+                });
+                let [all, begin] = of_cut.entry(root).or_default();
+                all.push(index);
+                begin.extend(begins);
+            }
+            if let Some(object) = motion.work_object.filter(|_| reached(index as usize)) {
+                of_object.entry(object).or_default()[usize::from(cut.is_none())].push(index);
+            }
+        }
+        // Where something is cut, the way through the air does not count.
+        let objects = of_object.into_iter().map(|(object, [cuts, rest])| {
+            (object, spread(if cuts.is_empty() { &rest } else { &cuts }, placement::MOST_POINTS))
+        });
+        let cuts = of_cut.into_values().filter_map(|[all, begin]| {
+            let told: Vec<u32> = begin.iter().chain(&all).copied().filter(|m| reached(*m as usize)).collect();
+            (!told.is_empty()).then(|| (all, spread(&told, cut_risk::MOST_POINTS)))
+        });
+        Self { objects: objects.collect(), cuts: cuts.collect() }
+    }
+
+    /// Every motion that is looked at, once.
+    pub(crate) fn motions(&self) -> Vec<u32> {
+        let objects = self.objects.iter().flat_map(|(_, motions)| motions);
+        let mut all: Vec<u32> = objects.chain(self.cuts.iter().flat_map(|(_, told)| told)).copied().collect();
+        all.sort_unstable();
+        all.dedup();
+        all
+    }
+}
+
+/// Assesses a program. `at` are the targets of [`Chosen::motions`], by motion. Work objects of which the shape alone is
+/// corrected are displaced in `list` to where the path lies.
+pub(crate) fn assessed(
+    listing: &Listing,
+    chosen: &Chosen,
+    at: &BTreeMap<u32, Commanded>,
+    list: &mut [Mounted],
+    objects: &[u32],
+    with: &Knowing<'_, '_>,
+    wanted: Wanted,
+) -> Assessment {
+    let Knowing { acting, knowledge } = *with;
+    let mut out = Assessment { cut_of: vec![None; listing.motions.len()], ..Assessment::default() };
+    let mut taken: BTreeMap<u32, Placement> = BTreeMap::new();
+    for (object, motions) in &chosen.objects {
+        let targets: Vec<Commanded> = motions.iter().filter_map(|m| at.get(m).copied()).collect();
+        let name = &listing.work_objects[*object as usize].name;
+        let found = placed(name, &targets, list, acting, knowledge, wanted);
+        let Some((mut placement, displaced)) = found else { continue };
+        if placement.taken == Placement::Shape && wanted.remedies {
+            let max_risk = wanted.max_risk;
+            let place = Place { targets: &targets, list: &*list, acting, knowledge, max_risk };
+            placement.remedy = remedy_search::remedy(&place);
+        }
+        taken.insert(*object, placement.taken);
+        out.placements.push(placement);
+        if let Some(motion) = displaced {
+            for (mounted, _) in list.iter_mut().zip(objects).filter(|(_, of)| **of == *object) {
+                mounted.real.object *= motion;
+            }
+        }
+    }
+    let list: &[Mounted] = list;
+    let judged: Vec<Option<(Judged, Judgement)>> = chosen
+        .cuts
+        .par_iter()
+        .map(|(motions, told)| {
+            let targets: Vec<&Commanded> = told.iter().filter_map(|m| at.get(m)).collect();
+            let mounted = &list[targets.first()?.mounted];
+            let object = listing.motions[motions[0] as usize].work_object?;
+            let placement = *taken.get(&object)?;
+            let off: Vec<Off> = targets.iter().map(|t| Off::of(t, mounted, acting, knowledge)).collect();
+            let judgement = cut_risk::judged(&off, knowledge, placement)?;
+            let weight = motions.len() as f64 / off.len() as f64;
+            let carried = (!mounted.real.holds_part)
+                .then(|| cut_risk::in_base(&judgement.registered, &mounted.real.object));
+            Some((Judged { placement, points: off.len(), weight, carried }, judgement))
+        })
+        .collect();
+    for ((motions, _), judged) in chosen.cuts.iter().zip(judged) {
+        let Some((judged, judgement)) = judged else { continue };
+        let chance = chance(judgement.square, &judgement.toward, knowledge, judged.points);
+        let left = !(chance <= wanted.max_risk);
+        let place = out.cuts.len() as u32;
+        motions.iter().for_each(|m| out.cut_of[*m as usize] = Some(place));
+        out.cuts.push(CutRisk {
+            motions: motions.clone(),
+            judged: judged.placement,
+            off_mm: judgement.off_mm,
+            sigma_mm: judgement.sigma_mm,
+            shape_sigma_mm: judgement.shape_sigma_mm,
+            chance,
+            left,
+            corrected: false,
+        });
+        out.registered.push(judged.carried);
+        out.shares.push(Share {
+            points: judged.weight * judged.points as f64,
+            square: judged.weight * judgement.square,
+            toward: judgement.toward * judged.weight,
+        });
+    }
+    out
+}
+
+/// How a cut was judged.
+struct Judged {
+    placement: Placement,
+    points: usize,
+    /// Motions for each point that was asked.
+    weight: f64,
+    carried: Option<Carried>,
+}
+
+/// What a cut weighs among others: points, |d|² (mm²), and Jᵀ d.
+#[derive(Debug, Clone)]
+struct Share {
+    points: f64,
+    square: f64,
+    toward: DVector<f64>,
+}
+
+/// Cuts together.
+struct Whole(Share);
+
+impl Whole {
+    fn of(knowledge: &Estimated) -> Self {
+        Self(Share { points: 0.0, square: 0.0, toward: DVector::zeros(knowledge.order.len()) })
+    }
+
+    fn add(&mut self, cut: &Share) {
+        self.0.points += cut.points;
+        self.0.square += cut.square;
+        self.0.toward += &cut.toward;
+    }
+
+    fn chance(&self, knowledge: &Estimated) -> Option<f64> {
+        let Share { points, square, toward } = &self.0;
+        (*points > 0.0).then(|| chance(*square, toward, knowledge, points.round() as usize))
+    }
+}

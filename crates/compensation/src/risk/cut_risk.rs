@@ -1,0 +1,103 @@
+//! The chance that a correction makes a cut worse than it is.
+//!
+//! A path whose shape alone is corrected is judged by what its best rigid registration leaves. The probability itself is in
+//! `probability`.
+
+use nalgebra::{DVector, Matrix3xX, Vector3, Vector6};
+
+use crate::risk::placement::{Off, Placement};
+use crate::risk::registration::Registration;
+use truegrind_arm::estimated::{Carried, Estimated};
+use truegrind_math::se3::Pose;
+
+/// What is known of one cut.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CutRisk {
+    /// Its motions, by index, in order.
+    pub motions: Vec<u32>,
+    /// Whether its shape is judged, or its place too.
+    pub judged: Placement,
+    /// How far it is off as it is (RMS, mm).
+    pub off_mm: f64,
+    /// Predicted standard deviation of its correction (RMS, mm).
+    pub sigma_mm: f64,
+    /// Predicted standard deviation of its shape, after its best rigid registration (RMS, mm).
+    pub shape_sigma_mm: f64,
+    /// Probability that the correction makes it worse.
+    pub chance: f64,
+    /// Whether it is left as it is for that.
+    pub left: bool,
+    /// Whether it is rewritten, or with [`Cuts::Partial`](crate::cut::Cuts::Partial) a part of it: a cut of which no motion is
+    /// likely to get worse may stay for another reason, which its motions say.
+    pub corrected: bool,
+}
+
+/// A cut, judged.
+pub(crate) struct Judgement {
+    pub(crate) off_mm: f64,
+    pub(crate) sigma_mm: f64,
+    pub(crate) shape_sigma_mm: f64,
+    /// |d|² (mm²), and Jᵀ d: added up they judge the program.
+    pub(crate) square: f64,
+    pub(crate) toward: DVector<f64>,
+    /// Twists of the best registration per unit of each parameter, in the work object, and the point that they turn about.
+    pub(crate) registered: Carried,
+}
+
+/// Points of a cut by which it is judged; more are not asked.
+pub(crate) const MOST_POINTS: usize = 32;
+
+/// Judges the points of a cut.
+pub(crate) fn judged(off: &[Off], knowledge: &Estimated, placement: Placement) -> Option<Judgement> {
+    let registration = Registration::of(&off.iter().map(|o| o.meant).collect::<Vec<_>>())?;
+    let twists = registration.twists(off.iter().map(|o| &o.jacobian));
+    let twist = registration.twist(off.iter().map(|o| &o.shift));
+    let (mut square, mut variance, mut of_shape) = (0.0, 0.0, 0.0);
+    let mut toward = DVector::zeros(knowledge.order.len());
+    let spread = |jacobian: &Matrix3xX<f64>| (jacobian * &knowledge.covariance).component_mul(jacobian).sum();
+    for (k, point) in off.iter().enumerate() {
+        let mut shape = point.jacobian.clone();
+        for p in 0..shape.ncols() {
+            let moved = registration.shift(&twists.column(p).into_owned(), k);
+            (0..3).for_each(|i| shape[(i, p)] -= moved[i]);
+        }
+        of_shape += spread(&shape);
+        let (shift, jacobian) = match placement {
+            Placement::Shape => (point.shift - registration.shift(&twist, k), &shape),
+            _ => (point.shift, &point.jacobian),
+        };
+        square += shift.norm_squared();
+        toward += jacobian.tr_mul(&shift);
+        variance += spread(jacobian);
+    }
+    let rms = |sum: f64| (sum.max(0.0) / off.len() as f64).sqrt();
+    let registered = Carried {
+        origin_mm: registration.centre.coords,
+        twists: twists.column_iter().map(|twist| twist.into_owned()).collect(),
+    };
+    Some(Judgement {
+        off_mm: rms(square),
+        sigma_mm: rms(variance),
+        shape_sigma_mm: rms(of_shape),
+        square,
+        toward,
+        registered,
+    })
+}
+
+/// The registration of a cut seen from the base, for a work object that stands.
+pub(crate) fn in_base(registered: &Carried, base_from_object: &Pose) -> Carried {
+    let turn = base_from_object.rotation;
+    Carried {
+        origin_mm: base_from_object.transform_point(&registered.origin_mm.into()).coords,
+        twists: registered
+            .twists
+            .iter()
+            .map(|t| {
+                let v: Vector3<f64> = turn * t.fixed_rows::<3>(0);
+                let w: Vector3<f64> = turn * t.fixed_rows::<3>(3);
+                Vector6::new(v.x, v.y, v.z, w.x, w.y, w.z)
+            })
+            .collect(),
+    }
+}

@@ -1,0 +1,166 @@
+//! What a measurement that is not made yet would tell of the arm's parameters.
+//!
+//! A reading hangs on the arm's parameters a and on some of the measurement's own b (where the sensor stands, where the target
+//! sits): r = A a + B b + noise. With W the weights of the readings and N the inverse covariance that b has beforehand, the
+//! readings tell of a
+//!
+//! I = AᵀWA − AᵀWB (BᵀWB + N)⁻¹ BᵀWA,
+//!
+//! and a covariance C = F Fᵀ becomes F (1 + Fᵀ I F)⁻¹ Fᵀ (Bayes, linear and normal). To *state* what a measurement of before had
+//! to find out is worth what its readings tell with a narrow N less what they told with a wide one.
+
+use nalgebra::{Cholesky, DMatrix, Matrix3, Vector3};
+
+use truegrind_arm::estimated::Estimated;
+use truegrind_arm::model::{Joints, PreparedModel};
+use truegrind_math::se3::Pose;
+
+/// How well something of the measurement is known before it is fitted (mm, rad).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Spread {
+    pub(crate) mm: f64,
+    pub(crate) rad: f64,
+}
+
+/// What is fitted freely, as in an identification.
+pub(crate) const FREE: Spread = Spread { mm: 2000.0, rad: 3.0 };
+/// A target that sits anywhere near the flange.
+const MOUNTED: Spread = Spread { mm: 50.0, rad: 1.0 };
+
+/// Where a sensor stands (mm, in the base).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Stand {
+    /// A tracker, about which its frame turns.
+    Tracker(Vector3<f64>),
+    /// The outlet of a cable.
+    Outlet(Vector3<f64>),
+}
+
+/// Readings to be.
+pub(crate) struct Readings<'a> {
+    pub(crate) poses: &'a [Joints],
+    /// What each pose counts.
+    pub(crate) weight: f64,
+    pub(crate) stand: Stand,
+    /// How well it is known where the sensor stands.
+    pub(crate) stand_known: Spread,
+    /// Targets on the flange (mm).
+    pub(crate) targets: &'a [Vector3<f64>],
+    /// How well their places on the flange are known (mm); `None` for targets that sit anywhere.
+    pub(crate) target_known_mm: Option<f64>,
+    /// Standard deviation of a reading, for each coordinate (mm).
+    pub(crate) sigma_mm: f64,
+}
+
+/// AᵀWA, AᵀWB and BᵀWB of readings.
+pub(crate) struct Normal {
+    arms: DMatrix<f64>,
+    mixed: DMatrix<f64>,
+    owns: DMatrix<f64>,
+}
+
+impl Normal {
+    /// The information on the arm's parameters, with the standard deviations that the measurement's own have beforehand.
+    pub(crate) fn information(&self, own: &[f64]) -> DMatrix<f64> {
+        let Self { arms, mixed, owns } = self;
+        let mut owns = owns.clone();
+        for (k, sigma) in own.iter().enumerate() {
+            owns[(k, k)] += sigma.powi(-2);
+        }
+        match Cholesky::new(owns) {
+            Some(factor) => arms - mixed * factor.solve(&mixed.transpose()),
+            None => DMatrix::zeros(arms.nrows(), arms.ncols()),
+        }
+    }
+}
+
+impl Readings<'_> {
+    /// Their normal equations, on the parameters of `knowledge` and on their own.
+    pub(crate) fn normal(&self, knowledge: &Estimated, arm: &PreparedModel<'_>) -> Normal {
+        let (parameters, own) = (knowledge.order.len(), self.own().len());
+        let mut arms = DMatrix::zeros(parameters, parameters);
+        let (mut mixed, mut owns) = (DMatrix::zeros(parameters, own), DMatrix::zeros(own, own));
+        let weight = self.weight / (self.sigma_mm * self.sigma_mm);
+        for q in self.poses {
+            let flange = arm.forward(q);
+            let turn = flange.rotation.to_rotation_matrix();
+            for (k, target) in self.targets.iter().enumerate() {
+                let point = (flange * Pose::translation(target.x, target.y, target.z)).translation.vector;
+                let by_arm =
+                    knowledge.position_jacobian(arm, q, &Pose::translation(target.x, target.y, target.z));
+                let by_own = self.by_own(&point, turn.matrix(), k);
+                let (by_arm, by_own) = match self.stand {
+                    Stand::Tracker(_) => (by_arm, by_own),
+                    Stand::Outlet(outlet) => {
+                        let along = (point - outlet).normalize();
+                        let along = DMatrix::from_row_slice(1, 3, along.as_slice());
+                        let mut by_own = &along * by_own;
+                        by_own[(0, 3)] = 1.0;
+                        (along * by_arm, by_own)
+                    }
+                };
+                arms += by_arm.tr_mul(&by_arm) * weight;
+                mixed += by_arm.tr_mul(&by_own) * weight;
+                owns += by_own.tr_mul(&by_own) * weight;
+            }
+        }
+        Normal { arms, mixed, owns }
+    }
+
+    /// Standard deviations of the measurement's own parameters: six of the frame, or three of the outlet and the zero of its
+    /// cable, then three for each target.
+    pub(crate) fn own(&self) -> Vec<f64> {
+        let Spread { mm, rad } = self.stand_known;
+        let mut out = match self.stand {
+            Stand::Tracker(_) => vec![mm, mm, mm, rad, rad, rad],
+            Stand::Outlet(_) => vec![mm; 4],
+        };
+        let target = self.target_known_mm.unwrap_or(MOUNTED.mm);
+        out.extend(vec![target; 3 * self.targets.len()]);
+        out
+    }
+
+    /// How the place at which a target is read moves with the measurement's own parameters (3 × own).
+    fn by_own(&self, point: &Vector3<f64>, turn: &Matrix3<f64>, target: usize) -> DMatrix<f64> {
+        let first = match self.stand {
+            Stand::Tracker(_) => 6,
+            Stand::Outlet(_) => 4,
+        };
+        let mut out = DMatrix::zeros(3, first + 3 * self.targets.len());
+        out.view_mut((0, 0), (3, 3)).copy_from(&-Matrix3::<f64>::identity());
+        if let Stand::Tracker(at) = self.stand {
+            out.view_mut((0, 3), (3, 3)).copy_from(&(point - at).cross_matrix());
+        }
+        out.view_mut((0, first + 3 * target), (3, 3)).copy_from(turn);
+        out
+    }
+}
+
+/// A factor F of a covariance C = F Fᵀ; what rounding took below 0 counts as 0. `None` where it is not finite.
+pub(crate) fn factor(covariance: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    // In correlations, so that mm and rad are of one size.
+    let scale: Vec<f64> = covariance.diagonal().iter().map(|v| v.max(0.0).sqrt()).collect();
+    let unit = |k: usize| if scale[k] > 0.0 { scale[k] } else { 1.0 };
+    let n = scale.len();
+    let scaled = DMatrix::from_fn(n, n, |i, j| covariance[(i, j)] / (unit(i) * unit(j)));
+    if !scaled.iter().all(|v| v.is_finite()) {
+        return None;
+    }
+    let eigen = scaled.symmetric_eigen();
+    Some(DMatrix::from_fn(n, n, |i, j| {
+        scale[i] * eigen.eigenvectors[(i, j)] * eigen.eigenvalues[j].max(0.0).sqrt()
+    }))
+}
+
+/// Covariance of `seen` = T a (T: `seen` × parameters) once `information` on a has come, C = `factor` `factor`ᵀ before.
+pub(crate) fn updated(
+    factor: &DMatrix<f64>,
+    information: &DMatrix<f64>,
+    seen: &DMatrix<f64>,
+) -> Option<DMatrix<f64>> {
+    let told = factor.tr_mul(&(information * factor));
+    let whole = DMatrix::identity(told.nrows(), told.ncols()) + (&told + told.transpose()) * 0.5;
+    let lower = Cholesky::new(whole)?;
+    let part = lower.l().solve_lower_triangular(&(seen * factor).transpose())?;
+    Some(part.tr_mul(&part))
+}

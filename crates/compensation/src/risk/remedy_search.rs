@@ -1,0 +1,403 @@
+//! The cheapest measurement that would make the place of a path known, foreseen from the covariance that the model carries.
+//!
+//! For each of a short list of measurements, alone and by two, the covariance of the path's place is worked out as it would be
+//! with them (`information`). A path that is off by d with covariance P now is then known to P', and d has to be expected where
+//! M = d dᵀ + (1 − tr P' / tr P) P has it. It is enough where the place would be taken at that: sigma no larger than √tr M, and
+//! the chance Φ(−c/2s) to make it worse no larger than is taken, with c² = tr M and s² = tr(P' M) / tr M (all of them of the
+//! points of the path together).
+//!
+//! What the model's file does not say is assumed, and stated with the constants below: where sensor and target are.
+
+use nalgebra::{DMatrix, Matrix3, Matrix6, Point3, Vector3, Vector6};
+use rayon::prelude::*;
+
+use crate::condition::arm_conditions::Circumstances;
+use crate::frames::frame_pair::{Mounted, carried_through};
+use crate::frames::taught::taught_frame;
+use crate::risk::measurement_information::{FREE, Readings, Spread, Stand, factor, updated};
+use crate::risk::placement::{Commanded, Off, spread};
+use crate::risk::registration::Registration;
+use crate::risk::remedy::{Measurement, Remedy};
+use truegrind_arm::estimated::{Carried, Estimated};
+use truegrind_arm::model::{Joints, PreparedModel};
+use truegrind_math::se3::{Pose, difference};
+use truegrind_math::tail::normal_two_sided;
+
+/// How well a sensor's frame is measured in the base, as `--frame-sigma 0.1` has it (mm, rad).
+const FRAME_KNOWN: Spread = Spread { mm: 0.1, rad: 1e-4 };
+/// How well a coordinate measuring machine tells where a target sits on the flange (mm).
+const PLATE_KNOWN_MM: f64 = 0.03;
+/// How well a point of a part is touched by hand (mm, each coordinate).
+const TOUCH_KNOWN_MM: f64 = 0.05;
+/// What a reading scatters by where the model does not tell (mm).
+const READING_MM: f64 = 0.05;
+/// No sensor reads better (mm).
+const FINEST_MM: f64 = 1e-3;
+/// A tracker stands that far from the base, the outlet of a cable so many times as far from it as the outermost target.
+const TRACKER_MM: f64 = 2500.0;
+const OUTLET_FARTHER: f64 = 1.6;
+/// A target stands off the flange, one beside the axis of joint 6 that far from it (mm).
+const TARGET_OFF_MM: f64 = 60.0;
+const BESIDE_MM: f64 = 100.0;
+/// Points of a work object that are touched lie no nearer to each other (mm).
+const TOUCHED_APART_MM: f64 = 100.0;
+
+const POSES: u32 = 30;
+const MORE_POSES: u32 = 100;
+
+/// A path whose place is not taken: what was asked of it.
+pub(crate) struct Place<'a, 'm> {
+    pub(crate) targets: &'a [Commanded],
+    pub(crate) list: &'a [Mounted],
+    pub(crate) acting: &'a Circumstances<'m>,
+    pub(crate) knowledge: &'a Estimated,
+    pub(crate) max_risk: f64,
+}
+
+/// The cheapest measurement, or two, that would make its place known; the best one where none would. `None` where nothing can be
+/// foreseen: a covariance that is none.
+pub(crate) fn remedy(place: &Place<'_, '_>) -> Option<Remedy> {
+    let known = Known::of(place)?;
+    let touched = place.touched().map(|touched| known.touching(place, &touched));
+    let candidates = candidates(touched.is_some(), place.has_rows());
+    let informations = Informations::of(place, &candidates);
+    let foreseen: Vec<(f64, Remedy)> = candidates
+        .into_par_iter()
+        .filter_map(|measurements| {
+            let remedy = known.with(measurements, &informations, touched.as_ref(), place.max_risk)?;
+            Some((remedy.minutes(), remedy))
+        })
+        .collect();
+    let cheapest = foreseen.iter().filter(|(_, r)| r.suffices).min_by(|a, b| a.0.total_cmp(&b.0));
+    let best = foreseen.iter().min_by(|a, b| a.1.sigma_mm.total_cmp(&b.1.sigma_mm));
+    cheapest.or(best).map(|(_, remedy)| remedy.clone())
+}
+
+/// What is looked at.
+fn candidates(touch: bool, rows: bool) -> Vec<Vec<Measurement>> {
+    use Measurement::{Beside, Frame, More, Plate, Station, Touch};
+    let (beside, plate) = (Beside { poses: POSES }, Plate { poses: POSES });
+    let (station, more) = (Station { poses: POSES }, More { poses: MORE_POSES });
+    let mut out = Vec::new();
+    if touch {
+        out.push(vec![Touch]);
+    }
+    if rows {
+        let alone = [Frame, beside, plate, station, more];
+        out.extend(alone.map(|measurement| vec![measurement]));
+        out.extend([beside, plate, station].map(|measurement| vec![Frame, measurement]));
+    }
+    if touch && rows {
+        out.extend([beside, plate].map(|measurement| vec![Touch, measurement]));
+    }
+    out
+}
+
+/// What each measurement tells of the arm's parameters, once for all candidates: it is the same beside any other, but that a
+/// sensor's frame that is stated is known to all of them.
+struct Informations(Vec<((Measurement, bool), DMatrix<f64>)>);
+
+impl Informations {
+    fn of(place: &Place<'_, '_>, candidates: &[Vec<Measurement>]) -> Self {
+        let mut asked: Vec<(Measurement, bool)> = Vec::new();
+        for set in candidates {
+            let stated = set.contains(&Measurement::Frame);
+            for measurement in set.iter().filter(|m| **m != Measurement::Touch) {
+                if !asked.contains(&(*measurement, stated)) {
+                    asked.push((*measurement, stated));
+                }
+            }
+        }
+        let one = |asked: (Measurement, bool)| (asked, place.information(asked.0, asked.1));
+        Self(asked.into_par_iter().map(one).collect())
+    }
+
+    /// What all measurements of a candidate tell, of so many parameters.
+    fn sum(&self, measurements: &[Measurement], parameters: usize) -> DMatrix<f64> {
+        let stated = measurements.contains(&Measurement::Frame);
+        let of = |m: &Measurement| self.0.iter().find(|(asked, _)| *asked == (*m, stated));
+        let zero = DMatrix::zeros(parameters, parameters);
+        measurements.iter().filter_map(of).fold(zero, |sum, (_, information)| sum + information)
+    }
+}
+
+/// Where the work object's frame goes with the arm once the arm has touched it, and by how much touching is unsure, in the base.
+struct Touched {
+    carried: Carried,
+    /// Twists of the frame by each coordinate of each touched point, of one standard deviation.
+    unsure: Vec<Vector6<f64>>,
+}
+
+/// What touching changes of what is known.
+struct Touching {
+    /// How the path hangs on the arm's parameters, against the frame that the arm has touched.
+    twists: DMatrix<f64>,
+    /// The covariance that the hand adds.
+    adds: Matrix6<f64>,
+}
+
+/// What is known now of where the path lies.
+struct Known {
+    registration: Registration,
+    off: Vec<Off>,
+    /// Where it lies, and how that hangs on the arm's parameters.
+    twist: Vector6<f64>,
+    twists: DMatrix<f64>,
+    /// Of the points together: gᵀ W h is the sum of the products of what two twists displace them by.
+    weights: Matrix6<f64>,
+    covariance: Matrix6<f64>,
+    factor: DMatrix<f64>,
+}
+
+impl Known {
+    fn of(place: &Place<'_, '_>) -> Option<Self> {
+        let off = place.off(None);
+        let registration = Registration::of(&off.iter().map(|o| o.meant).collect::<Vec<_>>())?;
+        let twist = registration.twist(off.iter().map(|o| &o.shift));
+        let twists = twists_of(&registration, &off);
+        let mut weights = Matrix6::zeros();
+        for k in 0..6 {
+            weights.set_column(k, &registration.weighed(&Matrix6::identity().column(k).into_owned()));
+        }
+        let factor = factor(&place.knowledge.covariance)?;
+        let part = &twists * &factor;
+        let covariance = Matrix6::from_iterator((&part * part.transpose()).iter().copied());
+        Some(Self { registration, off, twist, twists, weights, covariance, factor })
+    }
+
+    /// What is known with `measurements` too.
+    fn with(
+        &self,
+        measurements: Vec<Measurement>,
+        informations: &Informations,
+        touching: Option<&Touching>,
+        max_risk: f64,
+    ) -> Option<Remedy> {
+        let information = informations.sum(&measurements, self.factor.nrows());
+        let touching = touching.filter(|_| measurements.contains(&Measurement::Touch));
+        let twists = touching.map_or(&self.twists, |touching| &touching.twists);
+        let left = updated(&self.factor, &information, twists)?;
+        let mut left = Matrix6::from_iterator(left.iter().copied());
+        if let Some(touching) = touching {
+            left += touching.adds;
+        }
+        let sigma_mm = self.registration.mean_square(&left).max(0.0).sqrt();
+        sigma_mm.is_finite().then(|| Remedy {
+            measurements,
+            sigma_mm,
+            suffices: self.would_be_taken(&left, sigma_mm, max_risk),
+        })
+    }
+
+    /// What touching changes.
+    fn touching(&self, place: &Place<'_, '_>, touched: &Touched) -> Touching {
+        let twists = twists_of(&self.registration, &place.off(Some(&touched.carried)));
+        let mut adds = Matrix6::zeros();
+        let Some(first) = place.targets.first() else { return Touching { twists, adds } };
+        let object = place.list[first.mounted].real.object;
+        for unsure in &touched.unsure {
+            let shifts: Vec<Vector3<f64>> = self
+                .off
+                .iter()
+                .map(|o| {
+                    let lever = (object * o.meant).coords - touched.carried.origin_mm;
+                    let moved: Vector3<f64> =
+                        unsure.fixed_rows::<3>(0) + unsure.fixed_rows::<3>(3).cross(&lever);
+                    object.rotation.inverse() * moved
+                })
+                .collect();
+            let twist = self.registration.twist(shifts.iter());
+            adds += twist * twist.transpose();
+        }
+        Touching { twists, adds }
+    }
+
+    /// Whether the place has to be expected to be corrected with `left` for its covariance.
+    fn would_be_taken(&self, left: &Matrix6<f64>, sigma_mm: f64, max_risk: f64) -> bool {
+        let total = |m: &Matrix6<f64>| (self.weights * m).trace();
+        let (now, then) = (total(&self.covariance), total(left));
+        let brought = if now > 0.0 { (1.0 - then / now).max(0.0) } else { 0.0 };
+        let expected = self.twist * self.twist.transpose() + self.covariance * brought;
+        let square = total(&expected);
+        let along = (self.weights * left * self.weights * expected).trace() / square;
+        let chance = 0.5 * normal_two_sided(0.5 * (square / along).sqrt());
+        let off_mm = (square / self.off.len() as f64).sqrt();
+        sigma_mm <= off_mm && chance <= max_risk
+    }
+}
+
+fn twists_of(registration: &Registration, off: &[Off]) -> DMatrix<f64> {
+    let twists = registration.twists(off.iter().map(|o| &o.jacobian));
+    DMatrix::from_fn(6, twists.ncols(), |i, k| twists[(i, k)])
+}
+
+impl Place<'_, '_> {
+    fn arm(&self) -> Option<&PreparedModel<'_>> {
+        self.targets.first().map(|target| self.acting.arm(target.place))
+    }
+
+    fn has_rows(&self) -> bool {
+        !self.knowledge.region.samples_deg.is_empty()
+    }
+
+    /// How far each target is off, against a frame that moves with the arm where there is one.
+    fn off(&self, carried: Option<&Carried>) -> Vec<Off> {
+        let against = |mounted: &Mounted| match carried {
+            Some(carried) => Mounted { carried: Some(carried.clone()), ..mounted.clone() },
+            None => mounted.clone(),
+        };
+        let list: Vec<Mounted> = self.list.iter().map(against).collect();
+        self.targets.iter().map(|t| Off::of(t, &list[t.mounted], self.acting, self.knowledge)).collect()
+    }
+
+    /// The measured poses, `count` of them.
+    fn poses(&self, count: usize) -> Vec<Joints> {
+        let samples = &self.knowledge.region.samples_deg;
+        let joints = |deg: &[f64; 6]| Joints::from_fn(|i, _| deg[i].to_radians());
+        (0..count.div_ceil(samples.len()))
+            .flat_map(|_| spread(samples, count))
+            .take(count)
+            .map(|deg| joints(&deg))
+            .collect()
+    }
+
+    /// The same with joint 6 turned as far as it may, evenly.
+    fn turned(&self, count: usize) -> Vec<Joints> {
+        let mut poses = self.poses(count);
+        for (k, q) in poses.iter_mut().enumerate() {
+            let mut turned = *q;
+            // The golden ratio spreads any number of angles.
+            turned[5] += std::f64::consts::PI * ((k as f64 * 0.618_033_988_75).fract() - 0.5);
+            if self.knowledge.nominal.limits.violated(&turned).is_none() {
+                *q = turned;
+            }
+        }
+        poses
+    }
+
+    /// Where a sensor stands, the second one a quarter turn about the base from the first.
+    fn stand(&self, second: bool) -> Stand {
+        let Some(arm) = self.arm() else { return Stand::Tracker(Vector3::zeros()) };
+        let points: Vec<Vector3<f64>> =
+            self.poses(POSES as usize).iter().map(|q| arm.forward(q).translation.vector).collect();
+        let middle = points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64;
+        let out = Vector3::new(middle.x, middle.y, 0.0).try_normalize(1e-9).unwrap_or_else(Vector3::x);
+        let out = if second { Vector3::z().cross(&out) } else { out };
+        if self.knowledge.provenance.sensor == "cable" {
+            let farthest = points.iter().map(|p| p.xy().norm()).fold(0.0, f64::max);
+            Stand::Outlet(out * (OUTLET_FARTHER * farthest))
+        } else {
+            Stand::Tracker(out * TRACKER_MM)
+        }
+    }
+
+    /// What a reading scatters by, each coordinate (mm): what rows that were held out are off by.
+    fn reading_mm(&self) -> f64 {
+        let rmse = self.knowledge.geometry.held_out.rmse;
+        let coordinates: f64 = if self.knowledge.provenance.sensor == "cable" { 1.0 } else { 3.0 };
+        let sigma = rmse / coordinates.sqrt();
+        if sigma > 0.0 && sigma.is_finite() { sigma.max(FINEST_MM) } else { READING_MM }
+    }
+
+    /// The information of one measurement on the arm's parameters; `stated` where it is known where the sensor stands.
+    fn information(&self, measurement: Measurement, stated: bool) -> DMatrix<f64> {
+        let n = self.knowledge.order.len();
+        let Some(arm) = self.arm() else { return DMatrix::zeros(n, n) };
+        let on_axis = [Vector3::new(0.0, 0.0, TARGET_OFF_MM)];
+        let around: [Vector3<f64>; 3] = std::array::from_fn(|k| {
+            let angle = k as f64 * std::f64::consts::TAU / 3.0;
+            Vector3::new(BESIDE_MM * angle.cos(), BESIDE_MM * angle.sin(), TARGET_OFF_MM)
+        });
+        let count = measurement.poses() as usize;
+        let poses = match measurement {
+            Measurement::Touch => return DMatrix::zeros(n, n),
+            Measurement::Frame => self.poses(self.knowledge.region.samples_deg.len()),
+            Measurement::Beside { .. } | Measurement::Plate { .. } => self.turned(count),
+            Measurement::Station { .. } | Measurement::More { .. } => self.poses(count),
+        };
+        let readings = Readings {
+            poses: &poses,
+            weight: 1.0,
+            stand: self.stand(matches!(measurement, Measurement::Station { .. })),
+            stand_known: if stated { FRAME_KNOWN } else { FREE },
+            targets: match measurement {
+                Measurement::Beside { .. } => &around[..1],
+                Measurement::Plate { .. } => &around,
+                _ => &on_axis,
+            },
+            target_known_mm: matches!(measurement, Measurement::Plate { .. }).then_some(PLATE_KNOWN_MM),
+            sigma_mm: self.reading_mm(),
+        };
+        if measurement == Measurement::Frame {
+            // What there is, counted again with the frame known.
+            let rows = self.knowledge.provenance.rows.max(poses.len()) as f64;
+            let there = Readings { weight: rows / poses.len() as f64, ..readings };
+            let free = Readings { stand_known: FREE, ..there };
+            let normal = there.normal(self.knowledge, arm);
+            return normal.information(&there.own()) - normal.information(&free.own());
+        }
+        readings.normal(self.knowledge, arm).information(&readings.own())
+    }
+
+    /// Three points of the work object that the arm can touch: across the path, and no nearer to each other than a hand would
+    /// choose them. `None` where the arm taught the frame already, the robot holds the part, or they are out of reach.
+    fn touched(&self) -> Option<Touched> {
+        let first = self.targets.first()?;
+        let mounted = &self.list[first.mounted];
+        if mounted.carried.is_some() || mounted.real.holds_part {
+            return None;
+        }
+        let (place, arm) = (first.place, self.arm()?);
+        let (middle, [along, across]) = self.extent();
+        [1.0, 0.5, 0.25].iter().find_map(|share| {
+            let corners = [middle - along * *share, middle + along * *share, middle + across * *share];
+            let joints = corners.map(|corner| {
+                let distance = |t: &&Commanded| (t.meant.translation.vector - corner).norm_squared();
+                let near = self.targets.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+                let pose = Pose::from_parts(corner.into(), near.meant.rotation);
+                let flange = mounted.real.flange_for(&pose);
+                self.acting.inverse(place).solve_near(&flange, &near.joints).ok().map(|s| s.joints)
+            });
+            let [Some(a), Some(b), Some(c)] = joints else { return None };
+            let joints = [a, b, c];
+            let tip = mounted.real.tool.translation.vector;
+            let points = joints.map(|q| arm.forward(&q) * Point3::from(tip));
+            let frame = taught_frame(&points)?;
+            let carried = carried_through(self.knowledge, arm, &tip, &joints, &points, &frame)?;
+            Some(Touched { carried, unsure: unsure(&points)? })
+        })
+    }
+
+    /// The middle of the path in its work object, and half of what is touched along and across it (mm).
+    fn extent(&self) -> (Vector3<f64>, [Vector3<f64>; 2]) {
+        let points: Vec<Vector3<f64>> = self.targets.iter().map(|t| t.meant.translation.vector).collect();
+        let middle = points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64;
+        let scatter: Matrix3<f64> = points.iter().map(|p| (p - middle) * (p - middle).transpose()).sum();
+        let eigen = scatter.symmetric_eigen();
+        let mut order = [0, 1, 2];
+        order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
+        let half = |k: usize| {
+            let axis: Vector3<f64> = eigen.eigenvectors.column(order[k]).into_owned();
+            let reach = points.iter().map(|p| (p - middle).dot(&axis).abs()).fold(0.0, f64::max);
+            axis * reach.max(0.5 * TOUCHED_APART_MM)
+        };
+        (middle, [half(0), half(1)])
+    }
+}
+
+/// How a frame through three points moves with each coordinate of each of them, by as much as touching is unsure.
+fn unsure(points: &[Point3<f64>; 3]) -> Option<Vec<Vector6<f64>>> {
+    const STEP_MM: f64 = 1e-3;
+    let moved = |point: usize, axis: usize, step: f64| {
+        let mut off = *points;
+        off[point][axis] += step;
+        taught_frame(&off)
+    };
+    (0..9)
+        .map(|k| {
+            let (point, axis) = (k / 3, k % 3);
+            let apart = difference(&moved(point, axis, -STEP_MM)?, &moved(point, axis, STEP_MM)?);
+            Some(apart * (TOUCH_KNOWN_MM / (2.0 * STEP_MM)))
+        })
+        .collect()
+}

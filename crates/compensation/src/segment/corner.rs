@@ -1,0 +1,141 @@
+//! Corners that the robot rounds: the path in the zone of a fly-by point.
+//!
+//! Method. Within its zone of radius r a fly-by point is not gone to: the path leaves the way in at the distance r before
+//! the point and meets the way out at the distance r behind it, on a parabola whose tangents are the two ways, that is
+//! the quadratic Bézier curve with the point as its middle control point, orientation by repeated slerp alike. r is at
+//! most half of each way. The told corner, gone by the estimated arm, is compared with the intended one, so it shows
+//! when targets that were put in shorten a zone and so change the shape of the corner.
+//! Shapes: poses of the tool in the work object (mm).
+//! Stops: sampled to the chord error of lines (0.002 mm); corners that cut off less than `CUT_MM` are as the lines they join.
+//! Source: ABB, RAPID reference manual, zonedata and motion principles (corner path a parabola, zones cut to half the
+//! distance). Departure: the larger zones of reorientation and external axes are taken as that of the position.
+//! Checked against: a right angle in closed form, dense samples of the corner in the tests.
+
+use nalgebra::Vector3;
+
+use crate::arms::Arms;
+use crate::backlash::play_operator::Slack;
+use crate::segment::curve::{Curve, beside, between};
+use crate::segment::line::{Ends, STEPS, largest_from};
+use truegrind_arm::model::Joints;
+use truegrind_math::se3::Pose;
+
+/// A corner that cuts off less than this has the shape of the lines that it joins (mm): over so short a way an arm's
+/// error changes by less than the lines are told to.
+pub(crate) const CUT_MM: f64 = 0.2;
+
+/// A rounded corner: where it leaves the way in, the point that it rounds, where it meets the way out.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Corner {
+    control: [Pose; 3],
+}
+
+impl Corner {
+    /// The corner between two courses that a zone of this radius makes.
+    pub fn of(way_in: &Curve, way_out: &Curve, zone_mm: f64) -> Self {
+        let (long_in, long_out) = (way_in.length_mm(), way_out.length_mm());
+        let radius = zone_mm.min(0.5 * long_in).min(0.5 * long_out);
+        let share = |long: f64| if long > 1e-9 { radius / long } else { 0.0 };
+        Self { control: [way_in.at(1.0 - share(long_in)), way_in.to, way_out.at(share(long_out))] }
+    }
+
+    /// The pose at a share of the corner.
+    pub fn at(&self, t: f64) -> Pose {
+        let [a, b, c] = &self.control;
+        between(&between(a, b, t), &between(b, c, t), t)
+    }
+
+    /// How far the path stays from the point that it rounds (mm).
+    pub fn cut_mm(&self) -> f64 {
+        let [a, b, c] = self.control.map(|pose| pose.translation.vector);
+        (0.25 * (a + c) - 0.5 * b).norm()
+    }
+
+    /// How far a pose lies beside the corner and the ways that it joins (mm), near the share `t`.
+    pub fn distance(&self, pose: &Pose, t: f64) -> f64 {
+        let [a, b, c] = self.control.map(|pose| pose.translation.vector);
+        let point = pose.translation.vector;
+        let curve = a - 2.0 * b + c;
+        let along = |t: f64| 2.0 * ((b - a) + curve * t);
+        let at = |t: f64| a + 2.0 * (b - a) * t + curve * (t * t);
+        // The nearest share, by Gauss-Newton steps: the point lies close by, and they never go the wrong way.
+        let mut t = t;
+        for _ in 0..12 {
+            let (off, first) = (at(t) - point, along(t));
+            let square = first.norm_squared();
+            if square < 1e-12 {
+                break;
+            }
+            let next = (t - off.dot(&first) / square).clamp(0.0, 1.0);
+            let step = (next - t).abs();
+            t = next;
+            if step < 1e-12 {
+                break;
+            }
+        }
+        let off: Vector3<f64> = point - at(t);
+        // Before and behind the corner its tangents are the ways themselves.
+        if t <= 0.0 || t >= 1.0 { beside(&off, &along(t)) } else { off.norm() }
+    }
+}
+
+/// [`Corner::cut_mm`] of two lines through three points.
+pub(crate) fn cut_of_lines(points: &[Vector3<f64>; 3], zone_mm: f64) -> f64 {
+    let (way_in, way_out) = (points[1] - points[0], points[2] - points[1]);
+    let (long_in, long_out) = (way_in.norm(), way_out.norm());
+    let radius = zone_mm.min(0.5 * long_in).min(0.5 * long_out);
+    if radius > 1e-9 { 0.25 * radius * (way_out / long_out - way_in / long_in).norm() } else { 0.0 }
+}
+
+/// The ways in and out of a corner, as meant and as told.
+pub(crate) struct Ways {
+    pub(crate) meant: [Curve; 2],
+    pub(crate) told: [Curve; 2],
+}
+
+/// Largest distance of the tool from the intended corner at `point`, gone under two conditions before and behind it; `None` where the corner cuts off next to nothing,
+/// infinite where the arm cannot go.
+pub(crate) fn corner_bend(
+    point: &Ends<'_>,
+    ways: &Ways,
+    zone_mm: f64,
+    places: [usize; 2],
+    arms: &Arms<'_>,
+) -> Option<f64> {
+    let meant = Corner::of(&ways.meant[0], &ways.meant[1], zone_mm);
+    if !(meant.cut_mm() > CUT_MM) {
+        return None;
+    }
+    let told = Corner::of(&ways.told[0], &ways.told[1], zone_mm);
+    let flange = |t: f64| point.mounted.told.flange_for(&told.at(t));
+    let motor = |t: f64| {
+        let solution = arms.nominal.solve_near(&flange(t), &point.joints);
+        solution.ok().map(|solution| solution.joints)
+    };
+    let off = |t: f64, flange: &Pose| meant.distance(&point.mounted.real.target_of(flange), t);
+    if places[0] != places[1] {
+        let Some(start) = motor(0.0) else { return Some(f64::INFINITY) };
+        let links = Slack::at(&start, places[0], places[1], &arms.acting);
+        return Some(links.most_off(2 * STEPS, &motor, &off));
+    }
+    let arm = arms.acting.arm(places[0]);
+    // The samples that every corner needs, in lanes.
+    let solved = arms.nominal.reach_seeded(&FIRST.map(flange), &[point.joints; FIRST.len()]);
+    let joints: Vec<Joints> =
+        solved.iter().map(|found| found.as_ref().map_or(point.joints, |found| found.joints)).collect();
+    let flanges = arm.forward_many(&joints);
+    let first: [f64; FIRST.len()] =
+        std::array::from_fn(|k| if solved[k].is_ok() { off(FIRST[k], &flanges[k]) } else { f64::INFINITY });
+    let even = |t: f64| match FIRST.iter().position(|first| (*first - t).abs() < 1e-9) {
+        Some(k) => first[k],
+        None => motor(t).map_or(f64::INFINITY, |joints| off(t, &arm.forward(&joints))),
+    };
+    Some(largest_from([even(0.0), even(1.0)], PIECES, &even))
+}
+
+/// Equal pieces of a corner that are halved until their chords tell enough: so many that what is asked for first fills
+/// the lanes once.
+const PIECES: usize = 3;
+
+/// The ends, the pieces' ends and their middles: what [`largest_from`] asks for first.
+const FIRST: [f64; 2 * PIECES + 1] = [0.0, 1.0 / 6.0, 2.0 / 6.0, 0.5, 4.0 / 6.0, 5.0 / 6.0, 1.0];

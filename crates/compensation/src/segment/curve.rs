@@ -1,0 +1,257 @@
+//! The course of the tool from one target to the next, as controllers interpolate it.
+//!
+//! Method. Line: position straight, orientation by the shortest turn (slerp). Arc: position on the circle through
+//! start, circle point and end, or, where the program names the axis it turns about (G2, G3), on the circle in the
+//! plane across that axis, rising along it in proportion to the angle. Orientation on an arc of an NC program: slerp. On
+//! one of RAPID: in proportion within the frame that goes along with the path, R(s) = turn(axis, s θ) R₀ exp(s v) with
+//! exp(v) = R₀⁻¹ turn(axis, −θ) R₁, of whose turns v, v ± 2π the one is taken that passes nearest to the orientation of
+//! the circle point; with CirPathMode \CirPointOri from start over circle point to end.
+//! Shapes: poses of the tool in the work object (mm), shares s of the way from 0 to 1.
+//! Source: ABB, RAPID reference manual, MoveC and CirPathMode; DIN 66025 for G2 and G3. Departure: CirPathMode
+//! \ObjectFrame and the wrist modes are taken as the standard mode; the position on the circle is the same in all.
+//! Checked against: circles and helices in closed form, whole circles, a tool that keeps its orientation, one that turns
+//! with the path.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{Point3, Unit, UnitQuaternion, Vector3};
+
+use truegrind_math::se3::Pose;
+use truegrind_programs::motion::{Motion, Switch};
+
+/// Ends of an arc that are nearer than this make it a whole circle (mm). Never less than what the writers of NC close: a
+/// corrected whole circle whose ends are so near is written as one, and must be followed as one here.
+pub(crate) const CLOSED_MM: f64 = 2e-3;
+
+/// An arc from its start over a point to its end, perhaps rising along its axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Arc {
+    /// On the axis, at the height of the start (mm).
+    pub centre: Point3<f64>,
+    /// The axis; the arc turns positively about it.
+    pub axis: Unit<Vector3<f64>>,
+    /// From the axis to the start, of length 1.
+    x: Vector3<f64>,
+    y: Vector3<f64>,
+    /// Its radius (mm).
+    pub radius: f64,
+    /// The angle that it sweeps (rad), above 0.
+    pub sweep: f64,
+    /// How far it rises along the axis on the whole way (mm).
+    rise: f64,
+}
+
+impl Arc {
+    /// The arc through three points, about the axis where one is stated; `None` where they are in line or coincide.
+    pub fn through(
+        start: &Point3<f64>,
+        via: &Point3<f64>,
+        end: &Point3<f64>,
+        axis: Option<&Unit<Vector3<f64>>>,
+    ) -> Option<Self> {
+        let (mut a, mut b) = (via - start, end - start);
+        let mut rise = 0.0;
+        let axis = match axis {
+            Some(axis) => {
+                rise = axis.dot(&b);
+                a -= axis.into_inner() * axis.dot(&a);
+                b -= axis.into_inner() * rise;
+                *axis
+            }
+            None => Unit::try_new(a.cross(&b), 1e-9)?,
+        };
+        let whole = b.norm() < CLOSED_MM;
+        let to_centre = if whole {
+            0.5 * a
+        } else {
+            let normal = a.cross(&b);
+            let square = normal.norm_squared();
+            if square < 1e-9 {
+                return None;
+            }
+            (normal.cross(&a) * b.norm_squared() + b.cross(&normal) * a.norm_squared()) / (2.0 * square)
+        };
+        let radius = to_centre.norm();
+        if !(radius > CLOSED_MM) {
+            return None;
+        }
+        let x = -to_centre / radius;
+        let y = axis.cross(&x);
+        let to_end = b - to_centre;
+        let sweep = if whole { TAU } else { to_end.dot(&y).atan2(to_end.dot(&x)).rem_euclid(TAU) };
+        Some(Self { centre: start + to_centre, axis, x, y, radius, sweep, rise })
+    }
+
+    /// The point at a share of the way.
+    pub fn at(&self, s: f64) -> Point3<f64> {
+        let (sin, cos) = (self.sweep * s).sin_cos();
+        self.centre + (self.x * cos + self.y * sin) * self.radius + self.axis.into_inner() * (self.rise * s)
+    }
+
+    /// Its length (mm).
+    pub fn length_mm(&self) -> f64 {
+        (self.radius * self.sweep).hypot(self.rise)
+    }
+
+    /// The share of the way that is level with a point near `near`.
+    fn share(&self, point: &Point3<f64>, near: f64) -> f64 {
+        let off = point - self.centre;
+        let angle = off.dot(&self.y).atan2(off.dot(&self.x));
+        let turns = ((near * self.sweep - angle) / TAU).round();
+        (angle + turns * TAU) / self.sweep
+    }
+
+    /// Distance of a point from the arc and its continuation (mm), at about the share `near`.
+    pub fn distance(&self, point: &Point3<f64>, near: f64) -> f64 {
+        let s = self.share(point, near);
+        let off = point - self.at(s);
+        let (sin, cos) = (self.sweep * s).sin_cos();
+        let along =
+            (self.y * cos - self.x * sin) * (self.radius * self.sweep) + self.axis.into_inner() * self.rise;
+        beside(&off, &along)
+    }
+
+    fn turn(&self, s: f64) -> UnitQuaternion<f64> {
+        UnitQuaternion::from_axis_angle(&self.axis, self.sweep * s)
+    }
+}
+
+/// The part of an offset that is across a direction; all of it where there is no direction.
+pub(crate) fn beside(off: &Vector3<f64>, along: &Vector3<f64>) -> f64 {
+    match along.try_normalize(1e-6) {
+        Some(direction) => (off - direction * direction.dot(off)).norm(),
+        None => off.norm(),
+    }
+}
+
+/// How the tool turns on an arc.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Turning {
+    /// By the shortest turn from start to end.
+    Shortest,
+    /// By this much within the frame that goes along with the path (rad).
+    WithPath(Vector3<f64>),
+    /// Over the orientation of the circle point, at this share.
+    Over(UnitQuaternion<f64>, f64),
+}
+
+/// The course of the tool from one pose to another.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Curve {
+    /// Where it begins.
+    pub from: Pose,
+    /// Where it ends.
+    pub to: Pose,
+    arc: Option<(Arc, Turning)>,
+}
+
+impl Curve {
+    /// A straight line.
+    pub fn line(from: Pose, to: Pose) -> Self {
+        Self { from, to, arc: None }
+    }
+
+    /// The arc of a circular motion; `None` where its points make none.
+    pub fn round(from: Pose, via: &Pose, to: Pose, motion: &Motion) -> Option<Self> {
+        let point = |p: &Pose| Point3::from(p.translation.vector);
+        let axis = motion.axis.and_then(|axis| Unit::try_new(Vector3::from(axis), 1e-9));
+        let arc = Arc::through(&point(&from), &point(via), &point(&to), axis.as_ref())?;
+        let middle = arc.share(&point(via), 0.5).clamp(0.0, 1.0);
+        let turning = if axis.is_some() {
+            Turning::Shortest
+        } else if motion.modal.circle_point_orientation == Switch::On {
+            Turning::Over(via.rotation, middle.clamp(0.01, 0.99))
+        } else {
+            with_path(&arc, &from.rotation, &via.rotation, middle, &to.rotation)
+        };
+        Some(Self { from, to, arc: Some((arc, turning)) })
+    }
+
+    /// The arc, where it is one.
+    pub fn arc(&self) -> Option<&Arc> {
+        self.arc.as_ref().map(|(arc, _)| arc)
+    }
+
+    /// At which share of an arc a point on it is passed; half way on a line.
+    pub(crate) fn passes(&self, via: &Pose) -> f64 {
+        let point = Point3::from(via.translation.vector);
+        self.arc().map_or(0.5, |arc| arc.share(&point, 0.5).clamp(0.0, 1.0))
+    }
+
+    /// The pose at a share of the way.
+    pub fn at(&self, s: f64) -> Pose {
+        let Some((arc, turning)) = &self.arc else { return between(&self.from, &self.to, s) };
+        let rotation = match turning {
+            Turning::Shortest => turned(&self.from.rotation, &self.to.rotation, s),
+            Turning::WithPath(v) => {
+                arc.turn(s) * self.from.rotation * UnitQuaternion::from_scaled_axis(v * s)
+            }
+            Turning::Over(via, at) if s < *at => turned(&self.from.rotation, via, s / at),
+            Turning::Over(via, at) => turned(via, &self.to.rotation, (s - at) / (1.0 - at)),
+        };
+        Pose::from_parts(arc.at(s).coords.into(), rotation)
+    }
+
+    /// Its length (mm).
+    pub fn length_mm(&self) -> f64 {
+        match &self.arc {
+            Some((arc, _)) => arc.length_mm(),
+            None => (self.to.translation.vector - self.from.translation.vector).norm(),
+        }
+    }
+
+    /// How far the tool turns (rad), in steps that see a turn of more than half round.
+    pub fn turn_rad(&self) -> f64 {
+        if self.arc.is_none() {
+            return self.from.rotation.angle_to(&self.to.rotation);
+        }
+        let at = |k: i32| self.at(f64::from(k) / 4.0).rotation;
+        (0..4).map(|k| at(k).angle_to(&at(k + 1))).sum()
+    }
+
+    /// How far a pose lies beside the course (mm), where it should be at about this share.
+    pub fn distance(&self, pose: &Pose, near: f64) -> f64 {
+        match &self.arc {
+            Some((arc, _)) => arc.distance(&Point3::from(pose.translation.vector), near),
+            None => {
+                let along = self.to.translation.vector - self.from.translation.vector;
+                let on = self.from.translation.vector + along * near;
+                beside(&(pose.translation.vector - on), &along)
+            }
+        }
+    }
+}
+
+/// Position straight, orientation by the shortest turn.
+pub(crate) fn between(from: &Pose, to: &Pose, s: f64) -> Pose {
+    let position = from.translation.vector.lerp(&to.translation.vector, s);
+    Pose::from_parts(position.into(), turned(&from.rotation, &to.rotation, s))
+}
+
+fn turned(from: &UnitQuaternion<f64>, to: &UnitQuaternion<f64>, s: f64) -> UnitQuaternion<f64> {
+    from.try_slerp(to, s, 1e-9).unwrap_or(*from)
+}
+
+/// The turn within the frame of the path whose course passes nearest to the orientation of the circle point.
+fn with_path(
+    arc: &Arc,
+    from: &UnitQuaternion<f64>,
+    via: &UnitQuaternion<f64>,
+    middle: f64,
+    to: &UnitQuaternion<f64>,
+) -> Turning {
+    let short = (from.inverse() * arc.turn(-1.0) * to).scaled_axis();
+    // Once more round the same way, or about the axis of the arc where there is no turn yet.
+    let about = short.try_normalize(1e-3).unwrap_or_else(|| from.inverse() * arc.axis.into_inner());
+    let off = |v: &Vector3<f64>| {
+        (arc.turn(middle) * from * UnitQuaternion::from_scaled_axis(v * middle)).angle_to(via)
+    };
+    let mut best = short;
+    for other in [short - about * TAU, short + about * TAU] {
+        // The short way unless another is clearly nearer.
+        if off(&other) + 0.1 < off(&best) {
+            best = other;
+        }
+    }
+    Turning::WithPath(best)
+}

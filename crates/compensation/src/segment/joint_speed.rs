@@ -1,0 +1,67 @@
+//! Whether the joints can follow at the programmed speed.
+//!
+//! Method: the time that the controller gives the motion is that of the slower of position and reorientation at their
+//! programmed speeds, or what the program states; the joints' mean speeds over equal parts of the told course are set against their limits. Ramps
+//! at the ends are not looked at: a motion that is flagged here is slowed down or stopped by the controller.
+//! Checked against: the analytic joint speed of a circle about axis 1.
+
+use crate::arms::Arms;
+use crate::segment::curve::Curve;
+use crate::segment::line::Ends;
+use truegrind_programs::motion::SpeedValue;
+
+/// What the program says of how fast a motion goes.
+pub(crate) enum Pace<'a> {
+    /// Speeds of position and reorientation.
+    Speed(&'a SpeedValue),
+    /// How long it takes (s).
+    Duration(f64),
+}
+
+/// The joint that turns fastest for what it can, with its speed over its limit, on a told course; `None` where the
+/// course or the limits say nothing.
+pub(crate) fn fastest(
+    from: &Ends<'_>,
+    to: &Ends<'_>,
+    course: &Curve,
+    pace: &Pace<'_>,
+    arms: &Arms<'_>,
+) -> Option<(usize, f64)> {
+    let limits = arms.nominal.arm().model.limits.speed_rad_s?;
+    let (length_mm, turn_deg) = (course.length_mm(), course.turn_rad().to_degrees());
+    let duration_s = match pace {
+        Pace::Speed(speed) => (length_mm / speed.tcp_mm_s).max(turn_deg / speed.orientation_deg_s),
+        Pace::Duration(duration_s) => *duration_s,
+    };
+    if !(duration_s > 1e-6 && duration_s.is_finite()) {
+        return None;
+    }
+    // Joints at the ends of a short line are enough; those at the parts of a long or turning one are worked out.
+    let least = if course.arc().is_some() { 4 } else { 1 };
+    let parts = ((length_mm / PART_MM).ceil() as usize).max((turn_deg / PART_DEG).ceil() as usize);
+    let parts = parts.clamp(least, 40);
+    let mut worst: Option<(usize, f64)> = None;
+    let mut before = from.joints;
+    for part in 1..=parts {
+        let s = part as f64 / parts as f64;
+        let joints = if part == parts {
+            to.joints
+        } else {
+            arms.nominal.solve_near(&to.mounted.told.flange_for(&course.at(s)), &before).ok()?.joints
+        };
+        for joint in 0..6 {
+            let ratio = (joints[joint] - before[joint]).abs() * parts as f64 / duration_s / limits[joint];
+            if worst.is_none_or(|(_, most)| ratio > most) {
+                worst = Some((joint, ratio));
+            }
+        }
+        before = joints;
+    }
+    worst
+}
+
+/// Longest part of a course (mm).
+const PART_MM: f64 = 50.0;
+
+/// Largest turn of a part (°).
+const PART_DEG: f64 = 10.0;

@@ -1,0 +1,74 @@
+//! How the joints go along a path on which the wrist is interpolated by itself (ABB, RAPID, `SingArea \Wrist`): joints 4 to
+//! 6 go in proportion from start to end, joints 1 to 3 such that the tool's point keeps to the path.
+//!
+//! Method. Newton's method for the three joints, from the sample before, with differences for the slope.
+//! Shapes: joints (rad) at the shares 1/n … (n − 1)/n of a curve in the work object (mm).
+//! Stops: within [`REACHED_MM`] of the path, or after [`STEPS`] steps: then the arm cannot go along.
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::frames::frame_pair::Mounting;
+use crate::segment::curve::Curve;
+use truegrind_arm::model::{Joints, PreparedModel};
+
+/// Steps of Newton's method for one sample.
+const STEPS: usize = 12;
+
+/// The tool's point keeps to the path to this (mm).
+const REACHED_MM: f64 = 1e-7;
+
+/// Difference of the slope (rad).
+const DIFFERENCE_RAD: f64 = 1e-6;
+
+/// Joints between the ends of a motion, in so many pieces; `None` where the arm cannot go along, or a joint goes farther than
+/// `most_step_rad` between neighbouring samples.
+pub(crate) fn along(
+    arm: &PreparedModel<'_>,
+    within: &Mounting,
+    curve: &Curve,
+    [start, end]: [&Joints; 2],
+    pieces: usize,
+    most_step_rad: f64,
+) -> Option<Vec<(f64, Joints)>> {
+    let mut out = Vec::with_capacity(pieces);
+    let mut last = *start;
+    for k in 1..=pieces {
+        let share = k as f64 / pieces as f64;
+        let mut near = last;
+        (3..6).for_each(|j| near[j] = start[j] + (end[j] - start[j]) * share);
+        let joints = reach(arm, within, &curve.at(share).translation.vector, near)?;
+        if (joints - last).amax() >= most_step_rad {
+            return None;
+        }
+        last = joints;
+        out.push((share, joints));
+    }
+    out.pop();
+    // On another branch the arm comes to another end.
+    ((end - last).amax() < most_step_rad).then_some(out)
+}
+
+/// Joints whose last three are given, with the tool's point at a place in the work object.
+fn reach(
+    arm: &PreparedModel<'_>,
+    within: &Mounting,
+    place: &Vector3<f64>,
+    mut joints: Joints,
+) -> Option<Joints> {
+    let at = |joints: &Joints| within.target_of(&arm.forward(joints)).translation.vector;
+    for _ in 0..STEPS {
+        let here = at(&joints);
+        let off = place - here;
+        if off.norm() < REACHED_MM {
+            return Some(joints);
+        }
+        let slope = Matrix3::from_columns(&std::array::from_fn::<_, 3, _>(|j| {
+            let mut moved = joints;
+            moved[j] += DIFFERENCE_RAD;
+            (at(&moved) - here) / DIFFERENCE_RAD
+        }));
+        let step = slope.try_inverse()? * off;
+        (0..3).for_each(|j| joints[j] += step[j]);
+    }
+    None
+}

@@ -1,0 +1,5 @@
+//! Targets: the joints of the original program, and the corrected joints and commanded poses.
+
+pub(crate) mod original_joints;
+pub(crate) mod solve;
+pub(crate) mod solved_target;
