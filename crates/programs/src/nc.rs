@@ -25,7 +25,7 @@ pub mod orientation;
 pub mod arc;
 pub mod setup;
 pub mod mark;
-mod machine;
+mod modal_state;
 mod task;
 mod rewrite;
 pub mod writer;

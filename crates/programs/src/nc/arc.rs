@@ -141,10 +141,10 @@ impl Arc {
         via: [f64; 3],
         end: [f64; 3],
         positive: bool,
-        whole: bool,
+        file_effects: bool,
     ) -> Option<Arc> {
         let Plane { a, b, .. } = plane;
-        if whole {
+        if file_effects {
             let centre = [0.5 * (start[a] + via[a]), 0.5 * (start[b] + via[b])];
             return Arc::about(plane, start, start, centre, positive);
         }
@@ -171,16 +171,16 @@ impl Arc {
     ///
     /// Where the ends are far apart for the radius the three points tell the circle. Where they are not, be the arc short or
     /// nearly closed, what is rounded of them would turn it: the centre then moves with the points, as a whole.
-    pub fn moved(&self, meant: [[f64; 3]; 3], told: [[f64; 3]; 3], positive: bool) -> Option<Arc> {
+    pub fn moved(&self, intended: [[f64; 3]; 3], commanded: [[f64; 3]; 3], positive: bool) -> Option<Arc> {
         let Plane { a, b, .. } = self.plane;
-        let [start, via, end] = told;
+        let [start, via, end] = commanded;
         let chord = [end[a] - start[a], end[b] - start[b]];
         let length = chord[0].hypot(chord[1]);
-        let radius = (meant[0][a] - self.centre_mm[0]).hypot(meant[0][b] - self.centre_mm[1]);
+        let radius = (intended[0][a] - self.centre_mm[0]).hypot(intended[0][b] - self.centre_mm[1]);
         if self.is_whole() || length >= FAR * radius {
             return Arc::through(self.plane, start, via, end, positive, self.is_whole());
         }
-        let mut centre_mm = self.moved_centre(meant, told);
+        let mut centre_mm = self.moved_centre(intended, commanded);
         if length < 1e-6 {
             return None;
         }
@@ -188,7 +188,7 @@ impl Arc {
         let along = chord.map(|x| x / length);
         let middle = [start[a] + 0.5 * chord[0], start[b] + 0.5 * chord[1]];
         let off = along[0] * (centre_mm[0] - middle[0]) + along[1] * (centre_mm[1] - middle[1]);
-        let end_radius = (meant[2][a] - self.centre_mm[0]).hypot(meant[2][b] - self.centre_mm[1]);
+        let end_radius = (intended[2][a] - self.centre_mm[0]).hypot(intended[2][b] - self.centre_mm[1]);
         let apart_mm = off.abs() * length / radius - (end_radius - radius).abs();
         if self.sweep_rad.abs() < PI {
             if apart_mm > SAME_MM {
@@ -202,14 +202,14 @@ impl Arc {
     }
 
     /// The centre, moved and turned as the points are (least squares over turn, scale and shift).
-    fn moved_centre(&self, meant: [[f64; 3]; 3], told: [[f64; 3]; 3]) -> [f64; 2] {
+    fn moved_centre(&self, intended: [[f64; 3]; 3], commanded: [[f64; 3]; 3]) -> [f64; 2] {
         let Plane { a, b, .. } = self.plane;
         let mean =
             |points: &[[f64; 3]; 3]| [a, b].map(|axis| points.iter().map(|p| p[axis]).sum::<f64>() / 3.0);
-        let (old, new) = (mean(&meant), mean(&told));
+        let (old, new) = (mean(&intended), mean(&commanded));
         // The complex factor that takes the one to the other.
         let (mut real, mut imaginary, mut square) = (0.0, 0.0, 0.0);
-        for (from, to) in meant.iter().zip(&told) {
+        for (from, to) in intended.iter().zip(&commanded) {
             let [x, y] = [from[a] - old[0], from[b] - old[1]];
             let [u, v] = [to[a] - new[0], to[b] - new[1]];
             real += x * u + y * v;
@@ -227,13 +227,13 @@ impl Arc {
 
     /// How far an arc that goes between `told` (start, middle, end) leaves this one, moved as its points are: the largest
     /// distance in the plane (mm).
-    pub fn leaves(&self, meant: [[f64; 3]; 3], told: [[f64; 3]; 3], new: &Arc) -> f64 {
+    pub fn leaves(&self, intended: [[f64; 3]; 3], commanded: [[f64; 3]; 3], new: &Arc) -> f64 {
         let axes = [self.plane.a, self.plane.b];
-        let moved = |point: usize, axis: usize| told[point][axis] - meant[point][axis];
+        let moved = |point: usize, axis: usize| commanded[point][axis] - intended[point][axis];
         (1..SAMPLES).fold(0.0, |most, k| {
             let t = f64::from(k) / f64::from(SAMPLES);
             let weights = [2.0 * (t - 0.5) * (t - 1.0), 4.0 * t * (1.0 - t), 2.0 * t * (t - 0.5)];
-            let (was, is) = (self.at(meant[0], meant[2], t), new.at(told[0], told[2], t));
+            let (was, is) = (self.at(intended[0], intended[2], t), new.at(commanded[0], commanded[2], t));
             let off = axes.map(|axis| {
                 let shift: f64 = (0..3).map(|point| weights[point] * moved(point, axis)).sum();
                 is[axis] - was[axis] - shift

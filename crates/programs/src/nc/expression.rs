@@ -20,34 +20,34 @@ const DEPTH: u32 = 64;
 pub type Variable = Vec<u8>;
 
 /// What an expression is worth, or why that is not known.
-pub type Worth = Result<f64, Reason>;
+pub type Evaluated = Result<f64, Reason>;
 
 /// The bytes are no expression.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct NoExpression;
+pub struct NotAnExpression;
 
-type Read = Result<Worth, NoExpression>;
+type Read = Result<Evaluated, NotAnExpression>;
 
 /// Reads one expression.
-pub struct Reader<'r, 's> {
+pub struct Evaluator<'r, 's> {
     tree: &'r NcTree<'s>,
     dialect: Dialect,
     /// The next token that is no white space.
     pub at: u32,
     end: u32,
     depth: u32,
-    variables: &'r dyn Fn(&Variable) -> Worth,
+    variables: &'r dyn Fn(&Variable) -> Evaluated,
 }
 
-impl<'r, 's> Reader<'r, 's> {
+impl<'r, 's> Evaluator<'r, 's> {
     /// Reads tokens `first..end` with what is known of variables.
     pub fn new(
         tree: &'r NcTree<'s>,
         dialect: Dialect,
         (first, end): (u32, u32),
-        variables: &'r dyn Fn(&Variable) -> Worth,
+        variables: &'r dyn Fn(&Variable) -> Evaluated,
     ) -> Self {
-        let mut reader = Reader { tree, dialect, at: first, end, depth: 0, variables };
+        let mut reader = Evaluator { tree, dialect, at: first, end, depth: 0, variables };
         reader.skip();
         reader
     }
@@ -82,7 +82,7 @@ impl<'r, 's> Reader<'r, 's> {
 
     fn nested(&mut self, inner: impl FnOnce(&mut Self) -> Read) -> Read {
         if self.depth >= DEPTH {
-            return Err(NoExpression);
+            return Err(NotAnExpression);
         }
         self.depth += 1;
         let read = inner(self);
@@ -111,8 +111,8 @@ impl<'r, 's> Reader<'r, 's> {
         Ok(left)
     }
 
-    fn operator(&mut self, level: u8) -> Option<fn(f64, f64) -> Worth> {
-        let found: fn(f64, f64) -> Worth = match (level, self.peek()) {
+    fn operator(&mut self, level: u8) -> Option<fn(f64, f64) -> Evaluated> {
+        let found: fn(f64, f64) -> Evaluated = match (level, self.peek()) {
             (1, Token::EqualEqual) => |a, b| Ok(f64::from(u8::from(a == b))),
             (1, Token::NotEqual) => |a, b| Ok(f64::from(u8::from(a != b))),
             (1, Token::Less) => |a, b| Ok(f64::from(u8::from(a < b))),
@@ -132,7 +132,7 @@ impl<'r, 's> Reader<'r, 's> {
                 let bitwise = matches!(self.dialect, Dialect::Fanuc | Dialect::Iso);
                 let divides = self.dialect == Dialect::Heidenhain;
                 let floors = self.dialect == Dialect::LinuxCnc;
-                let found: fn(f64, f64) -> Worth = match (level, &*name) {
+                let found: fn(f64, f64) -> Evaluated = match (level, &*name) {
                     // Bit by bit, and of other priority: known only where they are not asked for.
                     (0, b"AND" | b"OR" | b"XOR") if bitwise => |_, _| Err(Reason::Variable),
                     (3, b"DIV") if divides => {
@@ -219,7 +219,7 @@ impl<'r, 's> Reader<'r, 's> {
                 Ok(number.and_then(|number| (self.variables)(&numbered(&[letter], number))))
             }
             Token::Name => self.named(),
-            _ => Err(NoExpression),
+            _ => Err(NotAnExpression),
         }
     }
 
@@ -235,7 +235,7 @@ impl<'r, 's> Reader<'r, 's> {
             inner = Err(Reason::Variable);
         }
         if self.peek() != close {
-            return Err(NoExpression);
+            return Err(NotAnExpression);
         }
         self.bump();
         Ok(inner)
@@ -253,7 +253,7 @@ impl<'r, 's> Reader<'r, 's> {
             Token::Number | Token::BracketOpen | Token::Hash => {
                 self.nested(Self::primary)?.map(|number| numbered(b"#", number))
             }
-            _ => return Err(NoExpression),
+            _ => return Err(NotAnExpression),
         };
         Ok(key.and_then(|key| (self.variables)(&key)))
     }
@@ -291,7 +291,7 @@ impl<'r, 's> Reader<'r, 's> {
             second = Some(self.expression()?);
         }
         if self.peek() != close {
-            return Err(NoExpression);
+            return Err(NotAnExpression);
         }
         self.bump();
         // ATAN[y]/[x] of Fanuc and LinuxCNC.
@@ -307,13 +307,13 @@ impl<'r, 's> Reader<'r, 's> {
     }
 
     /// Brackets whose content is not looked at, to the end of the line at most.
-    fn skip_group(&mut self, close: Token) -> Result<(), NoExpression> {
+    fn skip_group(&mut self, close: Token) -> Result<(), NotAnExpression> {
         let open = self.peek();
         let mut depth = 0_u32;
         loop {
             let kind = self.peek();
             if kind == Token::End || kind == Token::LineEnd {
-                return Err(NoExpression);
+                return Err(NotAnExpression);
             }
             self.bump();
             if kind == open {
@@ -329,7 +329,7 @@ impl<'r, 's> Reader<'r, 's> {
 }
 
 /// What is left of a division; its sign differs between controls.
-fn remainder(a: f64, b: f64) -> Worth {
+fn remainder(a: f64, b: f64) -> Evaluated {
     match () {
         () if b == 0.0 => Err(Reason::WrongShape),
         () if a < 0.0 || b < 0.0 => Err(Reason::Variable),
@@ -371,7 +371,7 @@ const FUNCTIONS: [&[u8]; 23] = [
     b"LN", b"EXP", b"TRUNC", b"POT", b"SQR", b"INT", b"FRAC", b"SGN", b"NEG", b"SQ", b"EXISTS",
 ];
 
-fn function(name: &[u8], x: f64, second: Option<f64>, dialect: Dialect) -> Worth {
+fn function(name: &[u8], x: f64, second: Option<f64>, dialect: Dialect) -> Evaluated {
     // A parameter of a Fanuc says where the range of an angle begins; what plain ISO means is not certain either.
     let fanuc = matches!(dialect, Dialect::Fanuc | Dialect::Iso);
     let iso = dialect == Dialect::Iso;

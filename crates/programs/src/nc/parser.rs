@@ -1,9 +1,9 @@
 //! Tokens to tree: lines to blocks, blocks to words. Never fails: what cannot be read is opaque to the end of its line.
 
 use super::dialect::Dialect;
-use super::expression::{Reader, Worth, is_function};
+use super::expression::{Evaluated, Evaluator, is_function};
 use super::lexer::lex;
-use super::syntax::{Belongs, NcTree, Syntax, Word};
+use super::syntax::{NcTree, Syntax, Word, WordValue};
 use super::token::Token;
 use crate::motion::{OpaqueReason, Reason};
 use crate::tree::{Node, Opaque};
@@ -407,9 +407,9 @@ impl Parser<'_, '_> {
     }
 
     fn read(&mut self, whole: bool) -> Option<u32> {
-        let unknown = |_: &Vec<u8>| -> Worth { Err(Reason::Variable) };
+        let unknown = |_: &Vec<u8>| -> Evaluated { Err(Reason::Variable) };
         let first = self.at;
-        let mut reader = Reader::new(self.tree, self.dialect, (first, self.tree.len() as u32), &unknown);
+        let mut reader = Evaluator::new(self.tree, self.dialect, (first, self.tree.len() as u32), &unknown);
         let read = if whole { reader.expression() } else { reader.primary_only() };
         let _ = read.ok()?;
         self.at = reader.at;
@@ -442,7 +442,7 @@ pub fn word<'s>(tree: &NcTree<'s>, node: u32) -> Word<'s> {
     };
     let kind = |at: u32| if at < end { tree.kind(at).unwrap_or(Token::End) } else { Token::End };
     let mut word =
-        Word { first, end, name: tree.text(first), index: None, belongs: Belongs::Nothing, assigned: false };
+        Word { first, end, name: tree.text(first), index: None, value: WordValue::Absent, assigned: false };
     let hash = kind(at) == Token::Hash;
     next(&mut at);
     if hash {
@@ -480,15 +480,15 @@ pub fn word<'s>(tree: &NcTree<'s>, node: u32) -> Word<'s> {
     if sign.is_some() {
         next(&mut after_sign);
     }
-    word.belongs = match kind(at) {
-        Token::End => Belongs::Nothing,
-        Token::ParenOpen if !word.assigned => Belongs::Arguments { first: at, end },
+    word.value = match kind(at) {
+        Token::End => WordValue::Absent,
+        Token::ParenOpen if !word.assigned => WordValue::Arguments { first: at, end },
         _ if kind(after_sign) == Token::Number && after_sign + 1 == end => {
-            Belongs::Literal { sign, number: after_sign }
+            WordValue::Literal { sign, number: after_sign }
         }
         // R+, DR-: a bare sign.
-        _ if at >= end || kind(after_sign) == Token::End => Belongs::Nothing,
-        _ => Belongs::Expression { first: at, end },
+        _ if at >= end || kind(after_sign) == Token::End => WordValue::Absent,
+        _ => WordValue::Expression { first: at, end },
     };
     word
 }

@@ -5,28 +5,30 @@
 //! that what is left as it is goes where it always went. Arcs get the centre (or radius) of the circle through their new
 //! start, middle and end, as long as it keeps to the way that was meant, with the numbers as they are written.
 
-mod again;
+mod restate;
 mod arcs;
-mod ends;
-mod long;
-mod now;
-mod origins;
-mod pen;
-mod slots;
+mod pinned_ends;
+mod line_length;
+mod control_state;
+mod position_dependencies;
+mod block_writer;
+mod word_slots;
 
 use std::collections::{BTreeSet, HashMap};
 
 use nalgebra::UnitQuaternion;
 
-use self::now::Now;
-use self::pen::{Pen, differs};
-use self::slots::{ANGLES, AXES, CENTRE, ORDER, RADIUS, SPIN, Slots, VECTOR, said, slots};
+use self::block_writer::{BlockWriter, differs};
+use self::control_state::ControlState;
+use self::word_slots::{
+    ANGLES, AXES, CENTRE, ORDER, RADIUS, SPIN, VECTOR, WordSlots, slots, states_increment,
+};
 use super::arc::{Arc, Plane};
 use super::dialect::Dialect;
-use super::machine::Turn;
 use super::mark;
+use super::modal_state::OrientationMode;
 use super::orientation::{Angles, vector_and_spin};
-use super::task::{Event, Task, Written};
+use super::task::{BlockContext, StateEvent, Task};
 use crate::edit::{EditError, Edits};
 use crate::motion::{Frame, Motion, MotionKind, Reason, RobTarget, Role, TargetValue};
 use crate::rewrite::{Change, Extra, FileEdits, NewTarget, Outcome, RewriteOptions, Rewritten};
@@ -59,15 +61,16 @@ impl Task<'_> {
         let mut rounds = 0;
         while !wanted.is_empty() {
             edits.iter_mut().for_each(|edits| *edits = Edits::new());
-            let fixed = self.fixed_ends(changes, &mut wanted, &mut outcomes);
-            if self.keep_origins(&fixed, &mut wanted, &mut outcomes) {
+            let pinned = self.find_pinned_ends(changes, &mut wanted, &mut outcomes);
+            if self.refuse_position_dependents(&pinned, &mut wanted, &mut outcomes) {
                 // What is refused now stays, and with it what it hangs on.
                 continue;
             }
-            let unfit = self.follow((changes, &wanted), options, &fixed, &mut edits, &mut outcomes);
+            let unfit_arcs =
+                self.rewrite_motions((changes, &wanted), options, &pinned, &mut edits, &mut outcomes);
             // An arc that no circle fits stays, and with it what ends where it starts.
             let mut again = false;
-            for motion in unfit {
+            for motion in unfit_arcs {
                 if let Some(index) = wanted.remove(&motion) {
                     outcomes[index] = Outcome::Refused(Reason::WrongShape);
                     again = true;
@@ -77,7 +80,7 @@ impl Task<'_> {
                 for edits in &mut edits {
                     edits.sort()?;
                 }
-                for motion in self.too_long(&edits, &wanted) {
+                for motion in self.motions_on_long_lines(&edits, &wanted) {
                     if let Some(index) = wanted.remove(&motion) {
                         outcomes[index] = Outcome::Refused(Reason::LineTooLong);
                         again = true;
@@ -105,39 +108,48 @@ impl Task<'_> {
 
     /// Writes all motions in their order: those of `wanted`, and what the others must say again. Hands back the arcs that no
     /// circle fits.
-    fn follow(
+    fn rewrite_motions(
         &self,
         (changes, wanted): (&[Change], &HashMap<u32, usize>),
         options: &RewriteOptions,
-        fixed: &BTreeSet<u32>,
+        pinned: &BTreeSet<u32>,
         edits: &mut Vec<Edits>,
         outcomes: &mut [Outcome],
     ) -> Vec<u32> {
-        let mut follower =
-            Follower { task: self, options, edits, now: Now::default(), unfit: Vec::new(), fixed };
+        let mut rewriter = Rewriter {
+            task: self,
+            options,
+            edits,
+            control: ControlState::default(),
+            unfit_arcs: Vec::new(),
+            pinned,
+        };
         for event in &self.events {
             match *event {
-                Event::Start => follower.now = Now::default(),
-                Event::Unknown | Event::Join => {
+                StateEvent::FileStart => rewriter.control = ControlState::default(),
+                StateEvent::PoseUnknown | StateEvent::Join => {
                     // A shift that is set where the tool stands elsewhere stays where it is.
-                    let Now { straightened, moved, .. } = follower.now;
-                    follower.now = Now { straightened, moved, ..Now::default() };
+                    let ControlState { straightened, moved, .. } = rewriter.control;
+                    rewriter.control = ControlState { straightened, moved, ..ControlState::default() };
                 }
-                Event::Lost(axes) => follower.now.lose(axes),
-                Event::Shift { stated, .. } => follower.now.shift_at(stated),
-                Event::Placed(axes) => follower.now.place(axes),
+                StateEvent::AxesUnknown(axes) => rewriter.control.lose(axes),
+                StateEvent::OriginSet { stated, .. } => rewriter.control.shift_at(stated),
+                StateEvent::ShiftStated(axes) => rewriter.control.place(axes),
                 // Nothing has moved there: the motions that end there stay.
-                Event::MaybePlaced(_) | Event::Restored | Event::Held { .. } | Event::Jump => {}
-                Event::Motion(motion) => {
+                StateEvent::ShiftMaybeStated(_)
+                | StateEvent::ShiftRestored
+                | StateEvent::PositionUsed { .. }
+                | StateEvent::Branch => {}
+                StateEvent::Motion(motion) => {
                     let index = wanted.get(&motion).copied();
-                    let outcome = follower.motion(motion, index.map(|index| &changes[index]));
+                    let outcome = rewriter.motion(motion, index.map(|index| &changes[index]));
                     if let Some(index) = index {
                         outcomes[index] = outcome;
                     }
                 }
             }
         }
-        follower.unfit
+        rewriter.unfit_arcs
     }
 
     /// The edits of each file, with the mark of this version.
@@ -182,7 +194,7 @@ impl Task<'_> {
         if change.before.is_empty() {
             return None;
         }
-        if !change.straightens() && !self.written[change.motion as usize].insertable {
+        if !change.straightens() && !self.contexts[change.motion as usize].insertable {
             return Some(Reason::NoInsertion);
         }
         change.before.iter().find_map(|extra| match (extra.kind, &extra.target) {
@@ -194,76 +206,79 @@ impl Task<'_> {
 }
 
 /// Where a motion shall go.
-struct Aim {
+struct Goal {
     position: [f64; 3],
     /// `None` keeps the words of the orientation.
     rotation: Option<UnitQuaternion<f64>>,
     via: Option<[f64; 3]>,
 }
 
-struct Follower<'f, 's> {
+struct Rewriter<'f, 's> {
     task: &'f Task<'s>,
     options: &'f RewriteOptions,
     edits: &'f mut Vec<Edits>,
-    now: Now,
+    control: ControlState,
     /// Arcs that no circle fits.
-    unfit: Vec<u32>,
+    unfit_arcs: Vec<u32>,
     /// Motions that end where they always did, whatever is asked.
-    fixed: &'f BTreeSet<u32>,
+    pinned: &'f BTreeSet<u32>,
 }
 
-impl<'s> Follower<'_, 's> {
+impl<'s> Rewriter<'_, 's> {
     /// Writes one motion; what was asked for it, if anything.
     fn motion(&mut self, index: u32, change: Option<&Change>) -> Outcome {
         let task = self.task;
         let motion = &task.listing.motions[index as usize];
-        let written = &task.written[index as usize];
+        let context = &task.contexts[index as usize];
         let to =
             motion.to().and_then(|target| target.value.ok().and_then(|value| value.cartesian().copied()));
-        let stays = motion.left.is_some_and(|reason| !stays_in_place(reason));
+        let stays = motion.left.is_some_and(|reason| !keeps_endpoint(reason));
         let straightens = change.is_some_and(Change::straightens);
-        self.mode_again(motion, written, straightens);
+        self.restate_motion_mode(motion, context, straightens);
         let Some(to) = to.filter(|_| !stays) else {
-            if written.restates {
-                self.say_again(motion, written);
+            if context.can_restate {
+                self.restate_words(motion, context);
             }
             let file = motion.place.file as usize;
-            self.pass(&task.trees[file], task.dialects[file], written, motion.conditional);
+            self.skip_unmodified(&task.trees[file], task.dialects[file], context, motion.conditional);
             return Outcome::Unchanged;
         };
         let start: [Option<f64>; 3] =
-            std::array::from_fn(|axis| self.now.position[axis].or(written.start[axis]));
-        let new =
-            change.and_then(|change| aim_of(motion, change)).map(|aim| match self.fixed.contains(&index) {
-                true => Aim { position: to.position_mm, rotation: None, via: aim.via },
-                false => aim,
-            });
+            std::array::from_fn(|axis| self.control.position[axis].or(context.start[axis]));
+        let new = change.and_then(|change| goal_of(motion, change)).map(|goal| {
+            match self.pinned.contains(&index) {
+                true => Goal { position: to.position_mm, rotation: None, via: goal.via },
+                false => goal,
+            }
+        });
         let adds = change.is_some_and(|change| !change.before.is_empty());
-        if new.is_none() && !adds && self.is_as_meant(written, &start) {
-            self.arrive(&to, written, None);
+        if new.is_none() && !adds && self.is_as_intended(context, &start) {
+            self.update_after_motion(&to, context, None);
             return Outcome::Unchanged;
         }
-        let original = Aim { position: to.position_mm, rotation: None, via: via_of(motion) };
-        let mut aim = new.unwrap_or(original);
+        let original = Goal { position: to.position_mm, rotation: None, via: via_of(motion) };
+        let mut goal = new.unwrap_or(original);
         let mut arc = None;
         let mut outcome = Outcome::Unchanged;
-        if written.arc.is_some() && !straightens {
+        if context.arc.is_some() && !straightens {
             let file = motion.place.file as usize;
-            let by_radius = slots(&task.trees[file], task.dialects[file], written).radius.is_some();
-            let meant = all(written.start).zip(via_of(motion)).map(|(from, via)| [from, via, to.position_mm]);
-            arc = meant.and_then(|meant| self.arc(&mut aim, start, written, (meant, by_radius)));
+            let by_radius = slots(&task.trees[file], task.dialects[file], context).radius.is_some();
+            let intended =
+                all(context.start).zip(via_of(motion)).map(|(from, via)| [from, via, to.position_mm]);
+            arc = intended.and_then(|intended| self.arc(&mut goal, start, context, (intended, by_radius)));
             if arc.is_none() {
-                self.unfit.push(index);
+                self.unfit_arcs.push(index);
                 // No circle goes there: the motion stays.
                 if change.is_some() {
                     outcome = Outcome::Refused(Reason::WrongShape);
-                    aim = Aim { position: to.position_mm, rotation: None, via: via_of(motion) };
-                    arc = meant.and_then(|meant| self.arc(&mut aim, start, written, (meant, by_radius)));
+                    goal = Goal { position: to.position_mm, rotation: None, via: via_of(motion) };
+                    arc = intended
+                        .and_then(|intended| self.arc(&mut goal, start, context, (intended, by_radius)));
                 }
             }
         }
         let tree = &task.trees[motion.place.file as usize];
-        let mut slots = slots(tree, task.dialects[motion.place.file as usize], written);
+        let mut slots = slots(tree, task.dialects[motion.place.file as usize], context);
         if straightens {
             self.straighten(motion, &mut slots, change.is_some_and(|change| change.before.is_empty()));
             outcome = Outcome::InPlace;
@@ -272,29 +287,38 @@ impl<'s> Follower<'_, 's> {
             && !matches!(outcome, Outcome::Refused(_))
             && !change.before.is_empty()
         {
-            self.extras(motion, written, &slots, &change.before, &to);
+            self.extras(motion, context, &slots, &change.before, &to);
             outcome = Outcome::InPlace;
         }
-        let done = self.write(motion, written, &slots, &aim, arc);
+        let done = self.write(motion, context, &slots, &goal, arc);
         if matches!(outcome, Outcome::Refused(_)) || done == Outcome::Unchanged { outcome } else { done }
     }
 
     /// After a motion: as meant, or where it has been told to go.
-    fn arrive(&mut self, to: &RobTarget, written: &Written, told: Option<([f64; 3], Told)>) {
-        self.now.meant = to.position_mm.map(Some);
-        match told {
+    fn update_after_motion(
+        &mut self,
+        to: &RobTarget,
+        context: &BlockContext,
+        commanded: Option<([f64; 3], CommandedOrientation)>,
+    ) {
+        self.control.intended = to.position_mm.map(Some);
+        match commanded {
             None => {
-                self.now.position = to.position_mm.map(Some);
-                self.now.angles = written.angles;
-                self.now.vector = written.vector;
+                self.control.position = to.position_mm.map(Some);
+                self.control.angles = context.angles;
+                self.control.vector = context.vector;
             }
-            Some((position, told)) => {
-                self.now.position = position.map(Some);
-                match told {
-                    Told::AsMeant => (self.now.angles, self.now.vector) = (written.angles, written.vector),
-                    Told::Angles(angles) => (self.now.angles, self.now.vector) = (angles.map(Some), None),
-                    Told::Vector(vector, spin) => {
-                        (self.now.angles, self.now.vector) = ([None; 3], Some((vector, spin)));
+            Some((position, commanded)) => {
+                self.control.position = position.map(Some);
+                match commanded {
+                    CommandedOrientation::Unchanged => {
+                        (self.control.angles, self.control.vector) = (context.angles, context.vector)
+                    }
+                    CommandedOrientation::Angles(angles) => {
+                        (self.control.angles, self.control.vector) = (angles.map(Some), None)
+                    }
+                    CommandedOrientation::Vector(vector, spin) => {
+                        (self.control.angles, self.control.vector) = ([None; 3], Some((vector, spin)));
                     }
                 }
             }
@@ -305,66 +329,68 @@ impl<'s> Follower<'_, 's> {
     fn write(
         &mut self,
         motion: &Motion,
-        written: &Written,
-        slots: &Slots<'s>,
-        aim: &Aim,
+        context: &BlockContext,
+        slots: &WordSlots<'s>,
+        goal: &Goal,
         arc: Option<Arc>,
     ) -> Outcome {
         let task = self.task;
         let file = motion.place.file as usize;
         let (tree, dialect) = (&task.trees[file], task.dialects[file]);
         let mut edits = std::mem::take(&mut self.edits[file]);
-        let mut pen = Pen::new(tree, dialect, &mut edits, slots, written);
-        let unit = written.unit_mm;
+        let mut writer = BlockWriter::new(tree, dialect, &mut edits, slots, context);
+        let unit = context.unit_mm;
         let decimals = self.options.position_decimals + u8::from(unit != 1.0) * 2;
         let start: [Option<f64>; 3] =
-            std::array::from_fn(|axis| self.now.position[axis].or(written.start[axis]));
+            std::array::from_fn(|axis| self.control.position[axis].or(context.start[axis]));
         let to =
             motion.to().and_then(|target| target.value.ok().and_then(|value| value.cartesian().copied()));
-        let meant = to.map_or(aim.position, |to| to.position_mm);
-        let mut reached = aim.position;
+        let intended = to.map_or(goal.position, |to| to.position_mm);
+        let mut reached = goal.position;
         for axis in 0..3 {
-            let shift = written.shift[axis].unwrap_or(0.0) + self.now.moved[axis];
+            let shift = context.shift[axis].unwrap_or(0.0) + self.control.moved[axis];
             let from = start[axis].unwrap_or(0.0);
             let word = slots.axes[axis];
-            let increment = word.and_then(|word| said(tree, dialect, &word)).unwrap_or(!written.absolute);
+            let increment =
+                word.and_then(|word| states_increment(tree, dialect, &word)).unwrap_or(!context.absolute);
             let base = if increment { from } else { shift };
-            let value = (aim.position[axis] - base) / unit;
+            let value = (goal.position[axis] - base) / unit;
             let keep = (from - base) / unit;
-            let old_base = if increment { written.start[axis] } else { written.shift[axis] };
-            let was = old_base.map_or(f64::NAN, |old| (meant[axis] - old) / unit);
+            let old_base = if increment { context.start[axis] } else { context.shift[axis] };
+            let was = old_base.map_or(f64::NAN, |old| (intended[axis] - old) / unit);
             let name = [b"X", b"Y", b"Z"][axis];
-            let value = pen.put(AXES + axis, name, value, keep, was, decimals);
+            let value = writer.put(AXES + axis, name, value, keep, was, decimals);
             reached[axis] = value * unit + base;
         }
-        let told = self.orientation(&mut pen, written, slots, aim, file);
+        let commanded = self.orientation(&mut writer, context, slots, goal, file);
         if let (Some(arc), Some(begin)) = (arc, all(start)) {
             let Plane { a, b, .. } = arc.plane;
-            let absolute_centre = written.arc.is_some_and(|(_, _, absolute)| absolute);
-            let old = written.arc.map(|(old, _, _)| old);
+            let absolute_centre = context.arc.is_some_and(|old| old.centre_absolute);
+            let old = context.arc.map(|old| old.arc);
             if slots.radius.is_some() {
                 let was = old.and_then(|old| {
-                    let length = (written.start[a]? - old.centre_mm[0])
-                        .hypot(written.start[b]? - old.centre_mm[1])
+                    let length = (context.start[a]? - old.centre_mm[0])
+                        .hypot(context.start[b]? - old.centre_mm[1])
                         / unit;
                     Some(if old.is_long() { -length } else { length })
                 });
                 let length = (begin[a] - arc.centre_mm[0]).hypot(begin[b] - arc.centre_mm[1]) / unit;
                 let length = if arc.is_long() { -length } else { length };
-                pen.put(RADIUS, b"R", length, length, was.unwrap_or(f64::NAN), decimals);
+                writer.put(RADIUS, b"R", length, length, was.unwrap_or(f64::NAN), decimals);
             } else if dialect != Dialect::Heidenhain {
                 for (place, axis) in [a, b].into_iter().enumerate() {
                     let word = slots.centre[axis];
-                    let increment =
-                        word.and_then(|word| said(tree, dialect, &word)).unwrap_or(!absolute_centre);
-                    let shift = written.shift[axis].unwrap_or(0.0) + self.now.moved[axis];
+                    let increment = word
+                        .and_then(|word| states_increment(tree, dialect, &word))
+                        .unwrap_or(!absolute_centre);
+                    let shift = context.shift[axis].unwrap_or(0.0) + self.control.moved[axis];
                     let base = if increment { begin[axis] } else { shift };
                     let value = (arc.centre_mm[place] - base) / unit;
                     // A centre that is left out is that of the start.
                     let keep = (begin[axis] - base) / unit;
-                    let old_base = if increment { written.start[axis] } else { written.shift[axis] };
+                    let old_base = if increment { context.start[axis] } else { context.shift[axis] };
                     let was = old.and_then(|old| Some((old.centre_mm[place] - old_base?) / unit));
-                    pen.put(
+                    writer.put(
                         CENTRE + axis,
                         [b"I", b"J", b"K"][axis],
                         value,
@@ -375,78 +401,82 @@ impl<'s> Follower<'_, 's> {
                 }
             }
         }
-        let replaced = pen.finish();
+        let replaced = writer.finish();
         self.edits[file] = edits;
         if let Some(to) = to {
-            self.arrive(&to, written, Some((reached, told)));
+            self.update_after_motion(&to, context, Some((reached, commanded)));
         }
         replaced
     }
 
     fn orientation(
         &self,
-        pen: &mut Pen<'_, 's>,
-        written: &Written,
-        slots: &Slots<'s>,
-        aim: &Aim,
+        writer: &mut BlockWriter<'_, 's>,
+        context: &BlockContext,
+        slots: &WordSlots<'s>,
+        goal: &Goal,
         file: usize,
-    ) -> Told {
-        match written.turn {
-            Turn::Unknown(_) => Told::AsMeant,
-            Turn::Angles | Turn::Rpy => {
-                let rpy = written.turn == Turn::Rpy;
-                let Some(meant) = all(written.angles) else { return Told::AsMeant };
+    ) -> CommandedOrientation {
+        match context.orientation_mode {
+            OrientationMode::Unknown(_) => CommandedOrientation::Unchanged,
+            OrientationMode::Angles | OrientationMode::Rpy => {
+                let rpy = context.orientation_mode == OrientationMode::Rpy;
+                let Some(intended) = all(context.angles) else { return CommandedOrientation::Unchanged };
                 let angles =
-                    match (aim.rotation, if rpy { Some(Angles::Wpr) } else { self.task.angles[file] }) {
-                        (Some(rotation), Some(angles)) => angles.angles(&rotation, meant),
-                        _ => meant,
+                    match (goal.rotation, if rpy { Some(Angles::Wpr) } else { self.task.angles[file] }) {
+                        (Some(rotation), Some(angles)) => angles.angles(&rotation, intended),
+                        _ => intended,
                     };
                 let mut reached = angles;
                 let names: [&[u8]; 3] = if rpy { [b"A2", b"B2", b"C2"] } else { [b"A", b"B", b"C"] };
                 for axis in 0..3 {
-                    let from = self.now.angles[axis].or(written.start_angles[axis]);
+                    let from = self.control.angles[axis].or(context.start_angles[axis]);
                     let word = slots.angles[axis];
-                    let increment =
-                        word.and_then(|word| said(pen.tree, pen.dialect, &word)).unwrap_or(!written.absolute);
+                    let increment = word
+                        .and_then(|word| states_increment(writer.tree, writer.dialect, &word))
+                        .unwrap_or(!context.absolute);
                     let base = if increment { from.unwrap_or(0.0) } else { 0.0 };
                     // An angle that was never stated before this block has a word in it.
                     let keep = from.map_or(angles[axis], |from| from - base);
-                    let old_base = if increment { written.start_angles[axis] } else { Some(0.0) };
-                    let was = old_base.map_or(f64::NAN, |old| meant[axis] - old);
+                    let old_base = if increment { context.start_angles[axis] } else { Some(0.0) };
+                    let was = old_base.map_or(f64::NAN, |old| intended[axis] - old);
                     let decimals = self.options.joint_decimals;
-                    let value = pen.put(ANGLES + axis, names[axis], angles[axis] - base, keep, was, decimals);
+                    let value =
+                        writer.put(ANGLES + axis, names[axis], angles[axis] - base, keep, was, decimals);
                     reached[axis] = value + base;
                 }
-                Told::Angles(reached)
+                CommandedOrientation::Angles(reached)
             }
-            Turn::Vector => {
-                let Some((meant, meant_spin)) = written.vector else { return Told::AsMeant };
-                let length = meant.iter().map(|x| x * x).sum::<f64>().sqrt();
-                let (vector, spin) = match &aim.rotation {
+            OrientationMode::Vector => {
+                let Some((intended, meant_spin)) = context.vector else {
+                    return CommandedOrientation::Unchanged;
+                };
+                let length = intended.iter().map(|x| x * x).sum::<f64>().sqrt();
+                let (vector, spin) = match &goal.rotation {
                     Some(rotation) => {
                         let (vector, spin) = vector_and_spin(rotation, meant_spin);
                         // As long as the old one, which need not have length 1.
                         (vector.map(|x| x * length), spin)
                     }
-                    None => (meant, meant_spin),
+                    None => (intended, meant_spin),
                 };
                 let decimals = self.options.quaternion_decimals;
-                let names = vector_names(pen.dialect, written);
-                let before = self.now.vector.or(written.start_vector);
+                let names = vector_names(writer.dialect, context);
+                let before = self.control.vector.or(context.start_vector);
                 let stated = slots.vector.iter().any(Option::is_some);
                 let holds =
                     before.is_some_and(|(old, _)| (0..3).all(|i| !differs(old[i], vector[i], decimals)));
                 if stated || !holds {
                     for axis in 0..3 {
                         // A component that is left out is 0.
-                        pen.put(VECTOR + axis, names[axis], vector[axis], 0.0, meant[axis], decimals);
+                        writer.put(VECTOR + axis, names[axis], vector[axis], 0.0, intended[axis], decimals);
                     }
                 }
-                if pen.dialect == Dialect::Siemens {
+                if writer.dialect == Dialect::Siemens {
                     let held = before.map_or(0.0, |(_, spin)| spin);
-                    pen.put(SPIN, b"THETA", spin, held, meant_spin, self.options.joint_decimals);
+                    writer.put(SPIN, b"THETA", spin, held, meant_spin, self.options.joint_decimals);
                 }
-                Told::Vector(vector, spin)
+                CommandedOrientation::Vector(vector, spin)
             }
         }
     }
@@ -455,8 +485,8 @@ impl<'s> Follower<'_, 's> {
     fn extras(
         &mut self,
         motion: &Motion,
-        written: &Written,
-        slots: &Slots<'s>,
+        context: &BlockContext,
+        slots: &WordSlots<'s>,
         extras: &[Extra],
         to: &RobTarget,
     ) {
@@ -470,7 +500,7 @@ impl<'s> Follower<'_, 's> {
             let NewTarget::Cartesian { position_mm, quaternion, .. } = extra.target else { continue };
             let rotation = Frame { position_mm, quaternion }.pose().rotation;
             let mut scratch = Edits::new();
-            let mut pen = Pen {
+            let mut writer = BlockWriter {
                 tree,
                 dialect,
                 edits: &mut scratch,
@@ -481,22 +511,22 @@ impl<'s> Follower<'_, 's> {
                 spaced: true,
                 lead: None,
             };
-            let unit = written.unit_mm;
+            let unit = context.unit_mm;
             let decimals = self.options.position_decimals + u8::from(unit != 1.0) * 2;
             let mut reached = position_mm;
             for axis in 0..3 {
-                let from = self.now.position[axis].or(written.start[axis]).unwrap_or(0.0);
-                let shift = written.shift[axis].unwrap_or(0.0) + self.now.moved[axis];
-                let base = if written.absolute { shift } else { from };
+                let from = self.control.position[axis].or(context.start[axis]).unwrap_or(0.0);
+                let shift = context.shift[axis].unwrap_or(0.0) + self.control.moved[axis];
+                let base = if context.absolute { shift } else { from };
                 let value = (position_mm[axis] - base) / unit;
                 let value =
-                    pen.put(AXES + axis, [b"X", b"Y", b"Z"][axis], value, f64::NAN, f64::NAN, decimals);
+                    writer.put(AXES + axis, [b"X", b"Y", b"Z"][axis], value, f64::NAN, f64::NAN, decimals);
                 reached[axis] = value * unit + base;
             }
-            let none = Slots::default();
-            let aim = Aim { position: position_mm, rotation: Some(rotation), via: None };
-            let told = self.orientation(&mut pen, written, &none, &aim, file);
-            let words = pen.added;
+            let none = WordSlots::default();
+            let goal = Goal { position: position_mm, rotation: Some(rotation), via: None };
+            let commanded = self.orientation(&mut writer, context, &none, &goal, file);
+            let words = writer.added;
             text.extend_from_slice(b"G1");
             if let Some(distance) = slots.distance {
                 text.push(b' ');
@@ -508,22 +538,22 @@ impl<'s> Follower<'_, 's> {
                 text.extend_from_slice(&source[tree.range(feed.first, feed.end)]);
             }
             text.extend_from_slice(line_end(source));
-            self.arrive(to, written, Some((reached, told)));
+            self.update_after_motion(to, context, Some((reached, commanded)));
         }
         self.edits[file].insert(begin, &text);
     }
 }
 
 /// How the orientation was written.
-enum Told {
-    AsMeant,
+enum CommandedOrientation {
+    Unchanged,
     Angles([f64; 3]),
     Vector([f64; 3], f64),
 }
 
 /// The words of a tool vector.
-fn vector_names(dialect: Dialect, written: &Written) -> [&'static [u8]; 3] {
-    match (dialect, written.vector_words) {
+fn vector_names(dialect: Dialect, context: &BlockContext) -> [&'static [u8]; 3] {
+    match (dialect, context.vector_words) {
         (_, true) => [b"I", b"J", b"K"],
         (Dialect::Heidenhain, _) => [b"TX", b"TY", b"TZ"],
         _ => [b"A3", b"B3", b"C3"],
@@ -536,7 +566,7 @@ fn all(values: [Option<f64>; 3]) -> Option<[f64; 3]> {
 
 /// Whether a motion that is left for this reason still goes to the point that its words say in the work frame, so that
 /// words which the motions before it have changed must be said again.
-fn stays_in_place(reason: Reason) -> bool {
+fn keeps_endpoint(reason: Reason) -> bool {
     matches!(
         reason,
         Reason::RadiusCompensation
@@ -557,8 +587,8 @@ fn via_of(motion: &Motion) -> Option<[f64; 3]> {
     }
 }
 
-fn aim_of(motion: &Motion, change: &Change) -> Option<Aim> {
-    let mut aim: Option<Aim> = None;
+fn goal_of(motion: &Motion, change: &Change) -> Option<Goal> {
+    let mut goal: Option<Goal> = None;
     let mut via = via_of(motion);
     for (target, new) in motion.targets.iter().zip(&change.targets) {
         let NewTarget::Cartesian { position_mm, quaternion, .. } = *new else { continue };
@@ -566,13 +596,13 @@ fn aim_of(motion: &Motion, change: &Change) -> Option<Aim> {
             Role::Via => via = Some(position_mm),
             Role::To => {
                 let rotation = Some(Frame { position_mm, quaternion }.pose().rotation);
-                aim = Some(Aim { position: position_mm, rotation, via: None });
+                goal = Some(Goal { position: position_mm, rotation, via: None });
             }
         }
     }
-    let mut aim = aim?;
-    aim.via = via;
-    Some(aim)
+    let mut goal = goal?;
+    goal.via = via;
+    Some(goal)
 }
 
 /// The line end that a file uses.

@@ -27,9 +27,9 @@ pub enum Syntax {
 
 /// What belongs to a word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Belongs {
+pub enum WordValue {
     /// Nothing: a bare word.
-    Nothing,
+    Absent,
     /// A literal: its sign, where one is written, and its number.
     Literal {
         /// The token of the sign.
@@ -65,7 +65,7 @@ pub struct Word<'s> {
     /// The index in brackets after the name (`$P_UIFR[1]`, `R[5]`), as tokens without the brackets.
     pub index: Option<(u32, u32)>,
     /// What belongs to it.
-    pub belongs: Belongs,
+    pub value: WordValue,
     /// Whether an equals sign stands before what belongs to it.
     pub assigned: bool,
 }

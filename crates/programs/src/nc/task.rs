@@ -4,43 +4,43 @@
 //! subprogram), what went before holds no more, but for groups that the whole file sets to one thing only. A block that
 //! may be skipped leaves known only what it does not change.
 
-mod codes;
-mod commands;
-mod doubt;
-mod flow;
-mod found;
+mod modal_codes;
+mod siemens_commands;
+mod invalidation;
+mod control_flow;
+mod file_effects;
 mod frames;
 mod heidenhain;
-mod known;
+mod g_codes;
 mod m_words;
 mod motion;
-mod names;
-mod once;
-mod said;
+mod siemens_names;
+mod one_shot;
+mod block;
 mod shift;
-mod survey;
+mod prescan;
 mod tools;
 mod words;
-mod written;
+mod block_context;
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::sync::Arc as Shared;
 
 use super::dialect::Dialect;
 use super::expression::{LARGEST, Variable, literal};
-use super::machine::{Group, Meaning, Mode, State};
 use super::mark;
+use super::modal_state::{ModalGroup, ModalState, MotionMode, WordSemantics};
 use super::orientation::Angles;
 use super::parser::parse;
 use super::setup::{self, Setup, Stated, Statement, held, statement};
-use super::syntax::{Belongs, NcTree, Word};
+use super::syntax::{NcTree, Word, WordValue};
 use super::token::Token;
 use crate::motion::{
     Frame, Listing, Misstated, Motion, MotionKind, OpaqueReason, OpaqueRegion, Place, Reason, Tool,
 };
-use found::Found;
-use said::Said;
-pub(super) use written::{Event, Needs, Written};
+use block::Block;
+pub(super) use block_context::{BlockArc, BlockContext, StartDependency, StateEvent};
+use file_effects::FileEffects;
 
 /// NC files, read together: each runs on its own, the setup holds for all.
 #[derive(Debug)]
@@ -56,19 +56,19 @@ pub struct Task<'s> {
     /// What they tell the machine to do.
     pub listing: Listing,
     /// What happens to the position, in the order of files and lines.
-    pub(super) events: Vec<Event>,
+    pub(super) events: Vec<StateEvent>,
     /// How each motion is written; by motion.
-    pub(super) written: Vec<Written>,
+    pub(super) contexts: Vec<BlockContext>,
 }
 
 impl Task<'_> {
     /// What the way of a motion hangs on, where it stays or does not.
-    pub(super) fn needs(&self, motion: usize, stays: bool) -> Needs {
-        let needs = self.written[motion].needs;
+    pub(super) fn start_dependency(&self, motion: usize, stays: bool) -> StartDependency {
+        let own = self.contexts[motion].start_dependency;
         match self.listing.motions[motion].kind {
-            _ if !stays => Needs::Nothing,
-            MotionKind::Circular => needs.max(Needs::Start),
-            _ => needs,
+            _ if !stays => StartDependency::Independent,
+            MotionKind::Circular => own.max(StartDependency::Position),
+            _ => own,
         }
     }
 }
@@ -88,28 +88,29 @@ impl<'s> Task<'s> {
             angles: Vec::new(),
             listing: Listing { numbered: true, ..Listing::default() },
             events: Vec::new(),
-            written: Vec::new(),
+            contexts: Vec::new(),
         };
         for file in 0..files.len() {
-            let mut lister = Lister::new(&task.trees[file], file as u32, task.dialects[file], setup);
+            let mut interpreter =
+                Interpreter::new(&task.trees[file], file as u32, task.dialects[file], setup);
             // Siemens: a subprogram by the ending of its name.
-            lister.called = task.names[file].to_ascii_lowercase().ends_with(".spf");
-            lister.listing = std::mem::take(&mut task.listing);
-            lister.events = std::mem::take(&mut task.events);
-            lister.written = std::mem::take(&mut task.written);
-            lister.file();
-            task.angles.push(lister.angles);
-            let open = lister.listing.misstated.iter_mut().filter(|comment| comment.file.is_empty());
+            interpreter.is_subprogram = task.names[file].to_ascii_lowercase().ends_with(".spf");
+            interpreter.listing = std::mem::take(&mut task.listing);
+            interpreter.events = std::mem::take(&mut task.events);
+            interpreter.contexts = std::mem::take(&mut task.contexts);
+            interpreter.file();
+            task.angles.push(interpreter.angles);
+            let open = interpreter.listing.misstated.iter_mut().filter(|comment| comment.file.is_empty());
             open.for_each(|comment| comment.file.clone_from(&task.names[file]));
-            let Lister { listing, events, written, .. } = lister;
-            (task.listing, task.events, task.written) = (listing, events, written);
+            let Interpreter { listing, events, contexts, .. } = interpreter;
+            (task.listing, task.events, task.contexts) = (listing, events, contexts);
         }
-        task.spare_arcs();
+        task.leave_pinned_ends();
         task
     }
 }
 
-pub(super) struct Lister<'t, 's> {
+pub(super) struct Interpreter<'t, 's> {
     tree: &'t NcTree<'s>,
     file: u32,
     dialect: Dialect,
@@ -119,55 +120,55 @@ pub(super) struct Lister<'t, 's> {
     tools: HashMap<String, Frame>,
     frames: HashMap<String, Frame>,
     /// Variables that the file sets before here.
-    ever_set: HashSet<Variable>,
-    state: State,
+    assigned_variables: HashSet<Variable>,
+    state: ModalState,
     /// What the file sets; found while it is followed.
-    found: Found,
+    effects: FileEffects,
     /// What the whole file sets, where it has been followed before.
-    whole: Option<Found>,
+    file_effects: Option<FileEffects>,
     /// Groups that are set before the way can first part.
-    settled: u32,
+    set_before_branch: u32,
     /// Whether the way has parted: jumps, calls, labels.
     branched: bool,
     /// Whether the block that is being followed may be skipped.
-    skipping: bool,
+    in_skippable_block: bool,
     /// Whether the program has ended (M30): what comes next belongs to another.
-    ended: bool,
+    program_ended: bool,
     /// Whether synchronised actions may set variables.
-    actions: bool,
+    synchronised_actions: bool,
     /// What numbers and words meant before the block that is being followed.
-    meaning: Meaning,
-    /// What held before the subprogram that is being passed.
-    passed: Option<State>,
+    meaning: WordSemantics,
+    /// What held before the subprogram that is being state_before_subprogram.
+    state_before_subprogram: Option<ModalState>,
     /// Whether tools come in with M6.
-    changes_tools: bool,
+    tool_change_by_m6: bool,
     /// Whether a cycle that is called may be a program (cycle 12 of Heidenhain).
-    calls_program: bool,
+    cycle_is_program: bool,
     /// Whether a block has words of NC and no others.
-    speaks: bool,
+    has_nc_blocks: bool,
     /// Whether the program begins again at its end.
-    repeats: bool,
+    restarts_at_end: bool,
     /// Whether the file is a subprogram and no more: what holds at its begin is its caller's.
-    called: bool,
+    is_subprogram: bool,
     /// Whether the file is of a control of which no reader here knows the words (DIN/ISO of Heidenhain).
-    foreign: bool,
+    unknown_control: bool,
     /// Contours that cycles of lathes read, from block to block.
     contours: HashMap<u64, u64>,
     /// The block that ends the contour which is being read.
-    contour: Option<u64>,
+    contour_end: Option<u64>,
     /// Names that the file declares (Siemens).
     declared: BTreeSet<Vec<u8>>,
     /// Those of them that hold whole numbers only.
-    whole_numbers: BTreeSet<Vec<u8>>,
+    integer_variables: BTreeSet<Vec<u8>>,
     /// The programs and subprograms that stand in the file, by their O.
     programs: BTreeSet<Variable>,
     /// Blocks that jumps go to.
-    targets: BTreeSet<u64>,
+    jump_targets: BTreeSet<u64>,
     /// Whether a jump goes to a computed block.
-    anywhere: bool,
+    computed_jump: bool,
     listing: Listing,
-    events: Vec<Event>,
-    written: Vec<Written>,
+    events: Vec<StateEvent>,
+    contexts: Vec<BlockContext>,
     instructions: BTreeMap<String, Shared<str>>,
     speeds: BTreeMap<u64, u32>,
     tool_index: HashMap<String, u32>,
@@ -177,10 +178,10 @@ pub(super) struct Lister<'t, 's> {
 /// How long the lists were before a file.
 struct Lengths([usize; 7]);
 
-impl<'t, 's> Lister<'t, 's> {
+impl<'t, 's> Interpreter<'t, 's> {
     fn new(tree: &'t NcTree<'s>, file: u32, dialect: Dialect, setup: &'t Setup) -> Self {
-        let state = State::start(if dialect == Dialect::Siemens { "G500" } else { "G54" }, "T0");
-        Lister {
+        let state = ModalState::start(if dialect == Dialect::Siemens { "G500" } else { "G54" }, "T0");
+        Interpreter {
             tree,
             file,
             dialect,
@@ -188,33 +189,33 @@ impl<'t, 's> Lister<'t, 's> {
             angles: setup.angles,
             tools: HashMap::new(),
             frames: HashMap::new(),
-            ever_set: HashSet::new(),
+            assigned_variables: HashSet::new(),
             state,
-            found: Found::default(),
-            whole: None,
-            settled: 0,
+            effects: FileEffects::default(),
+            file_effects: None,
+            set_before_branch: 0,
             branched: false,
-            skipping: false,
-            ended: false,
-            actions: false,
-            meaning: Meaning::default(),
-            passed: None,
-            changes_tools: false,
-            calls_program: false,
-            speaks: false,
-            repeats: false,
-            called: false,
-            foreign: false,
+            in_skippable_block: false,
+            program_ended: false,
+            synchronised_actions: false,
+            meaning: WordSemantics::default(),
+            state_before_subprogram: None,
+            tool_change_by_m6: false,
+            cycle_is_program: false,
+            has_nc_blocks: false,
+            restarts_at_end: false,
+            is_subprogram: false,
+            unknown_control: false,
             contours: HashMap::new(),
-            contour: None,
+            contour_end: None,
             declared: BTreeSet::new(),
-            whole_numbers: BTreeSet::new(),
+            integer_variables: BTreeSet::new(),
             programs: BTreeSet::new(),
-            targets: BTreeSet::new(),
-            anywhere: false,
+            jump_targets: BTreeSet::new(),
+            computed_jump: false,
             listing: Listing { numbered: true, ..Listing::default() },
             events: Vec::new(),
-            written: Vec::new(),
+            contexts: Vec::new(),
             instructions: BTreeMap::new(),
             speeds: BTreeMap::new(),
             tool_index: HashMap::new(),
@@ -237,38 +238,39 @@ impl<'t, 's> Lister<'t, 's> {
             });
         }
         self.comments();
-        self.survey();
+        self.prescan();
         let lengths = self.lengths();
         let start = self.state.clone();
-        self.follow();
+        self.interpret_file();
         if self.branched {
             // Now it is known what the whole file sets, which tells what still holds where ways meet.
             self.back_to(&lengths);
             self.state = start;
-            self.whole = Some(std::mem::take(&mut self.found));
-            (self.settled, self.branched, self.ended, self.actions) = (0, false, false, false);
-            (self.passed, self.contour) = (None, None);
-            self.follow();
+            self.file_effects = Some(std::mem::take(&mut self.effects));
+            (self.set_before_branch, self.branched, self.program_ended, self.synchronised_actions) =
+                (0, false, false, false);
+            (self.state_before_subprogram, self.contour_end) = (None, None);
+            self.interpret_file();
         }
         // A text of which not one block is NC is no program: nothing in it moves.
         let unread = |motion: &Motion| matches!(motion.left, Some(Reason::Unread | Reason::UnknownWord));
-        if !self.speaks && self.listing.motions[lengths.0[0]..].iter().all(unread) {
+        if !self.has_nc_blocks && self.listing.motions[lengths.0[0]..].iter().all(unread) {
             self.back_to(&lengths);
-            self.events.push(Event::Start);
+            self.events.push(StateEvent::FileStart);
         }
     }
 
-    fn follow(&mut self) {
-        self.events.push(Event::Start);
-        if self.called {
-            self.enter();
-        } else if self.repeats() {
-            self.forget();
+    fn interpret_file(&mut self) {
+        self.events.push(StateEvent::FileStart);
+        if self.is_subprogram {
+            self.enter_subprogram();
+        } else if self.restarts_at_end() {
+            self.join_unseen_predecessors();
         }
-        let mut said = Said::default();
+        let mut block = Block::default();
         let blocks: Vec<u32> = self.tree.child_nodes(0).collect();
-        for block in blocks {
-            self.block(block, &mut said);
+        for node in blocks {
+            self.block(node, &mut block);
         }
     }
 
@@ -281,11 +283,11 @@ impl<'t, 's> Lister<'t, 's> {
             listing.tools.len(),
             listing.work_objects.len(),
             self.events.len(),
-            self.written.len(),
+            self.contexts.len(),
         ])
     }
 
-    fn back_to(&mut self, &Lengths([motions, speeds, zones, tools, objects, events, written]): &Lengths) {
+    fn back_to(&mut self, &Lengths([motions, speeds, zones, tools, objects, events, contexts]): &Lengths) {
         self.listing.motions.truncate(motions);
         self.listing.outside.retain(|call| (*call as usize) < motions);
         self.listing.speeds.truncate(speeds);
@@ -293,7 +295,7 @@ impl<'t, 's> Lister<'t, 's> {
         self.listing.tools.truncate(tools);
         self.listing.work_objects.truncate(objects);
         self.events.truncate(events);
-        self.written.truncate(written);
+        self.contexts.truncate(contexts);
         self.speeds.clear();
         self.tool_index.clear();
         self.frame_index = None;
@@ -370,7 +372,7 @@ impl<'t, 's> Lister<'t, 's> {
         self.listing.misstated.push(Misstated { file, line, text, expected });
     }
 
-    /// A comment that was meant for this program and cannot be used is listed, not passed over.
+    /// A comment that was meant for this program and cannot be used is listed, not state_before_subprogram over.
     fn unread_comment(&mut self, token: u32) {
         self.listing.opaque.push(OpaqueRegion {
             place: self.place(token),
@@ -381,105 +383,106 @@ impl<'t, 's> Lister<'t, 's> {
 
     // ---- blocks ----
 
-    fn block(&mut self, node: u32, said: &mut Said<'s>) {
-        self.gather(node, said);
-        self.speaks |= !said.opaque && (!said.g.is_empty() || !said.m.is_empty() || said.moves());
-        if !said.skippable {
-            self.run(said);
+    fn block(&mut self, node: u32, block: &mut Block<'s>) {
+        self.gather(node, block);
+        self.has_nc_blocks |=
+            !block.opaque && (!block.g.is_empty() || !block.m.is_empty() || block.has_motion_words());
+        if !block.skippable {
+            self.interpret(block);
             return;
         }
         let before = self.state.clone();
-        self.skipping = true;
-        self.run(said);
-        self.skipping = false;
+        self.in_skippable_block = true;
+        self.interpret(block);
+        self.in_skippable_block = false;
         // What ends the program or goes elsewhere does so only where it is not skipped.
-        self.ended = false;
+        self.program_ended = false;
         let after = std::mem::replace(&mut self.state, before);
-        self.state = after.joined(&self.state);
+        self.state = after.join(&self.state);
         self.frame_index = None;
         self.tool_index.clear();
     }
 
     /// What a block does.
-    fn run(&mut self, said: &Said<'s>) {
-        if std::mem::take(&mut self.ended) {
-            self.forget();
+    fn interpret(&mut self, block: &Block<'s>) {
+        if std::mem::take(&mut self.program_ended) {
+            self.join_unseen_predecessors();
         }
-        if self.is_reached_by_jumps(said) {
-            self.forget();
-            self.state.mode = Mode::Lost(Reason::UnknownFlow);
+        if self.is_reached_by_jumps(block) {
+            self.join_unseen_predecessors();
+            self.state.mode = MotionMode::Unknown(Reason::UnknownFlow);
         }
-        self.contour_of(said);
-        self.position_read(said);
-        let values = self.values(said);
-        let before = self.found.forgotten;
-        self.meaning = self.state.meaning();
-        self.effect(said);
-        self.assign(values, self.found.forgotten != before);
+        self.contour_of(block);
+        self.mark_position_reads(block);
+        let values = self.values(block);
+        let before = self.effects.joins;
+        self.meaning = self.state.word_semantics();
+        self.transfer(block);
+        self.assign(values, self.effects.joins != before);
     }
 
-    fn effect(&mut self, said: &Said<'s>) {
-        if let Some(on) = said.compensates {
-            self.state.radius = on;
-            self.set(Group::Radius, u64::from(on));
+    fn transfer(&mut self, block: &Block<'s>) {
+        if let Some(on) = block.radius_compensation {
+            self.state.radius_compensation = on;
+            self.set_group(ModalGroup::RadiusCompensation, u64::from(on));
         }
-        if self.dialect == Dialect::Heidenhain && self.heidenhain(said) {
+        if self.dialect == Dialect::Heidenhain && self.heidenhain(block) {
             return;
         }
-        if self.is_action(said) {
+        if self.is_action(block) {
             // What it sets, it sets at any time from here on.
-            self.actions = true;
-            self.state.variables.lose(Reason::Variable);
-            self.forget();
+            self.synchronised_actions = true;
+            self.state.variables.invalidate(Reason::Variable);
+            self.join_unseen_predecessors();
             return;
         }
-        if self.foreign {
-            if !said.words.is_empty() {
-                self.deny(said, "?", Reason::UnknownWord);
+        if self.unknown_control {
+            if !block.words.is_empty() {
+                self.list_unknown_word(block, "?", Reason::UnknownWord);
             }
             return;
         }
-        if self.control_flow(said) {
+        if self.control_flow(block) {
             return;
         }
-        if let Some((word, reason)) = self.not_known(said) {
-            self.deny(said, &word, reason);
-            self.ends(said);
+        if let Some((word, reason)) = self.unknown_word(block) {
+            self.list_unknown_word(block, &word, reason);
+            self.end_of_block(block);
             return;
         }
-        if said.opaque && said.obscure {
-            self.deny(said, "?", Reason::Unread);
-            self.ends(said);
+        if block.opaque && block.opaque_may_set {
+            self.list_unknown_word(block, "?", Reason::Unread);
+            self.end_of_block(block);
             return;
         }
-        self.m_words(said);
-        self.tool_words(said);
-        let machine = said.machine
-            || said.g.contains(&530)
-            || self.dialect == Dialect::Siemens && said.g.contains(&1530)
-            || self.dialect == Dialect::Heidenhain && said.m.iter().any(|m| matches!(m, 91 | 92));
-        self.tools_of(said);
-        if self.named_commands(said) || self.modal_codes(said) || self.unmodal_codes(said) {
-            self.ends(said);
+        self.m_words(block);
+        self.tool_words(block);
+        let machine = block.machine_coordinates
+            || block.g.contains(&530)
+            || self.dialect == Dialect::Siemens && block.g.contains(&1530)
+            || self.dialect == Dialect::Heidenhain && block.m.iter().any(|m| matches!(m, 91 | 92));
+        self.select_tool(block);
+        if self.named_commands(block) || self.modal_codes(block) || self.one_shot_codes(block) {
+            self.end_of_block(block);
             return;
         }
-        if let Some(index) = said.feed {
-            let feed = self.worth(&said.words[index]).0;
+        if let Some(index) = block.feed {
+            let feed = self.evaluate_word(&block.words[index]).0;
             // A feed has no decimals on any control.
-            let feed = self.literal(&said.words[index]).ok_or(Reason::Variable).or(feed);
+            let feed = self.literal(&block.words[index]).ok_or(Reason::Variable).or(feed);
             let feed = feed.and_then(|feed| match feed > 0.0 && feed < LARGEST {
                 true => Ok(feed),
                 // F0 and F-5 go nowhere, and what is too large is read as something else.
                 false => Err(Reason::NumberRange),
             });
-            self.state.feed = self.in_mm(feed).map(|feed| feed / 60.0);
+            self.state.feed = self.length_in_mm(feed).map(|feed| feed / 60.0);
         }
-        self.motion(said, machine);
-        self.ends(said);
+        self.motion(block, machine);
+        self.end_of_block(block);
     }
 
     /// M2, M30, M99, M17 of Siemens: what comes after belongs to another program. M6 goes to change the tool.
-    fn ends(&mut self, said: &Said<'s>) {
+    fn end_of_block(&mut self, block: &Block<'s>) {
         let dialect = self.dialect;
         let end = |m: &u32| match m {
             2 | 30 => true,
@@ -488,29 +491,31 @@ impl<'t, 's> Lister<'t, 's> {
             _ => false,
         };
         // M99 P100 jumps, perhaps over what comes next, and so do M96 and M46 of Haas.
-        if said.m.iter().any(|m| matches!(m, 46 | 96 | 99)) {
-            self.parts();
+        if block.m.iter().any(|m| matches!(m, 46 | 96 | 99)) {
+            self.branch();
         }
-        if self.dialect == Dialect::Heidenhain && said.m.contains(&129) {
+        if self.dialect == Dialect::Heidenhain && block.m.contains(&129) {
             // It acts at the end of its block.
-            self.tip(false, false);
+            self.set_tcp_mode(false, false);
         }
-        if said.m.iter().any(end) || said.words.iter().any(|word| word.is("RET")) {
-            self.ended = true;
-        } else if said.m.contains(&6) {
-            self.lose_all();
+        if block.m.iter().any(end) || block.words.iter().any(|word| word.is("RET")) {
+            self.program_ended = true;
+        } else if block.m.contains(&6) {
+            self.invalidate_pose();
         }
     }
 
     /// Tools: T, with M6 where the file changes them so.
-    fn tools_of(&mut self, said: &Said<'s>) {
-        for word in &said.words {
+    fn select_tool(&mut self, block: &Block<'s>) {
+        for word in &block.words {
             if word.address() != Some(b'T') {
                 continue;
             }
-            let name = match (self.literal(word), word.belongs) {
+            let name = match (self.literal(word), word.value) {
                 (Some(number), _) => format!("T{}", number.round()),
-                (None, Belongs::Expression { first, .. }) if self.tree.kind(first) == Some(Token::String) => {
+                (None, WordValue::Expression { first, .. })
+                    if self.tree.kind(first) == Some(Token::String) =>
+                {
                     let text = self.tree.text(first);
                     String::from_utf8_lossy(text).trim_matches(['"', '\'']).to_owned()
                 }
@@ -520,20 +525,20 @@ impl<'t, 's> Lister<'t, 's> {
         }
         // LinuxCNC: M61 says which tool is in; T alone only makes one ready, whatever else the file has.
         let linux = self.dialect == Dialect::LinuxCnc;
-        if linux && said.m.contains(&61) {
-            let number = said.q.and_then(|index| self.literal(&said.words[index]));
+        if linux && block.m.contains(&61) {
+            let number = block.q.and_then(|index| self.literal(&block.words[index]));
             self.change_tool(number.map_or("T?".to_owned(), |number| format!("T{}", number.round())));
         }
-        if (said.m.contains(&6) || !self.changes_tools && !linux)
+        if (block.m.contains(&6) || !self.tool_change_by_m6 && !linux)
             && let Some(name) = self.state.next_tool.take()
         {
             self.change_tool(name);
         }
         if self.dialect == Dialect::Siemens
-            && let Some(index) = said.d
+            && let Some(index) = block.d
         {
-            let edge = self.literal(&said.words[index]).map_or(u32::MAX, |edge| edge.round() as u32);
-            self.length_is(|state| state.edge = edge);
+            let edge = self.literal(&block.words[index]).map_or(u32::MAX, |edge| edge.round() as u32);
+            self.length_is(|state| state.cutting_edge = edge);
         }
     }
 }
@@ -544,10 +549,11 @@ fn is_axis(letter: u8) -> bool {
 }
 
 /// The axes that a block names, as bits.
-fn named_axes(said: &Said<'_>) -> u8 {
-    said.axes
+fn named_axes(block: &Block<'_>) -> u8 {
+    block
+        .axes
         .iter()
-        .chain(&said.abc)
+        .chain(&block.abc)
         .enumerate()
         .fold(0, |all, (axis, word)| all | u8::from(word.is_some()) << axis)
 }

@@ -1,11 +1,11 @@
 //! Arcs between their new ends, and arcs that become straight.
 
-use super::slots::{Slots, slots};
-use super::{Aim, Follower, all};
+use super::word_slots::{WordSlots, slots};
+use super::{Goal, Rewriter, all};
 use crate::motion::{Motion, MotionKind};
 use crate::nc::arc::{Arc, Plane};
-use crate::nc::syntax::{Belongs, Word};
-use crate::nc::task::Written;
+use crate::nc::syntax::{Word, WordValue};
+use crate::nc::task::{BlockArc, BlockContext};
 
 /// Ends of a whole circle that are farther apart than this are none (mm): a thousandth, and what is rounded. Whoever asks
 /// for changes follows circles of up to 0.002 mm as closed.
@@ -18,15 +18,15 @@ const LEAVES_MM: f64 = 5e-3;
 /// How much more or less of a turn it may be than the one that was meant (rad).
 const TURNS_RAD: f64 = 0.5;
 
-impl<'s> Follower<'_, 's> {
+impl<'s> Rewriter<'_, 's> {
     /// Says G2 or G3 again in a block that leaves it out, where an arc before has become straight.
-    pub(super) fn mode_again(&mut self, motion: &Motion, written: &Written, straightens: bool) {
-        if !self.now.straightened || straightens {
+    pub(super) fn restate_motion_mode(&mut self, motion: &Motion, context: &BlockContext, straightens: bool) {
+        if !self.control.straightened || straightens {
             return;
         }
         let task = self.task;
         let file = motion.place.file as usize;
-        let slots = slots(&task.trees[file], task.dialects[file], written);
+        let slots = slots(&task.trees[file], task.dialects[file], context);
         if slots.mode.is_none() && motion.kind == MotionKind::Circular {
             let at = slots
                 .first
@@ -36,17 +36,17 @@ impl<'s> Follower<'_, 's> {
         }
         // A motion of another kind that stands here has been told by a word of its own. A block that may be skipped
         // may not have said it.
-        let told = slots.mode.is_some() || motion.kind != MotionKind::Unknown;
-        self.now.straightened &= !told || motion.conditional;
+        let commanded = slots.mode.is_some() || motion.kind != MotionKind::Unknown;
+        self.control.straightened &= !commanded || motion.conditional;
     }
 
     /// An arc's block becomes a straight one: G1 for G2 or G3, and no centre or radius.
-    pub(super) fn straighten(&mut self, motion: &Motion, slots: &mut Slots<'s>, alone: bool) {
+    pub(super) fn straighten(&mut self, motion: &Motion, slots: &mut WordSlots<'s>, alone: bool) {
         let file = motion.place.file as usize;
         let tree = &self.task.trees[file];
         let edits = &mut self.edits[file];
         match slots.mode {
-            Some(Word { belongs: Belongs::Literal { number, .. }, .. }) => {
+            Some(Word { value: WordValue::Literal { number, .. }, .. }) => {
                 let range = tree.range(number, number + 1);
                 let digits = tree.text(number).iter().rposition(u8::is_ascii_digit).unwrap_or(0);
                 // G02 to G01: the last digit before a point.
@@ -54,7 +54,7 @@ impl<'s> Follower<'_, 's> {
                     tree.text(number).iter().position(|&byte| byte == b'.').map_or(digits, |point| point - 1);
                 edits.replace(range.start + whole..range.start + whole + 1, b"1");
             }
-            _ if alone && !self.now.straightened => {
+            _ if alone && !self.control.straightened => {
                 let at = slots.first.map_or(motion.statement.start as usize, |word| tree.start(word.first));
                 edits.insert(at, b"G1 ");
             }
@@ -70,36 +70,36 @@ impl<'s> Follower<'_, 's> {
             let end = tree.start(word.end - 1) + tree.text(word.end - 1).len();
             edits.replace(begin..end, b"");
         }
-        self.now.straightened = true;
+        self.control.straightened = true;
     }
 
     /// The arc of a motion between its new ends; `None` where none keeps to the way that was meant (start, middle, end).
     pub(super) fn arc(
         &self,
-        aim: &mut Aim,
+        goal: &mut Goal,
         start: [Option<f64>; 3],
-        written: &Written,
-        (meant, by_radius): ([[f64; 3]; 3], bool),
+        context: &BlockContext,
+        (intended, by_radius): ([[f64; 3]; 3], bool),
     ) -> Option<Arc> {
-        let (old, positive, _) = written.arc?;
+        let BlockArc { arc: old, positive, .. } = context.arc?;
         let start = all(start).filter(|start| !start.iter().any(|x| x.is_nan()))?;
         let Plane { a, b, .. } = old.plane;
         if old.is_whole() {
-            let gap = (start[a] - aim.position[a]).hypot(start[b] - aim.position[b]);
+            let gap = (start[a] - goal.position[a]).hypot(start[b] - goal.position[b]);
             if gap > CLOSED_MM {
                 return None;
             }
             // The control takes it for a whole circle as long as nothing of a gap is left.
-            (aim.position[a], aim.position[b]) = (start[a], start[b]);
+            (goal.position[a], goal.position[b]) = (start[a], start[b]);
         }
-        let told = [start, aim.via?, aim.position];
-        let new = old.moved(meant, told, positive)?;
+        let commanded = [start, goal.via?, goal.position];
+        let new = old.moved(intended, commanded, positive)?;
         // As the control will read it.
-        let step = 0.1_f64.powi(i32::from(self.options.position_decimals)) * written.unit_mm.min(1.0);
+        let step = 0.1_f64.powi(i32::from(self.options.position_decimals)) * context.unit_mm.min(1.0);
         let rounded = |value: f64, base: f64| ((value - base) / step).round() * step + base;
-        let mut end = aim.position;
+        let mut end = goal.position;
         for axis in [a, b] {
-            end[axis] = rounded(end[axis], written.shift[axis].unwrap_or(0.0) + self.now.moved[axis]);
+            end[axis] = rounded(end[axis], context.shift[axis].unwrap_or(0.0) + self.control.moved[axis]);
         }
         let as_read = if new.is_whole() {
             new
@@ -112,12 +112,14 @@ impl<'s> Follower<'_, 's> {
             Arc::about(old.plane, start, end, centre, positive)?
         };
         let apart = |i: usize, j: usize| {
-            let moved = |axis: usize| (told[i][axis] - meant[i][axis]) - (told[j][axis] - meant[j][axis]);
+            let moved = |axis: usize| {
+                (commanded[i][axis] - intended[i][axis]) - (commanded[j][axis] - intended[j][axis])
+            };
             moved(a).hypot(moved(b))
         };
         let most = LEAVES_MM + apart(0, 1).max(apart(1, 2)).max(apart(0, 2));
         let turns =
             (as_read.sweep_rad - old.sweep_rad).abs() <= TURNS_RAD && as_read.is_whole() == old.is_whole();
-        (turns && old.leaves(meant, told, &as_read) <= most).then_some(new)
+        (turns && old.leaves(intended, commanded, &as_read) <= most).then_some(new)
     }
 }

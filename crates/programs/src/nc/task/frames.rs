@@ -3,19 +3,19 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::super::dialect::Dialect;
-use super::super::machine::{Group, OF_TOOL, State};
+use super::super::modal_state::{ModalGroup, ModalState, TOOL_GROUPS};
 use super::super::orientation::Angles;
 use super::super::setup::{self, held};
-use super::super::syntax::{Belongs, Word};
+use super::super::syntax::{Word, WordValue};
 use super::super::token::Token;
-use super::{Lister, Said};
+use super::{Block, Interpreter};
 use crate::motion::{Frame, Reason, Tool, WorkObject, WorkObjectValue};
 use truegrind_math::se3::Pose;
 
-impl Lister<'_, '_> {
+impl Interpreter<'_, '_> {
     /// TRANS, ROT and those that add to them. True where the block is one.
-    pub(super) fn programmable_frame(&mut self, said: &Said<'_>) -> bool {
-        let Some(word) = said.words.iter().find(|word| {
+    pub(super) fn programmable_frame(&mut self, block: &Block<'_>) -> bool {
+        let Some(word) = block.words.iter().find(|word| {
             [
                 "TRANS", "ATRANS", "ROT", "AROT", "SCALE", "ASCALE", "MIRROR", "AMIRROR", "ROTS", "AROTS",
                 "CROTS",
@@ -27,33 +27,33 @@ impl Lister<'_, '_> {
         };
         let name = word.name.to_ascii_uppercase();
         let adds = name[0] == b'A';
-        let before = self.state.programmable;
-        let turned = |state: &State| state.turned & 1 << Group::Programmable as u32 != 0;
+        let before = self.state.programmable_frame;
+        let turned = |state: &ModalState| state.is_transform_active(ModalGroup::ProgrammableFrame);
         let was = turned(&self.state);
-        let unknown = self.state.doubt(1 << Group::Programmable as u32).is_some();
+        let unknown = self.state.unknown_reason(ModalGroup::ProgrammableFrame.bit()).is_some();
         self.programmable_is_set();
         if adds && unknown {
             // To what it adds is not known.
-            self.state.turn_frame(Group::Programmable, true);
+            self.state.set_transform(ModalGroup::ProgrammableFrame, true);
         }
         if !adds {
             // Whatever is not added replaces all of the programmable frame, and nothing else.
-            self.state.programmable = None;
-            self.state.turn_frame(Group::Programmable, false);
+            self.state.programmable_frame = None;
+            self.state.set_transform(ModalGroup::ProgrammableFrame, false);
         }
-        self.lose_position();
+        self.invalidate_position();
         // Angles of ROT, lengths of TRANS, factors of SCALE.
         let lengths = name.ends_with(b"TRANS");
         let value = |index: usize| {
-            let value = self.worth(&said.words[index]).0;
-            if lengths { self.in_mm(value) } else { value }
+            let value = self.evaluate_word(&block.words[index]).0;
+            if lengths { self.length_in_mm(value) } else { value }
         };
         let values: Result<Vec<Option<f64>>, Reason> =
-            said.axes.iter().map(|word| word.map(value).transpose()).collect();
-        let rpl = said.words.iter().find(|word| word.is("RPL"));
-        let stated = said.moves() || rpl.is_some();
+            block.axes.iter().map(|word| word.map(value).transpose()).collect();
+        let rpl = block.words.iter().find(|word| word.is("RPL"));
+        let stated = block.has_motion_words() || rpl.is_some();
         // Shifts of rotary axes turn what A, B and C mean.
-        let rotary = said.abc.iter().any(Option::is_some) || said.others;
+        let rotary = block.abc.iter().any(Option::is_some) || block.other_axes;
         let pose = match (&*name, values) {
             (_, Err(_)) => None,
             _ if rotary => None,
@@ -63,10 +63,12 @@ impl Lister<'_, '_> {
             }
             (b"ROT" | b"AROT", Ok(angles)) => {
                 let mut angles: Vec<f64> = angles.iter().map(|value| value.unwrap_or(0.0)).collect();
-                match rpl.map(|word| self.worth(word).0) {
+                match rpl.map(|word| self.evaluate_word(word).0) {
                     None => {}
                     // About the axis across the plane.
-                    Some(_) if self.state.doubt(1 << Group::Plane as u32).is_some() => angles[0] = f64::NAN,
+                    Some(_) if self.state.unknown_reason(ModalGroup::Plane.bit()).is_some() => {
+                        angles[0] = f64::NAN
+                    }
                     Some(Ok(turn)) => angles[self.state.plane.across] = turn,
                     Some(Err(_)) => angles[0] = f64::NAN,
                 }
@@ -81,44 +83,45 @@ impl Lister<'_, '_> {
         match pose {
             Some(_) if !stated => {}
             Some(pose) => {
-                self.state.programmable = Some(self.state.programmable.unwrap_or_else(Pose::identity) * pose);
+                self.state.programmable_frame =
+                    Some(self.state.programmable_frame.unwrap_or_else(Pose::identity) * pose);
             }
-            None => self.state.turn_frame(Group::Programmable, true),
+            None => self.state.set_transform(ModalGroup::ProgrammableFrame, true),
         }
         let rotation = |pose: &Option<Pose>| pose.map_or(UnitQuaternion::identity(), |pose| pose.rotation);
-        let same = rotation(&before).angle_to(&rotation(&self.state.programmable)) < 1e-9;
+        let same = rotation(&before).angle_to(&rotation(&self.state.programmable_frame)) < 1e-9;
         if !same || was || turned(&self.state) {
-            self.lose_all();
+            self.invalidate_pose();
         }
         true
     }
 
     /// The programmable frame is set: where ways meet it is known no more.
     pub(super) fn programmable_is_set(&mut self) {
-        self.set_any(Group::Programmable);
+        self.set_group_varying(ModalGroup::ProgrammableFrame);
         self.frame_index = None;
     }
 
     /// G58 and G59 of Siemens: shifts within the work offset, no motion.
-    pub(super) fn axial_shift(&mut self, said: &Said<'_>, absolute: bool) {
-        let alone = self.state.programmable.is_none()
-            && self.state.doubt(1 << Group::Programmable as u32).is_none()
+    pub(super) fn axial_shift(&mut self, block: &Block<'_>, absolute: bool) {
+        let alone = self.state.programmable_frame.is_none()
+            && self.state.unknown_reason(ModalGroup::ProgrammableFrame.bit()).is_none()
             && absolute
-            && said.abc.iter().all(Option::is_none);
+            && block.abc.iter().all(Option::is_none);
         self.programmable_is_set();
-        self.lose_position();
+        self.invalidate_position();
         let mut shift = Vector3::zeros();
         for axis in 0..3 {
-            let Some(index) = said.axes[axis] else { continue };
-            match self.in_mm(self.worth(&said.words[index]).0) {
+            let Some(index) = block.axes[axis] else { continue };
+            match self.length_in_mm(self.evaluate_word(&block.words[index]).0) {
                 Ok(value) if alone => shift[axis] = value,
-                _ => return self.turn(Group::Programmable, true),
+                _ => return self.switch_transform(ModalGroup::ProgrammableFrame, true),
             }
         }
         if !alone {
-            return self.turn(Group::Programmable, true);
+            return self.switch_transform(ModalGroup::ProgrammableFrame, true);
         }
-        self.state.programmable = Some(Pose::translation(shift.x, shift.y, shift.z));
+        self.state.programmable_frame = Some(Pose::translation(shift.x, shift.y, shift.z));
     }
 
     /// `$P_UIFR[1]=CTRANS(X,1,Y,2):CROT(Z,90)` and `$TC_DP3[1,1]=120`.
@@ -142,13 +145,13 @@ impl Lister<'_, '_> {
             };
             let pose = self.frame_expression(word).filter(|_| self.is_index_alone(word));
             // The offset that holds goes on as it was until it is called again.
-            self.state.stale |= frame == self.state.frame;
+            self.state.offset_pending |= frame == self.state.work_offset;
             self.assign_frame(&frame, pose.map(|pose| Frame::from_pose(&pose)));
         } else if word.is("$P_PFRAME") {
             self.programmable_is_set();
-            self.state.programmable = self.frame_expression(word);
-            self.state.turn_frame(Group::Programmable, self.state.programmable.is_none());
-            self.lose_all();
+            self.state.programmable_frame = self.frame_expression(word);
+            self.state.set_transform(ModalGroup::ProgrammableFrame, self.state.programmable_frame.is_none());
+            self.invalidate_pose();
         } else if word.is("$TC_DP3") || word.is("$TC_DP4") || word.is("$TC_DP5") {
             let (Some(number), Some(1)) = (index(0), index(1)) else { return self.tools_assigned() };
             let tool = format!("T{number}");
@@ -158,9 +161,9 @@ impl Lister<'_, '_> {
                 _ => 0,
             };
             // Under G70 the data of the control stay in its own unit, under G700 they do not.
-            let value = self.worth(word).0.ok().filter(|_| self.counts_in_mm());
+            let value = self.evaluate_word(word).0.ok().filter(|_| self.counts_in_mm());
             // What the control holds of a tool that nobody has stated is not known: each length until it is said.
-            let held = match (self.state.tools.of(&tool), self.tool_value(&tool)) {
+            let held = match (self.state.assigned_tools.get(&tool), self.tool_value(&tool)) {
                 (_, Ok(frame)) | (Some(Some(frame)), _) => Some(frame),
                 (None, Err(Reason::ToolUnknown)) => {
                     Some(Frame { position_mm: [f64::NAN; 3], ..Frame::IDENTITY })
@@ -168,16 +171,16 @@ impl Lister<'_, '_> {
                 _ => None,
             };
             // The tool that is in keeps its lengths until it is called again.
-            let open = self.state.doubt(OF_TOOL).is_some() || self.state.tool == tool;
+            let open = self.state.unknown_reason(TOOL_GROUPS).is_some() || self.state.tool == tool;
             let frame = value.zip(held).filter(|_| !open).map(|(value, mut frame)| {
                 frame.position_mm[axis] = value;
                 frame
             });
-            self.state.tools.set(&tool, frame);
-            self.found.assigns.tools |= self.anywhere_else();
+            self.state.assigned_tools.set(&tool, frame);
+            self.effects.assigned.tools |= self.is_conditional();
             self.tool_index.clear();
             if open {
-                self.lose_position();
+                self.invalidate_position();
             }
         } else if matches!(&*name, b"$TC_DP1" | b"$TC_DP2" | b"$TC_DP6" | b"$TC_DP24" | b"$TC_DP25")
             || starts(&["$A_", "$AC_TIMER", "$AC_MARKER", "$AC_PARAM", "$AC_FIFO", "$TC_MPP", "$TC_TP"])
@@ -188,15 +191,15 @@ impl Lister<'_, '_> {
         } else if starts(&["$P_"]) {
             self.frames_assigned();
         } else {
-            self.state.lose_everything(Reason::UnknownWord);
-            self.found.add_all();
-            self.events.push(super::Event::Unknown);
+            self.state.invalidate_all(Reason::UnknownWord);
+            self.effects.set_all_varying();
+            self.events.push(super::StateEvent::PoseUnknown);
         }
     }
 
     /// Whether lengths are certainly mm here.
     fn counts_in_mm(&self) -> bool {
-        self.state.unit_mm == 1.0 && self.state.doubt(1 << Group::Unit as u32).is_none()
+        self.state.unit_mm == 1.0 && self.state.unknown_reason(ModalGroup::Unit.bit()).is_none()
     }
 
     /// Whether a word has one index and no more: `$P_UIFR[1,X,TR]` sets one component.
@@ -206,14 +209,14 @@ impl Lister<'_, '_> {
 
     /// The program gives a work offset a value, or one that is not known.
     pub(super) fn assign_frame(&mut self, name: &str, frame: Option<Frame>) {
-        self.state.frames.set(name, frame);
-        self.found.assigns.frames |= self.anywhere_else();
+        self.state.assigned_offsets.set(name, frame);
+        self.effects.assigned.offsets |= self.is_conditional();
         self.frame_index = None;
     }
 
     /// A chain of CTRANS and CROT with plain numbers.
     fn frame_expression(&self, word: &Word<'_>) -> Option<Pose> {
-        let Belongs::Expression { first, end } = word.belongs else { return None };
+        let WordValue::Expression { first, end } = word.value else { return None };
         if !self.counts_in_mm() {
             return None;
         }
@@ -258,23 +261,23 @@ impl Lister<'_, '_> {
 
     /// A number that is written or can be worked out; whole numbers need no point.
     pub(super) fn number(&self, word: &Word<'_>) -> Option<f64> {
-        self.literal(word).or_else(|| match word.belongs {
-            Belongs::Expression { first, end } => self.evaluated((first, end)).ok(),
+        self.literal(word).or_else(|| match word.value {
+            WordValue::Expression { first, end } => self.evaluate_tokens((first, end)).ok(),
             _ => None,
         })
     }
 
     /// G10: L2 P1 X sets a work offset, L20 one from where the tool stands, others tools and parameters.
-    pub(super) fn set_offset(&mut self, said: &Said<'_>) {
-        let number = |at: Option<usize>| at.and_then(|index| self.number(&said.words[index]));
+    pub(super) fn set_offset(&mut self, block: &Block<'_>) {
+        let number = |at: Option<usize>| at.and_then(|index| self.number(&block.words[index]));
         let linux = self.dialect == Dialect::LinuxCnc;
-        let p = number(said.p);
+        let p = number(block.p);
         let named = |p: f64| match p as u32 {
             p @ 1..=6 => Some(format!("G{}", 53 + p)),
             p @ 7..=9 if linux => Some(format!("G59.{}", p - 6)),
             _ => None,
         };
-        match number(said.l) {
+        match number(block.l) {
             Some(2.0) => {
                 let name = match p {
                     Some(0.0) if linux => self.frame_that_holds(),
@@ -283,14 +286,14 @@ impl Lister<'_, '_> {
                 };
                 // The external offset of a Fanuc is added to all.
                 let Some(name) = name else { return self.frames_assigned() };
-                self.state_offset(said, &name);
+                self.state_offset(block, &name);
             }
             Some(20.0) => {
-                self.held_here(super::named_axes(said));
+                self.mark_position_used(super::named_axes(block));
                 let here = p.filter(|p| linux && *p == 0.0).and_then(|_| self.frame_that_holds());
                 match p.and_then(named).filter(|_| linux).or(here) {
                     Some(name) => {
-                        if said.abc.iter().any(Option::is_some) {
+                        if block.abc.iter().any(Option::is_some) {
                             self.has_rotary(&name, true);
                         }
                         self.offset_is(&name, None);
@@ -301,51 +304,54 @@ impl Lister<'_, '_> {
             Some(number @ (1.0 | 3.0 | 10.0 | 11.0 | 12.0 | 13.0 | 14.0)) => {
                 if linux && (number == 10.0 || number == 11.0) {
                     // A length with which the tool would stand there.
-                    self.held_here(super::named_axes(said));
+                    self.mark_position_used(super::named_axes(block));
                 }
                 self.tools_assigned();
             }
-            None if said.p.is_some() && said.l.is_none() => self.tools_assigned(),
+            None if block.p.is_some() && block.l.is_none() => self.tools_assigned(),
             // Parameters of the control, or what is not known.
-            _ => self.deny(said, "G10", Reason::UnknownWord),
+            _ => self.list_unknown_word(block, "G10", Reason::UnknownWord),
         }
     }
 
     /// The work offset that holds, where that is known.
     fn frame_that_holds(&self) -> Option<String> {
-        self.state.doubt(1 << Group::Frame as u32).is_none().then(|| self.state.frame.clone())
+        self.state
+            .unknown_reason(ModalGroup::WorkOffset.bit())
+            .is_none()
+            .then(|| self.state.work_offset.clone())
     }
 
-    fn state_offset(&mut self, said: &Said<'_>, name: &str) {
+    fn state_offset(&mut self, block: &Block<'_>, name: &str) {
         let known = self.frame_value(name).ok();
         let mut frame = known.unwrap_or(Frame::IDENTITY);
         // What is not said stays: on LinuxCNC, for which a plain file may be, an offset has a turn as well.
         let turns = matches!(self.dialect, Dialect::LinuxCnc | Dialect::Iso);
-        let whole = said.axes.iter().all(Option::is_some) && (said.radius.is_some() || !turns);
+        let whole = block.axes.iter().all(Option::is_some) && (block.radius.is_some() || !turns);
         let mut good = whole || known.is_some();
         // LinuxCNC takes the values as they are in G91 too, Fanuc and Haas add them; which of them a plain file is for is
         // not known.
         let absolute = self.state.absolute || self.dialect == Dialect::LinuxCnc;
         good &= absolute || self.dialect != Dialect::Iso;
-        for (axis, word) in said.axes.iter().enumerate() {
+        for (axis, word) in block.axes.iter().enumerate() {
             let Some(index) = word else { continue };
-            match self.worth(&said.words[*index]) {
+            match self.evaluate_word(&block.words[*index]) {
                 (Ok(value), _) if absolute => frame.position_mm[axis] = value * self.state.unit_mm,
                 (Ok(value), _) => frame.position_mm[axis] += value * self.state.unit_mm,
                 (Err(_), _) => good = false,
             }
         }
-        let distance = if self.dialect == Dialect::LinuxCnc { 0 } else { 1 << Group::Distance as u32 };
-        good &= self.state.doubt(distance | 1 << Group::Unit as u32).is_none();
+        let distance = if self.dialect == Dialect::LinuxCnc { 0 } else { ModalGroup::DistanceMode.bit() };
+        good &= self.state.unknown_reason(distance | ModalGroup::Unit.bit()).is_none();
         // Offsets of rotary axes turn what A, B and C mean; they stay until each is said to be 0.
-        let zero = |index: usize| self.number(&said.words[index]) == Some(0.0);
-        if !said.abc.iter().flatten().all(|&index| zero(index)) {
+        let zero = |index: usize| self.number(&block.words[index]) == Some(0.0);
+        if !block.abc.iter().flatten().all(|&index| zero(index)) {
             self.has_rotary(name, true);
-        } else if absolute && said.abc.iter().all(Option::is_some) {
+        } else if absolute && block.abc.iter().all(Option::is_some) {
             self.has_rotary(name, false);
         }
-        good &= !self.state.frames.is_rotary(name);
-        match said.radius.map(|index| self.number(&said.words[index])) {
+        good &= !self.state.assigned_offsets.is_rotary(name);
+        match block.radius.map(|index| self.number(&block.words[index])) {
             // The turn of the work frame about z (LinuxCNC).
             Some(Some(turn)) => {
                 let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turn.to_radians());
@@ -359,29 +365,29 @@ impl Lister<'_, '_> {
 
     /// Whether a work offset has offsets of rotary axes, which its value does not say.
     pub(super) fn has_rotary(&mut self, name: &str, rotary: bool) {
-        self.state.frames.set_rotary(name, rotary);
-        self.found.assigns.rotary |= rotary && self.anywhere_else();
+        self.state.assigned_offsets.set_rotary(name, rotary);
+        self.effects.assigned.rotary |= rotary && self.is_conditional();
     }
 
     /// A work offset gets a value; where it is the one that holds, the tool stands elsewhere in it now.
     pub(super) fn offset_is(&mut self, name: &str, frame: Option<Frame>) {
         let before = self.frame_value(name).ok();
         self.assign_frame(name, frame);
-        let holds = name.eq_ignore_ascii_case(&self.state.frame);
-        if !holds && self.state.doubt(1 << Group::Frame as u32).is_none() {
+        let holds = name.eq_ignore_ascii_case(&self.state.work_offset);
+        if !holds && self.state.unknown_reason(ModalGroup::WorkOffset.bit()).is_none() {
             return;
         }
-        self.lose_position();
+        self.invalidate_position();
         let alike = matches!((before, frame), (Some(a), Some(b))
             if a.pose().rotation.angle_to(&b.pose().rotation) < 1e-9);
         if !alike {
-            self.lose_all();
+            self.invalidate_pose();
         }
     }
 
     /// The tool of a name, as the program, the setup or a comment states it.
     pub(super) fn tool_value(&self, name: &str) -> Result<Frame, Reason> {
-        match self.state.tools.of(name) {
+        match self.state.assigned_tools.get(name) {
             // A length of it has not been said yet.
             Some(Some(frame)) if frame.position_mm.iter().any(|mm| mm.is_nan()) => Err(Reason::ToolUnknown),
             Some(Some(frame)) => Ok(frame),
@@ -392,7 +398,7 @@ impl Lister<'_, '_> {
 
     /// The work offset of a name, as the program, the setup or a comment states it.
     pub(super) fn frame_value(&self, name: &str) -> Result<Frame, Reason> {
-        match self.state.frames.of(name) {
+        match self.state.assigned_offsets.get(name) {
             Some(Some(frame)) => Ok(frame),
             Some(None) => Err(Reason::Assigned),
             // Without a settable offset Siemens counts from the base.
@@ -424,14 +430,14 @@ impl Lister<'_, '_> {
     /// The work frame that holds.
     pub(super) fn work_object(&mut self) -> u32 {
         if let Some((name, pose, index)) = &self.frame_index
-            && *name == self.state.frame
-            && *pose == self.state.programmable
+            && *name == self.state.work_offset
+            && *pose == self.state.programmable_frame
         {
             return *index;
         }
-        let name = self.state.frame.clone();
-        let stated = if self.state.stale { Err(Reason::Assigned) } else { self.frame_value(&name) };
-        let within = self.state.programmable.as_ref().map_or(Frame::IDENTITY, Frame::from_pose);
+        let name = self.state.work_offset.clone();
+        let stated = if self.state.offset_pending { Err(Reason::Assigned) } else { self.frame_value(&name) };
+        let within = self.state.programmable_frame.as_ref().map_or(Frame::IDENTITY, Frame::from_pose);
         let near = stated.and_then(Frame::within_reach).and_then(|user| Ok((user, within.within_reach()?)));
         let value = near.map(|(user_frame, within)| WorkObjectValue {
             robhold: false,
@@ -440,10 +446,10 @@ impl Lister<'_, '_> {
             user_frame,
             object_frame: within,
         });
-        let displacement = self.state.programmable.as_ref().map(Frame::from_pose);
+        let displacement = self.state.programmable_frame.as_ref().map(Frame::from_pose);
         let work_object = WorkObject { name: name.clone(), value, place: None, displacement };
         let index = intern(&mut self.listing.work_objects, work_object);
-        self.frame_index = Some((name, self.state.programmable, index));
+        self.frame_index = Some((name, self.state.programmable_frame, index));
         index
     }
 }

@@ -2,67 +2,67 @@
 
 use super::super::arc::Plane;
 use super::super::dialect::Dialect;
-use super::super::expression::{Worth, literal, numbered};
-use super::super::machine::{Group, Mode};
-use super::super::syntax::{Belongs, Word};
+use super::super::expression::{Evaluated, literal, numbered};
+use super::super::modal_state::{ModalGroup, MotionMode};
+use super::super::syntax::{Word, WordValue};
 use super::super::token::Token;
-use super::{Lister, Needs, Said};
+use super::{Block, Interpreter, StartDependency};
 use crate::motion::Reason;
 use truegrind_math::se3::Pose;
 
-impl<'s> Lister<'_, 's> {
+impl<'s> Interpreter<'_, 's> {
     /// What the first word of a block says. True where the block does nothing else.
-    pub(super) fn heidenhain(&mut self, said: &Said<'s>) -> bool {
+    pub(super) fn heidenhain(&mut self, block: &Block<'s>) -> bool {
         debug_assert_eq!(self.dialect, Dialect::Heidenhain);
-        let Some(first) = said.words.first() else { return false };
+        let Some(first) = block.words.first() else { return false };
         let name = first.name.to_ascii_uppercase();
         match &*name {
             b"L" | b"LN" => {
-                self.state.mode = Mode::Linear;
+                self.state.mode = MotionMode::Linear;
                 false
             }
             // Positioning blocks without L.
             [b'X' | b'Y' | b'Z' | b'A' | b'B' | b'U' | b'V' | b'W']
             | [b'I', b'X' | b'Y' | b'Z' | b'A' | b'B' | b'C' | b'U' | b'V' | b'W'] => {
-                self.state.mode = Mode::Linear;
+                self.state.mode = MotionMode::Linear;
                 false
             }
-            b"C" if first.belongs != Belongs::Nothing => {
-                self.state.mode = Mode::Linear;
+            b"C" if first.value != WordValue::Absent => {
+                self.state.mode = MotionMode::Linear;
                 false
             }
             b"F" | b"R" => false,
             b"C" | b"CR" => {
-                let direction = said.words.iter().find(|word| word.is("DR"));
+                let direction = block.words.iter().find(|word| word.is("DR"));
                 let negative = direction.is_some_and(|word| {
                     (word.first..word.end).any(|token| self.tree.kind(token) == Some(Token::Minus))
                 });
                 self.state.mode = match direction {
-                    Some(_) => Mode::Circular(!negative),
-                    None => Mode::Other(Reason::NotFollowed),
+                    Some(_) => MotionMode::Circular(!negative),
+                    None => MotionMode::Unsupported(Reason::NotFollowed),
                 };
-                self.state.tangent = false;
+                self.state.starts_tangent = false;
                 false
             }
             b"CT" => {
-                self.state.mode = Mode::Other(Reason::NotFollowed);
-                self.state.tangent = true;
+                self.state.mode = MotionMode::Unsupported(Reason::NotFollowed);
+                self.state.starts_tangent = true;
                 false
             }
             b"CC" => {
                 let whole =
-                    |axis: usize| said.axes[axis].is_some_and(|index| said.words[index].name.len() == 1);
-                if said.axes.iter().all(Option::is_none)
-                    || !(0..2).all(|axis| whole(axis) || said.axes[axis].is_none())
+                    |axis: usize| block.axes[axis].is_some_and(|index| block.words[index].name.len() == 1);
+                if block.axes.iter().all(Option::is_none)
+                    || !(0..2).all(|axis| whole(axis) || block.axes[axis].is_none())
                 {
                     // The pole is where the tool stands, or counts from there.
-                    self.held_here(super::POSITION);
+                    self.mark_position_used(super::POSITION);
                 }
                 for axis in 0..2 {
-                    self.state.pole[axis] = match said.axes[axis] {
+                    self.state.pole[axis] = match block.axes[axis] {
                         None => self.state.position[axis],
                         Some(index) => {
-                            let (value, increment) = self.worth(&said.words[index]);
+                            let (value, increment) = self.evaluate_word(&block.words[index]);
                             if increment == Some(true) {
                                 self.state.position[axis].and_then(|at| value.map(|value| at + value))
                             } else {
@@ -75,45 +75,45 @@ impl<'s> Lister<'_, 's> {
             }
             b"M" => {
                 // No motion: axis words are values of the M word.
-                match self.not_known(said) {
-                    Some((word, reason)) => self.deny(said, &word, reason),
+                match self.unknown_word(block) {
+                    Some((word, reason)) => self.list_unknown_word(block, &word, reason),
                     None => {
-                        self.m_words(said);
-                        self.calls_cycle(said);
+                        self.m_words(block);
+                        self.calls_cycle(block);
                     }
                 }
-                self.ends(said);
+                self.end_of_block(block);
                 true
             }
             _ => {
-                self.other_block(said, first, &name);
+                self.other_block(block, first, &name);
                 true
             }
         }
     }
 
     /// Blocks that are not looked into word by word.
-    fn other_block(&mut self, said: &Said<'_>, first: &Word<'_>, name: &[u8]) {
+    fn other_block(&mut self, block: &Block<'_>, first: &Word<'_>, name: &[u8]) {
         let text = self.tree.source()[self.tree.range(first.first, first.end)].to_ascii_uppercase();
         let words: Vec<&[u8]> =
             text.split(|byte| byte.is_ascii_whitespace()).filter(|part| !part.is_empty()).collect();
         let second = words.get(1).copied().unwrap_or_default();
         match name {
             b"TOOL" if self.tool_block(&text, &words) => {}
-            b"PLANE" | b"FUNCTION" | b"TRANS" if self.transformation_block(said, name, &words) => {}
-            b"CYCL" => self.cycle_block(said, first, &words),
-            b"FN" | b"Q" | b"QL" | b"QR" => self.function_block(said, first, &text, &words),
+            b"PLANE" | b"FUNCTION" | b"TRANS" if self.transformation_block(block, name, &words) => {}
+            b"CYCL" => self.cycle_block(block, first, &words),
+            b"FN" | b"Q" | b"QL" | b"QR" => self.function_block(block, first, &text, &words),
             b"LBL" if second != b"0" => {
-                self.forget();
-                self.state.mode = Mode::Lost(Reason::UnknownFlow);
+                self.join_unseen_predecessors();
+                self.state.mode = MotionMode::Unknown(Reason::UnknownFlow);
             }
-            b"LBL" => self.parts(),
+            b"LBL" => self.branch(),
             b"CALL" | b"SEL" if second == b"LBL" || second == b"PGM" || name == b"CALL" => {
-                self.subprogram(said, "CALL");
+                self.subprogram(block, "CALL");
             }
             b"TCH" => {
-                self.left(said, "TCH PROBE", Reason::Probe);
-                self.lose_position();
+                self.list_left(block, "TCH PROBE", Reason::Probe);
+                self.invalidate_position();
             }
             b"BEGIN" | b"END" => {
                 if words.contains(&&b"INCH"[..]) {
@@ -125,8 +125,8 @@ impl<'s> Lister<'_, 's> {
             | b"PATTERN" | b"POS" => {}
             // The rest of a cycle's definition in lines of its own.
             _ if !first.name.first().is_some_and(u8::is_ascii_alphabetic) => {}
-            _ if self.path_block(said, name) => {}
-            _ => self.deny(said, &String::from_utf8_lossy(name), Reason::UnknownWord),
+            _ if self.path_block(block, name) => {}
+            _ => self.list_unknown_word(block, &String::from_utf8_lossy(name), Reason::UnknownWord),
         }
     }
 
@@ -143,19 +143,19 @@ impl<'s> Lister<'_, 's> {
     }
 
     /// `CYCL CALL` and `CYCL DEF`.
-    fn cycle_block(&mut self, said: &Said<'_>, first: &Word<'_>, words: &[&[u8]]) {
+    fn cycle_block(&mut self, block: &Block<'_>, first: &Word<'_>, words: &[&[u8]]) {
         if words.get(1) == Some(&&b"CALL"[..]) {
-            return self.cycle_call(said, "CYCL CALL");
+            return self.cycle_call(block, "CYCL CALL");
         }
         let number: Vec<u8> = words
             .get(2)
             .map(|word| word.iter().copied().take_while(u8::is_ascii_digit).collect())
             .unwrap_or_default();
-        self.cycle_definition(said, first, &number, words.get(2..).unwrap_or_default());
+        self.cycle_definition(block, first, &number, words.get(2..).unwrap_or_default());
     }
 
     /// `PLANE`, `FUNCTION TCPM`, `TRANS`: frames, and functions that none of them hangs on. Whether the block is one of these.
-    fn transformation_block(&mut self, said: &Said<'_>, name: &[u8], words: &[&[u8]]) -> bool {
+    fn transformation_block(&mut self, block: &Block<'_>, name: &[u8], words: &[&[u8]]) -> bool {
         let second = words.get(1).copied().unwrap_or_default();
         let third = words.get(2).copied();
         let on = third != Some(b"RESET");
@@ -164,15 +164,15 @@ impl<'s> Lister<'_, 's> {
                 // TURN moves the rotary axes to the plane, MOVE the others as well.
                 let moves = words.iter().any(|word| matches!(*word, b"TURN" | b"MOVE"));
                 if moves {
-                    self.left(said, "PLANE", Reason::Cycle);
+                    self.list_left(block, "PLANE", Reason::Cycle);
                 }
-                self.turn(Group::Swivel, second != b"RESET");
+                self.switch_transform(ModalGroup::TiltedPlane, second != b"RESET");
                 if moves {
-                    self.lose_all();
+                    self.invalidate_pose();
                 }
             }
-            (b"FUNCTION", b"TCPM") => self.tip(true, false),
-            (b"FUNCTION", _) if words.contains(&&b"TCPM"[..]) => self.tip(false, false),
+            (b"FUNCTION", b"TCPM") => self.set_tcp_mode(true, false),
+            (b"FUNCTION", _) if words.contains(&&b"TCPM"[..]) => self.set_tcp_mode(false, false),
             // What a mill does anyway; the name of a kinematic may follow, which is not known.
             (b"FUNCTION", b"MODE") => return words[2..] == [b"MILL"],
             (b"FUNCTION", b"FEED" | b"S-PULSE" | b"DWELL" | b"FILE" | b"COUNT") => {}
@@ -180,57 +180,57 @@ impl<'s> Lister<'_, 's> {
                 match third {
                     Some(b"RESET") => {
                         self.datum_is([Some(0.0); 3]);
-                        self.turn(Group::Rotary, false);
+                        self.switch_transform(ModalGroup::RotaryOffset, false);
                     }
                     Some(b"AXIS") => self.datum_shift(&words[3..]),
                     _ => self.datum_is([None; 3]),
                 }
-                self.lose_position();
+                self.invalidate_position();
             }
-            (b"TRANS", b"MIRROR") => self.turn(Group::Mirror, on),
-            (b"TRANS", b"ROTATION") => self.turn(Group::Rotation, on),
-            (b"TRANS", b"SCALE") => self.turn(Group::Scale, on),
+            (b"TRANS", b"MIRROR") => self.switch_transform(ModalGroup::Mirror, on),
+            (b"TRANS", b"ROTATION") => self.switch_transform(ModalGroup::Rotation, on),
+            (b"TRANS", b"SCALE") => self.switch_transform(ModalGroup::Scaling, on),
             _ => return false,
         }
         true
     }
 
     /// Blocks whose path is not followed. Whether the block is one of these.
-    fn path_block(&mut self, said: &Said<'_>, name: &[u8]) -> bool {
-        let needs = match name {
-            b"RND" | b"CHF" | b"FPOL" => Needs::Nothing,
-            b"CP" | b"LP" | b"FC" | b"FL" | b"SPL" => Needs::Start,
-            b"APPR" | b"DEP" | b"CTP" | b"FLT" | b"FCT" => Needs::Tangent,
+    fn path_block(&mut self, block: &Block<'_>, name: &[u8]) -> bool {
+        let dependency = match name {
+            b"RND" | b"CHF" | b"FPOL" => StartDependency::Independent,
+            b"CP" | b"LP" | b"FC" | b"FL" | b"SPL" => StartDependency::Position,
+            b"APPR" | b"DEP" | b"CTP" | b"FLT" | b"FCT" => StartDependency::Tangent,
             _ => return false,
         };
         let previous = self.state.previous;
-        self.left_path(said, &String::from_utf8_lossy(name), needs);
+        self.list_left_path(block, &String::from_utf8_lossy(name), dependency);
         if matches!(name, b"RND" | b"CHF") {
             // They round or cut the corner that their neighbours make; the next block counts from the corner.
             self.state.previous = previous;
         } else {
-            self.lose_position();
+            self.invalidate_position();
         }
         true
     }
 
     /// `FN 0: Q1 = +5`, `Q1 = +5`.
-    fn function_block(&mut self, said: &Said<'_>, first: &Word<'_>, text: &[u8], words: &[&[u8]]) {
+    fn function_block(&mut self, block: &Block<'_>, first: &Word<'_>, text: &[u8], words: &[&[u8]]) {
         // FN 25 sets a datum, FN 17 any data of the control.
         match number_of_function(text) {
-            Some(17) => return self.deny(said, "FN 17", Reason::UnknownWord),
+            Some(17) => return self.list_unknown_word(block, "FN 17", Reason::UnknownWord),
             Some(25) => {
-                self.held_here(super::EVERYWHERE);
+                self.mark_position_used(super::EVERYWHERE);
                 return self.frames_assigned();
             }
             Some(18) if text.windows(3).any(|id| id == b"270" || id == b"240") => {
-                self.events.push(super::Event::Held { axes: super::EVERYWHERE, read: true });
+                self.events.push(super::StateEvent::PositionUsed { axes: super::EVERYWHERE, read: true });
             }
             _ => {}
         }
         // FN 9 to FN 12 jump: what is set from here on may be passed over.
         if words.contains(&&b"GOTO"[..]) {
-            self.parts();
+            self.branch();
         }
         self.parameter(first);
     }
@@ -276,7 +276,7 @@ impl<'s> Lister<'_, 's> {
         match tool {
             Some(tool) => {
                 self.change_tool(tool + &longer);
-                self.lose_all();
+                self.invalidate_pose();
             }
             // Which tool that is may not be known.
             None if !longer.is_empty() => self.change_tool(format!("T?{longer}")),
@@ -285,7 +285,7 @@ impl<'s> Lister<'_, 's> {
     }
 
     /// `CYCL DEF 8.1 X`: the number with what stands after the point, and the words from it on.
-    fn cycle_definition(&mut self, said: &Said<'_>, first: &Word<'_>, number: &[u8], words: &[&[u8]]) {
+    fn cycle_definition(&mut self, block: &Block<'_>, first: &Word<'_>, number: &[u8], words: &[&[u8]]) {
         let title = words.first().is_some_and(|word| word.ends_with(b".0"));
         let values = words.get(1..).unwrap_or_default();
         let zero = |word: &&[u8], letters: usize| {
@@ -296,14 +296,14 @@ impl<'s> Lister<'_, 's> {
         match number {
             b"7" => {
                 self.datum_shift(values);
-                self.lose_position();
+                self.invalidate_position();
             }
             // A title begins the definition; what it sets stands in the lines after it.
-            b"8" => self.turn(Group::Mirror, title || !values.is_empty()),
+            b"8" => self.switch_transform(ModalGroup::Mirror, title || !values.is_empty()),
             b"10" => {
                 let ends = values.len() == 1
                     && values.iter().all(|word| word.starts_with(b"ROT") && zero(word, 3) == Some(0.0));
-                self.turn(Group::Rotation, title || !ends);
+                self.switch_transform(ModalGroup::Rotation, title || !ends);
             }
             b"11" => {
                 let value = match values {
@@ -311,26 +311,26 @@ impl<'s> Lister<'_, 's> {
                     [_, word] => zero(word, 0),
                     _ => None,
                 };
-                self.turn(Group::Scale, title || value != Some(1.0));
+                self.switch_transform(ModalGroup::Scaling, title || value != Some(1.0));
             }
             b"19" => {
                 let ends = values.iter().all(|word| zero(word, 1) == Some(0.0));
-                self.turn(Group::Swivel, title || !ends);
+                self.switch_transform(ModalGroup::TiltedPlane, title || !ends);
             }
             b"26" => {
                 let ends = !values.is_empty() && values.iter().all(|word| zero(word, 1) == Some(1.0));
-                self.turn(Group::AxisScale, title || !ends);
+                self.switch_transform(ModalGroup::AxisScaling, title || !ends);
             }
             b"247" => {
                 self.frame_is(self.preset(first));
                 self.shift_may_end();
             }
             b"220" | b"221" => {
-                self.left(said, "CYCL DEF", Reason::Cycle);
-                self.lose_all();
+                self.list_left(block, "CYCL DEF", Reason::Cycle);
+                self.invalidate_pose();
             }
             // A program takes the place of the cycle.
-            b"12" => self.calls_program = true,
+            b"12" => self.cycle_is_program = true,
             // Definitions that CYCL CALL, M89 and M99 carry out, and settings.
             b"1"
             | b"2"
@@ -359,17 +359,17 @@ impl<'s> Lister<'_, 's> {
             | b"39"
             | [b'2', b'0', b'0'..=b'9']
             | [b'2', b'3' | b'4' | b'5' | b'6' | b'7', b'0'..=b'9'] => {}
-            _ => self.deny(said, "CYCL DEF", Reason::UnknownWord),
+            _ => self.list_unknown_word(block, "CYCL DEF", Reason::UnknownWord),
         }
     }
 
     /// A preset ends the shift within the one before on some controls, and not on others.
     fn shift_may_end(&mut self) {
-        if self.state.datum != [Some(0.0); 3] {
-            self.state.programmable = None;
+        if self.state.datum_shift != [Some(0.0); 3] {
+            self.state.programmable_frame = None;
             self.frame_index = None;
-            self.state.datum = [None; 3];
-            self.doubt(Group::Datum, Reason::Displacement);
+            self.state.datum_shift = [None; 3];
+            self.invalidate_group(ModalGroup::DatumShift, Reason::Displacement);
         }
     }
 
@@ -380,10 +380,10 @@ impl<'s> Lister<'_, 's> {
             // The title: what it sets stands in the lines after it.
             return;
         }
-        let doubts = 1 << Group::Datum as u32 | 1 << Group::Programmable as u32;
-        let mut shift = match self.state.doubt(doubts) {
+        let doubts = ModalGroup::DatumShift.bit() | ModalGroup::ProgrammableFrame.bit();
+        let mut shift = match self.state.unknown_reason(doubts) {
             Some(_) => [None; 3],
-            None => self.state.datum,
+            None => self.state.datum_shift,
         };
         for word in words {
             let (name, increment) = match word {
@@ -406,7 +406,7 @@ impl<'s> Lister<'_, 's> {
                     *entry = old.zip(value).map(|(old, value)| old + value);
                 }
                 // A, B and C are counted from elsewhere, until the whole shift ends.
-                b'A'..=b'C' if value != Some(0.0) => self.turn(Group::Rotary, true),
+                b'A'..=b'C' if value != Some(0.0) => self.switch_transform(ModalGroup::RotaryOffset, true),
                 b'A'..=b'C' | b'U'..=b'W' => {}
                 _ => {
                     shift = [None; 3];
@@ -420,12 +420,12 @@ impl<'s> Lister<'_, 's> {
     /// The datum shift is this, as far as it is known.
     fn datum_is(&mut self, shift: [Option<f64>; 3]) {
         self.programmable_is_set();
-        self.state.datum = shift;
-        self.state.programmable = match shift {
+        self.state.datum_shift = shift;
+        self.state.programmable_frame = match shift {
             [Some(x), Some(y), Some(z)] if shift != [Some(0.0); 3] => Some(Pose::translation(x, y, z)),
             _ => None,
         };
-        self.turn(Group::Datum, shift.iter().any(Option::is_none));
+        self.switch_transform(ModalGroup::DatumShift, shift.iter().any(Option::is_none));
     }
 
     /// The name of the preset that `CYCL DEF 247 … Q339=n` takes: `PRESET1`; the number may stand in the next line.
@@ -454,11 +454,11 @@ impl<'s> Lister<'_, 's> {
         let (Some(at), Some(number)) = (at, number) else { return };
         // Q, QL and QR are three sets.
         let set = self.tree.text(at.saturating_sub(1)).to_ascii_uppercase();
-        let value: Worth = self.evaluated((equal + 1, word.end));
+        let value: Evaluated = self.evaluate_tokens((equal + 1, word.end));
         if matches!(&*set, b"Q" | b"QL" | b"QR") {
             self.set_variable(numbered(&set, number), value);
         } else {
-            self.state.variables.lose(Reason::Variable);
+            self.state.variables.invalidate(Reason::Variable);
         }
     }
 }

@@ -6,16 +6,18 @@ use nalgebra::UnitQuaternion;
 
 use super::super::arc::{Arc, Plane};
 use super::super::dialect::Dialect;
-use super::super::expression::Worth;
-use super::super::machine::{Group, Mode, OF_ALL, OF_ARCS, OF_TOOL, Turn};
-use super::super::syntax::Belongs;
-use super::{Event, Lister, Needs, Said, Written};
+use super::super::expression::Evaluated;
+use super::super::modal_state::{
+    ARC_GROUPS, MOTION_GROUPS, ModalGroup, MotionMode, OrientationMode, TOOL_GROUPS, all_known,
+};
+use super::super::syntax::WordValue;
+use super::{Block, BlockArc, BlockContext, Interpreter, StartDependency, StateEvent};
 use crate::motion::{
     FARTHEST_MM, Modal, Motion, MotionKind, MotionTarget, Origin, Reason, RobTarget, Role, Span, Speed,
     SpeedValue, Switch, TargetValue, Zone, ZoneValue,
 };
 
-impl Lister<'_, '_> {
+impl Interpreter<'_, '_> {
     fn instruction(&mut self, name: &str) -> Shared<str> {
         if let Some(found) = self.instructions.get(name) {
             return found.clone();
@@ -25,11 +27,11 @@ impl Lister<'_, '_> {
         shared
     }
 
-    fn listed(&mut self, said: &Said<'_>, name: &str, kind: MotionKind) -> Motion {
-        let first = said.words.first().map_or(self.tree.nodes[said.node as usize].first, |word| word.first);
+    fn new_motion(&mut self, block: &Block<'_>, name: &str, kind: MotionKind) -> Motion {
+        let first = block.words.first().map_or(self.tree.nodes[block.node as usize].first, |word| word.first);
         Motion {
             place: self.place(first),
-            statement: self.tree.node_span(said.node),
+            statement: self.tree.node_span(block.node),
             instruction: self.instruction(name),
             kind,
             targets: Vec::new(),
@@ -46,105 +48,109 @@ impl Lister<'_, '_> {
             by_radius: false,
             modal: Modal { conf_linear: Switch::Off, conf_joint: Switch::Off, ..Modal::START },
             in_loop: false,
-            conditional: said.skippable,
+            conditional: block.skippable,
             previous: self.state.previous,
             routine: None,
             left: None,
         }
     }
 
-    fn push(&mut self, motion: Motion, written: Written) -> u32 {
+    fn push(&mut self, motion: Motion, context: BlockContext) -> u32 {
         let index = self.listing.motions.len() as u32;
         self.listing.motions.push(motion);
-        self.written.push(written);
-        self.events.push(Event::Motion(index));
+        self.contexts.push(context);
+        self.events.push(StateEvent::Motion(index));
         index
     }
 
     /// A motion that is listed and left.
-    pub(super) fn left(&mut self, said: &Said<'_>, name: &str, reason: Reason) {
-        let mut motion = self.listed(said, name, MotionKind::Unknown);
+    pub(super) fn list_left(&mut self, block: &Block<'_>, name: &str, reason: Reason) {
+        let mut motion = self.new_motion(block, name, MotionKind::Unknown);
         motion.left = Some(reason);
-        let written = self.written_as(said, None);
-        self.push(motion, written);
+        let context = self.block_context(block, None);
+        self.push(motion, context);
         self.state.previous = None;
-        if said.spin.is_some() {
+        if block.spin.is_some() {
             // It holds beyond what makes the orientation unknown.
             self.state.spin = Err(Reason::OrientationUnknown);
         }
     }
 
     /// A path of its own kind that is listed and left.
-    pub(super) fn left_path(&mut self, said: &Said<'_>, name: &str, needs: Needs) {
-        self.left(said, name, Reason::NotFollowed);
-        if let Some(written) = self.written.last_mut() {
-            written.needs = needs;
+    pub(super) fn list_left_path(&mut self, block: &Block<'_>, name: &str, dependency: StartDependency) {
+        self.list_left(block, name, Reason::NotFollowed);
+        if let Some(context) = self.contexts.last_mut() {
+            context.start_dependency = dependency;
         }
     }
 
     /// What the way of a block hangs on where it is no line and no arc, or a line that its words say by an angle.
-    fn needs_of(&self, said: &Said<'_>, mode: Mode) -> Needs {
+    fn start_dependency_of(&self, block: &Block<'_>, mode: MotionMode) -> StartDependency {
         match mode {
-            Mode::Other(Reason::NotFollowed) if self.state.tangent => Needs::Tangent,
-            Mode::Other(Reason::NotFollowed) => Needs::Start,
-            _ if said.aside == Some(Reason::NotFollowed) => Needs::Start,
+            MotionMode::Unsupported(Reason::NotFollowed) if self.state.starts_tangent => {
+                StartDependency::Tangent
+            }
+            MotionMode::Unsupported(Reason::NotFollowed) => StartDependency::Position,
+            _ if block.unmodelled == Some(Reason::NotFollowed) => StartDependency::Position,
             // No word can be put into a block with R+, and none of A, B, C into this LN: what they leave out holds on.
-            _ if said.lengthens => Needs::Start,
-            _ if said.aside == Some(Reason::AlongNormal) && said.axes.contains(&None) => Needs::Start,
-            _ => Needs::Nothing,
+            _ if block.paraxial_compensation => StartDependency::Position,
+            _ if block.unmodelled == Some(Reason::AlongNormal) && block.axes.contains(&None) => {
+                StartDependency::Position
+            }
+            _ => StartDependency::Independent,
         }
     }
 
-    fn written_as(&self, said: &Said<'_>, arc: Option<(Arc, bool, bool)>) -> Written {
+    fn block_context(&self, block: &Block<'_>, arc: Option<BlockArc>) -> BlockContext {
         let state = &self.state;
-        let angles = if state.turn == Turn::Rpy { &state.rpy } else { &state.abc };
+        let angles = if state.orientation_mode == OrientationMode::Rpy { &state.rpy } else { &state.abc };
         let vector = match (state.vector, state.spin) {
             ([Ok(x), Ok(y), Ok(z)], Ok(spin)) => Some(([x, y, z], spin)),
             _ => None,
         };
-        Written {
-            node: said.node,
+        BlockContext {
+            node: block.node,
             absolute: state.absolute,
             unit_mm: state.unit_mm,
-            counting_open: state.doubt(1 << Group::Distance as u32).is_some(),
+            distance_mode_unknown: state.unknown_reason(ModalGroup::DistanceMode.bit()).is_some(),
             start: state.position.map(Result::ok),
             start_angles: angles.map(Result::ok),
             angles: angles.map(Result::ok),
             start_vector: vector,
             vector,
             shift: state.shift.map(Result::ok),
-            turn: state.turn,
+            orientation_mode: state.orientation_mode,
             vector_words: state.vector_words,
             arc,
             insertable: false,
-            paraxial: said.paraxial,
-            restates: false,
-            may_lack: self.may_lack(said),
-            needs: Needs::Nothing,
+            paraxial: block.paraxial,
+            can_restate: false,
+            may_omit_words: self.may_omit_words(block),
+            start_dependency: StartDependency::Independent,
         }
     }
 
     /// Whether a word of the block may say nothing: Fanuc passes over a word whose variable has never been set.
-    fn may_lack(&self, said: &Said<'_>) -> bool {
-        let words = said.axes.iter().chain(&said.abc).chain(&said.centre).chain([&said.radius]).flatten();
+    fn may_omit_words(&self, block: &Block<'_>) -> bool {
+        let words = block.axes.iter().chain(&block.abc).chain(&block.centre).chain([&block.radius]).flatten();
         let unset = |&index: &usize| {
-            let word = &said.words[index];
-            matches!(word.belongs, Belongs::Expression { .. }) && self.worth(word).0.is_err()
+            let word = &block.words[index];
+            matches!(word.value, WordValue::Expression { .. }) && self.evaluate_word(word).0.is_err()
         };
         matches!(self.dialect, Dialect::Fanuc | Dialect::Iso) && { words }.any(unset)
     }
 
     fn axis_values(
         &self,
-        said: &Said<'_>,
+        block: &Block<'_>,
         words: &[Option<usize>; 3],
-        old: &[Worth; 3],
+        old: &[Evaluated; 3],
         unit: f64,
-    ) -> [Worth; 3] {
+    ) -> [Evaluated; 3] {
         std::array::from_fn(|axis| match words[axis] {
             None => old[axis],
             Some(index) => {
-                let (value, increment) = self.worth(&said.words[index]);
+                let (value, increment) = self.evaluate_word(&block.words[index]);
                 let value = value.map(|value| value * unit);
                 if increment.unwrap_or(!self.state.absolute) {
                     old[axis].and_then(|old| value.map(|value| old + value))
@@ -156,11 +162,11 @@ impl Lister<'_, '_> {
     }
 
     /// Where the axes stand at the end of a block.
-    fn ends_at(&self, said: &Said<'_>, from: &[Worth; 3]) -> [Worth; 3] {
-        let mut to = self.axis_values(said, &said.axes, from, self.state.unit_mm);
+    fn end_position(&self, block: &Block<'_>, from: &[Evaluated; 3]) -> [Evaluated; 3] {
+        let mut to = self.axis_values(block, &block.axes, from, self.state.unit_mm);
         for (axis, to) in to.iter_mut().enumerate() {
-            let Some(index) = said.axes[axis] else { continue };
-            let increment = self.worth(&said.words[index]).1.unwrap_or(!self.state.absolute);
+            let Some(index) = block.axes[axis] else { continue };
+            let increment = self.evaluate_word(&block.words[index]).1.unwrap_or(!self.state.absolute);
             if !increment {
                 *to = to.and_then(|value| self.state.shift[axis].map(|shift| value + shift));
             }
@@ -169,9 +175,9 @@ impl Lister<'_, '_> {
     }
 
     /// Whether a target stands in the block as numbers.
-    fn origin(&self, said: &Said<'_>, value: &Result<TargetValue, Reason>) -> Origin {
-        let words = said.axes.iter().chain(&said.abc).chain(&said.rpy).chain(&said.vector);
-        let literal = words.flatten().all(|&index| self.literal(&said.words[index]).is_some());
+    fn origin(&self, block: &Block<'_>, value: &Result<TargetValue, Reason>) -> Origin {
+        let words = block.axes.iter().chain(&block.abc).chain(&block.rpy).chain(&block.vector);
+        let literal = words.flatten().all(|&index| self.literal(&block.words[index]).is_some());
         match value {
             Ok(_) if literal => Origin::Inline,
             Ok(_) => Origin::Computed,
@@ -180,101 +186,98 @@ impl Lister<'_, '_> {
     }
 
     /// Where a block goes.
-    pub(super) fn motion(&mut self, said: &Said<'_>, machine: bool) {
+    pub(super) fn motion(&mut self, block: &Block<'_>, machine: bool) {
         let heidenhain = self.dialect == Dialect::Heidenhain;
-        let mode = if heidenhain && said.rapid && self.state.mode == Mode::Linear {
-            Mode::Rapid
+        let mode = if heidenhain && block.rapid && self.state.mode == MotionMode::Linear {
+            MotionMode::Rapid
         } else {
             self.state.mode
         };
-        let straight = matches!(mode, Mode::Rapid | Mode::Linear);
+        let straight = matches!(mode, MotionMode::Rapid | MotionMode::Linear);
         let vector_words = self.state.vector_words && straight;
-        let has_centre = said.centre.iter().any(Option::is_some);
-        let bends = has_centre && !vector_words || said.radius.is_some();
+        let has_centre = block.centre.iter().any(Option::is_some);
+        let bends = has_centre && !vector_words || block.radius.is_some();
         // R, I and K of a straight block round or cut its corner, on controls that take them.
         let cut = self.dialect.paren_comments() && straight && bends;
-        let circular = matches!(mode, Mode::Circular(_));
-        if !(said.moves() || circular && bends || vector_words && has_centre) {
-            self.without_axes(said);
+        let circular = matches!(mode, MotionMode::Circular(_));
+        if !(block.has_motion_words() || circular && bends || vector_words && has_centre) {
+            self.block_without_axes(block);
             return;
         }
         let unknown = match mode {
-            Mode::Unset => Some(Reason::NoMotionCode),
-            Mode::Lost(reason) => Some(reason),
+            MotionMode::Unset => Some(Reason::NoMotionCode),
+            MotionMode::Unknown(reason) => Some(reason),
             _ => None,
         };
         if let Some(reason) = unknown {
-            self.left(said, "?", reason);
-            self.lose_all();
+            self.list_left(block, "?", reason);
+            self.invalidate_pose();
             return;
         }
-        let before = self.written_as(said, None);
-        // Orientation.
-        let turn = self.turned(said, vector_words);
-        // Position.
+        let before = self.block_context(block, None);
         let from = self.state.position;
-        let to = self.ends_at(said, &from);
+        let to = self.end_position(block, &from);
         let (name, kind) = name_and_kind(mode, heidenhain);
-        let mut motion = self.listed(said, name, kind);
+        let mut motion = self.new_motion(block, name, kind);
         let old_rotation = self.state.rotation(self.angles);
-        self.state.turn = turn.0;
-        (self.state.abc, self.state.rpy, self.state.vector, self.state.spin) = turn.1;
+        self.set_orientation(block, vector_words);
         let rotation = self.state.rotation(self.angles);
-        let arc = self.targets(said, mode, [from, to], [old_rotation, rotation], &mut motion);
-        motion.speed = (mode != Mode::Rapid).then(|| self.speed()).flatten();
+        let arc = self.targets(block, mode, [from, to], [old_rotation, rotation], &mut motion);
+        motion.speed = (mode != MotionMode::Rapid).then(|| self.speed()).flatten();
         motion.zone = self.zone();
         motion.tool = Some(self.tool());
         motion.work_object = Some(self.work_object());
-        motion.left = self.left_because(said, mode, machine, &motion);
+        motion.left = self.reason_to_leave(block, mode, machine, &motion);
         if cut && motion.left.is_none() {
             motion.left = Some(Reason::NotFollowed);
         }
         motion.timed = !self.state.feed_per_minute && kind != MotionKind::Joint;
-        let splits = !motion.timed && self.splits(said, &before);
-        motion.insertable = splits && kind == MotionKind::Linear && !said.others;
-        motion.straightens = splits && arc.is_some() && !said.opaque;
-        motion.axis = arc.map(|(arc, positive, _)| arc.plane.axis(positive));
-        motion.by_radius = arc.is_some() && said.radius.is_some();
-        let after = self.written_as(said, arc);
-        let written = Written {
+        let splits = !motion.timed && self.can_split(block, &before);
+        motion.insertable = splits && kind == MotionKind::Linear && !block.other_axes;
+        motion.straightens = splits && arc.is_some() && !block.opaque;
+        motion.axis = arc.map(|block_arc| block_arc.arc.plane.axis(block_arc.positive));
+        motion.by_radius = arc.is_some() && block.radius.is_some();
+        let after = self.block_context(block, arc);
+        let context = BlockContext {
             insertable: motion.insertable,
-            restates: self.restates(said, &motion),
-            needs: self.needs_of(said, mode),
+            can_restate: self.can_restate(block, &motion),
+            start_dependency: self.start_dependency_of(block, mode),
             ..before.until(&after)
         };
-        let index = self.push(motion, written);
+        let index = self.push(motion, context);
         self.state.previous = Some(index);
         self.state.position = to;
-        self.arrived(said, mode, machine);
+        self.update_after_motion(block, mode, machine);
         // A tool vector holds in its own LN: the blocks after it have no word that says how the tool is turned now.
-        if heidenhain && self.state.turn == Turn::Vector {
-            self.state.lose_orientation();
-            self.events.push(Event::Lost(super::ORIENTATION));
+        if heidenhain && self.state.orientation_mode == OrientationMode::Vector {
+            self.state.invalidate_orientation();
+            self.events.push(StateEvent::AxesUnknown(super::ORIENTATION));
         }
     }
 
     /// The targets of a motion, and its arc with whether it turns positively and whether its centre is absolute.
     fn targets(
         &self,
-        said: &Said<'_>,
-        mode: Mode,
-        [from, to]: [[Worth; 3]; 2],
+        block: &Block<'_>,
+        mode: MotionMode,
+        [from, to]: [[Evaluated; 3]; 2],
         rotations: [Rotation; 2],
         motion: &mut Motion,
-    ) -> Option<(Arc, bool, bool)> {
-        let value = match said.lengthens {
+    ) -> Option<BlockArc> {
+        let value = match block.paraxial_compensation {
             true => Err(Reason::RadiusCompensation),
             false => target(to, rotations[1]),
         };
-        let origin = self.origin(said, &value);
-        let argument = self.argument(said);
+        let origin = self.origin(block, &value);
+        let argument = self.argument(block);
         let mut arc = None;
-        if let Mode::Circular(positive) = mode {
-            let found = self.arc(said, from, to, positive);
+        if let MotionMode::Circular(positive) = mode {
+            let found = self.arc(block, from, to, positive);
             let via = middle(found, [from, to], rotations);
             let via_origin = if via.is_ok() { Origin::Computed } else { Origin::Unknown };
             motion.targets.push(MotionTarget { role: Role::Via, value: via, origin: via_origin, argument });
-            arc = found.ok().map(|arc| (arc, positive, self.state.centre_absolute));
+            arc =
+                found.ok().map(|arc| BlockArc { arc, positive, centre_absolute: self.state.centre_absolute });
         }
         if motion.kind != MotionKind::Unknown {
             motion.targets.push(MotionTarget { role: Role::To, value, origin, argument });
@@ -283,80 +286,86 @@ impl Lister<'_, '_> {
     }
 
     /// Whether a block may stand before this one: the words of this block that change what numbers mean would come after it.
-    fn splits(&self, said: &Said<'_>, before: &Written) -> bool {
-        self.meaning == self.state.meaning()
-            && !begins_something(said)
+    fn can_split(&self, block: &Block<'_>, before: &BlockContext) -> bool {
+        self.meaning == self.state.word_semantics()
+            && !begins_something(block)
             && self.dialect != Dialect::Heidenhain
-            && !said.skippable
+            && !block.skippable
             && before.start.iter().all(Option::is_some)
     }
 
     /// What is not where the words of the block say.
-    fn arrived(&mut self, said: &Said<'_>, mode: Mode, machine: bool) {
-        if let Mode::Other(_) = mode {
+    fn update_after_motion(&mut self, block: &Block<'_>, mode: MotionMode, machine: bool) {
+        if let MotionMode::Unsupported(_) = mode {
             // A spline ends at its last point, whatever its way.
             self.state.previous = None;
         }
-        let call = self.modal_call(said);
-        if call == Some(Reason::Subprogram) || call == Some(Reason::Cycle) && self.calls_program {
+        let call = self.modal_call(block);
+        if call == Some(Reason::Subprogram) || call == Some(Reason::Cycle) && self.cycle_is_program {
             let held = self.state.modal_call;
             // G66 has been noted itself.
             if !self.dialect.paren_comments() {
                 self.listing.outside.push(self.listing.motions.len() as u32 - 1);
             }
-            self.forget();
+            self.join_unseen_predecessors();
             self.state.modal_call = held;
-        } else if (machine || said.aside.is_some())
-            && said.abc.iter().chain(&said.rpy).chain(&said.vector).any(Option::is_some)
+        } else if (machine || block.unmodelled.is_some())
+            && block.abc.iter().chain(&block.rpy).chain(&block.vector).any(Option::is_some)
         {
-            self.lose_all();
-        } else if mode == Mode::Other(Reason::Cycle)
+            self.invalidate_pose();
+        } else if mode == MotionMode::Unsupported(Reason::Cycle)
             || machine
             || call.is_some()
-            || matches!(said.aside, Some(Reason::Transformed | Reason::NotFollowed | Reason::Probe))
-            || said.opaque
-            || said.others && self.parallel()
+            || matches!(block.unmodelled, Some(Reason::Transformed | Reason::NotFollowed | Reason::Probe))
+            || block.opaque
+            || block.other_axes && self.parallel()
         {
-            self.lose_position();
-        } else if said.aside == Some(Reason::AlongNormal) {
+            self.invalidate_position();
+        } else if block.unmodelled == Some(Reason::AlongNormal) {
             // How the tool is turned at the end of this is not what the block before says.
-            self.state.lose_orientation();
+            self.state.invalidate_orientation();
             self.state.previous = None;
-            self.events.push(Event::Lost(super::ORIENTATION));
-        } else if said.aside.is_some() {
+            self.events.push(StateEvent::AxesUnknown(super::ORIENTATION));
+        } else if block.unmodelled.is_some() {
             // The place is as before in the axes that the block leaves out, with what has been corrected there.
-            self.state.lose_orientation();
-            self.events.push(Event::Lost(super::ORIENTATION));
+            self.state.invalidate_orientation();
+            self.events.push(StateEvent::AxesUnknown(super::ORIENTATION));
         }
-        if said.lengthens {
-            self.lose_axes(said);
+        if block.paraxial_compensation {
+            self.invalidate_named_axes(block);
         }
-        if said.opaque || self.contour.is_some() {
-            self.lose_all();
+        if block.opaque || self.contour_end.is_some() {
+            self.invalidate_pose();
         }
         // Where it is not known what the numbers mean, where they lead is not known either.
-        let meaning = [Group::Distance, Group::Unit, Group::Shift, Group::Diameter, Group::Rotary];
-        if self.state.doubt(meaning.iter().fold(0, |all, &group| all | 1 << group as u32)).is_some() {
-            self.lose_all();
+        let meaning = [
+            ModalGroup::DistanceMode,
+            ModalGroup::Unit,
+            ModalGroup::CoordinateShift,
+            ModalGroup::Diameter,
+            ModalGroup::RotaryOffset,
+        ];
+        if self.state.unknown_reason(meaning.iter().fold(0, |all, &group| all | group.bit())).is_some() {
+            self.invalidate_pose();
         }
     }
 
     /// Whether a straight motion that stays can have the words said again that it leaves out.
-    fn restates(&self, said: &Said<'_>, motion: &Motion) -> bool {
+    fn can_restate(&self, block: &Block<'_>, motion: &Motion) -> bool {
         let straight = matches!(motion.kind, MotionKind::Linear | MotionKind::Joint);
-        let plain = straight && !said.opaque && said.aside.is_none() && self.contour.is_none();
-        let settled = !(1 << Group::Radius as u32 | OF_TOOL) & OF_ALL;
+        let plain = straight && !block.opaque && block.unmodelled.is_none() && self.contour_end.is_none();
+        let set_before_branch = !(ModalGroup::RadiusCompensation.bit() | TOOL_GROUPS) & MOTION_GROUPS;
         // A cycle runs where the words of the block say.
-        let call = self.modal_call(said);
+        let call = self.modal_call(block);
         // With words put in, a block would move that does not where its variable has never been set.
         plain
-            && !self.may_lack(said)
+            && !self.may_omit_words(block)
             && call.is_none_or(|call| call == Reason::Cycle)
-            && self.state.turned == 0
-            && self.state.doubt(settled).is_none()
+            && self.state.active_transforms == 0
+            && self.state.unknown_reason(set_before_branch).is_none()
             && match motion.left {
                 None | Some(Reason::Skippable | Reason::UnknownFlow | Reason::UnknownWord) => true,
-                Some(Reason::NotFollowed) => said.corner,
+                Some(Reason::NotFollowed) => block.corner,
                 Some(Reason::Cycle) => call.is_some(),
                 _ => false,
             }
@@ -368,97 +377,98 @@ impl Lister<'_, '_> {
     }
 
     /// What runs after this motion: G66, MCALL, M89, or M99 of Heidenhain.
-    fn modal_call(&self, said: &Said<'_>) -> Option<Reason> {
-        let here = self.dialect == Dialect::Heidenhain && said.m.contains(&99);
+    fn modal_call(&self, block: &Block<'_>) -> Option<Reason> {
+        let here = self.dialect == Dialect::Heidenhain && block.m.contains(&99);
         self.state.modal_call.or(here.then_some(Reason::Cycle))
     }
 
     /// A block without words of the axes that are followed: it may move others, or what it does could not be read.
-    fn without_axes(&mut self, said: &Said<'_>) {
-        if !said.opaque && self.calls_cycle(said) {
+    fn block_without_axes(&mut self, block: &Block<'_>) {
+        if !block.opaque && self.calls_cycle(block) {
             return;
         }
-        if said.opaque {
-            self.left(said, "?", Reason::Unread);
-            self.lose_all();
-        } else if let Some(reason) = said.aside {
-            self.left(said, "path", reason);
+        if block.opaque {
+            self.list_left(block, "?", Reason::Unread);
+            self.invalidate_pose();
+        } else if let Some(reason) = block.unmodelled {
+            self.list_left(block, "path", reason);
             match reason {
-                Reason::Transformed => self.lose_position(),
-                _ => self.lose_all(),
+                Reason::Transformed => self.invalidate_position(),
+                _ => self.invalidate_pose(),
             }
-        } else if said.others {
-            self.left(said, "axes", Reason::ExternalOnly);
+        } else if block.other_axes {
+            self.list_left(block, "axes", Reason::ExternalOnly);
             if self.parallel() {
-                self.lose_position();
+                self.invalidate_position();
             }
         }
     }
 
-    #[allow(clippy::type_complexity)]
-    fn turned(
-        &self,
-        said: &Said<'_>,
-        vector_words: bool,
-    ) -> (Turn, ([Worth; 3], [Worth; 3], [Worth; 3], Worth)) {
-        let state = &self.state;
-        let (mut abc, mut rpy, mut vector, mut spin) = (state.abc, state.rpy, state.vector, state.spin);
-        let mut turn = state.turn;
+    /// Updates the orientation by the words of a block.
+    fn set_orientation(&mut self, block: &Block<'_>, vector_words: bool) {
         let any = |words: &[Option<usize>; 3]| words.iter().any(Option::is_some);
-        // What turns the tool in one way leaves open what the words of the other ways hold.
-        let lost = [Err(Reason::OrientationUnknown); 3];
-        if any(&said.abc) {
-            abc = self.axis_values(said, &said.abc, &abc, 1.0);
-            (turn, rpy, vector) = (Turn::Angles, lost, lost);
+        // Words of one mode leave the values of the other modes unknown.
+        let unknown = [Err(Reason::OrientationUnknown); 3];
+        if any(&block.abc) {
+            self.state.abc = self.axis_values(block, &block.abc, &self.state.abc, 1.0);
+            (self.state.rpy, self.state.vector) = (unknown, unknown);
+            self.state.orientation_mode = OrientationMode::Angles;
         }
-        if any(&said.rpy) {
-            rpy = self.axis_values(said, &said.rpy, &rpy, 1.0);
-            (turn, abc, vector) = (Turn::Rpy, lost, lost);
+        if any(&block.rpy) {
+            self.state.rpy = self.axis_values(block, &block.rpy, &self.state.rpy, 1.0);
+            (self.state.abc, self.state.vector) = (unknown, unknown);
+            self.state.orientation_mode = OrientationMode::Rpy;
         }
-        let vector_said = if vector_words { &said.centre } else { &said.vector };
-        if any(vector_said) {
-            // Components that are not written are 0.
-            vector = vector_said.map(|index| index.map_or(Ok(0.0), |index| self.worth(&said.words[index]).0));
-            (turn, abc, rpy) = (Turn::Vector, lost, lost);
+        let vector = if vector_words { &block.centre } else { &block.vector };
+        if any(vector) {
+            // An omitted component is 0.
+            self.state.vector =
+                vector.map(|index| index.map_or(Ok(0.0), |index| self.evaluate_word(&block.words[index]).0));
+            (self.state.abc, self.state.rpy) = (unknown, unknown);
+            self.state.orientation_mode = OrientationMode::Vector;
         }
-        if let Some(index) = said.spin {
-            spin = self.worth(&said.words[index]).0;
-            if !state.spin_absolute {
-                spin = Err(Reason::OrientationUnknown);
-            }
+        if let Some(index) = block.spin {
+            let spin = self.evaluate_word(&block.words[index]).0;
+            let absolute = self.state.spin_absolute;
+            self.state.spin = if absolute { spin } else { Err(Reason::OrientationUnknown) };
         }
-        (turn, (abc, rpy, vector, spin))
     }
 
-    fn arc(&self, said: &Said<'_>, from: [Worth; 3], to: [Worth; 3], positive: bool) -> Result<Arc, Reason> {
-        let one = |index: usize| self.literal(&said.words[index]) == Some(1.0);
+    fn arc(
+        &self,
+        block: &Block<'_>,
+        from: [Evaluated; 3],
+        to: [Evaluated; 3],
+        positive: bool,
+    ) -> Result<Arc, Reason> {
+        let one = |index: usize| self.literal(&block.words[index]) == Some(1.0);
         // P: turns of LinuxCNC; Q, L: spirals and cones.
         let more = self.dialect != Dialect::Siemens
-            && (said.p.is_some_and(|index| !one(index)) || said.q.is_some() || said.l.is_some());
-        if said.turns || more {
+            && (block.p.is_some_and(|index| !one(index)) || block.q.is_some() || block.l.is_some());
+        if block.special_arc || more {
             return Err(Reason::NotFollowed);
         }
-        let (start, end) = (all(from)?, all(to)?);
+        let (start, end) = (all_known(from)?, all_known(to)?);
         let plane = self.state.plane;
         let unit = self.state.unit_mm;
         if self.dialect == Dialect::Heidenhain && plane != Plane::XY {
             return Err(Reason::Transformed);
         }
-        if self.dialect == Dialect::Heidenhain && said.radius.is_none() {
+        if self.dialect == Dialect::Heidenhain && block.radius.is_none() {
             let centre = [self.state.pole[0]?, self.state.pole[1]?];
             return Arc::about(plane, start, end, centre, positive).ok_or(Reason::WrongShape);
         }
-        if let Some(index) = said.radius {
-            let radius = self.worth(&said.words[index]).0? * unit;
+        if let Some(index) = block.radius {
+            let radius = self.evaluate_word(&block.words[index]).0? * unit;
             return Arc::of_radius(plane, start, end, radius, positive).ok_or(Reason::WrongShape);
         }
         let mut centre = [0.0; 2];
         for (place, axis) in [plane.a, plane.b].into_iter().enumerate() {
-            centre[place] = match said.centre[axis] {
+            centre[place] = match block.centre[axis] {
                 None if self.state.centre_absolute => return Err(Reason::MissingArgument),
                 None => start[axis],
                 Some(index) => {
-                    let (value, increment) = self.worth(&said.words[index]);
+                    let (value, increment) = self.evaluate_word(&block.words[index]);
                     let value = value? * unit;
                     if increment.unwrap_or(!self.state.centre_absolute) {
                         start[axis] + value
@@ -468,70 +478,76 @@ impl Lister<'_, '_> {
                 }
             };
         }
-        if said.centre[plane.a].is_none() && said.centre[plane.b].is_none() {
+        if block.centre[plane.a].is_none() && block.centre[plane.b].is_none() {
             return Err(Reason::MissingArgument);
         }
         Arc::about(plane, start, end, centre, positive).ok_or(Reason::WrongShape)
     }
 
     /// From the first to the last word that says where to go.
-    fn argument(&self, said: &Said<'_>) -> Span {
-        let words = said
+    fn argument(&self, block: &Block<'_>) -> Span {
+        let words = block
             .axes
             .iter()
-            .chain(&said.abc)
-            .chain(&said.rpy)
-            .chain(&said.vector)
-            .chain(&said.centre)
+            .chain(&block.abc)
+            .chain(&block.rpy)
+            .chain(&block.vector)
+            .chain(&block.centre)
             .flatten()
-            .map(|&index| said.words[index]);
+            .map(|&index| block.words[index]);
         let (first, end) =
             words.fold((u32::MAX, 0), |(first, end), word| (first.min(word.first), end.max(word.end)));
-        if first < end { self.tree.span(first, end) } else { self.tree.node_span(said.node) }
+        if first < end { self.tree.span(first, end) } else { self.tree.node_span(block.node) }
     }
 
-    fn left_because(&self, said: &Said<'_>, mode: Mode, machine: bool, motion: &Motion) -> Option<Reason> {
+    fn reason_to_leave(
+        &self,
+        block: &Block<'_>,
+        mode: MotionMode,
+        machine: bool,
+        motion: &Motion,
+    ) -> Option<Reason> {
         let state = &self.state;
-        let turns = !matches!(state.turn, Turn::Unknown(Reason::OrientationUnknown));
+        let turns = !matches!(state.orientation_mode, OrientationMode::Unknown(Reason::OrientationUnknown));
         let needs_tip = matches!(self.dialect, Dialect::Fanuc | Dialect::Siemens | Dialect::Heidenhain);
-        if said.opaque {
+        if block.opaque {
             Some(Reason::Unread)
-        } else if said.skippable {
+        } else if block.skippable {
             Some(Reason::Skippable)
-        } else if said.corner {
+        } else if block.corner {
             Some(Reason::NotFollowed)
-        } else if let Mode::Other(reason) = mode {
+        } else if let MotionMode::Unsupported(reason) = mode {
             Some(reason)
         } else if machine {
             Some(Reason::MachineCoordinates)
-        } else if self.contour.is_some() {
+        } else if self.contour_end.is_some() {
             Some(Reason::Cycle)
-        } else if let Some(reason) = said.aside.or(self.modal_call(said)) {
+        } else if let Some(reason) = block.unmodelled.or(self.modal_call(block)) {
             Some(reason)
-        } else if let Some(reason) = state.doubt(OF_ALL) {
+        } else if let Some(reason) = state.unknown_reason(MOTION_GROUPS) {
             Some(reason)
-        } else if let (Mode::Circular(_), Some(reason)) = (mode, state.doubt(OF_ARCS)) {
+        } else if let (MotionMode::Circular(_), Some(reason)) = (mode, state.unknown_reason(ARC_GROUPS)) {
             Some(reason)
-        } else if state.turned != 0 {
+        } else if state.active_transforms != 0 {
             Some(Reason::Transformed)
-        } else if said.others && self.parallel() {
+        } else if block.other_axes && self.parallel() {
             Some(Reason::UnknownWord)
         } else if self.dialect == Dialect::Heidenhain
-            && matches!(mode, Mode::Circular(_))
+            && matches!(mode, MotionMode::Circular(_))
             && state.plane != Plane::XY
         {
             // The working plane goes with the axis of the tool.
             Some(Reason::Transformed)
-        } else if state.radius {
+        } else if state.radius_compensation {
             Some(Reason::RadiusCompensation)
-        } else if turns && needs_tip && !state.tip {
+        } else if turns && needs_tip && !state.tcp_mode {
             Some(Reason::NoTipControl)
         } else if self.dialect == Dialect::Heidenhain
-            && matches!(mode, Mode::Circular(_))
-            && said.radius.is_none()
+            && matches!(mode, MotionMode::Circular(_))
+            && block.radius.is_none()
         {
             Some(Reason::CentreElsewhere)
-        } else if state.feed == Err(Reason::NumberRange) && mode != Mode::Rapid {
+        } else if state.feed == Err(Reason::NumberRange) && mode != MotionMode::Rapid {
             Some(Reason::NumberRange)
         } else {
             self.listing.left_by_frames(motion)
@@ -572,14 +588,15 @@ impl Lister<'_, '_> {
     }
 }
 
-impl Written {
+impl BlockContext {
     /// From where the tool stands before a block to how it is turned after it.
-    fn until(self, after: &Written) -> Written {
-        let same_angles = (self.turn == Turn::Rpy) == (after.turn == Turn::Rpy);
-        Written {
+    fn until(self, after: &BlockContext) -> BlockContext {
+        let same_angles = (self.orientation_mode == OrientationMode::Rpy)
+            == (after.orientation_mode == OrientationMode::Rpy);
+        BlockContext {
             arc: after.arc,
             start_angles: if same_angles { self.start_angles } else { [None; 3] },
-            turn: after.turn,
+            orientation_mode: after.orientation_mode,
             angles: after.angles,
             vector: after.vector,
             ..self
@@ -588,25 +605,27 @@ impl Written {
 }
 
 /// What a motion of this mode is called in lists, and what kind it is.
-fn name_and_kind(mode: Mode, heidenhain: bool) -> (&'static str, MotionKind) {
+fn name_and_kind(mode: MotionMode, heidenhain: bool) -> (&'static str, MotionKind) {
     match mode {
-        Mode::Rapid if heidenhain => ("L FMAX", MotionKind::Joint),
-        Mode::Linear if heidenhain => ("L", MotionKind::Linear),
-        Mode::Circular(_) if heidenhain => ("C", MotionKind::Circular),
-        Mode::Rapid => ("G0", MotionKind::Joint),
-        Mode::Linear => ("G1", MotionKind::Linear),
-        Mode::Circular(false) => ("G2", MotionKind::Circular),
-        Mode::Circular(true) => ("G3", MotionKind::Circular),
-        Mode::Other(Reason::Cycle) => ("cycle", MotionKind::Unknown),
-        Mode::Other(_) | Mode::Unset | Mode::Lost(_) => ("path", MotionKind::Unknown),
+        MotionMode::Rapid if heidenhain => ("L FMAX", MotionKind::Joint),
+        MotionMode::Linear if heidenhain => ("L", MotionKind::Linear),
+        MotionMode::Circular(_) if heidenhain => ("C", MotionKind::Circular),
+        MotionMode::Rapid => ("G0", MotionKind::Joint),
+        MotionMode::Linear => ("G1", MotionKind::Linear),
+        MotionMode::Circular(false) => ("G2", MotionKind::Circular),
+        MotionMode::Circular(true) => ("G3", MotionKind::Circular),
+        MotionMode::Unsupported(Reason::Cycle) => ("cycle", MotionKind::Unknown),
+        MotionMode::Unsupported(_) | MotionMode::Unset | MotionMode::Unknown(_) => {
+            ("path", MotionKind::Unknown)
+        }
     }
 }
 
 type Rotation = Result<UnitQuaternion<f64>, Reason>;
 
 /// The pose at these axes, turned so.
-fn target(position: [Worth; 3], rotation: Rotation) -> Result<TargetValue, Reason> {
-    let position_mm = all(position)?;
+fn target(position: [Evaluated; 3], rotation: Rotation) -> Result<TargetValue, Reason> {
+    let position_mm = all_known(position)?;
     if !position_mm.iter().all(|coordinate| coordinate.abs() <= FARTHEST_MM) {
         return Err(Reason::BeyondReach);
     }
@@ -618,11 +637,11 @@ fn target(position: [Worth; 3], rotation: Rotation) -> Result<TargetValue, Reaso
 /// The pose half way along an arc.
 fn middle(
     arc: Result<Arc, Reason>,
-    [from, to]: [[Worth; 3]; 2],
+    [from, to]: [[Evaluated; 3]; 2],
     rotations: [Rotation; 2],
 ) -> Result<TargetValue, Reason> {
     let arc = arc?;
-    let (Ok(a), Ok(b)) = (all(from), all(to)) else { return Err(Reason::PositionUnknown) };
+    let (Ok(a), Ok(b)) = (all_known(from), all_known(to)) else { return Err(Reason::PositionUnknown) };
     let half = match rotations {
         [Ok(a), Ok(b)] => Ok(a.try_slerp(&b, 0.5, 1e-9).unwrap_or(b)),
         [Err(reason), _] | [_, Err(reason)] => Err(reason),
@@ -630,13 +649,9 @@ fn middle(
     target(arc.at(a, b, 0.5).map(Ok), half)
 }
 
-fn all(values: [Worth; 3]) -> Result<[f64; 3], Reason> {
-    Ok([values[0]?, values[1]?, values[2]?])
-}
-
 /// Whether a block starts the spindle, the coolant or what else an M word may: a block that is put in before it would move
 /// without. Stops and ends come when the motion is done.
-fn begins_something(said: &Said<'_>) -> bool {
-    said.m.iter().any(|m| !matches!(m, 0..=2 | 5 | 9 | 30))
-        || said.words.iter().any(|word| word.address() == Some(b'S'))
+fn begins_something(block: &Block<'_>) -> bool {
+    block.m.iter().any(|m| !matches!(m, 0..=2 | 5 | 9 | 30))
+        || block.words.iter().any(|word| word.address() == Some(b'S'))
 }

@@ -9,12 +9,12 @@
 
 use std::collections::{BTreeSet, HashMap};
 
-use super::slots::{said, slots};
-use super::stays_in_place;
+use super::keeps_endpoint;
+use super::word_slots::{slots, states_increment};
 use crate::motion::{MotionKind, Reason};
 use crate::nc::expression::literal;
-use crate::nc::syntax::{Belongs, NcTree, Word};
-use crate::nc::task::{Event, Needs, Task};
+use crate::nc::syntax::{NcTree, Word, WordValue};
+use crate::nc::task::{StartDependency, StateEvent, Task};
 use crate::rewrite::Outcome;
 
 /// More single motions are not told apart: all of the file then.
@@ -25,7 +25,7 @@ const AXES: usize = 6;
 
 /// What a coordinate hangs on.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-struct Hangs {
+struct Dependencies {
     on: [Option<u32>; SINGLE],
     /// All motions of the file that move.
     on_all: bool,
@@ -37,21 +37,21 @@ struct Hangs {
     unsettled: bool,
 }
 
-impl Hangs {
-    const NOTHING: Hangs =
-        Hangs { on: [None; SINGLE], on_all: false, places: false, origins: false, unsettled: false };
+impl Dependencies {
+    const NOTHING: Dependencies =
+        Dependencies { on: [None; SINGLE], on_all: false, places: false, origins: false, unsettled: false };
 
-    fn only(motion: u32) -> Hangs {
+    fn only(motion: u32) -> Dependencies {
         let mut on = [None; SINGLE];
         on[0] = Some(motion);
-        Hangs { on, ..Hangs::NOTHING }
+        Dependencies { on, ..Dependencies::NOTHING }
     }
 
     fn is_nothing(&self) -> bool {
         self.on[0].is_none() && !self.on_all && !self.places && !self.origins
     }
 
-    fn and(mut self, other: Hangs) -> Hangs {
+    fn and(mut self, other: Dependencies) -> Dependencies {
         for motion in other.on.into_iter().flatten() {
             if self.on.contains(&Some(motion)) {
                 continue;
@@ -71,22 +71,22 @@ impl Hangs {
 
 /// The same over many places.
 #[derive(Debug, Clone, Default)]
-struct Gathered {
+struct DependencySet {
     on: BTreeSet<u32>,
     on_all: bool,
     places: bool,
     origins: bool,
 }
 
-impl Gathered {
-    fn add(&mut self, hangs: &Hangs) {
+impl DependencySet {
+    fn add(&mut self, hangs: &Dependencies) {
         self.on.extend(hangs.on.iter().flatten());
         self.on_all |= hangs.on_all;
         self.places |= hangs.places;
         self.origins |= hangs.origins;
     }
 
-    fn join(&mut self, other: &Gathered) {
+    fn join(&mut self, other: &DependencySet) {
         self.on.extend(&other.on);
         self.on_all |= other.on_all;
         self.places |= other.places;
@@ -94,7 +94,7 @@ impl Gathered {
     }
 
     /// With the places and origins that it names.
-    fn whole(mut self, places: &Gathered, origins: &Gathered) -> Gathered {
+    fn whole(mut self, places: &DependencySet, origins: &DependencySet) -> DependencySet {
         for _ in 0..2 {
             if self.places {
                 self.join(places);
@@ -109,15 +109,15 @@ impl Gathered {
 
 /// One file while its events are followed.
 #[derive(Default)]
-struct Course {
-    place: [Hangs; AXES],
-    origin: [Hangs; 3],
+struct FileDependencies {
+    place: [Dependencies; AXES],
+    origin: [Dependencies; 3],
     /// Where jumps may begin.
-    places: [Gathered; AXES],
+    places: [DependencySet; AXES],
     /// Where origins are set.
-    origins: [Gathered; 3],
+    origins: [DependencySet; 3],
     /// What must not move: because of origins, because of increments.
-    held: [[Gathered; AXES]; 2],
+    held: [[DependencySet; AXES]; 2],
     motions: std::ops::Range<u32>,
     /// Whether the axes may turn anywhere in the file: where ways meet they may come from another frame.
     turns: bool,
@@ -127,7 +127,7 @@ struct Course {
 const BY_ORIGIN: usize = 0;
 const BY_INCREMENT: usize = 1;
 
-impl Course {
+impl FileDependencies {
     fn hold_place(&mut self, why: usize, axis: usize) {
         self.held[why][axis].add(&self.place[axis]);
     }
@@ -136,9 +136,9 @@ impl Course {
         self.held[BY_ORIGIN][axis].add(&self.origin[axis]);
     }
 
-    fn event(&mut self, event: &Event) {
+    fn event(&mut self, event: &StateEvent) {
         match *event {
-            Event::Shift { stated, named } => {
+            StateEvent::OriginSet { stated, named } => {
                 for axis in (0..3).filter(|&axis| named[axis]) {
                     if stated[axis].is_none() || self.place[axis].unsettled {
                         // By how much it moves cannot be counted.
@@ -148,27 +148,27 @@ impl Course {
                     self.origins[axis].add(&self.place[axis]);
                 }
             }
-            Event::Placed(axes) => {
-                (0..3).filter(|&axis| axes[axis]).for_each(|axis| self.origin[axis] = Hangs::NOTHING);
+            StateEvent::ShiftStated(axes) => {
+                (0..3).filter(|&axis| axes[axis]).for_each(|axis| self.origin[axis] = Dependencies::NOTHING);
             }
-            Event::MaybePlaced(axes) => {
+            StateEvent::ShiftMaybeStated(axes) => {
                 (0..3).filter(|&axis| axes[axis]).for_each(|axis| self.hold_origin(axis));
             }
-            Event::Restored => self.origin.iter_mut().for_each(|origin| origin.origins = true),
-            Event::Held { axes, read } => {
+            StateEvent::ShiftRestored => self.origin.iter_mut().for_each(|origin| origin.origins = true),
+            StateEvent::PositionUsed { axes, read } => {
                 let why = if read { BY_INCREMENT } else { BY_ORIGIN };
                 (0..AXES).filter(|axis| axes & 1 << axis != 0).for_each(|axis| self.hold_place(why, axis));
             }
-            Event::Jump => self.leave(),
-            Event::Join => {
+            StateEvent::Branch => self.leave(),
+            StateEvent::Join => {
                 self.leave();
                 for place in &mut self.place {
                     (place.places, place.unsettled) = (true, true);
                 }
                 self.origin.iter_mut().for_each(|origin| origin.origins = true);
             }
-            Event::Unknown => self.turn(),
-            Event::Start | Event::Lost(_) | Event::Motion(_) => {}
+            StateEvent::PoseUnknown => self.turn(),
+            StateEvent::FileStart | StateEvent::AxesUnknown(_) | StateEvent::Motion(_) => {}
         }
     }
 
@@ -190,11 +190,11 @@ impl Course {
     }
 
     /// The motions that must not move, and why.
-    fn ends(&self) -> [Gathered; 2] {
+    fn ends(&self) -> [DependencySet; 2] {
         std::array::from_fn(|why| {
-            let mut all = Gathered::default();
+            let mut all = DependencySet::default();
             for (axis, held) in self.held[why].iter().enumerate() {
-                let none = Gathered::default();
+                let none = DependencySet::default();
                 let origins = self.origins.get(axis).unwrap_or(&none);
                 all.join(&held.clone().whole(&self.places[axis], origins));
             }
@@ -205,15 +205,15 @@ impl Course {
 
 impl Task<'_> {
     /// Refuses the motions from whose ends something counts that stays. Whether there is one.
-    pub(super) fn keep_origins(
+    pub(super) fn refuse_position_dependents(
         &self,
-        fixed: &BTreeSet<u32>,
+        pinned: &BTreeSet<u32>,
         wanted: &mut HashMap<u32, usize>,
         outcomes: &mut [Outcome],
     ) -> bool {
-        let mut course = Course::default();
+        let mut course = FileDependencies::default();
         let mut refused: Vec<(u32, Reason)> = Vec::new();
-        let mut end = |course: &Course| {
+        let mut end = |course: &FileDependencies| {
             for (gathered, reason) in
                 course.ends().iter().zip([Reason::BeforeOrigin, Reason::BeforeIncrement])
             {
@@ -223,17 +223,18 @@ impl Task<'_> {
         };
         for (at, event) in self.events.iter().enumerate() {
             match *event {
-                Event::Start => {
+                StateEvent::FileStart => {
                     end(&course);
                     let next = course.motions.end;
-                    let of_file = self.events[at + 1..].iter().take_while(|event| **event != Event::Start);
-                    let mut moving = of_file.skip_while(|event| !matches!(event, Event::Motion(_)));
-                    let turns = moving.any(|event| *event == Event::Unknown);
-                    course = Course { motions: next..next, turns, ..Course::default() };
+                    let of_file =
+                        self.events[at + 1..].iter().take_while(|event| **event != StateEvent::FileStart);
+                    let mut moving = of_file.skip_while(|event| !matches!(event, StateEvent::Motion(_)));
+                    let turns = moving.any(|event| *event == StateEvent::PoseUnknown);
+                    course = FileDependencies { motions: next..next, turns, ..FileDependencies::default() };
                 }
-                Event::Motion(motion) => {
+                StateEvent::Motion(motion) => {
                     course.motions.end = motion + 1;
-                    let moves = wanted.contains_key(&motion) && !fixed.contains(&motion);
+                    let moves = wanted.contains_key(&motion) && !pinned.contains(&motion);
                     self.goes(motion, moves, &mut course);
                 }
                 _ => course.event(event),
@@ -252,17 +253,19 @@ impl Task<'_> {
 
     /// After a block that may be skipped the tool stands as corrected or as it always did: no increment can be written from
     /// there that is right on both ways.
-    fn hold_unsettled(&self, index: u32, course: &mut Course) {
+    fn hold_unsettled(&self, index: u32, course: &mut FileDependencies) {
         if !course.place.iter().any(|place| place.unsettled) {
             return;
         }
-        let (motion, written) = (&self.listing.motions[index as usize], &self.written[index as usize]);
+        let (motion, context) = (&self.listing.motions[index as usize], &self.contexts[index as usize]);
         let file = motion.place.file as usize;
         let (tree, dialect) = (&self.trees[file], self.dialects[file]);
-        let slots = slots(tree, dialect, written);
+        let slots = slots(tree, dialect, context);
         for (axis, word) in slots.axes.iter().chain(&slots.angles).enumerate() {
-            let counts =
-                word.as_ref().and_then(|word| said(tree, dialect, word)).unwrap_or(!written.absolute);
+            let counts = word
+                .as_ref()
+                .and_then(|word| states_increment(tree, dialect, word))
+                .unwrap_or(!context.absolute);
             if counts && course.place[axis].unsettled {
                 course.hold_place(BY_INCREMENT, axis);
             }
@@ -270,40 +273,43 @@ impl Task<'_> {
     }
 
     /// What a motion makes of place and origin.
-    fn goes(&self, index: u32, moves: bool, course: &mut Course) {
-        let (motion, written) = (&self.listing.motions[index as usize], &self.written[index as usize]);
+    fn goes(&self, index: u32, moves: bool, course: &mut FileDependencies) {
+        let (motion, context) = (&self.listing.motions[index as usize], &self.contexts[index as usize]);
         let known = motion.to().is_some_and(|target| target.value.is_ok());
         if known {
             self.hold_unsettled(index, course);
         }
-        if known && motion.left.is_none_or(stays_in_place) {
+        if known && motion.left.is_none_or(keeps_endpoint) {
             // It is written anew, or says again what must be said again.
-            let hangs = if moves { Hangs::only(index) } else { Hangs::NOTHING };
+            let hangs = if moves { Dependencies::only(index) } else { Dependencies::NOTHING };
             course.place = [hangs; AXES];
             return;
         }
         let file = motion.place.file as usize;
         let (tree, dialect) = (&self.trees[file], self.dialects[file]);
-        let slots = slots(tree, dialect, written);
+        let slots = slots(tree, dialect, context);
         let reason = motion.reason();
         let machine = reason == Some(Reason::MachineCoordinates);
         let returns = reason == Some(Reason::ReferenceReturn);
-        let mends = written.restates && known && slots.axes.iter().any(Option::is_some);
+        let mends = context.can_restate && known && slots.axes.iter().any(Option::is_some);
         let before = course.place;
         for (axis, was) in before.iter().enumerate() {
             let linear = axis < 3;
             let word = if linear { slots.axes[axis] } else { slots.angles[axis - 3] };
-            let start = if linear { written.start[axis] } else { written.start_angles[axis - 3] };
-            let increment = word.map(|word| said(tree, dialect, &word).unwrap_or(!written.absolute));
+            let start = if linear { context.start[axis] } else { context.start_angles[axis - 3] };
+            let increment =
+                word.map(|word| states_increment(tree, dialect, &word).unwrap_or(!context.absolute));
             match (word, increment) {
-                _ if mends && linear && start.is_some() => course.place[axis] = Hangs::NOTHING,
-                (Some(_), Some(false)) if mends && linear => course.place[axis] = Hangs::NOTHING,
+                _ if mends && linear && start.is_some() => course.place[axis] = Dependencies::NOTHING,
+                (Some(_), Some(false)) if mends && linear => course.place[axis] = Dependencies::NOTHING,
                 (Some(word), Some(true)) if returns && is_zero(tree, &word) => {
-                    course.place[axis] = Hangs::NOTHING;
+                    course.place[axis] = Dependencies::NOTHING;
                 }
-                (Some(_), _) if machine => course.place[axis] = Hangs::NOTHING,
+                (Some(_), _) if machine => course.place[axis] = Dependencies::NOTHING,
                 // It may count from the place or from the origin.
-                (Some(word), _) if written.counting_open && said(tree, dialect, &word).is_none() => {
+                (Some(word), _)
+                    if context.distance_mode_unknown && states_increment(tree, dialect, &word).is_none() =>
+                {
                     course.hold_place(BY_INCREMENT, axis);
                     if linear {
                         course.hold_origin(axis);
@@ -316,16 +322,16 @@ impl Task<'_> {
                         course.hold_origin(axis);
                     }
                     course.place[axis] =
-                        if linear && !returns { course.origin[axis] } else { Hangs::NOTHING };
+                        if linear && !returns { course.origin[axis] } else { Dependencies::NOTHING };
                 }
                 (None, _) => {}
             }
-            if motion.conditional || written.may_lack {
+            if motion.conditional || context.may_omit_words {
                 let hangs = course.place[axis].and(*was);
-                course.place[axis] = Hangs { unsettled: !hangs.is_nothing(), ..hangs };
+                course.place[axis] = Dependencies { unsettled: !hangs.is_nothing(), ..hangs };
             }
         }
-        if self.needs(index as usize, true) != Needs::Nothing {
+        if self.start_dependency(index as usize, true) != StartDependency::Independent {
             let axes = self.start_axes(index as usize, true, 0);
             for axis in (0..3).filter(|axis| axes & 1 << axis != 0) {
                 course.held[BY_INCREMENT][axis].add(&before[axis]);
@@ -341,5 +347,5 @@ impl Task<'_> {
 }
 
 fn is_zero(tree: &NcTree<'_>, word: &Word<'_>) -> bool {
-    matches!(word.belongs, Belongs::Literal { number, .. } if literal(tree.text(number)) == Some(0.0))
+    matches!(word.value, WordValue::Literal { number, .. } if literal(tree.text(number)) == Some(0.0))
 }

@@ -1,11 +1,11 @@
 //! Writing the words of one block: numbers in place, words that were left out at their place in the order.
 
-use super::slots::{ORDER, Slots, spaced};
+use super::word_slots::{ORDER, WordSlots, spaced};
 use crate::edit::Edits;
 use crate::nc::dialect::Dialect;
 use crate::nc::expression::literal;
-use crate::nc::syntax::{Belongs, NcTree, Word};
-use crate::nc::task::Written;
+use crate::nc::syntax::{NcTree, Word, WordValue};
+use crate::nc::task::BlockContext;
 use crate::nc::token::Token;
 use crate::rapid::number;
 use crate::rewrite::Outcome;
@@ -14,7 +14,7 @@ use crate::rewrite::Outcome;
 const NOISE: f64 = 1e-9;
 
 /// Writes words of one block.
-pub(super) struct Pen<'p, 's> {
+pub(super) struct BlockWriter<'p, 's> {
     pub(super) tree: &'p NcTree<'s>,
     pub(super) dialect: Dialect,
     pub(super) edits: &'p mut Edits,
@@ -31,16 +31,16 @@ pub(super) struct Pen<'p, 's> {
     pub(super) lead: Option<u32>,
 }
 
-impl<'p, 's: 'p> Pen<'p, 's> {
+impl<'p, 's: 'p> BlockWriter<'p, 's> {
     /// A pen for a block that there is.
     pub(super) fn new(
         tree: &'p NcTree<'s>,
         dialect: Dialect,
         edits: &'p mut Edits,
-        slots: &Slots<'s>,
-        written: &Written,
+        slots: &WordSlots<'s>,
+        context: &BlockContext,
     ) -> Self {
-        Pen {
+        BlockWriter {
             tree,
             dialect,
             edits,
@@ -49,7 +49,7 @@ impl<'p, 's: 'p> Pen<'p, 's> {
             added: Vec::new(),
             replaced: Outcome::Unchanged,
             spaced: spaced(tree, slots.last),
-            lead: slots.first.filter(|_| written.paraxial).map(|word| word.first),
+            lead: slots.first.filter(|_| context.paraxial).map(|word| word.first),
         }
     }
 
@@ -64,7 +64,7 @@ impl<'p, 's: 'p> Pen<'p, 's> {
     }
 }
 
-impl Pen<'_, '_> {
+impl BlockWriter<'_, '_> {
     /// Puts a word in at its place among the others: before the next of them, else after the last.
     fn insert(&mut self, place: usize, mut text: Vec<u8>) {
         if self.end == 0 {
@@ -138,8 +138,8 @@ impl Pen<'_, '_> {
             self.insert(place, text);
             return number::rounded(value, least);
         };
-        match word.belongs {
-            Belongs::Literal { sign, number: token } => {
+        match word.value {
+            WordValue::Literal { sign, number: token } => {
                 let text = self.tree.text(token);
                 let minus = sign.is_some_and(|sign| self.tree.kind(sign) == Some(Token::Minus));
                 let old = literal(text).map_or(f64::NAN, |old| if minus { -old } else { old });
@@ -162,17 +162,17 @@ impl Pen<'_, '_> {
                 }
                 rounded
             }
-            Belongs::Expression { .. } if !differs(was, value, least) => was,
-            Belongs::Expression { first, end } => {
+            WordValue::Expression { .. } if !differs(was, value, least) => was,
+            WordValue::Expression { first, end } => {
                 // AC( … ) and IC( … ) keep their name.
-                let called =
+                let is_subprogram =
                     self.dialect == Dialect::Siemens && self.tree.kind(first) == Some(Token::Name) && {
                         let name = self.tree.text(first).to_ascii_uppercase();
                         matches!(&*name, b"AC" | b"IC" | b"DC" | b"ACP" | b"ACN")
                     };
                 let open = (first..end).find(|&token| self.tree.kind(token) == Some(Token::ParenOpen));
                 let range = match open {
-                    Some(open) if called => self.tree.start(open + 1)..self.tree.start(end - 1),
+                    Some(open) if is_subprogram => self.tree.start(open + 1)..self.tree.start(end - 1),
                     _ => self.tree.range(first, end),
                 };
                 let rounded = number::rounded(value, least);
@@ -180,7 +180,7 @@ impl Pen<'_, '_> {
                 self.replaced = Outcome::Inlined;
                 rounded
             }
-            Belongs::Nothing | Belongs::Arguments { .. } => keep,
+            WordValue::Absent | WordValue::Arguments { .. } => keep,
         }
     }
 }

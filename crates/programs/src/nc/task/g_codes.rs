@@ -6,7 +6,7 @@ use super::super::dialect::Dialect;
 
 /// What kinds of word a block has.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Says {
+pub(super) struct WordKinds {
     /// X, Y, Z, A, B, C and the like.
     pub(super) axes: bool,
     /// I, J, K.
@@ -14,18 +14,18 @@ pub(super) struct Says {
 }
 
 /// Whether a G word is known to the reader of this dialect, in a block with these words.
-pub(super) fn is_g(code: u32, dialect: Dialect, says: Says) -> bool {
+pub(super) fn is_g(code: u32, dialect: Dialect, word_kinds: WordKinds) -> bool {
     match code {
         0 | 10 | 20 | 30 | 40 | 90 | 170 | 180 | 190 | 330 | 400 | 410 | 420 | 530 => true,
         540 | 550 | 560 | 570 | 640 | 900 | 910 | 930 | 940 | 950 | 960 | 970 => true,
         _ => match dialect {
             Dialect::Siemens => siemens(code),
             Dialect::LinuxCnc => linux_cnc(code),
-            Dialect::Fanuc => fanuc(code, says),
+            Dialect::Fanuc => fanuc(code, word_kinds),
             Dialect::Iso => {
                 // G5 with a centre is a spline of LinuxCNC; alone it is a switch of Fanuc's.
-                let either = !matches!(code, 50 | 51) || says.centre || !says.axes;
-                (fanuc(code, says) || linux_cnc(code)) && either
+                let either = !matches!(code, 50 | 51) || word_kinds.centre || !word_kinds.axes;
+                (fanuc(code, word_kinds) || linux_cnc(code)) && either
             }
             // It has no G words.
             Dialect::Heidenhain => false,
@@ -33,17 +33,17 @@ pub(super) fn is_g(code: u32, dialect: Dialect, says: Says) -> bool {
     }
 }
 
-fn fanuc(code: u32, says: Says) -> bool {
+fn fanuc(code: u32, word_kinds: WordKinds) -> bool {
     match code {
         // High speed, smoothing: no motion, and axis words only name axes.
         50 | 51 => true,
         // Look-ahead.
-        80 => !says.axes,
+        80 => !word_kinds.axes,
         22..=24 | 32..=34 | 62 | 71 | 100 | 110 | 120 | 121 | 130 | 131 => true,
         150 | 160 | 200 | 210 | 220 | 230 | 250 | 260 | 270 | 280 | 281 | 290 | 300 | 301 | 310..=318 => true,
         320 | 340 | 350 | 360 | 370 | 412..=416 | 422..=426 | 430 | 431 | 434 | 435 | 440 | 490 => true,
         // G50 with axes sets the origin of a lathe.
-        500 => !says.axes,
+        500 => !word_kinds.axes,
         501 | 510 | 511 | 520 | 531 | 536 | 541 | 542 | 544 | 580 | 590 | 600 | 610 | 611 | 620 | 630 => true,
         650 | 660 | 661 | 670 | 680..=690 | 700..=790 | 800..=899 | 901 | 911 | 920 | 921 | 922 | 923 => true,
         980 | 990 | 1000 | 1010 | 1030 | 1070 | 1120 | 1130 | 1360 | 1500 | 1530 | 1550 => true,

@@ -3,29 +3,29 @@
 use super::super::dialect::Dialect;
 use super::super::expression::{Variable, literal, numbered};
 use super::super::parser::word;
-use super::super::syntax::{Belongs, Syntax, Word};
+use super::super::syntax::{Syntax, Word, WordValue};
 use super::super::token::Token;
-use super::{Lister, code};
+use super::{Interpreter, code};
 
-impl Lister<'_, '_> {
+impl Interpreter<'_, '_> {
     /// What the whole file sets, and where its jumps go.
-    pub(super) fn survey(&mut self) {
-        self.survey_tape();
-        let mut survey = Survey::default();
+    pub(super) fn prescan(&mut self) {
+        self.prescan_tape();
+        let mut prescan = Prescan::default();
         for node in 0..self.tree.nodes.len() as u32 {
             match self.tree.nodes[node as usize].kind {
                 kind @ (Syntax::Block | Syntax::Skippable) => {
-                    self.survey_block(&mut survey);
-                    survey.block.skippable = kind == Syntax::Skippable;
+                    self.prescan_block(&mut prescan);
+                    prescan.block.skippable = kind == Syntax::Skippable;
                 }
-                Syntax::Word => self.survey_word(&mut survey, &word(self.tree, node)),
+                Syntax::Word => self.prescan_word(&mut prescan, &word(self.tree, node)),
                 _ => {}
             }
         }
-        self.survey_block(&mut survey);
-        self.repeats = survey.back && survey.programs <= 1;
-        let subs = survey.subs;
-        self.called |= match self.dialect {
+        self.prescan_block(&mut prescan);
+        self.restarts_at_end = prescan.back && prescan.programs <= 1;
+        let subs = prescan.subs;
+        self.is_subprogram |= match self.dialect {
             Dialect::Heidenhain => false,
             Dialect::LinuxCnc => subs.returns == Some(true) || subs.has && !subs.outside,
             _ => subs.returns == Some(true),
@@ -34,88 +34,88 @@ impl Lister<'_, '_> {
 
     /// What the first line says: `%NAME G71 *` is DIN/ISO of Heidenhain, `$NAME.MIN%` Okuma, whose G words have meanings of their
     /// own; `%_N_NAME_SPF` is a subprogram of Siemens.
-    fn survey_tape(&mut self) {
+    fn prescan_tape(&mut self) {
         let tape = (0..self.tree.len() as u32).find(|&token| self.tree.kind(token) == Some(Token::Tape));
         let text = tape.map(|token| self.tree.text(token).to_ascii_uppercase()).unwrap_or_default();
         let mut words = text.split(u8::is_ascii_whitespace);
-        self.foreign = self.dialect.paren_comments()
+        self.unknown_control = self.dialect.paren_comments()
             && (text.first() == Some(&b'$') || words.any(|word| matches!(word, b"G70" | b"G71")));
-        self.called |= text.windows(4).any(|part| part == b"_SPF");
-        self.called &= self.dialect == Dialect::Siemens;
+        self.is_subprogram |= text.windows(4).any(|part| part == b"_SPF");
+        self.is_subprogram &= self.dialect == Dialect::Siemens;
     }
 
-    fn survey_word(&mut self, survey: &mut Survey, said: &Word<'_>) {
-        let Survey { block, subs, jump, programs, .. } = survey;
-        let number = match said.belongs {
-            Belongs::Literal { sign: None, number } => literal(self.tree.text(number)),
+    fn prescan_word(&mut self, prescan: &mut Prescan, word: &Word<'_>) {
+        let Prescan { block, subs, jump, programs, .. } = prescan;
+        let number = match word.value {
+            WordValue::Literal { sign: None, number } => literal(self.tree.text(number)),
             _ => None,
         };
-        let address = said.address();
+        let address = word.address();
         let moves_or_sets =
-            address.is_some_and(|letter| b"GXYZABCUVWTFS".contains(&letter)) || said.is("CALL");
+            address.is_some_and(|letter| b"GXYZABCUVWTFS".contains(&letter)) || word.is("CALL");
         block.does |= moves_or_sets;
-        block.sub |= said.is("SUB");
-        block.endsub |= said.is("ENDSUB");
-        block.returns |= said.is("RET");
+        block.sub |= word.is("SUB");
+        block.endsub |= word.is("ENDSUB");
+        block.returns |= word.is("RET");
         if matches!(address, Some(b'O' | b':')) {
             block.program = Some(match number {
                 Some(number) if self.dialect != Dialect::LinuxCnc => numbered(b"O", number),
-                _ => self.tree.source()[self.tree.range(said.first, said.end)].to_ascii_uppercase(),
+                _ => self.tree.source()[self.tree.range(word.first, word.end)].to_ascii_uppercase(),
             });
         }
         if std::mem::take(jump) {
             // GOTO N100: the block number stands in a word of its own.
             match (address, number) {
                 (Some(b'N'), Some(number)) => {
-                    self.targets.insert(number as u64);
+                    self.jump_targets.insert(number as u64);
                     return;
                 }
                 // A label; anything else is computed.
                 (None, _)
-                    if said.name.first().is_some_and(|byte| byte.is_ascii_alphabetic() || *byte == b'_') => {}
-                _ => self.anywhere = true,
+                    if word.name.first().is_some_and(|byte| byte.is_ascii_alphabetic() || *byte == b'_') => {}
+                _ => self.computed_jump = true,
             }
         }
         match (address, number) {
-            (Some(b'M'), Some(number)) => self.survey_m_word(block, number),
+            (Some(b'M'), Some(number)) => self.prescan_m_word(block, number),
             (Some(b'G'), Some(number)) => block.cycle |= matches!(code(number), 700..=730),
             (Some(b'P'), Some(number)) => block.p = Some(number as u64),
             (Some(b'Q'), Some(number)) => block.q = Some(number as u64),
             (Some(b'H'), Some(number)) => block.h = Some(number as u64),
-            (Some(b'P'), None) => block.computed.0 |= said.belongs != Belongs::Nothing,
-            (Some(b'Q' | b'H'), None) => block.computed.1 |= said.belongs != Belongs::Nothing,
+            (Some(b'P'), None) => block.computed.0 |= word.value != WordValue::Absent,
+            (Some(b'Q' | b'H'), None) => block.computed.1 |= word.value != WordValue::Absent,
             (Some(b'O'), Some(_)) => *programs += 1,
             // What the caller hands over has names too.
-            (None, _) if said.is("PROC") => {
+            (None, _) if word.is("PROC") => {
                 block.declares = true;
-                self.called |= self.dialect == Dialect::Siemens && !subs.outside;
+                self.is_subprogram |= self.dialect == Dialect::Siemens && !subs.outside;
             }
-            (None, _) if block.declares && matches!(said.belongs, Belongs::Arguments { .. }) => {
-                for at in said.first..said.end {
+            (None, _) if block.declares && matches!(word.value, WordValue::Arguments { .. }) => {
+                for at in word.first..word.end {
                     if self.tree.kind(at) == Some(Token::Name) {
                         self.declare(block, self.tree.text(at));
                     }
                 }
             }
-            (None, _) if said.is("DEF") || block.declares => {
+            (None, _) if word.is("DEF") || block.declares => {
                 block.declares = true;
-                self.declare(block, said.name);
+                self.declare(block, word.name);
             }
-            (None, number) if said.name.len() >= 4 && said.name[..4].eq_ignore_ascii_case(b"GOTO") => {
+            (None, number) if word.name.len() >= 4 && word.name[..4].eq_ignore_ascii_case(b"GOTO") => {
                 match number {
                     Some(number) => {
-                        self.targets.insert(number as u64);
+                        self.jump_targets.insert(number as u64);
                     }
-                    None if said.belongs == Belongs::Nothing && said.index.is_none() => *jump = true,
-                    None => self.anywhere = true,
+                    None if word.value == WordValue::Absent && word.index.is_none() => *jump = true,
+                    None => self.computed_jump = true,
                 }
             }
             _ => {}
         }
     }
 
-    fn survey_m_word(&mut self, block: &mut Block, number: f64) {
-        self.changes_tools |= number == 6.0;
+    fn prescan_m_word(&mut self, block: &mut BlockSummary, number: f64) {
+        self.tool_change_by_m6 |= number == 6.0;
         block.ends |= number == 2.0 || number == 30.0;
         block.returns |= number == 17.0 && self.dialect == Dialect::Siemens;
         block.back |= number == 99.0;
@@ -125,13 +125,13 @@ impl Lister<'_, '_> {
     }
 
     /// A name of a declaration: a type, or what is of that type.
-    fn declare(&mut self, block: &mut Block, name: &[u8]) {
+    fn declare(&mut self, block: &mut BlockSummary, name: &[u8]) {
         let name = name.to_ascii_uppercase();
         match &*name {
-            b"INT" | b"BOOL" | b"CHAR" => block.whole = true,
-            b"REAL" | b"STRING" | b"AXIS" | b"FRAME" => block.whole = false,
-            _ if block.whole => {
-                self.whole_numbers.insert(name.clone());
+            b"INT" | b"BOOL" | b"CHAR" => block.integer_type = true,
+            b"REAL" | b"STRING" | b"AXIS" | b"FRAME" => block.integer_type = false,
+            _ if block.integer_type => {
+                self.integer_variables.insert(name.clone());
             }
             _ => {}
         }
@@ -139,10 +139,10 @@ impl Lister<'_, '_> {
     }
 
     /// A block is read: what it says together.
-    fn survey_block(&mut self, survey: &mut Survey) {
-        let block = std::mem::take(&mut survey.block);
-        survey.subs.add(&block);
-        survey.back |= block.back && block.p.is_none();
+    fn prescan_block(&mut self, prescan: &mut Prescan) {
+        let block = std::mem::take(&mut prescan.block);
+        prescan.subs.add(&block);
+        prescan.back |= block.back && block.p.is_none();
         if self.dialect == Dialect::Heidenhain {
             return;
         }
@@ -150,12 +150,13 @@ impl Lister<'_, '_> {
             self.programs.extend(block.program);
         }
         if block.back || block.jumps {
-            self.targets.extend(block.p);
+            self.jump_targets.extend(block.p);
         }
         if block.calls {
-            self.targets.extend([block.q, block.h].into_iter().flatten());
+            self.jump_targets.extend([block.q, block.h].into_iter().flatten());
         }
-        self.anywhere |= block.computed.0 && (block.back || block.jumps) || block.computed.1 && block.calls;
+        self.computed_jump |=
+            block.computed.0 && (block.back || block.jumps) || block.computed.1 && block.calls;
         if block.cycle
             && let (Some(p), Some(q)) = (block.p, block.q)
         {
@@ -164,16 +165,16 @@ impl Lister<'_, '_> {
     }
 
     /// Whether the program begins again at its end (M99 in one that calls nothing).
-    pub(super) fn repeats(&self) -> bool {
-        self.dialect != Dialect::Heidenhain && self.repeats
+    pub(super) fn restarts_at_end(&self) -> bool {
+        self.dialect != Dialect::Heidenhain && self.restarts_at_end
     }
 }
 
 /// What has been read so far.
 #[derive(Default)]
-struct Survey {
+struct Prescan {
     /// The block that is being read.
-    block: Block,
+    block: BlockSummary,
     subs: Subs,
     /// GOTO has been read, and not yet where to.
     jump: bool,
@@ -185,7 +186,7 @@ struct Survey {
 
 /// What a block says that the survey looks at.
 #[derive(Default)]
-struct Block {
+struct BlockSummary {
     /// M99.
     back: bool,
     /// M46, M96, M97.
@@ -197,7 +198,7 @@ struct Block {
     /// DEF.
     declares: bool,
     /// INT, BOOL or CHAR.
-    whole: bool,
+    integer_type: bool,
     /// The block may be skipped.
     skippable: bool,
     /// M2, M30.
@@ -231,7 +232,7 @@ struct Subs {
 }
 
 impl Subs {
-    fn add(&mut self, block: &Block) {
+    fn add(&mut self, block: &BlockSummary) {
         self.has |= block.sub;
         self.within |= block.sub;
         self.outside |= block.does && !self.within;

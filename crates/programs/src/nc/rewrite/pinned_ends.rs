@@ -2,10 +2,10 @@
 
 use std::collections::{BTreeSet, HashMap};
 
-use super::slots::{said, slots};
-use super::stays_in_place;
+use super::keeps_endpoint;
+use super::word_slots::{slots, states_increment};
 use crate::motion::{MotionKind, Reason, WorkObjectValue};
-use crate::nc::task::{Needs, Task};
+use crate::nc::task::{StartDependency, Task};
 use crate::rewrite::{Change, Outcome};
 
 /// Axes X, Y and Z as bits.
@@ -15,12 +15,12 @@ impl Task<'_> {
     /// An arc or another path that stays as it is needs its start: the straight motion that ends there stays too, and where it
     /// goes on in the direction of that, so does the start of that. Where an arc ends there it is the rewrite that sees to it,
     /// because that arc may become straight.
-    pub(in crate::nc) fn spare_arcs(&mut self) {
+    pub(in crate::nc) fn leave_pinned_ends(&mut self) {
         let mut held = vec![0; self.listing.motions.len()];
         for index in (0..self.listing.motions.len()).rev() {
             let motion = &self.listing.motions[index];
             let stays = motion.reason().is_some();
-            let needs = self.needs(index, stays);
+            let dependency = self.start_dependency(index, stays);
             let axes = self.start_axes(index, stays, held[index]);
             if axes == 0 {
                 continue;
@@ -37,22 +37,22 @@ impl Task<'_> {
                 before.left = Some(if circular { Reason::BeforeLeftArc } else { Reason::BeforeLeftPath });
             }
             // Where the block before may be skipped, the one before that ends here too.
-            let written = &mut self.written[at as usize];
-            if needs == Needs::Tangent || before.conditional || written.may_lack {
-                written.needs = written.needs.max(Needs::Start);
+            let context = &mut self.contexts[at as usize];
+            if dependency == StartDependency::Tangent || before.conditional || context.may_omit_words {
+                context.start_dependency = context.start_dependency.max(StartDependency::Position);
             }
         }
     }
 
     /// An arc or other path that stays starts where the one before it ends: that one stays too, or, where it becomes straight pieces, the
     /// last of them ends where it always did. Hands back the latter.
-    pub(super) fn fixed_ends(
+    pub(super) fn find_pinned_ends(
         &self,
         changes: &[Change],
         wanted: &mut HashMap<u32, usize>,
         outcomes: &mut [Outcome],
     ) -> BTreeSet<u32> {
-        let mut fixed = BTreeSet::new();
+        let mut pinned = BTreeSet::new();
         let mut refused = BTreeSet::new();
         // Motions whose start stays because what comes after them goes on in their direction.
         let mut directed = BTreeSet::new();
@@ -61,7 +61,7 @@ impl Task<'_> {
             let motion = &self.listing.motions[index as usize];
             let arc_stays = motion.kind == MotionKind::Circular && !wanted.contains_key(&index);
             let stays = motion.reason().is_some() || refused.contains(&index) || arc_stays;
-            let needs = self.needs(index as usize, stays);
+            let dependency = self.start_dependency(index as usize, stays);
             let axes = self.start_axes(index as usize, stays, held[index as usize]);
             if axes == 0 && !directed.contains(&index) {
                 continue;
@@ -72,14 +72,14 @@ impl Task<'_> {
             }
             let mixed = axes != 0 && self.turns_between(before, index);
             held[before as usize] |= if mixed { ALL } else { axes };
-            let perhaps =
-                self.listing.motions[before as usize].conditional || self.written[before as usize].may_lack;
-            if needs == Needs::Tangent || perhaps {
+            let perhaps = self.listing.motions[before as usize].conditional
+                || self.contexts[before as usize].may_omit_words;
+            if dependency == StartDependency::Tangent || perhaps {
                 directed.insert(before);
             }
             match wanted.get(&before).copied() {
-                Some(change) if changes[change].straightens() && needs != Needs::Tangent => {
-                    fixed.insert(before);
+                Some(change) if changes[change].straightens() && dependency != StartDependency::Tangent => {
+                    pinned.insert(before);
                 }
                 Some(change) => {
                     wanted.remove(&before);
@@ -93,7 +93,7 @@ impl Task<'_> {
                 None => {}
             }
         }
-        fixed
+        pinned
     }
 
     /// Whether the axes of one motion point elsewhere than those of another (ROT, another work offset), or that is not known: then
@@ -117,10 +117,12 @@ impl Task<'_> {
     /// The axes in which a motion must begin where it always did: those that its own way hangs on, and those of `held`,
     /// in which it must end there, that it takes from the motion before.
     pub(super) fn start_axes(&self, index: usize, stays: bool, held: u8) -> u8 {
-        let (motion, written) = (&self.listing.motions[index], &self.written[index]);
-        let own = match self.needs(index, stays) {
-            Needs::Nothing => 0,
-            Needs::Start if written.needs == Needs::Nothing => self.arc_axes(index),
+        let (motion, context) = (&self.listing.motions[index], &self.contexts[index]);
+        let own = match self.start_dependency(index, stays) {
+            StartDependency::Independent => 0,
+            StartDependency::Position if context.start_dependency == StartDependency::Independent => {
+                self.arc_axes(index)
+            }
             _ => ALL,
         };
         // Behind a call the tool stands where that has left it; a cycle begins where the tool stands.
@@ -131,7 +133,7 @@ impl Task<'_> {
     /// The axes of an arc as far as its words tell them; all where they do not.
     fn arc_axes(&self, index: usize) -> u8 {
         let file = self.listing.motions[index].place.file as usize;
-        let slots = slots(&self.trees[file], self.dialects[file], &self.written[index]);
+        let slots = slots(&self.trees[file], self.dialects[file], &self.contexts[index]);
         let named = |axis: &usize| slots.axes[*axis].is_some() || slots.centre[*axis].is_some();
         let axes = (0..3).filter(named).fold(0, |all, axis| all | 1 << axis);
         if u8::count_ones(axes) < 2 { ALL } else { axes }
@@ -140,19 +142,19 @@ impl Task<'_> {
     /// The axes in which a motion that stays ends where it says, whatever is before it: it states them, or what it leaves out
     /// is said again.
     fn own_ends(&self, index: usize) -> u8 {
-        let (motion, written) = (&self.listing.motions[index], &self.written[index]);
+        let (motion, context) = (&self.listing.motions[index], &self.contexts[index]);
         let file = motion.place.file as usize;
         let (tree, dialect) = (&self.trees[file], self.dialects[file]);
-        let slots = slots(tree, dialect, written);
-        if written.may_lack {
+        let slots = slots(tree, dialect, context);
+        if context.may_omit_words {
             return 0;
         }
-        let again = written.restates || motion.reason().is_none_or(stays_in_place);
+        let again = context.can_restate || motion.reason().is_none_or(keeps_endpoint);
         let own = |axis: &usize| {
-            again && written.start[*axis].is_some()
+            again && context.start[*axis].is_some()
                 || slots.axes[*axis].is_some_and(|word| {
-                    let increment = said(tree, dialect, &word);
-                    !increment.unwrap_or(!written.absolute || written.counting_open)
+                    let increment = states_increment(tree, dialect, &word);
+                    !increment.unwrap_or(!context.absolute || context.distance_mode_unknown)
                 })
         };
         (0..3).filter(own).fold(0, |all, axis| all | 1 << axis)

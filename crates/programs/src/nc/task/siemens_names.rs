@@ -15,8 +15,8 @@ struct Nothing {
 
 static NAMES: LazyLock<HashMap<&'static [u8], Nothing>> = LazyLock::new(|| {
     let lines = include_str!("../siemens.txt").lines().filter(|line| !line.starts_with('#'));
-    let listed = lines.filter_map(|line| line.split_once(' '));
-    listed
+    let new_motion = lines.filter_map(|line| line.split_once(' '));
+    new_motion
         .map(|(name, places)| {
             let is = |place: &str| places.split(',').any(|one| one.trim() == place);
             (name.as_bytes(), Nothing { alone: is("alone"), call: is("call"), value: is("value") })

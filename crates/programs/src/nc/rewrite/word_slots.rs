@@ -2,15 +2,15 @@
 
 use crate::nc::dialect::Dialect;
 use crate::nc::expression::literal;
-use crate::nc::machine::Turn;
+use crate::nc::modal_state::OrientationMode;
 use crate::nc::parser::word;
-use crate::nc::syntax::{Belongs, NcTree, Syntax, Word};
-use crate::nc::task::Written;
+use crate::nc::syntax::{NcTree, Syntax, Word, WordValue};
+use crate::nc::task::BlockContext;
 use crate::nc::token::Token;
 
 /// The words of a block that say where to go.
 #[derive(Default)]
-pub(super) struct Slots<'s> {
+pub(super) struct WordSlots<'s> {
     pub(super) axes: [Option<Word<'s>>; 3],
     pub(super) angles: [Option<Word<'s>>; 3],
     pub(super) vector: [Option<Word<'s>>; 3],
@@ -39,7 +39,7 @@ pub(super) const CENTRE: usize = 10;
 pub(super) const RADIUS: usize = 13;
 pub(super) const ORDER: usize = 14;
 
-impl<'s> Slots<'s> {
+impl<'s> WordSlots<'s> {
     /// In the order in which controls list them.
     pub(super) fn order(&self) -> [Option<Word<'s>>; ORDER] {
         let mut order = [None; ORDER];
@@ -57,7 +57,7 @@ impl<'s> Slots<'s> {
         &mut self,
         tree: &NcTree<'_>,
         dialect: Dialect,
-        written: &Written,
+        context: &BlockContext,
         word: &Word<'_>,
         name: &[u8],
         radius_block: bool,
@@ -67,25 +67,29 @@ impl<'s> Slots<'s> {
         Some(match *name {
             [letter @ b'X'..=b'Z'] => &mut self.axes[at(letter, b'X')],
             [b'I', letter @ b'X'..=b'Z'] if heidenhain => &mut self.axes[at(letter, b'X')],
-            [b'C'] if heidenhain && word.belongs == Belongs::Nothing => return None,
-            [letter @ b'A'..=b'C'] if written.turn == Turn::Angles => &mut self.angles[at(letter, b'A')],
+            [b'C'] if heidenhain && word.value == WordValue::Absent => return None,
+            [letter @ b'A'..=b'C'] if context.orientation_mode == OrientationMode::Angles => {
+                &mut self.angles[at(letter, b'A')]
+            }
             [b'I', letter @ b'A'..=b'C'] if heidenhain => &mut self.angles[at(letter, b'A')],
-            [letter @ b'A'..=b'C', b'2'] if written.turn == Turn::Rpy => &mut self.angles[at(letter, b'A')],
+            [letter @ b'A'..=b'C', b'2'] if context.orientation_mode == OrientationMode::Rpy => {
+                &mut self.angles[at(letter, b'A')]
+            }
             [letter @ b'A'..=b'C', b'3'] => &mut self.vector[at(letter, b'A')],
             [b'T', letter @ b'X'..=b'Z'] if heidenhain => &mut self.vector[at(letter, b'X')],
-            [letter @ b'I'..=b'K'] if written.vector_words && written.arc.is_none() => {
+            [letter @ b'I'..=b'K'] if context.vector_words && context.arc.is_none() => {
                 &mut self.vector[at(letter, b'I')]
             }
             [letter @ b'I'..=b'K'] => &mut self.centre[at(letter, b'I')],
             [b'T', b'H', b'E', b'T', b'A'] => &mut self.spin,
-            [b'R'] if heidenhain => match word.belongs {
+            [b'R'] if heidenhain => match word.value {
                 // R0: no correction by the radius.
-                Belongs::Literal { sign: None, .. }
+                WordValue::Literal { sign: None, .. }
                     if !radius_block || number_of(tree, word) == Some(0.0) =>
                 {
                     return None;
                 }
-                Belongs::Nothing => return None,
+                WordValue::Absent => return None,
                 _ => &mut self.radius,
             },
             [b'R'] => &mut self.radius,
@@ -96,16 +100,16 @@ impl<'s> Slots<'s> {
 }
 
 /// The words of a block by what they are.
-pub(super) fn slots<'s>(tree: &NcTree<'s>, dialect: Dialect, written: &Written) -> Slots<'s> {
-    let mut slots = Slots::default();
-    let node = tree.nodes[written.node as usize];
+pub(super) fn slots<'s>(tree: &NcTree<'s>, dialect: Dialect, context: &BlockContext) -> WordSlots<'s> {
+    let mut slots = WordSlots::default();
+    let node = tree.nodes[context.node as usize];
     if !matches!(node.kind, Syntax::Block | Syntax::Skippable) {
         return slots;
     }
     let (mut place, mut fallback) = (None, (node.end, node.first));
     let (mut comma, mut after_m) = (false, false);
     let mut radius_block = false;
-    for child in tree.child_nodes(written.node) {
+    for child in tree.child_nodes(context.node) {
         let word = word(tree, child);
         let name = word.name.to_ascii_uppercase();
         radius_block |= &*name == b"CR";
@@ -119,7 +123,7 @@ pub(super) fn slots<'s>(tree: &NcTree<'s>, dialect: Dialect, written: &Written) 
         }
         comma = &*name == b",";
         after_m |= &*name == b"M" && !matches!(number_of(tree, &word), Some(91.0 | 92.0));
-        if let Some(slot) = slots.slot(tree, dialect, written, &word, &name, radius_block) {
+        if let Some(slot) = slots.slot(tree, dialect, context, &word, &name, radius_block) {
             *slot = Some(word);
             place = Some((word.end, word.first));
             continue;
@@ -128,7 +132,7 @@ pub(super) fn slots<'s>(tree: &NcTree<'s>, dialect: Dialect, written: &Written) 
             b"F" => slots.feed = Some(word),
             b"G" | b"N" | b"L" | b"LN" => {
                 fallback = (word.end, word.first);
-                if let Belongs::Literal { sign: None, number } = word.belongs
+                if let WordValue::Literal { sign: None, number } = word.value
                     && &*name == b"G"
                 {
                     match literal(tree.text(number)) {
@@ -146,8 +150,8 @@ pub(super) fn slots<'s>(tree: &NcTree<'s>, dialect: Dialect, written: &Written) 
 }
 
 fn number_of(tree: &NcTree<'_>, word: &Word<'_>) -> Option<f64> {
-    match word.belongs {
-        Belongs::Literal { number, .. } => literal(tree.text(number)),
+    match word.value {
+        WordValue::Literal { number, .. } => literal(tree.text(number)),
         _ => None,
     }
 }
@@ -158,11 +162,11 @@ fn is_axis_name(name: &[u8]) -> bool {
 }
 
 /// Whether a word says by itself that it is an increment (IC, IX) or not (AC).
-pub(super) fn said(tree: &NcTree<'_>, dialect: Dialect, word: &Word<'_>) -> Option<bool> {
+pub(super) fn states_increment(tree: &NcTree<'_>, dialect: Dialect, word: &Word<'_>) -> Option<bool> {
     if dialect == Dialect::Heidenhain {
         return Some(word.name.len() == 2 && word.name[0] | 32 == b'i');
     }
-    let Belongs::Expression { first, .. } = word.belongs else { return None };
+    let WordValue::Expression { first, .. } = word.value else { return None };
     if dialect != Dialect::Siemens || tree.kind(first) != Some(Token::Name) {
         return None;
     }

@@ -1,30 +1,30 @@
 //! Siemens: commands with a name.
 
 use super::super::dialect::Dialect;
-use super::super::machine::{Group, Mode};
-use super::super::syntax::{Belongs, Word};
+use super::super::modal_state::{ModalGroup, MotionMode};
+use super::super::syntax::{Word, WordValue};
 use super::super::token::Token;
-use super::names::{is_cycle, is_harmless_call, is_keyword};
-use super::{Lister, Said};
+use super::siemens_names::{is_cycle, is_harmless_call, is_keyword};
+use super::{Block, Interpreter};
 use crate::motion::Reason;
 
-impl Lister<'_, '_> {
+impl Interpreter<'_, '_> {
     /// Commands with a name. True where nothing else is done in the block.
-    pub(super) fn named_commands(&mut self, said: &Said<'_>) -> bool {
+    pub(super) fn named_commands(&mut self, block: &Block<'_>) -> bool {
         if self.dialect != Dialect::Siemens {
             return false;
         }
-        for word in &said.words {
+        for word in &block.words {
             if word.name.first() == Some(&b'$') && word.assigned {
                 self.system_variable(word);
             }
         }
-        if self.programmable_frame(said) {
+        if self.programmable_frame(block) {
             return true;
         }
         let mut done = false;
-        for index in 0..said.words.len() {
-            let word = said.words[index];
+        for index in 0..block.words.len() {
+            let word = block.words[index];
             if word.name.len() < 2 || word.assigned || self.tree.kind(word.end - 1) == Some(Token::Colon) {
                 continue;
             }
@@ -35,24 +35,24 @@ impl Lister<'_, '_> {
             {
                 continue;
             }
-            match word.belongs {
+            match word.value {
                 _ if name == b"CYCLE800" => {
-                    self.swivel_cycle(said, &word);
+                    self.swivel_cycle(block, &word);
                     done = true;
                 }
-                Belongs::Arguments { .. } if is_harmless_call(&name) => {}
-                Belongs::Arguments { .. } if is_cycle(&name) => {
-                    self.left(said, &String::from_utf8_lossy(&name), Reason::Cycle);
-                    self.lose_position();
+                WordValue::Arguments { .. } if is_harmless_call(&name) => {}
+                WordValue::Arguments { .. } if is_cycle(&name) => {
+                    self.list_left(block, &String::from_utf8_lossy(&name), Reason::Cycle);
+                    self.invalidate_position();
                     done = true;
                 }
                 _ if is_keyword(&name) => {}
-                Belongs::Nothing | Belongs::Arguments { .. } if self.is_call(said, index) => {
-                    self.subprogram(said, &String::from_utf8_lossy(word.name));
+                WordValue::Absent | WordValue::Arguments { .. } if self.is_call(block, index) => {
+                    self.subprogram(block, &String::from_utf8_lossy(word.name));
                     done = true;
                 }
                 _ => {
-                    self.deny(said, &String::from_utf8_lossy(word.name), Reason::UnknownWord);
+                    self.list_unknown_word(block, &String::from_utf8_lossy(word.name), Reason::UnknownWord);
                     return true;
                 }
             }
@@ -64,23 +64,23 @@ impl Lister<'_, '_> {
     fn transformation_command(&mut self, name: &[u8]) -> bool {
         match name {
             b"TRAORI" | b"TRAFOOF" => {
-                self.turn_only(Group::Kinematic, false);
-                self.tip(name == b"TRAORI", false);
+                self.switch_transform_in_place(ModalGroup::Kinematic, false);
+                self.set_tcp_mode(name == b"TRAORI", false);
             }
             b"TRANSMIT" | b"TRACYL" | b"TRAANG" | b"TRACON" => {
-                self.tip(false, false);
-                self.turn(Group::Kinematic, true);
+                self.set_tcp_mode(false, false);
+                self.switch_transform(ModalGroup::Kinematic, true);
             }
             b"DIAMON" | b"DIAM90" | b"DIAMOF" | b"DIAMCYCOF" | b"DIAMONA" | b"DIAM90A" | b"DIAMOFA" => {
-                self.turn_only(Group::Diameter, name != b"DIAMOF");
+                self.switch_transform_in_place(ModalGroup::Diameter, name != b"DIAMOF");
             }
             b"TOFRAME" | b"TOFRAMEX" | b"TOFRAMEY" | b"TOFRAMEZ" | b"TOROT" | b"TOROTX" | b"TOROTY"
             | b"TOROTZ" => {
-                self.held_here(super::EVERYWHERE);
-                self.turn(Group::ToolFrame, true);
+                self.mark_position_used(super::EVERYWHERE);
+                self.switch_transform(ModalGroup::ToolFrame, true);
             }
-            b"TOROTOF" => self.turn(Group::ToolFrame, false),
-            b"PAROT" | b"PAROTOF" => self.turn(Group::PartFrame, name == b"PAROT"),
+            b"TOROTOF" => self.switch_transform(ModalGroup::ToolFrame, false),
+            b"PAROT" | b"PAROTOF" => self.switch_transform(ModalGroup::PartFrame, name == b"PAROT"),
             _ => return false,
         }
         true
@@ -89,24 +89,26 @@ impl Lister<'_, '_> {
     /// How the tool is turned, and which way it goes. Whether the command is one of these.
     fn orientation_command(&mut self, name: &[u8]) -> bool {
         match name {
-            b"ORIMKS" | b"ORIWKS" => self.turn_only(Group::OrientationFrame, name == b"ORIMKS"),
+            b"ORIMKS" | b"ORIWKS" => {
+                self.switch_transform_in_place(ModalGroup::OrientationFrame, name == b"ORIMKS")
+            }
             b"ORIRPY" | b"ORIEULER" | b"ORIVIRT1" | b"ORIVIRT2" | b"ORIRPY2" => {
-                self.state.rpy_stated = name == b"ORIRPY";
-                self.set(Group::Rpy, 1 + u64::from(self.state.rpy_stated));
+                self.state.rpy_convention_stated = name == b"ORIRPY";
+                self.set_group(ModalGroup::RpyConvention, 1 + u64::from(self.state.rpy_convention_stated));
             }
             b"ORIROTA" => {
                 self.state.spin_absolute = true;
-                self.set(Group::Spin, 0);
+                self.set_group(ModalGroup::SpinReference, 0);
             }
             b"ORIROTR" | b"ORIROTT" | b"ORIROTC" => {
                 self.state.spin_absolute = false;
-                self.set(Group::Spin, 1);
+                self.set_group(ModalGroup::SpinReference, 1);
                 self.state.spin = Err(Reason::OrientationUnknown);
             }
-            b"ORIPATH" | b"ORIPATHS" | b"ORIRESET" => self.state.lose_orientation(),
+            b"ORIPATH" | b"ORIPATHS" | b"ORIRESET" => self.state.invalidate_orientation(),
             b"CIP" | b"CT" | b"BSPLINE" | b"ASPLINE" | b"CSPLINE" | b"POLY" | b"INVCW" | b"INVCCW" => {
-                self.state.mode = Mode::Other(Reason::NotFollowed);
-                self.state.tangent = !matches!(name, b"CIP" | b"POLY" | b"INVCW" | b"INVCCW");
+                self.state.mode = MotionMode::Unsupported(Reason::NotFollowed);
+                self.state.starts_tangent = !matches!(name, b"CIP" | b"POLY" | b"INVCW" | b"INVCCW");
             }
             _ => return false,
         }
@@ -121,7 +123,7 @@ impl Lister<'_, '_> {
             | b"TCOFR" | b"TCOFRX" | b"TCOFRY" | b"TCOFRZ" => self.tool_assigned(),
             b"GEOAX" => self.frames_assigned(),
             b"PRESETON" | b"PRESETONS" => {
-                self.held_here(super::EVERYWHERE);
+                self.mark_position_used(super::EVERYWHERE);
                 self.frames_assigned();
             }
             _ => return false,
@@ -130,18 +132,18 @@ impl Lister<'_, '_> {
     }
 
     /// `CYCLE800(…)` tilts the plane; with nothing in its brackets it ends that.
-    fn swivel_cycle(&mut self, said: &Said<'_>, word: &Word<'_>) {
-        let empty = matches!(word.belongs, Belongs::Arguments { first, end } if end == first + 2);
+    fn swivel_cycle(&mut self, block: &Block<'_>, word: &Word<'_>) {
+        let empty = matches!(word.value, WordValue::Arguments { first, end } if end == first + 2);
         if !empty {
-            self.left(said, "CYCLE800", Reason::Cycle);
+            self.list_left(block, "CYCLE800", Reason::Cycle);
         }
-        self.turn(Group::Swivel, !empty);
+        self.switch_transform(ModalGroup::TiltedPlane, !empty);
     }
 
     /// Whether a name that is not known calls a subprogram: it stands first, alone or with how often (P).
-    fn is_call(&self, said: &Said<'_>, index: usize) -> bool {
-        !said.opaque
-            && said.words.iter().enumerate().all(|(at, word)| {
+    fn is_call(&self, block: &Block<'_>, index: usize) -> bool {
+        !block.opaque
+            && block.words.iter().enumerate().all(|(at, word)| {
                 at == index || matches!(word.address(), Some(b'N' | b'P' | b'M' | b'F' | b'S' | b'T' | b'D'))
             })
     }

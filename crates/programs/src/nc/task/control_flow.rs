@@ -1,55 +1,55 @@
 //! Jumps, loops, subprograms, and the values of variables.
 
 use super::super::dialect::Dialect;
-use super::super::expression::{Variable, Worth, numbered};
-use super::super::machine::Group;
-use super::super::syntax::Belongs;
+use super::super::expression::{Evaluated, Variable, numbered};
+use super::super::modal_state::ModalGroup;
+use super::super::syntax::WordValue;
 use super::super::token::Token;
-use super::names::{Address, address};
-use super::{Event, Lister, Said};
+use super::siemens_names::{Address, address};
+use super::{Block, Interpreter, StateEvent};
 use crate::motion::Reason;
 
-impl Lister<'_, '_> {
+impl Interpreter<'_, '_> {
     /// Whether a block can be reached from elsewhere than the block before.
-    pub(super) fn is_reached_by_jumps(&self, said: &Said<'_>) -> bool {
-        let Some(first) = said.words.first() else { return false };
+    pub(super) fn is_reached_by_jumps(&self, block: &Block<'_>) -> bool {
+        let Some(first) = block.words.first() else { return false };
         if first.name.len() > 1
             && self.dialect == Dialect::Siemens
             && self.tree.kind(first.end.saturating_sub(1)) == Some(Token::Colon)
         {
             return true;
         }
-        let number = said.words.iter().take(2).find(|word| word.address() == Some(b'N'));
-        let labelled = said
+        let number = block.words.iter().take(2).find(|word| word.address() == Some(b'N'));
+        let labelled = block
             .words
             .get(1)
             .is_some_and(|word| self.tree.kind(word.end - 1) == Some(Token::Colon) && word.name.len() > 1);
         labelled
             || number
                 .and_then(|word| self.literal(word))
-                .is_some_and(|number| self.anywhere || self.targets.contains(&(number as u64)))
+                .is_some_and(|number| self.computed_jump || self.jump_targets.contains(&(number as u64)))
     }
 
     /// Whether a block stands in the contour that a cycle of a lathe reads.
-    pub(super) fn contour_of(&mut self, said: &Said<'_>) {
-        let number = said.words.iter().take(2).find(|word| word.address() == Some(b'N'));
+    pub(super) fn contour_of(&mut self, block: &Block<'_>) {
+        let number = block.words.iter().take(2).find(|word| word.address() == Some(b'N'));
         let number = number.and_then(|word| self.literal(word)).map(|number| number as u64);
         // The block before was the last one.
-        if self.contour == Some(u64::MAX) {
-            self.contour = None;
+        if self.contour_end == Some(u64::MAX) {
+            self.contour_end = None;
         }
         let Some(number) = number else { return };
-        if self.contour == Some(number) {
-            self.contour = Some(u64::MAX);
+        if self.contour_end == Some(number) {
+            self.contour_end = Some(u64::MAX);
         } else if let Some(&last) = self.contours.get(&number) {
-            self.contour = Some(if last == number { u64::MAX } else { last });
+            self.contour_end = Some(if last == number { u64::MAX } else { last });
         }
     }
 
     /// Whether a block holds a synchronised action of Siemens.
-    pub(super) fn is_action(&self, said: &Said<'_>) -> bool {
+    pub(super) fn is_action(&self, block: &Block<'_>) -> bool {
         self.dialect == Dialect::Siemens
-            && said
+            && block
                 .words
                 .iter()
                 .any(|word| ["WHEN", "WHENEVER", "FROM", "EVERY"].iter().any(|name| word.is(name)))
@@ -59,11 +59,12 @@ impl Lister<'_, '_> {
     ///
     /// LinuxCNC reads the whole line before it assigns; what others do with a value in the line that assigns it is not
     /// certain, so that it is not known there where the line moves as well.
-    pub(super) fn values(&mut self, said: &Said<'_>) -> Vec<(Option<Variable>, Worth)> {
+    pub(super) fn values(&mut self, block: &Block<'_>) -> Vec<(Option<Variable>, Evaluated)> {
         let mut values = Vec::new();
-        let conditional = said.words.iter().any(|word| word.is("IF"));
-        let moves = said.moves() || said.centre.iter().any(Option::is_some) || !said.g.is_empty();
-        for word in &said.words {
+        let conditional = block.words.iter().any(|word| word.is("IF"));
+        let moves =
+            block.has_motion_words() || block.centre.iter().any(Option::is_some) || !block.g.is_empty();
+        for word in &block.words {
             if !word.assigned {
                 continue;
             }
@@ -72,7 +73,7 @@ impl Lister<'_, '_> {
                     Some((first, _)) if self.tree.kind(first) == Some(Token::Name) => {
                         Some(self.tree.text(first).to_ascii_uppercase())
                     }
-                    Some(range) => self.evaluated(range).ok().map(|number| {
+                    Some(range) => self.evaluate_tokens(range).ok().map(|number| {
                         self.system_parameter(number);
                         numbered(b"#", number)
                     }),
@@ -80,7 +81,7 @@ impl Lister<'_, '_> {
                 },
                 [b'R' | b'r'] => word
                     .index
-                    .and_then(|range| self.evaluated(range).ok())
+                    .and_then(|range| self.evaluate_tokens(range).ok())
                     .map(|number| numbered(b"R", number)),
                 [b'R' | b'r', digits @ ..] if !digits.is_empty() && digits.iter().all(u8::is_ascii_digit) => {
                     Some(word.name.to_ascii_uppercase())
@@ -90,16 +91,16 @@ impl Lister<'_, '_> {
                 }
                 _ => continue,
             };
-            let value = match word.belongs {
-                _ if self.actions => Err(Reason::Variable),
+            let value = match word.value {
+                _ if self.synchronised_actions => Err(Reason::Variable),
                 _ if conditional => Err(Reason::UnknownFlow),
-                Belongs::Literal { .. } => self.literal(word).ok_or(Reason::WrongShape),
-                Belongs::Expression { first, end } => self.evaluated((first, end)),
+                WordValue::Literal { .. } => self.literal(word).ok_or(Reason::WrongShape),
+                WordValue::Expression { first, end } => self.evaluate_tokens((first, end)),
                 _ => Err(Reason::WrongShape),
             };
             let value = match &name {
                 // An INT rounds what it is given; in which direction is left to the control.
-                Some(name) if self.whole_numbers.contains(name) => value
+                Some(name) if self.integer_variables.contains(name) => value
                     .and_then(|value| if value.fract() == 0.0 { Ok(value) } else { Err(Reason::Variable) }),
                 _ => value,
             };
@@ -107,7 +108,7 @@ impl Lister<'_, '_> {
                 // It may be one that the control itself reads: offsets, tools, settings.
                 self.frames_assigned();
                 self.tools_assigned();
-                self.doubt(Group::Shift, Reason::Variable);
+                self.invalidate_group(ModalGroup::CoordinateShift, Reason::Variable);
             }
             match &name {
                 _ if self.dialect == Dialect::LinuxCnc => {}
@@ -115,20 +116,20 @@ impl Lister<'_, '_> {
                     let now = if moves { Err(Reason::Variable) } else { value };
                     self.set_variable(name.clone(), now);
                 }
-                None => self.state.variables.lose(Reason::Variable),
+                None => self.state.variables.invalidate(Reason::Variable),
             }
             values.push((name, value));
         }
         values
     }
 
-    pub(super) fn set_variable(&mut self, name: Variable, value: Worth) {
-        self.ever_set.insert(name.clone());
+    pub(super) fn set_variable(&mut self, name: Variable, value: Evaluated) {
+        self.assigned_variables.insert(name.clone());
         self.state.variables.insert(name, value);
     }
 
     /// After the block its variables have their values, but where the way has parted in it.
-    pub(super) fn assign(&mut self, values: Vec<(Option<Variable>, Worth)>, parted: bool) {
+    pub(super) fn assign(&mut self, values: Vec<(Option<Variable>, Evaluated)>, parted: bool) {
         for (name, value) in values {
             match name {
                 Some(name) => {
@@ -136,7 +137,7 @@ impl Lister<'_, '_> {
                     self.set_variable(name, value);
                 }
                 // Any of them.
-                None => self.state.variables.lose(Reason::Variable),
+                None => self.state.variables.invalidate(Reason::Variable),
             }
         }
     }
@@ -149,8 +150,8 @@ impl Lister<'_, '_> {
             // Own ones, signals, timers, messages.
             ..=1199 | 3000..=3004 | 3006..=3012 | 3901 | 3902 => {}
             5061..=5070 | 5161..=5190 | 1200..=5000 | 5391.. if linux => {}
-            5211..=5219 if linux => self.doubt(Group::Shift, Reason::Variable),
-            5220 if linux => self.doubt(Group::Frame, Reason::Variable),
+            5211..=5219 if linux => self.invalidate_group(ModalGroup::CoordinateShift, Reason::Variable),
+            5220 if linux => self.invalidate_group(ModalGroup::WorkOffset, Reason::Variable),
             5221..=5390 if linux || number <= 5340 => {
                 let name = match (number - 5221) / 20 {
                     frame @ 0..=5 => format!("G{}", 54 + frame),
@@ -167,35 +168,35 @@ impl Lister<'_, '_> {
             _ => {
                 self.frames_assigned();
                 self.tools_assigned();
-                self.state.lose_everything(Reason::UnknownWord);
-                self.found.add_all();
+                self.state.invalidate_all(Reason::UnknownWord);
+                self.effects.set_all_varying();
             }
         }
     }
 
     /// Names of Siemens with a value, or alone.
-    pub(super) fn gather_siemens(&self, said: &mut Said<'_>, index: usize, name: &[u8]) {
-        let word = said.words[index];
+    pub(super) fn gather_siemens(&self, block: &mut Block<'_>, index: usize, name: &[u8]) {
+        let word = block.words[index];
         if !word.assigned || name.starts_with(b"$") || self.is_variable(name) {
             return;
         }
         match address(name) {
             Some(Address::Setting) => {}
-            Some(Address::Aside(reason)) => said.aside = Some(reason),
-            Some(Address::External) => said.others = true,
+            Some(Address::Aside(reason)) => block.unmodelled = Some(reason),
+            Some(Address::External) => block.other_axes = true,
             // What it sets is told by the words of the block, in `tool_words`.
             Some(Address::Tool) => {}
             // A name of the control or of the machine's axes, or a variable of another file.
             None => {
                 let text = String::from_utf8_lossy(name).into_owned();
-                said.unknown = Some((text, Reason::UnknownWord));
+                block.unknown_word = Some((text, Reason::UnknownWord));
             }
         }
     }
 
     /// TOFFL=, TCARR=: the tool is no more what its name says, or is again.
-    pub(super) fn tool_words(&mut self, said: &Said<'_>) {
-        for word in &said.words {
+    pub(super) fn tool_words(&mut self, block: &Block<'_>) {
+        for word in &block.words {
             let name = word.name.to_ascii_uppercase();
             if self.dialect == Dialect::Siemens && word.assigned && address(&name) == Some(Address::Tool) {
                 self.tools_assigned();
@@ -211,36 +212,36 @@ impl Lister<'_, '_> {
     }
 
     /// Jumps, loops and subprograms. True where the block does nothing else.
-    pub(super) fn control_flow(&mut self, said: &Said<'_>) -> bool {
-        let Some(first) = said.words.iter().find(|word| word.address() != Some(b'N')) else { return false };
+    pub(super) fn control_flow(&mut self, block: &Block<'_>) -> bool {
+        let Some(first) = block.words.iter().find(|word| word.address() != Some(b'N')) else { return false };
         let name = first.name.to_ascii_uppercase();
         if self.dialect == Dialect::LinuxCnc && first.address() == Some(b'O') {
-            self.o_word(said);
+            self.o_word(block);
             return true;
         }
         match (&*name, first.address()) {
             (_, Some(b'O')) if matches!(self.dialect, Dialect::Fanuc | Dialect::Iso) => {
                 // The number of a program: the first one is where the machine starts.
-                if !self.written.is_empty() {
-                    self.forget();
+                if !self.contexts.is_empty() {
+                    self.join_unseen_predecessors();
                 }
                 // Words may stand on its line.
-                said.words.iter().filter(|word| word.address() != Some(b'N')).count() == 1
+                block.words.iter().filter(|word| word.address() != Some(b'N')).count() == 1
             }
             // A program number stands alone; with words it is a block number.
-            (b":", _) if said.words.len() == 1 => {
-                if !self.written.is_empty() {
-                    self.forget();
+            (b":", _) if block.words.len() == 1 => {
+                if !self.contexts.is_empty() {
+                    self.join_unseen_predecessors();
                 }
                 true
             }
             (b"PROC", _) => {
-                self.forget();
+                self.join_unseen_predecessors();
                 true
             }
             (b"IF", _) => {
                 // A jump may go away; what stands here holds where it does not.
-                self.parts();
+                self.branch();
                 true
             }
             (
@@ -248,32 +249,32 @@ impl Lister<'_, '_> {
                 | b"ENDLOOP" | b"REPEAT" | b"UNTIL" | b"CASE",
                 _,
             ) => {
-                self.forget();
+                self.join_unseen_predecessors();
                 true
             }
             _ if name.starts_with(b"GOTO") => {
-                self.parts();
+                self.branch();
                 true
             }
             _ if name.starts_with(b"REPEAT") => {
-                self.subprogram(said, "REPEAT");
+                self.subprogram(block, "REPEAT");
                 true
             }
             (b"MCALL", _) => {
-                let called = said.words.iter().skip_while(|word| !word.is("MCALL")).nth(1);
-                self.state.modal_call = called.map(|word| {
-                    let cycle = super::names::is_cycle(&word.name.to_ascii_uppercase());
+                let is_subprogram = block.words.iter().skip_while(|word| !word.is("MCALL")).nth(1);
+                self.state.modal_call = is_subprogram.map(|word| {
+                    let cycle = super::siemens_names::is_cycle(&word.name.to_ascii_uppercase());
                     if cycle { Reason::Cycle } else { Reason::Subprogram }
                 });
                 true
             }
             (b"CALL" | b"PCALL" | b"EXTCALL" | b"EXECSTRING", _) => {
                 let text = String::from_utf8_lossy(&name).into_owned();
-                self.subprogram(said, &text);
+                self.subprogram(block, &text);
                 true
             }
-            (_, Some(b'L')) if self.dialect == Dialect::Siemens && first.belongs != Belongs::Nothing => {
-                self.subprogram(said, "L");
+            (_, Some(b'L')) if self.dialect == Dialect::Siemens && first.value != WordValue::Absent => {
+                self.subprogram(block, "L");
                 true
             }
             (b"DEF" | b"EXTERN" | b"DEFINE", _) => true,
@@ -282,43 +283,43 @@ impl Lister<'_, '_> {
     }
 
     /// LinuxCNC: `O100 sub`, `O100 if […]`.
-    fn o_word(&mut self, said: &Said<'_>) {
-        let keyword = said.words.get(1).map(|word| word.name.to_ascii_uppercase()).unwrap_or_default();
+    fn o_word(&mut self, block: &Block<'_>) {
+        let keyword = block.words.get(1).map(|word| word.name.to_ascii_uppercase()).unwrap_or_default();
         match &*keyword {
-            b"CALL" => self.subprogram(said, "O call"),
-            b"IF" => self.parts(),
+            b"CALL" => self.subprogram(block, "O call"),
+            b"IF" => self.branch(),
             b"SUB" => {
-                let passed = self.state.clone();
-                self.forget();
-                self.passed = Some(passed);
+                let state_before_subprogram = self.state.clone();
+                self.join_unseen_predecessors();
+                self.state_before_subprogram = Some(state_before_subprogram);
             }
             // The way goes past a subprogram; what stands in it holds only where it is called.
-            b"ENDSUB" if self.passed.is_some() => {
-                if let Some(state) = self.passed.take() {
+            b"ENDSUB" if self.state_before_subprogram.is_some() => {
+                if let Some(state) = self.state_before_subprogram.take() {
                     self.state = state;
                 }
-                self.ended = false;
+                self.program_ended = false;
                 self.frame_index = None;
                 self.tool_index.clear();
-                self.events.push(Event::Join);
+                self.events.push(StateEvent::Join);
             }
-            _ => self.forget(),
+            _ => self.join_unseen_predecessors(),
         }
     }
 
     /// A call: listed, and where it leaves the axes is not known. What a program that does not stand in the file may set
     /// beside is not known either; it is taken to set nothing, and noted.
-    pub(super) fn subprogram(&mut self, said: &Said<'_>, name: &str) {
-        if !self.stands_here(said) {
+    pub(super) fn subprogram(&mut self, block: &Block<'_>, name: &str) {
+        if !self.stands_here(block) {
             self.listing.outside.push(self.listing.motions.len() as u32);
         }
-        self.left(said, name, Reason::Subprogram);
-        self.forget();
+        self.list_left(block, name, Reason::Subprogram);
+        self.join_unseen_predecessors();
     }
 
     /// Whether what a block calls stands in the file.
-    fn stands_here(&self, said: &Said<'_>) -> bool {
-        let Some(first) = said.words.iter().find(|word| word.address() != Some(b'N')) else { return false };
+    fn stands_here(&self, block: &Block<'_>) -> bool {
+        let Some(first) = block.words.iter().find(|word| word.address() != Some(b'N')) else { return false };
         let text = self.tree.source()[self.tree.range(first.first, first.end)].to_ascii_uppercase();
         match self.dialect {
             Dialect::Heidenhain => {
@@ -327,10 +328,10 @@ impl Lister<'_, '_> {
             Dialect::Siemens => text.starts_with(b"REPEAT"),
             Dialect::LinuxCnc if first.address() == Some(b'O') => self.programs.contains(&text),
             _ => {
-                let number = said.p.and_then(|index| self.literal(&said.words[index]));
+                let number = block.p.and_then(|index| self.literal(&block.words[index]));
                 // M98 P51000 calls O1000 five times.
                 let here = |p: f64| [p, p % 1e4].iter().any(|p| self.programs.contains(&numbered(b"O", *p)));
-                said.m.contains(&97) || number.is_some_and(here)
+                block.m.contains(&97) || number.is_some_and(here)
             }
         }
     }

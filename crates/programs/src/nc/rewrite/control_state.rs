@@ -2,11 +2,11 @@
 
 /// What the control will hold at a block, where the rewritten file says something else than the original.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Now {
+pub(super) struct ControlState {
     /// Position (mm); `None` where it is as the original says.
     pub(super) position: [Option<f64>; 3],
     /// What the original says there.
-    pub(super) meant: [Option<f64>; 3],
+    pub(super) intended: [Option<f64>; 3],
     pub(super) angles: [Option<f64>; 3],
     pub(super) vector: Option<([f64; 3], f64)>,
     /// By how much a shift of G92 has moved, because it was set where the tool now stands elsewhere.
@@ -15,11 +15,11 @@ pub(super) struct Now {
     pub(super) straightened: bool,
 }
 
-impl Now {
+impl ControlState {
     pub(super) fn lose(&mut self, axes: u8) {
         for axis in 0..3 {
             if axes & 1 << axis != 0 {
-                (self.position[axis], self.meant[axis]) = (None, None);
+                (self.position[axis], self.intended[axis]) = (None, None);
             }
             if axes & 8 << axis != 0 {
                 self.angles[axis] = None;
@@ -35,8 +35,8 @@ impl Now {
 
     pub(super) fn shift_at(&mut self, stated: [Option<f64>; 3]) {
         for (axis, _) in stated.iter().enumerate().filter(|(_, stated)| stated.is_some()) {
-            self.moved[axis] = match (self.position[axis], self.meant[axis]) {
-                (Some(now), Some(meant)) if !now.is_nan() => now - meant,
+            self.moved[axis] = match (self.position[axis], self.intended[axis]) {
+                (Some(now), Some(intended)) if !now.is_nan() => now - intended,
                 // It stands where the original says.
                 _ => 0.0,
             };

@@ -21,7 +21,7 @@ fn most(dialect: Dialect) -> Option<usize> {
 impl Task<'_> {
     /// The motions that must stay because a line becomes longer than the control takes: the one that is written there, or,
     /// where the line only says again what has changed before it, the last of `wanted` before it.
-    pub(super) fn too_long(&self, edits: &[Edits], wanted: &HashMap<u32, usize>) -> Vec<u32> {
+    pub(super) fn motions_on_long_lines(&self, edits: &[Edits], wanted: &HashMap<u32, usize>) -> Vec<u32> {
         let mut out = Vec::new();
         for (file, edits) in edits.iter().enumerate() {
             let Some(most) = most(self.dialects[file]) else { continue };
