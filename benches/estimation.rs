@@ -121,9 +121,9 @@ mod arm {
     use truegrind::arm::estimated::Estimated;
     use truegrind::arm::model::Model;
     use truegrind::arm::parameter::link_parameters;
-    use truegrind::calibration::identification::calibration::{Calibration, Weight};
+    use truegrind::calibration::identification::calibration::{CalibrationProblem, Weight};
     use truegrind::calibration::identification::fit::{Start, fit, frame_parameters};
-    use truegrind::calibration::identification::identify::{Options, identify, observe};
+    use truegrind::calibration::identification::identify::{Options, identify, prepare_observations};
     use truegrind::calibration::identification::solver::SOLVERS;
     use truegrind::calibration::identification::start::starts;
     use truegrind::calibration::identification::tolerance::Tolerance;
@@ -137,20 +137,20 @@ mod arm {
     }
 
     /// The first `rows` cable rows as the papers set them up.
-    pub(super) fn cable(rows: usize) -> Calibration {
+    pub(super) fn cable(rows: usize) -> CalibrationProblem {
         let experiment = Experiment::by_name("ltlm-table-6").expect("ships");
         let (dataset, simulation, _) = simulated::measure(&experiment, nominal).expect("ships");
         let dataset = dataset.subset(&(0..rows).collect::<Vec<_>>());
         let model = simulation.nominal;
         let frames = starts(&dataset, &model).expect("placed").remove(0);
-        let (observed, _) = observe(&dataset, &model, false);
+        let (observed, _) = prepare_observations(&dataset, &model, false);
         let start = Start { model: &model, frames: &frames };
         let sensing = frame_parameters(&dataset);
         let fitted = fit(&observed, start, &sensing, &Tolerance::default(), &SOLVERS[0], 0);
         let parameters = link_parameters(&model);
         let priors = Tolerance::default().priors(&parameters, &model);
         let weights = vec![Weight { per_mm: 1.0, per_rad: 1.0 }; rows];
-        Calibration::new(&dataset, &model, &fitted.frames, &parameters, &priors, &weights)
+        CalibrationProblem::new(&dataset, &model, &fitted.frames, &parameters, &priors, &weights)
     }
 
     /// A model and the rows that it comes from: a draw-wire, a tracker, or a tracker with full poses.
@@ -185,9 +185,9 @@ mod arm {
 /// Every method on 100 cable rows of an arm, as the papers set it up: seconds of the whole search.
 #[divan::bench(args = truegrind::calibration::identification::solver::all().map(|s| s.name).collect::<Vec<_>>())]
 fn method_on_100_cable_rows(bencher: Bencher<'_, '_>, name: &str) {
-    let task = arm::cable(100);
+    let problem = arm::cable(100);
     let solver = truegrind::calibration::identification::solver::by_name(name).expect("in the list");
-    bencher.bench_local(|| solver.solve(&task, &[0.0; 24], 0));
+    bencher.bench_local(|| solver.solve(&problem, &[0.0; 24], 0));
 }
 
 /// One pose taken in by a track: process noise, linearisation, update.
@@ -196,10 +196,10 @@ fn track_one_pose(bencher: Bencher<'_, '_>, sensor: &str) {
     use truegrind::calibration::tracking::{Options, Tracker};
     let (model, dataset) = arm::measured(sensor);
     let mut tracker = Tracker::begin(&model, "bench", &dataset, &Options::default()).expect("placed");
-    let task = tracker.prepare(&dataset);
+    let problem = tracker.prepare(&dataset);
     let mut pose = 0;
     bencher.bench_local(|| {
         pose = (pose + 1) % dataset.rows.len();
-        tracker.update(&task, pose)
+        tracker.update(&problem, pose)
     });
 }

@@ -16,7 +16,7 @@ use rand_chacha::ChaCha8Rng;
 use truegrind::arm::condition::Condition;
 use truegrind::arm::model::{Joints, Model};
 use truegrind::arm::parameter::{Parameter, link_parameters};
-use truegrind::calibration::identification::calibration::{Calibration, Frames, Weight};
+use truegrind::calibration::identification::calibration::{CalibrationProblem, Frames, Weight};
 use truegrind::calibration::identification::tolerance::Tolerance;
 use truegrind::calibration::measurement::dataset::{Dataset, Reading, Row, Sensor};
 use truegrind::estimation::least_squares::lm;
@@ -35,8 +35,8 @@ fn parameters(model: &Model) -> Vec<Parameter> {
     out
 }
 
-/// The task, and the true parameters.
-fn task(rows: usize) -> (Calibration, Vec<f64>) {
+/// The problem, and the true parameters.
+fn problem(rows: usize) -> (CalibrationProblem, Vec<f64>) {
     let nominal = truegrind::robots::load("abb-irb-120").expect("in the catalogue").model;
     let mut random = ChaCha8Rng::seed_from_u64(1042);
     let mut actual = nominal.clone();
@@ -84,37 +84,40 @@ fn task(rows: usize) -> (Calibration, Vec<f64>) {
     });
     let truth = truth.collect();
     let priors: Vec<Prior> = Tolerance::default().priors(&list, &nominal);
-    (Calibration::new(&dataset, &nominal, &frames, &list, &priors, &weights), truth)
+    (CalibrationProblem::new(&dataset, &nominal, &frames, &list, &priors, &weights), truth)
 }
 
-fn cost(task: &Calibration, x: &[f64]) -> f64 {
-    task.row_cost(x) + prior_cost(task.priors(), x)
+fn cost(problem: &CalibrationProblem, x: &[f64]) -> f64 {
+    problem.row_cost(x) + prior_cost(problem.priors(), x)
 }
 
-/// A calibration task whose fit with default stops is known to end within 1e-8 of the optimal cost. The reference comes
+/// A calibration problem whose fit with default stops is known to end within 1e-8 of the optimal cost. The reference comes
 /// from the true parameters, so it does not start on a part of the rows as the fit may, and stops far later.
-fn checked(rows: usize, options: &lm::Options) -> Calibration {
-    let (task, truth) = task(rows);
-    let start = vec![0.0; task.parameters()];
-    let optimum =
-        lm::solve(&task, &truth, &lm::Options { cost_tolerance: 1e-14, gradient_tolerance: 0.0, ..*options });
-    let found = lm::solve(&task, &start, options);
-    let worth = |x: &[f64]| if options.priors { cost(&task, x) } else { task.row_cost(x) };
+fn checked(rows: usize, options: &lm::Options) -> CalibrationProblem {
+    let (problem, truth) = problem(rows);
+    let start = vec![0.0; problem.parameters()];
+    let optimum = lm::solve(
+        &problem,
+        &truth,
+        &lm::Options { cost_tolerance: 1e-14, gradient_tolerance: 0.0, ..*options },
+    );
+    let found = lm::solve(&problem, &start, options);
+    let worth = |x: &[f64]| if options.priors { cost(&problem, x) } else { problem.row_cost(x) };
     let gap = (worth(&found.x) - worth(&optimum.x)) / worth(&optimum.x);
     assert!(gap.abs() < 1e-8, "relative gap to the optimal cost {gap:e}");
-    let passes = found.evaluations.jacobians / task.rows() as u64;
+    let passes = found.evaluations.jacobians / problem.rows() as u64;
     eprintln!(
         "{rows} rows: {passes} passes with Jacobians, relative gap {gap:.1e}, {:?}; reference {:?} after {} passes",
         found.termination,
         optimum.termination,
-        optimum.evaluations.jacobians / task.rows() as u64
+        optimum.evaluations.jacobians / problem.rows() as u64
     );
-    task
+    problem
 }
 
-fn fit(bencher: divan::Bencher<'_, '_>, task: &Calibration, options: &lm::Options) {
-    let start = vec![0.0; task.parameters()];
-    bencher.bench_local(|| lm::solve(divan::black_box(task), &start, options));
+fn fit(bencher: divan::Bencher<'_, '_>, problem: &CalibrationProblem, options: &lm::Options) {
+    let start = vec![0.0; problem.parameters()];
+    bencher.bench_local(|| lm::solve(divan::black_box(problem), &start, options));
 }
 
 /// From the nominal arm to 1e-8 of the optimal cost.
@@ -125,7 +128,7 @@ fn fit_28_parameters_to_1042_rows(bencher: divan::Bencher<'_, '_>) {
 }
 
 /// A thousand times as many rows, without priors, as other solvers are measured: some seconds in all, and the memory of
-/// rows, task and fit.
+/// rows, problem and fit.
 #[divan::bench(sample_count = 3, sample_size = 1)]
 fn fit_28_parameters_to_1042000_rows(bencher: divan::Bencher<'_, '_>) {
     let options = lm::Options { priors: false, ..lm::Options::default() };
@@ -155,7 +158,7 @@ fn peak_memory_mb() -> Option<f64> {
 /// One pass: residuals, Jacobian and normal equations of all rows.
 #[divan::bench(args = [1_042, 1_042_000], sample_count = 5)]
 fn one_pass(bencher: divan::Bencher<'_, '_>, rows: usize) {
-    let (task, _) = task(rows);
-    let x = vec![1e-5; task.parameters()];
-    bencher.bench_local(|| task.normal_equations(divan::black_box(&x)));
+    let (problem, _) = problem(rows);
+    let x = vec![1e-5; problem.parameters()];
+    bencher.bench_local(|| problem.normal_equations(divan::black_box(&x)));
 }

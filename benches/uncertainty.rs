@@ -129,7 +129,7 @@ fn model_of(case: &Case, simulation: &Simulation) -> Option<Estimated> {
             length_mm: length,
             angle_rad: twist.to_radians(),
             zero_rad: zero.to_radians(),
-            learned: false,
+            learn_widths: false,
             ..options.tolerance
         };
     }

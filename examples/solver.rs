@@ -9,7 +9,7 @@ use std::error::Error;
 
 use truegrind::estimation::least_squares::lm;
 use truegrind::{
-    Calibration, ImportOptions, Parameter, Problem, Tolerance, Weight, read_measurements, robots,
+    CalibrationProblem, ImportOptions, Parameter, Problem, Tolerance, Weight, read_measurements, robots,
     starting_frames,
 };
 
@@ -24,7 +24,7 @@ fn descend(problem: &dyn Problem, steps: usize) -> (Vec<f64>, f64) {
     for _ in 0..steps {
         let mut equations = problem.normal_equations(&x);
         equations.add_priors(priors, &x);
-        equations.mirror();
+        equations.symmetrize();
         // Columns are scaled by the priors: millimetres and radians have no common length.
         let scale = nalgebra::DVector::from_iterator(priors.len(), priors.iter().map(|p| p.sigma));
         let gradient = equations.gradient.component_mul(&scale);
@@ -48,18 +48,18 @@ fn main() -> Result<(), Box<dyn Error>> {
         .collect();
     let priors = Tolerance::default().priors(&free, &robot.model);
     let weights = vec![Weight { per_mm: 10.0, per_rad: 1e3 }; rows.rows.len()];
-    let task = Calibration::new(&rows, &robot.model, &frames, &free, &priors, &weights);
+    let problem = CalibrationProblem::new(&rows, &robot.model, &frames, &free, &priors, &weights);
 
     let rmse_mm = |x: &[f64]| {
-        let errors = task.errors_mm(x);
+        let errors = problem.errors_mm(x);
         (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt()
     };
     println!("start                {:.4} mm on the rows of the fit", rmse_mm(&vec![0.0; free.len()]));
     for steps in [10, 100, 1000] {
-        let (x, cost) = descend(&task, steps);
+        let (x, cost) = descend(&problem, steps);
         println!("{steps:>4} steps downhill  {:.4} mm, cost {cost:.1}", rmse_mm(&x));
     }
-    let best = lm::solve(&task, &vec![0.0; free.len()], &lm::Options::default());
+    let best = lm::solve(&problem, &vec![0.0; free.len()], &lm::Options::default());
     println!(
         "Levenberg–Marquardt  {:.4} mm, cost {:.1}, {} iterations",
         rmse_mm(&best.x),

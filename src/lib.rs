@@ -88,14 +88,14 @@ pub use truegrind_calibration::diagnosis::finding::{
     Alternative, Confidence, DiagnoseError, Diagnosis, Finding, Fits, FoundParameter, Gain, NotTestable,
     Stage,
 };
-pub use truegrind_calibration::identification::calibration::{Calibration, Frames, Weight};
+pub use truegrind_calibration::identification::calibration::{CalibrationProblem, Frames, Weight};
 pub use truegrind_calibration::identification::identifiability::{Identifiability, identifiability};
 pub use truegrind_calibration::identification::identify::{
-    Identification, IdentifyError, Options as IdentifyOptions, identify, observe,
+    Identification, IdentifyError, Options as IdentifyOptions, identify, prepare_observations,
 };
 pub use truegrind_calibration::identification::register::{Registered, register, starting_frames};
 pub use truegrind_calibration::identification::solver::{Solver, SolverError, by_name as solver_by_name};
-pub use truegrind_calibration::identification::start::NoStart;
+pub use truegrind_calibration::identification::start::StartError;
 pub use truegrind_calibration::identification::tolerance::Tolerance;
 pub use truegrind_calibration::tracking::{
     Alarm, Options as TrackOptions, State as TrackState, StateError as TrackStateError, TrackError, Tracker,

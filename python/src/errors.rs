@@ -3,7 +3,7 @@
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use truegrind::calibration::identification::start::NoStart;
+use truegrind::calibration::identification::start::StartError;
 use truegrind::calibration::measurement::matching::Mismatch;
 use truegrind::compensation::cell::CellError;
 use truegrind::{
@@ -235,7 +235,7 @@ macro_rules! told {
 }
 
 told! {
-    NoStart => Fit,
+    StartError => Fit,
     SolverError => Argument,
     ModelFileError => Model,
     NominalMismatch => Model,

@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use truegrind::calibration::diagnosis::transfer::transfer;
 use truegrind::calibration::identification::verdict::Limits;
-use truegrind::math::work::tell;
+use truegrind::math::work::report_step;
 use truegrind::report::{diagnosis, format, identification};
 use truegrind::{
     Dataset, DiagnoseOptions, Diagnosed, Identification, IdentifyOptions, Robot, Tolerance, diagnose,
@@ -157,7 +157,7 @@ pub(crate) fn identify_(
     }
     // As the command line has it: tolerances that are stated are taken as they are.
     tolerance.zero_rad = tolerance.angle_rad;
-    tolerance.learned = tolerance_length_mm.is_none() && tolerance_angle_deg.is_none();
+    tolerance.learn_widths = tolerance_length_mm.is_none() && tolerance_angle_deg.is_none();
     for (name, limit) in [("limit_rmse_mm", limit_rmse_mm), ("limit_max_mm", limit_max_mm)] {
         limit.map(|limit| positive(name, limit)).transpose()?;
     }
@@ -172,10 +172,10 @@ pub(crate) fn identify_(
         stated_frames: None,
     };
     run(py, threads, progress, || {
-        tell("checking units");
+        report_step("checking units");
         let rows = dataset.of(&robot, angles)?;
         let (name, nominal) = (&robot.sheet.name, &robot.model);
-        tell("placing the sensor");
+        report_step("placing the sensor");
         let frames = starting_frames(&rows, nominal, &options.tolerance, options.fuse_readout)?;
         let share = |rows: &Dataset| split::random(rows, options.held_out, options.seed);
         let found = identify(&rows, name, nominal, &frames, &share, &options)?;
@@ -328,14 +328,14 @@ pub(crate) fn diagnose_(
     options.selection.seed = seed;
     let others: Vec<&PyDataset> = also.iter().map(|other| &**other).collect();
     run(py, threads, progress, || {
-        tell("checking units");
+        report_step("checking units");
         let rows = dataset.of(&robot, angles)?;
         let (name, nominal) = (&robot.sheet.name, &robot.model);
         let frames = starting_frames(&rows, nominal, &options.tolerance, options.fuse_readout)?;
-        let mut found = diagnose(&rows, name, nominal, &frames, &options, &|step| tell(step))?;
+        let mut found = diagnose(&rows, name, nominal, &frames, &options, &|step| report_step(step))?;
         for other in others {
             let other = other.of(&robot, angles)?;
-            tell(&format!("judging on {}", other.file));
+            report_step(&format!("judging on {}", other.file));
             let frames = starting_frames(&other, nominal, &options.tolerance, options.fuse_readout)?;
             let (geometric, extended) = (&found.geometric.model, &found.extended.model);
             let judged = transfer(

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use pyo3::prelude::*;
 use truegrind::calibration::tracking::first_poses as first_of;
-use truegrind::math::work::tell;
+use truegrind::math::work::report_step;
 use truegrind::planning::poses::candidate::Bounds;
 use truegrind::planning::poses::drive::{Drive, draft};
 use truegrind::planning::poses::rows::Noise;
@@ -259,7 +259,7 @@ pub(crate) fn plan_(
     };
     let speed_mm_s = positive("speed_mm_s", speed_mm_s)?;
     run(py, threads, progress, || {
-        tell(&format!("choosing {poses} of {candidates} poses"));
+        report_step(&format!("choosing {poses} of {candidates} poses"));
         let wanted = PosesWanted { nominal: &robot.model, sensor, frames: &frames };
         let plan = plan_poses(&wanted, &options)
             .map_err(|error| Refusal::new(Kind::Plan, format!("{}: {error}", robot.sheet.name)))?;
@@ -391,14 +391,14 @@ pub(crate) fn track_(
             None => {
                 let first = first_of(&rows, options.first_poses)
                     .ok_or_else(|| Refusal::new(Kind::Track, "no measurements to begin with"))?;
-                tell("placing the sensor");
+                report_step("placing the sensor");
                 Tracker::begin(arm, &estimated.hash, &first, &options)?
             }
         };
         let before = tracker.state().poses;
         let mut alarms = Vec::new();
         for dataset in &rows {
-            tell(&format!("taking in {}", dataset.file));
+            report_step(&format!("taking in {}", dataset.file));
             alarms.extend(tracker.take(dataset)?);
         }
         let fresh = tracker.state().poses - before;

@@ -12,7 +12,7 @@ use truegrind::compensation::risk::placement::Placement;
 use truegrind::compensation::cell::robot_match::none_in_reach;
 use truegrind::compensation::cell::nc_setup::setup;
 use truegrind::compensation::frames::taught::contradictions;
-use truegrind::math::work::tell;
+use truegrind::math::work::report_step;
 use truegrind::programs::rapid::task_list;
 use truegrind::report::compensation::{self as view, ProgramFile};
 use truegrind::report::{deviation as deviations, format};
@@ -391,7 +391,7 @@ fn corrected(
     let arm: &Estimated = &model.arm;
     let Place { cell, surface } = place;
     agreed(&sources, &cell, arm)?;
-    tell(&format!("reading {}", sources.name()));
+    report_step(&format!("reading {}", sources.name()));
     let setup = nc_setup(&cell, &arm.robot);
     let mut program = sources.task(&setup);
     let loads = own_loads.then(|| Loads::of(&program));
@@ -411,7 +411,7 @@ fn corrected(
     }
     let options = CompensateOptions { loads, ..options };
     let mark = Mark { version: env!("CARGO_PKG_VERSION").into(), model: model.hash.clone(), partial: false };
-    tell(&format!("rewriting {}", sources.name()));
+    report_step(&format!("rewriting {}", sources.name()));
     let Compensated { mut plan, rewritten } = compensate(&program, arm, &cell, &options, Some(mark))?;
     if let Some(motions) = none_in_reach(&plan) {
         let message = format!(
@@ -546,7 +546,7 @@ impl Run<'_> {
         let arm: &Estimated = &self.estimated.arm;
         agreed(self.programs, cell, arm)?;
         let setup = nc_setup(cell, &arm.robot);
-        tell(&format!("reading {}", self.programs.name()));
+        report_step(&format!("reading {}", self.programs.name()));
         let task = self.programs.task(&setup);
         let original = self.originals.map(|original| original.task(&setup));
         for program in original.iter().chain([&task]) {
@@ -573,7 +573,7 @@ impl Run<'_> {
             loads: [loads[0].as_ref(), loads[1].as_ref()],
         };
         let acting = Acting { nominal: &arm.nominal, model, knowledge, condition: self.condition };
-        tell(&format!("running {name}"));
+        report_step(&format!("running {name}"));
         let report = judge(&judged, &acting);
         if report.points.is_empty() {
             let message = format!("{name}: no motion has a target that is known from the text");

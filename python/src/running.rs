@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use pyo3::prelude::*;
-use truegrind::math::work::{Watch, watched};
+use truegrind::math::work::{Watch, run_watched};
 
 use crate::errors::{Kind, Refusal};
 
@@ -34,11 +34,11 @@ pub(crate) fn run<T: Send>(
     }
     let (send, receive) = channel();
     let ended = send.clone();
-    let watch = Arc::new(Watch::telling(move |step| drop(send.send(Event::Step(step.to_owned())))));
+    let watch = Arc::new(Watch::with_listener(move |step| drop(send.send(Event::Step(step.to_owned())))));
     let receive = Mutex::new(receive);
     let (fault, joined) = std::thread::scope(|scope| {
         let worker = scope.spawn(|| {
-            let done = watched(&watch, threads, work);
+            let done = run_watched(&watch, threads, work);
             drop(ended.send(Event::Done));
             done
         });

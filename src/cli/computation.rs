@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use clap::Args;
-use truegrind::math::work::{Watch, watched};
+use truegrind::math::work::{Watch, run_watched};
 
 use super::progress::Work;
 
@@ -37,8 +37,8 @@ pub(super) fn watching<T: Send>(
     shown: &Work,
     work: impl FnOnce() -> T + Send,
 ) -> anyhow::Result<T> {
-    let watch = Arc::new(Watch::telling(shown.listener()));
-    Ok(watched(&watch, checked(threads)?, work)??)
+    let watch = Arc::new(Watch::with_listener(shown.listener()));
+    Ok(run_watched(&watch, checked(threads)?, work)??)
 }
 
 /// Runs `work` on the stated number of threads.

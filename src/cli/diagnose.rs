@@ -10,10 +10,10 @@ use truegrind::calibration::diagnosis::diagnose::{Diagnosed, Options, diagnose};
 use truegrind::calibration::diagnosis::transfer::transfer;
 use truegrind::calibration::identification::calibration::Frames;
 use truegrind::calibration::identification::fit::summary_on;
-use truegrind::calibration::identification::identify::observe;
+use truegrind::calibration::identification::identify::prepare_observations;
 use truegrind::calibration::identification::register::starting_frames;
 use truegrind::calibration::measurement::dataset::Dataset;
-use truegrind::math::work::tell as tell_step;
+use truegrind::math::work::report_step;
 use truegrind::report::diagnosis as view;
 
 use super::computation::{Common, watching};
@@ -154,7 +154,7 @@ pub(super) fn of_rows(
     let stated = arguments.stated.frames(dataset)?;
     let (tolerance, frames) = arguments.held.held(&options.tolerance, stated.as_ref(), frames)?;
     let held = Options { tolerance, ..options.clone() };
-    let mut found = diagnose(dataset, name, nominal, &frames, &held, &|step| tell_step(step))?;
+    let mut found = diagnose(dataset, name, nominal, &frames, &held, &|step| report_step(step))?;
     if let Some(stated) = &stated {
         let raw = raw_error(dataset, nominal, stated, options.fuse_readout);
         found.diagnosis.notes.push(format!(
@@ -163,7 +163,7 @@ pub(super) fn of_rows(
         ));
     }
     for other in others {
-        tell_step(&format!("judging on {}", other.file));
+        report_step(&format!("judging on {}", other.file));
         let frames = starting_frames(other, nominal, &options.tolerance, options.fuse_readout)?;
         found.diagnosis.transfers.push(transfer(
             other,
@@ -180,7 +180,7 @@ pub(super) fn of_rows(
 
 /// What the data sheet's arm is off by with frames that were measured by other means.
 fn raw_error(dataset: &Dataset, nominal: &Model, stated: &Frames, fuse: bool) -> ErrorSummary {
-    summary_on(&observe(dataset, nominal, fuse).0, nominal, stated)
+    summary_on(&prepare_observations(dataset, nominal, fuse).0, nominal, stated)
 }
 
 /// The diagnosis, starting frames included.

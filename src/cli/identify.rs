@@ -286,7 +286,7 @@ fn options(arguments: &Arguments, limits: Limits) -> anyhow::Result<Options> {
     }
     // Tolerances that are stated are taken as they are.
     tolerance.zero_rad = tolerance.angle_rad;
-    tolerance.learned = arguments.tolerance_length.is_none() && arguments.tolerance_angle.is_none();
+    tolerance.learn_widths = arguments.tolerance_length.is_none() && arguments.tolerance_angle.is_none();
     Ok(Options {
         tolerance,
         solver: by_name(&arguments.method)?,

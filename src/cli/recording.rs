@@ -9,7 +9,7 @@ use truegrind::arm::model::Model;
 use truegrind::calibration::diagnosis::diagnose::Diagnosed;
 use truegrind::calibration::identification::calibration::Frames;
 use truegrind::calibration::identification::fit::errors_on;
-use truegrind::calibration::identification::identify::{Identification, observe};
+use truegrind::calibration::identification::identify::{Identification, prepare_observations};
 use truegrind::calibration::identification::register::register;
 use truegrind::calibration::identification::tolerance::Tolerance;
 use truegrind::calibration::measurement::dataset::{Dataset, Row};
@@ -159,7 +159,7 @@ pub(super) fn track(
     }
     let numbers: Vec<usize> = rows.iter().map(|row| row.number).collect();
     let dataset = Dataset::new(&first.file, first.sensor, rows);
-    let observed = observe(&dataset, begun, false).0;
+    let observed = prepare_observations(&dataset, begun, false).0;
     let left = |stage: &str, arm: &Model, frames: &Frames| Residuals {
         stage: stage.to_owned(),
         rows: numbers.iter().copied().zip(errors_on(&observed, arm, frames)).collect(),
@@ -209,7 +209,7 @@ pub(super) struct Compared<'a> {
 
 /// The recording of an experiment, as a file: the arm and the sensor at the rows that the methods were given, and the answer.
 pub(super) fn comparison(of: &Compared<'_>, summary: &Document) -> anyhow::Result<Vec<u8>> {
-    let observed = observe(of.dataset, of.nominal, true).0;
+    let observed = prepare_observations(of.dataset, of.nominal, true).0;
     let frames = register(&observed, of.nominal, &Tolerance::default())?.fitted.frames;
     let errors = errors_on(&observed, of.nominal, &frames);
     let registered = Residuals {

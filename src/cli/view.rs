@@ -8,7 +8,7 @@ use truegrind::arm::condition::Condition;
 use truegrind::arm::estimated::Estimated;
 use truegrind::arm::model::Joints;
 use truegrind::calibration::identification::fit::{Start, errors_on, fit, frame_parameters};
-use truegrind::calibration::identification::identify::{Options, observe};
+use truegrind::calibration::identification::identify::{Options, prepare_observations};
 use truegrind::calibration::identification::register::starting_frames;
 use truegrind::calibration::identification::solver::SOLVERS;
 use truegrind::calibration::identification::tolerance::Tolerance;
@@ -187,7 +187,7 @@ fn measurements(arguments: &Arguments, file: &Path) -> anyhow::Result<Recording>
     };
     // The sensor may stand elsewhere than when the model was made: frames are fitted anew, for either arm.
     let frames = starting_frames(&dataset, &robot.model, &options.tolerance, options.fuse_readout)?;
-    let (observed, _) = observe(&dataset, &robot.model, true);
+    let (observed, _) = prepare_observations(&dataset, &robot.model, true);
     let sensing = frame_parameters(&dataset);
     let mut registered = None;
     let mut residuals = Vec::new();

@@ -17,15 +17,15 @@ use truegrind_arm::condition::Condition;
 use truegrind_arm::estimated::Estimated;
 use truegrind_arm::model::Model;
 use truegrind_math::statistics::ErrorSummary;
-use truegrind_math::work::tell;
+use truegrind_math::work::report_step;
 
 use self::orientation::Orientation;
 use self::path::{PathFound, seen};
 use crate::identification::calibration::Frames;
-use crate::identification::fit::{Observed, errors_on};
-use crate::identification::identify::observe;
+use crate::identification::fit::{Observations, errors_on};
+use crate::identification::identify::prepare_observations;
 use crate::identification::register::register;
-use crate::identification::start::NoStart;
+use crate::identification::start::StartError;
 use crate::identification::tolerance::Tolerance;
 use crate::measurement::dataset::{Dataset, Sensor};
 use crate::measurement::split::{Split, folds, noise_floor, noise_floor_rad, poses};
@@ -133,13 +133,13 @@ pub fn accept(
     if is_of_the_fit(dataset, estimated) {
         return Err(AcceptError::RowsOfTheFit { file: dataset.file.clone() });
     }
-    let (all, _) = observe(dataset, &estimated.nominal, true);
+    let (all, _) = prepare_observations(dataset, &estimated.nominal, true);
     let observed = at_rest(&all)?;
     let paths = paths(&all, &observed, &estimated.model, options)?;
     let dataset = &observed.dataset;
-    tell("judging the arm of the data sheet");
+    report_step("judging the arm of the data sheet");
     let [nominal, nominal_rad] = errors(&observed, &estimated.nominal, options)?;
-    tell("judging the estimated arm");
+    report_step("judging the estimated arm");
     let [found, found_rad] = errors(&observed, &estimated.model, options)?;
     let model = ErrorSummary::of(found.iter().copied());
     let groups = poses(dataset);
@@ -210,7 +210,7 @@ fn is_of_the_fit(dataset: &Dataset, estimated: &Estimated) -> bool {
 
 /// The errors of each row, of the position (mm) and of the orientation (rad; none where none was measured), with frames that have not
 /// seen it.
-fn errors(observed: &Observed, model: &Model, options: &Options) -> Result<[Vec<f64>; 2], NoStart> {
+fn errors(observed: &Observations, model: &Model, options: &Options) -> Result<[Vec<f64>; 2], StartError> {
     let count = observed.dataset.rows.len();
     if let Some(frames) = &options.frames {
         let rows: Vec<usize> = (0..count).collect();
@@ -240,7 +240,7 @@ fn range(dataset: &Dataset, value: fn(&Condition) -> Option<f64>) -> Option<[f64
 }
 
 /// The rows at which the arm stood.
-fn at_rest(observed: &Observed) -> Result<Observed, AcceptError> {
+fn at_rest(observed: &Observations) -> Result<Observations, AcceptError> {
     let rows = &observed.dataset.rows;
     let at_rest: Vec<usize> = (0..rows.len()).filter(|&row| rows[row].path().is_none()).collect();
     match at_rest.len() {
@@ -252,8 +252,8 @@ fn at_rest(observed: &Observed) -> Result<Observed, AcceptError> {
 
 /// Path accuracy and repeatability, where paths were measured by a sensor that sees positions.
 fn paths(
-    all: &Observed,
-    at_rest: &Observed,
+    all: &Observations,
+    at_rest: &Observations,
     model: &Model,
     options: &Options,
 ) -> Result<Vec<PathFound>, AcceptError> {
@@ -264,7 +264,7 @@ fn paths(
 }
 
 /// Those that were stated, or that fit the rows best.
-fn frames(observed: &Observed, model: &Model, options: &Options) -> Result<Frames, NoStart> {
+fn frames(observed: &Observations, model: &Model, options: &Options) -> Result<Frames, StartError> {
     match &options.frames {
         Some(frames) => Ok(frames.clone()),
         None => Ok(register(observed, model, &Tolerance::default())?.fitted.frames),
@@ -273,11 +273,11 @@ fn frames(observed: &Observed, model: &Model, options: &Options) -> Result<Frame
 
 /// ISO 9283 at the poses with enough cycles, where there are enough of them and the sensor sees positions.
 fn cycles(
-    observed: &Observed,
+    observed: &Observations,
     groups: &[Vec<usize>],
     model: &Model,
     options: &Options,
-) -> Result<Option<Cycles>, NoStart> {
+) -> Result<Option<Cycles>, StartError> {
     let enough: Vec<&Vec<usize>> = groups.iter().filter(|rows| rows.len() >= ISO_CYCLES).collect();
     if enough.len() < ISO_POSES || observed.dataset.sensor == Sensor::Cable {
         return Ok(None);

@@ -62,7 +62,7 @@ pub struct Prior {
 /// JᵀJ, Jᵀr and ½ rᵀr of a set of rows, priors not included.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NormalEquations {
-    /// JᵀJ, p × p; only the lower triangle is guaranteed to be filled until [`NormalEquations::mirror`] is
+    /// JᵀJ, p × p; only the lower triangle is guaranteed to be filled until [`NormalEquations::symmetrize`] is
     /// called.
     pub matrix: DMatrix<f64>,
     /// Jᵀr, p.
@@ -97,7 +97,7 @@ impl NormalEquations {
     }
 
     /// Copies the lower triangle onto the upper one.
-    pub fn mirror(&mut self) {
+    pub fn symmetrize(&mut self) {
         self.matrix.fill_upper_triangle_with_lower_triangle();
     }
 }
@@ -129,7 +129,7 @@ pub trait Problem: Sync {
     }
 
     /// The same task with `observations` alone, by their index; `None` where that is not offered.
-    fn thinned(&self, _observations: &[usize]) -> Option<Box<dyn Problem + '_>> {
+    fn subsample(&self, _observations: &[usize]) -> Option<Box<dyn Problem + '_>> {
         None
     }
 

@@ -9,23 +9,28 @@ use super::lanes::Real;
 /// Value of the bump at `u` around `centre`, for one point or several in lanes.
 ///
 /// ```
-/// use truegrind_math::radial::bump;
+/// use truegrind_math::radial::wendland;
 ///
 /// let centre = [0.2, -0.1];
-/// assert_eq!(bump(&centre, &centre, 0.5), 1.0);
+/// assert_eq!(wendland(&centre, &centre, 0.5), 1.0);
 /// // Not small beyond its reach, but zero.
-/// assert_eq!(bump(&[0.2, 0.41], &centre, 0.5), 0.0);
+/// assert_eq!(wendland(&[0.2, 0.41], &centre, 0.5), 0.0);
 /// ```
 #[cfg_attr(not(debug_assertions), inline(always))]
-pub fn bump<R: Real, const D: usize>(u: &[R; D], centre: &[f64; D], reach: f64) -> R {
+pub fn wendland<R: Real, const D: usize>(u: &[R; D], centre: &[f64; D], reach: f64) -> R {
     let (t, r) = inside(u, centre, reach);
     let square = t * t;
     square * square * (r.splat(4.0) * r + r.splat(1.0))
 }
 
-/// Derivative of [`bump`] along `step`.
+/// Derivative of [`wendland`] along `step`.
 #[cfg_attr(not(debug_assertions), inline(always))]
-pub fn slope_along<R: Real, const D: usize>(u: &[R; D], centre: &[f64; D], reach: f64, step: &[R; D]) -> R {
+pub fn wendland_slope<R: Real, const D: usize>(
+    u: &[R; D],
+    centre: &[f64; D],
+    reach: f64,
+    step: &[R; D],
+) -> R {
     let (t, _) = inside(u, centre, reach);
     let mut along = t.splat(0.0);
     for k in 0..D {
@@ -52,14 +57,14 @@ fn inside<R: Real, const D: usize>(u: &[R; D], centre: &[f64; D], reach: f64) ->
 /// the same for the same points.
 ///
 /// ```
-/// use truegrind_math::radial::spread_out;
+/// use truegrind_math::radial::farthest_point_sample;
 ///
 /// // Two heaps of poses: two centres, one in each, and no pose farther than 1 from its own.
-/// let (centres, fill) = spread_out(&[[0.0], [1.0], [10.0], [9.0]], 2);
+/// let (centres, fill) = farthest_point_sample(&[[0.0], [1.0], [10.0], [9.0]], 2);
 /// assert_eq!(centres, [[0.0], [10.0]]);
 /// assert_eq!(fill, 1.0);
 /// ```
-pub fn spread_out<const D: usize>(points: &[[f64; D]], most: usize) -> (Vec<[f64; D]>, f64) {
+pub fn farthest_point_sample<const D: usize>(points: &[[f64; D]], most: usize) -> (Vec<[f64; D]>, f64) {
     let mut nearest = vec![f64::INFINITY; points.len()];
     let mut centres: Vec<[f64; D]> = Vec::new();
     let mut next = points.iter().position(|p| p.iter().all(|v| v.is_finite()));

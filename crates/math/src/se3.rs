@@ -17,14 +17,14 @@ pub fn skew(v: &Vector3<f64>) -> Matrix3<f64> {
 /// (mm) first, then the rotation vector (rad) of `to.rotation * from.rotation⁻¹`.
 ///
 /// ```
-/// use truegrind_math::se3::{difference, moved, pose_from_vector};
+/// use truegrind_math::se3::{apply_twist, difference, pose_from_vector};
 ///
 /// let from = pose_from_vector(&[300.0, 0.0, 500.0, 0.0, 0.4, 0.0]);
 /// let to = pose_from_vector(&[300.5, -0.2, 500.0, 0.0, 0.4, 0.01]);
 /// let twist = difference(&from, &to);
 /// assert!((twist.fixed_rows::<3>(0) - nalgebra::Vector3::new(0.5, -0.2, 0.0)).norm() < 1e-9);
 /// // Moved by what it lacks, a pose is the other one.
-/// assert!(difference(&moved(&from, &twist), &to).norm() < 1e-12);
+/// assert!(difference(&apply_twist(&from, &twist), &to).norm() < 1e-12);
 /// ```
 pub fn difference(from: &Pose, to: &Pose) -> Vector6<f64> {
     let translation = to.translation.vector - from.translation.vector;
@@ -33,7 +33,7 @@ pub fn difference(from: &Pose, to: &Pose) -> Vector6<f64> {
 }
 
 /// The inverse of [`difference`]: moves a pose by a twist given in the frame of its parent.
-pub fn moved(pose: &Pose, twist: &Vector6<f64>) -> Pose {
+pub fn apply_twist(pose: &Pose, twist: &Vector6<f64>) -> Pose {
     let rotation = UnitQuaternion::from_scaled_axis(twist.fixed_rows::<3>(3).into_owned());
     Pose::from_parts((pose.translation.vector + twist.fixed_rows::<3>(0)).into(), rotation * pose.rotation)
 }

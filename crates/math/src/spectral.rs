@@ -22,11 +22,11 @@ const PRECISION: f64 = 5.0 * f64::EPSILON;
 /// # Ok::<(), &str>(())
 /// ```
 pub fn singular_values(matrix: &Matrix6<f64>) -> Option<Vector6<f64>> {
-    decomposed(matrix, false).map(|svd| svd.singular_values)
+    svd(matrix, false).map(|found| found.singular_values)
 }
 
 /// Singular values, largest first, and with `directions` the rows of Vᵀ; `None` for a matrix that is not finite.
-pub fn decomposed(matrix: &Matrix6<f64>, directions: bool) -> Option<SVD<f64, U6, U6>> {
+pub fn svd(matrix: &Matrix6<f64>, directions: bool) -> Option<SVD<f64, U6, U6>> {
     if !matrix.iter().all(|v| v.is_finite()) {
         return None;
     }
@@ -34,7 +34,7 @@ pub fn decomposed(matrix: &Matrix6<f64>, directions: bool) -> Option<SVD<f64, U6
 }
 
 /// Eigenvalues and eigenvectors of a symmetric matrix; `None` for one that is not finite.
-pub fn symmetric(matrix: DMatrix<f64>) -> Option<SymmetricEigen<f64, Dyn>> {
+pub fn symmetric_eigen(matrix: DMatrix<f64>) -> Option<SymmetricEigen<f64, Dyn>> {
     if !matrix.iter().all(|v| v.is_finite()) {
         return None;
     }

@@ -1,6 +1,6 @@
 //! Long work that can be watched and called off: one hook for progress and for cancelling, from outside the library.
 //!
-//! A caller runs its work under a [`Watch`] ([`watched`]). What computes says where it stands ([`tell`]) and asks now and then
+//! A caller runs its work under a [`Watch`] ([`run_watched`]). What computes says where it stands ([`report_step`]) and asks now and then
 //! whether it shall go on ([`checkpoint`]), without being handed anything: the watch is known to the threads that the work runs
 //! on. Called off, the work is unwound from its next checkpoint, so that nothing between there and the caller has to know; the
 //! caller gets [`Cancelled`] in place of a result. Outside a watch both do nothing.
@@ -28,13 +28,13 @@ impl fmt::Debug for Watch {
 
 impl Default for Watch {
     fn default() -> Self {
-        Self::telling(|_| {})
+        Self::with_listener(|_| {})
     }
 }
 
 impl Watch {
     /// A watch that hears of each step, from whatever thread comes to it.
-    pub fn telling(listener: impl Fn(&str) + Send + Sync + 'static) -> Self {
+    pub fn with_listener(listener: impl Fn(&str) + Send + Sync + 'static) -> Self {
         Self { cancelled: AtomicBool::new(false), listener: Box::new(listener) }
     }
 
@@ -80,7 +80,7 @@ pub fn checkpoint() {
 }
 
 /// Says what is being done now, and ends the work where it was called off.
-pub fn tell(step: &str) {
+pub fn report_step(step: &str) {
     checkpoint();
     let watch = WATCH.with(|place| place.borrow().clone());
     if let Some(watch) = watch {
@@ -95,16 +95,16 @@ const STACK_BYTES: usize = 8 << 20;
 ///
 /// ```
 /// use std::sync::Arc;
-/// use truegrind_math::work::{Cancelled, Watch, checkpoint, tell, watched};
+/// use truegrind_math::work::{Cancelled, Watch, checkpoint, report_step, run_watched};
 ///
 /// let watch = Arc::new(Watch::default());
-/// assert_eq!(watched(&watch, Some(2), || 6 * 7)?, Ok(42));
+/// assert_eq!(run_watched(&watch, Some(2), || 6 * 7)?, Ok(42));
 ///
 /// // Whoever holds the watch calls the work off; here the work itself, at its second step.
 /// let caller = watch.clone();
-/// let ended = watched(&watch, None, move || {
+/// let ended = run_watched(&watch, None, move || {
 ///     for step in 0.. {
-///         tell(&format!("step {step}"));
+///         report_step(&format!("step {step}"));
 ///         if step == 1 {
 ///             caller.cancel();
 ///         }
@@ -120,7 +120,7 @@ const STACK_BYTES: usize = 8 << 20;
 ///
 /// # Panics
 /// With what the work panics with.
-pub fn watched<T: Send>(
+pub fn run_watched<T: Send>(
     watch: &Arc<Watch>,
     threads: Option<usize>,
     work: impl FnOnce() -> T + Send,

@@ -418,7 +418,7 @@ pub enum ExperimentError {
     },
     /// The rows do not place the sensor.
     #[error(transparent)]
-    NoStart(#[from] truegrind_calibration::identification::start::NoStart),
+    StartError(#[from] truegrind_calibration::identification::start::StartError),
     /// The recipe cannot be measured.
     #[error("recipe of experiment {experiment}: {message}")]
     Recipe {

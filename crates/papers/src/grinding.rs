@@ -16,7 +16,9 @@ use crate::protocol::{Options as CaseOptions, drawn};
 use crate::verdict::{Test, paired};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Model;
-use truegrind_calibration::identification::identify::{Identification, Options, identify, observe};
+use truegrind_calibration::identification::identify::{
+    Identification, Options, identify, prepare_observations,
+};
 use truegrind_calibration::identification::register::register;
 use truegrind_calibration::identification::solver::{self, SOLVERS, Solver};
 use truegrind_calibration::identification::tolerance::Tolerance;
@@ -310,7 +312,7 @@ fn found(
     held_out: f64,
     seed: u64,
 ) -> Result<Identification, String> {
-    let (observed, _) = observe(dataset, nominal, false);
+    let (observed, _) = prepare_observations(dataset, nominal, false);
     let frames = register(&observed, nominal, &Tolerance::default()).map_err(|e| e.to_string())?.start;
     let options = Options {
         tolerance: Tolerance::default(),

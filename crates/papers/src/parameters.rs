@@ -10,7 +10,7 @@ use nalgebra::DMatrix;
 
 use crate::experiment::{Method, PaperLink};
 use truegrind_arm::parameter::{LinkCoordinate, Parameter};
-use truegrind_calibration::identification::calibration::Calibration;
+use truegrind_calibration::identification::calibration::CalibrationProblem;
 use truegrind_calibration::identification::tolerance::Tolerance;
 use truegrind_estimation::problem::Problem;
 
@@ -52,13 +52,13 @@ impl ParameterRow {
 /// The table of a method that ended at `x`; `variance` is what a row of weight 1 is left with.
 pub fn parameter_table(
     method: &Method,
-    task: &Calibration,
+    problem: &CalibrationProblem,
     parameters: &[Parameter],
     x: &[f64],
     variance: f64,
 ) -> ParameterTable {
-    let priors = Tolerance::default().priors(parameters, task.start());
-    let equations = task.normal_equations(x);
+    let priors = Tolerance::default().priors(parameters, problem.start());
+    let equations = problem.normal_equations(x);
     let p = parameters.len();
     // In units of the priors, where the unit matrix is the prior's information.
     let scaled = DMatrix::from_fn(p, p, |i, j| {
@@ -74,7 +74,7 @@ pub fn parameter_table(
             let Parameter::Link { joint, coordinate } = *parameter else { return None };
             Some(ParameterRow {
                 parameter: *parameter,
-                nominal: task.start().links[joint].get(coordinate),
+                nominal: problem.start().links[joint].get(coordinate),
                 deviation: x[k],
                 sigma: priors[k].sigma * share(k).sqrt(),
                 determined: 1.0 - share(k),

@@ -33,11 +33,11 @@ use crate::rescaled::Rescaled;
 use crate::verdict::{Judgement, judge};
 use truegrind_arm::model::Model;
 use truegrind_arm::parameter::{Parameter, link_parameters};
-use truegrind_calibration::identification::calibration::{Calibration, Weight};
+use truegrind_calibration::identification::calibration::{CalibrationProblem, Weight};
 use truegrind_calibration::identification::fit::{
-    Fitted, Observed, Start, errors_on, fit, frame_parameters, summary_on,
+    Fitted, Observations, Start, errors_on, fit, frame_parameters, summary_on,
 };
-use truegrind_calibration::identification::identify::observe;
+use truegrind_calibration::identification::identify::prepare_observations;
 use truegrind_calibration::identification::register::{Registered, register};
 use truegrind_calibration::identification::rounding;
 use truegrind_calibration::identification::solver::{Family, Run, SOLVERS, Scope, Solver, SolverError};
@@ -119,8 +119,8 @@ pub struct Case {
 
 /// A case with everything that methods start from.
 pub(super) struct Prepared {
-    train: Observed,
-    test: Observed,
+    train: Observations,
+    test: Observations,
     registered: Fitted,
     nominal: Model,
     sound: Option<Sound>,
@@ -159,7 +159,7 @@ pub fn run(
         });
     }
     enough(experiment, methods, &dataset, rows, nominal)?;
-    let (observed, _) = observe(&dataset, nominal, protocol.fuse_readout);
+    let (observed, _) = prepare_observations(&dataset, nominal, protocol.fuse_readout);
     let any_sound = methods.method.iter().any(|m| treatment_of(m, methods) == Treatment::Sound);
     let seeds: Vec<u64> = (0..protocol.cases as u64).map(|k| options.seed + k).collect();
     let prepared = seeds
@@ -252,15 +252,15 @@ fn treatment_of(method: &Method, methods: &Methods) -> Treatment {
 /// What the result of a least-squares method becomes when it is continued, on the same rows and the same cost, by steps
 /// that neither fixed damping nor a decaying step size slows. Both leave stationary points where they are, so this is
 /// where the method itself would end, thousands of its iterations later.
-fn continued(task: &Calibration, solver: &Solver, x: &[f64]) -> Estimate {
+fn continued(problem: &CalibrationProblem, solver: &Solver, x: &[f64]) -> Estimate {
     let options = lm::Options {
         factorisation: Factorisation::Qr,
-        priors: !solver.literal,
+        priors: !solver.as_printed,
         max_iterations: 5_000,
         cost_tolerance: 1e-13,
         ..lm::Options::default()
     };
-    lm::solve(task, x, &options)
+    lm::solve(problem, x, &options)
 }
 
 /// The rows with the part of the reading that the protocol uses.
@@ -346,7 +346,7 @@ pub(super) fn drawn(rows: usize, count: usize, seed: u64) -> Vec<usize> {
 }
 
 fn prepare(
-    observed: &Observed,
+    observed: &Observations,
     nominal: &Model,
     rows: usize,
     held_out: f64,
@@ -377,9 +377,13 @@ fn prepare(
 }
 
 /// The problem that a method is given, what moves in it, and the root mean square of its rows' weights (1/mm).
-fn task_of(case: &Prepared, solver: &Solver, treatment: Treatment) -> (Calibration, Vec<Parameter>, f64) {
+fn problem_of(
+    case: &Prepared,
+    solver: &Solver,
+    treatment: Treatment,
+) -> (CalibrationProblem, Vec<Parameter>, f64) {
     let train = &case.train.dataset;
-    let model = solver.prepared(&case.nominal, train);
+    let model = solver.prepare_model(&case.nominal, train);
     let frames = &case.registered.frames;
     let sensing = frame_parameters(train);
     let tolerance = match solver.network {
@@ -408,8 +412,8 @@ fn task_of(case: &Prepared, solver: &Solver, treatment: Treatment) -> (Calibrati
     };
     let priors = tolerance.priors(&parameters, &model);
     let squares = weights.iter().map(|w| w.per_mm * w.per_mm).sum::<f64>() / weights.len().max(1) as f64;
-    let task = Calibration::new(train, &model, frames, &parameters, &priors, &weights);
-    (task, parameters, squares.sqrt().max(f64::MIN_POSITIVE))
+    let problem = CalibrationProblem::new(train, &model, frames, &parameters, &priors, &weights);
+    (problem, parameters, squares.sqrt().max(f64::MIN_POSITIVE))
 }
 
 fn outcome(
@@ -420,14 +424,14 @@ fn outcome(
     run: &Run,
     seed: u64,
 ) -> (Outcome, Option<Outcome>) {
-    let (task, parameters, per_mm) = task_of(case, solver, treatment);
+    let (problem, parameters, per_mm) = problem_of(case, solver, treatment);
     let start = vec![0.0; parameters.len()];
     let begun = Instant::now();
     let estimate = match method.units {
-        Units::Rad => run(&task, &start, seed),
+        Units::Rad => run(&problem, &start, seed),
         Units::Deg => {
             let scale = parameters.iter().map(|p| if p.unit() == "mm" { 1.0 } else { 1.0_f64.to_radians() });
-            let rescaled = Rescaled::new(&task, scale.collect());
+            let rescaled = Rescaled::new(&problem, scale.collect());
             let estimate = run(&rescaled, &start, seed);
             rescaled.back(estimate)
         }
@@ -435,24 +439,30 @@ fn outcome(
     let seconds = begun.elapsed().as_secs_f64();
     let converged = (solver.family == Family::LeastSquares).then(|| {
         let from = if estimate.x.iter().all(|x| x.is_finite()) { &estimate.x } else { &start };
-        judged(case, &task, per_mm, continued(&task, solver, from), 0.0)
+        judged(case, &problem, per_mm, continued(&problem, solver, from), 0.0)
     });
-    (judged(case, &task, per_mm, estimate, seconds), converged)
+    (judged(case, &problem, per_mm, estimate, seconds), converged)
 }
 
 /// `per_mm` is the root mean square of the rows' weights.
-fn judged(case: &Prepared, task: &Calibration, per_mm: f64, estimate: Estimate, seconds: f64) -> Outcome {
-    let (model, frames) = task.apply(&estimate.x);
+fn judged(
+    case: &Prepared,
+    problem: &CalibrationProblem,
+    per_mm: f64,
+    estimate: Estimate,
+    seconds: f64,
+) -> Outcome {
+    let (model, frames) = problem.apply(&estimate.x);
     let errors_mm = errors_on(&case.test, &model, &frames);
     let held_out = ErrorSummary::of(errors_mm.iter().copied());
     let fitted = summary_on(&case.train, &model, &frames);
     let before = summary_on(&case.test, &case.registered.model, &case.registered.frames).rmse;
     let finite = held_out.rmse.is_finite() && estimate.x.iter().all(|x| x.is_finite());
     let diverged = !finite || estimate.termination.is_failure() || held_out.rmse > DIVERGED * before;
-    let rows = task.rows().max(1) as f64;
+    let rows = problem.rows().max(1) as f64;
     // The three coordinates of a position make one distance. The orientation of a pose has no mm: there rows are taken
     // alike.
-    let per = task.rows_per_observation();
+    let per = problem.rows_per_observation();
     let lengths = if per == 3 { 3.0 } else { 1.0 };
     let curve = estimate
         .trace
@@ -464,9 +474,9 @@ fn judged(case: &Prepared, task: &Calibration, per_mm: f64, estimate: Estimate, 
             rmse: (lengths * 2.0 * i.row_cost.unwrap_or(i.cost).max(0.0) / rows).sqrt() / per_mm,
         })
         .collect();
-    let tolerances = Tolerance::default().priors(task.parameters_list(), task.start());
-    let farthest = task
-        .parameters_list()
+    let tolerances = Tolerance::default().priors(problem.free_parameters(), problem.start());
+    let farthest = problem
+        .free_parameters()
         .iter()
         .zip(&estimate.x)
         .zip(&tolerances)
@@ -493,17 +503,17 @@ fn parameters_of(case: &Prepared, result: &MethodResult) -> Option<ParameterTabl
         return None;
     }
     let outcome = result.outcomes.first()?;
-    let (task, parameters, _) = task_of(case, result.solver, result.treatment);
-    let readings = task.rows().saturating_sub(parameters.len()).max(1) as f64;
+    let (problem, parameters, _) = problem_of(case, result.solver, result.treatment);
+    let readings = problem.rows().saturating_sub(parameters.len()).max(1) as f64;
     let variance = match result.treatment {
         // Rows as printed are not weighed: their spread is what the fit left.
-        Treatment::Printed => 2.0 * task.row_cost(&outcome.x) / readings,
+        Treatment::Printed => 2.0 * problem.row_cost(&outcome.x) / readings,
         Treatment::Sound => 1.0,
     };
-    Some(parameter_table(&result.method, &task, &parameters, &outcome.x, variance))
+    Some(parameter_table(&result.method, &problem, &parameters, &outcome.x, variance))
 }
 
-fn noise_floor(observed: &Observed, case: &Prepared, sensor_sigma_mm: f64) -> Option<f64> {
+fn noise_floor(observed: &Observations, case: &Prepared, sensor_sigma_mm: f64) -> Option<f64> {
     if let Some(floor) = split::noise_floor(&observed.dataset) {
         return Some(floor.sigma_mm);
     }

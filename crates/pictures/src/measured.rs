@@ -31,8 +31,8 @@ use truegrind_arm::estimated::Estimated;
 use truegrind_arm::model::Model;
 use truegrind_calibration::diagnosis::diagnose::Diagnosed;
 use truegrind_calibration::identification::calibration::Frames;
-use truegrind_calibration::identification::fit::{Observed, errors_on};
-use truegrind_calibration::identification::identify::{Identification, observe};
+use truegrind_calibration::identification::fit::{Observations, errors_on};
+use truegrind_calibration::identification::identify::{Identification, prepare_observations};
 use truegrind_calibration::identification::rounding::logged_covariance;
 use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row};
 use truegrind_math::se3::Pose;
@@ -62,9 +62,9 @@ pub fn dataset_recording(
 ) -> Result<Recording, VisualError> {
     let estimated: &Estimated = &found.estimated;
     let observed = if found.readout_fusion.is_ok() {
-        observe(dataset, &estimated.nominal, true).0
+        prepare_observations(dataset, &estimated.nominal, true).0
     } else {
-        Observed { dataset: dataset.clone(), angles: logged_covariance(dataset) }
+        Observations { dataset: dataset.clone(), angles: logged_covariance(dataset) }
     };
     let left = |stage: &str, model: &Model, frames: &Frames| Residuals {
         stage: stage.to_owned(),

@@ -253,7 +253,7 @@ pub(super) fn promise(benefit: Option<&Benefit>) -> Vec<KeyFigure> {
         KeyFigure::new("Programs before", benefit.nominal_mm, 3, "mm")
             .note("expected RMS inside the measured region, apart from where base and flange are placed"),
         KeyFigure::new("Programs after", benefit.estimated_mm, 3, "mm")
-            .note(format!("expected RMS; better with a probability of {}", percent_of(benefit.chance))),
+            .note(format!("expected RMS; better with a probability of {}", percent_of(benefit.probability))),
     ]
 }
 

@@ -111,7 +111,7 @@ pub fn json(rows: &[MethodRow], robot: &str, dataset: &Dataset) -> Value {
             };
             json!({
                 "method": row.solver.map(|s| s.name),
-                "literal": row.solver.map(|s| s.literal),
+                "literal": row.solver.map(|s| s.as_printed),
                 "held_out": {
                     "rmse_mm": over(|s| s.rmse),
                     "mean_absolute_mm": over(|s| s.mean_absolute),
@@ -176,7 +176,7 @@ fn notes(rows: &[MethodRow]) -> Vec<String> {
             .to_owned(),
     ]);
     let literal: Vec<&str> =
-        rows.iter().filter(|row| row.solver.is_some_and(|s| s.literal)).map(name).collect();
+        rows.iter().filter(|row| row.solver.is_some_and(|s| s.as_printed)).map(name).collect();
     if !literal.is_empty() {
         notes.push(format!(
             "{} as the paper prints: fixed μ = 5, no scaling, no priors. What the data cannot see moves freely, so \

@@ -85,7 +85,7 @@ impl Smooth {
         let v = [u[0], u[1], u[2]];
         let mut out = Vec::with_capacity(JOINTS * self.centres_rad.len());
         for centre in &self.centres_rad {
-            let bump: f64 = radial::bump(&v, centre, self.reach_rad);
+            let bump: f64 = radial::wendland(&v, centre, self.reach_rad);
             for joint in 0..JOINTS {
                 let mut turn = Joints::zeros();
                 turn[joint] = bump;
@@ -105,7 +105,7 @@ impl Smooth {
     pub(super) fn add_offset<R: Real>(&self, u: &[R; 6], out: &mut [R; 6]) {
         let v = [u[0], u[1], u[2]];
         for (centre, weights) in self.centres_rad.iter().zip(&self.weights_rad) {
-            let bump = radial::bump(&v, centre, self.reach_rad);
+            let bump = radial::wendland(&v, centre, self.reach_rad);
             for joint in 0..JOINTS {
                 out[joint] += bump.splat(weights[joint]) * bump;
             }
@@ -116,7 +116,7 @@ impl Smooth {
     pub(super) fn add_jacobian_product<R: Real>(&self, u: &[R; 6], step: &[R; 6], out: &mut [R; 6]) {
         let (v, along) = ([u[0], u[1], u[2]], [step[0], step[1], step[2]]);
         for (centre, weights) in self.centres_rad.iter().zip(&self.weights_rad) {
-            let slope = radial::slope_along(&v, centre, self.reach_rad, &along);
+            let slope = radial::wendland_slope(&v, centre, self.reach_rad, &along);
             for joint in 0..JOINTS {
                 out[joint] += slope.splat(weights[joint]) * slope;
             }

@@ -343,7 +343,7 @@ impl Search<'_, '_> {
         let arm = &self.inverse.arm;
         let jacobian =
             newton::scaled_jacobian(arm, root, self.inverse.kernel.length_mm) * arm.rotation_slopes(root);
-        let Some(svd) = spectral::decomposed(&jacobian, true) else { return };
+        let Some(svd) = spectral::svd(&jacobian, true) else { return };
         let Some(directions) = svd.v_t else { return };
         for k in (0..6).filter(|&k| svd.singular_values[k] < NEARLY_SINGULAR) {
             let direction = directions.row(k).transpose();

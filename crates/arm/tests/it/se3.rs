@@ -3,8 +3,8 @@
 use nalgebra::{Matrix3, UnitQuaternion, Vector3, Vector6};
 use truegrind_math::difference::jacobian;
 use truegrind_math::se3::{
-    Pose, difference, left_jacobian, left_jacobian_inverse, moved, pose_from_vector, rotation_from_matrix,
-    skew, vector_from_pose,
+    Pose, apply_twist, difference, left_jacobian, left_jacobian_inverse, pose_from_vector,
+    rotation_from_matrix, skew, vector_from_pose,
 };
 
 use super::arms::{even, generator};
@@ -22,7 +22,7 @@ fn moving_by_the_difference_arrives() {
     let mut random = generator(21);
     for _ in 0..1000 {
         let (from, to) = (pose(&mut random), pose(&mut random));
-        let error = difference(&moved(&from, &difference(&from, &to)), &to);
+        let error = difference(&apply_twist(&from, &difference(&from, &to)), &to);
         assert!(error.fixed_rows::<3>(0).amax() < 1e-12 * 2000.0 && error.fixed_rows::<3>(3).amax() < 1e-14);
     }
 }
@@ -34,7 +34,7 @@ fn the_difference_after_a_move_is_the_move() {
         let from = pose(&mut random);
         let (shift, turn) = (vector(&mut random, 10.0), vector(&mut random, 1.7));
         let twist = Vector6::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z);
-        assert!((difference(&from, &moved(&from, &twist)) - twist).amax() < 1e-12);
+        assert!((difference(&from, &apply_twist(&from, &twist)) - twist).amax() < 1e-12);
     }
 }
 

@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
-use truegrind_math::work::{Cancelled, Watch, checkpoint, tell, watched};
+use truegrind_math::work::{Cancelled, Watch, checkpoint, report_step, run_watched};
 
 /// Whatever nests threads below the work, each of them knows the watch, and all of them end.
 #[test]
@@ -17,7 +17,7 @@ fn what_runs_in_parallel_is_called_off_as_a_whole() {
             std::thread::sleep(Duration::from_millis(30));
             caller.cancel();
         });
-        let ended = watched(&watch, Some(threads), || {
+        let ended = run_watched(&watch, Some(threads), || {
             (0..64).into_par_iter().for_each(|_| {
                 (0..64).into_par_iter().for_each(|_| {
                     for _ in 0..100 {
@@ -37,10 +37,10 @@ fn what_runs_in_parallel_is_called_off_as_a_whole() {
 fn steps_are_told_in_their_order() {
     let told = Arc::new(Mutex::new(Vec::new()));
     let listener = told.clone();
-    let watch = Arc::new(Watch::telling(move |step| listener.lock().unwrap().push(step.to_owned())));
-    let done = watched(&watch, Some(1), || {
-        tell("first");
-        tell("second");
+    let watch = Arc::new(Watch::with_listener(move |step| listener.lock().unwrap().push(step.to_owned())));
+    let done = run_watched(&watch, Some(1), || {
+        report_step("first");
+        report_step("second");
         7
     });
     assert_eq!(done.unwrap(), Ok(7));
@@ -51,7 +51,7 @@ fn steps_are_told_in_their_order() {
 #[test]
 fn outside_a_watch_nothing_happens() {
     checkpoint();
-    tell("nobody hears this");
+    report_step("nobody hears this");
     let watch = Arc::new(Watch::default());
     watch.cancel();
     checkpoint();
@@ -61,5 +61,5 @@ fn outside_a_watch_nothing_happens() {
 #[test]
 #[should_panic(expected = "a defect")]
 fn a_panic_is_no_cancelling() {
-    let _ = watched(&Arc::new(Watch::default()), Some(1), || panic!("a defect"));
+    let _ = run_watched(&Arc::new(Watch::default()), Some(1), || panic!("a defect"));
 }

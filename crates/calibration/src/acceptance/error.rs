@@ -3,7 +3,7 @@
 use thiserror::Error;
 
 use super::decision::FEWEST_POSES;
-use crate::identification::start::NoStart;
+use crate::identification::start::StartError;
 use crate::measurement::dataset::PathPoint;
 
 /// Why nothing can be said at all.
@@ -59,5 +59,5 @@ pub enum AcceptError {
     },
     /// The frames cannot be found.
     #[error(transparent)]
-    NoStart(#[from] NoStart),
+    StartError(#[from] StartError),
 }

@@ -5,7 +5,7 @@ use truegrind_math::statistics::ErrorSummary;
 
 use super::decision::{Decision, Uncertainty};
 use crate::identification::calibration::Frames;
-use crate::identification::fit::Observed;
+use crate::identification::fit::Observations;
 use crate::measurement::dataset::Reading;
 
 /// What was found of the orientation. Errors are the angle of the turn between where the target was seen and where the arm says it is.
@@ -29,7 +29,7 @@ pub struct Orientation {
 
 /// The error of each of these rows (rad); `None` where a reading has no orientation.
 pub(super) fn errors(
-    observed: &Observed,
+    observed: &Observations,
     rows: &[usize],
     model: &Model,
     frames: &Frames,

@@ -24,7 +24,7 @@ use truegrind_math::statistics::{ErrorSummary, largest};
 
 use super::error::AcceptError;
 use crate::identification::calibration::Frames;
-use crate::identification::fit::Observed;
+use crate::identification::fit::Observations;
 use crate::measurement::dataset::Reading;
 
 /// Cycles of a path for path accuracy and repeatability (ISO 9283).
@@ -64,7 +64,7 @@ type Cycles = BTreeMap<u32, BTreeMap<u32, usize>>;
 
 /// Every path of the rows, in the order in which they come.
 pub(super) fn found(
-    observed: &Observed,
+    observed: &Observations,
     model: &Model,
     frames: &Frames,
 ) -> Result<Vec<PathFound>, AcceptError> {
@@ -87,7 +87,7 @@ pub(super) fn found(
     Ok(names.iter().zip(&paths).map(|(name, cycles)| one(name, cycles, observed, model, frames)).collect())
 }
 
-fn one(name: &str, cycles: &Cycles, observed: &Observed, model: &Model, frames: &Frames) -> PathFound {
+fn one(name: &str, cycles: &Cycles, observed: &Observations, model: &Model, frames: &Frames) -> PathFound {
     let all: BTreeSet<u32> = cycles.values().flat_map(BTreeMap::keys).copied().collect();
     let shared: Vec<u32> =
         all.iter().copied().filter(|sample| cycles.values().all(|rows| rows.contains_key(sample))).collect();
@@ -180,7 +180,7 @@ fn passing(path: &[Place], near: Range<usize>, point: &Place, along: &Place) -> 
 }
 
 /// Where a row saw the target, in the base (mm).
-pub(super) fn seen(observed: &Observed, row: usize, base_from_sensor: &Pose) -> Option<Vector3<f64>> {
+pub(super) fn seen(observed: &Observations, row: usize, base_from_sensor: &Pose) -> Option<Vector3<f64>> {
     let place = match &observed.dataset.rows[row].reading {
         Reading::Cable(_) => return None,
         Reading::Position(place) => *place,

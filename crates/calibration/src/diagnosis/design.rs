@@ -16,7 +16,7 @@ use rayon::prelude::*;
 use super::algebra::{finite, gram, lower_factor, outer, product, product_of_transposed, solved};
 use super::correlated::filter;
 use super::extension::{Extended, Subject};
-use crate::identification::calibration::Calibration;
+use crate::identification::calibration::CalibrationProblem;
 use crate::measurement::dataset::{Reading, Sensor};
 use crate::measurement::sensor::disturbance::sag_mm;
 use crate::measurement::split;
@@ -124,9 +124,9 @@ impl Linear {
     /// Linearises a fit at its estimate.
     pub fn of(subject: &Subject<'_>, fit: &Extended) -> Self {
         let dataset = &subject.observed.dataset;
-        let per = fit.task.rows_per_observation();
-        let rows = fit.task.rows();
-        let (residual, transposed) = linearised(&fit.task, &fit.x);
+        let per = fit.problem.rows_per_observation();
+        let rows = fit.problem.rows();
+        let (residual, transposed) = linearised(&fit.problem, &fit.x);
         let precision: Vec<f64> = fit.priors.iter().map(|prior| prior.sigma.powi(-2)).collect();
         let mut gradient = &transposed * &residual;
         for (k, precision) in precision.iter().enumerate() {
@@ -157,8 +157,8 @@ impl Linear {
                 per_rad: w.per_rad * t.sqrt(),
             })
             .collect();
-        let task = fit.task.beside(dataset, &fit.model, &fit.frames, &probes, &weights);
-        let slopes = linearised(&task, &vec![0.0; probes.len()]).1;
+        let problem = fit.problem.with_parameters(dataset, &fit.model, &fit.frames, &probes, &weights);
+        let slopes = linearised(&problem, &vec![0.0; probes.len()]).1;
         let column = |k: usize| slopes.row(k).transpose();
         let mut by_growth = DVector::zeros(rows);
         for (joint, link) in fit.model.links.iter().enumerate() {
@@ -515,9 +515,9 @@ impl Design {
 /// Columns from which a product of matrices is worth packing the basis.
 const MANY: usize = 8;
 
-/// Whitened residuals of a task at `x` and its Jacobian transposed, p × n; what is no number counts as 0.
-fn linearised(task: &Calibration, x: &[f64]) -> (DVector<f64>, DMatrix<f64>) {
-    let (mut residual, mut rows) = task.linearised(x);
+/// Whitened residuals of a problem at `x` and its Jacobian transposed, p × n; what is no number counts as 0.
+fn linearised(problem: &CalibrationProblem, x: &[f64]) -> (DVector<f64>, DMatrix<f64>) {
+    let (mut residual, mut rows) = problem.linearise(x);
     residual.apply(|v| *v = finite(*v));
     rows.apply(|v| *v = finite(*v));
     (residual, rows)

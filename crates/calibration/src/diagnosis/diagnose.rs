@@ -19,13 +19,13 @@ use super::validation::{StageError, nominal};
 use super::written::{kept, wandered, written};
 use crate::identification::benefit::{Benefit, benefit};
 use crate::identification::calibration::Frames;
-use crate::identification::fit::{Fitted, Observed, frame_parameters};
+use crate::identification::fit::{Fitted, Observations, frame_parameters};
 use crate::identification::identify::{
     arm_covariance, arm_of, mean_condition, parameter_table, sensor_name, with_sigma_in_region,
 };
-use crate::identification::start::different_poses;
+use crate::identification::start::count_distinct_poses;
 use crate::identification::tolerance::Tolerance;
-use crate::identification::verdict::{Hearing, Limits};
+use crate::identification::verdict::{Limits, VerdictBuilder};
 use crate::measurement::dataset::{Dataset, Sensor};
 use crate::measurement::split;
 use truegrind_arm::estimated::{Estimated, EstimatedParameter, Judgement, Provenance, StageErrors, Verdict};
@@ -103,7 +103,7 @@ pub fn diagnose(
             "{} rows at {} different poses are too few to tell effects from geometry: at least {needed} poses are needed, some hundred are \
              usual; what is said here rests on the priors",
             dataset.rows.len(),
-            different_poses(dataset, usize::MAX)
+            count_distinct_poses(dataset, usize::MAX)
         ));
     }
     notes.append(&mut search.notes);
@@ -272,7 +272,7 @@ fn summed_up(
 const SEARCHED: usize = 9_000;
 
 /// Rows of a very long data set, drawn by their angles; `None` for one that is searched whole.
-fn thinned(observed: &Observed) -> Option<Observed> {
+fn thinned(observed: &Observations) -> Option<Observations> {
     let dataset = &observed.dataset;
     let per = match dataset.sensor {
         Sensor::Cable => 1,
@@ -299,7 +299,7 @@ fn scarce(dataset: &Dataset, nominal: &Model) -> Option<usize> {
     };
     let parameters = arm_parameters(nominal).len() + frame_parameters(dataset).len();
     let needed = (3 * parameters).div_ceil(2 * per) + 10;
-    (different_poses(dataset, needed) < needed).then_some(needed)
+    (count_distinct_poses(dataset, needed) < needed).then_some(needed)
 }
 
 fn stage(errors: &StageError) -> Stage {
@@ -357,7 +357,7 @@ fn estimated(
     let rows = &subject.observed.dataset;
     // Links and what the model promises are held against the tolerance of arms, not against the wide priors of a diagnosis.
     let plausible = Tolerance::default();
-    let benefit = benefit(fitted, rows, &estimated, &plausible, lack(fitted, rows, &stages[2]));
+    let benefit = benefit(fitted, rows, &estimated, &plausible, variance_inflation(fitted, rows, &stages[2]));
     let parameters = parameter_table(fitted, nominal_arm);
     estimated.verdict = judge(fitted, rows.sensor, benefit.as_ref(), &parameters, stages, &options.limits);
     (estimated, benefit)
@@ -372,23 +372,23 @@ fn judge(
     stages: &[StageError; 3],
     limits: &Limits,
 ) -> Verdict {
-    let mut hearing = Hearing::default();
+    let mut verdict = VerdictBuilder::default();
     if fitted.termination().is_converged() {
-        hearing.tell("the fit converged");
+        verdict.note("the fit converged");
     } else {
-        hearing.fail(format!("the fit did not converge: {}", fitted.termination()));
+        verdict.fail(format!("the fit did not converge: {}", fitted.termination()));
     }
     if stages[2].blocks.rmse > stages[1].blocks.rmse * 1.05 && stages[2].random.rmse > stages[1].random.rmse {
-        hearing.fail(format!(
+        verdict.fail(format!(
             "with the findings the held-out error is {:.3} mm, geometry alone has {:.3}",
             stages[2].random.rmse, stages[1].random.rmse
         ));
     }
-    hearing.strange_links(parameters, &Tolerance::default(), SURE);
-    hearing.held_out(stages[0].random.rmse, stages[2].random.rmse);
-    hearing.benefit(benefit, sensor);
-    hearing.limits(limits, &stages[2].random);
-    hearing.verdict()
+    verdict.check_links(parameters, &Tolerance::default(), SURE);
+    verdict.check_held_out(stages[0].random.rmse, stages[2].random.rmse);
+    verdict.check_benefit(benefit, sensor);
+    verdict.check_limits(limits, &stages[2].random);
+    verdict.build()
 }
 
 /// With its wide priors a link that the rows hardly see is believed off only beyond this many standard deviations.
@@ -396,12 +396,12 @@ const SURE: f64 = 2.0;
 
 /// How many times larger than it should be the square of the held-out error is: with k parameters determined by n readings
 /// it is (n + k) / (n − k) times that of the fit.
-fn lack(fitted: &Fitted, dataset: &Dataset, errors: &StageError) -> f64 {
-    let per = fitted.task.rows_per_observation();
+fn variance_inflation(fitted: &Fitted, dataset: &Dataset, errors: &StageError) -> f64 {
+    let per = fitted.problem.rows_per_observation();
     let n = (dataset.rows.len() * per) as f64;
     let shares = fitted.sigmas().into_iter().zip(&fitted.priors);
     let spent: f64 = shares.map(|(s, p)| (1.0 - (s / p.sigma).powi(2)).clamp(0.0, 1.0)).sum();
     let expected = (n + spent) / (n - spent).max(0.05 * n).max(1.0);
-    let lack = (errors.random.rmse / errors.fitted.rmse).powi(2) / expected;
-    if lack.is_finite() { lack.max(1.0) } else { 1.0 }
+    let variance_inflation = (errors.random.rmse / errors.fitted.rmse).powi(2) / expected;
+    if variance_inflation.is_finite() { variance_inflation.max(1.0) } else { 1.0 }
 }

@@ -13,8 +13,8 @@ use std::ops::Range;
 use super::cause::Cause;
 use super::newton::{self, Step};
 use super::repeated::Repeated;
-use crate::identification::calibration::{Calibration, Frames, Weight};
-use crate::identification::fit::{Fitted, Observed, frame_parameters};
+use crate::identification::calibration::{CalibrationProblem, Frames, Weight};
+use crate::identification::fit::{Fitted, Observations, frame_parameters};
 use crate::identification::rounding;
 use crate::identification::tolerance::Tolerance;
 use crate::measurement::dataset::Sensor;
@@ -31,7 +31,7 @@ use truegrind_math::statistics::median;
 #[derive(Debug, Clone, Copy)]
 pub struct Subject<'a> {
     /// The rows.
-    pub observed: &'a Observed,
+    pub observed: &'a Observations,
     /// The data sheet's arm.
     pub nominal: &'a Model,
     /// Starting frames, without disturbances.
@@ -58,8 +58,8 @@ pub struct Extended {
     pub parameters: Vec<Parameter>,
     /// Their priors.
     pub priors: Vec<Prior>,
-    /// The task, with robust weights.
-    pub task: Calibration,
+    /// The problem, with robust weights.
+    pub problem: CalibrationProblem,
     /// The estimate, in deviations from the start.
     pub x: Vec<f64>,
     /// The arm.
@@ -213,17 +213,17 @@ pub(super) fn warm_fit(
     let mut round = 0;
     let unweighted = vec![Weight { per_mm: 1.0, per_rad: 1.0 }; n];
     let plain_task =
-        Calibration::new(dataset, &start_model, &start_frames, &parameters, &priors, &unweighted);
+        CalibrationProblem::new(dataset, &start_model, &start_frames, &parameters, &priors, &unweighted);
     let (mut model, mut frames) = plain_task.apply(&x);
     let mut nearby = near.is_some() && freedom == Freedom::All;
     loop {
         round += 1;
         let base = rounding::weights(dataset, &model, &frames, &observed.angles, sigma.0, sigma.1);
-        let task = plain_task.reweighted(&with_robust_weights(&base, &robust_weight));
-        let gone = Gone::one(&task, &mut x, nearby, near.is_some());
+        let problem = plain_task.reweighted(&with_robust_weights(&base, &robust_weight));
+        let gone = Gone::one(&problem, &mut x, nearby, near.is_some());
         nearby = matches!(gone, Gone::Step(_));
-        (model, frames) = task.apply(&x);
-        let plain = task.plain_residuals(&x);
+        (model, frames) = problem.apply(&x);
+        let plain = problem.unweighted_residuals(&x);
         let whitened = Whitened { base: &base, plain: &plain, per, repeated: repeated.as_ref() };
         let of_lengths = whitened.spread(0..lengths);
         let of_angles = if angles > 0 { whitened.spread(lengths..per) } else { 1.0 };
@@ -245,9 +245,9 @@ pub(super) fn warm_fit(
                     per_rad: (w.per_rad / angle).min(FINEST.1.recip()),
                 })
                 .collect();
-            let task = plain_task.reweighted(&with_robust_weights(&weights, &robust_weight));
-            let estimate = descended(&task, &priors, x, nearby);
-            let (model, frames) = task.apply(&estimate.x);
+            let problem = plain_task.reweighted(&with_robust_weights(&weights, &robust_weight));
+            let estimate = descended(&problem, &priors, x, nearby);
+            let (model, frames) = problem.apply(&estimate.x);
             return Extended {
                 causes: filled(causes, &model, &frames),
                 parameters,
@@ -261,7 +261,7 @@ pub(super) fn warm_fit(
                 witnesses,
                 sigma,
                 estimate,
-                task,
+                problem,
             };
         }
         robust_weight = next;
@@ -279,14 +279,14 @@ enum Gone {
 
 impl Gone {
     /// Goes on by one step where the optimum is nearby and that is taken, else by a few.
-    fn one(task: &Calibration, x: &mut Vec<f64>, nearby: bool, near: bool) -> Self {
-        if nearby && let Some(step) = Step::taken(task, x) {
+    fn one(problem: &CalibrationProblem, x: &mut Vec<f64>, nearby: bool, near: bool) -> Self {
+        if nearby && let Some(step) = Step::taken(problem, x) {
             return Self::Step(step);
         }
         // Weights still change: what is beyond a few steps would be thrown away.
         let steps = if near { 1 } else { 3 };
         let rough = lm::Options { max_iterations: steps, cost_tolerance: 1e-4, ..lm::Options::default() };
-        let estimate = lm::solve(task, x, &rough);
+        let estimate = lm::solve(problem, x, &rough);
         x.clone_from(&estimate.x);
         Self::Solved(estimate.covariance)
     }
@@ -384,11 +384,11 @@ impl Whitened<'_> {
 }
 
 /// The end of a fit under weights that stay.
-fn descended(task: &Calibration, priors: &[Prior], mut x: Vec<f64>, nearby: bool) -> Estimate {
-    if nearby && newton::descend_to(task, &mut x, SEARCHED) {
+fn descended(problem: &CalibrationProblem, priors: &[Prior], mut x: Vec<f64>, nearby: bool) -> Estimate {
+    if nearby && newton::descend_to(problem, &mut x, SEARCHED) {
         return Estimate {
             covariance: None,
-            cost: task.row_cost(&x) + prior_cost(priors, &x),
+            cost: problem.row_cost(&x) + prior_cost(priors, &x),
             evaluations: Evaluations::default(),
             termination: Termination::Cost,
             trace: Vec::new(),
@@ -398,9 +398,9 @@ fn descended(task: &Calibration, priors: &[Prior], mut x: Vec<f64>, nearby: bool
     if nearby {
         // A promise is held against the cost, half the rows: the same as above.
         let loose = lm::Options { cost_tolerance: 2.0 * SEARCHED, ..lm::Options::default() };
-        return Estimate { covariance: None, ..lm::solve(task, &x, &loose) };
+        return Estimate { covariance: None, ..lm::solve(problem, &x, &loose) };
     }
-    lm::solve(task, &x, &lm::Options::default())
+    lm::solve(problem, &x, &lm::Options::default())
 }
 
 /// The sensor's σ after the spread of whole residuals turned out `spread` times what σ and the angles' share promised.
@@ -446,11 +446,11 @@ impl Extended {
             return self;
         }
         let p = self.parameters.len() as f64;
-        let much = self.task.rows() as f64 * p * p > MUCH_WORK;
+        let much = self.problem.rows() as f64 * p * p > MUCH_WORK;
         let tolerance = if much { FINE_ENOUGH } else { lm::Options::default().cost_tolerance };
         let options = lm::Options { cost_tolerance: tolerance, ..lm::Options::default() };
-        let estimate = lm::solve(&self.task, &self.x, &options);
-        let (model, frames) = self.task.apply(&estimate.x);
+        let estimate = lm::solve(&self.problem, &self.x, &options);
+        let (model, frames) = self.problem.apply(&estimate.x);
         let causes = filled(&self.causes, &model, &frames);
         Self { causes, x: estimate.x.clone(), model, frames, estimate, ..self }
     }
@@ -475,9 +475,9 @@ impl Extended {
         });
         let weights = with_robust_weights(&self.weights, &self.robust_weight);
         let dataset = &subject.observed.dataset;
-        let task = Calibration::new(dataset, &model, &frames, &parameters, &priors, &weights);
+        let problem = CalibrationProblem::new(dataset, &model, &frames, &parameters, &priors, &weights);
         let estimate = Estimate { x: x.clone(), covariance, ..self.estimate };
-        Self { parameters, priors, task, x, estimate, ..self }
+        Self { parameters, priors, problem, x, estimate, ..self }
     }
 
     /// Places in x of the parameters of cause `index`.
@@ -509,7 +509,7 @@ impl From<&Extended> for Fitted {
             frames: fit.frames.clone(),
             sigma_mm: fit.sigma.0,
             sigma_rad: fit.sigma.1,
-            task: fit.task.clone(),
+            problem: fit.problem.clone(),
             evaluations: fit.estimate.evaluations,
             rounds: vec![fit.estimate.trace.clone()],
         }

@@ -53,7 +53,7 @@ pub(super) fn beside(written: &Extended, with: Extended) -> Extended {
     }
     let x: Vec<f64> = from.iter().map(|from| from.map_or(0.0, |k| written.x[k])).collect();
     let missing = DVector::from_fn(x.len(), |k, _| with.x[k] - x[k]);
-    let (model, frames) = with.task.apply(&x);
+    let (model, frames) = with.problem.apply(&x);
     let mut estimate = with.estimate.clone();
     estimate.covariance = estimate.covariance.map(|own| own + &missing * missing.transpose());
     estimate.x.clone_from(&x);

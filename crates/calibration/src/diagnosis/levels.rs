@@ -108,9 +108,9 @@ fn levels(group: &[(&Disturbance, usize, usize)]) -> Vec<Disturbance> {
 
 /// Whether `told` describes the rows as well as `before` does, for the number of its parameters.
 pub fn as_good(told: &Extended, before: &Extended) -> bool {
-    let per = before.task.rows_per_observation();
+    let per = before.problem.rows_per_observation();
     let criterion = |fit: &Extended| {
-        let plain = fit.task.plain_residuals(&fit.x);
+        let plain = fit.problem.unweighted_residuals(&fit.x);
         let rows: f64 = plain
             .chunks(per)
             .zip(before.weights.iter().zip(&before.robust_weight))

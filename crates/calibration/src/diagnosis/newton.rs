@@ -4,7 +4,7 @@
 //! the cost. A step is judged by its cost alone, and no covariance is computed: one pass over the rows with derivatives and one
 //! without make a step.
 //!
-//! **Shapes.** x, m and g have p entries, N is p × p; priors are the task's own.
+//! **Shapes.** x, m and g have p entries, N is p × p; priors are the problem's own.
 //!
 //! **Stops.** Where a step promises less than 10⁻⁷ for each scalar row, in units of χ²/2, or where the fall from the step before
 //! to this one, to a twentieth at most, says so of all that would follow. Not at all where no length lowers the cost, or after eight
@@ -22,7 +22,7 @@ use super::algebra::{back_and_forth, factored, solved};
 use truegrind_estimation::objective::Objective;
 use truegrind_estimation::problem::Problem;
 
-/// Promise for each scalar row below which a task counts as solved.
+/// Promise for each scalar row below which a problem counts as solved.
 const NEAR: f64 = 1e-7;
 
 /// Most steps.
@@ -53,8 +53,8 @@ pub(super) struct Step {
 
 impl Step {
     /// Moves `x`; `None` where the cost would rise, or where N is not positive definite: `x` then stays.
-    pub(super) fn taken(task: &dyn Problem, x: &mut Vec<f64>) -> Option<Self> {
-        let mut objective = Objective::new(task, x, true);
+    pub(super) fn taken(problem: &dyn Problem, x: &mut Vec<f64>) -> Option<Self> {
+        let mut objective = Objective::new(problem, x, true);
         let normal = objective.normal_equations(x);
         let mut lower = normal.matrix;
         factored(&mut lower).then_some(())?;
@@ -70,7 +70,7 @@ impl Step {
             }
             length *= 0.5;
         }
-        (promise < NEAR * task.rows() as f64).then_some(Self { lower, promise, length: 0.0 })
+        (promise < NEAR * problem.rows() as f64).then_some(Self { lower, promise, length: 0.0 })
     }
 
     /// Variances of the parameters: the diagonal of N⁻¹.
@@ -81,16 +81,16 @@ impl Step {
 }
 
 /// Moves `x` to the optimum; `false` where that did not come about.
-pub fn descend(task: &dyn Problem, x: &mut Vec<f64>) -> bool {
-    descend_to(task, x, NEAR)
+pub fn descend(problem: &dyn Problem, x: &mut Vec<f64>) -> bool {
+    descend_to(problem, x, NEAR)
 }
 
 /// The same up to a promise of `near` for each scalar row.
-pub(super) fn descend_to(task: &dyn Problem, x: &mut Vec<f64>, near: f64) -> bool {
-    let enough = near * task.rows() as f64;
+pub(super) fn descend_to(problem: &dyn Problem, x: &mut Vec<f64>, near: f64) -> bool {
+    let enough = near * problem.rows() as f64;
     let mut last = f64::MIN_POSITIVE;
     for _ in 0..STEPS {
-        let Some(step) = Step::taken(task, x) else { return false };
+        let Some(step) = Step::taken(problem, x) else { return false };
         // What all further steps would promise, as far as the steps before this one tell.
         let share = if step.length < 1.0 { SLOW } else { (step.promise / last).clamp(STEADY, SLOW) };
         if step.promise < enough || share / (1.0 - share) * step.promise < enough {

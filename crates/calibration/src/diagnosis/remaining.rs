@@ -62,14 +62,14 @@ fn vectors(subject: &Subject<'_>, fit: &Extended) -> Vec<Vector3<f64>> {
         Sensor::Position => 3,
         Sensor::Pose => 6,
     };
-    let plain = fit.task.plain_residuals(&fit.x);
+    let plain = fit.problem.unweighted_residuals(&fit.x);
     fit.weights
         .iter()
         .enumerate()
         .map(|(i, w)| {
             Vector3::from_fn(|k, _| {
                 if k < per.min(3) {
-                    // Residuals are held with Huber's weight in the task; plain ones are in mm.
+                    // Residuals are held with Huber's weight in the problem; plain ones are in mm.
                     plain[i * per + k] * w.per_mm
                 } else {
                     0.0
@@ -128,7 +128,7 @@ fn reach(nu: f64, n: usize) -> f64 {
 /// Whether the noise grows with range.
 pub fn noise_model(subject: &Subject<'_>, fit: &Extended, set_aside: &[usize]) -> Option<NoiseModel> {
     let dataset = &subject.observed.dataset;
-    let plain = fit.task.errors_mm(&fit.x);
+    let plain = fit.problem.errors_mm(&fit.x);
     let coordinates = if dataset.sensor == Sensor::Cable { 1.0 } else { 3.0_f64.sqrt() };
     let pairs: Vec<(f64, f64)> = dataset
         .rows
@@ -230,5 +230,5 @@ pub fn structure(subject: &Subject<'_>, fit: &Extended, set_aside: &[usize]) -> 
 
 /// Median size of the rows' errors (mm), for words.
 pub fn typical_mm(fit: &Extended) -> f64 {
-    median(&fit.task.errors_mm(&fit.x).iter().map(|e| e.abs()).collect::<Vec<_>>()).unwrap_or(0.0)
+    median(&fit.problem.errors_mm(&fit.x).iter().map(|e| e.abs()).collect::<Vec<_>>()).unwrap_or(0.0)
 }

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use nalgebra::{Point3, Vector3};
 
 use super::halves::is_path;
-use crate::identification::fit::Observed;
+use crate::identification::fit::Observations;
 use crate::identification::rounding::{NotFused, ReadoutFusion, fuse_readout, logged_covariance};
 use crate::measurement::dataset::{Dataset, Motion};
 use truegrind_arm::condition::Condition;
@@ -67,9 +67,9 @@ pub fn mismatches(dataset: &Dataset, nominal: &Model) -> Mismatch {
 #[derive(Debug, Clone)]
 pub struct Prepared {
     /// The rows with what is known of their angles.
-    pub observed: Observed,
+    pub observed: Observations,
     /// The same without the use of the read-out.
-    pub logged: Observed,
+    pub logged: Observations,
     /// What sharpening brought, or why it was not done.
     pub readout_fusion: Result<ReadoutFusion, NotFused>,
     /// Contradicting rows.
@@ -92,7 +92,7 @@ pub fn prepare(dataset: &Dataset, nominal: &Model, fuse: bool) -> Prepared {
         }
     }
     fill_motion(&mut rows);
-    let logged = Observed { angles: logged_covariance(&rows), dataset: rows.clone() };
+    let logged = Observations { angles: logged_covariance(&rows), dataset: rows.clone() };
     let good: Vec<usize> =
         (0..rows.rows.len()).filter(|i| mismatch.rows.iter().all(|(m, _)| m != i)).collect();
     let mut kept = rows.subset(&good);

@@ -10,7 +10,7 @@
 //! `probability`), here for the arm itself.
 
 use super::extension::Extended;
-use crate::identification::benefit::{below, shape_weights};
+use crate::identification::benefit::{normal_cdf, shape_metric};
 use crate::identification::fit::Fitted;
 use truegrind_arm::condition::Condition;
 
@@ -25,11 +25,11 @@ pub(super) fn chance_worse(
     condition: &Condition,
     samples_deg: &[[f64; 6]],
 ) -> Option<f64> {
-    let weights = shape_weights(&Fitted::from(with), condition, samples_deg)?;
+    let weights = shape_metric(&Fitted::from(with), condition, samples_deg)?;
     let covariance = with.estimate.covariance.as_ref()?;
     let apart = nalgebra::DVector::from_fn(with.x.len(), |k, _| with.x[k] - without.x[k]);
     let along = &weights * &apart;
     let variance = along.dot(&(covariance * &along));
-    let chance = below(-0.5 * along.dot(&apart) / variance.sqrt());
+    let chance = normal_cdf(-0.5 * along.dot(&apart) / variance.sqrt());
     chance.is_finite().then_some(chance)
 }

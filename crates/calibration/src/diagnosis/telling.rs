@@ -98,7 +98,7 @@ pub(super) fn told(
 
 /// How far the farthest of some rows is off (mm).
 fn off_mm(fit: &Extended, rows: &[(usize, f64)]) -> f64 {
-    let errors = fit.task.errors_mm(&fit.x);
+    let errors = fit.problem.errors_mm(&fit.x);
     rows.iter().filter_map(|(i, _)| errors.get(*i)).map(|e| e.abs()).fold(0.0, f64::max)
 }
 

@@ -135,6 +135,6 @@ fn smallest_rad(scored: &Scored) -> Option<f64> {
     }
     let k = scaled.len();
     let per_peak = nalgebra::DMatrix::from_fn(k, k, |a, b| information[(a, b)] / (scaled[a] * scaled[b]));
-    let least = spectral::symmetric(per_peak)?.eigenvalues.min().max(1e-12);
+    let least = spectral::symmetric_eigen(per_peak)?.eigenvalues.min().max(1e-12);
     Some((VISIBLE / least).sqrt())
 }

@@ -11,8 +11,8 @@ use super::algebra::{back_and_forth, factored};
 use super::extension::{Extended, Freedom, Subject};
 use super::held::neither;
 use super::newton;
-use crate::identification::calibration::{Calibration, Weight};
-use crate::identification::fit::{Observed, errors_on};
+use crate::identification::calibration::{CalibrationProblem, Weight};
+use crate::identification::fit::{Observations, errors_on};
 use crate::identification::solver::SOLVERS;
 use crate::measurement::split::{self, Split};
 use truegrind_estimation::problem::{NormalEquations, Problem};
@@ -36,7 +36,7 @@ const MUCH_WORK: f64 = 1e9;
 #[derive(Debug, Clone)]
 pub struct Validation {
     kept: Vec<usize>,
-    rows: Observed,
+    rows: Observations,
     random: Vec<Split>,
     blocks: Vec<Split>,
 }
@@ -72,7 +72,7 @@ impl Validation {
     pub fn stage(&self, fit: &Extended) -> StageError {
         let fitted = ErrorSummary::of(errors_on(&self.rows, &fit.model, &fit.frames));
         let p = fit.parameters.len() as f64;
-        if fit.task.rows() as f64 * p * p > MUCH_WORK
+        if fit.problem.rows() as f64 * p * p > MUCH_WORK
             && let Some([random, blocks]) = self.by_steps(fit)
         {
             return StageError { fitted, random, blocks };
@@ -96,7 +96,7 @@ impl Validation {
         let p = fit.parameters.len();
         let rows_of = |rows: &[usize]| -> Option<NormalEquations> {
             let observations: Vec<usize> = rows.iter().map(|&k| self.kept[k]).collect();
-            Some(fit.task.thinned(&observations)?.normal_equations(&fit.x))
+            Some(fit.problem.subsample(&observations)?.normal_equations(&fit.x))
         };
         // The random folds share out all rows.
         let parts = self
@@ -113,7 +113,7 @@ impl Validation {
             factored(&mut normal).then_some(())?;
             let step = back_and_forth(&normal, &gradient)?;
             let x: Vec<f64> = fit.x.iter().zip(step.iter()).map(|(x, s)| x - s).collect();
-            let (model, frames) = fit.task.apply(&x);
+            let (model, frames) = fit.problem.apply(&x);
             Some(errors_on(&self.rows.subset(&split.test), &model, &frames))
         };
         let random = self
@@ -156,19 +156,19 @@ impl Validation {
             .map(|split| {
                 let train = self.rows.subset(&split.train);
                 let weights: Vec<Weight> = split.train.iter().map(|&i| start_weights[i]).collect();
-                let task = Calibration::new(
+                let problem = CalibrationProblem::new(
                     &train.dataset,
-                    fit.task.start(),
-                    fit.task.starting_frames(),
+                    fit.problem.start(),
+                    fit.problem.starting_frames(),
                     &fit.parameters,
                     &fit.priors,
                     &weights,
                 );
                 let mut x = fit.x.clone();
-                if !newton::descend(&task, &mut x) {
-                    x = SOLVERS[0].solve(&task, &x, 0).x;
+                if !newton::descend(&problem, &mut x) {
+                    x = SOLVERS[0].solve(&problem, &x, 0).x;
                 }
-                let (model, frames) = task.apply(&x);
+                let (model, frames) = problem.apply(&x);
                 errors_on(&self.rows.subset(&split.test), &model, &frames)
             })
             .collect();

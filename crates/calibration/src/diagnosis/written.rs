@@ -10,7 +10,7 @@ use super::cause::Cause;
 use super::design::Linear;
 use super::discrepancy::Discrepancy;
 use super::extension::{Extended, Freedom, Subject, filled, fit};
-use crate::identification::prior_width::learned;
+use crate::identification::prior_width::learn_tolerance;
 use crate::identification::tolerance::Tolerance;
 use crate::measurement::sensor::disturbance::Kind;
 use truegrind_arm::parameter::Parameter;
@@ -44,7 +44,7 @@ pub(super) fn written(
     let kept = if causes == extended.causes { extended.clone() } else { refit(subject, causes, extended) };
     let wide = subject.tolerance;
     let catalogue = Tolerance { frame_mm: wide.frame_mm, frame_rad: wide.frame_rad, ..Tolerance::default() };
-    let tolerance = learned(&catalogue, &kept.parameters, &kept.priors, &kept.estimate);
+    let tolerance = learn_tolerance(&catalogue, &kept.parameters, &kept.priors, &kept.estimate);
     let held = refit(&Subject { tolerance: &tolerance, ..*subject }, &kept.causes, &kept);
     let written = wandered.and_then(|wandered| beside(subject, &held, wandered)).unwrap_or(held);
     written.whole(&Subject { tolerance: &tolerance, ..*subject })
@@ -77,7 +77,7 @@ fn beside(subject: &Subject<'_>, fit: &Extended, wandered: &Discrepancy) -> Opti
     if !x.iter().all(|v| v.is_finite()) || (0..x.len()).any(strayed) {
         return None;
     }
-    let (model, frames) = fit.task.apply(&x);
+    let (model, frames) = fit.problem.apply(&x);
     let mut out = fit.clone();
     out.estimate.x.clone_from(&x);
     out.estimate.covariance = Some(covariance);

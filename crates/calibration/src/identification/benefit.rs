@@ -1,23 +1,24 @@
-//! Whether an estimated arm will serve programs better than the data sheet: the benefit that its own data predict.
+//! Posterior probability that the estimated arm corrects programs better than the nominal one: Bayesian model averaging
+//! over prior widths, noise levels and a sensor scale error.
 //!
-//! A small held-out error is no proof. A sensor that reads everything too long is held out just as well, and a fit of few
-//! noisy rows follows their noise. So what the fit found is judged against what else could have made the same readings:
+//! A small held-out error proves nothing: a sensor scale error is the same in held-out rows, and a fit of few noisy rows
+//! follows their noise. The estimate is therefore compared with alternative models of the same readings:
 //!
-//! - arms nearer to their data sheet than the prior allows, with more noise: the width of lengths and angles and the
-//!   sensor's σ are no numbers here but grids, weighed by evidence;
-//! - a sensor whose scale is off, beside any such arm.
+//! - narrower priors and more noise: prior widths of lengths and angles and the sensor's σ run over grids, each grid point
+//!   weighted by its evidence (marginal likelihood);
+//! - each of these with a scale error of the sensor as a further parameter.
 //!
-//! With x̂ what is written and x the arm as these rivals believe it, a point that rides on the flange moves by J x̂ where it
-//! should move by J x. Against the arm of the data sheet that is worth
+//! Let x̂ be the estimate and x the deviations of the actual arm. A point fixed to the flange is corrected by J x̂ where J x is
+//! required. The reduction of its squared error relative to the nominal arm is
 //!
-//! |J x|² − |J (x − x̂)|² = 2 x̂ᵀM x − x̂ᵀM x̂,  M = mean of Jᵀ J over poses of the measured region,
+//! |J x|² − |J (x − x̂)|² = 2 x̂ᵀM x − x̂ᵀM x̂,  M = mean of Jᵀ J over poses of the measured region.
 //!
-//! which is linear in x: under each rival it has a normal distribution, and their mixture says how likely it is above zero.
-//! J is taken apart from motions of the base and of the point on the flange, which the data do not see and which placing
-//! the part takes care of.
+//! It is linear in x, hence normal under each model; the mixture gives the probability that it is positive. Rigid motions of
+//! the base and of the point on the flange are projected out of J: the data do not determine them, and they are absorbed
+//! when the part is placed.
 //!
-//! Everything is linear about the estimate, from one pass over the rows: normal equations with the scale's column beside
-//! them. Evidence of linear models with normal priors as in any text (Bishop 2006, section 3.5).
+//! All models share one linearisation at the estimate: the normal equations with a column for the scale. Evidence of linear
+//! models with normal priors: Bishop 2006, section 3.5.
 //! Checked against: simulated arms at fresh poses (tests, and the sweep in `benches/verdict.rs`).
 
 use faer::dyn_stack::{MemBuffer, MemStack};
@@ -27,8 +28,8 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector3};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::identification::calibration::Calibration;
-use crate::identification::fit::{Fitted, Observed};
+use crate::identification::calibration::CalibrationProblem;
+use crate::identification::fit::{Fitted, Observations};
 use crate::identification::rounding;
 use crate::identification::tolerance::Tolerance;
 use crate::measurement::dataset::{Dataset, Reading, Sensor};
@@ -43,7 +44,7 @@ use truegrind_math::se3::{Pose, vector_from_pose};
 use truegrind_math::tail::normal_two_sided;
 use truegrind_math::work::checkpoint;
 
-/// What a model promises inside its measured region, apart from where base and flange are placed.
+/// Expected benefit of a model inside its measured region, rigid motions of base and flange excluded.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Benefit {
     /// Expected RMS position error of the data sheet's arm (mm).
@@ -51,10 +52,12 @@ pub struct Benefit {
     /// Expected RMS position error of the estimated arm (mm).
     pub estimated_mm: f64,
     /// Probability that the estimated arm is the better one.
-    pub chance: f64,
-    /// The same if the sensor's scale were known to be right.
-    pub chance_without_scale: f64,
-    /// The sensor's scale as the rival that has one finds it; absent where the fit held one itself.
+    #[serde(rename = "chance")]
+    pub probability: f64,
+    /// The same under the models without a scale error.
+    #[serde(rename = "chance_without_scale")]
+    pub probability_without_scale: f64,
+    /// The scale error under the models that have one; absent where the fit itself had a scale parameter.
     pub scale: Option<ScaleError>,
     /// Scalar readings.
     pub readings: usize,
@@ -64,51 +67,51 @@ pub struct Benefit {
     pub parameters: usize,
 }
 
-/// A scale of the sensor that explains readings in the place of the arm.
+/// A scale error of the sensor as an alternative explanation of the readings.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ScaleError {
-    /// Probability of the rivals with a scale, against those without.
+    /// Posterior probability of the models with a scale error.
     pub probability: f64,
-    /// Relative error: positive where readings are too long.
+    /// Relative scale error: positive where readings are too long.
     pub value: f64,
     /// Its standard deviation.
     pub sigma: f64,
-    /// Share of the squared correction that is left to the arm's geometry beside the scale.
-    pub left: f64,
+    /// Share of the squared correction still attributed to the arm's geometry once the scale error is modelled.
+    #[serde(rename = "left")]
+    pub geometry_share: f64,
     /// Expected RMS error (mm) of the estimated arm if there is such a scale.
     pub estimated_mm: f64,
     /// Expected RMS error (mm) of the data sheet's arm if there is such a scale.
     pub nominal_mm: f64,
 }
 
-/// Widths of lengths and of angles that are tried, as shares of the tolerance.
-const LENGTHS: [f64; 6] = [0.0625, 0.125, 0.25, 0.5, 1.0, 2.0];
-const ANGLES: [f64; 7] = [0.0625, 0.125, 0.25, 0.5, 1.0, 2.0, 4.0];
-/// The sensor's σ that is tried, as a multiple of the fit's.
-const NOISES: [f64; 4] = [0.71, 1.0, 1.41, 2.0];
-/// With more parameters than this every second width is left out.
+/// Grid of prior widths, as multiples of the tolerance.
+const LENGTH_WIDTHS: [f64; 6] = [0.0625, 0.125, 0.25, 0.5, 1.0, 2.0];
+const ANGLE_WIDTHS: [f64; 7] = [0.0625, 0.125, 0.25, 0.5, 1.0, 2.0, 4.0];
+/// Grid of the sensor's σ, as a multiple of the fit's.
+const NOISE_FACTORS: [f64; 4] = [0.71, 1.0, 1.41, 2.0];
+/// Above this number of parameters every second width is skipped and products run in blocks.
 const MANY: usize = 90;
 
-/// What may stand beside the arm, with its probability beforehand: nothing, or a scale. Those of a good instrument are
-/// parts in a million; what is weighed here are faults, met in a fifth of the cases: atmosphere and drift, a wrong wheel or
-/// calibration, a wrong unit.
-const RIVALS: [Rival; 4] = [
-    Rival { sigma: None, before: 0.8 },
-    Rival { sigma: Some(1e-3), before: 0.05 },
-    Rival { sigma: Some(4e-3), before: 0.1 },
-    Rival { sigma: Some(1e-2), before: 0.05 },
+/// Prior over the sensor's scale error. A good instrument is accurate to parts in a million; these are faults (atmosphere
+/// and drift, a wrong measuring wheel or calibration, a wrong unit), assumed in a fifth of the cases.
+const SCALE_PRIORS: [ScalePrior; 4] = [
+    ScalePrior { sigma: None, probability: 0.8 },
+    ScalePrior { sigma: Some(1e-3), probability: 0.05 },
+    ScalePrior { sigma: Some(4e-3), probability: 0.1 },
+    ScalePrior { sigma: Some(1e-2), probability: 0.05 },
 ];
 
 #[derive(Debug, Clone, Copy)]
-struct Rival {
-    /// Standard deviation of the sensor's relative scale error; absent where the scale is taken to be right.
+struct ScalePrior {
+    /// Standard deviation of the sensor's relative scale error; `None` for no scale error.
     sigma: Option<f64>,
-    before: f64,
+    probability: f64,
 }
 
-/// Readings as linear equations in the parameters and a scale of the sensor.
-struct Readings {
-    /// JᵀJ, the scale last.
+/// Normal equations of the readings in the parameters of the fit and a scale error of the sensor.
+struct LinearisedReadings {
+    /// JᵀJ, the scale error last.
     matrix: DMatrix<f64>,
     /// Jᵀy.
     right: DVector<f64>,
@@ -117,54 +120,55 @@ struct Readings {
     count: usize,
 }
 
-/// Weighs the fit `fitted` of `dataset` against its rivals. `tolerance` is what an arm plausibly deviates by; `lack` is how
-/// many times larger than it should be the square of a held-out error was.
+/// Expected benefit of the fit `fitted` to `dataset`. `tolerance` holds plausible deviations of an arm;
+/// `variance_inflation` ([`variance_inflation`]) multiplies every posterior variance.
 ///
-/// `None` where nothing of the arm was fitted, or nothing is finite.
+/// `None` where no parameter of the arm was fitted, or a number is not finite.
 pub fn benefit(
     fitted: &Fitted,
     dataset: &Dataset,
     estimated: &Estimated,
     tolerance: &Tolerance,
-    lack: f64,
+    variance_inflation: f64,
 ) -> Option<Benefit> {
-    let moved = shape_weights(fitted, &estimated.condition, &estimated.region.samples_deg)?;
-    let mut readings = readings(fitted, dataset);
-    readings.within_the_arm(fitted, tolerance)?;
+    let metric = shape_metric(fitted, &estimated.condition, &estimated.region.samples_deg)?;
+    let mut readings = linearise_readings(fitted, dataset);
+    readings.project_scale_onto_arm(fitted, tolerance)?;
     let x = DVector::from_column_slice(&fitted.estimate.x);
-    let toward = &moved * &x;
-    let square = x.dot(&toward);
-    let written = Written { moved: &moved, x: &x, toward: &toward, square, lack };
-    let weighed = weighed(&beliefs(fitted, tolerance), &readings, &written)?;
-    let total: f64 = weighed.iter().map(|(w, _)| w).sum();
-    let mean = |of: &dyn Fn(&View) -> f64, only: &dyn Fn(&View) -> bool| {
+    let gradient = &metric * &x;
+    let square = x.dot(&gradient);
+    let correction = Correction { metric: &metric, x: &x, gradient: &gradient, square, variance_inflation };
+    let posteriors = weighted_posteriors(&hypotheses(fitted, tolerance), &readings, &correction)?;
+    let total: f64 = posteriors.iter().map(|(w, _)| w).sum();
+    let mean = |of: &dyn Fn(&Posterior) -> f64, only: &dyn Fn(&Posterior) -> bool| {
         let (mut sum, mut weight) = (0.0, 0.0);
-        for (w, view) in weighed.iter().filter(|(_, v)| only(v)) {
-            sum += w * of(view);
+        for (w, posterior) in posteriors.iter().filter(|(_, v)| only(v)) {
+            sum += w * of(posterior);
             weight += w;
         }
         if weight > 0.0 { sum / weight } else { f64::NAN }
     };
-    let (any, plain) = (&|_: &View| true, &|v: &View| v.scale.is_none());
-    let scaled = |v: &View| v.scale.is_some();
-    let scale = (!held_already(fitted)).then(|| {
-        let value = mean(&|v| v.scale.map_or(0.0, |s| s.0), &scaled);
-        let spread = mean(&|v| v.scale.map_or(0.0, |s| s.1 + (s.0 - value).powi(2)), &scaled);
+    let (any, without_scale) = (&|_: &Posterior| true, &|v: &Posterior| v.scale.is_none());
+    let with_scale = |v: &Posterior| v.scale.is_some();
+    let scale = (!fits_scale(fitted)).then(|| {
+        let value = mean(&|v| v.scale.map_or(0.0, |s| s.0), &with_scale);
+        let variance = mean(&|v| v.scale.map_or(0.0, |s| s.1 + (s.0 - value).powi(2)), &with_scale);
         ScaleError {
-            probability: weighed.iter().filter(|(_, v)| scaled(v)).map(|(w, _)| w).sum::<f64>() / total,
+            probability: posteriors.iter().filter(|(_, v)| with_scale(v)).map(|(w, _)| w).sum::<f64>()
+                / total,
             value,
-            sigma: spread.sqrt(),
-            left: mean(&|v| v.left, &scaled),
-            estimated_mm: mean(&|v| v.estimated, &scaled).max(0.0).sqrt(),
-            nominal_mm: mean(&|v| v.nominal, &scaled).max(0.0).sqrt(),
+            sigma: variance.sqrt(),
+            geometry_share: mean(&|v| v.geometry_share, &with_scale),
+            estimated_mm: mean(&|v| v.estimated, &with_scale).max(0.0).sqrt(),
+            nominal_mm: mean(&|v| v.nominal, &with_scale).max(0.0).sqrt(),
         }
     });
     let shares = fitted.sigmas().into_iter().zip(&fitted.priors);
     Some(Benefit {
         nominal_mm: mean(&|v| v.nominal, any).max(0.0).sqrt(),
         estimated_mm: mean(&|v| v.estimated, any).max(0.0).sqrt(),
-        chance: mean(&|v| v.chance, any),
-        chance_without_scale: mean(&|v| v.chance, plain),
+        probability: mean(&|v| v.probability, any),
+        probability_without_scale: mean(&|v| v.probability, without_scale),
         scale: scale.filter(|s| s.value.is_finite()),
         readings: readings.count,
         determined: shares.map(|(s, p)| (1.0 - (s / p.sigma).powi(2)).clamp(0.0, 1.0)).sum(),
@@ -172,91 +176,97 @@ pub fn benefit(
     })
 }
 
-/// The views of all beliefs that count, with their weights, the largest 1.
-fn weighed(beliefs: &[Belief], readings: &Readings, written: &Written<'_>) -> Option<Vec<(f64, View)>> {
-    let arm = written.x.len();
-    let seen = RIVALS.map(|rival| rival.seen(readings, arm));
-    let seen_by = |belief: &Belief| &seen[belief.rival];
-    let heard: Vec<Option<f64>> = beliefs
+/// Posteriors of all hypotheses of non-negligible evidence, with their weights relative to the largest.
+fn weighted_posteriors(
+    hypotheses: &[Hypothesis],
+    readings: &LinearisedReadings,
+    correction: &Correction<'_>,
+) -> Option<Vec<(f64, Posterior)>> {
+    let arm = correction.x.len();
+    let equations = SCALE_PRIORS.map(|prior| prior.normal_equations(readings, arm));
+    let equations_of = |hypothesis: &Hypothesis| &equations[hypothesis.scale_prior];
+    let evidences: Vec<Option<f64>> = hypotheses
         .par_iter()
-        .map(|belief| {
+        .map(|hypothesis| {
             checkpoint();
-            belief.log_weight(seen_by(belief), readings)
+            hypothesis.log_evidence(equations_of(hypothesis), readings)
         })
         .collect();
-    let best = heard.iter().flatten().copied().fold(f64::NEG_INFINITY, f64::max);
-    let views = beliefs
+    let best = evidences.iter().flatten().copied().fold(f64::NEG_INFINITY, f64::max);
+    let posteriors = hypotheses
         .par_iter()
-        .zip(&heard)
-        .filter_map(|(belief, heard)| {
+        .zip(&evidences)
+        .filter_map(|(hypothesis, evidence)| {
             checkpoint();
-            let log = (*heard)? - best;
-            (log > NEGLIGIBLE).then(|| Some((log.exp(), belief.view(seen_by(belief), written)?)))?
+            let log = (*evidence)? - best;
+            (log > NEGLIGIBLE)
+                .then(|| Some((log.exp(), hypothesis.posterior(equations_of(hypothesis), correction)?)))?
         })
         .collect::<Vec<_>>();
-    (!views.is_empty()).then_some(views)
+    (!posteriors.is_empty()).then_some(posteriors)
 }
 
-/// Rivals whose log evidence is so far behind add nothing.
+/// Log evidence relative to the best hypothesis below which a hypothesis is dropped.
 const NEGLIGIBLE: f64 = -14.0;
 
-impl Readings {
-    /// Takes of the scale what the parameters of the fit could explain as well. What is left over would fit whatever else the
-    /// arm does that is no geometry, and with thousands of rows make a scale of it; and a true scale has next to nothing left
-    /// over, since it is an arm that is larger. Which of two explanations of the same readings holds is then for the
-    /// tolerances alone to say.
-    fn within_the_arm(&mut self, fitted: &Fitted, tolerance: &Tolerance) -> Option<()> {
+impl LinearisedReadings {
+    /// Projects the scale column onto the columns of the fit's parameters. The orthogonal remainder would fit any
+    /// non-geometric error of the arm, and thousands of rows would turn that into evidence of a scale; an actual scale error
+    /// has almost no such remainder, since it is equivalent to a larger arm. The tolerances alone then decide between two
+    /// explanations of the same readings.
+    fn project_scale_onto_arm(&mut self, fitted: &Fitted, tolerance: &Tolerance) -> Option<()> {
         let arm = fitted.parameters.len();
-        let held = self.matrix.view((0, 0), (arm, arm)).into_owned();
-        let mut matrix = held.clone();
+        let own = self.matrix.view((0, 0), (arm, arm)).into_owned();
+        let mut matrix = own.clone();
         for (k, (parameter, prior)) in fitted.parameters.iter().zip(&fitted.priors).enumerate() {
             let sigma = match parameter {
-                Parameter::Link { .. } => FREE * tolerance.prior(parameter, &fitted.model).sigma,
+                Parameter::Link { .. } => WIDE * tolerance.prior(parameter, &fitted.model).sigma,
                 _ => prior.sigma,
             };
             matrix[(k, k)] += 1.0 / (sigma * sigma);
         }
         let (factor, _) = factored(&matrix)?;
-        let beside = self.matrix.view((0, arm), (arm, 1)).column(0).into_owned();
-        let moves = factor.solve(&beside);
-        let seen = held * &moves;
-        self.right[arm] = moves.dot(&self.right.rows(0, arm));
-        self.matrix[(arm, arm)] = moves.dot(&seen);
+        let scale = self.matrix.view((0, arm), (arm, 1)).column(0).into_owned();
+        let coefficients = factor.solve(&scale);
+        let projected = own * &coefficients;
+        self.right[arm] = coefficients.dot(&self.right.rows(0, arm));
+        self.matrix[(arm, arm)] = coefficients.dot(&projected);
         for k in 0..arm {
-            self.matrix[(k, arm)] = seen[k];
-            self.matrix[(arm, k)] = seen[k];
+            self.matrix[(k, arm)] = projected[k];
+            self.matrix[(arm, k)] = projected[k];
         }
         Some(())
     }
 }
 
-/// Links may move this many of their tolerances to explain a scale.
-const FREE: f64 = 10.0;
+/// Prior width of the links in that projection, in tolerances.
+const WIDE: f64 = 10.0;
 
-/// Whether the fit itself has a scale for all rows beside the arm.
-fn held_already(fitted: &Fitted) -> bool {
+/// Whether the fit itself has a scale parameter for all rows.
+fn fits_scale(fitted: &Fitted) -> bool {
     fitted.frames.disturbances.iter().any(|d| d.kind == Kind::Scale && d.course == Course::Always)
 }
 
-/// A rival with its widths and noise.
-struct Belief {
-    /// Place in [`RIVALS`].
-    rival: usize,
-    /// Weight of each parameter's prior, 1/σ², the scale's included.
+/// A point of the grid: scale prior, prior widths and noise.
+struct Hypothesis {
+    /// Index into [`SCALE_PRIORS`].
+    scale_prior: usize,
+    /// Prior precision 1/σ² of each parameter, the scale error last.
     precision: Vec<f64>,
+    /// The sensor's σ as a multiple of the fit's.
     noise: f64,
 }
 
-fn beliefs(fitted: &Fitted, tolerance: &Tolerance) -> Vec<Belief> {
+fn hypotheses(fitted: &Fitted, tolerance: &Tolerance) -> Vec<Hypothesis> {
     let step = if fitted.parameters.len() > MANY { 2 } else { 1 };
-    let held = held_already(fitted);
+    let fits_scale = fits_scale(fitted);
     let mut out = Vec::new();
-    for (rival, kind) in RIVALS.iter().enumerate() {
-        if kind.sigma.is_some() && held {
+    for (scale_prior, ScalePrior { sigma, .. }) in SCALE_PRIORS.iter().enumerate() {
+        if sigma.is_some() && fits_scale {
             continue;
         }
-        for length in LENGTHS.iter().step_by(step) {
-            for angle in ANGLES.iter().step_by(step) {
+        for length in LENGTH_WIDTHS.iter().step_by(step) {
+            for angle in ANGLE_WIDTHS.iter().step_by(step) {
                 let links =
                     fitted.parameters.iter().zip(&fitted.priors).map(|(parameter, prior)| match parameter {
                         Parameter::Link { coordinate, .. } if coordinate.is_length() => {
@@ -265,130 +275,137 @@ fn beliefs(fitted: &Fitted, tolerance: &Tolerance) -> Vec<Belief> {
                         Parameter::Link { .. } => angle * tolerance.angle_rad,
                         _ => prior.sigma,
                     });
-                let precision: Vec<f64> = links.chain(kind.sigma).map(|s| 1.0 / (s * s)).collect();
-                out.extend(NOISES.map(|noise| Belief { rival, precision: precision.clone(), noise }));
+                let precision: Vec<f64> = links.chain(*sigma).map(|s| 1.0 / (s * s)).collect();
+                out.extend(NOISE_FACTORS.map(|noise| Hypothesis {
+                    scale_prior,
+                    precision: precision.clone(),
+                    noise,
+                }));
             }
         }
     }
     out
 }
 
-impl Rival {
-    /// The readings as this rival sees them.
-    fn seen(&self, readings: &Readings, arm: usize) -> Seen {
+impl ScalePrior {
+    /// The readings' normal equations, with the scale error where this prior has one.
+    fn normal_equations(&self, readings: &LinearisedReadings, arm: usize) -> Equations {
         let size = arm + usize::from(self.sigma.is_some());
-        Seen {
+        Equations {
             matrix: readings.matrix.view((0, 0), (size, size)).into_owned(),
             right: readings.right.rows(0, size).into_owned(),
         }
     }
 }
 
-/// Normal equations of a rival, priors not included.
-struct Seen {
+/// Normal equations, priors not included.
+struct Equations {
     matrix: DMatrix<f64>,
     right: DVector<f64>,
 }
 
-/// What is written, and where it counts.
-struct Written<'a> {
+/// The correction that is judged.
+struct Correction<'a> {
     /// M (mm² per unit of parameters squared).
-    moved: &'a DMatrix<f64>,
+    metric: &'a DMatrix<f64>,
     /// x̂.
     x: &'a DVector<f64>,
     /// M x̂.
-    toward: &'a DVector<f64>,
+    gradient: &'a DVector<f64>,
     /// x̂ᵀ M x̂ (mm²).
     square: f64,
-    /// By what variances are multiplied.
-    lack: f64,
+    /// Factor on every posterior variance.
+    variance_inflation: f64,
 }
 
-/// What a belief makes of the model.
-struct View {
-    /// Chance that the model helps.
-    chance: f64,
-    /// Expected squared error of the data sheet's arm (mm²).
+/// Posterior expectations under one hypothesis.
+struct Posterior {
+    /// Probability that the correction reduces the squared error.
+    probability: f64,
+    /// Expected squared error of the nominal arm (mm²).
     nominal: f64,
     /// The same of the estimated arm (mm²).
     estimated: f64,
-    /// Mean scale and its variance.
+    /// Mean and variance of the scale error.
     scale: Option<(f64, f64)>,
-    /// Share of the squared correction left to geometry.
-    left: f64,
+    /// Share of the squared correction attributed to geometry.
+    geometry_share: f64,
 }
 
-impl Belief {
-    /// The factor of its normal equations, the logarithm of their determinant, and where the arm is.
-    fn solved(&self, seen: &Seen) -> Option<(Scaled, f64, DVector<f64>)> {
+impl Hypothesis {
+    /// Cholesky factor of the posterior precision, its log determinant, and the posterior mean.
+    fn solve(&self, equations: &Equations) -> Option<(ScaledCholesky, f64, DVector<f64>)> {
         let weight = 1.0 / (self.noise * self.noise);
-        let mut matrix = &seen.matrix * weight;
+        let mut matrix = &equations.matrix * weight;
         for (k, precision) in self.precision.iter().enumerate() {
             matrix[(k, k)] += precision;
         }
-        let (factor, log_determinant) = factored(&matrix)?;
-        let found = factor.solve(&(&seen.right * weight));
-        Some((factor, log_determinant, found))
+        let (factor, log_determinant) = factorise(&matrix)?;
+        let mean = factor.solve(&(&equations.right * weight));
+        Some((factor, log_determinant, mean))
     }
 
-    fn log_weight(&self, seen: &Seen, readings: &Readings) -> Option<f64> {
-        let (_, log_determinant, found) = self.solved(seen)?;
-        let misfit = (readings.square - seen.right.dot(&found)) / (self.noise * self.noise);
+    /// Log of prior probability times evidence, up to a constant.
+    fn log_evidence(&self, equations: &Equations, readings: &LinearisedReadings) -> Option<f64> {
+        let (_, log_determinant, mean) = self.solve(equations)?;
+        let misfit = (readings.square - equations.right.dot(&mean)) / (self.noise * self.noise);
         let log_prior: f64 = self.precision.iter().map(|p| p.ln()).sum();
-        let spread = 2.0 * readings.count as f64 * self.noise.ln();
-        let log = RIVALS[self.rival].before.ln() - 0.5 * (spread + log_determinant - log_prior + misfit);
+        let log_noise = 2.0 * readings.count as f64 * self.noise.ln();
+        let log = SCALE_PRIORS[self.scale_prior].probability.ln()
+            - 0.5 * (log_noise + log_determinant - log_prior + misfit);
         log.is_finite().then_some(log)
     }
 
-    fn view(&self, seen: &Seen, written: &Written<'_>) -> Option<View> {
-        let (factor, _, found) = self.solved(seen)?;
-        let Written { moved, x, toward, square, lack } = *written;
+    fn posterior(&self, equations: &Equations, correction: &Correction<'_>) -> Option<Posterior> {
+        let (factor, _, all) = self.solve(equations)?;
+        let Correction { metric, x, gradient, square, variance_inflation } = *correction;
         let arm = x.len();
-        let along = DVector::from_fn(found.len(), |k, _| if k < arm { toward[k] } else { 0.0 });
-        let variance = 4.0 * lack * along.dot(&factor.solve(&along));
-        let there = found.rows(0, arm).into_owned();
-        let mean = 2.0 * there.dot(toward) - square;
-        let inverse = factor.inverse();
-        let unknown = lack * moved.component_mul(&inverse.view((0, 0), (arm, arm))).sum();
-        let off = x - &there;
-        let believed = there.dot(&(moved * &there));
-        let scale = (found.len() > arm).then(|| (found[arm], inverse[(arm, arm)]));
-        Some(View {
-            chance: if variance > 0.0 { below(mean / variance.sqrt()) } else { 0.5 },
-            nominal: believed + unknown,
-            estimated: off.dot(&(moved * &off)) + unknown,
+        let along = DVector::from_fn(all.len(), |k, _| if k < arm { gradient[k] } else { 0.0 });
+        let variance = 4.0 * variance_inflation * along.dot(&factor.solve(&along));
+        let mean = all.rows(0, arm).into_owned();
+        let reduction = 2.0 * mean.dot(gradient) - square;
+        let covariance = factor.inverse();
+        let unknown = variance_inflation * metric.component_mul(&covariance.view((0, 0), (arm, arm))).sum();
+        let remaining = x - &mean;
+        let explained = mean.dot(&(metric * &mean));
+        let scale = (all.len() > arm).then(|| (all[arm], covariance[(arm, arm)]));
+        Some(Posterior {
+            probability: if variance > 0.0 { normal_cdf(reduction / variance.sqrt()) } else { 0.5 },
+            nominal: explained + unknown,
+            estimated: remaining.dot(&(metric * &remaining)) + unknown,
             scale,
-            left: if square > 0.0 { believed / square } else { f64::NAN },
+            geometry_share: if square > 0.0 { explained / square } else { f64::NAN },
         })
     }
 }
 
-/// Probability of a standard normal number below `value`.
-pub(crate) fn below(value: f64) -> f64 {
+/// Φ(`value`), the standard normal distribution function.
+pub(crate) fn normal_cdf(value: f64) -> f64 {
     let tail = 0.5 * normal_two_sided(value);
     if value < 0.0 { tail } else { 1.0 - tail }
 }
 
-/// A Cholesky factor with the logarithm of the determinant, through unit diagonal: mm and rad are far apart.
-fn factored(matrix: &DMatrix<f64>) -> Option<(Scaled, f64)> {
+/// Cholesky factor and log determinant, of the matrix scaled to a unit diagonal since mm and rad differ by orders of
+/// magnitude.
+fn factorise(matrix: &DMatrix<f64>) -> Option<(ScaledCholesky, f64)> {
     let size = DVector::from_fn(matrix.nrows(), |k, _| matrix[(k, k)].sqrt().recip());
     if size.iter().any(|s| !s.is_finite()) {
         return None;
     }
     let unit = DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| matrix[(i, j)] * size[i] * size[j]);
-    let factor = if unit.nrows() > MANY { of_many(unit)? } else { Cholesky::new(unit)? };
+    let factor = if unit.nrows() > MANY { blocked_cholesky(unit)? } else { Cholesky::new(unit)? };
     let determinant: f64 = factor.l_dirty().diagonal().iter().map(|v| 2.0 * v.ln()).sum();
     let scaling: f64 = size.iter().map(|s| 2.0 * s.ln()).sum();
-    Some((Scaled { factor, size }, determinant - scaling))
+    Some((ScaledCholesky { factor, size }, determinant - scaling))
 }
 
-/// AᵀA, of many columns in blocks.
-fn squared(a: &DMatrix<f64>) -> DMatrix<f64> {
+/// AᵀA, in blocks for many columns.
+fn gram(a: &DMatrix<f64>) -> DMatrix<f64> {
     if a.ncols() > MANY { a.transpose() * a } else { a.tr_mul(a) }
 }
 
-/// The factor of a large matrix, in blocks.
-fn of_many(mut matrix: DMatrix<f64>) -> Option<Cholesky<f64, Dyn>> {
+/// Cholesky factor of a large matrix, in blocks.
+fn blocked_cholesky(mut matrix: DMatrix<f64>) -> Option<Cholesky<f64, Dyn>> {
     let n = matrix.nrows();
     let request = llt::factor::cholesky_in_place_scratch::<f64>(n, Par::Seq, Default::default());
     let mut memory = MemBuffer::new(request);
@@ -399,42 +416,42 @@ fn of_many(mut matrix: DMatrix<f64>) -> Option<Cholesky<f64, Dyn>> {
 }
 
 /// (L Lᵀ)⁻¹ of a large factor, in blocks: XᵀX with X = L⁻¹.
-fn inverse_of_many(factor: &Cholesky<f64, Dyn>) -> DMatrix<f64> {
+fn blocked_inverse(factor: &Cholesky<f64, Dyn>) -> DMatrix<f64> {
     let lower = factor.l_dirty();
     let n = lower.nrows();
     let mut x = DMatrix::identity(n, n);
     let lower = MatRef::from_column_major_slice(lower.as_slice(), n, n);
     let place = MatMut::from_column_major_slice_mut(x.as_mut_slice(), n, n);
     faer::linalg::triangular_solve::solve_lower_triangular_in_place(lower, place, Par::Seq);
-    squared(&x)
+    gram(&x)
 }
 
-struct Scaled {
+struct ScaledCholesky {
     factor: Cholesky<f64, Dyn>,
     size: DVector<f64>,
 }
 
-impl Scaled {
+impl ScaledCholesky {
     fn solve(&self, right: &DVector<f64>) -> DVector<f64> {
         self.factor.solve(&right.component_mul(&self.size)).component_mul(&self.size)
     }
 
     fn inverse(&self) -> DMatrix<f64> {
         let n = self.size.len();
-        let unit = if n > MANY { inverse_of_many(&self.factor) } else { self.factor.inverse() };
+        let unit = if n > MANY { blocked_inverse(&self.factor) } else { self.factor.inverse() };
         DMatrix::from_fn(unit.nrows(), unit.ncols(), |i, j| unit[(i, j)] * self.size[i] * self.size[j])
     }
 }
 
-/// Mean square of the held-out readings, each in units of the σ that the training fit predicts for it: 1 where the fit knows
-/// what it does not know. Never below 1.
-pub fn lack(training: &Fitted, held: &Observed) -> f64 {
+/// Mean square of the held-out residuals, each divided by the σ that the training fit predicts for it, and at least 1.
+/// It is 1 where the predicted uncertainty is right.
+pub fn variance_inflation(training: &Fitted, held: &Observations) -> f64 {
     let (Some(covariance), x) = (&training.estimate.covariance, &training.estimate.x) else { return 1.0 };
     if x.is_empty() || held.dataset.rows.is_empty() {
         return 1.0;
     }
-    let few = held.few();
-    let held = few.as_ref().unwrap_or(held);
+    let subsample = held.subsample();
+    let held = subsample.as_ref().unwrap_or(held);
     let (sigma_mm, sigma_rad) = (training.sigma_mm, training.sigma_rad);
     let weights = rounding::weights(
         &held.dataset,
@@ -444,17 +461,17 @@ pub fn lack(training: &Fitted, held: &Observed) -> f64 {
         sigma_mm,
         sigma_rad,
     );
-    let task = Calibration::new(
+    let problem = CalibrationProblem::new(
         &held.dataset,
-        training.task.start(),
-        training.task.starting_frames(),
+        training.problem.start(),
+        training.problem.starting_frames(),
         &training.parameters,
         &[],
         &weights,
     );
-    let (residuals, transposed) = task.linearised(x);
+    let (residuals, transposed) = problem.linearise(x);
     let mut sum = 0.0;
-    // In pieces, as there may be a million rows.
+    // In pieces: there can be a million rows.
     for from in (0..residuals.len()).step_by(ROWS) {
         let slopes = transposed.columns(from, ROWS.min(residuals.len() - from));
         let known = covariance * slopes;
@@ -466,48 +483,52 @@ pub fn lack(training: &Fitted, held: &Observed) -> f64 {
     if mean.is_finite() { mean.max(1.0) } else { 1.0 }
 }
 
-/// One pass over the rows at the estimate: J x̂ − r is what a linear fit has to meet.
-fn readings(fitted: &Fitted, dataset: &Dataset) -> Readings {
-    let task = &fitted.task;
-    let (p, per) = (task.parameters(), task.rows_per_observation());
+/// Normal equations of the linear model J x = y, y = J x̂ − r, in one pass over the rows at the estimate x̂.
+fn linearise_readings(fitted: &Fitted, dataset: &Dataset) -> LinearisedReadings {
+    let problem = &fitted.problem;
+    let (p, per) = (problem.parameters(), problem.rows_per_observation());
     let x = &fitted.estimate.x;
-    let turn = fitted.frames.base_from_sensor.rotation;
-    let middle = middle(dataset);
+    let rotation = fitted.frames.base_from_sensor.rotation;
+    let centre = mean_reading(dataset);
     let all = p + 1;
-    let mut out =
-        Readings { matrix: DMatrix::zeros(all, all), right: DVector::zeros(all), square: 0.0, count: 0 };
+    let mut out = LinearisedReadings {
+        matrix: DMatrix::zeros(all, all),
+        right: DVector::zeros(all),
+        square: 0.0,
+        count: 0,
+    };
     for from in (0..dataset.rows.len()).step_by(ROWS) {
         checkpoint();
         let to = (from + ROWS).min(dataset.rows.len());
         let n = (to - from) * per;
         let (mut residuals, mut jacobian) = (vec![0.0; n], vec![0.0; n * all]);
-        task.jacobian(x, from * per..to * per, &mut residuals, &mut jacobian[..n * p]);
+        problem.jacobian(x, from * per..to * per, &mut residuals, &mut jacobian[..n * p]);
         for (i, row) in dataset.rows.iter().skip(from).take(to - from).enumerate() {
-            let weight = task.per_mm(from + i);
-            let seen = Vector3::from(placed(&row.reading)) - Vector3::from(middle);
+            let weight = problem.per_mm(from + i);
+            let offset = Vector3::from(coordinates(&row.reading)) - Vector3::from(centre);
             match dataset.sensor {
-                Sensor::Cable => jacobian[n * p + i] = weight * seen.x,
+                Sensor::Cable => jacobian[n * p + i] = weight * offset.x,
                 Sensor::Position | Sensor::Pose => {
-                    let pushed = -weight * (turn * seen);
+                    let slope = -weight * (rotation * offset);
                     let first = n * p + i * per;
-                    jacobian[first..first + 3].copy_from_slice(pushed.as_slice());
+                    jacobian[first..first + 3].copy_from_slice(slope.as_slice());
                 }
             }
         }
         let jacobian = DMatrix::from_vec(n, all, jacobian);
-        let met = jacobian.columns(0, p) * DVector::from_column_slice(x) - DVector::from_vec(residuals);
-        out.matrix += squared(&jacobian);
-        out.right += jacobian.tr_mul(&met);
-        out.square += met.norm_squared();
+        let y = jacobian.columns(0, p) * DVector::from_column_slice(x) - DVector::from_vec(residuals);
+        out.matrix += gram(&jacobian);
+        out.right += jacobian.tr_mul(&y);
+        out.square += y.norm_squared();
         out.count += n;
     }
     out
 }
 
-/// Rows in one go.
+/// Rows that are processed together.
 const ROWS: usize = 512;
 
-fn placed(reading: &Reading) -> [f64; 3] {
+fn coordinates(reading: &Reading) -> [f64; 3] {
     match reading {
         Reading::Cable(length) => [*length, 0.0, 0.0],
         Reading::Position(v) => (*v).into(),
@@ -515,27 +536,28 @@ fn placed(reading: &Reading) -> [f64; 3] {
     }
 }
 
-/// Mean reading: a scale about it asks nothing of where the sensor stands.
-fn middle(dataset: &Dataset) -> [f64; 3] {
+/// Mean reading: a scale about it does not move the sensor frame.
+fn mean_reading(dataset: &Dataset) -> [f64; 3] {
     let n = dataset.rows.len().max(1) as f64;
     let mut sum = [0.0; 3];
     for row in &dataset.rows {
-        let seen = placed(&row.reading);
-        (0..3).for_each(|k| sum[k] += seen[k] / n);
+        let at = coordinates(&row.reading);
+        (0..3).for_each(|k| sum[k] += at[k] / n);
     }
     sum
 }
 
-/// M for the parameters of the fit, at `condition` over the region of these poses (°): rows and columns of the measurement's own are
-/// zero. δᵀ M δ is the mean square by which a change δ of the parameters moves the target, apart from motions of base and target (mm²).
-pub(crate) fn shape_weights(
+/// M at `condition` over the region spanned by the poses `samples_deg` (°). δᵀ M δ is the mean square displacement (mm²) of the
+/// target by a change δ of the fit's parameters, rigid motions of base and target projected out. Rows and columns of
+/// measurement parameters are zero.
+pub(crate) fn shape_metric(
     fitted: &Fitted,
     condition: &Condition,
     samples_deg: &[[f64; 6]],
 ) -> Option<DMatrix<f64>> {
-    let places: Vec<usize> =
+    let indices: Vec<usize> =
         fitted.parameters.iter().enumerate().filter(|(_, p)| p.is_of_arm()).map(|(k, _)| k).collect();
-    let mut list: Vec<Parameter> = places.iter().map(|&k| fitted.parameters[k]).collect();
+    let mut list: Vec<Parameter> = indices.iter().map(|&k| fitted.parameters[k]).collect();
     let own = list.len();
     if own == 0 {
         return None;
@@ -545,43 +567,43 @@ pub(crate) fn shape_weights(
     let target =
         Pose::from_parts(fitted.frames.flange_from_target.translation, nalgebra::UnitQuaternion::identity());
     let ends = Ends { world_from_base: [0.0; 6], flange_from_tool: vector_from_pose(&target) };
-    let poses = inside(samples_deg);
+    let poses = judged_poses(samples_deg);
     let mut stack = DMatrix::zeros(3 * poses.len(), list.len());
     for (k, q) in poses.iter().enumerate() {
         let twists = parameter_jacobian(&ends, &posed, q, &list);
         stack.rows_mut(3 * k, 3).copy_from(&twists.rows(0, 3));
     }
     let (arm, rigid) = (stack.columns(0, own).into_owned(), stack.columns(own, 9).into_owned());
-    // Turns move by hundreds of millimetres per radian: columns of equal length, then an orthonormal basis.
-    let decomposed =
+    // Rotations move by hundreds of millimetres per radian: columns of equal length, then an orthonormal basis.
+    let svd =
         DMatrix::from_columns(&rigid.column_iter().map(|c| c / c.norm().max(1e-12)).collect::<Vec<_>>())
             .svd(true, false);
-    let basis = decomposed.u?;
-    let kept: Vec<DVector<f64>> = basis
+    let basis = svd.u?;
+    let rigid: Vec<DVector<f64>> = basis
         .column_iter()
-        .zip(decomposed.singular_values.iter())
+        .zip(svd.singular_values.iter())
         .filter(|(_, value)| **value > 1e-6)
         .map(|(column, _)| column.into_owned())
         .collect();
-    let apart = if kept.is_empty() {
+    let shape = if rigid.is_empty() {
         arm
     } else {
-        let basis = DMatrix::from_columns(&kept);
+        let basis = DMatrix::from_columns(&rigid);
         &arm - &basis * basis.tr_mul(&arm)
     };
     let mut out = DMatrix::zeros(fitted.parameters.len(), fitted.parameters.len());
-    let square = squared(&apart) / poses.len().max(1) as f64;
-    for (i, &a) in places.iter().enumerate() {
-        for (j, &b) in places.iter().enumerate() {
+    let square = gram(&shape) / poses.len().max(1) as f64;
+    for (i, &a) in indices.iter().enumerate() {
+        for (j, &b) in indices.iter().enumerate() {
             out[(a, b)] = square[(i, j)];
         }
     }
     out.iter().all(|v| v.is_finite()).then_some(out)
 }
 
-/// Poses of the measured region: its samples, and halfway from each to another, so that a fit of few rows is not judged
-/// where it was pinned.
-fn inside(samples_deg: &[[f64; 6]]) -> Vec<Joints> {
+/// Poses of the measured region: its samples and the midpoints of pairs of them, so that a fit of few rows is not judged only
+/// at the poses that it was fitted to.
+fn judged_poses(samples_deg: &[[f64; 6]]) -> Vec<Joints> {
     let n = samples_deg.len();
     let radians = |q: [f64; 6]| Joints::from_fn(|i, _| q[i].to_radians());
     let mut out: Vec<Joints> = samples_deg.iter().map(|q| radians(*q)).collect();

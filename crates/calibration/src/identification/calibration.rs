@@ -1,4 +1,4 @@
-//! Calibration as a fitting task: link, effect and frame parameters against cable lengths, positions or poses.
+//! Calibration as a fitting problem: link, effect and frame parameters against cable lengths, positions or poses.
 //!
 //! Residuals (whitened by the row's weight w = 1/σ), with p the touched point in the base, C the sensor's frame in
 //! the base, m the reading:
@@ -9,7 +9,7 @@
 //! - pose: the same, and three rows of ½ vee(E − Eᵀ), E = R_C R_m (R R_t)ᵀ, which is the rotation vector up to third
 //!   order of the remaining angle, with a weight of its own.
 //!
-//! Shapes: x holds deviations from the starting values of [`Calibration::parameters_list`], so that the nominal arm is
+//! Shapes: x holds deviations from the starting values of [`CalibrationProblem::free_parameters`], so that the nominal arm is
 //! x = 0 and every prior has mean 0. Rows travel eight at a time in lanes; sines and cosines of the logged joints are
 //! taken once, but for very many rows, where they are taken in each pass. One pass over n rows with 28 parameters costs some 1,200 n operations and reads 13 numbers a row.
 //! Checked against: numerical twins of every column in the tests.
@@ -19,8 +19,8 @@ mod forms;
 mod frames;
 mod kernel;
 mod passes;
-mod task;
+mod problem;
 
 pub use forms::{flange_torques, rotations, shifts};
 pub use frames::{Frames, Weight};
-pub use task::Calibration;
+pub use problem::CalibrationProblem;

@@ -14,9 +14,9 @@
 //! deviation is estimated along with the fit: the value under which the whitened residuals have their degrees of
 //! freedom.
 
-use crate::identification::calibration::{Calibration, Frames, Weight};
+use crate::identification::calibration::{CalibrationProblem, Frames, Weight};
 use crate::identification::identifiability::{Identifiability, identifiability};
-use crate::identification::prior_width::learned;
+use crate::identification::prior_width::learn_tolerance;
 use crate::identification::rounding::{self, AngleCovariance};
 use crate::identification::solver::Solver;
 use crate::identification::tolerance::Tolerance;
@@ -46,14 +46,14 @@ pub fn frame_parameters(dataset: &Dataset) -> Vec<Parameter> {
 
 /// Rows with what is known of their angles.
 #[derive(Debug, Clone)]
-pub struct Observed {
+pub struct Observations {
     /// The rows, their angles sharpened where that was possible.
     pub dataset: Dataset,
     /// Covariance of each row's angles.
     pub angles: AngleCovariance,
 }
 
-impl Observed {
+impl Observations {
     /// The rows at `indices`.
     pub fn subset(&self, indices: &[usize]) -> Self {
         Self { dataset: self.dataset.subset(indices), angles: self.angles.subset(indices) }
@@ -62,7 +62,7 @@ impl Observed {
     /// Some of very many rows, one from each of equal stretches; `None` where there are not so many.
     ///
     /// Weights, the sensor's standard deviation and what is an outlier are as well told by them, at a fraction of the cost.
-    pub(crate) fn few(&self) -> Option<Self> {
+    pub(crate) fn subsample(&self) -> Option<Self> {
         let rows = self.dataset.rows.len();
         if rows <= MANY_ROWS {
             return None;
@@ -101,8 +101,8 @@ pub struct Fitted {
     pub sigma_mm: f64,
     /// The same for an orientation (rad).
     pub sigma_rad: f64,
-    /// The task at its last weights, for whoever wants to look closer.
-    pub task: Calibration,
+    /// The problem at its last weights, for whoever wants to look closer.
+    pub problem: CalibrationProblem,
     /// Work of all rounds together.
     pub evaluations: Evaluations,
     /// The story of every round. Weights change between rounds, so their costs do not share a scale.
@@ -126,7 +126,7 @@ const SMALLEST_SIGMA_RAD: f64 = 1e-6;
 ///
 /// Three rounds of solver and variance, and of the tolerances of links where they are to be learned.
 pub fn fit(
-    observed: &Observed,
+    observed: &Observations,
     start: Start<'_>,
     parameters: &[Parameter],
     tolerance: &Tolerance,
@@ -139,9 +139,10 @@ pub fn fit(
     let mut model = start.model.clone();
     let mut frames = start.frames.clone();
     let mut evaluations = Evaluations::default();
-    let (mut last, mut rounds): (Option<(Calibration, Estimate)>, _) = (None, Vec::with_capacity(ROUNDS));
+    let (mut last, mut rounds): (Option<(CalibrationProblem, Estimate)>, _) =
+        (None, Vec::with_capacity(ROUNDS));
     // Of very many rows some settle the weights, and all of them are fitted once.
-    let few = observed.few();
+    let few = observed.subsample();
     let mut steps = Steps::of(few.as_ref().unwrap_or(observed), parameters);
     for round in 1..=ROUNDS {
         checkpoint();
@@ -152,33 +153,38 @@ pub fn fit(
         let before = rounding::angle_shares(&observed.dataset, &model, &frames, &observed.angles);
         let weights = rounding::weights_of(&before, sigma_mm, sigma_rad);
         // Only the weights change from round to round.
-        let task = match last.take() {
-            Some((task, _)) => task.weighted(&weights),
-            None => {
-                Calibration::new(&observed.dataset, start.model, start.frames, parameters, &priors, &weights)
-            }
+        let problem = match last.take() {
+            Some((problem, _)) => problem.with_weights(&weights),
+            None => CalibrationProblem::new(
+                &observed.dataset,
+                start.model,
+                start.frames,
+                parameters,
+                &priors,
+                &weights,
+            ),
         };
         drop(weights);
-        let estimate = steps.solve(solver, &task, &x, seed);
+        let estimate = steps.solve(solver, &problem, &x, seed);
         evaluations.residuals += estimate.evaluations.residuals;
         evaluations.jacobians += estimate.evaluations.jacobians;
         x.clone_from(&estimate.x);
-        (model, frames) = task.apply(&x);
+        (model, frames) = problem.apply(&x);
         let shares = match &few {
             // Where they were told from is near enough: the arm moved by a share of its tolerance.
             Some(_) => before,
             None => rounding::angle_shares(&observed.dataset, &model, &frames, &observed.angles),
         };
-        let spent = spent_freedom(&task, &estimate);
-        (sigma_mm, sigma_rad) = spreads(&task, &x, &shares, spent);
+        let spent = spent_freedom(&problem, &estimate);
+        (sigma_mm, sigma_rad) = spreads(&problem, &x, &shares, spent);
         rounds.push(estimate.trace.clone());
-        if tolerance.learned && round < ROUNDS {
-            let learned = learned(tolerance, parameters, &priors, &estimate);
+        if tolerance.learn_widths && round < ROUNDS {
+            let learned = learn_tolerance(tolerance, parameters, &priors, &estimate);
             priors = learned.priors_within(parameters, start.model, start.frames);
         }
-        last = Some((task.held(&priors), estimate));
+        last = Some((problem.with_priors(&priors), estimate));
     }
-    let (task, estimate) = last.unwrap_or_else(|| unreachable!("at least one round"));
+    let (problem, estimate) = last.unwrap_or_else(|| unreachable!("at least one round"));
     Fitted {
         parameters: parameters.to_vec(),
         priors,
@@ -187,7 +193,7 @@ pub fn fit(
         frames,
         sigma_mm,
         sigma_rad,
-        task,
+        problem,
         evaluations,
         rounds,
     }
@@ -209,22 +215,22 @@ const WORK: usize = 5_000_000_000;
 const FEWEST_STEPS: usize = 100;
 
 impl Steps {
-    fn of(observed: &Observed, parameters: &[Parameter]) -> Self {
+    fn of(observed: &Observations, parameters: &[Parameter]) -> Self {
         let step = observed.dataset.rows.len() * parameters.len() * parameters.len();
         Self { left: (WORK / step.max(1)).max(FEWEST_STEPS) }
     }
 
-    fn solve(&mut self, solver: &Solver, task: &Calibration, start: &[f64], seed: u64) -> Estimate {
-        let estimate = solver.solve_within(task, start, seed, self.left);
+    fn solve(&mut self, solver: &Solver, problem: &CalibrationProblem, start: &[f64], seed: u64) -> Estimate {
+        let estimate = solver.solve_within(problem, start, seed, self.left);
         self.left = self.left.saturating_sub(estimate.trace.len().saturating_sub(1));
         estimate
     }
 }
 
 /// Degrees of freedom that the fit used up: Σ (1 − σ²/prior²), each parameter's share that the data determined.
-fn spent_freedom(task: &Calibration, estimate: &Estimate) -> f64 {
+fn spent_freedom(problem: &CalibrationProblem, estimate: &Estimate) -> f64 {
     let Some(covariance) = &estimate.covariance else { return 0.0 };
-    let shares = task
+    let shares = problem
         .priors()
         .iter()
         .enumerate()
@@ -233,9 +239,9 @@ fn spent_freedom(task: &Calibration, estimate: &Estimate) -> f64 {
 }
 
 /// The standard deviations σ with Σ r²/(σ² + share) = rows − spent, for lengths and for orientations.
-fn spreads(task: &Calibration, x: &[f64], shares: &[(f64, f64)], spent: f64) -> (f64, f64) {
-    let per = task.rows_per_observation();
-    let plain = task.plain_residuals(x);
+fn spreads(problem: &CalibrationProblem, x: &[f64], shares: &[(f64, f64)], spent: f64) -> (f64, f64) {
+    let per = problem.rows_per_observation();
+    let plain = problem.unweighted_residuals(x);
     let rows = plain.len() as f64;
     let freedom_share = ((rows - spent) / rows).max(0.1);
     let solve = |components: std::ops::Range<usize>, share: fn(&(f64, f64)) -> f64, smallest: f64| {
@@ -281,12 +287,17 @@ const OUTLIER_CUT: f64 = 10.0;
 const OUTLIER_SHARE: f64 = 0.1;
 
 /// Finds gross outliers by a robust fit of geometry.
-pub fn outliers(observed: &Observed, start: Start<'_>, tolerance: &Tolerance, solver: &Solver) -> Outliers {
+pub fn outliers(
+    observed: &Observations,
+    start: Start<'_>,
+    tolerance: &Tolerance,
+    solver: &Solver,
+) -> Outliers {
     let dataset = &observed.dataset;
     let parameters: Vec<Parameter> =
         arm_parameters(start.model).into_iter().chain(frame_parameters(dataset)).collect();
     let priors = tolerance.priors_within(&parameters, start.model, start.frames);
-    let (all, few) = (observed, observed.few());
+    let (all, few) = (observed, observed.subsample());
     let observed = few.as_ref().unwrap_or(all);
     let n = all.dataset.rows.len();
     let dataset = &observed.dataset;
@@ -297,7 +308,7 @@ pub fn outliers(observed: &Observed, start: Start<'_>, tolerance: &Tolerance, so
     let mut sigma = 0.1;
     // 1.4826 turns the median of |normal| into σ; the norm of three coordinates has median 1.538 σ.
     let consistency = if dataset.sensor == Sensor::Cable { 1.4826 } else { 1.0 / 1.538 };
-    let mut before: Option<Calibration> = None;
+    let mut before: Option<CalibrationProblem> = None;
     let mut steps = Steps::of(observed, &parameters);
     for _ in 0..ROBUST_ROUNDS {
         let base = rounding::weights(dataset, &model, &frames, &observed.angles, sigma, 1e-3);
@@ -306,11 +317,13 @@ pub fn outliers(observed: &Observed, start: Start<'_>, tolerance: &Tolerance, so
             .zip(&factor)
             .map(|(w, f)| Weight { per_mm: w.per_mm * f, per_rad: w.per_rad * f })
             .collect();
-        let task = match before.take() {
-            Some(task) => task.weighted(&weights),
-            None => Calibration::new(dataset, start.model, start.frames, &parameters, &priors, &weights),
+        let problem = match before.take() {
+            Some(problem) => problem.with_weights(&weights),
+            None => {
+                CalibrationProblem::new(dataset, start.model, start.frames, &parameters, &priors, &weights)
+            }
         };
-        let estimate = steps.solve(solver, &task, &x, 0);
+        let estimate = steps.solve(solver, &problem, &x, 0);
         let moved: f64 = estimate
             .x
             .iter()
@@ -319,8 +332,8 @@ pub fn outliers(observed: &Observed, start: Start<'_>, tolerance: &Tolerance, so
             .map(|((a, b), p)| ((a - b) / p.sigma).abs())
             .fold(0.0, f64::max);
         x = estimate.x;
-        (model, frames) = task.apply(&x);
-        let errors = task.errors_mm(&x);
+        (model, frames) = problem.apply(&x);
+        let errors = problem.errors_mm(&x);
         let sizes: Vec<f64> = errors.iter().zip(&base).map(|(e, w)| e.abs() * w.per_mm).collect();
         let spread = (median(&sizes).unwrap_or(1.0) * consistency).max(1e-9);
         scaled = sizes.iter().map(|s| s / spread).collect();
@@ -328,7 +341,7 @@ pub fn outliers(observed: &Observed, start: Start<'_>, tolerance: &Tolerance, so
         for (f, s) in factor.iter_mut().zip(&scaled) {
             *f = 1.0 / (1.0 + (s / CAUCHY).powi(2)).sqrt();
         }
-        before = Some(task);
+        before = Some(problem);
         if moved < 1e-3 {
             break;
         }
@@ -355,14 +368,14 @@ const ROBUST_ROUNDS: usize = 12;
 /// Tuning constant of the Cauchy weight: 95 % efficiency on normal errors.
 const CAUCHY: f64 = 2.385;
 
-/// Errors of a fit on rows of its own task's data set or on others.
-pub fn errors_on(observed: &Observed, model: &Model, frames: &Frames) -> Vec<f64> {
+/// Errors of a fit on rows of its own problem's data set or on others.
+pub fn errors_on(observed: &Observations, model: &Model, frames: &Frames) -> Vec<f64> {
     let weights = vec![Weight { per_mm: 1.0, per_rad: 1.0 }; observed.dataset.rows.len()];
-    Calibration::new(&observed.dataset, model, frames, &[], &[], &weights).errors_mm(&[])
+    CalibrationProblem::new(&observed.dataset, model, frames, &[], &[], &weights).errors_mm(&[])
 }
 
 /// Summary of [`errors_on`].
-pub fn summary_on(observed: &Observed, model: &Model, frames: &Frames) -> ErrorSummary {
+pub fn summary_on(observed: &Observations, model: &Model, frames: &Frames) -> ErrorSummary {
     ErrorSummary::of(errors_on(observed, model, frames))
 }
 
@@ -378,7 +391,7 @@ impl Fitted {
     /// What the data could tell of the parameters.
     pub fn identifiability(&self) -> Option<Identifiability> {
         let scale: Vec<f64> = self.priors.iter().map(|p| p.sigma).collect();
-        identifiability(&self.task, &self.estimate.x, &scale)
+        identifiability(&self.problem, &self.estimate.x, &scale)
     }
 
     /// How the solver ended.

@@ -8,7 +8,7 @@
 
 use nalgebra::DMatrix;
 
-use crate::identification::calibration::Calibration;
+use crate::identification::calibration::CalibrationProblem;
 use truegrind_arm::parameter::Parameter;
 use truegrind_estimation::least_squares::rank;
 use truegrind_estimation::least_squares::triangular::triangular_factor;
@@ -41,13 +41,13 @@ const SHOWN_SHARE: f64 = 0.05;
 /// The report for a calibration at `x`, with `scale[k]` the unit of parameter k (its prior's σ).
 ///
 /// `None` when the Jacobian is not finite.
-pub fn identifiability(task: &Calibration, x: &[f64], scale: &[f64]) -> Option<Identifiability> {
-    let factor = triangular_factor(task, x, scale);
+pub fn identifiability(problem: &CalibrationProblem, x: &[f64], scale: &[f64]) -> Option<Identifiability> {
+    let factor = triangular_factor(problem, x, scale);
     let analysis = rank::analyse(&factor.r, Some(RANK_TOLERANCE))?;
     let values = analysis.singular_values.clone();
     let count = values.len();
     let full = analysis.rank == count && count > 0;
-    let poses = (task.rows() / task.rows_per_observation()) as f64;
+    let poses = (problem.rows() / problem.rows_per_observation()) as f64;
     let (first, last) = (values.first().copied().unwrap_or(0.0), values.last().copied().unwrap_or(0.0));
     let determined = &values[..analysis.rank.min(count)];
     let least = determined.last().copied().unwrap_or(0.0);
@@ -61,7 +61,7 @@ pub fn identifiability(task: &Calibration, x: &[f64], scale: &[f64]) -> Option<I
     let determined_condition = if determined.is_empty() { f64::INFINITY } else { first / least };
     let combinations = sparse_basis(analysis.null_space())
         .into_iter()
-        .map(|vector| combination(&vector, task.parameters_list(), scale))
+        .map(|vector| combination(&vector, problem.free_parameters(), scale))
         .collect();
     Some(Identifiability {
         parameters: count,

@@ -4,19 +4,19 @@ use thiserror::Error;
 
 use rayon::prelude::*;
 
-use crate::identification::benefit::{Benefit, benefit, lack};
-use crate::identification::calibration::{Calibration, Frames, Weight};
+use crate::identification::benefit::{Benefit, benefit, variance_inflation};
+use crate::identification::calibration::{CalibrationProblem, Frames, Weight};
 use crate::identification::fit::{
-    Fitted, Observed, Outliers, Start, errors_on, fit, frame_parameters, outliers, summary_on,
+    Fitted, Observations, Outliers, Start, errors_on, fit, frame_parameters, outliers, summary_on,
 };
 use crate::identification::identifiability::Identifiability;
 use crate::identification::rounding::{
     AngleCovariance, NotFused, ReadoutFusion, fuse_readout, logged_covariance,
 };
 use crate::identification::solver::{Family, SOLVERS, Solver};
-use crate::identification::start::different_poses;
+use crate::identification::start::count_distinct_poses;
 use crate::identification::tolerance::Tolerance;
-use crate::identification::verdict::{Hearing, Limits};
+use crate::identification::verdict::{Limits, VerdictBuilder};
 use crate::measurement::dataset::{Dataset, Sensor};
 use crate::measurement::split::{self, NoiseFloor, Split};
 use truegrind_arm::condition::Condition;
@@ -27,7 +27,7 @@ use truegrind_arm::region::Region;
 use truegrind_estimation::estimate::Termination;
 use truegrind_estimation::problem::Problem;
 use truegrind_math::statistics::{ErrorSummary, largest, median};
-use truegrind_math::work::{checkpoint, tell};
+use truegrind_math::work::{checkpoint, report_step};
 
 /// How to identify.
 #[derive(Debug, Clone)]
@@ -54,7 +54,7 @@ impl Default for Options {
     /// Levenberg–Marquardt with ordinary tolerances; a fifth of the rows is held out.
     fn default() -> Self {
         Self {
-            tolerance: Tolerance { learned: true, ..Tolerance::default() },
+            tolerance: Tolerance { learn_widths: true, ..Tolerance::default() },
             solver: &SOLVERS[0],
             held_out: 0.2,
             seed: 0,
@@ -150,13 +150,13 @@ pub fn identify(
     split: &dyn Fn(&Dataset) -> Split,
     options: &Options,
 ) -> Result<Identification, IdentifyError> {
-    tell("looking for outliers");
+    report_step("looking for outliers");
     let start = Start { model: nominal, frames };
-    let (observed, readout_fusion) = observe(dataset, nominal, options.fuse_readout);
+    let (observed, readout_fusion) = prepare_observations(dataset, nominal, options.fuse_readout);
     enough(&observed.dataset, nominal, options.held_out)?;
     // Every method sees the same rows.
     let outliers = outliers(&observed, start, &options.tolerance, options.solver_for_frames());
-    let prepared = options.solver.prepared(nominal, dataset);
+    let prepared = options.solver.prepare_model(nominal, dataset);
     let nominal = &prepared;
     let observed = without(observed, &outliers);
     // Before the fits, whose columns take room of their own.
@@ -173,10 +173,11 @@ pub fn identify(
     let wrong =
         |rmse_mm| IdentifyError::WrongArm { file: dataset.file.clone(), robot: robot.to_owned(), rmse_mm };
     let trained = trained.map_err(wrong)?;
-    let lack = (!options.solver.literal).then(|| lack(&trained.training, &held_rows));
+    let variance_inflation =
+        (!options.solver.as_printed).then(|| variance_inflation(&trained.training, &held_rows));
     drop((fitted_rows, held_rows));
     // The model itself: all rows.
-    tell("fitting all rows");
+    report_step("fitting all rows");
     let registered = stages.registered(&observed);
     let geometry = stages.geometry(&observed, &registered);
     let raw = options.stated_frames.as_ref().map(|f| summary_on(&observed, nominal, f));
@@ -198,10 +199,11 @@ pub fn identify(
         region,
         condition: mean_condition(dataset),
     };
-    tell("judging what the model promises programs");
+    report_step("judging what the model promises programs");
     let mut estimated = with_sigma_in_region(estimated, &geometry);
-    let benefit =
-        lack.and_then(|lack| benefit(&geometry, &observed.dataset, &estimated, &options.tolerance, lack));
+    let benefit = variance_inflation.and_then(|variance_inflation| {
+        benefit(&geometry, &observed.dataset, &estimated, &options.tolerance, variance_inflation)
+    });
     let case = Case {
         trained: &trained,
         geometry: &geometry,
@@ -239,8 +241,8 @@ struct Trained {
 
 /// Fits some rows and judges by others; the error with frames alone (mm) where that is no tolerance but a mistake. Literal forms move
 /// frames first, then links without priors.
-fn trained(stages: &Stages<'_>, rows: &Observed, held: &Observed) -> Result<Trained, f64> {
-    tell("fitting without the rows that are held out");
+fn trained(stages: &Stages<'_>, rows: &Observations, held: &Observations) -> Result<Trained, f64> {
+    report_step("fitting without the rows that are held out");
     let registered = stages.registered(rows);
     let rmse_mm = summary_on(rows, &registered.model, &registered.frames).rmse;
     if !(rmse_mm < WRONG_ARM_MM) {
@@ -255,7 +257,7 @@ fn trained(stages: &Stages<'_>, rows: &Observed, held: &Observed) -> Result<Trai
         (errors, held)
     };
     let mut training = stages.geometry(rows, &registered);
-    training.task.forget_rows();
+    training.problem.drop_rows();
     let ((registered, before), (geometry, after)) = (on(&registered), on(&training));
     let numbers = held.dataset.rows.iter().map(|row| row.number);
     let held_out =
@@ -264,7 +266,12 @@ fn trained(stages: &Stages<'_>, rows: &Observed, held: &Observed) -> Result<Trai
 }
 
 /// Where a model is from, as far as the file and the options tell.
-fn provenance(dataset: &Dataset, observed: &Observed, outliers: &Outliers, options: &Options) -> Provenance {
+fn provenance(
+    dataset: &Dataset,
+    observed: &Observations,
+    outliers: &Outliers,
+    options: &Options,
+) -> Provenance {
     Provenance {
         file: dataset.file.clone(),
         sha256: dataset.sha256.clone(),
@@ -280,7 +287,7 @@ fn provenance(dataset: &Dataset, observed: &Observed, outliers: &Outliers, optio
 }
 
 /// The rows but for those that are outliers.
-fn without(observed: Observed, outliers: &Outliers) -> Observed {
+fn without(observed: Observations, outliers: &Outliers) -> Observations {
     if outliers.rows.is_empty() {
         return observed;
     }
@@ -304,21 +311,21 @@ struct Stages<'a> {
 
 impl Stages<'_> {
     /// The nominal arm, with the frames fitted. Its rows are forgotten.
-    fn registered(&self, rows: &Observed) -> Fitted {
+    fn registered(&self, rows: &Observations) -> Fitted {
         let Options { tolerance, seed, .. } = self.options;
         let start = Start { model: self.nominal, frames: self.frames };
         let mut fitted = fit(rows, start, self.sensing, tolerance, self.options.solver_for_frames(), *seed);
-        fitted.task.forget_rows();
+        fitted.problem.drop_rows();
         fitted
     }
 
     /// The links too. Literal forms move frames first, then links without priors.
-    fn geometry(&self, rows: &Observed, registered: &Fitted) -> Fitted {
+    fn geometry(&self, rows: &Observations, registered: &Fitted) -> Fitted {
         let Options { solver, tolerance, seed, .. } = self.options;
-        if solver.literal {
+        if solver.as_printed {
             return literal(rows, self.nominal, &registered.frames, solver, *seed);
         }
-        let frames = if solver.wants_registered() { &registered.frames } else { self.frames };
+        let frames = if solver.needs_registered_frames() { &registered.frames } else { self.frames };
         let start = Start { model: self.nominal, frames };
         fit(rows, start, self.everything, &solver.tolerance(tolerance), solver, *seed)
     }
@@ -347,19 +354,19 @@ pub fn sensor_name(sensor: Sensor) -> &'static str {
 }
 
 /// Sharpens what can be sharpened.
-pub fn observe(
+pub fn prepare_observations(
     dataset: &Dataset,
     nominal: &Model,
     wanted: bool,
-) -> (Observed, Result<ReadoutFusion, NotFused>) {
+) -> (Observations, Result<ReadoutFusion, NotFused>) {
     let mut rows = dataset.clone();
     match if wanted { fuse_readout(&mut rows, nominal) } else { Err(NotFused::Nothing) } {
         Ok((report, angles)) => {
-            (Observed { dataset: rows, angles: AngleCovariance::each(angles) }, Ok(report))
+            (Observations { dataset: rows, angles: AngleCovariance::each(angles) }, Ok(report))
         }
         Err(why) => {
             let angles = logged_covariance(dataset);
-            (Observed { dataset: rows, angles }, Err(why))
+            (Observations { dataset: rows, angles }, Err(why))
         }
     }
 }
@@ -373,7 +380,7 @@ fn enough(dataset: &Dataset, nominal: &Model, held_out: f64) -> Result<(), Ident
     };
     let rows = dataset.rows.len();
     let needed = (((parameters + 1).div_ceil(per)) as f64 / (1.0 - held_out)).ceil() as usize;
-    let poses = different_poses(dataset, 2 * needed);
+    let poses = count_distinct_poses(dataset, 2 * needed);
     let held = (poses as f64 * held_out).round() as usize;
     let scalars = (poses - held.min(poses)) * per;
     if scalars > parameters {
@@ -392,17 +399,17 @@ fn enough(dataset: &Dataset, nominal: &Model, held_out: f64) -> Result<(), Ident
 
 /// The papers' protocol: frames from the frame-only fit, then 24 link parameters without priors or weights
 /// (ltlm-2024, with the outlet that it takes as known).
-fn literal(rows: &Observed, nominal: &Model, frames: &Frames, solver: &Solver, seed: u64) -> Fitted {
+fn literal(rows: &Observations, nominal: &Model, frames: &Frames, solver: &Solver, seed: u64) -> Fitted {
     let parameters = link_parameters(nominal);
     let weights = vec![Weight { per_mm: 1.0, per_rad: 1.0 }; rows.dataset.rows.len()];
     // Priors for what cannot do without: first covariances of filters, boxes of swarms. The others ignore them.
     let priors = Tolerance::default().priors(&parameters, nominal);
-    let task = Calibration::new(&rows.dataset, nominal, frames, &parameters, &priors, &weights);
-    let estimate = solver.solve(&task, &vec![0.0; parameters.len()], seed);
-    let (model, frames) = task.apply(&estimate.x);
+    let problem = CalibrationProblem::new(&rows.dataset, nominal, frames, &parameters, &priors, &weights);
+    let estimate = solver.solve(&problem, &vec![0.0; parameters.len()], seed);
+    let (model, frames) = problem.apply(&estimate.x);
     let evaluations = estimate.evaluations;
-    let freedom = (task.rows() as f64 - parameters.len() as f64).max(1.0);
-    let sigma_mm = (2.0 * task.row_cost(&estimate.x) / freedom).sqrt();
+    let freedom = (problem.rows() as f64 - parameters.len() as f64).max(1.0);
+    let sigma_mm = (2.0 * problem.row_cost(&estimate.x) / freedom).sqrt();
     let rounds = vec![estimate.trace.clone()];
     Fitted {
         parameters,
@@ -412,7 +419,7 @@ fn literal(rows: &Observed, nominal: &Model, frames: &Frames, solver: &Solver, s
         frames,
         sigma_mm,
         sigma_rad: 1e-3,
-        task,
+        problem,
         evaluations,
         rounds,
     }
@@ -492,7 +499,7 @@ pub(crate) fn arm_covariance(fitted: &Fitted) -> nalgebra::DMatrix<f64> {
 
 /// What repeated poses scatter by (mm), or else what the rounding of angles alone leaves in a row; `None` where
 /// neither is known.
-fn noise_floor(repeats: Option<NoiseFloor>, observed: &Observed, fitted: &Fitted) -> Option<f64> {
+fn noise_floor(repeats: Option<NoiseFloor>, observed: &Observations, fitted: &Fitted) -> Option<f64> {
     if let Some(floor) = repeats {
         return Some(floor.sigma_mm);
     }
@@ -545,37 +552,37 @@ struct Case<'a> {
 }
 
 fn judge(case: &Case<'_>, options: &Options) -> Verdict {
-    let mut hearing = Hearing::default();
+    let mut verdict = VerdictBuilder::default();
     for (fitted, rows) in [(&case.trained.training, "the rows of the split"), (case.geometry, "all rows")] {
         let filtered =
             options.solver.family == Family::Filter && fitted.termination() == Termination::DataProcessed;
         if fitted.termination().is_converged() {
-            hearing.tell(format!("on {rows} the fit converged"));
+            verdict.note(format!("on {rows} the fit converged"));
         } else if filtered {
-            hearing.tell(format!("on {rows} the filter took in every reading; it claims no minimum"));
+            verdict.note(format!("on {rows} the filter took in every reading; it claims no minimum"));
         } else {
-            hearing.fail(format!("on {rows} the fit did not converge: {}", fitted.termination()));
+            verdict.fail(format!("on {rows} the fit did not converge: {}", fitted.termination()));
         }
     }
-    if options.solver.literal {
-        hearing.fail(format!(
+    if options.solver.as_printed {
+        verdict.fail(format!(
             "{} has no priors: what the data cannot see moved freely, so its parameters are a comparison and no model",
             options.solver.name
         ));
     }
-    hearing.strange_links(case.parameters, &options.tolerance, 0.0);
+    verdict.check_links(case.parameters, &options.tolerance, 0.0);
     if case.outliers.too_many > 0 {
-        hearing.tell(format!(
+        verdict.note(format!(
             "{} rows lie beyond ten robust standard deviations, too many to be accidents: none was set aside",
             case.outliers.too_many
         ));
     }
     let (before, held) = (case.trained.registered.held_out.rmse, case.trained.geometry.held_out.rmse);
-    hearing.held_out(before, held);
-    if !options.solver.literal {
-        hearing.benefit(case.benefit, case.sensor);
+    verdict.check_held_out(before, held);
+    if !options.solver.as_printed {
+        verdict.check_benefit(case.benefit, case.sensor);
     }
     let limits = Limits { rmse_mm: options.limit_rmse_mm, max_mm: options.limit_max_mm };
-    hearing.limits(&limits, &case.trained.geometry.held_out);
-    hearing.verdict()
+    verdict.check_limits(&limits, &case.trained.geometry.held_out);
+    verdict.build()
 }

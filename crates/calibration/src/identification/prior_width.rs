@@ -55,7 +55,7 @@ fn widths(tolerance: &mut Tolerance) -> [&mut f64; GROUPS] {
 
 /// The tolerances of the arm that `estimate` was fitted to with `priors`; those of the `catalogue` where the estimate says
 /// nothing of its covariance, or no link was free.
-pub fn learned(
+pub fn learn_tolerance(
     catalogue: &Tolerance,
     parameters: &[Parameter],
     priors: &[Prior],

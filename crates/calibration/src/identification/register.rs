@@ -4,10 +4,10 @@
 //! met best is taken.
 
 use super::calibration::Frames;
-use super::fit::{Fitted, Observed, Start, fit, frame_parameters, summary_on};
-use super::identify::observe;
+use super::fit::{Fitted, Observations, Start, fit, frame_parameters, summary_on};
+use super::identify::prepare_observations;
 use super::solver::SOLVERS;
-use super::start::{NoStart, starts};
+use super::start::{StartError, starts};
 use super::tolerance::Tolerance;
 use crate::measurement::dataset::Dataset;
 use truegrind_arm::model::Model;
@@ -24,8 +24,12 @@ pub struct Registered {
 /// Registers the sensor of `observed` under the arm `nominal`.
 ///
 /// # Errors
-/// [`NoStart`] when the rows do not determine the frames.
-pub fn register(observed: &Observed, nominal: &Model, tolerance: &Tolerance) -> Result<Registered, NoStart> {
+/// [`StartError`] when the rows do not determine the frames.
+pub fn register(
+    observed: &Observations,
+    nominal: &Model,
+    tolerance: &Tolerance,
+) -> Result<Registered, StartError> {
     let sensing = frame_parameters(&observed.dataset);
     let (mut best, mut least_mm) = (None, f64::INFINITY);
     for frames in starts(&observed.dataset, nominal)? {
@@ -37,24 +41,24 @@ pub fn register(observed: &Observed, nominal: &Model, tolerance: &Tolerance) -> 
             best = Some(Registered { start: frames, fitted });
         }
     }
-    best.ok_or_else(|| NoStart::of(&observed.dataset, "sensor", 4))
+    best.ok_or_else(|| StartError::of(&observed.dataset, "sensor", 4))
 }
 
-/// The frames where a fit of the arm to `dataset` starts; `fuse_readout` as [`observe`] has it. Nothing is fitted where
+/// The frames where a fit of the arm to `dataset` starts; `fuse_readout` as [`prepare_observations`] has it. Nothing is fitted where
 /// closed forms leave no choice.
 ///
 /// # Errors
-/// [`NoStart`] when the rows do not determine the frames.
+/// [`StartError`] when the rows do not determine the frames.
 pub fn starting_frames(
     dataset: &Dataset,
     nominal: &Model,
     tolerance: &Tolerance,
     fuse_readout: bool,
-) -> Result<Frames, NoStart> {
+) -> Result<Frames, StartError> {
     let mut candidates = starts(dataset, nominal)?;
     if candidates.len() == 1 {
         return Ok(candidates.remove(0));
     }
-    let (observed, _) = observe(dataset, nominal, fuse_readout);
+    let (observed, _) = prepare_observations(dataset, nominal, fuse_readout);
     Ok(register(&observed, nominal, tolerance)?.start)
 }

@@ -53,7 +53,7 @@ pub struct Solver {
     pub about: &'static str,
     /// Whether the method is a paper's literal form: without priors, so that what the data cannot see moves freely.
     /// Such a fit is a comparison, never a model.
-    pub literal: bool,
+    pub as_printed: bool,
     /// What kind of method it is.
     pub family: Family,
     /// Whether the arm gets a network, and with what.
@@ -132,7 +132,7 @@ impl Solver {
     }
 
     /// The arm that the method fits: with a network that does nothing yet, where the method has one.
-    pub fn prepared(&self, nominal: &Model, dataset: &Dataset) -> Model {
+    pub fn prepare_model(&self, nominal: &Model, dataset: &Dataset) -> Model {
         match self.network {
             Some(_) => with_network(nominal, dataset, &network_options()),
             None => nominal.clone(),
@@ -141,7 +141,7 @@ impl Solver {
 
     /// Whether frames must be registered before the method begins: it explores the whole of its priors, or leaves
     /// frames alone.
-    pub fn wants_registered(&self) -> bool {
+    pub fn needs_registered_frames(&self) -> bool {
         matches!(self.family, Family::Filter | Family::Swarm) || self.network == Some(Scope::Alone)
     }
 
@@ -156,7 +156,7 @@ impl Solver {
     /// Priors for the method: where frames are registered beforehand they lie within what links of ordinary tolerance
     /// can shift them by (1 mm and 0.3° at some 0.7 m).
     pub fn tolerance(&self, tolerance: &Tolerance) -> Tolerance {
-        if self.wants_registered() {
+        if self.needs_registered_frames() {
             Tolerance { target_mm: 10.0, target_rad: 0.02, frame_mm: 10.0, frame_rad: 0.02, ..*tolerance }
         } else {
             *tolerance
@@ -193,11 +193,11 @@ fn merge(into: &mut toml::Table, changes: &toml::Table) {
 
 /// A line of the list: its module gives `Options` and `solve`.
 macro_rules! method {
-    ($name:literal, $about:literal, $family:ident, $literal:literal, $network:expr, $module:ident, $options:expr) => {
+    ($name:literal, $about:literal, $family:ident, $as_printed:literal, $network:expr, $module:ident, $options:expr) => {
         Solver {
             name: $name,
             about: $about,
-            literal: $literal,
+            as_printed: $as_printed,
             family: Family::$family,
             network: $network,
             run: |problem, start, seed| {
@@ -239,7 +239,7 @@ pub const SOLVERS: &[Solver] = &[
 ];
 
 /// All others.
-pub const FURTHER: &[Solver] = &[
+pub const FURTHER_SOLVERS: &[Solver] = &[
     method!("sslm", "LM with a step size found by line search", LeastSquares, sound sslm),
     method!("vslm", "variable step-size LM that grows back to whole steps", LeastSquares, sound vslm),
     method!("least-squares", "Gauss–Newton with halved steps, with priors", LeastSquares, sound gauss_newton),
@@ -264,7 +264,7 @@ pub const FURTHER: &[Solver] = &[
     Solver {
         name: "rbf",
         about: "LM on links and a radial basis function network together, with priors",
-        literal: false,
+        as_printed: false,
         family: Family::Network,
         network: Some(Scope::WithLinks),
         run: |problem, start, seed| lm::solve(problem, start, &lm::Options { seed, ..Default::default() }),
@@ -320,7 +320,7 @@ pub const FURTHER: &[Solver] = &[
 
 /// Every method there is, the default one first.
 pub fn all() -> impl Iterator<Item = &'static Solver> {
-    SOLVERS.iter().chain(FURTHER)
+    SOLVERS.iter().chain(FURTHER_SOLVERS)
 }
 
 /// The solver of that name.
@@ -329,7 +329,7 @@ pub fn all() -> impl Iterator<Item = &'static Solver> {
 /// use truegrind_calibration::identification::solver::{SolverError, by_name};
 ///
 /// let method = by_name("lm").map_err(|error| error.to_string())?;
-/// assert!(!method.literal);
+/// assert!(!method.as_printed);
 /// let Err(SolverError::Unknown { known, .. }) = by_name("annealing") else { panic!("there is no annealing") };
 /// assert!(known.contains(&"ltlm"));
 /// // A setting that a method has not is refused, with the method's name.

@@ -18,7 +18,7 @@ use truegrind_math::se3::Pose;
     "{file}: the {rows} rows, at {poses} different poses of the arm, do not tell where the {what} is: measure at least \
      {needed} poses that are not all in one line and turn the wrist between them"
 )]
-pub struct NoStart {
+pub struct StartError {
     /// File.
     pub file: String,
     /// Rows.
@@ -31,9 +31,9 @@ pub struct NoStart {
     pub needed: usize,
 }
 
-impl NoStart {
+impl StartError {
     pub(super) fn of(dataset: &Dataset, what: &'static str, needed: usize) -> Self {
-        let poses = different_poses(dataset, usize::MAX);
+        let poses = count_distinct_poses(dataset, usize::MAX);
         Self { file: dataset.file.clone(), rows: dataset.rows.len(), poses, what, needed }
     }
 }
@@ -41,15 +41,15 @@ impl NoStart {
 /// Starting frames for a data set, best first: cable lengths seen from one side may leave a second outlet.
 ///
 /// # Errors
-/// [`NoStart`] when the rows do not determine them.
-pub fn starts(dataset: &Dataset, nominal: &Model) -> Result<Vec<Frames>, NoStart> {
-    let none = |what, needed| NoStart::of(dataset, what, needed);
+/// [`StartError`] when the rows do not determine them.
+pub fn starts(dataset: &Dataset, nominal: &Model) -> Result<Vec<Frames>, StartError> {
+    let none = |what, needed| StartError::of(dataset, what, needed);
     let (what, needed) = match dataset.sensor {
         Sensor::Cable => ("cable outlet", 4),
         Sensor::Position => ("sensor frame", 4),
         Sensor::Pose => ("sensor frame", 3),
     };
-    if different_poses(dataset, needed) < needed {
+    if count_distinct_poses(dataset, needed) < needed {
         return Err(none(what, needed));
     }
     let posed = nominal.at_condition(&Condition::default());
@@ -104,7 +104,7 @@ pub fn starts(dataset: &Dataset, nominal: &Model) -> Result<Vec<Frames>, NoStart
 }
 
 /// How many rows differ in their joint angles or their cable; counted up to `enough`.
-pub fn different_poses(dataset: &Dataset, enough: usize) -> usize {
+pub fn count_distinct_poses(dataset: &Dataset, enough: usize) -> usize {
     let mut met = HashSet::new();
     for row in &dataset.rows {
         let angles: [i64; 6] = std::array::from_fn(|j| (row.joints[j] * 1e6).round() as i64);

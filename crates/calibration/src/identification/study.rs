@@ -52,7 +52,7 @@ pub fn study(
         .map(|&(s, seed)| {
             let options = Options { solver: &SOLVERS[s], seed, ..options.clone() };
             let result = identify(dataset, robot, nominal, frames, &|d| split(d, seed), &options)?;
-            let rows = result.training.task.rows().max(1);
+            let rows = result.training.problem.rows().max(1);
             let per = result.training.evaluations.jacobians as f64 / rows as f64;
             Ok((
                 s,

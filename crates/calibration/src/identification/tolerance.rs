@@ -28,7 +28,7 @@ pub struct Tolerance {
     /// Orientation of the sensor frame about its starting value (rad); wide.
     pub frame_rad: f64,
     /// Whether the rows tell how wide the tolerances of links are, weighed by the ones stated here (`prior_width`).
-    pub learned: bool,
+    pub learn_widths: bool,
 }
 
 impl Default for Tolerance {
@@ -43,7 +43,7 @@ impl Default for Tolerance {
             target_rad: 1.0,
             frame_mm: 2000.0,
             frame_rad: 3.0,
-            learned: false,
+            learn_widths: false,
         }
     }
 }

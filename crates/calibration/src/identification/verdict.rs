@@ -12,7 +12,7 @@ use truegrind_arm::estimated::{EstimatedParameter, Judgement, Verdict};
 use truegrind_math::statistics::ErrorSummary;
 
 /// Least probability of a benefit with which a model is not doubtful.
-pub const LEAST_CHANCE: f64 = 0.96;
+pub const MIN_PROBABILITY: f64 = 0.96;
 
 /// Probability from which a scale of the sensor counts as found.
 const FOUND: f64 = 0.95;
@@ -26,7 +26,7 @@ const STRANGE_DEVIATION: f64 = 6.0;
 
 /// What speaks for and against a model, one sentence each.
 #[derive(Debug, Clone, Default)]
-pub struct Hearing {
+pub struct VerdictBuilder {
     failures: Vec<String>,
     doubts: Vec<String>,
     others: Vec<String>,
@@ -42,7 +42,7 @@ pub struct Limits {
     pub max_mm: Option<f64>,
 }
 
-impl Hearing {
+impl VerdictBuilder {
     /// A reason why this is no model.
     pub fn fail(&mut self, reason: impl Into<String>) {
         self.failures.push(reason.into());
@@ -54,13 +54,13 @@ impl Hearing {
     }
 
     /// Something to know.
-    pub fn tell(&mut self, reason: impl Into<String>) {
+    pub fn note(&mut self, reason: impl Into<String>) {
         self.others.push(reason.into());
     }
 
     /// Fails where a link lies where no arm has it. `sure` standard deviations of the estimate are taken off first: with
     /// wide priors a parameter that the data hardly see wanders.
-    pub fn strange_links(&mut self, parameters: &[EstimatedParameter], tolerance: &Tolerance, sure: f64) {
+    pub fn check_links(&mut self, parameters: &[EstimatedParameter], tolerance: &Tolerance, sure: f64) {
         for p in parameters.iter().filter(|p| p.name.starts_with("link")) {
             let one = if p.unit == "mm" { tolerance.length_mm } else { tolerance.angle_rad };
             let off = (p.value - p.nominal).abs();
@@ -75,7 +75,7 @@ impl Hearing {
     }
 
     /// Fails where rows that were held out are worse off (RMSE in mm).
-    pub fn held_out(&mut self, registered_mm: f64, model_mm: f64) {
+    pub fn check_held_out(&mut self, registered_mm: f64, model_mm: f64) {
         if model_mm > registered_mm {
             self.fail(format!(
                 "geometry is worse than registered frames on held-out rows: {model_mm:.3} against {registered_mm:.3} mm RMSE"
@@ -84,32 +84,32 @@ impl Hearing {
     }
 
     /// Fails where a stated limit of the held-out error is missed, and says where none is stated.
-    pub fn limits(&mut self, limits: &Limits, held_out: &ErrorSummary) {
+    pub fn check_limits(&mut self, limits: &Limits, held_out: &ErrorSummary) {
         for (name, limit, found) in
             [("RMSE", limits.rmse_mm, held_out.rmse), ("maximum", limits.max_mm, held_out.max)]
         {
             let Some(limit) = limit else { continue };
             self.limits_stated = true;
             if found <= limit {
-                self.tell(format!("held-out {name} {found:.3} mm is within the stated {limit} mm"));
+                self.note(format!("held-out {name} {found:.3} mm is within the stated {limit} mm"));
             } else {
                 self.fail(format!("held-out {name} {found:.3} mm exceeds the stated {limit} mm"));
             }
         }
         if !self.limits_stated {
-            self.tell("held-out error not evaluated: no limits were stated (--limit-rmse, --limit-max)");
+            self.note("held-out error not evaluated: no limits were stated (--limit-rmse, --limit-max)");
         }
     }
 
     /// Doubts where the model does not promise to help, and says why.
-    pub fn benefit(&mut self, benefit: Option<&Benefit>, sensor: Sensor) {
+    pub fn check_benefit(&mut self, benefit: Option<&Benefit>, sensor: Sensor) {
         let Some(found) = benefit else {
             self.doubt("what the model would bring programs cannot be told: its equations have no solution");
             return;
         };
         let promise = promise(found);
-        if found.chance >= LEAST_CHANCE {
-            self.tell(promise);
+        if found.probability >= MIN_PROBABILITY {
+            self.note(promise);
             match &found.scale {
                 Some(scale) if spoils(scale) => self.doubt(scale_sentence(scale, sensor)),
                 _ => {}
@@ -117,7 +117,7 @@ impl Hearing {
             return;
         }
         self.doubt(promise);
-        if found.chance_without_scale < LEAST_CHANCE {
+        if found.probability_without_scale < MIN_PROBABILITY {
             self.doubt(few(found));
             return;
         }
@@ -133,7 +133,7 @@ impl Hearing {
     }
 
     /// The verdict: what speaks against the model first.
-    pub fn verdict(mut self) -> Verdict {
+    pub fn build(mut self) -> Verdict {
         let status = match (self.failures.is_empty(), self.doubts.is_empty(), self.limits_stated) {
             (false, ..) => Judgement::Fail,
             (true, false, _) => Judgement::Doubtful,
@@ -151,7 +151,7 @@ impl Hearing {
 fn spoils(scale: &ScaleError) -> bool {
     scale.probability > FOUND
         && scale.value.abs() > 3.0 * scale.sigma
-        && scale.left < 1.0
+        && scale.geometry_share < 1.0
         && scale.estimated_mm > SPOILT * scale.nominal_mm
 }
 
@@ -174,14 +174,14 @@ pub fn percent_of(probability: f64) -> String {
 
 /// What a model promises.
 fn promise(found: &Benefit) -> String {
-    let chance = percent_of(found.chance);
+    let probability = percent_of(found.probability);
     format!(
         "inside the measured region, apart from where base and flange are placed, the data sheet's arm is expected to be \
-         {:.3} mm RMS off and the estimated one {:.3} mm: it helps programs with a probability of {chance} (at least {:.0} % \
+         {:.3} mm RMS off and the estimated one {:.3} mm: it helps programs with a probability of {probability} (at least {:.0} % \
          is asked for)",
         found.nominal_mm,
         found.estimated_mm,
-        100.0 * LEAST_CHANCE
+        100.0 * MIN_PROBABILITY
     )
 }
 
@@ -190,7 +190,7 @@ fn percent(scale: &ScaleError) -> String {
 }
 
 fn scale_sentence(scale: &ScaleError, sensor: Sensor) -> String {
-    let share = 100.0 * (1.0 - scale.left.clamp(0.0, 1.0).sqrt());
+    let share = 100.0 * (1.0 - scale.geometry_share.clamp(0.0, 1.0).sqrt());
     let bent = if share >= 0.5 {
         format!(", and {share:.0} % of what the links were bent by")
     } else {

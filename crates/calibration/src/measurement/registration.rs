@@ -22,7 +22,7 @@ use nalgebra::{
 };
 
 use self::fit::{Normal, fit};
-use truegrind_math::se3::{Pose, difference, moved, rotation_from_matrix, skew};
+use truegrind_math::se3::{Pose, apply_twist, difference, rotation_from_matrix, skew};
 
 /// Lever that turns an error of orientation into one of position [mm/rad] where both are summed.
 const LEVER_MM: f64 = 300.0;
@@ -147,7 +147,7 @@ pub fn touching_point(base_from_flange: &[Pose], measured_mm: &[Vector3<f64>]) -
     };
     let step = |state: &(Pose, Vector3<f64>), d: &DVector<f64>| {
         let twist = Vector6::from_iterator(d.iter().take(6).copied());
-        (moved(&state.0, &twist), state.1 + Vector3::new(d[6], d[7], d[8]))
+        (apply_twist(&state.0, &twist), state.1 + Vector3::new(d[6], d[7], d[8]))
     };
     let (cost, (base_from_sensor, on_flange_mm)) = best(starts, 9, rows, step)?;
     Some(PointRegistration { base_from_sensor, on_flange_mm, rmse_mm: (cost / n as f64).sqrt() })
@@ -220,7 +220,7 @@ pub fn poses(base_from_flange: &[Pose], sensor_from_target: &[Pose]) -> Option<P
             Translation3::from(turn * state.1.translation.vector + Vector3::new(d[6], d[7], d[8])),
             turn * state.1.rotation,
         );
-        (moved(&state.0, &at(0)), target)
+        (apply_twist(&state.0, &at(0)), target)
     };
     let (_, (base_from_sensor, flange_from_target)) = best(starts, 12, rows, step)?;
     let (mut square_mm, mut square_rad) = (0.0, 0.0);

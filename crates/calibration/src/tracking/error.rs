@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use crate::identification::start::NoStart;
+use crate::identification::start::StartError;
 
 /// Why an arm cannot be tracked.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -23,7 +23,7 @@ pub enum TrackError {
     },
     /// The rows do not place the sensor.
     #[error(transparent)]
-    Placing(#[from] NoStart),
+    Placing(#[from] StartError),
     /// The first poses do not fit the model.
     #[error(
         "{file}: the first {poses} poses leave {left_mm:.3} mm under this model, which left {held_out_mm:.3} mm on rows \

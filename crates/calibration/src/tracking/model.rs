@@ -1,7 +1,7 @@
 //! The model that a track writes: the one it began with, moved to where the filter stands, with its covariance.
 
 use super::tracker::Tracker;
-use crate::identification::calibration::{Calibration, Frames};
+use crate::identification::calibration::{CalibrationProblem, Frames};
 use crate::measurement::dataset::{Dataset, Sensor};
 use truegrind_arm::estimated::{Estimated, EstimatedParameter, Judgement, Verdict};
 use truegrind_arm::model::Model;
@@ -10,7 +10,7 @@ use truegrind_math::statistics::ErrorSummary;
 impl Tracker {
     /// The arm and the sensor's frames as they stand now.
     pub fn standing(&self) -> (Model, Frames) {
-        let task = Calibration::new(
+        let problem = CalibrationProblem::new(
             &Dataset::new("track", Sensor::Position, Vec::new()),
             &self.begun.model,
             &self.frames,
@@ -18,7 +18,7 @@ impl Tracker {
             &[],
             &[],
         );
-        task.apply(self.recursion.x.as_slice())
+        problem.apply(self.recursion.x.as_slice())
     }
 
     /// The model as it stands now.

@@ -15,7 +15,7 @@ use crate::identification::calibration::Frames;
 use crate::measurement::registration::points;
 use truegrind_arm::model::Joints;
 use truegrind_arm::parameter::Parameter;
-use truegrind_estimation::filter::rls::Recursion;
+use truegrind_estimation::filter::rls::RecursiveLeastSquares;
 use truegrind_math::se3::{Pose, pose_from_vector, vector_from_pose};
 
 /// So many poses set aside one after the other are no lone accidents.
@@ -133,11 +133,11 @@ impl Tracker {
                 self.frames.base_from_sensor = pose_from_vector(&self.state.base_from_sensor);
             }
         }
-        self.recursion = Recursion::from_root(x, root);
+        self.recursion = RecursiveLeastSquares::from_root(x, root);
         self.recursion.predict(&room);
-        let task = self.task(&poses);
+        let problem = self.problem(&poses);
         for (at, seen) in poses.iter().enumerate() {
-            if !self.update(&task, at).set_aside {
+            if !self.update(&problem, at).set_aside {
                 self.state.accidents = self.state.accidents.saturating_sub(1);
                 reach(&mut self.state.region, &seen.joints);
             }

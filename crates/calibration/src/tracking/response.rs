@@ -182,7 +182,7 @@ impl Tracker {
         let (per, p) = (self.rows_per_pose(), self.parameters.len());
         let rows = poses.len() * per;
         let (mut r, mut j) = (vec![0.0; rows], vec![0.0; rows * p]);
-        self.task(poses).jacobian(&self.state.reference.x, 0..rows, &mut r, &mut j);
+        self.problem(poses).jacobian(&self.state.reference.x, 0..rows, &mut r, &mut j);
         // The rows of position; a pose has three more.
         let axes = per.min(3);
         let changed = (poses.len() - together.since).max(1) as f64;
@@ -233,7 +233,7 @@ impl Tracker {
         let reference = &self.state.reference;
         let (rows, p) = (poses.len() * per, self.parameters.len());
         let (mut r, mut j) = (vec![0.0; rows], vec![0.0; rows * p]);
-        self.task(poses).jacobian(&reference.x, 0..rows, &mut r, &mut j);
+        self.problem(poses).jacobian(&reference.x, 0..rows, &mut r, &mut j);
         for (pose, seen) in poses.iter().enumerate() {
             if self.is_lone_accident(pose) || !seen.nis.is_finite() {
                 let of_pose = pose * per..(pose + 1) * per;
@@ -250,7 +250,7 @@ impl Tracker {
         let Some(recursion) = self.state.reference.recursion() else { return };
         self.recursion = recursion;
         let poses = std::mem::take(&mut self.state.history);
-        let task = self.task(&poses);
+        let problem = self.problem(&poses);
         let single = found.together.is_none();
         let all = || std::iter::once(&found.best).chain(&found.alternatives).filter(|_| single);
         for at in 0..poses.len() {
@@ -278,7 +278,7 @@ impl Tracker {
             if any {
                 self.recursion.predict(&room);
             }
-            self.update(&task, at);
+            self.update(&problem, at);
         }
         // What came before the change is settled.
         let snapshot = Snapshot::of(&self.recursion, 0);

@@ -10,7 +10,7 @@ use crate::measurement::dataset::{Reading, Row};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Joints;
 use truegrind_arm::region::Region;
-use truegrind_estimation::filter::rls::Recursion;
+use truegrind_estimation::filter::rls::RecursiveLeastSquares;
 use truegrind_math::se3::{pose_from_vector, vector_from_pose};
 
 /// Schema of the state file.
@@ -82,7 +82,7 @@ pub(super) struct Snapshot {
 }
 
 impl Snapshot {
-    pub(super) fn of(recursion: &Recursion, before: usize) -> Self {
+    pub(super) fn of(recursion: &RecursiveLeastSquares, before: usize) -> Self {
         let rows = |s: &DMatrix<f64>| s.row_iter().map(|r| r.iter().copied().collect()).collect();
         Self {
             x: recursion.x.as_slice().to_vec(),
@@ -102,8 +102,8 @@ impl Snapshot {
         self.root().map(|s| &s * s.transpose())
     }
 
-    pub(super) fn recursion(&self) -> Option<Recursion> {
-        Some(Recursion::from_root(DVector::from_column_slice(&self.x), self.root()?))
+    pub(super) fn recursion(&self) -> Option<RecursiveLeastSquares> {
+        Some(RecursiveLeastSquares::from_root(DVector::from_column_slice(&self.x), self.root()?))
     }
 }
 

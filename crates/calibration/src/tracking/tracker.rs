@@ -7,9 +7,9 @@ use super::bounds::accident_bound;
 use super::error::TrackError;
 use super::options::Options;
 use super::state::{Consumed, SCHEMA, Seen, Snapshot, State, digest, reach};
-use crate::identification::calibration::{Calibration, Frames, Weight};
-use crate::identification::fit::{Observed, frame_parameters};
-use crate::identification::identify::{observe, sensor_name};
+use crate::identification::calibration::{CalibrationProblem, Frames, Weight};
+use crate::identification::fit::{Observations, frame_parameters};
+use crate::identification::identify::{prepare_observations, sensor_name};
 use crate::identification::register::register;
 use crate::identification::rounding;
 use crate::identification::tolerance::Tolerance;
@@ -18,7 +18,7 @@ use truegrind_arm::condition::Condition;
 use truegrind_arm::estimated::Estimated;
 use truegrind_arm::model::Joints;
 use truegrind_arm::parameter::Parameter;
-use truegrind_estimation::filter::rls::{Memory, Recursion};
+use truegrind_estimation::filter::rls::{Memory, RecursiveLeastSquares};
 use truegrind_estimation::problem::Problem;
 use truegrind_math::se3::{pose_from_vector, vector_from_pose};
 
@@ -68,7 +68,7 @@ pub struct Tracker {
     pub(super) parameters: Vec<Parameter>,
     pub(super) drift: Vec<f64>,
     pub(super) frames: Frames,
-    pub(super) recursion: Recursion,
+    pub(super) recursion: RecursiveLeastSquares,
     pub(super) state: State,
     pub(super) condition: Condition,
 }
@@ -101,7 +101,7 @@ impl Tracker {
             });
         }
         let first = dataset.subset(&(0..options.first_poses).collect::<Vec<_>>());
-        let (observed, _) = observe(&first, &model.nominal, false);
+        let (observed, _) = prepare_observations(&first, &model.nominal, false);
         let fitted = register(&observed, &model.model, &Tolerance::default())?.fitted;
         // A reading cannot agree better with the model than held-out readings did when it was identified; a few poses that
         // have just placed the sensor seem to.
@@ -125,11 +125,12 @@ impl Tracker {
         let sensing = frame_parameters(dataset);
         let parameters: Vec<Parameter> = model.order.iter().copied().chain(sensing).collect();
         let covariance = first_covariance(model, &parameters);
-        let recursion = Recursion::new(DVector::zeros(parameters.len()), covariance, Memory::SquareRoot)
-            .ok_or_else(|| TrackError::State {
-                file: model.provenance.file.clone(),
-                why: "the model's covariance is not positive definite".to_owned(),
-            })?;
+        let recursion =
+            RecursiveLeastSquares::new(DVector::zeros(parameters.len()), covariance, Memory::SquareRoot)
+                .ok_or_else(|| TrackError::State {
+                    file: model.provenance.file.clone(),
+                    why: "the model's covariance is not positive definite".to_owned(),
+                })?;
         let snapshot = Snapshot::of(&recursion, 0);
         let state = State {
             schema: SCHEMA.to_owned(),
@@ -228,17 +229,17 @@ impl Tracker {
             return Ok(Vec::new());
         }
         let fresh = dataset.subset(&(from..dataset.rows.len()).collect::<Vec<_>>());
-        let (observed, _) = observe(&fresh, &self.begun.nominal, false);
+        let (observed, _) = prepare_observations(&fresh, &self.begun.nominal, false);
         let mut seen = self.seen(&observed);
-        let mut task = self.task(&seen);
+        let mut problem = self.problem(&seen);
         let mut alarms = Vec::new();
         for (at, row) in observed.dataset.rows.iter().enumerate() {
             self.condition = *row.condition;
-            let alarm = self.pose(&task, at, seen[at].clone());
+            let alarm = self.pose(&problem, at, seen[at].clone());
             if alarm.as_ref().is_some_and(|alarm| alarm.course == Course::Mounted) {
                 // Its frames are others now, and with them what rounded angles cost.
                 seen = self.seen(&observed);
-                task = self.task(&seen);
+                problem = self.problem(&seen);
             }
             alarms.extend(alarm);
         }
@@ -255,13 +256,13 @@ impl Tracker {
         Ok(alarms)
     }
 
-    /// Observation `at` of `task`, which is `seen`. Gives the alarm, where it raises one.
-    pub(super) fn pose(&mut self, task: &Calibration, at: usize, mut seen: Seen) -> Option<Alarm> {
-        let taken = self.update(task, at);
+    /// Observation `at` of `problem`, which is `seen`. Gives the alarm, where it raises one.
+    pub(super) fn pose(&mut self, problem: &CalibrationProblem, at: usize, mut seen: Seen) -> Option<Alarm> {
+        let taken = self.update(problem, at);
         seen.nis = taken.nis;
         self.state.poses += 1;
         self.state.accidents += usize::from(taken.set_aside);
-        seen.error_mm = self.error_mm(task, at, seen.per_mm);
+        seen.error_mm = self.error_mm(problem, at, seen.per_mm);
         if !taken.set_aside {
             reach(&mut self.state.region, &seen.joints);
         }
@@ -283,15 +284,15 @@ impl Tracker {
         None
     }
 
-    /// Takes in observation `pose` of `task`: process noise, linearisation, one update for each row. This is the whole
+    /// Takes in observation `pose` of `problem`: process noise, linearisation, one update for each row. This is the whole
     /// cost of a pose but for the alarm.
-    pub fn update(&mut self, task: &Calibration, pose: usize) -> Taken {
-        let (p, per) = (self.parameters.len(), task.rows_per_observation());
+    pub fn update(&mut self, problem: &CalibrationProblem, pose: usize) -> Taken {
+        let (p, per) = (self.parameters.len(), problem.rows_per_observation());
         self.recursion.predict(&self.drift);
         let mut trial = self.recursion.clone();
         let (mut r, mut j) = (vec![0.0; per], vec![0.0; per * p]);
         let at = trial.x.clone();
-        task.jacobian(at.as_slice(), pose * per..(pose + 1) * per, &mut r, &mut j);
+        problem.jacobian(at.as_slice(), pose * per..(pose + 1) * per, &mut r, &mut j);
         let mut a = DVector::zeros(p);
         let mut nis = 0.0;
         for i in 0..per {
@@ -309,7 +310,7 @@ impl Tracker {
         Taken { nis, set_aside }
     }
 
-    pub(super) fn task(&self, poses: &[Seen]) -> Calibration {
+    pub(super) fn problem(&self, poses: &[Seen]) -> CalibrationProblem {
         let rows: Vec<Row> = poses.iter().map(|seen| seen.row_of(&self.state.sensor)).collect();
         let sensor = match self.state.sensor.as_str() {
             "cable" => Sensor::Cable,
@@ -318,10 +319,10 @@ impl Tracker {
         };
         let dataset = Dataset::new("track", sensor, rows);
         let weights: Vec<_> = poses.iter().map(|s| Weight { per_mm: s.per_mm, per_rad: s.per_rad }).collect();
-        Calibration::new(&dataset, &self.begun.model, &self.frames, &self.parameters, &[], &weights)
+        CalibrationProblem::new(&dataset, &self.begun.model, &self.frames, &self.parameters, &[], &weights)
     }
 
-    pub(super) fn seen(&self, observed: &Observed) -> Vec<Seen> {
+    pub(super) fn seen(&self, observed: &Observations) -> Vec<Seen> {
         let weights = rounding::weights(
             &observed.dataset,
             &self.begun.model,
@@ -351,10 +352,10 @@ impl Tracker {
     }
 
     /// Error of a pose with the state after it (mm): signed for a cable, the norm otherwise.
-    pub(super) fn error_mm(&self, task: &Calibration, at: usize, per_mm: f64) -> f64 {
-        let per = task.rows_per_observation();
+    pub(super) fn error_mm(&self, problem: &CalibrationProblem, at: usize, per_mm: f64) -> f64 {
+        let per = problem.rows_per_observation();
         let mut r = vec![0.0; per];
-        task.residuals(self.recursion.x.as_slice(), at * per..(at + 1) * per, &mut r);
+        problem.residuals(self.recursion.x.as_slice(), at * per..(at + 1) * per, &mut r);
         match r.as_slice() {
             [length] => length / per_mm,
             rows => rows.iter().take(3).map(|v| v * v).sum::<f64>().sqrt() / per_mm,
@@ -399,10 +400,10 @@ impl Tracker {
         self.recursion.covariance().diagonal().iter().map(|v| v.max(0.0).sqrt()).collect()
     }
 
-    /// A task of rows for [`Tracker::update`], with the weights that tracking gives them.
-    pub fn prepare(&self, dataset: &Dataset) -> Calibration {
-        let (observed, _) = observe(dataset, &self.begun.nominal, false);
-        self.task(&self.seen(&observed))
+    /// A problem of rows for [`Tracker::update`], with the weights that tracking gives them.
+    pub fn prepare(&self, dataset: &Dataset) -> CalibrationProblem {
+        let (observed, _) = prepare_observations(dataset, &self.begun.nominal, false);
+        self.problem(&self.seen(&observed))
     }
 }
 

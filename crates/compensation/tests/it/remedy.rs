@@ -12,7 +12,7 @@ use truegrind_arm::estimated::Estimated;
 use truegrind_arm::inverse::Inverse;
 use truegrind_arm::model::{Joints, Model};
 use truegrind_arm::parameter::{LinkCoordinate, Parameter};
-use truegrind_calibration::identification::calibration::{Calibration, Weight};
+use truegrind_calibration::identification::calibration::{CalibrationProblem, Weight};
 use truegrind_calibration::identification::fit::frame_parameters;
 use truegrind_calibration::identification::identify::{self, Identification, identify};
 use truegrind_calibration::identification::start::starts;
@@ -223,12 +223,12 @@ fn fitted(known: &Estimated, rows: &Dataset) -> DMatrix<f64> {
     let weights = vec![Weight { per_mm: 1.0 / sigma_mm, per_rad: 1.0 }; rows.rows.len()];
     let n = known.order.len();
     // Sensor and target first, with the arm as it is known.
-    let task = Calibration::new(rows, &known.model, &frames, &own, &priors[n..], &weights);
-    let found = lm::solve(&task, &vec![0.0; own.len()], &lm::Options::default());
-    let (_, frames) = task.apply(&found.x);
-    let task = Calibration::new(rows, &known.model, &frames, &parameters, &priors, &weights);
-    let mut normal = task.normal_equations(&vec![0.0; parameters.len()]);
-    normal.mirror();
+    let problem = CalibrationProblem::new(rows, &known.model, &frames, &own, &priors[n..], &weights);
+    let found = lm::solve(&problem, &vec![0.0; own.len()], &lm::Options::default());
+    let (_, frames) = problem.apply(&found.x);
+    let problem = CalibrationProblem::new(rows, &known.model, &frames, &parameters, &priors, &weights);
+    let mut normal = problem.normal_equations(&vec![0.0; parameters.len()]);
+    normal.symmetrize();
     let before = known.covariance.clone().cholesky().unwrap().inverse();
     normal.matrix.view_mut((0, 0), (n, n)).add_assign(&before);
     for (k, prior) in priors.iter().enumerate().skip(n) {

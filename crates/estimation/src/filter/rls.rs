@@ -100,7 +100,7 @@ impl Options {
 
 /// The running recursion, for those who feed it themselves.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Recursion {
+pub struct RecursiveLeastSquares {
     /// The parameters.
     pub x: DVector<f64>,
     kept: Kept,
@@ -117,7 +117,7 @@ enum Kept {
     Ordered(Ordered),
 }
 
-impl Recursion {
+impl RecursiveLeastSquares {
     /// Begins with `x` and its covariance; `None` where the square-root form is asked for and the covariance is
     /// not positive definite.
     pub fn new(x: DVector<f64>, covariance: DMatrix<f64>, memory: Memory) -> Option<Self> {
@@ -128,7 +128,7 @@ impl Recursion {
         Some(Self { x, kept })
     }
 
-    /// Goes on in square-root form from a state and the root S of its covariance, as [`Recursion::root`] gave it.
+    /// Goes on in square-root form from a state and the root S of its covariance, as [`RecursiveLeastSquares::root`] gave it.
     pub fn from_root(x: DVector<f64>, root: DMatrix<f64>) -> Self {
         Self { x, kept: Kept::Root(root) }
     }
@@ -269,7 +269,7 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
         let begun = match options.initial {
             Initial::Prior => {
                 let (x, covariance) = prior_state(problem, start, options.unknown_sigma);
-                Recursion::new(x, covariance, options.memory).map(|recursion| (recursion, 0))
+                RecursiveLeastSquares::new(x, covariance, options.memory).map(|recursion| (recursion, 0))
             }
             Initial::FirstRows(count) => first_rows(&mut objective, &point, count, options.memory),
         };
@@ -306,7 +306,7 @@ fn first_rows(
     point: &DVector<f64>,
     count: usize,
     memory: Memory,
-) -> Option<(Recursion, usize)> {
+) -> Option<(RecursiveLeastSquares, usize)> {
     let p = point.len();
     let per = objective.problem.rows_per_observation().max(1);
     let n = (count * per).min(objective.problem.rows() / per * per);
@@ -316,5 +316,5 @@ fn first_rows(
     let equations = NormalEquations { matrix: j.tr_mul(&j), gradient: j.tr_mul(&r), cost: 0.0 };
     let covariance = inverse_of_normal(&equations.matrix)?;
     let x = point - &covariance * equations.gradient;
-    Recursion::new(x, covariance, memory).map(|recursion| (recursion, n / per))
+    RecursiveLeastSquares::new(x, covariance, memory).map(|recursion| (recursion, n / per))
 }

@@ -68,7 +68,7 @@ impl Linearisation {
 
 /// What a step promises.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Promise {
+pub(crate) struct PredictedReduction {
     /// Reduction of the cost that the undamped quadratic model predicts.
     pub(crate) reduction: f64,
     /// ‖s‖ = ‖D h‖.
@@ -151,7 +151,7 @@ impl DampedSystem {
         mu: f64,
         x: &[f64],
         trial: &mut [f64],
-    ) -> Option<Promise> {
+    ) -> Option<PredictedReduction> {
         match at {
             Linearisation::Normal(equations) => self.solve_normal(equations, mu)?,
             Linearisation::Factor(factor) => self.solve_factor(factor, mu),
@@ -166,7 +166,7 @@ impl DampedSystem {
         // c(0) − c(s) = −γᵀs − ½ sᵀSs = ½ sᵀ(μs − γ), since Ss = −γ − μs.
         let reduction = 0.5 * (mu * square + descent);
         let finite = reduction.is_finite() && trial.iter().all(|x| x.is_finite());
-        finite.then(|| Promise { reduction, step_norm: square.sqrt() })
+        finite.then(|| PredictedReduction { reduction, step_norm: square.sqrt() })
     }
 
     fn solve_normal(&mut self, equations: &NormalEquations, mu: f64) -> Option<()> {

@@ -123,14 +123,14 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
         if let Some(end) = end.filter(|_| !printed) {
             return here.finish(&objective, end, trace);
         }
-        let Some(promise) = system.step(&here.at, 0.0, &here.x, &mut trial) else {
+        let Some(predicted) = system.step(&here.at, 0.0, &here.x, &mut trial) else {
             return here.finish(&objective, Termination::Singular, trace);
         };
-        if !printed && promise.reduction <= options.cost_tolerance * cost {
+        if !printed && predicted.reduction <= options.cost_tolerance * cost {
             return here.finish(&objective, Termination::Cost, trace);
         }
         let mut at = Linearisation::at(&mut objective, &trial, options.factorisation);
-        let mut length = promise.step_norm;
+        let mut length = predicted.step_norm;
         let mut halvings = 0;
         while !(printed || at.is_finite() && at.cost() < cost) {
             halvings += 1;

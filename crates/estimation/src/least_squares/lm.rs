@@ -29,8 +29,7 @@
 //! step; damping slows, it is no prior. Eq. 8's 1/n does not change the step and is left out. Sound: Moré, "The
 //! Levenberg–Marquardt algorithm" (1978) for the scaling, Madsen, Nielsen, Tingleff, *Methods for non-linear
 //! least squares problems* (2004), algorithm 3.16, for μ. Departures from the latter: μ starts near zero
-//! (`initial_damping`), since priors regularise here; a step with less damping than 10⁻³ must keep a quarter of
-//! its promise, and a refusal lifts μ to at least 10⁻³ at once; an almost perfect gain ratio divides μ by ten,
+//! (`initial_damping`), since priors regularise here; a step with less damping than 10⁻³ must //! its predicted reduction, and a refusal lifts μ to at least 10⁻³ at once; an almost perfect gain ratio divides μ by ten,
 //! not by three; the start on few rows.
 //!
 //! **Checked against** the Moré–Garbow–Hillstrom problems and NIST StRD certified values, Cholesky against QR.
@@ -173,7 +172,7 @@ fn on_few_rows(objective: &mut Objective<'_>, start: &[f64], options: &Options) 
     let mut random = ChaCha8Rng::seed_from_u64(options.seed);
     let part = |k: usize| k * all / few;
     let chosen: Vec<usize> = (0..few).map(|k| random.random_range(part(k)..part(k + 1))).collect();
-    let thinned = problem.thinned(&chosen)?;
+    let thinned = problem.subsample(&chosen)?;
     // Damping is relative to what the rows say. Any that is more than what the priors say lets go of what they hold.
     let options = Options { initial_damping: DAMPING_RANGE.0, ..*options };
     let found = solve(thinned.as_ref(), start, &options);
@@ -193,8 +192,8 @@ fn gain_ratio(objective: &mut Objective<'_>, start: &[f64], options: &Options) -
     let mut trial = vec![0.0; p];
     let mut cosine = system.enter(&here.at);
     trace[0].gradient_norm = Some(cosine);
-    if let Some(promise) = system.step(&here.at, damping.mu, &here.x, &mut trial)
-        && promise.reduction > FAR * here.at.cost()
+    if let Some(predicted) = system.step(&here.at, damping.mu, &here.x, &mut trial)
+        && predicted.reduction > FAR * here.at.cost()
         && let Some(x) = on_few_rows(objective, &here.x, options)
     {
         damping = Damping::new(DAMPING_RANGE.0);
@@ -210,7 +209,7 @@ fn gain_ratio(objective: &mut Objective<'_>, start: &[f64], options: &Options) -
         if let Some(end) = here.end(options.small_cost, cosine, Some(options.gradient_tolerance)) {
             return here.finish(objective, end, trace);
         }
-        let Some(promise) = system.step(&here.at, damping.mu, &here.x, &mut trial) else {
+        let Some(predicted) = system.step(&here.at, damping.mu, &here.x, &mut trial) else {
             damping.refuse();
             refused += 1;
             if damping.is_exhausted() {
@@ -225,22 +224,22 @@ fn gain_ratio(objective: &mut Objective<'_>, start: &[f64], options: &Options) -
             cost_tolerance: options.cost_tolerance,
             step_tolerance: options.step_tolerance,
         };
-        if let Some(end) = converged(&mut system, &here, &promise, &search) {
+        if let Some(end) = converged(&mut system, &here, &predicted, &search) {
             return here.finish(objective, end, trace);
         }
         let cost = here.at.cost();
         // After a refusal the cost alone is asked for first: it is several times cheaper than the derivatives.
         let worth_it = refused == 0 || {
             let new = objective.cost(&trial);
-            damping.is_acceptable((cost - new) / promise.reduction)
+            damping.is_acceptable((cost - new) / predicted.reduction)
         };
         let mut step_norm = 0.0;
         let mut accepted = false;
         if worth_it {
             let at = Linearisation::at(objective, &trial, options.factorisation);
-            if at.is_finite() && damping.is_acceptable((cost - at.cost()) / promise.reduction) {
-                damping.accept((cost - at.cost()) / promise.reduction);
-                step_norm = promise.step_norm;
+            if at.is_finite() && damping.is_acceptable((cost - at.cost()) / predicted.reduction) {
+                damping.accept((cost - at.cost()) / predicted.reduction);
+                step_norm = predicted.step_norm;
                 here.at = at;
                 std::mem::swap(&mut here.x, &mut trial);
                 cosine = system.enter(&here.at);
@@ -274,7 +273,7 @@ fn fixed_damping(objective: &mut Objective<'_>, start: &[f64], options: &Options
         if let Some(end) = here.end(options.small_cost, cosine, None) {
             return here.finish(objective, end, trace);
         }
-        let Some(promise) = system.step(&here.at, options.mu, &here.x, &mut trial) else {
+        let Some(predicted) = system.step(&here.at, options.mu, &here.x, &mut trial) else {
             return here.finish(objective, Termination::Singular, trace);
         };
         let at = Linearisation::at(objective, &trial, options.factorisation);
@@ -284,11 +283,11 @@ fn fixed_damping(objective: &mut Objective<'_>, start: &[f64], options: &Options
         let (before, after) = (here.at.cost(), at.cost());
         let size = system.scaled_norm(&here.x);
         here = Point { x: trial.clone(), at };
-        trace.push(here.entry(promise.step_norm, Some(options.mu), Some(cosine), objective));
+        trace.push(here.entry(predicted.step_norm, Some(options.mu), Some(cosine), objective));
         if (before - after).abs() <= options.cost_tolerance * before {
             return here.finish(objective, Termination::Cost, trace);
         }
-        if promise.step_norm <= options.step_tolerance * (size + options.step_tolerance) {
+        if predicted.step_norm <= options.step_tolerance * (size + options.step_tolerance) {
             return here.finish(objective, Termination::Step, trace);
         }
     }

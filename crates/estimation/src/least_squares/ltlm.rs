@@ -151,7 +151,7 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
         if let Some(end) = here.end(options.small_cost, cosine, tolerance) {
             return here.finish(&objective, end, trace);
         }
-        let Some(promise) = system.step(&here.at, damping.mu, &here.x, &mut x1) else {
+        let Some(predicted) = system.step(&here.at, damping.mu, &here.x, &mut x1) else {
             if printed || damping.is_exhausted() {
                 return here.finish(&objective, Termination::Singular, trace);
             }
@@ -166,11 +166,11 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
             cost_tolerance: options.cost_tolerance,
             step_tolerance: 0.0,
         };
-        if !printed && let Some(end) = converged(&mut system, &here, &promise, &search) {
+        if !printed && let Some(end) = converged(&mut system, &here, &predicted, &search) {
             return here.finish(&objective, end, trace);
         }
         let at1 = Linearisation::at(&mut objective, &x1, options.factorisation);
-        let gain = (cost - at1.cost()) / promise.reduction;
+        let gain = (cost - at1.cost()) / predicted.reduction;
         if !(at1.is_finite() && (printed || damping.is_acceptable(gain))) {
             if printed {
                 return here.finish(&objective, Termination::NotFinite, trace);

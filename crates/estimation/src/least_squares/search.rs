@@ -2,7 +2,7 @@
 
 use crate::estimate::{Estimate, Iteration, Termination};
 use crate::least_squares::Factorisation;
-use crate::least_squares::damped::{DampedSystem, Linearisation, Promise};
+use crate::least_squares::damped::{DampedSystem, Linearisation, PredictedReduction};
 use crate::objective::Objective;
 
 /// Where a search stands.
@@ -75,7 +75,7 @@ impl Damping {
     }
 
     /// Whether a step with this gain ratio may be taken. A step with hardly any damping must keep a quarter of
-    /// its promise: otherwise one leap from a far start lands on a plateau from which nothing leads back.
+    /// the predicted reduction: otherwise one leap from a far start lands on a plateau from which nothing leads back.
     pub(crate) fn is_acceptable(&self, gain: f64) -> bool {
         gain > if self.mu < FIRST_REFUSAL { 0.25 } else { 1e-4 }
     }
@@ -98,7 +98,7 @@ impl Damping {
     }
 }
 
-/// What the tests of convergence want to know of a search.
+/// State of a search as the convergence tests need it.
 pub(crate) struct Search {
     pub(crate) mu: f64,
     /// Steps refused since the last one taken.
@@ -108,24 +108,24 @@ pub(crate) struct Search {
     pub(crate) step_tolerance: f64,
 }
 
-/// The tests that need a step: cost and step size. A small promise under heavy damping proves nothing, so the
-/// promise is asked again almost without damping. Where the undamped model promises more than the problem keeps
-/// (large residuals), a small promise after refusals counts as converged if the gradient is small too.
+/// Convergence tests that need a step: predicted reduction of the cost, and step size. A small prediction under heavy
+/// damping proves nothing, so it is repeated almost without damping. Where the undamped model predicts more than the problem
+/// delivers (large residuals), a small prediction after refusals counts as converged if the gradient is small too.
 pub(crate) fn converged(
     system: &mut DampedSystem,
     here: &Point,
-    promise: &Promise,
+    predicted: &PredictedReduction,
     search: &Search,
 ) -> Option<Termination> {
     const LIGHT: f64 = 1e-8;
     const SMALL_COSINE: f64 = 1e-5;
     let enough = search.cost_tolerance * here.at.cost();
     let tiny = search.step_tolerance * (system.scaled_norm(&here.x) + search.step_tolerance);
-    if promise.reduction > enough && promise.step_norm > tiny {
+    if predicted.reduction > enough && predicted.step_norm > tiny {
         return None;
     }
     if search.mu <= LIGHT {
-        return Some(if promise.reduction <= enough { Termination::Cost } else { Termination::Step });
+        return Some(if predicted.reduction <= enough { Termination::Cost } else { Termination::Step });
     }
     let mut unused = vec![0.0; here.x.len()];
     match system.step(&here.at, LIGHT, &here.x, &mut unused) {

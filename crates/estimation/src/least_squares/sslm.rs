@@ -153,14 +153,14 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
         if let Some(end) = here.end(options.small_cost, cosine, Some(options.gradient_tolerance)) {
             return here.finish(&objective, end, trace);
         }
-        let Some(promise) = system.step(&here.at, options.damping, &here.x, &mut full) else {
+        let Some(predicted) = system.step(&here.at, options.damping, &here.x, &mut full) else {
             return here.finish(&objective, Termination::Singular, trace);
         };
-        if promise.reduction <= options.cost_tolerance * cost {
+        if predicted.reduction <= options.cost_tolerance * cost {
             return here.finish(&objective, Termination::Cost, trace);
         }
         // With little damping the slope along the step is −2 × the promised reduction.
-        let slope = -2.0 * promise.reduction;
+        let slope = -2.0 * predicted.reduction;
         let mut delta = 1.0;
         let mut trials = 0;
         let at = loop {
@@ -191,7 +191,7 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
         };
         here.at = at;
         std::mem::swap(&mut here.x, &mut trial);
-        trace.push(here.entry(delta * promise.step_norm, Some(delta), Some(cosine), &objective));
+        trace.push(here.entry(delta * predicted.step_norm, Some(delta), Some(cosine), &objective));
     }
     here.finish(&objective, Termination::IterationLimit, trace)
 }

@@ -206,7 +206,7 @@ fn per_iteration(objective: &mut Objective<'_>, start: &[f64], options: &Options
         if let Some(end) = here.end(options.small_cost, cosine, None) {
             return here.finish(objective, end, trace);
         }
-        let Some(promise) = system.step(&here.at, options.lambda, &here.x, &mut trial) else {
+        let Some(predicted) = system.step(&here.at, options.lambda, &here.x, &mut trial) else {
             return here.finish(objective, Termination::Singular, trace);
         };
         let from = if options.restart { start } else { &here.x };
@@ -222,7 +222,7 @@ fn per_iteration(objective: &mut Objective<'_>, start: &[f64], options: &Options
         }
         let (before, after) = (here.at.cost(), at.cost());
         here = Point { x, at };
-        trace.push(here.entry(delta * promise.step_norm, Some(delta), Some(cosine), objective));
+        trace.push(here.entry(delta * predicted.step_norm, Some(delta), Some(cosine), objective));
         delta *= options.decay_factor;
         if (before - after).abs() <= options.cost_tolerance * before {
             return here.finish(objective, Termination::Cost, trace);
@@ -248,11 +248,11 @@ fn sound(objective: &mut Objective<'_>, start: &[f64], options: &Options) -> Est
         if let Some(end) = here.end(options.small_cost, cosine, Some(options.gradient_tolerance)) {
             return here.finish(objective, end, trace);
         }
-        let promise = system.step(&here.at, damping.mu, &here.x, &mut trial);
-        if promise.is_none() && damping.is_exhausted() {
+        let predicted = system.step(&here.at, damping.mu, &here.x, &mut trial);
+        if predicted.is_none() && damping.is_exhausted() {
             return here.finish(objective, Termination::Singular, trace);
         }
-        let Some(promise) = promise else {
+        let Some(predicted) = predicted else {
             damping.refuse();
             refused += 1;
             continue;
@@ -264,12 +264,12 @@ fn sound(objective: &mut Objective<'_>, start: &[f64], options: &Options) -> Est
             cost_tolerance: options.cost_tolerance,
             step_tolerance: 0.0,
         };
-        if let Some(end) = converged(&mut system, &here, &promise, &search) {
+        if let Some(end) = converged(&mut system, &here, &predicted, &search) {
             return here.finish(objective, end, trace);
         }
         trial.iter_mut().zip(&here.x).for_each(|(trial, x)| *trial = x + delta * (*trial - x));
         // Along the step the model promises δ(2 − δ) of the whole reduction (exactly so without damping).
-        let promised = delta * (2.0 - delta) * promise.reduction;
+        let promised = delta * (2.0 - delta) * predicted.reduction;
         let at = Linearisation::at(objective, &trial, options.factorisation);
         let gain = (cost - at.cost()) / promised;
         let taken = at.is_finite() && damping.is_acceptable(gain);
@@ -279,7 +279,7 @@ fn sound(objective: &mut Objective<'_>, start: &[f64], options: &Options) -> Est
             std::mem::swap(&mut here.x, &mut trial);
             cosine = system.enter(&here.at);
         }
-        let step_norm = if taken { delta * promise.step_norm } else { 0.0 };
+        let step_norm = if taken { delta * predicted.step_norm } else { 0.0 };
         trace.push(here.entry(step_norm, Some(delta), Some(cosine), objective));
         if taken {
             refused = 0;

@@ -75,7 +75,7 @@ impl<const D: usize> Layout<D> {
     /// Places the centres for `points`. Points that are not finite are passed over.
     pub fn of(points: &[[f64; D]], options: &Options) -> Self {
         let most = if options.form == Form::AsPrinted { points.len() } else { options.centres };
-        let (centres, fill) = radial::spread_out(points, most);
+        let (centres, fill) = radial::farthest_point_sample(points, most);
         let neighbours: Vec<f64> = centres
             .iter()
             .enumerate()
@@ -95,7 +95,7 @@ impl<const D: usize> Layout<D> {
     /// Value of bump k at u.
     pub fn bump(&self, k: usize, u: &[f64; D]) -> f64 {
         match self.form {
-            Form::Robust => radial::bump(u, &self.centres[k], self.reach),
+            Form::Robust => radial::wendland(u, &self.centres[k], self.reach),
             Form::AsPrinted => (-0.5 * (radial::distance(u, &self.centres[k]) / self.reach).powi(2)).exp(),
         }
     }

@@ -113,7 +113,7 @@ fn the_square_root_stays_positive_definite_where_the_printed_form_does_not() {
     let tiny = 1e-9;
     let smallest = |memory| {
         let covariance = DMatrix::identity(2, 2) / (tiny * tiny);
-        let mut recursion = rls::Recursion::new(DVector::zeros(2), covariance, memory).unwrap();
+        let mut recursion = rls::RecursiveLeastSquares::new(DVector::zeros(2), covariance, memory).unwrap();
         recursion.update(&DVector::from_vec(vec![1.0, tiny]), 0.0, 1.0);
         recursion.update(&DVector::from_vec(vec![1.0, 1.0]), 0.0, 1.0);
         recursion.covariance().symmetric_eigenvalues().min()
@@ -144,7 +144,8 @@ fn forgetting_follows_a_change() {
     let drifting = ukf::Options { process_sigma: vec![0.5], ..Default::default() };
     assert!((ukf::solve(&problem, &[0.0], &drifting).x[0] - 5.0).abs() < 0.01);
     let mut recursion =
-        rls::Recursion::new(DVector::zeros(1), DMatrix::identity(1, 1), rls::Memory::SquareRoot).unwrap();
+        rls::RecursiveLeastSquares::new(DVector::zeros(1), DMatrix::identity(1, 1), rls::Memory::SquareRoot)
+            .unwrap();
     recursion.predict(&[3.0]);
     assert!((recursion.covariance()[(0, 0)] - 10.0).abs() < 1e-12);
 }
@@ -160,7 +161,7 @@ fn a_root_of_which_some_parameters_drift_is_the_covariance() {
         (rng >> 33) as f64 / 2f64.powi(31) - 0.5
     };
     let start = DMatrix::from_fn(p, p, |i, j| if i == j { 4.0 } else { 0.3 / (1.0 + (i + j) as f64) });
-    let begun = |memory| rls::Recursion::new(DVector::zeros(p), start.clone(), memory).unwrap();
+    let begun = |memory| rls::RecursiveLeastSquares::new(DVector::zeros(p), start.clone(), memory).unwrap();
     let (mut plain, mut root) = (begun(rls::Memory::Covariance), begun(rls::Memory::SquareRoot));
     for step in 0..120 {
         let drifting = |k: usize| if step < 60 { k % 3 == 1 } else { k < 2 };
@@ -173,7 +174,7 @@ fn a_root_of_which_some_parameters_drift_is_the_covariance() {
         let [one, other] = [&mut plain, &mut root].map(|recursion| recursion.update(&a, e, forgetting));
         assert!((one - other).abs() < 1e-10 * one, "step {step}: {one} {other}");
         if step == 40 {
-            let again = rls::Recursion::from_root(root.x.clone(), root.root().unwrap());
+            let again = rls::RecursiveLeastSquares::from_root(root.x.clone(), root.root().unwrap());
             let mut stopped = again;
             let mut going = root.clone();
             stopped.predict(&sigma);

@@ -277,7 +277,7 @@ impl Problem for Turntable {
         }
     }
 
-    fn thinned(&self, observations: &[usize]) -> Option<Box<dyn Problem + '_>> {
+    fn subsample(&self, observations: &[usize]) -> Option<Box<dyn Problem + '_>> {
         Some(Box::new(Self {
             points: observations.iter().map(|&i| self.points[i]).collect(),
             distances: observations.iter().map(|&i| self.distances[i]).collect(),
@@ -286,7 +286,7 @@ impl Problem for Turntable {
     }
 }
 
-/// The same without a thinned form.
+/// The same without a subsample form.
 struct Plain(Turntable);
 
 impl Problem for Plain {

@@ -90,7 +90,7 @@ impl AnyWidth for Bumps<'_> {
         let mut out = [0.0; WIDTH];
         for from in (0..WIDTH).step_by(R::ROWS) {
             let points: [R; 3] = std::array::from_fn(|k| like.load(&self.columns[k], from));
-            radial::bump(&points, self.centre, 0.5).store(&mut out, from);
+            radial::wendland(&points, self.centre, 0.5).store(&mut out, from);
         }
         out
     }
@@ -99,23 +99,23 @@ impl AnyWidth for Bumps<'_> {
 #[test]
 fn the_bump_ends_at_its_reach_and_is_the_same_in_lanes() {
     let centre = [0.1, -0.2, 0.3];
-    assert_eq!(radial::bump(&centre, &centre, 0.5), 1.0);
-    assert_eq!(radial::bump(&[0.1, -0.2, 0.8], &centre, 0.5), 0.0);
-    assert_eq!(radial::bump(&[7.0, 8.0, 9.0], &centre, 0.5), 0.0);
+    assert_eq!(radial::wendland(&centre, &centre, 0.5), 1.0);
+    assert_eq!(radial::wendland(&[0.1, -0.2, 0.8], &centre, 0.5), 0.0);
+    assert_eq!(radial::wendland(&[7.0, 8.0, 9.0], &centre, 0.5), 0.0);
     let row = |i: usize| [0.05 * i as f64, -0.1, 0.2 + 0.03 * i as f64];
     let columns: [[f64; WIDTH]; 3] = std::array::from_fn(|k| std::array::from_fn(|i| row(i)[k]));
     for i in 0..WIDTH {
-        let alone: f64 = radial::bump(&row(i), &centre, 0.5);
+        let alone: f64 = radial::wendland(&row(i), &centre, 0.5);
         for set in Instructions::available() {
             let together =
                 with_instructions(set, || vectorised(Bumps { columns: &columns, centre: &centre }));
             assert_eq!(alone.to_bits(), together[i].to_bits());
         }
         let step = [0.3, -0.2, 0.1];
-        let slope: f64 = radial::slope_along(&row(i), &centre, 0.5, &step);
+        let slope: f64 = radial::wendland_slope(&row(i), &centre, 0.5, &step);
         let moved = |t: f64| {
             let u: [f64; 3] = std::array::from_fn(|k| row(i)[k] + t * step[k]);
-            radial::bump::<f64, 3>(&u, &centre, 0.5)
+            radial::wendland::<f64, 3>(&u, &centre, 0.5)
         };
         assert!((slope - (moved(1e-5) - moved(-1e-5)) / 2e-5).abs() < 1e-8);
     }
@@ -124,12 +124,12 @@ fn the_bump_ends_at_its_reach_and_is_the_same_in_lanes() {
 #[test]
 fn spread_out_points_are_far_apart_and_nothing_is_far_from_them() {
     let points = grid(10, 0.0);
-    let (centres, fill) = radial::spread_out(&points, 9);
+    let (centres, fill) = radial::farthest_point_sample(&points, 9);
     assert_eq!(centres.len(), 9);
     let far =
         points.iter().map(|p| centres.iter().map(|c| radial::distance(p, c)).fold(f64::INFINITY, f64::min));
     assert_eq!(far.fold(0.0, f64::max), fill);
     assert!(fill < 0.45);
     // More centres than points: each once.
-    assert_eq!(radial::spread_out(&points, 500).0.len(), 100);
+    assert_eq!(radial::farthest_point_sample(&points, 500).0.len(), 100);
 }

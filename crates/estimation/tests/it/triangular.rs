@@ -14,7 +14,7 @@ fn has_the_normal_equations_of_the_whole_jacobian() {
     let x = vec![0.01; 28];
     let factor = triangular_factor(&problem, &x, &[1.0; 28]);
     let mut normal = problem.normal_equations(&x);
-    normal.mirror();
+    normal.symmetrize();
     let scale = normal.matrix.norm();
     assert!((factor.r.tr_mul(&factor.r) - &normal.matrix).norm() < 1e-12 * scale);
     assert!((factor.r.tr_mul(&factor.rhs) - &normal.gradient).norm() < 1e-12 * normal.gradient.norm());

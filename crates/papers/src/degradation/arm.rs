@@ -5,8 +5,8 @@ use crate::experiment::ExperimentError;
 use truegrind_arm::model::Model;
 use truegrind_arm::parameter::{Parameter, link_parameters};
 use truegrind_calibration::identification::calibration::{Frames, Weight};
-use truegrind_calibration::identification::fit::{Observed, Start, errors_on, fit, frame_parameters};
-use truegrind_calibration::identification::identify::observe;
+use truegrind_calibration::identification::fit::{Observations, Start, errors_on, fit, frame_parameters};
+use truegrind_calibration::identification::identify::prepare_observations;
 use truegrind_calibration::identification::solver::SOLVERS;
 use truegrind_calibration::identification::start::starts;
 use truegrind_calibration::identification::tolerance::Tolerance;
@@ -23,8 +23,8 @@ pub(super) struct Arm {
 
 /// What was measured at one hour.
 pub(super) struct Group {
-    pub(super) identify: Observed,
-    pub(super) verify: Observed,
+    pub(super) identify: Observations,
+    pub(super) verify: Observations,
 }
 
 /// Measures the arm with this seed.
@@ -68,7 +68,7 @@ pub(super) fn arm(
                 settings.identification
             )));
         }
-        let (observed, _) = observe(&dataset, &nominal, false);
+        let (observed, _) = prepare_observations(&dataset, &nominal, false);
         let all: Vec<usize> = (0..dataset.rows.len()).collect();
         let (identify, verify) = all.split_at(settings.identification);
         groups.push(Group { identify: observed.subset(identify), verify: observed.subset(verify) });
@@ -93,7 +93,7 @@ pub(super) fn arm(
 }
 
 /// Mean position error of rows (mm).
-pub(super) fn mean_error(arm: &Arm, rows: &Observed, model: &Model) -> f64 {
+pub(super) fn mean_error(arm: &Arm, rows: &Observations, model: &Model) -> f64 {
     let errors = errors_on(rows, model, &arm.frames);
     errors.iter().sum::<f64>() / errors.len().max(1) as f64
 }

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::arm::{Arm, mean_error};
 use super::settings::Degradation;
 use super::way::State;
-use truegrind_calibration::identification::fit::Observed;
+use truegrind_calibration::identification::fit::Observations;
 use truegrind_calibration::identification::identifiability::identifiability;
 use truegrind_estimation::least_squares::lm;
 use truegrind_math::statistics::median;
@@ -111,7 +111,7 @@ pub struct Count {
     pub without_prior_mm: Option<f64>,
 }
 
-fn first_poses(rows: &Observed, count: usize) -> Observed {
+fn first_poses(rows: &Observations, count: usize) -> Observations {
     rows.subset(&(0..count.min(rows.dataset.rows.len())).collect::<Vec<_>>())
 }
 
@@ -184,16 +184,16 @@ pub(super) fn count_of(arms: &[Arm], count: usize) -> Count {
     for arm in arms {
         let rows = first_poses(&arm.groups[0].identify, count);
         let mut state = State::new(arm);
-        let task = state.task(arm, &rows, arm.sigma, &[]);
+        let problem = state.problem(arm, &rows, arm.sigma, &[]);
         let scale: Vec<f64> = state.covariance.diagonal().iter().map(|v| v.sqrt()).collect();
-        if let Some(seen) = identifiability(&task, state.x.as_slice(), &scale) {
+        if let Some(seen) = identifiability(&problem, state.x.as_slice(), &scale) {
             out.rank = out.rank.min(seen.rank);
             out.condition = out.condition.max(seen.condition);
         }
         // One linearisation without priors, as eq. 9 has it.
         let options = lm::Options { priors: false, max_iterations: 50, ..lm::Options::default() };
-        let bare = lm::solve(&task, state.x.as_slice(), &options);
-        let bare_model = task.apply(&bare.x).0;
+        let bare = lm::solve(&problem, state.x.as_slice(), &options);
+        let bare_model = problem.apply(&bare.x).0;
         state.rls(arm, &rows, 1.0);
         let model = state.model(arm);
         out.identification_mm += mean_error(arm, &rows, &model) / n;

@@ -5,10 +5,10 @@ use nalgebra::{DMatrix, DVector};
 use super::arm::Arm;
 use truegrind_arm::model::Model;
 use truegrind_arm::parameter::{Parameter, link_parameters};
-use truegrind_calibration::identification::calibration::{Calibration, Weight};
-use truegrind_calibration::identification::fit::Observed;
+use truegrind_calibration::identification::calibration::{CalibrationProblem, Weight};
+use truegrind_calibration::identification::fit::Observations;
 use truegrind_calibration::identification::tolerance::Tolerance;
-use truegrind_estimation::filter::rls::{Memory, Recursion};
+use truegrind_estimation::filter::rls::{Memory, RecursiveLeastSquares};
 use truegrind_estimation::least_squares::lm;
 use truegrind_estimation::problem::{Prior, Problem};
 
@@ -31,30 +31,37 @@ impl State {
         }
     }
 
-    pub(super) fn task(&self, arm: &Arm, rows: &Observed, weight: Weight, priors: &[Prior]) -> Calibration {
+    pub(super) fn problem(
+        &self,
+        arm: &Arm,
+        rows: &Observations,
+        weight: Weight,
+        priors: &[Prior],
+    ) -> CalibrationProblem {
         let weights = vec![weight; rows.dataset.rows.len()];
-        Calibration::new(&rows.dataset, &arm.nominal, &arm.frames, &self.parameters, priors, &weights)
+        CalibrationProblem::new(&rows.dataset, &arm.nominal, &arm.frames, &self.parameters, priors, &weights)
     }
 
     pub(super) fn model(&self, arm: &Arm) -> Model {
-        self.task(arm, &arm.groups[0].verify, arm.sigma, &[]).apply(self.x.as_slice()).0
+        self.problem(arm, &arm.groups[0].verify, arm.sigma, &[]).apply(self.x.as_slice()).0
     }
 
     /// Takes the rows in, pose by pose, each linearised at the state it meets.
-    pub(super) fn rls(&mut self, arm: &Arm, rows: &Observed, forgetting: f64) {
-        let task = self.task(arm, rows, arm.sigma, &[]);
+    pub(super) fn rls(&mut self, arm: &Arm, rows: &Observations, forgetting: f64) {
+        let problem = self.problem(arm, rows, arm.sigma, &[]);
         let covariance = self.covariance.clone();
-        let Some(mut recursion) = Recursion::new(self.x.clone(), covariance, Memory::SquareRoot) else {
+        let Some(mut recursion) = RecursiveLeastSquares::new(self.x.clone(), covariance, Memory::SquareRoot)
+        else {
             return;
         };
-        let (p, per) = (self.x.len(), task.rows_per_observation());
+        let (p, per) = (self.x.len(), problem.rows_per_observation());
         let (mut r, mut j) = (vec![0.0; per], vec![0.0; per * p]);
         let mut a = DVector::zeros(p);
         // A pose has six rows: each forgets its share.
         let share = forgetting.powf(1.0 / per as f64);
         for pose in 0..rows.dataset.rows.len() {
             let at = recursion.x.clone();
-            task.jacobian(at.as_slice(), pose * per..(pose + 1) * per, &mut r, &mut j);
+            problem.jacobian(at.as_slice(), pose * per..(pose + 1) * per, &mut r, &mut j);
             for i in 0..per {
                 (0..p).for_each(|k| a[k] = j[k * per + i]);
                 let e = r[i] + a.dot(&recursion.x) - a.dot(&at);
@@ -66,13 +73,13 @@ impl State {
     }
 
     /// The rows at once, with the covariance as prior or without any.
-    pub(super) fn lm(&mut self, arm: &Arm, rows: &Observed, memory: bool) {
-        let task = self.task(arm, rows, arm.sigma, &[]);
+    pub(super) fn lm(&mut self, arm: &Arm, rows: &Observations, memory: bool) {
+        let problem = self.problem(arm, rows, arm.sigma, &[]);
         let estimate = if memory {
-            let problem = Remembering::new(&task, &self.x, &self.covariance);
-            lm::solve(&problem, self.x.as_slice(), &lm::Options::default())
+            let remembering = Remembering::new(&problem, &self.x, &self.covariance);
+            lm::solve(&remembering, self.x.as_slice(), &lm::Options::default())
         } else {
-            lm::solve(&task, self.x.as_slice(), &lm::Options { priors: false, ..lm::Options::default() })
+            lm::solve(&problem, self.x.as_slice(), &lm::Options { priors: false, ..lm::Options::default() })
         };
         if estimate.x.iter().all(|x| x.is_finite()) {
             self.x = DVector::from_vec(estimate.x);
@@ -82,10 +89,10 @@ impl State {
         }
     }
 
-    pub(super) fn stopped(&mut self, arm: &Arm, rows: &Observed, steps: usize) {
-        let task = self.task(arm, rows, Weight { per_mm: 1.0, per_rad: 1.0 }, &[]);
+    pub(super) fn stopped(&mut self, arm: &Arm, rows: &Observations, steps: usize) {
+        let problem = self.problem(arm, rows, Weight { per_mm: 1.0, per_rad: 1.0 }, &[]);
         let options = lm::Options { max_iterations: steps, ..lm::Options::as_printed() };
-        let estimate = lm::solve(&task, self.x.as_slice(), &options);
+        let estimate = lm::solve(&problem, self.x.as_slice(), &options);
         if estimate.x.iter().all(|x| x.is_finite()) {
             self.x = DVector::from_vec(estimate.x);
         }
@@ -94,13 +101,13 @@ impl State {
 
 /// A problem with a normal prior of full covariance: p more rows L⁻¹(x − m) with LLᵀ the covariance.
 struct Remembering<'a> {
-    inner: &'a Calibration,
+    inner: &'a CalibrationProblem,
     mean: DVector<f64>,
     inverse_root: DMatrix<f64>,
 }
 
 impl<'a> Remembering<'a> {
-    fn new(inner: &'a Calibration, mean: &DVector<f64>, covariance: &DMatrix<f64>) -> Self {
+    fn new(inner: &'a CalibrationProblem, mean: &DVector<f64>, covariance: &DMatrix<f64>) -> Self {
         let p = mean.len();
         let inverse_root = covariance
             .clone()

@@ -97,7 +97,7 @@ impl Design<'_> {
         let told = self.told;
         if self.index == Index::O1 {
             let total = &told.readings * told.readings.transpose();
-            let eigen = spectral::symmetric(total)?;
+            let eigen = spectral::symmetric_eigen(total)?;
             let largest = eigen.eigenvalues.max();
             let kept: Vec<usize> = (0..eigen.eigenvalues.len())
                 .filter(|&k| eigen.eigenvalues[k] > DETERMINED * largest)

@@ -94,7 +94,7 @@ pub(super) fn decidable(
             let shown = a.columns.tr_mul(&a.columns) - xr.tr_mul(&factor.solve(&xr));
             // By its own symmetry, not by rounding.
             let shown = (&shown + shown.transpose()) * 0.5;
-            let weakest = spectral::symmetric(shown).map_or(f64::NAN, |eigen| eigen.eigenvalues.min());
+            let weakest = spectral::symmetric_eigen(shown).map_or(f64::NAN, |eigen| eigen.eigenvalues.min());
             let size = (options.decisive / weakest).sqrt();
             let shows = size * a.to_shows;
             let known = weakest > 0.0 && shows.is_finite() && shows < ABSURD;

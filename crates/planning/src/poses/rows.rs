@@ -12,7 +12,7 @@ use super::wanted::Wanted;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Model;
 use truegrind_arm::parameter::Parameter;
-use truegrind_calibration::identification::calibration::{Calibration, Weight};
+use truegrind_calibration::identification::calibration::{CalibrationProblem, Weight};
 use truegrind_calibration::measurement::dataset::{Dataset, Row, Sensor};
 use truegrind_calibration::measurement::sensor::Rig;
 use truegrind_estimation::problem::Problem;
@@ -78,11 +78,11 @@ pub(super) fn jacobian(
     let weights = vec![weight; rows.len()];
     let priors = options.tolerance.priors(parameters, model);
     let dataset = Dataset::new("plan", wanted.sensor, rows);
-    let task = Calibration::new(&dataset, model, wanted.frames, parameters, &priors, &weights);
-    let count = task.rows();
+    let problem = CalibrationProblem::new(&dataset, model, wanted.frames, parameters, &priors, &weights);
+    let count = problem.rows();
     let mut residuals = vec![0.0; count];
     let mut columns = vec![0.0; count * parameters.len()];
-    task.jacobian(&vec![0.0; parameters.len()], 0..count, &mut residuals, &mut columns);
+    problem.jacobian(&vec![0.0; parameters.len()], 0..count, &mut residuals, &mut columns);
     let scale = priors.iter().map(|prior| prior.sigma).collect();
     (DMatrix::from_vec(count, parameters.len(), columns), scale)
 }

@@ -8,7 +8,7 @@ use truegrind_arm::condition::Condition;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::inverse::Inverse;
 use truegrind_arm::model::{Joints, Model};
-use truegrind_calibration::identification::calibration::{Calibration, Frames, Weight};
+use truegrind_calibration::identification::calibration::{CalibrationProblem, Frames, Weight};
 use truegrind_calibration::identification::tolerance::Tolerance;
 use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row, Sensor};
 use truegrind_estimation::least_squares::lm;
@@ -223,8 +223,8 @@ fn left_by_geometry(found: &Plan, sensor: Sensor, frames: &Frames, effect: Effec
     let weights = vec![weight; rows.len()];
     let dataset = Dataset::new("made", sensor, rows);
     let priors = Tolerance::default().priors(&found.parameters, &nominal);
-    let task = Calibration::new(&dataset, &nominal, frames, &found.parameters, &priors, &weights);
-    lm::solve(&task, &vec![0.0; found.parameters.len()], &lm::Options::default()).cost
+    let problem = CalibrationProblem::new(&dataset, &nominal, frames, &found.parameters, &priors, &weights);
+    lm::solve(&problem, &vec![0.0; found.parameters.len()], &lm::Options::default()).cost
 }
 
 #[test]

@@ -87,7 +87,8 @@ pub fn parameter_table(found: &Identification) -> Table {
             Column::text("held", "Held by"),
         ],
     );
-    let literal = solver::by_name(&found.estimated.provenance.method).is_ok_and(|solver| solver.literal);
+    let as_printed =
+        solver::by_name(&found.estimated.provenance.method).is_ok_and(|solver| solver.as_printed);
     for parameter in found.parameters.iter().filter(|parameter| is_of_arm(parameter)) {
         let shown = handy(parameter);
         table.push([
@@ -98,7 +99,7 @@ pub fn parameter_table(found: &Identification) -> Table {
             shown.unit.as_str().into(),
             shown.prior_sigma.into(),
             (100.0 * shown.determined).into(),
-            held(parameter, literal),
+            held(parameter, as_printed),
         ]);
     }
     table.notes.push(
@@ -107,7 +108,7 @@ pub fn parameter_table(found: &Identification) -> Table {
          where it moved all the same, the data saw a combination, and the priors shared it out among its parts."
             .to_owned(),
     );
-    if literal {
+    if as_printed {
         table.notes.push(
             "This method has no priors: what the data cannot determine moved freely. These numbers are no geometry.".to_owned(),
         );
@@ -119,8 +120,8 @@ pub fn parameter_table(found: &Identification) -> Table {
 const FAR: f64 = 3.0;
 
 /// What holds a parameter where it is, and whether that is far from the data sheet.
-fn held(parameter: &EstimatedParameter, literal: bool) -> Cell {
-    let (status, mut text) = match (held_by_prior(parameter), literal) {
+fn held(parameter: &EstimatedParameter, as_printed: bool) -> Cell {
+    let (status, mut text) = match (held_by_prior(parameter), as_printed) {
         (false, _) => (None, "data".to_owned()),
         (true, false) => (Some(Status::Warning), "held by prior".to_owned()),
         (true, true) => (Some(Status::Bad), "not determined".to_owned()),

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::columns::{Angles, Columns};
-use super::task::Calibration;
+use super::problem::CalibrationProblem;
 use crate::measurement::dataset::Sensor;
 use crate::measurement::sensor::disturbance::{Disturbance, Kind};
 use truegrind_arm::chain::{self, Chain, LinkTable, cross, dot, minus, scaled, scaled_chain};
@@ -104,11 +104,11 @@ fn three<R: Real>(like: R, columns: &[Vec<f64>], first: usize, at: usize) -> V<R
 }
 
 impl State {
-    pub(super) fn of(task: &Calibration, x: &[f64]) -> Self {
-        let (model, frames) = task.apply(x);
+    pub(super) fn of(problem: &CalibrationProblem, x: &[f64]) -> Self {
+        let (model, frames) = problem.apply(x);
         let turned = |is: fn(&Parameter) -> Option<usize>| {
             let mut phi = Vector3::zeros();
-            for (parameter, value) in task.parameters.iter().zip(x) {
+            for (parameter, value) in problem.parameters.iter().zip(x) {
                 if let Some(k) = is(parameter).filter(|&k| k >= 3) {
                     phi[k - 3] += value;
                 }
@@ -128,27 +128,27 @@ impl State {
             sensor_axes: left_jacobian(&sensor),
             target_axes: flange * left_jacobian(&target),
             flange,
-            effects: task.columns.effects.iter().map(|e| x[e.place]).collect(),
-            pushed: Pushed::of(&frames.disturbances, &task.columns),
+            effects: problem.columns.effects.iter().map(|e| x[e.place]).collect(),
+            pushed: Pushed::of(&frames.disturbances, &problem.columns),
         }
     }
 }
 
-/// See [`Calibration::fill`].
+/// See [`CalibrationProblem::fill`].
 pub(super) fn fill(
-    task: &Calibration,
+    problem: &CalibrationProblem,
     state: &State,
     from: usize,
     lanes: usize,
     jacobian: bool,
     out: &mut [f64],
 ) {
-    vectorised(Fill { task, state, from, lanes, jacobian, out });
+    vectorised(Fill { problem, state, from, lanes, jacobian, out });
 }
 
-/// See [`Calibration::fill`].
+/// See [`CalibrationProblem::fill`].
 struct Fill<'a> {
-    task: &'a Calibration,
+    problem: &'a CalibrationProblem,
     state: &'a State,
     from: usize,
     lanes: usize,
@@ -161,18 +161,18 @@ impl AnyWidth for Fill<'_> {
 
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn run<R: SinCos>(self, like: R) {
-        let Self { task, state, from, lanes, jacobian, out } = self;
+        let Self { problem, state, from, lanes, jacobian, out } = self;
         let rows = lanes * WIDTH;
-        match task.sensor {
+        match problem.sensor {
             Sensor::Cable => {
                 for place in (0..rows).step_by(R::ROWS) {
-                    cable(like, task, state, from * WIDTH + place, jacobian, rows, place, out);
+                    cable(like, problem, state, from * WIDTH + place, jacobian, rows, place, out);
                 }
             }
             Sensor::Position | Sensor::Pose => {
-                let oriented = task.sensor == Sensor::Pose;
+                let oriented = problem.sensor == Sensor::Pose;
                 for place in (0..rows).step_by(R::ROWS) {
-                    space(like, task, state, from * WIDTH + place, jacobian, rows, place, oriented, out);
+                    space(like, problem, state, from * WIDTH + place, jacobian, rows, place, oriented, out);
                 }
             }
         }
@@ -186,8 +186,8 @@ fn splat<R: Real>(like: R, v: &Vector3<f64>) -> V<R> {
 
 /// Frames of the rows, and the factor by which their lengths have grown.
 #[cfg_attr(not(debug_assertions), inline(always))]
-fn frames<R: SinCos>(like: R, task: &Calibration, state: &State, at: usize) -> (Chain<R>, R) {
-    let columns = &task.columns;
+fn frames<R: SinCos>(like: R, problem: &CalibrationProblem, state: &State, at: usize) -> (Chain<R>, R) {
+    let columns = &problem.columns;
     let (mut sin, mut cos) = match &*columns.angles {
         Angles::Worked { sin, cos } => (six(like, sin, at), six(like, cos, at)),
         Angles::Plain(angles) => {
@@ -263,8 +263,8 @@ fn point<R: Real>(frames: &Chain<R>, state: &State, at: usize) -> V<R> {
 
 /// How far disturbance `index` goes in the rows.
 #[inline(always)]
-fn course<R: Real>(like: R, task: &Calibration, index: usize, at: usize) -> R {
-    like.load(&task.columns.courses[index], at)
+fn course<R: Real>(like: R, problem: &CalibrationProblem, index: usize, at: usize) -> R {
+    like.load(&problem.columns.courses[index], at)
 }
 
 /// What a unit of a cable's sag adds to its length (mm m²): see the page of disturbances.
@@ -275,12 +275,12 @@ fn sagging<R: Real>(away: &V<R>, length: R) -> R {
 
 /// One value of the row's cable, for each lane.
 #[inline(always)]
-fn of_anchor<R: Real>(like: R, task: &Calibration, at: usize, value: impl Fn(usize) -> f64) -> R {
-    if task.columns.anchor.is_empty() {
+fn of_anchor<R: Real>(like: R, problem: &CalibrationProblem, at: usize, value: impl Fn(usize) -> f64) -> R {
+    if problem.columns.anchor.is_empty() {
         return like.splat(value(0));
     }
     let mut lanes = [0.0; WIDTH];
-    for (lane, anchor) in lanes.iter_mut().zip(&task.columns.anchor[at..at + R::ROWS]) {
+    for (lane, anchor) in lanes.iter_mut().zip(&problem.columns.anchor[at..at + R::ROWS]) {
         *lane = value(*anchor as usize);
     }
     like.load(&lanes, 0)
@@ -290,7 +290,7 @@ fn of_anchor<R: Real>(like: R, task: &Calibration, at: usize, value: impl Fn(usi
 #[cfg_attr(not(debug_assertions), inline(always))]
 fn cable<R: SinCos>(
     like: R,
-    task: &Calibration,
+    problem: &CalibrationProblem,
     state: &State,
     at: usize,
     jacobian: bool,
@@ -298,8 +298,8 @@ fn cable<R: SinCos>(
     place: usize,
     out: &mut [f64],
 ) {
-    let weight = like.load(&task.weights.per_mm, at);
-    let (frames, scale) = frames(like, task, state, at);
+    let weight = like.load(&problem.weights.per_mm, at);
+    let (frames, scale) = frames(like, problem, state, at);
     let p = point(&frames, state, at);
     let single = state.outlets.len() == 1;
     let (outlet, zero): (V<R>, R) = if single {
@@ -307,9 +307,9 @@ fn cable<R: SinCos>(
     } else {
         let mut outlet = [like; 3];
         for (k, coordinate) in outlet.iter_mut().enumerate() {
-            *coordinate = of_anchor(like, task, at, |a| state.outlets[a][k]);
+            *coordinate = of_anchor(like, problem, at, |a| state.outlets[a][k]);
         }
-        (outlet, of_anchor(like, task, at, |a| state.zeros[a]))
+        (outlet, of_anchor(like, problem, at, |a| state.zeros[a]))
     };
     let mut v = minus(&p, &outlet);
     if let Some(pushed) = &state.pushed {
@@ -322,8 +322,8 @@ fn cable<R: SinCos>(
         free += like.load(&pushed.zero, at);
         predicted = free * like.load(&pushed.scale, at) + like.load(&pushed.sag, at) * sagging(&v, length);
     }
-    let residual = weight * (predicted - like.load(&task.columns.reading[0], at));
-    let columns = task.parameters.len();
+    let residual = weight * (predicted - like.load(&problem.columns.reading[0], at));
+    let columns = problem.parameters.len();
     if !jacobian {
         residual.store(out, place);
         return;
@@ -338,7 +338,7 @@ fn cable<R: SinCos>(
         *moment = cross(&minus(&p, origin), &u);
     }
     let none = like.splat(0.0);
-    for (k, parameter) in task.parameters.iter().enumerate() {
+    for (k, parameter) in problem.parameters.iter().enumerate() {
         let value = match *parameter {
             Parameter::Link { joint, coordinate } if coordinate.is_length() => {
                 scale * link_pull(&frames, &u, &moment, joint, coordinate)
@@ -350,27 +350,27 @@ fn cable<R: SinCos>(
             Parameter::Outlet { axis, .. } if single => -u[axis],
             Parameter::Zero { .. } if single => weight * through,
             Parameter::Outlet { anchor, axis } => {
-                -u[axis] * of_anchor(like, task, at, |a| f64::from(u8::from(a == anchor)))
+                -u[axis] * of_anchor(like, problem, at, |a| f64::from(u8::from(a == anchor)))
             }
             Parameter::Zero { anchor } => {
-                weight * through * of_anchor(like, task, at, |a| f64::from(u8::from(a == anchor)))
+                weight * through * of_anchor(like, problem, at, |a| f64::from(u8::from(a == anchor)))
             }
-            Parameter::Disturbance { index, parameter } if !turns_joints(task, index) => {
-                let how_far = course(like, task, index, at);
+            Parameter::Disturbance { index, parameter } if !turns_joints(problem, index) => {
+                let how_far = course(like, problem, index, at);
                 how_far
-                    * match task.frames.disturbances[index].kind {
+                    * match problem.frames.disturbances[index].kind {
                         Kind::Zero => weight * through,
                         Kind::Frame { .. } => -u[parameter.min(2)],
                         Kind::Tool => dot(&in_base(&frames, &state.flange.column(parameter).into()), &u),
                         Kind::Scale => weight * free,
                         Kind::Sag => weight * sagging(&v, length),
-                        Kind::Form(_) => -dot(&load(like, &task.columns.shifts[index][parameter], at), &u),
+                        Kind::Form(_) => -dot(&load(like, &problem.columns.shifts[index][parameter], at), &u),
                         Kind::Load { .. } => none,
                     }
             }
             Parameter::Effect { .. } | Parameter::Disturbance { .. } => {
                 let mut sum = none;
-                if let Some(effect) = task.columns.effect_of(k) {
+                if let Some(effect) = problem.columns.effect_of(k) {
                     for (joint, rotation) in effect.rotation.iter().enumerate() {
                         if let Some(rotation) = rotation {
                             sum += like.load(rotation, at)
@@ -398,8 +398,8 @@ fn cable<R: SinCos>(
 
 /// Whether a disturbance bends the joints, as effects do.
 #[inline(always)]
-fn turns_joints(task: &Calibration, index: usize) -> bool {
-    task.frames.disturbances[index].kind.turns_joints()
+fn turns_joints(problem: &CalibrationProblem, index: usize) -> bool {
+    problem.frames.disturbances[index].kind.turns_joints()
 }
 
 /// v turned by a small rotation vector, to second order: some 1e-7 of v is left out at 0.5°.
@@ -470,7 +470,7 @@ fn times<R: Real>(columns: &[V<R>; 3], v: &V<R>) -> V<R> {
 #[cfg_attr(not(debug_assertions), inline(always))]
 fn space<R: SinCos>(
     like: R,
-    task: &Calibration,
+    problem: &CalibrationProblem,
     state: &State,
     at: usize,
     jacobian: bool,
@@ -479,11 +479,11 @@ fn space<R: SinCos>(
     oriented: bool,
     out: &mut [f64],
 ) {
-    let columns = &task.columns;
-    let weight = like.load(&task.weights.per_mm, at);
-    let turn_weight = if oriented { like.load(&task.weights.per_rad, at) } else { weight };
+    let columns = &problem.columns;
+    let weight = like.load(&problem.weights.per_mm, at);
+    let turn_weight = if oriented { like.load(&problem.weights.per_rad, at) } else { weight };
     let none = [like.splat(0.0); 3];
-    let (frames, scale) = frames(like, task, state, at);
+    let (frames, scale) = frames(like, problem, state, at);
     let p = point(&frames, state, at);
     let components = if oriented { 6 } else { 3 };
     let rotation = state.base_from_sensor.rotation.to_rotation_matrix();
@@ -502,7 +502,7 @@ fn space<R: SinCos>(
         origin = plus(&origin, &load(like, &pushed.frame, at));
     }
     let seen = minus(&p, &origin);
-    let last = if jacobian { task.parameters.len() } else { 0 };
+    let last = if jacobian { problem.parameters.len() } else { 0 };
     for k in 0..3 {
         let residual = weight * (turned[k] - through * seen[k]);
         residual.store(out, (last * components + k) * rows + place);
@@ -542,7 +542,7 @@ fn space<R: SinCos>(
     if !jacobian {
         return;
     }
-    for (k, parameter) in task.parameters.iter().enumerate() {
+    for (k, parameter) in problem.parameters.iter().enumerate() {
         // The reading's side moves with a sensor frame, the arm's side with everything else.
         let mut of_sensor = false;
         let twist: Twist<R> = match *parameter {
@@ -564,9 +564,9 @@ fn space<R: SinCos>(
                 let w = splat(like, &state.sensor_axes.column(axis - 3).into());
                 (cross(&w, &turned), w)
             }
-            Parameter::Disturbance { index, parameter } if !turns_joints(task, index) => {
-                let how_far = course(like, task, index, at);
-                let kind = &task.frames.disturbances[index].kind;
+            Parameter::Disturbance { index, parameter } if !turns_joints(problem, index) => {
+                let how_far = course(like, problem, index, at);
+                let kind = &problem.frames.disturbances[index].kind;
                 of_sensor = !matches!(kind, Kind::Tool);
                 let (v, w) = match kind {
                     Kind::Frame { .. } if parameter < 3 => (splat(like, &Vector3::ith(parameter, 1.0)), none),

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
 
 use super::kernel::{self, State};
-use super::task::Calibration;
+use super::problem::CalibrationProblem;
 use crate::measurement::dataset::Sensor;
 use truegrind_estimation::problem::{NormalEquations, Prior, Problem};
 use truegrind_math::gram::add_products;
@@ -26,16 +26,16 @@ const FEW: usize = 64;
 /// Bytes of a buffer for more of them.
 const BUFFER_BYTES: usize = 1 << 20;
 
-/// Groups of eight rows in a block, for p parameters and c components: a function of the task alone, so that sums are the
+/// Groups of eight rows in a block, for p parameters and c components: a function of the problem alone, so that sums are the
 /// same for any number of threads.
 fn block_lanes(p: usize, c: usize) -> usize {
     if p <= FEW { BLOCK_LANES } else { (BUFFER_BYTES / ((p + 1) * c * WIDTH * 8)).clamp(4, BLOCK_LANES) }
 }
 
-impl Calibration {
+impl CalibrationProblem {
     /// Residuals at `x` without weights: mm for a cable (model minus reading) and for the three coordinates of a
     /// position (reading minus model, in the base), then rad for the orientation of a pose. One entry per scalar row.
-    pub fn plain_residuals(&self, x: &[f64]) -> Vec<f64> {
+    pub fn unweighted_residuals(&self, x: &[f64]) -> Vec<f64> {
         let per = self.rows_per_observation();
         let state = State::of(self, x);
         let mut out = vec![0.0; self.rows()];
@@ -57,10 +57,10 @@ impl Calibration {
     ///
     /// # Panics
     /// Where nothing may move.
-    pub fn linearised(&self, x: &[f64]) -> (DVector<f64>, DMatrix<f64>) {
+    pub fn linearise(&self, x: &[f64]) -> (DVector<f64>, DMatrix<f64>) {
         let state = State::of(self, x);
         let (p, n, per) = (self.parameters.len(), self.rows(), self.components());
-        assert!(p > 0, "a task without parameters has no Jacobian");
+        assert!(p > 0, "a problem without parameters has no Jacobian");
         let chunk = COST_LANES * WIDTH;
         let (mut residuals, mut transposed) = (DVector::zeros(n), DMatrix::zeros(p, n));
         residuals
@@ -82,7 +82,7 @@ impl Calibration {
 
     /// The size of each row's position error at `x` (mm): signed for a cable, the norm otherwise.
     pub fn errors_mm(&self, x: &[f64]) -> Vec<f64> {
-        let plain = self.plain_residuals(x);
+        let plain = self.unweighted_residuals(x);
         match self.sensor {
             Sensor::Cable => plain,
             Sensor::Position => plain.chunks(3).map(|v| Vector3::from_column_slice(v).norm()).collect(),
@@ -97,7 +97,7 @@ impl Calibration {
     }
 }
 
-impl Problem for Calibration {
+impl Problem for CalibrationProblem {
     fn parameters(&self) -> usize {
         self.parameters.len()
     }
@@ -126,7 +126,7 @@ impl Problem for Calibration {
         &self.priors
     }
 
-    fn thinned(&self, observations: &[usize]) -> Option<Box<dyn Problem + '_>> {
+    fn subsample(&self, observations: &[usize]) -> Option<Box<dyn Problem + '_>> {
         Some(Box::new(Self {
             start: self.start.clone(),
             frames: self.frames.clone(),
@@ -187,12 +187,12 @@ impl Problem for Calibration {
             gradient: DVector::from_iterator(p, square.row(p).iter().take(p).copied()),
             cost: 0.5 * square[(p, p)],
         };
-        out.mirror();
+        out.symmetrize();
         out
     }
 }
 
-impl Calibration {
+impl CalibrationProblem {
     /// First group of eight rows and number of groups of each block of at most `lanes` groups.
     fn blocks_of(&self, lanes: usize) -> Vec<(usize, usize)> {
         let groups = self.rows.div_ceil(WIDTH);

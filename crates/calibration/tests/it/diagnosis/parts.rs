@@ -221,17 +221,17 @@ fn knots_that_no_row_reaches_are_not_searched_for_and_change_nothing() {
 #[test]
 fn gauss_newton_from_nearby_ends_where_levenberg_marquardt_does() {
     fitted(120, |_, fitted| {
-        let task = &fitted.task;
+        let problem = &fitted.problem;
         // Away from the optimum as another sample of the noise would be.
         let covariance = fitted.estimate.covariance.clone().unwrap();
         let signs = DVector::from_fn(fitted.x.len(), |k, _| if k.is_multiple_of(2) { 1.0 } else { -1.0 });
         let away = covariance.clone().cholesky().unwrap().l() * signs;
         let mut x: Vec<f64> = fitted.x.iter().zip(away.iter()).map(|(x, a)| x + a).collect();
-        let cost = |x: &[f64]| task.row_cost(x) + prior_cost(&fitted.priors, x);
+        let cost = |x: &[f64]| problem.row_cost(x) + prior_cost(&fitted.priors, x);
         assert!(cost(&x) > fitted.estimate.cost + 5.0, "{} and {}", cost(&x), fitted.estimate.cost);
-        assert!(descend(task, &mut x));
-        let solved = lm::solve(task, &x, &lm::Options::default());
-        assert!(cost(&x) - solved.cost < 1e-6 * task.rows() as f64, "{} and {}", cost(&x), solved.cost);
+        assert!(descend(problem, &mut x));
+        let solved = lm::solve(problem, &x, &lm::Options::default());
+        assert!(cost(&x) - solved.cost < 1e-6 * problem.rows() as f64, "{} and {}", cost(&x), solved.cost);
         for (k, (a, b)) in x.iter().zip(&solved.x).enumerate() {
             assert!(
                 (a - b).abs() < 0.02 * covariance[(k, k)].sqrt(),

@@ -19,7 +19,7 @@ use truegrind_calibration::diagnosis::diagnose::{Diagnosed, Options, diagnose};
 use truegrind_calibration::diagnosis::extension::{Freedom, Subject, fit};
 use truegrind_calibration::diagnosis::finding::{Confidence, Finding};
 use truegrind_calibration::diagnosis::validation::Validation;
-use truegrind_calibration::identification::calibration::{Calibration, Frames, Weight};
+use truegrind_calibration::identification::calibration::{CalibrationProblem, Frames, Weight};
 use truegrind_calibration::identification::start::starts;
 use truegrind_calibration::measurement::dataset::{Dataset, Sensor};
 use truegrind_calibration::measurement::sensor::disturbance::{Course, Disturbance, Kind};
@@ -314,7 +314,7 @@ fn lambdas(subject: &Subject<'_>, found: &Diagnosed, run: &Run, setup: &Setup, c
     let weight = Weight { per_mm: 1.0 / setup.sigma_mm, per_rad: 1.0 };
     still.weights = vec![weight; n];
     still.robust_weight = vec![1.0; n];
-    still.task = Calibration::new(
+    still.problem = CalibrationProblem::new(
         &subject.observed.dataset,
         subject.nominal,
         subject.frames,

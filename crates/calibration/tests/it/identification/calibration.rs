@@ -11,7 +11,7 @@ use truegrind_arm::effect::thermal::Thermal;
 use truegrind_arm::link::{Link, LinkModel};
 use truegrind_arm::model::{Body, Joints, Limits, Model};
 use truegrind_arm::parameter::{Parameter, link_parameters};
-use truegrind_calibration::identification::calibration::{Calibration, Frames, Weight};
+use truegrind_calibration::identification::calibration::{CalibrationProblem, Frames, Weight};
 use truegrind_calibration::measurement::dataset::{Dataset, Motion, Reading, Row, Sensor};
 use truegrind_calibration::measurement::sensor::disturbance::{Course, Disturbance, Kind};
 use truegrind_calibration::measurement::sensor::form::Form;
@@ -177,11 +177,11 @@ fn parameters(sensor: Sensor) -> Vec<Parameter> {
     out
 }
 
-fn task(sensor: Sensor, rows: usize) -> Calibration {
+fn problem(sensor: Sensor, rows: usize) -> CalibrationProblem {
     task_with(sensor, rows, true)
 }
 
-fn task_with(sensor: Sensor, rows: usize, disturbed: bool) -> Calibration {
+fn task_with(sensor: Sensor, rows: usize, disturbed: bool) -> CalibrationProblem {
     let data = dataset(sensor, rows, 7);
     let frames = Frames {
         base_from_sensor: pose_from_vector(&[12.0, -5.0, 8.0, 0.02, 0.3, -0.1]),
@@ -194,15 +194,15 @@ fn task_with(sensor: Sensor, rows: usize, disturbed: bool) -> Calibration {
         (0..rows).map(|i| Weight { per_mm: 2.0 + i as f64 * 0.01, per_rad: 300.0 }).collect();
     let mut list = parameters(sensor);
     list.retain(|p| disturbed || !matches!(p, Parameter::Disturbance { .. }));
-    Calibration::new(&data, &arm(), &frames, &list, &[], &weights)
+    CalibrationProblem::new(&data, &arm(), &frames, &list, &[], &weights)
 }
 
 #[test]
 fn every_column_has_a_numerical_twin() {
     let sensors = [Sensor::Cable, Sensor::Position, Sensor::Pose];
     for (sensor, disturbed) in sensors.into_iter().flat_map(|s| [(s, false), (s, true)]) {
-        let task = task_with(sensor, 13, disturbed);
-        let list = task.parameters_list().to_vec();
+        let problem = task_with(sensor, 13, disturbed);
+        let list = problem.free_parameters().to_vec();
         let mut random = ChaCha8Rng::seed_from_u64(3);
         let scale = |p: &Parameter| match p.unit() {
             "mm" => 1.0,
@@ -215,16 +215,16 @@ fn every_column_has_a_numerical_twin() {
             if disturbed && turning { 3e-3 } else { 2e-6 }
         };
         let x: Vec<f64> = list.iter().map(|p| scale(p) * random.random_range(-1.0..1.0)).collect();
-        let (n, p) = (task.rows(), list.len());
+        let (n, p) = (problem.rows(), list.len());
         let (mut r, mut j) = (vec![0.0; n], vec![0.0; n * p]);
-        task.jacobian(&x, 0..n, &mut r, &mut j);
+        problem.jacobian(&x, 0..n, &mut r, &mut j);
         let mut alone = vec![0.0; n];
-        task.residuals(&x, 0..n, &mut alone);
+        problem.residuals(&x, 0..n, &mut alone);
         assert_eq!(r, alone, "residuals agree with and without the Jacobian");
         let analytic = DMatrix::from_vec(n, p, j);
         let steps: Vec<f64> =
             list.iter().map(|p| if p.unit() == "mm" { 0.5 } else { 0.1 * scale(p) }).collect();
-        let twin = difference::jacobian(|x, out| task.residuals(x, 0..n, out), &x, n, &steps);
+        let twin = difference::jacobian(|x, out| problem.residuals(x, 0..n, out), &x, n, &steps);
         for (k, parameter) in list.iter().enumerate() {
             let size = twin.column(k).amax().max(1e-3);
             let gap = (analytic.column(k) - twin.column(k)).amax() / size;
@@ -251,10 +251,16 @@ fn late_readings_do_not_hang_on_where_the_clock_begins() {
             Parameter::Disturbance { index: 0, parameter: 0 },
             Parameter::Disturbance { index: 0, parameter: 1 },
         ];
-        let task =
-            Calibration::new(&data, &arm, &frames, &list, &[], &[Weight { per_mm: 1.0, per_rad: 1.0 }; 9]);
-        let mut out = vec![0.0; task.rows()];
-        task.residuals(&[0.05, 0.2], 0..out.len(), &mut out);
+        let problem = CalibrationProblem::new(
+            &data,
+            &arm,
+            &frames,
+            &list,
+            &[],
+            &[Weight { per_mm: 1.0, per_rad: 1.0 }; 9],
+        );
+        let mut out = vec![0.0; problem.rows()];
+        problem.residuals(&[0.05, 0.2], 0..out.len(), &mut out);
         out
     };
     let early = residuals(0);
@@ -270,24 +276,24 @@ fn late_readings_do_not_hang_on_where_the_clock_begins() {
 fn normal_equations_equal_the_stacked_jacobian_and_padding_is_silent() {
     for sensor in [Sensor::Cable, Sensor::Position, Sensor::Pose] {
         for rows in [1, 8, 13, 530] {
-            let task = task(sensor, rows);
-            let (n, p) = (task.rows(), task.parameters());
+            let problem = problem(sensor, rows);
+            let (n, p) = (problem.rows(), problem.parameters());
             let x = vec![1e-5; p];
             let (mut r, mut j) = (vec![0.0; n], vec![0.0; n * p]);
-            task.jacobian(&x, 0..n, &mut r, &mut j);
+            problem.jacobian(&x, 0..n, &mut r, &mut j);
             let j = DMatrix::from_vec(n, p, j);
             let r = nalgebra::DVector::from_vec(r);
-            let normal = task.normal_equations(&x);
+            let normal = problem.normal_equations(&x);
             let matrix = j.tr_mul(&j);
             let gradient = j.tr_mul(&r);
             assert!((normal.matrix - &matrix).amax() < 1e-10 * matrix.amax());
             assert!((normal.gradient - &gradient).amax() < 1e-10 * gradient.amax());
             let cost = 0.5 * r.norm_squared();
             assert!((normal.cost - cost).abs() < 1e-11 * cost);
-            assert!((task.row_cost(&x) - cost).abs() < 1e-11 * cost);
-            let half = rows / 2 * task.rows_per_observation()..n;
+            assert!((problem.row_cost(&x) - cost).abs() < 1e-11 * cost);
+            let half = rows / 2 * problem.rows_per_observation()..n;
             let mut part = vec![0.0; half.len()];
-            task.residuals(&x, half.clone(), &mut part);
+            problem.residuals(&x, half.clone(), &mut part);
             assert_eq!(part, r.as_slice()[half]);
         }
     }
@@ -297,11 +303,11 @@ fn normal_equations_equal_the_stacked_jacobian_and_padding_is_silent() {
 #[test]
 fn every_set_of_instructions_gives_the_same_rows() {
     for sensor in [Sensor::Cable, Sensor::Position, Sensor::Pose] {
-        let task = task(sensor, 21);
-        let x = vec![1e-5; task.parameters()];
+        let problem = problem(sensor, 21);
+        let x = vec![1e-5; problem.parameters()];
         let found = |set| {
-            let (mut r, mut j) = (vec![0.0; task.rows()], vec![0.0; task.rows() * x.len()]);
-            with_instructions(set, || task.jacobian(&x, 0..task.rows(), &mut r, &mut j));
+            let (mut r, mut j) = (vec![0.0; problem.rows()], vec![0.0; problem.rows() * x.len()]);
+            with_instructions(set, || problem.jacobian(&x, 0..problem.rows(), &mut r, &mut j));
             r.into_iter().chain(j).map(f64::to_bits).collect::<Vec<_>>()
         };
         let alone = found(Instructions::Scalar);
@@ -314,20 +320,20 @@ fn every_set_of_instructions_gives_the_same_rows() {
 #[test]
 fn a_thinned_task_has_the_rows_that_were_chosen() {
     for sensor in [Sensor::Cable, Sensor::Position, Sensor::Pose] {
-        let task = task(sensor, 40);
+        let problem = problem(sensor, 40);
         let chosen = [3, 4, 9, 17, 18, 19, 31, 32, 38];
-        let thinned = task.thinned(&chosen).unwrap();
-        let per = task.rows_per_observation();
-        assert_eq!((thinned.rows(), thinned.parameters()), (chosen.len() * per, task.parameters()));
-        let x = vec![1e-5; task.parameters()];
-        let (mut all, mut some) = (vec![0.0; task.rows()], vec![0.0; thinned.rows()]);
-        task.residuals(&x, 0..task.rows(), &mut all);
+        let thinned = problem.subsample(&chosen).unwrap();
+        let per = problem.rows_per_observation();
+        assert_eq!((thinned.rows(), thinned.parameters()), (chosen.len() * per, problem.parameters()));
+        let x = vec![1e-5; problem.parameters()];
+        let (mut all, mut some) = (vec![0.0; problem.rows()], vec![0.0; thinned.rows()]);
+        problem.residuals(&x, 0..problem.rows(), &mut all);
         thinned.residuals(&x, 0..thinned.rows(), &mut some);
         let wanted: Vec<f64> = chosen.iter().flat_map(|i| all[i * per..(i + 1) * per].to_vec()).collect();
         assert_eq!(some, wanted);
         let cost = 0.5 * some.iter().map(|r| r * r).sum::<f64>();
         assert!((thinned.normal_equations(&x).cost - cost).abs() < 1e-11 * cost);
-        assert_eq!(task.thinned(&[]).unwrap().rows(), 0);
+        assert_eq!(problem.subsample(&[]).unwrap().rows(), 0);
     }
 }
 
@@ -339,14 +345,14 @@ fn a_row_among_very_many_is_the_same_as_among_few() {
     let (few, many) = (task_with(Sensor::Position, 13, false), task_with(Sensor::Position, MANY, false));
     let x = vec![1e-5; few.parameters()];
     let rows = few.rows();
-    let of = |task: &dyn Problem| {
+    let of = |problem: &dyn Problem| {
         let (mut r, mut j) = (vec![0.0; rows], vec![0.0; rows * x.len()]);
-        task.jacobian(&x, 0..rows, &mut r, &mut j);
+        problem.jacobian(&x, 0..rows, &mut r, &mut j);
         r.into_iter().chain(j).collect::<Vec<_>>()
     };
     let wanted = of(&few);
     let chosen: Vec<usize> = (0..13).chain([MANY - 1]).collect();
-    let thinned = many.thinned(&chosen).unwrap();
+    let thinned = many.subsample(&chosen).unwrap();
     for found in [of(&many), of(&*thinned)] {
         for (found, wanted) in found.iter().zip(&wanted) {
             assert!((found - wanted).abs() < 1e-11 * (1.0 + wanted.abs()), "{found} instead of {wanted}");
@@ -364,10 +370,10 @@ fn residuals_equal_the_plain_forward_map() {
     frames.base_from_sensor = pose_from_vector(&[12.0, -5.0, 8.0, 0.02, 0.3, -0.1]);
     frames.flange_from_target = pose_from_vector(&[10.0, 20.0, 30.0, 0.01, -0.02, 0.05]);
     let weights = vec![Weight { per_mm: 1.0, per_rad: 1.0 }; 11];
-    let task = Calibration::new(&data, &arm(), &frames, &list, &[], &weights);
-    let x: Vec<f64> = (0..task.parameters()).map(|k| 1e-5 * (k as f64 - 10.0)).collect();
-    let (model, frames) = task.apply(&x);
-    let errors = task.errors_mm(&x);
+    let problem = CalibrationProblem::new(&data, &arm(), &frames, &list, &[], &weights);
+    let x: Vec<f64> = (0..problem.parameters()).map(|k| 1e-5 * (k as f64 - 10.0)).collect();
+    let (model, frames) = problem.apply(&x);
+    let errors = problem.errors_mm(&x);
     for (row, error) in data.rows.iter().zip(errors) {
         let flange: Pose = model.forward(&row.joints, &row.condition);
         let touched = flange * nalgebra::Point3::from(frames.flange_from_target.translation.vector);

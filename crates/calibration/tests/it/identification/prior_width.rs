@@ -6,7 +6,7 @@ use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use truegrind_arm::parameter::{LinkCoordinate, Parameter};
 use truegrind_calibration::identification::identify::Identification;
-use truegrind_calibration::identification::prior_width::learned;
+use truegrind_calibration::identification::prior_width::learn_tolerance;
 use truegrind_calibration::identification::tolerance::Tolerance;
 use truegrind_estimation::estimate::{Estimate, Evaluations, Termination};
 use truegrind_estimation::problem::Prior;
@@ -79,20 +79,20 @@ fn estimate(x: [f64; 4], sigma: [f64; 4], catalogue: &Tolerance) -> (Vec<Paramet
 fn rows_that_say_nothing_leave_the_catalogue() {
     let catalogue = Tolerance::default();
     let (parameters, priors, nothing) = estimate([0.0; 4], [1e6; 4], &catalogue);
-    let found = learned(&catalogue, &parameters, &priors, &nothing);
+    let found = learn_tolerance(&catalogue, &parameters, &priors, &nothing);
     assert!((found.length_mm / catalogue.length_mm - 1.0).abs() < 1e-3, "{found:?}");
     assert!((found.zero_rad / catalogue.zero_rad - 1.0).abs() < 1e-3, "{found:?}");
     // And what is not a link, or has no covariance, is none of its business.
     let without = Estimate { covariance: None, ..nothing };
-    assert_eq!(learned(&catalogue, &parameters, &priors, &without), catalogue);
-    assert_eq!(learned(&catalogue, &[Parameter::Target(0)], &priors[..1], &without), catalogue);
+    assert_eq!(learn_tolerance(&catalogue, &parameters, &priors, &without), catalogue);
+    assert_eq!(learn_tolerance(&catalogue, &[Parameter::Target(0)], &priors[..1], &without), catalogue);
 }
 
 #[test]
 fn small_lengths_that_are_seen_narrow_lengths_and_leave_zeros() {
     let catalogue = Tolerance::default();
     let (parameters, priors, seen) = estimate([0.1, -0.1, 0.0, 0.0], [0.01, 0.01, 1e6, 1e6], &catalogue);
-    let found = learned(&catalogue, &parameters, &priors, &seen);
+    let found = learn_tolerance(&catalogue, &parameters, &priors, &seen);
     assert!((0.1..0.5).contains(&found.length_mm), "{found:?}");
     assert!((found.zero_rad / catalogue.zero_rad - 1.0).abs() < 1e-3, "{found:?}");
 }
@@ -122,7 +122,7 @@ fn a_width_is_the_root_of_the_mean_square_under_what_the_rows_say() {
         let sigma = [0.02, 0.02, 1e-4, 1e-4];
         let x = [length[0], length[1], zero[0], zero[1]];
         let (parameters, priors, seen) = estimate(x, sigma, &catalogue);
-        let found = learned(&catalogue, &parameters, &priors, &seen);
+        let found = learn_tolerance(&catalogue, &parameters, &priors, &seen);
         let meant =
             [summed(&length, sigma[0], catalogue.length_mm), summed(&zero, sigma[2], catalogue.zero_rad)];
         assert!(
@@ -165,7 +165,8 @@ fn what_the_rows_do_not_see_lies_as_far_off_as_the_width_says() {
         };
         let parameters: Vec<Parameter> =
             (0..6).map(|joint| Parameter::Link { joint, coordinate: LinkCoordinate::A }).collect();
-        let found = learned(&catalogue, &parameters, &[Prior { mean: 0.0, sigma: prior }; 6], &estimate);
+        let found =
+            learn_tolerance(&catalogue, &parameters, &[Prior { mean: 0.0, sigma: prior }; 6], &estimate);
         let off = (drawn[5] / found.length_mm).abs();
         square += off * off / f64::from(arms);
         (0..3).for_each(|k| within[k] += i32::from(off <= (k + 1) as f64));

@@ -129,7 +129,7 @@ impl Case {
         let rms = |model: &Model| placed_rms_mm(&simulation.actual, model, &poses, &target);
         Outcome {
             status: Some(found.estimated.verdict.status),
-            chances: found.benefit.map(|b| [b.chance, b.chance_without_scale]),
+            chances: found.benefit.map(|b| [b.probability, b.probability_without_scale]),
             rms_mm: [rms(&simulation.nominal), rms(&found.estimated.model)],
             found: Some(found),
         }
@@ -138,7 +138,7 @@ impl Case {
 
 fn identified(dataset: &Dataset, robot: &str, nominal: &Model) -> Option<Identification> {
     let options = Options {
-        tolerance: Tolerance { learned: true, ..Tolerance::default() },
+        tolerance: Tolerance { learn_widths: true, ..Tolerance::default() },
         solver: &SOLVERS[0],
         held_out: 0.2,
         seed: 0,

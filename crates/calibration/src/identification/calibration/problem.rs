@@ -10,11 +10,11 @@ use crate::measurement::dataset::{Dataset, Sensor};
 use truegrind_arm::model::Model;
 use truegrind_arm::parameter::Parameter;
 use truegrind_estimation::problem::Prior;
-use truegrind_math::se3::moved;
+use truegrind_math::se3::apply_twist;
 
-/// A calibration task. See the module page.
+/// A calibration problem. See the module page.
 #[derive(Debug, Clone)]
-pub struct Calibration {
+pub struct CalibrationProblem {
     pub(super) start: Model,
     pub(super) frames: Frames,
     pub(super) sensor: Sensor,
@@ -25,8 +25,8 @@ pub struct Calibration {
     pub(super) rows: usize,
 }
 
-impl Calibration {
-    /// Sets up the task.
+impl CalibrationProblem {
+    /// Sets up the problem.
     ///
     /// `start` and `frames` are the starting values, `parameters` what may move, `priors` one for each parameter
     /// (mean in deviations from the start) or empty, `weights` one for each row of `dataset`.
@@ -45,8 +45,8 @@ impl Calibration {
         Self::with(columns, dataset, (start, frames), parameters, priors, weights)
     }
 
-    /// Another task of the same rows and without priors, which need not be turned into columns once more.
-    pub(crate) fn beside(
+    /// Another problem of the same rows and without priors, which need not be turned into columns once more.
+    pub(crate) fn with_parameters(
         &self,
         dataset: &Dataset,
         start: &Model,
@@ -78,19 +78,19 @@ impl Calibration {
         }
     }
 
-    /// The same task with other weights, one for each row.
+    /// The same problem with other weights, one for each row.
     pub fn reweighted(&self, weights: &[Weight]) -> Self {
-        self.clone().weighted(weights)
+        self.clone().with_weights(weights)
     }
 
-    /// This task itself with other weights, one for each row.
-    pub fn weighted(mut self, weights: &[Weight]) -> Self {
+    /// This problem itself with other weights, one for each row.
+    pub fn with_weights(mut self, weights: &[Weight]) -> Self {
         self.weights = Weights::of(weights, self.rows, self.sensor);
         self
     }
 
-    /// This task itself with other priors, one for each parameter.
-    pub fn held(mut self, priors: &[Prior]) -> Self {
+    /// This problem itself with other priors, one for each parameter.
+    pub fn with_priors(mut self, priors: &[Prior]) -> Self {
         self.priors.clear();
         self.priors.extend_from_slice(priors);
         self
@@ -98,7 +98,7 @@ impl Calibration {
 
     /// Lets go of the rows, of which only the number is kept: a fit that is done needs them no longer, and they take up
     /// to a hundred and fifty bytes each.
-    pub(crate) fn forget_rows(&mut self) {
+    pub(crate) fn drop_rows(&mut self) {
         (self.columns, self.weights) = (Arc::default(), Weights::default());
     }
 
@@ -111,7 +111,7 @@ impl Calibration {
     }
 
     /// What may move, in the order of x.
-    pub fn parameters_list(&self) -> &[Parameter] {
+    pub fn free_parameters(&self) -> &[Parameter] {
         &self.parameters
     }
 
@@ -148,8 +148,8 @@ impl Calibration {
                 }
             }
         }
-        frames.base_from_sensor = moved(&frames.base_from_sensor, &sensor);
-        frames.flange_from_target = moved(&frames.flange_from_target, &tool);
+        frames.base_from_sensor = apply_twist(&frames.base_from_sensor, &sensor);
+        frames.flange_from_target = apply_twist(&frames.flange_from_target, &tool);
         (model, frames)
     }
 
