@@ -225,7 +225,7 @@ impl LinearisedReadings {
             };
             matrix[(k, k)] += 1.0 / (sigma * sigma);
         }
-        let (factor, _) = factored(&matrix)?;
+        let (factor, _) = factorise(&matrix)?;
         let scale = self.matrix.view((0, arm), (arm, 1)).column(0).into_owned();
         let coefficients = factor.solve(&scale);
         let projected = own * &coefficients;
