@@ -1,10 +1,10 @@
-//! Arguments, one file per verb, and the only place that prints or opens files.
+//! The command line: one file per verb. Only this module prints and opens files.
 //!
-//! Results go to stdout, talk and progress to stderr. Exit code 0: done; 1: done, but something was refused or
-//! flagged; 2: nothing done.
+//! Results go to stdout, messages and progress to stderr. Exit code 0: done; 1: done, but something was refused or
+//! flagged; 2: error, nothing done.
 
 mod computation;
-mod ending;
+mod exit_status;
 mod defect;
 mod terminal;
 mod colour;
@@ -17,7 +17,7 @@ mod recording;
 mod robots;
 mod simulate;
 mod identify;
-mod stated;
+mod stated_frames;
 mod diagnose;
 mod fleet;
 mod plan;
@@ -26,11 +26,11 @@ mod track;
 mod path;
 mod programs;
 mod shares;
-mod naming;
-mod belonging;
+mod output_extension;
+mod robot_match;
 mod cell;
+mod cell_arguments;
 mod manual;
-mod corrected;
 mod compensate;
 mod deviation;
 mod gather;
@@ -45,7 +45,7 @@ use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand};
 
-use self::ending::Ending;
+use self::exit_status::ExitStatus;
 
 /// Learns the real robot arm from measured poses and rewrites programs so that it follows them.
 #[derive(Debug, Parser)]
@@ -57,44 +57,44 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Verb {
-    /// The whole way on what ships with the project, without any file of yours.
+    /// Run the complete workflow on files that ship with truegrind.
     Demo(demo::Arguments),
-    /// The catalogue of robots; with a name, one robot and the source of each number.
+    /// List the known robots, or show one with the source of each number.
     Robots(robots::Arguments),
-    /// Measurements of a stated "actual" arm, effects, noise and rounding included.
+    /// Simulate measurements of a given "actual" arm, with effects, noise and rounding.
     Simulate(simulate::Arguments),
-    /// What belongs to a measurement before it is made: the empty table.
+    /// Prepare a measurement: write the empty table to fill in.
     Measurement(measurement::Arguments),
-    /// Fit the arm to measured poses: a model file, and what the data could tell.
+    /// Fit the arm geometry to measured poses; report what the data determine.
     Identify(identify::Arguments),
-    /// What the model of the arm gets wrong, and why: named causes, and a model extended by them.
+    /// Find the physical causes of errors that geometry does not explain, and extend the model by them.
     Diagnose(diagnose::Arguments),
-    /// Which poses to measure, as a program that moves there.
+    /// Choose the poses to measure and write a program that moves to them.
     Plan(Box<plan::Arguments>),
-    /// Methods side by side under a paper's protocol.
+    /// Compare calibration methods in the experiment of a paper.
     Compare(compare::Arguments),
-    /// Keep a model accurate as measurements come in.
+    /// Keep a model up to date as new measurements arrive.
     Track(track::Arguments),
-    /// A surface to a grinding program: RAPID, or NC by the ending of the output (.nc, .mpf).
+    /// Make a grinding program from a surface: RAPID, or NC by the extension of the output (.nc, .mpf).
     Path(path::Arguments),
-    /// The cell file that programs ask for, with every tool and frame that they name, to be filled in.
+    /// Write a cell file to fill in, with every tool and frame that the programs use.
     Cell(cell::Arguments),
-    /// Rewrite programs so that the estimated arm follows them.
+    /// Correct programs so that the real arm follows the intended path.
     Compensate(compensate::Arguments),
-    /// How far programs are off under a model; nothing is rewritten.
+    /// Report how far the arm deviates when it runs programs; nothing is rewritten.
     Deviation(deviation::Arguments),
-    /// Put together what the jobs of a shared run made (--shard), byte for byte as one run writes it.
+    /// Combine the results of the jobs of a shared run (--shard); same bytes as from a single run.
     Gather(gather::Arguments),
-    /// Whether an estimated arm holds a tolerance at poses that it was not fitted to: a page for the file of the cell.
+    /// Test whether an estimated arm meets a tolerance at new poses; writes an acceptance report.
     Accept(accept::Arguments),
-    /// The links of an estimated arm in the formats of others: URDF, tables of link parameters, the kinematics of UR drivers.
+    /// Export the links of an estimated arm: URDF, DH tables, kinematics for UR drivers.
     Export(export::Arguments),
-    /// Show in Rerun what any of the above wrote.
+    /// Show recordings, measurements, models and programs in Rerun.
     #[cfg(feature = "visual")]
     View(view::Arguments),
-    /// The script with which a shell completes verbs and options: bash, zsh, fish, elvish, powershell.
+    /// Print a shell completion script (bash, zsh, fish, elvish, powershell).
     Completions(manual::Completions),
-    /// The man page; with -o the pages of all verbs.
+    /// Print the man page, or write the man pages of all verbs.
     Man(manual::Man),
 }
 
@@ -103,36 +103,36 @@ pub(crate) fn run() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => {
-            // Help and version are no failure.
+            // Help and version are not errors.
             let code = if error.use_stderr() { 2 } else { 0 };
             if error.use_stderr() {
-                // What was typed stands in it, names of files that a pattern found among them.
-                terminal::tell_lines(&error.render().to_string());
+                // The message quotes the arguments, which may hold file names from a shell pattern.
+                terminal::print_message_lines(&error.render().to_string());
             } else {
                 let _ = error.print();
             }
             return ExitCode::from(code);
         }
     };
-    defect::hush();
-    match defect::isolated(|| dispatch(cli.verb)) {
-        Ok(Ending::Done) => ExitCode::SUCCESS,
-        Ok(Ending::Flagged) => ExitCode::from(1),
+    defect::install_silent_hook();
+    match defect::catch_panic(|| dispatch(cli.verb)) {
+        Ok(ExitStatus::Done) => ExitCode::SUCCESS,
+        Ok(ExitStatus::Flagged) => ExitCode::from(1),
         Err(error) => {
-            terminal::tell(format!("error: {error:#}"));
+            terminal::print_message(format!("error: {error:#}"));
             ExitCode::from(2)
         }
     }
 }
 
-fn dispatch(verb: Verb) -> anyhow::Result<Ending> {
+fn dispatch(verb: Verb) -> anyhow::Result<ExitStatus> {
     match verb {
         Verb::Demo(arguments) => demo::run(&arguments),
         Verb::Robots(arguments) => robots::run(&arguments),
         Verb::Simulate(arguments) => simulate::run(&arguments),
         Verb::Measurement(arguments) => measurement::run(&arguments),
         Verb::Identify(arguments) => identify::run(&arguments),
-        Verb::Diagnose(arguments) if fleet::is_asked(&arguments) => fleet::run(&arguments),
+        Verb::Diagnose(arguments) if fleet::is_requested(&arguments) => fleet::run(&arguments),
         Verb::Diagnose(arguments) => diagnose::run(&arguments),
         Verb::Plan(arguments) => plan::run(&arguments),
         Verb::Compare(arguments) => compare::run(&arguments),

@@ -9,59 +9,58 @@ use truegrind::calibration::acceptance::{Options, accept};
 use truegrind::report::acceptance::{self as view, Statement};
 
 use super::computation::{Common, watching};
-use super::ending::Ending;
+use super::exit_status::ExitStatus;
 use super::files::{self, Batch};
 use super::identify::{DataArguments, PointsArguments, read};
 use super::inputs::{self, NamedModel};
 use super::outputs::{Outputs, Pages};
-use super::progress::Work;
-use super::stated::StatedArguments;
-use super::terminal::tell;
+use super::progress::Spinner;
+use super::stated_frames::StatedFrameArguments;
+use super::terminal::print_message;
 
 /// Arguments of `accept`.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Measurements that the model was not fitted to, CSV or XLSX: at least 100 poses.
+    /// Measurements, CSV or XLSX, of at least 100 poses to which the model was not fitted.
     data: PathBuf,
-    /// The estimated arm.
+    /// Estimated arm to judge.
     #[arg(long, value_name = "MODEL.toml")]
     model: PathBuf,
-    /// The largest error that is accepted (mm).
+    /// Tolerance: the largest accepted position error (mm).
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     tolerance: f64,
-    /// Expanded uncertainty of the sensor, k = 2 (mm); else twice the scatter of repeated poses.
+    /// Expanded uncertainty of the sensor, k = 2 (mm). Default: twice the scatter of repeated poses.
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     sensor_uncertainty: Option<f64>,
-    /// The largest error of the orientation that is accepted (°), where the sensor measures it; without it the orientation is told and
-    /// not judged.
+    /// Tolerance of the orientation (°), for sensors that measure it. Without it orientation errors are reported but not judged.
     #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
     tolerance_angle: Option<f64>,
-    /// Expanded uncertainty of the sensor's orientation, k = 2 (°); else twice the scatter of repeated poses.
+    /// Expanded uncertainty of the measured orientation, k = 2 (°). Default: twice the scatter of repeated poses.
     #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
     sensor_uncertainty_angle: Option<f64>,
-    /// A serial number or the like for the page, such as --serial arm=120-503211; any number of times.
+    /// Serial number or other remark for the report, such as --serial arm=120-503211. May be repeated.
     #[arg(long, value_name = "WHAT=TEXT")]
     serial: Vec<String>,
-    /// The robot, where the model is of one that is not in the catalogue: its file.
+    /// Robot file, if the robot of the model is not in the catalogue.
     #[arg(long)]
     robot: Option<String>,
     #[command(flatten)]
     points: PointsArguments,
-    /// Sheet of a workbook; the first with the columns otherwise.
+    /// Sheet of a workbook. Default: the first with the needed columns.
     #[arg(long)]
     sheet: Option<String>,
-    /// Take the units as they are, however odd they look.
+    /// Accept implausible units.
     #[arg(long)]
     allow_odd_units: bool,
     #[command(flatten)]
-    stated: StatedArguments,
+    stated: StatedFrameArguments,
     #[command(flatten)]
     common: Common,
     #[command(flatten)]
     pages: Pages,
 }
 
-pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let outputs = Outputs::from(&arguments.pages);
     let mut given: Vec<&Path> = vec![&arguments.data, &arguments.model];
     given.extend(arguments.points.points.as_deref());
@@ -69,11 +68,13 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let serials = arguments.serial.iter().map(|text| serial(text)).collect::<anyhow::Result<Vec<_>>>()?;
     let named = inputs::model(&arguments.model.to_string_lossy())?;
     let NamedModel::Estimated { name, arm, .. } = &named else {
-        bail!("--model nominal: an acceptance judges an estimated arm, which `truegrind identify -o` writes");
+        bail!(
+            "--model nominal: an acceptance test needs an estimated arm, as written by `truegrind identify -o`"
+        );
     };
     let hash: String =
         Sha256::digest(files::read(&arguments.model)?).iter().map(|byte| format!("{byte:02x}")).collect();
-    // Refuses another robot than the model's.
+    // Refuses a robot other than that of the model.
     inputs::nominal(&named, arguments.robot.as_deref())?;
     let robot = arguments.robot.clone().unwrap_or_else(|| arm.robot.clone());
     let data = DataArguments {
@@ -91,13 +92,13 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         frames: arguments.stated.frames(&dataset)?,
         seed: arguments.common.seed,
     };
-    let work = Work::start(format!("judging {} by {} rows", arm.robot, dataset.rows.len()));
+    let work = Spinner::start(format!("judging {} on {} rows", arm.robot, dataset.rows.len()));
     let found = watching(arguments.common.threads, &work, || accept(&dataset, arm, &options))??;
     drop(work);
     for note in &dataset.notes {
-        tell(format_args!("note: {note}"));
+        print_message(format_args!("note: {note}"));
     }
-    let said = Statement {
+    let statement = Statement {
         serials,
         model: Some((name.clone(), hash)),
         frames_stated: options.frames.is_some(),
@@ -107,12 +108,12 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let mut batch = Batch::sparing(given);
     outputs.add_made(
         &mut batch,
-        || view::document(&found, &dataset, arm, &said),
+        || view::document(&found, &dataset, arm, &statement),
         || view::row_table(&found),
-        || view::json(&found, &dataset, arm, &said),
+        || view::json(&found, &dataset, arm, &statement),
     )?;
     batch.write()?;
-    Ok(if view::is_accepted(&found) { Ending::Done } else { Ending::Flagged })
+    Ok(if view::is_accepted(&found) { ExitStatus::Done } else { ExitStatus::Flagged })
 }
 
 fn serial(text: &str) -> anyhow::Result<(String, String)> {

@@ -1,4 +1,4 @@
-//! `truegrind cell PROGRAM… -o CELL.toml`: the cell file that programs ask for, to be filled in.
+//! `truegrind cell PROGRAM… -o CELL.toml`: writes a cell file to fill in.
 
 use std::path::{Path, PathBuf};
 
@@ -8,38 +8,40 @@ use truegrind::compensation::cell::Cell;
 use truegrind::compensation::cell::template::{Asking, skeleton};
 use truegrind::programs::reading::Program;
 
-use super::ending::Ending;
+use super::exit_status::ExitStatus;
 use super::files::Batch;
 use super::inputs;
 use super::programs::{self, Grouping, Programs};
-use super::terminal::tell;
+use super::terminal::print_message;
 
 /// Arguments of `cell`.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// RAPID modules of one task, .pgf lists of such, NC files, or folders of them.
+    /// Programs: RAPID modules of one task, .pgf task lists, NC files, or folders of them.
     #[arg(required = true)]
     programs: Vec<PathBuf>,
     #[command(flatten)]
     grouping: Grouping,
-    /// The cell file to write; `-` prints it.
+    /// Cell file to write; `-` prints it.
     #[arg(short, long, value_name = "CELL.toml")]
     output: PathBuf,
-    /// The robot that runs them, written into the file: a name of `truegrind robots`, or a TOML file.
+    /// Robot that runs them, noted in the file: a name from `truegrind robots`, or a robot file.
     #[arg(long)]
     robot: Option<String>,
 }
 
-pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let jobs = programs::jobs(&arguments.programs, arguments.grouping)?;
     let all: Vec<PathBuf> = jobs.iter().flat_map(|job| job.paths.clone()).collect();
     let inputs_of: Vec<&Path> = all.iter().map(PathBuf::as_path).collect();
     Batch::check(&inputs_of, &[&arguments.output])?;
-    if let Some(ending) = arguments.output.extension().filter(|ending| !ending.eq_ignore_ascii_case("toml")) {
+    if let Some(extension) =
+        arguments.output.extension().filter(|extension| !extension.eq_ignore_ascii_case("toml"))
+    {
         bail!(
-            "{}: a cell file is TOML: name a .toml file, not one that ends in .{}",
+            "{}: a cell file is TOML: expected the extension .toml, not .{}",
             arguments.output.display(),
-            ending.to_string_lossy()
+            extension.to_string_lossy()
         );
     }
     let robot = arguments.robot.as_deref().map(inputs::robot).transpose()?;
@@ -53,24 +55,25 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         .map(|(task, name)| Asking { name, language: task.language(), listing: task.listing() })
         .collect();
     for comment in asking.iter().flat_map(|program| &program.listing.misstated) {
-        tell(format_args!("note: {comment}"));
+        print_message(format_args!("note: {comment}"));
     }
     if asking.iter().all(|program| program.listing.motions.is_empty()) {
-        bail!("no motion is in these programs: there is no tool and no work object to ask for");
+        bail!("these programs contain no motion, so they use no tool and no work object");
     }
     let made = skeleton(&asking, robot.as_ref().map(|robot| robot.sheet.name.as_str()));
     let mut batch =
         Batch::sparing(read.iter().flat_map(|programs| programs.files.iter().map(|(path, _)| path)));
     batch.add(&arguments.output, made.text);
     batch.write()?;
-    let said = match made.open {
-        0 => "nothing to fill in: the programs use the controller's own tool and frame".to_owned(),
+    let to_do = match made.open {
+        0 => "nothing to fill in: the programs use only the default tool and work object of the controller"
+            .to_owned(),
         1 => "1 value to fill in, marked \"?\"".to_owned(),
         open => format!("{open} values to fill in, marked \"?\""),
     };
-    tell(format_args!(
-        "written to {}: {said}; then: truegrind compensate … --cell",
+    print_message(format_args!(
+        "written to {}: {to_do}; then run truegrind compensate … --cell",
         arguments.output.display()
     ));
-    Ok(Ending::Done)
+    Ok(ExitStatus::Done)
 }

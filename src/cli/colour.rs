@@ -1,25 +1,24 @@
-//! Colour on a terminal: of judgements and of the words that begin a message. Nothing hangs on it, and it is only there where
-//! somebody can see it and has not asked for none (`NO_COLOR`, a dumb terminal).
+//! Terminal colours for verdicts and message prefixes. They carry no information of their own.
 
 use std::io::IsTerminal;
 
 use truegrind::report::status::Status;
 
-/// Whether a stream gets colour: never where NO_COLOR says something, always where CLICOLOR_FORCE does, else on a terminal
-/// that is not dumb.
-pub(super) fn on(stream: &impl IsTerminal) -> bool {
+/// Whether a stream gets colour: never if `NO_COLOR` is set, always if `CLICOLOR_FORCE` is set, otherwise on a terminal that is
+/// not dumb.
+pub(super) fn is_enabled(stream: &impl IsTerminal) -> bool {
     let set = |name: &str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
     let forced = std::env::var_os("CLICOLOR_FORCE").is_some_and(|value| !value.is_empty() && value != "0");
-    !set("NO_COLOR") && (forced || stream.is_terminal() && !dumb())
+    !set("NO_COLOR") && (forced || stream.is_terminal() && !is_dumb())
 }
 
-/// Whether the terminal knows nothing but lines.
-pub(super) fn dumb() -> bool {
+/// Whether the terminal can only print lines (`TERM=dumb`).
+pub(super) fn is_dumb() -> bool {
     std::env::var_os("TERM").is_some_and(|term| term == "dumb")
 }
 
-/// The text with its judgements (`[ok]`, `[warning]`, `[failed]`) in colour.
-pub(super) fn judged(text: &str) -> String {
+/// Colours the verdicts `[ok]`, `[warning]` and `[failed]`.
+pub(super) fn colour_verdicts(text: &str) -> String {
     let mut out = text.to_owned();
     for (status, colour) in [(Status::Good, GREEN), (Status::Warning, YELLOW), (Status::Bad, RED)] {
         let badge = format!("[{}]", status.word());
@@ -28,8 +27,8 @@ pub(super) fn judged(text: &str) -> String {
     out
 }
 
-/// A message with the word that says what it is in colour.
-pub(super) fn message(text: &str) -> String {
+/// Colours the prefix of a message.
+pub(super) fn colour_prefix(text: &str) -> String {
     for (word, colour) in [("error:", RED), ("failed:", RED), ("note:", CYAN)] {
         if let Some(rest) = text.strip_prefix(word) {
             return format!("{colour}{word}{PLAIN}{rest}");

@@ -1,4 +1,4 @@
-//! `truegrind compare DATA --robot R --experiment NAME`: methods side by side under a paper's protocol.
+//! `truegrind compare DATA --robot R --experiment NAME`: compares methods in the experiment of a paper.
 
 use std::path::{Path, PathBuf};
 
@@ -14,44 +14,44 @@ use truegrind::papers::{Results, degradation, grinding, protocol, signed_rank, s
 use truegrind::report::format;
 
 use super::computation::{Common, on_threads};
-use super::ending::Ending;
+use super::exit_status::ExitStatus;
 use super::files::{self, Batch};
 use super::identify::{Angles, DataArguments, PointsArguments};
 use super::outputs::Outputs;
-use super::progress::Work;
-use super::terminal::{say, tell, tell_lines, width};
+use super::progress::Spinner;
+use super::terminal::{print_message, print_message_lines, print_result, width};
 use super::{identify, inputs};
 
 /// Arguments of `compare`.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Measurements, CSV or XLSX; left out, the experiment's own recipe is measured in simulation.
+    /// Measurements, CSV or XLSX. Default: simulated from the recipe of the experiment.
     data: Option<PathBuf>,
-    /// Robot that was measured: a name of `truegrind robots`, or a TOML file. Needed with DATA.
+    /// Measured robot: a name from `truegrind robots`, or a robot file. Required with DATA.
     #[arg(long)]
     robot: Option<String>,
-    /// Experiment: a name of `--list`, or a TOML file.
+    /// Experiment: a name from `--list`, or a TOML file.
     #[arg(long, required_unless_present = "list")]
     experiment: Option<String>,
-    /// The experiments that ship.
+    /// List the experiments.
     #[arg(long)]
     list: bool,
-    /// Rows of one case instead of the protocol's: the same shares of fewer rows, a reduced protocol.
+    /// Number of rows per case, for a reduced protocol with the same shares.
     #[arg(long, value_name = "N")]
     rows: Option<usize>,
-    /// Sheet of a workbook; the first with the columns otherwise.
+    /// Sheet of a workbook. Default: the first with the needed columns.
     #[arg(long)]
     sheet: Option<String>,
-    /// Whether the angles are the controller's or DH angles; the robot file says otherwise.
+    /// Convention of the logged angles. Default: that of the robot file.
     #[arg(long, value_enum)]
     angles: Option<Angles>,
-    /// Take the units as they are, however odd they look.
+    /// Accept implausible units.
     #[arg(long)]
     allow_odd_units: bool,
-    /// Measured seconds as CSV; they are in no other file unless --timings says so, since no two runs agree on them.
+    /// Write computing times as CSV. Other files contain them only with --timings, since they differ from run to run.
     #[arg(long, value_name = "FILE")]
     times: Option<PathBuf>,
-    /// Show measured seconds on stderr and on the pages, which are then not the same in every run.
+    /// Show computing times on stderr and in the reports, which then differ from run to run.
     #[arg(long)]
     timings: bool,
     #[command(flatten)]
@@ -60,20 +60,20 @@ pub(super) struct Arguments {
     outputs: Outputs,
 }
 
-/// Measured rows and where they come from.
+/// The measurements and their robot.
 struct Measured {
     dataset: Dataset,
     robot: String,
     nominal: Model,
     actual: Option<Model>,
-    /// Known where the rows are simulated, else 0.
+    /// 0 unless the rows are simulated.
     sensor_sigma_mm: f64,
 }
 
-pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     if arguments.list {
-        say(format::terminal::document(&view::list(&Experiment::shipped()?), width()))?;
-        return Ok(Ending::Done);
+        print_result(format::terminal::document(&view::list(&Experiment::shipped()?), width()))?;
+        return Ok(ExitStatus::Done);
     }
     let name = arguments.experiment.as_deref().unwrap_or_default();
     let mut inputs: Vec<&Path> = arguments.data.as_deref().into_iter().collect();
@@ -91,10 +91,10 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     };
     if arguments.outputs.rrd.is_some() && !experiment.takes_rows() {
         bail!(
-            "--rrd: experiment {name} moves no arm, so there is nothing to draw; --html FILE has its plots"
+            "--rrd: experiment {name} moves no arm, so there is nothing to draw; --html FILE writes its plots"
         );
     }
-    let kind = experiment.kind().ok_or_else(|| anyhow!("{name}: says nothing to run"))?;
+    let kind = experiment.kind().ok_or_else(|| anyhow!("{name}: the experiment defines nothing to run"))?;
     let seed = arguments.common.seed;
     let mut origin = Origin { seed, timings: arguments.timings, ..Origin::default() };
     let measured = if experiment.takes_rows() { Some(measured(arguments, &experiment)?) } else { None };
@@ -103,14 +103,14 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         origin.sha256 = Some(measured.dataset.sha256.clone());
         origin.rows = Some(measured.dataset.rows.len());
         origin.robot = Some(measured.robot.clone());
-        measured.dataset.notes.iter().for_each(|note| tell(format_args!("note: {note}")));
+        measured.dataset.notes.iter().for_each(|note| print_message(format_args!("note: {note}")));
     } else if let Some(data) = &arguments.data {
-        bail!("{}: experiment {name} takes no measurements; leave DATA out", data.display());
+        bail!("{}: experiment {name} takes no measurements; omit DATA", data.display());
     }
     if arguments.rows.is_some() && !experiment.takes_rows() {
-        bail!("--rows: experiment {name} draws no rows");
+        bail!("--rows: experiment {name} uses no rows");
     }
-    let work = Work::start(format!("experiment {}", experiment.name));
+    let work = Spinner::start(format!("experiment {}", experiment.name));
     let results =
         on_threads(arguments.common.threads, || results(arguments, &experiment, kind, measured.as_ref()))??;
     drop(work);
@@ -118,7 +118,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     arguments.outputs.print(&summary)?;
     let times = view::times(&results);
     if let Some(times) = times.as_ref().filter(|_| arguments.timings) {
-        tell_lines(&format::terminal::table(times, width()));
+        print_message_lines(&format::terminal::table(times, width()));
     }
     let mut batch = Batch::sparing(inputs);
     arguments.outputs.add_made(
@@ -142,10 +142,10 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         batch.add(path, format::csv::table(times));
     }
     batch.write()?;
-    Ok(Ending::Done)
+    Ok(ExitStatus::Done)
 }
 
-/// Runs an experiment on what was measured, where it takes rows.
+/// Runs an experiment, on measurements if it uses any.
 fn results(
     arguments: &Arguments,
     experiment: &Experiment,
@@ -192,7 +192,7 @@ fn nominal(name: &str) -> Result<Model, String> {
 fn measured(arguments: &Arguments, experiment: &Experiment) -> anyhow::Result<Measured> {
     let Some(data) = &arguments.data else {
         if arguments.robot.is_some() {
-            bail!("--robot without DATA: the experiment's recipe has a robot of its own");
+            bail!("--robot without DATA: the recipe of the experiment names its robot");
         }
         let (dataset, simulation, robot) = simulated::measure(experiment, nominal)?;
         let recipe = simulated::recipe(experiment.recipe.as_deref().unwrap_or_default(), &experiment.name)?;
@@ -206,7 +206,7 @@ fn measured(arguments: &Arguments, experiment: &Experiment) -> anyhow::Result<Me
     };
     let robot = arguments.robot.clone().ok_or_else(|| {
         anyhow!(
-            "{}: --robot says which arm was measured; `truegrind robots` lists those that ship",
+            "{}: --robot is missing: name the measured robot; `truegrind robots` lists the known ones",
             data.display()
         )
     })?;

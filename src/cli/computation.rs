@@ -1,28 +1,27 @@
-//! What every verb that computes takes, and the threads it computes on.
+//! Options of every verb that computes, and the thread pool.
 
 use std::sync::Arc;
 
 use clap::Args;
 use truegrind::math::work::{Watch, run_watched};
 
-use super::progress::Work;
+use super::progress::Spinner;
 
-/// What every verb that computes takes.
+/// Options of every verb that computes.
 #[derive(Debug, Clone, Args)]
 pub(super) struct Common {
-    /// Seed of everything random.
+    /// Seed of all random numbers.
     #[arg(long, default_value_t = 0)]
     pub(super) seed: u64,
-    /// Threads; the result is the same for any number.
+    /// Number of threads; the result does not depend on it.
     #[arg(long)]
     pub(super) threads: Option<usize>,
 }
 
-/// More threads than any machine has processors only cost memory.
+/// More threads would only cost memory.
 const MOST_THREADS: usize = 1024;
 
-/// A number of threads that can be.
-fn checked(threads: Option<usize>) -> anyhow::Result<Option<usize>> {
+fn check_threads(threads: Option<usize>) -> anyhow::Result<Option<usize>> {
     match threads {
         Some(n) if !(1..=MOST_THREADS).contains(&n) => {
             anyhow::bail!("--threads {n}: expected 1 to {MOST_THREADS}")
@@ -31,22 +30,22 @@ fn checked(threads: Option<usize>) -> anyhow::Result<Option<usize>> {
     }
 }
 
-/// Runs `work` on the stated number of threads, and shows each step that the library tells.
+/// Runs `work` on the given number of threads and shows the progress that the library reports.
 pub(super) fn watching<T: Send>(
     threads: Option<usize>,
-    shown: &Work,
+    shown: &Spinner,
     work: impl FnOnce() -> T + Send,
 ) -> anyhow::Result<T> {
     let watch = Arc::new(Watch::with_listener(shown.listener()));
-    Ok(run_watched(&watch, checked(threads)?, work)??)
+    Ok(run_watched(&watch, check_threads(threads)?, work)??)
 }
 
-/// Runs `work` on the stated number of threads.
+/// Runs `work` on the given number of threads.
 pub(super) fn on_threads<T: Send>(
     threads: Option<usize>,
     work: impl FnOnce() -> T + Send,
 ) -> anyhow::Result<T> {
-    match checked(threads)? {
+    match check_threads(threads)? {
         None => Ok(work()),
         Some(n) => Ok(rayon::ThreadPoolBuilder::new().num_threads(n).build()?.install(work)),
     }

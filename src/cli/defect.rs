@@ -1,22 +1,20 @@
-//! What happens when the program itself is at fault: a panic is caught where one unit of work ends, and becomes an error
-//! that asks to be reported.
+//! Catches panics: a defect of truegrind in one unit of work becomes an error of that unit, with a request to report it.
 //!
-//! A thousand programs are a thousand units: what one of them brings to light does not take the others with it. A stack that
-//! overflows cannot be caught; depth that inputs decide is bounded where it is read.
+//! In a run over many programs the others are not affected. A stack overflow cannot be caught; recursion depth that depends on
+//! inputs is limited by the parsers.
 
 use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Mutex, PoisonError};
 
-/// Where the latest panics came from, by their message: the place is known to the hook alone, and a panic may travel
-/// from thread to thread before it is caught.
+/// Source locations of the latest panics, by message: only the hook knows the location, and a panic may be caught on another
+/// thread.
 static PLACES: Mutex<VecDeque<(String, String)>> = Mutex::new(VecDeque::new());
 
-/// More are not kept.
 const MOST_PLACES: usize = 64;
 
-/// From here on a panic prints nothing: whoever catches it says it.
-pub(super) fn hush() {
+/// Replaces the panic hook by one that prints nothing; the message is printed where the panic is caught.
+pub(super) fn install_silent_hook() {
     std::panic::set_hook(Box::new(|info| {
         let message = message(info.payload());
         let place = info.location().map(|at| format!("{}:{}", at.file(), at.line())).unwrap_or_default();
@@ -30,18 +28,18 @@ pub(super) fn hush() {
     }));
 }
 
-/// Runs one unit of work; a panic in it is an error.
+/// Runs one unit of work and turns a panic into an error.
 ///
 /// # Errors
 /// Those of the work, and a panic.
-pub(super) fn isolated<T>(work: impl FnOnce() -> anyhow::Result<T>) -> anyhow::Result<T> {
+pub(super) fn catch_panic<T>(work: impl FnOnce() -> anyhow::Result<T>) -> anyhow::Result<T> {
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|payload| {
         let message = message(&*payload);
         let places = PLACES.lock().unwrap_or_else(PoisonError::into_inner);
         let place = places.iter().find(|(known, _)| *known == message).map_or("", |(_, place)| place);
         Err(anyhow::anyhow!(
-            "a defect of truegrind {}, not of its input: please report it, with the command and the files that it was \
-             given ({message}; {place})",
+            "internal error of truegrind {}, not of the input: please report it with the command and the input files \
+             ({message}; {place})",
             env!("CARGO_PKG_VERSION")
         ))
     })

@@ -1,8 +1,8 @@
-//! `truegrind demo [-o DIR]`: the whole way on what ships with the project.
+//! `truegrind demo [-o DIR]`: the complete workflow on files that ship with truegrind.
 //!
-//! The shipped surface becomes a RAPID program, the shipped simulated measurements identify the arm and tell what geometry
-//! does not explain, the program is rewritten with each model, and the simulated actual arm, which has effects and noise
-//! that geometry cannot hold, runs all of them. The program of the diagnosed arm is the one that is written.
+//! A surface becomes a RAPID program. Simulated measurements serve to identify the arm with each method and to diagnose the
+//! errors that geometry does not explain. The program is corrected with each model and run on the simulated actual arm, which
+//! has effects and noise beyond geometry. The program corrected with the diagnosed model is written.
 
 use std::path::{Path, PathBuf};
 
@@ -32,55 +32,55 @@ use truegrind::report::{
 use truegrind::surfaces::{SurfaceFile, sample};
 
 use super::computation::{Common, on_threads};
-use super::ending::Ending;
+use super::exit_status::ExitStatus;
 use super::files::{self, Batch};
-use super::progress::Work;
-use super::terminal::{say, width};
+use super::progress::Spinner;
+use super::terminal::{print_result, width};
 use super::{diagnose, identify, inputs, simulate};
 
-/// The shipped measurements and the recipe that made them.
+/// Simulated measurements and their recipe.
 const DATA: &[u8] = include_bytes!("../../tests/data/irb120-cable.csv");
 const RECIPE: &str = include_str!("../../tests/data/irb120-cable.toml");
 
-/// How the arm is called that has the causes found beside its geometry.
+/// Name of the diagnosed model.
 const DIAGNOSED: &str = "diagnosed";
 
 /// Arguments of `demo`.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Folder for everything that is written.
+    /// Folder for all outputs.
     #[arg(short, long, default_value = "truegrind-demo")]
     output: PathBuf,
     #[command(flatten)]
     common: Common,
 }
 
-pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     files::make_folder(&arguments.output)?;
-    on_threads(arguments.common.threads, || whole_way(&arguments.output, arguments.common.seed))?
+    on_threads(arguments.common.threads, || run_workflow(&arguments.output, arguments.common.seed))?
 }
 
-/// A program and who runs it.
+/// The program and the arms that run it.
 struct Job<'a> {
     task: &'a Program<'a>,
     program: &'a [u8],
     cell: &'a Cell,
     surface: &'a SurfaceFile,
     nominal: &'a Model,
-    /// The simulated arm.
+    /// The simulated actual arm.
     actual: &'a Model,
     condition: Condition,
 }
 
-/// The program as a model corrects it, and the file of that model.
+/// The program corrected with a model, and the model file.
 struct Corrected {
     program: Vec<u8>,
     model: String,
 }
 
 impl Job<'_> {
-    /// Rewrites the program with a model and runs it on the simulated arm.
-    fn ground(&self, name: &str, estimated: &Estimated) -> anyhow::Result<(PathReport, Corrected)> {
+    /// Corrects the program with a model and runs it on the simulated actual arm.
+    fn correct_and_run(&self, name: &str, estimated: &Estimated) -> anyhow::Result<(PathReport, Corrected)> {
         let bounds = RewriteBounds { condition: self.condition, ..RewriteBounds::default() };
         let model = estimated.to_toml()?;
         let mark = Mark {
@@ -113,7 +113,7 @@ impl Job<'_> {
         Ok((report, Corrected { program, model }))
     }
 
-    /// The files of the program and of how far it is off, corrected by `best`.
+    /// Adds the programs, the model and the deviation reports.
     fn add_files(
         &self,
         batch: &mut Batch,
@@ -149,10 +149,10 @@ impl Job<'_> {
     }
 }
 
-fn whole_way(folder: &Path, seed: u64) -> anyhow::Result<Ending> {
+fn run_workflow(folder: &Path, seed: u64) -> anyhow::Result<ExitStatus> {
     let robot = inputs::robot("abb-irb-120")?;
     let nominal = &robot.model;
-    let work = Work::start("surface to program");
+    let work = Spinner::start("making the program from the surface");
     let surface = sample::BLADE.read()?;
     let path = toolpath(&surface, nominal, &robot.sheet.name)?;
     let program = writer::write(&path.draft)?;
@@ -160,7 +160,7 @@ fn whole_way(folder: &Path, seed: u64) -> anyhow::Result<Ending> {
     let cell = taught_cell(&surface, &path, nominal, [&surface.tool.name, &surface.work_object.name])?;
 
     drop(work);
-    let work = Work::start("identifying the arm with four methods");
+    let work = Spinner::start("identifying the arm with each method");
     let dataset = import::read("irb120-cable.csv", DATA, &import::Options::default())?;
     let simulation = simulate::simulation(RECIPE, "irb120-cable.toml", None)?;
     let mut found: Vec<Identification> = Vec::new();
@@ -170,15 +170,15 @@ fn whole_way(folder: &Path, seed: u64) -> anyhow::Result<Ending> {
     }
 
     drop(work);
-    let work = Work::start("asking what geometry does not explain");
+    let work = Spinner::start("diagnosing errors beyond geometry");
     let mut asked = diagnosis::diagnose::Options::default();
     asked.selection.seed = seed;
-    let causes = diagnose::diagnosed(&dataset, &robot.sheet.name, nominal, &asked, &|step| work.tell(step))?;
+    let causes = diagnose::diagnosed(&dataset, &robot.sheet.name, nominal, &asked, &|step| work.show(step))?;
     let mut arms: Vec<(&str, &Estimated)> = vec![(DIAGNOSED, &causes.estimated)];
     arms.extend(found.iter().map(|one| (one.estimated.provenance.method.as_str(), &one.estimated)));
 
     drop(work);
-    let work = Work::start("rewriting the program, running all of them on the simulated actual arm");
+    let work = Spinner::start("correcting the program and running it on the simulated actual arm");
     let mass = path.draft.tool.1.mass_kg;
     let condition = Condition { payload_kg: Some(mass), ..Condition::default() };
     let job = Job {
@@ -190,9 +190,9 @@ fn whole_way(folder: &Path, seed: u64) -> anyhow::Result<Ending> {
         actual: &simulation.actual,
         condition,
     };
-    let ground = arms.into_iter().map(|(name, estimated)| job.ground(name, estimated));
+    let runs = arms.into_iter().map(|(name, estimated)| job.correct_and_run(name, estimated));
     let (reports, corrected): (Vec<_>, Vec<_>) =
-        ground.collect::<anyhow::Result<Vec<_>>>()?.into_iter().unzip();
+        runs.collect::<anyhow::Result<Vec<_>>>()?.into_iter().unzip();
 
     drop(work);
     let mut batch = Batch::default();
@@ -205,12 +205,12 @@ fn whole_way(folder: &Path, seed: u64) -> anyhow::Result<Ending> {
     batch.add(folder.join("demo.rrd"), job.recording(&reports[..1])?);
     batch.write()?;
 
-    say(answer(folder, &reports, &causes))?;
-    Ok(Ending::Done)
+    print_result(summary(folder, &reports, &causes))?;
+    Ok(ExitStatus::Done)
 }
 
-/// What the terminal says.
-fn answer(folder: &Path, reports: &[PathReport], causes: &diagnosis::diagnose::Diagnosed) -> String {
+/// The text for the terminal.
+fn summary(folder: &Path, reports: &[PathReport], causes: &diagnosis::diagnose::Diagnosed) -> String {
     let tables = [deviation_view::block_table(reports), deviation_view::registered_table(reports)];
     let mut text = headline(&reports[0], causes);
     for table in &tables {
@@ -218,32 +218,32 @@ fn answer(folder: &Path, reports: &[PathReport], causes: &diagnosis::diagnose::D
         text += "\n";
     }
     text += &format!(
-        "Simulated throughout: tests/data/README.md has recipe and seed. In {}:\n",
+        "All data are simulated (recipe and seed: tests/data/README.md). Written to {}:\n",
         folder.display()
     );
     for (name, what) in [
-        ("deviation.html", "the page: deviation along the path before and after"),
-        ("identification.html", "what the measurements told of the arm's geometry"),
-        ("diagnosis.html", "what geometry does not explain, and why"),
-        ("blade.mod, blade-compensated.mod", "the program before and after"),
-        ("model.toml", "the estimated arm, causes included"),
+        ("deviation.html", "start here: deviation along the path before and after correction"),
+        ("identification.html", "the arm geometry fitted to the measurements"),
+        ("diagnosis.html", "errors that geometry does not explain, and their causes"),
+        ("blade.mod, blade-compensated.mod", "the program before and after correction"),
+        ("model.toml", "the estimated arm, including the causes"),
         #[cfg(feature = "visual")]
-        ("demo.rrd", "the picture: truegrind view, or any Rerun viewer"),
+        ("demo.rrd", "3D recording: open with truegrind view or any Rerun viewer"),
     ] {
         text += &format!("  {name:<34} {what}\n");
     }
     text
 }
 
-/// What came of it, in two lines.
+/// The result in two lines.
 fn headline(report: &PathReport, causes: &diagnosis::diagnose::Diagnosed) -> String {
     let largest = |which: fn(&PathPoint) -> Option<Deviation>| {
         report.signed_mm(which).into_iter().map(f64::abs).fold(0.0, f64::max)
     };
     let named = causes.diagnosis.findings.iter().filter(|f| f.confidence == Confidence::Identified).count();
     format!(
-        "Largest deviation over the blade: {:.3} mm before, {:.3} mm after (simulated actual arm, along the surface normal).\n\
-         The model behind it: geometry and {named} identified causes, from {} measured poses.\n\n",
+        "Largest deviation on the blade: {:.3} mm before correction, {:.3} mm after (simulated actual arm, along the surface \
+         normal).\nModel: geometry and {named} identified causes, from {} measured poses.\n\n",
         largest(|p| p.before),
         largest(|p| p.after),
         causes.estimated.provenance.rows

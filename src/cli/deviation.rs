@@ -1,4 +1,4 @@
-//! `truegrind deviation PROGRAM… --model MODEL.toml…`: the report alone.
+//! `truegrind deviation PROGRAM… --model MODEL.toml…`: the deviation report, without rewriting.
 
 use std::path::PathBuf;
 
@@ -17,36 +17,36 @@ use truegrind::report::deviation as view;
 use truegrind::surfaces::SurfaceFile;
 use truegrind::units::done::Recorded;
 
-use super::belonging;
-use super::compensate::{CellArguments, agreed, say_unused};
+use super::cell_arguments::{CellArguments, note_unused_entries, refuse_contradictions};
 use super::computation::{Common, on_threads};
-use super::ending::Ending;
-use super::files::{self, Batch, witness};
+use super::exit_status::ExitStatus;
+use super::files::{self, Batch, read_log};
 use super::inputs;
 use super::inputs::NamedModel;
 use super::outputs::Outputs;
 use super::programs::{self, Grouping, Job, Programs};
+use super::robot_match;
 use super::shares::{Asked, Doing, Kept, Shares, Store, each, outputs_with};
-use super::terminal::tell;
+use super::terminal::print_message;
 
 /// Arguments of `deviation`.
 #[derive(Debug, Clone, Args)]
 pub(super) struct Arguments {
-    /// RAPID modules of one task, .pgf lists of such, NC files, or folders of them.
+    /// Programs: RAPID modules of one task, .pgf task lists, NC files, or folders of them.
     #[arg(required = true)]
     programs: Vec<PathBuf>,
     #[command(flatten)]
     grouping: Grouping,
-    /// Estimated arms; one row each. With --actual the word `nominal` is enough.
+    /// Estimated arms (model files), each with its own rows in the report. With --actual, the word `nominal` suffices.
     #[arg(long, required = true, num_args = 1..)]
     model: Vec<String>,
-    /// Robot; optional where a model says it, and checked against it.
+    /// Robot. The model names it already; if given, it must match.
     #[arg(long)]
     robot: Option<String>,
-    /// The original program, which states what was meant; PROGRAM is then what came of it.
+    /// Original program, which defines the intended path; PROGRAM is then its corrected version.
     #[arg(long, value_name = "ORIGINAL")]
     intended: Vec<PathBuf>,
-    /// A simulated actual arm (`simulate --arm`), on which the programs are run.
+    /// Simulated actual arm (from `simulate --arm`) that runs the programs.
     #[arg(long, value_name = "ARM.toml")]
     actual: Option<PathBuf>,
     #[command(flatten)]
@@ -60,8 +60,8 @@ pub(super) struct Arguments {
 }
 
 impl Arguments {
-    /// Every option that has a part in what is written, in words; as those of `compensate`.
-    fn that_count(&self) -> String {
+    /// All options that influence the outputs, as text; see [`super::compensate::Arguments`].
+    fn relevant_options(&self) -> String {
         let common = Common { threads: None, ..self.common.clone() };
         let (outputs, shares) = (Outputs::default(), Shares::default());
         format!("{:?}", Self { programs: Vec::new(), common, outputs, shares, ..self.clone() })
@@ -71,7 +71,7 @@ impl Arguments {
 /// An arm on which programs are run.
 struct Runner {
     name: String,
-    /// The robot, by the name that its model gives.
+    /// Robot name from the model.
     robot: Option<String>,
     nominal: Model,
     model: Model,
@@ -79,14 +79,14 @@ struct Runner {
     after: After,
 }
 
-pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let mut jobs = match arguments.shares.listed()? {
         Some(jobs) => jobs,
         None => programs::jobs(&arguments.programs, arguments.grouping)?,
     };
     let several = jobs.len() > 1 || arguments.shares.on();
     if several && !arguments.intended.is_empty() {
-        bail!("--intended states what one program meant: name one program, not {}", jobs.len());
+        bail!("--intended is the original of one program: name one program, not {}", jobs.len());
     }
     let originals =
         if arguments.intended.is_empty() { None } else { Some(Programs::read(&arguments.intended)?) };
@@ -99,17 +99,19 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let inputs: Vec<&std::path::Path> = all.iter().map(PathBuf::as_path).collect();
     Batch::check(&inputs, &arguments.outputs.files())?;
     if arguments.shares.on() && arguments.outputs.rrd.is_some() {
-        bail!("--rrd shows the programs of one job: leave the options of several jobs out");
+        bail!(
+            "--rrd shows the programs of a single job: it cannot be combined with options for several jobs"
+        );
     }
     if arguments.shares.on() {
-        witness::begin();
+        read_log::begin();
     }
     let runners = runners(arguments)?;
     let first = runners.first().ok_or_else(|| anyhow!("--model names no arm"))?;
     let (cell, surface, condition) = arguments.cell.read(first.knowledge.as_deref())?;
     let robot = arguments.robot.as_deref().or(first.robot.as_deref());
     let setup = programs::setup(&cell, robot);
-    let shop = Shop {
+    let context = DeviationContext {
         runners: &runners,
         originals: originals.as_ref(),
         cell: &cell,
@@ -117,11 +119,13 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         condition,
         arguments: &arguments.cell,
     };
-    let shared = witness::end();
+    let shared = read_log::finish();
     let store = if arguments.shares.on() {
-        let options = arguments.that_count();
+        let options = arguments.relevant_options();
         let asked = Asked { verb: "deviation", options, shared, context: Value::Null, output: None };
-        let Some(store) = Store::open(&arguments.shares, &asked, &mut jobs)? else { return Ok(Ending::Done) };
+        let Some(store) = Store::open(&arguments.shares, &asked, &mut jobs)? else {
+            return Ok(ExitStatus::Done);
+        };
         Some(store)
     } else {
         None
@@ -130,11 +134,11 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         read: |job: &Job| Programs::read(&job.paths),
         content: Programs::content,
         work: |job: &Job, programs: Programs| {
-            Ok((shop.judged(job, &programs, surface.as_ref())?, Vec::new()))
+            Ok((context.judged(job, &programs, surface.as_ref())?, Vec::new()))
         },
         whole: true,
     };
-    let mut found: Vec<Found> =
+    let mut found: Vec<ProgramReports> =
         on_threads(arguments.common.threads, || each(store.as_ref(), &jobs, &doing))??;
     if let ([one], false) = (found.as_mut_slice(), several)
         && let Some(error) = one.failed.take()
@@ -142,7 +146,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         bail!("{error}");
     }
     if store.is_none() {
-        say_unused(found.iter().map(|found| &found.used), &cell, surface.as_ref());
+        note_unused_entries(found.iter().map(|found| &found.used), &cell, surface.as_ref());
     }
     let outputs = outputs_with(store.as_ref(), &arguments.shares, &arguments.outputs)?;
     let shown = Reports { outputs: &outputs, is_part: store.is_some() };
@@ -167,7 +171,7 @@ impl Runner {
     }
 }
 
-/// How a report calls what it is of.
+/// Title of a report.
 fn name_of(programs: usize, reports: &[PathReport]) -> String {
     match reports {
         [first, ..] if programs == 1 => first.program.clone(),
@@ -175,19 +179,19 @@ fn name_of(programs: usize, reports: &[PathReport]) -> String {
     }
 }
 
-/// What was found of one program.
-pub(super) struct Found {
-    /// The program, for messages.
+/// The result for one program.
+pub(super) struct ProgramReports {
+    /// Name of the program in messages.
     name: String,
-    /// One per arm.
+    /// One report per arm.
     reports: Vec<PathReport>,
-    /// What it uses of the cell file; absent where it was not looked at.
+    /// The entries of the cell file that it uses; `None` if it was not examined.
     used: Option<Used>,
-    /// Why it could not be judged.
+    /// The error, if it could not be processed.
     failed: Option<String>,
 }
 
-impl Kept for Found {
+impl Kept for ProgramReports {
     fn failed(job: &Job, why: &str) -> Self {
         Self { name: job.name(), reports: Vec::new(), used: None, failed: Some(why.to_owned()) }
     }
@@ -214,32 +218,31 @@ impl Kept for Found {
     }
 }
 
-/// Where the reports go.
+/// The outputs of a run.
 struct Reports<'a> {
     outputs: &'a Outputs,
-    /// Of a run that goes on elsewhere, which no number of bad programs ends.
+    /// One job of a shared run, which does not fail even if all its programs do.
     is_part: bool,
 }
 
 impl Reports<'_> {
-    /// Prints and writes them; `further` adds what else is made of them.
+    /// Prints and writes the reports; `further` adds more outputs.
     fn write(
         &self,
-        found: Vec<Found>,
+        found: Vec<ProgramReports>,
         mut batch: Batch,
         further: impl FnOnce(&mut Batch, &str, &[PathReport]) -> anyhow::Result<()>,
-    ) -> anyhow::Result<Ending> {
+    ) -> anyhow::Result<ExitStatus> {
         let (programs, mut failed, mut reports) = (found.len(), 0, Vec::new());
         for found in found {
-            // A bad one among many is listed, and the others go on.
             if let Some(error) = found.failed {
                 failed += 1;
-                tell(format_args!("failed: {}: {error}", found.name));
+                print_message(format_args!("failed: {}: {error}", found.name));
             }
             reports.extend(found.reports);
         }
         if reports.is_empty() && !self.is_part {
-            bail!("none of {programs} programs has a motion whose target is known from the text");
+            bail!("none of {programs} programs has a motion whose target the program text determines");
         }
         let name = name_of(programs, &reports);
         self.outputs.print(&view::summary(&name, &reports))?;
@@ -251,17 +254,21 @@ impl Reports<'_> {
         )?;
         further(&mut batch, &name, &reports)?;
         batch.write()?;
-        Ok(if failed > 0 { Ending::Flagged } else { Ending::Done })
+        Ok(if failed > 0 { ExitStatus::Flagged } else { ExitStatus::Done })
     }
 }
 
-/// The reports of a shared run, from what was kept of each program.
-pub(super) fn gathered(found: Vec<Found>, outputs: &Outputs, batch: Batch) -> anyhow::Result<Ending> {
+/// The reports of a shared run, made from the records of its programs.
+pub(super) fn gathered(
+    found: Vec<ProgramReports>,
+    outputs: &Outputs,
+    batch: Batch,
+) -> anyhow::Result<ExitStatus> {
     Reports { outputs, is_part: false }.write(found, batch, |_, _, _| Ok(()))
 }
 
-/// What all programs of a run are judged by.
-struct Shop<'a> {
+/// What all programs of a `deviation` run share.
+struct DeviationContext<'a> {
     runners: &'a [Runner],
     originals: Option<&'a Programs>,
     cell: &'a Cell,
@@ -270,28 +277,33 @@ struct Shop<'a> {
     arguments: &'a CellArguments,
 }
 
-impl Shop<'_> {
+impl DeviationContext<'_> {
     /// The reports of one program, one per arm.
-    fn judged(&self, job: &Job, programs: &Programs, surface: Option<&SurfaceFile>) -> anyhow::Result<Found> {
+    fn judged(
+        &self,
+        job: &Job,
+        programs: &Programs,
+        surface: Option<&SurfaceFile>,
+    ) -> anyhow::Result<ProgramReports> {
         let task = programs.task(self.setup);
         let original = self.originals.map(|original| original.task(self.setup));
         for runner in self.runners {
             for program in original.iter().chain([&task]) {
-                agreed(program.listing(), self.cell, surface, &runner.nominal)?;
+                refuse_contradictions(program.listing(), self.cell, surface, &runner.nominal)?;
             }
             if let Some(robot) = &runner.robot {
-                belonging::cell_is_of(self.cell, robot, &runner.nominal)?;
-                belonging::made_for(programs, robot, &runner.nominal)?;
+                robot_match::refuse_other_cell(self.cell, robot, &runner.nominal)?;
+                robot_match::refuse_other_program(programs, robot, &runner.nominal)?;
             }
         }
         let name = match &job.under {
-            // Below a folder the same name may be there more than once.
+            // Below a folder the same file name may occur more than once.
             Some(under) if job.paths.len() == 1 => {
                 job.paths[0].strip_prefix(under).unwrap_or(&job.paths[0]).display().to_string()
             }
             _ => programs.name(),
         };
-        // The first program is the one that states what was meant.
+        // The original defines the intended path.
         let cell = self.arguments;
         let loads = [original.as_ref().unwrap_or(&task), &task].map(|program| cell.loads(program));
         let reports: Vec<PathReport> = self
@@ -318,13 +330,13 @@ impl Shop<'_> {
             })
             .collect();
         if reports.iter().all(|report| report.points.is_empty()) {
-            bail!("{name}: no motion has a target that is known from the text");
+            bail!("{name}: no motion has a target that the program text determines");
         }
         let mut used = Used::by(task.listing(), self.cell);
         if let Some(original) = &original {
             used.join(&Used::by(original.listing(), self.cell));
         }
-        Ok(Found { name: job.name(), reports, used: Some(used), failed: None })
+        Ok(ProgramReports { name: job.name(), reports, used: Some(used), failed: None })
     }
 }
 
@@ -333,7 +345,7 @@ fn runners(arguments: &Arguments) -> anyhow::Result<Vec<Runner>> {
     if let Some(path) = &arguments.actual {
         let text = files::read_text(path)?;
         let file: ArmFile = toml::from_str(&text).map_err(|e| {
-            anyhow!("{}: not an arm of `simulate --arm`: {}", path.display(), e.to_string().trim_end())
+            anyhow!("{}: not an arm file of `simulate --arm`: {}", path.display(), e.to_string().trim_end())
         })?;
         let model = file.model().map_err(|e| anyhow!("{}: {e}", path.display()))?;
         let first = models.first().ok_or_else(|| anyhow!("--model is missing"))?;
@@ -342,14 +354,14 @@ fn runners(arguments: &Arguments) -> anyhow::Result<Vec<Runner>> {
         let robot = Some(robot);
         return Ok(vec![Runner { name, robot, nominal, model, knowledge: None, after: After::Achieved }]);
     }
-    models.iter().for_each(inputs::say_doubtful);
+    models.iter().for_each(inputs::warn_doubtful);
     models
         .into_iter()
         .map(|model| {
             let (robot, nominal) = inputs::nominal(&model, arguments.robot.as_deref())?;
             match model {
                 NamedModel::Nominal => bail!(
-                    "--model nominal has no deviation from itself: give an estimated arm, or --actual ARM.toml"
+                    "--model nominal: the nominal arm has no deviation from itself; give an estimated arm, or --actual ARM.toml"
                 ),
                 NamedModel::Estimated { name, arm, .. } => Ok(Runner {
                     name,

@@ -1,4 +1,4 @@
-//! `truegrind diagnose DATA --robot R -o MODEL.toml`. Many arms in one run are in `fleet`.
+//! `truegrind diagnose DATA --robot R -o MODEL.toml` for one arm; see `fleet` for many.
 
 use std::path::PathBuf;
 
@@ -17,53 +17,52 @@ use truegrind::math::work::report_step;
 use truegrind::report::diagnosis as view;
 
 use super::computation::{Common, watching};
-use super::ending::Ending;
+use super::exit_status::ExitStatus;
 use super::files::Batch;
 use super::identify::{DataArguments, FitArguments, PointsArguments, read, write_model};
 use super::outputs::Outputs;
-use super::progress::Work;
+use super::progress::Spinner;
 use super::shares::Shares;
-use super::stated::{HeldArguments, StatedArguments};
-use super::terminal::tell;
+use super::stated_frames::{FramePriorArguments, StatedFrameArguments};
+use super::terminal::print_message;
 
 /// Arguments of `diagnose`.
 #[derive(Debug, Clone, Args)]
 pub(super) struct Arguments {
     #[command(flatten)]
     pub(super) data: DataArguments,
-    /// More measurements, each of an arm of its own. With these, or where DATA is a folder of measurements, one table over all arms
-    /// is made, and -o names a folder for their models and pages.
+    /// Measurements of further arms. With these, or if DATA is a folder, each file is one arm: one table over all arms is made, and
+    /// -o names a folder for models and pages.
     #[arg(value_name = "MORE")]
     pub(super) more: Vec<PathBuf>,
-    /// The extended model to write; one that fails the verdicts of `identify`, or is worse than geometry on held-out rows, is
-    /// not written, a doubtful one only with --allow-doubtful.
+    /// Model file to write. A model that fails the criteria of `identify`, or is worse than geometry on held-out rows, is not
+    /// written; a doubtful one only with --allow-doubtful.
     #[arg(short, long, value_name = "MODEL.toml")]
     pub(super) output: Option<PathBuf>,
-    /// Write a doubtful model too: one whose data do not promise that programs gain. The file carries the verdict.
+    /// Also write a doubtful model, whose data do not show that programs improve. The file contains the verdict.
     #[arg(long)]
     pub(super) allow_doubtful: bool,
-    /// Chance of any false finding on data with nothing hidden.
+    /// Probability of any false finding on data without further causes.
     #[arg(long, default_value_t = 0.01)]
     pub(super) alpha: f64,
-    /// Most causes that are accepted.
+    /// Largest number of causes.
     #[arg(long, default_value_t = 20)]
     pub(super) most: usize,
-    /// Contiguous blocks that are held out in turn, beside five random folds.
+    /// Number of contiguous blocks held out in turn, in addition to five random folds.
     #[arg(long, default_value_t = 10)]
     pub(super) blocks: usize,
-    /// Let a smooth correction, without a physical name, follow what no cause explains; it is kept only where it lowers both
-    /// held-out errors.
+    /// Add a smooth correction without physical meaning for the unexplained rest, if it lowers both held-out errors.
     #[arg(long)]
     pub(super) smooth: bool,
-    /// Another series of the same arm, on which the models are judged with only the frames refitted.
+    /// Another measurement of the same arm, on which the models are tested with only the sensor frames refitted. May be repeated.
     #[arg(long, value_name = "DATA")]
     pub(super) also: Vec<PathBuf>,
     #[command(flatten)]
-    pub(super) asked: FitArguments,
+    pub(super) fit: FitArguments,
     #[command(flatten)]
-    pub(super) stated: StatedArguments,
+    pub(super) stated: StatedFrameArguments,
     #[command(flatten)]
-    pub(super) held: HeldArguments,
+    pub(super) prior: FramePriorArguments,
     #[command(flatten)]
     pub(super) common: Common,
     #[command(flatten)]
@@ -72,7 +71,7 @@ pub(super) struct Arguments {
     pub(super) shares: Shares,
 }
 
-pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let mut targets = arguments.outputs.files();
     targets.extend(arguments.output.as_deref());
     let mut given: Vec<&std::path::Path> = arguments.data.files();
@@ -81,7 +80,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let options = options(arguments)?;
     let (robot, dataset) = read(&arguments.data)?;
     let name = robot.sheet.name.clone();
-    let work = Work::start(format!("diagnosing {name} from {} rows", dataset.rows.len()));
+    let work = Spinner::start(format!("diagnosing {name} from {} rows", dataset.rows.len()));
     let others = arguments
         .also
         .iter()
@@ -96,11 +95,11 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         })
         .collect::<anyhow::Result<Vec<Dataset>>>()?;
     let found = watching(arguments.common.threads, &work, || {
-        of_rows(arguments, &options, &name, &robot.model, &dataset, &others)
+        diagnose_rows(arguments, &options, &name, &robot.model, &dataset, &others)
     })??;
     drop(work);
     for note in found.diagnosis.notes.iter().chain(&dataset.notes) {
-        tell(format_args!("note: {note}"));
+        print_message(format_args!("note: {note}"));
     }
     arguments.outputs.print(&view::summary(&found))?;
     let mut batch = Batch::sparing(given);
@@ -117,10 +116,10 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     }
     let unexplained = found.diagnosis.findings.iter().any(|f| f.effect == "unexplained");
     let ending = write_model(&found.estimated, arguments.output.as_deref(), arguments.allow_doubtful, batch)?;
-    Ok(if unexplained { Ending::Flagged } else { ending })
+    Ok(if unexplained { ExitStatus::Flagged } else { ending })
 }
 
-/// What is asked of a diagnosis.
+/// Options of the library.
 pub(super) fn options(arguments: &Arguments) -> anyhow::Result<Options> {
     if !(arguments.alpha > 0.0 && arguments.alpha <= 0.5) {
         bail!("--alpha {}: expected a probability above 0, up to 0.5", arguments.alpha);
@@ -131,8 +130,8 @@ pub(super) fn options(arguments: &Arguments) -> anyhow::Result<Options> {
     let mut options = Options {
         blocks: arguments.blocks,
         smooth: arguments.smooth,
-        fuse_readout: !arguments.asked.raw_columns,
-        limits: arguments.asked.limits()?,
+        fuse_readout: !arguments.fit.raw_columns,
+        limits: arguments.fit.limits()?,
         ..Options::default()
     };
     options.selection.alpha = arguments.alpha;
@@ -141,8 +140,8 @@ pub(super) fn options(arguments: &Arguments) -> anyhow::Result<Options> {
     Ok(options)
 }
 
-/// The diagnosis of the rows of one arm, judged on its other series.
-pub(super) fn of_rows(
+/// Diagnoses one arm, and tests the models on its other measurements.
+pub(super) fn diagnose_rows(
     arguments: &Arguments,
     options: &Options,
     name: &str,
@@ -152,18 +151,22 @@ pub(super) fn of_rows(
 ) -> anyhow::Result<Diagnosed> {
     let frames = starting_frames(dataset, nominal, &options.tolerance, options.fuse_readout)?;
     let stated = arguments.stated.frames(dataset)?;
-    let (tolerance, frames) = arguments.held.held(&options.tolerance, stated.as_ref(), frames)?;
+    let (tolerance, frames) = arguments.prior.prior(&options.tolerance, stated.as_ref(), frames)?;
     let held = Options { tolerance, ..options.clone() };
     let mut found = diagnose(dataset, name, nominal, &frames, &held, &|step| report_step(step))?;
     if let Some(stated) = &stated {
         let raw = raw_error(dataset, nominal, stated, options.fuse_readout);
         found.diagnosis.notes.push(format!(
-            "with the frames as stated the data sheet's arm is {:.3} mm RMS off (raw error, nothing fitted)",
+            "with the stated frames the nominal arm has an error of {:.3} mm RMS (raw error, nothing fitted)",
             raw.rmse
         ));
     }
     for other in others {
+<<<<<<< HEAD
         report_step(&format!("judging on {}", other.file));
+=======
+        tell_step(&format!("testing on {}", other.file));
+>>>>>>> 5147f0a (cli: compensate in files of one idea; help, messages, names and comments in the terms of the field)
         let frames = starting_frames(other, nominal, &options.tolerance, options.fuse_readout)?;
         found.diagnosis.transfers.push(transfer(
             other,
@@ -178,12 +181,12 @@ pub(super) fn of_rows(
     Ok(found)
 }
 
-/// What the data sheet's arm is off by with frames that were measured by other means.
+/// Error of the nominal arm with the stated sensor frames, nothing fitted.
 fn raw_error(dataset: &Dataset, nominal: &Model, stated: &Frames, fuse: bool) -> ErrorSummary {
     summary_on(&prepare_observations(dataset, nominal, fuse).0, nominal, stated)
 }
 
-/// The diagnosis, starting frames included.
+/// Diagnosis including the starting frames.
 pub(super) fn diagnosed(
     dataset: &Dataset,
     robot: &str,

@@ -13,11 +13,11 @@ use truegrind::calibration::identification::tolerance::Tolerance;
 use truegrind::robots::export::{Format, angles, left_out, write};
 use truegrind::robots::foreign::{Choice, read_any};
 
-use super::ending::Ending;
+use super::exit_status::ExitStatus;
 use super::files::Batch;
 use super::identify::{DataArguments, read};
 use super::inputs::{self, NamedModel};
-use super::terminal::tell;
+use super::terminal::print_message;
 
 /// A format of others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -49,7 +49,7 @@ pub(super) struct Arguments {
     data: Option<PathBuf>,
 }
 
-pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let mut given = vec![arguments.model.as_path()];
     given.extend(arguments.data.as_deref());
     Batch::check(&given, &[&arguments.output])?;
@@ -75,12 +75,12 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let mut batch = Batch::sparing(given);
     batch.add(&arguments.output, text);
     batch.write()?;
-    inputs::say_doubtful(&named);
+    inputs::warn_doubtful(&named);
     for note in &notes {
-        tell(format_args!("note: {note}"));
+        print_message(format_args!("note: {note}"));
     }
     // What is not the arm that was identified is flagged.
-    Ok(if is_of_links_alone(&arm.model) { Ending::Done } else { Ending::Flagged })
+    Ok(if is_of_links_alone(&arm.model) { ExitStatus::Done } else { ExitStatus::Flagged })
 }
 
 /// Whether all that moves the arm is in its links.

@@ -1,13 +1,13 @@
-//! Files: read whole, written whole or not at all, inputs never overwritten.
+//! File access: files are read as a whole, written as a whole or not at all, and inputs are never overwritten.
 //!
-//! Every file that a verb reads or writes passes here, so that nothing has to be listed: `ledger` knows each by itself and
-//! not by its name, refuses an output that is an input, an input that is an output and two outputs that are one file, and
-//! does so before the work where both are known by then.
+//! Every file that a verb reads or writes passes through here. `ledger` identifies files by inode, not by name. It refuses an
+//! output that is an input, an input that is an output, and two outputs that are one file, before the computation if both
+//! are known by then.
 //!
-//! Outputs are handled as `cp` would handle them. A new file gets the permissions of new files (`umask`), one that is there keeps
-//! owner and permissions, a read-only one stays. A link is followed to its file, which is made where it is not there yet.
-//! Devices and pipes are written through. A file with several names (hard links) keeps them: it is written in place,
-//! everything else is written beside its place, synced, and renamed.
+//! Outputs behave as with `cp`. A new file gets the permissions of the `umask`; an existing file keeps owner and permissions;
+//! a read-only file is not overwritten. A link is followed to its file, which is created if it does not exist. Devices and pipes
+//! are written through. A file with several hard links is written in place; any other file is written to a temporary file,
+//! synced, and renamed.
 
 use std::fs;
 use std::io::{Read, Write};
@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 
-use super::terminal::hand_over;
+use super::terminal::write_stdout;
 use in_place::InPlace;
 use pending::Pending;
 use place::{Kind, Place, parent};
@@ -25,115 +25,115 @@ pub(super) use place::is_stdout;
 
 mod in_place;
 mod ledger;
-pub(super) mod own;
+pub(super) mod run_files;
 mod pending;
 mod place;
-pub(super) mod settle;
-pub(super) mod witness;
+pub(super) mod sync;
+pub(super) mod read_log;
 
-/// The bytes of a file: an input, which no output may overwrite from here on.
+/// The bytes of a file. It becomes an input, which no output may overwrite.
 pub(super) fn read(path: &Path) -> anyhow::Result<Vec<u8>> {
-    let (file, meta) = opened(path)?;
+    let (file, meta) = open(path)?;
     ledger::note_read(path, &meta)?;
-    let bytes = whole(file, &meta, path)?;
-    witness::note(&bytes);
+    let bytes = read_all(file, &meta, path)?;
+    read_log::note(&bytes);
     Ok(bytes)
 }
 
-/// All that comes on the standard input.
+/// All bytes of stdin.
 pub(super) fn read_stdin() -> anyhow::Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    std::io::stdin().lock().read_to_end(&mut bytes).context("the standard input cannot be read")?;
+    std::io::stdin().lock().read_to_end(&mut bytes).context("stdin cannot be read")?;
     Ok(bytes)
 }
 
-/// The bytes of a file that is this program's own and will be written again, such as the state of a track.
-pub(super) fn read_own(path: &Path) -> anyhow::Result<Vec<u8>> {
-    let (file, meta) = opened(path)?;
-    whole(file, &meta, path)
+/// The bytes of a state file, which the program will overwrite, such as the state of a track.
+pub(super) fn read_state(path: &Path) -> anyhow::Result<Vec<u8>> {
+    let (file, meta) = open(path)?;
+    read_all(file, &meta, path)
 }
 
-/// Takes a file for an input before it is read. One that cannot be looked at is left to whoever reads it.
+/// Registers a file as an input before it is read. A missing file is not an error here.
 ///
 /// # Errors
-/// It is an output too.
+/// The file is also an output.
 pub(super) fn expect(path: &Path) -> anyhow::Result<()> {
     fs::metadata(path).map_or(Ok(()), |meta| ledger::note_read(path, &meta))
 }
 
-fn opened(path: &Path) -> anyhow::Result<(fs::File, fs::Metadata)> {
-    let open = || {
+fn open(path: &Path) -> anyhow::Result<(fs::File, fs::Metadata)> {
+    let try_open = || {
         let file = fs::File::open(path)?;
         let meta = file.metadata()?;
         Ok::<_, std::io::Error>((file, meta))
     };
-    open().with_context(|| format!("{}: cannot be read", path.display()))
+    try_open().with_context(|| format!("{}: cannot be read", path.display()))
 }
 
-fn whole(file: fs::File, meta: &fs::Metadata, path: &Path) -> anyhow::Result<Vec<u8>> {
-    let bytes = in_parts(file, meta).with_context(|| format!("{}: cannot be read", path.display()))?;
-    if !meta.is_file() && bytes.len() as u64 > MOST_OF_A_STREAM {
+fn read_all(file: fs::File, meta: &fs::Metadata, path: &Path) -> anyhow::Result<Vec<u8>> {
+    let bytes = read_in_parts(file, meta).with_context(|| format!("{}: cannot be read", path.display()))?;
+    if !meta.is_file() && bytes.len() as u64 > MAX_STREAM_BYTES {
         bail!(
-            "{}: more than {} MB come from it without an end; expected a file",
+            "{}: more than {} MB without an end; expected a regular file",
             path.display(),
-            MOST_OF_A_STREAM >> 20
+            MAX_STREAM_BYTES >> 20
         );
     }
     Ok(bytes)
 }
 
-/// A pipe or device may never end: more than this is not taken from it (bytes).
-const MOST_OF_A_STREAM: u64 = 1 << 28;
+/// Limit for a pipe or device, which may never end (bytes).
+const MAX_STREAM_BYTES: u64 = 1 << 28;
 
-/// Files from here on are read in parts, on all threads (bytes).
+/// Files of this size or more are read in parts, in parallel (bytes).
 #[cfg(unix)]
-const LARGE: u64 = 1 << 22;
+const PARALLEL_BYTES: u64 = 1 << 22;
 
 #[cfg(unix)]
-fn in_parts(file: fs::File, meta: &fs::Metadata) -> std::io::Result<Vec<u8>> {
+fn read_in_parts(file: fs::File, meta: &fs::Metadata) -> std::io::Result<Vec<u8>> {
     use std::os::unix::fs::FileExt;
 
     use rayon::prelude::*;
 
     let length = if meta.is_file() { meta.len() } else { 0 };
-    if length < LARGE {
-        return at_once(file, meta);
+    if length < PARALLEL_BYTES {
+        return read_at_once(file, meta);
     }
     let mut bytes = vec![0; length as usize];
-    let part = LARGE as usize;
+    let part = PARALLEL_BYTES as usize;
     let parts = bytes.par_chunks_mut(part).enumerate();
     parts.try_for_each(|(index, bytes)| file.read_exact_at(bytes, (index * part) as u64))?;
-    // One that grew meanwhile is read again, to its end.
-    if file.metadata()?.len() == length { Ok(bytes) } else { at_once(file, meta) }
+    // A file that grew meanwhile is read again.
+    if file.metadata()?.len() == length { Ok(bytes) } else { read_at_once(file, meta) }
 }
 
 #[cfg(not(unix))]
-fn in_parts(file: fs::File, meta: &fs::Metadata) -> std::io::Result<Vec<u8>> {
-    at_once(file, meta)
+fn read_in_parts(file: fs::File, meta: &fs::Metadata) -> std::io::Result<Vec<u8>> {
+    read_at_once(file, meta)
 }
 
-fn at_once(mut file: fs::File, meta: &fs::Metadata) -> std::io::Result<Vec<u8>> {
+fn read_at_once(mut file: fs::File, meta: &fs::Metadata) -> std::io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     if meta.is_file() {
         bytes.reserve_exact(meta.len() as usize + 1);
         file.read_to_end(&mut bytes)?;
     } else {
-        file.take(MOST_OF_A_STREAM + 1).read_to_end(&mut bytes)?;
+        file.take(MAX_STREAM_BYTES + 1).read_to_end(&mut bytes)?;
     }
     Ok(bytes)
 }
 
-/// The text of a file.
+/// The text of an input file.
 pub(super) fn read_text(path: &Path) -> anyhow::Result<String> {
-    as_text(read(path)?, path)
+    decode(read(path)?, path)
 }
 
-/// The same of a file that is this program's own.
-pub(super) fn read_own_text(path: &Path) -> anyhow::Result<String> {
-    as_text(read_own(path)?, path)
+/// The text of a state file, see [`read_state`].
+pub(super) fn read_state_text(path: &Path) -> anyhow::Result<String> {
+    decode(read_state(path)?, path)
 }
 
-fn as_text(bytes: Vec<u8>, path: &Path) -> anyhow::Result<String> {
+fn decode(bytes: Vec<u8>, path: &Path) -> anyhow::Result<String> {
     match String::from_utf8(bytes) {
         Ok(text) => Ok(text),
         Err(error) => {
@@ -143,9 +143,9 @@ fn as_text(bytes: Vec<u8>, path: &Path) -> anyhow::Result<String> {
     }
 }
 
-/// Where a path leads, whether or not something is there yet: as much of it as is there with links followed, the rest as it
-/// is written. `None` for the standard output, and for a path that goes up from where nothing is.
-pub(super) fn whole_path(path: &Path) -> Option<PathBuf> {
+/// The canonical path of a file that may not exist yet: links are followed in the part that exists. `None` for stdout and for a
+/// path with `..` below a missing folder.
+pub(super) fn canonical_path(path: &Path) -> Option<PathBuf> {
     if is_stdout(path) {
         return None;
     }
@@ -161,31 +161,30 @@ pub(super) fn whole_path(path: &Path) -> Option<PathBuf> {
     }
 }
 
-/// The name of a file as reports print it.
+/// The file name as reports print it.
 pub(super) fn name(path: &Path) -> String {
     path.file_name().map_or_else(|| path.display().to_string(), |n| n.to_string_lossy().into_owned())
 }
 
-/// Files to be written together: collected first, then each written to the disk beside its place, synced, and only when
-/// all are there put in place.
+/// Files to be written together: first all are written to temporary files and synced, then all are renamed into place.
 #[derive(Debug, Default)]
 pub(super) struct Batch {
     files: Vec<(PathBuf, Vec<u8>)>,
     inputs: Vec<PathBuf>,
-    settled_later: bool,
+    synced_later: bool,
 }
 
 impl Batch {
-    /// A batch that spares `inputs` too, beside all that was read.
+    /// A batch that must not overwrite `inputs`, in addition to the files that were read.
     pub(super) fn sparing<P: AsRef<Path>>(inputs: impl IntoIterator<Item = P>) -> Self {
         let inputs = inputs.into_iter().map(|p| p.as_ref().to_path_buf()).collect();
-        Self { files: Vec::new(), inputs, settled_later: false }
+        Self { files: Vec::new(), inputs, synced_later: false }
     }
 
-    /// Leaves it to [`settle`] that new files get to the disk, for one who would notice that what a machine that went down left of them
-    /// is not what was written. What takes the place of another file is synced before all the same.
-    pub(super) fn settled_later(self, later: bool) -> Self {
-        Self { settled_later: later && settle::CAN, ..self }
+    /// Leaves syncing of new files to [`sync`], for a caller that detects files torn by a machine crash. A file that replaces
+    /// another is synced in any case.
+    pub(super) fn synced_later(self, later: bool) -> Self {
+        Self { synced_later: later && sync::AVAILABLE, ..self }
     }
 
     /// Adds a file; `-` prints it to stdout when the batch is written.
@@ -193,14 +192,14 @@ impl Batch {
         self.files.push((path.into(), bytes.into()));
     }
 
-    /// Refuses early, before the work, what writing would refuse late: an output that is an input (these, what was read
-    /// already, and from here on what is read), two outputs that are one file, and outputs that cannot be written.
+    /// Refuses before the computation what writing would refuse after it: an output that is an input (these, those read already,
+    /// and those read later), two outputs that are one file, and outputs that cannot be written.
     pub(super) fn check(inputs: &[&Path], outputs: &[&Path]) -> anyhow::Result<()> {
         inputs.iter().try_for_each(|input| expect(input))?;
         ledger::promise(outputs)
     }
 
-    /// Writes everything or nothing.
+    /// Writes all files or none.
     pub(super) fn write(self) -> anyhow::Result<()> {
         self.inputs.iter().try_for_each(|input| expect(input))?;
         let named: Vec<&Path> = self.files.iter().map(|(path, _)| path.as_path()).collect();
@@ -208,7 +207,7 @@ impl Batch {
         let (mut ready, mut over, mut last) = (Vec::new(), Vec::new(), Vec::new());
         for (place, (_, bytes)) in places.iter().zip(&self.files) {
             let failed = || format!("{}: cannot be written; nothing was changed", place.named.display());
-            match written_beside(place, bytes, self.settled_later).with_context(failed)? {
+            match write_temporary(place, bytes, self.synced_later).with_context(failed)? {
                 Some(pending) => ready.push((place, pending)),
                 None if matches!(place.kind, Kind::Over(_)) => {
                     over.push((place, bytes, InPlace::open(&place.path).with_context(failed)?));
@@ -216,7 +215,7 @@ impl Batch {
                 None => last.push((place, bytes)),
             }
         }
-        // What may still fail for want of room goes first: then all that was done can be taken back.
+        // Writes that can still fail because the disk is full go first, so that they can be undone.
         for index in 0..over.len() {
             let (place, bytes, file) = &mut over[index];
             if let Err(error) = file.put(bytes) {
@@ -234,8 +233,8 @@ impl Batch {
         }
         for (place, bytes) in last {
             match place.kind {
-                Kind::Stdout => hand_over(bytes)?,
-                _ => through(&place.path, bytes)
+                Kind::Stdout => write_stdout(bytes)?,
+                _ => write_through(&place.path, bytes)
                     .with_context(|| incomplete(place, "written", &done, &places))?,
             }
             done.push(place);
@@ -244,7 +243,7 @@ impl Batch {
     }
 }
 
-/// What is said where one of several outputs fails after others are there already: which are and which are not.
+/// Error text if an output fails after others were put in place: lists which are new and which are not.
 fn incomplete(failed: &Place, what: &str, done: &[&Place], all: &[Place]) -> String {
     let names = |of: &mut dyn Iterator<Item = &Place>| {
         of.map(|place| place.named.display().to_string()).collect::<Vec<_>>().join(", ")
@@ -255,18 +254,18 @@ fn incomplete(failed: &Place, what: &str, done: &[&Place], all: &[Place]) -> Str
     }
     let open = |place: &&Place| !done.iter().any(|other| std::ptr::eq(*other, *place));
     format!(
-        "{here}; new are already: {}; still as before: {}",
+        "{here}; already replaced: {}; unchanged: {}",
         names(&mut done.iter().copied()),
         names(&mut all.iter().filter(open))
     )
 }
 
-/// The file beside its place, on the disk; `None` where it is sent, printed, or written where it stands. `later`: a new file gets to the
-/// disk later.
-fn written_beside(place: &Place, bytes: &[u8], later: bool) -> std::io::Result<Option<Pending>> {
+/// Writes a temporary file beside the output; `None` for streams, stdout and files written in place. `later`: a new file is synced
+/// later.
+fn write_temporary(place: &Place, bytes: &[u8], later: bool) -> std::io::Result<Option<Pending>> {
     let over = match &place.kind {
         Kind::Stdout | Kind::Stream => return Ok(None),
-        Kind::Over(meta) if names(meta) > 1 => return Ok(None),
+        Kind::Over(meta) if link_count(meta) > 1 => return Ok(None),
         Kind::Over(meta) => Some(meta),
         Kind::New => None,
     };
@@ -276,23 +275,23 @@ fn written_beside(place: &Place, bytes: &[u8], later: bool) -> std::io::Result<O
     }
 }
 
-/// How many names a file has.
+/// Number of hard links.
 #[cfg(unix)]
-fn names(meta: &fs::Metadata) -> u64 {
+fn link_count(meta: &fs::Metadata) -> u64 {
     std::os::unix::fs::MetadataExt::nlink(meta)
 }
 
 #[cfg(not(unix))]
-fn names(_: &fs::Metadata) -> u64 {
+fn link_count(_: &fs::Metadata) -> u64 {
     1
 }
 
-/// Sends bytes to a device, a pipe or an open file.
-fn through(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+/// Writes to a device, a pipe or an open file.
+fn write_through(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     fs::OpenOptions::new().write(true).truncate(true).open(path)?.write_all(bytes)
 }
 
-/// Makes a folder for outputs.
+/// Creates a folder for outputs.
 pub(super) fn make_folder(path: &Path) -> anyhow::Result<()> {
-    fs::create_dir_all(path).with_context(|| format!("{}: folder cannot be made", path.display()))
+    fs::create_dir_all(path).with_context(|| format!("{}: folder cannot be created", path.display()))
 }

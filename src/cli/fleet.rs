@@ -1,4 +1,5 @@
-//! `truegrind diagnose FOLDER --robot R -o MODELS`, many arms in one run: each diagnosed by itself, its model and page written, and one table over all.
+//! `truegrind diagnose FOLDER --robot R -o MODELS`: diagnoses many arms, writes a model and a page for each, and one table over
+//! all.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -14,41 +15,43 @@ use truegrind::units::done::Recorded;
 use truegrind::units::key::sha256;
 
 use super::computation::{Common, on_threads};
-use super::diagnose::{Arguments, of_rows, options};
-use super::ending::Ending;
-use super::files::{self, Batch, witness};
+use super::diagnose::{Arguments, diagnose_rows, options};
+use super::exit_status::ExitStatus;
+use super::files::{self, Batch, read_log};
 use super::identify::{DataArguments, read_bytes, why_not_written};
 use super::inputs;
 use super::outputs::Outputs;
 use super::programs::{Job, found_below};
-use super::progress::Work;
+use super::progress::Spinner;
 use super::shares::{Asked, Doing, Kept, Shares, Store, Written, each, outputs_with};
-use super::terminal::tell;
+use super::terminal::print_message;
 
-/// Whether many arms are asked for, and not one.
-pub(super) fn is_asked(arguments: &Arguments) -> bool {
+/// Whether the arguments name many arms.
+pub(super) fn is_requested(arguments: &Arguments) -> bool {
     !arguments.more.is_empty() || arguments.data.data.is_dir() || arguments.shares.on()
 }
 
-/// Every option that has a part in what is written, in words; as those of `compensate`.
-fn that_count(arguments: &Arguments) -> String {
+/// All options that influence the outputs, as text; see [`super::compensate::Arguments`].
+fn relevant_options(arguments: &Arguments) -> String {
     let data = DataArguments { data: PathBuf::new(), ..arguments.data.clone() };
     let common = Common { threads: None, ..arguments.common.clone() };
     let (outputs, shares) = (Outputs::default(), Shares::default());
     format!("{:?}", Arguments { data, more: Vec::new(), common, outputs, shares, ..arguments.clone() })
 }
 
-pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let mut jobs = match arguments.shares.listed()? {
         Some(jobs) => jobs,
         None => jobs(arguments)?,
     };
-    refuse_one_place_for_two(&jobs)?;
+    refuse_shared_output(&jobs)?;
     if arguments.data.points.points.is_some() {
-        bail!("--points belong to one log of joints, and these are several arms: diagnose each by itself");
+        bail!("--points belongs to one joint log, but there are several arms: diagnose them separately");
     }
     if !arguments.also.is_empty() {
-        bail!("--also is another series of one arm, and these are several: diagnose that arm by itself");
+        bail!(
+            "--also is another measurement of one arm, but there are several arms: diagnose that arm separately"
+        );
     }
     if arguments.outputs.rrd.is_some() {
         bail!("--rrd shows one arm: name one");
@@ -60,42 +63,48 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     Batch::check(&all, &arguments.outputs.files())?;
     let options = options(arguments)?;
     if arguments.shares.on() {
-        witness::begin();
+        read_log::begin();
     }
     inputs::robot(&arguments.data.robot)?;
-    let shared = witness::end();
+    let shared = read_log::finish();
     let store = if arguments.shares.on() {
         let output = arguments.output.as_deref();
-        let asked =
-            Asked { verb: "diagnose", options: that_count(arguments), shared, context: Value::Null, output };
-        let Some(store) = Store::open(&arguments.shares, &asked, &mut jobs)? else { return Ok(Ending::Done) };
+        let asked = Asked {
+            verb: "diagnose",
+            options: relevant_options(arguments),
+            shared,
+            context: Value::Null,
+            output,
+        };
+        let Some(store) = Store::open(&arguments.shares, &asked, &mut jobs)? else {
+            return Ok(ExitStatus::Done);
+        };
         Some(store)
     } else {
         None
     };
-    let work = Work::start(format!("diagnosing {} arms", jobs.len()));
+    let work = Spinner::start(format!("diagnosing {} arms", jobs.len()));
     let doing = Doing {
         read: |job: &Job| job.paths.iter().map(|path| Ok((path.clone(), files::read(path)?))).collect(),
         content: |read: &Vec<(PathBuf, Vec<u8>)>| {
             read.iter().map(|(path, bytes)| (path.display().to_string(), sha256(bytes))).collect()
         },
-        work: |job: &Job, read: Vec<(PathBuf, Vec<u8>)>| one(arguments, &options, job, &read),
+        work: |job: &Job, read: Vec<(PathBuf, Vec<u8>)>| diagnose_arm(arguments, &options, job, &read),
         whole: true,
     };
-    let found: Vec<Found> = on_threads(arguments.common.threads, || each(store.as_ref(), &jobs, &doing))??;
+    let found: Vec<ArmResult> =
+        on_threads(arguments.common.threads, || each(store.as_ref(), &jobs, &doing))??;
     drop(work);
     let inputs = jobs.iter().flat_map(|job| &job.paths);
     let outputs = outputs_with(store.as_ref(), &arguments.shares, &arguments.outputs)?;
     write(found, &outputs, Batch::sparing(inputs), store.is_some())
 }
 
-/// The measurements that the command line names, those below folders among them, in the order of names.
+/// The named measurements, including those below folders, sorted by path.
 fn jobs(arguments: &Arguments) -> anyhow::Result<Vec<Job>> {
     let mut jobs = Vec::new();
     let is_table = |path: &Path| {
-        let known =
-            |ending: &std::ffi::OsStr| ["csv", "xlsx"].iter().any(|known| ending.eq_ignore_ascii_case(known));
-        path.extension().is_some_and(known)
+        path.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv") || e.eq_ignore_ascii_case("xlsx"))
     };
     for path in std::iter::once(&arguments.data.data).chain(&arguments.more) {
         if path.is_dir() {
@@ -109,43 +118,43 @@ fn jobs(arguments: &Arguments) -> anyhow::Result<Vec<Job>> {
         files::expect(path)?;
     }
     if jobs.is_empty() {
-        bail!("no measurements found: a folder is searched for .csv and .xlsx");
+        bail!("no measurements found: folders are searched for .csv and .xlsx");
     }
     Ok(jobs)
 }
 
-/// Where the model of an arm goes in the folder of outputs.
-fn place(job: &Job) -> PathBuf {
+/// Path of the model of an arm in the output folder.
+fn model_path(job: &Job) -> PathBuf {
     let file = job.paths.first().map(PathBuf::as_path).unwrap_or(Path::new(""));
     job.place(file).with_extension("toml")
 }
 
-/// No two arms may end in one file.
-fn refuse_one_place_for_two(jobs: &[Job]) -> anyhow::Result<()> {
+/// Refuses two arms with the same output file.
+fn refuse_shared_output(jobs: &[Job]) -> anyhow::Result<()> {
     let mut taken: BTreeMap<PathBuf, &Job> = BTreeMap::new();
     for job in jobs {
-        if let Some(first) = taken.insert(place(job), job) {
+        if let Some(first) = taken.insert(model_path(job), job) {
             bail!(
-                "{} and {} would both be written to {} in the output folder: call one of them otherwise, or run them one \
-                 by one, each into a folder of its own",
+                "{} and {} would both be written to {} in the output folder: rename one of them, or run them \
+                 separately, each into its own folder",
                 first.name(),
                 job.name(),
-                place(job).display()
+                model_path(job).display()
             );
         }
     }
     Ok(())
 }
 
-/// What was found of one arm.
-pub(super) struct Found {
+/// The result for one arm.
+pub(super) struct ArmResult {
     row: Row,
     notes: Vec<String>,
-    /// Whether its model may be used, and nothing is unexplained.
+    /// Whether its model may be used and no error is unexplained.
     clean: bool,
 }
 
-impl Kept for Found {
+impl Kept for ArmResult {
     fn failed(job: &Job, why: &str) -> Self {
         Self { row: Row::failed(job.name(), why.to_owned()), notes: Vec::new(), clean: false }
     }
@@ -171,21 +180,21 @@ impl Kept for Found {
     }
 }
 
-/// One arm of many: diagnosed, its model, page and contract written.
-fn one(
+/// Diagnoses one arm of many and writes its model, page and JSON.
+fn diagnose_arm(
     arguments: &Arguments,
     options: &Options,
     job: &Job,
     read: &[(PathBuf, Vec<u8>)],
-) -> anyhow::Result<(Found, Written)> {
+) -> anyhow::Result<(ArmResult, Written)> {
     let (path, bytes) = read.first().ok_or_else(|| anyhow!("{}: names no file", job.name()))?;
     let data = DataArguments { data: path.clone(), ..arguments.data.clone() };
     let (robot, dataset) = read_bytes(&data, bytes)?;
-    let found = of_rows(arguments, options, &robot.sheet.name, &robot.model, &dataset, &[])?;
+    let found = diagnose_rows(arguments, options, &robot.sheet.name, &robot.model, &dataset, &[])?;
     let diagnosis = &found.diagnosis;
     let notes: Vec<String> = diagnosis.notes.iter().chain(&dataset.notes).cloned().collect();
     let why = why_not_written(&found.estimated, arguments.allow_doubtful);
-    let model = arguments.output.as_ref().map(|folder| folder.join(place(job)));
+    let model = arguments.output.as_ref().map(|folder| folder.join(model_path(job)));
     let mut made = Vec::new();
     if let Some(model) = &model {
         let json = serde_json::to_value(diagnosis.clone().counted_from_0(&dataset))?;
@@ -210,14 +219,19 @@ fn one(
     let unexplained = diagnosis.findings.iter().any(|finding| finding.effect == "unexplained");
     let note = why.filter(|_| arguments.output.is_some()).map(|why| format!("the model {why}"));
     let row = Row::of(job.name(), output, note, diagnosis);
-    Ok((Found { row, notes, clean: !poor && !unexplained }, written))
+    Ok((ArmResult { row, notes, clean: !poor && !unexplained }, written))
 }
 
-/// Prints and writes the table over all arms. `is_part`: of a run that goes on elsewhere, which no number of bad files ends.
-fn write(found: Vec<Found>, outputs: &Outputs, mut batch: Batch, is_part: bool) -> anyhow::Result<Ending> {
+/// Prints and writes the table over all arms. `is_part`: one job of a shared run, which does not fail even if all its arms do.
+fn write(
+    found: Vec<ArmResult>,
+    outputs: &Outputs,
+    mut batch: Batch,
+    is_part: bool,
+) -> anyhow::Result<ExitStatus> {
     for found in &found {
         for note in &found.notes {
-            tell(format_args!("note: {}: {note}", found.row.file));
+            print_message(format_args!("note: {}: {note}", found.row.file));
         }
     }
     let clean = found.iter().all(|found| found.clean);
@@ -228,10 +242,10 @@ fn write(found: Vec<Found>, outputs: &Outputs, mut batch: Batch, is_part: bool) 
     if !is_part && rows.iter().all(|row| row.failed) {
         bail!("none of {} arms could be diagnosed", rows.len());
     }
-    Ok(if clean { Ending::Done } else { Ending::Flagged })
+    Ok(if clean { ExitStatus::Done } else { ExitStatus::Flagged })
 }
 
-/// The table of a shared run, from what was kept of each arm.
-pub(super) fn gathered(found: Vec<Found>, outputs: &Outputs, batch: Batch) -> anyhow::Result<Ending> {
+/// The table of a shared run, made from the records of its arms.
+pub(super) fn gathered(found: Vec<ArmResult>, outputs: &Outputs, batch: Batch) -> anyhow::Result<ExitStatus> {
     write(found, outputs, batch, false)
 }

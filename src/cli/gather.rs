@@ -14,12 +14,12 @@ use truegrind::units::run::Run;
 use truegrind::units::share::Share;
 
 use super::computation::on_threads;
-use super::ending::Ending;
+use super::exit_status::ExitStatus;
 use super::files::{self, Batch};
 use super::outputs::{Outputs, Pages};
 use super::programs::{Job, Programs};
 use super::shares::{Kept, Store};
-use super::{corrected, deviation, fleet};
+use super::{compensate, deviation, fleet};
 
 /// Arguments of `gather`.
 #[derive(Debug, Args)]
@@ -45,7 +45,7 @@ enum State<T> {
     Changed(Vec<PathBuf>),
 }
 
-pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let outputs = Outputs::from(&arguments.pages);
     let (store, run) = Store::of(&arguments.work)?;
     if run.version != env!("CARGO_PKG_VERSION") {
@@ -69,7 +69,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     match run.verb.as_str() {
         "compensate" => {
             let records = here.records(outputs.pages.json.is_some(), programs)?;
-            corrected::gathered(records, &run.context, &outputs, arguments.diff.as_deref(), batch())
+            compensate::batch::gathered(records, &run.context, &outputs, arguments.diff.as_deref(), batch())
         }
         "deviation" => deviation::gathered(here.records(true, programs)?, &outputs, batch()),
         "diagnose" => fleet::gathered(here.records(true, tables)?, &outputs, batch()),

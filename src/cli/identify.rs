@@ -24,13 +24,13 @@ use truegrind::report::{identification as view, study as study_view};
 use truegrind::robots::Robot;
 
 use super::computation::{Common, on_threads, watching};
-use super::ending::Ending;
+use super::exit_status::ExitStatus;
 use super::files::{self, Batch};
 use super::inputs;
 use super::outputs::Outputs;
-use super::progress::Work;
-use super::stated::{HeldArguments, StatedArguments};
-use super::terminal::{say, tell, tell_lines, width};
+use super::progress::Spinner;
+use super::stated_frames::{FramePriorArguments, StatedFrameArguments};
+use super::terminal::{print_message, print_message_lines, print_result, width};
 
 /// Whether logged angles are the controller's or already hold the DH offsets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -179,16 +179,16 @@ pub(super) struct Arguments {
     #[command(flatten)]
     asked: FitArguments,
     #[command(flatten)]
-    stated: StatedArguments,
+    stated: StatedFrameArguments,
     #[command(flatten)]
-    held: HeldArguments,
+    prior: FramePriorArguments,
     #[command(flatten)]
     common: Common,
     #[command(flatten)]
     outputs: Outputs,
 }
 
-pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let mut targets = arguments.outputs.files();
     targets.extend(arguments.output.as_deref());
     Batch::check(&arguments.data.files(), &targets)?;
@@ -199,18 +199,18 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let (robot, dataset) = read(&arguments.data)?;
     let options =
         Options { stated_frames: arguments.stated.frames(&dataset)?, ..options(arguments, limits)? };
-    let work = Work::start(format!("identifying {} from {} rows", robot.sheet.name, dataset.rows.len()));
+    let work = Spinner::start(format!("identifying {} from {} rows", robot.sheet.name, dataset.rows.len()));
     let name = robot.sheet.name.clone();
     let found = watching(arguments.common.threads, &work, || {
         let frames = starting_frames(&dataset, &robot.model, &options.tolerance, options.fuse_readout)?;
         let stated = options.stated_frames.as_ref();
-        let (tolerance, frames) = arguments.held.held(&options.tolerance, stated, frames)?;
+        let (tolerance, frames) = arguments.prior.prior(&options.tolerance, stated, frames)?;
         let options = Options { tolerance, ..options.clone() };
         from_frames(&dataset, &name, &robot.model, &frames, &options)
     })??;
     drop(work);
     for note in &dataset.notes {
-        tell(format_args!("note: {note}"));
+        print_message(format_args!("note: {note}"));
     }
     arguments.outputs.print(&view::summary(&found))?;
     let mut batch = Batch::sparing(arguments.data.files());
@@ -225,7 +225,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         batch.add(path, super::recording::identification(&found, &dataset, &arguments.data.robot)?);
     }
     if let Some(splits) = arguments.compare_methods {
-        let work = Work::start(format!("{} methods over {splits} splits", SOLVERS.len()));
+        let work = Spinner::start(format!("{} methods over {splits} splits", SOLVERS.len()));
         let rows = on_threads(arguments.common.threads, || {
             let frames = starting_frames(&dataset, &robot.model, &options.tolerance, options.fuse_readout)?;
             let share = arguments.held_out;
@@ -234,7 +234,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         })??;
         drop(work);
         let text = format::terminal::table(&study_view::table(&rows), width());
-        if arguments.outputs.takes_stdout() { tell_lines(&text) } else { say(text)? }
+        if arguments.outputs.takes_stdout() { print_message_lines(&text) } else { print_result(text)? }
     }
     write_model(&found.estimated, arguments.output.as_deref(), arguments.allow_doubtful, batch)
 }
@@ -257,7 +257,7 @@ pub(super) fn write_model(
     output: Option<&Path>,
     allow_doubtful: bool,
     mut batch: Batch,
-) -> anyhow::Result<Ending> {
+) -> anyhow::Result<ExitStatus> {
     let status = estimated.verdict.status;
     if let Some(path) = output {
         if let Some(why) = why_not_written(estimated, allow_doubtful) {
@@ -268,7 +268,7 @@ pub(super) fn write_model(
     }
     batch.write()?;
     let poor = matches!(status, Judgement::Fail | Judgement::Doubtful);
-    Ok(if poor { Ending::Flagged } else { Ending::Done })
+    Ok(if poor { ExitStatus::Flagged } else { ExitStatus::Done })
 }
 
 fn options(arguments: &Arguments, limits: Limits) -> anyhow::Result<Options> {

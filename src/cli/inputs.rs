@@ -10,7 +10,7 @@ use truegrind::robots::foreign::{Choice, Kind, read_any};
 use truegrind::robots::{self, Robot};
 
 use super::files;
-use super::terminal::tell;
+use super::terminal::print_message;
 
 /// A robot by catalogue name or from a file of any kind that is known.
 pub(super) fn robot(name: &str) -> anyhow::Result<Robot> {
@@ -71,15 +71,18 @@ pub(super) fn refuse_doubtful(model: &NamedModel, allowed: bool) -> anyhow::Resu
             arm.verdict.reasons.join("; ")
         );
     }
-    say_doubtful(model);
+    warn_doubtful(model);
     Ok(())
 }
 
 /// Says of a doubtful model that it is one, where it is only looked at.
-pub(super) fn say_doubtful(model: &NamedModel) {
+pub(super) fn warn_doubtful(model: &NamedModel) {
     let NamedModel::Estimated { name, arm, .. } = model else { return };
     if arm.verdict.status == Judgement::Doubtful {
-        tell(format_args!("note: {name}: this model is doubtful: {}", arm.verdict.reasons.join("; ")));
+        print_message(format_args!(
+            "note: {name}: this model is doubtful: {}",
+            arm.verdict.reasons.join("; ")
+        ));
     }
 }
 

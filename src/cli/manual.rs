@@ -6,9 +6,9 @@ use anyhow::Context;
 use clap::{Args, Command};
 use clap_complete::Shell;
 
-use super::ending::Ending;
+use super::exit_status::ExitStatus;
 use super::files::{self, Batch};
-use super::terminal::{hand_over, tell};
+use super::terminal::{print_message, write_stdout};
 
 /// Arguments of `completions`.
 #[derive(Debug, Args)]
@@ -27,21 +27,21 @@ pub(super) struct Man {
 }
 
 /// Prints the script of a shell.
-pub(super) fn completions(arguments: &Completions, mut command: Command) -> anyhow::Result<Ending> {
+pub(super) fn completions(arguments: &Completions, mut command: Command) -> anyhow::Result<ExitStatus> {
     let mut script = Vec::new();
     clap_complete::generate(arguments.shell, &mut command, "truegrind", &mut script);
-    hand_over(&script)?;
-    Ok(Ending::Done)
+    write_stdout(&script)?;
+    Ok(ExitStatus::Done)
 }
 
 /// Prints the first page, or writes all of them.
-pub(super) fn man(arguments: &Man, command: Command) -> anyhow::Result<Ending> {
+pub(super) fn man(arguments: &Man, command: Command) -> anyhow::Result<ExitStatus> {
     // Built, so that every verb has what holds for all.
     let mut command = command.disable_help_subcommand(true);
     command.build();
     let Some(folder) = &arguments.output else {
-        hand_over(&page(&command)?)?;
-        return Ok(Ending::Done);
+        write_stdout(&page(&command)?)?;
+        return Ok(ExitStatus::Done);
     };
     files::make_folder(folder)?;
     let mut batch = Batch::default();
@@ -51,12 +51,12 @@ pub(super) fn man(arguments: &Man, command: Command) -> anyhow::Result<Ending> {
         batch.add(folder.join(format!("{name}.1")), page(verb)?);
     }
     batch.write()?;
-    tell(format_args!(
+    print_message(format_args!(
         "written to {}: read one with `man {}`",
         folder.display(),
         folder.join("truegrind.1").display()
     ));
-    Ok(Ending::Done)
+    Ok(ExitStatus::Done)
 }
 
 fn page(command: &Command) -> anyhow::Result<Vec<u8>> {

@@ -6,10 +6,10 @@ use clap::{Args, Subcommand, ValueEnum};
 use truegrind::calibration::measurement::dataset::Sensor;
 use truegrind::calibration::measurement::import::template;
 
-use super::ending::Ending;
+use super::exit_status::ExitStatus;
 use super::files::Batch;
 use super::inputs;
-use super::terminal::tell;
+use super::terminal::print_message;
 
 /// Arguments of `measurement`.
 #[derive(Debug, Args)]
@@ -47,12 +47,12 @@ enum Reads {
     Pose,
 }
 
-pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let What::Template(template) = &arguments.what;
     empty_table(template)
 }
 
-fn empty_table(arguments: &Template) -> anyhow::Result<Ending> {
+fn empty_table(arguments: &Template) -> anyhow::Result<ExitStatus> {
     let robot = inputs::robot(&arguments.robot)?;
     let sensor = match arguments.sensor {
         Reads::Cable => Sensor::Cable,
@@ -64,18 +64,18 @@ fn empty_table(arguments: &Template) -> anyhow::Result<Ending> {
     let mut batch = Batch::default();
     batch.add(&arguments.output, names.join(",") + "\n");
     batch.write()?;
-    tell(format_args!("one row for each pose of {}:", robot.sheet.name));
+    print_message(format_args!("one row for each pose of {}:", robot.sheet.name));
     for (names, meaning) in template::meanings(&columns) {
-        tell(format_args!("  {names}: {meaning}"));
+        print_message(format_args!("  {names}: {meaning}"));
     }
     let joints = &robot.sheet.joints;
     if let (Some(low), Some(high)) = (joints.min_deg, joints.max_deg) {
         let ranges: Vec<String> =
             (0..6).map(|j| format!("J{} {} to {}°", j + 1, signed(low[j]), signed(high[j]))).collect();
-        tell(format_args!("ranges of the data sheet: {}", ranges.join(", ")));
+        print_message(format_args!("ranges of the data sheet: {}", ranges.join(", ")));
     }
-    tell("which poses tell most: `truegrind plan`");
-    Ok(Ending::Done)
+    print_message("which poses tell most: `truegrind plan`");
+    Ok(ExitStatus::Done)
 }
 
 /// A number with a minus sign that no one takes for a range.

@@ -1,4 +1,4 @@
-//! The outputs that every verb offers: --json, --csv, --parquet, --md, --html; and --rrd where there is an arm to be drawn.
+//! Output options of all verbs: --json, --csv, --parquet, --md, --html, and --rrd where there is an arm to draw.
 
 use std::path::{Path, PathBuf};
 
@@ -8,47 +8,47 @@ use truegrind::report::format;
 use truegrind::report::table::Table;
 
 use super::files::{Batch, is_stdout};
-use super::terminal::{say, tell_lines, width};
+use super::terminal::{print_message_lines, print_result, width};
 
-/// Tables and pages. Without a file name one goes to stdout.
+/// Tables and pages. An option without a file name writes to stdout.
 #[derive(Debug, Clone, Default, Args)]
 pub(super) struct Pages {
-    /// JSON.
+    /// Write the full result as JSON.
     #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "-")]
     pub(super) json: Option<PathBuf>,
-    /// CSV table.
+    /// Write the table as CSV.
     #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "-")]
     pub(super) csv: Option<PathBuf>,
-    /// The table as an Apache Parquet file.
+    /// Write the table as an Apache Parquet file.
     #[arg(long, value_name = "FILE")]
     pub(super) parquet: Option<PathBuf>,
-    /// Markdown page.
+    /// Write the report as Markdown.
     #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "-")]
     pub(super) md: Option<PathBuf>,
-    /// Self-contained HTML page with plots.
+    /// Write the report as a self-contained HTML page with plots.
     #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "-")]
     pub(super) html: Option<PathBuf>,
 }
 
-/// Where results go beside the terminal.
+/// Pages and, for verbs with an arm to draw, the recording.
 #[derive(Debug, Clone, Default, Args)]
 pub(super) struct Outputs {
     #[command(flatten)]
     pub(super) pages: Pages,
-    /// Rerun recording.
+    /// Write a Rerun recording (3D view).
     #[arg(long, value_name = "FILE")]
     #[cfg_attr(not(feature = "visual"), arg(value_parser = no_recordings))]
     pub(super) rrd: Option<PathBuf>,
 }
 
-/// A build without pictures says so, and does not pass over what was asked for.
+/// A build without pictures refuses `--rrd` instead of ignoring it.
 #[cfg(not(feature = "visual"))]
 fn no_recordings(_: &str) -> Result<PathBuf, String> {
     Err("this build makes no recordings (it was made with --no-default-features); --html FILE writes a page"
         .to_owned())
 }
 
-/// The outputs of a verb that makes no recording.
+/// Outputs of a verb without a recording.
 impl From<&Pages> for Outputs {
     fn from(pages: &Pages) -> Self {
         Self { pages: pages.clone(), rrd: None }
@@ -56,7 +56,7 @@ impl From<&Pages> for Outputs {
 }
 
 impl Outputs {
-    /// All files named.
+    /// All named files.
     pub(super) fn files(&self) -> Vec<&Path> {
         let Pages { json, csv, parquet, md, html } = &self.pages;
         [json, csv, parquet, md, html, &self.rrd].into_iter().filter_map(|p| p.as_deref()).collect()
@@ -73,7 +73,7 @@ impl Outputs {
         self.files().into_iter().any(is_stdout)
     }
 
-    /// Adds what was asked for; what was not is not made.
+    /// Makes the requested outputs, and only those, and adds them to the batch.
     pub(super) fn add_made(
         &self,
         batch: &mut Batch,
@@ -107,19 +107,19 @@ impl Outputs {
         Ok(())
     }
 
-    /// Prints the summary, to stdout unless a result goes there.
+    /// Prints the summary: to stdout, or to stderr if an output goes to stdout.
     pub(super) fn print(&self, page: &Document) -> anyhow::Result<()> {
         self.print_beside(page, false)
     }
 
-    /// The same; `taken`: a program goes to stdout.
+    /// [`Outputs::print`]; `taken`: a program goes to stdout.
     pub(super) fn print_beside(&self, page: &Document, taken: bool) -> anyhow::Result<()> {
         let text = format::terminal::document(page, width());
         if taken || self.takes_stdout() {
-            tell_lines(&text);
+            print_message_lines(&text);
             return Ok(());
         }
-        say(&text)
+        print_result(&text)
     }
 }
 
@@ -131,6 +131,6 @@ fn parquet(table: &Table) -> anyhow::Result<Vec<u8>> {
 #[cfg(not(feature = "parquet"))]
 fn parquet(_: &Table) -> anyhow::Result<Vec<u8>> {
     anyhow::bail!(
-        "--parquet: this build leaves Parquet out; build it with `--features parquet`, or take --csv"
+        "--parquet: this build has no Parquet support; build it with `--features parquet`, or use --csv"
     )
 }

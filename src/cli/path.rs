@@ -13,11 +13,11 @@ use truegrind::programs::reading::Language;
 use truegrind::robots::Robot;
 use truegrind::surfaces::SurfaceFile;
 
-use super::ending::Ending;
+use super::exit_status::ExitStatus;
 use super::files::{self, Batch};
 use super::inputs;
-use super::naming;
-use super::terminal::tell;
+use super::output_extension;
+use super::terminal::print_message;
 use truegrind::compensation::cell::nc_setup::angles;
 
 /// Arguments of `path`.
@@ -36,14 +36,14 @@ pub(super) struct Arguments {
     inline: bool,
 }
 
-pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     Batch::check(&[&arguments.surface], &[&arguments.output])?;
     let robot = inputs::robot(&arguments.robot)?;
     let file = surface(&arguments.surface)?;
     // An output that is an input is told as such first.
     files::expect(&arguments.surface)?;
     Batch::check(&[], &[&arguments.output])?;
-    naming::rapid_or_nc(&arguments.output)?;
+    output_extension::refuse_unknown(&arguments.output)?;
     let mut path = toolpath(&file, &robot.model, &robot.sheet.name)?;
     path.draft.named_targets = !arguments.inline;
     let ending = arguments.output.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
@@ -63,8 +63,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let mut batch = Batch::sparing([&arguments.surface]);
     batch.add(&arguments.output, bytes);
     batch.write()?;
-    say(&path, &robot, &arguments.output);
-    Ok(Ending::Done)
+    report_toolpath(&path, &robot, &arguments.output);
+    Ok(ExitStatus::Done)
 }
 
 /// What A, B and C mean: as the robot file says, else turns about the fixed x, y and z as their letters have it.
@@ -72,9 +72,9 @@ fn angles_of(robot: &Robot) -> Angles {
     robot.sheet.orientation().and_then(angles).unwrap_or(Angles::Wpr)
 }
 
-fn say(path: &Toolpath, robot: &Robot, output: &Path) {
+fn report_toolpath(path: &Toolpath, robot: &Robot, output: &Path) {
     let passes = path.points.iter().map(|p| p.pass + 1).max().unwrap_or(0);
-    tell(format_args!(
+    print_message(format_args!(
         "{} targets in {passes} passes for {}, distance to singularity at least {:.3}; written to {}",
         path.points.len(),
         robot.sheet.name,

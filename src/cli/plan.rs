@@ -16,14 +16,14 @@ use truegrind::programs::rapid::writer;
 use truegrind::report::planning as view;
 
 use super::computation::{Common, on_threads};
-use super::ending::Ending;
+use super::exit_status::ExitStatus;
 use super::files::{self, Batch};
 use super::inputs;
-use super::naming;
+use super::output_extension;
 use super::outputs::Outputs;
-use super::progress::Work;
-use super::stated::{StatedArguments, numbers};
-use super::terminal::tell;
+use super::progress::Spinner;
+use super::stated_frames::{StatedFrameArguments, numbers};
+use super::terminal::print_message;
 
 /// The sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -127,21 +127,21 @@ pub(super) struct Arguments {
     #[arg(long, default_value_t = 2000)]
     candidates: usize,
     #[command(flatten)]
-    stated: StatedArguments,
+    stated: StatedFrameArguments,
     #[command(flatten)]
     common: Common,
     #[command(flatten)]
     outputs: Outputs,
 }
 
-pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let mut targets = arguments.outputs.files();
     targets.extend(arguments.output.as_deref());
     let inputs_of: Vec<&std::path::Path> = arguments.diagnosis.as_deref().into_iter().collect();
     Batch::check(&inputs_of, &targets)?;
     let robot = inputs::robot(&arguments.robot)?;
     Batch::check(&inputs_of, &targets)?;
-    arguments.output.as_deref().map_or(Ok(()), naming::rapid)?;
+    arguments.output.as_deref().map_or(Ok(()), output_extension::refuse_nc)?;
     let sensor = match arguments.sensor {
         SensorArgument::Cable => Sensor::Cable,
         SensorArgument::Position => Sensor::Position,
@@ -151,7 +151,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let reach: f64 = robot.model.links[1..].iter().map(|l| l.a_mm.abs() + l.d_mm.abs()).sum();
     let options = options(arguments, sensor, reach)?;
     let wanted = Wanted { nominal: &robot.model, sensor, frames: &frames };
-    let work = Work::start(format!("choosing {} of {} poses", arguments.poses, arguments.candidates));
+    let work = Spinner::start(format!("choosing {} of {} poses", arguments.poses, arguments.candidates));
     let planned = on_threads(arguments.common.threads, || plan(&wanted, &options))?
         .map_err(|e| anyhow!("{}: {e}", robot.sheet.name))?;
     drop(work);
@@ -179,7 +179,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     }
     batch.write()?;
     let rough = planned.rows.iter().any(|row| row.rough_way);
-    Ok(if rough { Ending::Flagged } else { Ending::Done })
+    Ok(if rough { ExitStatus::Flagged } else { ExitStatus::Done })
 }
 
 /// Nobody measures more poses by one plan.
@@ -262,7 +262,7 @@ fn questions(arguments: &Arguments) -> anyhow::Result<Vec<rival::Question>> {
             let found =
                 rival::questions(&files::read_text(path)?).map_err(|e| anyhow!("{}: {e}", path.display()))?;
             if found.is_empty() {
-                tell(format_args!(
+                print_message(format_args!(
                     "note: {}: nothing is ambiguous or untested; planned for the geometry",
                     path.display()
                 ));

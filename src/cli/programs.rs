@@ -1,4 +1,4 @@
-//! Programs as the command line names them: modules of one task, task lists, NC files, folders.
+//! Programs on the command line: modules of one task, task lists, NC files, folders.
 
 use std::collections::BTreeSet;
 use std::path::{Component, Path, PathBuf};
@@ -13,43 +13,43 @@ use truegrind::programs::reading::{Language, Program};
 use truegrind::units::key::sha256;
 use truegrind::units::run::Unit;
 
-use super::terminal::tell;
+use super::terminal::print_message;
 use super::{files, inputs};
 
-/// Files that are read and rewritten together.
+/// The files of one task, read and rewritten together.
 #[derive(Debug)]
 pub(super) struct Programs {
     /// Files, in the order of the listing.
     pub(super) files: Vec<(PathBuf, Vec<u8>)>,
-    /// Task lists that named some of them.
+    /// The task lists that named them.
     lists: Vec<(PathBuf, Vec<u8>)>,
 }
 
-/// Which modules are read as one task.
+/// Which modules form one task.
 #[derive(Debug, Clone, Copy, Args)]
 pub(super) struct Grouping {
-    /// Every module is a program of its own, not one task together with the others that are named.
+    /// Treat every named module as a separate program. By default the named modules form one task.
     #[arg(long, conflicts_with = "together")]
     each: bool,
-    /// All RAPID modules below a folder are one task, as in a controller's backup; without it each is a program of its own.
+    /// Treat all RAPID modules below a folder as one task, as in a controller backup. By default each is a separate program.
     #[arg(long)]
     together: bool,
-    /// A task list (.pgf) may name modules outside its own folder.
+    /// Allow a task list (.pgf) to name modules outside its own folder.
     #[arg(long)]
     outside: bool,
 }
 
-/// Where the files of one task are, before they are read.
+/// Paths of the files of one task.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Job {
     /// Modules, a task list, or one NC file.
     pub(super) paths: Vec<PathBuf>,
-    /// The folder that was named, where it was one: outputs keep their place below it.
+    /// The folder in which they were found, if any: outputs keep their relative path.
     pub(super) under: Option<PathBuf>,
 }
 
 impl Job {
-    /// Its files, or the folder where it is one task.
+    /// Its files, or the folder that forms the task.
     pub(super) fn name(&self) -> String {
         match &self.under {
             Some(under) if self.paths.len() > 1 => under.display().to_string(),
@@ -57,8 +57,7 @@ impl Job {
         }
     }
 
-    /// Its name below the folder that was given, with `/` between folders: the same on every machine that is given the same folder,
-    /// wherever it lies there.
+    /// Its path relative to the given folder, with `/` as separator: the same on every machine, wherever the folder is.
     pub(super) fn name_below(&self) -> String {
         let below = |path: &Path| {
             let path = self.under.as_ref().and_then(|under| path.strip_prefix(under).ok()).unwrap_or(path);
@@ -68,7 +67,7 @@ impl Job {
         self.paths.iter().map(|path| below(path)).collect::<Vec<_>>().join(", ")
     }
 
-    /// As a list of units holds it.
+    /// Its entry in a list of units.
     pub(super) fn unit(&self) -> anyhow::Result<Unit> {
         let text = |path: &PathBuf| match path.to_str() {
             Some(text) => Ok(text.to_owned()),
@@ -80,7 +79,7 @@ impl Job {
         })
     }
 
-    /// From a list of units.
+    /// The job of an entry in a list of units.
     pub(super) fn of_unit(unit: &Unit) -> Self {
         Self {
             under: unit.under.as_ref().map(PathBuf::from),
@@ -88,7 +87,7 @@ impl Job {
         }
     }
 
-    /// Its files; a task list stands for those that it names.
+    /// Its files; a task list is replaced by the modules that it names.
     pub(super) fn files(&self) -> Vec<PathBuf> {
         let mut out = Vec::new();
         for path in &self.paths {
@@ -100,8 +99,7 @@ impl Job {
         out
     }
 
-    /// Where a file goes in the folder of outputs: below a folder that was named, or beside a task list, everything keeps
-    /// its place.
+    /// The path of a file in the output folder: relative to the given folder or to its task list.
     pub(super) fn place(&self, path: &Path) -> PathBuf {
         let beside_list = || self.paths.iter().filter(|path| is_list(path)).filter_map(|list| list.parent());
         let below = self.under.as_deref().into_iter().chain(beside_list());
@@ -117,34 +115,30 @@ fn is_list(path: &Path) -> bool {
     path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("pgf"))
 }
 
-/// The modules of a task list, where they are.
+/// The paths of the modules of a task list.
 fn listed(list: &Path, bytes: &[u8]) -> Vec<PathBuf> {
     let folder = list.parent().unwrap_or(Path::new(""));
-    task_list::modules(bytes).iter().map(|module| on_disk(folder, module)).collect()
+    task_list::modules(bytes).iter().map(|module| find_module(folder, module)).collect()
 }
 
-/// Whether a task list may have this module read: a plain file that stands below the folder of the list, links followed;
-/// `outside`: anywhere.
-fn allowed(list: &Path, module: &Path, outside: bool) -> anyhow::Result<()> {
+/// Refuses a module that is no plain file, or that lies outside the folder of its task list (links followed) unless
+/// `outside` allows it.
+fn check_listed(list: &Path, module: &Path, outside: bool) -> anyhow::Result<()> {
     let found = std::fs::metadata(module);
     if found.is_ok_and(|found| !found.is_file()) {
-        bail!(
-            "{}: named in {}, is no plain file: a folder, a device or a pipe is not read",
-            module.display(),
-            list.display()
-        );
+        bail!("{}: named in {}, is not a regular file", module.display(), list.display());
     }
     let folder = list.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let below = match (module.canonicalize(), folder.canonicalize()) {
         (Ok(module), Ok(folder)) => module.starts_with(folder),
-        // One that is not there: as it is written.
+        // A missing file: judged by its written path.
         _ => module.strip_prefix(list.parent().unwrap_or(Path::new(""))).is_ok_and(|rest| {
             rest.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir))
         }),
     };
     if !below && !outside {
         bail!(
-            "{}: named in {}, stands outside the folder of that list: put it there, or allow it with --outside",
+            "{}: named in {}, lies outside the folder of that task list: move it there, or allow it with --outside",
             module.display(),
             list.display()
         );
@@ -152,21 +146,20 @@ fn allowed(list: &Path, module: &Path, outside: bool) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// A task list that may name modules anywhere: those stand for it.
-fn outside_of(list: &Path) -> anyhow::Result<Job> {
+/// The job of a task list that may name modules anywhere.
+fn job_of_list(list: &Path) -> anyhow::Result<Job> {
     let modules = listed(list, &files::read(list)?);
     for module in &modules {
-        allowed(list, module, true)?;
+        check_listed(list, module, true)?;
     }
     if modules.is_empty() {
-        bail!("{}: names no module", list.display());
+        bail!("{}: the task list names no module", list.display());
     }
     Ok(Job { paths: modules, under: list.parent().map(Path::to_path_buf) })
 }
 
-/// A file that a controller's list names: its paths have backslashes, and it takes no notice of case. Where there is no
-/// such file, the name as it was written.
-fn on_disk(folder: &Path, name: &str) -> PathBuf {
+/// Finds a file by the name in a controller's list, which has backslashes and ignores case; the written name if there is none.
+fn find_module(folder: &Path, name: &str) -> PathBuf {
     let literal = folder.join(name);
     if literal.exists() {
         return literal;
@@ -186,8 +179,8 @@ fn on_disk(folder: &Path, name: &str) -> PathBuf {
     if place.is_file() { place } else { literal }
 }
 
-/// The tasks that the command line names. RAPID modules named one by one are one task, unless each shall be its own; a
-/// task list, an NC file and every program of a folder is a task of its own.
+/// The tasks that the command line names. Named RAPID modules form one task unless `each` is set; every task list, NC file
+/// and program of a folder is a separate task.
 pub(super) fn jobs(
     paths: &[PathBuf],
     Grouping { each, together: as_one, outside }: Grouping,
@@ -203,11 +196,11 @@ pub(super) fn jobs(
         let alone = each
             || is_list(path)
             || Language::by_name(&name).unwrap_or_else(|| {
-                // An ending that says nothing: the file itself does.
+                // An unknown extension: the content decides.
                 Language::of(&name, &files::read(path).unwrap_or_default())
             }) == Language::Nc;
         if alone && outside && is_list(path) {
-            jobs.push(outside_of(path)?);
+            jobs.push(job_of_list(path)?);
         } else if alone {
             jobs.push(Job { paths: vec![path.clone()], under: None });
         } else {
@@ -217,19 +210,19 @@ pub(super) fn jobs(
     if !together.is_empty() {
         jobs.insert(0, Job { paths: together, under: None });
     }
-    // What is read late is an input from here on: no output of one program is the source of the next.
+    // Register all files as inputs now, so that no output of one program overwrites the source of a later one.
     for path in jobs.iter().flat_map(|job| job.paths.iter().cloned().chain(job.files())) {
         files::expect(&path)?;
     }
     if jobs.is_empty() {
         bail!(
-            "no program found: a folder is searched for .mod, .prg, .sys, .pgf, .nc, .mpf, .ngc, .h and the like"
+            "no program found: folders are searched for .mod, .prg, .sys, .pgf, .nc, .mpf, .ngc, .h and other NC extensions"
         );
     }
     Ok(jobs)
 }
 
-/// Every file below a folder that is wanted, in the order of names.
+/// The wanted files below a folder, sorted by path.
 pub(super) fn found_below(folder: &Path, is_wanted: impl Fn(&Path) -> bool) -> anyhow::Result<Vec<PathBuf>> {
     let mut found = Vec::new();
     let mut open = vec![folder.to_path_buf()];
@@ -240,13 +233,13 @@ pub(super) fn found_below(folder: &Path, is_wanted: impl Fn(&Path) -> bool) -> a
             let entry = entry.with_context(|| format!("{}: cannot be read", next.display()))?;
             let (path, kind) = (entry.path(), entry.file_type());
             let Ok(kind) = kind else { continue };
-            // Links to folders are not followed: they could lead round in a circle.
+            // Links to folders are not followed, since they may form a cycle.
             if kind.is_dir() {
                 open.push(path);
             } else if is_wanted(&path) && path.is_file() {
                 found.push(path);
             } else if kind.is_symlink() && path.is_dir() {
-                tell(format_args!(
+                print_message(format_args!(
                     "note: {}: a link to a folder is not followed; name the folder",
                     path.display()
                 ));
@@ -257,8 +250,8 @@ pub(super) fn found_below(folder: &Path, is_wanted: impl Fn(&Path) -> bool) -> a
     Ok(found)
 }
 
-/// Every program below a folder, in the order of names. What a task list names is not taken again on its own; `as_one`:
-/// all RAPID modules are one task, and lists say nothing new.
+/// Every program below a folder, sorted by path. Modules of a task list are not listed again; `as_one`: all RAPID modules
+/// form one task, and task lists are ignored.
 fn in_folder(folder: &Path, as_one: bool, jobs: &mut Vec<Job>) -> anyhow::Result<()> {
     let mut found = found_below(folder, |path| Language::by_name(&files::name(path)).is_some())?;
     let under = Some(folder.to_path_buf());
@@ -286,14 +279,14 @@ fn in_folder(folder: &Path, as_one: bool, jobs: &mut Vec<Job>) -> anyhow::Result
 }
 
 impl Programs {
-    /// Reads the files of one task; a `.pgf` stands for the modules that it lists.
+    /// Reads the files of one task; a `.pgf` is replaced by the modules that it lists.
     pub(super) fn read(paths: &[PathBuf]) -> anyhow::Result<Self> {
         let (mut files, mut lists) = (Vec::new(), Vec::new());
         for path in paths {
             let bytes = files::read(path)?;
             if is_list(path) {
                 for place in listed(path, &bytes) {
-                    allowed(path, &place, false)?;
+                    check_listed(path, &place, false)?;
                     let module =
                         files::read(&place).with_context(|| format!("named in {}", path.display()))?;
                     files.push((place, module));
@@ -309,7 +302,7 @@ impl Programs {
         Ok(Self { files, lists })
     }
 
-    /// All that was read, by name and SHA-256: what decides, beside model, cell and options, what comes of it.
+    /// Name and SHA-256 of every file read, for the key of the unit.
     pub(super) fn content(&self) -> Vec<(String, String)> {
         let all = self.lists.iter().chain(&self.files);
         all.map(|(path, bytes)| (path.display().to_string(), sha256(bytes))).collect()
@@ -323,14 +316,14 @@ impl Programs {
         Program::read(&sources, setup)
     }
 
-    /// The names of the files, for a report.
+    /// The file names, for reports.
     pub(super) fn name(&self) -> String {
         self.files.iter().map(|(path, _)| files::name(path)).collect::<Vec<_>>().join(", ")
     }
 }
 
-/// What cell file and robot file say that NC programs do not say themselves. `robot` is a name of the catalogue or a
-/// file; one that is not found says nothing.
+/// Control settings that NC programs do not contain, from the cell file and the robot file. `robot`: catalogue name or file;
+/// an unknown one is ignored.
 pub(super) fn setup(cell: &Cell, robot: Option<&str>) -> Setup {
     let orientation =
         robot.and_then(|name| inputs::robot(name).ok()).and_then(|robot| robot.sheet.orientation());

@@ -1,20 +1,20 @@
-//! Talk on stderr: what is being done, with a spinner where a terminal shows it.
+//! Progress on stderr: a spinner, if stderr is a terminal.
 
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use truegrind::report::format::visible;
 
-use super::colour::dumb;
+use super::colour::is_dumb;
 
-/// A piece of work that takes a while. Nothing is shown where stderr is no terminal.
-pub(super) struct Work(ProgressBar);
+/// A spinner with a message and the elapsed time.
+pub(super) struct Spinner(ProgressBar);
 
-impl Work {
-    /// Starts a spinner with a message.
+impl Spinner {
+    /// Starts a spinner.
     pub(super) fn start(message: impl Into<String>) -> Self {
-        // A dumb terminal shows each turn of a spinner as a line of its own.
-        let target = if dumb() { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
+        // A dumb terminal would print every frame on a new line.
+        let target = if is_dumb() { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
         let bar = ProgressBar::with_draw_target(None, target);
         if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} [{elapsed}]") {
             bar.set_style(style);
@@ -24,19 +24,19 @@ impl Work {
         Self(bar)
     }
 
-    /// Shows what is being done now.
-    pub(super) fn tell(&self, message: &str) {
+    /// Replaces the message.
+    pub(super) fn show(&self, message: &str) {
         self.0.set_message(visible::line(message).into_owned());
     }
 
-    /// Shows what it is told, from whatever thread.
+    /// A callback that replaces the message, for any thread.
     pub(super) fn listener(&self) -> impl Fn(&str) + Send + Sync + 'static {
         let bar = self.0.clone();
         move |message| bar.set_message(visible::line(message).into_owned())
     }
 }
 
-impl Drop for Work {
+impl Drop for Spinner {
     fn drop(&mut self) {
         self.0.finish_and_clear();
     }

@@ -26,7 +26,7 @@ use truegrind::surfaces::{Mesh, SurfaceFile};
 
 use super::files;
 use super::inputs;
-use super::terminal::tell;
+use super::terminal::print_message;
 
 /// The arms of a picture: the one whose deviations are shown, what it is in words, and that of the data sheet.
 #[derive(Clone, Copy)]
@@ -273,7 +273,7 @@ pub(super) fn meshes(robot: Option<&str>) -> anyhow::Result<Vec<LinkMesh>> {
         out.push(LinkMesh { frame, pose, triangles: drawn });
     }
     if let Some(first) = missing.first() {
-        tell(format_args!(
+        print_message(format_args!(
             "note: {name}: {} of its meshes are not drawn ({first}{}): expected STL files of at most {MOST_TRIANGLES} triangles, \
              beside the robot file or in the package that it names; links without one are drawn as bars",
             missing.len(),

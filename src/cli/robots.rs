@@ -9,10 +9,10 @@ use truegrind::report::robots as view;
 use truegrind::robots;
 use truegrind::robots::foreign::{Choice, read_any};
 
-use super::ending::Ending;
+use super::exit_status::ExitStatus;
 use super::files::{self, Batch, is_stdout};
 use super::inputs;
-use super::terminal::{say, tell_lines, width};
+use super::terminal::{print_message_lines, print_result, width};
 
 /// Arguments of `robots`.
 #[derive(Debug, Args)]
@@ -40,26 +40,26 @@ pub(super) struct Arguments {
     html: Option<PathBuf>,
 }
 
-pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     if let Some(path) = &arguments.check {
         return check(arguments, path);
     }
     match &arguments.name {
         Some(name) => {
             let robot = inputs::robot(name)?;
-            say(format::terminal::document(&view::document(&robot), width()))?;
+            print_result(format::terminal::document(&view::document(&robot), width()))?;
         }
         None => {
             let all = robots::catalogue();
             let sheets = all.iter().map(|name| robots::load(name)).collect::<Result<Vec<_>, _>>()?;
-            say(format::terminal::table(&view::catalogue_table(&sheets), width()))?;
+            print_result(format::terminal::table(&view::catalogue_table(&sheets), width()))?;
         }
     }
-    Ok(Ending::Done)
+    Ok(ExitStatus::Done)
 }
 
 /// What is understood of a file.
-fn check(arguments: &Arguments, path: &Path) -> anyhow::Result<Ending> {
+fn check(arguments: &Arguments, path: &Path) -> anyhow::Result<ExitStatus> {
     let outputs: Vec<&Path> =
         [&arguments.output, &arguments.html].into_iter().filter_map(|p| p.as_deref()).collect();
     Batch::check(&[path], &outputs)?;
@@ -87,9 +87,9 @@ fn check(arguments: &Arguments, path: &Path) -> anyhow::Result<Ending> {
     batch.write()?;
     let said = format::terminal::document(&view::understood(&found), width());
     if outputs.into_iter().any(is_stdout) {
-        tell_lines(&said)
+        print_message_lines(&said)
     } else {
-        say(said)?
+        print_result(said)?
     }
-    Ok(Ending::Done)
+    Ok(ExitStatus::Done)
 }

@@ -20,12 +20,12 @@ use truegrind::units::key;
 use truegrind::units::run::{self, Run, Unit};
 use truegrind::units::share::Share;
 
-use super::defect::isolated;
-use super::files::settle::settle;
-use super::files::{self, own};
+use super::defect::catch_panic;
+use super::files::sync::sync_folder;
+use super::files::{self, run_files};
 use super::outputs::Outputs;
 use super::programs::Job;
-use super::terminal::tell;
+use super::terminal::print_message;
 
 /// How often a unit is begun before it is listed as one that kills whoever does it.
 const MOST_BEGUN: u32 = 3;
@@ -125,7 +125,7 @@ where
     W: Fn(&Job, I) -> anyhow::Result<(T, Written)> + Sync,
 {
     let Some(store) = store else {
-        let one = |job: &Job| isolated(|| (doing.work)(job, (doing.read)(job)?));
+        let one = |job: &Job| catch_panic(|| (doing.work)(job, (doing.read)(job)?));
         let failed = |job: &Job, error: anyhow::Error| T::failed(job, &format!("{error:#}"));
         let each =
             jobs.par_iter().map(|job| one(job).map_or_else(|error| failed(job, error), |(done, _)| done));
@@ -140,8 +140,8 @@ where
         None => here.done_or_do(job, doing, true)?.ok_or_else(|| anyhow!("{}: left out", job.name())),
     });
     let done = each.collect::<anyhow::Result<Vec<_>>>()?;
-    store.folders.iter().try_for_each(|folder| settle(folder))?;
-    own::gone(&here.note);
+    store.folders.iter().try_for_each(|folder| sync_folder(folder))?;
+    run_files::remove(&here.note);
     Ok(done)
 }
 
@@ -195,7 +195,7 @@ impl Store {
         if let Some(share) = shares.shard {
             let all = jobs.len();
             jobs.retain(|job| share.has(&job.name_below()));
-            tell(format_args!("share {} of {}: {} of {all}", share.number, share.of, jobs.len()));
+            print_message(format_args!("share {} of {}: {} of {all}", share.number, share.of, jobs.len()));
         }
         Ok(Some(store))
     }
@@ -217,7 +217,7 @@ impl Store {
     /// The store of a run that was begun: its folder, and the run.
     pub(super) fn of(work: &Path) -> anyhow::Result<(Self, Run)> {
         let path = work.join("run.json");
-        let bytes = own::there(&path)?.ok_or_else(|| {
+        let bytes = run_files::read_if_exists(&path)?.ok_or_else(|| {
             anyhow!(
                 "{}: not there; expected the folder of a run (compensate, deviation or diagnose with --shard or --resume)",
                 path.display()
@@ -240,12 +240,12 @@ impl Store {
             units: jobs.iter().map(Job::unit).collect::<anyhow::Result<_>>()?,
         };
         let (path, text) = (self.work.join("run.json"), run.to_text()?);
-        if own::there(&path)?.as_deref() == Some(text.as_bytes()) {
+        if run_files::read_if_exists(&path)?.as_deref() == Some(text.as_bytes()) {
             return Ok(());
         }
         // Tables of other units, of another model or of another number of shares are none of this run.
-        own::gone_of(&self.work.join(TABLES), TABLE);
-        own::put(&path, text.as_bytes())
+        run_files::remove_prefixed(&self.work.join(TABLES), TABLE);
+        run_files::replace(&path, text.as_bytes())
     }
 
     /// The key of a unit by its contents, or by the word that it cannot be read.
@@ -264,7 +264,7 @@ impl Store {
 
     /// The record of a unit, where it is there whole.
     pub(super) fn record<T: Kept>(&self, key: &str, whole: bool) -> anyhow::Result<Option<Recorded<T>>> {
-        Ok(own::there(&self.record_place(key))?.and_then(|bytes| T::read(&bytes, key, whole)))
+        Ok(run_files::read_if_exists(&self.record_place(key))?.and_then(|bytes| T::read(&bytes, key, whole)))
     }
 
     /// The outputs of a unit that are not as they were written.
@@ -275,7 +275,7 @@ impl Store {
         };
         let places = done.outputs.iter().map(|output| (place(output), &output.sha256));
         let other = places.filter(|(place, hash)| {
-            let bytes = files::read_own(place);
+            let bytes = files::read_state(place);
             !bytes.is_ok_and(|bytes| key::sha256(&bytes) == **hash)
         });
         other.map(|(place, _)| place).collect()
@@ -304,7 +304,7 @@ impl Store {
         };
         let text = done.to_text(&kept.record()?);
         let text = text.with_context(|| format!("{}: the record cannot be made", job.name()))?;
-        own::put(&self.record_place(key), text.as_bytes())
+        run_files::replace(&self.record_place(key), text.as_bytes())
     }
 }
 
@@ -331,8 +331,8 @@ impl<'s> Here<'s> {
         let start = key::Fields::new("truegrind.job/1").text(&store.run);
         let name = jobs.iter().fold(start, |fields, job| fields.text(&job.name())).hex();
         let note = store.work.join("begun").join(format!("job-{name}"));
-        let careful = store.resume && own::there(&note)?.is_some();
-        own::note(&note, "")?;
+        let careful = store.resume && run_files::read_if_exists(&note)?.is_some();
+        run_files::write_note(&note, "")?;
         Ok(Self { store, note, careful })
     }
 
@@ -349,7 +349,7 @@ impl<'s> Here<'s> {
         C: Fn(&I) -> Vec<(String, String)>,
         W: Fn(&Job, I) -> anyhow::Result<(T, Written)>,
     {
-        let read = isolated(|| (doing.read)(job));
+        let read = catch_panic(|| (doing.read)(job));
         let content = read.as_ref().ok().map(&doing.content);
         let key = self.store.key(job, content.as_deref());
         let begun = self.store.work.join("begun").join(&key);
@@ -363,8 +363,8 @@ impl<'s> Here<'s> {
         }
         if self.careful {
             // One that cannot be read was being noted.
-            let noted =
-                own::there(&begun)?.map(|bytes| String::from_utf8_lossy(&bytes).trim().parse().unwrap_or(1));
+            let noted = run_files::read_if_exists(&begun)?
+                .map(|bytes| String::from_utf8_lossy(&bytes).trim().parse().unwrap_or(1));
             times = noted.unwrap_or(0);
             if times > 0 && !alone {
                 return Ok(None);
@@ -377,19 +377,19 @@ impl<'s> Here<'s> {
             );
             let kept = T::failed(job, &why);
             self.store.keep(&key, job, &kept, Ended::Killed, Vec::new())?;
-            own::gone(&begun);
+            run_files::remove(&begun);
             return Ok(Some(kept));
         }
         if self.careful {
-            own::note(&begun, &(times + 1).to_string())?;
+            run_files::write_note(&begun, &(times + 1).to_string())?;
         }
-        let done = isolated(|| (doing.work)(job, read?));
+        let done = catch_panic(|| (doing.work)(job, read?));
         let (mut kept, written) =
             done.unwrap_or_else(|error| (T::failed(job, &format!("{error:#}")), Vec::new()));
         let ended = if kept.is_failed() { Ended::Failed } else { Ended::Done };
         self.store.keep(&key, job, &kept, ended, written)?;
         if self.careful {
-            own::gone(&begun);
+            run_files::remove(&begun);
         }
         if !doing.whole {
             kept.lighten();

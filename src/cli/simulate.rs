@@ -8,10 +8,10 @@ use truegrind::arm::model::Model;
 use truegrind::calibration::measurement::simulation::Simulation;
 use truegrind::calibration::measurement::simulation::recipe::Recipe;
 
-use super::ending::Ending;
+use super::exit_status::ExitStatus;
 use super::files::{self, Batch};
 use super::inputs;
-use super::terminal::tell;
+use super::terminal::print_message;
 
 /// Arguments of `simulate`.
 #[derive(Debug, Args)]
@@ -29,7 +29,7 @@ pub(super) struct Arguments {
     seed: Option<u64>,
 }
 
-pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let mut targets = vec![arguments.output.as_path()];
     targets.extend(arguments.arm.as_deref());
     Batch::check(&[&arguments.recipe], &targets)?;
@@ -44,11 +44,11 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         batch.add(path, arm_text(&simulation.actual)?);
     }
     batch.write()?;
-    tell(format_args!("{rows} rows, sensor {sensor:?}, written to {}", arguments.output.display()));
+    print_message(format_args!("{rows} rows, sensor {sensor:?}, written to {}", arguments.output.display()));
     if !about.is_empty() {
-        tell(format_args!("{about}"));
+        print_message(format_args!("{about}"));
     }
-    Ok(Ending::Done)
+    Ok(ExitStatus::Done)
 }
 
 /// Runs a recipe.

@@ -17,14 +17,14 @@ use truegrind::report::tracking as view;
 use truegrind::robots::sheet;
 
 use super::computation::{Common, on_threads};
-use super::defect::isolated;
-use super::ending::Ending;
+use super::defect::catch_panic;
+use super::exit_status::ExitStatus;
 use super::files::{self, Batch};
 use super::identify::Angles;
 use super::inputs;
 use super::inputs::NamedModel;
 use super::outputs::Outputs;
-use super::terminal::tell;
+use super::terminal::print_message;
 
 /// Arguments of `track`.
 #[derive(Debug, Args)]
@@ -77,10 +77,10 @@ impl Arguments {
     }
 }
 
-pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let name = arguments.model.display().to_string();
     let named = inputs::model(&name)?;
-    inputs::say_doubtful(&named);
+    inputs::warn_doubtful(&named);
     let NamedModel::Estimated { arm, hash, .. } = named else {
         bail!("--model {name}: expected a model file, since the nominal arm has nothing to keep accurate");
     };
@@ -110,7 +110,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         stamp(date)?;
     }
     if state_path.is_file() && arguments.states_settings() {
-        tell(format_args!(
+        print_message(format_args!(
             "note: {} goes on with the settings that it began with: --sigma, --drift and --first-poses are for a new track",
             state_path.display()
         ));
@@ -132,7 +132,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         let Some(seconds) = arguments.follow else { break };
         std::thread::sleep(Duration::from_secs_f64(seconds));
     }
-    Ok(if flagged { Ending::Flagged } else { Ending::Done })
+    Ok(if flagged { ExitStatus::Flagged } else { ExitStatus::Done })
 }
 
 /// What stays the same from look to look.
@@ -161,7 +161,7 @@ impl Track<'_> {
                 Ok(begun) => tracker = Some(begun),
                 // Files that are still growing: nothing is wrong, nothing can be done.
                 Err(error @ TrackError::TooFew { .. }) if arguments.follow.is_some() => {
-                    say_once(said, format!("note: {error}"));
+                    print_message_once(said, format!("note: {error}"));
                     return Ok(false);
                 }
                 Err(error) => return Err(error.into()),
@@ -175,12 +175,12 @@ impl Track<'_> {
                 let begun = Instant::now();
                 // A defect that one file brings to light leaves the track as it was before that file.
                 let before = tracker.clone();
-                match isolated(|| Ok(tracker.take(dataset))) {
+                match catch_panic(|| Ok(tracker.take(dataset))) {
                     Ok(raised) => alarms.extend(raised?),
                     Err(defect) if self.arguments.data.is_dir() || arguments.follow.is_some() => {
                         *tracker = before;
                         failed = true;
-                        say_once(said, format!("failed: {}: {defect:#}", dataset.file));
+                        print_message_once(said, format!("failed: {}: {defect:#}", dataset.file));
                     }
                     Err(defect) => return Err(defect),
                 }
@@ -196,11 +196,13 @@ impl Track<'_> {
         let fresh = tracker.state().poses - before;
         if fresh == 0 {
             if arguments.follow.is_none() {
-                tell(format_args!("note: no new measurements since {before} poses; nothing written"));
+                print_message(format_args!(
+                    "note: no new measurements since {before} poses; nothing written"
+                ));
             }
             return Ok(failed);
         }
-        tell(format_args!(
+        print_message(format_args!(
             "note: {fresh} poses taken in within {:.1} ms, {:.0} µs each",
             taking.as_secs_f64() * 1e3,
             taking.as_secs_f64() * 1e6 / fresh as f64
@@ -214,7 +216,7 @@ impl Track<'_> {
         if !self.state_path.is_file() {
             return Ok(None);
         }
-        let text = files::read_own_text(self.state_path)?;
+        let text = files::read_state_text(self.state_path)?;
         let name = self.state_path.display().to_string();
         let state = State::from_toml(&text).map_err(|e| anyhow!("{name}: {e}"))?;
         if state.model_hash != self.hash {
@@ -249,7 +251,7 @@ impl Track<'_> {
         // The model first, the state last: what is cut off between the two is done again in the next run, to the same bits.
         if !model_path.exists() {
             batch.add(&model_path, text);
-        } else if files::read_own(&model_path)? != text.as_bytes() {
+        } else if files::read_state(&model_path)? != text.as_bytes() {
             bail!("{path} is there already: it is never overwritten; give another --date or -o");
         }
         arguments.outputs.add_made(
@@ -263,7 +265,7 @@ impl Track<'_> {
             let robot = arguments.robot.as_deref();
             match super::recording::track(tracker, self.arm, datasets, alarms, robot)? {
                 Some(bytes) => batch.add(path, bytes),
-                None => tell("note: --rrd: no pose is there to be drawn; nothing written to it"),
+                None => print_message("note: --rrd: no pose is there to be drawn; nothing written to it"),
             }
         }
         #[cfg(not(feature = "visual"))]
@@ -284,12 +286,14 @@ impl Track<'_> {
         let (mut out, mut failed) = (Vec::new(), false);
         for path in measurement_files(self.arguments)? {
             let is_new = !known.iter().any(|k| k.file == files::name(&path));
-            match isolated(|| read(self.arguments, self.arm, &path, is_new)) {
+            match catch_panic(|| read(self.arguments, self.arm, &path, is_new)) {
                 Ok(dataset) => out.extend(dataset),
-                Err(error) if waits => say_once(said, format!("note: {error:#}; left for the next look")),
+                Err(error) if waits => {
+                    print_message_once(said, format!("note: {error:#}; left for the next look"))
+                }
                 Err(error) if several => {
                     failed = true;
-                    tell(format_args!("failed: {}: {error:#}", path.display()));
+                    print_message(format_args!("failed: {}: {error:#}", path.display()));
                 }
                 Err(error) => return Err(error),
             }
@@ -299,9 +303,9 @@ impl Track<'_> {
 }
 
 /// Says a thing once.
-fn say_once(said: &mut BTreeSet<String>, what: String) {
+fn print_message_once(said: &mut BTreeSet<String>, what: String) {
     if !said.contains(&what) {
-        tell(&what);
+        print_message(&what);
         said.insert(what);
     }
 }
@@ -314,7 +318,7 @@ fn measurement_files(arguments: &Arguments) -> anyhow::Result<Vec<PathBuf>> {
         return Ok(if waits { Vec::new() } else { vec![path.clone()] });
     }
     // The table of an earlier run, by what is in it: anything else under that name is a measurement, and stays.
-    let is_own = |path: &Path| files::read_own(path).is_ok_and(|bytes| view::is_table(&bytes));
+    let is_own = |path: &Path| files::read_state(path).is_ok_and(|bytes| view::is_table(&bytes));
     let outputs = arguments.outputs.files().into_iter().filter(|path| path.is_file() && is_own(path));
     let own: Vec<PathBuf> = outputs.filter_map(|o| std::fs::canonicalize(o).ok()).collect();
     let mut out: Vec<PathBuf> = std::fs::read_dir(path)

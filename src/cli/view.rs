@@ -21,15 +21,15 @@ use truegrind::pictures::{self, MeasuredScene, PathScene, Recording};
 use truegrind::programs::motion::MotionKind;
 use truegrind::programs::reading::Language;
 
-use super::belonging;
-use super::compensate::{CellArguments, agreed, say_unused};
+use super::cell_arguments::{CellArguments, note_unused_entries, refuse_contradictions};
 use super::computation::{Common, on_threads};
-use super::ending::Ending;
+use super::exit_status::ExitStatus;
 use super::files::{self, Batch};
 use super::inputs::NamedModel;
 use super::programs::Programs;
-use super::progress::Work;
+use super::progress::Spinner;
 use super::recording::{Arms, meshes, recording};
+use super::robot_match;
 use super::{identify, inputs, programs};
 
 /// Arguments of `view`.
@@ -95,7 +95,7 @@ fn kind(path: &Path) -> anyhow::Result<Kind> {
     })
 }
 
-pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let kinds = arguments.files.iter().map(|f| kind(f)).collect::<anyhow::Result<Vec<_>>>()?;
     let of = |wanted: Kind| -> Vec<PathBuf> {
         arguments.files.iter().zip(&kinds).filter(|(_, k)| **k == wanted).map(|(f, _)| f.clone()).collect()
@@ -112,7 +112,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     for file in of(Kind::Recording) {
         Recording::open(&file)?;
     }
-    let work = Work::start("drawing");
+    let work = Spinner::start("drawing");
     let recordings = on_threads(arguments.common.threads, || -> anyhow::Result<Vec<Recording>> {
         let mut out = Vec::new();
         for file in of(Kind::Measurements) {
@@ -137,7 +137,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
             None => recording.spawn()?,
         }
     }
-    Ok(Ending::Done)
+    Ok(ExitStatus::Done)
 }
 
 /// The model that the command line names; `None` where it names a robot alone.
@@ -147,7 +147,7 @@ fn stated_model(arguments: &Arguments) -> anyhow::Result<Option<(String, Box<Est
         NamedModel::Nominal => Ok(None),
         model @ NamedModel::Estimated { .. } => {
             inputs::nominal(&model, arguments.robot.as_deref())?;
-            inputs::say_doubtful(&model);
+            inputs::warn_doubtful(&model);
             let NamedModel::Estimated { name, arm, .. } = model else { return Ok(None) };
             Ok(Some((name, arm)))
         }
@@ -223,7 +223,7 @@ fn measurements(arguments: &Arguments, file: &Path) -> anyhow::Result<Recording>
 /// A model: the arm at the poses that it was measured in, coloured by how far it stands from the nominal one there.
 fn model(arguments: &Arguments, file: &Path) -> anyhow::Result<Recording> {
     let named = inputs::model(&file.display().to_string())?;
-    inputs::say_doubtful(&named);
+    inputs::warn_doubtful(&named);
     let NamedModel::Estimated { name, arm, .. } = named else {
         bail!("{}: expected a model file", file.display());
     };
@@ -293,13 +293,13 @@ fn program(arguments: &Arguments, paths: &[PathBuf]) -> anyhow::Result<Recording
     };
     let robot = arguments.robot.as_deref().or(knowledge.map(|k| k.robot.as_str()));
     let task = programs.task(&programs::setup(&cell, robot));
-    agreed(task.listing(), &cell, surface.as_ref(), &nominal)?;
+    refuse_contradictions(task.listing(), &cell, surface.as_ref(), &nominal)?;
     if let Some(robot) = robot {
         let name = inputs::robot(robot).map_or_else(|_| robot.to_owned(), |robot| robot.sheet.name);
-        belonging::cell_is_of(&cell, &name, &nominal)?;
-        belonging::made_for(&programs, &name, &nominal)?;
+        robot_match::refuse_other_cell(&cell, &name, &nominal)?;
+        robot_match::refuse_other_program(&programs, &name, &nominal)?;
     }
-    say_unused([&Some(Used::by(task.listing(), &cell))], &cell, surface.as_ref());
+    note_unused_entries([&Some(Used::by(task.listing(), &cell))], &cell, surface.as_ref());
     let program = programs.name();
     let acting =
         Acting { nominal: &nominal, model: knowledge.map_or(&nominal, |k| &k.model), knowledge, condition };

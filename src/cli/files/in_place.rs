@@ -1,14 +1,14 @@
-//! A file that is written where it stands, because another one in its place would not be the same: it has several names
-//! (hard links), or an owner or folder that a new file could not have.
+//! Writes a file in place, if a new file could not replace it: it has several hard links, or an owner or folder that a new file
+//! cannot have.
 //!
-//! The disk is asked for room before a byte changes, and what was there is put back where writing fails; a process that is
-//! killed in between leaves a part.
+//! Disk space is allocated before a byte changes, and the old content is restored if writing fails. A process killed in between
+//! leaves a partial file.
 
 use std::fs::{self, File};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
-/// See the module.
+/// An open file with its old content.
 #[derive(Debug)]
 pub(super) struct InPlace {
     file: File,
@@ -16,7 +16,7 @@ pub(super) struct InPlace {
 }
 
 impl InPlace {
-    /// Opens the file and keeps what is in it.
+    /// Opens the file and keeps its content.
     pub(super) fn open(place: &Path) -> io::Result<Self> {
         let mut file = fs::OpenOptions::new().read(true).write(true).open(place)?;
         let mut old = Vec::new();
@@ -24,17 +24,17 @@ impl InPlace {
         Ok(Self { file, old })
     }
 
-    /// Writes `bytes` over what is there; on failure what was there stays.
+    /// Overwrites the content; restores it on failure.
     pub(super) fn put(&mut self, bytes: &[u8]) -> io::Result<()> {
-        let done = self.over(bytes);
+        let done = self.overwrite(bytes);
         if done.is_err() {
             let _ = self.restore();
         }
         done
     }
 
-    fn over(&mut self, bytes: &[u8]) -> io::Result<()> {
-        // What is beyond the old end needs room on the disk: it comes first.
+    fn overwrite(&mut self, bytes: &[u8]) -> io::Result<()> {
+        // The part beyond the old end needs new disk space, so it is written first.
         let kept = self.old.len().min(bytes.len());
         self.file.seek(SeekFrom::Start(kept as u64))?;
         self.file.write_all(&bytes[kept..])?;
@@ -44,7 +44,7 @@ impl InPlace {
         self.file.sync_all()
     }
 
-    /// Puts back what was there.
+    /// Restores the old content.
     pub(super) fn restore(&mut self) -> io::Result<()> {
         let old = std::mem::take(&mut self.old);
         self.file.seek(SeekFrom::Start(0))?;

@@ -1,8 +1,7 @@
-//! What this process has read, will write and has written, by the files themselves and not by their names.
+//! The files that this process has read, will write and has written, identified by inode rather than by name.
 //!
-//! Every read and every write passes here, so no verb has to say what its inputs are: a file that was read is never
-//! written, a file that is to be written is never read, and no file is written twice. What is known before the work is
-//! refused before the work.
+//! Every read and write is registered here, so verbs need not declare their inputs: a file that was read is never written, a
+//! file to be written is never read, and no file is written twice.
 
 use std::collections::BTreeMap;
 use std::fs::{self, Metadata};
@@ -15,14 +14,13 @@ use super::place::{Identity, Key, Place};
 
 #[derive(Debug, Default)]
 struct Ledger {
-    /// Inputs, each under the name by which it was read first.
+    /// Inputs, with the name under which each was first read.
     read: BTreeMap<Identity, PathBuf>,
-    /// Files that are there already and that an output will replace.
+    /// Existing files that an output will replace.
     promised: BTreeMap<Identity, PathBuf>,
-    /// Outputs that are written, or just being written.
+    /// Outputs written or being written.
     written: BTreeMap<Key, PathBuf>,
-    /// Those among them that were made anew, by folder and by name without regard to case: a million outputs must not be
-    /// compared each with each.
+    /// New files among them, by folder and lower-case name, so that a million outputs need no pairwise comparison.
     alike: BTreeMap<(Identity, String), Vec<Key>>,
 }
 
@@ -36,10 +34,10 @@ fn ledger() -> MutexGuard<'static, Ledger> {
     LEDGER.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Notes an input.
+/// Registers an input.
 ///
 /// # Errors
-/// It is an output too.
+/// The file is also an output.
 pub(super) fn note_read(path: &Path, meta: &Metadata) -> anyhow::Result<()> {
     if meta.is_dir() {
         return Ok(());
@@ -47,15 +45,15 @@ pub(super) fn note_read(path: &Path, meta: &Metadata) -> anyhow::Result<()> {
     let identity = Identity::of(path, meta);
     let mut ledger = ledger();
     let output = ledger.promised.get(&identity).or_else(|| ledger.written.get(&Key::There(identity.clone())));
-    // A name that has gone to another file since says nothing any more.
+    // The name may belong to another file by now.
     if let Some(output) = output
         && fs::metadata(output).is_ok_and(|meta| Identity::of(output, &meta) == identity)
     {
-        return refused(output, path);
+        return refuse_input(output, path);
     }
     if meta.is_file() && stdout_file() == Some(&identity) {
         bail!(
-            "{} is an input, and the standard output goes to it: an input is never overwritten; name another output",
+            "{} is an input, and stdout goes to it: inputs are never overwritten; name another output",
             path.display()
         );
     }
@@ -63,7 +61,7 @@ pub(super) fn note_read(path: &Path, meta: &Metadata) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The file that the standard output was sent to, where it is one.
+/// The file that stdout is redirected to, if any.
 #[cfg(unix)]
 fn stdout_file() -> Option<&'static Identity> {
     use std::os::fd::AsFd;
@@ -82,20 +80,23 @@ fn stdout_file() -> Option<&'static Identity> {
     FILE.get_or_init(|| None).as_ref()
 }
 
-/// Looks where outputs will go, before the work.
+/// Registers outputs before the computation.
 ///
 /// # Errors
-/// One is an input, two are one file, or one cannot be written.
+/// An output is an input, two outputs are one file, or one cannot be written.
 pub(super) fn promise(outputs: &[&Path]) -> anyhow::Result<()> {
     let mut places: Vec<Place> = Vec::new();
     for output in outputs {
         let place = Place::of(output)?;
-        apart(&place, places.iter().filter_map(|other| Some((other.key.as_ref()?, other.named.as_path()))))?;
+        refuse_same_file(
+            &place,
+            places.iter().filter_map(|other| Some((other.key.as_ref()?, other.named.as_path()))),
+        )?;
         places.push(place);
     }
     let mut ledger = ledger();
     for place in &places {
-        ledger.spares_inputs(place)?;
+        ledger.refuse_inputs(place)?;
     }
     for place in places {
         if let Some(Key::There(identity)) = place.key {
@@ -105,18 +106,21 @@ pub(super) fn promise(outputs: &[&Path]) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Takes the places of outputs that are about to be written.
+/// Registers outputs that are about to be written.
 ///
 /// # Errors
-/// As [`promise`], and where something was written there before in this run.
+/// As [`promise`], and if this run has already written one of them.
 pub(super) fn take(outputs: &[&Path]) -> anyhow::Result<Vec<Place>> {
     let mut places: Vec<Place> = Vec::new();
     let mut ledger = ledger();
     for output in outputs {
         let place = Place::of(output)?;
-        ledger.spares_inputs(&place)?;
-        apart(&place, places.iter().filter_map(|other| Some((other.key.as_ref()?, other.named.as_path()))))?;
-        apart(&place, ledger.written_like(&place))?;
+        ledger.refuse_inputs(&place)?;
+        refuse_same_file(
+            &place,
+            places.iter().filter_map(|other| Some((other.key.as_ref()?, other.named.as_path()))),
+        )?;
+        refuse_same_file(&place, ledger.written_like(&place))?;
         places.push(place);
     }
     for place in &places {
@@ -130,7 +134,7 @@ pub(super) fn take(outputs: &[&Path]) -> anyhow::Result<Vec<Place>> {
     Ok(places)
 }
 
-/// A file that this process has just made: whatever bore its number before is gone.
+/// Registers a file that this process has just created: an earlier file with its inode number is gone.
 pub(super) fn note_made(path: &Path, meta: &Metadata) {
     let identity = Identity::of(path, meta);
     let mut ledger = ledger();
@@ -139,21 +143,21 @@ pub(super) fn note_made(path: &Path, meta: &Metadata) {
     ledger.written.remove(&Key::There(identity));
 }
 
-/// A file that was made is in its place.
+/// Registers a new file that was renamed into place.
 pub(super) fn note_put(place: &Place) {
     if let Ok(meta) = fs::metadata(&place.path) {
         ledger().written.insert(Key::There(Identity::of(&place.path, &meta)), place.named.clone());
     }
 }
 
-/// A new round of a run that goes on: it writes its outputs again.
+/// Starts a new round of a continuing run, which writes its outputs again.
 pub(crate) fn new_round() {
     let mut ledger = ledger();
     ledger.written.clear();
     ledger.alike.clear();
 }
 
-/// Folder and name of a file that is to be made, without regard to case.
+/// Folder and lower-case name of a new file.
 fn without_case(key: &Key) -> Option<(Identity, String)> {
     match key {
         Key::New(folder, name) => Some((folder.clone(), name.to_string_lossy().to_lowercase())),
@@ -162,9 +166,9 @@ fn without_case(key: &Key) -> Option<(Identity, String)> {
 }
 
 impl Ledger {
-    /// What was written and may be the same file.
+    /// Written outputs that may be the same file.
     fn written_like(&self, place: &Place) -> impl Iterator<Item = (&Key, &Path)> {
-        // Another job may have put its own file over ours: the number of ours then goes to any other.
+        // Another job may have replaced our file; its inode number may then be reused.
         let is_still = |key: &Key, named: &Path| match key {
             Key::There(identity) => {
                 fs::metadata(named).is_ok_and(|meta| Identity::of(named, &meta) == *identity)
@@ -178,15 +182,12 @@ impl Ledger {
         same.into_iter().chain(alike).map(|(key, named)| (key, named.as_path()))
     }
 
-    fn spares_inputs(&self, place: &Place) -> anyhow::Result<()> {
+    fn refuse_inputs(&self, place: &Place) -> anyhow::Result<()> {
         match &place.key {
             Some(Key::There(identity)) => match self.read.get(identity) {
-                Some(input) => refused(&place.named, input),
+                Some(input) => refuse_input(&place.named, input),
                 None if stdout_file() == Some(identity) => {
-                    bail!(
-                        "{}: the standard output goes to this file already; name another output",
-                        place.named.display()
-                    )
+                    bail!("{}: stdout already goes to this file; name another output", place.named.display())
                 }
                 None => Ok(()),
             },
@@ -195,28 +196,28 @@ impl Ledger {
     }
 }
 
-fn refused(output: &Path, input: &Path) -> anyhow::Result<()> {
+fn refuse_input(output: &Path, input: &Path) -> anyhow::Result<()> {
     let also = if output == input { String::new() } else { format!(" (it is {})", input.display()) };
-    bail!("{} is an input{also}: an input is never overwritten; name another output", output.display())
+    bail!("{} is an input{also}: inputs are never overwritten; name another output", output.display())
 }
 
-/// No two outputs go to one file: the second would take the place of the first.
-fn apart<'a>(place: &Place, others: impl Iterator<Item = (&'a Key, &'a Path)>) -> anyhow::Result<()> {
+/// Refuses two outputs that are one file.
+fn refuse_same_file<'a>(
+    place: &Place,
+    others: impl Iterator<Item = (&'a Key, &'a Path)>,
+) -> anyhow::Result<()> {
     for (key, named) in others {
         if !place.meets(key) {
             continue;
         }
         if *key == Key::Stdout {
-            bail!("two outputs go to the standard output: name a file for all but one");
+            bail!("two outputs go to stdout: name a file for all but one");
         }
         if named == place.named {
-            bail!(
-                "{} is named for two outputs: the second would take the place of the first",
-                named.display()
-            );
+            bail!("{} is named for two outputs: the second would overwrite the first", named.display());
         }
         bail!(
-            "{} and {} are one file: the second output would take the place of the first",
+            "{} and {} are the same file: the second output would overwrite the first",
             named.display(),
             place.named.display()
         );

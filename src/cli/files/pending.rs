@@ -1,6 +1,6 @@
-//! A file whose bytes are on the disk but which is not in its place yet.
+//! A written file that is not in place yet.
 //!
-//! Where the file system can, it has no name until then: a process that is killed meanwhile leaves nothing behind.
+//! On file systems that support it the file has no name until then (`O_TMPFILE`), so that a killed process leaves nothing behind.
 //! Elsewhere it is a temporary file in the same folder.
 
 use std::fs::{File, Metadata};
@@ -11,7 +11,7 @@ use tempfile::NamedTempFile;
 
 use super::ledger;
 
-/// See the module.
+/// A written file and its destination.
 #[derive(Debug)]
 pub(super) struct Pending {
     file: Written,
@@ -26,11 +26,11 @@ enum Written {
 }
 
 impl Pending {
-    /// Writes `bytes` to the disk, in the folder of `place`. A file that replaces another gets its permissions and owner; a
-    /// new one gets what the system gives to new files (`umask`), and is not waited for where it is settled `later`.
+    /// Writes `bytes` to a file in the folder of `place`. A file that replaces another gets its permissions and owner; a new one
+    /// gets those of the `umask`, and is not synced here if `later` is set.
     ///
     /// # Errors
-    /// [`io::ErrorKind::PermissionDenied`] where the folder takes no new file, or a new file cannot have the old one's owner.
+    /// [`io::ErrorKind::PermissionDenied`] if the folder is not writable or a new file cannot get the owner of the old one.
     pub(super) fn write(
         place: PathBuf,
         folder: &Path,
@@ -41,7 +41,7 @@ impl Pending {
         let mut file = Written::new(folder, over.is_none())?;
         ledger::note_made(folder, &file.handle().metadata()?);
         if let Some(old) = over {
-            like(file.handle(), old)?;
+            copy_attributes(file.handle(), old)?;
         }
         file.handle().write_all(bytes)?;
         if over.is_some() || !later {
@@ -50,7 +50,7 @@ impl Pending {
         Ok(Self { file, place })
     }
 
-    /// Puts the file in its place, over what was there.
+    /// Moves the file into place, replacing an existing one.
     pub(super) fn put(self) -> io::Result<()> {
         match self.file {
             Written::Named(file) => file.persist(&self.place).map(drop).map_err(|error| error.error),
@@ -61,7 +61,7 @@ impl Pending {
 }
 
 impl Written {
-    /// `open`: with the permissions of new files; else the owner's alone until it has those of the old one.
+    /// `open`: with the permissions of the `umask`; otherwise readable by the owner only until it gets those of the old file.
     fn new(folder: &Path, open: bool) -> io::Result<Self> {
         #[cfg(target_os = "linux")]
         if let Some(file) = nameless::new(folder, open) {
@@ -71,7 +71,7 @@ impl Written {
         #[cfg(unix)]
         if open {
             use std::os::unix::fs::PermissionsExt;
-            // The system takes away what its umask forbids.
+            // The system applies the umask.
             builder.permissions(std::fs::Permissions::from_mode(0o666));
         }
         builder.tempfile_in(folder).map(Written::Named)
@@ -86,9 +86,9 @@ impl Written {
     }
 }
 
-/// Gives a file the owner and the permissions of another.
+/// Copies owner and permissions of another file.
 #[cfg(unix)]
-fn like(file: &File, old: &Metadata) -> io::Result<()> {
+fn copy_attributes(file: &File, old: &Metadata) -> io::Result<()> {
     use std::os::unix::fs::{MetadataExt, PermissionsExt, fchown};
     let new = file.metadata()?;
     if (new.uid(), new.gid()) != (old.uid(), old.gid()) {
@@ -98,11 +98,11 @@ fn like(file: &File, old: &Metadata) -> io::Result<()> {
 }
 
 #[cfg(not(unix))]
-fn like(file: &File, old: &Metadata) -> io::Result<()> {
+fn copy_attributes(file: &File, old: &Metadata) -> io::Result<()> {
     file.set_permissions(old.permissions())
 }
 
-/// Files of Linux that get their name last.
+/// Unnamed files of Linux.
 #[cfg(target_os = "linux")]
 mod nameless {
     use std::fs::File;
@@ -113,14 +113,14 @@ mod nameless {
     use rustix::fs::{AtFlags, CWD, Mode, OFlags, linkat, open};
     use rustix::io::Errno;
 
-    /// A file without a name; `None` where the file system has no such thing.
+    /// An unnamed file; `None` if the file system does not support it.
     pub(super) fn new(folder: &Path, open_to_others: bool) -> Option<File> {
         let owner = Mode::RUSR | Mode::WUSR;
         let all = owner | Mode::RGRP | Mode::WGRP | Mode::ROTH | Mode::WOTH;
-        // The system takes away what its umask forbids.
+        // The system applies the umask.
         let mode = if open_to_others { all } else { owner };
         let file = open(folder, OFlags::TMPFILE | OFlags::WRONLY | OFlags::CLOEXEC, mode).ok()?;
-        // Its name is given through the list of open files, which not every machine shows.
+        // Naming it later needs /proc/self/fd, which may not be mounted.
         let file = File::from(file);
         Path::new(&path_of(&file)).exists().then_some(file)
     }
@@ -133,7 +133,7 @@ mod nameless {
         linkat(CWD, path_of(file), CWD, place, AtFlags::SYMLINK_FOLLOW)
     }
 
-    /// Gives the file its name. A name that is taken cannot be given: then it gets another one and is renamed at once.
+    /// Names the file. `linkat` cannot replace a file, so an existing one is replaced by a rename.
     pub(super) fn put(file: &File, place: &Path) -> io::Result<()> {
         match link(file, place) {
             Err(Errno::EXIST) => {}

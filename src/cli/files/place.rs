@@ -1,7 +1,7 @@
-//! What a name stands for: the file itself, whatever it is called.
+//! Identity of files, independent of their names.
 //!
-//! `a.mod`, `./a.mod`, a link to it, another hard link of it and, where the folder takes no notice of case, `A.MOD` are one
-//! file. What is not there yet is known by its folder and its name.
+//! `a.mod`, `./a.mod`, a symbolic or hard link to it and, in a case-insensitive folder, `A.MOD` are one file. A file that does
+//! not exist yet is identified by its folder and name.
 
 use std::ffi::OsString;
 use std::fs::{self, Metadata};
@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 
-/// A file that exists, whatever its name.
+/// An existing file.
 #[cfg(unix)]
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Identity {
@@ -26,7 +26,7 @@ impl Identity {
     }
 }
 
-/// A file that exists, whatever its name.
+/// An existing file.
 #[cfg(not(unix))]
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Identity(PathBuf);
@@ -38,52 +38,52 @@ impl Identity {
     }
 }
 
-/// What two outputs must not have in common.
+/// Identity of an output; no two outputs may share it.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Key {
-    /// Standard output.
+    /// Stdout.
     Stdout,
-    /// A file that is there.
+    /// An existing file.
     There(Identity),
-    /// A file that is to be made: its folder and its name.
+    /// A new file: its folder and its name.
     New(Identity, OsString),
 }
 
-/// How an output gets there.
+/// How an output is written.
 #[derive(Debug, Clone)]
 pub(super) enum Kind {
     /// Printed.
     Stdout,
-    /// Sent: a device, a pipe, a socket.
+    /// Written through: a device, a pipe, a socket.
     Stream,
-    /// Made anew.
+    /// A new file.
     New,
-    /// Put over a file that is there.
+    /// Replaces an existing file.
     Over(Metadata),
 }
 
-/// Where an output goes, links followed.
+/// Destination of an output, links followed.
 #[derive(Debug, Clone)]
 pub(super) struct Place {
     /// As the user named it.
     pub(super) named: PathBuf,
-    /// The file that is written.
+    /// The file to be written.
     pub(super) path: PathBuf,
     pub(super) kind: Kind,
-    /// `None` for a device, which takes any number of outputs.
+    /// `None` for a device, which accepts several outputs.
     pub(super) key: Option<Key>,
 }
 
-/// Names of the standard output.
+/// Whether a path names stdout.
 pub(crate) fn is_stdout(path: &Path) -> bool {
     ["-", "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"].iter().any(|name| path == Path::new(name))
 }
 
 impl Place {
-    /// Looks where an output would go.
+    /// Resolves the destination of an output.
     ///
     /// # Errors
-    /// A folder, a file that must not be written, a place whose folder is not there.
+    /// It is a folder, a read-only file, or lies in a missing folder.
     pub(super) fn of(named: &Path) -> anyhow::Result<Self> {
         let place =
             |path: &Path, kind, key| Self { named: named.to_path_buf(), path: path.to_path_buf(), kind, key };
@@ -93,7 +93,7 @@ impl Place {
         let meta = match fs::metadata(named) {
             Ok(meta) => meta,
             Err(error) if error.kind() == io::ErrorKind::NotFound => {
-                let path = followed(named)?;
+                let path = follow_links(named)?;
                 let folder = parent(&path);
                 let Some(meta) = fs::metadata(&folder).ok().filter(Metadata::is_dir) else {
                     bail!("{}: folder {} does not exist", named.display(), folder.display());
@@ -117,16 +117,16 @@ impl Place {
             return Ok(place(named, Kind::Stream, key));
         }
         if meta.permissions().readonly() {
-            bail!("{} is read-only: it is not overwritten; name another output", named.display());
+            bail!("{} is read-only and is not overwritten; name another output", named.display());
         }
         if let Err(error) = fs::OpenOptions::new().write(true).open(named) {
             return Err(error).with_context(|| format!("{}: cannot be written", named.display()));
         }
-        // What a link leads to may be nameless (an open file of this process): then it stays the link's business.
+        // A link may lead to an unnamed file (an open file of this process), which has no canonical path.
         let real = fs::canonicalize(named)
             .ok()
             .filter(|real| fs::metadata(real).is_ok_and(|meta| Identity::of(real, &meta) == identity));
-        // Another job put its own over it in between: then it is looked at again, and never written where it stands.
+        // Another job replaced the file in between: resolve again.
         if real.is_none() && fs::metadata(named).is_ok_and(|now| Identity::of(named, &now) != identity) {
             return Self::of(named);
         }
@@ -150,9 +150,9 @@ impl Place {
     }
 }
 
-/// A link that leads nowhere yet, followed to where it points; any other path as it is.
-fn followed(named: &Path) -> anyhow::Result<PathBuf> {
-    /// As many links as a system follows.
+/// Follows a dangling link to its target; returns any other path unchanged.
+fn follow_links(named: &Path) -> anyhow::Result<PathBuf> {
+    /// Limit of Linux.
     const MOST: usize = 40;
     let mut path = named.to_path_buf();
     for _ in 0..MOST {
@@ -161,10 +161,10 @@ fn followed(named: &Path) -> anyhow::Result<PathBuf> {
             Err(_) => return Ok(path),
         }
     }
-    bail!("{}: the link leads round in a circle", named.display())
+    bail!("{}: the link points to itself", named.display())
 }
 
-/// Whether two names that differ in case are one file in a folder. Asked only where two outputs differ in nothing else.
+/// Whether names in a folder are case-insensitive. Tested only if two outputs differ in case alone.
 fn ignores_case(folder: &Path) -> bool {
     let probe = tempfile::Builder::new().prefix("case-a").tempfile_in(folder);
     probe.ok().and_then(|probe| {
@@ -184,7 +184,7 @@ fn is_device(_: &Metadata) -> bool {
     true
 }
 
-/// The folder of a file.
+/// The folder of a file, `.` for a bare name.
 pub(super) fn parent(path: &Path) -> PathBuf {
     match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder.to_path_buf(),

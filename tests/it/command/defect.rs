@@ -11,7 +11,7 @@ fn a_panic_ends_one_unit_and_not_the_others() {
     let units: Vec<anyhow::Result<usize>> = (0..100usize)
         .into_par_iter()
         .map(|unit| {
-            caught::isolated(|| {
+            caught::catch_panic(|| {
                 // Across threads too.
                 let parts: Vec<usize> = (0..10usize)
                     .into_par_iter()
@@ -42,6 +42,6 @@ fn a_panic_ends_one_unit_and_not_the_others() {
 
 #[test]
 fn errors_pass_as_they_are() {
-    let done: anyhow::Result<()> = caught::isolated(|| anyhow::bail!("row 3: no number"));
+    let done: anyhow::Result<()> = caught::catch_panic(|| anyhow::bail!("row 3: no number"));
     assert_eq!(done.unwrap_err().to_string(), "row 3: no number");
 }

@@ -27,12 +27,12 @@ fn stated(output: &Path) -> anyhow::Result<Option<Language>> {
 }
 
 /// Refuses an output whose ending is of no language that is written here.
-pub(super) fn rapid_or_nc(output: &Path) -> anyhow::Result<()> {
+pub(super) fn refuse_unknown(output: &Path) -> anyhow::Result<()> {
     stated(output).map(drop)
 }
 
 /// Refuses an output that would pass for anything but RAPID.
-pub(super) fn rapid(output: &Path) -> anyhow::Result<()> {
+pub(super) fn refuse_nc(output: &Path) -> anyhow::Result<()> {
     match stated(output)? {
         Some(Language::Nc) => bail!("{}: a RAPID module is written; expected {RAPID}", output.display()),
         _ => Ok(()),
@@ -41,7 +41,7 @@ pub(super) fn rapid(output: &Path) -> anyhow::Result<()> {
 
 /// Refuses an output that would pass for another language or another control than the program that it is made of. What
 /// ends as its source does is no question.
-pub(super) fn like_its_source(output: &Path, source: &Path, bytes: &[u8]) -> anyhow::Result<()> {
+pub(super) fn refuse_other_language(output: &Path, source: &Path, bytes: &[u8]) -> anyhow::Result<()> {
     let ending = |path: &Path| path.extension().map(|ending| ending.to_ascii_lowercase());
     if ending(output) == ending(source) {
         return Ok(());

@@ -1,4 +1,4 @@
-//! Whether cell, program and model are of one robot: a correction of another arm is none.
+//! Checks that cell, program and model belong to the same robot.
 
 use anyhow::bail;
 use truegrind::arm::model::Model;
@@ -8,13 +8,13 @@ use truegrind::compensation::cell::robot_match::{cell_of_another, program_of_ano
 use super::files;
 use super::programs::Programs;
 
-/// Refuses a cell file that is another robot's.
-pub(super) fn cell_is_of(cell: &Cell, robot: &str, nominal: &Model) -> anyhow::Result<()> {
+/// Refuses the cell file of another robot.
+pub(super) fn refuse_other_cell(cell: &Cell, robot: &str, nominal: &Model) -> anyhow::Result<()> {
     cell_of_another(cell, robot, nominal).map_or(Ok(()), |fault| bail!("{fault}"))
 }
 
-/// Refuses programs that say that they were made for another robot.
-pub(super) fn made_for(programs: &Programs, robot: &str, nominal: &Model) -> anyhow::Result<()> {
+/// Refuses programs that name another robot.
+pub(super) fn refuse_other_program(programs: &Programs, robot: &str, nominal: &Model) -> anyhow::Result<()> {
     for (path, source) in &programs.files {
         if let Some(fault) = program_of_another(&files::name(path), source, robot, nominal) {
             bail!("{fault}");

@@ -1,5 +1,4 @@
-//! What is read, by its content: between two calls every file that is read is noted, so that a key covers what was read and
-//! not what somebody thought of listing.
+//! Log of the files read between two calls, by content, so that the key of a run covers every file that was read.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -11,17 +10,17 @@ fn seen() -> MutexGuard<'static, Option<Vec<String>>> {
     SEEN.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// From here on.
+/// Starts the log.
 pub(crate) fn begin() {
     *seen() = Some(Vec::new());
 }
 
-/// Up to here: the SHA-256 of each, in the order in which they were read.
-pub(crate) fn end() -> Vec<String> {
+/// Ends the log: the SHA-256 of each file, in the order of reading.
+pub(crate) fn finish() -> Vec<String> {
     seen().take().unwrap_or_default()
 }
 
-/// Notes what was read.
+/// Adds a file.
 pub(super) fn note(bytes: &[u8]) {
     if let Some(seen) = seen().as_mut() {
         seen.push(sha256(bytes));

@@ -1,4 +1,4 @@
-//! Frames that were measured by other means, as options: with them the raw error of a data set is a number.
+//! Options for sensor frames that were measured by other means. With them the raw error of a data set is defined.
 
 use anyhow::{anyhow, bail};
 use clap::Args;
@@ -8,38 +8,37 @@ use truegrind::calibration::identification::tolerance::Tolerance;
 use truegrind::calibration::measurement::dataset::{Dataset, Sensor};
 use truegrind::math::se3::Pose;
 
-/// Where the sensor stands, if that is known. Without [`HeldArguments`] it serves the raw error alone, and the fit finds frames by
-/// itself.
+/// Pose of the sensor, if known. Without [`FramePriorArguments`] it serves for the raw error only, and the fit determines the
+/// frames.
 #[derive(Debug, Clone, Default, Args)]
-pub(super) struct StatedArguments {
-    /// Frame of a position or pose sensor in the robot's base: x,y,z (mm), or x,y,z,qw,qx,qy,qz.
+pub(super) struct StatedFrameArguments {
+    /// Frame of a position or pose sensor in the robot base: x,y,z (mm) or x,y,z,qw,qx,qy,qz.
     #[arg(long, value_name = "X,Y,Z[,Q…]", allow_hyphen_values = true)]
     sensor_frame: Option<String>,
-    /// Outlet of a cable in the robot's base: x,y,z (mm); once for each cable, in the order of `anchor`.
+    /// Outlet of a draw-wire cable in the robot base: x,y,z (mm). Once per cable, in the order of the column `anchor`.
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     outlet: Vec<String>,
-    /// What a cable reads beyond its free length (mm); once for each cable.
+    /// Zero offset of a cable: reading minus free length (mm). Once per cable.
     #[arg(long, value_name = "MM", allow_hyphen_values = true)]
     cable_zero: Vec<String>,
-    /// The touched point (hook, reflector, target) on the flange: x,y,z (mm), or x,y,z,qw,qx,qy,qz; else the flange
-    /// itself.
+    /// Measured point (hook, reflector, target) on the flange: x,y,z (mm) or x,y,z,qw,qx,qy,qz. Default: the flange.
     #[arg(long, value_name = "X,Y,Z[,Q…]", allow_hyphen_values = true)]
     touched_point: Option<String>,
 }
 
-/// Whether a fit is held by the stated frames.
+/// Prior of a fit on the stated frames.
 #[derive(Debug, Clone, Default, Args)]
-pub(super) struct HeldArguments {
-    /// How well --sensor-frame, or --outlet and --cable-zero, are known in the robot's base: standard deviation in mm, and in °
-    /// for the turn of a frame (else that of the mm at a metre). The fit is held by them, and the place of a path becomes known.
+pub(super) struct FramePriorArguments {
+    /// Uncertainty of --sensor-frame, or of --outlet and --cable-zero: standard deviation in mm and, for the rotation of a frame, in
+    /// degrees (default: that of the mm at one metre). The fit then uses them as a prior, so that the place of a path can be
+    /// corrected.
     #[arg(long, value_name = "MM[,DEG]", allow_hyphen_values = true)]
     frame_sigma: Option<String>,
 }
 
-impl HeldArguments {
-    /// The tolerance with which a fit is held by the stated frames, and the frames where it starts: what was stated, with the
-    /// touched point of `found` where none was.
-    pub(super) fn held(
+impl FramePriorArguments {
+    /// Prior tolerance and starting frames of the fit. The measured point is that of `found` unless it was stated.
+    pub(super) fn prior(
         &self,
         tolerance: &Tolerance,
         stated: Option<&Frames>,
@@ -47,7 +46,7 @@ impl HeldArguments {
     ) -> anyhow::Result<(Tolerance, Frames)> {
         let Some(text) = &self.frame_sigma else { return Ok((*tolerance, found)) };
         let Some(stated) = stated else {
-            bail!("--frame-sigma says nothing without --sensor-frame, or --outlet and --cable-zero");
+            bail!("--frame-sigma needs --sensor-frame, or --outlet and --cable-zero");
         };
         let (mm, deg) = match numbers("--frame-sigma", text)?[..] {
             [mm] => (mm, (mm * 1e-3).to_degrees()),
@@ -67,25 +66,28 @@ impl HeldArguments {
     }
 }
 
-/// What the frames must fit.
+/// Data set that the frames must match.
 struct Measured<'a> {
     file: &'a str,
     sensor: Sensor,
     anchors: usize,
 }
 
-impl StatedArguments {
-    /// The frames, when they are stated; an error where they do not fit the sensor of the data.
+impl StatedFrameArguments {
+    /// The stated frames, if any.
+    ///
+    /// # Errors
+    /// The frames do not match the sensor of the data.
     pub(super) fn frames(&self, dataset: &Dataset) -> anyhow::Result<Option<Frames>> {
         let measured = Measured { file: &dataset.file, sensor: dataset.sensor, anchors: dataset.anchors() };
         self.frames_of(&measured)
     }
 
-    /// The frames of a measurement that is still to be made: a tracker may stand anywhere, a cable needs its outlet.
+    /// The frames of a planned measurement. A tracker may stand anywhere; a cable needs its outlet.
     pub(super) fn planned(&self, sensor: Sensor) -> anyhow::Result<Frames> {
         let anchors = self.outlet.len().max(1);
         if sensor == Sensor::Cable && self.outlet.is_empty() {
-            bail!("--outlet is missing: where in the robot's base does the cable come out?");
+            bail!("--outlet X,Y,Z is missing: the position of the cable outlet in the robot base (mm)");
         }
         let zeros = if self.cable_zero.is_empty() && sensor == Sensor::Cable {
             vec!["0".to_owned(); anchors]
@@ -104,7 +106,7 @@ impl StatedArguments {
         let framed = self.sensor_frame.is_some();
         if !cable && !framed {
             if self.touched_point.is_some() {
-                bail!("--touched-point says nothing without --sensor-frame, or --outlet and --cable-zero");
+                bail!("--touched-point needs --sensor-frame, or --outlet and --cable-zero");
             }
             return Ok(None);
         }
@@ -117,7 +119,7 @@ impl StatedArguments {
             Sensor::Cable => {
                 if framed {
                     bail!(
-                        "--sensor-frame: {} holds cable lengths, whose sensor has no frame: state --outlet and \
+                        "--sensor-frame: {} contains cable lengths, whose sensor has no frame: use --outlet and \
                          --cable-zero",
                         dataset.file
                     );
@@ -127,7 +129,7 @@ impl StatedArguments {
                 {
                     if found != anchors {
                         bail!(
-                            "{name}: stated {found} times, expected once for each of the {anchors} cables of {}",
+                            "{name}: given {found} times, expected once for each of the {anchors} cables of {}",
                             dataset.file
                         );
                     }
@@ -145,7 +147,7 @@ impl StatedArguments {
             Sensor::Position | Sensor::Pose => {
                 if cable {
                     bail!(
-                        "--outlet and --cable-zero: {} holds {} and no cable lengths: state --sensor-frame",
+                        "--outlet and --cable-zero: {} contains {} and no cable lengths: use --sensor-frame",
                         dataset.file,
                         if dataset.sensor == Sensor::Pose { "poses" } else { "positions" }
                     );
@@ -159,12 +161,12 @@ impl StatedArguments {
     }
 }
 
-/// Numbers of a list with commas.
+/// Numbers separated by commas.
 pub(super) fn numbers(option: &str, text: &str) -> anyhow::Result<Vec<f64>> {
     text.split(',')
         .map(|cell| match cell.trim().parse::<f64>() {
             Ok(value) if value.is_finite() => Ok(value),
-            _ => Err(anyhow!("{option} {text}: `{}` is no number", cell.trim())),
+            _ => Err(anyhow!("{option} {text}: `{}` is not a number", cell.trim())),
         })
         .collect()
 }

@@ -1,0 +1,122 @@
+//! Options that describe the cell a program runs in, shared by `compensate`, `deviation` and `view`.
+
+use std::path::PathBuf;
+
+use anyhow::{anyhow, bail};
+use clap::Args;
+use nalgebra::Point3;
+use truegrind::arm::condition::Condition;
+use truegrind::arm::estimated::Estimated;
+use truegrind::arm::model::Model;
+use truegrind::compensation::cell::{Cell, Used};
+use truegrind::compensation::condition::payload::Loads;
+use truegrind::compensation::frames::surface_frames::misplaced;
+use truegrind::compensation::frames::taught::contradictions;
+use truegrind::programs::motion::Listing;
+use truegrind::programs::reading::Program;
+use truegrind::surfaces::SurfaceFile;
+
+use super::files;
+use super::terminal::print_message;
+
+/// Payloads above this are typing errors (kg).
+const LARGEST_PAYLOAD_KG: f64 = 3000.0;
+
+/// Cell, surface and payload.
+#[derive(Debug, Clone, Args)]
+pub(super) struct CellArguments {
+    /// Cell file: origins of tools and work objects, measured or taught with their teaching points.
+    #[arg(long, value_name = "CELL.toml")]
+    pub(super) cell: Option<PathBuf>,
+    /// The ground surface; deviations are then also stated along its normal.
+    #[arg(long, value_name = "SURFACE.toml")]
+    pub(super) surface: Option<PathBuf>,
+    /// Mass at the flange while the program runs (kg). Overrides the tool and load data of a RAPID program; NC programs
+    /// have none.
+    #[arg(long, value_name = "KG", allow_negative_numbers = true)]
+    pub(super) payload: Option<f64>,
+    /// Centre of mass of the payload in the flange frame (mm).
+    #[arg(long, value_name = "X,Y,Z", requires = "payload", allow_hyphen_values = true)]
+    pub(super) payload_centre: Option<String>,
+}
+
+impl CellArguments {
+    /// The loads that the program declares; `None` if `--payload` overrides them.
+    pub(super) fn loads(&self, program: &Program<'_>) -> Option<Loads> {
+        self.payload.is_none().then(|| Loads::of(program))
+    }
+
+    /// Cell, surface and condition; the condition starts from that of the model.
+    pub(super) fn read(
+        &self,
+        model: Option<&Estimated>,
+    ) -> anyhow::Result<(Cell, Option<SurfaceFile>, Condition)> {
+        if let Some(kg) = self.payload
+            && !(0.0..=LARGEST_PAYLOAD_KG).contains(&kg)
+        {
+            bail!("--payload {kg}: expected a mass in kg, from 0 to {LARGEST_PAYLOAD_KG}");
+        }
+        let cell = self.read_cell()?;
+        let surface = self.surface.as_deref().map(super::path::surface).transpose()?;
+        let cell = match &surface {
+            Some(surface) => cell.with_surface(surface)?,
+            None => cell,
+        };
+        let mut condition = model.map(|m| m.condition).unwrap_or_default();
+        condition.payload_kg = self.payload.or(condition.payload_kg);
+        if let Some(text) = &self.payload_centre {
+            let on_flange = Point3::from(super::stated_frames::triple("--payload-centre", text)?);
+            let in_last_link = model.map_or(on_flange, |arm| arm.model.flange * on_flange);
+            condition.payload_centre_mm = in_last_link.coords.into();
+        }
+        Ok((cell, surface, condition))
+    }
+
+    fn read_cell(&self) -> anyhow::Result<Cell> {
+        let Some(path) = &self.cell else { return Ok(Cell::default()) };
+        let cell = Cell::from_toml(&files::read_text(path)?).map_err(|e| {
+            anyhow!(
+                "{}: {}; a cell file lists [[tool]] and [[wobj]]",
+                path.display(),
+                e.to_string().trim_end()
+            )
+        })?;
+        if let [first, rest @ ..] = cell.open.as_slice() {
+            let more = match rest.len() {
+                0 => String::new(),
+                1 => "; 1 more entry is open".to_owned(),
+                more => format!("; {more} more entries are open"),
+            };
+            bail!("{}: not filled in yet: {first}{more}", path.display());
+        }
+        Ok(cell)
+    }
+}
+
+/// Notes entries of the cell file that no program uses; silent if any program could not be examined.
+pub(super) fn note_unused_entries<'u>(
+    used: impl IntoIterator<Item = &'u Option<Used>>,
+    cell: &Cell,
+    surface: Option<&SurfaceFile>,
+) {
+    let mut all = Used::default();
+    for used in used {
+        let Some(used) = used else { return };
+        all.join(used);
+    }
+    for note in all.notes(cell, surface) {
+        print_message(format_args!("note: {note}"));
+    }
+}
+
+/// Refuses a program that contradicts the cell file or the surface file.
+pub(super) fn refuse_contradictions(
+    listing: &Listing,
+    cell: &Cell,
+    surface: Option<&SurfaceFile>,
+    nominal: &Model,
+) -> anyhow::Result<()> {
+    let mut found = contradictions(listing, cell, nominal);
+    found.extend(surface.iter().flat_map(|surface| misplaced(listing, surface)));
+    if found.is_empty() { Ok(()) } else { bail!("{}", found.join("; ")) }
+}

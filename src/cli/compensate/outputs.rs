@@ -1,0 +1,106 @@
+//! Where the corrected programs are written.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use anyhow::bail;
+
+use super::arguments::Arguments;
+use crate::cli::files::{self, Batch};
+use crate::cli::output_extension;
+use crate::cli::programs::{Job, Programs};
+
+/// The output file of each file of a program; `None` in a dry run.
+pub(super) fn output_files(
+    arguments: &Arguments,
+    job: &Job,
+    programs: &Programs,
+    several: bool,
+) -> anyhow::Result<Vec<Option<PathBuf>>> {
+    if arguments.writes_nothing() {
+        return Ok(vec![None; programs.files.len()]);
+    }
+    let Some(output) = &arguments.output else { bail!(MISSING_OUTPUT) };
+    let several = several || programs.files.len() > 1;
+    if !several && !output.is_dir() {
+        // An output that is an input is the graver fault, so it is reported before a wrong extension.
+        Batch::check(&[], &[output])?;
+        if let [(source, bytes)] = programs.files.as_slice() {
+            output_extension::refuse_other_language(output, source, bytes)?;
+        }
+        return Ok(vec![Some(output.clone())]);
+    }
+    if arguments.prints_program() {
+        bail!("-o -: stdout takes one program, and there are several: name a folder");
+    }
+    if output.is_file() {
+        bail!("{} is a file, but there are several programs: name a folder", output.display());
+    }
+    Ok(programs.files.iter().map(|(path, _)| Some(output.join(job.place(path)))).collect())
+}
+
+pub(super) const MISSING_OUTPUT: &str =
+    "-o OUT is missing: name a file for one program or a folder for several, or use --dry-run";
+
+/// Refuses two programs with the same output file.
+pub(super) fn refuse_shared_output(jobs: &[Job]) -> anyhow::Result<()> {
+    let mut taken: HashMap<PathBuf, PathBuf> = HashMap::new();
+    for job in jobs {
+        for path in job.files() {
+            let place = job.place(&path);
+            match taken.get(&place) {
+                Some(first) if *first == path => bail!("{} is named twice", path.display()),
+                Some(first) => bail!(
+                    "{} and {} would both be written to {} in the output folder: run them separately, each into its own folder",
+                    first.display(),
+                    path.display(),
+                    place.display()
+                ),
+                None => taken.insert(place, path),
+            };
+        }
+    }
+    Ok(())
+}
+
+/// Refuses a report whose file is the output of a program, before anything is written.
+pub(super) fn refuse_report_over_program(
+    jobs: &[Job],
+    output: Option<&Path>,
+    reports: &[&Path],
+) -> anyhow::Result<()> {
+    let Some(folder) = output.filter(|output| jobs.len() > 1 || output.is_dir()) else { return Ok(()) };
+    let reports: Vec<(&Path, PathBuf)> =
+        reports.iter().filter_map(|report| Some((*report, files::canonical_path(report)?))).collect();
+    if reports.is_empty() {
+        return Ok(());
+    }
+    for job in jobs {
+        for path in job.files() {
+            let there = files::canonical_path(&folder.join(job.place(&path)));
+            if let Some((report, _)) = reports.iter().find(|(_, whole)| Some(whole) == there.as_ref()) {
+                bail!(
+                    "{} is where {} will be written: name another file for the report",
+                    report.display(),
+                    path.display()
+                );
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Adds the corrected programs to a batch; `make_folders`: creates their folders.
+pub(super) fn add_programs(
+    batch: &mut Batch,
+    written: Vec<(PathBuf, Vec<u8>)>,
+    make_folders: bool,
+) -> anyhow::Result<()> {
+    for (path, bytes) in written {
+        if make_folders && let Some(folder) = path.parent() {
+            files::make_folder(folder)?;
+        }
+        batch.add(path, bytes);
+    }
+    Ok(())
+}
