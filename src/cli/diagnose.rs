@@ -152,8 +152,8 @@ pub(super) fn diagnose_rows(
     let frames = starting_frames(dataset, nominal, &options.tolerance, options.fuse_readout)?;
     let stated = arguments.stated.frames(dataset)?;
     let (tolerance, frames) = arguments.prior.prior(&options.tolerance, stated.as_ref(), frames)?;
-    let held = Options { tolerance, ..options.clone() };
-    let mut found = diagnose(dataset, name, nominal, &frames, &held, &|step| report_step(step))?;
+    let options = Options { tolerance, ..options.clone() };
+    let mut found = diagnose(dataset, name, nominal, &frames, &options, &|step| report_step(step))?;
     if let Some(stated) = &stated {
         let raw = raw_error(dataset, nominal, stated, options.fuse_readout);
         found.diagnosis.notes.push(format!(
@@ -162,11 +162,7 @@ pub(super) fn diagnose_rows(
         ));
     }
     for other in others {
-<<<<<<< HEAD
-        report_step(&format!("judging on {}", other.file));
-=======
-        tell_step(&format!("testing on {}", other.file));
->>>>>>> 5147f0a (cli: compensate in files of one idea; help, messages, names and comments in the terms of the field)
+        report_step(&format!("testing on {}", other.file));
         let frames = starting_frames(other, nominal, &options.tolerance, options.fuse_readout)?;
         found.diagnosis.transfers.push(transfer(
             other,
@@ -192,8 +188,8 @@ pub(super) fn diagnosed(
     robot: &str,
     nominal: &Model,
     options: &Options,
-    tell: &(dyn Fn(&str) + Sync),
+    progress: &(dyn Fn(&str) + Sync),
 ) -> anyhow::Result<Diagnosed> {
     let frames = starting_frames(dataset, nominal, &options.tolerance, true)?;
-    Ok(diagnose(dataset, robot, nominal, &frames, options, tell)?)
+    Ok(diagnose(dataset, robot, nominal, &frames, options, progress)?)
 }
