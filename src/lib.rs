@@ -48,15 +48,15 @@ pub use truegrind_arm::condition::Condition;
 pub use truegrind_arm::effect::backlash::Backlash;
 pub use truegrind_arm::effect::compliance::Compliance;
 pub use truegrind_arm::effect::coupling::Coupling;
+pub use truegrind_arm::effect::error_map::ErrorMap;
+pub use truegrind_arm::effect::gear_ratio::GearRatio;
 pub use truegrind_arm::effect::harmonic::Harmonic;
-pub use truegrind_arm::effect::load::{GravityLoad, Lump};
-pub use truegrind_arm::effect::map::JointMap;
-pub use truegrind_arm::effect::ratio::Ratio;
-pub use truegrind_arm::effect::smooth::Smooth;
+pub use truegrind_arm::effect::lumped_compliance::{Lump, LumpedCompliance};
+pub use truegrind_arm::effect::smooth_correction::SmoothCorrection;
 pub use truegrind_arm::effect::thermal::Thermal;
 pub use truegrind_arm::effect::{Effect, EffectParameter};
 pub use truegrind_arm::estimated::{
-    Estimated, EstimatedParameter, Judgement, ModelFileError, Provenance, RidingPoint, StageErrors, Verdict,
+    Estimated, EstimatedParameter, FlangePoint, Judgement, ModelFileError, Provenance, StageErrors, Verdict,
 };
 pub use truegrind_arm::inverse::Inverse;
 pub use truegrind_arm::inverse::configuration::Configuration;

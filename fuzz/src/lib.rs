@@ -17,7 +17,7 @@ use truegrind::compensation::options::Options as Bounds;
 use truegrind::papers::experiment::Experiment;
 use truegrind::programs::rapid::task_list;
 use truegrind::robots;
-use truegrind::robots::foreign::{Choice, read_any};
+use truegrind::robots::foreign::{ImportOptions, import};
 use truegrind::surfaces::mesh::{Mesh, MeshOptions};
 
 use truegrind::calibration::measurement::import::{self, Clocks, Options};
@@ -212,7 +212,7 @@ pub fn robot(bytes: &[u8]) {
 /// The file of an arm that others wrote, of each kind: one that is taken works.
 pub fn arm_file(bytes: &[u8]) {
     for file in ["fuzz.urdf", "fuzz.csv", "fuzz.yaml", "fuzz.conf"] {
-        if let Ok(found) = read_any(&text(bytes), file, &Choice::default()) {
+        if let Ok(found) = import(&text(bytes), file, &ImportOptions::default()) {
             let posed = found.robot.model.at_condition(&Condition::default());
             assert!(posed.forward(&Joints::zeros()).translation.vector.iter().all(|x| x.is_finite()));
         }

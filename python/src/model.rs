@@ -7,7 +7,7 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use sha2::{Digest, Sha256};
-use truegrind::arm::estimated::RidingPoint;
+use truegrind::arm::estimated::FlangePoint;
 use truegrind::{Estimated, Judgement, Pose, robots};
 
 use crate::arm::{Acting, Stated, forward, inverse};
@@ -56,7 +56,7 @@ impl PyModel {
             Refusal::new(Kind::Model, message).of_file(name)
         };
         let arm = Estimated::from_toml(text).map_err(|error| told(&error))?;
-        robots::agrees(&arm.robot, &arm.nominal)
+        robots::check_catalogue_name(&arm.robot, &arm.nominal)
             .map_err(|error| Refusal::new(Kind::Model, format!("{name}: {error}")).of_file(name))?;
         if arm.verdict.status == Judgement::Fail {
             let why = arm.verdict.reasons.join("; ");
@@ -250,8 +250,8 @@ impl PyModel {
         let [x, y, z] = tool_mm;
         let sigmas = py.detach(|| {
             let flange_from_tool = Pose::translation(x, y, z);
-            let points: Vec<RidingPoint<'_>> = (0..q_deg.nrows())
-                .map(|row| RidingPoint { joints: joints(q_deg, row), flange_from_tool, carried: None })
+            let points: Vec<FlangePoint<'_>> = (0..q_deg.nrows())
+                .map(|row| FlangePoint { joints: joints(q_deg, row), flange_from_tool, carried: None })
                 .collect();
             self.arm.position_sigmas_mm(&self.arm.model.at_condition(&self.arm.condition), &points)
         });

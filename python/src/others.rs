@@ -13,7 +13,7 @@ use truegrind::planning::poses::rows::Noise;
 use truegrind::planning::poses::schedule::Visits;
 use truegrind::planning::poses::space::Space;
 use truegrind::report::{format, planning, tracking};
-use truegrind::robots::foreign::Choice;
+use truegrind::robots::foreign::ImportOptions;
 use truegrind::{
     Alarm, Frames, Pose, PosesOptions, PosesPlan, PosesWanted, Recipe, Robot, Sensor, Simulation,
     TrackOptions, TrackState, Tracker, plan_poses, read_measurements, robots, write_rapid,
@@ -80,7 +80,7 @@ pub(crate) fn simulate(
         let mut recipe = Recipe::parse(&text, &file)?;
         recipe.seed = seed.unwrap_or(recipe.seed);
         let resolve = |name: &str| {
-            let found = from_name(Path::new(name), &Choice::default());
+            let found = from_name(Path::new(name), &ImportOptions::default());
             found.map(|(robot, _)| robot.model).map_err(|error| error.to_string())
         };
         let made = recipe.simulate(resolve)?;

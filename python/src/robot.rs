@@ -6,7 +6,7 @@ use nalgebra::Vector6;
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use truegrind::report::{format, robots as view};
-use truegrind::robots::foreign::{Choice, Kind as FileKind, read_any};
+use truegrind::robots::foreign::{ImportOptions, Kind as FileKind, import};
 use truegrind::{ArmFile, Condition, Model, Robot, robots};
 
 use crate::arm::{Acting, Stated, acting, forward, inverse};
@@ -38,18 +38,18 @@ pub(crate) fn robot(named: &Bound<'_, PyAny>) -> PyResult<Robot> {
     let path: PathBuf = named.extract().map_err(|_| {
         Refusal::argument("robot", named, "a Robot, a name of truegrind.robots(), or a robot file")
     })?;
-    Ok(from_name(&path, &Choice::default())?.0)
+    Ok(from_name(&path, &ImportOptions::default())?.0)
 }
 
 /// A robot by name of the catalogue, or by file, and what was understood of the file.
-pub(crate) fn from_name(path: &std::path::Path, choice: &Choice) -> PyResult<(Robot, Vec<String>)> {
+pub(crate) fn from_name(path: &std::path::Path, choice: &ImportOptions) -> PyResult<(Robot, Vec<String>)> {
     let text = path.display().to_string();
     if FileKind::of(&text).is_some() || text.contains('/') || path.is_file() {
         let content = files::read_text(path, Kind::Robot)?;
-        let found = read_any(&content, &text, choice).map_err(Refusal::from)?;
-        return Ok((found.robot, found.sentences));
+        let found = import(&content, &text, choice).map_err(Refusal::from)?;
+        return Ok((found.robot, found.summary));
     }
-    if *choice != Choice::default() {
+    if *choice != ImportOptions::default() {
         let expected = "the name alone: base, tip and ground_joint_3 are for files";
         return Err(Refusal::argument("name", text, expected).into());
     }
@@ -67,7 +67,7 @@ impl PyRobot {
     #[new]
     #[pyo3(signature = (name, *, base = None, tip = None, ground_joint_3 = false))]
     fn new(name: PathBuf, base: Option<String>, tip: Option<String>, ground_joint_3: bool) -> PyResult<Self> {
-        let (robot, understood) = from_name(&name, &Choice { base, tip, ground_joint_3 })?;
+        let (robot, understood) = from_name(&name, &ImportOptions { base, tip, ground_joint_3 })?;
         Ok(Self { robot, understood })
     }
 
@@ -117,7 +117,7 @@ impl PyRobot {
 
     /// The robot file (TOML) of this robot.
     fn to_toml(&self) -> PyResult<String> {
-        Ok(robots::text(&self.robot).map_err(|error| Refusal::new(Kind::Robot, error))?)
+        Ok(robots::to_toml(&self.robot).map_err(|error| Refusal::new(Kind::Robot, error))?)
     }
 
     /// What is allowed in its data sheet and will hurt, one sentence each.

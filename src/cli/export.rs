@@ -10,8 +10,8 @@ use truegrind::arm::model::Model;
 use truegrind::calibration::diagnosis::transfer::transfer;
 use truegrind::calibration::identification::register::starting_frames;
 use truegrind::calibration::identification::tolerance::Tolerance;
-use truegrind::robots::export::{Format, angles, left_out, write};
-use truegrind::robots::foreign::{Choice, read_any};
+use truegrind::robots::export::{Format, joint_matrix, lost_in_export, write};
+use truegrind::robots::foreign::{ImportOptions, import};
 
 use super::exit_status::ExitStatus;
 use super::files::Batch;
@@ -66,7 +66,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     };
     let bare = Model { effects: Vec::new(), ..arm.model.clone() };
     let mut notes = vec![format!("{} as estimated from {}", arm.robot, arm.provenance.file)];
-    notes.extend(left_out(&arm.model, format));
+    notes.extend(lost_in_export(&arm.model, format));
     notes.push(match &arguments.data {
         Some(data) => judged(data, arm, &read_back(&bare, &arm.robot, format)?)?,
         None => known(arm),
@@ -85,7 +85,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
 
 /// Whether all that moves the arm is in its links.
 fn is_of_links_alone(arm: &Model) -> bool {
-    arm.effects.iter().all(Effect::is_still)
+    arm.effects.iter().all(Effect::is_zero)
 }
 
 /// The arm as whoever reads the file has it.
@@ -96,9 +96,9 @@ fn read_back(bare: &Model, robot: &str, format: Format) -> anyhow::Result<Model>
         Format::UrYaml => "exported.yaml",
     };
     let text = write(bare, robot, format, &[]);
-    let mut back = read_any(&text, name, &Choice::default())?.robot.model;
+    let mut back = import(&text, name, &ImportOptions::default())?.robot.model;
     // Its user works out the file's angles from the controller's, as the notes say.
-    back.joint_map *= angles(bare, format);
+    back.joint_map *= joint_matrix(bare, format);
     Ok(back)
 }
 

@@ -6,7 +6,7 @@ use anyhow::{Context, anyhow, bail};
 use sha2::{Digest, Sha256};
 use truegrind::arm::estimated::{Estimated, Judgement};
 use truegrind::arm::model::Model;
-use truegrind::robots::foreign::{Choice, Kind, read_any};
+use truegrind::robots::foreign::{ImportOptions, Kind, import};
 use truegrind::robots::{self, Robot};
 
 use super::files;
@@ -16,7 +16,7 @@ use super::terminal::print_message;
 pub(super) fn robot(name: &str) -> anyhow::Result<Robot> {
     let path = Path::new(name);
     if Kind::of(name).is_some() || name.contains('/') || path.is_file() {
-        Ok(read_any(&files::read_text(path)?, name, &Choice::default())?.robot)
+        Ok(import(&files::read_text(path)?, name, &ImportOptions::default())?.robot)
     } else {
         Ok(robots::load(name)?)
     }
@@ -51,7 +51,7 @@ pub(super) fn model(argument: &str) -> anyhow::Result<NamedModel> {
             e.to_string().trim_end()
         )
     })?;
-    robots::agrees(&arm.robot, &arm.nominal).map_err(|e| anyhow!("{argument}: {e}"))?;
+    robots::check_catalogue_name(&arm.robot, &arm.nominal).map_err(|e| anyhow!("{argument}: {e}"))?;
     if arm.verdict.status == Judgement::Fail {
         bail!(
             "{argument}: the fit behind this model failed ({}); it is not used",
@@ -110,7 +110,7 @@ pub(super) fn nominal(model: &NamedModel, robot_name: Option<&str>) -> anyhow::R
                         arm.robot
                     );
                 }
-                robots::same(&arm.nominal, &robot.model)
+                robots::check_same_links(&arm.nominal, &robot.model)
                     .map_err(|e| anyhow!("--robot {stated}, model {name}: {e}"))?;
             }
             Ok((arm.robot.clone(), arm.nominal.clone()))

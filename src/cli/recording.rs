@@ -21,7 +21,7 @@ use truegrind::planning::poses::drive::{checked, reading};
 use truegrind::planning::poses::schedule::FIRST_ROW;
 use truegrind::planning::poses::{Plan, Wanted};
 use truegrind::report::document::{Block, Document};
-use truegrind::robots::foreign::{Choice, Kind, Visual, read_any};
+use truegrind::robots::foreign::{ImportOptions, Kind, Visual, import};
 use truegrind::surfaces::{Mesh, SurfaceFile};
 
 use super::files;
@@ -255,7 +255,7 @@ const MOST_TRIANGLES: usize = 150_000;
 pub(super) fn meshes(robot: Option<&str>) -> anyhow::Result<Vec<LinkMesh>> {
     let Some(name) = robot.filter(|name| Kind::of(name) == Some(Kind::Urdf)) else { return Ok(Vec::new()) };
     let path = Path::new(name);
-    let visuals = read_any(&files::read_text(path)?, name, &Choice::default())?.visuals;
+    let visuals = import(&files::read_text(path)?, name, &ImportOptions::default())?.visuals;
     let (mut out, mut missing, mut triangles) = (Vec::new(), Vec::new(), 0);
     for Visual { frame, pose, file, unit_mm } in visuals {
         let stl = file.to_ascii_lowercase().ends_with(".stl");

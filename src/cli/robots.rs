@@ -7,7 +7,7 @@ use clap::Args;
 use truegrind::report::format;
 use truegrind::report::robots as view;
 use truegrind::robots;
-use truegrind::robots::foreign::{Choice, read_any};
+use truegrind::robots::foreign::{ImportOptions, import};
 
 use super::exit_status::ExitStatus;
 use super::files::{self, Batch, is_stdout};
@@ -69,16 +69,16 @@ fn check(arguments: &Arguments, path: &Path) -> anyhow::Result<ExitStatus> {
     {
         bail!("{}: a robot file is written; expected a name that ends in .toml", output.display());
     }
-    let choice = Choice {
+    let choice = ImportOptions {
         base: arguments.base.clone(),
         tip: arguments.tip.clone(),
         ground_joint_3: arguments.ground_joint_3,
     };
     let name = path.display().to_string();
-    let found = read_any(&files::read_text(path)?, &name, &choice)?;
+    let found = import(&files::read_text(path)?, &name, &choice)?;
     let mut batch = Batch::sparing([path]);
     if let Some(output) = &arguments.output {
-        let text = robots::text(&found.robot).map_err(|error| anyhow!("{name}: {error}"))?;
+        let text = robots::to_toml(&found.robot).map_err(|error| anyhow!("{name}: {error}"))?;
         batch.add(output, text);
     }
     if let Some(html) = &arguments.html {

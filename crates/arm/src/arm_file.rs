@@ -3,7 +3,7 @@
 use nalgebra::{Matrix6, Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::bounds::{self, LENGTH_MM, SPEED_DEG_S, TWIST_DEG, Unfit, shown};
+use super::bounds::{self, InvalidValue, LENGTH_MM, SPEED_DEG_S, TWIST_DEG, display_number};
 use super::effect::Effect;
 use super::effect::bounds::effects;
 use super::link::{Link, LinkModel};
@@ -100,14 +100,14 @@ impl ArmFile {
     /// let mut file = ArmFile::from(&arm);
     /// assert!((file.model()?.links[1].a_mm - arm.links[1].a_mm).abs() < 1e-12);
     /// file.link[1].a_mm = f64::NAN;
-    /// let refused = file.model().map_err(|unfit| unfit.to_string());
+    /// let refused = file.model().map_err(|invalid| invalid.to_string());
     /// assert_eq!(refused, Err("link 2 a_mm: found NaN, expected a finite length in mm, within ±10,000".into()));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     ///
     /// # Errors
-    /// [`Unfit`], which names the key, where a list has the wrong length or a number cannot be used.
-    pub fn model(&self) -> Result<Model, Unfit> {
+    /// [`InvalidValue`], which names the key, where a list has the wrong length or a number cannot be used.
+    pub fn model(&self) -> Result<Model, InvalidValue> {
         self.check()?;
         let count = self.link.len();
         let links: Vec<Link> = self
@@ -123,12 +123,12 @@ impl ArmFile {
             })
             .collect();
         let links: [Link; 6] =
-            links.try_into().map_err(|_| Unfit::new("`link`", format!("{count} links"), "6"))?;
+            links.try_into().map_err(|_| InvalidValue::new("`link`", format!("{count} links"), "6"))?;
         let bodies = match &self.body {
             None => None,
             Some(list) => Some(
                 <[Body; 6]>::try_from(list.clone())
-                    .map_err(|_| Unfit::new("`body`", format!("{} bodies", list.len()), "6"))?,
+                    .map_err(|_| InvalidValue::new("`body`", format!("{} bodies", list.len()), "6"))?,
             ),
         };
         let [w, i, j, k] = self.flange_wxyz;
@@ -153,7 +153,7 @@ impl ArmFile {
     }
 
     /// Refuses numbers that no arm has; whatever passes is finite.
-    fn check(&self) -> Result<(), Unfit> {
+    fn check(&self) -> Result<(), InvalidValue> {
         bounds::joint_map(&self.joint_map)?;
         bounds::joint_ranges(&self.min_deg, &self.max_deg)?;
         SPEED_DEG_S.check_all("speed_deg_s", self.speed_deg_s.iter().flatten())?;
@@ -161,7 +161,11 @@ impl ArmFile {
         for (key, values) in [("gravity", &self.gravity[..]), ("flange_wxyz", &self.flange_wxyz[..])] {
             let length = values.iter().map(|v| v * v).sum::<f64>().sqrt();
             if !((length - 1.0).abs() <= 1e-3) {
-                return Err(Unfit::new(key, format!("a length of {}", shown(length)), "a length of 1"));
+                return Err(InvalidValue::new(
+                    key,
+                    format!("a length of {}", display_number(length)),
+                    "a length of 1",
+                ));
             }
         }
         for (i, link) in self.link.iter().enumerate() {

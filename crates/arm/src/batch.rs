@@ -5,7 +5,7 @@
 //! Shapes: one column per joint in, twelve columns out (position and the three axes of the flange).
 //! Checked against: [`PreparedModel::forward`], row by row.
 
-use super::chain::{End, end};
+use super::chain::{FrameColumns, last_frame};
 use super::model::PreparedModel;
 use crate::joints::Joints;
 use truegrind_math::lanes::{AnyWidth, Real, SinCos, aligned, sin_cos, vectorised};
@@ -84,7 +84,7 @@ impl PreparedModel<'_> {
         let rows = joints.len();
         out.resize(rows);
         let turn = self.model.flange.rotation.to_rotation_matrix();
-        let flange = End {
+        let flange = FrameColumns {
             axes: std::array::from_fn(|j| std::array::from_fn(|i| turn[(i, j)])),
             origin: self.model.flange.translation.vector.into(),
         };
@@ -120,7 +120,7 @@ impl PreparedModel<'_> {
 /// [`PreparedModel::forward_columns`], its buffers of the right size; no flange where it is the last frame.
 struct Forward<'a> {
     arm: &'a PreparedModel<'a>,
-    flange: Option<End<f64>>,
+    flange: Option<FrameColumns<f64>>,
     joints: &'a JointColumns,
     out: &'a mut PoseColumns,
 }
@@ -145,14 +145,14 @@ impl AnyWidth for Forward<'_> {
             if following < rows {
                 next = angles(like, joints, following);
             }
-            let rotation = arm.affected(&arm.mapped(&angle));
+            let rotation = arm.apply_effects(&arm.apply_joint_map(&angle));
             let (mut sin, mut cos) = (rotation, rotation);
             for j in 0..6 {
                 (sin[j], cos[j]) = sin_cos(rotation[j]);
             }
-            let mut end = end(&arm.tables, &sin, &cos);
+            let mut end = last_frame(&arm.tables, &sin, &cos);
             if let Some(flange) = &flange {
-                end = end.then(flange);
+                end = end.compose(flange);
             }
             for k in 0..3 {
                 end.origin[k].store(&mut out.position_mm[k], from);

@@ -13,7 +13,7 @@ use truegrind_math::spectral;
 /// A number that no arm has.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{key}: found {found}, expected {expected}")]
-pub struct Unfit {
+pub struct InvalidValue {
     /// Key, as a path; links, bodies and lists count from 1.
     pub key: String,
     /// What is there.
@@ -22,7 +22,7 @@ pub struct Unfit {
     pub expected: &'static str,
 }
 
-impl Unfit {
+impl InvalidValue {
     /// A fault that is no number out of its range.
     pub fn new(key: impl Into<String>, found: impl Into<String>, expected: &'static str) -> Self {
         Self { key: key.into(), found: found.into(), expected }
@@ -48,32 +48,36 @@ impl Bound {
     }
 
     /// Whether a number lies in the range; NaN lies in none.
-    pub fn holds(&self, value: f64) -> bool {
+    pub fn contains(&self, value: f64) -> bool {
         self.range.contains(&value)
     }
 
     /// Refuses a number outside the range under its key.
     ///
     /// # Errors
-    /// [`Unfit`].
-    pub fn check(&self, key: impl FnOnce() -> String, value: f64) -> Result<(), Unfit> {
-        if self.holds(value) {
+    /// [`InvalidValue`].
+    pub fn check(&self, key: impl FnOnce() -> String, value: f64) -> Result<(), InvalidValue> {
+        if self.contains(value) {
             return Ok(());
         }
-        Err(Unfit { key: key(), found: shown(value), expected: self.expected })
+        Err(InvalidValue { key: key(), found: display_number(value), expected: self.expected })
     }
 
     /// Refuses the first of several numbers under one key that is outside the range.
     ///
     /// # Errors
-    /// [`Unfit`].
-    pub fn check_all<'v>(&self, key: &str, values: impl IntoIterator<Item = &'v f64>) -> Result<(), Unfit> {
+    /// [`InvalidValue`].
+    pub fn check_all<'v>(
+        &self,
+        key: &str,
+        values: impl IntoIterator<Item = &'v f64>,
+    ) -> Result<(), InvalidValue> {
         values.into_iter().try_for_each(|value| self.check(|| key.to_owned(), *value))
     }
 }
 
 /// A number as a message shows it: three hundred digits say less than an exponent.
-pub fn shown(value: f64) -> String {
+pub fn display_number(value: f64) -> String {
     let size = value.abs();
     if size != 0.0 && !(1e-6..1e16).contains(&size) { format!("{value:e}") } else { value.to_string() }
 }
@@ -81,7 +85,7 @@ pub fn shown(value: f64) -> String {
 /// Lengths of links, frames and levers (mm).
 pub const LENGTH_MM: Bound = Bound::new(-1e4, 1e4, "a finite length in mm, within ±10,000");
 /// Positions in a cell (mm).
-pub const PLACE_MM: Bound = Bound::new(-1e6, 1e6, "a finite position in mm, within ±1,000,000");
+pub const POSITION_MM: Bound = Bound::new(-1e6, 1e6, "a finite position in mm, within ±1,000,000");
 /// Twists and offsets of links (°).
 pub const TWIST_DEG: Bound = Bound::new(-720.0, 720.0, "a finite angle in degrees, within ±720");
 /// Joint angles (°).
@@ -93,17 +97,17 @@ pub const MASS_KG: Bound = Bound::new(0.0, 1e4, "a mass in kg, 0 to 10,000");
 /// Components of a direction.
 pub const DIRECTION: Bound = Bound::new(-1e6, 1e6, "a finite component of a direction");
 /// Entries of a joint map.
-const TURNS: Bound = Bound::new(-10.0, 10.0, "turns of a link for a turn of a joint, within ±10");
+const COUPLING: Bound = Bound::new(-10.0, 10.0, "turns of a link for a turn of a joint, within ±10");
 
 /// Six joint ranges (°).
 ///
 /// # Errors
 /// A number that is no angle, or a range that is empty.
-pub fn joint_ranges(min_deg: &[f64; 6], max_deg: &[f64; 6]) -> Result<(), Unfit> {
+pub fn joint_ranges(min_deg: &[f64; 6], max_deg: &[f64; 6]) -> Result<(), InvalidValue> {
     JOINT_DEG.check_all("min_deg", min_deg)?;
     JOINT_DEG.check_all("max_deg", max_deg)?;
     match (0..6).find(|&i| min_deg[i] >= max_deg[i]) {
-        Some(i) => Err(Unfit::new(
+        Some(i) => Err(InvalidValue::new(
             format!("min_deg and max_deg of joint {}", i + 1),
             format!("{} and {}", min_deg[i], max_deg[i]),
             "min below max",
@@ -116,10 +120,10 @@ pub fn joint_ranges(min_deg: &[f64; 6], max_deg: &[f64; 6]) -> Result<(), Unfit>
 ///
 /// # Errors
 /// Numbers that are no turns, or a map that is far from a matrix of determinant ±1 with a good inverse.
-pub fn joint_map(rows: &[[f64; 6]; 6]) -> Result<(), Unfit> {
+pub fn joint_map(rows: &[[f64; 6]; 6]) -> Result<(), InvalidValue> {
     const VOLUME: RangeInclusive<f64> = 0.5..=2.0;
     const CONDITION: f64 = 100.0;
-    TURNS.check_all("joint_map", rows.as_flattened())?;
+    COUPLING.check_all("joint_map", rows.as_flattened())?;
     let map = Matrix6::from_fn(|row, column| rows[row][column]);
     let volume = map.determinant().abs();
     let values = spectral::singular_values(&map);
@@ -127,9 +131,13 @@ pub fn joint_map(rows: &[[f64; 6]; 6]) -> Result<(), Unfit> {
     if VOLUME.contains(&volume) && condition <= CONDITION {
         return Ok(());
     }
-    Err(Unfit::new(
+    Err(InvalidValue::new(
         "joint_map",
-        format!("a matrix of determinant ±{} and condition {}", shown(volume), shown(condition)),
+        format!(
+            "a matrix of determinant ±{} and condition {}",
+            display_number(volume),
+            display_number(condition)
+        ),
         "signs and couplings of the joints: a determinant near ±1 and a condition up to 100",
     ))
 }
@@ -137,8 +145,8 @@ pub fn joint_map(rows: &[[f64; 6]; 6]) -> Result<(), Unfit> {
 /// Mass and centre of a link.
 ///
 /// # Errors
-/// [`Unfit`].
-pub fn bodies(bodies: &[Body]) -> Result<(), Unfit> {
+/// [`InvalidValue`].
+pub fn bodies(bodies: &[Body]) -> Result<(), InvalidValue> {
     for (i, body) in bodies.iter().enumerate() {
         MASS_KG.check(|| format!("body {} mass_kg", i + 1), body.mass_kg)?;
         LENGTH_MM.check_all(&format!("body {} centre_mm", i + 1), &body.centre_mm)?;

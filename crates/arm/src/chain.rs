@@ -91,7 +91,7 @@ pub fn chain<R: Real>(links: &[LinkTable; 6], sin: &[R; 6], cos: &[R; 6]) -> Cha
 /// Like [`chain`], with all lengths times `scale`, which may differ from row to row (links that grow).
 #[cfg_attr(not(debug_assertions), inline(always))]
 pub fn scaled_chain<R: Real>(links: &[LinkTable; 6], sin: &[R; 6], cos: &[R; 6], scale: R) -> Chain<R> {
-    let mut end = End::base(scale);
+    let mut end = FrameColumns::identity(scale);
     let base = end;
     // One after the other and no loop: what nobody asks for is then never written to memory.
     let (lateral_1, end_1) = (end.advance(&links[0], sin[0], cos[0], scale), end);
@@ -112,9 +112,9 @@ pub fn scaled_chain<R: Real>(links: &[LinkTable; 6], sin: &[R; 6], cos: &[R; 6],
 
 /// The last frame alone, with the bits of [`chain`].
 #[cfg_attr(not(debug_assertions), inline(always))]
-pub fn end<R: Real>(links: &[LinkTable; 6], sin: &[R; 6], cos: &[R; 6]) -> End<R> {
+pub fn last_frame<R: Real>(links: &[LinkTable; 6], sin: &[R; 6], cos: &[R; 6]) -> FrameColumns<R> {
     let one = sin[0].splat(1.0);
-    let mut end = End::base(one);
+    let mut end = FrameColumns::identity(one);
     for (i, link) in links.iter().enumerate() {
         end.advance(link, sin[i], cos[i], one);
     }
@@ -123,17 +123,17 @@ pub fn end<R: Real>(links: &[LinkTable; 6], sin: &[R; 6], cos: &[R; 6]) -> End<R
 
 /// One frame in the base.
 #[derive(Debug, Clone, Copy)]
-pub struct End<R> {
+pub struct FrameColumns<R> {
     /// x, y and z axis.
     pub axes: [[R; 3]; 3],
     /// Origin (mm).
     pub origin: [R; 3],
 }
 
-impl<R: Real> End<R> {
+impl<R: Real> FrameColumns<R> {
     /// The base itself.
     #[inline(always)]
-    fn base(like: R) -> Self {
+    fn identity(like: R) -> Self {
         let (zero, one) = (like.splat(0.0), like.splat(1.0));
         Self { axes: [[one, zero, zero], [zero, one, zero], [zero, zero, one]], origin: [zero; 3] }
     }
@@ -168,18 +168,18 @@ impl<R: Real> End<R> {
 
     /// A frame that is fixed to this one, in the base.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub fn then(&self, fixed: &End<f64>) -> Self {
-        let mut origin = self.carried(&fixed.origin);
+    pub fn compose(&self, fixed: &FrameColumns<f64>) -> Self {
+        let mut origin = self.to_base(&fixed.origin);
         for (carried, base) in origin.iter_mut().zip(self.origin) {
             *carried += base;
         }
         let [x, y, z] = &fixed.axes;
-        Self { axes: [self.carried(x), self.carried(y), self.carried(z)], origin }
+        Self { axes: [self.to_base(x), self.to_base(y), self.to_base(z)], origin }
     }
 
     /// A direction of this frame, in the base.
     #[inline(always)]
-    fn carried(&self, v: &[f64; 3]) -> [R; 3] {
+    fn to_base(&self, v: &[f64; 3]) -> [R; 3] {
         let mut out = self.origin;
         let v = splats(out[0], v);
         for (k, out) in out.iter_mut().enumerate() {

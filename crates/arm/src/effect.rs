@@ -5,14 +5,14 @@
 //! here.
 
 pub mod compliance;
-pub mod load;
+pub mod lumped_compliance;
 pub mod harmonic;
-pub mod map;
-pub mod ratio;
+pub mod error_map;
+pub mod gear_ratio;
 pub mod coupling;
 pub mod backlash;
 pub mod thermal;
-pub mod smooth;
+pub mod smooth_correction;
 pub mod bounds;
 mod parameter;
 mod statics;
@@ -23,11 +23,11 @@ use serde::{Deserialize, Serialize};
 use self::backlash::Backlash;
 use self::compliance::Compliance;
 use self::coupling::Coupling;
+use self::error_map::ErrorMap;
+use self::gear_ratio::GearRatio;
 use self::harmonic::Harmonic;
-use self::load::GravityLoad;
-use self::map::JointMap;
-use self::ratio::Ratio;
-use self::smooth::Smooth;
+use self::lumped_compliance::LumpedCompliance;
+use self::smooth_correction::SmoothCorrection;
 use self::thermal::Thermal;
 use crate::condition::Condition;
 use crate::joints::Joints;
@@ -44,16 +44,16 @@ pub enum Effect {
     JointCompliance(Compliance),
     /// The same where masses or gravity's direction are unknown.
     #[serde(rename = "joint-compliance-lumped")]
-    LumpedCompliance(GravityLoad),
+    LumpedCompliance(LumpedCompliance),
     /// An eccentric gear: once or twice per joint turn.
     GearEccentricity(Harmonic),
     /// A line of the reducer at a higher order.
     GearTransmission(Harmonic),
     /// An error map fixed to a joint.
     #[serde(rename = "gear-transmission-map")]
-    GearMap(JointMap),
+    GearMap(ErrorMap),
     /// A gear whose ratio is not the nominal one.
-    GearRatio(Ratio),
+    GearRatio(GearRatio),
     /// A joint that moves along with another.
     JointCoupling(Coupling),
     /// Play that depends on the side from which the joint came.
@@ -61,7 +61,7 @@ pub enum Effect {
     /// Links that grow with time or temperature.
     ThermalDrift(Thermal),
     /// What a network learned of errors without a physical name.
-    SmoothCorrection(Smooth),
+    SmoothCorrection(SmoothCorrection),
 }
 
 macro_rules! each {
@@ -106,7 +106,7 @@ impl Effect {
     }
 
     /// Whether all its parameters are 0: it moves nothing, and stands there for what it may be.
-    pub fn is_still(&self) -> bool {
+    pub fn is_zero(&self) -> bool {
         self.parameters().iter().all(|parameter| parameter.value == 0.0)
     }
 
@@ -121,11 +121,11 @@ impl Effect {
     }
 
     /// What the effect adds to the joint rotations (rad).
-    pub fn rotation(&self, statics: &Statics, u: &Joints, condition: &Condition) -> Joints {
-        each!(self, e => e.rotation(statics, u, condition))
+    pub fn offset(&self, statics: &Statics, u: &Joints, condition: &Condition) -> Joints {
+        each!(self, e => e.offset(statics, u, condition))
     }
 
-    /// Adds [`Effect::rotation`] for one row or several in lanes; `torque` from [`Statics::loads`].
+    /// Adds [`Effect::offset`] for one row or several in lanes; `torque` from [`Statics::torques`].
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub fn add_offset<R: SinCos>(
         &self,
@@ -170,9 +170,9 @@ impl Effect {
         matches!(self, Effect::JointCompliance(_))
     }
 
-    /// Derivative of [`Effect::rotation`] with respect to u.
-    pub fn slope(&self, statics: &Statics, u: &Joints, condition: &Condition) -> Matrix6<f64> {
-        each!(self, e => e.slope(statics, u, condition))
+    /// Derivative of [`Effect::offset`] with respect to u.
+    pub fn jacobian(&self, statics: &Statics, u: &Joints, condition: &Condition) -> Matrix6<f64> {
+        each!(self, e => e.jacobian(statics, u, condition))
     }
 
     /// Relative growth of all lengths.

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use super::chain::{Chain, cross, minus, scaled};
 use super::condition::Condition;
-use super::jacobian::{Ends, effect_twist, parameter_jacobian};
+use super::jacobian::{BaseAndTool, effect_twist, parameter_jacobian};
 use super::model::{Model, PreparedModel};
 use super::parameter::{LinkCoordinate, Parameter};
 use super::region::Region;
@@ -137,7 +137,7 @@ pub struct Estimated {
 
 /// A frame that was taught with the arm, so that it moves with the arm's parameters.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Carried {
+pub struct RegisteredFrame {
     /// Its origin in the base (mm).
     pub origin_mm: Vector3<f64>,
     /// Its twist in the base per unit of each parameter of the covariance: velocity of the origin, angular velocity.
@@ -146,13 +146,13 @@ pub struct Carried {
 
 /// A point that rides on the flange, whose predicted σ is asked for.
 #[derive(Debug, Clone, Copy)]
-pub struct RidingPoint<'a> {
+pub struct FlangePoint<'a> {
     /// Controller angles (rad).
     pub joints: Joints,
     /// The point on the flange: its translation counts.
     pub flange_from_tool: Pose,
     /// The frame that the arm itself placed, against which the point is judged.
-    pub carried: Option<&'a Carried>,
+    pub carried: Option<&'a RegisteredFrame>,
 }
 
 /// Eight points' numbers side by side.
@@ -289,14 +289,14 @@ impl Estimated {
         arm: &PreparedModel<'_>,
         q: &Joints,
         flange_from_tool: &Pose,
-        carried: Option<&Carried>,
+        carried: Option<&RegisteredFrame>,
     ) -> f64 {
-        let point = RidingPoint { joints: *q, flange_from_tool: *flange_from_tool, carried };
+        let point = FlangePoint { joints: *q, flange_from_tool: *flange_from_tool, carried };
         self.position_sigmas_mm(arm, &[point])[0]
     }
 
     /// [`Estimated::position_sigma_mm`] of many points, eight in lanes.
-    pub fn position_sigmas_mm(&self, arm: &PreparedModel<'_>, points: &[RidingPoint<'_>]) -> Vec<f64> {
+    pub fn position_sigmas_mm(&self, arm: &PreparedModel<'_>, points: &[FlangePoint<'_>]) -> Vec<f64> {
         let growth: f64 = arm.model.effects.iter().map(|e| e.growth(&arm.condition)).sum();
         let mut velocities = vec![[[0.0; WIDTH]; 3]; self.order.len()];
         let mut out = Vec::with_capacity(points.len());
@@ -349,7 +349,8 @@ impl Estimated {
         q: &Joints,
         flange_from_tool: &Pose,
     ) -> DMatrix<f64> {
-        let ends = Ends { world_from_base: [0.0; 6], flange_from_tool: vector_from_pose(flange_from_tool) };
+        let ends =
+            BaseAndTool { world_from_base: [0.0; 6], flange_from_tool: vector_from_pose(flange_from_tool) };
         let full = parameter_jacobian(&ends, arm, q, &self.order);
         DMatrix::from_fn(3, self.order.len(), |i, j| full[(i, j)])
     }

@@ -11,7 +11,7 @@
 pub mod solution;
 pub mod configuration;
 pub mod newton;
-pub mod effort;
+pub mod budget;
 mod axes;
 mod seed;
 mod spherical;
@@ -29,7 +29,7 @@ use self::configuration::{BRANCH_TOLERANCE, Configuration};
 use self::kernel::{Kernel, Solved};
 use self::newton::{Goal, Outcome};
 use self::structure::Structure;
-use super::chain::End;
+use super::chain::FrameColumns;
 use super::condition::Condition;
 use super::link::Link;
 use super::model::{Model, PreparedModel};
@@ -44,21 +44,21 @@ pub use self::structure::Branch;
 const LIMIT_SLACK_RAD: f64 = 1e-9;
 
 /// A solution farther from its seed than this is found by way of all branches (rad).
-const FARTHEST_RAD: f64 = 0.9 * PI;
+const MAX_SEED_DISTANCE_RAD: f64 = 0.9 * PI;
 /// The same for an arm whose branches cannot be told apart (rad).
-const FARTHEST_WITHOUT_BRANCHES_RAD: f64 = 0.5;
+const MAX_SEED_DISTANCE_NO_BRANCHES_RAD: f64 = 0.5;
 
 /// The inverse map of one estimated arm under one condition. Prepare once, use for many targets.
 #[derive(Debug, Clone)]
 pub struct Inverse<'a> {
     arm: PreparedModel<'a>,
     map_inverse: Option<Matrix6<f64>>,
-    flange_inverse: End<f64>,
+    flange_inverse: FrameColumns<f64>,
     structure: Structure,
     kernel: Kernel,
     /// How far a point of the estimated arm and the same one of the nominal arm may be from each other, all joints turned
     /// alike, at the most (mm).
-    apart_mm: f64,
+    model_distance_mm: f64,
 }
 
 impl<'a> Inverse<'a> {
@@ -73,7 +73,7 @@ impl<'a> Inverse<'a> {
             flange_inverse: {
                 let inverse = estimated.flange.inverse();
                 let turn = inverse.rotation.to_rotation_matrix();
-                End {
+                FrameColumns {
                     axes: std::array::from_fn(|j| std::array::from_fn(|i| turn[(i, j)])),
                     origin: inverse.translation.vector.into(),
                 }
@@ -83,7 +83,7 @@ impl<'a> Inverse<'a> {
                 flange_mm: estimated.flange.translation.vector.into(),
                 length_mm: half.max(1.0),
             },
-            apart_mm: apart_mm(estimated, condition, nominal, structure.extent_mm()),
+            model_distance_mm: model_distance_mm(estimated, condition, nominal, structure.extent_mm()),
             structure,
         }
     }
@@ -168,18 +168,18 @@ impl<'a> Inverse<'a> {
         if !seed.iter().all(|q| q.is_finite()) {
             return Err(InverseError::NotFinite);
         }
-        if effort::refuses_step() {
+        if budget::refuses_near_solve() {
             return Err(InverseError::Abandoned);
         }
         let solved = self.solve_fast(target, seed);
         match self.accepted(&solved, seed) {
             Some(solution) => self.check_limits(&solution.joints).map(|()| solution),
-            None => self.solve_carefully(&goal, seed, &solved.margins[0]),
+            None => self.search_near(&goal, seed, &solved.margins[0]),
         }
     }
 
     /// [`Inverse::solve_near`] where no search of all branches is needed for the answer.
-    fn solve_easily(&self, target: &Pose, seed: &Joints) -> Option<Result<Solution, InverseError>> {
+    fn solve_without_search(&self, target: &Pose, seed: &Joints) -> Option<Result<Solution, InverseError>> {
         if self.goal(target).is_err() || !seed.iter().all(|q| q.is_finite()) {
             return Some(Err(InverseError::NotFinite));
         }
@@ -230,17 +230,17 @@ impl<'a> Inverse<'a> {
         if let Some(near) = near
             && let Ok(solution) = self.solve_near(target, near)
             && let margins = self.margins(&solution.joints)
-            && configuration.fits(&solution.joints, &margins)
-            && configuration.states_branch(&margins)
+            && configuration.matches(&solution.joints, &margins)
+            && configuration.matches_branch_exactly(&margins)
         {
             return Ok(solution);
         }
-        self.solve_in(&goal, configuration, near)
+        self.search_configured(&goal, configuration, near)
     }
 
     /// All solutions within the limits: every branch, and every turn of joints with more than one.
     pub fn all(&self, target: &Pose) -> Vec<Solution> {
-        self.goal(target).map(|goal| self.every_turn(&goal)).unwrap_or_default()
+        self.goal(target).map(|goal| self.all_within_limits(&goal)).unwrap_or_default()
     }
 
     fn goal(&self, target: &Pose) -> Result<Goal, InverseError> {
@@ -255,13 +255,13 @@ impl<'a> Inverse<'a> {
 
     /// The solution of the kernel, if it counts.
     fn accepted(&self, solved: &Solved<f64>, seed: &Joints) -> Option<Solution> {
-        let joints = self.unmapped(&solved.mapped);
-        self.counts(solved, &joints, seed).then_some(solved.solution(&joints))
+        let joints = self.controller_angles(&solved.mapped);
+        self.is_accepted(solved, &joints, seed).then_some(solved.solution(&joints))
     }
 
     /// Controller angles for mapped ones.
     #[inline(always)]
-    fn unmapped(&self, mapped: &[f64; 6]) -> Joints {
+    fn controller_angles(&self, mapped: &[f64; 6]) -> Joints {
         match &self.map_inverse {
             Some(inverse) if !self.arm.map_is_identity() => inverse * Joints::from(*mapped),
             _ => Joints::from(*mapped),
@@ -270,13 +270,16 @@ impl<'a> Inverse<'a> {
 
     /// Whether a solution of the kernel counts: arrived, not far from the seed, on its branch.
     #[inline(always)]
-    fn counts(&self, solved: &Solved<f64>, joints: &Joints, seed: &Joints) -> bool {
-        let farthest =
-            if self.structure.has_branches() { FARTHEST_RAD } else { FARTHEST_WITHOUT_BRANCHES_RAD };
+    fn is_accepted(&self, solved: &Solved<f64>, joints: &Joints, seed: &Joints) -> bool {
+        let farthest = if self.structure.has_branches() {
+            MAX_SEED_DISTANCE_RAD
+        } else {
+            MAX_SEED_DISTANCE_NO_BRANCHES_RAD
+        };
         self.map_inverse.is_some()
             && solved.converged == 1.0
             && solved.singularity > 1e-9
-            && joints::farthest_apart(joints, seed) < farthest
+            && joints::max_joint_difference(joints, seed) < farthest
             && same_branch(&solved.margins[0], &solved.margins[1])
     }
 
@@ -315,11 +318,11 @@ impl<'a> Inverse<'a> {
     }
 }
 
-/// See [`Inverse::apart_mm`]. Effects turn joints and do no more, but for the growth of the links. A link that is longer
+/// See [`Inverse::model_distance_mm`]. Effects turn joints and do no more, but for the growth of the links. A link that is longer
 /// moves what follows by as much; one that is turned moves it, and turns the last frame under a target, by no more than the
 /// angle times the length of the whole arm.
-fn apart_mm(estimated: &Model, condition: &Condition, nominal: &Model, extent_mm: f64) -> f64 {
-    let links = estimated.links_under(condition);
+fn model_distance_mm(estimated: &Model, condition: &Condition, nominal: &Model, extent_mm: f64) -> f64 {
+    let links = estimated.links_at(condition);
     let of = |(a, b): (&Link, &Link)| {
         let turned = (a.alpha_rad - b.alpha_rad).abs() + (a.beta_rad - b.beta_rad).abs();
         (a.a_mm - b.a_mm).abs() + (a.d_mm - b.d_mm).abs() + 2.0 * extent_mm * turned

@@ -52,19 +52,19 @@ pub fn joint_jacobian(
     let rotations = Matrix6::from_columns(&std::array::from_fn::<_, 6, _>(|j| {
         link_twist(frames, j, LinkCoordinate::Theta, point)
     }));
-    rotations * arm.rotation_slopes(q)
+    rotations * arm.rotation_jacobian(q)
 }
 
 /// An arm between a base frame and a tool frame, both given by translation and rotation vector.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Ends {
+pub struct BaseAndTool {
     /// The arm's base in the world: x, y, z (mm), rotation vector (rad).
     pub world_from_base: [f64; 6],
     /// The tool on the flange: x, y, z (mm), rotation vector (rad).
     pub flange_from_tool: [f64; 6],
 }
 
-impl Ends {
+impl BaseAndTool {
     /// Pose of the tool in the world.
     pub fn forward(&self, arm: &PreparedModel<'_>, q: &Joints) -> Pose {
         pose_from_vector(&self.world_from_base) * arm.forward(q) * pose_from_vector(&self.flange_from_tool)
@@ -74,7 +74,7 @@ impl Ends {
 /// Twists of the tool in the world, one column for each of `parameters` (base, links, effects, tool).
 /// Parameters of a cable move no pose: their columns are zero.
 pub fn parameter_jacobian(
-    ends: &Ends,
+    ends: &BaseAndTool,
     arm: &PreparedModel<'_>,
     q: &Joints,
     parameters: &[Parameter],

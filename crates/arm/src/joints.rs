@@ -36,7 +36,7 @@ impl Limits {
 
 /// The largest difference between joints of the same number (rad); one that is not a number counts as the largest of all.
 #[inline(always)]
-pub(crate) fn farthest_apart(a: &Joints, b: &Joints) -> f64 {
+pub(crate) fn max_joint_difference(a: &Joints, b: &Joints) -> f64 {
     let mut out = 0.0;
     for joint in 0..6 {
         let apart = (a[joint] - b[joint]).abs();

@@ -72,10 +72,10 @@ impl Model {
         PreparedModel {
             model: self,
             condition: *condition,
-            tables: chain::tables(&self.links_under(condition)),
+            tables: chain::tables(&self.links_at(condition)),
             statics: (!self.effects.is_empty()).then(|| self.statics()),
             loaded: self.effects.iter().any(Effect::needs_torque),
-            straight: self.joint_map == Matrix6::identity(),
+            has_identity_map: self.joint_map == Matrix6::identity(),
         }
     }
 
@@ -86,7 +86,7 @@ impl Model {
     }
 
     /// The links under a condition: grown by whatever effect changes lengths.
-    pub fn links_under(&self, condition: &Condition) -> [Link; 6] {
+    pub fn links_at(&self, condition: &Condition) -> [Link; 6] {
         let growth: f64 = self.effects.iter().map(|e| e.growth(condition)).sum();
         let mut links = self.links;
         if growth != 0.0 {
@@ -111,7 +111,7 @@ pub struct PreparedModel<'a> {
     statics: Option<Statics>,
     loaded: bool,
     /// Whether the joint map is the identity.
-    straight: bool,
+    has_identity_map: bool,
 }
 
 impl PreparedModel<'_> {
@@ -128,7 +128,7 @@ impl PreparedModel<'_> {
     /// All joint frames in the base, for one row or several in lanes.
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub fn frames_of<R: SinCos>(&self, q: &[R; 6]) -> Chain<R> {
-        let rotation = self.affected(&self.mapped(q));
+        let rotation = self.apply_effects(&self.apply_joint_map(q));
         let (mut sin, mut cos) = (rotation, rotation);
         for i in 0..6 {
             (sin[i], cos[i]) = sin_cos(rotation[i]);
@@ -137,21 +137,21 @@ impl PreparedModel<'_> {
     }
 
     /// DH joint rotations (offsets of the links not included): joint map, then the joint effects.
-    pub fn rotations(&self, q: &Joints) -> Joints {
-        self.affected(&self.mapped(&(*q).into())).into()
+    pub fn joint_rotations(&self, q: &Joints) -> Joints {
+        self.apply_effects(&self.apply_joint_map(&(*q).into())).into()
     }
 
     /// Whether mapped angles are the controller's.
     pub(crate) fn map_is_identity(&self) -> bool {
-        self.straight
+        self.has_identity_map
     }
 
     /// Joint angles after the joint map, for one row or several in lanes.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub fn mapped<R: Real>(&self, q: &[R; 6]) -> [R; 6] {
+    pub fn apply_joint_map<R: Real>(&self, q: &[R; 6]) -> [R; 6] {
         let map = &self.model.joint_map;
         let zero = q[0].splat(0.0);
-        if self.straight {
+        if self.has_identity_map {
             // The sum below, bit by bit: −0 becomes 0.
             let mut out = *q;
             for angle in &mut out {
@@ -172,11 +172,11 @@ impl PreparedModel<'_> {
 
     /// DH joint rotations for mapped joint angles: the effects alone, for one row or several in lanes.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub fn affected<R: SinCos>(&self, mapped: &[R; 6]) -> [R; 6] {
+    pub fn apply_effects<R: SinCos>(&self, mapped: &[R; 6]) -> [R; 6] {
         let mut out = *mapped;
         if let Some(statics) = &self.statics {
             let torque = match self.loaded {
-                true => statics.loads(mapped, &self.condition),
+                true => statics.torques(mapped, &self.condition),
                 false => [mapped[0].splat(0.0); 6],
             };
             for effect in &self.model.effects {
@@ -186,7 +186,7 @@ impl PreparedModel<'_> {
         out
     }
 
-    /// Derivative of [`PreparedModel::rotations`] with respect to the controller's angles.
+    /// Derivative of [`PreparedModel::joint_rotations`] with respect to the controller's angles.
     ///
     /// ```
     /// use truegrind_arm::condition::Condition;
@@ -198,21 +198,21 @@ impl PreparedModel<'_> {
     /// let mut arm = robots::load("abb-irb-120")?.model;
     /// arm.effects.push(Effect::JointCoupling(Coupling { joint: 5, driver: 4, factor: 1e-3 }));
     /// let still = Condition::default();
-    /// let slopes = arm.at_condition(&still).rotation_slopes(&Joints::repeat(0.3));
+    /// let slopes = arm.at_condition(&still).rotation_jacobian(&Joints::repeat(0.3));
     /// assert_eq!((slopes[(5, 4)], slopes[(4, 5)], slopes[(5, 5)]), (1e-3, 0.0, 1.0));
     /// # Ok::<(), robots::RobotError>(())
     /// ```
-    pub fn rotation_slopes(&self, q: &Joints) -> Matrix6<f64> {
+    pub fn rotation_jacobian(&self, q: &Joints) -> Matrix6<f64> {
         let mut slope = Matrix6::identity();
         if let Some(statics) = &self.statics {
             let mapped = self.model.joint_map * q;
-            let torque = self.loaded.then(|| statics.torques(&mapped, &self.condition).1);
+            let torque = self.loaded.then(|| statics.torques_and_jacobian(&mapped, &self.condition).1);
             for effect in &self.model.effects {
                 match (effect, &torque) {
                     (Effect::JointCompliance(compliance), Some(torque)) => {
-                        compliance.add_slope(torque, &mut slope)
+                        compliance.add_jacobian(torque, &mut slope)
                     }
-                    _ => slope += effect.slope(statics, &mapped, &self.condition),
+                    _ => slope += effect.jacobian(statics, &mapped, &self.condition),
                 }
             }
         }

@@ -99,7 +99,7 @@ impl Parameter {
     }
 
     /// Whether the number belongs to an effect or a disturbance.
-    pub fn is_of_a_cause(&self) -> bool {
+    pub fn is_of_cause(&self) -> bool {
         matches!(self, Parameter::Effect { .. } | Parameter::Disturbance { .. })
     }
 }

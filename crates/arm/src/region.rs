@@ -39,7 +39,7 @@ pub enum Outside {
 }
 
 /// Poses kept in a region.
-const SAMPLES: usize = 200;
+const MAX_SAMPLES: usize = 200;
 
 /// A joint may leave its measured range by this much without a flag (°): rounding of logs and programs.
 const SLACK_DEG: f64 = 0.5;
@@ -88,7 +88,7 @@ impl Region {
         let mut nearest = vec![f64::INFINITY; degrees.len()];
         let mut samples_deg: Vec<[f64; 6]> = Vec::new();
         let mut next = 0;
-        while samples_deg.len() < SAMPLES.min(degrees.len()) {
+        while samples_deg.len() < MAX_SAMPLES.min(degrees.len()) {
             let taken = degrees[next];
             samples_deg.push(taken);
             let far = farthest(&mut nearest, &degrees, &taken);
@@ -128,12 +128,12 @@ impl Region {
     /// assert!((by_deg - 15.0).abs() < 1e-9);
     /// ```
     pub fn outside(&self, q: &Joints) -> Option<Outside> {
-        self.outside_near(q, &mut Nearest::default())
+        self.outside_along(q, &mut NearestSample::default())
     }
 
     /// The same along a path: what was found at the pose before is looked at first, and left in `last` for the next one.
     /// The answer does not depend on it.
-    pub fn outside_near(&self, q: &Joints, last: &mut Nearest) -> Option<Outside> {
+    pub fn outside_along(&self, q: &Joints, last: &mut NearestSample) -> Option<Outside> {
         let degrees: [f64; 6] = std::array::from_fn(|i| q[i].to_degrees());
         let beyond = |i: usize| (self.min_deg[i] - degrees[i]).max(degrees[i] - self.max_deg[i]);
         let worst = (0..6).max_by(|&a, &b| beyond(a).total_cmp(&beyond(b))).unwrap_or(0);
@@ -162,7 +162,7 @@ impl Region {
             }
             let whole = square(sample, &degrees);
             if whole <= allowed * allowed {
-                *last = Nearest { index, at: degrees, others: f64::NEG_INFINITY };
+                *last = NearestSample { index, at: degrees, others: f64::NEG_INFINITY };
                 return None;
             }
             if whole < nearest {
@@ -178,7 +178,7 @@ impl Region {
 
 /// The sample that was nearest to the pose looked at last.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Nearest {
+pub struct NearestSample {
     index: usize,
     /// That pose (°).
     at: [f64; 6],
@@ -186,7 +186,7 @@ pub struct Nearest {
     others: f64,
 }
 
-impl Default for Nearest {
+impl Default for NearestSample {
     fn default() -> Self {
         Self { index: 0, at: [0.0; 6], others: f64::NEG_INFINITY }
     }

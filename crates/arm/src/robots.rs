@@ -107,18 +107,18 @@ pub fn load(name: &str) -> Result<Robot, RobotError> {
 /// use truegrind_arm::robots::{self, NominalMismatch};
 ///
 /// let mut arm = robots::load("abb-irb-120")?.model;
-/// assert_eq!(robots::agrees("abb-irb-120", &arm), Ok(()));
+/// assert_eq!(robots::check_catalogue_name("abb-irb-120", &arm), Ok(()));
 /// arm.links[3].d_mm += 1.0;
-/// let Err(NominalMismatch::Name { place, .. }) = robots::agrees("abb-irb-120", &arm) else { panic!("another arm") };
+/// let Err(NominalMismatch::Name { place, .. }) = robots::check_catalogue_name("abb-irb-120", &arm) else { panic!("another arm") };
 /// assert!(place.contains("link 4 d_mm"));
 /// // An arm of one's own has a name of its own.
-/// assert_eq!(robots::agrees("workshop-6", &arm), Ok(()));
+/// assert_eq!(robots::check_catalogue_name("workshop-6", &arm), Ok(()));
 /// # Ok::<(), robots::RobotError>(())
 /// ```
 ///
 /// # Errors
 /// [`NominalMismatch::Name`], which says where the two differ first.
-pub fn agrees(name: &str, nominal: &Model) -> Result<(), NominalMismatch> {
+pub fn check_catalogue_name(name: &str, nominal: &Model) -> Result<(), NominalMismatch> {
     let plain =
         |text: &str| text.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_lowercase();
     let wanted = plain(name);
@@ -144,7 +144,7 @@ pub fn agrees(name: &str, nominal: &Model) -> Result<(), NominalMismatch> {
 ///
 /// # Errors
 /// [`NominalMismatch::Arms`], which says where the two differ first.
-pub fn same(nominal: &Model, stated: &Model) -> Result<(), NominalMismatch> {
+pub fn check_same_links(nominal: &Model, stated: &Model) -> Result<(), NominalMismatch> {
     validation::difference(nominal, stated).map_or(Ok(()), |place| Err(NominalMismatch::Arms { place }))
 }
 
@@ -173,7 +173,7 @@ pub fn parse(text: &str, file: &str) -> Result<Robot, RobotError> {
 ///
 /// # Errors
 /// What the writer says of a number that TOML does not hold.
-pub fn text(robot: &Robot) -> Result<String, String> {
+pub fn to_toml(robot: &Robot) -> Result<String, String> {
     toml::to_string(&RobotFile { robot: vec![robot.sheet.clone()] }).map_err(|error| error.to_string())
 }
 

@@ -11,7 +11,7 @@ use truegrind_programs::motion::Listing;
 
 /// Whether an effect moves the arm by what it carries.
 pub(crate) fn yields(effect: &Effect) -> bool {
-    effect.needs_torque() && !effect.is_still()
+    effect.needs_torque() && !effect.is_zero()
 }
 
 /// The two arms and their inverses, shared by all targets.

@@ -76,7 +76,7 @@ pub fn compensate(
     let mut refused: BTreeMap<u32, Why> = BTreeMap::new();
     let mut round = 0;
     let play =
-        arm.model.effects.iter().any(|effect| matches!(effect, Effect::Backlash(_)) && !effect.is_still());
+        arm.model.effects.iter().any(|effect| matches!(effect, Effect::Backlash(_)) && !effect.is_zero());
     loop {
         let planned = targets.plan(&refused);
         if program.takes(&planned.changes) {

@@ -8,36 +8,36 @@
 
 use rayon::prelude::*;
 
-use truegrind_arm::inverse::effort::Allowance;
+use truegrind_arm::inverse::budget::SearchBudget;
 use truegrind_math::work::checkpoint;
 
 /// Works through pieces in parallel, each with its part of the whole; those that fell short are done again, one after the
 /// other, with what the others left.
 pub(crate) fn shared_out<T: Send>(
-    whole: Allowance,
+    whole: SearchBudget,
     pieces: usize,
-    work: impl Fn(usize, &mut Allowance) -> T + Sync,
+    work: impl Fn(usize, &mut SearchBudget) -> T + Sync,
 ) -> Vec<T> {
-    shared_out_into(whole, &mut vec![(); pieces], |piece, (), allowance| work(piece, allowance))
+    shared_out_into(whole, &mut vec![(); pieces], |piece, (), budget| work(piece, budget))
 }
 
 /// The same where each piece has a place of its own that its work fills.
 pub(crate) fn shared_out_into<P: Send, T: Send>(
-    whole: Allowance,
+    whole: SearchBudget,
     places: &mut [P],
-    work: impl Fn(usize, &mut P, &mut Allowance) -> T + Sync,
+    work: impl Fn(usize, &mut P, &mut SearchBudget) -> T + Sync,
 ) -> Vec<T> {
     let pieces = places.len();
     let one = |(piece, place): (usize, &mut P)| {
         checkpoint();
-        let mut allowance = whole.part(piece, pieces);
-        (work(piece, place, &mut allowance), allowance)
+        let mut budget = whole.share(piece, pieces);
+        (work(piece, place, &mut budget), budget)
     };
-    let done: Vec<(T, Allowance)> = places.par_iter_mut().enumerate().map(one).collect();
-    let mut rest = Allowance::of(done.iter().map(|(_, left)| left.evaluations).sum())
-        .with_steps(done.iter().fold(0, |sum, (_, left)| sum.saturating_add(left.steps)));
-    let again = |(piece, (done, left)): (usize, (T, Allowance))| {
-        if left.short { work(piece, &mut places[piece], &mut rest) } else { done }
+    let done: Vec<(T, SearchBudget)> = places.par_iter_mut().enumerate().map(one).collect();
+    let mut rest = SearchBudget::of(done.iter().map(|(_, left)| left.evaluations).sum())
+        .with_near_solves(done.iter().fold(0, |sum, (_, left)| sum.saturating_add(left.near_solves)));
+    let again = |(piece, (done, left)): (usize, (T, SearchBudget))| {
+        if left.ever_exhausted { work(piece, &mut places[piece], &mut rest) } else { done }
     };
     done.into_iter().enumerate().map(again).collect()
 }

@@ -14,7 +14,7 @@ use crate::deviation::{After, Deviation, PathPoint, PathReport, Status};
 use crate::frames::frame_table::Mountings;
 use crate::plan::reason::Why;
 use truegrind_arm::condition::Condition;
-use truegrind_arm::estimated::{Carried, Estimated};
+use truegrind_arm::estimated::{Estimated, RegisteredFrame};
 use truegrind_arm::model::{Joints, Model};
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{Listing, MotionKind, Reason, Role, TargetValue};
@@ -41,7 +41,7 @@ struct Run {
     reached: Pose,
     base_from_object: Pose,
     flange_from_tool: Pose,
-    carried: Option<Carried>,
+    carried: Option<RegisteredFrame>,
     /// The condition under which the arm came there.
     place: usize,
 }

@@ -11,7 +11,7 @@ use truegrind_arm::condition::Condition;
 use truegrind_arm::link::LinkModel;
 use truegrind_arm::model::Joints;
 use truegrind_arm::robots::Robot;
-use truegrind_arm::robots::foreign::Understood;
+use truegrind_arm::robots::foreign::ImportedRobot;
 use truegrind_arm::robots::sheet::{Angles, Dialect, Orientation, Point};
 use truegrind_arm::robots::validation;
 
@@ -283,16 +283,16 @@ fn push_published(page: &mut Document, robot: &Robot) {
 }
 
 /// What was understood of a robot file, in a few lines: to be compared with the manual before anything is measured.
-pub fn understood(found: &Understood) -> Document {
+pub fn understood(found: &ImportedRobot) -> Document {
     let mut page = Document::new(found.robot.sheet.name.clone());
     page.subtitle = format!("{}, as it is understood", found.kind.text());
-    page.push(Block::List(found.sentences.clone()));
+    page.push(Block::List(found.summary.clone()));
     page.paragraph("Compare zero pose and axes with the manual: a wrong zero is the usual mistake.");
     page
 }
 
 /// The same with a picture of the zero pose, and the page of the arm.
-pub fn checked(found: &Understood) -> Document {
+pub fn checked(found: &ImportedRobot) -> Document {
     let mut page = understood(found);
     page.push(Block::Figure(zero_pose(&found.robot)));
     let whole = document(&found.robot);

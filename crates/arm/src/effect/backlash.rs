@@ -20,7 +20,7 @@ use truegrind_math::lanes::Real;
 /// let mut arm = robots::load("abb-irb-120")?.model;
 /// arm.effects.push(Effect::Backlash(Backlash { joint: 1, play_rad: 4e-4 }));
 /// let from = |side| Condition { approach: [0, side, 0, 0, 0, 0], ..Condition::default() };
-/// let turned = |condition: &Condition| arm.at_condition(condition).rotations(&Joints::zeros())[1];
+/// let turned = |condition: &Condition| arm.at_condition(condition).joint_rotations(&Joints::zeros())[1];
 /// // From above and from below the joint rests on flanks that are one play apart; where the side is not known, between them.
 /// assert!((turned(&from(1)) - turned(&from(-1)) - 4e-4).abs() < 1e-15);
 /// assert_eq!(turned(&from(0)), 0.0);
@@ -54,7 +54,7 @@ impl Backlash {
         vec![out]
     }
 
-    pub(super) fn rotation(&self, statics: &Statics, u: &Joints, condition: &Condition) -> Joints {
+    pub(super) fn offset(&self, statics: &Statics, u: &Joints, condition: &Condition) -> Joints {
         self.regressors(statics, u, condition)[0] * self.play_rad
     }
 
@@ -64,7 +64,7 @@ impl Backlash {
         out[self.joint] += out[self.joint].splat(self.play_rad * 0.5 * side);
     }
 
-    pub(super) fn slope(&self, _: &Statics, _: &Joints, _: &Condition) -> Matrix6<f64> {
+    pub(super) fn jacobian(&self, _: &Statics, _: &Joints, _: &Condition) -> Matrix6<f64> {
         Matrix6::zeros()
     }
 }

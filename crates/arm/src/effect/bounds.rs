@@ -1,14 +1,14 @@
 //! Which parameters an effect may have that comes from a file.
 
 use super::Effect;
-use super::load::GravityLoad;
-use super::map::JointMap;
-use super::smooth::Smooth;
+use super::error_map::ErrorMap;
+use super::lumped_compliance::LumpedCompliance;
+use super::smooth_correction::SmoothCorrection;
 use super::thermal::Thermal;
-use crate::bounds::{Bound, Unfit};
+use crate::bounds::{Bound, InvalidValue};
 
 /// Turns that an effect adds (rad).
-const TURN_RAD: Bound = Bound::new(-0.5, 0.5, "an angle in rad, within ±0.5");
+const OFFSET_RAD: Bound = Bound::new(-0.5, 0.5, "an angle in rad, within ±0.5");
 /// Turns for a turn.
 const SHARE: Bound = Bound::new(-0.5, 0.5, "a share within ±0.5");
 /// Torsional compliance, lumped masses in it or not.
@@ -18,18 +18,18 @@ const ORDER: Bound = Bound::new(1e-3, 1e5, "periods per turn of the joint, above
 const GROWTH: Bound = Bound::new(-0.1, 0.1, "a relative growth within ±0.1");
 const TIME_H: Bound = Bound::new(1e-6, 1e6, "a time in hours, above 0");
 const TEMPERATURE_C: Bound = Bound::new(-273.15, 2000.0, "a temperature in °C");
-const PLACE_RAD: Bound = Bound::new(-100.0, 100.0, "joint angles in rad, within ±100");
+const ANGLE_RAD: Bound = Bound::new(-100.0, 100.0, "joint angles in rad, within ±100");
 const REACH_RAD: Bound = Bound::new(1e-6, 1e3, "an angle in rad, above 0");
 
 /// Most knots, lumps or centres of one effect.
-const MOST_PARTS: usize = 10_000;
+const MAX_PARTS: usize = 10_000;
 
 impl Effect {
     /// Refuses joints that an arm has not, and numbers that no effect of that kind has.
     ///
     /// # Errors
-    /// [`Unfit`], with the key within the effect.
-    pub fn check(&self) -> Result<(), Unfit> {
+    /// [`InvalidValue`], with the key within the effect.
+    pub fn check(&self) -> Result<(), InvalidValue> {
         joint("joint", self.joint().unwrap_or(0))?;
         match self {
             Effect::JointCompliance(e) => {
@@ -38,8 +38,8 @@ impl Effect {
             Effect::LumpedCompliance(e) => lumps(e),
             Effect::GearEccentricity(e) | Effect::GearTransmission(e) => {
                 ORDER.check(|| "order".to_owned(), e.order)?;
-                TURN_RAD.check(|| "sine_rad".to_owned(), e.sine_rad)?;
-                TURN_RAD.check(|| "cosine_rad".to_owned(), e.cosine_rad)
+                OFFSET_RAD.check(|| "sine_rad".to_owned(), e.sine_rad)?;
+                OFFSET_RAD.check(|| "cosine_rad".to_owned(), e.cosine_rad)
             }
             Effect::GearMap(e) => knots(e),
             Effect::GearRatio(e) => SHARE.check(|| "error".to_owned(), e.error),
@@ -47,7 +47,7 @@ impl Effect {
                 joint("driver", e.driver)?;
                 SHARE.check(|| "factor".to_owned(), e.factor)
             }
-            Effect::Backlash(e) => TURN_RAD.check(|| "play_rad".to_owned(), e.play_rad),
+            Effect::Backlash(e) => OFFSET_RAD.check(|| "play_rad".to_owned(), e.play_rad),
             Effect::ThermalDrift(e) => thermal(e),
             Effect::SmoothCorrection(e) => smooth(e),
         }
@@ -57,37 +57,37 @@ impl Effect {
 /// Checks a list of effects; they count from 1, as parameters name them.
 ///
 /// # Errors
-/// [`Unfit`].
-pub fn effects(list: &[Effect]) -> Result<(), Unfit> {
+/// [`InvalidValue`].
+pub fn effects(list: &[Effect]) -> Result<(), InvalidValue> {
     for (i, effect) in list.iter().enumerate() {
-        effect.check().map_err(|unfit| unfit.within(&format!("effect {} ({})", i + 1, effect.name())))?;
+        effect.check().map_err(|invalid| invalid.within(&format!("effect {} ({})", i + 1, effect.name())))?;
     }
     Ok(())
 }
 
-fn joint(key: &str, joint: usize) -> Result<(), Unfit> {
+fn joint(key: &str, joint: usize) -> Result<(), InvalidValue> {
     if joint < 6 {
         return Ok(());
     }
-    Err(Unfit::new(key, joint.to_string(), "a joint from 0 to 5"))
+    Err(InvalidValue::new(key, joint.to_string(), "a joint from 0 to 5"))
 }
 
-fn count(key: &str, found: usize, least: usize, expected: &'static str) -> Result<(), Unfit> {
-    if (least..=MOST_PARTS).contains(&found) {
+fn count(key: &str, found: usize, least: usize, expected: &'static str) -> Result<(), InvalidValue> {
+    if (least..=MAX_PARTS).contains(&found) {
         return Ok(());
     }
-    Err(Unfit::new(key, format!("{found} entries"), expected))
+    Err(InvalidValue::new(key, format!("{found} entries"), expected))
 }
 
-fn lumps(load: &GravityLoad) -> Result<(), Unfit> {
+fn lumps(load: &LumpedCompliance) -> Result<(), InvalidValue> {
     count("lump", load.lump.len(), 1, "1 to 10,000 lumps")?;
     for lump in &load.lump {
         if !(1..=6).contains(&lump.frame) {
-            return Err(Unfit::new("lump.frame", lump.frame.to_string(), "a frame from 1 to 6"));
+            return Err(InvalidValue::new("lump.frame", lump.frame.to_string(), "a frame from 1 to 6"));
         }
         for (key, axis) in [("lump.axis", lump.axis), ("lump.moment", lump.moment)] {
             if let Some(axis) = axis.filter(|axis| *axis > 2) {
-                return Err(Unfit::new(key, axis.to_string(), "an axis from 0 to 2"));
+                return Err(InvalidValue::new(key, axis.to_string(), "an axis from 0 to 2"));
             }
         }
         COMPLIANCE.check(|| "lump.factor".to_owned(), lump.factor)?;
@@ -95,25 +95,25 @@ fn lumps(load: &GravityLoad) -> Result<(), Unfit> {
     Ok(())
 }
 
-fn knots(map: &JointMap) -> Result<(), Unfit> {
+fn knots(map: &ErrorMap) -> Result<(), InvalidValue> {
     count("knots_rad", map.knots_rad.len(), 4, "4 to 10,000 knots")?;
-    TURN_RAD.check_all("knots_rad", &map.knots_rad)
+    OFFSET_RAD.check_all("knots_rad", &map.knots_rad)
 }
 
-fn thermal(thermal: &Thermal) -> Result<(), Unfit> {
+fn thermal(thermal: &Thermal) -> Result<(), InvalidValue> {
     GROWTH.check(|| "growth".to_owned(), thermal.growth)?;
     GROWTH.check(|| "growth_per_k".to_owned(), thermal.growth_per_k)?;
     TIME_H.check(|| "time_constant_h".to_owned(), thermal.time_constant_h)?;
     TEMPERATURE_C.check(|| "reference_c".to_owned(), thermal.reference_c)
 }
 
-fn smooth(smooth: &Smooth) -> Result<(), Unfit> {
+fn smooth(smooth: &SmoothCorrection) -> Result<(), InvalidValue> {
     count("centres_rad", smooth.centres_rad.len(), 0, "up to 10,000 centres")?;
     if smooth.weights_rad.len() != smooth.centres_rad.len() {
         let found = format!("{} weights for {} centres", smooth.weights_rad.len(), smooth.centres_rad.len());
-        return Err(Unfit::new("weights_rad", found, "one for each centre"));
+        return Err(InvalidValue::new("weights_rad", found, "one for each centre"));
     }
-    PLACE_RAD.check_all("centres_rad", smooth.centres_rad.as_flattened())?;
+    ANGLE_RAD.check_all("centres_rad", smooth.centres_rad.as_flattened())?;
     REACH_RAD.check(|| "reach_rad".to_owned(), smooth.reach_rad)?;
-    TURN_RAD.check_all("weights_rad", smooth.weights_rad.as_flattened())
+    OFFSET_RAD.check_all("weights_rad", smooth.weights_rad.as_flattened())
 }

@@ -53,11 +53,11 @@ impl Compliance {
 
     pub(super) fn regressors(&self, statics: &Statics, u: &Joints, condition: &Condition) -> Vec<Joints> {
         let mut out = Joints::zeros();
-        out[self.joint] = statics.torques(u, condition).0[self.joint];
+        out[self.joint] = statics.torques_and_jacobian(u, condition).0[self.joint];
         vec![out]
     }
 
-    pub(super) fn rotation(&self, statics: &Statics, u: &Joints, condition: &Condition) -> Joints {
+    pub(super) fn offset(&self, statics: &Statics, u: &Joints, condition: &Condition) -> Joints {
         self.regressors(statics, u, condition)[0] * self.compliance_rad_per_nm
     }
 
@@ -66,14 +66,14 @@ impl Compliance {
         out[self.joint] += torque[self.joint].splat(self.compliance_rad_per_nm) * torque[self.joint];
     }
 
-    pub(super) fn slope(&self, statics: &Statics, u: &Joints, condition: &Condition) -> Matrix6<f64> {
+    pub(super) fn jacobian(&self, statics: &Statics, u: &Joints, condition: &Condition) -> Matrix6<f64> {
         let mut out = Matrix6::zeros();
-        self.add_slope(&statics.torques(u, condition).1, &mut out);
+        self.add_jacobian(&statics.torques_and_jacobian(u, condition).1, &mut out);
         out
     }
 
     /// Adds the slope, given that of the torques.
-    pub(crate) fn add_slope(&self, torque: &Matrix6<f64>, out: &mut Matrix6<f64>) {
+    pub(crate) fn add_jacobian(&self, torque: &Matrix6<f64>, out: &mut Matrix6<f64>) {
         for i in 0..6 {
             out[(self.joint, i)] += self.compliance_rad_per_nm * torque[(self.joint, i)];
         }

@@ -40,7 +40,7 @@ impl Coupling {
         vec![out]
     }
 
-    pub(super) fn rotation(&self, statics: &Statics, u: &Joints, condition: &Condition) -> Joints {
+    pub(super) fn offset(&self, statics: &Statics, u: &Joints, condition: &Condition) -> Joints {
         self.regressors(statics, u, condition)[0] * self.factor
     }
 
@@ -54,7 +54,7 @@ impl Coupling {
         self.add_offset(step, out);
     }
 
-    pub(super) fn slope(&self, _: &Statics, _: &Joints, _: &Condition) -> Matrix6<f64> {
+    pub(super) fn jacobian(&self, _: &Statics, _: &Joints, _: &Condition) -> Matrix6<f64> {
         let mut out = Matrix6::zeros();
         out[(self.joint, self.driver)] = self.factor;
         out

@@ -28,7 +28,7 @@ use truegrind_math::lanes::{SinCos, sin_cos};
 /// arm.effects.push(Effect::GearEccentricity(runout));
 /// let still = Condition::default();
 /// let error = |angle: f64| {
-///     arm.at_condition(&still).rotations(&Joints::new(angle, 0.0, 0.0, 0.0, 0.0, 0.0))[0] - angle
+///     arm.at_condition(&still).joint_rotations(&Joints::new(angle, 0.0, 0.0, 0.0, 0.0, 0.0))[0] - angle
 /// };
 /// assert!((error(0.0) - 4e-4).abs() < 1e-12 && (error(FRAC_PI_2) - 3e-4).abs() < 1e-12);
 /// # Ok::<(), robots::RobotError>(())
@@ -80,7 +80,7 @@ impl Harmonic {
         vec![first, second]
     }
 
-    pub(super) fn rotation(&self, _: &Statics, u: &Joints, _: &Condition) -> Joints {
+    pub(super) fn offset(&self, _: &Statics, u: &Joints, _: &Condition) -> Joints {
         let (sin, cos) = (self.order * u[self.joint]).sin_cos();
         let mut out = Joints::zeros();
         out[self.joint] = self.sine_rad * sin + self.cosine_rad * cos;
@@ -101,7 +101,7 @@ impl Harmonic {
         out[self.joint] += slope * step[self.joint];
     }
 
-    pub(super) fn slope(&self, _: &Statics, u: &Joints, _: &Condition) -> Matrix6<f64> {
+    pub(super) fn jacobian(&self, _: &Statics, u: &Joints, _: &Condition) -> Matrix6<f64> {
         let (sin, cos) = (self.order * u[self.joint]).sin_cos();
         let mut out = Matrix6::zeros();
         out[(self.joint, self.joint)] = self.order * (self.sine_rad * cos - self.cosine_rad * sin);

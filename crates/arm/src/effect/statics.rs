@@ -30,7 +30,7 @@ impl Statics {
 
     /// Torque of gravity about each joint axis (N m) at mapped angles `u`, and its derivative ∂τⱼ/∂uᵢ, which is
     /// symmetric because torque is the gradient of the potential energy.
-    pub fn torques(&self, u: &Joints, condition: &Condition) -> (Joints, Matrix6<f64>) {
+    pub fn torques_and_jacobian(&self, u: &Joints, condition: &Condition) -> (Joints, Matrix6<f64>) {
         let (frames, levers) = self.levers::<f64>(&(*u).into(), condition);
         let g = self.gravity_newton();
         let torque = Joints::from_fn(|j, _| dot(&frames.z[j], &cross(&levers[j], &g)));
@@ -41,7 +41,7 @@ impl Statics {
 
     /// The torques alone, for one row or several in lanes.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub fn loads<R: SinCos>(&self, u: &[R; 6], condition: &Condition) -> [R; 6] {
+    pub fn torques<R: SinCos>(&self, u: &[R; 6], condition: &Condition) -> [R; 6] {
         let (frames, levers) = self.levers(u, condition);
         let g = splats(u[0], &self.gravity_newton());
         let mut out = *u;

@@ -56,11 +56,11 @@ impl Thermal {
         vec![Joints::zeros(); 2]
     }
 
-    pub(super) fn rotation(&self, _: &Statics, _: &Joints, _: &Condition) -> Joints {
+    pub(super) fn offset(&self, _: &Statics, _: &Joints, _: &Condition) -> Joints {
         Joints::zeros()
     }
 
-    pub(super) fn slope(&self, _: &Statics, _: &Joints, _: &Condition) -> Matrix6<f64> {
+    pub(super) fn jacobian(&self, _: &Statics, _: &Joints, _: &Condition) -> Matrix6<f64> {
         Matrix6::zeros()
     }
 }

@@ -6,7 +6,7 @@
 use nalgebra::DMatrix;
 
 use super::{Estimated, EstimatedParameter, Provenance, StageErrors};
-use crate::bounds::{self, Bound, JOINT_DEG, LENGTH_MM, MASS_KG, Unfit};
+use crate::bounds::{self, Bound, InvalidValue, JOINT_DEG, LENGTH_MM, MASS_KG};
 use crate::condition::Condition;
 use crate::model::Model;
 use crate::parameter::{Parameter, link_coordinates};
@@ -32,31 +32,31 @@ const FARTHEST_DEG: Bound = Bound::new(-45.0, 45.0, "a link within 45° of the n
 const MOST: usize = 100_000;
 
 /// Checks a model as it was read; its two arms have passed their own checks.
-pub(super) fn check(model: &Estimated) -> Result<(), Unfit> {
+pub(super) fn check(model: &Estimated) -> Result<(), InvalidValue> {
     if model.robot.trim().is_empty() {
-        return Err(Unfit::new("robot", "nothing", "the name of the arm"));
+        return Err(InvalidValue::new("robot", "nothing", "the name of the arm"));
     }
     arms(&model.nominal, &model.model)?;
     for (key, errors) in [("registered", &model.registered), ("geometry", &model.geometry)] {
-        stage(errors).map_err(|unfit| unfit.within(key))?;
+        stage(errors).map_err(|invalid| invalid.within(key))?;
     }
     if let Some(floor) = model.noise_floor_mm {
         ERROR_MM.check(|| "noise_floor_mm".to_owned(), floor)?;
     }
-    provenance(&model.provenance).map_err(|unfit| unfit.within("provenance"))?;
-    region(&model.region).map_err(|unfit| unfit.within("region"))?;
-    condition(&model.condition).map_err(|unfit| unfit.within("condition"))?;
+    provenance(&model.provenance).map_err(|invalid| invalid.within("provenance"))?;
+    region(&model.region).map_err(|invalid| invalid.within("region"))?;
+    condition(&model.condition).map_err(|invalid| invalid.within("condition"))?;
     order(model)?;
     for parameter in &model.parameters {
-        number(parameter).map_err(|unfit| unfit.within(&format!("parameter {}", parameter.name)))?;
+        number(parameter).map_err(|invalid| invalid.within(&format!("parameter {}", parameter.name)))?;
     }
     covariance(&model.order, &model.covariance)
 }
 
 /// The estimated arm is the nominal one, a little off: the same joint map, link by link.
-fn arms(nominal: &Model, estimated: &Model) -> Result<(), Unfit> {
+fn arms(nominal: &Model, estimated: &Model) -> Result<(), InvalidValue> {
     if (nominal.joint_map - estimated.joint_map).amax() > 1e-9 {
-        return Err(Unfit::new(
+        return Err(InvalidValue::new(
             "estimated.joint_map",
             "another map than nominal.joint_map",
             "the same: what an arm adds to it is an effect",
@@ -77,7 +77,7 @@ fn arms(nominal: &Model, estimated: &Model) -> Result<(), Unfit> {
     Ok(())
 }
 
-fn stage(errors: &StageErrors) -> Result<(), Unfit> {
+fn stage(errors: &StageErrors) -> Result<(), InvalidValue> {
     let summary = |errors: &ErrorSummary| {
         for (key, value) in [
             ("rmse", errors.rmse),
@@ -89,26 +89,26 @@ fn stage(errors: &StageErrors) -> Result<(), Unfit> {
         }
         SIGNED_MM.check(|| "mean".to_owned(), errors.mean)
     };
-    summary(&errors.fitted).map_err(|unfit| unfit.within("fitted"))?;
-    summary(&errors.held_out).map_err(|unfit| unfit.within("held_out"))
+    summary(&errors.fitted).map_err(|invalid| invalid.within("fitted"))?;
+    summary(&errors.held_out).map_err(|invalid| invalid.within("held_out"))
 }
 
-fn provenance(provenance: &Provenance) -> Result<(), Unfit> {
+fn provenance(provenance: &Provenance) -> Result<(), InvalidValue> {
     SHARE.check(|| "held_out".to_owned(), provenance.held_out)
 }
 
-pub(super) fn region(region: &Region) -> Result<(), Unfit> {
+pub(super) fn region(region: &Region) -> Result<(), InvalidValue> {
     JOINT_DEG.check_all("min_deg", &region.min_deg)?;
     JOINT_DEG.check_all("max_deg", &region.max_deg)?;
     if let Some(i) = (0..6).find(|&i| region.min_deg[i] > region.max_deg[i]) {
-        return Err(Unfit::new(
+        return Err(InvalidValue::new(
             format!("min_deg and max_deg of joint {}", i + 1),
             format!("{} and {}", region.min_deg[i], region.max_deg[i]),
             "min not above max",
         ));
     }
     if region.samples_deg.len() > MOST {
-        return Err(Unfit::new(
+        return Err(InvalidValue::new(
             "samples_deg",
             format!("{} poses", region.samples_deg.len()),
             "up to 100,000",
@@ -119,7 +119,7 @@ pub(super) fn region(region: &Region) -> Result<(), Unfit> {
     SIGMA_MM.check(|| "sigma_mm".to_owned(), region.sigma_mm)
 }
 
-pub(super) fn condition(condition: &Condition) -> Result<(), Unfit> {
+pub(super) fn condition(condition: &Condition) -> Result<(), InvalidValue> {
     for (key, bound, value) in [
         ("time_h", TIME_H, condition.time_h),
         ("temperature_c", TEMPERATURE_C, condition.temperature_c),
@@ -131,12 +131,12 @@ pub(super) fn condition(condition: &Condition) -> Result<(), Unfit> {
     }
     LENGTH_MM.check_all("payload_centre_mm", &condition.payload_centre_mm)?;
     match condition.approach.iter().find(|side| !(-1..=1).contains(*side)) {
-        Some(side) => Err(Unfit::new("approach", side.to_string(), "-1, 0 or 1 for each joint")),
+        Some(side) => Err(InvalidValue::new("approach", side.to_string(), "-1, 0 or 1 for each joint")),
         None => Ok(()),
     }
 }
 
-fn number(parameter: &EstimatedParameter) -> Result<(), Unfit> {
+fn number(parameter: &EstimatedParameter) -> Result<(), InvalidValue> {
     VALUE.check(|| "nominal".to_owned(), parameter.nominal)?;
     VALUE.check(|| "value".to_owned(), parameter.value)?;
     SIGMA.check(|| "sigma".to_owned(), parameter.sigma)?;
@@ -147,7 +147,7 @@ fn number(parameter: &EstimatedParameter) -> Result<(), Unfit> {
 }
 
 /// Every parameter of the covariance is one that the arm has, and the list of parameters follows the same order.
-fn order(model: &Estimated) -> Result<(), Unfit> {
+fn order(model: &Estimated) -> Result<(), InvalidValue> {
     let arm = &model.model;
     for (i, parameter) in model.order.iter().enumerate() {
         let exists = match *parameter {
@@ -160,10 +160,14 @@ fn order(model: &Estimated) -> Result<(), Unfit> {
             _ => false,
         };
         if !exists {
-            return Err(Unfit::new("covariance.order", parameter.to_string(), "parameters that the arm has"));
+            return Err(InvalidValue::new(
+                "covariance.order",
+                parameter.to_string(),
+                "parameters that the arm has",
+            ));
         }
         if model.order[..i].contains(parameter) {
-            return Err(Unfit::new(
+            return Err(InvalidValue::new(
                 "covariance.order",
                 format!("{parameter} twice"),
                 "each parameter of the arm once",
@@ -181,7 +185,7 @@ fn order(model: &Estimated) -> Result<(), Unfit> {
     }
     let at = named.iter().zip(&found).position(|(a, b)| a != b).unwrap_or(named.len().min(found.len()));
     let name = |name: Option<&str>| name.unwrap_or("nothing").to_owned();
-    Err(Unfit::new(
+    Err(InvalidValue::new(
         format!("parameter, number {}", at + 1),
         format!(
             "{} beside {} in covariance.order",
@@ -194,17 +198,17 @@ fn order(model: &Estimated) -> Result<(), Unfit> {
 
 /// A covariance has a Cholesky factor. It is looked for in correlations, so that units do not matter; a pivot may lie
 /// below 0 by what rounding does to parameters that are all but the same.
-fn covariance(order: &[Parameter], matrix: &DMatrix<f64>) -> Result<(), Unfit> {
+fn covariance(order: &[Parameter], matrix: &DMatrix<f64>) -> Result<(), InvalidValue> {
     const SLACK: f64 = 1e-6;
     let n = order.len();
     let refuse = |k: usize, found: String, expected| {
-        Err(Unfit::new(format!("covariance.lower, row {} ({})", k + 1, order[k]), found, expected))
+        Err(InvalidValue::new(format!("covariance.lower, row {} ({})", k + 1, order[k]), found, expected))
     };
     for (i, j) in (0..n).flat_map(|i| (0..=i).map(move |j| (i, j))) {
         let value = matrix[(i, j)];
         if !value.is_finite() || (i == j && !(0.0..=1e12).contains(&value)) {
             let expected = "finite numbers, and on the diagonal variances of 0 or more";
-            return refuse(i, bounds::shown(value), expected);
+            return refuse(i, bounds::display_number(value), expected);
         }
     }
     let sigma: Vec<f64> = (0..n).map(|i| matrix[(i, i)].sqrt()).collect();
@@ -215,7 +219,7 @@ fn covariance(order: &[Parameter], matrix: &DMatrix<f64>) -> Result<(), Unfit> {
             let scale = sigma[i] * sigma[k];
             // Of what never varies nothing depends.
             if scale == 0.0 && matrix[(i, k)] != 0.0 {
-                return refuse(i, bounds::shown(matrix[(i, k)]), "0 beside a variance of 0");
+                return refuse(i, bounds::display_number(matrix[(i, k)]), "0 beside a variance of 0");
             }
             let rest = if scale == 0.0 { 0.0 } else { matrix[(i, k)] / scale - known };
             if i == k && rest >= -SLACK {
@@ -227,7 +231,7 @@ fn covariance(order: &[Parameter], matrix: &DMatrix<f64>) -> Result<(), Unfit> {
                     "a positive semi-definite covariance: the block up to this row has no Cholesky factor";
                 return refuse(
                     i,
-                    format!("correlations that contradict each other by {}", bounds::shown(rest)),
+                    format!("correlations that contradict each other by {}", bounds::display_number(rest)),
                     expected,
                 );
             }

@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use crate::bounds::Unfit;
+use crate::bounds::InvalidValue;
 
 /// The name and version of the file format.
 pub const SCHEMA: &str = "truegrind.model/1";
@@ -41,9 +41,9 @@ pub enum ModelFileError {
         /// `nominal` or `estimated`.
         part: &'static str,
         /// What is wrong with it.
-        fault: Unfit,
+        fault: InvalidValue,
     },
     /// A number that no estimated arm has, or parts that do not go together.
     #[error(transparent)]
-    Unfit(#[from] Unfit),
+    InvalidValue(#[from] InvalidValue),
 }

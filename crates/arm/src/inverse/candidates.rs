@@ -4,8 +4,8 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use nalgebra::UnitQuaternion;
 
+use super::budget;
 use super::configuration::{BRANCH_TOLERANCE, Configuration, QUARTER_AXES};
-use super::effort;
 use super::newton::{self, Goal, Outcome};
 use super::{Inverse, InverseError, Solution, same_branch};
 use crate::joints::{Joints, Limits};
@@ -17,19 +17,19 @@ const SAME_RAD: f64 = 1e-6;
 /// Singular values below this belong to directions in which another solution may be near.
 const NEARLY_SINGULAR: f64 = 0.15;
 /// Spread seeds for an arm without a closed form.
-const SPREAD: usize = 64;
+const HALTON_SEEDS: usize = 64;
 /// Spread seeds where a closed form leads to nothing although the target seems to be in reach.
-const SPREAD_RESCUE: usize = 24;
+const RESCUE_SEEDS: usize = 24;
 /// A solution with a smaller margin to a singularity may have a neighbour across it.
-const FOLDED: f64 = 0.1;
+const NEAR_FOLD: f64 = 0.1;
 /// Targets beside one whose wanted solution is not found.
-const BESIDE: usize = 60;
+const PERTURBED_TARGETS: usize = 60;
 /// How far beside, in turn (rad, and shares of the characteristic length).
-const BESIDE_WIDTH: [f64; 3] = [0.01, 0.04, 0.15];
+const PERTURBATION: [f64; 3] = [0.01, 0.04, 0.15];
 
 impl Inverse<'_> {
     /// [`Inverse::solve_near`] where the kernel's answer does not count.
-    pub(super) fn solve_carefully(
+    pub(super) fn search_near(
         &self,
         goal: &Goal,
         seed: &Joints,
@@ -65,7 +65,7 @@ impl Inverse<'_> {
     }
 
     /// [`Inverse::solve_configured`] by way of all branches.
-    pub(super) fn solve_in(
+    pub(super) fn search_configured(
         &self,
         goal: &Goal,
         configuration: &Configuration,
@@ -84,11 +84,11 @@ impl Inverse<'_> {
         let mut found = self.branches(goal, near, &[1.0; 3], 0)?;
         let fits = |o: &Outcome| {
             let margins = self.margins(&o.joints);
-            configuration.states_branch(&margins)
-                && configuration.fits(&self.turned(goal, *o, &wanted).joints, &margins)
+            configuration.matches_branch_exactly(&margins)
+                && configuration.matches(&self.turned(goal, *o, &wanted).joints, &margins)
         };
         if !found.iter().any(fits) {
-            found = self.branches(goal, near, &[1.0; 3], SPREAD_RESCUE)?;
+            found = self.branches(goal, near, &[1.0; 3], RESCUE_SEEDS)?;
         }
         if !found.iter().any(fits) {
             found = self.beside(goal, near, found, &fits);
@@ -104,7 +104,7 @@ impl Inverse<'_> {
                 nearest = Some((overshoot, joints));
             }
             let margins = self.margins(&joints);
-            if !configuration.fits(&joints, &margins) {
+            if !configuration.matches(&joints, &margins) {
                 continue;
             }
             if let Err(error) = self.check_limits(&joints) {
@@ -113,13 +113,13 @@ impl Inverse<'_> {
             }
             let distance = near.map_or(0.0, |near| (joints - near).amax());
             // A joint more or less is no reason to take another branch than the one that is stated.
-            let strays = f64::from(u8::from(!configuration.states_branch(&margins)));
+            let strays = f64::from(u8::from(!configuration.matches_branch_exactly(&margins)));
             let rank = [strays, distance, overshoot.max(0.0)];
             if best.as_ref().is_none_or(|(r, _)| rank < *r) {
                 best = Some((rank, outcome));
             }
         }
-        if effort::ran_out() {
+        if budget::exhausted() {
             return Err(InverseError::Abandoned);
         }
         match (best, outside, nearest) {
@@ -135,7 +135,7 @@ impl Inverse<'_> {
 
     /// One solution within the limits for each branch, each joint on the turn nearest to `near`: those between which a
     /// controller chooses that goes to the nearest one. Empty where there is none.
-    pub fn solve_around(&self, target: &Pose, near: &Joints) -> Vec<Joints> {
+    pub fn solve_all_branches(&self, target: &Pose, near: &Joints) -> Vec<Joints> {
         let Ok(goal) = self.goal(target) else { return Vec::new() };
         let found = self.branches(&goal, Some(near), &self.margins(near), 0).unwrap_or_default();
         let within = |o: &Outcome| self.check_limits(&o.joints).is_ok();
@@ -143,10 +143,10 @@ impl Inverse<'_> {
     }
 
     /// Every solution within the limits.
-    pub(super) fn every_turn(&self, goal: &Goal) -> Vec<Solution> {
+    pub(super) fn all_within_limits(&self, goal: &Goal) -> Vec<Solution> {
         let mut out: Vec<Solution> = Vec::new();
         for outcome in self.branches(goal, None, &[1.0; 3], 0).unwrap_or_default() {
-            for start in turns_within(&outcome.joints, &self.arm.model.limits) {
+            for start in full_turns_within(&outcome.joints, &self.arm.model.limits) {
                 let outcome = newton::solve(&self.arm, goal, &start, self.kernel.length_mm);
                 let new = !out.iter().any(|s| (s.joints - outcome.joints).amax() < SAME_RAD);
                 if outcome.converged() && new && self.check_limits(&outcome.joints).is_ok() {
@@ -167,13 +167,13 @@ impl Inverse<'_> {
         margins: &[f64; 3],
         spread: usize,
     ) -> Result<Vec<Outcome>, InverseError> {
-        if effort::refuses() {
+        if budget::refuses() {
             return Err(InverseError::Abandoned);
         }
         let around = near.copied().unwrap_or_else(|| Joints::from_fn(|axis, _| self.middle(axis)));
         let seeds = self.structure.seeds(&goal.last, &(self.arm.model.joint_map * around).into());
         let beyond_mm = seeds.iter().map(|s| s.beyond_mm).fold(f64::INFINITY, f64::min);
-        if self.structure.surely_beyond(&goal.last, beyond_mm, self.apart_mm) {
+        if self.structure.is_surely_unreachable(&goal.last, beyond_mm, self.model_distance_mm) {
             return Err(InverseError::Unreachable { beyond_mm });
         }
         let mut search =
@@ -199,14 +199,14 @@ impl Inverse<'_> {
             }
         }
         let spread = match self.structure.has_branches() {
-            false => SPREAD,
-            true if search.found.is_empty() && beyond_mm < 0.05 * self.kernel.length_mm => SPREAD_RESCUE,
+            false => HALTON_SEEDS,
+            true if search.found.is_empty() && beyond_mm < 0.05 * self.kernel.length_mm => RESCUE_SEEDS,
             true => spread,
         };
         for k in 0..spread {
-            search.attempt(&self.spread_seed(k));
+            search.attempt(&self.halton_seed(k));
         }
-        if effort::ran_out() {
+        if budget::exhausted() {
             return Err(InverseError::Abandoned);
         }
         if !search.found.is_empty() {
@@ -239,13 +239,13 @@ impl Inverse<'_> {
         found: Vec<Outcome>,
         fits: &dyn Fn(&Outcome) -> bool,
     ) -> Vec<Outcome> {
-        let folded = |o: &Outcome| self.margins(&o.joints).iter().any(|m| m.abs() < FOLDED);
+        let folded = |o: &Outcome| self.margins(&o.joints).iter().any(|m| m.abs() < NEAR_FOLD);
         let Some(map_inverse) = self.map_inverse.filter(|_| found.iter().any(folded)) else { return found };
         let around = near.copied().unwrap_or_else(|| Joints::from_fn(|axis, _| self.middle(axis)));
         let mapped = (self.arm.model.joint_map * around).into();
         let mut search = Search { inverse: self, goal, around, found, stuck: Vec::new() };
-        for k in 0..BESIDE {
-            let width = BESIDE_WIDTH[k % BESIDE_WIDTH.len()];
+        for k in 0..PERTURBED_TARGETS {
+            let width = PERTURBATION[k % PERTURBATION.len()];
             let off = Joints::from_fn(|axis, _| width * (2.0 * halton(axis, k) - 1.0));
             let shift = off.fixed_rows::<3>(0) * self.kernel.length_mm;
             let turn = UnitQuaternion::from_scaled_axis(off.fixed_rows::<3>(3).into_owned());
@@ -265,7 +265,7 @@ impl Inverse<'_> {
     /// The outcome with each joint on the turn nearest to `wanted`; effects that know the turn are solved again. A joint
     /// whose turn no configuration states stays within its range where another turn does.
     fn turned(&self, goal: &Goal, outcome: Outcome, wanted: &Joints) -> Outcome {
-        let mut joints = on_turn_near(&outcome.joints, wanted);
+        let mut joints = on_nearest_turn(&outcome.joints, wanted);
         for axis in (0..6).filter(|axis| !QUARTER_AXES.contains(axis)) {
             let (low, high) = range(&self.arm.model.limits, axis);
             let (less, more) = (joints[axis] - TAU, joints[axis] + TAU);
@@ -293,7 +293,7 @@ impl Inverse<'_> {
     }
 
     /// Point `k` of a Halton sequence over the joint ranges.
-    fn spread_seed(&self, k: usize) -> Joints {
+    fn halton_seed(&self, k: usize) -> Joints {
         Joints::from_fn(|axis, _| {
             let (low, high) = range(&self.arm.model.limits, axis);
             low + halton(axis, k) * (high - low)
@@ -325,7 +325,7 @@ struct Search<'s, 'a> {
 impl Search<'_, '_> {
     fn attempt(&mut self, seed: &Joints) {
         let inverse = self.inverse;
-        let start = on_turn_near(seed, &self.around);
+        let start = on_nearest_turn(seed, &self.around);
         let outcome = newton::solve(&inverse.arm, self.goal, &start, inverse.kernel.length_mm);
         if !outcome.converged() {
             self.stuck.push(outcome);
@@ -342,7 +342,7 @@ impl Search<'_, '_> {
     fn explore(&mut self, root: &Joints) {
         let arm = &self.inverse.arm;
         let jacobian =
-            newton::scaled_jacobian(arm, root, self.inverse.kernel.length_mm) * arm.rotation_slopes(root);
+            newton::scaled_jacobian(arm, root, self.inverse.kernel.length_mm) * arm.rotation_jacobian(root);
         let Some(svd) = spectral::svd(&jacobian, true) else { return };
         let Some(directions) = svd.v_t else { return };
         for k in (0..6).filter(|&k| svd.singular_values[k] < NEARLY_SINGULAR) {
@@ -356,7 +356,7 @@ impl Search<'_, '_> {
 }
 
 /// The same joint positions, each on the turn nearest to `wanted`.
-fn on_turn_near(joints: &Joints, wanted: &Joints) -> Joints {
+fn on_nearest_turn(joints: &Joints, wanted: &Joints) -> Joints {
     joints.zip_map(wanted, |q, w| q + TAU * ((w - q) / TAU).round())
 }
 
@@ -367,10 +367,10 @@ fn range(limits: &Limits, axis: usize) -> (f64, f64) {
 }
 
 /// More combinations of turns than a robot has; an arm with wider limits gets the nearest turn of each joint alone.
-const MOST_COMBINATIONS: usize = 4096;
+const MAX_COMBINATIONS: usize = 4096;
 
 /// Every combination of full turns that lies within the limits.
-fn turns_within(joints: &Joints, limits: &Limits) -> Vec<Joints> {
+fn full_turns_within(joints: &Joints, limits: &Limits) -> Vec<Joints> {
     let mut out = vec![*joints];
     for axis in 0..6 {
         // A joint may lie outside by as much as effects move it from turn to turn; Newton and the limits decide.
@@ -379,7 +379,7 @@ fn turns_within(joints: &Joints, limits: &Limits) -> Vec<Joints> {
         let low = ((min - slack - joints[axis]) / TAU).ceil();
         let high = ((max + slack - joints[axis]) / TAU).floor();
         let count = (high - low + 1.0).max(0.0);
-        if count * out.len() as f64 > MOST_COMBINATIONS as f64 {
+        if count * out.len() as f64 > MAX_COMBINATIONS as f64 {
             continue;
         }
         out = out

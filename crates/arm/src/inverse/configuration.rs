@@ -103,17 +103,17 @@ impl Configuration {
     }
 
     /// Whether joints and their margins are of this configuration, borders counted to both sides.
-    pub(super) fn fits(&self, joints: &Joints, margins: &[f64; 3]) -> bool {
-        self.overshoot_rad(joints) <= QUARTER_TOLERANCE_RAD && self.has_branch(margins)
+    pub(super) fn matches(&self, joints: &Joints, margins: &[f64; 3]) -> bool {
+        self.overshoot_rad(joints) <= QUARTER_TOLERANCE_RAD && self.matches_branch(margins)
     }
 
     /// Whether margins are of the stated branch to the sign, as a controller that uses cfx reads it.
-    pub(super) fn states_branch(&self, margins: &[f64; 3]) -> bool {
+    pub(super) fn matches_branch_exactly(&self, margins: &[f64; 3]) -> bool {
         Branch::of(margins).index() == self.cfx
     }
 
     /// Whether margins of a solution belong to the stated branch, borders counted to both sides.
-    fn has_branch(&self, margins: &[f64; 3]) -> bool {
+    fn matches_branch(&self, margins: &[f64; 3]) -> bool {
         (0..3).all(|k| {
             let wanted_negative = (self.cfx >> (2 - k)) & 1 == 1;
             margins[k].abs() < BRANCH_TOLERANCE || (margins[k] < 0.0) == wanted_negative

@@ -8,32 +8,32 @@
 //! Shapes: `R` is one row or several; unknowns are the mapped joint angles u (rad).
 //! Stops: a row stands still once it is within [`TOLERANCE_MM`] and
 //! [`TOLERANCE_RAD`], so it gets the same bits whatever its neighbours do; a row whose step is longer than
-//! [`LONGEST_STEP_RAD`] or which needs more than [`STEPS`] is given up and left to [`super::newton`]. Where only the
-//! joints are asked for ([`Asked::Joints`]), a step shorter than [`SETTLED_RAD`] is the last: by Newton's square law
+//! [`MAX_STEP_RAD`] or which needs more than [`MAX_STEPS`] is given up and left to [`super::newton`]. Where only the
+//! joints are requested ([`Outputs::Joints`]), a step shorter than [`FINAL_STEP_RAD`] is the last: by Newton's square law
 //! what it leaves lies below the tolerances, which holds where the slope of the effects is exact, so only without them.
 //! Checked against: [`super::newton`], the forward map.
 
 use super::newton::{TOLERANCE_MM, TOLERANCE_RAD};
 use super::solution::Solution;
 use super::structure::Structure;
-use crate::chain::{Chain, End, chain, cross, dot, minus};
+use crate::chain::{Chain, FrameColumns, chain, cross, dot, minus};
 use crate::joints::Joints;
 use crate::model::PreparedModel;
 use truegrind_math::lanes::{SinCos, sin_cos, splats};
 
 /// Most steps of a row.
-const STEPS: usize = 8;
+const MAX_STEPS: usize = 8;
 /// Longest step of a joint (rad).
-const LONGEST_STEP_RAD: f64 = 0.5;
+const MAX_STEP_RAD: f64 = 0.5;
 
 /// A step of every joint below this leaves half its square, 1.3e-13 rad, and over 3 m of arm 4e-10 mm (rad).
-const SETTLED_RAD: f64 = 5e-7;
+const FINAL_STEP_RAD: f64 = 5e-7;
 
-/// What is asked of the kernel.
+/// What the kernel computes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Asked {
+pub(super) enum Outputs {
     /// Joints, residuals and the distance to singularity at the end.
-    Everything,
+    Full,
     /// Joints alone: `singularity` says by more than 0 that the Jacobian at the end has an inverse, and residuals are
     /// those before the last step.
     Joints,
@@ -192,9 +192,9 @@ impl Kernel {
         &self,
         arm: &PreparedModel<'_>,
         structure: &Structure,
-        goal: &End<R>,
+        goal: &FrameColumns<R>,
         start: &[R; 6],
-        asked: Asked,
+        outputs: Outputs,
     ) -> Solved<R> {
         let (zero, one) = (start[0].splat(0.0), start[0].splat(1.0));
         let goal_wrist = at(&goal.origin, &goal.axes, &self.wrist_mm);
@@ -202,8 +202,8 @@ impl Kernel {
         let mut mapped = *start;
         let (mut alive, mut steps) = (one, zero);
         // Rows whose last step was too short for another one, and their margins before it.
-        let (mut settled, mut settled_margins) = (zero, [zero; 3]);
-        let brief = asked == Asked::Joints && arm.model.effects.is_empty();
+        let (mut finished, mut finished_margins) = (zero, [zero; 3]);
+        let brief = outputs == Outputs::Joints && arm.model.effects.is_empty();
         let mut first_margins = [zero; 3];
         let mut step = 0;
         loop {
@@ -231,7 +231,7 @@ impl Kernel {
             }
             alive = alive * sensible * (one - converged);
             let factored = Factored::of(&frames, &wrist);
-            let mut ends = step == STEPS || !alive.any_above(0.0);
+            let mut ends = step == MAX_STEPS || !alive.any_above(0.0);
             if !ends {
                 let mut delta = factored.solve(&minus(&goal_wrist, &wrist), &turn);
                 let mut carried = [zero; 6];
@@ -240,7 +240,7 @@ impl Kernel {
                 }
                 for j in 0..6 {
                     delta[j] -= carried[j];
-                    alive = alive * delta[j].within(LONGEST_STEP_RAD);
+                    alive = alive * delta[j].within(MAX_STEP_RAD);
                 }
                 // Rows that stand still must not take up a NaN: 0 · NaN is NaN, so a lost row stays lost, and only it.
                 for j in 0..6 {
@@ -251,34 +251,34 @@ impl Kernel {
                 if brief {
                     let mut last = alive;
                     for turn in delta {
-                        last = last * turn.within(SETTLED_RAD);
+                        last = last * turn.within(FINAL_STEP_RAD);
                     }
                     alive += -last;
                     ends = !alive.any_above(0.0);
                     if last.any_above(0.0) {
                         let margins = structure.margins(&frames, &wrist);
                         for k in 0..3 {
-                            settled_margins[k] += last * margins[k];
+                            finished_margins[k] += last * margins[k];
                         }
-                        settled += last;
+                        finished += last;
                     }
                 }
             }
             if ends {
-                let open = one - settled;
+                let open = one - finished;
                 let mut margins = structure.margins(&frames, &wrist);
                 for k in 0..3 {
-                    margins[k] = open * margins[k] + settled_margins[k];
+                    margins[k] = open * margins[k] + finished_margins[k];
                 }
                 return Solved {
                     mapped,
                     residual_mm,
                     residual_rad,
                     steps,
-                    converged: open * converged + settled,
-                    singularity: match asked {
-                        Asked::Everything => factored.distance(&minus(&wrist, &flange), self.length_mm),
-                        Asked::Joints => factored.regular(self.length_mm),
+                    converged: open * converged + finished,
+                    singularity: match outputs {
+                        Outputs::Full => factored.distance(&minus(&wrist, &flange), self.length_mm),
+                        Outputs::Joints => factored.regular(self.length_mm),
                     },
                     margins: [first_margins, margins],
                 };
@@ -289,7 +289,7 @@ impl Kernel {
     /// Joint frames for mapped angles.
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn frames<R: SinCos>(&self, arm: &PreparedModel<'_>, mapped: &[R; 6]) -> Chain<R> {
-        let rotations = arm.affected(mapped);
+        let rotations = arm.apply_effects(mapped);
         let (mut sin, mut cos) = (rotations, rotations);
         for i in 0..6 {
             (sin[i], cos[i]) = sin_cos(rotations[i]);

@@ -10,7 +10,7 @@
 
 use nalgebra::{Matrix3, Matrix6, Rotation3, Vector3, Vector6};
 
-use super::effort;
+use super::budget;
 
 use crate::chain::Chain;
 use crate::jacobian::{joint_jacobian, link_twist};
@@ -25,8 +25,8 @@ pub const TOLERANCE_MM: f64 = 5e-10;
 pub const TOLERANCE_RAD: f64 = 5e-13;
 
 /// Longest step of a joint (rad).
-const LONGEST_STEP_RAD: f64 = 0.6;
-const EVALUATIONS: usize = 80;
+const MAX_STEP_RAD: f64 = 0.6;
+const MAX_EVALUATIONS: usize = 80;
 
 /// A target as the kernel wants it: pose of the last DH frame, and the flange.
 #[derive(Debug, Clone)]
@@ -117,16 +117,16 @@ fn rotation_vector(m: &Matrix3<f64>) -> Vector3<f64> {
     Rotation3::from_matrix_unchecked(*m).scaled_axis()
 }
 
-/// Runs from `start`. NaN ends it at once, not converged; so does an allowance that is used up.
+/// Runs from `start`. NaN ends it at once, not converged; so does an budget that is used up.
 pub(super) fn solve(arm: &PreparedModel<'_>, goal: &Goal, start: &Joints, length_mm: f64) -> Outcome {
-    if effort::refuses() {
+    if budget::refuses() {
         let far = f64::INFINITY;
         return Outcome { joints: *start, residual_mm: far, residual_rad: far, iterations: 0 };
     }
     let mut here = state(arm, goal, *start, length_mm);
     let mut damping = 0.0_f64;
     let mut iterations = 0;
-    while iterations < EVALUATIONS
+    while iterations < MAX_EVALUATIONS
         && !(here.residual_mm <= TOLERANCE_MM && here.residual_rad <= TOLERANCE_RAD)
         && here.missing.iter().all(|e| e.is_finite())
     {
@@ -143,7 +143,7 @@ pub(super) fn solve(arm: &PreparedModel<'_>, goal: &Goal, start: &Joints, length
             None => damping = (damping * 10.0).max(1e-6),
         }
     }
-    effort::spend(iterations as u64 + 1);
+    budget::spend(iterations as u64 + 1);
     Outcome {
         joints: here.joints,
         residual_mm: here.residual_mm,
@@ -161,7 +161,5 @@ fn step(here: &State, damping: f64) -> Option<Vector6<f64>> {
         normal.cholesky()?.solve(&(transposed * here.missing))
     };
     let longest = step.amax();
-    longest
-        .is_finite()
-        .then(|| if longest > LONGEST_STEP_RAD { step * (LONGEST_STEP_RAD / longest) } else { step })
+    longest.is_finite().then(|| if longest > MAX_STEP_RAD { step * (MAX_STEP_RAD / longest) } else { step })
 }

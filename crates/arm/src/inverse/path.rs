@@ -2,17 +2,17 @@
 
 use rayon::prelude::*;
 
+use super::budget::{SearchBudget, with_budget};
 use super::configuration::{self, Configuration};
-use super::effort::{Allowance, within};
-use super::kernel::{Asked, Solved};
+use super::kernel::{Outputs, Solved};
 use super::{Branch, Inverse, InverseError, Solution, same_branch};
-use crate::chain::End;
+use crate::chain::FrameColumns;
 use crate::joints::{self, Joints};
 use truegrind_math::lanes::{AnyWidth, SinCos, WIDTH, vectorised};
 use truegrind_math::se3::Pose;
 
 /// Neighbours on a path that stand farther apart are solved one after the other, not in lanes (rad).
-const LONGEST_STRIDE_RAD: f64 = 0.35;
+const MAX_STRIDE_RAD: f64 = 0.35;
 /// Strides up to here are continued into the next eight seeds (rad).
 const STEADY_STRIDE_RAD: f64 = 0.05;
 /// Targets that one thread takes at a time; the results do not depend on it.
@@ -20,7 +20,7 @@ const PORTION: usize = 1024;
 
 /// Joints that reach a target, and what comes with them at no cost.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Reached {
+pub struct PathJoints {
     /// Controller angles (rad).
     pub joints: Joints,
     /// Their configuration.
@@ -29,16 +29,16 @@ pub struct Reached {
     margins: [f64; 3],
 }
 
-impl Reached {
-    /// Whether the joints are of the configuration that was asked for, borders counted to both sides as in
+impl PathJoints {
+    /// Whether the joints are of the configuration that was requested, borders counted to both sides as in
     /// [`Inverse::solve_configured`].
-    pub fn fits(&self, wanted: &Configuration) -> bool {
-        wanted.fits(&self.joints, &self.margins)
+    pub fn matches(&self, wanted: &Configuration) -> bool {
+        wanted.matches(&self.joints, &self.margins)
     }
 
     /// The same with the branch to the sign: no other solution of the target is of that configuration.
-    pub fn is_of(&self, wanted: &Configuration) -> bool {
-        self.fits(wanted) && wanted.states_branch(&self.margins)
+    pub fn matches_exactly(&self, wanted: &Configuration) -> bool {
+        self.matches(wanted) && wanted.matches_branch_exactly(&self.margins)
     }
 
     /// [`Inverse::branch_margins`] at these joints.
@@ -53,21 +53,25 @@ impl Inverse<'_> {
     ///
     /// One thread; the same input gives the same bits.
     pub fn solve_path(&self, targets: &[Pose], start: &Joints) -> Vec<Result<Solution, InverseError>> {
-        self.along(targets, start, Asked::Everything, false, |solution, _| solution)
+        self.along(targets, start, Outputs::Full, false, |solution, _| solution)
     }
 
     /// The joints of [`Inverse::solve_path`], without residuals and distances to singularity: half the work. They may
     /// differ by 1e-12 rad.
-    pub fn reach_path(&self, targets: &[Pose], start: &Joints) -> Vec<Result<Reached, InverseError>> {
-        self.along(targets, start, Asked::Joints, false, |solution, margins| {
-            self.reached(&solution.joints, &margins)
+    pub fn solve_path_joints(
+        &self,
+        targets: &[Pose],
+        start: &Joints,
+    ) -> Vec<Result<PathJoints, InverseError>> {
+        self.along(targets, start, Outputs::Joints, false, |solution, margins| {
+            self.path_joints(&solution.joints, &margins)
         })
     }
 
-    /// The first of [`Inverse::reach_path`], up to a target for which all branches would have to be searched.
-    pub fn reach_path_easily(&self, targets: &[Pose], start: &Joints) -> Vec<Reached> {
-        let reached = self.along(targets, start, Asked::Joints, true, |solution, margins| {
-            self.reached(&solution.joints, &margins)
+    /// The first of [`Inverse::solve_path_joints`], up to a target for which all branches would have to be searched.
+    pub fn solve_path_prefix(&self, targets: &[Pose], start: &Joints) -> Vec<PathJoints> {
+        let reached = self.along(targets, start, Outputs::Joints, true, |solution, margins| {
+            self.path_joints(&solution.joints, &margins)
         });
         reached.into_iter().map_while(Result::ok).collect()
     }
@@ -77,7 +81,7 @@ impl Inverse<'_> {
         &self,
         targets: &[Pose],
         start: &Joints,
-        asked: Asked,
+        outputs: Outputs,
         easily: bool,
         keep: impl Fn(Solution, [f64; 3]) -> T,
     ) -> Vec<Result<T, InverseError>> {
@@ -85,7 +89,7 @@ impl Inverse<'_> {
         let (mut last, mut stride) = (*start, Joints::zeros());
         let mut margins = self.margins(start);
         let (mut seeds, mut solved) = ([last; WIDTH], Solved::default());
-        let mut lanes = Asking::default();
+        let mut lanes = Targets::default();
         for block in targets.chunks(WIDTH) {
             for (k, seed) in seeds.iter_mut().enumerate() {
                 let ahead = (k + 1) as f64;
@@ -93,13 +97,13 @@ impl Inverse<'_> {
                     seed[joint] = last[joint] + stride[joint] * ahead;
                 }
             }
-            self.solve_lanes(block, &seeds, asked, &mut lanes, &mut solved);
+            self.solve_lanes(block, &seeds, outputs, &mut lanes, &mut solved);
             for (k, target) in block.iter().enumerate() {
                 let row = lane(&solved, k);
-                let joints = self.unmapped(&row.mapped);
+                let joints = self.controller_angles(&row.mapped);
                 // The road in lanes is open while strides are short and the branch is kept.
-                if self.counts(&row, &joints, &seeds[k])
-                    && joints::farthest_apart(&joints, &last) < LONGEST_STRIDE_RAD
+                if self.is_accepted(&row, &joints, &seeds[k])
+                    && joints::max_joint_difference(&joints, &last) < MAX_STRIDE_RAD
                     && same_branch(&margins, &row.margins[1])
                     && self.within_limits(&joints)
                 {
@@ -110,7 +114,7 @@ impl Inverse<'_> {
                     continue;
                 }
                 let result = match easily {
-                    true => match self.solve_easily(target, &last) {
+                    true => match self.solve_without_search(target, &last) {
                         Some(Ok(solution)) => Ok(solution),
                         Some(Err(_)) | None => return out,
                     },
@@ -133,7 +137,7 @@ impl Inverse<'_> {
         self.solve_seeded_within(targets, seeds, u64::MAX)
     }
 
-    /// The same with so many evaluations at most for those that have to be searched for (see [`effort`](super::effort)),
+    /// The same with so many evaluations at most for those that have to be searched for (see [`budget`](super::budget)),
     /// shared out by their number.
     pub fn solve_seeded_within(
         &self,
@@ -148,12 +152,12 @@ impl Inverse<'_> {
             .zip(seeds[..count].par_chunks(PORTION))
             .enumerate()
             .flat_map_iter(|(portion, (targets, seeds))| {
-                let mut allowance = Allowance::of(evaluations).part(portion, portions);
-                within(&mut allowance, || {
+                let mut budget = SearchBudget::of(evaluations).share(portion, portions);
+                with_budget(&mut budget, || {
                     let blocks = targets.chunks(WIDTH).zip(seeds.chunks(WIDTH));
                     let solved = blocks.flat_map(|(targets, seeds)| {
-                        let (mut lanes, mut solved) = (Asking::default(), Solved::default());
-                        self.solve_lanes(targets, &padded(seeds), Asked::Everything, &mut lanes, &mut solved);
+                        let (mut lanes, mut solved) = (Targets::default(), Solved::default());
+                        self.solve_lanes(targets, &padded(seeds), Outputs::Full, &mut lanes, &mut solved);
                         (0..targets.len())
                             .map(move |k| self.judged(&lane(&solved, k), &targets[k], &seeds[k]))
                     });
@@ -165,19 +169,23 @@ impl Inverse<'_> {
 
     /// The joints of [`Inverse::solve_seeded`], without residuals and distances to singularity: half the work; they may
     /// differ by 1e-12 rad. One thread.
-    pub fn reach_seeded(&self, targets: &[Pose], seeds: &[Joints]) -> Vec<Result<Reached, InverseError>> {
+    pub fn solve_seeded_joints(
+        &self,
+        targets: &[Pose],
+        seeds: &[Joints],
+    ) -> Vec<Result<PathJoints, InverseError>> {
         let mut out = Vec::with_capacity(targets.len());
-        let (mut lanes, mut solved) = (Asking::default(), Solved::default());
+        let (mut lanes, mut solved) = (Targets::default(), Solved::default());
         for (targets, seeds) in targets.chunks(WIDTH).zip(seeds.chunks(WIDTH)) {
-            self.solve_lanes(targets, &padded(seeds), Asked::Joints, &mut lanes, &mut solved);
+            self.solve_lanes(targets, &padded(seeds), Outputs::Joints, &mut lanes, &mut solved);
             for (k, (target, seed)) in targets.iter().zip(seeds).enumerate() {
                 let row = lane(&solved, k);
-                let joints = self.unmapped(&row.mapped);
-                out.push(match self.counts(&row, &joints, seed) {
-                    true => self.check_limits(&joints).map(|()| self.reached(&joints, &row.margins[1])),
+                let joints = self.controller_angles(&row.mapped);
+                out.push(match self.is_accepted(&row, &joints, seed) {
+                    true => self.check_limits(&joints).map(|()| self.path_joints(&joints, &row.margins[1])),
                     false => {
                         let found = self.solve_near(target, seed);
-                        found.map(|s| self.reached(&s.joints, &self.margins(&s.joints)))
+                        found.map(|s| self.path_joints(&s.joints, &self.margins(&s.joints)))
                     }
                 });
             }
@@ -188,13 +196,17 @@ impl Inverse<'_> {
     /// [`Inverse::solve_seeded`] where solution and seed differ alike along the list, as on the path of an estimated arm
     /// that is seeded with the nominal one's joints: each eight begin by as much beside their seeds as the last one before
     /// them ended. One thread.
-    pub fn solve_beside(&self, targets: &[Pose], seeds: &[Joints]) -> Vec<Result<Solution, InverseError>> {
+    pub fn solve_offset_seeded(
+        &self,
+        targets: &[Pose],
+        seeds: &[Joints],
+    ) -> Vec<Result<Solution, InverseError>> {
         let mut out = Vec::with_capacity(targets.len());
         let mut beside = Joints::zeros();
-        let (mut lanes, mut solved) = (Asking::default(), Solved::default());
+        let (mut lanes, mut solved) = (Targets::default(), Solved::default());
         for (targets, seeds) in targets.chunks(WIDTH).zip(seeds.chunks(WIDTH)) {
             let begun = padded(seeds).map(|seed| seed + beside);
-            self.solve_lanes(targets, &begun, Asked::Everything, &mut lanes, &mut solved);
+            self.solve_lanes(targets, &begun, Outputs::Full, &mut lanes, &mut solved);
             for (k, (target, seed)) in targets.iter().zip(seeds).enumerate() {
                 let result = self.judged(&lane(&solved, k), target, seed);
                 if let Ok(solution) = &result {
@@ -211,25 +223,25 @@ impl Inverse<'_> {
 
     /// The kernel's solution where it counts, the careful one elsewhere.
     fn judged(&self, row: &Solved<f64>, target: &Pose, seed: &Joints) -> Result<Solution, InverseError> {
-        let joints = self.unmapped(&row.mapped);
-        match self.counts(row, &joints, seed) {
+        let joints = self.controller_angles(&row.mapped);
+        match self.is_accepted(row, &joints, seed) {
             true => self.check_limits(&joints).map(|()| row.solution(&joints)),
             false => self.solve_near(target, seed),
         }
     }
 
-    fn reached(&self, joints: &Joints, margins: &[f64; 3]) -> Reached {
+    fn path_joints(&self, joints: &Joints, margins: &[f64; 3]) -> PathJoints {
         let branch = self.structure.has_branches().then(|| Branch::of(margins));
-        Reached { joints: *joints, configuration: configuration::of(branch, joints), margins: *margins }
+        PathJoints { joints: *joints, configuration: configuration::of(branch, joints), margins: *margins }
     }
 
     /// The kernel on one target.
     pub(super) fn solve_fast(&self, target: &Pose, seed: &Joints) -> Solved<f64> {
         let q = target.rotation.coords;
         let t = target.translation.vector;
-        let goal = self.place(&[q.x, q.y, q.z, q.w], &[t.x, t.y, t.z]);
-        let start = self.arm.mapped(&(*seed).into());
-        self.kernel.solve(&self.arm, &self.structure, &goal, &start, Asked::Everything)
+        let goal = self.last_frame_goal(&[q.x, q.y, q.z, q.w], &[t.x, t.y, t.z]);
+        let start = self.arm.apply_joint_map(&(*seed).into());
+        self.kernel.solve(&self.arm, &self.structure, &goal, &start, Outputs::Full)
     }
 
     /// The kernel on up to eight targets; the last one fills the lanes. `lanes` is room for them.
@@ -237,8 +249,8 @@ impl Inverse<'_> {
         &self,
         targets: &[Pose],
         seeds: &[Joints; WIDTH],
-        asked: Asked,
-        lanes: &mut Asking,
+        outputs: Outputs,
+        lanes: &mut Targets,
         solved: &mut Solved<Eight>,
     ) {
         for k in 0..WIDTH {
@@ -253,7 +265,7 @@ impl Inverse<'_> {
                 lanes.start[i][k] = seeds[k][i];
             }
         }
-        vectorised(Block { inverse: self, targets: lanes, asked, solved });
+        vectorised(Block { inverse: self, targets: lanes, outputs, solved });
     }
 
     /// Place of the last frame for a pose of the flange, given by quaternion (x, y, z, w) and translation.
@@ -261,7 +273,7 @@ impl Inverse<'_> {
     /// The quaternion need not have length 1 to the last bit: an interpolated one seldom has, and axes that are longer
     /// than 1 by 1e-11 ask for a place that no joints reach.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn place<R: SinCos>(&self, quaternion: &[R; 4], translation: &[R; 3]) -> End<R> {
+    fn last_frame_goal<R: SinCos>(&self, quaternion: &[R; 4], translation: &[R; 3]) -> FrameColumns<R> {
         let [x, y, z, w] = *quaternion;
         let one = x.splat(1.0);
         let two = x.splat(2.0) / (x * x + y * y + z * z + w * w);
@@ -270,14 +282,14 @@ impl Inverse<'_> {
             [two * (x * y - w * z), one - two * (x * x + z * z), two * (y * z + w * x)],
             [two * (x * z + w * y), two * (y * z - w * x), one - two * (x * x + y * y)],
         ];
-        End { axes: columns, origin: *translation }.then(&self.flange_inverse)
+        FrameColumns { axes: columns, origin: *translation }.compose(&self.flange_inverse)
     }
 }
 
 /// The stride to be continued: none after a long one.
 #[inline(always)]
 fn stride_between(from: &Joints, to: &Joints) -> Joints {
-    if joints::farthest_apart(from, to) >= STEADY_STRIDE_RAD { Joints::zeros() } else { to - from }
+    if joints::max_joint_difference(from, to) >= STEADY_STRIDE_RAD { Joints::zeros() } else { to - from }
 }
 
 /// Eight seeds; the last one fills the lanes.
@@ -290,7 +302,7 @@ type Eight = [f64; WIDTH];
 
 /// Eight targets with their seeds.
 #[derive(Default)]
-struct Asking {
+struct Targets {
     quaternion: [Eight; 4],
     translation: [Eight; 3],
     start: [Eight; 6],
@@ -299,8 +311,8 @@ struct Asking {
 /// The kernel on eight targets.
 struct Block<'a> {
     inverse: &'a Inverse<'a>,
-    targets: &'a Asking,
-    asked: Asked,
+    targets: &'a Targets,
+    outputs: Outputs,
     solved: &'a mut Solved<Eight>,
 }
 
@@ -322,8 +334,8 @@ impl AnyWidth for Block<'_> {
             for k in 0..6 {
                 start[k] = like.load(&targets.start[k], from);
             }
-            let goal = self.inverse.place(&quaternion, &translation);
-            let solved = kernel.solve(arm, structure, &goal, &arm.mapped(&start), self.asked);
+            let goal = self.inverse.last_frame_goal(&quaternion, &translation);
+            let solved = kernel.solve(arm, structure, &goal, &arm.apply_joint_map(&start), self.outputs);
             for k in 0..6 {
                 solved.mapped[k].store(&mut out.mapped[k], from);
             }

@@ -126,7 +126,7 @@ pub enum InverseError {
     /// The target is reachable, but not in the requested configuration.
     #[error("target is not reachable in configuration {wanted}; the nearest is {nearest}")]
     OtherConfiguration {
-        /// What was asked for.
+        /// The requested configuration.
         wanted: Configuration,
         /// The nearest that reaches the target.
         nearest: Configuration,
@@ -139,7 +139,7 @@ pub enum InverseError {
         /// Remaining angle (rad).
         residual_rad: f64,
     },
-    /// The search was given up: see [`effort`](super::effort).
+    /// The search was given up: see [`budget`](super::budget).
     #[error(
         "its joints were not sought to the end: too many targets of this program are out of reach or beside a singularity, and \
          the work on those is bounded; correct them first, or divide the program"

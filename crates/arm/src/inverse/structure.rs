@@ -66,19 +66,19 @@ impl Structure {
         self.axes.extent_mm
     }
 
-    /// Whether no arm whose points are within `apart_mm` of this one's, all joints turned alike, reaches a pose of the last
+    /// Whether no arm whose points are within `model_distance_mm` of this one's, all joints turned alike, reaches a pose of the last
     /// frame that the closed form has beyond reach by `beyond_mm`.
     ///
     /// For a spherical wrist: the wrist centre is told by the pose, and the places that it reaches are a ring about axis 1.
     /// Seen in a plane through that axis, a shift of the wrist centre moves its place by no more than as much, but for an
     /// arm with an offset to the side, of which the plane turns: more the nearer to the axis. Any arm: what lies farther
     /// from the base than all links in line are long.
-    pub(super) fn surely_beyond(&self, last: &Pose, beyond_mm: f64, apart_mm: f64) -> bool {
+    pub(super) fn is_surely_unreachable(&self, last: &Pose, beyond_mm: f64, model_distance_mm: f64) -> bool {
         if !(beyond_mm > 0.0 && beyond_mm.is_finite()) {
             return false;
         }
         let axes = &self.axes;
-        if last.translation.vector.norm() > axes.extent_mm + apart_mm {
+        if last.translation.vector.norm() > axes.extent_mm + model_distance_mm {
             return true;
         }
         let Family::Spherical(centre) = self.family else { return false };
@@ -89,7 +89,7 @@ impl Structure {
         let loose = axes.meeting(3, 4).map_or(f64::INFINITY, |(_, gap)| gap)
             + axes.distance(5, &centre)
             + axes.extent_mm * axes.direction[1].cross(&axes.direction[2]).norm();
-        let shift = 2.0 * (apart_mm + loose) + 1e-3;
+        let shift = 2.0 * (model_distance_mm + loose) + 1e-3;
         let nearest = from_axis - shift;
         if !(nearest > 1.1 * to_side) {
             return to_side < 1e-6 && beyond_mm > shift;

@@ -1,5 +1,5 @@
 //! An arm in the formats of others. They hold links and ranges of joints; what an estimated arm has beyond that stays behind, and
-//! whoever writes one has to say so ([`left_out`]).
+//! whoever writes one has to say so ([`lost_in_export`]).
 
 use std::fmt::Write;
 
@@ -27,9 +27,9 @@ pub enum Format {
 const UR: [&str; 6] = ["shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2", "wrist_3"];
 
 /// What of an arm the format does not hold, one sentence each.
-pub fn left_out(model: &Model, format: Format) -> Vec<String> {
+pub fn lost_in_export(model: &Model, format: Format) -> Vec<String> {
     let mut out = Vec::new();
-    let acting = model.effects.iter().filter(|effect| !effect.is_still());
+    let acting = model.effects.iter().filter(|effect| !effect.is_zero());
     let names: Vec<&str> = acting.map(|effect| effect.name()).collect();
     if !names.is_empty() {
         out.push(format!("effects beyond rigid links are left out: {}", names.join(", ")));
@@ -37,7 +37,7 @@ pub fn left_out(model: &Model, format: Format) -> Vec<String> {
     if format != Format::Urdf && model.bodies.is_some() {
         out.push("masses are left out".to_owned());
     }
-    let behind = behind(model, format);
+    let behind = flange_in_last_frame(model, format);
     if behind != Pose::identity() {
         let (place, turn) = (behind.translation.vector, behind.rotation);
         out.push(format!(
@@ -46,7 +46,7 @@ pub fn left_out(model: &Model, format: Format) -> Vec<String> {
             place.x, place.y, place.z, turn.w, turn.i, turn.j, turn.k
         ));
     }
-    out.extend(reckoned(model, format));
+    out.extend(angle_note(model, format));
     if format == Format::UrYaml && model.limits.speed_rad_s.is_some() {
         out.push("ranges and speeds of joints are left out".to_owned());
     }
@@ -55,7 +55,7 @@ pub fn left_out(model: &Model, format: Format) -> Vec<String> {
 
 /// The flange in the last frame that a format holds: a table ends before it; Craig's, and the file of UR drivers, before length and
 /// twist of the last link.
-pub fn behind(model: &Model, format: Format) -> Pose {
+pub fn flange_in_last_frame(model: &Model, format: Format) -> Pose {
     let last = &model.links[5];
     match format {
         Format::Urdf => Pose::identity(),
@@ -69,7 +69,7 @@ pub fn behind(model: &Model, format: Format) -> Pose {
 
 /// The angles of the joints of a file for the angles that the controller counts: what a format does not hold of signs and
 /// couplings has to be worked out by whoever moves the exported arm.
-pub fn angles(model: &Model, format: Format) -> Matrix6<f64> {
+pub fn joint_matrix(model: &Model, format: Format) -> Matrix6<f64> {
     match format {
         Format::Standard | Format::Modified => Matrix6::identity(),
         Format::Urdf => Matrix6::from_diagonal(&signs(model)) * model.joint_map,
@@ -83,8 +83,8 @@ fn signs(model: &Model) -> Vector6<f64> {
 }
 
 /// Which joints of a file are not those of the controller, and what they are; `None` where all are.
-fn reckoned(model: &Model, format: Format) -> Option<String> {
-    let angles = angles(model, format);
+fn angle_note(model: &Model, format: Format) -> Option<String> {
+    let angles = joint_matrix(model, format);
     let sum = |i: usize| {
         let mut out = String::new();
         for (j, turn) in angles.row(i).iter().enumerate().filter(|(_, turn)| **turn != 0.0) {
@@ -127,7 +127,7 @@ pub fn write(model: &Model, name: &str, format: Format, notes: &[String]) -> Str
 }
 
 /// The frame of each joint in the one before, turning about its z; the flange in the last, all joints at zero.
-fn places(model: &Model) -> [Pose; 7] {
+fn joint_frames(model: &Model) -> [Pose; 7] {
     let mut out = [Pose::identity(); 7];
     let mut rest = Pose::identity();
     for (place, link) in out.iter_mut().zip(&model.links) {
@@ -157,7 +157,7 @@ fn urdf(model: &Model, name: &str, notes: &[String]) -> String {
     }
     let _ = writeln!(out, "<robot name=\"{plain}\">\n  <link name=\"base_link\"/>");
     let frames = model.at_condition(&Condition::default()).frames(&Joints::zeros());
-    let (places, signs, ranges) = (places(model), signs(model), Ranges::of(model));
+    let (places, signs, ranges) = (joint_frames(model), signs(model), Ranges::of(model));
     let mut at = Pose::identity();
     for i in 0..6 {
         at *= places[i];
@@ -209,7 +209,7 @@ struct Ranges {
 
 impl Ranges {
     fn of(model: &Model) -> Self {
-        let (angles, limits) = (angles(model, Format::Urdf), &model.limits);
+        let (angles, limits) = (joint_matrix(model, Format::Urdf), &model.limits);
         let sum = |i: usize, of: &dyn Fn(usize, f64) -> f64| {
             let row = angles.row(i);
             let parts = row.iter().enumerate().filter(|(_, turn)| **turn != 0.0);
@@ -253,7 +253,7 @@ fn ur_yaml(model: &Model, notes: &[String]) -> String {
         let _ = writeln!(out, "# {note}");
     }
     out.push_str("kinematics:\n");
-    let mut places = places(model);
+    let mut places = joint_frames(model);
     // The last frame turns about its own z, along which it may stand anywhere.
     places[5] *= Pose::translation(0.0, 0.0, model.links[5].d_mm);
     for (name, pose) in UR.iter().zip(&places) {
@@ -270,7 +270,7 @@ fn ur_yaml(model: &Model, notes: &[String]) -> String {
 
 /// Two twists as one about x, with what turns the joints before and after: a common normal that may lie far away.
 fn table(model: &Model, modified: bool, notes: &[String]) -> String {
-    let rows = plain(model);
+    let rows = plain_dh(model);
     let mut out = String::new();
     for note in comments(notes) {
         let _ = writeln!(out, "# {note}");
@@ -303,7 +303,7 @@ fn table(model: &Model, modified: bool, notes: &[String]) -> String {
 /// Rows theta (rad), d (mm), a (mm), alpha (rad) of plain Denavit–Hartenberg links for the same axes: the common normals between
 /// them, which for nearly parallel ones lie far away. The last frame stays where it is but for a turn and a shift that the last
 /// row takes up; where the last link has a twist, the flange keeps it.
-fn plain(model: &Model) -> [[f64; 4]; 6] {
+fn plain_dh(model: &Model) -> [[f64; 4]; 6] {
     let mut out = [[0.0; 4]; 6];
     // What the frame of the links is off the frame of the rows: a turn about z and a shift along z, since both have one axis.
     let (mut turn, mut shift) = (0.0, 0.0);

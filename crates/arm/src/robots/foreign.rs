@@ -1,7 +1,7 @@
-//! Arms that somebody else described: URDF files, tables of Denavit–Hartenberg parameters, the calibration files of Universal
+//! Arms that somebody else foreign: URDF files, tables of Denavit–Hartenberg parameters, the calibration files of Universal
 //! Robots.
 //!
-//! Whatever the form, six axes are read as lines in space at zero (`axes`), and our links are laid through them. So a table
+//! Whatever the form, six axes are read as lines in space at zero (`axes`), and our links are fitted through them. So a table
 //! whose parallel axes put a link hundreds of metres away gives links of the arm's own size, and nothing depends on where somebody
 //! else put his frames. The outcome is compared with the file's own product of transforms before it is handed out.
 
@@ -19,21 +19,21 @@ use super::sheet::{Angles, Convention, DataSheet, FlangeSheet, JointSheet, Masse
 use super::{Robot, load, parse};
 use crate::condition::Condition;
 use crate::joints::Joints;
-use chain::Described;
-pub use common::Choice;
-use common::{refused, tidy};
+use chain::ForeignArm;
+pub use common::ImportOptions;
+use common::{foreign_error, zero_if_tiny};
 use truegrind_math::se3::{Pose, difference};
 
 /// An arm, and what was understood of its file.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Understood {
+pub struct ImportedRobot {
     /// The arm.
     pub robot: Robot,
     /// Which kind of file it is.
     pub kind: Kind,
     /// What a reader should compare with the manual, one sentence each: joints, zero pose, axes, flange, and what was taken from
     /// the file beside.
-    pub sentences: Vec<String>,
+    pub summary: Vec<String>,
     /// Meshes that the file names for drawing; none where it names none.
     pub visuals: Vec<Visual>,
 }
@@ -96,13 +96,13 @@ impl Kind {
 /// An arm from a file of any kind that is known; `file` is its name, by whose ending the kind is told, and which messages name.
 ///
 /// ```
-/// use truegrind_arm::robots::foreign::{Choice, read_any};
+/// use truegrind_arm::robots::foreign::{ImportOptions, import};
 ///
 /// // Craig's ("modified") table of an arm: twist and length belong to the joint before.
 /// let table = "convention,alpha_deg,a_mm,theta_deg,d_mm\n\
 ///              modified,0,0,0,400\nmodified,-90,0,-90,0\nmodified,0,500,0,0\n\
 ///              modified,-90,60,0,480\nmodified,90,0,0,0\nmodified,-90,0,0,90\n";
-/// let found = read_any(table, "workshop.csv", &Choice::default())?;
+/// let found = import(table, "workshop.csv", &ImportOptions::default())?;
 /// let flange = found.robot.model.forward(&nalgebra::Vector6::zeros(), &Default::default());
 /// assert!((flange.translation.vector - nalgebra::Vector3::new(570.0, 0.0, 960.0)).norm() < 1e-9);
 /// # Ok::<(), truegrind_arm::robots::RobotError>(())
@@ -110,9 +110,9 @@ impl Kind {
 ///
 /// # Errors
 /// [`RobotError`], with line, found and expected as far as they are known.
-pub fn read_any(text: &str, file: &str, choice: &Choice) -> Result<Understood, RobotError> {
+pub fn import(text: &str, file: &str, choice: &ImportOptions) -> Result<ImportedRobot, RobotError> {
     let kind = Kind::of(file).ok_or_else(|| {
-        refused(
+        foreign_error(
             file,
             "the ending",
             file.to_owned(),
@@ -122,109 +122,109 @@ pub fn read_any(text: &str, file: &str, choice: &Choice) -> Result<Understood, R
     })?;
     if kind != Kind::Urdf && (choice.base.is_some() || choice.tip.is_some()) {
         let found = format!("a base or a tip for a {}", kind.text());
-        return Err(refused(file, "base and tip", found, "links of a URDF", "leave them out"));
+        return Err(foreign_error(file, "base and tip", found, "links of a URDF", "leave them out"));
     }
-    let described = match kind {
+    let foreign = match kind {
         Kind::Toml => {
             let robot = parse(text, file)?;
-            let sentences = told(&robot, &[]);
-            return Ok(Understood { robot, kind, sentences, visuals: Vec::new() });
+            let summary = summarise(&robot, &[]);
+            return Ok(ImportedRobot { robot, kind, summary, visuals: Vec::new() });
         }
         Kind::Urdf => urdf::read(text, file, choice)?,
         Kind::Table => table::read(text, file)?,
         Kind::UrYaml => ur::read_yaml(text, file)?,
         Kind::UrConf => ur::read_conf(text, file, load)?,
     };
-    let (robot, notes, visuals) = robot(described, file, choice.ground_joint_3)?;
-    let sentences = told(&robot, &notes);
-    Ok(Understood { robot, kind, sentences, visuals })
+    let (robot, notes, visuals) = robot(foreign, file, choice.ground_joint_3)?;
+    let summary = summarise(&robot, &notes);
+    Ok(ImportedRobot { robot, kind, summary, visuals })
 }
 
-/// Our arm through the axes of a described one, compared with it.
+/// Our arm through the axes of a foreign one, compared with it.
 fn robot(
-    described: Described,
+    foreign: ForeignArm,
     file: &str,
     ground_joint_3: bool,
 ) -> Result<(Robot, Vec<String>, Vec<Visual>), RobotError> {
-    let laid = axes::laid(&described, file)?;
-    let visuals = described.visuals.iter().map(|shown| Visual {
+    let fitted = axes::fit_links(&foreign, file)?;
+    let visuals = foreign.visuals.iter().map(|shown| Visual {
         frame: shown.joints,
-        pose: laid.frames[shown.joints].inverse() * shown.place,
+        pose: fitted.frames[shown.joints].inverse() * shown.place,
         file: shown.file.clone(),
         unit_mm: shown.unit_mm,
     });
     let visuals = visuals.collect();
-    let mut notes = described.notes.clone();
-    if let Some(note) = laid.note() {
+    let mut notes = foreign.notes.clone();
+    if let Some(note) = fitted.note() {
         notes.push(note);
     }
     let mut map = Matrix6::identity();
-    map[(0, 0)] = laid.first_turn;
-    if let Some(couplings) = &described.joint_map {
+    map[(0, 0)] = fitted.first_turn;
+    if let Some(couplings) = &foreign.joint_map {
         map *= couplings;
     }
     if ground_joint_3 {
         // The link's own angle is that against the ground less what joint 2 turns it by.
-        map[(2, 1)] -= laid.parallel_2_3(file)?;
+        map[(2, 1)] -= fitted.parallel_2_3(file)?;
         notes.push(
             "joint 3 is counted against the ground: link 3 turns by J3 and by what J2 takes back".to_owned(),
         );
     }
-    let inside = laid.base.inverse();
+    let inside = fitted.base.inverse();
     let gravity = inside.rotation * Vector3::new(0.0, 0.0, -1.0);
     let plain = map == Matrix6::identity();
-    let place = laid.base.translation.vector;
+    let place = fitted.base.translation.vector;
     let sheet = DataSheet {
         name: name_of(file),
-        maker: described.maker.clone(),
-        model: described.designation.clone(),
+        maker: foreign.maker.clone(),
+        model: foreign.designation.clone(),
         payload_kg: None,
         reach_mm: None,
         repeatability_mm: None,
-        dialect: described.dialect,
+        dialect: foreign.dialect,
         convention: Convention::StandardDh,
         orientation: None,
         compensates: false,
-        link: laid.links.to_vec(),
+        link: fitted.links.to_vec(),
         joints: JointSheet {
             angles: Angles::Logged,
             map: (!plain).then(|| std::array::from_fn(|i| std::array::from_fn(|j| map[(i, j)]))),
-            min_deg: described.limits_deg.map(|limits| limits.map(|[low, _]| low)),
-            max_deg: described.limits_deg.map(|limits| limits.map(|[_, high]| high)),
-            speed_deg_s: described.speed_deg_s,
+            min_deg: foreign.limits_deg.map(|limits| limits.map(|[low, _]| low)),
+            max_deg: foreign.limits_deg.map(|limits| limits.map(|[_, high]| high)),
+            speed_deg_s: foreign.speed_deg_s,
         },
-        flange: (laid.flange != Pose::identity()).then(|| FlangeSheet {
-            position_mm: laid.flange.translation.vector.into(),
+        flange: (fitted.flange != Pose::identity()).then(|| FlangeSheet {
+            position_mm: fitted.flange.translation.vector.into(),
             quaternion_wxyz: {
-                let q = laid.flange.rotation;
+                let q = fitted.flange.rotation;
                 [q.w, q.i, q.j, q.k]
             },
         }),
         mounting: Mounting {
-            gravity: gravity.map(tidy).into(),
-            plate_mm: (inside.rotation * -place).map(tidy).into(),
+            gravity: gravity.map(zero_if_tiny).into(),
+            plate_mm: (inside.rotation * -place).map(zero_if_tiny).into(),
         },
-        masses: masses(&described, &laid),
+        masses: masses(&foreign, &fitted),
         sources: Sources {
-            links: described.source.clone(),
-            limits: described.limits_deg.map(|_| described.source.clone()).unwrap_or_default(),
-            masses: described.masses.as_ref().map(|_| described.source.clone()).unwrap_or_default(),
+            links: foreign.source.clone(),
+            limits: foreign.limits_deg.map(|_| foreign.source.clone()).unwrap_or_default(),
+            masses: foreign.masses.as_ref().map(|_| foreign.source.clone()).unwrap_or_default(),
             payload: String::new(),
         },
         published: Vec::new(),
     };
     let robot = Robot::new(sheet, file)?;
-    compared(&robot, &described, &laid, &map, file)?;
+    check_against_file(&robot, &foreign, &fitted, &map, file)?;
     Ok((robot, notes, visuals))
 }
 
 /// Masses of the links, with their centres in the frames of our links.
-fn masses(described: &Described, laid: &axes::Laid) -> Option<Masses> {
-    described.masses.as_ref().map(|masses| Masses {
+fn masses(foreign: &ForeignArm, fitted: &axes::FittedLinks) -> Option<Masses> {
+    foreign.masses.as_ref().map(|masses| Masses {
         mass_kg: std::array::from_fn(|i| masses[i].mass_kg),
         centre_mm: std::array::from_fn(|i| {
-            let centre = laid.frames[i + 1].inverse() * nalgebra::Point3::from(masses[i].centre_mm);
-            centre.coords.map(tidy).into()
+            let centre = fitted.frames[i + 1].inverse() * nalgebra::Point3::from(masses[i].centre_mm);
+            centre.coords.map(zero_if_tiny).into()
         }),
     })
 }
@@ -238,27 +238,27 @@ fn name_of(file: &str) -> String {
 const SAME_MM: f64 = 1e-6;
 
 /// Refuses what came out otherwise than the file has it. The joints of the file are those of the links, before any coupling.
-fn compared(
+fn check_against_file(
     robot: &Robot,
-    described: &Described,
-    laid: &axes::Laid,
+    foreign: &ForeignArm,
+    fitted: &axes::FittedLinks,
     map: &Matrix6<f64>,
     file: &str,
 ) -> Result<(), RobotError> {
     // By which our links turn for those of the file; what the controller's joints make of it is in the map alone.
     let mut plain = Matrix6::identity();
-    plain[(0, 0)] = laid.first_turn;
+    plain[(0, 0)] = fitted.first_turn;
     let from_links = map.try_inverse().unwrap_or(plain) * plain;
     for joints in [
         Joints::zeros(),
         Joints::new(0.3, -0.4, 0.5, -0.6, 0.7, -0.8),
         Joints::new(-2.1, 0.9, -1.2, 1.7, -1.1, 2.9),
     ] {
-        let ours = laid.base * robot.model.forward(&(from_links * joints), &Condition::default());
-        let theirs = described.forward(&joints);
+        let ours = fitted.base * robot.model.forward(&(from_links * joints), &Condition::default());
+        let theirs = foreign.forward(&joints);
         let (translation, turn) = apart(&ours, &theirs);
         if !(translation.max(1000.0 * turn) <= SAME_MM) {
-            return Err(refused(
+            return Err(foreign_error(
                 file,
                 "links",
                 format!(
@@ -278,7 +278,7 @@ fn apart(a: &Pose, b: &Pose) -> (f64, f64) {
 }
 
 /// What was understood: to be compared with the manual.
-fn told(robot: &Robot, notes: &[String]) -> Vec<String> {
+fn summarise(robot: &Robot, notes: &[String]) -> Vec<String> {
     let still = Condition::default();
     let ready = robot.model.at_condition(&still);
     let frames = ready.frames(&Joints::zeros());

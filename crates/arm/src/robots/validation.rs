@@ -9,7 +9,7 @@ use nalgebra::{Matrix6, Vector6};
 use super::error::RobotError;
 use super::sheet::{DataSheet, LinkSheet, Point, Published, unit_quaternion};
 use crate::bounds::{
-    self, Bound, DIRECTION, JOINT_DEG, LENGTH_MM, MASS_KG, PLACE_MM, SPEED_DEG_S, TWIST_DEG, Unfit,
+    self, Bound, DIRECTION, InvalidValue, JOINT_DEG, LENGTH_MM, MASS_KG, POSITION_MM, SPEED_DEG_S, TWIST_DEG,
 };
 use crate::link::LinkModel;
 use crate::model::Model;
@@ -36,8 +36,8 @@ impl Fault {
         Self { key: key.into(), found: found.to_string(), expected, remedy }
     }
 
-    fn of_number(unfit: Unfit, remedy: &'static str) -> Self {
-        Self::new(unfit.key, unfit.found, unfit.expected, remedy)
+    fn of_number(invalid: InvalidValue, remedy: &'static str) -> Self {
+        Self::new(invalid.key, invalid.found, invalid.expected, remedy)
     }
 
     pub(super) fn of(self, file: &str, robot: &str) -> RobotError {
@@ -69,8 +69,9 @@ pub(super) fn check(sheet: &DataSheet) -> Result<Vec<String>, Fault> {
     if sheet.link.len() != 6 {
         return Err(link_count(sheet.link.len()));
     }
-    bounded(sheet).map_err(|unfit| Fault::of_number(unfit, "correct the number"))?;
-    performance(sheet).map_err(|unfit| Fault::of_number(unfit, "leave the key out where it is not known"))?;
+    bounded(sheet).map_err(|invalid| Fault::of_number(invalid, "correct the number"))?;
+    performance(sheet)
+        .map_err(|invalid| Fault::of_number(invalid, "leave the key out where it is not known"))?;
     units(sheet)?;
     links(&sheet.link)?;
     joints(sheet)?;
@@ -79,7 +80,7 @@ pub(super) fn check(sheet: &DataSheet) -> Result<Vec<String>, Fault> {
 }
 
 /// Every number is finite and such as an arm has.
-fn bounded(sheet: &DataSheet) -> Result<(), Unfit> {
+fn bounded(sheet: &DataSheet) -> Result<(), InvalidValue> {
     for (i, link) in sheet.link.iter().enumerate() {
         let key = |name: &str| format!("link {} {name}", i + 1);
         for (name, value) in [("a_mm", link.a_mm), ("d_mm", link.d_mm)] {
@@ -94,7 +95,7 @@ fn bounded(sheet: &DataSheet) -> Result<(), Unfit> {
     let joints = &sheet.joints;
     JOINT_DEG.check_all("joints.min_deg", joints.min_deg.iter().flatten())?;
     JOINT_DEG.check_all("joints.max_deg", joints.max_deg.iter().flatten())?;
-    TURNS.check_all("joints.map", joints.map.iter().flatten().flatten())?;
+    COUPLING.check_all("joints.map", joints.map.iter().flatten().flatten())?;
     DIRECTION.check_all("mounting.gravity", &sheet.mounting.gravity)?;
     LENGTH_MM.check_all("mounting.plate_mm", &sheet.mounting.plate_mm)?;
     if let Some(masses) = &sheet.masses {
@@ -106,16 +107,16 @@ fn bounded(sheet: &DataSheet) -> Result<(), Unfit> {
     }
     for pose in &sheet.published {
         JOINT_DEG.check_all("published.joints_deg", &pose.joints_deg)?;
-        PLACE_MM.check_all("published.position_mm", pose.position_mm.iter().flatten())?;
-        PLACE_MM.check_all("published.radius_mm", &pose.radius_mm)?;
+        POSITION_MM.check_all("published.position_mm", pose.position_mm.iter().flatten())?;
+        POSITION_MM.check_all("published.radius_mm", &pose.radius_mm)?;
         DIRECTION.check_all("published.quaternion_wxyz", pose.quaternion_wxyz.iter().flatten())?;
-        MISS_MM.check(|| "published.tolerance_mm".to_owned(), pose.tolerance_mm)?;
+        POSE_TOLERANCE_MM.check(|| "published.tolerance_mm".to_owned(), pose.tolerance_mm)?;
     }
     Ok(())
 }
 
 /// What a data sheet need not say; where it does, above 0.
-fn performance(sheet: &DataSheet) -> Result<(), Unfit> {
+fn performance(sheet: &DataSheet) -> Result<(), InvalidValue> {
     for (key, bound, value) in [
         ("payload_kg", LOAD_KG, sheet.payload_kg),
         ("reach_mm", REACH_MM, sheet.reach_mm),
@@ -127,10 +128,10 @@ fn performance(sheet: &DataSheet) -> Result<(), Unfit> {
     MASS_KG.check_all("masses.mass_kg", sheet.masses.iter().flat_map(|masses| &masses.mass_kg))
 }
 
-const TURNS: Bound = Bound::new(-10.0, 10.0, "turns of a link for a turn of a joint, within ±10");
+const COUPLING: Bound = Bound::new(-10.0, 10.0, "turns of a link for a turn of a joint, within ±10");
 const LOAD_KG: Bound = Bound::new(f64::MIN_POSITIVE, 1e4, "more than 0, up to 10,000 kg");
 const REACH_MM: Bound = Bound::new(f64::MIN_POSITIVE, 2e4, "more than 0, up to 20,000 mm");
-const MISS_MM: Bound = Bound::new(0.0, 100.0, "a length from 0 to 100 mm");
+const POSE_TOLERANCE_MM: Bound = Bound::new(0.0, 100.0, "a length from 0 to 100 mm");
 const TOLERANCE_MM: Bound = Bound::new(f64::MIN_POSITIVE, 100.0, "more than 0, up to 100 mm");
 
 /// Radians for degrees, metres for millimetres.
@@ -271,9 +272,9 @@ fn joints(sheet: &DataSheet) -> Result<(), Fault> {
                 "each row says which controller angles turn that link, with sign",
             ));
         }
-        bounds::joint_map(rows).map_err(|unfit| {
+        bounds::joint_map(rows).map_err(|invalid| {
             Fault::of_number(
-                Unfit { key: "joints.map".to_owned(), ..unfit },
+                InvalidValue { key: "joints.map".to_owned(), ..invalid },
                 "each row says which controller angles turn that link, with sign",
             )
         })?;

@@ -8,11 +8,11 @@ use rand_chacha::ChaCha8Rng;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::effect::compliance::Compliance;
 use truegrind_arm::effect::coupling::Coupling;
+use truegrind_arm::effect::error_map::ErrorMap;
+use truegrind_arm::effect::gear_ratio::GearRatio;
 use truegrind_arm::effect::harmonic::Harmonic;
-use truegrind_arm::effect::load::{GravityLoad, Lump};
-use truegrind_arm::effect::map::JointMap;
-use truegrind_arm::effect::ratio::Ratio;
-use truegrind_arm::effect::smooth::Smooth;
+use truegrind_arm::effect::lumped_compliance::{Lump, LumpedCompliance};
+use truegrind_arm::effect::smooth_correction::SmoothCorrection;
 use truegrind_arm::effect::thermal::Thermal;
 use truegrind_arm::link::{Link, LinkModel};
 use truegrind_arm::model::{Body, Joints, Limits, Model};
@@ -415,11 +415,11 @@ pub(crate) fn with_effects(model: &Model, random: &mut ChaCha8Rng) -> Model {
         cosine_rad: 3e-5,
     }));
     let knots_rad = (0..12).map(|_| 2e-4 * even(random)).collect();
-    out.effects.push(Effect::GearMap(JointMap { joint: 1, knots_rad }));
+    out.effects.push(Effect::GearMap(ErrorMap { joint: 1, knots_rad }));
     let lump = [(3, None, None), (6, Some(1), None), (2, None, Some(0)), (4, Some(0), Some(2))]
         .map(|(frame, axis, moment)| Lump { frame, axis, moment, factor: 3e-6 * even(random) });
-    out.effects.push(Effect::LumpedCompliance(GravityLoad { joint: 1, lump: lump.to_vec() }));
-    out.effects.push(Effect::GearRatio(Ratio { joint: 5, error: 2e-4 }));
+    out.effects.push(Effect::LumpedCompliance(LumpedCompliance { joint: 1, lump: lump.to_vec() }));
+    out.effects.push(Effect::GearRatio(GearRatio { joint: 5, error: 2e-4 }));
     out.effects.push(Effect::JointCoupling(Coupling { joint: 5, driver: 4, factor: 1e-3 }));
     out.effects.push(Effect::ThermalDrift(Thermal {
         growth: 2e-4,
@@ -427,7 +427,7 @@ pub(crate) fn with_effects(model: &Model, random: &mut ChaCha8Rng) -> Model {
         growth_per_k: 1e-5,
         reference_c: 20.0,
     }));
-    out.effects.push(Effect::SmoothCorrection(Smooth {
+    out.effects.push(Effect::SmoothCorrection(SmoothCorrection {
         centres_rad: vec![[0.0, 0.3, -0.2], [0.8, -0.4, 0.5], [-0.9, 0.1, 1.0]],
         reach_rad: 1.6,
         weights_rad: vec![[3e-4, -2e-4, 1e-4], [-1e-4, 3e-4, 2e-4], [2e-4, 1e-4, -3e-4]],

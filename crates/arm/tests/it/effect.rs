@@ -52,7 +52,7 @@ fn torque_is_the_negative_gradient_of_the_potential_energy() {
         let mut random = generator(42);
         for _ in 0..5 {
             let u = joints_within(&model, &mut random);
-            let (torque, slope) = statics.torques(&u, &condition);
+            let (torque, slope) = statics.torques_and_jacobian(&u, &condition);
             let gradient = jacobian(|x, out| out[0] = energy(x), u.as_slice(), 1, &[2e-3; 6]);
             for j in 0..6 {
                 assert!((torque[j] + gradient[(0, j)]).abs() < 1e-7, "{}: joint {j}", sheet.name);
@@ -60,7 +60,7 @@ fn torque_is_the_negative_gradient_of_the_potential_energy() {
             let twin = jacobian(
                 |x, out| {
                     out.copy_from_slice(
-                        statics.torques(&Joints::from_column_slice(x), &condition).0.as_slice(),
+                        statics.torques_and_jacobian(&Joints::from_column_slice(x), &condition).0.as_slice(),
                     );
                 },
                 u.as_slice(),
@@ -86,14 +86,14 @@ fn every_slope_has_a_numerical_twin() {
             let twin = jacobian(
                 |x, out| {
                     let there = Joints::from_column_slice(x);
-                    out.copy_from_slice(effect.rotation(&statics, &there, &condition).as_slice());
+                    out.copy_from_slice(effect.offset(&statics, &there, &condition).as_slice());
                 },
                 u.as_slice(),
                 6,
                 &[2e-4; 6],
             );
             let twin = Matrix6::from_column_slice(twin.as_slice());
-            assert_near(&effect.slope(&statics, &u, &condition), &twin, 1e-9, effect.name());
+            assert_near(&effect.jacobian(&statics, &u, &condition), &twin, 1e-9, effect.name());
         }
     }
 }
@@ -106,12 +106,17 @@ fn rotation_slopes_count_couplings_and_effects() {
     for _ in 0..10 {
         let q = joints_within(&model, &mut random);
         let twin = jacobian(
-            |x, out| out.copy_from_slice(posed.rotations(&Joints::from_column_slice(x)).as_slice()),
+            |x, out| out.copy_from_slice(posed.joint_rotations(&Joints::from_column_slice(x)).as_slice()),
             q.as_slice(),
             6,
             &[2e-4; 6],
         );
-        assert_near(&posed.rotation_slopes(&q), &Matrix6::from_column_slice(twin.as_slice()), 1e-8, "slopes");
+        assert_near(
+            &posed.rotation_jacobian(&q),
+            &Matrix6::from_column_slice(twin.as_slice()),
+            1e-8,
+            "slopes",
+        );
     }
 }
 
@@ -124,7 +129,7 @@ fn an_effect_is_the_sum_of_its_regressors() {
     effects.push(Effect::Backlash(Backlash { joint: 2, play_rad: 1e-3 }));
     let mut random = generator(48);
     let u = joints_within(&model, &mut random);
-    let torque = statics.loads::<f64>(&u.into(), &condition);
+    let torque = statics.torques::<f64>(&u.into(), &condition);
     for effect in &effects {
         let parameters = effect.parameters();
         let sum: Joints = effect
@@ -133,7 +138,7 @@ fn an_effect_is_the_sum_of_its_regressors() {
             .zip(&parameters)
             .map(|(regressor, parameter)| regressor * parameter.value)
             .sum();
-        let rotation = effect.rotation(&statics, &u, &condition);
+        let rotation = effect.offset(&statics, &u, &condition);
         assert!((rotation - sum).amax() < 1e-15, "{}", effect.name());
         let mut turned = [0.0; 6];
         effect.add_offset(&statics, &u.into(), &torque, &condition, &mut turned);
@@ -155,7 +160,7 @@ impl AnyWidth for Affected<'_> {
         let mut out = [[0.0; WIDTH]; 6];
         for from in (0..WIDTH).step_by(R::ROWS) {
             let mapped = std::array::from_fn(|j| like.load(&self.rows.map(|row| row[j]), from));
-            for (number, lanes) in self.arm.affected(&mapped).iter().zip(&mut out) {
+            for (number, lanes) in self.arm.apply_effects(&mapped).iter().zip(&mut out) {
                 number.store(lanes, from);
             }
         }
@@ -173,7 +178,7 @@ fn effects_in_lanes_get_the_bits_of_one_row_alone() {
         for set in Instructions::available() {
             let eight = with_instructions(set, || vectorised(Affected { arm, rows }));
             for (k, row) in rows.iter().enumerate() {
-                let one = arm.affected::<f64>(&(*row).into());
+                let one = arm.apply_effects::<f64>(&(*row).into());
                 assert_eq!(eight.map(|v| v[k].to_bits()), one.map(f64::to_bits), "{set:?}");
             }
         }
@@ -223,6 +228,6 @@ fn play_is_felt_between_the_two_sides() {
     let from = |side: i8| Condition { approach: [0, side, 0, 0, 0, 0], ..Condition::default() };
     let q = Joints::zeros();
     let (above, below) =
-        (model.at_condition(&from(1)).rotations(&q), model.at_condition(&from(-1)).rotations(&q));
+        (model.at_condition(&from(1)).joint_rotations(&q), model.at_condition(&from(-1)).joint_rotations(&q));
     assert!(((above - below)[1] - 2e-3).abs() < 1e-18);
 }

@@ -12,7 +12,7 @@ use truegrind_arm::arm_file::ArmFile;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::estimated::{
-    Estimated, EstimatedParameter, Judgement, Provenance, RidingPoint, StageErrors, Verdict,
+    Estimated, EstimatedParameter, FlangePoint, Judgement, Provenance, StageErrors, Verdict,
 };
 use truegrind_arm::inverse::Inverse;
 use truegrind_arm::model::{Body, Joints, Model};
@@ -165,7 +165,7 @@ fn a_model_with_any_number_wrong_is_refused_or_computes_finite_numbers() {
             Ok(model) => {
                 let posed = model.model.at_condition(&model.condition);
                 let joints = Joints::new(0.1, -0.2, 0.3, 0.4, 0.5, -0.6);
-                let point = RidingPoint { joints, flange_from_tool: Pose::identity(), carried: None };
+                let point = FlangePoint { joints, flange_from_tool: Pose::identity(), carried: None };
                 let sigma = model.position_sigmas_mm(&posed, &[point])[0];
                 assert!(sigma.is_finite() && sigma >= 0.0, "{said}: σ {sigma}");
                 // The rest of the arm stands still where a link, effect or condition was changed by little.
@@ -257,14 +257,19 @@ fn the_inverse_ends_on_an_arm_that_is_not_finite() {
 #[test]
 fn a_name_of_the_catalogue_has_the_links_of_the_catalogue() {
     let nominal = nominal();
-    assert!(truegrind_arm::robots::agrees("ABB-IRB-120", &nominal).is_ok());
-    assert!(truegrind_arm::robots::agrees("an-arm-of-my-own", &nominal).is_ok());
-    let error = truegrind_arm::robots::agrees("ur10", &nominal).unwrap_err().to_string();
+    assert!(truegrind_arm::robots::check_catalogue_name("ABB-IRB-120", &nominal).is_ok());
+    assert!(truegrind_arm::robots::check_catalogue_name("an-arm-of-my-own", &nominal).is_ok());
+    let error = truegrind_arm::robots::check_catalogue_name("ur10", &nominal).unwrap_err().to_string();
     assert!(error.contains("goes by the name ur10") && error.contains("link 1"), "{error}");
     let mut other = nominal.clone();
     let coordinate = LinkCoordinate::D;
     other.links[3].set(coordinate, other.links[3].get(coordinate) + 0.01);
-    assert!(truegrind_arm::robots::agrees("abb-irb-120", &other).is_err());
-    assert!(truegrind_arm::robots::same(&other, &nominal).unwrap_err().to_string().contains("link 4 d_mm"));
+    assert!(truegrind_arm::robots::check_catalogue_name("abb-irb-120", &other).is_err());
+    assert!(
+        truegrind_arm::robots::check_same_links(&other, &nominal)
+            .unwrap_err()
+            .to_string()
+            .contains("link 4 d_mm")
+    );
     assert!(matches!(complete().order[0], Parameter::Link { joint: 0, .. }));
 }

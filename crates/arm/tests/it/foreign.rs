@@ -4,8 +4,8 @@
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::{Joints, Model};
-use truegrind_arm::robots::foreign::{Choice, Kind, Understood, read_any};
-use truegrind_arm::robots::{RobotError, load, parse, text};
+use truegrind_arm::robots::foreign::{ImportOptions, ImportedRobot, Kind, import};
+use truegrind_arm::robots::{RobotError, load, parse, to_toml};
 
 const TURNED: &str = include_str!("../data/tool-turned.urdf");
 const GRIPPER: &str = include_str!("../data/gripper.urdf");
@@ -31,8 +31,8 @@ const WORKSHOP: [Pose; 3] = [
     ),
 ];
 
-fn only_tip(base: &str, tip: &str) -> Choice {
-    Choice { base: Some(base.to_owned()), tip: Some(tip.to_owned()), ground_joint_3: false }
+fn only_tip(base: &str, tip: &str) -> ImportOptions {
+    ImportOptions { base: Some(base.to_owned()), tip: Some(tip.to_owned()), ground_joint_3: false }
 }
 
 fn meets(arm: &Model, base: Vector3<f64>, poses: &[Pose; 3]) {
@@ -45,12 +45,12 @@ fn meets(arm: &Model, base: Vector3<f64>, poses: &[Pose; 3]) {
     }
 }
 
-fn read(text: &str, file: &str, choice: &Choice) -> Understood {
-    read_any(text, file, choice).unwrap_or_else(|error| panic!("{error}"))
+fn read(text: &str, file: &str, choice: &ImportOptions) -> ImportedRobot {
+    import(text, file, choice).unwrap_or_else(|error| panic!("{error}"))
 }
 
-fn refused(text: &str, file: &str, choice: &Choice, words: &[&str]) {
-    let said = read_any(text, file, choice).map(|found| found.robot.sheet.name).unwrap_err().to_string();
+fn refused(text: &str, file: &str, choice: &ImportOptions, words: &[&str]) {
+    let said = import(text, file, choice).map(|found| found.robot.sheet.name).unwrap_err().to_string();
     for word in words {
         assert!(said.contains(word), "{word}: {said}");
     }
@@ -61,10 +61,10 @@ fn refused(text: &str, file: &str, choice: &Choice, words: &[&str]) {
 #[test]
 fn a_turned_tool_and_whatever_is_fixed_belong_to_the_links() {
     for (text, file) in [(TURNED, "turned.urdf"), (GRIPPER, "gripper.urdf")] {
-        let found = read(text, file, &Choice::default());
+        let found = read(text, file, &ImportOptions::default());
         assert_eq!(found.kind, Kind::Urdf);
         meets(&found.robot.model, Vector3::zeros(), &WORKSHOP);
-        let told = found.sentences.join("\n");
+        let told = found.summary.join("\n");
         assert!(told.contains("from link world to link tool0"), "{told}");
         assert!(told.contains("all joints at 0° put the flange at (394.000, 0.000, 640.000) mm"), "{told}");
         assert!(told.contains("J1 +z, J2 +y, J3 +y, J4 +x, J5 +y, J6 +x"), "{told}");
@@ -75,8 +75,8 @@ fn a_turned_tool_and_whatever_is_fixed_belong_to_the_links() {
         assert!((limits.max_rad[3].to_degrees() - 360.0).abs() < 1e-9);
     }
     // What was read goes to a robot file and back.
-    let found = read(TURNED, "arms/turned.urdf", &Choice::default()).robot;
-    let again = parse(&text(&found).unwrap(), "turned.toml").unwrap();
+    let found = read(TURNED, "arms/turned.urdf", &ImportOptions::default()).robot;
+    let again = parse(&to_toml(&found).unwrap(), "turned.toml").unwrap();
     assert_eq!((again.model, again.sheet.name.as_str()), (found.model, "turned-urdf"));
 }
 
@@ -96,7 +96,7 @@ fn meshes_are_named_with_the_frames_that_they_move_with() {
         text =
             text.replace(&empty, &format!("<link name=\"{link}\">{}</link>", visual(&format!("{link}.stl"))));
     }
-    let found = read(&text, "gripper.urdf", &Choice::default());
+    let found = read(&text, "gripper.urdf", &ImportOptions::default());
     let named: Vec<(usize, &str)> = found.visuals.iter().map(|v| (v.frame, v.file.as_str())).collect();
     assert_eq!(named, [(0, "base_link.stl"), (3, "link_3.stl"), (6, "flange.stl")]);
     assert_eq!(found.visuals[0].unit_mm, [1.0; 3], "metres times the scale");
@@ -115,14 +115,14 @@ fn meshes_are_named_with_the_frames_that_they_move_with() {
     turned[2] = std::f64::consts::FRAC_PI_2;
     let off = place(1, &turned) - Vector3::new(50.0, 20.0, 560.0);
     assert!(off.norm() < 1e-9, "{off}");
-    assert!(read(GRIPPER, "gripper.urdf", &Choice::default()).visuals.is_empty());
+    assert!(read(GRIPPER, "gripper.urdf", &ImportOptions::default()).visuals.is_empty());
     // Many arms are shown by meshes of another kind, and stop at simpler ones that are STL.
     let other = text.replace("link_3.stl\"", "link_3.dae\"");
     let collision = visual("simple/link_3.STL").replace("visual>", "collision>");
     let both = other.replace("<link name=\"link_3\">", &format!("<link name=\"link_3\">{collision}"));
-    assert_eq!(read(&both, "gripper.urdf", &Choice::default()).visuals[1].file, "simple/link_3.STL");
+    assert_eq!(read(&both, "gripper.urdf", &ImportOptions::default()).visuals[1].file, "simple/link_3.STL");
     assert_eq!(
-        read(&other, "gripper.urdf", &Choice::default()).visuals[1].file,
+        read(&other, "gripper.urdf", &ImportOptions::default()).visuals[1].file,
         "link_3.dae",
         "to be told of"
     );
@@ -131,7 +131,7 @@ fn meshes_are_named_with_the_frames_that_they_move_with() {
 /// Masses stand where the links are, what is fixed to a link with it.
 #[test]
 fn masses_are_taken_with_their_places() {
-    let arm = read(TURNED, "turned.urdf", &Choice::default()).robot.model;
+    let arm = read(TURNED, "turned.urdf", &ImportOptions::default()).robot.model;
     let bodies = arm.bodies.unwrap();
     let frames = arm.at_condition(&Condition::default()).frames(&Joints::zeros());
     let place = |i: usize| {
@@ -163,7 +163,7 @@ fn of_two_arms_in_one_file_one_has_to_be_named() {
     refused(
         TWO,
         "cell.urdf",
-        &Choice::default(),
+        &ImportOptions::default(),
         &["2 arms of six joints", "left_joint_6, right_joint_6", "--base"],
     );
     for side in ["left", "right"] {
@@ -188,27 +188,23 @@ fn seven_joints_are_refused_by_name() {
     refused(
         SEVEN,
         "seven.urdf",
-        &Choice::default(),
+        &ImportOptions::default(),
         &["7 joints that move in a row", "seven_joint1, ", "seven_joint7"],
     );
     refused(SEVEN, "seven.urdf", &only_tip("base_link", "link_7"), &["7 joints", "seven_joint7"]);
     refused(SEVEN, "seven.urdf", &only_tip("base_link", "link_5"), &["5 joints", "seven_joint5"]);
     // Six of them are an arm where that is said.
     let six = read(SEVEN, "seven.urdf", &only_tip("link_1", "link_7"));
-    assert!(
-        six.sentences.join("\n").contains("positions are those of a base on axis 1"),
-        "{:?}",
-        six.sentences
-    );
+    assert!(six.summary.join("\n").contains("positions are those of a base on axis 1"), "{:?}", six.summary);
 }
 
 /// Parallel axes written as 1.5708, a base beside axis 1, joints that turn the other way round: nothing is rounded.
 #[test]
 fn what_is_nearly_a_right_angle_stays_as_it_is() {
-    let found = read(PARALLEL, "parallel.urdf", &Choice::default());
+    let found = read(PARALLEL, "parallel.urdf", &ImportOptions::default());
     meets(&found.robot.model, Vector3::new(100.0, -50.0, 0.0), &PARALLEL_POSES);
     assert_eq!(found.robot.model.joint_map[(0, 0)], -1.0);
-    let told = found.sentences.join("\n");
+    let told = found.summary.join("\n");
     assert!(
         told.contains("joint 1 turns clockwise seen from above")
             && told.contains("(100.000, -50.000, 0.000)"),
@@ -240,10 +236,10 @@ fn what_tools_leave_behind_is_passed_over() {
         "<drake:collision_filter_group name=\"a\"/><!-- <xacro:arm/> ${a} --><xacro:property name=\"a\" value=\"${b}\"/><link",
         1,
     );
-    meets(&read(&left, "left.urdf", &Choice::default()).robot.model, Vector3::zeros(), &WORKSHOP);
+    meets(&read(&left, "left.urdf", &ImportOptions::default()).robot.model, Vector3::zeros(), &WORKSHOP);
     // An axis that stands off the upright by less than the cosine of it tells.
     let leaning = TURNED.replacen("<axis xyz=\"0 0 1\"/>", "<axis xyz=\"3e-9 0 1\"/>", 1);
-    let found = read(&leaning, "leaning.urdf", &Choice::default()).robot.model;
+    let found = read(&leaning, "leaning.urdf", &ImportOptions::default()).robot.model;
     let flange = found.forward(&Joints::zeros(), &Condition::default()).translation.vector;
     // Seen from a base that leans so, the flange 640 mm higher stands 640 mm · 3e-9 further back.
     assert!((flange.x - (394.0 - 640.0 * 3e-9 + 290.0 * 3e-9)).abs() < 1e-9, "{:e}", flange.x - 394.0);
@@ -251,7 +247,7 @@ fn what_tools_leave_behind_is_passed_over() {
 
 #[test]
 fn what_is_no_urdf_of_an_arm_is_refused_in_words() {
-    let none = Choice::default();
+    let none = ImportOptions::default();
     let replaced = |from: &str, to: &str| TURNED.replacen(from, to, 1);
     for (text, words) in [
         (
@@ -338,7 +334,7 @@ fn a_table_says_itself_which_convention_it_is_of() {
     .map(|[theta, d, a, alpha]| [theta.to_radians(), d, a, alpha.to_radians()]);
     let both = [(STANDARD.to_owned(), false), (STANDARD.replace("standard", "Modified"), true)];
     let arms = both.map(|(text, modified)| {
-        let arm = read(&text, "table.csv", &Choice::default()).robot;
+        let arm = read(&text, "table.csv", &ImportOptions::default()).robot;
         // The base of ours is on axis 1, which Craig's first twist turns away from the table's.
         let base = product(&rows, modified, &JOINTS[0])
             * arm.model.forward(&Joints::zeros(), &Condition::default()).inverse();
@@ -352,7 +348,7 @@ fn a_table_says_itself_which_convention_it_is_of() {
     });
     assert_ne!(arms[0].model.links, arms[1].model.links);
     assert!((arms[0].model.limits.max_rad[1].to_degrees() - 100.0).abs() < 1e-9);
-    let none = Choice::default();
+    let none = ImportOptions::default();
     for (text, words) in [
         (
             STANDARD.replace("convention;", "name;"),
@@ -383,7 +379,7 @@ fn links_hundreds_of_metres_away_come_home() {
     let conf = "robot = universal-robots-ur10\n[mounting]\ndelta_theta = [0.00001, 0.9, -1.3, 0.4, 0.00002, 0]\n\
         delta_d = [0.0001, 431.2, -700.9, 269.7, -0.00003, 0.00004]\ndelta_a = [0.0002, 0.3, 0.2, 0.00005, 0.00001, 0]\n\
         delta_alpha = [-0.0003, 0.0009, -0.0012, 0.0006, 0.0001, 0]\njoint_checksum = [1, 2, 3, 4, 5, 6]\n";
-    let found = read(conf, "calibration.conf", &Choice::default());
+    let found = read(conf, "calibration.conf", &ImportOptions::default());
     let arm = &found.robot.model;
     assert!(
         arm.links.iter().all(|link| link.a_mm.abs() < 2000.0 && link.d_mm.abs() < 2000.0),
@@ -411,11 +407,11 @@ fn links_hundreds_of_metres_away_come_home() {
         assert!((ours.translation.vector - theirs.translation.vector).norm() < 1e-7);
     }
     assert!(
-        found.sentences.iter().any(|line| line.contains("up to 700.900 m there and back")),
+        found.summary.iter().any(|line| line.contains("up to 700.900 m there and back")),
         "{:?}",
-        found.sentences
+        found.summary
     );
-    let none = Choice::default();
+    let none = ImportOptions::default();
     refused(
         &conf.replace("robot = ", "arm = "),
         "calibration.conf",
@@ -429,7 +425,7 @@ fn links_hundreds_of_metres_away_come_home() {
         &["line 3, delta_theta", "six finite numbers"],
     );
     refused(&conf.replace("delta_a =", "a ="), "calibration.conf", &none, &["delta_a"]);
-    let unknown = read_any(&conf.replace("ur10", "ur99"), "calibration.conf", &none);
+    let unknown = import(&conf.replace("ur10", "ur99"), "calibration.conf", &none);
     assert!(matches!(unknown, Err(RobotError::Unknown { .. })));
 }
 
@@ -453,12 +449,12 @@ fn the_drivers_file_is_read() {
         );
     }
     text += "  hash: calib_209549117540498681\n";
-    let found = read(&text, "ur10e.yaml", &Choice::default());
+    let found = read(&text, "ur10e.yaml", &ImportOptions::default());
     let flange = found.robot.model.forward(&Joints::zeros(), &Condition::default());
     // Of the maker's table: x = a2 + a3, y = −(d4 + d6), z = d1 − d5.
     let expected = Vector3::new(-1184.25, -290.7, 60.85);
     assert!((flange.translation.vector - expected).norm() < 1e-5, "{}", flange.translation.vector);
-    let none = Choice::default();
+    let none = ImportOptions::default();
     refused(&text.replace("x: -0.6127", "x: far"), "ur10e.yaml", &none, &["line ", "forearm.x", "`x: far`"]);
     refused(
         &text.replace("forearm:", "fore_arm:"),
@@ -471,7 +467,7 @@ fn the_drivers_file_is_read() {
 /// FANUC controllers count joint 3 against the ground: turning joint 2 alone leaves the forearm's direction as it is.
 #[test]
 fn joint_3_may_be_counted_against_the_ground() {
-    let ground = Choice { ground_joint_3: true, ..Choice::default() };
+    let ground = ImportOptions { ground_joint_3: true, ..ImportOptions::default() };
     let turn = |arm: &Model, j2: f64| {
         arm.forward(&Joints::new(0.2, j2, 0.3, 0.1, 0.4, 0.5), &Condition::default()).rotation
     };
@@ -486,19 +482,15 @@ fn joint_3_may_be_counted_against_the_ground() {
     for text in &against {
         let arm = read(text, "fanuc.urdf", &ground).robot.model;
         assert!(turn(&arm, 0.0).angle_to(&turn(&arm, 0.7)) < 1e-12);
-        let plain = read(text, "fanuc.urdf", &Choice::default());
+        let plain = read(text, "fanuc.urdf", &ImportOptions::default());
         assert!((turn(&plain.robot.model, 0.0).angle_to(&turn(&plain.robot.model, 0.7)) - 0.7).abs() < 1e-9);
-        assert!(
-            plain.sentences.iter().any(|line| line.contains("--ground-joint-3")),
-            "{:?}",
-            plain.sentences
-        );
+        assert!(plain.summary.iter().any(|line| line.contains("--ground-joint-3")), "{:?}", plain.summary);
     }
     // As the catalogue has a FANUC, by a table with the columns q2 and q3.
     let table = "convention,theta_deg,d_mm,a_mm,alpha_deg,q1,q2,q3,q4,q5,q6\n\
         standard,0,0,50,-90,1,,,,,\nstandard,-90,0,330,0,,1,,,,\nstandard,0,0,35,-90,,-1,-1,,,\n\
         standard,0,335,0,90,,,,-1,,\nstandard,0,0,0,-90,,,,,-1,\nstandard,0,80,0,0,,,,,,-1\n";
-    let own = read(table, "lr-mate.csv", &Choice::default()).robot.model;
+    let own = read(table, "lr-mate.csv", &ImportOptions::default()).robot.model;
     let known = load("fanuc-lr-mate-200id").unwrap().model;
     for joints in JOINTS.map(Joints::from) {
         let (ours, theirs) = [&own, &known].map(|arm| arm.forward(&joints, &Condition::default())).into();
@@ -508,7 +500,7 @@ fn joint_3_may_be_counted_against_the_ground() {
     refused(
         SEVEN,
         "seven.urdf",
-        &Choice { ground_joint_3: true, ..only_tip("base_link", "link_6") },
+        &ImportOptions { ground_joint_3: true, ..only_tip("base_link", "link_6") },
         &["against the ground"],
     );
 }
@@ -518,7 +510,7 @@ fn joint_3_may_be_counted_against_the_ground() {
 /// angles, than the file's reader takes it for.
 #[test]
 fn what_is_exported_comes_back() {
-    use truegrind_arm::robots::export::{Format, angles, behind, left_out, write};
+    use truegrind_arm::robots::export::{Format, flange_in_last_frame, joint_matrix, lost_in_export, write};
     for name in [
         "universal-robots-ur10",
         "abb-irb-120",
@@ -546,9 +538,9 @@ fn what_is_exported_comes_back() {
             (Format::UrYaml, "out.yaml"),
         ] {
             let written = write(&arm, name, format, &["a note -- with dashes".to_owned()]);
-            let again = read(&written, file, &Choice::default()).robot.model;
-            let (flange, angles) = (behind(&arm, format), angles(&arm, format));
-            let told = left_out(&arm, format).join("\n");
+            let again = read(&written, file, &ImportOptions::default()).robot.model;
+            let (flange, angles) = (flange_in_last_frame(&arm, format), joint_matrix(&arm, format));
+            let told = lost_in_export(&arm, format).join("\n");
             assert_eq!(told.contains("who moves the arm"), angles != nalgebra::Matrix6::identity(), "{told}");
             for joints in JOINTS.map(Joints::from) {
                 let ours = arm.forward(&joints, &Condition::default());
@@ -611,7 +603,7 @@ fn what_is_tidied_away_does_not_add_up() {
         );
     }
     let found = read(&(text + "</robot>"), "rounded.urdf", &only_tip("l0", "l7"));
-    let told = found.sentences.join("\n");
+    let told = found.summary.join("\n");
     assert!(!told.contains("is not the z axis of the file's base"), "{told}");
     let pose = |joints: &[f64; 6]| {
         let turn = |angle| UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle);
@@ -643,7 +635,7 @@ fn no_damage_brings_the_readers_down() {
         truegrind_arm::robots::export::Format::UrYaml,
         &[],
     );
-    let none = Choice::default();
+    let none = ImportOptions::default();
     let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(11);
     let mut read_whole = 0;
     for (text, file) in [
@@ -670,7 +662,7 @@ fn no_damage_brings_the_readers_down() {
                 }
             }
             let damaged = String::from_utf8_lossy(&bytes);
-            if let Ok(found) = read_any(&damaged, file, &none) {
+            if let Ok(found) = import(&damaged, file, &none) {
                 read_whole += 1;
                 let flange = found.robot.model.forward(&Joints::repeat(0.3), &Condition::default());
                 assert!(flange.translation.vector.iter().all(|v| v.is_finite()));

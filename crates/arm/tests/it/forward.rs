@@ -72,7 +72,7 @@ fn the_kernel_agrees_with_the_product_of_link_poses() {
         let posed = model.at_condition(&condition);
         for _ in 0..50 {
             let q = joints_within(&model, &mut random);
-            let error = difference(&posed.forward(&q), &product(&model, &posed.rotations(&q)));
+            let error = difference(&posed.forward(&q), &product(&model, &posed.joint_rotations(&q)));
             assert!(error.fixed_rows::<3>(0).amax() < 1e-9, "{}: {error}", sheet.name);
             assert!(error.fixed_rows::<3>(3).amax() < 1e-13 * 10.0, "{}: {error}", sheet.name);
         }

@@ -172,9 +172,9 @@ fn every_set_of_instructions_solves_to_the_same_bits() {
             with_instructions(set, || {
                 (
                     inverse.solve_path(&targets, &seeds[0]),
-                    inverse.reach_path(&targets, &seeds[0]),
-                    inverse.reach_seeded(&targets, &seeds),
-                    inverse.solve_beside(&targets, &seeds),
+                    inverse.solve_path_joints(&targets, &seeds[0]),
+                    inverse.solve_seeded_joints(&targets, &seeds),
+                    inverse.solve_offset_seeded(&targets, &seeds),
                 )
             })
         };

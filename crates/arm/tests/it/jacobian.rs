@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, Vector3};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::effect::backlash::Backlash;
-use truegrind_arm::jacobian::{Ends, joint_jacobian, parameter_jacobian};
+use truegrind_arm::jacobian::{BaseAndTool, joint_jacobian, parameter_jacobian};
 use truegrind_arm::model::{Joints, Model};
 use truegrind_arm::parameter::{LinkCoordinate, Parameter, link_parameters};
 use truegrind_math::difference::jacobian;
@@ -79,7 +79,7 @@ struct Numbers {
 }
 
 impl Numbers {
-    fn of(model: &Model, ends: &Ends) -> Self {
+    fn of(model: &Model, ends: &BaseAndTool) -> Self {
         let mut parameters: Vec<Parameter> = (0..6).map(Parameter::SensorFrame).collect();
         parameters.extend(link_parameters(model));
         // Every link has all five, whichever four are free.
@@ -124,7 +124,7 @@ impl Numbers {
         Self { parameters, values, steps }
     }
 
-    fn pose(&self, model: &Model, ends: &Ends, x: &[f64], q: &Joints) -> Pose {
+    fn pose(&self, model: &Model, ends: &BaseAndTool, x: &[f64], q: &Joints) -> Pose {
         let (mut model, mut ends) = (model.clone(), *ends);
         for (parameter, &value) in self.parameters.iter().zip(x) {
             match *parameter {
@@ -150,7 +150,7 @@ fn parameter_jacobian_has_a_numerical_twin_on_every_arm() {
         let mut six = |mm: f64, rad: f64| {
             std::array::from_fn(|k| if k < 3 { mm * even(&mut random) } else { rad * even(&mut random) })
         };
-        let ends = Ends { world_from_base: six(500.0, 1.0), flange_from_tool: six(200.0, 1.0) };
+        let ends = BaseAndTool { world_from_base: six(500.0, 1.0), flange_from_tool: six(200.0, 1.0) };
         let numbers = Numbers::of(&model, &ends);
         let q = joints_within(&model, &mut random);
         let posed = model.at_condition(&condition());
@@ -173,7 +173,7 @@ fn parameter_jacobian_has_a_numerical_twin_on_every_arm() {
 fn compliance_has_a_numerical_twin_in_its_own_parameter() {
     let mut model = spoiled(0, 35);
     model.effects.retain(Effect::needs_torque);
-    let ends = Ends { world_from_base: [0.0; 6], flange_from_tool: [10.0, 0.0, 100.0, 0.0, 0.5, 0.0] };
+    let ends = BaseAndTool { world_from_base: [0.0; 6], flange_from_tool: [10.0, 0.0, 100.0, 0.0, 0.5, 0.0] };
     let mut numbers = Numbers::of(&model, &ends);
     let keep: Vec<usize> = (0..numbers.parameters.len())
         .filter(|&k| matches!(numbers.parameters[k], Parameter::Effect { .. }))
@@ -201,7 +201,7 @@ fn compliance_has_a_numerical_twin_in_its_own_parameter() {
 #[test]
 fn parameters_of_a_cable_move_no_pose() {
     let model = spoiled(0, 37);
-    let ends = Ends { world_from_base: [0.0; 6], flange_from_tool: [0.0; 6] };
+    let ends = BaseAndTool { world_from_base: [0.0; 6], flange_from_tool: [0.0; 6] };
     let cable = [Parameter::Zero { anchor: 0 }, Parameter::Outlet { anchor: 0, axis: 2 }];
     let columns = parameter_jacobian(&ends, &model.at_condition(&condition()), &Joints::zeros(), &cable);
     assert_eq!(columns.amax(), 0.0);

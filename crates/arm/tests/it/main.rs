@@ -9,7 +9,7 @@ mod robots;
 mod files;
 mod batch;
 mod effect;
-mod effort;
+mod search_budget;
 mod foreign;
 mod forward;
 mod gram;

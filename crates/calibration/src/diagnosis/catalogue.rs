@@ -21,10 +21,10 @@ use truegrind_arm::effect::Effect;
 use truegrind_arm::effect::backlash::Backlash;
 use truegrind_arm::effect::compliance::Compliance;
 use truegrind_arm::effect::coupling::Coupling;
+use truegrind_arm::effect::error_map::ErrorMap;
+use truegrind_arm::effect::gear_ratio::GearRatio;
 use truegrind_arm::effect::harmonic::Harmonic;
-use truegrind_arm::effect::load::{GravityLoad, Lump};
-use truegrind_arm::effect::map::JointMap;
-use truegrind_arm::effect::ratio::Ratio;
+use truegrind_arm::effect::lumped_compliance::{Lump, LumpedCompliance};
 use truegrind_arm::effect::thermal::Thermal;
 use truegrind_arm::model::Model;
 use truegrind_math::work::checkpoint;
@@ -255,7 +255,7 @@ pub fn fine_maps(subject: &Subject<'_>) -> Vec<Vec<Arc<Candidate>>> {
     let needed = POSES_PER_KNOT * FINE[1].0;
     let all = dataset.rows.len() >= needed && split::poses(dataset).len() >= needed;
     let map = |joint: usize, knots: usize| {
-        let effect = Effect::GearMap(JointMap { joint, knots_rad: vec![0.0; knots] });
+        let effect = Effect::GearMap(ErrorMap { joint, knots_rad: vec![0.0; knots] });
         Arc::new(Candidate::arm(effect, dataset, subject.nominal))
     };
     let tried = if all { &FINE[..] } else { &FINE[..1] };
@@ -277,8 +277,8 @@ pub fn arm_candidates(subject: &Subject<'_>) -> Vec<Candidate> {
             let harmonic = Harmonic { joint, order, sine_rad: 0.0, cosine_rad: 0.0 };
             effects.push((Effect::GearEccentricity(harmonic), 1.0));
         }
-        effects.push((Effect::GearRatio(Ratio { joint, error: 0.0 }), 1.0));
-        effects.push((Effect::GearMap(JointMap { joint, knots_rad: vec![0.0; MAP_KNOTS] }), 1.0));
+        effects.push((Effect::GearRatio(GearRatio { joint, error: 0.0 }), 1.0));
+        effects.push((Effect::GearMap(ErrorMap { joint, knots_rad: vec![0.0; MAP_KNOTS] }), 1.0));
     }
     if nominal.bodies.is_some() {
         for joint in 0..6 {
@@ -294,13 +294,13 @@ pub fn arm_candidates(subject: &Subject<'_>) -> Vec<Candidate> {
             _ => &[6],
         };
         let lumps: Vec<Lump> = frames.iter().map(|&frame| lump(frame, None, None)).collect();
-        effects.push((Effect::LumpedCompliance(GravityLoad { joint, lump: lumps.clone() }), 1.0));
+        effects.push((Effect::LumpedCompliance(LumpedCompliance { joint, lump: lumps.clone() }), 1.0));
         // With the first moments of the links between, the static torque of any masses is spanned.
         if (1..4).contains(&joint) {
             let moments = (joint + 1..if joint == 3 { 6 } else { 4 })
                 .flat_map(|frame| (0..3).map(move |m| lump(frame, None, Some(m))));
             let all = lumps.into_iter().chain(moments).collect();
-            effects.push((Effect::LumpedCompliance(GravityLoad { joint, lump: all }), 1.0));
+            effects.push((Effect::LumpedCompliance(LumpedCompliance { joint, lump: all }), 1.0));
         }
     }
     // Gravity that does not point down the base's own axis: the same torques along the two other axes of the base.
@@ -314,13 +314,13 @@ pub fn arm_candidates(subject: &Subject<'_>) -> Vec<Candidate> {
         };
         let tilted = |frame, moment| across.iter().map(move |&axis| lump(frame, Some(axis), moment));
         let lumps: Vec<Lump> = frames.iter().flat_map(|&frame| tilted(frame, None)).collect();
-        effects.push((Effect::LumpedCompliance(GravityLoad { joint, lump: lumps.clone() }), 1.0));
+        effects.push((Effect::LumpedCompliance(LumpedCompliance { joint, lump: lumps.clone() }), 1.0));
         let moments = (joint + 1..5)
             .flat_map(|frame| (0..3).flat_map(move |m| tilted(frame, Some(m))))
             .collect::<Vec<_>>();
         let wrist = if joint < 3 { tilted(6, None).collect() } else { Vec::new() };
         let all = lumps.into_iter().chain(wrist).chain(moments).collect();
-        effects.push((Effect::LumpedCompliance(GravityLoad { joint, lump: all }), 1.0));
+        effects.push((Effect::LumpedCompliance(LumpedCompliance { joint, lump: all }), 1.0));
     }
     for (driver, joint) in COUPLINGS.into_iter().filter(|&(driver, _)| moves(driver)) {
         effects.push((Effect::JointCoupling(Coupling { joint, driver, factor: 0.0 }), 1.0));

@@ -16,7 +16,7 @@ use super::score::{non_centrality, score};
 use super::selection::Accepted;
 use super::words;
 use truegrind_arm::effect::Effect;
-use truegrind_arm::effect::map::JointMap;
+use truegrind_arm::effect::error_map::ErrorMap;
 
 /// Twice the log Bayes factor by which a finding must beat its best rival to be called identified: 20 to 1.
 const CLEAR: f64 = 6.0;
@@ -114,7 +114,7 @@ impl Context<'_> {
     fn any_curve(&self, cause: &Cause) -> Option<Candidate> {
         let Cause::Arm(Effect::GearEccentricity(harmonic)) = cause else { return None };
         self.is_any_curve(cause).then(|| {
-            let map = JointMap { joint: harmonic.joint, knots_rad: vec![0.0; MAP_KNOTS] };
+            let map = ErrorMap { joint: harmonic.joint, knots_rad: vec![0.0; MAP_KNOTS] };
             Candidate::arm(Effect::GearMap(map), &self.subject.observed.dataset, self.subject.nominal)
         })
     }

@@ -42,7 +42,7 @@ pub(super) fn beside(written: &Extended, with: Extended) -> Extended {
     let mut from: Vec<Option<usize>> = with
         .parameters
         .iter()
-        .map(|p| written.parameters.iter().position(|q| q == p).filter(|_| !p.is_of_a_cause()))
+        .map(|p| written.parameters.iter().position(|q| q == p).filter(|_| !p.is_of_cause()))
         .collect();
     for (k, cause) in with.causes.iter().enumerate() {
         let same = written.causes.iter().position(|other| already(std::slice::from_ref(other), cause));

@@ -36,7 +36,7 @@ use crate::measurement::dataset::{Dataset, Reading, Sensor};
 use crate::measurement::sensor::disturbance::{Course, Kind};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::estimated::Estimated;
-use truegrind_arm::jacobian::{Ends, parameter_jacobian};
+use truegrind_arm::jacobian::{BaseAndTool, parameter_jacobian};
 use truegrind_arm::model::Joints;
 use truegrind_arm::parameter::Parameter;
 use truegrind_estimation::problem::Problem;
@@ -566,7 +566,7 @@ pub(crate) fn shape_metric(
     let posed = fitted.model.at_condition(condition);
     let target =
         Pose::from_parts(fitted.frames.flange_from_target.translation, nalgebra::UnitQuaternion::identity());
-    let ends = Ends { world_from_base: [0.0; 6], flange_from_tool: vector_from_pose(&target) };
+    let ends = BaseAndTool { world_from_base: [0.0; 6], flange_from_tool: vector_from_pose(&target) };
     let poses = judged_poses(samples_deg);
     let mut stack = DMatrix::zeros(3 * poses.len(), list.len());
     for (k, q) in poses.iter().enumerate() {

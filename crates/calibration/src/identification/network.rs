@@ -2,7 +2,7 @@
 
 use crate::measurement::dataset::Dataset;
 use truegrind_arm::effect::Effect;
-use truegrind_arm::effect::smooth::Smooth;
+use truegrind_arm::effect::smooth_correction::SmoothCorrection;
 use truegrind_arm::model::Model;
 use truegrind_arm::parameter::Parameter;
 use truegrind_estimation::network::rbf::{Layout, Options};
@@ -21,7 +21,7 @@ pub fn with_network(model: &Model, dataset: &Dataset, options: &Options) -> Mode
     let layout = Layout::of(&wrists, &Options { form: Default::default(), ..*options });
     let mut out = model.clone();
     if !layout.centres.is_empty() {
-        out.effects.push(Effect::SmoothCorrection(Smooth::still(layout.centres, layout.reach)));
+        out.effects.push(Effect::SmoothCorrection(SmoothCorrection::still(layout.centres, layout.reach)));
     }
     out
 }

@@ -7,7 +7,7 @@ use crate::search_budget;
 use crate::segment::curve::Curve;
 use crate::segment::wrist_interpolation;
 use truegrind_arm::inverse::Inverse;
-use truegrind_arm::inverse::effort::{Allowance, within};
+use truegrind_arm::inverse::budget::{SearchBudget, with_budget};
 use truegrind_arm::model::Joints;
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{MotionKind, Switch};
@@ -179,7 +179,7 @@ impl Samples {
             if nominal.branch(start) != nominal.branch(end) {
                 return None;
             }
-            for (k, reached) in self.range(motion).zip(nominal.reach_path(flanges, start)) {
+            for (k, reached) in self.range(motion).zip(nominal.solve_path_joints(flanges, start)) {
                 let joints = reached.ok()?.joints;
                 let steady = (joints - last).amax() < MOST_STEP_RAD;
                 last = joints;
@@ -189,12 +189,12 @@ impl Samples {
         };
         let motions = self.ends.len();
         let portions = search_budget::shared_out(
-            Allowance::of(search_budget::SIDES),
+            SearchBudget::of(search_budget::SIDES),
             motions.div_ceil(PORTION),
-            |portion, allowance| {
+            |portion, budget| {
                 let first = portion * PORTION;
                 let here = first..(first + PORTION).min(motions);
-                within(allowance, || here.map(of).collect::<Vec<_>>())
+                with_budget(budget, || here.map(of).collect::<Vec<_>>())
             },
         );
         portions.into_iter().flatten().collect()

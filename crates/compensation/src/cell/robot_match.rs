@@ -11,7 +11,7 @@ use truegrind_programs::draft::robot_of;
 /// Whether a robot that a file names is the one of a model, under that name or as the same arm of the catalogue.
 fn is_same(stated: &str, robot: &str, nominal: &Model) -> bool {
     stated.eq_ignore_ascii_case(robot)
-        || robots::load(stated).is_ok_and(|known| robots::same(nominal, &known.model).is_ok())
+        || robots::load(stated).is_ok_and(|known| robots::check_same_links(nominal, &known.model).is_ok())
 }
 
 /// What is wrong with a cell file that is another robot's.

@@ -30,7 +30,7 @@ use crate::plan::reason::Why;
 use crate::search_budget;
 use crate::segment::curve::Curve;
 use crate::target::solved_target::{Solved, SolvedTargets, as_joints};
-use truegrind_arm::inverse::effort::{Allowance, within};
+use truegrind_arm::inverse::budget::{SearchBudget, with_budget};
 use truegrind_arm::inverse::{Inverse, InverseError};
 use truegrind_arm::model::Joints;
 use truegrind_math::se3::Pose;
@@ -149,7 +149,7 @@ pub(crate) fn forbid_ways(
     arms: &Arms<'_>,
     options: &Options,
     stays: Option<&BTreeMap<u32, Why>>,
-    allowance: &mut Allowance,
+    budget: &mut SearchBudget,
 ) -> bool {
     let none = BTreeMap::new();
     let mut ways = Ways { listing, solved, left: stays.unwrap_or(&none), mountings, arms, options };
@@ -157,7 +157,7 @@ pub(crate) fn forbid_ways(
         None => ways.forbid_each(),
         Some(stays) => stays.keys().map(|motion| *motion as usize).collect(),
     };
-    ways.forbid_behind(&found, allowance) || (stays.is_none() && !found.is_empty())
+    ways.forbid_behind(&found, budget) || (stays.is_none() && !found.is_empty())
 }
 
 /// Suspect motions that one thread takes at a time.
@@ -206,10 +206,10 @@ impl Ways<'_> {
             let here = &*self;
             let suspects: Vec<usize> = (0..count).into_par_iter().filter(|m| here.suspect(*m)).collect();
             let samples = here.samples(suspects.len());
-            let whole = Allowance::of(search_budget::WAYS);
+            let whole = SearchBudget::of(search_budget::WAYS);
             let found =
-                search_budget::shared_out(whole, suspects.len().div_ceil(PORTION), |portion, allowance| {
-                    let judge = |motion: &usize| Some((*motion, here.judge(*motion, samples, allowance)?));
+                search_budget::shared_out(whole, suspects.len().div_ceil(PORTION), |portion, budget| {
+                    let judge = |motion: &usize| Some((*motion, here.judge(*motion, samples, budget)?));
                     let mine = suspects.iter().skip(portion * PORTION).take(PORTION);
                     mine.filter_map(judge).collect::<Vec<_>>()
                 });
@@ -228,7 +228,7 @@ impl Ways<'_> {
     }
 
     /// In order, those that start where another one stays; whether any is forbidden.
-    fn forbid_behind(&mut self, staying: &HashSet<usize>, allowance: &mut Allowance) -> bool {
+    fn forbid_behind(&mut self, staying: &HashSet<usize>, budget: &mut SearchBudget) -> bool {
         let mut stay = staying.clone();
         let samples = self.samples(staying.len());
         let mut found = false;
@@ -248,13 +248,13 @@ impl Ways<'_> {
             };
             if stay.contains(&previous)
                 && !self.left.contains_key(&(motion as u32))
-                && let Some(why) = self.judge(motion, samples, allowance)
+                && let Some(why) = self.judge(motion, samples, budget)
             {
                 self.solved.forbid(motion, why);
                 stay.insert(motion);
                 found = true;
             }
-            if let Some(why) = self.leads_astray(motion, samples, allowance) {
+            if let Some(why) = self.leads_astray(motion, samples, budget) {
                 let line = self.listing.motions[motion].place.line;
                 let why = match why {
                     Why::WayOutsideLimits { joint } => Why::BeforeLimitedWay { line, joint },
@@ -297,9 +297,9 @@ impl Ways<'_> {
 
     /// Why a motion that stays must not start where another one is corrected: its way would come too close to a singularity
     /// from there, or a joint leave its range.
-    fn leads_astray(&self, index: usize, samples: usize, allowance: &mut Allowance) -> Option<Why> {
+    fn leads_astray(&self, index: usize, samples: usize, budget: &mut SearchBudget) -> Option<Why> {
         let left = Cell::new(samples);
-        within(allowance, || self.strayed_way(index, &left))
+        with_budget(budget, || self.strayed_way(index, &left))
     }
 
     fn strayed_way(&self, index: usize, samples: &Cell<usize>) -> Option<Why> {
@@ -411,13 +411,13 @@ impl Ways<'_> {
 
     /// Why a motion must not be corrected for its way, or for the choice of its configuration; also where that could not be
     /// looked at to the end.
-    fn judge(&self, index: usize, samples: usize, allowance: &mut Allowance) -> Option<Why> {
+    fn judge(&self, index: usize, samples: usize, budget: &mut SearchBudget) -> Option<Why> {
         if !self.suspect(index) {
             return None;
         }
         let left = Cell::new(samples);
-        let found = within(allowance, || self.judged(index, &left));
-        let unfinished = allowance.ran_out || (left.get() == 0 && samples < MOST_SAMPLES);
+        let found = with_budget(budget, || self.judged(index, &left));
+        let unfinished = budget.exhausted || (left.get() == 0 && samples < MOST_SAMPLES);
         if unfinished { Some(Why::Inverse(InverseError::Abandoned)) } else { found }
     }
 
@@ -457,7 +457,7 @@ impl Ways<'_> {
         let flange = self.mountings.list[mounted].told.flange_for(told);
         let distance = |joints: &Joints| [(joints - near).norm(), (joints - near).amax()];
         let [meant, meant_most] = distance(joints);
-        self.arms.nominal.solve_around(&flange, near).iter().any(|other| {
+        self.arms.nominal.solve_all_branches(&flange, near).iter().any(|other| {
             let [far, most] = distance(other);
             (other - joints).amax() > SAME && (far <= meant || most <= meant_most)
         })

@@ -13,7 +13,7 @@ use crate::plan::reason::Why;
 use crate::search_budget;
 use crate::target::solved_target::{Solved, SolvedTargets};
 use truegrind_arm::inverse::InverseError;
-use truegrind_arm::inverse::effort::Allowance;
+use truegrind_arm::inverse::budget::SearchBudget;
 use truegrind_programs::motion::{Listing, MotionKind, Reason};
 
 /// The motions whose targets could be corrected and that stay all the same, with the reason: what the writer refused,
@@ -30,8 +30,8 @@ pub(crate) fn staying(
     let mut stays = refused.clone();
     let cuts = cut::of(listing);
     // For ways that start where another motion stays, over all rounds.
-    let mut allowance = Allowance::of(search_budget::WAYS);
-    let mut forbidden = forbid_ways(listing, solved, mountings, arms, options, None, &mut allowance);
+    let mut budget = SearchBudget::of(search_budget::WAYS);
+    let mut forbidden = forbid_ways(listing, solved, mountings, arms, options, None, &mut budget);
     let mut rounds = (MOST_VISITS / listing.motions.len().max(1)).clamp(FEWEST_ROUNDS, MOST_ROUNDS);
     loop {
         let before = stays.len();
@@ -60,7 +60,7 @@ pub(crate) fn staying(
             stays.extend(all.filter(|m| !stays.contains_key(m)).map(|m| (m, ABANDONED)).collect::<Vec<_>>());
             return stays;
         }
-        forbidden = forbid_ways(listing, solved, mountings, arms, options, Some(&stays), &mut allowance);
+        forbidden = forbid_ways(listing, solved, mountings, arms, options, Some(&stays), &mut budget);
     }
 }
 

@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 
 use crate::cell::FrameOrigin;
 use crate::frames::taught::{RealObject, RealTool, TaughtFrame, Teaching, taught_frame, taught_tcp};
-use truegrind_arm::estimated::{Carried, Estimated};
+use truegrind_arm::estimated::{Estimated, RegisteredFrame};
 use truegrind_arm::inverse::Inverse;
 use truegrind_arm::model::{Joints, PreparedModel};
 use truegrind_math::se3::{Pose, difference};
@@ -59,7 +59,7 @@ pub(crate) struct Mounted {
     /// As it is, as far as is known.
     pub real: Mounting,
     /// How a taught work object moves with the arm's parameters; absent for any other.
-    pub carried: Option<Carried>,
+    pub carried: Option<RegisteredFrame>,
     /// What was assumed, one sentence each.
     pub notes: Vec<String>,
 }
@@ -158,7 +158,7 @@ fn carried_frame(
     knowledge: &Estimated,
     estimated: &PreparedModel<'_>,
     taught: &TaughtFrame,
-) -> Option<Carried> {
+) -> Option<RegisteredFrame> {
     let TaughtFrame { pointer, joints, points, frame } = taught;
     carried_through(knowledge, estimated, &pointer.real, joints, points, frame)
 }
@@ -172,7 +172,7 @@ pub(crate) fn carried_through(
     joints: &[Joints; 3],
     points: &[Point3<f64>; 3],
     frame: &Pose,
-) -> Option<Carried> {
+) -> Option<RegisteredFrame> {
     const STEP: f64 = 1e-4;
     let tip = Pose::translation(tip.x, tip.y, tip.z);
     let jacobians = joints.map(|q| knowledge.position_jacobian(estimated, &q, &tip));
@@ -187,7 +187,7 @@ pub(crate) fn carried_through(
             Some(difference(&moved_by(-STEP)?, &moved_by(STEP)?) / (2.0 * STEP))
         })
         .collect::<Option<Vec<_>>>()?;
-    Some(Carried { origin_mm: frame.translation.vector, twists })
+    Some(RegisteredFrame { origin_mm: frame.translation.vector, twists })
 }
 
 /// Said where no typical pose shows it.

@@ -9,7 +9,7 @@ use crate::frames::frame_pair::{Mounted, Mounting, Mounts, mount};
 use crate::frames::taught::Teaching;
 use crate::plan::reason::Why;
 use crate::search_budget;
-use truegrind_arm::inverse::effort::{Allowance, within};
+use truegrind_arm::inverse::budget::{SearchBudget, with_budget};
 use truegrind_arm::model::Joints;
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{Listing, Motion, Reason, RobTarget, Switch, WorkObjectValue};
@@ -38,7 +38,7 @@ impl Mountings {
         };
         let teaching = Teaching::of(arms.nominal.arm(), arms.estimated.arm(), cell, listing);
         let typical = typical(listing);
-        let mut allowance = Allowance::of(search_budget::FRAMES);
+        let mut budget = SearchBudget::of(search_budget::FRAMES);
         let mut last = None;
         for motion in &listing.motions {
             let (Some(tool), Some(object)) = (motion.tool, motion.work_object) else { continue };
@@ -55,7 +55,7 @@ impl Mountings {
                 continue;
             };
             let here = typical.get(&(tool, object)).map_or(&[][..], Vec::as_slice);
-            let found = within(&mut allowance, || {
+            let found = with_budget(&mut budget, || {
                 let usual = usual_joints(here, tv.frame.pose(), ov, arms);
                 let (teaching, inverse) = (&teaching, &arms.nominal);
                 mount((t, tv), (o, ov), &Mounts { teaching, knowledge: arms.knowledge, inverse, usual })

@@ -29,7 +29,7 @@ pub(crate) fn play_note(arms: &Arms<'_>, solved: &SolvedTargets) -> Option<Strin
 
 /// What may be wrong with the arm besides what is corrected.
 pub(crate) fn doubt_note(arms: &Arms<'_>) -> Option<String> {
-    let still = arms.estimated.arm().model.effects.iter().filter(|effect| effect.is_still());
+    let still = arms.estimated.arm().model.effects.iter().filter(|effect| effect.is_zero());
     let named: Vec<String> = still
         .map(|effect| match effect.joint() {
             Some(joint) => format!("{} of joint {}", effect.name(), joint + 1),
@@ -109,7 +109,7 @@ fn lines_of(listing: &Listing, motions: &[u32]) -> Option<String> {
 pub(crate) fn load_notes(listing: &Listing, arms: &Arms<'_>, options: &Options) -> Vec<String> {
     let model = arms.estimated.arm().model;
     let yields = model.effects.iter().any(yields);
-    let lumped = model.effects.iter().any(|e| matches!(e, Effect::LumpedCompliance(_)) && !e.is_still());
+    let lumped = model.effects.iter().any(|e| matches!(e, Effect::LumpedCompliance(_)) && !e.is_zero());
     let Some(loads) = options.loads.as_ref().filter(|_| yields || lumped) else { return Vec::new() };
     let mut out = Vec::new();
     let motions = || listing.motions.iter().enumerate().filter(|(_, m)| m.left.is_none() && m.tool.is_some());

@@ -34,7 +34,7 @@ use crate::target::solve::{solve_all, take_room};
 use crate::target::solved_target::{Solved, SolvedTargets, as_joints};
 use truegrind_arm::estimated::Estimated;
 use truegrind_arm::inverse::InverseError;
-use truegrind_arm::inverse::effort::{Allowance, within};
+use truegrind_arm::inverse::budget::{SearchBudget, with_budget};
 use truegrind_arm::region::Outside;
 use truegrind_programs::motion::{Listing, Motion, MotionKind, MotionTarget, Role, Switch, TargetValue};
 use truegrind_programs::rewrite::{Change, NewTarget};
@@ -177,15 +177,15 @@ const MOST_SETTLING: usize = 64;
 fn planned(job: &Job<'_>) -> Plan {
     let Job { listing, solved, mountings, arms, options, .. } = *job;
     let count = listing.motions.len();
-    let whole = Allowance::of(search_budget::PATHS).with_steps(search_budget::path_steps(count));
+    let whole = SearchBudget::of(search_budget::PATHS).with_near_solves(search_budget::path_steps(count));
     // Filled where they stay: lists of portions, put together, would be there twice.
     let mut outcomes: Vec<MotionOutcome> = (0..count as u32).map(MotionOutcome::left).collect();
     let mut changes: Vec<Option<Change>> = (0..count).map(|_| None).collect();
     let mut places: Vec<Places<'_>> = outcomes.chunks_mut(PORTION).zip(changes.chunks_mut(PORTION)).collect();
     let portions: Vec<Portion> =
-        search_budget::shared_out_into(whole, &mut places, |portion, places, allowance| {
+        search_budget::shared_out_into(whole, &mut places, |portion, places, budget| {
             let first = portion * PORTION;
-            job.portion(first..(first + PORTION).min(count), places, allowance)
+            job.portion(first..(first + PORTION).min(count), places, budget)
         });
     let mut notes = mountings.notes();
     notes.extend(play_note(arms, solved));
@@ -273,7 +273,7 @@ impl<'a> Job<'a> {
         &self,
         motions: std::ops::Range<usize>,
         (outcomes, changes): &mut Places<'_>,
-        allowance: &mut Allowance,
+        budget: &mut SearchBudget,
     ) -> Portion {
         take_room();
         let count = motions.len();
@@ -286,7 +286,7 @@ impl<'a> Job<'a> {
             .filter(|(i, _)| straight(*i))
             .filter_map(|(_, p)| p.as_ref())
             .collect();
-        let middles = within(allowance, || middles_off(&lines, self.arms, self.options.emit));
+        let middles = with_budget(budget, || middles_off(&lines, self.arms, self.options.emit));
         let mut middles = middles.into_iter();
         // The way of the motion before, which a corner asks for.
         let mut last: Option<(u32, Passage)> = None;
@@ -298,8 +298,8 @@ impl<'a> Job<'a> {
         for ((index, path), (outcome, change)) in motions.zip(&paths).zip(places) {
             let middle = if straight(index) && path.is_some() { middles.next() } else { None };
             let middle = middle.unwrap_or(f64::INFINITY);
-            let mut worked = within(allowance, || self.work(index, path.as_ref(), middle, last.as_ref()));
-            if allowance.ran_out && worked.change.is_some() {
+            let mut worked = with_budget(budget, || self.work(index, path.as_ref(), middle, last.as_ref()));
+            if budget.exhausted && worked.change.is_some() {
                 worked.flag(Why::Inverse(InverseError::Abandoned));
             }
             last = worked.passage.map(|passage| (index as u32, passage));

@@ -16,7 +16,7 @@ use crate::risk::cut_risk::{self, CutRisk, Judgement};
 use crate::risk::placement::{self, Commanded, ObjectPlacement, Off, Placement, Wanted, placed, spread};
 use crate::risk::probability::chance;
 use crate::risk::remedy_search::{self, Place};
-use truegrind_arm::estimated::{Carried, Estimated};
+use truegrind_arm::estimated::{Estimated, RegisteredFrame};
 use truegrind_programs::motion::Listing;
 
 /// What is known of a program.
@@ -31,7 +31,7 @@ pub(crate) struct Assessment {
     /// The cut of each motion, as its place in `cuts`; empty without any.
     cut_of: Vec<Option<u32>>,
     /// The best registration of each cut, in the base; absent where the robot holds the part.
-    registered: Vec<Option<Carried>>,
+    registered: Vec<Option<RegisteredFrame>>,
 }
 
 impl Assessment {
@@ -43,7 +43,7 @@ impl Assessment {
     }
 
     /// Against what the shape of a motion's cut is known: a frame that moves with the arm's parameters as the cut does.
-    pub(crate) fn registered(&self, motion: u32) -> Option<&Carried> {
+    pub(crate) fn registered(&self, motion: u32) -> Option<&RegisteredFrame> {
         self.registered[self.place(motion)?].as_ref()
     }
 
@@ -212,7 +212,7 @@ struct Judged {
     points: usize,
     /// Motions for each point that was asked.
     weight: f64,
-    carried: Option<Carried>,
+    carried: Option<RegisteredFrame>,
 }
 
 /// What a cut weighs among others: points, |d|² (mm²), and Jᵀ d.

@@ -7,7 +7,7 @@ use nalgebra::{DVector, Matrix3xX, Vector3, Vector6};
 
 use crate::risk::placement::{Off, Placement};
 use crate::risk::registration::Registration;
-use truegrind_arm::estimated::{Carried, Estimated};
+use truegrind_arm::estimated::{Estimated, RegisteredFrame};
 use truegrind_math::se3::Pose;
 
 /// What is known of one cut.
@@ -41,7 +41,7 @@ pub(crate) struct Judgement {
     pub(crate) square: f64,
     pub(crate) toward: DVector<f64>,
     /// Twists of the best registration per unit of each parameter, in the work object, and the point that they turn about.
-    pub(crate) registered: Carried,
+    pub(crate) registered: RegisteredFrame,
 }
 
 /// Points of a cut by which it is judged; more are not asked.
@@ -71,7 +71,7 @@ pub(crate) fn judged(off: &[Off], knowledge: &Estimated, placement: Placement) -
         variance += spread(jacobian);
     }
     let rms = |sum: f64| (sum.max(0.0) / off.len() as f64).sqrt();
-    let registered = Carried {
+    let registered = RegisteredFrame {
         origin_mm: registration.centre.coords,
         twists: twists.column_iter().map(|twist| twist.into_owned()).collect(),
     };
@@ -86,9 +86,9 @@ pub(crate) fn judged(off: &[Off], knowledge: &Estimated, placement: Placement) -
 }
 
 /// The registration of a cut seen from the base, for a work object that stands.
-pub(crate) fn in_base(registered: &Carried, base_from_object: &Pose) -> Carried {
+pub(crate) fn in_base(registered: &RegisteredFrame, base_from_object: &Pose) -> RegisteredFrame {
     let turn = base_from_object.rotation;
-    Carried {
+    RegisteredFrame {
         origin_mm: base_from_object.transform_point(&registered.origin_mm.into()).coords,
         twists: registered
             .twists

@@ -18,7 +18,7 @@ use crate::risk::measurement_information::{FREE, Readings, Spread, Stand, factor
 use crate::risk::placement::{Commanded, Off, spread};
 use crate::risk::registration::Registration;
 use crate::risk::remedy::{Measurement, Remedy};
-use truegrind_arm::estimated::{Carried, Estimated};
+use truegrind_arm::estimated::{Estimated, RegisteredFrame};
 use truegrind_arm::model::{Joints, PreparedModel};
 use truegrind_math::se3::{Pose, difference};
 use truegrind_math::tail::normal_two_sided;
@@ -123,7 +123,7 @@ impl Informations {
 
 /// Where the work object's frame goes with the arm once the arm has touched it, and by how much touching is unsure, in the base.
 struct Touched {
-    carried: Carried,
+    carried: RegisteredFrame,
     /// Twists of the frame by each coordinate of each touched point, of one standard deviation.
     unsure: Vec<Vector6<f64>>,
 }
@@ -241,7 +241,7 @@ impl Place<'_, '_> {
     }
 
     /// How far each target is off, against a frame that moves with the arm where there is one.
-    fn off(&self, carried: Option<&Carried>) -> Vec<Off> {
+    fn off(&self, carried: Option<&RegisteredFrame>) -> Vec<Off> {
         let against = |mounted: &Mounted| match carried {
             Some(carried) => Mounted { carried: Some(carried.clone()), ..mounted.clone() },
             None => mounted.clone(),

@@ -120,7 +120,7 @@ pub(crate) fn corner_bend(
     }
     let arm = arms.acting.arm(places[0]);
     // The samples that every corner needs, in lanes.
-    let solved = arms.nominal.reach_seeded(&FIRST.map(flange), &[point.joints; FIRST.len()]);
+    let solved = arms.nominal.solve_seeded_joints(&FIRST.map(flange), &[point.joints; FIRST.len()]);
     let joints: Vec<Joints> =
         solved.iter().map(|found| found.as_ref().map_or(point.joints, |found| found.joints)).collect();
     let flanges = arm.forward_many(&joints);

@@ -158,7 +158,7 @@ pub(crate) fn middles_off(lines: &[&Path<'_>], arms: &Arms<'_>, emit: Emit) -> V
                 line.to.mounted.told.flange_for(&between(&line.from.told, &line.to.told, 0.5))
             };
             let flanges: Vec<Pose> = lines.iter().map(told).collect();
-            let reached = arms.nominal.reach_seeded(&flanges, &halfway).into_iter();
+            let reached = arms.nominal.solve_seeded_joints(&flanges, &halfway).into_iter();
             reached.map(|reached| reached.ok().map(|reached| reached.joints)).collect()
         }
     };

@@ -12,8 +12,8 @@ use crate::frames::frame_table::Mountings;
 use crate::plan::reason::Why;
 use crate::risk::placement::Commanded;
 use crate::search_budget;
+use truegrind_arm::inverse::budget::{SearchBudget, with_budget};
 use truegrind_arm::inverse::configuration::Configuration;
-use truegrind_arm::inverse::effort::{Allowance, within};
 use truegrind_arm::model::Joints;
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{Listing, Motion, MotionTarget, RobTarget, Switch, TargetValue};
@@ -131,17 +131,17 @@ fn starts(
     let each = out.par_chunks_mut(STRETCH).zip(asked.par_chunks(STRETCH)).enumerate();
     each.for_each(|(stretch, (mut out, asked))| {
         let mut near = None;
-        let mut allowance = Allowance::of(search_budget::STARTS).part(stretch, stretches);
+        let mut budget = SearchBudget::of(search_budget::STARTS).share(stretch, stretches);
         for run in asked.chunk_by(|a, b| depends(a) == depends(b)) {
             let (here, rest) = out.split_at_mut(run.len());
             out = rest;
             if !depends(&run[0]) {
-                along(run, &mut near, arms, mountings, &mut allowance, here);
+                along(run, &mut near, arms, mountings, &mut budget, here);
             }
         }
     });
     // Now those that depend on the motion before, in order: a run is what follows each other in the listing.
-    let mut allowance = Allowance::of(search_budget::STARTS);
+    let mut budget = SearchBudget::of(search_budget::STARTS);
     let mut motion = 0;
     while motion < listing.motions.len() {
         let chained =
@@ -164,7 +164,7 @@ fn starts(
             reached.last().and_then(|start| start.as_ref().ok().map(Near::of))
         });
         let run = first[motion]..first[end];
-        along(&asked[run.clone()], &mut near, arms, mountings, &mut allowance, &mut out[run]);
+        along(&asked[run.clone()], &mut near, arms, mountings, &mut budget, &mut out[run]);
         motion = end;
     }
     guess_unsure(listing, asked, first, arms, mountings, &mut out);
@@ -210,13 +210,13 @@ fn guess_unsure(
 const RUNS: [usize; 2] = [8, 64];
 
 /// The starts of targets that follow each other. `near`: the joints from which the first one is reached, if known; left
-/// at the joints of the last. `allowance`: for those that have to be searched for.
+/// at the joints of the last. `budget`: for those that have to be searched for.
 fn along(
     asked: &[Asked<'_>],
     near: &mut Option<Near>,
     arms: &Arms<'_>,
     mountings: &Mountings,
-    allowance: &mut Allowance,
+    budget: &mut SearchBudget,
     out: &mut [Result<Start, Why>],
 ) {
     let mut at = 0;
@@ -239,7 +239,7 @@ fn along(
         }
         run = RUNS[0];
         if at < asked.len() {
-            let start = within(allowance, || start(&asked[at], near.as_ref(), arms, mountings));
+            let start = with_budget(budget, || start(&asked[at], near.as_ref(), arms, mountings));
             match &start {
                 Ok(start) => *near = Some(Near::of(start)),
                 // What goes on from there does not go on from the one before.
@@ -288,8 +288,8 @@ fn together(told: &[Told<'_>], last: &mut Near, arms: &Arms<'_>, out: &mut [Resu
     let flanges: Vec<Pose> = told.iter().map(|t| t.flange).collect();
     let mut taken = 0;
     // One that has to be searched for is started by itself.
-    for (told, reached) in told.iter().zip(arms.nominal.reach_path_easily(&flanges, &last.joints)) {
-        if told.monitored != Switch::Off && !reached.is_of(&wanted(told.target)) {
+    for (told, reached) in told.iter().zip(arms.nominal.solve_path_prefix(&flanges, &last.joints)) {
+        if told.monitored != Switch::Off && !reached.matches_exactly(&wanted(told.target)) {
             break;
         }
         let (joints, cfx, margins) = (reached.joints, reached.configuration.cfx, reached.margins());

@@ -28,11 +28,11 @@ use crate::search_budget;
 use crate::segment::condition_schedule::Way;
 use crate::target::original_joints::{AsItIs, Asked, Guess, Start};
 use crate::target::solved_target::{PORTION, Solved, SolvedTargets, as_joints};
-use truegrind_arm::estimated::{Carried, RidingPoint};
+use truegrind_arm::estimated::{FlangePoint, RegisteredFrame};
+use truegrind_arm::inverse::budget::{SearchBudget, with_budget};
 use truegrind_arm::inverse::configuration::Configuration;
-use truegrind_arm::inverse::effort::{Allowance, within};
 use truegrind_arm::model::Joints;
-use truegrind_arm::region::Nearest;
+use truegrind_arm::region::NearestSample;
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{Listing, MotionKind, RobTarget, Role, Switch, TargetValue};
 
@@ -189,8 +189,8 @@ impl Work<'_> {
             portions.push(here);
             rest = after;
         }
-        let whole = Allowance::of(search_budget::TARGETS);
-        search_budget::shared_out_into(whole, &mut portions, |portion, solved, allowance| {
+        let whole = SearchBudget::of(search_budget::TARGETS);
+        search_budget::shared_out_into(whole, &mut portions, |portion, solved, budget| {
             if stale.is_some_and(|stale| !stale[portion]) {
                 return;
             }
@@ -198,7 +198,7 @@ impl Work<'_> {
             let targets = self.targets(portion * PORTION);
             let places = [&before[targets.clone()], &places[targets.clone()]];
             let (asked, starts) = (&self.asked[targets.clone()], &self.starts[targets]);
-            within(allowance, || finish(asked, starts, places, arms, self, solved));
+            with_budget(budget, || finish(asked, starts, places, arms, self, solved));
         });
     }
 
@@ -304,7 +304,7 @@ fn finish(
     let absolute = sigmas(&way, &tools, frames, arms);
     let registered = way.iter().map(|w| assessment.registered(cut_of(w)).map(Some)).collect();
     let of_shape = sigmas(&way, &tools, registered, arms);
-    let mut near = Nearest::default();
+    let mut near = NearestSample::default();
     for (k, w) in way.iter().enumerate() {
         if let Some(why) = failed[k] {
             out[w.index] = Err(why);
@@ -335,7 +335,7 @@ fn finish(
             in_play_mm,
             place: w.place,
             guess: w.start.guess,
-            outside: arms.knowledge.and_then(|k| k.region.outside_near(&w.after, &mut near)),
+            outside: arms.knowledge.and_then(|k| k.region.outside_along(&w.after, &mut near)),
             forbidden: None,
         };
         solved.forbidden = forbidden(&solved, w.singularity, arms, options).or_else(|| {
@@ -366,8 +366,10 @@ fn on_their_way(
     let [places_before, places] = places.map(|all| open.iter().map(|(k, _)| all[*k]).collect::<Vec<usize>>());
     let reached_before = acting.forward(&places_before, &before);
     let solutions = acting.each(&places, |place, items| match items {
-        None => acting.inverse(place).solve_beside(&flanges, &before),
-        Some(items) => acting.inverse(place).solve_beside(&picked(&flanges, items), &picked(&before, items)),
+        None => acting.inverse(place).solve_offset_seeded(&flanges, &before),
+        Some(items) => {
+            acting.inverse(place).solve_offset_seeded(&picked(&flanges, items), &picked(&before, items))
+        }
     });
     let mut way: Vec<OnItsWay> = Vec::with_capacity(open.len());
     for (k, ((index, start), solution)) in open.iter().zip(solutions).enumerate() {
@@ -415,8 +417,11 @@ fn replayed(
     let hears =
         |(w, told): (&OnItsWay, &Pose)| mounting(w).flange_for(&rounded(told, options.position_decimals));
     let heard: Vec<Pose> = way.iter().zip(&told).map(hears).collect();
-    let reached =
-        if way.iter().all(joint_form) { Vec::new() } else { arms.nominal.reach_seeded(&heard, &after) };
+    let reached = if way.iter().all(joint_form) {
+        Vec::new()
+    } else {
+        arms.nominal.solve_seeded_joints(&heard, &after)
+    };
     let mut last: Vec<Joints> = Vec::with_capacity(way.len());
     let mut branches = Vec::with_capacity(way.len());
     let mut failed: Vec<Option<Why>> = vec![None; way.len()];
@@ -441,7 +446,7 @@ fn replayed(
 fn sigmas(
     way: &[OnItsWay],
     tools: &[Pose],
-    against: Vec<Option<Option<&Carried>>>,
+    against: Vec<Option<Option<&RegisteredFrame>>>,
     arms: &Arms<'_>,
 ) -> Vec<Option<f64>> {
     let Some(knowledge) = arms.knowledge else { return vec![None; way.len()] };
@@ -449,7 +454,7 @@ fn sigmas(
     let mut at = Vec::with_capacity(way.len());
     for ((k, w), carried) in way.iter().enumerate().zip(against) {
         let Some(carried) = carried else { continue };
-        points.push(RidingPoint { joints: w.after, flange_from_tool: tools[k], carried });
+        points.push(FlangePoint { joints: w.after, flange_from_tool: tools[k], carried });
         places.push(w.place);
         at.push(k);
     }

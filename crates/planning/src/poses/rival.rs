@@ -11,8 +11,8 @@ use truegrind_arm::effect::Effect;
 use truegrind_arm::effect::backlash::Backlash;
 use truegrind_arm::effect::compliance::Compliance;
 use truegrind_arm::effect::coupling::Coupling;
+use truegrind_arm::effect::gear_ratio::GearRatio;
 use truegrind_arm::effect::harmonic::Harmonic;
-use truegrind_arm::effect::ratio::Ratio;
 use truegrind_arm::effect::thermal::Thermal;
 use truegrind_arm::parameter::Parameter;
 use truegrind_calibration::diagnosis::finding::Confidence;
@@ -161,7 +161,7 @@ pub fn effects_of(suspect: &Suspect) -> Vec<Effect> {
             each(|joint| Effect::JointCompliance(Compliance { joint, compliance_rad_per_nm: 0.0 }))
         }
         "gear-eccentricity" => joints.iter().flat_map(|&j| [harmonic(j, 1.0), harmonic(j, 2.0)]).collect(),
-        "gear-ratio" => each(|joint| Effect::GearRatio(Ratio { joint, error: 0.0 })),
+        "gear-ratio" => each(|joint| Effect::GearRatio(GearRatio { joint, error: 0.0 })),
         "joint-coupling" => match *joints {
             [joint, driver, ..] if joint != driver => vec![coupling(joint, driver)],
             [joint] => vec![coupling(joint, if joint == 0 { 1 } else { joint - 1 })],

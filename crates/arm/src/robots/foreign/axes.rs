@@ -9,8 +9,8 @@
 
 use nalgebra::{Point3, UnitQuaternion, UnitVector3, Vector3};
 
-use super::chain::Described;
-use super::common::{refused, tidy};
+use super::chain::ForeignArm;
+use super::common::{foreign_error, zero_if_tiny};
 use crate::link::{Link, LinkModel};
 use crate::robots::error::RobotError;
 use crate::robots::sheet::LinkSheet;
@@ -26,12 +26,12 @@ const MEET_MM: f64 = 1e-11;
 /// A first axis that leans by less is upright (rad): ten picometres at the end of a metre.
 const SAME_RAD: f64 = 1e-14;
 
-/// What a place (mm) and an angle (°) have to be for the digits of [`Laid::note`] to show them.
+/// What a place (mm) and an angle (°) have to be for the digits of [`FittedLinks::note`] to show them.
 const SHOWN: [f64; 2] = [5e-4, 5e-5];
 
-/// Links, and where they were laid.
+/// Links, and where they were fitted.
 #[derive(Debug, Clone)]
-pub(super) struct Laid {
+pub(super) struct FittedLinks {
     /// The links.
     pub(super) links: [LinkSheet; 6],
     /// The flange in the last link frame.
@@ -46,12 +46,12 @@ pub(super) struct Laid {
     directions: [UnitVector3<f64>; 6],
 }
 
-/// Lays our links through the axes of a described arm.
-pub(super) fn laid(described: &Described, file: &str) -> Result<Laid, RobotError> {
-    let frames = described.frames();
+/// Lays our links through the axes of a foreign arm.
+pub(super) fn fit_links(foreign: &ForeignArm, file: &str) -> Result<FittedLinks, RobotError> {
+    let frames = foreign.frames();
     let lines: [(Point3<f64>, UnitVector3<f64>); 6] = std::array::from_fn(|i| {
         let frame = &frames[i];
-        let direction = UnitVector3::new_normalize((frame.rotation * described.steps[i].axis).into_inner());
+        let direction = UnitVector3::new_normalize((frame.rotation * foreign.steps[i].axis).into_inner());
         (Point3::from(frame.translation.vector), direction)
     });
     let (base, first_turn) = base(&lines[0]);
@@ -75,7 +75,7 @@ pub(super) fn laid(described: &Described, file: &str) -> Result<Laid, RobotError
     let (last, flange) = last(&(at.inverse() * frames[6]));
     links[5] = last;
     out[6] = at * turned(&last);
-    Ok(Laid {
+    Ok(FittedLinks {
         links,
         flange,
         base,
@@ -144,7 +144,7 @@ fn between(
         let meets = point - direction.into_inner() * (point.z / direction.z);
         let length = meets.x.hypot(meets.y);
         if length < 1e-6 {
-            return Err(refused(
+            return Err(foreign_error(
                 file,
                 format!("joints {} and {}", joint + 1, joint + 2),
                 "two joints that turn about one line",
@@ -158,9 +158,9 @@ fn between(
             model: LinkModel::Hayati,
             a_mm: sign * length,
             d_mm: 0.0,
-            alpha_deg: tidy((-next.y).atan2(next.z).to_degrees()),
-            theta_deg: tidy(theta.to_degrees()),
-            beta_deg: tidy(next.x.asin().to_degrees()),
+            alpha_deg: zero_if_tiny((-next.y).atan2(next.z).to_degrees()),
+            theta_deg: zero_if_tiny(theta.to_degrees()),
+            beta_deg: zero_if_tiny(next.x.asin().to_degrees()),
         });
     }
     // The common normal: across both axes.
@@ -174,8 +174,8 @@ fn between(
         model: LinkModel::Dh,
         a_mm: if length.abs() < MEET_MM { 0.0 } else { sign * length },
         d_mm: if foot.z.abs() < MEET_MM { 0.0 } else { foot.z },
-        alpha_deg: tidy((-next.y).atan2(next.z).to_degrees()),
-        theta_deg: tidy(theta.to_degrees()),
+        alpha_deg: zero_if_tiny((-next.y).atan2(next.z).to_degrees()),
+        theta_deg: zero_if_tiny(theta.to_degrees()),
         beta_deg: 0.0,
     })
 }
@@ -194,9 +194,9 @@ fn last(flange: &Pose) -> (LinkSheet, Pose) {
     let link = LinkSheet {
         model: LinkModel::Dh,
         a_mm: 0.0,
-        d_mm: tidy(place.z),
+        d_mm: zero_if_tiny(place.z),
         alpha_deg: alpha.to_degrees(),
-        theta_deg: tidy(theta.to_degrees()),
+        theta_deg: zero_if_tiny(theta.to_degrees()),
         beta_deg: 0.0,
     };
     let rest = turned(&link).inverse() * flange;
@@ -204,7 +204,7 @@ fn last(flange: &Pose) -> (LinkSheet, Pose) {
     (link, if none { Pose::identity() } else { rest })
 }
 
-impl Laid {
+impl FittedLinks {
     /// Where our base lies, where that is not the file's.
     pub(super) fn note(&self) -> Option<String> {
         let mut parts = Vec::new();
@@ -233,7 +233,7 @@ impl Laid {
     pub(super) fn parallel_2_3(&self, file: &str) -> Result<f64, RobotError> {
         let along = self.directions[1].dot(&self.directions[2]);
         if along.abs() < 1.0 - 1e-4 {
-            return Err(refused(
+            return Err(foreign_error(
                 file,
                 "joint 3 against the ground",
                 format!("axes 2 and 3 at {:.2}° to each other", along.clamp(-1.0, 1.0).acos().to_degrees()),

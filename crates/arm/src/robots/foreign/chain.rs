@@ -18,7 +18,7 @@ pub(super) struct Step {
 
 /// An arm as a file describes it.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Described {
+pub(super) struct ForeignArm {
     /// The joints from base to flange.
     pub(super) steps: [Step; 6],
     /// From the sixth joint's frame to the flange.
@@ -38,14 +38,14 @@ pub(super) struct Described {
     /// Where the numbers come from.
     pub(super) source: String,
     /// Meshes that the file names for drawing.
-    pub(super) visuals: Vec<Shown>,
+    pub(super) visuals: Vec<Mesh>,
     /// What a reader should know.
     pub(super) notes: Vec<String>,
 }
 
 /// A mesh that a file names for drawing.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Shown {
+pub(super) struct Mesh {
     /// How many of the six joints move it.
     pub(super) joints: usize,
     /// Where it lies in the file's base with all joints at zero.
@@ -56,7 +56,7 @@ pub(super) struct Shown {
     pub(super) unit_mm: [f64; 3],
 }
 
-impl Described {
+impl ForeignArm {
     /// The frame of each joint in the base, all joints at zero; the flange last.
     pub(super) fn frames(&self) -> [Pose; 7] {
         let mut pose = Pose::identity();

@@ -5,7 +5,7 @@ use crate::robots::sheet::Dialect;
 
 /// What a file leaves open.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Choice {
+pub struct ImportOptions {
     /// The link that stands: the root of the tree where left out.
     pub base: Option<String>,
     /// The link that is the flange: `tool0` or `flange` where left out and there is one.
@@ -15,7 +15,7 @@ pub struct Choice {
 }
 
 /// Something that cannot be used, in a file of somebody else.
-pub(super) fn refused(
+pub(super) fn foreign_error(
     file: &str,
     key: impl Into<String>,
     found: impl Into<String>,
@@ -32,7 +32,7 @@ pub(super) fn refused(
 }
 
 /// What stands where a zero was meant.
-pub(super) fn tidy(value: f64) -> f64 {
+pub(super) fn zero_if_tiny(value: f64) -> f64 {
     if value.abs() < 1e-12 { 0.0 } else { value }
 }
 

@@ -10,8 +10,8 @@
 
 use nalgebra::{Matrix6, UnitQuaternion, Vector3};
 
-use super::chain::{Described, Step, about_z};
-use super::common::{maker_of, refused};
+use super::chain::{ForeignArm, Step, about_z};
+use super::common::{foreign_error, maker_of};
 use crate::robots::error::RobotError;
 use truegrind_math::se3::Pose;
 
@@ -34,7 +34,7 @@ impl<'a> Table<'a> {
             .map(|(k, line)| (k + 1, line.trim()))
             .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
         let (_, first) = lines.next().ok_or_else(|| {
-            refused(
+            foreign_error(
                 file,
                 "table",
                 "nothing",
@@ -51,7 +51,7 @@ impl<'a> Table<'a> {
             decimal_comma: separator != ',',
         };
         if table.rows.len() != 6 {
-            return Err(refused(
+            return Err(foreign_error(
                 file,
                 "table",
                 format!("{} rows", table.rows.len()),
@@ -61,7 +61,7 @@ impl<'a> Table<'a> {
         }
         let width = table.header.len();
         if let Some((line, cells)) = table.rows.iter().find(|(_, cells)| cells.len() > width) {
-            return Err(refused(
+            return Err(foreign_error(
                 file,
                 format!("line {line}"),
                 format!("{} cells under a header of {width}", cells.len()),
@@ -89,7 +89,7 @@ impl<'a> Table<'a> {
         let plain = if self.decimal_comma { text.replace(',', ".") } else { text.to_owned() };
         plain.replace('\u{2212}', "-").parse().ok().filter(|value: &f64| value.is_finite()).ok_or_else(|| {
             let found = if text.is_empty() { "an empty cell".to_owned() } else { format!("`{text}`") };
-            refused(self.file, self.place(row, column), found, "a finite number", "correct the cell")
+            foreign_error(self.file, self.place(row, column), found, "a finite number", "correct the cell")
         })
     }
 
@@ -115,7 +115,7 @@ impl<'a> Table<'a> {
             |v: &f64| *v != 0.0 && ((v / FRAC_PI_2).round() * FRAC_PI_2 - v).abs() < 0.01 && v.round() != *v;
         if self.column(in_degrees).is_some() {
             if values.iter().all(|v| v.abs() < TAU + 0.01) && values.iter().any(quarter) {
-                return Err(refused(
+                return Err(foreign_error(
                     self.file,
                     format!("column {in_degrees}"),
                     shown(),
@@ -126,7 +126,7 @@ impl<'a> Table<'a> {
             return Ok(values.map(f64::to_radians));
         }
         if values.iter().any(|v| v.abs() > TAU + 0.01) {
-            return Err(refused(
+            return Err(foreign_error(
                 self.file,
                 format!("column {in_radians}"),
                 shown(),
@@ -139,7 +139,7 @@ impl<'a> Table<'a> {
 
     fn needed(&self, names: &[(&str, f64)]) -> Result<[f64; 6], RobotError> {
         self.numbers(names)?.ok_or_else(|| {
-            refused(
+            foreign_error(
                 self.file,
                 format!("column {}", names[0].0),
                 format!("the columns {}", self.header.join(", ")),
@@ -153,7 +153,7 @@ impl<'a> Table<'a> {
     fn modified(&self) -> Result<bool, RobotError> {
         const EXPECTED: &str = "standard or modified, the same in every row";
         let Some(column) = self.column("convention") else {
-            return Err(refused(
+            return Err(foreign_error(
                 self.file,
                 "column convention",
                 format!("the columns {}", self.header.join(", ")),
@@ -166,7 +166,7 @@ impl<'a> Table<'a> {
         for row in 1..6 {
             if !self.cell(row, column).eq_ignore_ascii_case(&first) {
                 let found = format!("`{}`, and `{first}` above", self.cell(row, column));
-                return Err(refused(
+                return Err(foreign_error(
                     self.file,
                     self.place(row, column),
                     found,
@@ -178,7 +178,7 @@ impl<'a> Table<'a> {
         match first.as_str() {
             "standard" => Ok(false),
             "modified" => Ok(true),
-            other => Err(refused(
+            other => Err(foreign_error(
                 self.file,
                 self.place(0, column),
                 format!("`{other}`"),
@@ -205,7 +205,7 @@ impl<'a> Table<'a> {
 }
 
 /// The arm of a table.
-pub(super) fn read(text: &str, file: &str) -> Result<Described, RobotError> {
+pub(super) fn read(text: &str, file: &str) -> Result<ForeignArm, RobotError> {
     let table = Table::of(text, file)?;
     let degree = 1.0_f64.to_radians();
     let modified = table.modified()?;
@@ -221,7 +221,7 @@ pub(super) fn read(text: &str, file: &str) -> Result<Described, RobotError> {
     };
     let (steps, after) = steps(modified, &theta, &d, &a, &alpha);
     let word = if modified { "modified (Craig)" } else { "standard" };
-    Ok(Described {
+    Ok(ForeignArm {
         steps,
         after,
         limits_deg: low.zip(high).map(|(low, high)| std::array::from_fn(|i| [low[i], high[i]])),

@@ -10,8 +10,8 @@
 
 use nalgebra::Vector3;
 
-use super::chain::{Described, about_z, from_rpy};
-use super::common::refused;
+use super::chain::{ForeignArm, about_z, from_rpy};
+use super::common::foreign_error;
 use super::table;
 use crate::joints::Joints;
 use crate::robots::Robot;
@@ -23,8 +23,8 @@ use truegrind_math::se3::Pose;
 const NAMES: [&str; 6] = ["shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2", "wrist_3"];
 const PLACES: [&str; 6] = ["x", "y", "z", "roll", "pitch", "yaw"];
 
-fn described(steps: [super::chain::Step; 6], after: Pose, file: &str, what: &str) -> Described {
-    Described {
+fn foreign(steps: [super::chain::Step; 6], after: Pose, file: &str, what: &str) -> ForeignArm {
+    ForeignArm {
         steps,
         after,
         limits_deg: None,
@@ -41,7 +41,7 @@ fn described(steps: [super::chain::Step; 6], after: Pose, file: &str, what: &str
 }
 
 /// The arm of a kinematics file: two levels of keys, as `ur_calibration` writes them.
-pub(super) fn read_yaml(text: &str, file: &str) -> Result<Described, RobotError> {
+pub(super) fn read_yaml(text: &str, file: &str) -> Result<ForeignArm, RobotError> {
     let mut found: [[Option<f64>; 6]; 6] = [[None; 6]; 6];
     let mut joint = None;
     for (number, line) in text.lines().enumerate() {
@@ -58,14 +58,20 @@ pub(super) fn read_yaml(text: &str, file: &str) -> Result<Described, RobotError>
         let value: Option<f64> = value.parse().ok().filter(|value: &f64| value.is_finite());
         let value = value.ok_or_else(|| {
             let key = format!("line {}, {}.{key}", number + 1, NAMES[joint]);
-            refused(file, key, format!("`{}`", plain.trim()), "a finite number (m or rad)", "correct it")
+            foreign_error(
+                file,
+                key,
+                format!("`{}`", plain.trim()),
+                "a finite number (m or rad)",
+                "correct it",
+            )
         })?;
         found[joint][place] = Some(value);
     }
     let mut places = [Pose::identity(); 6];
     for (joint, values) in found.iter().enumerate() {
         if let Some(missing) = values.iter().position(Option::is_none) {
-            return Err(refused(
+            return Err(foreign_error(
                 file,
                 format!("kinematics.{}.{}", NAMES[joint], PLACES[missing]),
                 "nothing",
@@ -76,7 +82,7 @@ pub(super) fn read_yaml(text: &str, file: &str) -> Result<Described, RobotError>
         let [x, y, z, roll, pitch, yaw] = values.map(Option::unwrap_or_default);
         places[joint] = from_rpy(Vector3::new(x, y, z) * 1000.0, [roll, pitch, yaw]);
     }
-    Ok(described(
+    Ok(foreign(
         places.map(about_z),
         Pose::identity(),
         file,
@@ -89,7 +95,7 @@ pub(super) fn read_conf(
     text: &str,
     file: &str,
     load: impl Fn(&str) -> Result<Robot, RobotError>,
-) -> Result<Described, RobotError> {
+) -> Result<ForeignArm, RobotError> {
     const LISTS: [&str; 4] = ["delta_theta", "delta_d", "delta_a", "delta_alpha"];
     let mut lists: [Option<[f64; 6]>; 4] = [None; 4];
     let mut robot = None;
@@ -106,7 +112,7 @@ pub(super) fn read_conf(
             values.map(|cell| cell.trim().parse().ok().filter(|v: &f64| v.is_finite())).collect();
         let six = values.and_then(|values| <[f64; 6]>::try_from(values).ok()).ok_or_else(|| {
             let key = format!("line {}, {key}", number + 1);
-            refused(
+            foreign_error(
                 file,
                 key,
                 format!("`{value}`"),
@@ -117,7 +123,7 @@ pub(super) fn read_conf(
         lists[list] = Some(six);
     }
     if let Some(missing) = lists.iter().position(Option::is_none) {
-        return Err(refused(
+        return Err(foreign_error(
             file,
             LISTS[missing],
             "nothing",
@@ -126,7 +132,7 @@ pub(super) fn read_conf(
         ));
     }
     let Some(name) = robot else {
-        return Err(refused(
+        return Err(foreign_error(
             file,
             "robot",
             "nothing",
@@ -144,7 +150,7 @@ pub(super) fn read_conf(
         &std::array::from_fn(|i| link(i).a_mm + 1000.0 * a[i]),
         &std::array::from_fn(|i| link(i).alpha_rad + alpha[i]),
     );
-    let mut out = described(steps, after, file, "the controller's own calibration");
+    let mut out = foreign(steps, after, file, "the controller's own calibration");
     out.designation = name.clone();
     let limits = &nominal.limits;
     out.limits_deg =

@@ -10,25 +10,25 @@ use std::collections::BTreeMap;
 use nalgebra::{Point3, UnitVector3, Vector3};
 use roxmltree::{Document, Node, ParsingOptions};
 
-use super::chain::{Described, Shown, Step, from_rpy};
-use super::common::{Choice, maker_of, refused};
+use super::chain::{ForeignArm, Mesh, Step, from_rpy};
+use super::common::{ImportOptions, foreign_error, maker_of};
 use crate::body::Body;
 use crate::robots::error::RobotError;
 use truegrind_math::se3::Pose;
 
 /// Far more than any description of robots has.
-const MOST_NODES: u32 = 1_000_000;
+const MAX_NODES: u32 = 1_000_000;
 
 /// Names by which the flange goes; the first that is there is taken.
 const FLANGES: [&str; 4] = ["tool0", "flange", "ee_link", "tool_link"];
 
 #[derive(Debug, Clone, PartialEq)]
-enum Moves {
-    Not,
-    Turns,
-    Slides,
-    Follows(String),
-    Otherwise(String),
+enum JointKind {
+    Fixed,
+    Revolute,
+    Prismatic,
+    Mimic(String),
+    Other(String),
 }
 
 #[derive(Debug, Clone)]
@@ -38,7 +38,7 @@ struct Joint<'a> {
     child: &'a str,
     before: Pose,
     axis: Vector3<f64>,
-    moves: Moves,
+    kind: JointKind,
     limits_rad: Option<[f64; 2]>,
     speed_rad_s: Option<f64>,
     line: u32,
@@ -46,7 +46,7 @@ struct Joint<'a> {
 
 impl Joint<'_> {
     fn is_moving(&self) -> bool {
-        self.moves != Moves::Not
+        self.kind != JointKind::Fixed
     }
 }
 
@@ -59,30 +59,30 @@ struct Tree<'a> {
     links: Vec<&'a str>,
     meshes: usize,
     /// Link, and where a mesh is drawn in its frame.
-    visuals: Vec<(&'a str, Drawn)>,
+    visuals: Vec<(&'a str, LinkMesh)>,
 }
 
 /// A mesh of a link.
-struct Drawn {
+struct LinkMesh {
     origin: Pose,
     file: String,
     scale: [f64; 3],
 }
 
 /// The arm of a description.
-pub(super) fn read(text: &str, file: &str, choice: &Choice) -> Result<Described, RobotError> {
+pub(super) fn read(text: &str, file: &str, choice: &ImportOptions) -> Result<ForeignArm, RobotError> {
     if file.to_ascii_lowercase().ends_with(".xacro") {
         return Err(macros(file));
     }
     let text = with_prefixes(text);
     let document = Document::parse_with_options(&text, options()).map_err(|error| {
         let key = format!("line {}", error.pos().row);
-        refused(file, key, error.to_string(), "XML", "export the description again")
+        foreign_error(file, key, error.to_string(), "XML", "export the description again")
     })?;
     let root = document.root_element();
     if !root.has_tag_name("robot") {
         let found = format!("<{}>", root.tag_name().name());
-        return Err(refused(
+        return Err(foreign_error(
             file,
             "root element",
             found,
@@ -100,15 +100,15 @@ pub(super) fn read(text: &str, file: &str, choice: &Choice) -> Result<Described,
     let tree = Tree::of(&root, file)?;
     let base = tree.base(choice)?;
     let path = tree.chain(base, choice)?;
-    tree.described(&root, base, &path)
+    tree.foreign(&root, base, &path)
 }
 
 fn options<'a>() -> ParsingOptions<'a> {
-    ParsingOptions { nodes_limit: MOST_NODES, ..ParsingOptions::default() }
+    ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() }
 }
 
 fn macros(file: &str) -> RobotError {
-    refused(
+    foreign_error(
         file,
         "robot",
         "xacro macros",
@@ -118,12 +118,12 @@ fn macros(file: &str) -> RobotError {
 }
 
 /// More than these no file forgets to declare.
-const MOST_PREFIXES: usize = 16;
+const MAX_PREFIXES: usize = 16;
 
 /// The text with its prefixes declared: many tools leave that out, and nothing of what they mark is read.
 fn with_prefixes(text: &str) -> Cow<'_, str> {
     let mut text = Cow::Borrowed(text);
-    for _ in 0..MOST_PREFIXES {
+    for _ in 0..MAX_PREFIXES {
         let Err(roxmltree::Error::UnknownNamespace(prefix, _)) =
             Document::parse_with_options(&text, options())
         else {
@@ -153,7 +153,7 @@ fn numbers<const N: usize>(
         text.split_whitespace().map(|cell| cell.parse().ok().filter(|v: &f64| v.is_finite())).collect();
     values.and_then(|values| <[f64; N]>::try_from(values).ok()).ok_or_else(|| {
         let line = node.document().text_pos_at(node.range().start).row;
-        refused(
+        foreign_error(
             file,
             format!("line {line}, <{} {attribute}>", node.tag_name().name()),
             format!("`{text}`"),
@@ -181,23 +181,29 @@ fn joint<'a>(node: &Node<'a, '_>, file: &str) -> Result<Joint<'a>, RobotError> {
     let link = |end: &str| {
         child(node, end).and_then(|end| end.attribute("link")).ok_or_else(|| {
             let key = format!("line {line}, joint {name}, <{end}>");
-            refused(file, key, "nothing", "the name of a link", "a joint leads from a parent to a child")
+            foreign_error(
+                file,
+                key,
+                "nothing",
+                "the name of a link",
+                "a joint leads from a parent to a child",
+            )
         })
     };
     let axis = Vector3::from(numbers(child(node, "axis"), "xyz", [1.0, 0.0, 0.0], file)?);
-    let kind = node.attribute("type").unwrap_or_default();
+    let type_name = node.attribute("type").unwrap_or_default();
     let mimic =
         child(node, "mimic").map(|mimic| mimic.attribute("joint").unwrap_or("another joint").to_owned());
-    let moves = match (kind, mimic) {
-        ("fixed", _) => Moves::Not,
-        (_, Some(other)) => Moves::Follows(other),
-        ("revolute" | "continuous", None) => Moves::Turns,
-        ("prismatic", None) => Moves::Slides,
-        (other, None) => Moves::Otherwise(other.to_owned()),
+    let kind = match (type_name, mimic) {
+        ("fixed", _) => JointKind::Fixed,
+        (_, Some(other)) => JointKind::Mimic(other),
+        ("revolute" | "continuous", None) => JointKind::Revolute,
+        ("prismatic", None) => JointKind::Prismatic,
+        (other, None) => JointKind::Other(other.to_owned()),
     };
-    if moves == Moves::Turns && !(axis.norm() > 1e-6) {
+    if kind == JointKind::Revolute && !(axis.norm() > 1e-6) {
         let key = format!("line {line}, joint {name}, <axis>");
-        return Err(refused(
+        return Err(foreign_error(
             file,
             key,
             format!("({}, {}, {})", axis.x, axis.y, axis.z),
@@ -206,7 +212,7 @@ fn joint<'a>(node: &Node<'a, '_>, file: &str) -> Result<Joint<'a>, RobotError> {
         ));
     }
     let limit = child(node, "limit");
-    let bounded = kind == "revolute"
+    let bounded = type_name == "revolute"
         && limit.is_some_and(|limit| limit.has_attribute("lower") || limit.has_attribute("upper"));
     let limits_rad = if bounded {
         let [low] = numbers(limit, "lower", [0.0], file)?;
@@ -222,7 +228,7 @@ fn joint<'a>(node: &Node<'a, '_>, file: &str) -> Result<Joint<'a>, RobotError> {
         child: link("child")?,
         before: origin(node, file)?,
         axis,
-        moves,
+        kind,
         limits_rad,
         speed_rad_s: (speed > 0.0).then_some(speed),
         line,
@@ -238,12 +244,12 @@ fn body(node: &Node<'_, '_>, file: &str) -> Result<Option<Body>, RobotError> {
 }
 
 /// The meshes of one link that show it: those of `<visual>`, or, where none of them is STL and those of `<collision>` are, these.
-fn shown_by(link: &Node<'_, '_>, file: &str) -> Result<Vec<Drawn>, RobotError> {
-    let of = |tag: &str| -> Result<Vec<Drawn>, RobotError> {
+fn shown_by(link: &Node<'_, '_>, file: &str) -> Result<Vec<LinkMesh>, RobotError> {
+    let of = |tag: &str| -> Result<Vec<LinkMesh>, RobotError> {
         let parts = link.children().filter(|inner| inner.has_tag_name(tag));
         parts.filter_map(|part| drawn(&part, file).transpose()).collect()
     };
-    let is_stl = |mesh: &Drawn| mesh.file.to_ascii_lowercase().ends_with(".stl");
+    let is_stl = |mesh: &LinkMesh| mesh.file.to_ascii_lowercase().ends_with(".stl");
     let visual = of("visual")?;
     if visual.is_empty() || visual.iter().any(is_stl) {
         return Ok(visual);
@@ -253,11 +259,11 @@ fn shown_by(link: &Node<'_, '_>, file: &str) -> Result<Vec<Drawn>, RobotError> {
 }
 
 /// The mesh of a `<visual>` or `<collision>`; boxes, cylinders and balls are left to us.
-fn drawn(visual: &Node<'_, '_>, file: &str) -> Result<Option<Drawn>, RobotError> {
+fn drawn(visual: &Node<'_, '_>, file: &str) -> Result<Option<LinkMesh>, RobotError> {
     let mesh = child(visual, "geometry").and_then(|geometry| child(&geometry, "mesh"));
     let Some(name) = mesh.and_then(|mesh| mesh.attribute("filename")) else { return Ok(None) };
     let scale = numbers(mesh, "scale", [1.0; 3], file)?;
-    Ok(Some(Drawn { origin: origin(visual, file)?, file: name.to_owned(), scale }))
+    Ok(Some(LinkMesh { origin: origin(visual, file)?, file: name.to_owned(), scale }))
 }
 
 impl<'a> Tree<'a> {
@@ -287,7 +293,7 @@ impl<'a> Tree<'a> {
                     let joint = joint(&node, file)?;
                     if let Some(first) = tree.to.insert(joint.child, tree.joints.len()) {
                         let first: &Joint<'_> = &tree.joints[first];
-                        return Err(refused(
+                        return Err(foreign_error(
                             file,
                             format!("line {}, joint {}", joint.line, joint.name),
                             format!(
@@ -307,7 +313,7 @@ impl<'a> Tree<'a> {
     }
 
     /// The link where the arm begins.
-    fn base(&self, choice: &Choice) -> Result<&'a str, RobotError> {
+    fn base(&self, choice: &ImportOptions) -> Result<&'a str, RobotError> {
         if let Some(base) = &choice.base {
             return self.named(base, "base");
         }
@@ -317,14 +323,14 @@ impl<'a> Tree<'a> {
         roots.dedup();
         match roots.as_slice() {
             [root] => Ok(root),
-            [] => Err(refused(
+            [] => Err(foreign_error(
                 self.file,
                 "joints",
                 "no link that stands",
                 "one root",
                 "a tree begins at a link that is no child",
             )),
-            several => Err(refused(
+            several => Err(foreign_error(
                 self.file,
                 "links",
                 format!("{} links that stand: {}", several.len(), several.join(", ")),
@@ -339,7 +345,7 @@ impl<'a> Tree<'a> {
         found.ok_or_else(|| {
             let mut known: Vec<&str> = self.links.clone();
             known.truncate(40);
-            refused(
+            foreign_error(
                 self.file,
                 which,
                 format!("`{name}`; the links are {}", known.join(", ")),
@@ -375,12 +381,18 @@ impl<'a> Tree<'a> {
     }
 
     /// The joints of the arm, from base to flange.
-    fn chain(&self, base: &'a str, choice: &Choice) -> Result<Vec<usize>, RobotError> {
+    fn chain(&self, base: &'a str, choice: &ImportOptions) -> Result<Vec<usize>, RobotError> {
         if let Some(tip) = &choice.tip {
             let tip = self.named(tip, "tip")?;
             let path = self.path(base, tip).ok_or_else(|| {
                 let found = format!("link {tip}, to which no joints lead from {base}");
-                refused(self.file, "tip", found, "a link behind the base", "give base and tip of one arm")
+                foreign_error(
+                    self.file,
+                    "tip",
+                    found,
+                    "a link behind the base",
+                    "give base and tip of one arm",
+                )
             })?;
             self.six(&path)?;
             return Ok(path);
@@ -447,7 +459,7 @@ impl<'a> Tree<'a> {
     }
 
     fn several(&self, ends: &[usize]) -> RobotError {
-        refused(
+        foreign_error(
             self.file,
             "joints",
             format!("{} arms of six joints, which end with {}", ends.len(), self.names(ends)),
@@ -459,7 +471,7 @@ impl<'a> Tree<'a> {
 
     fn not_six(&self, moving: &[usize]) -> RobotError {
         let found = format!("{} joints that move in a row: {}", moving.len(), self.names(moving));
-        refused(
+        foreign_error(
             self.file,
             "joints",
             found,
@@ -473,13 +485,13 @@ impl<'a> Tree<'a> {
     fn six(&self, path: &[usize]) -> Result<Vec<usize>, RobotError> {
         let moving = self.moving(path);
         for joint in moving.iter().map(|joint| &self.joints[*joint]) {
-            let found = match &joint.moves {
-                Moves::Not | Moves::Turns => continue,
-                Moves::Slides => "a joint that slides (prismatic)".to_owned(),
-                Moves::Follows(other) => format!("a joint that follows {other} (mimic)"),
-                Moves::Otherwise(kind) => format!("a joint of type `{kind}`"),
+            let found = match &joint.kind {
+                JointKind::Fixed | JointKind::Revolute => continue,
+                JointKind::Prismatic => "a joint that slides (prismatic)".to_owned(),
+                JointKind::Mimic(other) => format!("a joint that follows {other} (mimic)"),
+                JointKind::Other(kind) => format!("a joint of type `{kind}`"),
             };
-            return Err(refused(
+            return Err(foreign_error(
                 self.file,
                 format!("line {}, joint {}", joint.line, joint.name),
                 found,
@@ -500,7 +512,7 @@ impl<'a> Tree<'a> {
         let tip = match behind.as_slice() {
             [only] => only,
             several => {
-                return Err(refused(
+                return Err(foreign_error(
                     self.file,
                     "flange",
                     format!(
@@ -533,7 +545,7 @@ impl<'a> Tree<'a> {
         out
     }
 
-    fn described(&self, root: &Node<'_, '_>, base: &str, path: &[usize]) -> Result<Described, RobotError> {
+    fn foreign(&self, root: &Node<'_, '_>, base: &str, path: &[usize]) -> Result<ForeignArm, RobotError> {
         let moving = self.six(path)?;
         let mut before = Pose::identity();
         let mut steps: Vec<Step> = Vec::new();
@@ -588,7 +600,7 @@ impl<'a> Tree<'a> {
                     .to_owned(),
             );
         }
-        Ok(Described {
+        Ok(ForeignArm {
             steps,
             after: before,
             limits_deg,
@@ -608,8 +620,8 @@ impl<'a> Tree<'a> {
     }
 
     /// The meshes of the arm's links and of what is fixed to them.
-    fn shown(&self, base: &str, moving: &[usize]) -> Vec<Shown> {
-        let shown = |(link, drawn): &(&str, Drawn)| {
+    fn shown(&self, base: &str, moving: &[usize]) -> Vec<Mesh> {
+        let shown = |(link, drawn): &(&str, LinkMesh)| {
             let path = self.path(base, link)?;
             let own = self.moving(&path);
             // What hangs on a finger does not belong to the arm.
@@ -617,7 +629,7 @@ impl<'a> Tree<'a> {
                 return None;
             }
             let frame = path.iter().fold(Pose::identity(), |pose, joint| pose * self.joints[*joint].before);
-            Some(Shown {
+            Some(Mesh {
                 joints: own.len(),
                 place: frame * drawn.origin,
                 file: drawn.file.clone(),

@@ -356,7 +356,7 @@ impl OfEffects {
             if posed.condition != *row.condition {
                 posed = start.at_condition(&row.condition);
             }
-            let rotation = posed.rotations(&row.joints) - start.joint_map * row.joints;
+            let rotation = posed.joint_rotations(&row.joints) - start.joint_map * row.joints;
             for j in 0..6 {
                 out.extra[j][i] = rotation[j];
             }

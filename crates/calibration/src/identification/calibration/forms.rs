@@ -72,7 +72,7 @@ fn torques(dataset: &Dataset, model: &Model) -> Vec<Joints> {
         return flange_torques(dataset, model);
     }
     let statics = Model { effects: Vec::new(), ..model.clone() }.statics();
-    let torque = |r: &Row| statics.torques(&(model.joint_map * r.joints), &r.condition).0;
+    let torque = |r: &Row| statics.torques_and_jacobian(&(model.joint_map * r.joints), &r.condition).0;
     dataset.rows.iter().map(torque).collect()
 }
 
@@ -170,5 +170,9 @@ pub fn flange_torques(dataset: &Dataset, model: &Model) -> Vec<Joints> {
     let bare = Model { bodies: None, effects: Vec::new(), ..model.clone() };
     let statics = bare.statics();
     let kilogram = Condition { payload_kg: Some(1.0), ..Condition::default() };
-    dataset.rows.iter().map(|r| statics.torques(&(model.joint_map * r.joints), &kilogram).0).collect()
+    dataset
+        .rows
+        .iter()
+        .map(|r| statics.torques_and_jacobian(&(model.joint_map * r.joints), &kilogram).0)
+        .collect()
 }

@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use truegrind_arm::effect::Effect;
-use truegrind_arm::effect::load::{GravityLoad, Lump};
+use truegrind_arm::effect::lumped_compliance::{Lump, LumpedCompliance};
 use truegrind_arm::model::Model;
 use truegrind_arm::robots;
 use truegrind_calibration::diagnosis::candidate_scores::CandidateScores;
@@ -118,7 +118,7 @@ fn few_poses_prove_nothing_however_often_they_are_read() {
 
 fn leaning(joint: usize) -> Cause {
     let across = |axis| Lump { frame: 4, axis: Some(axis), moment: None, factor: 1e-5 };
-    Cause::Arm(Effect::LumpedCompliance(GravityLoad { joint, lump: vec![across(0), across(1)] }))
+    Cause::Arm(Effect::LumpedCompliance(LumpedCompliance { joint, lump: vec![across(0), across(1)] }))
 }
 
 /// The first joint turns about the vertical: weight turns it only in an arm that leans, and there the joints behind it yield sideways

@@ -97,10 +97,10 @@ fn a_cause_in_doubt_moves_nothing_and_stands_in_the_covariance() {
     let doubted = found.diagnosis.findings.iter().find(|f| f.effect == "gear-eccentricity").unwrap();
     assert_eq!(doubted.confidence, Confidence::Ambiguous);
     let effects = &found.estimated.model.effects;
-    let acting: Vec<&str> = effects.iter().filter(|e| !e.is_still()).map(Effect::name).collect();
+    let acting: Vec<&str> = effects.iter().filter(|e| !e.is_zero()).map(Effect::name).collect();
     assert_eq!(acting, ["joint-compliance"]);
     let index = effects.iter().position(gear).unwrap();
-    assert!(effects[index].is_still());
+    assert!(effects[index].is_zero());
     // What it was found to be is within what it may be.
     let size = found.extended.causes.iter().find_map(|cause| match cause {
         Cause::Arm(effect) if gear(effect) => Some(cause.values()),
@@ -123,7 +123,7 @@ fn what_no_arm_carries_is_stood_for_by_its_best_rival() {
     let effects = &found.estimated.model.effects;
     let gear = |effect: &Effect| matches!(effect, Effect::GearEccentricity(h) if h.joint == 0);
     let index = effects.iter().position(gear).unwrap();
-    assert!(effects[index].is_still());
+    assert!(effects[index].is_zero());
     // It may be as large as it is.
     let sigmas = sigmas(&found.estimated, index);
     assert!(sigmas[0] > 0.5 * 3.7655e-4 && sigmas[0] < 2.0 * 3.7655e-4, "{sigmas:?}");

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::effect::Effect;
-use truegrind_arm::effect::map::JointMap;
+use truegrind_arm::effect::error_map::ErrorMap;
 use truegrind_arm::parameter::Parameter;
 use truegrind_arm::robots;
 use truegrind_calibration::diagnosis::catalogue::Candidate;
@@ -198,7 +198,7 @@ fn a_refit_by_one_step_is_a_refit() {
 #[test]
 fn knots_that_no_row_reaches_are_not_searched_for_and_change_nothing() {
     fitted(90, |subject, fitted| {
-        let map = JointMap { joint: 1, knots_rad: vec![0.0; 72] };
+        let map = ErrorMap { joint: 1, knots_rad: vec![0.0; 72] };
         let angles =
             || subject.observed.dataset.rows.iter().map(|row| (subject.nominal.joint_map * row.joints)[1]);
         let mut seen: Vec<usize> = angles().flat_map(|u| map.reached(u)).collect();

@@ -9,8 +9,8 @@ use truegrind_arm::effect::Effect;
 use truegrind_arm::effect::backlash::Backlash;
 use truegrind_arm::effect::compliance::Compliance;
 use truegrind_arm::effect::coupling::Coupling;
+use truegrind_arm::effect::gear_ratio::GearRatio;
 use truegrind_arm::effect::harmonic::Harmonic;
-use truegrind_arm::effect::ratio::Ratio;
 use truegrind_arm::effect::thermal::Thermal;
 use truegrind_arm::model::Model;
 use truegrind_calibration::diagnosis::cause::Cause;
@@ -271,7 +271,7 @@ pub fn cause(hidden: &Hidden) -> Option<Cause> {
         Hidden::Gear { joint, order, .. } => {
             Cause::Arm(Effect::GearEccentricity(Harmonic { joint, order, sine_rad: 0.0, cosine_rad: 0.0 }))
         }
-        Hidden::Ratio { joint, .. } => Cause::Arm(Effect::GearRatio(Ratio { joint, error: 0.0 })),
+        Hidden::Ratio { joint, .. } => Cause::Arm(Effect::GearRatio(GearRatio { joint, error: 0.0 })),
         Hidden::Coupling { driver, joint, .. } => {
             Cause::Arm(Effect::JointCoupling(Coupling { joint, driver, factor: 0.0 }))
         }

@@ -9,7 +9,7 @@ use std::fmt;
 use nalgebra::{DMatrix, DVector, UnitQuaternion};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::estimated::Judgement;
-use truegrind_arm::jacobian::{Ends, parameter_jacobian};
+use truegrind_arm::jacobian::{BaseAndTool, parameter_jacobian};
 use truegrind_arm::model::{Joints, Model};
 use truegrind_arm::parameter::Parameter;
 use truegrind_calibration::identification::identify::{Identification, Options, identify};
@@ -158,7 +158,7 @@ fn placed_rms_mm(actual: &Model, model: &Model, poses: &[Joints], target: &Pose)
     let still = Condition::default();
     let (real, known) = (actual.at_condition(&still), model.at_condition(&still));
     let target = Pose::from_parts(target.translation, UnitQuaternion::identity());
-    let ends = Ends { world_from_base: [0.0; 6], flange_from_tool: vector_from_pose(&target) };
+    let ends = BaseAndTool { world_from_base: [0.0; 6], flange_from_tool: vector_from_pose(&target) };
     let list: Vec<Parameter> =
         (0..6).map(Parameter::SensorFrame).chain((0..3).map(Parameter::Target)).collect();
     let (mut off, mut rigid) = (DVector::zeros(3 * poses.len()), DMatrix::zeros(3 * poses.len(), 9));

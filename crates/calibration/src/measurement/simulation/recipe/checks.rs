@@ -2,7 +2,9 @@
 
 use super::{Circumstances, Frame, Poses, Recipe, SensorFault as Fault, SensorSetup, View};
 use crate::measurement::simulation::error::RecipeError;
-use truegrind_arm::bounds::{self, Bound, JOINT_DEG, LENGTH_MM, MASS_KG, PLACE_MM, Unfit, shown};
+use truegrind_arm::bounds::{
+    self, Bound, InvalidValue, JOINT_DEG, LENGTH_MM, MASS_KG, POSITION_MM, display_number,
+};
 use truegrind_arm::effect::bounds::effects;
 
 /// Most rows of a simulated file.
@@ -25,20 +27,20 @@ const STEP: Bound = Bound::new(1e-9, 1e4, "a step above 0");
 const SCALE: Bound = Bound::new(-0.5, 0.5, "a share within ±0.5");
 const SAG_PER_M: Bound = Bound::new(-10.0, 10.0, "weight over tension in 1/m, within ±10");
 
-impl From<Unfit> for RecipeError {
-    fn from(unfit: Unfit) -> Self {
-        RecipeError::Invalid { key: unfit.key, found: unfit.found, expected: unfit.expected }
+impl From<InvalidValue> for RecipeError {
+    fn from(invalid: InvalidValue) -> Self {
+        RecipeError::Invalid { key: invalid.key, found: invalid.found, expected: invalid.expected }
     }
 }
 
 impl Recipe {
     /// Checks what the types leave open.
     pub fn check(&self) -> Result<(), RecipeError> {
-        self.check_arm().map_err(|unfit| unfit.within("arm"))?;
-        self.check_poses().map_err(|unfit| unfit.within("poses"))?;
-        view(&self.view).map_err(|unfit| unfit.within("view"))?;
-        circumstances(&self.circumstances).map_err(|unfit| unfit.within("circumstances"))?;
-        sensor(&self.sensor).map_err(|unfit| unfit.within("sensor"))?;
+        self.check_arm().map_err(|invalid| invalid.within("arm"))?;
+        self.check_poses().map_err(|invalid| invalid.within("poses"))?;
+        view(&self.view).map_err(|invalid| invalid.within("view"))?;
+        circumstances(&self.circumstances).map_err(|invalid| invalid.within("circumstances"))?;
+        sensor(&self.sensor).map_err(|invalid| invalid.within("sensor"))?;
         for (key, sigma) in [
             ("noise.sigma_mm", self.noise.sigma_mm),
             ("noise.per_metre_mm", self.noise.per_metre_mm),
@@ -59,7 +61,7 @@ impl Recipe {
         self.check_company()
     }
 
-    fn check_arm(&self) -> Result<(), Unfit> {
+    fn check_arm(&self) -> Result<(), InvalidValue> {
         if let Some(random) = &self.arm.random {
             for (key, bound, value) in [
                 ("a_mm", LENGTH_SIGMA_MM, random.a_mm),
@@ -73,7 +75,7 @@ impl Recipe {
         }
         for link in &self.arm.link {
             if link.joint > 5 {
-                return Err(Unfit::new("link.joint", link.joint.to_string(), "a joint from 0 to 5"));
+                return Err(InvalidValue::new("link.joint", link.joint.to_string(), "a joint from 0 to 5"));
             }
             for (key, bound, value) in [
                 ("a_mm", LENGTH_OFF_MM, link.a_mm),
@@ -88,12 +90,12 @@ impl Recipe {
         effects(&self.arm.effect)?;
         let Some(bodies) = &self.arm.body else { return Ok(()) };
         if bodies.len() != 6 {
-            return Err(Unfit::new("body", format!("{} bodies", bodies.len()), "six"));
+            return Err(InvalidValue::new("body", format!("{} bodies", bodies.len()), "six"));
         }
         bounds::bodies(bodies)
     }
 
-    fn check_poses(&self) -> Result<(), Unfit> {
+    fn check_poses(&self) -> Result<(), InvalidValue> {
         let repeats = match &self.poses {
             Poses::Random { margin_deg, min_deg, max_deg, repeats, .. } => {
                 JOINT_DEG.check(|| "margin_deg".to_owned(), *margin_deg)?;
@@ -123,21 +125,21 @@ impl Recipe {
             return Ok(());
         }
         let found = rows.map_or_else(|| "more rows than can be counted".to_owned(), |n| format!("{n} rows"));
-        Err(Unfit::new("count, steps and repeats", found, "at most 1,000,000 rows in all"))
+        Err(InvalidValue::new("count, steps and repeats", found, "at most 1,000,000 rows in all"))
     }
 }
 
-fn view(view: &View) -> Result<(), Unfit> {
-    PLACE_MM.check_all("box_mm", view.box_mm.iter().flatten().flatten())?;
-    PLACE_MM.check_all("distance_mm", view.distance_mm.iter().flatten())?;
+fn view(view: &View) -> Result<(), InvalidValue> {
+    POSITION_MM.check_all("box_mm", view.box_mm.iter().flatten().flatten())?;
+    POSITION_MM.check_all("distance_mm", view.distance_mm.iter().flatten())?;
     TILT_DEG.check_all("tilt_deg", &view.tilt_deg)
 }
 
-fn circumstances(circumstances: &Circumstances) -> Result<(), Unfit> {
+fn circumstances(circumstances: &Circumstances) -> Result<(), InvalidValue> {
     HOURS.check_all("hours", &circumstances.hours)?;
     if let Some(warm) = &circumstances.temperature {
         if circumstances.hours.is_none() {
-            return Err(Unfit::new("temperature", "no hours", "`hours` beside a temperature"));
+            return Err(InvalidValue::new("temperature", "no hours", "`hours` beside a temperature"));
         }
         TEMPERATURE_C.check(|| "temperature.start_c".to_owned(), warm.start_c)?;
         TEMPERATURE_C.check(|| "temperature.end_c".to_owned(), warm.end_c)?;
@@ -147,26 +149,26 @@ fn circumstances(circumstances: &Circumstances) -> Result<(), Unfit> {
     LENGTH_MM.check_all("payload_centre_mm", &circumstances.payload_centre_mm)
 }
 
-fn frame(key: &str, frame: &Frame) -> Result<(), Unfit> {
-    PLACE_MM.check_all(&format!("{key}.position_mm"), &frame.position_mm)?;
+fn frame(key: &str, frame: &Frame) -> Result<(), InvalidValue> {
+    POSITION_MM.check_all(&format!("{key}.position_mm"), &frame.position_mm)?;
     let length = frame.wxyz.iter().map(|v| v * v).sum::<f64>().sqrt();
     if (1e-3..=1e3).contains(&length) {
         return Ok(());
     }
     let expected = "a quaternion whose length is not 0";
-    Err(Unfit::new(format!("{key}.wxyz"), format!("a length of {}", shown(length)), expected))
+    Err(InvalidValue::new(format!("{key}.wxyz"), format!("a length of {}", display_number(length)), expected))
 }
 
-fn sensor(sensor: &SensorSetup) -> Result<(), Unfit> {
+fn sensor(sensor: &SensorSetup) -> Result<(), InvalidValue> {
     match sensor {
         SensorSetup::Cable { outlets_mm, zeros_mm, hook_mm } => {
             if outlets_mm.is_empty() || zeros_mm.len() > outlets_mm.len() {
                 let found = format!("{} outlets, {} zeros", outlets_mm.len(), zeros_mm.len());
                 let expected = "one outlet at least, and no more zeros than outlets";
-                return Err(Unfit::new("outlets_mm", found, expected));
+                return Err(InvalidValue::new("outlets_mm", found, expected));
             }
-            PLACE_MM.check_all("outlets_mm", outlets_mm.as_flattened())?;
-            PLACE_MM.check_all("zeros_mm", zeros_mm)?;
+            POSITION_MM.check_all("outlets_mm", outlets_mm.as_flattened())?;
+            POSITION_MM.check_all("zeros_mm", zeros_mm)?;
             LENGTH_MM.check_all("hook_mm", hook_mm)
         }
         SensorSetup::Position { frame: stands, reflector_mm } => {
@@ -180,10 +182,10 @@ fn sensor(sensor: &SensorSetup) -> Result<(), Unfit> {
     }
 }
 
-fn faults(list: &[Fault]) -> Result<(), Unfit> {
+fn faults(list: &[Fault]) -> Result<(), InvalidValue> {
     let mut named = list.len();
     for (i, fault) in list.iter().enumerate() {
-        numbers(fault).map_err(|unfit| unfit.within(&format!("fault {}", i + 1)))?;
+        numbers(fault).map_err(|invalid| invalid.within(&format!("fault {}", i + 1)))?;
         if let Fault::Outliers { row_list, .. } | Fault::ReadoutMismatch { row_list, .. } = fault {
             named = named.saturating_add(row_list.len());
         }
@@ -191,14 +193,14 @@ fn faults(list: &[Fault]) -> Result<(), Unfit> {
     if named <= MOST_FAULTS {
         return Ok(());
     }
-    Err(Unfit::new("fault", format!("{named} faults and rows in lists"), "at most 10,000"))
+    Err(InvalidValue::new("fault", format!("{named} faults and rows in lists"), "at most 10,000"))
 }
 
-fn numbers(fault: &Fault) -> Result<(), Unfit> {
+fn numbers(fault: &Fault) -> Result<(), InvalidValue> {
     match fault {
-        Fault::SensorZeroShift { offset_mm, .. } => PLACE_MM.check(|| "offset_mm".to_owned(), *offset_mm),
+        Fault::SensorZeroShift { offset_mm, .. } => POSITION_MM.check(|| "offset_mm".to_owned(), *offset_mm),
         Fault::SensorFrameShift { shift_mm, turn_deg, .. } => {
-            PLACE_MM.check_all("shift_mm", shift_mm)?;
+            POSITION_MM.check_all("shift_mm", shift_mm)?;
             TURN_DEG.check_all("turn_deg", turn_deg)
         }
         Fault::ToolShift { shift_mm, .. } => LENGTH_MM.check_all("shift_mm", shift_mm),
@@ -206,8 +208,8 @@ fn numbers(fault: &Fault) -> Result<(), Unfit> {
         Fault::CableSag { weight_over_tension_per_m } => {
             SAG_PER_M.check(|| "weight_over_tension_per_m".to_owned(), *weight_over_tension_per_m)
         }
-        Fault::Outliers { size_mm, .. } => PLACE_MM.check(|| "size_mm".to_owned(), *size_mm),
-        Fault::ReadoutMismatch { shift_mm, .. } => PLACE_MM.check_all("shift_mm", shift_mm),
+        Fault::Outliers { size_mm, .. } => POSITION_MM.check(|| "size_mm".to_owned(), *size_mm),
+        Fault::ReadoutMismatch { shift_mm, .. } => POSITION_MM.check_all("shift_mm", shift_mm),
         Fault::PayloadChange { payload_kg, .. } => MASS_KG.check(|| "payload_kg".to_owned(), *payload_kg),
     }
 }

@@ -21,7 +21,7 @@ use truegrind_math::lanes::Real;
 ///
 /// ```
 /// use truegrind_arm::condition::Condition;
-/// use truegrind_arm::effect::{Effect, map::JointMap};
+/// use truegrind_arm::effect::{Effect, error_map::ErrorMap};
 /// use truegrind_arm::model::Joints;
 /// use truegrind_arm::robots;
 ///
@@ -29,11 +29,11 @@ use truegrind_math::lanes::Real;
 /// let mut knots_rad = vec![0.0; 12];
 /// knots_rad[0] = 6e-4;
 /// let mut arm = robots::load("abb-irb-120")?.model;
-/// arm.effects.push(Effect::GearMap(JointMap { joint: 0, knots_rad }));
+/// arm.effects.push(Effect::GearMap(ErrorMap { joint: 0, knots_rad }));
 /// let still = Condition::default();
 /// let error = |angle_deg: f64| {
 ///     let q = Joints::new(angle_deg.to_radians(), 0.0, 0.0, 0.0, 0.0, 0.0);
-///     arm.at_condition(&still).rotations(&q)[0] - q[0]
+///     arm.at_condition(&still).joint_rotations(&q)[0] - q[0]
 /// };
 /// // A cubic spline: two thirds of the knot above it, a sixth at its neighbours, nothing two spacings away.
 /// assert!((error(0.0) - 4e-4).abs() < 1e-12 && (error(-30.0) - 1e-4).abs() < 1e-12);
@@ -42,14 +42,14 @@ use truegrind_math::lanes::Real;
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct JointMap {
+pub struct ErrorMap {
     /// Joint, 0-based.
     pub joint: usize,
     /// Values at the knots (rad), evenly spaced over a turn from angle 0; at least four.
     pub knots_rad: Vec<f64>,
 }
 
-impl JointMap {
+impl ErrorMap {
     pub(super) fn joint(&self) -> Option<usize> {
         Some(self.joint)
     }
@@ -115,7 +115,7 @@ impl JointMap {
         out
     }
 
-    pub(super) fn rotation(&self, _: &Statics, u: &Joints, _: &Condition) -> Joints {
+    pub(super) fn offset(&self, _: &Statics, u: &Joints, _: &Condition) -> Joints {
         let mut out = Joints::zeros();
         let (first, weights, _) = self.near(u[self.joint]);
         out[self.joint] = self.sum(first, &weights);
@@ -139,7 +139,7 @@ impl JointMap {
         out[self.joint] += slope * step[self.joint];
     }
 
-    pub(super) fn slope(&self, _: &Statics, u: &Joints, _: &Condition) -> Matrix6<f64> {
+    pub(super) fn jacobian(&self, _: &Statics, u: &Joints, _: &Condition) -> Matrix6<f64> {
         let mut out = Matrix6::zeros();
         let (first, _, slopes) = self.near(u[self.joint]);
         out[(self.joint, self.joint)] = self.sum(first, &slopes);

@@ -38,7 +38,7 @@ pub struct Lump {
 ///
 /// ```
 /// use truegrind_arm::condition::Condition;
-/// use truegrind_arm::effect::load::{GravityLoad, Lump};
+/// use truegrind_arm::effect::lumped_compliance::{LumpedCompliance, Lump};
 /// use truegrind_arm::effect::{Effect, compliance::Compliance};
 /// use truegrind_arm::model::{Joints, Model};
 /// use truegrind_arm::robots;
@@ -47,7 +47,7 @@ pub struct Lump {
 /// let bare = Model { bodies: None, ..robots::load("abb-irb-120")?.model };
 /// let with = |effect| Model { effects: vec![effect], ..bare.clone() };
 /// let lump = Lump { frame: 6, axis: None, moment: None, factor: 3.0 * 1e-5 };
-/// let lumped = with(Effect::LumpedCompliance(GravityLoad { joint: 1, lump: vec![lump] }));
+/// let lumped = with(Effect::LumpedCompliance(LumpedCompliance { joint: 1, lump: vec![lump] }));
 /// let known = with(Effect::JointCompliance(Compliance { joint: 1, compliance_rad_per_nm: 1e-5 }));
 ///
 /// let (q, load) = (Joints::repeat(0.3), Condition { payload_kg: Some(3.0), ..Condition::default() });
@@ -58,14 +58,14 @@ pub struct Lump {
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct GravityLoad {
+pub struct LumpedCompliance {
     /// Joint, 0-based.
     pub joint: usize,
     /// The lumps.
     pub lump: Vec<Lump>,
 }
 
-impl GravityLoad {
+impl LumpedCompliance {
     pub(super) fn joint(&self) -> Option<usize> {
         Some(self.joint)
     }
@@ -113,7 +113,7 @@ impl GravityLoad {
             .collect()
     }
 
-    pub(super) fn rotation(&self, statics: &Statics, u: &Joints, _: &Condition) -> Joints {
+    pub(super) fn offset(&self, statics: &Statics, u: &Joints, _: &Condition) -> Joints {
         let mut out = [0.0; 6];
         self.add_offset(statics, &(*u).into(), &mut out);
         out.into()
@@ -127,7 +127,7 @@ impl GravityLoad {
         }
     }
 
-    pub(super) fn slope(&self, statics: &Statics, u: &Joints, _: &Condition) -> Matrix6<f64> {
+    pub(super) fn jacobian(&self, statics: &Statics, u: &Joints, _: &Condition) -> Matrix6<f64> {
         let frames = statics.frames::<f64>(&(*u).into());
         let mut out = Matrix6::zeros();
         for lump in &self.lump {

@@ -25,26 +25,26 @@ pub const JOINTS: usize = 3;
 /// A network over the first three joints.
 ///
 /// ```
-/// use truegrind_arm::effect::smooth::Smooth;
+/// use truegrind_arm::effect::smooth_correction::SmoothCorrection;
 /// use truegrind_arm::effect::Effect;
 /// use truegrind_arm::model::{Joints, Model};
 /// use truegrind_arm::robots;
 ///
 /// let plain = robots::load("abb-irb-120")?.model;
-/// let mut learned = Smooth::still(vec![[0.2, -0.3, 0.1]], 0.5);
+/// let mut learned = SmoothCorrection::still(vec![[0.2, -0.3, 0.1]], 0.5);
 /// learned.weights_rad[0] = [1e-4, 0.0, -2e-4];
 /// let (near, far) = (Joints::new(0.2, -0.3, 0.1, 0.0, 0.4, 0.0), Joints::new(1.2, 0.4, 0.1, 0.0, 0.4, 0.0));
 /// assert!(learned.reaches(&near) && !learned.reaches(&far));
 /// let arm = Model { effects: vec![Effect::SmoothCorrection(learned)], ..plain };
 /// let still = Default::default();
-/// let added = |q: &Joints| arm.at_condition(&still).rotations(q) - q;
+/// let added = |q: &Joints| arm.at_condition(&still).joint_rotations(q) - q;
 /// assert!((added(&near) - Joints::new(1e-4, 0.0, -2e-4, 0.0, 0.0, 0.0)).norm() < 1e-12);
 /// assert_eq!(added(&far), Joints::zeros());
 /// # Ok::<(), robots::RobotError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Smooth {
+pub struct SmoothCorrection {
     /// Centres in the angles of the first three joints, after the joint map (rad).
     pub centres_rad: Vec<[f64; JOINTS]>,
     /// ρ: how far a centre reaches (rad).
@@ -53,7 +53,7 @@ pub struct Smooth {
     pub weights_rad: Vec<[f64; JOINTS]>,
 }
 
-impl Smooth {
+impl SmoothCorrection {
     /// A correction that does nothing yet.
     pub fn still(centres_rad: Vec<[f64; JOINTS]>, reach_rad: f64) -> Self {
         let weights_rad = vec![[0.0; JOINTS]; centres_rad.len()];
@@ -95,7 +95,7 @@ impl Smooth {
         out
     }
 
-    pub(super) fn rotation(&self, _: &Statics, u: &Joints, _: &Condition) -> Joints {
+    pub(super) fn offset(&self, _: &Statics, u: &Joints, _: &Condition) -> Joints {
         let mut out = [0.0; 6];
         self.add_offset(&(*u).into(), &mut out);
         out.into()
@@ -123,7 +123,7 @@ impl Smooth {
         }
     }
 
-    pub(super) fn slope(&self, _: &Statics, u: &Joints, _: &Condition) -> Matrix6<f64> {
+    pub(super) fn jacobian(&self, _: &Statics, u: &Joints, _: &Condition) -> Matrix6<f64> {
         let mut out = Matrix6::zeros();
         for column in 0..JOINTS {
             let (mut step, mut moved) = ([0.0; 6], [0.0; 6]);

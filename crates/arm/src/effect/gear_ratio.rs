@@ -13,27 +13,27 @@ use truegrind_math::lanes::Real;
 ///
 /// ```
 /// use truegrind_arm::condition::Condition;
-/// use truegrind_arm::effect::{Effect, ratio::Ratio};
+/// use truegrind_arm::effect::{Effect, gear_ratio::GearRatio};
 /// use truegrind_arm::model::Joints;
 /// use truegrind_arm::robots;
 ///
 /// // A joint that turns by 0.05 % too much errs the more the farther it turns.
 /// let mut arm = robots::load("abb-irb-120")?.model;
-/// arm.effects.push(Effect::GearRatio(Ratio { joint: 3, error: 5e-4 }));
-/// let turned = arm.at_condition(&Condition::default()).rotations(&Joints::new(0.0, 0.0, 0.0, 2.0, 0.0, 0.0));
+/// arm.effects.push(Effect::GearRatio(GearRatio { joint: 3, error: 5e-4 }));
+/// let turned = arm.at_condition(&Condition::default()).joint_rotations(&Joints::new(0.0, 0.0, 0.0, 2.0, 0.0, 0.0));
 /// assert!((turned[3] - 2.001).abs() < 1e-12);
 /// # Ok::<(), robots::RobotError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Ratio {
+pub struct GearRatio {
     /// Joint, 0-based.
     pub joint: usize,
     /// Relative error of the ratio.
     pub error: f64,
 }
 
-impl Ratio {
+impl GearRatio {
     pub(super) fn joint(&self) -> Option<usize> {
         Some(self.joint)
     }
@@ -52,7 +52,7 @@ impl Ratio {
         vec![out]
     }
 
-    pub(super) fn rotation(&self, statics: &Statics, u: &Joints, condition: &Condition) -> Joints {
+    pub(super) fn offset(&self, statics: &Statics, u: &Joints, condition: &Condition) -> Joints {
         self.regressors(statics, u, condition)[0] * self.error
     }
 
@@ -66,7 +66,7 @@ impl Ratio {
         self.add_offset(step, out);
     }
 
-    pub(super) fn slope(&self, _: &Statics, _: &Joints, _: &Condition) -> Matrix6<f64> {
+    pub(super) fn jacobian(&self, _: &Statics, _: &Joints, _: &Condition) -> Matrix6<f64> {
         let mut out = Matrix6::zeros();
         out[(self.joint, self.joint)] = self.error;
         out
