@@ -31,7 +31,7 @@ use super::inputs::{self, NamedModel};
 use super::programs::{self, Job, Programs};
 use super::progress::Spinner;
 use super::robot_match;
-use super::shares::{Asked, Doing, Store, Written, each, outputs_with};
+use super::shares::{RunDescription, Store, UnitSteps, Written, outputs_with, process_units};
 use super::terminal::{print_message, print_message_lines, print_result};
 
 pub(super) use self::arguments::Arguments;
@@ -93,7 +93,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
         return compensate_one(&context, job);
     }
     let store = if arguments.shares.on() {
-        let asked = Asked {
+        let asked = RunDescription {
             verb: "compensate",
             options: arguments.relevant_options(),
             shared,
@@ -195,13 +195,14 @@ fn compensate_many(
         bail!("--rrd shows one program: name one");
     }
     let work = Spinner::start(format!("rewriting {} programs", jobs.len()));
-    let doing = Doing {
+    let steps = UnitSteps {
         read: |job: &Job| Programs::read(&job.paths),
         content: Programs::content,
         work: |job: &Job, programs: Programs| compensate_and_write(context, job, &programs),
         whole: arguments.outputs.pages.json.is_some(),
     };
-    let done: Vec<ProgramResult> = on_threads(arguments.common.threads, || each(store, jobs, &doing))??;
+    let done: Vec<ProgramResult> =
+        on_threads(arguments.common.threads, || process_units(store, jobs, &steps))??;
     drop(work);
     for done in &done {
         for note in &done.notes {

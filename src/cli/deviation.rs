@@ -26,7 +26,7 @@ use super::inputs::NamedModel;
 use super::outputs::Outputs;
 use super::programs::{self, Grouping, Job, Programs};
 use super::robot_match;
-use super::shares::{Asked, Doing, Kept, Shares, Store, each, outputs_with};
+use super::shares::{RunDescription, Shares, Store, UnitResult, UnitSteps, outputs_with, process_units};
 use super::terminal::print_message;
 
 /// Arguments of `deviation`.
@@ -122,7 +122,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let shared = read_log::finish();
     let store = if arguments.shares.on() {
         let options = arguments.relevant_options();
-        let asked = Asked { verb: "deviation", options, shared, context: Value::Null, output: None };
+        let asked = RunDescription { verb: "deviation", options, shared, context: Value::Null, output: None };
         let Some(store) = Store::open(&arguments.shares, &asked, &mut jobs)? else {
             return Ok(ExitStatus::Done);
         };
@@ -130,7 +130,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     } else {
         None
     };
-    let doing = Doing {
+    let steps = UnitSteps {
         read: |job: &Job| Programs::read(&job.paths),
         content: Programs::content,
         work: |job: &Job, programs: Programs| {
@@ -139,7 +139,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
         whole: true,
     };
     let mut found: Vec<ProgramReports> =
-        on_threads(arguments.common.threads, || each(store.as_ref(), &jobs, &doing))??;
+        on_threads(arguments.common.threads, || process_units(store.as_ref(), &jobs, &steps))??;
     if let ([one], false) = (found.as_mut_slice(), several)
         && let Some(error) = one.failed.take()
     {
@@ -191,7 +191,7 @@ pub(super) struct ProgramReports {
     failed: Option<String>,
 }
 
-impl Kept for ProgramReports {
+impl UnitResult for ProgramReports {
     fn failed(job: &Job, why: &str) -> Self {
         Self { name: job.name(), reports: Vec::new(), used: None, failed: Some(why.to_owned()) }
     }

@@ -1,6 +1,6 @@
-//! How a verb ended.
+//! Exit status of a verb.
 
-/// How a verb ended, short of an error.
+/// Exit status of a verb that ended without an error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum ExitStatus {
     /// Everything done.

@@ -1,4 +1,4 @@
-//! `truegrind export MODEL.toml --to urdf|dh-csv|mdh-csv|ur-yaml`: the links of an estimated arm in the formats of others.
+//! `truegrind export MODEL.toml --to urdf|dh-csv|mdh-csv|ur-yaml`: the links of an estimated arm in other formats.
 
 use std::path::{Path, PathBuf};
 
@@ -19,32 +19,32 @@ use super::identify::{DataArguments, read};
 use super::inputs::{self, NamedModel};
 use super::terminal::print_message;
 
-/// A format of others.
+/// Output format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum To {
     /// Unified Robot Description Format: links without shapes.
     Urdf,
-    /// Standard table of Denavit–Hartenberg parameters.
+    /// Table of standard Denavit–Hartenberg parameters.
     DhCsv,
-    /// The same after Craig.
+    /// Table of modified Denavit–Hartenberg parameters (Craig).
     MdhCsv,
-    /// The kinematics file of ROS drivers for Universal Robots.
+    /// Kinematics file of the ROS drivers for Universal Robots.
     UrYaml,
 }
 
 /// Arguments of `export`.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// An estimated arm.
+    /// Estimated arm (model file).
     model: PathBuf,
-    /// The format to write.
+    /// Output format.
     #[arg(long, value_enum)]
     to: To,
-    /// The file to write; `-` prints it.
+    /// File to write; `-` prints it.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// Measurements that the exported links are judged on, with only the sensor's frame fitted: the error of a model with effects
-    /// is not that of its links alone.
+    /// Measurements on which the error of the exported links is evaluated, with only the sensor frame fitted. The links of a model
+    /// with effects have a larger error than the model.
     #[arg(long, value_name = "DATA")]
     data: Option<PathBuf>,
 }
@@ -56,7 +56,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let name = arguments.model.display().to_string();
     let named = inputs::model(&name)?;
     let NamedModel::Estimated { arm, .. } = &named else {
-        bail!("{name}: expected a model file; `truegrind robots` has the nominal arms");
+        bail!("{name}: expected a model file; `truegrind robots` shows the nominal arms");
     };
     let format = match arguments.to {
         To::Urdf => Format::Urdf,
@@ -68,8 +68,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let mut notes = vec![format!("{} as estimated from {}", arm.robot, arm.provenance.file)];
     notes.extend(lost_in_export(&arm.model, format));
     notes.push(match &arguments.data {
-        Some(data) => judged(data, arm, &read_back(&bare, &arm.robot, format)?)?,
-        None => known(arm),
+        Some(data) => measured_error(data, arm, &read_back(&bare, &arm.robot, format)?)?,
+        None => stated_error(arm),
     });
     let text = write(&bare, &arm.robot, format, &notes);
     let mut batch = Batch::sparing(given);
@@ -79,16 +79,16 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     for note in &notes {
         print_message(format_args!("note: {note}"));
     }
-    // What is not the arm that was identified is flagged.
-    Ok(if is_of_links_alone(&arm.model) { ExitStatus::Done } else { ExitStatus::Flagged })
+    // Links without their effects are not the identified arm.
+    Ok(if has_links_only(&arm.model) { ExitStatus::Done } else { ExitStatus::Flagged })
 }
 
-/// Whether all that moves the arm is in its links.
-fn is_of_links_alone(arm: &Model) -> bool {
+/// Whether the links alone describe the arm.
+fn has_links_only(arm: &Model) -> bool {
     arm.effects.iter().all(Effect::is_zero)
 }
 
-/// The arm as whoever reads the file has it.
+/// The arm as a reader of the file sees it.
 fn read_back(bare: &Model, robot: &str, format: Format) -> anyhow::Result<Model> {
     let name = match format {
         Format::Urdf => "exported.urdf",
@@ -97,40 +97,38 @@ fn read_back(bare: &Model, robot: &str, format: Format) -> anyhow::Result<Model>
     };
     let text = write(bare, robot, format, &[]);
     let mut back = import(&text, name, &ImportOptions::default())?.robot.model;
-    // Its user works out the file's angles from the controller's, as the notes say.
-    back.joint_map *= joint_matrix(bare, format);
+    // Users convert the controller angles to those of the file, as the notes say.
+    back.joint_map  angles(=*= joint_matrix(= angles(bare, format);
     Ok(back)
 }
 
-/// What the model file says of the error of its links.
-fn known(arm: &Estimated) -> String {
+/// The error of the links according to the model file.
+fn stated_error(arm: &Estimated) -> String {
     let error = arm.geometry.held_out.rmse;
-    if is_of_links_alone(&arm.model) {
-        format!(
-            "held-out error of these links: {error:.4} mm RMS; all that the model holds of the arm is in them"
-        )
+    if has_links_only(&arm.model) {
+        format!("held-out error of these links: {error:.4} mm RMS; they contain the whole model")
     } else {
         format!(
-            "held-out error of these links alone: not evaluated; that of the whole model is {error:.4} mm RMS and counts the effects; \
-             measurements given with the option data state it"
+            "held-out error of these links alone: not evaluated (--data evaluates it); that of the whole model with its effects is \
+             {error:.4} mm RMS"
         )
     }
 }
 
-/// The error of what was exported on measurements.
-fn judged(data: &Path, arm: &Estimated, exported: &Model) -> anyhow::Result<String> {
+/// The error of the exported links on measurements.
+fn measured_error(data: &Path, arm: &Estimated, exported: &Model) -> anyhow::Result<String> {
     let reading = DataArguments::of(data.to_path_buf(), arm.robot.clone());
     let (_, rows) = read(&reading)?;
     let tolerance = Tolerance::default();
     let frames = starting_frames(&rows, &arm.nominal, &tolerance, true)?;
     let found = transfer(&rows, &frames, &arm.nominal, exported, &arm.model, &tolerance, true);
-    let seen = if rows.sha256 == arm.provenance.sha256 {
-        "which the model was fitted to, so that this is no held-out error"
+    let relation = if rows.sha256 == arm.provenance.sha256 {
+        "to which the model was fitted, so this is not a held-out error"
     } else {
-        "which the model was not fitted to"
+        "to which the model was not fitted"
     };
     Ok(format!(
-        "error of these links on {} ({} rows, {seen}), only the sensor's frame fitted: {:.4} mm RMS; whole model {:.4} mm, data sheet \
+        "error of these links on {} ({} rows, {relation}), only the sensor frame fitted: {:.4} mm RMS; whole model {:.4} mm, data sheet \
          {:.4} mm",
         rows.file, found.rows, found.geometric_rmse_mm, found.extended_rmse_mm, found.nominal_rmse_mm
     ))

@@ -23,7 +23,9 @@ use super::inputs;
 use super::outputs::Outputs;
 use super::programs::{Job, found_below};
 use super::progress::Spinner;
-use super::shares::{Asked, Doing, Kept, Shares, Store, Written, each, outputs_with};
+use super::shares::{
+    RunDescription, Shares, Store, UnitResult, UnitSteps, Written, outputs_with, process_units,
+};
 use super::terminal::print_message;
 
 /// Whether the arguments name many arms.
@@ -69,7 +71,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let shared = read_log::finish();
     let store = if arguments.shares.on() {
         let output = arguments.output.as_deref();
-        let asked = Asked {
+        let asked = RunDescription {
             verb: "diagnose",
             options: relevant_options(arguments),
             shared,
@@ -84,7 +86,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
         None
     };
     let work = Spinner::start(format!("diagnosing {} arms", jobs.len()));
-    let doing = Doing {
+    let steps = UnitSteps {
         read: |job: &Job| job.paths.iter().map(|path| Ok((path.clone(), files::read(path)?))).collect(),
         content: |read: &Vec<(PathBuf, Vec<u8>)>| {
             read.iter().map(|(path, bytes)| (path.display().to_string(), sha256(bytes))).collect()
@@ -93,7 +95,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
         whole: true,
     };
     let found: Vec<ArmResult> =
-        on_threads(arguments.common.threads, || each(store.as_ref(), &jobs, &doing))??;
+        on_threads(arguments.common.threads, || process_units(store.as_ref(), &jobs, &steps))??;
     drop(work);
     let inputs = jobs.iter().flat_map(|job| &job.paths);
     let outputs = outputs_with(store.as_ref(), &arguments.shares, &arguments.outputs)?;
@@ -154,7 +156,7 @@ pub(super) struct ArmResult {
     clean: bool,
 }
 
-impl Kept for ArmResult {
+impl UnitResult for ArmResult {
     fn failed(job: &Job, why: &str) -> Self {
         Self { row: Row::failed(job.name(), why.to_owned()), notes: Vec::new(), clean: false }
     }

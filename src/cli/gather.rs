@@ -1,7 +1,7 @@
-//! `truegrind gather FOLDER`: what the jobs of a shared run made, put together as one run writes it.
+//! `truegrind gather FOLDER`: combines the results of the jobs of a shared run.
 //!
-//! Which records count is told by the inputs as they are now: a unit whose files changed since it was done counts as missing, and
-//! nothing stale gets into a table.
+//! Records are looked up by the current content of the inputs: a unit whose files changed since counts as missing, so that no
+//! stale result gets into a table.
 
 use std::path::{Path, PathBuf};
 
@@ -18,66 +18,66 @@ use super::exit_status::ExitStatus;
 use super::files::{self, Batch};
 use super::outputs::{Outputs, Pages};
 use super::programs::{Job, Programs};
-use super::shares::{Kept, Store};
+use super::shares::{Store, UnitResult};
 use super::{compensate, deviation, fleet};
 
 /// Arguments of `gather`.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// The folder in which the jobs kept what is done: that of --work, else of -o. It is called from where the jobs were.
+    /// Folder of the run: that of --work, or else of -o. Start gather in the same directory as the jobs.
     #[arg(value_name = "FOLDER")]
     work: PathBuf,
-    /// What changes in all programs, as a unified diff, where every job made one.
+    /// Write the changes of all programs as a unified diff, if every job was run with --diff.
     #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "-")]
     diff: Option<PathBuf>,
-    /// Threads; the result is the same for any number.
+    /// Number of threads; the result does not depend on it.
     #[arg(long)]
     threads: Option<usize>,
     #[command(flatten)]
     pages: Pages,
 }
 
-/// What became of a unit.
-enum State<T> {
+/// State of a unit.
+enum UnitState<T> {
     Done(T),
     Missing,
-    /// Outputs are not as they were written.
+    /// Outputs changed after they were written.
     Changed(Vec<PathBuf>),
 }
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let outputs = Outputs::from(&arguments.pages);
-    let (store, run) = Store::of(&arguments.work)?;
+    let (store, run) = Store::open_existing(&arguments.work)?;
     if run.version != env!("CARGO_PKG_VERSION") {
         bail!(
-            "{}: the run is of version {}, this is {}: gather with the version that made it, or do it again",
+            "{}: the run was made by version {}, this is {}: gather with that version, or repeat the run",
             arguments.work.display(),
             run.version,
             env!("CARGO_PKG_VERSION")
         );
     }
     if arguments.diff.is_some() && run.verb != "compensate" {
-        bail!("--diff: {} rewrites nothing", run.verb);
+        bail!("--diff: `{}` rewrites nothing", run.verb);
     }
     let jobs: Vec<Job> = run.units.iter().map(Job::of_unit).collect();
     let inputs: Vec<&Path> = jobs.iter().flat_map(|job| &job.paths).map(PathBuf::as_path).collect();
     let mut targets = outputs.files();
     targets.extend(arguments.diff.as_deref());
     Batch::check(&inputs, &targets)?;
-    let here = Here { arguments, store: &store, run: &run, jobs: &jobs };
+    let context = GatherContext { arguments, store: &store, run: &run, jobs: &jobs };
     let batch = || Batch::sparing(inputs.iter());
     match run.verb.as_str() {
         "compensate" => {
-            let records = here.records(outputs.pages.json.is_some(), programs)?;
+            let records = context.records(outputs.pages.json.is_some(), programs)?;
             compensate::batch::gathered(records, &run.context, &outputs, arguments.diff.as_deref(), batch())
         }
-        "deviation" => deviation::gathered(here.records(true, programs)?, &outputs, batch()),
-        "diagnose" => fleet::gathered(here.records(true, tables)?, &outputs, batch()),
-        verb => bail!("{}: a run of `{verb}`, which is not known", arguments.work.display()),
+        "deviation" => deviation::gathered(context.records(true, programs)?, &outputs, batch()),
+        "diagnose" => fleet::gathered(context.records(true, tables)?, &outputs, batch()),
+        verb => bail!("{}: a run of the unknown verb `{verb}`", arguments.work.display()),
     }
 }
 
-/// The files of a unit by name and content; `None` where one cannot be read.
+/// Name and SHA-256 of each file of a unit; `None` if one cannot be read.
 type Content = Option<Vec<(String, String)>>;
 
 fn programs(job: &Job) -> Content {
@@ -89,18 +89,17 @@ fn tables(job: &Job) -> Content {
     job.paths.iter().map(read).collect::<anyhow::Result<_>>().ok()
 }
 
-/// A run whose units are looked at.
-struct Here<'a> {
+/// A run with its units.
+struct GatherContext<'a> {
     arguments: &'a Arguments,
     store: &'a Store,
     run: &'a Run,
     jobs: &'a [Job],
 }
 
-impl Here<'_> {
-    /// What was kept of all units, in their order. Each is read into what its verb makes of it and nothing else, since all of them
-    /// are held at once.
-    fn records<T: Kept>(
+impl GatherContext<'_> {
+    /// The records of all units, in order. Each is deserialised directly into the type of its verb to save memory.
+    fn records<T: UnitResult>(
         &self,
         whole: bool,
         content: impl Fn(&Job) -> Content + Sync,
@@ -109,39 +108,41 @@ impl Here<'_> {
         let states = on_threads(self.arguments.threads, || {
             self.jobs.par_iter().map(state).collect::<anyhow::Result<Vec<_>>>()
         })??;
-        complete(self.run, self.jobs, &states)?;
+        check_complete(self.run, self.jobs, &states)?;
         let done = states.into_iter().filter_map(|state| match state {
-            State::Done(record) => Some(record),
+            UnitState::Done(record) => Some(record),
             _ => None,
         });
         Ok(done.collect())
     }
 }
 
-fn state<T: Kept>(
+fn state<T: UnitResult>(
     store: &Store,
     job: &Job,
     content: Option<&[(String, String)]>,
     whole: bool,
-) -> anyhow::Result<State<T>> {
-    let Some(done) = store.record::<T>(&store.key(job, content), whole)? else { return Ok(State::Missing) };
+) -> anyhow::Result<UnitState<T>> {
+    let Some(done) = store.record::<T>(&store.key(job, content), whole)? else {
+        return Ok(UnitState::Missing);
+    };
     let changed = if done.ended == Ended::Done { store.changed(&done) } else { Vec::new() };
-    Ok(if changed.is_empty() { State::Done(done.record) } else { State::Changed(changed) })
+    Ok(if changed.is_empty() { UnitState::Done(done.record) } else { UnitState::Changed(changed) })
 }
 
-/// Units that are named one by one.
-const NAMED: usize = 50;
+/// Largest number of listed units.
+const MAX_LISTED: usize = 50;
 
-/// Refuses a run of which anything is missing, and says what, by shares where there were some.
-fn complete<T>(run: &Run, jobs: &[Job], states: &[State<T>]) -> anyhow::Result<()> {
+/// Refuses an incomplete run, and lists what is missing by share.
+fn check_complete<T>(run: &Run, jobs: &[Job], states: &[UnitState<T>]) -> anyhow::Result<()> {
     let mut open: Vec<(Option<u32>, String)> = Vec::new();
     for (job, state) in jobs.iter().zip(states) {
         let what = match state {
-            State::Done(_) => continue,
-            State::Missing => job.name(),
-            State::Changed(places) => {
+            UnitState::Done(_) => continue,
+            UnitState::Missing => job.name(),
+            UnitState::Changed(places) => {
                 let places: Vec<String> = places.iter().map(|place| place.display().to_string()).collect();
-                format!("{} (not as it was written: {})", job.name(), places.join(", "))
+                format!("{} (outputs changed after they were written: {})", job.name(), places.join(", "))
             }
         };
         open.push((run.shares.map(|of| Share::of_name(&job.name_below(), of)), what));
@@ -163,13 +164,13 @@ fn complete<T>(run: &Run, jobs: &[Job], states: &[State<T>]) -> anyhow::Result<(
         }
         lines.extend(names.iter().map(|name| format!("  {name}")));
     }
-    let more = lines.len().saturating_sub(NAMED);
-    lines.truncate(NAMED);
+    let more = lines.len().saturating_sub(MAX_LISTED);
+    lines.truncate(MAX_LISTED);
     if more > 0 {
         lines.push(format!("and {more} more"));
     }
     bail!(
-        "{} of {} are not done, or were changed since; nothing was gathered. Run the same jobs again with --resume:\n{}",
+        "{} of {} units are missing or were changed since; nothing was gathered. Run the same jobs again with --resume:\n{}",
         open.len(),
         jobs.len(),
         lines.join("\n")

@@ -32,12 +32,12 @@ use super::progress::Spinner;
 use super::stated_frames::{FramePriorArguments, StatedFrameArguments};
 use super::terminal::{print_message, print_message_lines, print_result, width};
 
-/// Whether logged angles are the controller's or already hold the DH offsets.
+/// Convention of the logged angles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum Angles {
-    /// The controller's.
+    /// Angles as the controller displays them.
     Logged,
-    /// DH angles: the offsets of the link table are in them.
+    /// DH angles, which include the offsets of the link table.
     Dh,
 }
 
@@ -50,44 +50,44 @@ impl From<Angles> for AngleConvention {
     }
 }
 
-/// How a measurement file is read.
+/// Options for reading a measurement file.
 #[derive(Debug, Clone, Args)]
 pub(super) struct DataArguments {
     /// Measurements, CSV or XLSX.
     pub(super) data: PathBuf,
-    /// Robot: a name of `truegrind robots`, or a TOML file.
+    /// Robot: a name from `truegrind robots`, or a robot file.
     #[arg(long)]
     pub(super) robot: String,
     #[command(flatten)]
     pub(super) points: PointsArguments,
-    /// Sheet of a workbook; the first with the columns otherwise.
+    /// Sheet of a workbook. Default: the first with the needed columns.
     #[arg(long)]
     pub(super) sheet: Option<String>,
-    /// Whether the angles are the controller's or DH angles; the robot file says otherwise.
+    /// Convention of the logged angles. Default: that of the robot file.
     #[arg(long, value_enum)]
     pub(super) angles: Option<Angles>,
-    /// Take the units as they are, however odd they look.
+    /// Accept implausible units.
     #[arg(long)]
     pub(super) allow_odd_units: bool,
 }
 
-/// Measured points in a file of their own.
+/// Measured points in a separate file.
 #[derive(Debug, Clone, Default, Args)]
 pub(super) struct PointsArguments {
-    /// Points that the tracker's software exported (SpatialAnalyzer, ASCII), joined with the joints by their column `name`.
+    /// Points exported by the tracker software (SpatialAnalyzer, ASCII), matched to the joint log by the column `name`.
     #[arg(long, value_name = "POINTS.txt")]
     pub(super) points: Option<PathBuf>,
-    /// Join the points by time, with the log's column `time`: each with the row nearest to it, at most so far away (s). Points and rows
-    /// without a partner are left out and told; where several rows or points could be meant, nothing is joined.
+    /// Match points by time instead, using the column `time` of the log: each point to the nearest row within this many seconds.
+    /// Unmatched points and rows are omitted with a note; an ambiguous match is an error.
     #[arg(long, value_name = "S", requires = "points", allow_negative_numbers = true)]
     points_within: Option<f64>,
-    /// By how much the clock of the points is ahead of that of the log (s).
+    /// Clock of the points minus clock of the log (s).
     #[arg(long, value_name = "S", requires = "points_within", allow_negative_numbers = true)]
     points_ahead: Option<f64>,
 }
 
 impl PointsArguments {
-    /// How the points are joined by time, where that is asked for.
+    /// Settings for matching by time, if requested.
     fn clocks(&self) -> anyhow::Result<Option<Clocks>> {
         let Some(within_s) = self.points_within else { return Ok(None) };
         if !(0.0..=LONGEST_S).contains(&within_s) || within_s == 0.0 {
@@ -101,11 +101,11 @@ impl PointsArguments {
     }
 }
 
-/// No point belongs to a row that is further away in time.
+/// Largest `--points-within` (s).
 const LONGEST_S: f64 = 3600.0;
 
 impl DataArguments {
-    /// A file as it is, of a robot.
+    /// A plain measurement file of a robot.
     pub(super) fn of(data: PathBuf, robot: String) -> Self {
         Self {
             data,
@@ -117,28 +117,28 @@ impl DataArguments {
         }
     }
 
-    /// The files that are read.
+    /// The files to be read.
     pub(super) fn files(&self) -> Vec<&Path> {
         std::iter::once(&self.data).chain(&self.points.points).map(PathBuf::as_path).collect()
     }
 }
 
-/// What is asked of a fit, of geometry alone or with causes.
+/// Options of a fit, of geometry alone or with causes.
 #[derive(Debug, Clone, Args)]
 pub(super) struct FitArguments {
-    /// Do not sharpen rounded angles by the controller's read-out.
+    /// Do not use the Cartesian readout of the controller to refine rounded joint angles.
     #[arg(long)]
     pub(super) raw_columns: bool,
-    /// The fit passes only with a held-out RMSE up to this (mm).
+    /// Largest held-out RMSE with which the fit passes (mm).
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     limit_rmse: Option<f64>,
-    /// The fit passes only with a held-out maximum up to this (mm).
+    /// Largest held-out error with which the fit passes (mm).
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     limit_max: Option<f64>,
 }
 
 impl FitArguments {
-    /// The stated limits.
+    /// The limits, checked.
     pub(super) fn limits(&self) -> anyhow::Result<Limits> {
         for (name, limit) in [("--limit-rmse", self.limit_rmse), ("--limit-max", self.limit_max)] {
             if let Some(limit) = limit.filter(|limit| !(*limit > 0.0 && limit.is_finite())) {
@@ -154,30 +154,29 @@ impl FitArguments {
 pub(super) struct Arguments {
     #[command(flatten)]
     data: DataArguments,
-    /// The model file to write; a failed fit is not written, a doubtful one only with --allow-doubtful.
+    /// Model file to write. A failed fit is not written; a doubtful one only with --allow-doubtful.
     #[arg(short, long, value_name = "MODEL.toml")]
     output: Option<PathBuf>,
-    /// Write a doubtful model too: one whose data do not promise that programs gain. The file carries the verdict.
+    /// Also write a doubtful model, whose data do not show that programs improve. The file contains the verdict.
     #[arg(long)]
     allow_doubtful: bool,
-    /// Method, such as lm, ltlm, ekf, ukf-vslm, rls, rbf or lm-as-printed; an unknown one gets the list.
+    /// Solver: lm, ltlm, ekf, ukf-vslm, rls, rbf, lm-as-printed or others; an unknown name prints the list.
     #[arg(long, default_value = "lm")]
     method: String,
-    /// Share of rows held out to state the error.
+    /// Share of rows held out to estimate the error.
     #[arg(long, default_value_t = 0.2, allow_negative_numbers = true)]
     held_out: f64,
-    /// Compare all methods over this many splits (seeds 0, 1, …).
+    /// Also compare all solvers over this many random splits (seeds 0, 1, …).
     #[arg(long, value_name = "SPLITS")]
     compare_methods: Option<u64>,
-    /// Tolerance of link lengths (mm), as a prior. Without it and --tolerance-angle the rows tell the tolerances, weighed by 1 mm
-    /// and 0.3°.
+    /// Manufacturing tolerance of link lengths (mm), used as prior σ. Default: estimated from the data, starting from 1 mm and 0.3°.
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     tolerance_length: Option<f64>,
-    /// Tolerance of link angles and joint offsets (°), as a prior.
+    /// Manufacturing tolerance of link angles and joint offsets (°), used as prior σ.
     #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
     tolerance_angle: Option<f64>,
     #[command(flatten)]
-    asked: FitArguments,
+    fit: FitArguments,
     #[command(flatten)]
     stated: StatedFrameArguments,
     #[command(flatten)]
@@ -195,7 +194,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     if !(0.0..=0.9).contains(&arguments.held_out) || arguments.held_out == 0.0 {
         bail!("--held-out {}: expected a share above 0, up to 0.9", arguments.held_out);
     }
-    let limits = arguments.asked.limits()?;
+    let limits = arguments.fit.limits()?;
     let (robot, dataset) = read(&arguments.data)?;
     let options =
         Options { stated_frames: arguments.stated.frames(&dataset)?, ..options(arguments, limits)? };
@@ -239,19 +238,17 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     write_model(&found.estimated, arguments.output.as_deref(), arguments.allow_doubtful, batch)
 }
 
-/// Why a model is not written, where its verdict does not allow it.
+/// Why a model is not written; `None` if its verdict allows it.
 pub(super) fn why_not_written(estimated: &Estimated, allow_doubtful: bool) -> Option<String> {
     let why = match estimated.verdict.status {
         Judgement::Fail => "the fit failed",
-        Judgement::Doubtful if !allow_doubtful => {
-            "the model is doubtful (--allow-doubtful writes it all the same)"
-        }
+        Judgement::Doubtful if !allow_doubtful => "the model is doubtful (--allow-doubtful writes it anyway)",
         _ => return None,
     };
     Some(format!("was not written, because {why}: {}", estimated.verdict.reasons.join("; ")))
 }
 
-/// Writes what was made, and the model where its verdict allows it.
+/// Writes the reports, and the model if its verdict allows it.
 pub(super) fn write_model(
     estimated: &Estimated,
     output: Option<&Path>,
@@ -279,12 +276,12 @@ fn options(arguments: &Arguments, limits: Limits) -> anyhow::Result<Options> {
     ] {
         if let Some(value) = stated {
             if !(value > 0.0 && value.is_finite()) {
-                bail!("a tolerance of {value}: expected a number above 0");
+                bail!("tolerance {value}: expected a number above 0");
             }
             *place = value * scale;
         }
     }
-    // Tolerances that are stated are taken as they are.
+    // Stated tolerances are not estimated from the data.
     tolerance.zero_rad = tolerance.angle_rad;
     tolerance.learn_widths = arguments.tolerance_length.is_none() && arguments.tolerance_angle.is_none();
     Ok(Options {
@@ -292,26 +289,26 @@ fn options(arguments: &Arguments, limits: Limits) -> anyhow::Result<Options> {
         solver: by_name(&arguments.method)?,
         held_out: arguments.held_out,
         seed: arguments.common.seed,
-        fuse_readout: !arguments.asked.raw_columns,
+        fuse_readout: !arguments.fit.raw_columns,
         limit_rmse_mm: limits.rmse_mm,
         limit_max_mm: limits.max_mm,
         stated_frames: None,
     })
 }
 
-/// Reads robot and measurements, and checks that their units fit each other.
+/// Reads robot and measurements, and checks that their units are plausible.
 pub(super) fn read(arguments: &DataArguments) -> anyhow::Result<(Robot, Dataset)> {
-    // A robot that there is not is told before measurements that there are not.
+    // An unknown robot is reported before missing measurements.
     let robot = inputs::robot(&arguments.robot)?;
     let bytes = files::read(&arguments.data)?;
     let dataset = imported(arguments, &bytes)?;
-    // The text is not needed beside its rows.
+    // Free the text before the rows are processed.
     drop(bytes);
     let dataset = measured(arguments, &robot, dataset)?;
     Ok((robot, dataset))
 }
 
-/// The same of measurements whose bytes are there.
+/// [`read`] for measurements that are already in memory.
 pub(super) fn read_bytes(arguments: &DataArguments, bytes: &[u8]) -> anyhow::Result<(Robot, Dataset)> {
     let robot = inputs::robot(&arguments.robot)?;
     let dataset = measured(arguments, &robot, imported(arguments, bytes)?)?;
@@ -341,18 +338,18 @@ fn measured(arguments: &DataArguments, robot: &Robot, dataset: Dataset) -> anyho
     let (name, odd) = (&robot.sheet.name, arguments.allow_odd_units);
     let dataset =
         matched(dataset, name, &robot.model, convention, odd).map_err(|mismatch| match mismatch {
-            Mismatch::Units(_) => anyhow!("{mismatch} (--allow-odd-units takes the file at its word)"),
+            Mismatch::Units(_) => anyhow!("{mismatch} (--allow-odd-units accepts the file anyway)"),
             _ => anyhow!("{mismatch}"),
         })?;
     Ok(dataset)
 }
 
-/// The rows to fit and to hold out; repeated poses stay together.
+/// Rows to fit and rows to hold out; repeats of a pose stay together.
 pub(super) fn split_of(dataset: &Dataset, share: f64, seed: u64) -> Split {
     split::random(dataset, share, seed)
 }
 
-/// The whole identification, starting frames included.
+/// Identification including the starting frames.
 pub(super) fn identified(
     dataset: &Dataset,
     robot: &str,

@@ -1,4 +1,4 @@
-//! Inputs that several verbs share: robots, models, measurements, programs.
+//! Inputs shared by several verbs: robots and models.
 
 use std::path::{Path, PathBuf};
 
@@ -12,7 +12,7 @@ use truegrind::robots::{self, Robot};
 use super::files;
 use super::terminal::print_message;
 
-/// A robot by catalogue name or from a file of any kind that is known.
+/// A robot by catalogue name, or from a robot file of any supported format.
 pub(super) fn robot(name: &str) -> anyhow::Result<Robot> {
     let path = Path::new(name);
     if Kind::of(name).is_some() || name.contains('/') || path.is_file() {
@@ -22,7 +22,7 @@ pub(super) fn robot(name: &str) -> anyhow::Result<Robot> {
     }
 }
 
-/// A model as the command line names it.
+/// A model on the command line.
 #[derive(Debug, Clone)]
 pub(super) enum NamedModel {
     /// The word `nominal`: nothing is corrected.
@@ -47,14 +47,14 @@ pub(super) fn model(argument: &str) -> anyhow::Result<NamedModel> {
     let text = files::read_text(path)?;
     let arm = Estimated::from_toml(&text).map_err(|e| {
         anyhow!(
-            "{argument}: {}; a model file is what `truegrind identify -o` writes",
+            "{argument}: {}; expected a model file as written by `truegrind identify -o`",
             e.to_string().trim_end()
         )
     })?;
     robots::check_catalogue_name(&arm.robot, &arm.nominal).map_err(|e| anyhow!("{argument}: {e}"))?;
     if arm.verdict.status == Judgement::Fail {
         bail!(
-            "{argument}: the fit behind this model failed ({}); it is not used",
+            "{argument}: this model cannot be used, since its fit failed: {}",
             arm.verdict.reasons.join("; ")
         );
     }
@@ -62,12 +62,12 @@ pub(super) fn model(argument: &str) -> anyhow::Result<NamedModel> {
     Ok(NamedModel::Estimated { name: files::name(path), hash, arm: Box::new(arm) })
 }
 
-/// A doubtful model corrects programs only where that is asked for, and is called what it is where it does.
+/// Refuses a doubtful model unless allowed, in which case a note is printed.
 pub(super) fn refuse_doubtful(model: &NamedModel, allowed: bool) -> anyhow::Result<()> {
     let NamedModel::Estimated { name, arm, .. } = model else { return Ok(()) };
     if arm.verdict.status == Judgement::Doubtful && !allowed {
         bail!(
-            "{name}: this model is doubtful, programs are corrected with it only with --allow-doubtful: {}",
+            "{name}: this model is doubtful, so programs are corrected with it only with --allow-doubtful: {}",
             arm.verdict.reasons.join("; ")
         );
     }
@@ -75,7 +75,7 @@ pub(super) fn refuse_doubtful(model: &NamedModel, allowed: bool) -> anyhow::Resu
     Ok(())
 }
 
-/// Says of a doubtful model that it is one, where it is only looked at.
+/// Prints a note if the model is doubtful.
 pub(super) fn warn_doubtful(model: &NamedModel) {
     let NamedModel::Estimated { name, arm, .. } = model else { return };
     if arm.verdict.status == Judgement::Doubtful {
@@ -91,10 +91,10 @@ pub(super) fn hash(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().take(6).map(|b| format!("{b:02x}")).collect()
 }
 
-/// The robot that a model and `--robot` agree on: the nominal arm of programs.
+/// Name and nominal arm of the robot; `--robot` must match the model.
 pub(super) fn nominal(model: &NamedModel, robot_name: Option<&str>) -> anyhow::Result<(String, Model)> {
     match (model, robot_name) {
-        (NamedModel::Nominal, None) => bail!("--model nominal: --robot says which arm"),
+        (NamedModel::Nominal, None) => bail!("--model nominal needs --robot"),
         (NamedModel::Nominal, Some(name)) => {
             let robot = robot(name)?;
             Ok((robot.sheet.name.clone(), robot.model))
@@ -104,8 +104,8 @@ pub(super) fn nominal(model: &NamedModel, robot_name: Option<&str>) -> anyhow::R
                 let robot = robot(stated)?;
                 if !robot.sheet.name.eq_ignore_ascii_case(&arm.robot) {
                     bail!(
-                        "--robot is {}, but model {name} was identified for {}: give the robot that the model belongs \
-                         to, or leave --robot out",
+                        "--robot is {}, but model {name} was identified for {}: give the robot of the model, or \
+                         omit --robot",
                         robot.sheet.name,
                         arm.robot
                     );
@@ -118,7 +118,7 @@ pub(super) fn nominal(model: &NamedModel, robot_name: Option<&str>) -> anyhow::R
     }
 }
 
-/// Where `path`'s own relative names are looked up.
+/// A path relative to the folder of another file.
 pub(super) fn beside(path: &Path, name: &str) -> PathBuf {
     path.parent().unwrap_or(Path::new("")).join(name)
 }

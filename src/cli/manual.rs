@@ -1,4 +1,4 @@
-//! `truegrind completions SHELL` and `truegrind man`: what shells and `man` know, from the same arguments as `--help`.
+//! `truegrind completions SHELL` and `truegrind man`, generated from the same arguments as `--help`.
 
 use std::path::PathBuf;
 
@@ -13,7 +13,7 @@ use super::terminal::{print_message, write_stdout};
 /// Arguments of `completions`.
 #[derive(Debug, Args)]
 pub(super) struct Completions {
-    /// The shell that shall complete verbs and options.
+    /// Shell.
     #[arg(value_enum)]
     shell: Shell,
 }
@@ -21,12 +21,12 @@ pub(super) struct Completions {
 /// Arguments of `man`.
 #[derive(Debug, Args)]
 pub(super) struct Man {
-    /// A folder for the pages of all verbs: truegrind.1, truegrind-compensate.1 and so on; without it the first one is printed.
+    /// Write the pages of all verbs to this folder: truegrind.1, truegrind-compensate.1 and so on. Default: print the main page.
     #[arg(short, long, value_name = "FOLDER")]
     output: Option<PathBuf>,
 }
 
-/// Prints the script of a shell.
+/// Prints a completion script.
 pub(super) fn completions(arguments: &Completions, mut command: Command) -> anyhow::Result<ExitStatus> {
     let mut script = Vec::new();
     clap_complete::generate(arguments.shell, &mut command, "truegrind", &mut script);
@@ -34,9 +34,9 @@ pub(super) fn completions(arguments: &Completions, mut command: Command) -> anyh
     Ok(ExitStatus::Done)
 }
 
-/// Prints the first page, or writes all of them.
+/// Prints the main page, or writes all pages.
 pub(super) fn man(arguments: &Man, command: Command) -> anyhow::Result<ExitStatus> {
-    // Built, so that every verb has what holds for all.
+    // Propagates global settings to every verb.
     let mut command = command.disable_help_subcommand(true);
     command.build();
     let Some(folder) = &arguments.output else {
@@ -62,6 +62,6 @@ pub(super) fn man(arguments: &Man, command: Command) -> anyhow::Result<ExitStatu
 fn page(command: &Command) -> anyhow::Result<Vec<u8>> {
     let mut out = Vec::new();
     let made = clap_mangen::Man::new(command.clone()).section("1").render(&mut out);
-    made.context("the man page cannot be made")?;
+    made.context("the man page cannot be generated")?;
     Ok(out)
 }

@@ -1,4 +1,4 @@
-//! `truegrind measurement template --robot R`: the empty table of a measurement.
+//! `truegrind measurement template --robot R`: writes an empty measurement table.
 
 use std::path::PathBuf;
 
@@ -20,28 +20,28 @@ pub(super) struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum What {
-    /// An empty table with the columns that a measurement of a robot needs, to be filled in.
+    /// Write an empty table with the columns that a measurement needs.
     Template(Template),
 }
 
 #[derive(Debug, Args)]
 struct Template {
-    /// Robot: a name of `truegrind robots`, or a file of one's own.
+    /// Robot: a name from `truegrind robots`, or a robot file.
     #[arg(long)]
     robot: String,
-    /// What the sensor reads.
+    /// Quantity that the sensor measures.
     #[arg(long, value_enum, default_value_t = Reads::Position)]
     sensor: Reads,
-    /// The CSV file to write; stdout otherwise.
+    /// CSV file to write. Default: stdout.
     #[arg(short, long, value_name = "FILE.csv", default_value = "-")]
     output: PathBuf,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Reads {
-    /// The length of a cable.
+    /// Length of a draw-wire cable.
     Cable,
-    /// The position of a reflector or marker.
+    /// Position of a reflector or marker.
     Position,
     /// Position and orientation of a target.
     Pose,
@@ -64,7 +64,7 @@ fn empty_table(arguments: &Template) -> anyhow::Result<ExitStatus> {
     let mut batch = Batch::default();
     batch.add(&arguments.output, names.join(",") + "\n");
     batch.write()?;
-    print_message(format_args!("one row for each pose of {}:", robot.sheet.name));
+    print_message(format_args!("fill in one row for each pose of {}:", robot.sheet.name));
     for (names, meaning) in template::meanings(&columns) {
         print_message(format_args!("  {names}: {meaning}"));
     }
@@ -72,13 +72,13 @@ fn empty_table(arguments: &Template) -> anyhow::Result<ExitStatus> {
     if let (Some(low), Some(high)) = (joints.min_deg, joints.max_deg) {
         let ranges: Vec<String> =
             (0..6).map(|j| format!("J{} {} to {}°", j + 1, signed(low[j]), signed(high[j]))).collect();
-        print_message(format_args!("ranges of the data sheet: {}", ranges.join(", ")));
+        print_message(format_args!("joint ranges in the data sheet: {}", ranges.join(", ")));
     }
-    print_message("which poses tell most: `truegrind plan`");
+    print_message("`truegrind plan` chooses the most informative poses");
     Ok(ExitStatus::Done)
 }
 
-/// A number with a minus sign that no one takes for a range.
+/// A number with a true minus sign, which cannot be read as a range.
 fn signed(value: f64) -> String {
     format!("{value}").replace('-', "−")
 }

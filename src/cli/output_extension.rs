@@ -1,4 +1,4 @@
-//! How a program that is written may be called: its ending tells controller and reader which language it is in.
+//! File extensions of written programs: controller and reader infer the language from them.
 
 use std::path::Path;
 
@@ -8,64 +8,63 @@ use truegrind::programs::reading::Language;
 
 use super::files;
 
-/// The endings of each language, for messages.
+/// Extensions of each language, for messages.
 const RAPID: &str = ".mod, .modx, .prg, .sys (RAPID)";
-const NC: &str = ".nc (Fanuc style), .mpf, .spf (840D), .ngc (LinuxCNC), .h (Heidenhain) and the other endings of NC files";
+const NC: &str = ".nc (Fanuc style), .mpf, .spf (840D), .ngc (LinuxCNC), .h (Heidenhain) and the other extensions of NC files";
 
-/// What the ending of an output says; `None` where it has none, as the standard output and devices.
-fn stated(output: &Path) -> anyhow::Result<Option<Language>> {
-    let Some(ending) = output.extension() else { return Ok(None) };
-    let list = ending.eq_ignore_ascii_case("pgf");
+/// The language that the extension of an output stands for; `None` without extension, as for stdout and devices.
+fn language_of(output: &Path) -> anyhow::Result<Option<Language>> {
+    let Some(extension) = output.extension() else { return Ok(None) };
+    let list = extension.eq_ignore_ascii_case("pgf");
     match Language::by_name(&files::name(output)).filter(|_| !list) {
         Some(language) => Ok(Some(language)),
         None => bail!(
-            "{}: .{} is the ending of no program that is written here; expected {RAPID}, or {NC}",
+            "{}: .{} is not an extension of programs that can be written; expected {RAPID}, or {NC}",
             output.display(),
-            ending.to_string_lossy()
+            extension.to_string_lossy()
         ),
     }
 }
 
-/// Refuses an output whose ending is of no language that is written here.
+/// Refuses an output with an unknown extension.
 pub(super) fn refuse_unknown(output: &Path) -> anyhow::Result<()> {
-    stated(output).map(drop)
+    language_of(output).map(drop)
 }
 
-/// Refuses an output that would pass for anything but RAPID.
+/// Refuses an output with the extension of an NC program.
 pub(super) fn refuse_nc(output: &Path) -> anyhow::Result<()> {
-    match stated(output)? {
-        Some(Language::Nc) => bail!("{}: a RAPID module is written; expected {RAPID}", output.display()),
+    match language_of(output)? {
+        Some(Language::Nc) => bail!("{}: the output is a RAPID module; expected {RAPID}", output.display()),
         _ => Ok(()),
     }
 }
 
-/// Refuses an output that would pass for another language or another control than the program that it is made of. What
-/// ends as its source does is no question.
+/// Refuses an output whose extension stands for another language or another control than that of its source.
 pub(super) fn refuse_other_language(output: &Path, source: &Path, bytes: &[u8]) -> anyhow::Result<()> {
-    let ending = |path: &Path| path.extension().map(|ending| ending.to_ascii_lowercase());
-    if ending(output) == ending(source) {
+    let extension = |path: &Path| path.extension().map(|extension| extension.to_ascii_lowercase());
+    if extension(output) == extension(source) {
         return Ok(());
     }
-    let Some(language) = stated(output)? else { return Ok(()) };
+    let Some(language) = language_of(output)? else { return Ok(()) };
     let (from, to) = (files::name(source), files::name(output));
     let is = Language::of(&from, bytes);
     let expected = match is {
         Language::Rapid => RAPID,
         Language::Nc => NC,
     };
-    // A file of another ending that shows no sign of RAPID may be no program at all: that is told elsewhere.
-    let told = Language::by_name(&from).is_some() || is == Language::Rapid;
-    if is != language && told {
+    // A file with an unknown extension and no sign of RAPID may be no program at all, which is reported elsewhere.
+    let known = Language::by_name(&from).is_some() || is == Language::Rapid;
+    if is != language && known {
         bail!(
-            "{}: programs are not translated, and {} is {}; expected {expected}",
+            "{}: programs are not translated between languages, and {} is {}; expected {expected}",
             output.display(),
             source.display(),
             if is == Language::Rapid { "RAPID" } else { "an NC program" }
         );
     }
-    if is == Language::Nc && told && Dialect::of_named(&from, bytes) != Dialect::of_named(&to, bytes) {
+    if is == Language::Nc && known && Dialect::of_named(&from, bytes) != Dialect::of_named(&to, bytes) {
         bail!(
-            "{}: under this ending the program would be taken for one of {}, and {} is one of {}: name a file that ends as it does",
+            "{}: this extension stands for {}, but {} is for {}: use the extension of the original",
             output.display(),
             Dialect::of_named(&to, bytes).text(),
             source.display(),

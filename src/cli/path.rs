@@ -1,4 +1,4 @@
-//! `truegrind path SURFACE.toml --robot R -o PROGRAM.mod`.
+//! `truegrind path SURFACE.toml --robot R -o PROGRAM.mod`: makes a grinding program.
 
 use std::path::{Path, PathBuf};
 
@@ -23,15 +23,15 @@ use truegrind::compensation::cell::nc_setup::angles;
 /// Arguments of `path`.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Surface, work object, tool and pattern.
+    /// Surface file: surface, work object, tool and pattern.
     surface: PathBuf,
-    /// Robot: a name of `truegrind robots`, or a TOML file.
+    /// Robot: a name from `truegrind robots`, or a robot file.
     #[arg(long)]
     robot: String,
-    /// The program to write: RAPID (.mod), Fanuc style (.nc) or Siemens (.mpf) by its ending; `-` prints RAPID.
+    /// Program to write; the extension selects RAPID (.mod), Fanuc style (.nc) or Siemens 840D (.mpf). `-` prints RAPID.
     #[arg(short, long, value_name = "PROGRAM")]
     output: PathBuf,
-    /// Put the targets into the instructions instead of naming them p10, p20, …
+    /// Write the targets into the instructions instead of declaring them as p10, p20, …
     #[arg(long)]
     inline: bool,
 }
@@ -40,22 +40,23 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     Batch::check(&[&arguments.surface], &[&arguments.output])?;
     let robot = inputs::robot(&arguments.robot)?;
     let file = surface(&arguments.surface)?;
-    // An output that is an input is told as such first.
+    // An output that is an input is reported first.
     files::expect(&arguments.surface)?;
     Batch::check(&[], &[&arguments.output])?;
     output_extension::refuse_unknown(&arguments.output)?;
     let mut path = toolpath(&file, &robot.model, &robot.sheet.name)?;
     path.draft.named_targets = !arguments.inline;
-    let ending = arguments.output.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
-    let bytes = match ending.as_deref() {
+    let extension =
+        arguments.output.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
+    let bytes = match extension.as_deref() {
         Some("nc") => nc::writer::write(&path.draft, Dialect::Fanuc, angles_of(&robot))?,
         Some("mpf" | "spf") => nc::writer::write(&path.draft, Dialect::Siemens, angles_of(&robot))?,
         Some("ngc" | "h") => bail!(
-            "{}: programs of this control are read and rewritten, not written anew; name a .mod, .nc or .mpf file",
+            "{}: new programs cannot be written for this control; expected .mod, .nc or .mpf",
             arguments.output.display()
         ),
         _ if Language::by_name(&files::name(&arguments.output)) == Some(Language::Nc) => bail!(
-            "{}: which control it is for, the ending does not say; name a .mod (RAPID), .nc (Fanuc style) or .mpf (840D) file",
+            "{}: the extension does not determine the control; expected .mod (RAPID), .nc (Fanuc style) or .mpf (840D)",
             arguments.output.display()
         ),
         _ => writer::write(&path.draft)?,
@@ -67,7 +68,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     Ok(ExitStatus::Done)
 }
 
-/// What A, B and C mean: as the robot file says, else turns about the fixed x, y and z as their letters have it.
+/// Meaning of A, B and C: that of the robot file, or else rotations about the fixed x, y and z axes (W, P, R).
 fn angles_of(robot: &Robot) -> Angles {
     robot.sheet.orientation().and_then(angles).unwrap_or(Angles::Wpr)
 }
@@ -75,7 +76,7 @@ fn angles_of(robot: &Robot) -> Angles {
 fn report_toolpath(path: &Toolpath, robot: &Robot, output: &Path) {
     let passes = path.points.iter().map(|p| p.pass + 1).max().unwrap_or(0);
     print_message(format_args!(
-        "{} targets in {passes} passes for {}, distance to singularity at least {:.3}; written to {}",
+        "{} targets in {passes} passes for {}, smallest distance to a singularity {:.3}; written to {}",
         path.points.len(),
         robot.sheet.name,
         path.singularity,
@@ -83,7 +84,7 @@ fn report_toolpath(path: &Toolpath, robot: &Robot, output: &Path) {
     ));
 }
 
-/// Reads a surface file; a mesh is looked up beside it.
+/// Reads a surface file and the mesh that it names.
 pub(super) fn surface(path: &Path) -> anyhow::Result<SurfaceFile> {
     let bytes = files::read(path)?;
     let name = path.display().to_string();

@@ -1,4 +1,4 @@
-//! `truegrind plan --robot R --sensor S --poses N -o POSES.mod`: what to measure, as a program that moves there.
+//! `truegrind plan --robot R --sensor S --poses N -o POSES.mod`: chooses the poses to measure.
 
 use std::path::PathBuf;
 
@@ -25,21 +25,21 @@ use super::progress::Spinner;
 use super::stated_frames::{StatedFrameArguments, numbers};
 use super::terminal::print_message;
 
-/// The sensor.
+/// Sensor type.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum SensorArgument {
-    /// Draw-wire: a length.
+    /// Draw-wire encoder: length.
     Cable,
-    /// Tracker with a reflector: a position.
+    /// Tracker with a reflector: position.
     Position,
-    /// Tracker with a six-dimensional target: a pose.
+    /// Tracker with a 6D target: pose.
     Pose,
 }
 
-/// What makes a set of poses good.
+/// Design criterion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum IndexArgument {
-    /// D-optimality, priors counted in.
+    /// D-optimality, including the priors.
     D,
     /// Observability index O1.
     O1,
@@ -48,82 +48,81 @@ enum IndexArgument {
 /// Arguments of `plan`.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Robot: a name of `truegrind robots`, or a TOML file.
+    /// Robot: a name from `truegrind robots`, or a robot file.
     #[arg(long)]
     robot: String,
-    /// Sensor.
+    /// Sensor that will measure.
     #[arg(long, value_enum)]
     sensor: SensorArgument,
-    /// Different poses; repeats come on top.
+    /// Number of different poses; repeats are added to these.
     #[arg(long, default_value_t = 60)]
     poses: usize,
-    /// The RAPID module to write.
+    /// RAPID module to write.
     #[arg(short, long, value_name = "POSES.mod")]
     output: Option<PathBuf>,
-    /// A diagnosis (`diagnose --json`): weigh the poses that decide between what it could not tell apart.
+    /// Diagnosis (from `diagnose --json`): prefer poses that distinguish the causes it left ambiguous or untested.
     #[arg(long = "for", value_name = "DIAGNOSIS.json")]
     diagnosis: Option<PathBuf>,
-    /// What makes a set of poses good.
+    /// Design criterion for the set of poses.
     #[arg(long, value_enum, default_value_t = IndexArgument::D)]
     index: IndexArgument,
-    /// Standard deviation of a length or coordinate, everything counted (mm); 0.05 for a cable, 0.03 for a tracker.
+    /// Total standard deviation of a measured length or coordinate (mm). Default: 0.05 for a cable, 0.03 for a tracker.
     #[arg(long, value_name = "MM")]
     sigma: Option<f64>,
-    /// Standard deviation of an orientation (°).
+    /// Standard deviation of a measured orientation (°).
     #[arg(long, value_name = "DEG", default_value_t = 0.006)]
     sigma_angle: f64,
-    /// Box for the touched point in the base: two corners x,y,z,x,y,z (mm).
+    /// Box that must contain the measured point, in the base frame: lower and upper corner x,y,z,x,y,z (mm).
     #[arg(long = "box", value_name = "X,Y,Z,X,Y,Z", allow_hyphen_values = true)]
     box_mm: Option<String>,
-    /// Shortest and longest cable, or distance to the sensor: min,max (mm).
+    /// Allowed cable length or distance to the sensor: min,max (mm).
     #[arg(long, value_name = "MIN,MAX")]
     range: Option<String>,
-    /// Distance that a cable keeps from the lines between the joints (mm); 0 does not look. A twelfth of the reach unless
-    /// stated.
+    /// Smallest distance of the cable from the links, taken as lines between the joints (mm); 0 disables the check. Default: a
+    /// twelfth of the reach.
     #[arg(long, value_name = "MM")]
     clearance: Option<f64>,
-    /// A box that neither links nor target enter, at poses and on the ways between them: two corners in the base, x,y,z,x,y,z (mm).
-    /// May be repeated.
+    /// Box that links and target must not enter, at the poses and between them: two corners in the base frame, x,y,z,x,y,z (mm). May
+    /// be repeated.
     #[arg(long, value_name = "X,Y,Z,X,Y,Z", allow_hyphen_values = true)]
     keep_out: Vec<String>,
-    /// Height in the base that nothing goes below (mm): the mounting plane; the floor where the arm stands on a pedestal.
+    /// Lowest allowed height in the base frame (mm): the mounting plane, or the floor for an arm on a pedestal.
     #[arg(long, value_name = "MM", default_value_t = 0.0, allow_negative_numbers = true)]
     floor: f64,
-    /// How thick the links are taken to be, as the radius about the lines between the joints (mm). A twelfth of the reach unless
-    /// stated.
+    /// Assumed radius of the links about the lines between the joints (mm). Default: a twelfth of the reach.
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     link_radius: Option<f64>,
-    /// Distance that joints keep from their limits (°); at least that of the approach.
+    /// Distance from the joint limits (°), at least --approach.
     #[arg(long, value_name = "DEG", default_value_t = 6.0)]
     margin: f64,
-    /// Smallest distance to singularity.
+    /// Smallest distance to a singularity.
     #[arg(long, default_value_t = 0.05)]
     singularity: f64,
-    /// Poses that are measured twice more, for the noise floor.
+    /// Number of poses measured two more times, to determine the noise floor.
     #[arg(long, default_value_t = 4)]
     repeats: usize,
-    /// Poses that are measured again from the other side, for backlash.
+    /// Number of poses measured again with the opposite approach direction, to detect backlash.
     #[arg(long, default_value_t = 12)]
     both_sides: usize,
-    /// Visits of one pose over the whole run, for thermal drift.
+    /// Number of visits of one pose spread over the run, to detect thermal drift.
     #[arg(long, default_value_t = 8)]
     warm_up: usize,
-    /// Where an approach begins, in every joint (°).
+    /// Length of each approach move, in every joint (°).
     #[arg(long, value_name = "DEG", default_value_t = 3.0)]
     approach: f64,
-    /// Time at rest before a reading (s).
+    /// Waiting time before a reading (s).
     #[arg(long, value_name = "S", default_value_t = 2.0)]
     settle: f64,
-    /// Time from row to row (s), for what changes with time.
+    /// Expected time per row (s), for effects that change with time.
     #[arg(long, value_name = "S", default_value_t = 12.0)]
     seconds_per_row: f64,
-    /// Speed between poses [mm/s].
+    /// Speed between poses (mm/s).
     #[arg(long, value_name = "MM/S", default_value_t = 200.0)]
     speed: f64,
-    /// Non-centrality from which an effect counts as decided.
+    /// Non-centrality above which an effect counts as detectable.
     #[arg(long, default_value_t = 25.0)]
     decisive: f64,
-    /// Random poses to choose from.
+    /// Number of random candidate poses.
     #[arg(long, default_value_t = 2000)]
     candidates: usize,
     #[command(flatten)]
@@ -182,13 +181,13 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     Ok(if rough { ExitStatus::Flagged } else { ExitStatus::Done })
 }
 
-/// Nobody measures more poses by one plan.
-const MOST_POSES: usize = 2000;
+/// Largest number of poses.
+const MAX_POSES: usize = 2000;
 
-/// And no choice is better for more than this.
-const MOST_CANDIDATES: usize = 100_000;
+/// Largest number of candidates; more do not improve the design.
+const MAX_CANDIDATES: usize = 100_000;
 
-/// What the arm must not enter.
+/// The space that the arm must keep out of.
 fn space(arguments: &Arguments, reach_mm: f64) -> anyhow::Result<Space> {
     let mut boxes_mm = Vec::new();
     for text in &arguments.keep_out {
@@ -204,13 +203,13 @@ fn space(arguments: &Arguments, reach_mm: f64) -> anyhow::Result<Space> {
     }
     let radius_mm = arguments.link_radius.unwrap_or(reach_mm / 12.0);
     if !(0.0..=reach_mm).contains(&radius_mm) {
-        bail!("--link-radius {radius_mm}: expected 0 or more, and less than the reach of {reach_mm:.0} mm");
+        bail!("--link-radius {radius_mm}: expected 0 up to the reach of {reach_mm:.0} mm");
     }
     let approach_rad = arguments.approach.to_radians();
     Ok(Space { floor_mm: Some(arguments.floor), boxes_mm, radius_mm, approach_rad })
 }
 
-/// What can be refused by itself: numbers and counts.
+/// Refuses numbers and counts out of range.
 fn check_numbers(arguments: &Arguments, sigma: f64) -> anyhow::Result<()> {
     for (name, value) in [
         ("--sigma", sigma),
@@ -236,25 +235,25 @@ fn check_numbers(arguments: &Arguments, sigma: f64) -> anyhow::Result<()> {
     if arguments.poses < 4 {
         bail!("--poses {}: expected at least 4; some 50 to 100 are usual", arguments.poses);
     }
-    if arguments.poses > MOST_POSES {
-        bail!("--poses {}: expected at most {MOST_POSES}; some 50 to 100 are usual", arguments.poses);
+    if arguments.poses > MAX_POSES {
+        bail!("--poses {}: expected at most {MAX_POSES}; some 50 to 100 are usual", arguments.poses);
     }
     for (name, count) in [
         ("--repeats", arguments.repeats),
         ("--both-sides", arguments.both_sides),
         ("--warm-up", arguments.warm_up),
     ] {
-        if count > MOST_POSES {
-            bail!("{name} {count}: expected at most {MOST_POSES}");
+        if count > MAX_POSES {
+            bail!("{name} {count}: expected at most {MAX_POSES}");
         }
     }
-    if arguments.candidates > MOST_CANDIDATES {
-        bail!("--candidates {}: expected at most {MOST_CANDIDATES}; 2000 are usual", arguments.candidates);
+    if arguments.candidates > MAX_CANDIDATES {
+        bail!("--candidates {}: expected at most {MAX_CANDIDATES}; 2000 are usual", arguments.candidates);
     }
     Ok(())
 }
 
-/// What a diagnosis left open, for the plan to settle.
+/// The questions that a diagnosis left open.
 fn questions(arguments: &Arguments) -> anyhow::Result<Vec<rival::Question>> {
     Ok(match &arguments.diagnosis {
         None => Vec::new(),
@@ -263,7 +262,7 @@ fn questions(arguments: &Arguments) -> anyhow::Result<Vec<rival::Question>> {
                 rival::questions(&files::read_text(path)?).map_err(|e| anyhow!("{}: {e}", path.display()))?;
             if found.is_empty() {
                 print_message(format_args!(
-                    "note: {}: nothing is ambiguous or untested; planned for the geometry",
+                    "note: {}: the diagnosis left nothing ambiguous or untested; the poses are chosen for the geometry",
                     path.display()
                 ));
             }
@@ -294,7 +293,9 @@ fn options(arguments: &Arguments, sensor: Sensor, reach_mm: f64) -> anyhow::Resu
         (Sensor::Cable, Some(0.0)) => None,
         (Sensor::Cable, Some(mm)) if mm > 0.0 && mm.is_finite() => Some(mm),
         (Sensor::Cable, Some(mm)) => bail!("--clearance {mm}: expected 0 or more (mm)"),
-        (_, Some(_)) => bail!("--clearance is for a cable; a tracker's line of sight is not checked"),
+        (_, Some(_)) => {
+            bail!("--clearance applies to cables only; the line of sight of a tracker is not checked")
+        }
         (_, None) => None,
     };
     let space = space(arguments, reach_mm)?;

@@ -28,17 +28,19 @@ use super::files;
 use super::inputs;
 use super::terminal::print_message;
 
-/// The arms of a picture: the one whose deviations are shown, what it is in words, and that of the data sheet.
+/// The arms of a recording.
 #[derive(Clone, Copy)]
 pub(super) struct Arms<'a> {
+    /// The arm whose deviations are shown.
     pub(super) real: &'a Model,
+    /// Its description.
     pub(super) is: &'a str,
     pub(super) nominal: &'a Model,
-    /// The robot as the command line names it: a file may name meshes.
+    /// The robot on the command line; a robot file may name meshes.
     pub(super) robot: Option<&'a str>,
 }
 
-/// The recording of a path, as a file.
+/// The bytes of the recording of a path.
 pub(super) fn path(
     title: &str,
     arms: Arms<'_>,
@@ -76,7 +78,7 @@ pub(super) fn recording(
     Ok(pictures::path_recording(&scene)?)
 }
 
-/// The recording of an identification, as a file.
+/// The bytes of the recording of an identification.
 pub(super) fn identification(
     found: &Identification,
     dataset: &Dataset,
@@ -85,12 +87,12 @@ pub(super) fn identification(
     Ok(pictures::dataset_recording(dataset, found, &meshes(Some(robot))?)?.rrd()?)
 }
 
-/// The recording of a diagnosis, as a file.
+/// The bytes of the recording of a diagnosis.
 pub(super) fn diagnosis(found: &Diagnosed, dataset: &Dataset, robot: &str) -> anyhow::Result<Vec<u8>> {
     Ok(pictures::diagnosis_recording(dataset, found, &meshes(Some(robot))?)?.rrd()?)
 }
 
-/// The recording of a plan, as a file: the arm at each row with what the sensor will see, and what is kept out of.
+/// The bytes of the recording of a plan: the arm at each row, the expected readings, and the forbidden boxes.
 pub(super) fn plan(plan: &Plan, wanted: &Wanted<'_>, name: &str, robot: &str) -> anyhow::Result<Vec<u8>> {
     let rows = (FIRST_ROW..).zip(&plan.rows).filter_map(|(number, row)| {
         let pose = &plan.poses[row.pose];
@@ -104,17 +106,17 @@ pub(super) fn plan(plan: &Plan, wanted: &Wanted<'_>, name: &str, robot: &str) ->
     let mut answer = vec![
         format!("{} rows at {} poses, in this order", plan.rows.len(), plan.poses.len()),
         format!(
-            "checked: {}; the way to the first pose and anything else in the cell are not",
+            "checked: {}; not checked: the move to the first pose and anything else in the cell",
             checked(plan)
         ),
     ];
     if rough > 0 {
-        answer.push(format!("{rough} times the cable has to be unhooked on the way"));
+        answer.push(format!("the cable must be unhooked between poses {rough} times"));
     }
     let scene = MeasuredScene {
         dataset: &dataset,
         arm: wanted.nominal,
-        arm_is: &format!("{name} after its data sheet"),
+        arm_is: &format!("nominal {name}"),
         nominal: None,
         meshes: &meshes(Some(robot))?,
         planned: true,
@@ -130,8 +132,8 @@ pub(super) fn plan(plan: &Plan, wanted: &Wanted<'_>, name: &str, robot: &str) ->
     Ok(pictures::measured_recording(&scene)?.rrd()?)
 }
 
-/// The recording of a track, as a file: the poses since sensor and target stand as they do, and what the model that it began with
-/// and the one that it has now leave of them.
+/// The bytes of the recording of a track: the poses since sensor and target were last mounted, with the residuals of the initial and
+/// the current model.
 pub(super) fn track(
     tracker: &Tracker,
     arm: &Estimated,
@@ -142,8 +144,8 @@ pub(super) fn track(
     let Some(first) = datasets.first() else { return Ok(None) };
     let begun = &arm.model;
     let (model, frames) = tracker.standing();
-    // One wild pose would flatten all others.
-    let tame = tracker.state().history.iter().filter(|seen| seen.nis < WILD);
+    // A single outlier would dominate the scale.
+    let tame = tracker.state().history.iter().filter(|seen| seen.nis < MAX_NIS);
     let seen: BTreeSet<(&str, usize)> = tame.map(|seen| (seen.file.as_str(), seen.row)).collect();
     let mut rows: Vec<Row> = Vec::new();
     for dataset in datasets {
@@ -153,7 +155,7 @@ pub(super) fn track(
     if rows.is_empty() {
         return Ok(None);
     }
-    // Several files count their rows alike: then the poses are counted.
+    // Row numbers of several files collide, so poses are numbered instead.
     if datasets.len() > 1 {
         rows.iter_mut().zip(1..).for_each(|(row, number)| row.number = number);
     }
@@ -165,16 +167,15 @@ pub(super) fn track(
         rows: numbers.iter().copied().zip(errors_on(&observed, arm, frames)).collect(),
     };
     let residuals = [
-        left("before: the model that the track began with", begun, &frames),
-        left("after: the model as it stands now", &model, &frames),
+        left("before: the initial model of the track", begun, &frames),
+        left("after: the current model", &model, &frames),
     ];
     let mut answer: Vec<String> = alarms.iter().map(ToString::to_string).collect();
     if answer.is_empty() {
-        answer.push("no change was noticed".to_owned());
+        answer.push("no change was detected".to_owned());
     }
     answer.push(
-        "shown: the latest poses, since sensor and target stand as they do now, but for what was set aside"
-            .to_owned(),
+        "shown: the poses since sensor and target were last mounted, without those set aside".to_owned(),
     );
     let scene = MeasuredScene {
         dataset: &dataset,
@@ -195,25 +196,25 @@ pub(super) fn track(
     Ok(Some(pictures::measured_recording(&scene)?.rrd()?))
 }
 
-/// A pose whose normalised innovation squared is beyond this belongs to another mounting, or to none.
-const WILD: f64 = 1e3;
+/// Poses with a larger normalised innovation squared belong to another mounting.
+const MAX_NIS: f64 = 1e3;
 
-/// What an experiment was made on.
+/// The data of an experiment.
 pub(super) struct Compared<'a> {
     pub(super) dataset: &'a Dataset,
     pub(super) nominal: &'a Model,
-    /// The arm that the rows were simulated on, where they were.
+    /// The actual arm, if the rows were simulated.
     pub(super) actual: Option<&'a Model>,
     pub(super) robot: &'a str,
 }
 
-/// The recording of an experiment, as a file: the arm and the sensor at the rows that the methods were given, and the answer.
+/// The bytes of the recording of an experiment: arm and sensor at its rows, and the result.
 pub(super) fn comparison(of: &Compared<'_>, summary: &Document) -> anyhow::Result<Vec<u8>> {
     let observed = prepare_observations(of.dataset, of.nominal, true).0;
     let frames = register(&observed, of.nominal, &Tolerance::default())?.fitted.frames;
     let errors = errors_on(&observed, of.nominal, &frames);
     let registered = Residuals {
-        stage: "frames registered, links nominal: what the methods begin with".to_owned(),
+        stage: "frames registered, links nominal: the start of all methods".to_owned(),
         rows: of.dataset.rows.iter().map(|row| row.number).zip(errors).collect(),
     };
     let mut answer = vec![summary.title.clone()];
@@ -226,7 +227,7 @@ pub(super) fn comparison(of: &Compared<'_>, summary: &Document) -> anyhow::Resul
     }
     let (arm, is) = match of.actual {
         Some(actual) => (actual, "simulated actual arm"),
-        None => (of.nominal, "arm after its data sheet"),
+        None => (of.nominal, "nominal arm"),
     };
     let scene = MeasuredScene {
         dataset: of.dataset,
@@ -247,11 +248,10 @@ pub(super) fn comparison(of: &Compared<'_>, summary: &Document) -> anyhow::Resul
     Ok(pictures::measured_recording(&scene)?.rrd()?)
 }
 
-/// More triangles than these no picture of an arm needs, and a viewer is slow with.
-const MOST_TRIANGLES: usize = 150_000;
+/// Limit on the triangles of an arm; more make the viewer slow.
+const MAX_TRIANGLES: usize = 150_000;
 
-/// The meshes that a robot file names, so far as they are there and are STL; none of a robot of the catalogue. What is not drawn is
-/// said.
+/// The STL meshes that a URDF names. A note lists those that are not drawn.
 pub(super) fn meshes(robot: Option<&str>) -> anyhow::Result<Vec<LinkMesh>> {
     let Some(name) = robot.filter(|name| Kind::of(name) == Some(Kind::Urdf)) else { return Ok(Vec::new()) };
     let path = Path::new(name);
@@ -266,7 +266,7 @@ pub(super) fn meshes(robot: Option<&str>) -> anyhow::Result<Vec<LinkMesh>> {
         let drawn = Mesh::triangles_of_stl(&files::read(&place)?, unit_mm)
             .map_err(|error| anyhow::anyhow!("{}: {error}", place.display()))?;
         triangles += drawn.triangles.len();
-        if triangles > MOST_TRIANGLES {
+        if triangles > MAX_TRIANGLES {
             missing.push(file);
             continue;
         }
@@ -274,7 +274,7 @@ pub(super) fn meshes(robot: Option<&str>) -> anyhow::Result<Vec<LinkMesh>> {
     }
     if let Some(first) = missing.first() {
         print_message(format_args!(
-            "note: {name}: {} of its meshes are not drawn ({first}{}): expected STL files of at most {MOST_TRIANGLES} triangles, \
+            "note: {name}: {} of its meshes are not drawn ({first}{}): expected STL files of at most {MAX_TRIANGLES} triangles, \
              beside the robot file or in the package that it names; links without one are drawn as bars",
             missing.len(),
             if missing.len() > 1 { " and others" } else { "" }
@@ -283,8 +283,8 @@ pub(super) fn meshes(robot: Option<&str>) -> anyhow::Result<Vec<LinkMesh>> {
     Ok(out)
 }
 
-/// Where a mesh lies that a URDF names: `package://NAME/…` in a folder of that name above or beside the file, or beside the file
-/// itself; other names as they stand, beside the file.
+/// Path of a mesh of a URDF: `package://NAME/…` in a folder NAME above or beside the file, or beside the file; other names relative
+/// to the file.
 fn mesh_file(urdf: &Path, name: &str) -> Option<PathBuf> {
     let is_there = |place: PathBuf| place.is_file().then_some(place);
     if let Some(place) = name.strip_prefix("file://") {

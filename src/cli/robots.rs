@@ -1,4 +1,4 @@
-//! `truegrind robots [NAME]`, `truegrind robots --check FILE`.
+//! `truegrind robots [NAME]`, `truegrind robots --check FILE`: catalogue and robot files.
 
 use std::path::{Path, PathBuf};
 
@@ -17,25 +17,25 @@ use super::terminal::{print_message_lines, print_result, width};
 /// Arguments of `robots`.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// A robot of the catalogue, or a robot file.
+    /// Robot of the catalogue, or a robot file.
     name: Option<String>,
-    /// Say what is understood of a robot file, to be compared with the manual: a robot file of truegrind, a URDF, a table of link
-    /// parameters (CSV), the calibration of a Universal Robots arm (.conf, .yaml).
+    /// Show how a robot file is interpreted, to compare with the manual: a robot file of truegrind, a URDF, a table of DH parameters
+    /// (CSV), or the calibration of a Universal Robots arm (.conf, .yaml).
     #[arg(long, value_name = "FILE", conflicts_with = "name")]
     check: Option<PathBuf>,
-    /// The link of a URDF that stands; the root of its tree otherwise.
+    /// Base link of a URDF. Default: the root of its tree.
     #[arg(long, value_name = "LINK", requires = "check")]
     base: Option<String>,
-    /// The link of a URDF that is the flange; tool0 or flange otherwise.
+    /// Flange link of a URDF. Default: tool0 or flange.
     #[arg(long, value_name = "LINK", requires = "check")]
     tip: Option<String>,
-    /// The log counts joint 3 against the ground, whatever joint 2 does, as FANUC controllers do.
+    /// The log states joint 3 relative to the ground, independent of joint 2, as FANUC controllers do.
     #[arg(long, requires = "check")]
     ground_joint_3: bool,
-    /// Write the arm as a robot file of truegrind.
+    /// Write the arm as a truegrind robot file.
     #[arg(short, long, value_name = "ARM.toml", requires = "check")]
     output: Option<PathBuf>,
-    /// Self-contained HTML page with a picture of the zero pose.
+    /// Write a self-contained HTML page with a picture of the zero pose.
     #[arg(long, value_name = "FILE", requires = "check", num_args = 0..=1, default_missing_value = "-")]
     html: Option<PathBuf>,
 }
@@ -58,16 +58,16 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     Ok(ExitStatus::Done)
 }
 
-/// What is understood of a file.
+/// Shows how a robot file is interpreted.
 fn check(arguments: &Arguments, path: &Path) -> anyhow::Result<ExitStatus> {
     let outputs: Vec<&Path> =
         [&arguments.output, &arguments.html].into_iter().filter_map(|p| p.as_deref()).collect();
     Batch::check(&[path], &outputs)?;
     if let Some(output) = &arguments.output
         && !is_stdout(output)
-        && !output.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
+        && !output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
     {
-        bail!("{}: a robot file is written; expected a name that ends in .toml", output.display());
+        bail!("{}: the output is a robot file; expected the extension .toml", output.display());
     }
     let choice = ImportOptions {
         base: arguments.base.clone(),
@@ -78,18 +78,18 @@ fn check(arguments: &Arguments, path: &Path) -> anyhow::Result<ExitStatus> {
     let found = import(&files::read_text(path)?, &name, &choice)?;
     let mut batch = Batch::sparing([path]);
     if let Some(output) = &arguments.output {
-        let text = robots::to_toml(&found.robot).map_err(|error| anyhow!("{name}: {error}"))?;
-        batch.add(output, text);
+        let toml = robots::to_toml(&found.robot).map_err(|error| anyhow!("{name}: {error}"))?;
+        batch.add(output, toml);
     }
     if let Some(html) = &arguments.html {
         batch.add(html, format::html::document(&view::checked(&found)));
     }
     batch.write()?;
-    let said = format::terminal::document(&view::understood(&found), width());
+    let text = format::terminal::document(&view::understood(&found), width());
     if outputs.into_iter().any(is_stdout) {
-        print_message_lines(&said)
+        print_message_lines(&text)
     } else {
-        print_result(said)?
+        print_result(text)?
     }
     Ok(ExitStatus::Done)
 }

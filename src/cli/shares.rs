@@ -1,13 +1,13 @@
-//! Runs that several jobs share, on one machine or many, and that go on where they were stopped: `--shard`, `--resume`.
+//! Runs that are split over several jobs, on one machine or many, and that can be resumed: `--shard`, `--resume`.
 //!
-//! Jobs know nothing of each other but a folder. In it `run.json` lists all units, `done/KEY.json` is the record of one that is
-//! done, and `begun/` holds what was begun and did not end; `tables/` has the table of each share. Two jobs that do the same unit at the same time both come to
-//! the same bytes, and whoever is last puts them over the same. New outputs and records get to the disk together when a job ends: one
-//! that a crash of the machine tore before is not as its record says, and is made again.
+//! Jobs share nothing but a folder. There `run.json` lists all units, `done/KEY.json` is the record of a finished unit, `begun/`
+//! marks unfinished units, and `tables/` has the table of each share. Two jobs that process the same unit at the same time write the
+//! same bytes. New outputs and records are synced together at the end of a job: an output torn by a machine crash before that does
+//! not match its record, and is made again.
 //!
-//! A unit may take its whole process with it (memory, stack). The next job of the same units finds that one before it did not end,
-//! and from then on notes each unit that it begins. One that is begun and not ended is left to the end and done alone, so that it
-//! takes nobody else along, and after [`MOST_BEGUN`] times it is listed as failed. Jobs that nobody kills note nothing.
+//! A unit may crash its whole process (memory, stack). The next job over the same units sees that an earlier one did not finish,
+//! and from then on marks each unit that it begins. A unit that was begun but not finished is processed last and alone, and after
+//! [`MOST_BEGUN`] attempts it is listed as failed. Jobs that do not crash write no marks.
 
 use std::path::{Path, PathBuf};
 
@@ -27,44 +27,43 @@ use super::outputs::Outputs;
 use super::programs::Job;
 use super::terminal::print_message;
 
-/// How often a unit is begun before it is listed as one that kills whoever does it.
+/// Attempts before a unit that crashes its process is listed as failed.
 const MOST_BEGUN: u32 = 3;
 
-/// Where the tables of the shares are, in the folder of the run, and how their names begin.
+/// Folder of the tables of the shares, and prefix of their names.
 const TABLES: &str = "tables";
 const TABLE: &str = "share-";
 
-/// Many inputs over several jobs; docs in README, examples in deploy/.
+/// Options for splitting a run over several jobs; see README and deploy/.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Several jobs, on one machine or many")]
 pub(super) struct Shares {
-    /// Do one share of the programs or arms alone, I of N, from 1; names alone tell which. `truegrind gather` puts together what all
-    /// shares made. The table of the share goes to tables/ in the folder of the run, as Parquet, where --parquet names no other
-    /// file.
+    /// Process only share I of N (counted from 1) of the programs or arms; the file names determine the shares. `truegrind gather`
+    /// combines the results. The table of the share is written to tables/ in the folder of the run as Parquet, unless --parquet
+    /// names another file.
     #[arg(long, value_name = "I/N", conflicts_with = "units")]
     shard: Option<Share>,
-    /// Leave out what is done already with the same inputs, model, cell, options and version, as long as its outputs are as they were
-    /// written.
+    /// Skip units already processed with the same inputs, model, cell, options and version whose outputs are unchanged.
     #[arg(long)]
     resume: bool,
-    /// Folder in which the jobs of a run keep what is done; without it the one of -o.
+    /// Folder in which the jobs of a run keep their records. Default: that of -o.
     #[arg(long, value_name = "FOLDER")]
     work: Option<PathBuf>,
-    /// Do these alone: a list as `units` in run.json, `-` for the standard input. No folder is searched.
+    /// Process only the units in this file, a JSON list like `units` in run.json; `-` reads stdin. No folder is searched.
     #[arg(long, value_name = "FILE")]
     units: Option<PathBuf>,
-    /// Write run.json, the list of all that is to be done, and do nothing.
+    /// Only write run.json, the list of all units.
     #[arg(long, conflicts_with_all = ["shard", "units", "resume"])]
     list_units: bool,
 }
 
 impl Shares {
-    /// Whether a run is shared or goes on.
+    /// Whether the run keeps records.
     pub(super) fn on(&self) -> bool {
         self.shard.is_some() || self.resume || self.work.is_some() || self.units.is_some() || self.list_units
     }
 
-    /// The units that were listed, in place of those that are found; `None` where none were.
+    /// The units listed by `--units`, if given.
     pub(super) fn listed(&self) -> anyhow::Result<Option<Vec<Job>>> {
         let Some(path) = &self.units else { return Ok(None) };
         let bytes = if path == Path::new("-") { files::read_stdin()? } else { files::read(path)? };
@@ -82,102 +81,106 @@ impl Shares {
     }
 }
 
-/// What a verb keeps of a unit.
-pub(super) trait Kept: Sized + Send {
-    /// Of one that could not be done.
+/// The result of a unit, with its record.
+pub(super) trait UnitResult: Sized + Send {
+    /// The result of a unit that failed.
     fn failed(job: &Job, why: &str) -> Self;
-    /// Whether it is one of those.
+    /// Whether the unit failed.
     fn is_failed(&self) -> bool;
-    /// As JSON, every bit.
+    /// The record as JSON, bit-exact.
     fn record(&self) -> anyhow::Result<String>;
-    /// From the bytes of the record with this key; `None` where it is not whole, or none of this verb. `whole`: with what no report but
-    /// --json shows; a run may be of a million units.
+    /// Reads the record with this key; `None` if it is incomplete or of another verb. `whole`: including what only --json shows, which
+    /// is large in a run over a million units.
     fn read(bytes: &[u8], key: &str, whole: bool) -> Option<Recorded<Self>>;
-    /// Lets go of what is only read where it is asked for `whole`.
+    /// Drops what [`UnitResult::read`] reads only if `whole`.
     fn lighten(&mut self) {}
 }
 
-/// Files that were written, each with the SHA-256 of its bytes.
+/// Written files with the SHA-256 of their bytes.
 pub(super) type Written = Vec<(PathBuf, String)>;
 
-/// How a verb reads and does a unit.
-pub(super) struct Doing<R, C, W> {
+/// How a verb reads and processes a unit.
+pub(super) struct UnitSteps<R, C, W> {
     /// Reads its files.
     pub(super) read: R,
-    /// Their names and contents; see [`key::of_unit`].
+    /// Name and SHA-256 of each file; see [`key::of_unit`].
     pub(super) content: C,
-    /// Does it, and writes its outputs.
+    /// Processes it and writes its outputs.
     pub(super) work: W,
-    /// Whether the reports of this job need all of a unit; see [`Kept::read`].
+    /// Whether the reports of this job need whole results; see [`UnitResult::read`].
     pub(super) whole: bool,
 }
 
-/// Does all units, each by itself: what one brings to light does not take the others with it.
-pub(super) fn each<I, T, R, C, W>(
+/// Processes all units in parallel; an error or panic in one does not affect the others.
+pub(super) fn process_units<I, T, R, C, W>(
     store: Option<&Store>,
     jobs: &[Job],
-    doing: &Doing<R, C, W>,
+    steps: &UnitSteps<R, C, W>,
 ) -> anyhow::Result<Vec<T>>
 where
-    T: Kept,
+    T: UnitResult,
     R: Fn(&Job) -> anyhow::Result<I> + Sync,
     C: Fn(&I) -> Vec<(String, String)> + Sync,
     W: Fn(&Job, I) -> anyhow::Result<(T, Written)> + Sync,
 {
     let Some(store) = store else {
-        let one = |job: &Job| catch_panic(|| (doing.work)(job, (doing.read)(job)?));
+        let one = |job: &Job| catch_panic(|| (steps.work)(job, (steps.read)(job)?));
         let failed = |job: &Job, error: anyhow::Error| T::failed(job, &format!("{error:#}"));
         let each =
             jobs.par_iter().map(|job| one(job).map_or_else(|error| failed(job, error), |(done, _)| done));
         return Ok(each.collect());
     };
-    let here = Here::enter(store, jobs)?;
-    let first =
-        jobs.par_iter().map(|job| here.done_or_do(job, doing, false)).collect::<anyhow::Result<Vec<_>>>()?;
-    // What was begun before and not ended may have killed its process: alone, after all others.
+    let session = JobSession::enter(store, jobs)?;
+    let first = jobs
+        .par_iter()
+        .map(|job| session.resume_or_process(job, steps, false))
+        .collect::<anyhow::Result<Vec<_>>>()?;
+    // Units that were begun before but not finished may crash the process: last and alone.
     let each = first.into_iter().zip(jobs).map(|(done, job)| match done {
         Some(done) => Ok(done),
-        None => here.done_or_do(job, doing, true)?.ok_or_else(|| anyhow!("{}: left out", job.name())),
+        None => {
+            session.resume_or_process(job, steps, true)?.ok_or_else(|| anyhow!("{}: skipped", job.name()))
+        }
     });
     let done = each.collect::<anyhow::Result<Vec<_>>>()?;
     store.folders.iter().try_for_each(|folder| sync_folder(folder))?;
-    run_files::remove(&here.note);
+    run_files::remove(&session.note);
     Ok(done)
 }
 
-/// What the jobs of one run keep.
+/// The records of a run.
 #[derive(Debug)]
 pub(super) struct Store {
     work: PathBuf,
     run: String,
     resume: bool,
-    /// Where a job writes.
+    /// Folders in which a job writes.
     folders: Vec<PathBuf>,
 }
 
-/// What makes a run.
-pub(super) struct Asked<'a> {
+/// Everything that defines a run.
+pub(super) struct RunDescription<'a> {
     /// The verb.
     pub(super) verb: &'a str,
-    /// Every option that has a part in the outputs.
+    /// All options that influence the outputs, as text.
     pub(super) options: String,
-    /// The SHA-256 of every file that is read for all units.
+    /// SHA-256 of each file that all units use.
     pub(super) shared: Vec<String>,
-    /// What the reports need beside the units.
+    /// Further data for the reports.
     pub(super) context: Value,
-    /// The folder of -o, where there is one.
+    /// The folder of -o, if given.
     pub(super) output: Option<&'a Path>,
 }
 
 impl Store {
-    /// Opens the folder, notes the run, and keeps of the units those of this job. `None` where nothing is to be done but to list.
+    /// Opens the folder, writes `run.json`, and reduces `jobs` to the share of this job. `None` for `--list-units`.
     pub(super) fn open(
         shares: &Shares,
-        asked: &Asked<'_>,
+        asked: &RunDescription<'_>,
         jobs: &mut Vec<Job>,
     ) -> anyhow::Result<Option<Self>> {
         let Some(work) = shares.work.as_deref().or(asked.output) else {
-            bail!("--work FOLDER is missing: the folder in which the jobs of this run keep what is done");
+            bail!("--work FOLDER is missing: the folder in which the jobs of this run keep their records");
         };
         let run = key::of_run(asked.verb, &asked.options, asked.shared.iter().map(String::as_str));
         for folder in ["done", "begun"] {
@@ -200,13 +203,13 @@ impl Store {
         Ok(Some(store))
     }
 
-    /// Where the results of this job go: the table of a share to the folder of the run, where nobody names another file.
+    /// The outputs of this job: by default the table of a share goes to the folder of the run.
     fn outputs(&self, shares: &Shares, asked: &Outputs) -> anyhow::Result<Outputs> {
         let mut outputs = asked.clone();
         if let (true, Some(share), None) = (cfg!(feature = "parquet"), shares.shard, &asked.pages.parquet) {
             let tables = self.work.join(TABLES);
             files::make_folder(&tables)?;
-            // As wide as the last one's, so that their order by name is that of their numbers.
+            // Zero-padded, so that sorting by name sorts by number.
             let wide = share.of.to_string().len();
             let name = format!("{TABLE}{:0wide$}-of-{}.parquet", share.number, share.of);
             outputs.pages.parquet = Some(tables.join(name));
@@ -214,12 +217,12 @@ impl Store {
         Ok(outputs)
     }
 
-    /// The store of a run that was begun: its folder, and the run.
-    pub(super) fn of(work: &Path) -> anyhow::Result<(Self, Run)> {
+    /// Opens the folder of an existing run.
+    pub(super) fn open_existing(work: &Path) -> anyhow::Result<(Self, Run)> {
         let path = work.join("run.json");
         let bytes = run_files::read_if_exists(&path)?.ok_or_else(|| {
             anyhow!(
-                "{}: not there; expected the folder of a run (compensate, deviation or diagnose with --shard or --resume)",
+                "{}: not found; expected the folder of a run (compensate, deviation or diagnose with --shard or --resume)",
                 path.display()
             )
         })?;
@@ -229,7 +232,7 @@ impl Store {
         Ok((store, run))
     }
 
-    fn list(&self, shares: &Shares, asked: &Asked<'_>, jobs: &[Job]) -> anyhow::Result<()> {
+    fn list(&self, shares: &Shares, asked: &RunDescription<'_>, jobs: &[Job]) -> anyhow::Result<()> {
         let run = Run {
             schema: run::SCHEMA.to_owned(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -243,12 +246,12 @@ impl Store {
         if run_files::read_if_exists(&path)?.as_deref() == Some(text.as_bytes()) {
             return Ok(());
         }
-        // Tables of other units, of another model or of another number of shares are none of this run.
+        // Tables of other units, another model or another number of shares do not belong to this run.
         run_files::remove_prefixed(&self.work.join(TABLES), TABLE);
         run_files::replace(&path, text.as_bytes())
     }
 
-    /// The key of a unit by its contents, or by the word that it cannot be read.
+    /// The key of a unit, from its content or from the fact that it cannot be read.
     pub(super) fn key(&self, job: &Job, content: Option<&[(String, String)]>) -> String {
         let under = job.under.as_ref().map(|under| under.display().to_string()).unwrap_or_default();
         let unread =
@@ -258,16 +261,20 @@ impl Store {
         key::of_unit(&self.run, files.iter().map(|(name, content)| (name.as_str(), content.as_str())))
     }
 
-    fn record_place(&self, key: &str) -> PathBuf {
+    fn record_path(&self, key: &str) -> PathBuf {
         self.work.join("done").join(format!("{key}.json"))
     }
 
-    /// The record of a unit, where it is there whole.
-    pub(super) fn record<T: Kept>(&self, key: &str, whole: bool) -> anyhow::Result<Option<Recorded<T>>> {
-        Ok(run_files::read_if_exists(&self.record_place(key))?.and_then(|bytes| T::read(&bytes, key, whole)))
+    /// The complete record of a unit, if any.
+    pub(super) fn record<T: UnitResult>(
+        &self,
+        key: &str,
+        whole: bool,
+    ) -> anyhow::Result<Option<Recorded<T>>> {
+        Ok(run_files::read_if_exists(&self.record_path(key))?.and_then(|bytes| T::read(&bytes, key, whole)))
     }
 
-    /// The outputs of a unit that are not as they were written.
+    /// The outputs of a unit that changed after they were written.
     pub(super) fn changed<R>(&self, done: &Recorded<R>) -> Vec<PathBuf> {
         let place = |output: &Output| match output.below {
             true => self.work.join(&output.file),
@@ -281,7 +288,7 @@ impl Store {
         other.map(|(place, _)| place).collect()
     }
 
-    fn keep<T: Kept>(
+    fn keep<T: UnitResult>(
         &self,
         key: &str,
         job: &Job,
@@ -303,12 +310,12 @@ impl Store {
             record: (),
         };
         let text = done.to_text(&kept.record()?);
-        let text = text.with_context(|| format!("{}: the record cannot be made", job.name()))?;
-        run_files::replace(&self.record_place(key), text.as_bytes())
+        let text = text.with_context(|| format!("{}: the record cannot be written", job.name()))?;
+        run_files::replace(&self.record_path(key), text.as_bytes())
     }
 }
 
-/// Where the results of a job go: what was asked for, and what a share keeps beside; see [`Store::outputs`].
+/// The outputs of a job; see [`Store::outputs`].
 pub(super) fn outputs_with(
     store: Option<&Store>,
     shares: &Shares,
@@ -317,16 +324,16 @@ pub(super) fn outputs_with(
     store.map_or_else(|| Ok(asked.clone()), |store| store.outputs(shares, asked))
 }
 
-/// One job among those of a run.
-struct Here<'s> {
+/// One job of a run.
+struct JobSession<'s> {
     store: &'s Store,
-    /// Says that a job of these units was begun and did not end.
+    /// Marker file: a job over these units was begun and did not finish.
     note: PathBuf,
-    /// Whether one was, before this one: then each unit is noted.
+    /// Whether the marker existed before: then each unit is marked.
     careful: bool,
 }
 
-impl<'s> Here<'s> {
+impl<'s> JobSession<'s> {
     fn enter(store: &'s Store, jobs: &[Job]) -> anyhow::Result<Self> {
         let start = key::Fields::new("truegrind.job/1").text(&store.run);
         let name = jobs.iter().fold(start, |fields, job| fields.text(&job.name())).hex();
@@ -336,33 +343,33 @@ impl<'s> Here<'s> {
         Ok(Self { store, note, careful })
     }
 
-    /// A unit that is done, or does it. `None` where it was begun before and not ended, unless it is done `alone` now.
-    fn done_or_do<I, T, R, C, W>(
+    /// The recorded result of a unit, or processes it. `None` if it was begun before but not finished, unless `alone`.
+    fn resume_or_process<I, T, R, C, W>(
         &self,
         job: &Job,
-        doing: &Doing<R, C, W>,
+        steps: &UnitSteps<R, C, W>,
         alone: bool,
     ) -> anyhow::Result<Option<T>>
     where
-        T: Kept,
+        T: UnitResult,
         R: Fn(&Job) -> anyhow::Result<I>,
         C: Fn(&I) -> Vec<(String, String)>,
         W: Fn(&Job, I) -> anyhow::Result<(T, Written)>,
     {
-        let read = catch_panic(|| (doing.read)(job));
-        let content = read.as_ref().ok().map(&doing.content);
+        let read = catch_panic(|| (steps.read)(job));
+        let content = read.as_ref().ok().map(&steps.content);
         let key = self.store.key(job, content.as_deref());
         let begun = self.store.work.join("begun").join(&key);
         let mut times = 0;
         if self.store.resume
-            && let Some(done) = self.store.record::<T>(&key, doing.whole)?
+            && let Some(done) = self.store.record::<T>(&key, steps.whole)?
             && done.ended != Ended::Failed
             && self.store.changed(&done).is_empty()
         {
             return Ok(Some(done.record));
         }
         if self.careful {
-            // One that cannot be read was being noted.
+            // An unreadable mark counts as one attempt.
             let noted = run_files::read_if_exists(&begun)?
                 .map(|bytes| String::from_utf8_lossy(&bytes).trim().parse().unwrap_or(1));
             times = noted.unwrap_or(0);
@@ -372,8 +379,8 @@ impl<'s> Here<'s> {
         }
         if times >= MOST_BEGUN {
             let why = format!(
-                "whoever did it died, {times} times, the last times with nothing else running: too little memory, or a defect of \
-                 truegrind, then please report it (--resume leaves it; without --resume it is tried again)"
+                "processing it crashed {times} times, the last times with nothing else running: too little memory, or a defect of \
+                 truegrind, which please report (--resume skips it; without --resume it is tried again)"
             );
             let kept = T::failed(job, &why);
             self.store.keep(&key, job, &kept, Ended::Killed, Vec::new())?;
@@ -383,7 +390,7 @@ impl<'s> Here<'s> {
         if self.careful {
             run_files::write_note(&begun, &(times + 1).to_string())?;
         }
-        let done = catch_panic(|| (doing.work)(job, read?));
+        let done = catch_panic(|| (steps.work)(job, read?));
         let (mut kept, written) =
             done.unwrap_or_else(|error| (T::failed(job, &format!("{error:#}")), Vec::new()));
         let ended = if kept.is_failed() { Ended::Failed } else { Ended::Done };
@@ -391,7 +398,7 @@ impl<'s> Here<'s> {
         if self.careful {
             run_files::remove(&begun);
         }
-        if !doing.whole {
+        if !steps.whole {
             kept.lighten();
         }
         Ok(Some(kept))

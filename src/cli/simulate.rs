@@ -16,15 +16,15 @@ use super::terminal::print_message;
 /// Arguments of `simulate`.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// What the actual arm is, which poses are measured, and how.
+    /// Recipe: the actual arm, the measured poses and the sensor.
     recipe: PathBuf,
-    /// The measurements to write; `-` prints them.
+    /// Measurements to write; `-` prints them.
     #[arg(short, long, value_name = "DATA.csv")]
     output: PathBuf,
     /// Also write the simulated actual arm, for `deviation --actual`.
     #[arg(long, value_name = "ARM.toml")]
     arm: Option<PathBuf>,
-    /// Seed of poses and noise instead of the recipe's; the arm stays the same.
+    /// Seed of poses and noise, instead of that of the recipe; the arm stays the same.
     #[arg(long)]
     seed: Option<u64>,
 }

@@ -1,4 +1,4 @@
-//! `truegrind track DATA --model MODEL.toml`: keeps an arm accurate over its life.
+//! `truegrind track DATA --model MODEL.toml`: keeps a model up to date over the life of the arm.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -29,40 +29,40 @@ use super::terminal::print_message;
 /// Arguments of `track`.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Measurements: a file that grows, or a folder of files.
+    /// Measurements: a growing file, or a folder of files.
     data: PathBuf,
-    /// The model to keep accurate, as `truegrind identify -o` wrote it.
+    /// Model to keep up to date, as written by `truegrind identify -o`.
     #[arg(long, value_name = "MODEL.toml")]
     model: PathBuf,
-    /// Robot; the model says which otherwise, and a mismatch is an error.
+    /// Robot. The model names it already; if given, it must match.
     #[arg(long)]
     robot: Option<String>,
-    /// Folder for the dated models; the model's own otherwise.
+    /// Folder for the dated models. Default: the folder of the model.
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
-    /// Where the state is kept between runs; beside the dated models otherwise.
+    /// State file, kept between runs. Default: beside the dated models.
     #[arg(long, value_name = "TRACK.toml")]
     state: Option<PathBuf>,
-    /// Go on and look for new measurements every so many seconds, until stopped.
+    /// Keep running and look for new measurements every so many seconds, until stopped.
     #[arg(long, value_name = "SECONDS")]
     follow: Option<f64>,
-    /// Date for the names of models, such as 2026-05-04T12:30:00Z; the clock's otherwise.
+    /// Date in the names of the models, such as 2026-05-04T12:30:00Z. Default: the current time.
     #[arg(long, value_name = "DATE")]
     date: Option<String>,
-    /// Poses that place the sensor before tracking begins.
+    /// Number of poses that locate the sensor before tracking begins.
     #[arg(long, value_name = "N")]
     first_poses: Option<usize>,
-    /// Standard deviation of a reading (mm), with what the model does not explain; otherwise what the first poses leave,
-    /// but no less than the model's held-out error.
+    /// Standard deviation of a reading (mm), including unexplained errors. Default: the residual of the first poses, at least the
+    /// held-out error of the model.
     #[arg(long, value_name = "MM")]
     sigma: Option<f64>,
-    /// How much a parameter may drift from pose to pose, in mm or degrees: link2.theta=0.0001. May be repeated.
+    /// Drift of a parameter per pose, in mm or degrees (1σ), such as link2.theta=0.0001. May be repeated.
     #[arg(long, value_name = "NAME=VALUE")]
     drift: Vec<String>,
-    /// Whether the angles are the controller's or DH angles; the robot file says otherwise.
+    /// Convention of the logged angles. Default: that of the robot file.
     #[arg(long, value_enum)]
     angles: Option<Angles>,
-    /// Take the units as they are, however odd they look.
+    /// Accept implausible units.
     #[arg(long)]
     allow_odd_units: bool,
     #[command(flatten)]
@@ -82,7 +82,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let named = inputs::model(&name)?;
     inputs::warn_doubtful(&named);
     let NamedModel::Estimated { arm, hash, .. } = named else {
-        bail!("--model {name}: expected a model file, since the nominal arm has nothing to keep accurate");
+        bail!("--model {name}: expected a model file; the nominal arm cannot be tracked");
     };
     inputs::nominal(
         &NamedModel::Estimated { name: name.clone(), hash: hash.clone(), arm: arm.clone() },
@@ -90,7 +90,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     )?;
     let stem = arguments.model.file_stem().map_or("model".into(), |s| s.to_string_lossy().into_owned());
     let folder = match &arguments.output {
-        // Made when there is something to put into it.
+        // Created when the first model is written.
         Some(folder) => folder.clone(),
         None => arguments.model.parent().map(Path::to_path_buf).unwrap_or_default(),
     };
@@ -111,11 +111,11 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     }
     if state_path.is_file() && arguments.states_settings() {
         print_message(format_args!(
-            "note: {} goes on with the settings that it began with: --sigma, --drift and --first-poses are for a new track",
+            "note: {} keeps the settings with which it was started: --sigma, --drift and --first-poses apply to a new track",
             state_path.display()
         ));
     }
-    let track = Track {
+    let track = TrackContext {
         arguments,
         arm: &arm,
         hash: &hash,
@@ -128,15 +128,15 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let mut said = BTreeSet::new();
     loop {
         files::new_round();
-        flagged |= on_threads(arguments.common.threads, || track.look(&mut said))??;
+        flagged |= on_threads(arguments.common.threads, || track.update(&mut said))??;
         let Some(seconds) = arguments.follow else { break };
         std::thread::sleep(Duration::from_secs_f64(seconds));
     }
     Ok(if flagged { ExitStatus::Flagged } else { ExitStatus::Done })
 }
 
-/// What stays the same from look to look.
-struct Track<'a> {
+/// What is constant over all updates.
+struct TrackContext<'a> {
     arguments: &'a Arguments,
     arm: &'a Estimated,
     hash: &'a str,
@@ -146,10 +146,10 @@ struct Track<'a> {
     state_path: &'a Path,
 }
 
-impl Track<'_> {
-    /// One look at the data: everything new is taken in, and model and state are written together. Whether an alarm was
-    /// raised. What `said` holds is not said again.
-    fn look(&self, said: &mut BTreeSet<String>) -> anyhow::Result<bool> {
+impl TrackContext<'_> {
+    /// Processes all new data and writes model and state together. Returns whether an alarm was raised or a file failed. Messages in
+    /// `said` are not repeated.
+    fn update(&self, said: &mut BTreeSet<String>) -> anyhow::Result<bool> {
         let (arguments, arm) = (self.arguments, self.arm);
         let mut tracker = self.state()?;
         let known = tracker.as_ref().map(|t| t.state().consumed.clone()).unwrap_or_default();
@@ -159,7 +159,7 @@ impl Track<'_> {
         {
             match Tracker::begin(arm, self.hash, &first, &self.options) {
                 Ok(begun) => tracker = Some(begun),
-                // Files that are still growing: nothing is wrong, nothing can be done.
+                // The files are still growing: wait.
                 Err(error @ TrackError::TooFew { .. }) if arguments.follow.is_some() => {
                     print_message_once(said, format!("note: {error}"));
                     return Ok(false);
@@ -173,7 +173,7 @@ impl Track<'_> {
         if let Some(tracker) = &mut tracker {
             for dataset in &datasets {
                 let begun = Instant::now();
-                // A defect that one file brings to light leaves the track as it was before that file.
+                // After a panic on one file, continue with the state before that file.
                 let before = tracker.clone();
                 match catch_panic(|| Ok(tracker.take(dataset))) {
                     Ok(raised) => alarms.extend(raised?),
@@ -191,19 +191,19 @@ impl Track<'_> {
             if arguments.follow.is_some() {
                 return Ok(false);
             }
-            bail!("{}: no measurements to begin with", arguments.data.display());
+            bail!("{}: no measurements to start from", arguments.data.display());
         };
         let fresh = tracker.state().poses - before;
         if fresh == 0 {
             if arguments.follow.is_none() {
                 print_message(format_args!(
-                    "note: no new measurements since {before} poses; nothing written"
+                    "note: no new measurements after {before} poses; nothing written"
                 ));
             }
             return Ok(failed);
         }
         print_message(format_args!(
-            "note: {fresh} poses taken in within {:.1} ms, {:.0} µs each",
+            "note: {fresh} poses processed in {:.1} ms, {:.0} µs each",
             taking.as_secs_f64() * 1e3,
             taking.as_secs_f64() * 1e6 / fresh as f64
         ));
@@ -211,7 +211,7 @@ impl Track<'_> {
         Ok(failed || !alarms.is_empty() || tracker.mostly_set_aside())
     }
 
-    /// Where the last run left off.
+    /// The state of the last run.
     fn state(&self) -> anyhow::Result<Option<Tracker>> {
         if !self.state_path.is_file() {
             return Ok(None);
@@ -221,7 +221,7 @@ impl Track<'_> {
         let state = State::from_toml(&text).map_err(|e| anyhow!("{name}: {e}"))?;
         if state.model_hash != self.hash {
             bail!(
-                "{name} is the track of another model than {}: give the model that it began with, or another --state",
+                "{name} belongs to another model than {}: give the model with which it was started, or another --state",
                 self.arguments.model.display()
             );
         }
@@ -248,11 +248,11 @@ impl Track<'_> {
             files::make_folder(self.folder)?;
         }
         let mut batch = Batch::sparing([&arguments.data, &arguments.model]);
-        // The model first, the state last: what is cut off between the two is done again in the next run, to the same bits.
+        // The model first, the state last: if the process stops in between, the next run repeats the update bit for bit.
         if !model_path.exists() {
             batch.add(&model_path, text);
         } else if files::read_state(&model_path)? != text.as_bytes() {
-            bail!("{path} is there already: it is never overwritten; give another --date or -o");
+            bail!("{path} exists and is not overwritten; give another --date or -o");
         }
         arguments.outputs.add_made(
             &mut batch,
@@ -265,7 +265,7 @@ impl Track<'_> {
             let robot = arguments.robot.as_deref();
             match super::recording::track(tracker, self.arm, datasets, alarms, robot)? {
                 Some(bytes) => batch.add(path, bytes),
-                None => print_message("note: --rrd: no pose is there to be drawn; nothing written to it"),
+                None => print_message("note: --rrd: there is no pose to draw; nothing written"),
             }
         }
         #[cfg(not(feature = "visual"))]
@@ -274,8 +274,8 @@ impl Track<'_> {
         batch.write()
     }
 
-    /// What there is to take in, and whether a file of a folder failed: it is listed, and the others go on. Who follows waits
-    /// for what cannot be read yet.
+    /// The data sets, and whether a file of a folder failed; the others are still used. With `--follow`, files that cannot be read
+    /// yet are retried at the next update.
     fn datasets(
         &self,
         known: &[Consumed],
@@ -288,9 +288,7 @@ impl Track<'_> {
             let is_new = !known.iter().any(|k| k.file == files::name(&path));
             match catch_panic(|| read(self.arguments, self.arm, &path, is_new)) {
                 Ok(dataset) => out.extend(dataset),
-                Err(error) if waits => {
-                    print_message_once(said, format!("note: {error:#}; left for the next look"))
-                }
+                Err(error) if waits => print_message_once(said, format!("note: {error:#}; will be retried")),
                 Err(error) if several => {
                     failed = true;
                     print_message(format_args!("failed: {}: {error:#}", path.display()));
@@ -302,7 +300,7 @@ impl Track<'_> {
     }
 }
 
-/// Says a thing once.
+/// Prints a message unless it was printed before.
 fn print_message_once(said: &mut BTreeSet<String>, what: String) {
     if !said.contains(&what) {
         print_message(&what);
@@ -310,14 +308,14 @@ fn print_message_once(said: &mut BTreeSet<String>, what: String) {
     }
 }
 
-/// The file, or the files of a folder by name. What the track itself writes is no measurement.
+/// The file, or the files of a folder sorted by name, without those that the track itself writes.
 fn measurement_files(arguments: &Arguments) -> anyhow::Result<Vec<PathBuf>> {
     let path = &arguments.data;
     if !path.is_dir() {
         let waits = arguments.follow.is_some() && !path.exists();
         return Ok(if waits { Vec::new() } else { vec![path.clone()] });
     }
-    // The table of an earlier run, by what is in it: anything else under that name is a measurement, and stays.
+    // Tables of an earlier run are recognised by their content; any other file of that name is a measurement.
     let is_own = |path: &Path| files::read_state(path).is_ok_and(|bytes| view::is_table(&bytes));
     let outputs = arguments.outputs.files().into_iter().filter(|path| path.is_file() && is_own(path));
     let own: Vec<PathBuf> = outputs.filter_map(|o| std::fs::canonicalize(o).ok()).collect();
@@ -336,8 +334,7 @@ fn measurement_files(arguments: &Arguments) -> anyhow::Result<Vec<PathBuf>> {
     Ok(out)
 }
 
-/// The rows of a file that are whole; `None` while it has no row. Whether their units fit the arm is looked at in a file
-/// that is new, once it has rows enough to tell.
+/// The complete rows of a file; `None` if there is none yet. The units of a new file are checked once it has enough rows.
 fn read(
     arguments: &Arguments,
     arm: &Estimated,
@@ -347,7 +344,7 @@ fn read(
     let mut bytes = files::read(path)?;
     let is_text = !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("xlsx"));
     if is_text {
-        // A line that is still being written has no end yet.
+        // The last line may still be incomplete.
         let end = bytes.iter().rposition(|b| *b == b'\n').map_or(0, |at| at + 1);
         if bytes[end..].iter().any(|b| !b.is_ascii_whitespace()) {
             bytes.truncate(end);
@@ -368,7 +365,7 @@ fn read(
     if is_new && !allow_odd_units && dataset.rows.len() >= ROWS_TO_TELL_UNITS {
         let suspicions = plausibility(&dataset, &arm.nominal, convention);
         if let Some(suspicion) = suspicions.iter().find(|s| s.evidence == Evidence::Sensor) {
-            bail!("{suspicion} (--allow-odd-units takes the file at its word)");
+            bail!("{suspicion} (--allow-odd-units accepts the file anyway)");
         }
     }
     let applied = convention.apply(dataset, &arm.nominal);
@@ -399,10 +396,10 @@ fn options(arguments: &Arguments, arm: &Estimated) -> anyhow::Result<Options> {
     Ok(options)
 }
 
-/// Rows from which a wrong unit is told from a few odd poses.
+/// Fewest rows for the check of units.
 const ROWS_TO_TELL_UNITS: usize = 15;
 
-/// A date as it stands in a file name, 20260504T123000Z.
+/// A date for file names, 20260504T123000Z.
 fn stamp(date: &str) -> anyhow::Result<String> {
     let out: String = date.chars().filter(|c| !matches!(c, '-' | ':')).collect();
     let fits = out.len() >= 8
@@ -414,10 +411,10 @@ fn stamp(date: &str) -> anyhow::Result<String> {
     Ok(out)
 }
 
-/// The clock, in UTC.
+/// The current time in UTC.
 fn now() -> anyhow::Result<String> {
     let seconds =
-        SystemTime::now().duration_since(UNIX_EPOCH).context("the clock stands before 1970")?.as_secs();
+        SystemTime::now().duration_since(UNIX_EPOCH).context("the system clock is before 1970")?.as_secs();
     let (days, rest) = (seconds / 86_400, seconds % 86_400);
     // Days to year, month and day in the proleptic Gregorian calendar (Hinnant, chrono-compatible algorithms).
     let z = days + 719_468;

@@ -1,4 +1,4 @@
-//! `truegrind view FILE…`: what any verb wrote, and measurements.
+//! `truegrind view FILE…`: shows recordings, measurements, models and programs in Rerun.
 
 use std::path::{Path, PathBuf};
 
@@ -38,16 +38,16 @@ pub(super) struct Arguments {
     /// Recordings (.rrd), measurements (.csv, .xlsx), models (.toml), programs (.mod and others).
     #[arg(required = true)]
     files: Vec<PathBuf>,
-    /// An estimated arm: on it programs are run, and against it measurements are held.
+    /// Estimated arm that runs the programs or predicts the measurements.
     #[arg(long, value_name = "MODEL.toml")]
     model: Option<String>,
-    /// Robot; optional where the model says it, and checked against it.
+    /// Robot. The model names it already; if given, it must match.
     #[arg(long)]
     robot: Option<String>,
-    /// Sheet of a workbook; the first with the columns otherwise.
+    /// Sheet of a workbook. Default: the first with the needed columns.
     #[arg(long)]
     sheet: Option<String>,
-    /// Write the one recording instead of opening it.
+    /// Write the recording instead of opening it.
     #[arg(long, value_name = "FILE.rrd")]
     rrd: Option<PathBuf>,
     #[command(flatten)]
@@ -56,7 +56,7 @@ pub(super) struct Arguments {
     common: Common,
 }
 
-/// What a file is, by its name and, for TOML, by its schema.
+/// Kind of a file, by its extension and, for TOML, by its schema.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Recording,
@@ -75,12 +75,13 @@ fn kind(path: &Path) -> anyhow::Result<Kind> {
         "csv" | "xlsx" | "xls" | "xlsm" | "ods" => Kind::Measurements,
         "toml" => {
             let text = files::read_text(path)?;
-            let table: toml::Table = text.parse().map_err(|e| anyhow!("{}: no TOML: {e}", path.display()))?;
+            let table: toml::Table =
+                text.parse().map_err(|e| anyhow!("{}: not TOML: {e}", path.display()))?;
             let schema = table.get("schema").and_then(|s| s.as_str()).unwrap_or_default();
             if schema != truegrind::arm::estimated::SCHEMA {
                 bail!(
-                    "{}: no model file; of TOML files only those that `truegrind identify -o` wrote can be shown (a \
-                     surface: make its program with `truegrind path`)",
+                    "{}: not a model file; of TOML files only models written by `truegrind identify -o` can be shown (for a \
+                     surface, make its program with `truegrind path`)",
                     path.display()
                 );
             }
@@ -89,7 +90,7 @@ fn kind(path: &Path) -> anyhow::Result<Kind> {
         _ if extension == "pgf" || Language::by_name(&files::name(path)).is_some() => Kind::Program,
         _ => bail!(
             "{}: expected a recording (.rrd), measurements (.csv, .xlsx), a model (.toml) or a program (.mod, .prg, .sys, \
-             .pgf, .nc, .mpf and the like)",
+             .pgf, .nc, .mpf and others)",
             path.display()
         ),
     })
@@ -140,7 +141,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     Ok(ExitStatus::Done)
 }
 
-/// The model that the command line names; `None` where it names a robot alone.
+/// The model of `--model`; `None` if absent or nominal.
 fn stated_model(arguments: &Arguments) -> anyhow::Result<Option<(String, Box<Estimated>)>> {
     let Some(name) = &arguments.model else { return Ok(None) };
     match inputs::model(name)? {
@@ -154,13 +155,13 @@ fn stated_model(arguments: &Arguments) -> anyhow::Result<Option<(String, Box<Est
     }
 }
 
-/// Measurements: with a model what it leaves of them, without one what an identification finds.
+/// Measurements: with the residuals of the given model, or with those of an identification.
 fn measurements(arguments: &Arguments, file: &Path) -> anyhow::Result<Recording> {
     let stated = stated_model(arguments)?;
     let robot = match (&arguments.robot, &stated) {
         (Some(robot), _) => robot.clone(),
         (None, Some((_, arm))) => arm.robot.clone(),
-        (None, None) => bail!("{}: --robot or --model says which arm was measured", file.display()),
+        (None, None) => bail!("{}: give --robot or --model: the measured arm is unknown", file.display()),
     };
     let data = identify::DataArguments {
         data: file.to_path_buf(),
@@ -185,7 +186,7 @@ fn measurements(arguments: &Arguments, file: &Path) -> anyhow::Result<Recording>
         let found = identify::identified(&dataset, &robot.sheet.name, &robot.model, &options)?;
         return Ok(pictures::dataset_recording(&dataset, &found, &meshes(arguments.robot.as_deref())?)?);
     };
-    // The sensor may stand elsewhere than when the model was made: frames are fitted anew, for either arm.
+    // The sensor may have moved since the model was made, so the frames are refitted for both arms.
     let frames = starting_frames(&dataset, &robot.model, &options.tolerance, options.fuse_readout)?;
     let (observed, _) = prepare_observations(&dataset, &robot.model, true);
     let sensing = frame_parameters(&dataset);
@@ -220,7 +221,7 @@ fn measurements(arguments: &Arguments, file: &Path) -> anyhow::Result<Recording>
     })?)
 }
 
-/// A model: the arm at the poses that it was measured in, coloured by how far it stands from the nominal one there.
+/// A model: the arm at its measured poses, coloured by the distance from the nominal arm.
 fn model(arguments: &Arguments, file: &Path) -> anyhow::Result<Recording> {
     let named = inputs::model(&file.display().to_string())?;
     inputs::warn_doubtful(&named);
@@ -280,7 +281,7 @@ fn model(arguments: &Arguments, file: &Path) -> anyhow::Result<Recording> {
     Ok(pictures::path_recording(&scene)?)
 }
 
-/// Programs of one task: where an estimated arm goes with them, or the nominal one.
+/// Programs of one task, run by the estimated or the nominal arm.
 fn program(arguments: &Arguments, paths: &[PathBuf]) -> anyhow::Result<Recording> {
     let programs = Programs::read(paths)?;
     let stated = stated_model(arguments)?;
@@ -289,7 +290,9 @@ fn program(arguments: &Arguments, paths: &[PathBuf]) -> anyhow::Result<Recording
     let nominal = match (&stated, &arguments.robot) {
         (Some((_, arm)), _) => arm.nominal.clone(),
         (None, Some(robot)) => inputs::robot(robot)?.model,
-        (None, None) => bail!("{}: --robot or --model says which arm runs it", paths[0].display()),
+        (None, None) => {
+            bail!("{}: give --robot or --model: the arm that runs it is unknown", paths[0].display())
+        }
     };
     let robot = arguments.robot.as_deref().or(knowledge.map(|k| k.robot.as_str()));
     let task = programs.task(&programs::setup(&cell, robot));
@@ -318,7 +321,7 @@ fn program(arguments: &Arguments, paths: &[PathBuf]) -> anyhow::Result<Recording
         &acting,
     );
     if report.points.is_empty() {
-        bail!("{program}: no motion has a target that is known from the text and in reach");
+        bail!("{program}: no motion has a reachable target that the program text determines");
     }
     let is = if knowledge.is_some() { "estimated arm" } else { "nominal arm" };
     let arms = Arms { real: acting.model, is, nominal: &nominal, robot: arguments.robot.as_deref() };

@@ -15,7 +15,7 @@ use crate::cli::exit_status::ExitStatus;
 use crate::cli::files::Batch;
 use crate::cli::outputs::Outputs;
 use crate::cli::programs::Job;
-use crate::cli::shares::Kept;
+use crate::cli::shares::UnitResult;
 
 /// The result for one program.
 pub(in crate::cli) struct ProgramResult {
@@ -78,7 +78,7 @@ struct RecordIn<J> {
     json: J,
 }
 
-impl Kept for ProgramResult {
+impl UnitResult for ProgramResult {
     fn failed(job: &Job, why: &str) -> Self {
         let row = Row::without(job.name(), Ended::Failed, Some(why.to_owned()));
         Self { json: Some(Vec::new()), ..Self::empty(row, Vec::new()) }
