@@ -20,7 +20,7 @@ use truegrind::robots;
 use truegrind::robots::foreign::{ImportOptions, import};
 use truegrind::surfaces::mesh::{Mesh, MeshOptions};
 
-use truegrind::calibration::measurement::import::{self, Clocks, Options};
+use truegrind::calibration::measurement::import::{self, Options, TimeMatching};
 use truegrind::programs::diff::unified;
 use truegrind::programs::motion::{Mark, MotionKind, Role, TargetValue};
 use truegrind::programs::nc::setup::Setup;
@@ -226,10 +226,12 @@ pub fn points(bytes: &[u8]) {
     let (log, rest) = bytes.split_at(at);
     let points = rest.strip_prefix(line).unwrap_or(rest);
     let (log, points, clocks) =
-        (("log.csv", log), ("points.txt", points), Clocks { within_s: 0.5, ahead_s: 0.0 });
+        (("log.csv", log), ("points.txt", points), TimeMatching { within_s: 0.5, ahead_s: 0.0 });
     let options = Options::default();
-    let both =
-        [import::joined(log, points, &options), import::joined_by_time(log, points, &clocks, &options)];
+    let both = [
+        import::read_joined(log, points, &options),
+        import::read_joined_by_time(log, points, &clocks, &options),
+    ];
     assert!(both.iter().flatten().all(|dataset| !dataset.rows.is_empty()));
 }
 

@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList};
 use truegrind::calibration::measurement::convention::AngleConvention;
 use truegrind::calibration::measurement::import::{self, cell::Cell};
-use truegrind::calibration::measurement::matching::matched;
+use truegrind::calibration::measurement::matching::match_to_arm;
 use truegrind::{Dataset, ImportOptions, Reading, Robot, Sensor, read_measurements};
 
 use crate::arrays::Numbers;
@@ -84,7 +84,7 @@ fn of_columns(
             };
         let lines = (0..count).map(|row| views.iter().map(|column| cell(column, row)).collect());
         let options = ImportOptions { allow_odd_units, ..ImportOptions::default() };
-        import::rows(name, &names, lines, &options)
+        import::from_rows(name, &names, lines, &options)
     });
     Ok(PyDataset { rows: Arc::new(rows.map_err(Refusal::from)?), odd_units: allow_odd_units })
 }
@@ -310,6 +310,6 @@ impl PyDataset {
             }
         };
         let name = &robot.sheet.name;
-        Ok(matched((*self.rows).clone(), name, &robot.model, convention, self.odd_units)?)
+        Ok(match_to_arm((*self.rows).clone(), name, &robot.model, convention, self.odd_units)?)
     }
 }

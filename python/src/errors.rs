@@ -121,7 +121,7 @@ impl From<Refusal> for PyErr {
 impl From<ImportError> for Refusal {
     fn from(error: ImportError) -> Self {
         let told = Self::new(Kind::Dataset, &error);
-        let place = error.place().cloned();
+        let place = error.location().cloned();
         let (found, expected) = match &error {
             ImportError::Cell { found, expected, .. } | ImportError::Units { found, expected, .. } => {
                 (Some(found.to_string()), Some((*expected).to_owned()))

@@ -370,7 +370,7 @@ pub(crate) fn track_(
         let rows = given.iter().map(|dataset| {
             let odd = allow_odd_units || dataset.odd_units;
             let rows = (*dataset.rows).clone();
-            truegrind::calibration::measurement::matching::matched(
+            truegrind::calibration::measurement::matching::match_to_arm(
                 rows,
                 &arm.robot,
                 &arm.nominal,

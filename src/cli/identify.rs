@@ -16,8 +16,8 @@ use truegrind::calibration::identification::tolerance::Tolerance;
 use truegrind::calibration::identification::verdict::Limits;
 use truegrind::calibration::measurement::convention::AngleConvention;
 use truegrind::calibration::measurement::dataset::Dataset;
-use truegrind::calibration::measurement::import::{self, Clocks};
-use truegrind::calibration::measurement::matching::{Mismatch, matched};
+use truegrind::calibration::measurement::import::{self, TimeMatching};
+use truegrind::calibration::measurement::matching::{Mismatch, match_to_arm};
 use truegrind::calibration::measurement::split::{self, Split};
 use truegrind::report::format;
 use truegrind::report::{identification as view, study as study_view};
@@ -88,7 +88,7 @@ pub(super) struct PointsArguments {
 
 impl PointsArguments {
     /// Settings for matching by time, if requested.
-    fn clocks(&self) -> anyhow::Result<Option<Clocks>> {
+    fn clocks(&self) -> anyhow::Result<Option<TimeMatching>> {
         let Some(within_s) = self.points_within else { return Ok(None) };
         if !(0.0..=LONGEST_S).contains(&within_s) || within_s == 0.0 {
             bail!("--points-within {within_s}: expected a time above 0 s, up to {LONGEST_S} s");
@@ -97,7 +97,7 @@ impl PointsArguments {
         if !ahead_s.is_finite() {
             bail!("--points-ahead {ahead_s}: expected a time in s");
         }
-        Ok(Some(Clocks { within_s, ahead_s }))
+        Ok(Some(TimeMatching { within_s, ahead_s }))
     }
 }
 
@@ -324,9 +324,9 @@ fn imported(arguments: &DataArguments, bytes: &[u8]) -> anyhow::Result<Dataset> 
         (Some(points), clocks) => {
             let (export, exported) = (files::name(points), files::read(points)?);
             match clocks {
-                None => import::joined((&name, bytes), (&export, &exported), &options)?,
+                None => import::read_joined((&name, bytes), (&export, &exported), &options)?,
                 Some(clocks) => {
-                    import::joined_by_time((&name, bytes), (&export, &exported), &clocks, &options)?
+                    import::read_joined_by_time((&name, bytes), (&export, &exported), &clocks, &options)?
                 }
             }
         }
@@ -337,7 +337,7 @@ fn measured(arguments: &DataArguments, robot: &Robot, dataset: Dataset) -> anyho
     let convention = arguments.angles.map_or_else(|| robot.sheet.joints.angles.into(), AngleConvention::from);
     let (name, odd) = (&robot.sheet.name, arguments.allow_odd_units);
     let dataset =
-        matched(dataset, name, &robot.model, convention, odd).map_err(|mismatch| match mismatch {
+        match_to_arm(dataset, name, &robot.model, convention, odd).map_err(|mismatch| match mismatch {
             Mismatch::Units(_) => anyhow!("{mismatch} (--allow-odd-units accepts the file anyway)"),
             _ => anyhow!("{mismatch}"),
         })?;

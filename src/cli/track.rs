@@ -10,7 +10,7 @@ use truegrind::arm::estimated::Estimated;
 use truegrind::calibration::measurement::convention::AngleConvention;
 use truegrind::calibration::measurement::dataset::Dataset;
 use truegrind::calibration::measurement::import;
-use truegrind::calibration::measurement::plausibility::{Evidence, plausibility};
+use truegrind::calibration::measurement::plausibility::{ComparedReading, plausibility};
 use truegrind::calibration::tracking::state::Consumed;
 use truegrind::calibration::tracking::{Alarm, Options, State, TrackError, Tracker, first_poses};
 use truegrind::report::tracking as view;
@@ -364,7 +364,7 @@ fn read(
     let convention = if dh { AngleConvention::Dh } else { AngleConvention::Logged };
     if is_new && !allow_odd_units && dataset.rows.len() >= ROWS_TO_TELL_UNITS {
         let suspicions = plausibility(&dataset, &arm.nominal, convention);
-        if let Some(suspicion) = suspicions.iter().find(|s| s.evidence == Evidence::Sensor) {
+        if let Some(suspicion) = suspicions.iter().find(|s| s.compared == ComparedReading::Sensor) {
             bail!("{suspicion} (--allow-odd-units accepts the file anyway)");
         }
     }

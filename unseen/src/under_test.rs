@@ -16,7 +16,7 @@ use truegrind_calibration::identification::register::starting_frames;
 use truegrind_calibration::measurement::convention::AngleConvention;
 use truegrind_calibration::measurement::dataset::Dataset;
 use truegrind_calibration::measurement::import;
-use truegrind_calibration::measurement::plausibility::{Evidence, plausibility};
+use truegrind_calibration::measurement::plausibility::{ComparedReading, plausibility};
 use truegrind_calibration::measurement::split;
 
 use crate::arms::{Angles, Pose};
@@ -103,7 +103,7 @@ fn read_as(
 ) -> Result<(Dataset, AngleConvention), String> {
     let rows = read(text)?;
     for suspicion in plausibility(&rows, nominal, convention) {
-        if suspicion.evidence == Evidence::Sensor {
+        if suspicion.compared == ComparedReading::Sensor {
             return Err(suspicion.to_string());
         }
     }

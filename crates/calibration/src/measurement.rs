@@ -1,12 +1,12 @@
-//! What was measured: rows of joint angles with a sensor's reading, from files or from a simulated arm.
+//! Measurements: rows of joint angles, each with a sensor's reading, read from files or simulated.
 //!
 //! ```text
-//! bytes → import → Dataset → plausibility (does it mean what it says?) → convention (the controller's angles)
-//!       → registration (where does the sensor stand?) → split (what is held out?) → identification
+//! bytes → import → Dataset → plausibility (units, quaternion order) → convention (the controller's angles)
+//!       → registration (sensor frame and target) → split (held-out rows) → identification
 //! ```
 //!
-//! A [`simulation`] writes the same files from a stated arm, so that everything above can be judged against a known
-//! truth. Nothing here opens a file, and nothing knows the catalogue of robots: names are resolved by the caller.
+//! A [`simulation`] writes the same files from a known arm, so that everything above can be checked against the truth.
+//! Nothing in this module opens a file or knows the catalogue of robots: the caller resolves names.
 
 pub mod dataset;
 pub mod import;

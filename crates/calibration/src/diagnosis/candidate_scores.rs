@@ -16,7 +16,7 @@ use super::extension::{Extended, Subject};
 use super::intervals::{self, Strip};
 use super::lines;
 use super::score::{score_from, score_projected};
-use crate::measurement::sensor::disturbance::{Course, Disturbance, Kind};
+use crate::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
 use truegrind_arm::effect::Effect;
 use truegrind_math::work::checkpoint;
 
@@ -87,7 +87,7 @@ impl<'a> CandidateScores<'a> {
             .map(|(candidate, projected)| Entry { candidate: Arc::clone(candidate), projected })
             .collect();
         let known = known_load(&fit).map(|kind| {
-            let always = Disturbance::new(kind, Course::Always);
+            let always = Disturbance::new(kind, Profile::Constant);
             Candidate::measurement(always, &subject.observed.dataset, subject.nominal, subject.frames)
         });
         let shifts: Vec<&Candidate> = catalogue.shifts.iter().chain(&known).collect();
@@ -134,7 +134,7 @@ impl<'a> CandidateScores<'a> {
                 let found = shift.strip.as_ref().map_or_else(Vec::new, |s| s.scan(design, 2));
                 found.into_iter().map(|interval| {
                     let (from, to) = (dataset.rows[interval.from].number, dataset.rows[interval.to].number);
-                    let disturbance = Disturbance::new(shift.kind.clone(), Course::Rows { from, to });
+                    let disturbance = Disturbance::new(shift.kind.clone(), Profile::Rows { from, to });
                     let candidate = Candidate::measurement(
                         disturbance,
                         dataset,

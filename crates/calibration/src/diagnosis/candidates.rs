@@ -8,7 +8,7 @@ use super::extension::Subject;
 use super::lines::Turns;
 use super::score::{Score, log_p};
 use crate::measurement::dataset::Sensor;
-use crate::measurement::sensor::disturbance::{Course, Disturbance, Kind};
+use crate::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
 
 /// A candidate with its score against a fit.
 #[derive(Debug, Clone)]
@@ -39,7 +39,7 @@ impl Catalogue {
         let dataset = &subject.observed.dataset;
         let mut listed = arm_candidates(subject);
         listed.extend(measurement_candidates(subject));
-        let mut kinds = vec![Kind::Frame { turning: false }, Kind::Tool];
+        let mut kinds = vec![Kind::Frame { turning: false }, Kind::Target];
         if dataset.sensor == Sensor::Cable {
             kinds.push(Kind::Zero);
         } else {
@@ -49,7 +49,7 @@ impl Catalogue {
         let shifts: Vec<Candidate> = kinds
             .into_iter()
             .map(|kind| {
-                let disturbance = Disturbance::new(kind, Course::Always);
+                let disturbance = Disturbance::new(kind, Profile::Constant);
                 Candidate::measurement(disturbance, dataset, subject.nominal, subject.frames)
             })
             .collect();

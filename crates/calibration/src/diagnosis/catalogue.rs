@@ -14,8 +14,8 @@ use super::design::Design;
 use super::extension::Subject;
 use crate::identification::calibration::{Frames, rotations, shifts};
 use crate::measurement::dataset::{Dataset, Reading, Sensor};
-use crate::measurement::sensor::disturbance::{Course, Disturbance, Kind};
-use crate::measurement::sensor::form::Form;
+use crate::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
+use crate::measurement::sensor::empirical::EmpiricalFault;
 use crate::measurement::split;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::effect::backlash::Backlash;
@@ -50,12 +50,12 @@ pub enum Regressor {
         /// Relative growth; empty where there is none.
         growth: Vec<f64>,
     },
-    /// Pushes one coordinate of a kind of disturbance, as far as the course says.
-    Push {
+    /// Pushes one coordinate of a kind of disturbance, as far as the profile says.
+    Disturbance {
         /// Which.
         along: Along,
         /// How far in each row.
-        course: Vec<f64>,
+        profile: Vec<f64>,
     },
     /// Shifts the sensor in the base.
     Shift([Vec<f64>; 3]),
@@ -69,7 +69,7 @@ pub enum Along {
     /// Coordinate of the sensor's frame.
     Frame(usize),
     /// Coordinate of the touched point.
-    Tool(usize),
+    Target(usize),
     /// The scale.
     Scale,
     /// The sag.
@@ -131,17 +131,17 @@ impl Candidate {
         nominal: &Model,
         frames: &Frames,
     ) -> Self {
-        let course: Vec<f64> = dataset.rows.iter().map(|r| disturbance.course.at(r)).collect();
-        let push = |along| Regressor::Push { along, course: course.clone() };
+        let profile: Vec<f64> = dataset.rows.iter().map(|r| disturbance.profile.at(r)).collect();
+        let push = |along| Regressor::Disturbance { along, profile: profile.clone() };
         let regressors = match &disturbance.kind {
             Kind::Zero => vec![push(Along::Zero)],
             Kind::Frame { turning } => {
                 (0..if *turning { 6 } else { 3 }).map(|k| push(Along::Frame(k))).collect()
             }
-            Kind::Tool => (0..3).map(|k| push(Along::Tool(k))).collect(),
+            Kind::Target => (0..3).map(|k| push(Along::Target(k))).collect(),
             Kind::Scale => vec![push(Along::Scale)],
             Kind::Sag => vec![push(Along::Sag)],
-            Kind::Form(form) if !form.turns() => shifts(*form, dataset, nominal, frames)
+            Kind::Empirical(form) if !form.rotates_joints() => shifts(*form, dataset, nominal, frames)
                 .into_iter()
                 .map(|v| Regressor::Shift(std::array::from_fn(|k| v.iter().map(|v| v[k]).collect())))
                 .collect(),
@@ -151,7 +151,7 @@ impl Candidate {
                     rotation: rotation
                         .into_iter()
                         .enumerate()
-                        .filter_map(|(j, r)| Some((j, r?.iter().zip(&course).map(|(r, c)| r * c).collect())))
+                        .filter_map(|(j, r)| Some((j, r?.iter().zip(&profile).map(|(r, c)| r * c).collect())))
                         .collect(),
                     growth: Vec::new(),
                 })
@@ -166,8 +166,8 @@ impl Candidate {
         let mut out = DMatrix::zeros(n * per, self.regressors.len());
         for (k, regressor) in self.regressors.iter().enumerate() {
             let mut column = out.column_mut(k);
-            let mut add = |course: &[f64], slope: &dyn Fn(usize) -> f64| {
-                for (i, c) in course.iter().enumerate().filter(|(_, c)| **c != 0.0) {
+            let mut add = |profile: &[f64], slope: &dyn Fn(usize) -> f64| {
+                for (i, c) in profile.iter().enumerate().filter(|(_, c)| **c != 0.0) {
                     for s in i * per..(i + 1) * per {
                         column[s] += c * slope(s);
                     }
@@ -175,21 +175,21 @@ impl Candidate {
             };
             match regressor {
                 Regressor::Arm { rotation, growth } => {
-                    for (joint, course) in rotation {
-                        add(course, &|s| design.slopes.by_joint[*joint][s]);
+                    for (joint, profile) in rotation {
+                        add(profile, &|s| design.slopes.by_joint[*joint][s]);
                     }
                     add(growth, &|s| design.slopes.by_growth[s]);
                 }
-                Regressor::Push { along, course } => match along {
-                    Along::Zero => add(course, &|s| design.slopes.by_zero[s]),
-                    Along::Frame(axis) => add(course, &|s| design.slopes.by_frame[(s, *axis)]),
-                    Along::Tool(axis) => add(course, &|s| design.slopes.by_tool[(s, *axis)]),
-                    Along::Scale => add(course, &|s| design.slopes.by_scale[s]),
-                    Along::Sag => add(course, &|s| design.slopes.by_sag[s]),
+                Regressor::Disturbance { along, profile } => match along {
+                    Along::Zero => add(profile, &|s| design.slopes.by_zero[s]),
+                    Along::Frame(axis) => add(profile, &|s| design.slopes.by_frame[(s, *axis)]),
+                    Along::Target(axis) => add(profile, &|s| design.slopes.by_target[(s, *axis)]),
+                    Along::Scale => add(profile, &|s| design.slopes.by_scale[s]),
+                    Along::Sag => add(profile, &|s| design.slopes.by_sag[s]),
                 },
                 Regressor::Shift(vectors) => {
-                    for (axis, course) in vectors.iter().enumerate() {
-                        add(course, &|s| design.slopes.by_frame[(s, axis)]);
+                    for (axis, profile) in vectors.iter().enumerate() {
+                        add(profile, &|s| design.slopes.by_frame[(s, axis)]);
                     }
                 }
             }
@@ -328,7 +328,7 @@ pub fn arm_candidates(subject: &Subject<'_>) -> Vec<Candidate> {
     for joint in (0..6).filter(|&j| columns.approach[j]) {
         effects.push((Effect::Backlash(Backlash { joint, play_rad: 0.0 }), 1.0));
     }
-    for (time_constant_h, reference_c, tried) in courses(&columns) {
+    for (time_constant_h, reference_c, tried) in profiles(&columns) {
         let thermal = Thermal { growth: 0.0, time_constant_h, growth_per_k: 0.0, reference_c };
         effects.push((Effect::ThermalDrift(thermal), tried));
     }
@@ -348,7 +348,7 @@ const TIME_CONSTANTS: [f64; 5] = [0.05, 0.12, 0.3, 0.8, 3.0];
 const NEVER_H: f64 = 1e12;
 
 /// Clocks and thermometers that the columns allow: time constant (h), reference [°C], variants tried.
-fn courses(columns: &Columns) -> Vec<(f64, f64, f64)> {
+fn profiles(columns: &Columns) -> Vec<(f64, f64, f64)> {
     let mut out = Vec::new();
     if let Some((mean, _)) = columns.temperature {
         out.push((NEVER_H, mean, 1.0));
@@ -366,34 +366,40 @@ fn courses(columns: &Columns) -> Vec<(f64, f64, f64)> {
 pub fn measurement_candidates(subject: &Subject<'_>) -> Vec<Candidate> {
     let dataset = &subject.observed.dataset;
     let columns = Columns::of(dataset);
-    let mut list = vec![(Kind::Scale, Course::Always, 1.0)];
+    let mut list = vec![(Kind::Scale, Profile::Constant, 1.0)];
     if dataset.sensor == Sensor::Cable {
-        list.push((Kind::Sag, Course::Always, 1.0));
+        list.push((Kind::Sag, Profile::Constant, 1.0));
     }
     let turning = dataset.sensor != Sensor::Cable;
     if let Some((mean, _)) = columns.temperature {
-        list.push((Kind::Frame { turning }, Course::Thermometer { reference_c: mean }, 1.0));
+        list.push((Kind::Frame { turning }, Profile::Temperature { reference_c: mean }, 1.0));
         if dataset.sensor == Sensor::Cable {
-            list.push((Kind::Zero, Course::Thermometer { reference_c: mean }, 1.0));
+            list.push((Kind::Zero, Profile::Temperature { reference_c: mean }, 1.0));
         }
     }
     if let Some(hours) = columns.hours {
         let tried = TIME_CONSTANTS.len() as f64;
         for share in TIME_CONSTANTS {
-            let clock = Course::Clock { time_constant_h: share * hours };
+            let clock = Profile::Exponential { time_constant_h: share * hours };
             list.push((Kind::Frame { turning }, clock, tried));
             if dataset.sensor == Sensor::Cable {
                 list.push((Kind::Zero, clock, tried));
             }
         }
     }
-    let forms =
-        forms(dataset, &columns).into_iter().map(|(form, tried)| (Kind::Form(form), Course::Always, tried));
+    let forms = forms(dataset, &columns)
+        .into_iter()
+        .map(|(form, tried)| (Kind::Empirical(form), Profile::Constant, tried));
     list.into_iter()
         .chain(forms)
-        .map(|(kind, course, tried)| Candidate {
+        .map(|(kind, profile, tried)| Candidate {
             tried,
-            ..Candidate::measurement(Disturbance::new(kind, course), dataset, subject.nominal, subject.frames)
+            ..Candidate::measurement(
+                Disturbance::new(kind, profile),
+                dataset,
+                subject.nominal,
+                subject.frames,
+            )
         })
         .collect()
 }
@@ -403,44 +409,44 @@ const NEIGHBOURS: [(usize, usize); 10] =
     [(0, 1), (1, 0), (1, 2), (2, 1), (2, 3), (3, 2), (3, 4), (4, 3), (4, 5), (5, 4)];
 
 /// A drum between the shortest and the longest of the lengths that were read.
-fn drum(dataset: &Dataset) -> Form {
+fn drum(dataset: &Dataset) -> EmpiricalFault {
     let lengths = dataset.rows.iter().filter_map(|row| match row.reading {
         Reading::Cable(length) if length.is_finite() => Some(length),
         _ => None,
     });
     let (low, high) =
         lengths.fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), l| (low.min(l), high.max(l)));
-    Form::Drum { from_mm: low.min(high).max(0.0).floor() as u32, to_mm: high.ceil() as u32 }
+    EmpiricalFault::Drum { from_mm: low.min(high).max(0.0).floor() as u32, to_mm: high.ceil() as u32 }
 }
 
 /// Late readings, their delay counted from the middle of the times that were logged.
-fn latency(dataset: &Dataset) -> Form {
+fn latency(dataset: &Dataset) -> EmpiricalFault {
     let times = dataset.rows.iter().filter_map(|row| row.condition.time_h).filter(|t| t.is_finite());
     let (first, last) =
         times.fold((f64::INFINITY, f64::NEG_INFINITY), |(first, last), t| (first.min(t), last.max(t)));
     let middle_s = 0.5 * (first + last) * 3600.0;
-    Form::Latency { middle_s: if middle_s.is_finite() { middle_s.round() as i64 } else { 0 } }
+    EmpiricalFault::Latency { middle_s: if middle_s.is_finite() { middle_s.round() as i64 } else { 0 } }
 }
 
 /// Forms that the columns allow, with the variants tried of each.
-fn forms(dataset: &Dataset, columns: &Columns) -> Vec<(Form, f64)> {
+fn forms(dataset: &Dataset, columns: &Columns) -> Vec<(EmpiricalFault, f64)> {
     let mut out = Vec::new();
     let has =
         |rate: bool| dataset.rows.iter().any(|r| r.motion().is_some_and(|m| !rate || m.rate_per_h.is_some()));
     if has(true) {
         out.push((latency(dataset), 1.0));
     } else if has(false) {
-        out.extend([(Form::LastStep, 2.0), (Form::SlowReading, 2.0)]);
+        out.extend([(EmpiricalFault::ArmUnsettled, 2.0), (EmpiricalFault::SensorUnsettled, 2.0)]);
     }
     let moves = |j: usize| columns.range_rad[j] > STILL_RAD;
-    out.extend((0..3).map(|joint| (Form::Stiffness { joint }, 1.0)));
+    out.extend((0..3).map(|joint| (EmpiricalFault::NonlinearStiffness { joint }, 1.0)));
     let pairs = NEIGHBOURS.into_iter().filter(|&(a, b)| moves(a) && moves(b));
-    out.extend(pairs.map(|(joint, other)| (Form::TwoJointGear { joint, other }, 1.0)));
+    out.extend(pairs.map(|(joint, other)| (EmpiricalFault::TwoJointGear { joint, other }, 1.0)));
     if dataset.sensor == Sensor::Cable {
-        out.extend([(Form::Pulley, 1.0), (drum(dataset), 1.0)]);
+        out.extend([(EmpiricalFault::Pulley, 1.0), (drum(dataset), 1.0)]);
     } else {
-        out.push((Form::Refraction, 1.0));
-        out.extend([false, true].map(|second| (Form::Nest { second }, 2.0)));
+        out.push((EmpiricalFault::Refraction, 1.0));
+        out.extend([false, true].map(|second| (EmpiricalFault::TargetNest { second }, 2.0)));
     }
     out
 }

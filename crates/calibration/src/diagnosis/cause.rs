@@ -1,8 +1,8 @@
 //! A candidate cause: physics of the arm or a disturbance of the measurement, by its contract name.
 
 use crate::identification::tolerance::{Tolerance, effect_sigma};
-use crate::measurement::sensor::disturbance::{Course, Disturbance, Kind};
-use crate::measurement::sensor::form::Form;
+use crate::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
+use crate::measurement::sensor::empirical::EmpiricalFault;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::model::Model;
 
@@ -40,13 +40,13 @@ impl Cause {
     pub fn name(&self) -> &'static str {
         match self {
             Cause::Arm(effect) => effect.name(),
-            Cause::Measurement(disturbance) => match (&disturbance.kind, &disturbance.course) {
-                (Kind::Form(form), _) => form.name(),
+            Cause::Measurement(disturbance) => match (&disturbance.kind, &disturbance.profile) {
+                (Kind::Empirical(form), _) => form.name(),
                 (Kind::Load { .. }, _) => "payload-change",
-                (_, Course::Clock { .. } | Course::Thermometer { .. }) => "thermal-drift",
+                (_, Profile::Exponential { .. } | Profile::Temperature { .. }) => "thermal-drift",
                 (Kind::Zero, _) => "sensor-zero-shift",
                 (Kind::Frame { .. }, _) => "sensor-frame-shift",
-                (Kind::Tool, _) => "tool-shift",
+                (Kind::Target, _) => "tool-shift",
                 (Kind::Scale, _) => "sensor-scale",
                 (Kind::Sag, _) => "cable-sag",
             },
@@ -58,7 +58,7 @@ impl Cause {
         match self {
             Cause::Arm(Effect::JointCoupling(c)) => vec![c.driver, c.joint],
             Cause::Arm(effect) => effect.joint().into_iter().collect(),
-            Cause::Measurement(Disturbance { kind: Kind::Form(form), .. }) => form.joints(),
+            Cause::Measurement(Disturbance { kind: Kind::Empirical(form), .. }) => form.joints(),
             Cause::Measurement(_) => Vec::new(),
         }
     }
@@ -66,7 +66,7 @@ impl Cause {
     /// Data rows that it is about, both ends included.
     pub fn rows(&self) -> Option<[usize; 2]> {
         match self {
-            Cause::Measurement(Disturbance { course: Course::Rows { from, to }, .. }) => Some([*from, *to]),
+            Cause::Measurement(Disturbance { profile: Profile::Rows { from, to }, .. }) => Some([*from, *to]),
             _ => None,
         }
     }
@@ -107,7 +107,7 @@ impl Cause {
             Cause::Arm(effect) => {
                 !matches!(effect, Effect::Backlash(_) | Effect::GearTransmission(_) | Effect::ThermalDrift(_))
             }
-            Cause::Measurement(Disturbance { kind: Kind::Form(form), .. }) => form.is_of_the_arm(),
+            Cause::Measurement(Disturbance { kind: Kind::Empirical(form), .. }) => form.is_of_the_arm(),
             Cause::Measurement(_) => false,
         }
     }
@@ -132,10 +132,10 @@ impl Cause {
     /// Whether it is an error of two neighbouring joints with parallel axes that goes with the angle in which weight turns: what a
     /// spring does, or play whose flank follows the load, with a law that nobody has described.
     pub fn goes_with_weight(&self, nominal: &Model) -> bool {
-        let Cause::Measurement(Disturbance { kind: Kind::Form(form), values, .. }) = self else {
+        let Cause::Measurement(Disturbance { kind: Kind::Empirical(form), values, .. }) = self else {
             return false;
         };
-        let (Form::TwoJointGear { joint, other }, [a, b, c, d]) = (*form, values.as_slice()) else {
+        let (EmpiricalFault::TwoJointGear { joint, other }, [a, b, c, d]) = (*form, values.as_slice()) else {
             return false;
         };
         let (first, last) = (joint.min(other), joint.max(other));
@@ -150,15 +150,15 @@ impl Cause {
 
     /// Whether only the shape of it is known, not the law: a form.
     pub fn is_roughly_described(&self) -> bool {
-        matches!(self, Cause::Measurement(Disturbance { kind: Kind::Form(_), .. }))
+        matches!(self, Cause::Measurement(Disturbance { kind: Kind::Empirical(_), .. }))
     }
 
     /// Whether it is a fault of a cable and of what leads it.
     pub fn is_of_the_cable(&self) -> bool {
         match self {
             Cause::Measurement(Disturbance { kind: Kind::Sag, .. }) => true,
-            Cause::Measurement(Disturbance { kind: Kind::Form(form), .. }) => {
-                matches!(form, Form::Pulley | Form::Drum { .. })
+            Cause::Measurement(Disturbance { kind: Kind::Empirical(form), .. }) => {
+                matches!(form, EmpiricalFault::Pulley | EmpiricalFault::Drum { .. })
             }
             _ => false,
         }
@@ -168,7 +168,9 @@ impl Cause {
     pub fn follows_warmth(&self) -> bool {
         match self {
             Cause::Arm(effect) => matches!(effect, Effect::ThermalDrift(_)),
-            Cause::Measurement(d) => matches!(d.course, Course::Clock { .. } | Course::Thermometer { .. }),
+            Cause::Measurement(d) => {
+                matches!(d.profile, Profile::Exponential { .. } | Profile::Temperature { .. })
+            }
         }
     }
 
@@ -176,7 +178,7 @@ impl Cause {
     pub fn is_of_the_arm(&self) -> bool {
         match self {
             Cause::Arm(_) => true,
-            Cause::Measurement(Disturbance { kind: Kind::Form(form), .. }) => form.is_of_the_arm(),
+            Cause::Measurement(Disturbance { kind: Kind::Empirical(form), .. }) => form.is_of_the_arm(),
             Cause::Measurement(_) => false,
         }
     }
@@ -190,7 +192,10 @@ impl Cause {
         let part = match self {
             Cause::Arm(Effect::JointCompliance(_) | Effect::LumpedCompliance(_)) => Part::Spring,
             Cause::Arm(Effect::Backlash(_)) => Part::Play,
-            Cause::Measurement(Disturbance { kind: Kind::Form(Form::Stiffness { .. }), .. }) => Part::Spring,
+            Cause::Measurement(Disturbance {
+                kind: Kind::Empirical(EmpiricalFault::NonlinearStiffness { .. }),
+                ..
+            }) => Part::Spring,
             _ => Part::Gear,
         };
         Some((part, joint))

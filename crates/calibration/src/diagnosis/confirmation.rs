@@ -30,7 +30,7 @@ use super::halves::halves;
 use super::intervals::Strip;
 use super::score::{Score, log_p_of, score_columns, score_from, score_projected};
 use super::selection::{Accepted, Options, already};
-use crate::measurement::sensor::disturbance::{Course, Disturbance};
+use crate::measurement::sensor::disturbance::{Disturbance, Profile};
 use truegrind_arm::effect::Effect;
 use truegrind_math::work::checkpoint;
 
@@ -401,7 +401,7 @@ impl<'a> Half<'a> {
             return false;
         }
         // The kind in all rows, not only in its own.
-        let always = Cause::Measurement(Disturbance::new(disturbance.kind.clone(), Course::Always));
+        let always = Cause::Measurement(Disturbance::new(disturbance.kind.clone(), Profile::Constant));
         let everywhere = Candidate::of(&always, self.confirming.subject).columns(self.confirming.raw);
         let everywhere = self.columns(&everywhere);
         let Some(strip) = Strip::of(design, &everywhere, &tried.candidate.cause.sizes()) else {

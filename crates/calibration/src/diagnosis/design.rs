@@ -33,7 +33,7 @@ pub struct Slopes {
     /// By a common relative growth of all lengths.
     pub by_growth: DVector<f64>,
     /// By the touched point on the flange, n × 3.
-    pub by_tool: DMatrix<f64>,
+    pub by_target: DMatrix<f64>,
     /// By the sensor's frame or the outlet, n × 6 or n × 3.
     pub by_frame: DMatrix<f64>,
     /// By a cable's zero; zeros for other sensors.
@@ -180,7 +180,7 @@ impl Linear {
         let slopes = Arc::new(Slopes {
             by_joint: (0..6).map(column).collect(),
             by_growth,
-            by_tool: DMatrix::from_columns(&[column(18), column(19), column(20)]),
+            by_target: DMatrix::from_columns(&[column(18), column(19), column(20)]),
             by_frame,
             by_zero,
             by_scale,

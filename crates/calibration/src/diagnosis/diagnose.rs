@@ -283,7 +283,7 @@ fn thinned(observed: &Observations) -> Option<Observations> {
     (dataset.rows.len() > most).then(|| {
         // Not every so many rows: one row less would then be another choice of all that follow it.
         let all = (0..dataset.rows.len()).map(|i| vec![i]).collect();
-        let mut rows = split::drawn(dataset, all, 0).concat();
+        let mut rows = split::shuffled_by_angles(dataset, all, 0).concat();
         rows.truncate(most);
         rows.sort_unstable();
         observed.subset(&rows)

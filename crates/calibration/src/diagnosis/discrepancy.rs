@@ -101,7 +101,7 @@ impl Functions {
         let frame: Vec<DVector<f64>> = columns_of(&slopes.by_frame);
         let single = |slope: &DVector<f64>| vec![slope.clone()];
         out.push(Group::FrameInTime, &frame, &courses, per);
-        out.push(Group::TargetInTime, &columns_of(&slopes.by_tool), &courses, per);
+        out.push(Group::TargetInTime, &columns_of(&slopes.by_target), &courses, per);
         if dataset.sensor == Sensor::Cable {
             out.push(Group::ZeroInTime, &single(&slopes.by_zero), &courses, per);
         }

@@ -63,7 +63,8 @@ fn both(poses: &[Vec<usize>], first: &[bool]) -> [Vec<usize>; 2] {
 /// Half of the poses, drawn from the poses themselves: another row changes nothing about the others.
 fn random(dataset: &Dataset, poses: &[Vec<usize>], seed: u64) -> Vec<bool> {
     let mut side = vec![false; poses.len()];
-    let drawn = split::drawn(dataset, (0..poses.len()).map(|p| vec![poses[p][0], p]).collect(), seed);
+    let drawn =
+        split::shuffled_by_angles(dataset, (0..poses.len()).map(|p| vec![poses[p][0], p]).collect(), seed);
     drawn.iter().take(poses.len() / 2).for_each(|pose| side[pose[1]] = true);
     side
 }

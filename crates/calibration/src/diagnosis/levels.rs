@@ -9,7 +9,7 @@ use super::cause::Cause;
 use super::extension::Extended;
 use super::intervals::{SHORTEST, tried};
 use crate::identification::tolerance::Tolerance;
-use crate::measurement::sensor::disturbance::{Course, Disturbance, Kind};
+use crate::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
 use truegrind_estimation::problem::Problem;
 
 /// A piece whose level is below this share of the largest comes to nothing.
@@ -22,8 +22,8 @@ const PLAINER: f64 = 4.0;
 /// A shift and its rows.
 fn shift(cause: &Cause) -> Option<(&Disturbance, usize, usize)> {
     match cause {
-        Cause::Measurement(d) => match d.course {
-            Course::Rows { from, to } => Some((d, from, to)),
+        Cause::Measurement(d) => match d.profile {
+            Profile::Rows { from, to } => Some((d, from, to)),
             _ => None,
         },
         Cause::Arm(_) => None,
@@ -66,7 +66,7 @@ fn levels(group: &[(&Disturbance, usize, usize)]) -> Vec<Disturbance> {
     cuts.sort_unstable();
     cuts.dedup();
     let kind = &group[0].0.kind;
-    let unit = Disturbance::new(kind.clone(), Course::Always);
+    let unit = Disturbance::new(kind.clone(), Profile::Constant);
     let sizes: Vec<f64> = (0..unit.values.len()).map(|k| Tolerance::of_disturbance(&unit, k)).collect();
     let nothing = vec![0.0; sizes.len()];
     let apart = |a: &[f64], b: &[f64]| -> f64 {
@@ -101,7 +101,7 @@ fn levels(group: &[(&Disturbance, usize, usize)]) -> Vec<Disturbance> {
         .filter(|p| apart(&p.2, &nothing) > NOTHING * largest)
         .map(|(from, to, values)| Disturbance {
             values,
-            ..Disturbance::new(kind.clone(), Course::Rows { from, to: to - 1 })
+            ..Disturbance::new(kind.clone(), Profile::Rows { from, to: to - 1 })
         })
         .collect()
 }

@@ -6,7 +6,7 @@ use super::cause::Cause;
 use super::design::Design;
 use super::extension::Subject;
 use crate::measurement::dataset::{Dataset, Reading, Sensor};
-use crate::measurement::sensor::disturbance::{Course, Kind};
+use crate::measurement::sensor::disturbance::{Kind, Profile};
 use truegrind_arm::effect::Effect;
 
 /// What an axis shows, and its unit.
@@ -102,7 +102,7 @@ fn across<'d>(cause: &Cause, dataset: &'d Dataset) -> (Label, Box<dyn Fn(usize) 
                 Reading::Pose(p) => p.translation.vector.norm(),
             }),
         ),
-        Cause::Measurement(d) if matches!(d.course, Course::Thermometer { .. }) => (
+        Cause::Measurement(d) if matches!(d.profile, Profile::Temperature { .. }) => (
             ("temperature".to_owned(), "°C"),
             Box::new(|i| dataset.rows[i].condition.temperature_c.unwrap_or(f64::NAN)),
         ),
@@ -113,7 +113,7 @@ fn across<'d>(cause: &Cause, dataset: &'d Dataset) -> (Label, Box<dyn Fn(usize) 
         Cause::Arm(Effect::ThermalDrift(_)) => {
             (("time".to_owned(), "h"), Box::new(|i| dataset.rows[i].condition.time_h.unwrap_or(f64::NAN)))
         }
-        Cause::Measurement(d) if matches!(d.course, Course::Clock { .. }) => {
+        Cause::Measurement(d) if matches!(d.profile, Profile::Exponential { .. }) => {
             (("time".to_owned(), "h"), Box::new(|i| dataset.rows[i].condition.time_h.unwrap_or(f64::NAN)))
         }
         _ => (("data row".to_owned(), ""), Box::new(|i| dataset.rows[i].number as f64)),

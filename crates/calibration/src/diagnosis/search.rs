@@ -14,7 +14,7 @@ use super::selection::{self, Accepted, Selection};
 use super::validation::{StageError, Validation};
 use crate::identification::network::with_network;
 use crate::measurement::dataset::Dataset;
-use crate::measurement::sensor::disturbance::{Course, Disturbance};
+use crate::measurement::sensor::disturbance::{Disturbance, Profile};
 
 /// What is diagnosed, and how.
 pub(super) struct Ground<'a> {
@@ -272,12 +272,12 @@ fn to_the_end(causes: &[Cause], searched: &Dataset, dataset: &Dataset) -> Vec<Ca
     causes
         .iter()
         .map(|cause| match cause {
-            Cause::Measurement(Disturbance { kind, course: Course::Rows { from, to }, values })
+            Cause::Measurement(Disturbance { kind, profile: Profile::Rows { from, to }, values })
                 if *to == last(searched) =>
             {
                 Cause::Measurement(Disturbance {
                     kind: kind.clone(),
-                    course: Course::Rows { from: *from, to: last(dataset) },
+                    profile: Profile::Rows { from: *from, to: last(dataset) },
                     values: values.clone(),
                 })
             }

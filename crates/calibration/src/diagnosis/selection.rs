@@ -247,7 +247,7 @@ pub(super) fn already(causes: &[Cause], candidate: &Cause) -> bool {
             };
             still(a) == still(b)
         }
-        (Cause::Measurement(a), Cause::Measurement(b)) => a.kind == b.kind && a.course == b.course,
+        (Cause::Measurement(a), Cause::Measurement(b)) => a.kind == b.kind && a.profile == b.profile,
         _ => false,
     })
 }

@@ -126,7 +126,7 @@ fn smallest_rad(scored: &Scored) -> Option<f64> {
         Regressor::Arm { rotation, .. } => {
             rotation.iter().flat_map(|(_, c)| c.iter()).fold(0.0_f64, |m, v| m.max(v.abs()))
         }
-        Regressor::Push { .. } | Regressor::Shift(_) => 0.0,
+        Regressor::Disturbance { .. } | Regressor::Shift(_) => 0.0,
     };
     let information = &scored.score.information;
     let scaled: Vec<f64> = scored.candidate.regressors.iter().map(peak).collect();

@@ -3,8 +3,8 @@
 use super::cause::Cause;
 use super::extension::Extended;
 use super::finding::FoundParameter;
-use crate::measurement::sensor::disturbance::{Course, Disturbance, Kind};
-use crate::measurement::sensor::form::Form;
+use crate::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
+use crate::measurement::sensor::empirical::EmpiricalFault;
 use truegrind_arm::effect::Effect;
 
 /// Value and σ of the parameters of cause `index`.
@@ -135,19 +135,19 @@ pub fn cause(cause: &Cause, parameters: &[FoundParameter], last_row: usize) -> S
 /// One sentence for a disturbance of the measurement; `rows`: when.
 fn of_measurement(d: &Disturbance, rows: &str, parameters: &[FoundParameter]) -> String {
     let value = found(parameters, 0);
-    match (&d.kind, &d.course) {
-        (Kind::Form(form), _) => of_form(*form, parameters),
+    match (&d.kind, &d.profile) {
+        (Kind::Empirical(form), _) => of_form(*form, parameters),
         (Kind::Load { compliance: Some(_), .. }, _) => {
             format!("{rows} the arm carried {value:.1} kg more than the log says")
         }
         (Kind::Load { .. }, _) => {
             format!("{rows} the arm carried a load that the log does not tell of")
         }
-        (_, Course::Clock { time_constant_h }) => format!(
+        (_, Profile::Exponential { time_constant_h }) => format!(
             "the sensor drifts against the base while things warm up: {:.2} mm, time constant {time_constant_h:.2} h",
             size(parameters)
         ),
-        (_, Course::Thermometer { .. }) => format!(
+        (_, Profile::Temperature { .. }) => format!(
             "the sensor drifts against the base with temperature: {:.1} µm per kelvin",
             size(parameters) * 1e3
         ),
@@ -155,7 +155,7 @@ fn of_measurement(d: &Disturbance, rows: &str, parameters: &[FoundParameter]) ->
         (Kind::Frame { .. }, _) => {
             format!("the sensor stood {:.3} mm elsewhere {rows}: its stand was moved", size(parameters))
         }
-        (Kind::Tool, _) => format!(
+        (Kind::Target, _) => format!(
             "the touched point sat {:.3} mm elsewhere on the flange {rows}: hook or reflector slipped",
             size(parameters)
         ),
@@ -167,15 +167,15 @@ fn of_measurement(d: &Disturbance, rows: &str, parameters: &[FoundParameter]) ->
 }
 
 /// One sentence for a form.
-fn of_form(form: Form, parameters: &[FoundParameter]) -> String {
+fn of_form(form: EmpiricalFault, parameters: &[FoundParameter]) -> String {
     let value = found(parameters, 0);
     let joint = form.joints().first().map_or(0, |j| j + 1);
     match form {
-        Form::Latency { .. } => format!(
+        EmpiricalFault::Latency { .. } => format!(
             "the reading and the angles of a row are {:.1} ms apart while the arm moves",
             1e3 * value.abs()
         ),
-        Form::LastStep => {
+        EmpiricalFault::ArmUnsettled => {
             let share = |k: usize| found(parameters, k).abs();
             let most = (0..parameters.len()).max_by(|&a, &b| share(a).total_cmp(&share(b))).unwrap_or(0);
             format!(
@@ -184,29 +184,29 @@ fn of_form(form: Form, parameters: &[FoundParameter]) -> String {
                 most + 1
             )
         }
-        Form::SlowReading => format!(
+        EmpiricalFault::SensorUnsettled => format!(
             "readings were taken before the sensor had settled: {:.2} % of the way from the last one was still to come",
             100.0 * value.abs()
         ),
-        Form::Stiffness { .. } => format!(
+        EmpiricalFault::NonlinearStiffness { .. } => format!(
             "joint {joint} does not yield in proportion to its torque: its spring hardens, or has play"
         ),
-        Form::TwoJointGear { other, .. } => {
+        EmpiricalFault::TwoJointGear { other, .. } => {
             format!("the error of joint {joint} depends on its own angle and on that of joint {}", other + 1)
         }
-        Form::Refraction => format!(
+        EmpiricalFault::Refraction => format!(
             "the tracker's beam is bent: {:.3} mm at 3 m, in proportion to the square of the distance, as by air that is warmer above than below",
             9e3 * value.abs()
         ),
-        Form::Pulley => {
+        EmpiricalFault::Pulley => {
             "the cable's length depends on its direction, as over a pulley or through a worn outlet"
                 .to_owned()
         }
-        Form::Drum { .. } => {
+        EmpiricalFault::Drum { .. } => {
             "the cable's reading is not in proportion to its length, as from a drum wound in layers"
                 .to_owned()
         }
-        Form::Nest { .. } => {
+        EmpiricalFault::TargetNest { .. } => {
             "the target's centre depends on the direction from which it is seen: nest or reflector".to_owned()
         }
     }

@@ -33,7 +33,7 @@ use crate::identification::fit::{Fitted, Observations};
 use crate::identification::rounding;
 use crate::identification::tolerance::Tolerance;
 use crate::measurement::dataset::{Dataset, Reading, Sensor};
-use crate::measurement::sensor::disturbance::{Course, Kind};
+use crate::measurement::sensor::disturbance::{Kind, Profile};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::estimated::Estimated;
 use truegrind_arm::jacobian::{BaseAndTool, parameter_jacobian};
@@ -244,7 +244,7 @@ const WIDE: f64 = 10.0;
 
 /// Whether the fit itself has a scale parameter for all rows.
 fn fits_scale(fitted: &Fitted) -> bool {
-    fitted.frames.disturbances.iter().any(|d| d.kind == Kind::Scale && d.course == Course::Always)
+    fitted.frames.disturbances.iter().any(|d| d.kind == Kind::Scale && d.profile == Profile::Constant)
 }
 
 /// A point of the grid: scale prior, prior widths and noise.

@@ -83,10 +83,9 @@ pub fn starts(dataset: &Dataset, nominal: &Model) -> Result<Vec<Frames>, StartEr
         Sensor::Position => {
             let measured: Vec<Vector3<f64>> = positions(dataset);
             let found =
-                registration::touching_point(&flanges, &measured).ok_or_else(|| none("sensor frame", 4))?;
+                registration::target_point(&flanges, &measured).ok_or_else(|| none("sensor frame", 4))?;
             frames.base_from_sensor = found.base_from_sensor;
-            frames.flange_from_target =
-                Pose::from_parts(found.on_flange_mm.into(), UnitQuaternion::identity());
+            frames.flange_from_target = Pose::from_parts(found.target_mm.into(), UnitQuaternion::identity());
             Ok(vec![frames])
         }
         Sensor::Pose => {

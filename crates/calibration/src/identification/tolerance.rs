@@ -72,14 +72,14 @@ impl Tolerance {
     /// Standard deviation of a parameter of a disturbance, in its unit: sizes met in practice, wide.
     pub fn of_disturbance(disturbance: &Disturbance, parameter: usize) -> f64 {
         match &disturbance.kind {
-            Kind::Zero | Kind::Tool => 5.0,
+            Kind::Zero | Kind::Target => 5.0,
             Kind::Frame { .. } if parameter >= 3 => 5e-3,
             Kind::Frame { .. } => 5.0,
             Kind::Scale => 3e-3,
             Kind::Sag => 3e-3,
             Kind::Load { compliance: Some(_), .. } => 10.0,
             Kind::Load { .. } => 1e-4,
-            Kind::Form(form) => form.size(parameter),
+            Kind::Empirical(form) => form.prior_sigma(parameter),
         }
     }
 

@@ -1,4 +1,4 @@
-//! What the angles of a file mean: the controller's own, or DH angles with the links' offsets in them.
+//! Convention of the angles in a file: the controller's own, or DH angles that include the links' offsets.
 
 use std::fmt;
 use std::str::FromStr;
@@ -16,7 +16,7 @@ pub enum AngleConvention {
     /// The controller's angles, as its display shows them.
     #[default]
     Logged,
-    /// The angles θ of the DH table: joint map and theta offsets are in them already.
+    /// The angles θ of the DH table, joint map and theta offsets included.
     Dh,
 }
 
@@ -53,7 +53,8 @@ impl AngleConvention {
     /// The data set with the controller's angles in place of the file's, and a note where they differ.
     /// `None` when the arm's joint map cannot be inverted.
     pub fn apply(self, mut data: Dataset, model: &Model) -> Option<Dataset> {
-        // Rows that are shared would be copied.
+        // Iterating mutably would copy shared rows.
+
         if self == AngleConvention::Dh {
             for row in &mut data.rows {
                 row.joints = self.controller_angles(model, &row.joints)?;

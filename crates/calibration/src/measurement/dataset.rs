@@ -1,4 +1,4 @@
-//! Measured rows as the rest of truegrind sees them: units converted, columns resolved.
+//! A measurement file as the rest of truegrind uses it: units converted, columns resolved.
 
 mod row;
 mod rows;
@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 pub use self::row::{Extra, Motion, PathPoint, Reading, Row};
 pub use self::rows::{Iter, Rows};
 
-/// What the sensor tells of a pose.
+/// What the sensor measures of a pose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sensor {
@@ -35,18 +35,18 @@ pub struct Dataset {
     pub rows: Rows,
     /// Headers of columns that are kept but not used.
     pub other_columns: Vec<String>,
-    /// What a reader should know: columns skipped, blank rows dropped.
+    /// Notes for the user: columns skipped, blank rows dropped.
     pub notes: Vec<String>,
-    /// Step to which the angles are rounded (rad), where all are multiples of one.
+    /// Step to which the angles are rounded (rad); absent where no common step divides all of them.
     pub angle_step_rad: Option<f64>,
-    /// Step to which the read-out is rounded (mm), where all are multiples of one.
+    /// Step to which the controller's read-out is rounded (mm); absent as above.
     pub readout_step_mm: Option<f64>,
-    /// Step to which the sensor's lengths are rounded (mm), where all are multiples of one.
+    /// Step to which the sensor's lengths are rounded (mm); absent as above.
     pub reading_step_mm: Option<f64>,
 }
 
 impl Dataset {
-    /// Rows that come from no file.
+    /// Rows without a source file.
     pub fn new(file: &str, sensor: Sensor, rows: impl Into<Rows>) -> Self {
         Self {
             file: file.into(),
@@ -64,7 +64,7 @@ impl Dataset {
 
     /// The same file with only the rows at `indices` of [`Dataset::rows`].
     pub fn subset(&self, indices: &[usize]) -> Self {
-        Self { rows: self.rows.part(indices), ..self.clone() }
+        Self { rows: self.rows.select(indices), ..self.clone() }
     }
 
     /// Number of cable outlets.

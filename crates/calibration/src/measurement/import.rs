@@ -16,21 +16,21 @@ pub mod template;
 mod clock;
 mod columns;
 mod error;
-mod moments;
+mod join_by_time;
 mod options;
-mod points;
-mod profile;
+mod tracker_export;
+mod foreign;
 mod rows;
 mod rounding;
 
-pub use error::{ImportError, Place};
-pub use options::{Clocks, Options};
+pub use error::{ImportError, Location};
+pub use options::{Options, TimeMatching};
 
 use sha2::{Digest, Sha256};
 
 use self::cell::{Cell, Line, Table};
 use self::columns::Columns;
-use self::points::Points;
+use self::tracker_export::Points;
 use super::dataset::Dataset;
 
 /// Reads a measurement file. `file` is the name that messages and reports print; the format is told by the bytes.
@@ -44,7 +44,7 @@ use super::dataset::Dataset;
 /// assert_eq!(rows.rows[0].reading, Reading::Cable(500.25));
 /// assert!((rows.rows[0].joints[1].to_degrees() - 20.0).abs() < 1e-12);
 ///
-/// // A fault is named with its place.
+/// // A fault is named with its location.
 /// let error = read("poses.csv", b"q1,q2,q3,q4,q5,q6,L\n10,20,30,40,fifty,60,500.25\n", &Options::default());
 /// let said = error.map(|_| ()).map_err(|error| error.to_string()).err().ok_or("was read")?;
 /// assert!(said.starts_with("poses.csv, row 2, column q5") && said.contains("fifty"), "{said}");
@@ -69,11 +69,11 @@ pub fn read(file: &str, bytes: &[u8], options: &Options) -> Result<Dataset, Impo
 ///
 /// ```
 /// use truegrind_calibration::measurement::dataset::Reading;
-/// use truegrind_calibration::measurement::import::{Options, joined};
+/// use truegrind_calibration::measurement::import::{Options, read_joined};
 ///
 /// let log = b"name,q1,q2,q3,q4,q5,q6\np1,10,20,30,40,50,60\np2,11,21,31,41,51,61\n";
 /// let points = b"// Frame: World\nMain p2 812.5 -40.25 903.125\nMain p1 800.5 -41.0 900.25\n";
-/// let rows = joined(("joints.csv", log), ("tracker.txt", points), &Options::default())?;
+/// let rows = read_joined(("joints.csv", log), ("tracker.txt", points), &Options::default())?;
 /// assert_eq!(rows.rows[0].reading, Reading::Position([800.5, -41.0, 900.25].into()));
 /// # Ok::<(), truegrind_calibration::measurement::import::ImportError>(())
 /// ```
@@ -81,8 +81,12 @@ pub fn read(file: &str, bytes: &[u8], options: &Options) -> Result<Dataset, Impo
 /// # Errors
 /// [`ImportError`]: as of [`read`], and where lines of the export are not alike, a point stands twice, the log has no names, or none of
 /// them is that of a point.
-pub fn joined(log: (&str, &[u8]), points: (&str, &[u8]), options: &Options) -> Result<Dataset, ImportError> {
-    together(log, points, options, |measured, table| measured.joined(log.0, table))
+pub fn read_joined(
+    log: (&str, &[u8]),
+    points: (&str, &[u8]),
+    options: &Options,
+) -> Result<Dataset, ImportError> {
+    read_together(log, points, options, |measured, table| measured.join_by_name(log.0, table))
 }
 
 /// The same by the times of the log's column `time` and of the export's time stamps. A point is joined with the row nearest to it; a row
@@ -90,30 +94,32 @@ pub fn joined(log: (&str, &[u8]), points: (&str, &[u8]), options: &Options) -> R
 ///
 /// ```
 /// use truegrind_calibration::measurement::dataset::Reading;
-/// use truegrind_calibration::measurement::import::{Clocks, Options, joined_by_time};
+/// use truegrind_calibration::measurement::import::{TimeMatching, Options, read_joined_by_time};
 ///
 /// let log = b"time,q1,q2,q3,q4,q5,q6\n10:15:30,10,20,30,40,50,60\n10:15:40,11,21,31,41,51,61\n";
 /// let points = b"Main p1 800.5 -41.0 900.25 11/23/2026 10:15:39.8\n";
-/// let clocks = Clocks { within_s: 0.5, ahead_s: 0.0 };
-/// let rows = joined_by_time(("joints.csv", log), ("tracker.txt", points), &clocks, &Options::default())?;
+/// let clocks = TimeMatching { within_s: 0.5, ahead_s: 0.0 };
+/// let rows = read_joined_by_time(("joints.csv", log), ("tracker.txt", points), &clocks, &Options::default())?;
 /// assert_eq!(rows.rows.len(), 1);
 /// assert!((rows.rows[0].joints[0].to_degrees() - 11.0).abs() < 1e-12);
 /// # Ok::<(), truegrind_calibration::measurement::import::ImportError>(())
 /// ```
 ///
 /// # Errors
-/// [`ImportError`]: as of [`joined`], where a row or a point has no time, where no row lies within the tolerance of a point, and where it
+/// [`ImportError`]: as of [`read_joined`], where a row or a point has no time, where no row lies within the tolerance of a point, and where it
 /// would be a guess which row a point belongs to: the arm moved within the tolerance, or a row is the nearest to two points.
-pub fn joined_by_time(
+pub fn read_joined_by_time(
     log: (&str, &[u8]),
     points: (&str, &[u8]),
-    clocks: &Clocks,
+    clocks: &TimeMatching,
     options: &Options,
 ) -> Result<Dataset, ImportError> {
-    together(log, points, options, |measured, table| moments::joined(&measured, log.0, table, clocks))
+    read_together(log, points, options, |measured, table| {
+        join_by_time::join_by_time(&measured, log.0, table, clocks)
+    })
 }
 
-fn together(
+fn read_together(
     log: (&str, &[u8]),
     points: (&str, &[u8]),
     options: &Options,
@@ -121,7 +127,7 @@ fn together(
 ) -> Result<Dataset, ImportError> {
     let measured = Points::read(points.0, points.1)?;
     let table = match xlsx::is_workbook(log.1) {
-        true => sheet_of(log.0, xlsx::tables(log.0, log.1)?, options)?,
+        true => select_sheet(log.0, xlsx::tables(log.0, log.1)?, options)?,
         false => {
             let text = csv::Text::of(log.0, log.1)?;
             let rows = text.lines(log.0).collect::<Result<_, _>>()?;
@@ -138,7 +144,7 @@ fn together(
 }
 
 /// The sheet that is asked for, or the first that holds anything.
-fn sheet_of(file: &str, tables: Vec<Table>, options: &Options) -> Result<Table, ImportError> {
+fn select_sheet(file: &str, tables: Vec<Table>, options: &Options) -> Result<Table, ImportError> {
     let name = |table: &Table| table.sheet.clone().unwrap_or_default();
     let sheets: Vec<String> = tables.iter().map(name).collect();
     let wanted = |table: &Table| match &options.sheet {
@@ -147,7 +153,7 @@ fn sheet_of(file: &str, tables: Vec<Table>, options: &Options) -> Result<Table, 
     };
     tables.into_iter().find(wanted).ok_or_else(|| match &options.sheet {
         Some(sheet) => ImportError::UnknownSheet { file: file.into(), sheet: sheet.clone(), sheets },
-        None => ImportError::Empty { place: Place::file(file) },
+        None => ImportError::Empty { location: Location::file(file) },
     })
 }
 
@@ -156,15 +162,15 @@ fn sheet_of(file: &str, tables: Vec<Table>, options: &Options) -> Result<Table, 
 ///
 /// ```
 /// use truegrind_calibration::measurement::import::cell::Cell;
-/// use truegrind_calibration::measurement::import::{Options, rows};
+/// use truegrind_calibration::measurement::import::{Options, from_rows};
 ///
 /// let names = ["q1", "q2", "q3", "q4", "q5", "q6", "L"].map(String::from);
 /// let number = |value: f64| Cell::Number { value, as_text: false };
 /// let pose = |length: f64| vec![10.0, 20.0, 30.0, 40.0, 50.0, 60.0, length].into_iter().map(number).collect::<Vec<_>>();
-/// let found = rows("array", &names, [pose(500.25), pose(500.5)].into_iter(), &Options::default())?;
+/// let found = from_rows("array", &names, [pose(500.25), pose(500.5)].into_iter(), &Options::default())?;
 /// assert_eq!((found.rows.len(), found.rows[1].number), (2, 1));
 ///
-/// let error = rows("array", &names, [pose(500.25), pose(f64::NAN)].into_iter(), &Options::default());
+/// let error = from_rows("array", &names, [pose(500.25), pose(f64::NAN)].into_iter(), &Options::default());
 /// let said = error.map(|_| ()).map_err(|error| error.to_string());
 /// assert!(said.is_err_and(|said| said.starts_with("array, row 1, column L: found `NaN`; expected a finite number")));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -172,7 +178,7 @@ fn sheet_of(file: &str, tables: Vec<Table>, options: &Options) -> Result<Table, 
 ///
 /// # Errors
 /// [`ImportError`], as for a file.
-pub fn rows(
+pub fn from_rows(
     file: &str,
     names: &[String],
     rows: impl Iterator<Item = Vec<Cell>>,
@@ -201,19 +207,19 @@ pub fn rows(
 fn from_table(file: &str, table: &Table, options: &Options) -> Result<Dataset, ImportError> {
     match Columns::find(file, table) {
         Ok(columns) => rows::dataset(file, table, &columns, options, std::iter::empty()),
-        Err(error) => from_other(file, table, options).unwrap_or(Err(error)),
+        Err(error) => from_foreign(file, table, options).unwrap_or(Err(error)),
     }
 }
 
 /// A table of another program; `None` where it is none that is known.
-fn from_other(file: &str, table: &Table, options: &Options) -> Option<Result<Dataset, ImportError>> {
+fn from_foreign(file: &str, table: &Table, options: &Options) -> Option<Result<Dataset, ImportError>> {
     let read = |(table, notes): (Table, Vec<String>)| {
         let columns = Columns::find(file, &table)?;
         let mut dataset = rows::dataset(file, &table, &columns, options, std::iter::empty())?;
         dataset.notes.splice(0..0, notes);
         Ok(dataset)
     };
-    profile::known(file, table).map(|found| found.and_then(read))
+    foreign::convert(file, table).map(|found| found.and_then(read))
 }
 
 /// A text table: as many lines as it takes to find the header, and the rest one by one.
@@ -231,7 +237,7 @@ fn from_text(file: &str, text: &csv::Text<'_>, options: &Options) -> Result<Data
             for line in lines {
                 table.rows.push(line?);
             }
-            from_other(file, &table, options).unwrap_or(Err(error))
+            from_foreign(file, &table, options).unwrap_or(Err(error))
         }
     }
 }
@@ -247,14 +253,14 @@ fn from_workbook(file: &str, tables: &[Table], options: &Options) -> Result<Data
     }
     let mut usable = tables.iter().filter(|t| Columns::find(file, t).is_ok());
     let Some(table) = usable.next() else {
-        if let Some(found) = tables.iter().find_map(|table| from_other(file, table, options)) {
+        if let Some(found) = tables.iter().find_map(|table| from_foreign(file, table, options)) {
             return found;
         }
         // Nothing fits: complain about the first sheet that holds anything.
         let table = tables.iter().find(|t| !t.rows.is_empty()).or(tables.first());
         return match table {
             Some(table) => from_table(file, table, options),
-            None => Err(ImportError::Empty { place: Place::file(file) }),
+            None => Err(ImportError::Empty { location: Location::file(file) }),
         };
     };
     let mut dataset = from_table(file, table, options)?;

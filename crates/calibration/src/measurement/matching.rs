@@ -1,20 +1,20 @@
-//! A measurement file and the arm that was measured: do their units fit each other, and what are the file's angles?
+//! Checks a measurement file against the arm that was measured, and converts its angles to the controller's.
 
 use thiserror::Error;
 
 use super::convention::AngleConvention;
 use super::dataset::Dataset;
-use super::plausibility::{Evidence, UnitSuspicion, plausibility};
+use super::plausibility::{ComparedReading, UnitSuspicion, plausibility};
 use truegrind_arm::model::Model;
 
-/// Why rows cannot be those of an arm.
+/// Why a measurement file does not match an arm.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum Mismatch {
-    /// Another meaning of the file fits the arm far better than the stated one.
+    /// Another interpretation of the file's units fits the arm far better than the stated one.
     #[error("{0}")]
     Units(Box<UnitSuspicion>),
-    /// DH angles of an arm that has no way back from them.
+    /// DH angles of an arm whose joint map is singular.
     #[error("{robot}: its joint map cannot be inverted, so DH angles cannot be read")]
     JointMap {
         /// The arm.
@@ -22,12 +22,12 @@ pub enum Mismatch {
     },
 }
 
-/// The rows with the controller's angles, as the rest of truegrind takes them. `convention` is what the file's angles are,
-/// `allow_odd_units` takes the file at its word. What is odd about the controller's own read-out is noted, since no fit needs it.
+/// The rows with the controller's angles. `convention` states what the file's angles are; `allow_odd_units` skips the check of
+/// units. An implausible read-out of the controller is only noted, since no fit needs it.
 ///
 /// # Errors
 /// [`Mismatch`].
-pub fn matched(
+pub fn match_to_arm(
     mut dataset: Dataset,
     robot: &str,
     nominal: &Model,
@@ -36,9 +36,9 @@ pub fn matched(
 ) -> Result<Dataset, Mismatch> {
     if !allow_odd_units {
         for suspicion in plausibility(&dataset, nominal, convention) {
-            match suspicion.evidence {
-                Evidence::Sensor => return Err(Mismatch::Units(Box::new(suspicion))),
-                Evidence::Readout => dataset.notes.push(suspicion.to_string()),
+            match suspicion.compared {
+                ComparedReading::Sensor => return Err(Mismatch::Units(Box::new(suspicion))),
+                ComparedReading::Readout => dataset.notes.push(suspicion.to_string()),
             }
         }
     }

@@ -2,8 +2,8 @@
 //!
 //! Method: the nominal arm is registered to the sensor (and to the controller's read-out, where there is one) under
 //! every combination of {degrees, radians} × {mm, m, inch, cm} × {logged, DH angles} × {scalar first, scalar last,
-//! inverted}. What remains is taken relative to how far the flange travels under that meaning, since in a wrong unit the
-//! arm may hardly move. A data sheet is good to some tenths of a percent, a wrong unit to tens: when another meaning of
+//! inverted}. What remains is taken relative to how far the flange travels under that interpretation, since in a wrong unit the
+//! arm may hardly move. A data sheet is good to some tenths of a percent, a wrong unit to tens: when another interpretation of
 //! the file fits ten times better than the stated one, it is named.
 //!
 //! Shapes: up to 120 rows, evenly taken. Stops: closed forms and [`registration`]. Departures: none, there is no paper;
@@ -21,15 +21,15 @@ use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Model;
 use truegrind_math::se3::Pose;
 
-/// How much better another meaning of the file has to fit.
-const FACTOR: f64 = 10.0;
-/// Share of the travel to which a stated meaning may fail without being doubted: no wrong unit comes so close.
-const FINE: f64 = 0.01;
-/// Another meaning that leaves more than this share explains nothing.
-const USELESS: f64 = 0.1;
+/// How much better another interpretation of the file has to fit.
+const MARGIN: f64 = 10.0;
+/// Share of the travel to which a stated interpretation may fail without being doubted: no wrong unit comes so close.
+const ACCEPTED_SHARE: f64 = 0.01;
+/// Another interpretation that leaves more than this share explains nothing.
+const USELESS_SHARE: f64 = 0.1;
 /// Rows that are looked at.
 const ROWS: usize = 120;
-/// Lever that turns an error of orientation into one of position [mm/rad].
+/// Lever that turns an interpretation_error of orientation into one of position [mm/rad].
 const LEVER_MM: f64 = 300.0;
 
 /// Unit of the file's angles.
@@ -68,7 +68,7 @@ impl LengthUnit {
     }
 }
 
-/// Meaning of the four numbers of an orientation.
+/// Interpretation of the four numbers of an orientation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum Orientation {
@@ -82,7 +82,7 @@ pub enum Orientation {
 
 /// One way to read a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Meaning {
+pub struct Interpretation {
     /// Unit of q1 to q6.
     pub angles: AngleUnit,
     /// Unit of the sensor's (or read-out's) lengths.
@@ -93,35 +93,35 @@ pub struct Meaning {
     pub orientation: Orientation,
 }
 
-/// What spoke against the stated meaning.
+/// What spoke against the stated interpretation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Evidence {
+pub enum ComparedReading {
     /// The sensor's readings.
     Sensor,
     /// The controller's Cartesian read-out.
     Readout,
 }
 
-/// Another meaning of the file fits by an order of magnitude better than the stated one.
+/// Another interpretation of the file fits by an order of magnitude better than the stated one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UnitSuspicion {
     /// The file.
     pub file: String,
     /// What was compared with the arm.
-    pub evidence: Evidence,
-    /// The meaning that the format and the caller state.
-    pub stated: Meaning,
-    /// The meaning that fits.
-    pub likely: Meaning,
-    /// Error of the registered nominal arm under the stated meaning.
-    pub stated_error: MeaningError,
-    /// Error under the likely meaning.
-    pub likely_error: MeaningError,
+    pub compared: ComparedReading,
+    /// The interpretation that the format and the caller state.
+    pub stated: Interpretation,
+    /// The interpretation that fits.
+    pub likely: Interpretation,
+    /// Error of the registered nominal arm under the stated interpretation.
+    pub stated_error: InterpretationError,
+    /// Error under the likely interpretation.
+    pub likely_error: InterpretationError,
 }
 
-/// How badly a meaning fits.
+/// How badly a interpretation fits.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MeaningError {
+pub struct InterpretationError {
     /// Root mean square of what the registered nominal arm leaves (mm).
     pub rmse_mm: f64,
     /// The same as a share of the flange's travel, its root mean square distance from its mean position.
@@ -158,13 +158,13 @@ pub struct MeaningError {
 /// let found = plausibility(&data, &arm, AngleConvention::Logged);
 /// assert_eq!(found.len(), 1);
 /// assert_eq!(found[0].likely.lengths, LengthUnit::Inches);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// # Ok::<(), Box<dyn std::interpretation_error::Error>>(())
 /// ```
 pub fn plausibility(data: &Dataset, model: &Model, stated: AngleConvention) -> Vec<UnitSuspicion> {
     let stride = data.rows.len().div_ceil(ROWS).max(1);
     let rows: Vec<&Row> = data.rows.iter().step_by(stride).collect();
-    let sensor = [Evidence::Sensor, Evidence::Readout];
-    sensor.into_iter().filter_map(|evidence| suspicion(data, &rows, model, stated, evidence)).collect()
+    let sensor = [ComparedReading::Sensor, ComparedReading::Readout];
+    sensor.into_iter().filter_map(|compared| suspicion(data, &rows, model, stated, compared)).collect()
 }
 
 fn suspicion(
@@ -172,19 +172,19 @@ fn suspicion(
     rows: &[&Row],
     model: &Model,
     convention: AngleConvention,
-    evidence: Evidence,
+    compared: ComparedReading,
 ) -> Option<UnitSuspicion> {
-    let stated = Meaning {
+    let stated = Interpretation {
         angles: AngleUnit::Degrees,
         lengths: LengthUnit::Millimetres,
         convention,
         orientation: Orientation::ScalarFirst,
     };
-    let stated_error = error(rows, model, &stated, evidence)?;
-    if stated_error.share <= FINE {
+    let stated_error = interpretation_error(rows, model, &stated, compared)?;
+    if stated_error.share <= ACCEPTED_SHARE {
         return None;
     }
-    let poses = evidence == Evidence::Sensor && matches!(rows.first()?.reading, Reading::Pose(_));
+    let poses = compared == ComparedReading::Sensor && matches!(rows.first()?.reading, Reading::Pose(_));
     let orientations: &[Orientation] = if poses {
         &[Orientation::ScalarFirst, Orientation::ScalarLast, Orientation::Inverted]
     } else {
@@ -197,9 +197,10 @@ fn suspicion(
                 [LengthUnit::Millimetres, LengthUnit::Metres, LengthUnit::Inches, LengthUnit::Centimetres]
             {
                 for &orientation in orientations {
-                    let meaning = Meaning { angles, lengths, convention, orientation };
-                    let fits = error(rows, model, &meaning, evidence).filter(|e| e.share.is_finite());
-                    others.extend(fits.filter(|_| meaning != stated).map(|e| (meaning, e)));
+                    let interpretation = Interpretation { angles, lengths, convention, orientation };
+                    let fits = interpretation_error(rows, model, &interpretation, compared)
+                        .filter(|e| e.share.is_finite());
+                    others.extend(fits.filter(|_| interpretation != stated).map(|e| (interpretation, e)));
                 }
             }
         }
@@ -210,11 +211,11 @@ fn suspicion(
         others.into_iter().filter(|(_, e)| e.share <= 2.0 * lowest).min_by(|a, b| {
             a.0.changes(&stated).cmp(&b.0.changes(&stated)).then(a.1.share.total_cmp(&b.1.share))
         })?;
-    // An arm that stands still under the stated meaning leaves an infinite share.
-    let better = likely_error.share * FACTOR < stated_error.share;
-    (better && likely_error.share < USELESS).then(|| UnitSuspicion {
+    // An arm that stands still under the stated interpretation leaves an infinite share.
+    let better = likely_error.share * MARGIN < stated_error.share;
+    (better && likely_error.share < USELESS_SHARE).then(|| UnitSuspicion {
         file: data.file.clone(),
-        evidence,
+        compared,
         stated,
         likely,
         stated_error,
@@ -222,41 +223,46 @@ fn suspicion(
     })
 }
 
-/// Error of the registered nominal arm under a meaning; `None` where too few rows are there to tell.
-fn error(rows: &[&Row], model: &Model, meaning: &Meaning, evidence: Evidence) -> Option<MeaningError> {
+/// Error of the registered nominal arm under a interpretation; `None` where too few rows are there to tell.
+fn interpretation_error(
+    rows: &[&Row],
+    model: &Model,
+    interpretation: &Interpretation,
+    compared: ComparedReading,
+) -> Option<InterpretationError> {
     let arm = model.at_condition(&Condition::default());
-    let scale = meaning.lengths.millimetres();
+    let scale = interpretation.lengths.millimetres();
     let (mut flanges, mut lengths, mut positions, mut poses) =
         (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for row in rows {
-        if evidence == Evidence::Readout && row.readout_mm().is_none() {
+        if compared == ComparedReading::Readout && row.readout_mm().is_none() {
             continue;
         }
-        let file = match meaning.angles {
+        let file = match interpretation.angles {
             AngleUnit::Degrees => row.joints,
             // The import took the numbers for degrees.
             AngleUnit::Radians => row.joints.map(f64::to_degrees),
         };
-        flanges.push(arm.forward(&meaning.convention.controller_angles(model, &file)?));
-        match (evidence, &row.reading, row.readout_mm()) {
-            (Evidence::Readout, _, Some(p)) => positions.push(p * scale),
+        flanges.push(arm.forward(&interpretation.convention.controller_angles(model, &file)?));
+        match (compared, &row.reading, row.readout_mm()) {
+            (ComparedReading::Readout, _, Some(p)) => positions.push(p * scale),
             (_, Reading::Cable(l), _) => lengths.push(l * scale),
             (_, Reading::Position(p), _) => positions.push(p * scale),
-            (_, Reading::Pose(pose), _) => poses.push(meaning.orientation.of(pose, scale)),
+            (_, Reading::Pose(pose), _) => poses.push(interpretation.orientation.of(pose, scale)),
         }
     }
     let mean =
         flanges.iter().map(|f| f.translation.vector).sum::<Vector3<f64>>() / flanges.len().max(1) as f64;
     let square: f64 = flanges.iter().map(|f| (f.translation.vector - mean).norm_squared()).sum();
     let travel = (square / flanges.len().max(1) as f64).sqrt();
-    let of = |rmse_mm: f64| Some(MeaningError { rmse_mm, share: rmse_mm / travel });
+    let of = |rmse_mm: f64| Some(InterpretationError { rmse_mm, share: rmse_mm / travel });
     // Twice as many numbers as are fitted.
     if !poses.is_empty() {
         let fit = registration::poses(&flanges, &poses).filter(|_| poses.len() >= 4)?;
         return of(fit.rmse_mm.hypot(LEVER_MM * fit.rmse_rad));
     }
     if !positions.is_empty() {
-        let fit = registration::touching_point(&flanges, &positions).filter(|_| positions.len() >= 6)?;
+        let fit = registration::target_point(&flanges, &positions).filter(|_| positions.len() >= 6)?;
         return of(fit.rmse_mm);
     }
     // Several outlets: each on its own rows; most files have one.
@@ -265,8 +271,8 @@ fn error(rows: &[&Row], model: &Model, meaning: &Meaning, evidence: Evidence) ->
     anchors.dedup();
     let (mut square, mut count) = (0.0, 0);
     for anchor in anchors {
-        let of_anchor = |i: &usize| rows[*i].anchor == anchor;
-        let indices: Vec<usize> = (0..lengths.len()).filter(of_anchor).collect();
+        let at_outlet = |i: &usize| rows[*i].anchor == anchor;
+        let indices: Vec<usize> = (0..lengths.len()).filter(at_outlet).collect();
         if indices.len() < 14 {
             continue;
         }
@@ -292,8 +298,8 @@ impl Orientation {
     }
 }
 
-impl Meaning {
-    fn changes(&self, other: &Meaning) -> usize {
+impl Interpretation {
+    fn changes(&self, other: &Interpretation) -> usize {
         usize::from(self.angles != other.angles)
             + usize::from(self.lengths != other.lengths)
             + usize::from(self.convention != other.convention)
@@ -310,20 +316,20 @@ impl UnitSuspicion {
             out.push(("q1 to q6 look like radians", "convert the angles to degrees"));
         }
         if stated.lengths != likely.lengths {
-            out.push(match (likely.lengths, self.evidence) {
-                (LengthUnit::Metres, Evidence::Sensor) => {
+            out.push(match (likely.lengths, self.compared) {
+                (LengthUnit::Metres, ComparedReading::Sensor) => {
                     ("the sensor's lengths look like metres", "multiply them by 1000")
                 }
-                (LengthUnit::Inches, Evidence::Sensor) => {
+                (LengthUnit::Inches, ComparedReading::Sensor) => {
                     ("the sensor's lengths look like inches", "multiply them by 25.4")
                 }
-                (LengthUnit::Centimetres, Evidence::Sensor) => {
+                (LengthUnit::Centimetres, ComparedReading::Sensor) => {
                     ("the sensor's lengths look like centimetres", "multiply them by 10")
                 }
-                (LengthUnit::Metres, Evidence::Readout) => {
+                (LengthUnit::Metres, ComparedReading::Readout) => {
                     ("the read-out x, y, z looks like metres", "multiply it by 1000")
                 }
-                (LengthUnit::Inches, Evidence::Readout) => {
+                (LengthUnit::Inches, ComparedReading::Readout) => {
                     ("the read-out x, y, z looks like inches", "multiply it by 25.4")
                 }
                 (_, _) => ("the read-out x, y, z looks like centimetres", "multiply it by 10"),
@@ -358,13 +364,13 @@ impl UnitSuspicion {
 impl fmt::Display for UnitSuspicion {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (what, remedies): (Vec<_>, Vec<_>) = self.differences().into_iter().unzip();
-        let evidence = match self.evidence {
-            Evidence::Sensor => "the sensor",
-            Evidence::Readout => "the controller's read-out",
+        let compared = match self.compared {
+            ComparedReading::Sensor => "the sensor",
+            ComparedReading::Readout => "the controller's read-out",
         };
         write!(
             f,
-            "{}: {}: so read, the nominal arm meets {evidence} to {:.1} mm ({:.1} % of its travel), as the file stands \
+            "{}: {}: so read, the nominal arm meets {compared} to {:.1} mm ({:.1} % of its travel), as the file stands \
              only to {:.1} mm ({:.0} %); {}",
             self.file,
             what.join(" and "),

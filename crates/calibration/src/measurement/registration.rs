@@ -1,18 +1,18 @@
-//! Where the sensor stands and what it touches, from nominal poses: the start of every identification.
+//! Registration of the sensor's frame and target from nominal poses: the start of every identification.
 //!
 //! Method: closed forms where there are any, then a few damped Gauss–Newton steps on the true residual.
 //!
 //! - [`points`]: base_from_sensor from point pairs (Umeyama 1991, eq. 34 to 43, without scale).
-//! - [`touching_point`]: base_from_sensor B and the point t on the flange with Fᵢ t = B mᵢ; linear in (R_B, b, t), with
+//! - [`target_point`]: base_from_sensor B and the point t on the flange with Fᵢ t = B mᵢ; linear in (R_B, b, t), with
 //!   R_B projected to the nearest rotation.
 //! - [`poses`]: B and flange_from_target T with B Mᵢ = Fᵢ T (Shah 2013: the rotations from the first singular
 //!   vectors of Σ R_Mᵢᵀ ⊗ R_Fᵢᵀ).
-//! - [`cable`]: outlet o and zero z with lᵢ = |pᵢ − o| + z; linear in (o, z, |o|² − z²) after squaring, and starts
-//!   all around, since poses near a plane cannot tell an outlet from its mirror image.
+//! - [`cable`]: outlet o and zero z with lᵢ = |pᵢ − o| + z; linear in (o, z, |o|² − z²) after squaring, plus starts in
+//!   all directions, since poses near a plane do not distinguish an outlet from its mirror image.
 //!
-//! Shapes: n poses of the flange in the base and as many readings, paired by index. Stops: `fit`. Departures: none
-//! weights rows; every closed form has a second start beside it for the cases in which it is degenerate.
-//! Checked against: known truth, and the UR arms' residuals with frames alone.
+//! Shapes: n poses of the flange in the base and as many readings, paired by index. Stopping rule: see `fit`. Departures:
+//! rows are not weighted; every closed form has a second start for the cases in which it is degenerate.
+//! Checked against known truth, and against the UR arms' residuals with frames alone.
 
 mod fit;
 
@@ -24,60 +24,60 @@ use nalgebra::{
 use self::fit::{Normal, fit};
 use truegrind_math::se3::{Pose, apply_twist, difference, rotation_from_matrix, skew};
 
-/// Lever that turns an error of orientation into one of position [mm/rad] where both are summed.
+/// Lever arm that converts an orientation error to a position error [mm/rad] where both are summed.
 const LEVER_MM: f64 = 300.0;
 
-/// A sensor's frame.
+/// Result of [`points`]: a sensor's frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrameRegistration {
     /// The sensor's frame in the arm's base.
     pub base_from_sensor: Pose,
-    /// Root mean square of the distances that remain (mm).
+    /// Root mean square residual distance (mm).
     pub rmse_mm: f64,
 }
 
-/// A sensor's frame and the point that it sees.
+/// Result of [`target_point`]: a sensor's frame and its target.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PointRegistration {
     /// The sensor's frame in the arm's base.
     pub base_from_sensor: Pose,
-    /// The point on the flange (mm).
-    pub on_flange_mm: Vector3<f64>,
-    /// Root mean square of the distances that remain (mm).
+    /// The target in the flange frame (mm).
+    pub target_mm: Vector3<f64>,
+    /// Root mean square residual distance (mm).
     pub rmse_mm: f64,
 }
 
-/// A sensor's frame and the frame of its target.
+/// Result of [`poses`]: a sensor's frame and the frame of its target.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PoseRegistration {
     /// The sensor's frame in the arm's base.
     pub base_from_sensor: Pose,
     /// The target on the flange.
     pub flange_from_target: Pose,
-    /// Root mean square of the distances that remain (mm).
+    /// Root mean square residual distance (mm).
     pub rmse_mm: f64,
-    /// Root mean square of the rotations that remain (rad).
+    /// Root mean square residual rotation (rad).
     pub rmse_rad: f64,
 }
 
-/// A cable's outlet.
+/// Result of [`cable`]: a cable's outlet.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CableRegistration {
     /// The outlet in the arm's base (mm).
     pub outlet_mm: Vector3<f64>,
     /// Reading at length zero (mm).
     pub zero_mm: f64,
-    /// Root mean square of the lengths that remain (mm).
+    /// Root mean square residual length (mm).
     pub rmse_mm: f64,
-    /// The best other outlet, where another valley of the cost lies within twice the error: the poses hardly tell
-    /// the two apart.
+    /// The second-best outlet and zero, where another local minimum has at most twice the error: the poses hardly
+    /// distinguish the two.
     pub rival: Option<(Vector3<f64>, f64)>,
 }
 
-/// The rotation nearest to a matrix, proper in any case (Umeyama 1991, eq. 43). `None` when the matrix leaves more
-/// than one direction open.
+/// The proper rotation nearest to a matrix (Umeyama 1991, eq. 43). `None` when the matrix leaves more than one direction
+/// undetermined.
 fn nearest_rotation(matrix: &Matrix3<f64>) -> Option<UnitQuaternion<f64>> {
-    // Squares of these numbers must stay finite: the iteration does not end otherwise.
+    // The squares must be finite, or the SVD iteration does not end.
     if !matrix.iter().all(|v| v.abs() < 1e100) {
         return None;
     }
@@ -91,9 +91,9 @@ fn nearest_rotation(matrix: &Matrix3<f64>) -> Option<UnitQuaternion<f64>> {
     Some(rotation_from_matrix(&(u * sign * v_t)))
 }
 
-/// The motion that carries points seen by the sensor onto points in the base, in the least-squares sense.
+/// The rigid motion from points in the sensor's frame to points in the base, by least squares.
 ///
-/// `None` for fewer than three points, points on a line, or numbers that are not finite.
+/// `None` for fewer than three points, points on a line, or non-finite numbers.
 pub fn points(base_mm: &[Vector3<f64>], sensor_mm: &[Vector3<f64>]) -> Option<FrameRegistration> {
     let n = base_mm.len().min(sensor_mm.len());
     if n < 3 || base_mm.iter().chain(sensor_mm).any(|p| !p.iter().all(|v| v.is_finite())) {
@@ -116,16 +116,16 @@ pub fn points(base_mm: &[Vector3<f64>], sensor_mm: &[Vector3<f64>]) -> Option<Fr
     Some(FrameRegistration { base_from_sensor, rmse_mm: (square / n as f64).sqrt() })
 }
 
-/// The sensor's frame and the unknown point on the flange that it sees.
+/// The sensor's frame and its unknown target on the flange.
 ///
-/// Where the orientation of the flange hardly changes, the point cannot be told from the frame; then the point stays
-/// near the flange's origin.
-pub fn touching_point(base_from_flange: &[Pose], measured_mm: &[Vector3<f64>]) -> Option<PointRegistration> {
+/// Where the orientation of the flange hardly changes, target and frame are not separately identifiable; the target then
+/// remains near the flange's origin.
+pub fn target_point(base_from_flange: &[Pose], measured_mm: &[Vector3<f64>]) -> Option<PointRegistration> {
     let n = base_from_flange.len().min(measured_mm.len());
     let origins: Vec<_> = base_from_flange.iter().map(|f| f.translation.vector).collect();
     let plain = points(&origins, measured_mm)?;
     let mut starts = vec![(plain.base_from_sensor, Vector3::zeros())];
-    starts.extend(linear_point(base_from_flange, measured_mm));
+    starts.extend(linear_target_point(base_from_flange, measured_mm));
     let rows = |state: &(Pose, Vector3<f64>), normal: &mut Normal| {
         let (base_from_sensor, t) = state;
         for (flange, m) in base_from_flange.iter().zip(measured_mm) {
@@ -149,13 +149,16 @@ pub fn touching_point(base_from_flange: &[Pose], measured_mm: &[Vector3<f64>]) -
         let twist = Vector6::from_iterator(d.iter().take(6).copied());
         (apply_twist(&state.0, &twist), state.1 + Vector3::new(d[6], d[7], d[8]))
     };
-    let (cost, (base_from_sensor, on_flange_mm)) = best(starts, 9, rows, step)?;
-    Some(PointRegistration { base_from_sensor, on_flange_mm, rmse_mm: (cost / n as f64).sqrt() })
+    let (cost, (base_from_sensor, target_mm)) = best_start(starts, 9, rows, step)?;
+    Some(PointRegistration { base_from_sensor, target_mm, rmse_mm: (cost / n as f64).sqrt() })
 }
 
 /// R_B, b, t from Rᵢ t − R_B mᵢ − b = −pᵢ as if the nine entries of R_B were free.
-fn linear_point(base_from_flange: &[Pose], measured_mm: &[Vector3<f64>]) -> Option<(Pose, Vector3<f64>)> {
-    // Metres keep the columns of one size.
+fn linear_target_point(
+    base_from_flange: &[Pose],
+    measured_mm: &[Vector3<f64>],
+) -> Option<(Pose, Vector3<f64>)> {
+    // Metres give all columns a similar scale.
     let mut normal = Normal::new(15);
     for (flange, m) in base_from_flange.iter().zip(measured_mm) {
         let to_base = flange.rotation.to_rotation_matrix();
@@ -180,12 +183,12 @@ fn linear_point(base_from_flange: &[Pose], measured_mm: &[Vector3<f64>]) -> Opti
 pub fn poses(base_from_flange: &[Pose], sensor_from_target: &[Pose]) -> Option<PoseRegistration> {
     let n = base_from_flange.len().min(sensor_from_target.len());
     let measured: Vec<_> = sensor_from_target.iter().map(|m| m.translation.vector).collect();
-    let point = touching_point(base_from_flange, &measured)?;
+    let point = target_point(base_from_flange, &measured)?;
     let mut rotations = vec![point.base_from_sensor.rotation];
-    rotations.extend(shah(base_from_flange, sensor_from_target));
+    rotations.extend(shah_rotation(base_from_flange, sensor_from_target));
     let starts = rotations
         .into_iter()
-        .filter_map(|rotation| with_rotation(base_from_flange, sensor_from_target, rotation))
+        .filter_map(|rotation| solve_translations(base_from_flange, sensor_from_target, rotation))
         .collect();
     let rows = |state: &(Pose, Pose), normal: &mut Normal| {
         for (f, m) in base_from_flange.iter().zip(sensor_from_target) {
@@ -195,7 +198,7 @@ pub fn poses(base_from_flange: &[Pose], sensor_from_target: &[Pose]) -> Option<P
             let turn_tool = skew(&(predicted.translation.vector - f.translation.vector));
             let to_base = f.rotation.to_rotation_matrix();
             let lever = to_base.matrix();
-            // The target's twist is given in the flange, about the flange's origin.
+            // The target's twist is in the flange frame, about the flange's origin.
             let turned = -turn_tool * lever;
             for k in 0..3 {
                 let mut row = [0.0; 12];
@@ -222,7 +225,7 @@ pub fn poses(base_from_flange: &[Pose], sensor_from_target: &[Pose]) -> Option<P
         );
         (apply_twist(&state.0, &at(0)), target)
     };
-    let (_, (base_from_sensor, flange_from_target)) = best(starts, 12, rows, step)?;
+    let (_, (base_from_sensor, flange_from_target)) = best_start(starts, 12, rows, step)?;
     let (mut square_mm, mut square_rad) = (0.0, 0.0);
     for (f, m) in base_from_flange.iter().zip(sensor_from_target) {
         let d = difference(&(base_from_sensor * m), &(f * flange_from_target));
@@ -238,8 +241,8 @@ pub fn poses(base_from_flange: &[Pose], sensor_from_target: &[Pose]) -> Option<P
     })
 }
 
-/// Both frames where the sensor's rotation is known: the target's as the mean, both translations linear.
-fn with_rotation(
+/// Both frames for a known rotation of the sensor: the target's rotation is the mean, both translations follow linearly.
+fn solve_translations(
     base_from_flange: &[Pose],
     sensor_from_target: &[Pose],
     rotation: UnitQuaternion<f64>,
@@ -269,7 +272,7 @@ fn with_rotation(
 }
 
 /// The sensor's rotation in the base from rotations alone (Shah 2013, eq. 22 to 28).
-fn shah(base_from_flange: &[Pose], sensor_from_target: &[Pose]) -> Option<UnitQuaternion<f64>> {
+fn shah_rotation(base_from_flange: &[Pose], sensor_from_target: &[Pose]) -> Option<UnitQuaternion<f64>> {
     let mut sum = SMatrix::<f64, 9, 9>::zeros();
     for (f, m) in base_from_flange.iter().zip(sensor_from_target) {
         let (f, m) = (f.rotation.to_rotation_matrix(), m.rotation.to_rotation_matrix());
@@ -282,7 +285,7 @@ fn shah(base_from_flange: &[Pose], sensor_from_target: &[Pose]) -> Option<UnitQu
     let eigen = SymmetricEigen::new(sum.transpose() * sum);
     let v: SVector<f64, 9> = eigen.eigenvectors.column(eigen.eigenvalues.imax()).into_owned();
     let matrix = Matrix3::from_column_slice(v.as_slice());
-    // The vector's sign is open; a rotation has a positive determinant.
+    // The singular vector's sign is arbitrary; a rotation has a positive determinant.
     nearest_rotation(&(matrix * matrix.determinant().signum()))
 }
 
@@ -297,14 +300,13 @@ fn mean_rotation(rotations: impl Iterator<Item = UnitQuaternion<f64>>) -> Option
     Some(UnitQuaternion::from_quaternion(nalgebra::Quaternion::from(SVector::<f64, 4>::from(v))))
 }
 
-/// Prior standard deviation of a cable's zero and of its hook [mm per mm of residual]: lengths seen from one side
-/// hardly tell them from the outlet's distance.
-const PRIOR_SIGMA: f64 = 200.0;
+/// Prior standard deviation of a cable's zero and of its hook [mm per mm of residual]: lengths measured from one side
+/// hardly separate them from the outlet's distance.
+const PRIOR_SIGMA_RATIO: f64 = 200.0;
 
 /// A cable's outlet and zero from the hook's positions in the base and the lengths read.
 ///
-/// `None` for fewer than four rows or numbers that are not finite. The zero has a weak prior (σ 200 mm for residuals
-/// of 1 mm).
+/// `None` for fewer than four rows or non-finite numbers. The zero has a weak prior (σ 200 mm for residuals of 1 mm).
 pub fn cable(hook_mm: &[Vector3<f64>], lengths_mm: &[f64]) -> Option<CableRegistration> {
     let n = hook_mm.len().min(lengths_mm.len());
     if n < 4
@@ -336,25 +338,25 @@ pub fn cable(hook_mm: &[Vector3<f64>], lengths_mm: &[f64]) -> Option<CableRegist
                 let u = away / distance;
                 normal.add(&[u.x, u.y, u.z, 1.0], distance + state.1 - l);
             }
-            normal.add(&[0.0, 0.0, 0.0, 1.0 / PRIOR_SIGMA], state.1 / PRIOR_SIGMA);
+            normal.add(&[0.0, 0.0, 0.0, 1.0 / PRIOR_SIGMA_RATIO], state.1 / PRIOR_SIGMA_RATIO);
         };
     let step = |state: &(Vector3<f64>, f64), d: &DVector<f64>| {
         (state.0 + Vector3::new(d[0], d[1], d[2]), state.1 + d[3])
     };
-    // The valleys show in a sample; only the candidates are worked out on all rows.
+    // Local minima are found on a sample of the rows; only the best few are refined on all rows.
     let stride = n.div_ceil(80);
     let thin_points: Vec<_> = hook_mm.iter().step_by(stride).copied().collect();
     let thin_lengths: Vec<_> = lengths_mm.iter().step_by(stride).copied().collect();
-    let mut valleys: Vec<(f64, (Vector3<f64>, f64))> = Vec::new();
+    let mut minima: Vec<(f64, (Vector3<f64>, f64))> = Vec::new();
     for start in starts {
         let (cost, state) = fit(start, 4, |s, normal| rows(&thin_points, &thin_lengths, s, normal), step);
-        let known = valleys.iter().any(|(_, other)| (other.0 - state.0).norm() < 1.0);
+        let known = minima.iter().any(|(_, other)| (other.0 - state.0).norm() < 1.0);
         if cost.is_finite() && !known {
-            valleys.push((cost, state));
+            minima.push((cost, state));
         }
     }
-    valleys.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut refined: Vec<_> = valleys
+    minima.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut refined: Vec<_> = minima
         .into_iter()
         .take(3)
         .map(|(_, state)| fit(state, 4, |s, normal| rows(hook_mm, lengths_mm, s, normal), step))
@@ -372,8 +374,8 @@ pub fn cable(hook_mm: &[Vector3<f64>], lengths_mm: &[f64]) -> Option<CableRegist
 
 /// A cable's outlet and zero together with the hook on the flange, all unknown.
 ///
-/// The hook has a prior about the flange's origin (σ 200 mm for residuals of 1 mm): one cable sees one direction of
-/// each pose, and the hook is told from the outlet only by turning the flange.
+/// The hook has a prior about the flange's origin (σ 200 mm for residuals of 1 mm): one cable measures one direction at
+/// each pose, and only rotations of the flange separate the hook from the outlet.
 pub fn cable_and_hook(
     base_from_flange: &[Pose],
     lengths_mm: &[f64],
@@ -394,19 +396,19 @@ pub fn cable_and_hook(
         }
         for (k, value) in [(3, *zero), (4, hook.x), (5, hook.y), (6, hook.z)] {
             let mut row = [0.0; 7];
-            row[k] = 1.0 / PRIOR_SIGMA;
-            normal.add(&row, value / PRIOR_SIGMA);
+            row[k] = 1.0 / PRIOR_SIGMA_RATIO;
+            normal.add(&row, value / PRIOR_SIGMA_RATIO);
         }
     };
     let step = |(outlet, zero, hook): &(Vector3<f64>, f64, Vector3<f64>), d: &DVector<f64>| {
         (outlet + Vector3::new(d[0], d[1], d[2]), zero + d[3], hook + Vector3::new(d[4], d[5], d[6]))
     };
-    let (cost, (outlet_mm, zero_mm, hook_mm)) = best(starts, 7, rows, step)?;
+    let (cost, (outlet_mm, zero_mm, hook_mm)) = best_start(starts, 7, rows, step)?;
     let rmse_mm = (cost / n as f64).sqrt();
     Some((CableRegistration { outlet_mm, zero_mm, rmse_mm, rival: None }, hook_mm))
 }
 
-/// o, z from lᵢ² − |pᵢ|² = 2 lᵢ z − 2 pᵢ·o + (|o|² − z²), the last bracket free.
+/// o, z from lᵢ² − |pᵢ|² = 2 lᵢ z − 2 pᵢ·o + (|o|² − z²), with the last bracket as a free unknown.
 fn squared_lengths(
     hook_mm: &[Vector3<f64>],
     lengths_mm: &[f64],
@@ -421,9 +423,10 @@ fn squared_lengths(
     Some((centre + Vector3::new(x[0], x[1], x[2]) * 1e3, x[3] * 1e3))
 }
 
-/// The best of several starts; a later one has to be better by more than rounding, so that where the data leave a
-/// direction open the first, plainest start decides.
-fn best<S: Clone>(
+/// The best fit of several starts. A later one must be better by more than rounding, so that the first and simplest start
+/// decides directions that the data do not determine.
+
+fn best_start<S: Clone>(
     starts: Vec<S>,
     size: usize,
     rows: impl Fn(&S, &mut Normal),
@@ -437,7 +440,7 @@ fn best<S: Clone>(
 }
 
 impl Normal {
-    /// The least-squares step of least length: directions with a share below `relative` of the strongest stay put.
+    /// The minimum-norm least-squares step; eigenvalues below `relative` times the largest count as 0.
     fn least_norm_step(&self, relative: f64) -> Option<DVector<f64>> {
         let matrix: DMatrix<f64> = self.matrix.clone();
         if !matrix.iter().all(|v| v.is_finite()) {

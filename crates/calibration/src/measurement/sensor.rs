@@ -1,14 +1,14 @@
-//! What a sensor reads of a pose of the flange: a cable's length, a position, a pose.
+//! Sensor models: the reading of a cable, a position tracker or a pose tracker at a pose of the flange.
 
 pub mod disturbance;
-pub mod form;
+pub mod empirical;
 
 use nalgebra::{Point3, Vector3};
 
 use super::dataset::{Reading, Sensor};
 use truegrind_math::se3::{Pose, difference};
 
-/// A sensor as it stands and what it touches.
+/// A sensor with its location and its target on the flange.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Rig {
     /// Draw-wires: reading = distance from outlet to hook + zero.
@@ -36,9 +36,9 @@ pub enum Rig {
     },
 }
 
-/// When a sensor sees its target.
+/// Limits within which a sensor sees its target.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Sight {
+pub struct SightLimits {
     /// Shortest and longest distance (mm).
     pub distance_mm: Option<[f64; 2]>,
     /// Largest angle between the flange's z axis and the line from the target to the sensor (rad).
@@ -55,8 +55,8 @@ impl Rig {
         }
     }
 
-    /// The point on the flange that the sensor touches (mm).
-    pub fn touched_mm(&self) -> Vector3<f64> {
+    /// The target's position in the flange frame (mm).
+    pub fn target_on_flange_mm(&self) -> Vector3<f64> {
         match self {
             Rig::Cable { hook_mm, .. } => *hook_mm,
             Rig::Position { reflector_mm, .. } => *reflector_mm,
@@ -64,7 +64,7 @@ impl Rig {
         }
     }
 
-    /// Where the sensor stands in the base (mm); for a cable its outlet `anchor`, `None` if there is no such outlet.
+    /// The sensor's origin in the base (mm); for a cable its outlet `anchor`, `None` if there is no such outlet.
     pub fn origin_mm(&self, anchor: usize) -> Option<Vector3<f64>> {
         match self {
             Rig::Cable { outlets_mm, .. } => outlets_mm.get(anchor).copied(),
@@ -74,13 +74,13 @@ impl Rig {
         }
     }
 
-    /// Distance from the sensor to what it touches (mm).
+    /// Distance from the sensor to its target (mm).
     pub fn distance_mm(&self, base_from_flange: &Pose, anchor: usize) -> Option<f64> {
-        let at = base_from_flange * Point3::from(self.touched_mm());
+        let at = base_from_flange * Point3::from(self.target_on_flange_mm());
         self.origin_mm(anchor).map(|origin| (at.coords - origin).norm())
     }
 
-    /// The reading at a pose of the flange, without noise; `None` if there is no cable `anchor`.
+    /// The noise-free reading at a pose of the flange; `None` if there is no cable `anchor`.
     pub fn predict(&self, base_from_flange: &Pose, anchor: usize) -> Option<Reading> {
         match self {
             Rig::Cable { zeros_mm, .. } => {
@@ -99,18 +99,18 @@ impl Rig {
     }
 
     /// Whether the sensor sees the flange at a pose.
-    pub fn sees(&self, sight: &Sight, base_from_flange: &Pose, anchor: usize) -> bool {
-        let at = base_from_flange * Point3::from(self.touched_mm());
+    pub fn sees(&self, limits: &SightLimits, base_from_flange: &Pose, anchor: usize) -> bool {
+        let at = base_from_flange * Point3::from(self.target_on_flange_mm());
         let Some(origin) = self.origin_mm(anchor) else { return false };
         let line = origin - at.coords;
-        let near = sight.distance_mm.is_none_or(|[low, high]| (low..=high).contains(&line.norm()));
+        let near = limits.distance_mm.is_none_or(|[low, high]| (low..=high).contains(&line.norm()));
         let upright = base_from_flange.rotation * Vector3::z();
-        near && sight.tilt_rad.is_none_or(|tilt| upright.angle(&line) <= tilt)
+        near && limits.tilt_rad.is_none_or(|tilt| upright.angle(&line) <= tilt)
     }
 }
 
 /// Measured minus predicted: one number (mm) for a cable, three for a position, six (mm, then rotation vector in rad)
-/// for a pose; all in the sensor's frame. Nothing where the two are of different sensors.
+/// for a pose; all in the sensor's frame. Empty where the two are of different sensors.
 pub fn residual(measured: &Reading, predicted: &Reading) -> Vec<f64> {
     match (measured, predicted) {
         (Reading::Cable(m), Reading::Cable(p)) => vec![m - p],

@@ -2,7 +2,7 @@
 //!
 //! A [`Recipe`] states the actual arm (nominal plus deviations, effects, masses), where it is measured, with what
 //! sensor, noise, rounding and faults. The same recipe gives the same bytes: three independent ChaCha8 streams of one
-//! seed draw poses, circumstances and noise, and a seed of its own draws the arm.
+//! seed draw poses, conditions and noise, and a seed of its own draws the arm.
 //!
 //! What is logged: the encoder's angles and, where asked for, the read-out that the controller computes from them with
 //! the nominal model, both rounded as the recipe says. The arm itself stands at the unrounded angles.
@@ -49,7 +49,7 @@ pub struct Simulation {
 pub struct SimulatedRow {
     /// Angles of the encoders (rad).
     pub joints: Joints,
-    /// The circumstances of the actual arm, logged or not.
+    /// The conditions of the actual arm, logged or not.
     pub condition: Condition,
     /// Cable outlet, 0-based.
     pub anchor: usize,

@@ -29,7 +29,7 @@ impl From<Split> for (Vec<usize>, Vec<usize>) {
 
 /// Difference of every joint up to which two rows are the same pose (rad): below the step of a rounded log, or what an
 /// encoder read back at rest scatters by.
-fn same_rad(data: &Dataset) -> f64 {
+fn same_pose_rad(data: &Dataset) -> f64 {
     if data.angle_step_rad.is_some() { 0.000_5f64.to_radians() } else { 0.003f64.to_radians() }
 }
 
@@ -37,11 +37,11 @@ fn same_rad(data: &Dataset) -> f64 {
 /// log rounded to fixed steps, else to 0.003°) and the controller's read-out, where logged, does not tell them apart,
 /// as it may where angles are rounded coarsely.
 pub fn poses(data: &Dataset) -> Vec<Vec<usize>> {
-    by_pose(data, |poses| poses.map(<[usize]>::to_vec).collect())
+    with_poses(data, |poses| poses.map(<[usize]>::to_vec).collect())
 }
 
 /// Hands the rows of each pose, as [`poses`] gives them, to `work`; they share one list, as there may be a million.
-fn by_pose<T>(data: &Dataset, work: impl FnOnce(&mut dyn Iterator<Item = &[usize]>) -> T) -> T {
+fn with_poses<T>(data: &Dataset, work: impl FnOnce(&mut dyn Iterator<Item = &[usize]>) -> T) -> T {
     let first = first_rows(data);
     let mut rows: Vec<usize> = (0..data.rows.len()).collect();
     rows.sort_by_key(|&row| first[row]);
@@ -53,7 +53,7 @@ fn first_rows(data: &Dataset) -> Vec<usize> {
     // One number for each row, in which equal poses lie close together and others hardly ever: only neighbours have to
     // be compared. The weights are powers of the golden section, so that no grid of angles lines up.
     const WEIGHTS: [f64; 6] = [1.0, 0.618_034, 0.381_966, 0.236_068, 0.145_898, 0.090_170];
-    let same = same_rad(data);
+    let same = same_pose_rad(data);
     let reach = same * WEIGHTS.iter().sum::<f64>();
     let along = |row: &Row| row.joints.iter().zip(WEIGHTS).map(|(q, w)| q * w).sum::<f64>() + 0.0;
     let place: Vec<f64> = data.rows.iter().map(along).collect();
@@ -62,24 +62,26 @@ fn first_rows(data: &Dataset) -> Vec<usize> {
     let mut group: Vec<usize> = (0..data.rows.len()).collect();
     // Rows that are one to the last bit stand behind the first of them, so that a pose measured a thousand times is not
     // compared a million times. They are neighbours in the order.
-    let mut different: Vec<(usize, [u64; 10])> = Vec::new();
+    let mut distinct: Vec<(usize, [u64; 10])> = Vec::new();
     let mut last = None;
     order.retain(|&i| {
         if last != Some(place[i]) {
-            different.clear();
+            distinct.clear();
             last = Some(place[i]);
         }
         let bits = bits(&data.rows[i]);
-        match different.iter().find(|(_, known)| *known == bits) {
+        match distinct.iter().find(|(_, known)| *known == bits) {
             Some((first, _)) => group[i] = *first,
-            None => different.push((i, bits)),
+            None => distinct.push((i, bits)),
         }
         group[i] == i
     });
     for (k, &i) in order.iter().enumerate() {
         for &j in order[k + 1..].iter().take_while(|&&j| place[j] - place[i] <= reach) {
             let (a, b) = (root(&mut group, i), root(&mut group, j));
-            if a != b && (data.rows[i].joints - data.rows[j].joints).amax() <= same && !told_apart(data, i, j)
+            if a != b
+                && (data.rows[i].joints - data.rows[j].joints).amax() <= same
+                && !readouts_differ(data, i, j)
             {
                 group[a.max(b)] = a.min(b);
             }
@@ -108,8 +110,8 @@ fn root(group: &mut [usize], mut i: usize) -> usize {
     i
 }
 
-/// Whether the controller's read-out says that two rows of equal rounded angles are different poses.
-fn told_apart(data: &Dataset, i: usize, j: usize) -> bool {
+/// Whether the controller's read-out says that two rows of equal rounded angles are distinct poses.
+fn readouts_differ(data: &Dataset, i: usize, j: usize) -> bool {
     match (data.rows[i].readout_mm(), data.rows[j].readout_mm()) {
         (Some(a), Some(b)) => (a - b).amax() > 1.5 * data.readout_step_mm.unwrap_or(1e-3),
         _ => false,
@@ -135,7 +137,7 @@ fn told_apart(data: &Dataset, i: usize, j: usize) -> bool {
 pub fn random(data: &Dataset, held_out: f64, seed: u64) -> Split {
     let rows = data.rows.len();
     let wanted = (rows as f64 * held_out.clamp(0.0, 1.0)).round() as usize;
-    by_pose(data, |poses| {
+    with_poses(data, |poses| {
         let (mut test, mut train) = (Vec::with_capacity(wanted), Vec::with_capacity(rows - wanted));
         for pose in shuffled(poses.collect::<Vec<_>>(), seed) {
             // A group of repetitions that would overshoot by more than half of itself goes to the other side.
@@ -147,34 +149,34 @@ pub fn random(data: &Dataset, held_out: f64, seed: u64) -> Split {
 }
 
 /// k-fold cross-validation over random poses: k splits whose test rows cover every row once. `folds` above the number
-/// of poses is that number. Chance is drawn from the poses themselves, not from their places: a row more or less, or another order of
+/// of poses is that number. Chance is shuffled_by_angles from the poses themselves, not from their places: a row more or less, or another order of
 /// the rows, leaves nearly all others where they were.
 pub fn folds(data: &Dataset, folds: usize, seed: u64) -> Vec<Split> {
-    let poses = drawn(data, poses(data), seed);
+    let poses = shuffled_by_angles(data, poses(data), seed);
     let k = folds.clamp(1, poses.len().max(1));
-    complements(data.rows.len(), shared_out(poses, k))
+    complements(data.rows.len(), into_folds(poses, k))
 }
 
 /// Groups in an order that only their own angles and the seed determine.
-pub(crate) fn drawn(data: &Dataset, groups: Vec<Vec<usize>>, seed: u64) -> Vec<Vec<usize>> {
+pub(crate) fn shuffled_by_angles(data: &Dataset, groups: Vec<Vec<usize>>, seed: u64) -> Vec<Vec<usize>> {
     /// Step to which angles are rounded first (rad), so that their last digits decide nothing.
     const STEP_RAD: f64 = 1e-3;
     let key = |group: &Vec<usize>| {
         let steps = data.rows[group[0]].joints.iter().map(|q| (q / STEP_RAD).round() as i64 as u64);
-        steps.fold(mixed(seed, 0), mixed)
+        steps.fold(splitmix64(seed, 0), splitmix64)
     };
-    in_order_of(groups, key)
+    sorted_by_key(groups, key)
 }
 
 /// Groups in the order of their keys; equal ones as they were.
-fn in_order_of<T>(groups: Vec<T>, key: impl Fn(&T) -> u64) -> Vec<T> {
+fn sorted_by_key<T>(groups: Vec<T>, key: impl Fn(&T) -> u64) -> Vec<T> {
     let mut keyed: Vec<(u64, T)> = groups.into_iter().map(|group| (key(&group), group)).collect();
     keyed.sort_by_key(|(key, _)| *key);
     keyed.into_iter().map(|(_, group)| group).collect()
 }
 
 /// The next of a series of numbers that look random: SplitMix64, Steele, Lea and Flood 2014.
-fn mixed(state: u64, value: u64) -> u64 {
+fn splitmix64(state: u64, value: u64) -> u64 {
     let mut z = (state ^ value).wrapping_add(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
@@ -182,7 +184,7 @@ fn mixed(state: u64, value: u64) -> u64 {
 }
 
 /// Groups in k parts of nearly as many rows, each of groups that follow each other; none is empty where there are k groups.
-fn shared_out(groups: Vec<Vec<usize>>, k: usize) -> Vec<Vec<usize>> {
+fn into_folds(groups: Vec<Vec<usize>>, k: usize) -> Vec<Vec<usize>> {
     let (count, rows) = (groups.len(), groups.iter().map(Vec::len).sum::<usize>().max(1));
     let mut parts: Vec<Vec<usize>> = vec![Vec::new(); k];
     let (mut part, mut before) = (0, 0);
@@ -213,10 +215,10 @@ pub fn purged(data: &Dataset, folds: usize, reach: usize, seed: u64) -> Vec<Spli
     }
     let stretches: Vec<Vec<usize>> =
         (0..n.div_ceil(stretch)).map(|b| (b * stretch..n.min((b + 1) * stretch)).collect()).collect();
-    let order = in_order_of((0..stretches.len()).collect(), |b| mixed(mixed(seed, 0), *b as u64));
+    let order = sorted_by_key((0..stretches.len()).collect(), |b| splitmix64(splitmix64(seed, 0), *b as u64));
     let stretches = order.into_iter().map(|b| stretches[b].clone()).collect();
     let pose_of = pose_of_rows(data);
-    shared_out(stretches, k)
+    into_folds(stretches, k)
         .into_iter()
         .map(|mut test| {
             test.sort_unstable();
@@ -284,7 +286,7 @@ fn complements(rows: usize, tests: Vec<Vec<usize>>) -> Vec<Split> {
         .collect()
 }
 
-/// What repeated poses scatter by.
+/// What repeated poses pooled_scatter by.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NoiseFloor {
     /// Pooled standard deviation of a length, or of the position (root of the sum over the coordinates) (mm).
@@ -297,7 +299,7 @@ pub struct NoiseFloor {
 
 /// The noise floor from repeated poses: √(Σ |r − r̄|² / Σ (n − 1)) over poses with the same outlet and approach.
 /// `None` where no pose was repeated. Drift between the repetitions counts as noise. Rows that were copied show no noise: readings
-/// equal to the last digit count once, where the others scatter too widely for that to be chance, or where there are no others.
+/// equal to the last digit count once, where the others pooled_scatter too widely for that to be chance, or where there are no others.
 ///
 /// ```
 /// use truegrind_calibration::measurement::import::{Options, read};
@@ -311,7 +313,7 @@ pub struct NoiseFloor {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn noise_floor(data: &Dataset) -> Option<NoiseFloor> {
-    scatter(data, |row| match &row.reading {
+    pooled_scatter(data, |row| match &row.reading {
         Reading::Cable(l) => Some(Vector3::new(*l, 0.0, 0.0)),
         Reading::Position(p) => Some(*p),
         Reading::Pose(pose) => Some(pose.translation.vector),
@@ -328,20 +330,20 @@ pub fn noise_floor_rad(data: &Dataset) -> Option<f64> {
         let first = *if begins { first.insert(here) } else { first.get_or_insert(here) };
         Some((first.inverse() * here).scaled_axis())
     };
-    scattered(data, against).map(|floor| floor.sigma_mm)
+    pooled_scatter_by(data, against).map(|floor| floor.sigma_mm)
 }
 
-/// The pooled scatter of repeated readings, copies left out.
-fn scatter(data: &Dataset, place: impl Fn(&Row) -> Option<Vector3<f64>>) -> Option<NoiseFloor> {
-    scattered(data, |row, _| place(row))
+/// The pooled pooled_scatter of repeated readings, copies left out.
+fn pooled_scatter(data: &Dataset, place: impl Fn(&Row) -> Option<Vector3<f64>>) -> Option<NoiseFloor> {
+    pooled_scatter_by(data, |row, _| place(row))
 }
 
 /// The same of what may be counted from the first row of each pose; rows of one pose, outlet and approach follow each other.
-fn scattered(
+fn pooled_scatter_by(
     data: &Dataset,
     mut place: impl FnMut(&Row, bool) -> Option<Vector3<f64>>,
 ) -> Option<NoiseFloor> {
-    by_pose(data, |poses| {
+    with_poses(data, |poses| {
         let (mut all, mut own, mut finest) = (Scatter::default(), Scatter::default(), f64::INFINITY);
         for pose in poses.filter(|pose| pose.len() > 1) {
             let mut alike: BTreeMap<(usize, [i8; 6]), Vec<usize>> = BTreeMap::new();
@@ -353,20 +355,20 @@ fn scattered(
                 let of = |(k, &i): (usize, &usize)| place(&data.rows[i], k == 0);
                 let readings: Vec<Vector3<f64>> = rows.iter().enumerate().filter_map(of).collect();
                 all.add(&readings);
-                own.add(&different(&readings));
-                finest = finest.min(finest_mm(&readings));
+                own.add(&distinct(&readings));
+                finest = finest.min(finest_step_mm(&readings));
             }
         }
         let (all, own) = (all.pooled()?, own.pooled());
-        let copied = own.is_none_or(|own| own.sigma_mm > NO_CHANCE * finest);
+        let copied = own.is_none_or(|own| own.sigma_mm > COPY_RATIO * finest);
         if copied { own } else { Some(all) }
     })
 }
 
 /// Scatter over the finest difference of readings from which two readings that are equal to the last digit are copies, not chance.
-const NO_CHANCE: f64 = 10.0;
+const COPY_RATIO: f64 = 10.0;
 
-/// Pooled scatter of readings of the same pose.
+/// Pooled pooled_scatter of readings of the same pose.
 #[derive(Default)]
 struct Scatter {
     square: f64,
@@ -392,7 +394,7 @@ impl Scatter {
 }
 
 /// Readings, those that equal an earlier one left out.
-fn different(readings: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+fn distinct(readings: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
     let mut out: Vec<Vector3<f64>> = Vec::with_capacity(readings.len());
     for reading in readings {
         if !out.contains(reading) {
@@ -403,7 +405,7 @@ fn different(readings: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
 }
 
 /// The smallest difference of a coordinate between readings of one pose that is not 0 (mm).
-fn finest_mm(readings: &[Vector3<f64>]) -> f64 {
+fn finest_step_mm(readings: &[Vector3<f64>]) -> f64 {
     let mut finest = f64::INFINITY;
     for axis in 0..3 {
         let mut values: Vec<f64> = readings.iter().map(|r| r[axis]).collect();

@@ -91,7 +91,7 @@ impl fmt::Display for Alarm {
             return write!(
                 f,
                 "the {} readings from row {} of {} on are far off and agree with no one change: they are set aside, and so is what \
-                 follows until readings fit again; look at the target, the line of sight and the poses",
+                 follows until readings fit again; look at the target, the line of limits and the poses",
                 self.poses, self.since_row, self.since_file
             );
         }

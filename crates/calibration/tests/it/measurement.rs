@@ -1,9 +1,9 @@
 //! Tests of `measurement`.
 
 mod import;
-mod moments;
+mod join_by_time;
 mod plausibility;
-mod profile;
+mod foreign;
 mod registration;
 mod simulation;
 mod split;

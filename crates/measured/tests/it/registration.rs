@@ -29,7 +29,7 @@ fn real_arms_with_frames_alone() {
         data.rows.iter().map(|r| arm.forward(&r.joints)).collect()
     };
     let ur5 = data_set("ur5-jacobi/grid.csv", None);
-    let found = registration::touching_point(&poses("universal-robots-ur5", &ur5), &positions(&ur5)).unwrap();
+    let found = registration::target_point(&poses("universal-robots-ur5", &ur5), &positions(&ur5)).unwrap();
     assert!(found.rmse_mm < 0.75, "{found:?}");
     let ur10 = data_set("ur10-landgraf/series-d.csv", None);
     let measured: Vec<Pose> =

@@ -246,7 +246,7 @@ fn scale_column(wanted: &Wanted<'_>, rows: &[Row], per: usize, options: &Options
             column[(i, 0)] = distance * weight;
             continue;
         }
-        let point = flange * nalgebra::Point3::from(rig.touched_mm());
+        let point = flange * nalgebra::Point3::from(rig.target_on_flange_mm());
         let from_sensor = point.coords - wanted.frames.base_from_sensor.translation.vector;
         for k in 0..3 {
             column[(i * per + k, 0)] = from_sensor[k] * weight;

@@ -90,7 +90,7 @@ pub(super) struct Columns {
     /// Where in `effects` each parameter of x is; out of range for those that are no effect's.
     pub(super) effect_at: Vec<usize>,
     /// How far each disturbance goes in each row.
-    pub(super) courses: Vec<Vec<f64>>,
+    pub(super) profiles: Vec<Vec<f64>>,
     /// For each disturbance and each of its parameters the shift of the sensor in each row; none for those along an axis.
     pub(super) shifts: Vec<Vec<[Vec<f64>; 3]>>,
 }
@@ -149,7 +149,7 @@ impl Columns {
                 })
                 .collect(),
             effect_at: self.effect_at.clone(),
-            courses: self.courses.iter().map(|course| picked(course)).collect(),
+            profiles: self.profiles.iter().map(|profile| picked(profile)).collect(),
             shifts: self
                 .shifts
                 .iter()
@@ -211,12 +211,12 @@ impl Columns {
             anchor: if several { (0..padded).map(|i| row(i).anchor as u32).collect() } else { Vec::new() },
             ..Self::default()
         };
-        let turned = frames.disturbances.iter().any(|d| d.kind.turns_joints());
+        let turned = frames.disturbances.iter().any(|d| d.kind.rotates_joints());
         if !start.effects.is_empty() || turned {
             out.add_effects(dataset, start, parameters, padded);
         }
-        out.courses =
-            frames.disturbances.iter().map(|d| column(&|i| d.course.at(row(i)))).collect::<Vec<_>>();
+        out.profiles =
+            frames.disturbances.iter().map(|d| column(&|i| d.profile.at(row(i)))).collect::<Vec<_>>();
         if turned {
             out.add_turns(dataset, start, frames, parameters, padded);
         }
@@ -224,10 +224,12 @@ impl Columns {
             .disturbances
             .iter()
             .map(|d| match d.kind {
-                Kind::Form(form) if !form.turns() => forms::shifts(form, dataset, start, frames)
-                    .iter()
-                    .map(|v| std::array::from_fn(|k| column(&|i| v[i.min(n.saturating_sub(1))][k])))
-                    .collect(),
+                Kind::Empirical(form) if !form.rotates_joints() => {
+                    forms::shifts(form, dataset, start, frames)
+                        .iter()
+                        .map(|v| std::array::from_fn(|k| column(&|i| v[i.min(n.saturating_sub(1))][k])))
+                        .collect()
+                }
                 _ => Vec::new(),
             })
             .collect();
@@ -238,7 +240,7 @@ impl Columns {
         out
     }
 
-    /// Disturbances that turn the joints like an effect, in the rows of their course.
+    /// Disturbances that turn the joints like an effect, in the rows of their profile.
     fn add_turns(
         &mut self,
         dataset: &Dataset,
@@ -251,9 +253,9 @@ impl Columns {
         for (index, disturbance) in frames.disturbances.iter().enumerate() {
             for (parameter, rotation) in rotations(&disturbance.kind, dataset, start).into_iter().enumerate()
             {
-                let course = &self.courses[index];
+                let profile = &self.profiles[index];
                 let rotation: [Option<Vec<f64>>; 6] =
-                    rotation.map(|r| r.map(|r| (0..padded).map(|i| course[i] * r[i.min(last)]).collect()));
+                    rotation.map(|r| r.map(|r| (0..padded).map(|i| profile[i] * r[i.min(last)]).collect()));
                 if let Some(extra) = &mut self.extra {
                     for (column, rotation) in extra.iter_mut().zip(&rotation) {
                         let Some(rotation) = rotation else { continue };

@@ -5,7 +5,7 @@ use nalgebra::{Point3, Vector3};
 use super::frames::Frames;
 use crate::measurement::dataset::{Dataset, Reading, Row, Sensor};
 use crate::measurement::sensor::disturbance::Kind;
-use crate::measurement::sensor::form::{Form, second_degree};
+use crate::measurement::sensor::empirical::{EmpiricalFault, second_degree};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::{Joints, Model};
 
@@ -16,11 +16,11 @@ type Push<'a> = dyn Fn(&Row, Vector3<f64>) -> Vec<Vector3<f64>> + 'a;
 const HOUR_S: f64 = 3600.0;
 
 /// For each parameter the rotation of each joint (rad), row by row; for forms that turn joints.
-fn of_form(form: Form, dataset: &Dataset, model: &Model) -> Vec<[Option<Vec<f64>>; 6]> {
+fn of_form(form: EmpiricalFault, dataset: &Dataset, model: &Model) -> Vec<[Option<Vec<f64>>; 6]> {
     let rows = &dataset.rows;
     let none = || -> [Option<Vec<f64>>; 6] { Default::default() };
     match form {
-        Form::Latency { middle_s } => {
+        EmpiricalFault::Latency { middle_s } => {
             let rate =
                 |r: &Row, j: usize| r.motion().and_then(|m| m.rate_per_h).map_or(0.0, |q| q[j] / HOUR_S);
             let middle_h = middle_s as f64 / HOUR_S;
@@ -30,14 +30,14 @@ fn of_form(form: Form, dataset: &Dataset, model: &Model) -> Vec<[Option<Vec<f64>
             };
             vec![times(&|_| 1.0), times(&hours)]
         }
-        Form::LastStep => (0..6)
+        EmpiricalFault::ArmUnsettled => (0..6)
             .map(|joint| {
                 let mut out = none();
                 out[joint] = Some(rows.iter().map(|r| r.motion().map_or(0.0, |m| -m.step[joint])).collect());
                 out
             })
             .collect(),
-        Form::Stiffness { joint } => {
+        EmpiricalFault::NonlinearStiffness { joint } => {
             let torques = torques(dataset, model);
             [2, 3]
                 .map(|power: i32| {
@@ -48,7 +48,7 @@ fn of_form(form: Form, dataset: &Dataset, model: &Model) -> Vec<[Option<Vec<f64>
                 })
                 .to_vec()
         }
-        Form::TwoJointGear { joint, other } => {
+        EmpiricalFault::TwoJointGear { joint, other } => {
             let angle = |r: &Row, sign: f64| {
                 let u = model.joint_map * r.joints;
                 u[joint] + sign * u[other]
@@ -77,7 +77,12 @@ fn torques(dataset: &Dataset, model: &Model) -> Vec<Joints> {
 }
 
 /// For each parameter the shift of the sensor in the base (mm), row by row; for forms that shift it.
-pub fn shifts(form: Form, dataset: &Dataset, model: &Model, frames: &Frames) -> Vec<Vec<Vector3<f64>>> {
+pub fn shifts(
+    form: EmpiricalFault,
+    dataset: &Dataset,
+    model: &Model,
+    frames: &Frames,
+) -> Vec<Vec<Vector3<f64>>> {
     let posed = model.at_condition(&Condition::default());
     let touched = Point3::from(frames.flange_from_target.translation.vector);
     let sensor = |row: &Row| match dataset.sensor {
@@ -95,23 +100,23 @@ pub fn shifts(form: Form, dataset: &Dataset, model: &Model, frames: &Frames) -> 
         out
     };
     match form {
-        Form::SlowReading => pushed(&|row, _| {
+        EmpiricalFault::SensorUnsettled => pushed(&|row, _| {
             let Some(motion) = row.motion() else { return vec![Vector3::zeros()] };
             let (here, before) =
                 (posed.forward(&row.joints) * touched, posed.forward(&(row.joints - motion.step)) * touched);
             vec![here - before]
         }),
-        Form::Refraction => pushed(&|row, away| {
+        EmpiricalFault::Refraction => pushed(&|row, away| {
             let bend = model.gravity * (away.norm_squared() * 1e-3);
             // Half way along the beam, in metres above the base.
             let height = -1e-3 * model.gravity.dot(&(sensor(row) + 0.5 * away));
             vec![bend, bend * height]
         }),
-        Form::Pulley => pushed(&|_, away| {
+        EmpiricalFault::Pulley => pushed(&|_, away| {
             let u = away.normalize();
             second_degree(&u).map(|v| u * v).to_vec()
         }),
-        Form::Drum { from_mm, to_mm } => {
+        EmpiricalFault::Drum { from_mm, to_mm } => {
             let (low, high) = (f64::from(from_mm), f64::from(to_mm));
             pushed(&|row, away| {
                 let u = away.normalize();
@@ -122,7 +127,7 @@ pub fn shifts(form: Form, dataset: &Dataset, model: &Model, frames: &Frames) -> 
                 vec![u * (0.5 * (3.0 * t * t - 1.0)), u * (0.5 * (5.0 * t * t * t - 3.0 * t))]
             })
         }
-        Form::Nest { second } => pushed(&|row, away| {
+        EmpiricalFault::TargetNest { second } => pushed(&|row, away| {
             let turn = posed.forward(&row.joints).rotation * frames.flange_from_target.rotation;
             let seen = turn.inverse() * away.normalize();
             // All of a matrix times the direction but its trace, which lengthens the beam.
@@ -141,7 +146,7 @@ pub fn shifts(form: Form, dataset: &Dataset, model: &Model, frames: &Frames) -> 
 /// Rotation of each joint (rad) per unit of each parameter of a disturbance that turns joints, row by row.
 pub fn rotations(kind: &Kind, dataset: &Dataset, model: &Model) -> Vec<[Option<Vec<f64>>; 6]> {
     match kind {
-        Kind::Form(form) => of_form(*form, dataset, model),
+        Kind::Empirical(form) => of_form(*form, dataset, model),
         Kind::Load { joints, compliance } => {
             let torques = flange_torques(dataset, model);
             let bent = |joint: usize, factor: f64| torques.iter().map(|t| factor * t[joint]).collect();

@@ -47,8 +47,8 @@ struct Pushed {
 
 impl Pushed {
     fn of(disturbances: &[Disturbance], columns: &Columns) -> Option<Self> {
-        let courses = &columns.courses;
-        let n = courses.first().map(Vec::len)?;
+        let profiles = &columns.profiles;
+        let n = profiles.first().map(Vec::len)?;
         let zeros = || vec![0.0; n];
         let mut out = Self {
             zero: zeros(),
@@ -58,30 +58,30 @@ impl Pushed {
             scale: vec![1.0; n],
             sag: zeros(),
         };
-        let add = |to: &mut [f64], value: f64, course: &[f64]| {
-            to.iter_mut().zip(course).for_each(|(t, c)| *t += value * c);
+        let add = |to: &mut [f64], value: f64, profile: &[f64]| {
+            to.iter_mut().zip(profile).for_each(|(t, c)| *t += value * c);
         };
-        for ((disturbance, course), shifts) in disturbances.iter().zip(courses).zip(&columns.shifts) {
+        for ((disturbance, profile), shifts) in disturbances.iter().zip(profiles).zip(&columns.shifts) {
             let v = &disturbance.values;
             for (shift, value) in shifts.iter().zip(v) {
                 for (to, along) in out.frame.iter_mut().zip(shift) {
-                    to.iter_mut().zip(along).zip(course).for_each(|((t, s), c)| *t += value * s * c);
+                    to.iter_mut().zip(along).zip(profile).for_each(|((t, s), c)| *t += value * s * c);
                 }
             }
             match &disturbance.kind {
-                Kind::Zero => add(&mut out.zero, v[0], course),
+                Kind::Zero => add(&mut out.zero, v[0], profile),
                 Kind::Frame { turning } => {
                     for k in 0..3 {
-                        add(&mut out.frame[k], v[k], course);
+                        add(&mut out.frame[k], v[k], profile);
                         if *turning {
-                            add(&mut out.turn[k], v[k + 3], course);
+                            add(&mut out.turn[k], v[k + 3], profile);
                         }
                     }
                 }
-                Kind::Tool => (0..3).for_each(|k| add(&mut out.tool[k], v[k], course)),
-                Kind::Scale => add(&mut out.scale, v[0], course),
-                Kind::Sag => add(&mut out.sag, v[0], course),
-                Kind::Load { .. } | Kind::Form(_) => {}
+                Kind::Target => (0..3).for_each(|k| add(&mut out.tool[k], v[k], profile)),
+                Kind::Scale => add(&mut out.scale, v[0], profile),
+                Kind::Sag => add(&mut out.sag, v[0], profile),
+                Kind::Load { .. } | Kind::Empirical(_) => {}
             }
         }
         Some(out)
@@ -263,8 +263,8 @@ fn point<R: Real>(frames: &Chain<R>, state: &State, at: usize) -> V<R> {
 
 /// How far disturbance `index` goes in the rows.
 #[inline(always)]
-fn course<R: Real>(like: R, problem: &CalibrationProblem, index: usize, at: usize) -> R {
-    like.load(&problem.columns.courses[index], at)
+fn profile<R: Real>(like: R, problem: &CalibrationProblem, index: usize, at: usize) -> R {
+    like.load(&problem.columns.profiles[index], at)
 }
 
 /// What a unit of a cable's sag adds to its length (mm m²): see the page of disturbances.
@@ -355,16 +355,16 @@ fn cable<R: SinCos>(
             Parameter::Zero { anchor } => {
                 weight * through * of_anchor(like, problem, at, |a| f64::from(u8::from(a == anchor)))
             }
-            Parameter::Disturbance { index, parameter } if !turns_joints(problem, index) => {
-                let how_far = course(like, problem, index, at);
+            Parameter::Disturbance { index, parameter } if !rotates_joints(problem, index) => {
+                let how_far = profile(like, problem, index, at);
                 how_far
                     * match problem.frames.disturbances[index].kind {
                         Kind::Zero => weight * through,
                         Kind::Frame { .. } => -u[parameter.min(2)],
-                        Kind::Tool => dot(&in_base(&frames, &state.flange.column(parameter).into()), &u),
+                        Kind::Target => dot(&in_base(&frames, &state.flange.column(parameter).into()), &u),
                         Kind::Scale => weight * free,
                         Kind::Sag => weight * sagging(&v, length),
-                        Kind::Form(_) => -dot(&load(like, &problem.columns.shifts[index][parameter], at), &u),
+                        Kind::Empirical(_) => -dot(&load(like, &problem.columns.shifts[index][parameter], at), &u),
                         Kind::Load { .. } => none,
                     }
             }
@@ -398,8 +398,8 @@ fn cable<R: SinCos>(
 
 /// Whether a disturbance bends the joints, as effects do.
 #[inline(always)]
-fn turns_joints(problem: &CalibrationProblem, index: usize) -> bool {
-    problem.frames.disturbances[index].kind.turns_joints()
+fn rotates_joints(problem: &CalibrationProblem, index: usize) -> bool {
+    problem.frames.disturbances[index].kind.rotates_joints()
 }
 
 /// v turned by a small rotation vector, to second order: some 1e-7 of v is left out at 0.5°.
@@ -564,19 +564,19 @@ fn space<R: SinCos>(
                 let w = splat(like, &state.sensor_axes.column(axis - 3).into());
                 (cross(&w, &turned), w)
             }
-            Parameter::Disturbance { index, parameter } if !turns_joints(problem, index) => {
-                let how_far = course(like, problem, index, at);
+            Parameter::Disturbance { index, parameter } if !rotates_joints(problem, index) => {
+                let how_far = profile(like, problem, index, at);
                 let kind = &problem.frames.disturbances[index].kind;
-                of_sensor = !matches!(kind, Kind::Tool);
+                of_sensor = !matches!(kind, Kind::Target);
                 let (v, w) = match kind {
                     Kind::Frame { .. } if parameter < 3 => (splat(like, &Vector3::ith(parameter, 1.0)), none),
                     Kind::Frame { .. } => {
                         let w = splat(like, &Vector3::ith(parameter - 3, 1.0));
                         (cross(&w, &turned), w)
                     }
-                    Kind::Tool => (in_base(&frames, &state.flange.column(parameter).into()), none),
+                    Kind::Target => (in_base(&frames, &state.flange.column(parameter).into()), none),
                     Kind::Scale => ([-seen[0] / through, -seen[1] / through, -seen[2] / through], none),
-                    Kind::Form(_) => (load(like, &columns.shifts[index][parameter], at), none),
+                    Kind::Empirical(_) => (load(like, &columns.shifts[index][parameter], at), none),
                     Kind::Zero | Kind::Sag | Kind::Load { .. } => (none, none),
                 };
                 (scaled(how_far, &v), scaled(how_far, &w))

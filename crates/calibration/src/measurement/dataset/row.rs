@@ -28,7 +28,7 @@ pub struct Motion {
     pub rate_per_h: Option<Joints>,
 }
 
-/// Where on a measured path a row stands. The same path is run several times, in cycles, and read at the same sampling points in each.
+/// Sampling point of a row on a measured path. The path is run in several cycles and read at the same sampling points in each.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PathPoint {
     /// Which path.
@@ -39,46 +39,45 @@ pub struct PathPoint {
     pub sample: u32,
 }
 
-/// What only some rows have.
+/// Fields that only some rows have.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Extra {
     /// The controller's own Cartesian read-out (mm), where logged.
     pub readout_mm: Option<Vector3<f64>>,
-    /// How the arm came here, where the order of the rows is that of measuring; filled in by a diagnosis.
+    /// Motion from the previous row, where rows are in the order of measuring; filled in by a diagnosis.
     pub motion: Option<Motion>,
     /// Session label, where logged.
     pub session: Option<String>,
-    /// The place on a path, where the row was read on one.
+    /// Sampling point, where the row was read on a path.
     pub path: Option<Box<PathPoint>>,
     /// Cells of [`Dataset::other_columns`](super::Dataset::other_columns), as text, up to the last one that holds something.
     pub other: Vec<String>,
 }
 
-/// One measured pose. Kept small, as there may be a million of them: what few rows have, or many share, stands apart.
+/// One measured pose. Kept small, since a file can hold a million: rare fields are in [`Extra`], conditions are shared.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
-    /// What the row is called where people read of it: its line in a file that was read, counted as the spreadsheet counts;
-    /// an index where there is no file.
+    /// Row number in reports: the line of the file, counted as a spreadsheet counts; an index where there is no file.
     pub number: usize,
     /// Line of the file or row of the sheet, from 1, as an editor or spreadsheet shows it.
     pub line: u32,
     /// Logged joint angles of the controller (rad).
     pub joints: Joints,
-    /// What the sensor read.
+    /// The sensor's reading.
     pub reading: Reading,
     /// Time, temperature, payload and approach sides, where logged; rows of one condition share it.
     pub condition: Arc<Condition>,
     /// Which cable outlet (0-based) the row belongs to.
     pub anchor: usize,
-    /// What only some rows have.
+    /// Fields that only some rows have.
     pub extra: Option<Box<Extra>>,
 }
 
-/// The condition of a row of which none is logged.
+/// The condition of a row without any logged.
 static UNKNOWN: LazyLock<Arc<Condition>> = LazyLock::new(Arc::default);
 
 impl Row {
-    /// A row of nothing but joint angles (rad) and a reading, line `number + 2` of a file with a header.
+    /// A row of joint angles (rad) and a reading alone, line `number + 2` of a file with a header.
     pub fn new(number: usize, joints: Joints, reading: Reading) -> Self {
         let line = u32::try_from(number).unwrap_or(u32::MAX).saturating_add(2);
         Self { number, line, joints, reading, condition: UNKNOWN.clone(), anchor: 0, extra: None }
@@ -89,7 +88,7 @@ impl Row {
         self.extra.as_ref()?.readout_mm
     }
 
-    /// How the arm came here, where that is known.
+    /// Motion from the previous row, where known.
     pub fn motion(&self) -> Option<&Motion> {
         self.extra.as_ref()?.motion.as_ref()
     }
@@ -99,7 +98,7 @@ impl Row {
         self.extra.as_ref()?.session.as_deref()
     }
 
-    /// The place on a path, where the row was read on one.
+    /// Sampling point, where the row was read on a path.
     pub fn path(&self) -> Option<&PathPoint> {
         self.extra.as_ref()?.path.as_deref()
     }
@@ -109,7 +108,7 @@ impl Row {
         self.extra.as_ref().map_or(&[], |extra| &extra.other)
     }
 
-    /// What only some rows have, to be filled in.
+    /// The optional fields, to be filled in.
     pub fn extra_mut(&mut self) -> &mut Extra {
         self.extra.get_or_insert_default()
     }

@@ -1,4 +1,4 @@
-//! The rows of a data set, shared by its parts: half of a million rows costs the places of its rows and no copies.
+//! Copy-on-write rows of a data set: a subset costs the indices of its rows, not copies of them.
 
 use std::fmt;
 use std::ops::{Index, IndexMut, Range};
@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::row::Row;
 
-/// Measured rows. A copy and a part share them with the whole until one of them is changed.
+/// Measured rows. Clones and subsets share storage until one of them is modified.
 #[derive(Clone, Default)]
 pub struct Rows {
     all: Arc<Vec<Row>>,
@@ -25,11 +25,11 @@ impl Rows {
         self.len() == 0
     }
 
-    /// The row at a place.
-    pub fn get(&self, place: usize) -> Option<&Row> {
+    /// The row at an index.
+    pub fn get(&self, index: usize) -> Option<&Row> {
         match &self.at {
-            None => self.all.get(place),
-            Some(at) => self.all.get(*at.get(place)? as usize),
+            None => self.all.get(index),
+            Some(at) => self.all.get(*at.get(index)? as usize),
         }
     }
 
@@ -38,31 +38,31 @@ impl Rows {
         self.get(self.len().checked_sub(1)?)
     }
 
-    /// One after the other.
+    /// Iterates over the rows.
     pub fn iter(&self) -> Iter<'_> {
-        Iter { rows: self, places: 0..self.len() }
+        Iter { rows: self, indices: 0..self.len() }
     }
 
-    /// One after the other, to be changed; shared ones are copied first.
+    /// Iterates over mutable rows; shared ones are copied first.
     pub fn iter_mut(&mut self) -> std::slice::IterMut<'_, Row> {
-        self.own().iter_mut()
+        self.make_mut().iter_mut()
     }
 
     /// Adds a row.
     pub fn push(&mut self, row: Row) {
-        self.own().push(row);
+        self.make_mut().push(row);
     }
 
-    /// The rows at some places, which must be there.
-    pub fn part(&self, places: &[usize]) -> Self {
-        let place = |&place: &usize| self.at.as_ref().map_or(place as u32, |at| at[place]);
-        Self { all: self.all.clone(), at: Some(Arc::new(places.iter().map(place).collect())) }
+    /// The rows at `indices`, all of which must exist.
+    pub fn select(&self, indices: &[usize]) -> Self {
+        let in_all = |&index: &usize| self.at.as_ref().map_or(index as u32, |at| at[index]);
+        Self { all: self.all.clone(), at: Some(Arc::new(indices.iter().map(in_all).collect())) }
     }
 
-    /// Rows that nothing else shares.
-    fn own(&mut self) -> &mut Vec<Row> {
+    /// Unshared storage, copied if necessary.
+    fn make_mut(&mut self) -> &mut Vec<Row> {
         if let Some(at) = self.at.take() {
-            self.all = Arc::new(at.iter().map(|&place| self.all[place as usize].clone()).collect());
+            self.all = Arc::new(at.iter().map(|&index| self.all[index as usize].clone()).collect());
         }
         Arc::make_mut(&mut self.all)
     }
@@ -71,17 +71,17 @@ impl Rows {
 impl Index<usize> for Rows {
     type Output = Row;
 
-    fn index(&self, place: usize) -> &Row {
+    fn index(&self, index: usize) -> &Row {
         match &self.at {
-            None => &self.all[place],
-            Some(at) => &self.all[at[place] as usize],
+            None => &self.all[index],
+            Some(at) => &self.all[at[index] as usize],
         }
     }
 }
 
 impl IndexMut<usize> for Rows {
-    fn index_mut(&mut self, place: usize) -> &mut Row {
-        &mut self.own()[place]
+    fn index_mut(&mut self, index: usize) -> &mut Row {
+        &mut self.make_mut()[index]
     }
 }
 
@@ -99,7 +99,7 @@ impl FromIterator<Row> for Rows {
 
 impl Extend<Row> for Rows {
     fn extend<I: IntoIterator<Item = Row>>(&mut self, rows: I) {
-        self.own().extend(rows);
+        self.make_mut().extend(rows);
     }
 }
 
@@ -115,11 +115,11 @@ impl fmt::Debug for Rows {
     }
 }
 
-/// Goes through [`Rows`].
+/// Iterator over [`Rows`].
 #[derive(Debug, Clone)]
 pub struct Iter<'a> {
     rows: &'a Rows,
-    places: Range<usize>,
+    indices: Range<usize>,
 }
 
 impl<'a> Iterator for Iter<'a> {
@@ -130,17 +130,17 @@ impl<'a> Iterator for Iter<'a> {
     }
 
     fn nth(&mut self, over: usize) -> Option<&'a Row> {
-        self.places.nth(over).map(|place| &self.rows[place])
+        self.indices.nth(over).map(|index| &self.rows[index])
     }
 
     fn size_hint(&self) -> (usize, Option<usize>) {
-        self.places.size_hint()
+        self.indices.size_hint()
     }
 }
 
 impl DoubleEndedIterator for Iter<'_> {
     fn next_back(&mut self) -> Option<Self::Item> {
-        self.places.next_back().map(|place| &self.rows[place])
+        self.indices.next_back().map(|index| &self.rows[index])
     }
 }
 
@@ -169,6 +169,6 @@ impl IntoIterator for Rows {
     type IntoIter = std::vec::IntoIter<Row>;
 
     fn into_iter(mut self) -> Self::IntoIter {
-        std::mem::take(self.own()).into_iter()
+        std::mem::take(self.make_mut()).into_iter()
     }
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::cell::{Line, Table};
-use super::error::{ImportError, Place};
+use super::error::{ImportError, Location};
 use crate::measurement::dataset::Sensor;
 
 /// The measured point.
@@ -50,12 +50,12 @@ pub(super) struct Columns {
 impl Columns {
     /// Finds the columns, or says which are missing, doubled or too many.
     pub(super) fn find(file: &str, table: &Table) -> Result<Self, ImportError> {
-        let mut place = Place { sheet: table.sheet.as_deref().map(Into::into), ..Place::file(file) };
+        let mut location = Location { sheet: table.sheet.as_deref().map(Into::into), ..Location::file(file) };
         let Some(header) = header_row(&table.rows) else {
-            return Err(ImportError::Empty { place });
+            return Err(ImportError::Empty { location });
         };
         let line = &table.rows[header];
-        place.row = Some(line.number);
+        location.row = Some(line.number);
         let named: Vec<(String, usize)> = line
             .cells
             .iter()
@@ -66,9 +66,9 @@ impl Columns {
         let found: Vec<String> = named.iter().map(|(n, _)| n.clone()).collect();
         let letter = joint_letter(&found);
         let is_known = |name: &str| is_known(name, letter);
-        let by_name = by_name(&named, letter, &place)?;
+        let by_name = by_name(&named, letter, &location)?;
         let get = |name: &str| by_name.get(name).copied();
-        let path = path_columns(&named, &get, &place)?;
+        let path = path_columns(&named, &get, &location)?;
         let is_used = |name: &str| is_known(name) || path.is_some() && PATH.contains(&name);
         let unused: Vec<&str> = by_name.keys().copied().filter(|n| !is_used(n)).collect();
 
@@ -78,11 +78,11 @@ impl Columns {
             .map(|name| describe_missing(&name, &unused))
             .collect();
         if !missing.is_empty() {
-            return Err(ImportError::MissingColumns { place, missing, found });
+            return Err(ImportError::MissingColumns { location, missing, found });
         }
         let joints = std::array::from_fn(|j| get(&format!("{letter}{}", j + 1)).unwrap_or_default());
 
-        let (sensor, reading) = sensor_columns(&get, &place, &unused, &found)?;
+        let (sensor, reading) = sensor_columns(&get, &location, &unused, &found)?;
         let mut notes = Vec::new();
         let readout = match ["x", "y", "z"].map(get) {
             [Some(x), Some(y), Some(z)] => Some([x, y, z]),
@@ -132,13 +132,13 @@ impl Columns {
 fn path_columns(
     named: &[(String, usize)],
     get: &dyn Fn(&str) -> Option<usize>,
-    place: &Place,
+    location: &Location,
 ) -> Result<Option<[usize; 3]>, ImportError> {
     let [Some(path), Some(cycle), Some(sample)] = PATH.map(get) else { return Ok(None) };
     match PATH.into_iter().find(|name| named.iter().filter(|(found, _)| found == name).count() > 1) {
         None => Ok(Some([path, cycle, sample])),
         Some(doubled) => Err(ImportError::DuplicateColumn {
-            place: Place { column: Some(doubled.into()), ..place.clone() },
+            location: Location { column: Some(doubled.into()), ..location.clone() },
         }),
     }
 }
@@ -159,21 +159,21 @@ fn part_of_path(get: &dyn Fn(&str) -> Option<usize>, path: Option<[usize; 3]>) -
 fn by_name<'a>(
     named: &'a [(String, usize)],
     letter: char,
-    place: &Place,
+    location: &Location,
 ) -> Result<BTreeMap<&'a str, usize>, ImportError> {
     let mut by_name = BTreeMap::new();
     for (name, index) in named {
         let doubled = by_name.insert(name.as_str(), *index).is_some();
         if doubled && is_known(name, letter) {
             return Err(ImportError::DuplicateColumn {
-                place: Place { column: Some(name.as_str().into()), ..place.clone() },
+                location: Location { column: Some(name.as_str().into()), ..location.clone() },
             });
         }
     }
     for name in by_name.keys() {
         if let Some(joint) = joint_number(name, letter).filter(|j| *j > 6) {
-            let place = Place { column: Some((*name).into()), ..place.clone() };
-            return Err(ImportError::TooManyJoints { place, joint });
+            let location = Location { column: Some((*name).into()), ..location.clone() };
+            return Err(ImportError::TooManyJoints { location, joint });
         }
     }
     Ok(by_name)
@@ -203,7 +203,7 @@ fn header_row(rows: &[Line]) -> Option<usize> {
 
 fn sensor_columns(
     get: &dyn Fn(&str) -> Option<usize>,
-    place: &Place,
+    location: &Location,
     unused: &[&str],
     found: &[String],
 ) -> Result<(Sensor, Vec<usize>), ImportError> {
@@ -212,7 +212,7 @@ fn sensor_columns(
         POSITION.iter().chain(&QUATERNION).copied().filter(|n| get(n).is_some()).collect();
     match (cable, tracker.is_empty()) {
         (Some(_), false) => {
-            Err(ImportError::TwoSensors { place: place.clone(), tracker: tracker.join(", ") })
+            Err(ImportError::TwoSensors { location: location.clone(), tracker: tracker.join(", ") })
         }
         (Some(l), true) => Ok((Sensor::Cable, vec![l])),
         (None, true) => {
@@ -225,7 +225,7 @@ fn sensor_columns(
                     Some(((*name).to_owned(), expected.to_owned()))
                 })
                 .collect();
-            Err(ImportError::NoSensor { place: place.clone(), near, found: found.to_vec() })
+            Err(ImportError::NoSensor { location: location.clone(), near, found: found.to_vec() })
         }
         (None, false) => {
             let turned = QUATERNION.iter().any(|n| get(n).is_some());
@@ -235,7 +235,7 @@ fn sensor_columns(
                 wanted.iter().filter(|n| get(n).is_none()).map(|n| describe_missing(n, unused)).collect();
             if !missing.is_empty() {
                 let found = found.to_vec();
-                return Err(ImportError::MissingColumns { place: place.clone(), missing, found });
+                return Err(ImportError::MissingColumns { location: location.clone(), missing, found });
             }
             let sensor = if turned { Sensor::Pose } else { Sensor::Position };
             Ok((sensor, wanted.iter().filter_map(|n| get(n)).collect()))

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use ::csv::{ByteRecord, ReaderBuilder};
 
 use super::cell::{Cell, Line, Table};
-use super::error::{ImportError, Place};
+use super::error::{ImportError, Location};
 
 /// A text table that is read line by line: its cells together would take several times the memory of its numbers.
 pub(super) struct Text<'a> {
@@ -17,7 +17,7 @@ impl<'a> Text<'a> {
     pub(super) fn of(file: &str, bytes: &'a [u8]) -> Result<Self, ImportError> {
         let text = text(bytes);
         if text.contains('\0') {
-            return Err(ImportError::NotATable { place: Place::file(file) });
+            return Err(ImportError::NotATable { location: Location::file(file) });
         }
         let delimiter = delimiter(&text);
         Ok(Self { text, delimiter })
@@ -52,7 +52,7 @@ impl<'a> Text<'a> {
                 Some(Ok(Line { number, cells }))
             }
             Err(error) => {
-                Some(Err(ImportError::Format { place: Place::file(file), message: error.to_string() }))
+                Some(Err(ImportError::Format { location: Location::file(file), message: error.to_string() }))
             }
         })
     }
@@ -125,7 +125,7 @@ fn cell(field: &str, decimal_comma: bool) -> Cell {
     }
 }
 
-/// A decimal number. `decimal_comma` admits one comma in the place of the point; a point and a comma together are
+/// A decimal number. `decimal_comma` admits one comma in the location of the point; a point and a comma together are
 /// nobody's number for certain and stay text.
 pub(super) fn number(text: &str, decimal_comma: bool) -> Option<f64> {
     // Spreadsheets write a typographic minus now and then.

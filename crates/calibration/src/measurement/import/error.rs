@@ -6,7 +6,7 @@ use thiserror::Error;
 
 /// Where in a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Place {
+pub struct Location {
     /// File, as the caller named it.
     pub file: Box<str>,
     /// Sheet, in a workbook.
@@ -17,14 +17,14 @@ pub struct Place {
     pub column: Option<Box<str>>,
 }
 
-impl Place {
+impl Location {
     /// The file as a whole.
     pub fn file(file: &str) -> Self {
         Self { file: file.into(), sheet: None, row: None, column: None }
     }
 }
 
-impl fmt::Display for Place {
+impl fmt::Display for Location {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.file)?;
         if let Some(sheet) = &self.sheet {
@@ -45,34 +45,38 @@ impl fmt::Display for Place {
 #[non_exhaustive]
 pub enum ImportError {
     /// Neither text nor a workbook.
-    #[error("{place}: this is neither a text table nor a workbook; export the measurements as CSV or XLSX")]
+    #[error(
+        "{location}: this is neither a text table nor a workbook; export the measurements as CSV or XLSX"
+    )]
     NotATable {
         /// The file.
-        place: Place,
+        location: Location,
     },
     /// The container is broken.
-    #[error("{place}: cannot be read: {message}; export the measurements again as CSV or XLSX")]
+    #[error("{location}: cannot be read: {message}; export the measurements again as CSV or XLSX")]
     Format {
         /// The file.
-        place: Place,
+        location: Location,
         /// What the reader of the format says.
         message: String,
     },
     /// More than is read, or than can be true.
-    #[error("{place}: found {found}; expected {expected}; save the table alone in a new workbook, or as CSV")]
+    #[error(
+        "{location}: found {found}; expected {expected}; save the table alone in a new workbook, or as CSV"
+    )]
     TooLarge {
         /// The file or sheet.
-        place: Place,
+        location: Location,
         /// What is there.
         found: Box<str>,
         /// What would be read.
         expected: Box<str>,
     },
     /// Nothing in it.
-    #[error("{place}: found no rows; expected a header line and one row for each measured pose")]
+    #[error("{location}: found no rows; expected a header line and one row for each measured pose")]
     Empty {
         /// The file or sheet.
-        place: Place,
+        location: Location,
     },
     /// A sheet was named that is not there.
     #[error("{file}: there is no sheet {sheet}; it has {}", sheets.join(", "))]
@@ -95,10 +99,10 @@ pub enum ImportError {
         sheet: String,
     },
     /// Columns are missing.
-    #[error("{place}: {}; found the columns {}{}", missing.join("; "), list(found), headless(found))]
+    #[error("{location}: {}; found the columns {}{}", missing.join("; "), list(found), headless(found))]
     MissingColumns {
         /// The file or sheet, with the row of the header.
-        place: Place,
+        location: Location,
         /// What is missing, each with a suggestion where a header comes close.
         missing: Vec<String>,
         /// The headers that are there.
@@ -106,14 +110,14 @@ pub enum ImportError {
     },
     /// No sensor.
     #[error(
-        "{place}: found no sensor's column; expected L (cable length) or measured_x, measured_y, measured_z{}; \
+        "{location}: found no sensor's column; expected L (cable length) or measured_x, measured_y, measured_z{}; \
          found the columns {}",
         suggestion(near),
         list(found)
     )]
     NoSensor {
         /// The file or sheet, with the row of the header.
-        place: Place,
+        location: Location,
         /// Headers that come close, each with the name that was expected.
         near: Vec<(String, String)>,
         /// The headers that are there.
@@ -121,37 +125,37 @@ pub enum ImportError {
     },
     /// Two sensors in one file.
     #[error(
-        "{place}: found two sensors at once, a cable (L) and a tracker ({tracker}); expected one; \
+        "{location}: found two sensors at once, a cable (L) and a tracker ({tracker}); expected one; \
          keep each sensor's rows in a file of its own, or rename the columns of the one not to be used"
     )]
     TwoSensors {
         /// The file or sheet, with the row of the header.
-        place: Place,
+        location: Location,
         /// The tracker's columns.
         tracker: String,
     },
     /// A header twice.
-    #[error("{place}: found the column twice; expected it once; rename or delete one of the two")]
+    #[error("{location}: found the column twice; expected it once; rename or delete one of the two")]
     DuplicateColumn {
         /// The column.
-        place: Place,
+        location: Location,
     },
     /// An arm with more than six joints.
     #[error(
-        "{place}: found a column for joint {joint}; truegrind works with six-axis arms, q1 to q6; \
+        "{location}: found a column for joint {joint}; truegrind works with six-axis arms, q1 to q6; \
          a track or positioner can be left out only if it stood still while measuring"
     )]
     TooManyJoints {
         /// The column.
-        place: Place,
+        location: Location,
         /// Number of the joint.
         joint: usize,
     },
     /// A cell that is not what its column needs.
-    #[error("{place}: found {found}; expected {expected}; {remedy}")]
+    #[error("{location}: found {found}; expected {expected}; {remedy}")]
     Cell {
         /// The cell.
-        place: Place,
+        location: Location,
         /// What is there.
         found: Box<str>,
         /// What should be there.
@@ -161,22 +165,22 @@ pub enum ImportError {
     },
     /// A row longer than the header.
     #[error(
-        "{place}: found {found} cells under a header of {expected}; are these decimal commas? \
+        "{location}: found {found} cells under a header of {expected}; are these decimal commas? \
          Export with a decimal point, or with semicolons between the columns"
     )]
     LongRow {
         /// The row.
-        place: Place,
+        location: Location,
         /// Cells of the row.
         found: usize,
         /// Columns of the header.
         expected: usize,
     },
     /// Numbers in the wrong unit.
-    #[error("{place}: {found}; expected {expected}; {remedy}")]
+    #[error("{location}: {found}; expected {expected}; {remedy}")]
     Units {
         /// The columns.
-        place: Place,
+        location: Location,
         /// What looks wrong.
         found: Box<str>,
         /// The unit of the format.
@@ -188,33 +192,33 @@ pub enum ImportError {
 
 impl ImportError {
     /// Where in the file, as far as it is known.
-    pub fn place(&self) -> Option<&Place> {
+    pub fn location(&self) -> Option<&Location> {
         match self {
-            Self::NotATable { place }
-            | Self::Format { place, .. }
-            | Self::TooLarge { place, .. }
-            | Self::Empty { place }
-            | Self::MissingColumns { place, .. }
-            | Self::NoSensor { place, .. }
-            | Self::TwoSensors { place, .. }
-            | Self::DuplicateColumn { place }
-            | Self::TooManyJoints { place, .. }
-            | Self::Cell { place, .. }
-            | Self::LongRow { place, .. }
-            | Self::Units { place, .. } => Some(place),
+            Self::NotATable { location }
+            | Self::Format { location, .. }
+            | Self::TooLarge { location, .. }
+            | Self::Empty { location }
+            | Self::MissingColumns { location, .. }
+            | Self::NoSensor { location, .. }
+            | Self::TwoSensors { location, .. }
+            | Self::DuplicateColumn { location }
+            | Self::TooManyJoints { location, .. }
+            | Self::Cell { location, .. }
+            | Self::LongRow { location, .. }
+            | Self::Units { location, .. } => Some(location),
             Self::UnknownSheet { .. } | Self::NoSheets { .. } => None,
         }
     }
 
     /// The same of a table whose header stands in no row.
     pub(super) fn without_row(mut self) -> Self {
-        if let Self::MissingColumns { place, .. }
-        | Self::NoSensor { place, .. }
-        | Self::TwoSensors { place, .. }
-        | Self::DuplicateColumn { place }
-        | Self::TooManyJoints { place, .. } = &mut self
+        if let Self::MissingColumns { location, .. }
+        | Self::NoSensor { location, .. }
+        | Self::TwoSensors { location, .. }
+        | Self::DuplicateColumn { location }
+        | Self::TooManyJoints { location, .. } = &mut self
         {
-            place.row = None;
+            location.row = None;
         }
         self
     }

@@ -11,7 +11,7 @@ pub struct Options {
 
 /// How far the times of two clocks may be apart where a log and measured points are joined by them.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Clocks {
+pub struct TimeMatching {
     /// The largest difference (s).
     pub within_s: f64,
     /// By how much the clock of the points is ahead of that of the log (s).

@@ -8,7 +8,7 @@ use nalgebra::{Quaternion, Translation3, UnitQuaternion, Vector3};
 
 use super::cell::{Cell, Line, Table};
 use super::columns::Columns;
-use super::error::{ImportError, Place};
+use super::error::{ImportError, Location};
 use super::options::Options;
 use super::rounding;
 use crate::measurement::dataset::{Dataset, Extra, PathPoint, Reading, Row, Sensor};
@@ -37,9 +37,9 @@ pub(super) fn dataset(
         let line = line.as_ref();
         let extra = line.cells.iter().skip(columns.width).filter(|c| !c.is_empty()).count();
         if extra > 0 && table.sheet.is_none() {
-            let place = Place { row: Some(line.number), ..reader.place() };
+            let location = Location { row: Some(line.number), ..reader.location() };
             let expected = columns.width;
-            return Err(ImportError::LongRow { place, found: line.cells.len(), expected });
+            return Err(ImportError::LongRow { location, found: line.cells.len(), expected });
         }
         let headed = |i: usize| reader.header.cells.get(i).is_some_and(|c| !c.is_empty());
         if line.cells.iter().enumerate().all(|(i, c)| c.is_empty() || !headed(i)) {
@@ -52,7 +52,7 @@ pub(super) fn dataset(
         rows.push(reader.row(line, columns, &mut conditions)?);
     }
     if rows.is_empty() {
-        return Err(ImportError::Empty { place: reader.place() });
+        return Err(ImportError::Empty { location: reader.location() });
     }
     rows.shrink_to_fit();
     let headed = reader.header.cells.iter().filter(|c| !c.is_empty()).count();
@@ -73,7 +73,7 @@ pub(super) fn dataset(
     let outlets = rows.iter().map(|row| row.anchor + 1).max().unwrap_or(1);
     if outlets > MOST_OUTLETS {
         return Err(ImportError::Cell {
-            place: Place { column: Some("anchor".into()), ..reader.place() },
+            location: Location { column: Some("anchor".into()), ..reader.location() },
             found: format!("{outlets} different cable outlets").into(),
             expected: "at most 64 in one file",
             remedy: "each is sought with four parameters of its own: keep the rows of others in other files",
@@ -154,13 +154,13 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    fn place(&self) -> Place {
-        Place { sheet: self.sheet.map(Into::into), ..Place::file(self.file) }
+    fn location(&self) -> Location {
+        Location { sheet: self.sheet.map(Into::into), ..Location::file(self.file) }
     }
 
-    fn cell_place(&self, line: &Line, column: usize) -> Place {
+    fn cell_location(&self, line: &Line, column: usize) -> Location {
         let column = self.header.cells.get(column).map(|c| c.to_string().into());
-        Place { row: Some(line.number), column, ..self.place() }
+        Location { row: Some(line.number), column, ..self.location() }
     }
 
     fn wrong(&self, line: &Line, column: usize, expected: &'static str, remedy: &'static str) -> ImportError {
@@ -168,7 +168,7 @@ impl Reader<'_> {
             None | Some(Cell::Empty) => "an empty cell".into(),
             Some(cell) => format!("`{cell}`").into(),
         };
-        ImportError::Cell { place: self.cell_place(line, column), found, expected, remedy }
+        ImportError::Cell { location: self.cell_location(line, column), found, expected, remedy }
     }
 
     /// A finite number that must be there.
@@ -266,8 +266,8 @@ impl Reader<'_> {
         };
         let extra = (extra != Extra::default()).then(|| Box::new(extra));
         let condition = conditions.share(condition);
-        let place = u32::try_from(line.number).unwrap_or(u32::MAX);
-        Ok(Row { number: line.number, line: place, joints, reading, condition, anchor, extra })
+        let location = u32::try_from(line.number).unwrap_or(u32::MAX);
+        Ok(Row { number: line.number, line: location, joints, reading, condition, anchor, extra })
     }
 
     /// What the sensor read.
@@ -285,7 +285,7 @@ impl Reader<'_> {
                 Reading::Pose(Box::new(Pose::from_parts(Translation3::new(*x, *y, *z), rotation)))
             }
             // The columns were chosen for the sensor: one, three or seven.
-            _ => return Err(ImportError::Empty { place: self.place() }),
+            _ => return Err(ImportError::Empty { location: self.location() }),
         })
     }
 
@@ -350,10 +350,10 @@ impl Reader<'_> {
         if (q.norm() - 1.0).abs() <= QUATERNION_TOLERANCE {
             return Ok(UnitQuaternion::from_quaternion(q));
         }
-        let mut place = self.cell_place(line, columns.reading[3]);
-        place.column = Some("measured_qw to measured_qz".into());
+        let mut location = self.cell_location(line, columns.reading[3]);
+        location.column = Some("measured_qw to measured_qz".into());
         Err(ImportError::Cell {
-            place,
+            location,
             found: format!("a quaternion of length {:.4} ({}, {}, {}, {})", q.norm(), q.w, q.i, q.j, q.k)
                 .into(),
             expected: "a unit quaternion, scalar first",
@@ -382,8 +382,8 @@ fn number_anchors(rows: &mut [Row]) -> Option<String> {
 /// `plausibility`.
 fn check_units(reader: &Reader<'_>, rows: &[Row], sensor: Sensor) -> Result<(), ImportError> {
     let units = |columns: &str, found: String, expected, remedy| {
-        let place = Place { column: Some(columns.into()), ..reader.place() };
-        Err(ImportError::Units { place, found: found.into(), expected, remedy })
+        let location = Location { column: Some(columns.into()), ..reader.location() };
+        Err(ImportError::Units { location, found: found.into(), expected, remedy })
     };
     let largest_deg = rows.iter().map(|r| r.joints.amax().to_degrees()).fold(0.0, f64::max);
     let spread_deg = (0..6)

@@ -14,7 +14,7 @@ use calamine::{Data, DataRef, Dimensions, Reader, Xlsx, XlsxError};
 use super::archive::{self, Refusal};
 use super::cell::{Cell, Line, Table};
 use super::csv::number;
-use super::error::{ImportError, Place};
+use super::error::{ImportError, Location};
 
 /// Rows and columns of a sheet.
 const SHEET: (u32, u32) = (1 << 20, 1 << 14);
@@ -33,15 +33,17 @@ pub fn is_workbook(bytes: &[u8]) -> bool {
 
 /// All sheets of a workbook, in its order.
 pub fn tables(file: &str, bytes: &[u8]) -> Result<Vec<Table>, ImportError> {
-    let fail = |message: String| ImportError::Format { place: Place::file(file), message };
+    let fail = |message: String| ImportError::Format { location: Location::file(file), message };
     if !bytes.starts_with(b"PK") {
         return Err(fail("this is an XLS workbook, or an XLSX workbook with a password".to_owned()));
     }
     let unpacked = archive::unpacked(bytes).map_err(|refusal| match refusal {
         Refusal::Broken(message) => fail(message),
-        Refusal::Large { found, expected } => {
-            ImportError::TooLarge { place: Place::file(file), found: found.into(), expected: expected.into() }
-        }
+        Refusal::Large { found, expected } => ImportError::TooLarge {
+            location: Location::file(file),
+            found: found.into(),
+            expected: expected.into(),
+        },
     })?;
     // The reader of the format still indexes by numbers of the file in places and then panics.
     let read = catch_unwind(AssertUnwindSafe(|| {
@@ -49,7 +51,7 @@ pub fn tables(file: &str, bytes: &[u8]) -> Result<Vec<Table>, ImportError> {
         let names = workbook.sheet_names();
         if names.len() as u64 > SHARED * unpacked.allowed / unpacked.largest.max(1) {
             return Err(ImportError::TooLarge {
-                place: Place::file(file),
+                location: Location::file(file),
                 found: format!("{} sheets beside a part of {} bytes", names.len(), unpacked.largest).into(),
                 expected: "sheets with parts of their own".into(),
             });
@@ -68,10 +70,10 @@ struct Room {
 
 impl Room {
     /// Takes `count` cells and `text` bytes.
-    fn take(&mut self, place: &Place, count: usize, text: usize) -> Result<(), ImportError> {
+    fn take(&mut self, location: &Location, count: usize, text: usize) -> Result<(), ImportError> {
         let (Some(cells), Some(text)) = (self.cells.checked_sub(count), self.text.checked_sub(text)) else {
             return Err(ImportError::TooLarge {
-                place: place.clone(),
+                location: location.clone(),
                 found: format!(
                     "more than {MOST_CELLS} cells (the empty ones before a used one counted in) or {} MB of text",
                     MOST_TEXT >> 20
@@ -92,9 +94,9 @@ fn table(
     sheet: &str,
     room: &mut Room,
 ) -> Result<Table, ImportError> {
-    let place = Place { sheet: Some(sheet.into()), ..Place::file(file) };
+    let location = Location { sheet: Some(sheet.into()), ..Location::file(file) };
     let fail = |e: XlsxError| ImportError::Format {
-        place: Place::file(file),
+        location: Location::file(file),
         message: format!("sheet {sheet}: {e}"),
     };
     let mut found = Table { sheet: Some(sheet.to_owned()), ..Table::default() };
@@ -113,7 +115,7 @@ fn table(
         let (row, column) = next.get_position();
         if row >= SHEET.0 || column >= SHEET.1 {
             return Err(ImportError::TooLarge {
-                place,
+                location,
                 found: format!("a cell in row {}, column {}", u64::from(row) + 1, u64::from(column) + 1)
                     .into(),
                 expected: format!("at most {} rows and {} columns", SHEET.0, SHEET.1).into(),
@@ -123,7 +125,7 @@ fn table(
         let text = if let Cell::Text(text) = &value { text.len() } else { 0 };
         let line = lines.entry(row).or_default();
         let column = column as usize;
-        room.take(&place, (column + 1).saturating_sub(line.len()), text)?;
+        room.take(&location, (column + 1).saturating_sub(line.len()), text)?;
         if line.len() <= column {
             line.resize(column + 1, Cell::Empty);
         }
@@ -133,7 +135,7 @@ fn table(
     let (Some((&first, _)), Some((&last, _))) = (lines.first_key_value(), lines.last_key_value()) else {
         return Ok(found);
     };
-    room.take(&place, (last - first) as usize, 0)?;
+    room.take(&location, (last - first) as usize, 0)?;
     found.rows = (first..=last)
         .map(|row| Line { number: row as usize + 1, cells: lines.remove(&row).unwrap_or_default() })
         .collect();

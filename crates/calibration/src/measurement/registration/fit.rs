@@ -1,11 +1,11 @@
-//! A small Levenberg–Marquardt fit for up to a dozen unknowns that move on a manifold.
+//! A small Levenberg–Marquardt solver for up to a dozen unknowns on a manifold.
 //!
-//! Stops after 100 steps, when a step gains less than 1e-14 of the cost, or when no damping helps any more.
+//! Stops after 100 steps, when a step gains less than 1e-14 of the cost, or when no damping lowers the cost.
 
 use nalgebra::{DMatrix, DVector};
 use truegrind_math::work::checkpoint;
 
-/// Normal equations, one row at a time.
+/// Normal equations, accumulated row by row.
 #[derive(Debug, Clone)]
 pub(super) struct Normal {
     /// JᵀJ.
@@ -34,8 +34,8 @@ impl Normal {
     }
 }
 
-/// Minimises the cost from `start`; `rows` fills the normal equations at a state, `moved` takes a step from one.
-/// Returns the cost and the state.
+/// Minimises the cost from `start`; `rows` fills the normal equations at a state, `moved` applies a step to a state.
+/// Returns the final cost and state.
 pub(super) fn fit<S: Clone>(
     start: S,
     size: usize,

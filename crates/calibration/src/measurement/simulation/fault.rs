@@ -76,7 +76,7 @@ fn within(rows: &[usize; 2], row: usize) -> bool {
 }
 
 impl Fault {
-    /// Changes the sensor and the circumstances that a row really has.
+    /// Changes the sensor and the conditions that a row really has.
     pub(super) fn before(&self, row: usize, rig: &mut Rig, condition: &mut Condition) {
         match self {
             Fault::SensorZeroShift { rows, offset_mm } if within(rows, row) => {
@@ -130,7 +130,8 @@ impl Fault {
             },
             Fault::CableSag { weight_over_tension_per_m } => {
                 if let (Reading::Cable(length), Some(outlet)) = (reading, rig.origin_mm(anchor)) {
-                    let away = ((base_from_flange * Point3::from(rig.touched_mm())).coords - outlet) * 1e-3;
+                    let away =
+                        ((base_from_flange * Point3::from(rig.target_on_flange_mm())).coords - outlet) * 1e-3;
                     let level = away.x.hypot(away.y);
                     *length += 1e3 * (weight_over_tension_per_m * level).powi(2) * away.norm() / 24.0;
                 }

@@ -1,10 +1,10 @@
-//! Which poses a recipe measures, in which order and under which circumstances.
+//! Which poses a recipe measures, in which order and under which conditions.
 
 use nalgebra::Point3;
 use rand::RngExt;
 
 use super::error::RecipeError;
-use super::recipe::{Approach, Circumstances, Poses, Recipe};
+use super::recipe::{Approach, Poses, Recipe, RunConditions};
 use super::stream::{Stream, stream};
 use crate::measurement::sensor::Rig;
 use truegrind_arm::condition::Condition;
@@ -25,12 +25,12 @@ pub(super) struct Planned {
 
 pub(super) fn plan(recipe: &Recipe, nominal: &Model, rig: &Rig) -> Result<Vec<Planned>, RecipeError> {
     let (poses, repeats) = distinct(recipe, nominal, rig)?;
-    let mut rng = stream(recipe.seed, Stream::Circumstances);
+    let mut rng = stream(recipe.seed, Stream::Conditions);
     let mut out = Vec::new();
     let mut before: Option<Joints> = None;
     // Repeats come after the whole round, so that they see the drift of the run.
     for joints in (0..repeats.max(1)).flat_map(|_| &poses) {
-        let sides: Vec<[i8; 6]> = match recipe.circumstances.approach {
+        let sides: Vec<[i8; 6]> = match recipe.conditions.approach {
             Approach::Unknown => vec![[0; 6]],
             Approach::Random => vec![std::array::from_fn(|_| if rng.random_bool(0.5) { 1 } else { -1 })],
             // A joint that moves up comes to rest from below.
@@ -49,22 +49,22 @@ pub(super) fn plan(recipe: &Recipe, nominal: &Model, rig: &Rig) -> Result<Vec<Pl
             }
         }
     }
-    set_circumstances(&mut out, &recipe.circumstances);
+    set_conditions(&mut out, &recipe.conditions);
     Ok(out)
 }
 
-fn set_circumstances(rows: &mut [Planned], circumstances: &Circumstances) {
+fn set_conditions(rows: &mut [Planned], conditions: &RunConditions) {
     let last = rows.len().saturating_sub(1).max(1) as f64;
     for (i, row) in rows.iter_mut().enumerate() {
         let condition = &mut row.condition;
-        condition.time_h = circumstances.hours.map(|hours| hours * i as f64 / last);
-        condition.temperature_c = circumstances
+        condition.time_h = conditions.hours.map(|hours| hours * i as f64 / last);
+        condition.temperature_c = conditions
             .temperature
             .zip(condition.time_h)
             .map(|(warm, t)| warm.end_c + (warm.start_c - warm.end_c) * (-t / warm.time_constant_h).exp());
-        let payloads = &circumstances.payload_kg;
+        let payloads = &conditions.payload_kg;
         condition.payload_kg = (!payloads.is_empty()).then(|| payloads[i % payloads.len()]);
-        condition.payload_centre_mm = circumstances.payload_centre_mm;
+        condition.payload_centre_mm = conditions.payload_centre_mm;
     }
 }
 
@@ -73,11 +73,11 @@ fn distinct(recipe: &Recipe, nominal: &Model, rig: &Rig) -> Result<(Vec<Joints>,
     let arm = nominal.at_condition(&Condition::default());
     let seen = |q: &Joints| {
         let flange = arm.forward(q);
-        let at = flange * Point3::from(rig.touched_mm());
+        let at = flange * Point3::from(rig.target_on_flange_mm());
         let inside =
             recipe.view.box_mm.is_none_or(|[low, high]| (0..3).all(|k| (low[k]..=high[k]).contains(&at[k])));
-        let sight = recipe.view.sight();
-        inside && (0..recipe.sensor.anchors()).all(|anchor| rig.sees(&sight, &flange, anchor))
+        let limits = recipe.view.limits();
+        inside && (0..recipe.sensor.anchors()).all(|anchor| rig.sees(&limits, &flange, anchor))
     };
     let from_degrees = |q: &[f64; 6]| Joints::from_fn(|j, _| q[j].to_radians());
     let (poses, repeats, wanted, tries) = match &recipe.poses {

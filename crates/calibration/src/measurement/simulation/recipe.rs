@@ -43,13 +43,13 @@ use nalgebra::{Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::error::RecipeError;
-use super::fault::Fault;
-use crate::measurement::sensor::{Rig, Sight};
+
+use crate::measurement::sensor::{Rig, SightLimits};
 use truegrind_arm::effect::Effect;
 use truegrind_arm::model::Body;
 use truegrind_math::se3::Pose;
 
-pub use super::fault::Fault as SensorFault;
+pub use super::fault::Fault;
 
 /// A stated arm, measured in a stated way.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -60,7 +60,7 @@ pub struct Recipe {
     pub about: String,
     /// Name of the nominal arm.
     pub robot: String,
-    /// Seed of poses, circumstances and noise.
+    /// Seed of poses, conditions and noise.
     pub seed: u64,
     /// How the actual arm differs from its data sheet.
     #[serde(default)]
@@ -71,8 +71,8 @@ pub struct Recipe {
     #[serde(default)]
     pub view: View,
     /// Time, temperature, payload, approach.
-    #[serde(default)]
-    pub circumstances: Circumstances,
+    #[serde(default, rename = "circumstances")]
+    pub conditions: RunConditions,
     /// The sensor.
     pub sensor: SensorSetup,
     /// Noise of sensor and arm.
@@ -215,8 +215,8 @@ pub struct View {
 
 impl View {
     /// The sensor's part.
-    pub fn sight(&self) -> Sight {
-        Sight { distance_mm: self.distance_mm, tilt_rad: self.tilt_deg.map(f64::to_radians) }
+    pub fn limits(&self) -> SightLimits {
+        SightLimits { distance_mm: self.distance_mm, tilt_rad: self.tilt_deg.map(f64::to_radians) }
     }
 }
 
@@ -239,7 +239,7 @@ pub enum Approach {
 /// Time, temperature, payload, approach.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Circumstances {
+pub struct RunConditions {
     /// Length of the whole run (h); rows follow evenly from 0.
     pub hours: Option<f64>,
     /// Temperature over the run; needs `hours`.

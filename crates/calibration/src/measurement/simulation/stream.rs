@@ -6,7 +6,7 @@ use rand_chacha::rand_core::SeedableRng;
 /// Independent streams of one seed.
 pub(super) enum Stream {
     Poses,
-    Circumstances,
+    Conditions,
     Noise,
 }
 

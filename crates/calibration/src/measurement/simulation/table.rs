@@ -48,12 +48,12 @@ pub(super) fn csv(recipe: &Recipe, rig: &Rig, rows: &[Logged]) -> String {
     let readout = Format::new(recipe.rounding.readout_mm, 4);
     let quaternion = Format::new(None, 9);
     let (hours, degrees, mass) = (Format::new(None, 5), Format::new(None, 3), Format::new(None, 3));
-    let logged = !recipe.circumstances.unlogged;
+    let logged = !recipe.conditions.unlogged;
     let first = rows.first().map(|r| r.condition).unwrap_or_default();
     let time = logged && first.time_h.is_some();
     let temperature = logged && first.temperature_c.is_some();
     let payload = logged && first.payload_kg.is_some();
-    let approach = logged && recipe.circumstances.approach != Approach::Unknown;
+    let approach = logged && recipe.conditions.approach != Approach::Unknown;
     let anchors = recipe.sensor.anchors() > 1;
 
     let mut header: Vec<String> = (1..=6).map(|j| format!("q{j}")).collect();

@@ -22,7 +22,7 @@ use truegrind_calibration::diagnosis::marginal::variances;
 use truegrind_calibration::diagnosis::rows::prepare;
 use truegrind_calibration::identification::fit::errors_on;
 use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row, Sensor};
-use truegrind_calibration::measurement::sensor::disturbance::{Course, Disturbance, Kind};
+use truegrind_calibration::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
 
 use super::scenarios::frames;
 use super::simulator::{Hidden, Log, Setup, run};
@@ -181,7 +181,10 @@ fn nature_has_no_joint_that_yields_upwards() {
         |size| Cause::Arm(Effect::JointCompliance(Compliance { joint: 1, compliance_rad_per_nm: size }));
     let play = |size| Cause::Arm(Effect::Backlash(Backlash { joint: 1, play_rad: size }));
     let sag = |size| {
-        Cause::Measurement(Disturbance { values: vec![size], ..Disturbance::new(Kind::Sag, Course::Always) })
+        Cause::Measurement(Disturbance {
+            values: vec![size],
+            ..Disturbance::new(Kind::Sag, Profile::Constant)
+        })
     };
     for of in [&compliance as &dyn Fn(f64) -> Cause, &play, &sag] {
         assert!(of(1e-5).is_possible() && !of(-1e-5).is_possible());

@@ -20,8 +20,8 @@ use truegrind_calibration::diagnosis::extension::{Extended, Freedom, Subject, fi
 use truegrind_calibration::diagnosis::finding::Confidence;
 use truegrind_calibration::diagnosis::rows::prepare;
 use truegrind_calibration::measurement::dataset::{Dataset, Reading, Sensor};
-use truegrind_calibration::measurement::sensor::disturbance::{Course, Disturbance, Kind};
-use truegrind_calibration::measurement::sensor::form::Form;
+use truegrind_calibration::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
+use truegrind_calibration::measurement::sensor::empirical::EmpiricalFault;
 
 use super::scenarios::frames;
 use super::simulator::{Hidden, Log, Setup, run};
@@ -157,7 +157,8 @@ fn the_first_joint_yields_only_where_another_shows_that_the_arm_leans() {
 }
 
 fn of_two_joints(joint: usize, other: usize, values: [f64; 4]) -> Cause {
-    let disturbance = Disturbance::new(Kind::Form(Form::TwoJointGear { joint, other }), Course::Always);
+    let disturbance =
+        Disturbance::new(Kind::Empirical(EmpiricalFault::TwoJointGear { joint, other }), Profile::Constant);
     Cause::Measurement(Disturbance { values: values.to_vec(), ..disturbance })
 }
 

@@ -21,7 +21,7 @@ use truegrind_calibration::diagnosis::rows::{mismatches, prepare};
 use truegrind_calibration::diagnosis::score::score_columns;
 use truegrind_calibration::diagnosis::validation::Validation;
 use truegrind_calibration::measurement::dataset::Sensor;
-use truegrind_calibration::measurement::sensor::disturbance::{Course, Disturbance, Kind};
+use truegrind_calibration::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
 use truegrind_calibration::measurement::split;
 use truegrind_estimation::least_squares::lm;
 use truegrind_estimation::problem::{Problem, prior_cost};
@@ -62,7 +62,7 @@ fn plain(n: usize, residual: impl Fn(usize) -> f64) -> Design {
     let slopes = Slopes {
         by_joint: vec![DVector::zeros(n); 6],
         by_growth: DVector::zeros(n),
-        by_tool: DMatrix::zeros(n, 3),
+        by_target: DMatrix::zeros(n, 3),
         by_frame: DMatrix::zeros(n, 3),
         by_zero: DVector::from_element(n, 1.0),
         by_scale: DVector::zeros(n),
@@ -295,12 +295,14 @@ fn part_of_the_whole(subject: &Subject<'_>, fitted: &Extended) {
 #[test]
 fn overlapping_shifts_are_told_as_levels() {
     let zero = |from, to, mm| {
-        let mut d = Disturbance::new(Kind::Zero, Course::Rows { from, to });
+        let mut d = Disturbance::new(Kind::Zero, Profile::Rows { from, to });
         d.values[0] = mm;
         Cause::Measurement(d)
     };
-    let frame =
-        Cause::Measurement(Disturbance::new(Kind::Frame { turning: false }, Course::Rows { from: 5, to: 9 }));
+    let frame = Cause::Measurement(Disturbance::new(
+        Kind::Frame { turning: false },
+        Profile::Rows { from: 5, to: 9 },
+    ));
     let told = disjoint(&[zero(72, 535, -2.2), frame.clone(), zero(300, 387, 2.25), zero(386, 537, -0.8)]);
     let told = told.expect("they overlap");
     let rows: Vec<_> = told.iter().map(Cause::rows).collect();

@@ -22,7 +22,7 @@ use truegrind_calibration::diagnosis::validation::Validation;
 use truegrind_calibration::identification::calibration::{CalibrationProblem, Frames, Weight};
 use truegrind_calibration::identification::start::starts;
 use truegrind_calibration::measurement::dataset::{Dataset, Sensor};
-use truegrind_calibration::measurement::sensor::disturbance::{Course, Disturbance, Kind};
+use truegrind_calibration::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
 
 use super::simulator::{Hidden, Log, Run, Setup, difference, run};
 
@@ -263,7 +263,7 @@ pub fn matches(hidden: &Hidden, finding: &Finding, rows: usize) -> bool {
 
 /// The hidden effect as a cause to fit.
 pub fn cause(hidden: &Hidden) -> Option<Cause> {
-    let rows = |from: usize, to: usize| Course::Rows { from, to };
+    let rows = |from: usize, to: usize| Profile::Rows { from, to };
     Some(match *hidden {
         Hidden::Compliance { joint, .. } => {
             Cause::Arm(Effect::JointCompliance(Compliance { joint, compliance_rad_per_nm: 0.0 }))
@@ -286,10 +286,10 @@ pub fn cause(hidden: &Hidden) -> Option<Cause> {
         Hidden::Frame { from, to, .. } => {
             Cause::Measurement(Disturbance::new(Kind::Frame { turning: false }, rows(from, to)))
         }
-        Hidden::Tool { from, to, .. } => Cause::Measurement(Disturbance::new(Kind::Tool, rows(from, to))),
+        Hidden::Tool { from, to, .. } => Cause::Measurement(Disturbance::new(Kind::Target, rows(from, to))),
         Hidden::Drift { time_constant_h, .. } => Cause::Measurement(Disturbance::new(
             Kind::Frame { turning: false },
-            Course::Clock { time_constant_h },
+            Profile::Exponential { time_constant_h },
         )),
         Hidden::Warm { .. } => Cause::Arm(Effect::ThermalDrift(Thermal {
             growth: 0.0,
@@ -297,8 +297,8 @@ pub fn cause(hidden: &Hidden) -> Option<Cause> {
             growth_per_k: 0.0,
             reference_c: 20.0,
         })),
-        Hidden::Scale { .. } => Cause::Measurement(Disturbance::new(Kind::Scale, Course::Always)),
-        Hidden::Sag { .. } => Cause::Measurement(Disturbance::new(Kind::Sag, Course::Always)),
+        Hidden::Scale { .. } => Cause::Measurement(Disturbance::new(Kind::Scale, Profile::Constant)),
+        Hidden::Sag { .. } => Cause::Measurement(Disturbance::new(Kind::Sag, Profile::Constant)),
         Hidden::Payload { from, to, .. } => Cause::Measurement(Disturbance::new(
             Kind::Load { joints: vec![1, 2], compliance: None },
             rows(from, to),

@@ -13,8 +13,8 @@ use truegrind_arm::model::{Body, Joints, Limits, Model};
 use truegrind_arm::parameter::{Parameter, link_parameters};
 use truegrind_calibration::identification::calibration::{CalibrationProblem, Frames, Weight};
 use truegrind_calibration::measurement::dataset::{Dataset, Motion, Reading, Row, Sensor};
-use truegrind_calibration::measurement::sensor::disturbance::{Course, Disturbance, Kind};
-use truegrind_calibration::measurement::sensor::form::Form;
+use truegrind_calibration::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
+use truegrind_calibration::measurement::sensor::empirical::EmpiricalFault;
 use truegrind_estimation::problem::Problem;
 use truegrind_math::difference;
 use truegrind_math::lanes::{Instructions, with_instructions};
@@ -106,32 +106,40 @@ fn dataset(sensor: Sensor, rows: usize, seed: u64) -> Dataset {
 
 /// One of each kind that the sensor can suffer, none of them at rest.
 fn disturbances(sensor: Sensor) -> Vec<Disturbance> {
-    let rows = Course::Rows { from: 3, to: 8 };
+    let rows = Profile::Rows { from: 3, to: 8 };
     let mut kinds = vec![
-        (Kind::Tool, rows),
-        (Kind::Scale, Course::Always),
+        (Kind::Target, rows),
+        (Kind::Scale, Profile::Constant),
         (Kind::Frame { turning: sensor != Sensor::Cable }, rows),
-        (Kind::Frame { turning: false }, Course::Thermometer { reference_c: 21.5 }),
+        (Kind::Frame { turning: false }, Profile::Temperature { reference_c: 21.5 }),
         (Kind::Load { joints: vec![1, 2], compliance: None }, rows),
         (
             Kind::Load { joints: vec![1, 4], compliance: Some(vec![1e-5, 2e-5]) },
-            Course::Clock { time_constant_h: 0.5 },
+            Profile::Exponential { time_constant_h: 0.5 },
         ),
     ];
     if sensor == Sensor::Cable {
         kinds.push((Kind::Zero, rows));
-        kinds.push((Kind::Sag, Course::Always));
+        kinds.push((Kind::Sag, Profile::Constant));
     }
-    let of_pose = [Form::Stiffness { joint: 1 }, Form::TwoJointGear { joint: 2, other: 3 }];
+    let of_pose = [
+        EmpiricalFault::NonlinearStiffness { joint: 1 },
+        EmpiricalFault::TwoJointGear { joint: 2, other: 3 },
+    ];
     let of_sensor = match sensor {
-        Sensor::Cable => [Form::Pulley, Form::Drum { from_mm: 500, to_mm: 1200 }],
-        _ => [Form::Refraction, Form::Nest { second: true }],
+        Sensor::Cable => [EmpiricalFault::Pulley, EmpiricalFault::Drum { from_mm: 500, to_mm: 1200 }],
+        _ => [EmpiricalFault::Refraction, EmpiricalFault::TargetNest { second: true }],
     };
-    let of_motion = [Form::Latency { middle_s: 900 }, Form::LastStep, Form::SlowReading];
+    let of_motion = [
+        EmpiricalFault::Latency { middle_s: 900 },
+        EmpiricalFault::ArmUnsettled,
+        EmpiricalFault::SensorUnsettled,
+    ];
     let forms = of_pose.into_iter().chain(of_sensor).chain(of_motion);
-    kinds.extend(forms.map(|form| (Kind::Form(form), Course::Always)));
+    kinds.extend(forms.map(|form| (Kind::Empirical(form), Profile::Constant)));
     // A form that does not go as far in each row.
-    kinds.extend(of_sensor.map(|form| (Kind::Form(form), Course::Clock { time_constant_h: 0.5 })));
+    kinds
+        .extend(of_sensor.map(|form| (Kind::Empirical(form), Profile::Exponential { time_constant_h: 0.5 })));
     kinds
         .into_iter()
         .map(|(kind, course)| {
@@ -141,7 +149,7 @@ fn disturbances(sensor: Sensor) -> Vec<Disturbance> {
                 // Its slope by the geometry is left out: a millionth of the length's own.
                 Kind::Sag => 1e-6,
                 Kind::Load { compliance: None, .. } => 1e-5,
-                Kind::Form(form) => 0.1 * form.size(0),
+                Kind::Empirical(form) => 0.1 * form.prior_sigma(0),
                 _ => 0.6,
             };
             out.values.iter_mut().enumerate().for_each(|(k, v)| *v = size * (1.0 - 0.3 * k as f64));
@@ -243,8 +251,8 @@ fn late_readings_do_not_hang_on_where_the_clock_begins() {
             let time_h = row.condition.time_h.map(|t| t + f64::from(begins_h));
             row.condition = Condition { time_h, ..*row.condition }.into();
         }
-        let form = Form::Latency { middle_s: 900 + 3600 * i64::from(begins_h) };
-        let mut late = Disturbance::new(Kind::Form(form), Course::Always);
+        let form = EmpiricalFault::Latency { middle_s: 900 + 3600 * i64::from(begins_h) };
+        let mut late = Disturbance::new(Kind::Empirical(form), Profile::Constant);
         late.values = vec![0.05, 0.2];
         let frames = Frames { disturbances: vec![late], ..Frames::at_origin(0) };
         let list = [

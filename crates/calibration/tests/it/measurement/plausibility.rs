@@ -5,7 +5,7 @@ use truegrind_arm::model::{Joints, Model};
 use truegrind_calibration::measurement::convention::AngleConvention;
 use truegrind_calibration::measurement::dataset::{Dataset, Reading};
 use truegrind_calibration::measurement::plausibility::{
-    AngleUnit, Evidence, LengthUnit, Orientation, UnitSuspicion, plausibility,
+    AngleUnit, ComparedReading, LengthUnit, Orientation, UnitSuspicion, plausibility,
 };
 
 use super::simulation::{CABLE, SIX, TRACKER, measure, random};
@@ -67,7 +67,7 @@ fn lengths_in_other_units_are_named() {
             (LengthUnit::Centimetres, "centimetres"),
         ] {
             let found = one(&scaled(&data, 1.0 / unit.millimetres()));
-            assert_eq!((found.likely.lengths, found.evidence), (unit, Evidence::Sensor));
+            assert_eq!((found.likely.lengths, found.compared), (unit, ComparedReading::Sensor));
             assert_eq!(found.differences().len(), 1);
             let message = found.to_string();
             assert!(message.contains(words) && message.contains("multiply"), "{message}");

@@ -54,8 +54,8 @@ fn touching_point_is_found_far_off_the_flange() {
     let sensor = TRACKER.replace("[30, 10, 60]", "[250, -120, 310]");
     let (simulation, data) = measure(&random(40, &format!("{sensor}[noise]\nsigma_mm = 0.05\n")));
     let Rig::Position { base_from_sensor, reflector_mm } = simulation.rig else { panic!() };
-    let found = registration::touching_point(&flanges(&simulation), &positions(&data)).unwrap();
-    assert!((found.on_flange_mm - reflector_mm).norm() < 0.1, "{found:?}");
+    let found = registration::target_point(&flanges(&simulation), &positions(&data)).unwrap();
+    assert!((found.target_mm - reflector_mm).norm() < 0.1, "{found:?}");
     assert!((found.base_from_sensor.translation.vector - base_from_sensor.translation.vector).norm() < 0.3);
     assert!((0.06..0.11).contains(&found.rmse_mm), "0.05 mm a coordinate: {}", found.rmse_mm);
 }
@@ -69,9 +69,9 @@ fn one_orientation_leaves_the_point_at_the_flange() {
         spots.iter().map(|p| pose_from_vector(&[p[0], p[1], p[2], 3.0, 0.0, 0.0])).collect();
     let seen: Vec<_> =
         flanges.iter().map(|f| frame.inverse_transform_point(&(f * reflector)).coords).collect();
-    let found = registration::touching_point(&flanges, &seen).unwrap();
+    let found = registration::target_point(&flanges, &seen).unwrap();
     assert!(found.rmse_mm < 1e-6);
-    assert!(found.on_flange_mm.norm() < 100.0, "{}", found.on_flange_mm);
+    assert!(found.target_mm.norm() < 100.0, "{}", found.target_mm);
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! What the types of a recipe leave open: numbers that are none, arms that cannot be, and more rows than anyone measures.
 
-use super::{Circumstances, Frame, Poses, Recipe, SensorFault as Fault, SensorSetup, View};
+use super::{Fault, Frame, Poses, Recipe, RunConditions, SensorSetup, View};
 use crate::measurement::simulation::error::RecipeError;
 use truegrind_arm::bounds::{
     self, Bound, InvalidValue, JOINT_DEG, LENGTH_MM, MASS_KG, POSITION_MM, display_number,
@@ -39,7 +39,7 @@ impl Recipe {
         self.check_arm().map_err(|invalid| invalid.within("arm"))?;
         self.check_poses().map_err(|invalid| invalid.within("poses"))?;
         view(&self.view).map_err(|invalid| invalid.within("view"))?;
-        circumstances(&self.circumstances).map_err(|invalid| invalid.within("circumstances"))?;
+        conditions(&self.conditions).map_err(|invalid| invalid.within("circumstances"))?;
         sensor(&self.sensor).map_err(|invalid| invalid.within("sensor"))?;
         for (key, sigma) in [
             ("noise.sigma_mm", self.noise.sigma_mm),
@@ -118,7 +118,7 @@ impl Recipe {
             Poses::Grid { steps, .. } => steps.iter().try_fold(1_usize, |all, step| all.checked_mul(*step)),
             Poses::List { joints_deg, .. } => Some(joints_deg.len()),
         };
-        let sides = if self.circumstances.approach == super::Approach::Both { 2 } else { 1 };
+        let sides = if self.conditions.approach == super::Approach::Both { 2 } else { 1 };
         let rows = [repeats.max(1), sides, self.sensor.anchors()];
         let rows = rows.iter().try_fold(poses.unwrap_or(usize::MAX), |all, times| all.checked_mul(*times));
         if rows.is_some_and(|rows| rows <= MOST_ROWS) && poses.is_some_and(|poses| poses <= MOST_ROWS) {
@@ -135,18 +135,18 @@ fn view(view: &View) -> Result<(), InvalidValue> {
     TILT_DEG.check_all("tilt_deg", &view.tilt_deg)
 }
 
-fn circumstances(circumstances: &Circumstances) -> Result<(), InvalidValue> {
-    HOURS.check_all("hours", &circumstances.hours)?;
-    if let Some(warm) = &circumstances.temperature {
-        if circumstances.hours.is_none() {
+fn conditions(conditions: &RunConditions) -> Result<(), InvalidValue> {
+    HOURS.check_all("hours", &conditions.hours)?;
+    if let Some(warm) = &conditions.temperature {
+        if conditions.hours.is_none() {
             return Err(InvalidValue::new("temperature", "no hours", "`hours` beside a temperature"));
         }
         TEMPERATURE_C.check(|| "temperature.start_c".to_owned(), warm.start_c)?;
         TEMPERATURE_C.check(|| "temperature.end_c".to_owned(), warm.end_c)?;
         TIME_H.check(|| "temperature.time_constant_h".to_owned(), warm.time_constant_h)?;
     }
-    MASS_KG.check_all("payload_kg", &circumstances.payload_kg)?;
-    LENGTH_MM.check_all("payload_centre_mm", &circumstances.payload_centre_mm)
+    MASS_KG.check_all("payload_kg", &conditions.payload_kg)?;
+    LENGTH_MM.check_all("payload_centre_mm", &conditions.payload_centre_mm)
 }
 
 fn frame(key: &str, frame: &Frame) -> Result<(), InvalidValue> {

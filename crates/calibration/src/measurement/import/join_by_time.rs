@@ -6,9 +6,9 @@
 use super::cell::{Cell, Line, Table};
 use super::clock::{FORMS, Stamp};
 use super::columns::{Columns, POSITION};
-use super::error::{ImportError, Place};
-use super::options::Clocks;
-use super::points::{Point, Points, broken, cells, headed};
+use super::error::{ImportError, Location};
+use super::options::TimeMatching;
+use super::tracker_export::{Point, Points, broken, cells, headed};
 
 /// Columns of a log that hold the time, in this order of preference.
 const TIMES: [&str; 5] = ["time", "timestamp", "time_stamp", "datetime", "date_time"];
@@ -23,7 +23,7 @@ const NAMED: usize = 5;
 
 /// A row of the log.
 struct Logged {
-    /// Its place in the table.
+    /// Its location in the table.
     index: usize,
     /// Its line in the file.
     number: usize,
@@ -31,27 +31,27 @@ struct Logged {
 }
 
 /// The log with the measured points as columns of ours, and what was left out.
-pub(super) fn joined(
+pub(super) fn join_by_time(
     points: &Points,
     file: &str,
     mut log: Table,
-    clocks: &Clocks,
+    clocks: &TimeMatching,
 ) -> Result<(Table, Vec<String>), ImportError> {
-    let place = Place { sheet: log.sheet.as_deref().map(Into::into), ..Place::file(file) };
+    let location = Location { sheet: log.sheet.as_deref().map(Into::into), ..Location::file(file) };
     let header = log.rows.iter().position(|line| headed(line, &TIMES).is_some());
     let Some((header, column)) = header.and_then(|at| Some((at, headed(&log.rows[at], &TIMES)?))) else {
         let message =
             "has no column with the time of each row; expected `time` beside q1 to q6, such as 10:15:30.25";
-        return Err(broken(place, message.to_owned()));
+        return Err(broken(location, message.to_owned()));
     };
     let width = log.rows.iter().map(|line| line.cells.len()).max().unwrap_or(0);
     log.rows.drain(..header);
     log.rows.iter_mut().for_each(|line| line.cells.resize(width, Cell::Empty));
     log.rows[0].cells.extend(POSITION.map(|name| Cell::Text(name.to_owned())));
     let columns = Columns::find(file, &log)?;
-    let (logged, measured) = times(points, &log, column, &place)?;
+    let (logged, measured) = times(points, &log, column, &location)?;
     let pairing = Pairing { points, log: &log, joints: columns.joints, clocks, logged, measured };
-    let pairs = pairing.pairs(file, &place)?;
+    let pairs = pairing.pairs(file, &location)?;
     let notes = pairing.notes(&pairs);
     let mut partner: Vec<Option<usize>> = vec![None; log.rows.len()];
     pairs.iter().for_each(|pair| partner[pair.index] = Some(pair.point));
@@ -70,7 +70,7 @@ fn times(
     points: &Points,
     log: &Table,
     column: usize,
-    place: &Place,
+    location: &Location,
 ) -> Result<(Vec<Logged>, Vec<f64>), ImportError> {
     let time = log.rows[0].cells[column].to_string();
     let rows: Vec<(usize, &Line)> = log
@@ -80,33 +80,34 @@ fn times(
         .skip(1)
         .filter(|(_, line)| line.cells.iter().any(|cell| !cell.is_empty()))
         .collect();
-    let stamp = |place: Place, text: &str| {
-        Stamp::of(text).ok_or_else(|| broken(place, format!("found `{text}`; expected {FORMS}")))
+    let stamp = |location: Location, text: &str| {
+        Stamp::of(text).ok_or_else(|| broken(location, format!("found `{text}`; expected {FORMS}")))
     };
     let of_rows = rows.iter().map(|(_, line)| {
-        let place = Place { row: Some(line.number), column: Some(time.as_str().into()), ..place.clone() };
-        stamp(place, &line.cells[column].to_string())
+        let location =
+            Location { row: Some(line.number), column: Some(time.as_str().into()), ..location.clone() };
+        stamp(location, &line.cells[column].to_string())
     });
     let of_rows = of_rows.collect::<Result<Vec<_>, _>>()?;
     let of_points = points.all.iter().map(|point| {
-        let place = Place { row: Some(point.row), ..Place::file(&points.file) };
+        let location = Location { row: Some(point.row), ..Location::file(&points.file) };
         let without = || {
             let message = format!(
                 "no time after the coordinates of point `{}`, found `{}`; expected {FORMS}: export the points with their time stamps",
                 point.name, point.more
             );
-            broken(place.clone(), message)
+            broken(location.clone(), message)
         };
         Stamp::of(&point.more).ok_or_else(without)
     });
     let of_points = of_points.collect::<Result<Vec<_>, _>>()?;
-    let dated = days(place, &of_rows)? && days(&Place::file(&points.file), &of_points)?;
-    if !dated && let Some((place, [first, last])) = over_midnight(place, &of_rows, points, &of_points) {
+    let dated = days(location, &of_rows)? && days(&Location::file(&points.file), &of_points)?;
+    if !dated && let Some((location, [first, last])) = over_midnight(location, &of_rows, points, &of_points) {
         let message = format!(
             "has times of {} days, and the other file has no dates; expected dates in both, or one day",
             last - first + 1
         );
-        return Err(broken(place, message));
+        return Err(broken(location, message));
     }
     let base = of_rows.first().and_then(|stamp| stamp.day).unwrap_or(0);
     let seconds = |stamp: &Stamp| {
@@ -121,34 +122,34 @@ fn times(
 }
 
 /// Whether the times of a file have dates; all or none.
-fn days(place: &Place, stamps: &[Stamp]) -> Result<bool, ImportError> {
+fn days(location: &Location, stamps: &[Stamp]) -> Result<bool, ImportError> {
     let dated = stamps.iter().filter(|stamp| stamp.day.is_some()).count();
     if dated == 0 || dated == stamps.len() {
         return Ok(dated > 0);
     }
     let message =
         format!("{dated} of {} times have a date; expected one in every line or in none", stamps.len());
-    Err(broken(place.clone(), message))
+    Err(broken(location.clone(), message))
 }
 
 /// The file, and its first and last day, whose dates are needed where the other has none.
 fn over_midnight(
-    place: &Place,
+    location: &Location,
     rows: &[Stamp],
     points: &Points,
     measured: &[Stamp],
-) -> Option<(Place, [i64; 2])> {
+) -> Option<(Location, [i64; 2])> {
     let range = |stamps: &[Stamp]| {
         let days = || stamps.iter().filter_map(|stamp| stamp.day);
         Some([days().min()?, days().max()?]).filter(|[first, last]| first < last)
     };
-    let of_points = || Some((Place::file(&points.file), range(measured)?));
-    range(rows).map(|days| (place.clone(), days)).or_else(of_points)
+    let of_points = || Some((Location::file(&points.file), range(measured)?));
+    range(rows).map(|days| (location.clone(), days)).or_else(of_points)
 }
 
 /// A row and its point.
 struct Pair {
-    /// The row's place in the table.
+    /// The row's location in the table.
     index: usize,
     point: usize,
     /// How far their times are apart (s).
@@ -159,13 +160,13 @@ struct Pairing<'a> {
     points: &'a Points,
     log: &'a Table,
     joints: [usize; 6],
-    clocks: &'a Clocks,
+    clocks: &'a TimeMatching,
     logged: Vec<Logged>,
     measured: Vec<f64>,
 }
 
 impl Pairing<'_> {
-    fn pairs(&self, file: &str, place: &Place) -> Result<Vec<Pair>, ImportError> {
+    fn pairs(&self, file: &str, location: &Location) -> Result<Vec<Pair>, ImportError> {
         let mut order: Vec<&Logged> = self.logged.iter().collect();
         order.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
         let within = self.clocks.within_s;
@@ -193,9 +194,9 @@ impl Pairing<'_> {
                 nearest_s.first().copied().unwrap_or(f64::NAN),
                 nearest_s.last().copied().unwrap_or(f64::NAN)
             );
-            return Err(broken(place.clone(), message));
+            return Err(broken(location.clone(), message));
         }
-        self.each_once(pairs, place)
+        self.each_once(pairs, location)
     }
 
     /// Refuses a point near which the arm moved: which of the rows it belongs to would be a guess.
@@ -221,11 +222,11 @@ impl Pairing<'_> {
             first.number.min(last.number),
             first.number.max(last.number),
         );
-        Err(broken(Place { row: Some(point.row), ..Place::file(&self.points.file) }, message))
+        Err(broken(Location { row: Some(point.row), ..Location::file(&self.points.file) }, message))
     }
 
     /// Refuses two points for one row. The pairs come back in the order of the rows.
-    fn each_once(&self, mut pairs: Vec<Pair>, place: &Place) -> Result<Vec<Pair>, ImportError> {
+    fn each_once(&self, mut pairs: Vec<Pair>, location: &Location) -> Result<Vec<Pair>, ImportError> {
         pairs.sort_by_key(|pair| (pair.index, pair.point));
         let mut beside = pairs.iter().zip(pairs.iter().skip(1));
         let Some((one, two)) = beside.find(|(one, two)| one.index == two.index) else { return Ok(pairs) };
@@ -239,7 +240,7 @@ impl Pairing<'_> {
             named(one),
             named(two)
         );
-        Err(broken(Place { row: Some(self.log.rows[one.index].number), ..place.clone() }, message))
+        Err(broken(Location { row: Some(self.log.rows[one.index].number), ..location.clone() }, message))
     }
 
     fn notes(&self, pairs: &[Pair]) -> Vec<String> {

@@ -11,7 +11,7 @@ use nalgebra::UnitQuaternion;
 
 use super::cell::{Cell, Line, Table};
 use super::columns::{POSITION, QUATERNION};
-use super::error::{ImportError, Place};
+use super::error::{ImportError, Location};
 
 /// A point nearer to zero than this in every coordinate was not measured (mm).
 const NOT_MEASURED_MM: f64 = 1e-3;
@@ -29,7 +29,7 @@ const LEAST: usize = 4;
 ///
 /// # Errors
 /// [`ImportError`] where it is one of these and cannot be used: several TCPs, more than six joints, nothing measured.
-pub(super) fn known(file: &str, table: &Table) -> Option<Result<(Table, Vec<String>), ImportError>> {
+pub(super) fn convert(file: &str, table: &Table) -> Option<Result<(Table, Vec<String>), ImportError>> {
     let used: Vec<&Line> = table.rows.iter().filter(|line| widest(line) > 0).collect();
     let (first, rest) = used.split_first()?;
     // A header is a row in which no cell but the first is a number.
@@ -38,9 +38,9 @@ pub(super) fn known(file: &str, table: &Table) -> Option<Result<(Table, Vec<Stri
     if rows.len() < LEAST || headed && is_ours(first) {
         return None;
     }
-    let place = Place { sheet: table.sheet.as_deref().map(Into::into), ..Place::file(file) };
+    let location = Location { sheet: table.sheet.as_deref().map(Into::into), ..Location::file(file) };
     if rows.iter().all(|line| numbers::<ROBODK>(line, 0).is_some()) {
-        return robodk(rows, &place)
+        return robodk(rows, &location)
             .map(|found| found.map(|(rows, notes)| (under_our_header(table, rows), notes)));
     }
     let joints = rows.iter().map(|line| widest(line)).max()?.saturating_sub(DELMIA - 6);
@@ -51,7 +51,7 @@ pub(super) fn known(file: &str, table: &Table) -> Option<Result<(Table, Vec<Stri
         return None;
     }
     if joints > 6 {
-        return Some(Err(ImportError::TooManyJoints { place, joint: joints }));
+        return Some(Err(ImportError::TooManyJoints { location, joint: joints }));
     }
     delmia(rows).map(|(rows, notes)| Ok((under_our_header(table, rows), notes)))
 }
@@ -70,7 +70,7 @@ fn is_number(cell: &Cell) -> bool {
     cell.number().is_some()
 }
 
-/// So many numbers from a place on, where the line ends with them.
+/// So many numbers from a location on, where the line ends with them.
 fn numbers<const N: usize>(line: &Line, from: usize) -> Option<[f64; N]> {
     if widest(line) != from + N {
         return None;
@@ -84,7 +84,7 @@ fn numbers<const N: usize>(line: &Line, from: usize) -> Option<[f64; N]> {
 
 type Rows = (Vec<Line>, Vec<String>);
 
-fn robodk(rows: &[&Line], place: &Place) -> Option<Result<Rows, ImportError>> {
+fn robodk(rows: &[&Line], location: &Location) -> Option<Result<Rows, ImportError>> {
     let values: Vec<[f64; ROBODK]> = rows.iter().filter_map(|line| numbers(line, 0)).collect();
     let measured = |row: &[f64; ROBODK]| row[6..9].iter().any(|v| v.abs() >= NOT_MEASURED_MM);
     let tcp = values.iter().find(|row| measured(row))?[9..].to_vec();
@@ -96,7 +96,7 @@ fn robodk(rows: &[&Line], place: &Place) -> Option<Result<Rows, ImportError>> {
         // Columns that change from row to row are no TCP.
         return (groups * 2 < values.len()).then(|| {
             Err(ImportError::Format {
-                place: place.clone(),
+                location: location.clone(),
                 message: "a calibration table of RoboDK with more than one TCP; expected one: write a file for each target on \
                           the arm, and give the others with --also"
                     .to_owned(),

@@ -1,4 +1,4 @@
-//! Points that the tracker's software exports, joined with a log of the joints by name (`moments` joins them by time).
+//! Points that the tracker's software exports, joined with a log of the joints by name (`join_by_time` joins them by time).
 //!
 //! SpatialAnalyzer, "Export ASCII Points" (user's manual): lines of a name, x, y, z and more, separated by blanks, tabs or commas; the
 //! name is that of the target alone, or of its group and collection before it; lines that begin with `//` are comments. What follows the
@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use super::cell::{Cell, Line, Table};
 use super::columns::POSITION;
 use super::csv;
-use super::error::{ImportError, Place};
+use super::error::{ImportError, Location};
 
 /// Columns of a log of joints that name the point, in this order of preference.
 const NAMES: [&str; 4] = ["name", "point", "target", "tag"];
@@ -39,15 +39,15 @@ pub(super) struct Points {
     pub(super) all: Vec<Point>,
 }
 
-pub(super) fn broken(place: Place, message: String) -> ImportError {
-    ImportError::Format { place, message }
+pub(super) fn broken(location: Location, message: String) -> ImportError {
+    ImportError::Format { location, message }
 }
 
 impl Points {
     /// Reads an export.
     pub(super) fn read(file: &str, bytes: &[u8]) -> Result<Self, ImportError> {
         let text = csv::text(bytes);
-        let place = |row: Option<usize>| Place { row, ..Place::file(file) };
+        let location = |row: Option<usize>| Location { row, ..Location::file(file) };
         let mut lines: Vec<(usize, Vec<&str>)> = Vec::new();
         for (index, line) in text.lines().map(str::trim).enumerate() {
             if let Some(comment) = line.strip_prefix("//") {
@@ -56,7 +56,7 @@ impl Points {
                     comment.contains("unit") && comment.contains(**unit) && !comment.contains("millimeter")
                 }) {
                     let message = format!("found `{unit}` in a comment on units; expected millimetres");
-                    return Err(broken(place(Some(index + 1)), message));
+                    return Err(broken(location(Some(index + 1)), message));
                 }
                 continue;
             }
@@ -67,7 +67,7 @@ impl Points {
         let names = layout(&lines).ok_or_else(|| {
             let message = "no line has a name and x, y, z; expected points as SpatialAnalyzer exports them (target, x, y, z, with group \
                            and collection before it or not), the same in every line";
-            broken(place(lines.first().map(|(row, _)| *row)), message.to_owned())
+            broken(location(lines.first().map(|(row, _)| *row)), message.to_owned())
         })?;
         let mut all = Vec::new();
         for (row, fields) in &lines {
@@ -77,7 +77,7 @@ impl Points {
                     "found `{}`; expected {names} names and x, y, z as in the lines above",
                     fields.join(" ")
                 );
-                return Err(broken(place(Some(*row)), message));
+                return Err(broken(location(Some(*row)), message));
             };
             all.push(Point {
                 row: *row,
@@ -94,27 +94,31 @@ impl Points {
         let mut by_name = BTreeMap::new();
         for Point { row, name, at_mm, .. } in &self.all {
             if by_name.insert(name.as_str(), *at_mm).is_some() {
-                let place = Place { row: Some(*row), ..Place::file(&self.file) };
+                let location = Location { row: Some(*row), ..Location::file(&self.file) };
                 let message = format!(
                     "point `{name}` stands twice; expected each name once: export one group, rename the repeats, or join by time \
                      (--points-within)"
                 );
-                return Err(broken(place, message));
+                return Err(broken(location, message));
             }
         }
         Ok(by_name)
     }
 
     /// The log with the measured points as columns of ours, and what was left out.
-    pub(super) fn joined(&self, file: &str, mut log: Table) -> Result<(Table, Vec<String>), ImportError> {
+    pub(super) fn join_by_name(
+        &self,
+        file: &str,
+        mut log: Table,
+    ) -> Result<(Table, Vec<String>), ImportError> {
         let by_name = self.by_name()?;
-        let place = Place { sheet: log.sheet.as_deref().map(Into::into), ..Place::file(file) };
+        let location = Location { sheet: log.sheet.as_deref().map(Into::into), ..Location::file(file) };
         let header = log.rows.iter().position(|line| named(line).is_some());
         let Some((header, column)) = header.and_then(|at| Some((at, named(&log.rows[at])?))) else {
             let message =
                 "has no column that names the measured points; expected `name` beside q1 to q6, or join by time (--points-within)"
                     .to_owned();
-            return Err(broken(place, message));
+            return Err(broken(location, message));
         };
         let width = log.rows.iter().map(|line| line.cells.len()).max().unwrap_or(0);
         let mut used = 0_usize;
@@ -149,7 +153,7 @@ impl Points {
                 some(&mut without.iter().map(String::as_str)),
                 some(&mut by_name.keys().copied())
             );
-            return Err(broken(place, message));
+            return Err(broken(location, message));
         }
         log.rows.retain(|line| !line.cells.is_empty());
         let mut notes = vec![format!("{used} rows joined by name with {} measured points", by_name.len())];

@@ -1,11 +1,11 @@
 //! A log of joints and a tracker's points, joined by the times of two clocks: what belongs together for certain, and nothing else.
 
 use truegrind_calibration::measurement::dataset::{Dataset, Reading};
-use truegrind_calibration::measurement::import::{Clocks, ImportError, Options, joined_by_time};
+use truegrind_calibration::measurement::import::{ImportError, Options, TimeMatching, read_joined_by_time};
 
 fn read(log: &str, points: &str, within_s: f64, ahead_s: f64) -> Result<Dataset, ImportError> {
-    let clocks = Clocks { within_s, ahead_s };
-    joined_by_time(
+    let clocks = TimeMatching { within_s, ahead_s };
+    read_joined_by_time(
         ("log.csv", log.as_bytes()),
         ("points.txt", points.as_bytes()),
         &clocks,
