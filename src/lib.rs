@@ -73,7 +73,7 @@ pub use truegrind_math::statistics::ErrorSummary;
 pub use truegrind_calibration::measurement::convention::{AngleConvention, UnknownConvention};
 pub use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row, Sensor};
 pub use truegrind_calibration::measurement::import::{
-    ImportError, Options as ImportOptions, Place as ImportPlace, read as read_measurements,
+    ImportError, Location as ImportLocation, Options as ImportOptions, read as read_measurements,
 };
 pub use truegrind_calibration::measurement::plausibility::{UnitSuspicion, plausibility};
 pub use truegrind_calibration::measurement::sensor::disturbance::Disturbance;

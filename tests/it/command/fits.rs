@@ -83,7 +83,7 @@ fn points_of_the_tracker_are_joined_with_a_log_of_joints_by_name() {
         let (code, _, err) = truegrind(at, &begin);
         assert!(code == 2 && expected.iter().all(|part| err.contains(part)), "{err}");
     };
-    refused("p1, 1.5, 2.5, 3.5\np1, 1.5, 2.5, 3.5\n", &["points.txt, row 2", "`p1` stands twice"]);
+    refused("p1, 1.5, 2.5, 3.5\np1, 1.5, 2.5, 3.5\n", &["points.txt, row 2", "`p1` occurs twice"]);
     refused("r1 1.5 2.5 3.5\n", &["none of its names", "`r1`", "`extra`"]);
     refused("// Units: Inches\np1 1.5 2.5 3.5\n", &["row 1", "millimetres"]);
     refused("1 2 3 4\n5 6\n", &["row 1", "x, y, z"]);

@@ -1,12 +1,12 @@
-//! Measurement files: bytes in, a [`Dataset`] or a precise complaint out.
+//! Reads measurement files to a [`Dataset`]; errors name the location in the file.
 //!
 //! Columns are found by header name, in any order: `q1…q6` logged joint angles (deg); one sensor, `L` (mm) or
 //! `measured_x, measured_y, measured_z` (mm) (with `measured_qw … measured_qz` a full pose); optional `x, y, z` (mm),
 //! `t` (h), `session`, `temperature` [°C], `payload` (kg), `approach1…6`, `anchor`, and `path, cycle, sample` of rows that were read
 //! on a path. Other columns are kept as text.
-//! Tables of RoboDK and DELMIA are told by their content (see the notes of the dataset).
-//! CSV may be separated by comma, semicolon or tab; with semicolon or tab a decimal comma is understood. Of a
-//! workbook the first sheet that has the columns is read, or the one named.
+//! Tables of RoboDK and DELMIA are recognised by their content (see the notes of the dataset).
+//! CSV fields are separated by comma, semicolon or tab; with semicolon or tab, decimal commas are accepted. Of a workbook,
+//! the named sheet is read, or else the first with the required columns.
 
 mod archive;
 pub mod cell;
@@ -33,7 +33,7 @@ use self::columns::Columns;
 use self::tracker_export::Points;
 use super::dataset::Dataset;
 
-/// Reads a measurement file. `file` is the name that messages and reports print; the format is told by the bytes.
+/// Reads a measurement file. `file` is the name in messages and reports; the format is detected from the bytes.
 ///
 /// ```
 /// use truegrind_calibration::measurement::dataset::{Reading, Sensor};
@@ -44,7 +44,7 @@ use super::dataset::Dataset;
 /// assert_eq!(rows.rows[0].reading, Reading::Cable(500.25));
 /// assert!((rows.rows[0].joints[1].to_degrees() - 20.0).abs() < 1e-12);
 ///
-/// // A fault is named with its location.
+/// // An error names its location.
 /// let error = read("poses.csv", b"q1,q2,q3,q4,q5,q6,L\n10,20,30,40,fifty,60,500.25\n", &Options::default());
 /// let said = error.map(|_| ()).map_err(|error| error.to_string()).err().ok_or("was read")?;
 /// assert!(said.starts_with("poses.csv, row 2, column q5") && said.contains("fifty"), "{said}");
@@ -64,8 +64,8 @@ pub fn read(file: &str, bytes: &[u8], options: &Options) -> Result<Dataset, Impo
     Ok(dataset)
 }
 
-/// Reads a log of joints whose points a tracker's software has exported into a file of their own, and joins the two by the column
-/// `name` of the log. Both are given by the name that messages print, and bytes.
+/// Reads a log of joints and a tracker's exported points, and joins them by the column `name` of the log. Each is a pair of its name
+/// in messages and its bytes.
 ///
 /// ```
 /// use truegrind_calibration::measurement::dataset::Reading;
@@ -79,8 +79,8 @@ pub fn read(file: &str, bytes: &[u8], options: &Options) -> Result<Dataset, Impo
 /// ```
 ///
 /// # Errors
-/// [`ImportError`]: as of [`read`], and where lines of the export are not alike, a point stands twice, the log has no names, or none of
-/// them is that of a point.
+/// [`ImportError`]: as of [`read`], and for an export whose lines differ in layout, a duplicate point, a log without names, or no
+/// common name.
 pub fn read_joined(
     log: (&str, &[u8]),
     points: (&str, &[u8]),
@@ -89,8 +89,8 @@ pub fn read_joined(
     read_together(log, points, options, |measured, table| measured.join_by_name(log.0, table))
 }
 
-/// The same by the times of the log's column `time` and of the export's time stamps. A point is joined with the row nearest to it; a row
-/// or a point that has no partner within the tolerance is left out and told in the notes.
+/// Reads the same pair of files and joins them by the log's column `time` and the export's time stamps. A point is joined with the
+/// row nearest in time; rows and points without a partner within the tolerance are omitted and listed in the notes.
 ///
 /// ```
 /// use truegrind_calibration::measurement::dataset::Reading;
@@ -106,8 +106,8 @@ pub fn read_joined(
 /// ```
 ///
 /// # Errors
-/// [`ImportError`]: as of [`read_joined`], where a row or a point has no time, where no row lies within the tolerance of a point, and where it
-/// would be a guess which row a point belongs to: the arm moved within the tolerance, or a row is the nearest to two points.
+/// [`ImportError`]: as of [`read_joined`], for a row or point without a time, no row within the tolerance of any point, and an
+/// ambiguous match: the arm moved within the tolerance, or a row is nearest to two points.
 pub fn read_joined_by_time(
     log: (&str, &[u8]),
     points: (&str, &[u8]),
@@ -143,7 +143,7 @@ fn read_together(
     Ok(dataset)
 }
 
-/// The sheet that is asked for, or the first that holds anything.
+/// The requested sheet, or the first nonempty one.
 fn select_sheet(file: &str, tables: Vec<Table>, options: &Options) -> Result<Table, ImportError> {
     let name = |table: &Table| table.sheet.clone().unwrap_or_default();
     let sheets: Vec<String> = tables.iter().map(name).collect();
@@ -157,8 +157,8 @@ fn select_sheet(file: &str, tables: Vec<Table>, options: &Options) -> Result<Tab
     })
 }
 
-/// Rows that stand in no file, as arrays and data frames of a program do, under the same names and checks as the columns of a
-/// file. `file` is what messages and reports call them; rows are counted from 0.
+/// Converts rows in memory, such as arrays and data frames, with the same column names and checks as a file. `file` is their name
+/// in messages and reports; rows are counted from 0.
 ///
 /// ```
 /// use truegrind_calibration::measurement::import::cell::Cell;
@@ -211,7 +211,7 @@ fn from_table(file: &str, table: &Table, options: &Options) -> Result<Dataset, I
     }
 }
 
-/// A table of another program; `None` where it is none that is known.
+/// Reads a table of another program; `None` for an unknown format.
 fn from_foreign(file: &str, table: &Table, options: &Options) -> Option<Result<Dataset, ImportError>> {
     let read = |(table, notes): (Table, Vec<String>)| {
         let columns = Columns::find(file, &table)?;
@@ -222,7 +222,7 @@ fn from_foreign(file: &str, table: &Table, options: &Options) -> Option<Result<D
     foreign::convert(file, table).map(|found| found.and_then(read))
 }
 
-/// A text table: as many lines as it takes to find the header, and the rest one by one.
+/// Reads a text table: the lines up to the header at once, the rest one by one.
 fn from_text(file: &str, text: &csv::Text<'_>, options: &Options) -> Result<Dataset, ImportError> {
     let mut table = text.empty();
     let mut lines = text.lines(file);
@@ -256,7 +256,7 @@ fn from_workbook(file: &str, tables: &[Table], options: &Options) -> Result<Data
         if let Some(found) = tables.iter().find_map(|table| from_foreign(file, table, options)) {
             return found;
         }
-        // Nothing fits: complain about the first sheet that holds anything.
+        // No sheet fits: report the error of the first nonempty sheet.
         let table = tables.iter().find(|t| !t.rows.is_empty()).or(tables.first());
         return match table {
             Some(table) => from_table(file, table, options),

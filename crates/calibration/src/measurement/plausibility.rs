@@ -1,14 +1,14 @@
-//! Whether a file means what its format says: units, angle convention and quaternion order, judged by the arm itself.
+//! Plausibility of a file's units, angle convention and quaternion order, tested against the nominal arm.
 //!
-//! Method: the nominal arm is registered to the sensor (and to the controller's read-out, where there is one) under
-//! every combination of {degrees, radians} × {mm, m, inch, cm} × {logged, DH angles} × {scalar first, scalar last,
-//! inverted}. What remains is taken relative to how far the flange travels under that interpretation, since in a wrong unit the
-//! arm may hardly move. A data sheet is good to some tenths of a percent, a wrong unit to tens: when another interpretation of
-//! the file fits ten times better than the stated one, it is named.
+//! Method: the nominal arm is registered to the sensor (and to the controller's read-out, if logged) under every combination
+//! of {degrees, radians} × {mm, m, inch, cm} × {logged, DH angles} × {scalar first, scalar last, inverted}. The residual is
+//! taken relative to the travel of the flange under that interpretation, since in a wrong unit the arm hardly moves. A data
+//! sheet is accurate to some tenths of a percent, a wrong unit to tens of percent: an interpretation that fits ten times
+//! better than the stated one is reported.
 //!
-//! Shapes: up to 120 rows, evenly taken. Stops: closed forms and [`registration`]. Departures: none, there is no paper;
-//! a hook, reflector or tool of unknown place is fitted along, so that its stand-off is not taken for a unit.
-//! Checked against: simulated files in every wrong unit, and the real ones.
+//! Shapes: up to 120 evenly spaced rows. Stopping rule: closed forms and [`registration`]. Source: none. A hook, reflector
+//! or tool of unknown position is fitted too, so that its offset is not mistaken for a wrong unit.
+//! Checked against simulated files in every wrong unit, and against real files.
 
 use std::fmt;
 
@@ -21,15 +21,15 @@ use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Model;
 use truegrind_math::se3::Pose;
 
-/// How much better another interpretation of the file has to fit.
+/// Factor by which another interpretation must fit better.
 const MARGIN: f64 = 10.0;
-/// Share of the travel to which a stated interpretation may fail without being doubted: no wrong unit comes so close.
+/// Relative residual up to which the stated interpretation is accepted: no wrong unit fits so well.
 const ACCEPTED_SHARE: f64 = 0.01;
-/// Another interpretation that leaves more than this share explains nothing.
+/// Relative residual above which another interpretation explains nothing.
 const USELESS_SHARE: f64 = 0.1;
-/// Rows that are looked at.
+/// Most rows that are used.
 const ROWS: usize = 120;
-/// Lever that turns an interpretation_error of orientation into one of position [mm/rad].
+/// Lever arm that converts an orientation error to a position error [mm/rad].
 const LEVER_MM: f64 = 300.0;
 
 /// Unit of the file's angles.
@@ -72,28 +72,28 @@ impl LengthUnit {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum Orientation {
-    /// Scalar first, target seen by the sensor, as the format says.
+    /// Scalar first, target in the sensor's frame, as the format says.
     ScalarFirst,
-    /// The scalar stands in the last column.
+    /// Scalar in the last column.
     ScalarLast,
-    /// The sensor seen by the target.
+    /// Orientation of the sensor in the target's frame.
     Inverted,
 }
 
-/// One way to read a file.
+/// One interpretation of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Interpretation {
     /// Unit of q1 to q6.
     pub angles: AngleUnit,
     /// Unit of the sensor's (or read-out's) lengths.
     pub lengths: LengthUnit,
-    /// What the angles are.
+    /// Convention of the angles.
     pub convention: AngleConvention,
-    /// What the quaternion is; only of full poses.
+    /// Quaternion order; of full poses only.
     pub orientation: Orientation,
 }
 
-/// What spoke against the stated interpretation.
+/// The readings that were compared with the nominal arm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ComparedReading {
     /// The sensor's readings.
@@ -102,37 +102,37 @@ pub enum ComparedReading {
     Readout,
 }
 
-/// Another interpretation of the file fits by an order of magnitude better than the stated one.
+/// Another interpretation of the file fits an order of magnitude better than the stated one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UnitSuspicion {
     /// The file.
     pub file: String,
-    /// What was compared with the arm.
+    /// Readings that were compared with the arm.
     pub compared: ComparedReading,
-    /// The interpretation that the format and the caller state.
+    /// The interpretation stated by format and caller.
     pub stated: Interpretation,
     /// The interpretation that fits.
     pub likely: Interpretation,
-    /// Error of the registered nominal arm under the stated interpretation.
+    /// Residual of the registered nominal arm under the stated interpretation.
     pub stated_error: InterpretationError,
-    /// Error under the likely interpretation.
+    /// Residual under the likely interpretation.
     pub likely_error: InterpretationError,
 }
 
-/// How badly a interpretation fits.
+/// Residual of an interpretation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InterpretationError {
-    /// Root mean square of what the registered nominal arm leaves (mm).
+    /// Root mean square residual of the registered nominal arm (mm).
     pub rmse_mm: f64,
-    /// The same as a share of the flange's travel, its root mean square distance from its mean position.
+    /// The residual relative to the flange's travel, its root mean square distance from its mean position.
     pub share: f64,
 }
 
-/// Other meanings of a file that fit the nominal arm far better than the stated one: at most one for the sensor and
-/// one for the read-out. `data` holds the file's angles as they were read, before any
-/// [`AngleConvention::apply`]; `stated` is the convention they are taken for.
+/// Interpretations of a file that fit the nominal arm far better than the stated one: at most one for the sensor and
+/// one for the read-out. `data` holds the file's angles as read, before any [`AngleConvention::apply`]; `stated` is their
+/// assumed convention.
 ///
-/// Empty when all is well, and when too few rows are there to tell.
+/// Empty for a plausible file, and for one with too few rows to decide.
 ///
 /// ```
 /// use truegrind_arm::robots;
@@ -206,12 +206,12 @@ fn suspicion(
         }
     }
     let lowest = others.iter().map(|(_, e)| e.share).fold(f64::INFINITY, f64::min);
-    // Of meanings that fit about equally well the one that is nearest to the stated one.
+    // Of interpretations that fit about equally well, the nearest to the stated one.
     let (likely, likely_error) =
         others.into_iter().filter(|(_, e)| e.share <= 2.0 * lowest).min_by(|a, b| {
             a.0.changes(&stated).cmp(&b.0.changes(&stated)).then(a.1.share.total_cmp(&b.1.share))
         })?;
-    // An arm that stands still under the stated interpretation leaves an infinite share.
+    // An arm that does not move under the stated interpretation has an infinite relative residual.
     let better = likely_error.share * MARGIN < stated_error.share;
     (better && likely_error.share < USELESS_SHARE).then(|| UnitSuspicion {
         file: data.file.clone(),
@@ -223,7 +223,7 @@ fn suspicion(
     })
 }
 
-/// Error of the registered nominal arm under a interpretation; `None` where too few rows are there to tell.
+/// Residual of the registered nominal arm under an interpretation; `None` for too few rows.
 fn interpretation_error(
     rows: &[&Row],
     model: &Model,
@@ -240,7 +240,7 @@ fn interpretation_error(
         }
         let file = match interpretation.angles {
             AngleUnit::Degrees => row.joints,
-            // The import took the numbers for degrees.
+            // The import converted the numbers from degrees.
             AngleUnit::Radians => row.joints.map(f64::to_degrees),
         };
         flanges.push(arm.forward(&interpretation.convention.controller_angles(model, &file)?));
@@ -256,7 +256,7 @@ fn interpretation_error(
     let square: f64 = flanges.iter().map(|f| (f.translation.vector - mean).norm_squared()).sum();
     let travel = (square / flanges.len().max(1) as f64).sqrt();
     let of = |rmse_mm: f64| Some(InterpretationError { rmse_mm, share: rmse_mm / travel });
-    // Twice as many numbers as are fitted.
+    // At least twice as many readings as unknowns.
     if !poses.is_empty() {
         let fit = registration::poses(&flanges, &poses).filter(|_| poses.len() >= 4)?;
         return of(fit.rmse_mm.hypot(LEVER_MM * fit.rmse_rad));
@@ -286,7 +286,7 @@ fn interpretation_error(
 }
 
 impl Orientation {
-    /// The pose that was meant, of one that was read scalar first.
+    /// The pose under this quaternion order, from one that was read scalar first.
     fn of(self, pose: &Pose, scale: f64) -> Pose {
         let q = pose.rotation;
         let rotation = match self {
@@ -308,7 +308,7 @@ impl Interpretation {
 }
 
 impl UnitSuspicion {
-    /// What differs, and what to do: one pair for each.
+    /// Pairs of a difference and its remedy.
     pub fn differences(&self) -> Vec<(&'static str, &'static str)> {
         let mut out = Vec::new();
         let (stated, likely) = (&self.stated, &self.likely);
@@ -348,8 +348,8 @@ impl UnitSuspicion {
         if stated.orientation != likely.orientation {
             out.push(match likely.orientation {
                 Orientation::Inverted => (
-                    "the quaternions look inverted (sensor seen by the target)",
-                    "write measured_qw to measured_qz as the target seen by the sensor",
+                    "the quaternions look inverted (sensor in the target's frame)",
+                    "write measured_qw to measured_qz as the target's orientation in the sensor's frame",
                 ),
                 _ => (
                     "the quaternions look scalar-last",
@@ -370,8 +370,8 @@ impl fmt::Display for UnitSuspicion {
         };
         write!(
             f,
-            "{}: {}: so read, the nominal arm meets {compared} to {:.1} mm ({:.1} % of its travel), as the file stands \
-             only to {:.1} mm ({:.0} %); {}",
+            "{}: {}: read that way, the nominal arm agrees with {compared} to {:.1} mm ({:.1} % of its travel), but as \
+             stated only to {:.1} mm ({:.0} %); {}",
             self.file,
             what.join(" and "),
             self.likely_error.rmse_mm,

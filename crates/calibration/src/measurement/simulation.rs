@@ -1,11 +1,11 @@
-//! Measurements of an arm that is known in every detail, so that whatever identifies it can be judged.
+//! Simulated measurements of a known arm, to test identification and diagnosis against the truth.
 //!
 //! A [`Recipe`] states the actual arm (nominal plus deviations, effects, masses), where it is measured, with what
 //! sensor, noise, rounding and faults. The same recipe gives the same bytes: three independent ChaCha8 streams of one
-//! seed draw poses, conditions and noise, and a seed of its own draws the arm.
+//! seed draw poses, conditions and noise, and a separate seed draws the arm.
 //!
-//! What is logged: the encoder's angles and, where asked for, the read-out that the controller computes from them with
-//! the nominal model, both rounded as the recipe says. The arm itself stands at the unrounded angles.
+//! The log has the encoder's angles and, if requested, the read-out that the controller computes from them with the nominal
+//! model, both rounded as the recipe says. The arm itself is at the unrounded angles.
 
 pub mod recipe;
 mod arm;
@@ -29,7 +29,7 @@ use super::sensor::Rig;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::{Joints, Model};
 
-/// What a recipe gives.
+/// A simulated measurement.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Simulation {
     /// The measurement file, with header.
@@ -38,13 +38,13 @@ pub struct Simulation {
     pub actual: Model,
     /// The arm of the data sheet.
     pub nominal: Model,
-    /// The sensor as it stood before any fault.
+    /// The sensor before any fault.
     pub rig: Rig,
     /// The rows before rounding and noise.
     pub rows: Vec<SimulatedRow>,
 }
 
-/// One row as it really was.
+/// The true state of one row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SimulatedRow {
     /// Angles of the encoders (rad).
@@ -53,12 +53,12 @@ pub struct SimulatedRow {
     pub condition: Condition,
     /// Cable outlet, 0-based.
     pub anchor: usize,
-    /// The reading that a perfect sensor would give.
+    /// The noise-free reading.
     pub reading: Reading,
 }
 
 impl Recipe {
-    /// Measures the actual arm. `resolve` gives the nominal model of a robot by name.
+    /// Simulates the measurement of the actual arm. `resolve` returns the nominal model of a robot by name.
     ///
     /// ```
     /// use truegrind_arm::robots;
@@ -69,7 +69,7 @@ impl Recipe {
     /// use truegrind_calibration::measurement::simulation::recipe::Recipe;
     /// use truegrind_calibration::measurement::{import, split};
     ///
-    /// // An arm whose third joint stands 0.1° beside its mark, seen by a tracker.
+    /// // An arm whose third joint has a zero offset of 0.1°, seen by a tracker.
     /// let recipe = r#"
     /// robot = "abb-irb-120"
     /// seed = 4
@@ -91,7 +91,7 @@ impl Recipe {
     /// let turned = simulation.actual.links[2].theta_rad - simulation.nominal.links[2].theta_rad;
     /// assert!((turned.to_degrees() - 0.1).abs() < 1e-9);
     ///
-    /// // What it wrote is a measurement like any other; the fit of it finds the joint.
+    /// // The simulated file is read like any other; the fit recovers the offset.
     /// let rows = import::read("simulated.csv", simulation.csv.as_bytes(), &import::Options::default())?;
     /// assert_eq!(rows.rows.len(), 60);
     /// let options = Options::default();
@@ -122,12 +122,12 @@ impl Recipe {
             for fault in &self.fault {
                 fault.before(number, &mut seen_by, &mut truth);
             }
-            let mut stands = planned.joints;
-            for q in stands.iter_mut() {
-                let wobble: f64 = StandardNormal.sample(&mut rng);
-                *q += wobble * self.noise.joints_deg.to_radians();
+            let mut actual_joints = planned.joints;
+            for q in actual_joints.iter_mut() {
+                let repeatability: f64 = StandardNormal.sample(&mut rng);
+                *q += repeatability * self.noise.joints_deg.to_radians();
             }
-            let flange = actual.forward(&stands, &truth);
+            let flange = actual.forward(&actual_joints, &truth);
             let exact = seen_by.predict(&flange, planned.anchor).ok_or(RecipeError::Invalid {
                 key: "sensor.outlets_mm".into(),
                 found: "no outlet".into(),
@@ -158,7 +158,7 @@ impl Recipe {
     }
 }
 
-/// A reading with the sensor's noise. A heavy tail keeps the stated standard deviation.
+/// A reading with the sensor's noise. Student's t is scaled to the stated standard deviation.
 fn noisy(exact: &Reading, distance_mm: f64, noise: &Noise, rng: &mut ChaCha8Rng) -> Reading {
     let sigma = noise.sigma_mm + noise.per_metre_mm * distance_mm * 1e-3;
     // The degrees of freedom were checked to be above 2.
@@ -184,7 +184,7 @@ fn noisy(exact: &Reading, distance_mm: f64, noise: &Noise, rng: &mut ChaCha8Rng)
 }
 
 impl Simulation {
-    /// Which sensor the file is of.
+    /// The sensor of the file.
     pub fn sensor(&self) -> Sensor {
         self.rig.sensor()
     }

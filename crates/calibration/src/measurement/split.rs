@@ -1,7 +1,7 @@
-//! Which rows train and which test, and what repeated poses say about the noise.
+//! Train/test splits and cross-validation folds of the rows, and the noise floor from repeated poses.
 //!
-//! A pose that was measured several times stays on one side of every split: a fit that has seen a pose has seen its
-//! repetitions. All functions return indices of [`Dataset::rows`] in ascending order.
+//! All readings of a repeated pose are on the same side of every split: a fit that has seen one has seen the others.
+//! All functions return indices of [`Dataset::rows`] in ascending order.
 
 use std::collections::BTreeMap;
 
@@ -12,7 +12,7 @@ use rand_chacha::rand_core::SeedableRng;
 
 use super::dataset::{Dataset, Reading, Row};
 
-/// Rows to fit and rows to judge the fit by.
+/// Training rows and held-out rows.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Split {
     /// Rows of the fit.
@@ -27,20 +27,20 @@ impl From<Split> for (Vec<usize>, Vec<usize>) {
     }
 }
 
-/// Difference of every joint up to which two rows are the same pose (rad): below the step of a rounded log, or what an
-/// encoder read back at rest scatters by.
+/// Largest joint difference between two rows of the same pose (rad): below the step of a rounded log, or the scatter of an
+/// encoder at rest.
 fn same_pose_rad(data: &Dataset) -> f64 {
     if data.angle_step_rad.is_some() { 0.000_5f64.to_radians() } else { 0.003f64.to_radians() }
 }
 
-/// Rows of the same pose, in the order of their first row. Poses are the same when all joints agree (to 0.0005° in a
-/// log rounded to fixed steps, else to 0.003°) and the controller's read-out, where logged, does not tell them apart,
-/// as it may where angles are rounded coarsely.
+/// Rows grouped by pose, in the order of their first row. Two rows are of one pose when all joints agree (to 0.0005° in a
+/// log rounded to fixed steps, else to 0.003°) and the controller's read-out, if logged, agrees too: it separates poses whose
+/// angles are rounded coarsely.
 pub fn poses(data: &Dataset) -> Vec<Vec<usize>> {
     with_poses(data, |poses| poses.map(<[usize]>::to_vec).collect())
 }
 
-/// Hands the rows of each pose, as [`poses`] gives them, to `work`; they share one list, as there may be a million.
+/// Calls `work` with the rows of each pose, as [`poses`] groups them; one shared list, since there can be a million.
 fn with_poses<T>(data: &Dataset, work: impl FnOnce(&mut dyn Iterator<Item = &[usize]>) -> T) -> T {
     let first = first_rows(data);
     let mut rows: Vec<usize> = (0..data.rows.len()).collect();
@@ -50,8 +50,8 @@ fn with_poses<T>(data: &Dataset, work: impl FnOnce(&mut dyn Iterator<Item = &[us
 
 /// The first row of the same pose, for each row.
 fn first_rows(data: &Dataset) -> Vec<usize> {
-    // One number for each row, in which equal poses lie close together and others hardly ever: only neighbours have to
-    // be compared. The weights are powers of the golden section, so that no grid of angles lines up.
+    // One key for each row, close for equal poses and hardly ever for others: only neighbours in its order are compared.
+    // The weights are powers of the golden section, so that no regular grid of angles collides.
     const WEIGHTS: [f64; 6] = [1.0, 0.618_034, 0.381_966, 0.236_068, 0.145_898, 0.090_170];
     let same = same_pose_rad(data);
     let reach = same * WEIGHTS.iter().sum::<f64>();
@@ -60,8 +60,8 @@ fn first_rows(data: &Dataset) -> Vec<usize> {
     let mut order: Vec<usize> = (0..data.rows.len()).collect();
     order.sort_by(|&a, &b| place[a].total_cmp(&place[b]).then(a.cmp(&b)));
     let mut group: Vec<usize> = (0..data.rows.len()).collect();
-    // Rows that are one to the last bit stand behind the first of them, so that a pose measured a thousand times is not
-    // compared a million times. They are neighbours in the order.
+    // Bitwise equal rows are represented by the first of them, so that a pose measured a thousand times is not compared a
+    // million times. They are neighbours in the order.
     let mut distinct: Vec<(usize, [u64; 10])> = Vec::new();
     let mut last = None;
     order.retain(|&i| {
@@ -90,7 +90,7 @@ fn first_rows(data: &Dataset) -> Vec<usize> {
     (0..data.rows.len()).map(|row| root(&mut group, row)).collect()
 }
 
-/// Joints and read-out of a row, by their bits; −0 and 0 are one.
+/// The bits of a row's joints and read-out; −0 and 0 count as equal.
 fn bits(row: &Row) -> [u64; 10] {
     let mut out = [0; 10];
     let readout = row.readout_mm();
@@ -101,7 +101,7 @@ fn bits(row: &Row) -> [u64; 10] {
     out
 }
 
-/// The first row of a group; the way to it is halved as it is walked.
+/// The first row of a group (union–find with path halving).
 fn root(group: &mut [usize], mut i: usize) -> usize {
     while group[i] != i {
         group[i] = group[group[i]];
@@ -110,7 +110,7 @@ fn root(group: &mut [usize], mut i: usize) -> usize {
     i
 }
 
-/// Whether the controller's read-out says that two rows of equal rounded angles are distinct poses.
+/// Whether the controller's read-out separates two rows of equal rounded angles.
 fn readouts_differ(data: &Dataset, i: usize, j: usize) -> bool {
     match (data.rows[i].readout_mm(), data.rows[j].readout_mm()) {
         (Some(a), Some(b)) => (a - b).amax() > 1.5 * data.readout_step_mm.unwrap_or(1e-3),
@@ -118,14 +118,13 @@ fn readouts_differ(data: &Dataset, i: usize, j: usize) -> bool {
     }
 }
 
-/// A random share of the poses held out: `held_out` = 0.2 for 80/20. Both sides get a pose at least, where there are
-/// two; a share outside 0 to 1 is taken to its nearest end.
+/// Holds out a random share of the poses: `held_out` = 0.2 for 80/20, clamped to 0 to 1.
 ///
 /// ```
 /// use truegrind_calibration::measurement::import::{Options, read};
 /// use truegrind_calibration::measurement::split;
 ///
-/// // Ten poses, each read twice: whoever has fitted a pose has seen its repetition.
+/// // Ten poses, each read twice: both readings are on the same side.
 /// let lines: String = (0..20).map(|k| format!("{},20,30,40,50,60,500.{k}\n", k / 2)).collect();
 /// let rows = read("poses.csv", format!("q1,q2,q3,q4,q5,q6,L\n{lines}").as_bytes(), &Options::default())?;
 /// let split = split::random(&rows, 0.2, 7);
@@ -140,7 +139,7 @@ pub fn random(data: &Dataset, held_out: f64, seed: u64) -> Split {
     with_poses(data, |poses| {
         let (mut test, mut train) = (Vec::with_capacity(wanted), Vec::with_capacity(rows - wanted));
         for pose in shuffled(poses.collect::<Vec<_>>(), seed) {
-            // A group of repetitions that would overshoot by more than half of itself goes to the other side.
+            // A pose that would overshoot by more than half of its rows goes to the other side.
             let side = if 2 * test.len() + pose.len() <= 2 * wanted { &mut test } else { &mut train };
             side.extend_from_slice(pose);
         }
@@ -148,18 +147,18 @@ pub fn random(data: &Dataset, held_out: f64, seed: u64) -> Split {
     })
 }
 
-/// k-fold cross-validation over random poses: k splits whose test rows cover every row once. `folds` above the number
-/// of poses is that number. Chance is shuffled_by_angles from the poses themselves, not from their places: a row more or less, or another order of
-/// the rows, leaves nearly all others where they were.
+/// k-fold cross-validation over random poses: k splits whose test rows cover every row once; at most one fold for each pose.
+/// The random order depends on the joint angles, not on row indices: adding, removing or reordering rows leaves nearly all
+/// other rows in their folds.
 pub fn folds(data: &Dataset, folds: usize, seed: u64) -> Vec<Split> {
     let poses = shuffled_by_angles(data, poses(data), seed);
     let k = folds.clamp(1, poses.len().max(1));
     complements(data.rows.len(), into_folds(poses, k))
 }
 
-/// Groups in an order that only their own angles and the seed determine.
+/// Groups in a random order that depends only on their angles and the seed.
 pub(crate) fn shuffled_by_angles(data: &Dataset, groups: Vec<Vec<usize>>, seed: u64) -> Vec<Vec<usize>> {
-    /// Step to which angles are rounded first (rad), so that their last digits decide nothing.
+    /// Angles are first rounded to this step (rad), so that the order does not depend on their last digits.
     const STEP_RAD: f64 = 1e-3;
     let key = |group: &Vec<usize>| {
         let steps = data.rows[group[0]].joints.iter().map(|q| (q / STEP_RAD).round() as i64 as u64);
@@ -168,14 +167,14 @@ pub(crate) fn shuffled_by_angles(data: &Dataset, groups: Vec<Vec<usize>>, seed: 
     sorted_by_key(groups, key)
 }
 
-/// Groups in the order of their keys; equal ones as they were.
+/// Groups in the order of their keys (stable).
 fn sorted_by_key<T>(groups: Vec<T>, key: impl Fn(&T) -> u64) -> Vec<T> {
     let mut keyed: Vec<(u64, T)> = groups.into_iter().map(|group| (key(&group), group)).collect();
     keyed.sort_by_key(|(key, _)| *key);
     keyed.into_iter().map(|(_, group)| group).collect()
 }
 
-/// The next of a series of numbers that look random: SplitMix64, Steele, Lea and Flood 2014.
+/// Hash step of SplitMix64 (Steele, Lea and Flood 2014).
 fn splitmix64(state: u64, value: u64) -> u64 {
     let mut z = (state ^ value).wrapping_add(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -183,13 +182,13 @@ fn splitmix64(state: u64, value: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// Groups in k parts of nearly as many rows, each of groups that follow each other; none is empty where there are k groups.
+/// Consecutive groups in k parts of nearly equal numbers of rows; no part is empty if there are at least k groups.
 fn into_folds(groups: Vec<Vec<usize>>, k: usize) -> Vec<Vec<usize>> {
     let (count, rows) = (groups.len(), groups.iter().map(Vec::len).sum::<usize>().max(1));
     let mut parts: Vec<Vec<usize>> = vec![Vec::new(); k];
     let (mut part, mut before) = (0, 0);
     for (i, group) in groups.into_iter().enumerate() {
-        // The part of its middle row; the next one at most, and so early that as many groups are left as parts.
+        // The part of its middle row, at most the next one, and early enough to leave a group for each further part.
         let wanted = (2 * before + group.len()) * k / (2 * rows);
         let next = part + usize::from(!parts[part].is_empty());
         part = wanted.clamp(part, next.min(k - 1)).max((k + i).saturating_sub(count).min(next));
@@ -199,13 +198,12 @@ fn into_folds(groups: Vec<Vec<usize>>, k: usize) -> Vec<Vec<usize>> {
     parts
 }
 
-/// Folds of rows that resemble those before and after them: stretches of rows, shared out at random over `folds` folds, and
-/// rows within `reach` of a held-out row are left out of the fit, as are repetitions of held-out poses. Test rows cover
-/// every row once. With a `reach` of 0, or where too few stretches of that length fit, these are random [`folds`].
+/// Purged cross-validation for serially correlated rows: blocks of rows, distributed at random over `folds` folds; rows within
+/// `reach` of a held-out row, and repetitions of held-out poses, are excluded from training. Test rows cover every row once.
+/// With a `reach` of 0, or too few blocks, these are random [`folds`].
 ///
-/// Random folds leave a held-out row between two rows of the fit that share its error, so they promise too little error for
-/// rows that come later. Source: purged cross-validation, López de Prado 2018; h-block cross-validation, Burman, Chow and
-/// Nolan 1994.
+/// Random folds leave a held-out row between two training rows that share its error, so they underestimate the error of later
+/// rows. Source: purged cross-validation, López de Prado 2018; h-block cross-validation, Burman, Chow and Nolan 1994.
 pub fn purged(data: &Dataset, folds: usize, reach: usize, seed: u64) -> Vec<Split> {
     let n = data.rows.len();
     let stretch = (2 * reach).max(1);
@@ -234,7 +232,7 @@ pub fn purged(data: &Dataset, folds: usize, reach: usize, seed: u64) -> Vec<Spli
         .collect()
 }
 
-/// Number of the pose of each row, in the order of [`poses`].
+/// The pose index of each row, in the order of [`poses`].
 pub fn pose_of_rows(data: &Dataset) -> Vec<usize> {
     let mut out = vec![0; data.rows.len()];
     for (p, rows) in poses(data).iter().enumerate() {
@@ -243,8 +241,8 @@ pub fn pose_of_rows(data: &Dataset) -> Vec<usize> {
     out
 }
 
-/// Cross-validation over contiguous blocks of rows: what drifts or jumps while measuring shows here and hides in
-/// random folds. Repetitions of a test pose in other blocks are left out of the fit.
+/// Cross-validation over contiguous blocks of rows: drifts and jumps during the measurement raise this error but not that of
+/// random folds. Repetitions of a test pose in other blocks are excluded from training.
 pub fn blocks(data: &Dataset, blocks: usize) -> Vec<Split> {
     let n = data.rows.len();
     let k = blocks.clamp(1, n.max(1));
@@ -286,20 +284,20 @@ fn complements(rows: usize, tests: Vec<Vec<usize>>) -> Vec<Split> {
         .collect()
 }
 
-/// What repeated poses pooled_scatter by.
+/// Scatter of repeated poses.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NoiseFloor {
     /// Pooled standard deviation of a length, or of the position (root of the sum over the coordinates) (mm).
     pub sigma_mm: f64,
-    /// Poses that were measured more than once.
+    /// Number of poses that were measured more than once.
     pub poses: usize,
-    /// Degrees of freedom: rows in these poses minus poses.
+    /// Degrees of freedom: rows of these poses minus poses.
     pub freedom: usize,
 }
 
 /// The noise floor from repeated poses: √(Σ |r − r̄|² / Σ (n − 1)) over poses with the same outlet and approach.
-/// `None` where no pose was repeated. Drift between the repetitions counts as noise. Rows that were copied show no noise: readings
-/// equal to the last digit count once, where the others pooled_scatter too widely for that to be chance, or where there are no others.
+/// `None` where no pose was repeated. Drift between the repetitions counts as noise. Copied rows show no noise: readings equal
+/// to the last digit count once if the others scatter too widely for that to be chance, or if there are no others.
 ///
 /// ```
 /// use truegrind_calibration::measurement::import::{Options, read};
@@ -320,8 +318,8 @@ pub fn noise_floor(data: &Dataset) -> Option<NoiseFloor> {
     })
 }
 
-/// The same of orientations, as turns against the first reading of a pose: the root of the sum over the coordinates of the turn (rad).
-/// `None` where no pose was repeated or the sensor sees no orientation.
+/// The noise floor of orientations (rad), from rotation vectors relative to the first reading of each pose, as the root of the
+/// sum over the coordinates. `None` where no pose was repeated or the sensor measures no orientation.
 pub fn noise_floor_rad(data: &Dataset) -> Option<f64> {
     let turn = |row: &Row| if let Reading::Pose(pose) = &row.reading { Some(pose.rotation) } else { None };
     let mut first = None;
@@ -333,12 +331,12 @@ pub fn noise_floor_rad(data: &Dataset) -> Option<f64> {
     pooled_scatter_by(data, against).map(|floor| floor.sigma_mm)
 }
 
-/// The pooled pooled_scatter of repeated readings, copies left out.
+/// Pooled scatter of repeated readings without copies.
 fn pooled_scatter(data: &Dataset, place: impl Fn(&Row) -> Option<Vector3<f64>>) -> Option<NoiseFloor> {
     pooled_scatter_by(data, |row, _| place(row))
 }
 
-/// The same of what may be counted from the first row of each pose; rows of one pose, outlet and approach follow each other.
+/// [`pooled_scatter`] of a quantity relative to the first row of its pose, outlet and approach (flagged by `true`).
 fn pooled_scatter_by(
     data: &Dataset,
     mut place: impl FnMut(&Row, bool) -> Option<Vector3<f64>>,
@@ -365,7 +363,7 @@ fn pooled_scatter_by(
     })
 }
 
-/// Scatter over the finest difference of readings from which two readings that are equal to the last digit are copies, not chance.
+/// Ratio of scatter to the finest step of readings above which readings equal to the last digit are copies, not chance.
 const COPY_RATIO: f64 = 10.0;
 
 /// Pooled pooled_scatter of readings of the same pose.
@@ -377,7 +375,7 @@ struct Scatter {
 }
 
 impl Scatter {
-    /// Adds the readings of one pose; a single one tells nothing.
+    /// Adds the readings of one pose; a single reading has no scatter.
     fn add(&mut self, readings: &[Vector3<f64>]) {
         if readings.len() > 1 {
             let mean = readings.iter().sum::<Vector3<f64>>() / readings.len() as f64;
@@ -393,7 +391,7 @@ impl Scatter {
     }
 }
 
-/// Readings, those that equal an earlier one left out.
+/// Readings without those that equal an earlier one.
 fn distinct(readings: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
     let mut out: Vec<Vector3<f64>> = Vec::with_capacity(readings.len());
     for reading in readings {
@@ -404,13 +402,13 @@ fn distinct(readings: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
     out
 }
 
-/// The smallest difference of a coordinate between readings of one pose that is not 0 (mm).
+/// The smallest nonzero difference of a coordinate between readings of one pose (mm).
 fn finest_step_mm(readings: &[Vector3<f64>]) -> f64 {
     let mut finest = f64::INFINITY;
     for axis in 0..3 {
         let mut values: Vec<f64> = readings.iter().map(|r| r[axis]).collect();
         values.sort_by(f64::total_cmp);
-        // Readings that differ by rounding of the last bit are equal.
+        // Differences by rounding of the last bit are 0.
         let steps = values.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 1e-9);
         finest = steps.fold(finest, f64::min);
     }

@@ -1,62 +1,62 @@
-//! What an archive unpacks to, counted before anything is read from it.
+//! Measures the unpacked size of an archive before it is read (protection against zip bombs).
 //!
-//! The reader of workbooks unpacks parts whole and believes what they say of themselves, so a file of a few kilobytes could
-//! ask for any amount of memory. Here every part is unpacked once and thrown away, in a buffer of fixed size: what counts
-//! is what comes out, not what the directory claims.
+//! The workbook reader unpacks whole parts and trusts the sizes that they declare, so a file of a few kilobytes could
+//! allocate any amount of memory. Here every part is unpacked once into a buffer of fixed size and discarded: the actual
+//! size counts, not the directory's.
 
 use std::io::{Cursor, Read};
 
 use zip::ZipArchive;
 
-/// What any workbook may unpack to (bytes).
+/// Unpacked bytes that any workbook is allowed.
 const FREE_BYTES: u64 = 32 << 20;
-/// And for each byte of the file; sheets of numbers shrink to a tenth, rarely to a fiftieth.
+/// Further unpacked bytes allowed for each byte of the file; sheets of numbers shrink to a tenth, rarely to a fiftieth.
 const RATIO: u64 = 100;
-/// A part that is neither a sheet nor the shared strings: styles, relations, the list of sheets (bytes).
+/// Largest part other than a sheet or the shared strings: styles, relations, the list of sheets (bytes).
 const OTHER_BYTES: u64 = 16 << 20;
-/// No shared string takes fewer (bytes): `<si/>`.
+/// Shortest possible shared string, `<si/>` (bytes).
 const STRING_BYTES: u64 = 5;
 
-/// Why an archive is not read.
+/// Why an archive is refused.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Refusal {
     /// Not a zip archive.
     Broken(String),
-    /// It unpacks to too much.
+    /// It exceeds a limit.
     Large {
         /// What was found.
         found: String,
-        /// What would be taken.
+        /// The limit.
         expected: String,
     },
 }
 
-/// What was counted.
+/// Unpacked sizes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Unpacked {
     /// Bytes of the largest part.
     pub(super) largest: u64,
-    /// What all parts together may have (bytes).
+    /// Limit for all parts together (bytes).
     pub(super) allowed: u64,
 }
 
-/// Unpacks every part of the archive once.
-pub(super) fn unpacked(bytes: &[u8]) -> Result<Unpacked, Refusal> {
+/// Unpacks every part of the archive once and checks the limits.
+pub(super) fn measure_unpacked(bytes: &[u8]) -> Result<Unpacked, Refusal> {
     let allowed = FREE_BYTES + RATIO * bytes.len() as u64;
     let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|e| Refusal::Broken(e.to_string()))?;
     let (mut total, mut largest) = (0, 0);
     let mut buffer = vec![0; 1 << 16];
     for index in 0..archive.len() {
-        // A part that cannot be unpacked is no load; whether it is needed, its reader will say.
+        // A part that cannot be unpacked takes no memory; if it is needed, the workbook reader reports it.
         let Ok(mut part) = archive.by_index(index) else { continue };
         let name = part.name().unwrap_or_default().replace('\\', "/").to_lowercase();
         let strings = name.ends_with("sharedstrings.xml");
         let other = !strings && !name.contains("/worksheets/");
-        let (mut size, mut claims) = (0, Claims::default());
+        let (mut size, mut string_count) = (0, StringCountScanner::default());
         while let Ok(count @ 1..) = part.read(&mut buffer) {
             size += count as u64;
             if strings {
-                claims.look(&buffer[..count]);
+                string_count.scan(&buffer[..count]);
             }
             if total + size > allowed {
                 return Err(Refusal::Large {
@@ -74,9 +74,12 @@ pub(super) fn unpacked(bytes: &[u8]) -> Result<Unpacked, Refusal> {
                 });
             }
         }
-        if claims.largest > size / STRING_BYTES + 1 {
+        if string_count.largest > size / STRING_BYTES + 1 {
             return Err(Refusal::Large {
-                found: format!("a count of {} shared strings in a part of {size} bytes", claims.largest),
+                found: format!(
+                    "a count of {} shared strings in a part of {size} bytes",
+                    string_count.largest
+                ),
                 expected: "no more strings than fit".to_owned(),
             });
         }
@@ -86,34 +89,34 @@ pub(super) fn unpacked(bytes: &[u8]) -> Result<Unpacked, Refusal> {
     Ok(Unpacked { largest, allowed })
 }
 
-/// Looks for `uniqueCount = "…"` in a stream of bytes, wherever it stands: memory is set aside for that many strings before
-/// the first one is read. Zero bytes are passed over, so that sixteen-bit text is read too.
+/// Scans a byte stream for `uniqueCount = "…"`: the workbook reader allocates memory for that many strings before it reads
+/// the first one. Zero bytes are skipped, so that UTF-16 is covered too.
 #[derive(Debug, Default)]
-struct Claims {
-    /// Characters of the name and its `=` and quote that have been met.
-    met: usize,
+struct StringCountScanner {
+    /// Characters of the name and its `=` and quote that have matched.
+    matched: usize,
     number: u64,
     largest: u64,
 }
 
-impl Claims {
+impl StringCountScanner {
     const NAME: &'static [u8] = b"uniqueCount";
 
-    fn look(&mut self, bytes: &[u8]) {
+    fn scan(&mut self, bytes: &[u8]) {
         let name = Self::NAME.len();
         for &byte in bytes.iter().filter(|b| **b != 0) {
-            self.met = match self.met {
-                met if met < name && byte == Self::NAME[met] => met + 1,
-                met if met >= name && byte.is_ascii_whitespace() && met < name + 2 => met,
-                met if met == name && byte == b'=' => met + 1,
-                met if met == name + 1 && matches!(byte, b'"' | b'\'') => {
+            self.matched = match self.matched {
+                at if at < name && byte == Self::NAME[at] => at + 1,
+                at if at >= name && byte.is_ascii_whitespace() && at < name + 2 => at,
+                at if at == name && byte == b'=' => at + 1,
+                at if at == name + 1 && matches!(byte, b'"' | b'\'') => {
                     self.number = 0;
-                    met + 1
+                    at + 1
                 }
-                met if met == name + 2 && byte.is_ascii_digit() => {
+                at if at == name + 2 && byte.is_ascii_digit() => {
                     self.number = self.number.saturating_mul(10).saturating_add(u64::from(byte - b'0'));
                     self.largest = self.largest.max(self.number);
-                    met
+                    at
                 }
                 _ => usize::from(byte == Self::NAME[0]),
             };

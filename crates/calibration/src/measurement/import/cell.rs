@@ -1,4 +1,4 @@
-//! What CSV and workbooks have in common: rows of cells with the line at which the user sees them.
+//! Tables of cells, common to CSV and workbooks, with the line numbers that users see.
 
 use std::fmt;
 
@@ -7,7 +7,7 @@ use std::fmt;
 pub enum Cell {
     /// Nothing, or only white space.
     Empty,
-    /// A number; `as_text` where the file held it as text in a format that has numbers.
+    /// A number.
     Number {
         /// The value.
         value: f64,
@@ -37,7 +37,7 @@ impl fmt::Display for Cell {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Cell::Empty => Ok(()),
-            // Three hundred digits say less than an exponent.
+            // Not up to three hundred digits.
             Cell::Number { value, .. } if value.abs() >= 1e16 => write!(f, "{value:e}"),
             Cell::Number { value, .. } => write!(f, "{value}"),
             Cell::Text(text) => f.write_str(text),
@@ -61,12 +61,12 @@ pub struct Table {
     pub sheet: Option<String>,
     /// The rows.
     pub rows: Vec<Line>,
-    /// Columns up to the last one in which any row of a sheet has a cell; 0 for a text table, whose lines say it themselves.
+    /// Columns of a sheet up to the last used one; 0 for a text table, whose lines have their own lengths.
     pub width: usize,
-    /// What was passed over on the way: blank lines that the format itself hides.
+    /// Blank lines that the format's reader skips.
     pub blank_lines: usize,
-    /// Columns that the format counts as used though nothing stands in them.
+    /// Empty columns that the format counts as used.
     pub blank_columns: usize,
-    /// Whether a decimal comma was understood.
+    /// Whether decimal commas are accepted.
     pub decimal_comma: bool,
 }

@@ -1,20 +1,20 @@
-//! Times as clocks show them in tables: `10:15:30.25`, with a date before it or not.
+//! Parses time stamps such as `10:15:30.25`, with or without a date.
 
-/// A time of a clock.
+/// A time stamp.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Stamp {
-    /// The day, counted from 1970-01-01, where a date stands with the time.
+    /// The day, counted from 1970-01-01, where a date is given.
     pub(super) day: Option<i64>,
     /// Seconds since midnight.
     pub(super) seconds: f64,
 }
 
-/// The forms that are understood, for messages.
+/// The accepted formats, for messages.
 pub(super) const FORMS: &str =
     "a time such as 10:15:30.25, with a date (2026-11-23, 11/23/2026 month first, 23.11.2026) or without";
 
 impl Stamp {
-    /// The one time in a text of several words; `None` where there is none, or more than one, or a date that is none.
+    /// The only time in a text of several words; `None` for no time, more than one, or an invalid date.
     pub(super) fn of(text: &str) -> Option<Self> {
         // ISO 8601 joins date and time by a letter.
         let joined = |word: &str| word.contains('-') && word.contains(':');
@@ -38,7 +38,7 @@ impl Stamp {
     }
 }
 
-/// Seconds since midnight; `next`: the word after it, which may say which half of the day.
+/// Seconds since midnight; `next` is the following word, possibly am or pm.
 fn seconds(word: &str, next: Option<&str>) -> Option<f64> {
     let lower = word.to_ascii_lowercase();
     let lower = lower.strip_suffix('z').unwrap_or(&lower);
@@ -61,7 +61,7 @@ fn seconds(word: &str, next: Option<&str>) -> Option<f64> {
         .then_some(hours * 3600.0 + minutes * 60.0 + seconds)
 }
 
-/// Digits, with decimals after a point or a comma, and nothing else.
+/// An unsigned number with a decimal point or comma and nothing else.
 fn number(text: &str) -> Option<f64> {
     let plain = text.bytes().all(|byte| byte.is_ascii_digit() || byte == b'.' || byte == b',');
     (plain && text.starts_with(|c: char| c.is_ascii_digit())).then(|| text.replace(',', ".").parse().ok())?
@@ -69,7 +69,7 @@ fn number(text: &str) -> Option<f64> {
 
 const SEPARATORS: [char; 3] = ['/', '-', '.'];
 
-/// Whether a word is written as a date: three whole numbers with one sign between them.
+/// Whether a word looks like a date: three integers with the same separator.
 fn is_date(word: &str) -> bool {
     SEPARATORS.iter().any(|&sign| {
         let parts: Vec<&str> = word.split(sign).collect();
@@ -78,7 +78,7 @@ fn is_date(word: &str) -> bool {
     })
 }
 
-/// The number of a day. The year first, or with `/` the month and with `.` the day; with `-` and the year last nobody can say.
+/// Days since 1970-01-01. Order: year first; else month first with `/`, day first with `.`; ambiguous with `-`.
 fn day(word: &str) -> Option<i64> {
     let sign = word.chars().find(|c| SEPARATORS.contains(c))?;
     let parts: Vec<i64> = word.split(sign).map(|part| part.parse().ok()).collect::<Option<_>>()?;

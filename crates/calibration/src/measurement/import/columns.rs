@@ -1,4 +1,4 @@
-//! Which column of a table is what, by its header.
+//! Finds the columns of a table by their headers.
 
 use std::collections::BTreeMap;
 
@@ -8,18 +8,18 @@ use crate::measurement::dataset::Sensor;
 
 /// The measured point.
 pub(super) const POSITION: [&str; 3] = ["measured_x", "measured_y", "measured_z"];
-/// The measured orientation, beside the point.
+/// The measured orientation.
 pub(super) const QUATERNION: [&str; 4] = ["measured_qw", "measured_qx", "measured_qy", "measured_qz"];
 
-/// Where on a path a row was read.
+/// The sampling point of a row on a path.
 pub(super) const PATH: [&str; 3] = ["path", "cycle", "sample"];
 
-/// Where the columns are.
+/// Column indices.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Columns {
     /// Index of the header in the table's rows.
     pub(super) header: usize,
-    /// Cells of the header up to the last name.
+    /// Width of the header up to the last name.
     pub(super) width: usize,
     /// q1 to q6.
     pub(super) joints: [usize; 6],
@@ -41,14 +41,14 @@ pub(super) struct Columns {
     pub(super) anchor: Option<usize>,
     /// path, cycle, sample, where all three are there.
     pub(super) path: Option<[usize; 3]>,
-    /// Columns that are only kept.
+    /// Columns that are kept but not used.
     pub(super) other: Vec<(String, usize)>,
-    /// What a reader should know.
+    /// Notes for the user.
     pub(super) notes: Vec<String>,
 }
 
 impl Columns {
-    /// Finds the columns, or says which are missing, doubled or too many.
+    /// Finds the columns, or reports missing, duplicate or superfluous ones.
     pub(super) fn find(file: &str, table: &Table) -> Result<Self, ImportError> {
         let mut location = Location { sheet: table.sheet.as_deref().map(Into::into), ..Location::file(file) };
         let Some(header) = header_row(&table.rows) else {
@@ -89,7 +89,7 @@ impl Columns {
             [None, None, None] => None,
             _ => {
                 notes.push(
-                    "the controller's read-out needs x, y and z; found only part of it and left it out"
+                    "the controller's read-out needs x, y and z; found only some of them, so it is not used"
                         .into(),
                 );
                 None
@@ -128,7 +128,7 @@ impl Columns {
     }
 }
 
-/// Where a row stands on a path. Other programs call columns of theirs so, therefore these are ours only together.
+/// The columns of a path. Other programs use these names too, so they count only when all three are present.
 fn path_columns(
     named: &[(String, usize)],
     get: &dyn Fn(&str) -> Option<usize>,
@@ -143,7 +143,7 @@ fn path_columns(
     }
 }
 
-/// What to say where two of the three columns are there.
+/// A note where only two of the three columns are present.
 fn part_of_path(get: &dyn Fn(&str) -> Option<usize>, path: Option<[usize; 3]>) -> Option<String> {
     let missing: Vec<&str> = PATH.into_iter().filter(|name| get(name).is_none()).collect();
     let [missing] = missing[..] else { return None };
@@ -155,7 +155,7 @@ fn part_of_path(get: &dyn Fn(&str) -> Option<usize>, path: Option<[usize; 3]>) -
     })
 }
 
-/// The columns by their names. No column that is used stands there twice, and no joint is beyond the sixth.
+/// The columns by name. A used column that occurs twice, or a joint beyond the sixth, is an error.
 fn by_name<'a>(
     named: &'a [(String, usize)],
     letter: char,
@@ -179,16 +179,16 @@ fn by_name<'a>(
     Ok(by_name)
 }
 
-/// Whether no further row could become the header.
+/// Whether the header row is decided.
 pub(super) fn shows_header(rows: &[Line]) -> bool {
     let used = |line: &Line| line.cells.iter().any(|cell| !cell.is_empty());
     rows.len() >= TITLES && (rows[..TITLES].iter().any(used) || rows.last().is_some_and(used))
 }
 
-/// A title of so many rows may stand above the header.
+/// Most title rows above the header.
 const TITLES: usize = 20;
 
-/// The first row with a joint's name in it (a title may stand above), else the first row with anything in it.
+/// The first row with a joint's name, else the first nonempty row.
 fn header_row(rows: &[Line]) -> Option<usize> {
     let names_a_joint = |line: &Line| {
         line.cells
@@ -258,10 +258,10 @@ const OPTIONAL: [&str; 12] = [
     "L",
 ];
 
-/// How headers call a joint: `q1`, as here, or `J1`, as controllers show it.
+/// Prefixes of joint names: `q1`, as here, or `J1`, as controllers show it.
 const LETTERS: [char; 2] = ['q', 'J'];
 
-/// Which of them this header means: the first of which it has a joint, else the first.
+/// The prefix that a header uses; the first by default.
 fn joint_letter(found: &[String]) -> char {
     let names = |letter: char| {
         found.iter().any(|name| joint_number(name, letter).is_some_and(|joint| (1..=6).contains(&joint)))
@@ -291,7 +291,7 @@ fn describe_missing(name: &str, unused: &[&str]) -> String {
     }
 }
 
-/// Whether a header is likely a misspelling: the same letters and digits but for case and signs, or one letter off.
+/// Whether a header is likely a misspelling: equal but for case and punctuation, or one letter off.
 fn is_near(found: &str, expected: &str) -> bool {
     let plain = |s: &str| s.chars().filter(|c| c.is_alphanumeric()).collect::<String>().to_lowercase();
     let (f, e) = (plain(found), plain(expected));
@@ -299,7 +299,7 @@ fn is_near(found: &str, expected: &str) -> bool {
         return true;
     }
     let digits = |s: &str| s.chars().filter(char::is_ascii_digit).collect::<String>();
-    // A joint's number is never the misspelt letter: q5 is not a wrong q6. Units after the name are common.
+    // The joint number is never misspelt: q5 is not a wrong q6. Units after the name are common.
     if digits(&f) != digits(&e) {
         return false;
     }

@@ -1,4 +1,4 @@
-//! Text tables: comma, semicolon or tab; UTF-8, UTF-16 with a byte order mark, or Latin-1.
+//! Text tables with comma, semicolon or tab, in UTF-8, UTF-16 with a byte order mark, or Latin-1.
 
 use std::borrow::Cow;
 
@@ -7,7 +7,7 @@ use ::csv::{ByteRecord, ReaderBuilder};
 use super::cell::{Cell, Line, Table};
 use super::error::{ImportError, Location};
 
-/// A text table that is read line by line: its cells together would take several times the memory of its numbers.
+/// A text table, read line by line: all its cells would take several times the memory of its numbers.
 pub(super) struct Text<'a> {
     text: Cow<'a, str>,
     delimiter: u8,
@@ -23,7 +23,7 @@ impl<'a> Text<'a> {
         Ok(Self { text, delimiter })
     }
 
-    /// What is known of the table before its rows.
+    /// The table without its rows.
     pub(super) fn empty(&self) -> Table {
         let blank_lines = self.text.lines().filter(|l| l.trim().is_empty()).count();
         Table { blank_lines, decimal_comma: self.decimal_comma(), ..Table::default() }
@@ -33,7 +33,7 @@ impl<'a> Text<'a> {
         self.delimiter != b','
     }
 
-    /// The lines, blank ones left out.
+    /// The lines without blank ones.
     pub(super) fn lines(&self, file: &str) -> impl Iterator<Item = Result<Line, ImportError>> {
         let mut reader = ReaderBuilder::new()
             .delimiter(self.delimiter)
@@ -58,7 +58,7 @@ impl<'a> Text<'a> {
     }
 }
 
-/// Line numbers as an editor counts them; the reader of the format does not count blank lines it skips.
+/// Line numbers as an editor counts them; the CSV reader does not count the blank lines that it skips.
 struct LineCounter<'a> {
     bytes: &'a [u8],
     byte: usize,
@@ -66,7 +66,7 @@ struct LineCounter<'a> {
 }
 
 impl LineCounter<'_> {
-    /// Line of the first character at or after `byte` that is no line end. Offsets must not decrease.
+    /// Line of the first character at or after `byte` that is not a line end. Offsets must not decrease.
     fn at(&mut self, byte: usize) -> usize {
         while let Some(&b) = self.bytes.get(self.byte) {
             if self.byte >= byte && b != b'\n' && b != b'\r' {
@@ -79,7 +79,7 @@ impl LineCounter<'_> {
     }
 }
 
-/// Text of a file in whatever encoding spreadsheets export.
+/// Decodes the text of a file in any encoding that spreadsheets export.
 pub(super) fn text(bytes: &[u8]) -> Cow<'_, str> {
     let wide = |from: fn([u8; 2]) -> u16| {
         let units: Vec<u16> = bytes[2..].chunks_exact(2).map(|c| from([c[0], c[1]])).collect();
@@ -99,8 +99,7 @@ pub(super) fn text(bytes: &[u8]) -> Cow<'_, str> {
     }
 }
 
-/// The separator that the first line with text uses most. A semicolon wins a tie with commas: a line such as
-/// `1,5;2,5` has as many.
+/// The most frequent separator in the first nonblank line. A semicolon wins a tie with commas, as in `1,5;2,5`.
 fn delimiter(text: &str) -> u8 {
     let line = text.lines().find(|l| !l.trim().is_empty()).unwrap_or("");
     let count = |c: char| line.matches(c).count();
@@ -125,10 +124,10 @@ fn cell(field: &str, decimal_comma: bool) -> Cell {
     }
 }
 
-/// A decimal number. `decimal_comma` admits one comma in the location of the point; a point and a comma together are
-/// nobody's number for certain and stay text.
+/// Parses a decimal number. With `decimal_comma`, one comma is accepted in place of the point; a point and a comma together
+/// are ambiguous and remain text.
 pub(super) fn number(text: &str, decimal_comma: bool) -> Option<f64> {
-    // Spreadsheets write a typographic minus now and then.
+    // Spreadsheets sometimes write a typographic minus.
     let text = if text.is_ascii() { Cow::Borrowed(text) } else { Cow::Owned(text.replace('\u{2212}', "-")) };
     if decimal_comma && text.matches(',').count() == 1 && !text.contains('.') {
         return text.replace(',', ".").parse().ok();

@@ -1,10 +1,10 @@
-//! What can be wrong with a measurement file, told so that it can be put right.
+//! Errors of measurement files: location, what was found, what was expected, and the remedy.
 
 use std::fmt;
 
 use thiserror::Error;
 
-/// Where in a file.
+/// A location in a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Location {
     /// File, as the caller named it.
@@ -57,45 +57,43 @@ pub enum ImportError {
     Format {
         /// The file.
         location: Location,
-        /// What the reader of the format says.
+        /// Message of the format's reader.
         message: String,
     },
-    /// More than is read, or than can be true.
+    /// A size limit is exceeded.
     #[error(
         "{location}: found {found}; expected {expected}; save the table alone in a new workbook, or as CSV"
     )]
     TooLarge {
         /// The file or sheet.
         location: Location,
-        /// What is there.
+        /// What was found.
         found: Box<str>,
-        /// What would be read.
+        /// The limit.
         expected: Box<str>,
     },
-    /// Nothing in it.
+    /// No rows.
     #[error("{location}: found no rows; expected a header line and one row for each measured pose")]
     Empty {
         /// The file or sheet.
         location: Location,
     },
-    /// A sheet was named that is not there.
+    /// The named sheet does not exist.
     #[error("{file}: there is no sheet {sheet}; it has {}", sheets.join(", "))]
     UnknownSheet {
         /// The file.
         file: String,
-        /// The sheet that was asked for.
+        /// The requested sheet.
         sheet: String,
-        /// The sheets that are there.
+        /// The existing sheets.
         sheets: Vec<String>,
     },
-    /// A sheet was named, the file is text.
-    #[error(
-        "{file}: sheet {sheet} was asked for, but this is a text table without sheets; leave the sheet out"
-    )]
+    /// A sheet was named, but the file is text.
+    #[error("{file}: sheet {sheet} was requested, but this is a text table without sheets; omit the sheet")]
     NoSheets {
         /// The file.
         file: String,
-        /// The sheet that was asked for.
+        /// The requested sheet.
         sheet: String,
     },
     /// Columns are missing.
@@ -103,9 +101,9 @@ pub enum ImportError {
     MissingColumns {
         /// The file or sheet, with the row of the header.
         location: Location,
-        /// What is missing, each with a suggestion where a header comes close.
+        /// The missing columns, each with a suggestion if a header is similar.
         missing: Vec<String>,
-        /// The headers that are there.
+        /// The headers found.
         found: Vec<String>,
     },
     /// No sensor.
@@ -118,9 +116,9 @@ pub enum ImportError {
     NoSensor {
         /// The file or sheet, with the row of the header.
         location: Location,
-        /// Headers that come close, each with the name that was expected.
+        /// Similar headers, each with the expected name.
         near: Vec<(String, String)>,
-        /// The headers that are there.
+        /// The headers found.
         found: Vec<String>,
     },
     /// Two sensors in one file.
@@ -134,7 +132,7 @@ pub enum ImportError {
         /// The tracker's columns.
         tracker: String,
     },
-    /// A header twice.
+    /// A duplicate header.
     #[error("{location}: found the column twice; expected it once; rename or delete one of the two")]
     DuplicateColumn {
         /// The column.
@@ -151,14 +149,14 @@ pub enum ImportError {
         /// Number of the joint.
         joint: usize,
     },
-    /// A cell that is not what its column needs.
+    /// An invalid cell.
     #[error("{location}: found {found}; expected {expected}; {remedy}")]
     Cell {
         /// The cell.
         location: Location,
-        /// What is there.
+        /// What was found.
         found: Box<str>,
-        /// What should be there.
+        /// What was expected.
         expected: &'static str,
         /// What to do.
         remedy: &'static str,
@@ -181,7 +179,7 @@ pub enum ImportError {
     Units {
         /// The columns.
         location: Location,
-        /// What looks wrong.
+        /// What looks wrong about the numbers.
         found: Box<str>,
         /// The unit of the format.
         expected: &'static str,
@@ -191,7 +189,7 @@ pub enum ImportError {
 }
 
 impl ImportError {
-    /// Where in the file, as far as it is known.
+    /// The location in the file, as far as known.
     pub fn location(&self) -> Option<&Location> {
         match self {
             Self::NotATable { location }
@@ -210,7 +208,7 @@ impl ImportError {
         }
     }
 
-    /// The same of a table whose header stands in no row.
+    /// The same error for a table whose header is not a row of a file.
     pub(super) fn without_row(mut self) -> Self {
         if let Self::MissingColumns { location, .. }
         | Self::NoSensor { location, .. }
@@ -237,11 +235,11 @@ fn list(names: &[String]) -> String {
     if more > 0 { format!("{shown} and {more} more") } else { shown }
 }
 
-/// Names of columns are shown up to this many characters, and this many of them.
+/// Limits for column names in messages: characters of a name, and number of names.
 const LONGEST_NAME: usize = 32;
 const MOST_NAMES: usize = 40;
 
-/// A first line of numbers alone is no header.
+/// A hint where the first line has only numbers and thus is not a header.
 fn headless(found: &[String]) -> &'static str {
     let numbers = !found.is_empty() && found.iter().all(|name| name.trim().parse::<f64>().is_ok());
     if numbers {

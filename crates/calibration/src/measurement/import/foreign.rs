@@ -1,11 +1,11 @@
-//! Tables that other programs write, told by their content where the header is not ours.
+//! Converts tables of other programs, recognised by their content.
 //!
 //! - RoboDK, exported measurements of a calibration: six joints (°), the measured point (mm), the TCP (mm). A point near zero was
 //!   not measured. Source: RoboDK's macro for distance errors after a calibration, which reads the columns in that order.
-//! - DELMIA, input of Auto ID: name of the tag, x, y, z (mm), roll, pitch, yaw (°) as measured, six joints (°); a header may stand
-//!   above and is not used. Source: DELMIA robotics offline programming, "Auto ID input file".
+//! - DELMIA, input of Auto ID: name of the tag, x, y, z (mm), roll, pitch, yaw (°) as measured, six joints (°); an optional header is
+//!   ignored. Source: DELMIA robotics offline programming, "Auto ID input file".
 //!
-//! They become a table with our header, so that every cell is checked as any other is.
+//! The result is a table with truegrind's header, whose cells are checked as usual.
 
 use nalgebra::UnitQuaternion;
 
@@ -22,17 +22,17 @@ const ROBODK: usize = 12;
 /// Cells of a row of DELMIA for an arm of six joints.
 const DELMIA: usize = 13;
 
-/// Fewer rows than these are no measurement that could be told from any other table of numbers.
+/// Fewest rows by which such a table can be recognised.
 const LEAST: usize = 4;
 
-/// The table under our header, and what is to be said of it; `None` where it is none of these.
+/// The table under truegrind's header, and notes; `None` for an unknown format.
 ///
 /// # Errors
-/// [`ImportError`] where it is one of these and cannot be used: several TCPs, more than six joints, nothing measured.
+/// [`ImportError`] for a known format that cannot be used: several TCPs, more than six joints, nothing measured.
 pub(super) fn convert(file: &str, table: &Table) -> Option<Result<(Table, Vec<String>), ImportError>> {
     let used: Vec<&Line> = table.rows.iter().filter(|line| widest(line) > 0).collect();
     let (first, rest) = used.split_first()?;
-    // A header is a row in which no cell but the first is a number.
+    // In a header, only the first cell can be a number.
     let headed = first.cells.iter().skip(1).all(|cell| cell.number().is_none());
     let rows = if headed { rest } else { &used[..] };
     if rows.len() < LEAST || headed && is_ours(first) {
@@ -56,7 +56,7 @@ pub(super) fn convert(file: &str, table: &Table) -> Option<Result<(Table, Vec<St
     delmia(rows).map(|(rows, notes)| Ok((under_our_header(table, rows), notes)))
 }
 
-/// Whether a header names columns as we do: what is missing is told by name then.
+/// Whether a header uses truegrind's column names; missing columns are then reported by name.
 fn is_ours(header: &Line) -> bool {
     let ours = |name: &str| name.starts_with("measured_") || ["q1", "x", "y", "z", "L"].contains(&name);
     header.cells.iter().any(|cell| ours(&cell.to_string()))
@@ -70,7 +70,7 @@ fn is_number(cell: &Cell) -> bool {
     cell.number().is_some()
 }
 
-/// So many numbers from a location on, where the line ends with them.
+/// The `N` numbers from index `from` to the end of the line.
 fn numbers<const N: usize>(line: &Line, from: usize) -> Option<[f64; N]> {
     if widest(line) != from + N {
         return None;
@@ -93,7 +93,7 @@ fn robodk(rows: &[&Line], location: &Location) -> Option<Result<Rows, ImportErro
     };
     if values.iter().any(|row| other(&row)) {
         let groups = values.iter().filter(other).count();
-        // Columns that change from row to row are no TCP.
+        // Columns that change from row to row are not a TCP.
         return (groups * 2 < values.len()).then(|| {
             Err(ImportError::Format {
                 location: location.clone(),
@@ -133,7 +133,7 @@ fn delmia(rows: &[&Line]) -> Option<Rows> {
             let mut cells: Vec<Cell> = row[6..].iter().chain(&row[..3]).map(|v| cell(*v)).collect();
             if turned {
                 let [roll, pitch, yaw] = [row[3], row[4], row[5]].map(f64::to_radians);
-                // About the fixed x by roll, then y by pitch, then z by yaw.
+                // Fixed axes: roll about x, then pitch about y, then yaw about z.
                 let q = UnitQuaternion::from_euler_angles(roll, pitch, yaw);
                 cells.extend([q.w, q.i, q.j, q.k].map(cell));
             }

@@ -1,7 +1,7 @@
-//! Points that the tracker's software exports, joined with a log of the joints by the times of two clocks.
+//! Joins a tracker's exported points with a log of the joints by the time stamps of two clocks.
 //!
-//! A point belongs to the row nearest to it in time. It is joined only where that is no guess: within the stated tolerance all rows
-//! have the same joints (the arm stood), and no second point belongs to the same row.
+//! A point is matched with the row nearest in time, and only if the match is unambiguous: all rows within the stated tolerance have
+//! the same joints (the arm stood still), and no second point matches the same row.
 
 use super::cell::{Cell, Line, Table};
 use super::clock::{FORMS, Stamp};
@@ -13,24 +13,24 @@ use super::tracker_export::{Point, Points, broken, cells, headed};
 /// Columns of a log that hold the time, in this order of preference.
 const TIMES: [&str; 5] = ["time", "timestamp", "time_stamp", "datetime", "date_time"];
 
-/// Joints that differ by less are one pose (°): encoders flicker by some thousandths.
+/// Joints that differ by less are of one pose (°): encoders flicker by some thousandths.
 const SAME_DEG: f64 = 0.01;
 
 const SECONDS_A_DAY: f64 = 86_400.0;
 
-/// Points and rows that a message or a note names.
+/// Most points and rows that a message or note lists.
 const NAMED: usize = 5;
 
 /// A row of the log.
 struct Logged {
-    /// Its location in the table.
+    /// Its index in the table.
     index: usize,
     /// Its line in the file.
     number: usize,
     time_s: f64,
 }
 
-/// The log with the measured points as columns of ours, and what was left out.
+/// The log with the measured points as columns `measured_x` to `measured_z`, and notes on omitted rows and points.
 pub(super) fn join_by_time(
     points: &Points,
     file: &str,
@@ -65,7 +65,7 @@ pub(super) fn join_by_time(
     Ok((log, notes))
 }
 
-/// The times of the rows, in their order, and of the points, in theirs (s, by a start that both have in common).
+/// The times of the rows and of the points, each in their order (s from a common origin).
 fn times(
     points: &Points,
     log: &Table,
@@ -121,7 +121,7 @@ fn times(
     Ok((logged, of_points.iter().map(seconds).collect()))
 }
 
-/// Whether the times of a file have dates; all or none.
+/// Whether the times of a file have dates; an error if only some have.
 fn days(location: &Location, stamps: &[Stamp]) -> Result<bool, ImportError> {
     let dated = stamps.iter().filter(|stamp| stamp.day.is_some()).count();
     if dated == 0 || dated == stamps.len() {
@@ -132,7 +132,7 @@ fn days(location: &Location, stamps: &[Stamp]) -> Result<bool, ImportError> {
     Err(broken(location.clone(), message))
 }
 
-/// The file, and its first and last day, whose dates are needed where the other has none.
+/// The file that spans several days, with its first and last day, while the other has no dates.
 fn over_midnight(
     location: &Location,
     rows: &[Stamp],
@@ -149,10 +149,10 @@ fn over_midnight(
 
 /// A row and its point.
 struct Pair {
-    /// The row's location in the table.
+    /// The row's index in the table.
     index: usize,
     point: usize,
-    /// How far their times are apart (s).
+    /// Difference of their times (s).
     apart_s: f64,
 }
 
@@ -183,7 +183,7 @@ impl Pairing<'_> {
             nearest_s.push(near(&order[from.saturating_sub(1)..(to + 1).min(order.len())]));
             let rows = &order[from..to];
             let Some(row) = rows.iter().min_by(|a, b| apart(a).total_cmp(&apart(b))) else { continue };
-            self.stood(point, rows, file)?;
+            self.check_at_rest(point, rows, file)?;
             pairs.push(Pair { index: row.index, point: at, apart_s: apart(&row) });
         }
         if pairs.is_empty() {
@@ -196,11 +196,11 @@ impl Pairing<'_> {
             );
             return Err(broken(location.clone(), message));
         }
-        self.each_once(pairs, location)
+        self.check_unique(pairs, location)
     }
 
-    /// Refuses a point near which the arm moved: which of the rows it belongs to would be a guess.
-    fn stood(&self, point: &Point, rows: &[&Logged], file: &str) -> Result<(), ImportError> {
+    /// Refuses a point during which the arm moved: its row would be ambiguous.
+    fn check_at_rest(&self, point: &Point, rows: &[&Logged], file: &str) -> Result<(), ImportError> {
         let mut range = [[f64::INFINITY, f64::NEG_INFINITY]; 6];
         for row in rows {
             for (range, column) in range.iter_mut().zip(self.joints) {
@@ -225,8 +225,8 @@ impl Pairing<'_> {
         Err(broken(Location { row: Some(point.row), ..Location::file(&self.points.file) }, message))
     }
 
-    /// Refuses two points for one row. The pairs come back in the order of the rows.
-    fn each_once(&self, mut pairs: Vec<Pair>, location: &Location) -> Result<Vec<Pair>, ImportError> {
+    /// Refuses two points for one row. Returns the pairs in the order of the rows.
+    fn check_unique(&self, mut pairs: Vec<Pair>, location: &Location) -> Result<Vec<Pair>, ImportError> {
         pairs.sort_by_key(|pair| (pair.index, pair.point));
         let mut beside = pairs.iter().zip(pairs.iter().skip(1));
         let Some((one, two)) = beside.find(|(one, two)| one.index == two.index) else { return Ok(pairs) };

@@ -1,19 +1,19 @@
-//! How a measurement file is read.
+//! Options for reading measurement files.
 
-/// How a file is read.
+/// Options for reading a file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Options {
-    /// Sheet of a workbook; without it the first that has the columns.
+    /// Sheet of a workbook; by default the first with the required columns.
     pub sheet: Option<String>,
-    /// Takes angles that look like radians and lengths that look like metres at their word.
+    /// Accepts angles that look like radians and lengths that look like metres.
     pub allow_odd_units: bool,
 }
 
-/// How far the times of two clocks may be apart where a log and measured points are joined by them.
+/// Tolerance and offset of two clocks when a log and measured points are joined by time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TimeMatching {
-    /// The largest difference (s).
+    /// Largest time difference of a row and its point (s).
     pub within_s: f64,
-    /// By how much the clock of the points is ahead of that of the log (s).
+    /// Offset by which the points' clock is ahead of the log's (s).
     pub ahead_s: f64,
 }

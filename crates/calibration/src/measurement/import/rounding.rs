@@ -1,10 +1,10 @@
-//! The step to which a column of numbers is rounded, told from the numbers.
+//! Detects the step to which a column of numbers is rounded.
 
-/// Steps that loggers and teach pendants round to.
+/// Rounding steps of loggers and teach pendants.
 const STEPS: [f64; 4] = [0.1, 0.01, 0.001, 0.000_1];
 
-/// The largest step of which all values are multiples. `None` for finer numbers, and for whole numbers only: those
-/// were commanded, not rounded.
+/// The largest step of which all values are multiples. `None` for finer numbers, and for integers only: those were
+/// commanded, not rounded.
 pub(super) fn step(values: impl Iterator<Item = f64> + Clone) -> Option<f64> {
     let multiples = |step: f64| {
         values.clone().all(|v| {

@@ -1,4 +1,4 @@
-//! Rows of a table as measured rows: every cell checked, units converted.
+//! Converts the rows of a table to measured rows: checks every cell and converts units.
 
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -16,10 +16,10 @@ use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Joints;
 use truegrind_math::se3::Pose;
 
-/// Largest difference of a quaternion's length from 1: four decimals still pass.
+/// Largest difference of a quaternion's norm from 1: four decimals still pass.
 const QUATERNION_TOLERANCE: f64 = 1e-3;
 
-/// The rows below the header: those of the table, and `further` ones of a text that is read line by line.
+/// Builds the data set from the rows below the header: those of the table, and `further` ones of a text read line by line.
 pub(super) fn dataset(
     file: &str,
     table: &Table,
@@ -76,7 +76,7 @@ pub(super) fn dataset(
             location: Location { column: Some("anchor".into()), ..reader.location() },
             found: format!("{outlets} different cable outlets").into(),
             expected: "at most 64 in one file",
-            remedy: "each is sought with four parameters of its own: keep the rows of others in other files",
+            remedy: "each outlet adds four unknowns: put the rows of further outlets into other files",
         });
     }
     if !options.allow_odd_units {
@@ -101,7 +101,7 @@ pub(super) fn dataset(
     })
 }
 
-/// The step to which readings are rounded (mm), where they are.
+/// The step to which readings are rounded (mm).
 fn reading_step(rows: &[Row], sensor: Sensor) -> Option<f64> {
     let count = if sensor == Sensor::Cable { 1 } else { 3 };
     rounding::step(rows.iter().flat_map(|r| {
@@ -110,26 +110,26 @@ fn reading_step(rows: &[Row], sensor: Sensor) -> Option<f64> {
     }))
 }
 
-/// No joint angle is larger: ten turns.
+/// Largest joint angle: ten turns.
 const LARGEST_DEG: f64 = 3600.0;
-/// No reading is larger: a kilometre.
+/// Largest reading: a kilometre.
 const LARGEST_MM: f64 = 1e6;
 const LENGTH: &str = "a length in mm, below a kilometre";
-/// No cell has more cables; what their outlets cost grows with the cube of their number.
+/// Most cable outlets; the cost of identification grows with the cube of their number.
 const MOST_OUTLETS: usize = 64;
-/// No arm carries more.
+/// Largest payload.
 const LARGEST_KG: f64 = 1e4;
 
-/// Conditions that rows may share: many rows have one of few.
+/// Interned conditions: many rows share few of them.
 #[derive(Default)]
 struct Conditions {
     seen: HashMap<Bits, Arc<Condition>>,
 }
 
-/// What a file says of a condition, to the bit: time, temperature, payload; sides.
+/// The bits of a condition: time, temperature, payload; approach sides.
 type Bits = ([Option<u64>; 3], [i8; 6]);
 
-/// A log of times has a condition for each row, of which none comes back.
+/// Most interned conditions; in a log with times every row has its own.
 const MOST_SHARED: usize = 4096;
 
 impl Conditions {
@@ -171,7 +171,7 @@ impl Reader<'_> {
         ImportError::Cell { location: self.cell_location(line, column), found, expected, remedy }
     }
 
-    /// A finite number that must be there.
+    /// A required finite number.
     fn number(&self, line: &Line, column: usize) -> Result<f64, ImportError> {
         const EXPECTED: &str = "a finite number";
         match line.cells.get(column) {
@@ -185,7 +185,7 @@ impl Reader<'_> {
         }
     }
 
-    /// A number that no measurement exceeds.
+    /// A required number within ±`largest`.
     fn bounded(
         &self,
         line: &Line,
@@ -200,7 +200,7 @@ impl Reader<'_> {
         Err(self.wrong(line, column, expected, "correct the cell, or delete the row"))
     }
 
-    /// A number that may be absent.
+    /// An optional number.
     fn optional(&self, line: &Line, column: Option<usize>) -> Result<Option<f64>, ImportError> {
         match column {
             Some(i) if !line.cells.get(i).is_none_or(Cell::is_empty) => self.number(line, i).map(Some),
@@ -228,7 +228,7 @@ impl Reader<'_> {
         let approach = self.approach(line, columns)?;
         let payload_kg = self.optional(line, columns.payload)?;
         if payload_kg.is_some_and(|kg| !(0.0..=LARGEST_KG).contains(&kg)) {
-            let remedy = "state what hangs on the flange, or leave the cell empty";
+            let remedy = "enter the mass at the flange, or leave the cell empty";
             return Err(self.wrong(
                 line,
                 columns.payload.unwrap_or_default(),
@@ -254,6 +254,7 @@ impl Reader<'_> {
                 value as usize
             }
         };
+        // Trailing empty cells are not stored.
         let kept = columns.other.iter().rposition(|(_, i)| line.cells.get(*i).is_some_and(|c| !c.is_empty()));
         let kept = kept.map_or(0, |last| last + 1);
         let text = |i: usize| line.cells.get(i).map(Cell::to_string).unwrap_or_default();
@@ -270,7 +271,7 @@ impl Reader<'_> {
         Ok(Row { number: line.number, line: location, joints, reading, condition, anchor, extra })
     }
 
-    /// What the sensor read.
+    /// The sensor's reading.
     fn reading(&self, line: &Line, columns: &Columns) -> Result<Reading, ImportError> {
         let values: Vec<f64> = columns
             .reading
@@ -284,12 +285,12 @@ impl Reader<'_> {
                 let rotation = self.quaternion(line, columns, Quaternion::new(*w, *i, *j, *k))?;
                 Reading::Pose(Box::new(Pose::from_parts(Translation3::new(*x, *y, *z), rotation)))
             }
-            // The columns were chosen for the sensor: one, three or seven.
+            // Unreachable: the sensor has one, three or seven columns.
             _ => return Err(ImportError::Empty { location: self.location() }),
         })
     }
 
-    /// Where on a path the row was read; `None` where the arm stood still.
+    /// The sampling point on a path; `None` where the arm stood still.
     fn path(&self, line: &Line, columns: &Columns) -> Result<Option<PathPoint>, ImportError> {
         let Some([path, cycle, sample]) = columns.path else { return Ok(None) };
         let is_empty = |column: usize| line.cells.get(column).is_none_or(Cell::is_empty);
@@ -324,7 +325,7 @@ impl Reader<'_> {
         }))
     }
 
-    /// From which side each joint came.
+    /// The approach side of each joint.
     fn approach(&self, line: &Line, columns: &Columns) -> Result<[i8; 6], ImportError> {
         let mut approach = [0i8; 6];
         for (side, column) in approach.iter_mut().zip(columns.approach) {
@@ -333,7 +334,7 @@ impl Reader<'_> {
                 Some(1.0) => 1,
                 None | Some(0.0) => 0,
                 Some(_) => {
-                    let remedy = "the sign says from which side the joint came, 0 where that is not known";
+                    let remedy = "enter the side from which the joint approached, or 0 if it is not known";
                     return Err(self.wrong(line, column.unwrap_or_default(), "-1, 0 or 1", remedy));
                 }
             };
@@ -362,7 +363,7 @@ impl Reader<'_> {
     }
 }
 
-/// Outlets count from 0 inside, whatever numbers the file uses for them.
+/// Renumbers the outlets from 0; notes the numbers of the file if they are not consecutive.
 fn number_anchors(rows: &mut [Row]) -> Option<String> {
     let mut labels: Vec<usize> = rows.iter().map(|r| r.anchor).collect();
     labels.sort_unstable();
@@ -378,8 +379,7 @@ fn number_anchors(rows: &mut [Row]) -> Option<String> {
     })
 }
 
-/// Units that show without a model of the arm. What only the arm can tell is the business of
-/// `plausibility`.
+/// Checks of units that need no model of the arm; `plausibility` has those that do.
 fn check_units(reader: &Reader<'_>, rows: &[Row], sensor: Sensor) -> Result<(), ImportError> {
     let units = |columns: &str, found: String, expected, remedy| {
         let location = Location { column: Some(columns.into()), ..reader.location() };
@@ -392,13 +392,13 @@ fn check_units(reader: &Reader<'_>, rows: &[Row], sensor: Sensor) -> Result<(), 
             angles().fold(f64::MIN, f64::max) - angles().fold(f64::MAX, f64::min)
         })
         .fold(0.0, f64::max);
-    // Over a whole file no joint ever leaves ±2π "degrees", yet joints do move: nobody measures an arm so.
+    // Joints that move, but never beyond ±2π "degrees" in the whole file, are in radians.
     if rows.len() >= 3 && spread_deg > 0.05 && largest_deg <= 2.0 * std::f64::consts::PI + 1e-6 {
         return units(
             "q1 to q6",
             format!("no angle exceeds {largest_deg:.3}: these look like radians"),
             "degrees",
-            "convert the angles to degrees, or allow odd units (--allow-odd-units) if the arm really moved so little",
+            "convert the angles to degrees, or allow odd units (--allow-odd-units) if the arm did move so little",
         );
     }
     let Some(spread_mm) = spread(rows) else { return Ok(()) };
@@ -411,7 +411,7 @@ fn check_units(reader: &Reader<'_>, rows: &[Row], sensor: Sensor) -> Result<(), 
                 "the readings span {spread_mm:.4} while joints turn by {spread_deg:.0}°: these look like metres"
             ),
             "millimetres",
-            "multiply the readings by 1000, or allow odd units (--allow-odd-units) if the sensor really saw so little",
+            "multiply the readings by 1000, or allow odd units (--allow-odd-units) if the readings did change so little",
         );
     }
     let readout = Row::readout_mm;

@@ -1,13 +1,13 @@
-//! The columns of a measurement before anything was measured.
+//! Column template of an empty measurement table.
 
 use crate::measurement::dataset::Sensor;
 
 /// A column of an empty table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Column {
-    /// Its name, as the import reads it.
+    /// Its name, as the import expects it.
     pub name: &'static str,
-    /// What is written there, with its unit; columns with the same meaning stand together.
+    /// Its content and unit; columns with the same meaning are adjacent.
     pub meaning: &'static str,
 }
 
@@ -20,7 +20,7 @@ const TEMPERATURE: &str = "temperature of the arm (°C, may be empty)";
 const PAYLOAD: &str = "load on the flange (kg, may be empty)";
 const SESSION: &str = "any name; another one where sensor or target were set up anew (may be empty)";
 
-/// The columns for a sensor, in the order in which they are written.
+/// The columns for a sensor, in the order of the template.
 ///
 /// ```
 /// use truegrind_calibration::measurement::dataset::Sensor;
@@ -53,7 +53,8 @@ pub fn columns(sensor: Sensor) -> Vec<Column> {
     .concat()
 }
 
-/// What stands in which columns: the first and last name of those that belong together, and their meaning.
+/// The meaning of each group of columns, with the first and last name of the group.
+
 pub fn meanings(columns: &[Column]) -> Vec<(String, &'static str)> {
     let mut out: Vec<(String, &'static str)> = Vec::new();
     for together in columns.chunk_by(|a, b| a.meaning == b.meaning) {

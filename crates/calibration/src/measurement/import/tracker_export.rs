@@ -1,8 +1,8 @@
-//! Points that the tracker's software exports, joined with a log of the joints by name (`join_by_time` joins them by time).
+//! Reads points exported by a tracker's software, and joins them with a log of the joints by name (by time: `join_by_time`).
 //!
 //! SpatialAnalyzer, "Export ASCII Points" (user's manual): lines of a name, x, y, z and more, separated by blanks, tabs or commas; the
-//! name is that of the target alone, or of its group and collection before it; lines that begin with `//` are comments. What follows the
-//! coordinates (offsets, time stamps, comments) is as the user chose.
+//! name is that of the target, optionally preceded by group and collection; lines that begin with `//` are comments. The user chooses
+//! what follows the coordinates (offsets, time stamps, comments).
 
 use std::collections::BTreeMap;
 
@@ -14,7 +14,7 @@ use super::error::{ImportError, Location};
 /// Columns of a log of joints that name the point, in this order of preference.
 const NAMES: [&str; 4] = ["name", "point", "target", "tag"];
 
-/// Fields that may stand before x: collection, group, target.
+/// Most names before x: collection, group, target.
 const MOST_NAMES: usize = 3;
 
 /// A measured point.
@@ -24,16 +24,16 @@ pub(super) struct Point {
     pub(super) row: usize,
     /// The name of its target, without group and collection.
     pub(super) name: String,
-    /// Where it is (mm).
+    /// Its position (mm).
     pub(super) at_mm: [f64; 3],
-    /// What stands after the coordinates.
+    /// The text after the coordinates.
     pub(super) more: String,
 }
 
 /// The measured points of an export, in its order.
 #[derive(Debug)]
 pub(super) struct Points {
-    /// The export, as messages name it.
+    /// The export's name in messages.
     pub(super) file: String,
     /// At least one.
     pub(super) all: Vec<Point>,
@@ -96,7 +96,7 @@ impl Points {
             if by_name.insert(name.as_str(), *at_mm).is_some() {
                 let location = Location { row: Some(*row), ..Location::file(&self.file) };
                 let message = format!(
-                    "point `{name}` stands twice; expected each name once: export one group, rename the repeats, or join by time \
+                    "point `{name}` occurs twice; expected each name once: export one group, rename the repeats, or join by time \
                      (--points-within)"
                 );
                 return Err(broken(location, message));
@@ -105,7 +105,7 @@ impl Points {
         Ok(by_name)
     }
 
-    /// The log with the measured points as columns of ours, and what was left out.
+    /// The log with the measured points as columns `measured_x` to `measured_z`, and notes on omitted rows.
     pub(super) fn join_by_name(
         &self,
         file: &str,
@@ -170,7 +170,7 @@ pub(super) fn cells(at_mm: [f64; 3]) -> [Cell; 3] {
     at_mm.map(|value| Cell::Number { value, as_text: false })
 }
 
-/// The fields of a line: between commas where there are some, else between blanks.
+/// The fields of a line, separated by commas if there are any, else by blanks.
 fn fields(line: &str) -> Vec<&str> {
     match line.contains(',') {
         true => line.split(',').map(str::trim).collect(),
@@ -178,7 +178,7 @@ fn fields(line: &str) -> Vec<&str> {
     }
 }
 
-/// How many names stand before x, y and z in every line. Names may be numbers: a coordinate has a point or an exponent.
+/// The number of names before x, y and z in every line. Names can be numbers: a coordinate has a point or an exponent.
 fn layout(lines: &[(usize, Vec<&str>)]) -> Option<usize> {
     let is_coordinate = |text: &&str| csv::number(text, false).is_some() && text.contains(['.', 'e', 'E']);
     (1..=MOST_NAMES).find(|&names| {
@@ -200,7 +200,7 @@ fn named(line: &Line) -> Option<usize> {
     headed(line, &NAMES)
 }
 
-/// The column under the first of these names that the line holds, whatever its case.
+/// The column under the first of these names that occurs in the line, ignoring case.
 pub(super) fn headed(line: &Line, names: &[&str]) -> Option<usize> {
     let is = |wanted: &str| line.cells.iter().position(|cell| cell.to_string().eq_ignore_ascii_case(wanted));
     names.iter().find_map(|name| is(name))

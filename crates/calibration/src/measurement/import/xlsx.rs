@@ -1,9 +1,8 @@
 //! Workbooks: XLSX, read cell by cell, so that a table takes the memory of its cells and not of the rectangle around them.
 //!
-//! What a workbook may ask for is bounded before it is believed: what its parts unpack to (`archive`), the sheets
-//! that share a part, the cells of all sheets together with the empty ones to the left of each, and their text. The old
-//! binary workbooks (XLS, XLSB) and ODS are told apart and refused: their reader sets memory aside for whatever
-//! rectangle a file claims.
+//! Limits protect against hostile files: the unpacked size of its parts (`archive`), the sheets that share a part, the cells
+//! of all sheets (with the empty ones to the left of each), and their text. The old binary workbooks (XLS, XLSB) and ODS are
+//! refused: their reader allocates whatever rectangle a file declares.
 
 use std::collections::BTreeMap;
 use std::io::Cursor;
@@ -18,12 +17,12 @@ use super::error::{ImportError, Location};
 
 /// Rows and columns of a sheet.
 const SHEET: (u32, u32) = (1 << 20, 1 << 14);
-/// Cells of all sheets, empty ones to the left of a used one and blank lines between used ones counted in: 400,000 rows of
+/// Cells of all sheets, including empty ones to the left of a used one and blank lines between used ones: 400,000 rows of
 /// forty columns.
 const MOST_CELLS: usize = 16_000_000;
-/// Text of all cells (bytes): one string may be shared by any number of them.
+/// Text of all cells (bytes); any number of cells can share one string.
 const MOST_TEXT: usize = 128 << 20;
-/// How often the largest part may be read again by sheets that share it, in shares of what may be unpacked at all.
+/// Limit for repeated reads of the largest part by sheets that share it, in multiples of the unpacked limit.
 const SHARED: u64 = 4;
 
 /// Whether the bytes are a workbook: a zip archive (XLSX, XLSB, ODS) or an OLE container (XLS, or XLSX with a password).
@@ -37,7 +36,7 @@ pub fn tables(file: &str, bytes: &[u8]) -> Result<Vec<Table>, ImportError> {
     if !bytes.starts_with(b"PK") {
         return Err(fail("this is an XLS workbook, or an XLSX workbook with a password".to_owned()));
     }
-    let unpacked = archive::unpacked(bytes).map_err(|refusal| match refusal {
+    let unpacked = archive::measure_unpacked(bytes).map_err(|refusal| match refusal {
         Refusal::Broken(message) => fail(message),
         Refusal::Large { found, expected } => ImportError::TooLarge {
             location: Location::file(file),
@@ -45,7 +44,7 @@ pub fn tables(file: &str, bytes: &[u8]) -> Result<Vec<Table>, ImportError> {
             expected: expected.into(),
         },
     })?;
-    // The reader of the format still indexes by numbers of the file in places and then panics.
+    // The workbook reader still panics on some inconsistent indices.
     let read = catch_unwind(AssertUnwindSafe(|| {
         let mut workbook = Xlsx::new(Cursor::new(bytes)).map_err(|e| fail(e.to_string()))?;
         let names = workbook.sheet_names();
@@ -56,20 +55,20 @@ pub fn tables(file: &str, bytes: &[u8]) -> Result<Vec<Table>, ImportError> {
                 expected: "sheets with parts of their own".into(),
             });
         }
-        let mut room = Room { cells: MOST_CELLS, text: MOST_TEXT };
-        names.iter().map(|name| table(file, &mut workbook, name, &mut room)).collect()
+        let mut budget = Budget { cells: MOST_CELLS, text: MOST_TEXT };
+        names.iter().map(|name| table(file, &mut workbook, name, &mut budget)).collect()
     }));
     read.unwrap_or_else(|_| Err(fail("a number in it contradicts another".to_owned())))
 }
 
-/// What is left of the bounds.
-struct Room {
+/// Cells and text that are left of the limits.
+struct Budget {
     cells: usize,
     text: usize,
 }
 
-impl Room {
-    /// Takes `count` cells and `text` bytes.
+impl Budget {
+    /// Spends `count` cells and `text` bytes.
     fn take(&mut self, location: &Location, count: usize, text: usize) -> Result<(), ImportError> {
         let (Some(cells), Some(text)) = (self.cells.checked_sub(count), self.text.checked_sub(text)) else {
             return Err(ImportError::TooLarge {
@@ -87,12 +86,12 @@ impl Room {
     }
 }
 
-/// One sheet, its lines up to their last used cell.
+/// Reads one sheet, each line up to its last used cell.
 fn table(
     file: &str,
     workbook: &mut Xlsx<Cursor<&[u8]>>,
     sheet: &str,
-    room: &mut Room,
+    budget: &mut Budget,
 ) -> Result<Table, ImportError> {
     let location = Location { sheet: Some(sheet.into()), ..Location::file(file) };
     let fail = |e: XlsxError| ImportError::Format {
@@ -102,7 +101,7 @@ fn table(
     let mut found = Table { sheet: Some(sheet.to_owned()), ..Table::default() };
     let mut cells = match workbook.worksheet_cells_reader(sheet) {
         Ok(cells) => cells,
-        // A sheet of charts or of macros.
+        // A chart or macro sheet.
         Err(XlsxError::NotAWorksheet(_)) => return Ok(found),
         Err(e) => return Err(fail(e)),
     };
@@ -125,7 +124,7 @@ fn table(
         let text = if let Cell::Text(text) = &value { text.len() } else { 0 };
         let line = lines.entry(row).or_default();
         let column = column as usize;
-        room.take(&location, (column + 1).saturating_sub(line.len()), text)?;
+        budget.take(&location, (column + 1).saturating_sub(line.len()), text)?;
         if line.len() <= column {
             line.resize(column + 1, Cell::Empty);
         }
@@ -135,11 +134,11 @@ fn table(
     let (Some((&first, _)), Some((&last, _))) = (lines.first_key_value(), lines.last_key_value()) else {
         return Ok(found);
     };
-    room.take(&location, (last - first) as usize, 0)?;
+    budget.take(&location, (last - first) as usize, 0)?;
     found.rows = (first..=last)
         .map(|row| Line { number: row as usize + 1, cells: lines.remove(&row).unwrap_or_default() })
         .collect();
-    // What was once typed into and cleared, or only formatted, is inside the sheet's own extent but has no value.
+    // Cleared or merely formatted cells are inside the sheet's extent but have no value.
     found.blank_lines = end.0.min(SHEET.0 - 1).saturating_sub(last) as usize;
     found.blank_columns = (end.1.min(SHEET.1 - 1) as usize + 1).saturating_sub(found.width);
     Ok(found)

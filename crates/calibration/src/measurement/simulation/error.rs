@@ -1,8 +1,8 @@
-//! Why a recipe gives no measurements.
+//! Errors of simulation recipes.
 
 use thiserror::Error;
 
-/// Why a recipe gives no measurements.
+/// A recipe that cannot be simulated.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum RecipeError {
@@ -16,23 +16,23 @@ pub enum RecipeError {
         /// What the TOML reader found and expected.
         message: String,
     },
-    /// A value that cannot be used.
+    /// An invalid value.
     #[error("{key}: found {found}, expected {expected}")]
     Invalid {
         /// Key, as a path.
         key: String,
         /// Value.
         found: String,
-        /// What it should be.
+        /// Expected value.
         expected: &'static str,
     },
     /// The robot is not known.
     #[error("robot: {message}")]
     Robot {
-        /// What the catalogue says.
+        /// Message of the catalogue.
         message: String,
     },
-    /// No pose satisfies the recipe.
+    /// Too few poses satisfy the recipe.
     #[error(
         "poses: found {found} of {wanted} poses after {tries} tries; expected poses inside the joint ranges that the \
          sensor sees; widen the joint box, `view.box_mm`, `view.distance_mm` or `view.tilt_deg`"
@@ -40,9 +40,9 @@ pub enum RecipeError {
     NoPose {
         /// Poses found.
         found: usize,
-        /// Poses asked for.
+        /// Poses required.
         wanted: usize,
-        /// Draws.
+        /// Number of draws.
         tries: usize,
     },
 }

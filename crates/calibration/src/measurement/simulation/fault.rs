@@ -1,4 +1,4 @@
-//! What goes wrong while measuring, named as a diagnosis names it. Rows count from 0, ranges include both ends.
+//! Simulated faults of the measurement, named as in a diagnosis. Rows count from 0, ranges include both ends.
 
 use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
@@ -13,14 +13,14 @@ use truegrind_math::se3::Pose;
 #[serde(tag = "fault", rename_all = "kebab-case", deny_unknown_fields)]
 #[non_exhaustive]
 pub enum Fault {
-    /// The cable's zero is another one in some rows.
+    /// The cable's zero is shifted in some rows.
     SensorZeroShift {
         /// First and last row.
         rows: [usize; 2],
         /// Added to the reading (mm).
         offset_mm: f64,
     },
-    /// The sensor, or a cable's outlet, stood elsewhere in some rows.
+    /// The sensor, or a cable's outlet, is displaced in some rows.
     SensorFrameShift {
         /// First and last row.
         rows: [usize; 2],
@@ -30,20 +30,20 @@ pub enum Fault {
         #[serde(default)]
         turn_deg: [f64; 3],
     },
-    /// The touched point sat elsewhere on the flange in some rows.
+    /// The target is displaced on the flange in some rows.
     ToolShift {
         /// First and last row.
         rows: [usize; 2],
         /// Shift on the flange (mm).
         shift_mm: [f64; 3],
     },
-    /// The sensor's millimetre is not one.
+    /// Scale error of the sensor.
     SensorScale {
-        /// Readings are longer by this share.
+        /// Relative error of the readings.
         error: f64,
     },
-    /// The cable hangs through: longer by (w/T)² h² d / 24, h the horizontal span, d the distance (parabola under its
-    /// own weight, second order).
+    /// The cable sags: longer by (w/T)² h² d / 24, h the horizontal span, d the distance (parabola under its own weight,
+    /// second order).
     CableSag {
         /// Weight per length over tension w/T [1/m].
         weight_over_tension_per_m: f64,
@@ -55,14 +55,14 @@ pub enum Fault {
         /// Added to the reading, or to each coordinate in turn (mm).
         size_mm: f64,
     },
-    /// The controller's read-out belongs to another pose in some rows.
+    /// The controller's read-out is of another pose in some rows.
     ReadoutMismatch {
         /// Rows.
         row_list: Vec<usize>,
         /// Added to x, y, z (mm).
         shift_mm: [f64; 3],
     },
-    /// The arm carries another payload in some rows than the log says.
+    /// The payload differs from the logged one in some rows.
     PayloadChange {
         /// First and last row.
         rows: [usize; 2],
@@ -76,7 +76,7 @@ fn within(rows: &[usize; 2], row: usize) -> bool {
 }
 
 impl Fault {
-    /// Changes the sensor and the conditions that a row really has.
+    /// Applies the fault to the true sensor and conditions of a row.
     pub(super) fn before(&self, row: usize, rig: &mut Rig, condition: &mut Condition) {
         match self {
             Fault::SensorZeroShift { rows, offset_mm } if within(rows, row) => {
@@ -112,7 +112,7 @@ impl Fault {
         }
     }
 
-    /// Changes what is read.
+    /// Applies the fault to the reading and the read-out of a row.
     pub(super) fn after(
         &self,
         row: usize,

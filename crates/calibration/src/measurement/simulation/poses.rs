@@ -1,4 +1,4 @@
-//! Which poses a recipe measures, in which order and under which conditions.
+//! The measured poses of a recipe, their order and conditions.
 
 use nalgebra::Point3;
 use rand::RngExt;
@@ -10,12 +10,12 @@ use crate::measurement::sensor::Rig;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::{Joints, Model};
 
-/// Draws for each pose before the recipe counts as impossible.
+/// Draws for each pose before the recipe counts as infeasible.
 const TRIES: usize = 10_000;
-/// But no more than this in all, or than a hundred for each pose where that is more.
+/// Upper limit of all draws, or a hundred for each pose if that is more.
 const MOST_TRIES: usize = 5_000_000;
 
-/// One row to be measured.
+/// One planned row.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Planned {
     pub(super) joints: Joints,
@@ -28,12 +28,12 @@ pub(super) fn plan(recipe: &Recipe, nominal: &Model, rig: &Rig) -> Result<Vec<Pl
     let mut rng = stream(recipe.seed, Stream::Conditions);
     let mut out = Vec::new();
     let mut before: Option<Joints> = None;
-    // Repeats come after the whole round, so that they see the drift of the run.
+    // Repeats follow the whole round, so that they include the drift of the run.
     for joints in (0..repeats.max(1)).flat_map(|_| &poses) {
         let sides: Vec<[i8; 6]> = match recipe.conditions.approach {
             Approach::Unknown => vec![[0; 6]],
             Approach::Random => vec![std::array::from_fn(|_| if rng.random_bool(0.5) { 1 } else { -1 })],
-            // A joint that moves up comes to rest from below.
+            // An increasing joint angle approaches from below (−1).
             Approach::Sequence => vec![std::array::from_fn(|j| match &before {
                 Some(from) if joints[j] > from[j] => -1,
                 Some(from) if joints[j] < from[j] => 1,
@@ -68,7 +68,7 @@ fn set_conditions(rows: &mut [Planned], conditions: &RunConditions) {
     }
 }
 
-/// The different poses, and how often each is measured.
+/// The distinct poses, and how often each is measured.
 fn distinct(recipe: &Recipe, nominal: &Model, rig: &Rig) -> Result<(Vec<Joints>, usize), RecipeError> {
     let arm = nominal.at_condition(&Condition::default());
     let seen = |q: &Joints| {

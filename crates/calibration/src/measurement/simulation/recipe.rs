@@ -51,23 +51,23 @@ use truegrind_math::se3::Pose;
 
 pub use super::fault::Fault;
 
-/// A stated arm, measured in a stated way.
+/// A simulated measurement: arm, poses, sensor, noise and faults.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Recipe {
-    /// What the simulation is for, in words.
+    /// Purpose of the simulation, in words.
     #[serde(default)]
     pub about: String,
     /// Name of the nominal arm.
     pub robot: String,
     /// Seed of poses, conditions and noise.
     pub seed: u64,
-    /// How the actual arm differs from its data sheet.
+    /// Deviations of the actual arm from its data sheet.
     #[serde(default)]
     pub arm: Deviations,
-    /// Where it is measured.
+    /// Measured poses.
     pub poses: Poses,
-    /// Which of these poses the sensor can see.
+    /// The sensor's field of view.
     #[serde(default)]
     pub view: View,
     /// Time, temperature, payload, approach.
@@ -78,18 +78,18 @@ pub struct Recipe {
     /// Noise of sensor and arm.
     #[serde(default)]
     pub noise: Noise,
-    /// What is rounded before it is written.
+    /// Rounding of the written numbers.
     #[serde(default)]
     pub rounding: Rounding,
     /// Whether the controller's own x, y, z are written.
     #[serde(default)]
     pub readout: bool,
-    /// What goes wrong while measuring.
+    /// Faults of the measurement.
     #[serde(default)]
     pub fault: Vec<Fault>,
 }
 
-/// How an actual arm differs from its data sheet.
+/// Deviations of an actual arm from its data sheet.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Deviations {
@@ -98,14 +98,14 @@ pub struct Deviations {
     /// Stated deviations, added.
     #[serde(default)]
     pub link: Vec<LinkDeviation>,
-    /// Effects, in place of those of the nominal arm.
+    /// Effects; they replace those of the nominal arm.
     #[serde(default)]
     pub effect: Vec<Effect>,
-    /// Masses, in place of those of the data sheet.
+    /// Masses; they replace those of the data sheet.
     pub body: Option<Vec<Body>>,
 }
 
-/// Standard deviations of the links' numbers; beta counts on Hayati links, d on the others.
+/// Standard deviations of the link parameters; beta applies to Hayati links, d to the others.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RandomDeviations {
@@ -151,16 +151,16 @@ pub struct LinkDeviation {
     pub theta_deg: f64,
 }
 
-/// Where the arm is measured.
+/// Measured poses.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 #[non_exhaustive]
 pub enum Poses {
-    /// Joint angles drawn evenly from a box.
+    /// Joint angles drawn uniformly from a box.
     Random {
-        /// Different poses.
+        /// Number of distinct poses.
         count: usize,
-        /// Distance kept from the joint limits [°].
+        /// Margin from the joint limits [°].
         #[serde(default = "five")]
         margin_deg: f64,
         /// Lower corner of the box [°]; the limits otherwise.
@@ -177,7 +177,7 @@ pub enum Poses {
         min_deg: [f64; 6],
         /// Highest angles [°].
         max_deg: [f64; 6],
-        /// Angles of each joint.
+        /// Number of angles of each joint.
         steps: [usize; 6],
         /// Measurements of each pose, spread over the whole run.
         #[serde(default = "one")]
@@ -201,11 +201,11 @@ fn one() -> usize {
     1
 }
 
-/// What the sensor can see; poses it cannot see are passed over.
+/// The sensor's field of view; poses outside are skipped.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct View {
-    /// Box for the touched point, in the arm's base: lower and upper corner (mm).
+    /// Box for the target, in the arm's base: lower and upper corner (mm).
     pub box_mm: Option<[[f64; 3]; 2]>,
     /// Shortest and longest distance from the sensor (mm).
     pub distance_mm: Option<[f64; 2]>,
@@ -214,23 +214,23 @@ pub struct View {
 }
 
 impl View {
-    /// The sensor's part.
+    /// The limits that depend on the sensor.
     pub fn limits(&self) -> SightLimits {
         SightLimits { distance_mm: self.distance_mm, tilt_rad: self.tilt_deg.map(f64::to_radians) }
     }
 }
 
-/// From which side the joints come to rest.
+/// Approach side of the joints.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Approach {
-    /// Not known, and without consequence: play stays in the middle.
+    /// Unknown; backlash is simulated as centred.
     #[default]
     Unknown,
-    /// The side that the order of the rows gives.
+    /// From the previous row.
     Sequence,
-    /// Each joint by chance.
+    /// Random for each joint.
     Random,
     /// Each pose twice, from below and from above.
     Both,
@@ -244,21 +244,21 @@ pub struct RunConditions {
     pub hours: Option<f64>,
     /// Temperature over the run; needs `hours`.
     pub temperature: Option<WarmUp>,
-    /// Payloads (kg), taken in turn row by row.
+    /// Payloads (kg), cycled row by row.
     #[serde(default)]
     pub payload_kg: Vec<f64>,
     /// Centre of the payload in the last frame (mm).
     #[serde(default)]
     pub payload_centre_mm: [f64; 3],
-    /// From which side the joints come.
+    /// Approach side of the joints.
     #[serde(default)]
     pub approach: Approach,
-    /// Leaves out the columns that would tell of all this: the arm feels it, the log does not.
+    /// Omits the columns of these conditions: they affect the arm but are not logged.
     #[serde(default)]
     pub unlogged: bool,
 }
 
-/// A first-order rise of temperature.
+/// A first-order temperature rise.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WarmUp {
@@ -297,16 +297,16 @@ impl Frame {
     }
 }
 
-/// The sensor as it stands.
+/// The sensor and its target.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 #[non_exhaustive]
 pub enum SensorSetup {
-    /// Draw-wires. With several outlets each pose is measured with one after the other.
+    /// Draw-wires. With several outlets, each pose is measured with each of them in turn.
     Cable {
         /// Outlets in the base (mm).
         outlets_mm: Vec<[f64; 3]>,
-        /// Readings at distance zero (mm); 0 where left out.
+        /// Readings at distance zero (mm); 0 by default.
         #[serde(default)]
         zeros_mm: Vec<f64>,
         /// The hook on the flange (mm).
@@ -364,7 +364,7 @@ pub struct Noise {
     /// Of a length or coordinate (mm).
     #[serde(default)]
     pub sigma_mm: f64,
-    /// What each metre from the sensor adds [mm/m].
+    /// Additional noise for each metre from the sensor [mm/m].
     #[serde(default)]
     pub per_metre_mm: f64,
     /// Of a measured orientation, about each axis [°].
@@ -372,7 +372,7 @@ pub struct Noise {
     pub sigma_deg: f64,
     /// Degrees of freedom of Student's t, above 2, for a heavy tail; normal otherwise.
     pub student_t: Option<f64>,
-    /// Of the joints of the arm when it comes to rest (repeatability) [°].
+    /// Repeatability of the joints at rest [°].
     #[serde(default)]
     pub joints_deg: f64,
 }
@@ -399,8 +399,8 @@ impl Recipe {
         })
     }
 
-    /// Whether each key has what gives it a meaning.
-    fn check_company(&self) -> Result<(), RecipeError> {
+    /// Checks that each key is consistent with the others.
+    fn check_consistency(&self) -> Result<(), RecipeError> {
         let wrong = |key: &str, found: &str, expected| {
             Err(RecipeError::Invalid { key: key.into(), found: found.into(), expected })
         };

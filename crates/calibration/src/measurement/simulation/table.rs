@@ -1,5 +1,4 @@
-//! The measurement file of a simulation: the columns of the format, numbers with the decimals that their rounding
-//! leaves.
+//! Writes the measurement file of a simulation, with as many decimals as the rounding requires.
 
 use nalgebra::Vector3;
 
@@ -18,7 +17,8 @@ pub(super) struct Logged {
     pub(super) anchor: usize,
 }
 
-/// A number rounded to a step, where there is one, with just the decimals it needs; never a negative zero.
+/// Format of a number: rounded to an optional step, with the decimals that the step needs; never a negative zero.
+
 struct Format {
     step: Option<f64>,
     decimals: usize,

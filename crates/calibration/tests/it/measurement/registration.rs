@@ -50,7 +50,7 @@ fn points_carry_a_tetrahedron_back() {
 }
 
 #[test]
-fn touching_point_is_found_far_off_the_flange() {
+fn target_point_is_found_far_off_the_flange() {
     let sensor = TRACKER.replace("[30, 10, 60]", "[250, -120, 310]");
     let (simulation, data) = measure(&random(40, &format!("{sensor}[noise]\nsigma_mm = 0.05\n")));
     let Rig::Position { base_from_sensor, reflector_mm } = simulation.rig else { panic!() };

@@ -1,4 +1,4 @@
-//! What the types of a recipe leave open: numbers that are none, arms that cannot be, and more rows than anyone measures.
+//! Range checks of a recipe: non-finite numbers, implausible arms, too many rows.
 
 use super::{Fault, Frame, Poses, Recipe, RunConditions, SensorSetup, View};
 use crate::measurement::simulation::error::RecipeError;
@@ -34,7 +34,7 @@ impl From<InvalidValue> for RecipeError {
 }
 
 impl Recipe {
-    /// Checks what the types leave open.
+    /// Checks all values that the types do not restrict.
     pub fn check(&self) -> Result<(), RecipeError> {
         self.check_arm().map_err(|invalid| invalid.within("arm"))?;
         self.check_poses().map_err(|invalid| invalid.within("poses"))?;
@@ -58,7 +58,7 @@ impl Recipe {
             STEP.check_all(key, &step)?;
         }
         faults(&self.fault)?;
-        self.check_company()
+        self.check_consistency()
     }
 
     fn check_arm(&self) -> Result<(), InvalidValue> {
