@@ -28,7 +28,7 @@ use truegrind::arm::inverse::Inverse;
 use truegrind::calibration::identification::start::starts;
 use truegrind::calibration::measurement::import;
 use truegrind::compensation::risk::placement::Placement;
-use truegrind::compensation::verify::{Acting, Judged, judge};
+use truegrind::compensation::verify::{ActingArm, VerificationTask, verify};
 use truegrind::programs::rapid::Task;
 use truegrind::{
     CompensateOptions, Condition, DiagnoseOptions, Estimated, IdentifyOptions, Joints, Model, Pose, Program,
@@ -316,7 +316,7 @@ fn cuts(text: &str, estimated: &Estimated, actual: &Model, arm: u64, out: &mut O
         placement,
         max_risk,
         max_correction_mm: 50.0,
-        max_turn_rad: 0.2,
+        max_rotation_rad: 0.2,
         ..CompensateOptions::default()
     };
     // With the default chance, below which a place is corrected and above which the shape is.
@@ -330,7 +330,7 @@ fn cuts(text: &str, estimated: &Estimated, actual: &Model, arm: u64, out: &mut O
             continue;
         };
         let after = Task::read(&[("cut.mod", bytes.as_slice())]);
-        let judged = Judged {
+        let judged = VerificationTask {
             original: program.listing(),
             rewritten: Some(&after.listing),
             cell: &cell,
@@ -340,13 +340,13 @@ fn cuts(text: &str, estimated: &Estimated, actual: &Model, arm: u64, out: &mut O
             after: truegrind::After::Achieved,
             loads: [None, None],
         };
-        let acting = Acting {
+        let acting = ActingArm {
             nominal: &estimated.nominal,
             model: actual,
             knowledge: None,
             condition: Condition::default(),
         };
-        let report = judge(&judged, &acting);
+        let report = verify(&judged, &acting);
         let lines: Vec<_> = report.points.iter().filter(|p| p.cutting).collect();
         if lines.iter().any(|p| p.after.is_none()) || !done.changed() {
             out.failed += 1;
@@ -361,8 +361,15 @@ fn cuts(text: &str, estimated: &Estimated, actual: &Model, arm: u64, out: &mut O
             (left.norm_squared() / points.len() as f64).sqrt()
         };
         let off_mm = [rms(&|p| p.before.unwrap().vector_mm), rms(&|p| p.after.unwrap().vector_mm)];
-        let auto_takes = auto.plan.placements[0].taken == placement;
-        out.cuts.push(Cut { arm, placement, sigma_mm: cut.sigma_mm, chance: cut.chance, off_mm, auto_takes });
+        let auto_takes = auto.plan.placements[0].applied == placement;
+        out.cuts.push(Cut {
+            arm,
+            placement,
+            sigma_mm: cut.sigma_mm,
+            chance: cut.probability_of_harm,
+            off_mm,
+            auto_takes,
+        });
     }
 }
 

@@ -134,9 +134,9 @@ pub use truegrind_compensation::compensate::{CompensateError, Compensated, compe
 pub use truegrind_compensation::cut::Cuts;
 pub use truegrind_compensation::deviation::{After, Deviation, PathPoint, PathReport, Status};
 pub use truegrind_compensation::options::{Circles, Emit, Options as CompensateOptions};
-pub use truegrind_compensation::plan::reason::Why;
+pub use truegrind_compensation::plan::reason::OutcomeReason;
 pub use truegrind_compensation::plan::{MotionOutcome, Plan as CompensatePlan};
-pub use truegrind_compensation::verify::{Acting, Judged, judge};
+pub use truegrind_compensation::verify::{ActingArm, VerificationTask, verify};
 
 // How it is told.
 pub use truegrind_report::document::{Block, Document, Figure};

@@ -10,7 +10,7 @@ use truegrind::compensation::condition::payload::Loads;
 use truegrind::compensation::cut::Cuts;
 use truegrind::compensation::deviation::Status as Became;
 use truegrind::compensation::options::{self, Circles, Emit};
-use truegrind::compensation::plan::reason::Why;
+use truegrind::compensation::plan::reason::OutcomeReason;
 use truegrind::programs::motion::Mark;
 use truegrind::programs::nc::setup::Setup;
 use truegrind::programs::reading::Program;
@@ -154,7 +154,7 @@ pub fn corrected_task(
         joint_targets: options.joint_targets,
         condition,
         loads: options.payload.is_none().then(|| Loads::of(&program)),
-        open_starts: true,
+        flag_unknown_starts: true,
         points: false,
         cuts: if case.whole_cuts { Cuts::Whole } else { Cuts::Single },
         ..options::Options::default()
@@ -185,8 +185,8 @@ pub fn corrected_task(
             reason: outcome.reason.map(|why| why.to_string()),
             after_mm: outcome.after_mm,
             sigma_mm: outcome.sigma_mm,
-            bend_mm: outcome.bend_mm,
-            guessed: outcome.reason == Some(Why::OpenStart),
+            bend_mm: outcome.path_deviation_mm,
+            guessed: outcome.reason == Some(OutcomeReason::UnknownStart),
         });
     }
     Ok(out)

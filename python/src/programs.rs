@@ -4,21 +4,21 @@ use std::path::{Path, PathBuf};
 
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList, PyString, PyTuple};
-use truegrind::compensation::cell::robot_match::{cell_of_another, program_of_another};
+use truegrind::compensation::cell::robot_match::{cell_robot_mismatch, program_robot_mismatch};
 use truegrind::compensation::cell::Used;
 use truegrind::compensation::condition::payload::Loads;
-use truegrind::compensation::frames::surface_frames::misplaced;
+use truegrind::compensation::frames::surface_frames::surface_frame_contradictions;
 use truegrind::compensation::risk::placement::Placement;
-use truegrind::compensation::cell::robot_match::none_in_reach;
-use truegrind::compensation::cell::nc_setup::setup;
+use truegrind::compensation::cell::robot_match::unreachable_motions;
+use truegrind::compensation::cell::nc_setup::cell_setup;
 use truegrind::compensation::frames::taught::contradictions;
 use truegrind::math::work::report_step;
 use truegrind::programs::rapid::task_list;
 use truegrind::report::compensation::{self as view, ProgramFile};
 use truegrind::report::{deviation as deviations, format};
 use truegrind::{
-    Acting, After, Cell, Circles, CompensateOptions, CompensatePlan, Compensated, Condition, Cuts, Emit,
-    Estimated, Judged, Listing, Mark, NcSetup, PathReport, Program, Status, SurfaceFile, compensate, judge,
+    ActingArm, After, Cell, Circles, CompensateOptions, CompensatePlan, Compensated, Condition, Cuts, Emit,
+    Estimated, VerificationTask, Listing, Mark, NcSetup, PathReport, Program, Status, SurfaceFile, compensate, verify,
     robots,
 };
 
@@ -405,7 +405,7 @@ fn corrected(
         let message = format!("{name} is already compensated with this model: give the original program");
         return Err(Refusal::new(Kind::Program, message).of_file(name));
     }
-    let found: Vec<String> = surface.iter().flat_map(|surface| misplaced(listing, surface)).collect();
+    let found: Vec<String> = surface.iter().flat_map(|surface| surface_frame_contradictions(listing, surface)).collect();
     if !found.is_empty() {
         return Err(Refusal::new(Kind::Cell, format!("{}: {}", sources.name(), found.join("; "))));
     }
@@ -413,7 +413,7 @@ fn corrected(
     let mark = Mark { version: env!("CARGO_PKG_VERSION").into(), model: model.hash.clone(), partial: false };
     report_step(&format!("rewriting {}", sources.name()));
     let Compensated { mut plan, rewritten } = compensate(&program, arm, &cell, &options, Some(mark))?;
-    if let Some(motions) = none_in_reach(&plan) {
+    if let Some(motions) = unreachable_motions(&plan) {
         let message = format!(
             "{}: {motions} motions and hardly one in reach of {} ({}): the program is another robot's, or its tool and work \
              object are not where it is told (cell); give the model of the robot that runs it",
@@ -446,11 +446,11 @@ fn corrected(
 /// Nothing is corrected or judged with a cell or a program of another robot.
 fn agreed(sources: &Sources, cell: &Cell, arm: &Estimated) -> Result<(), Refusal> {
     let (robot, nominal) = (&arm.robot, &arm.nominal);
-    if let Some(fault) = cell_of_another(cell, robot, nominal) {
+    if let Some(fault) = cell_robot_mismatch(cell, robot, nominal) {
         return Err(Refusal::new(Kind::Cell, fault));
     }
     let fault = sources.files.iter().find_map(|(name, bytes)| {
-        program_of_another(last(name), bytes, robot, nominal).map(|fault| (name, fault))
+        program_robot_mismatch(last(name), bytes, robot, nominal).map(|fault| (name, fault))
     });
     fault.map_or(Ok(()), |(name, fault)| Err(Refusal::new(Kind::Program, fault).of_file(name)))
 }
@@ -551,7 +551,7 @@ impl Run<'_> {
         let original = self.originals.map(|original| original.task(&setup));
         for program in original.iter().chain([&task]) {
             let mut found = contradictions(program.listing(), cell, &arm.nominal);
-            found.extend(surface.iter().flat_map(|surface| misplaced(program.listing(), surface)));
+            found.extend(surface.iter().flat_map(|surface| surface_frame_contradictions(program.listing(), surface)));
             if !found.is_empty() {
                 return Err(Refusal::new(Kind::Cell, found.join("; ")));
             }
@@ -562,7 +562,7 @@ impl Run<'_> {
             Some(actual) => (&actual.model, format!("actual arm {}", actual.name), None, After::Achieved),
             None => (&arm.model, self.estimated.name.clone(), Some(arm), After::PredictedRemainder),
         };
-        let judged = Judged {
+        let judged = VerificationTask {
             original: original.as_ref().map_or(task.listing(), |original| original.listing()),
             rewritten: original.as_ref().map(|_| task.listing()),
             cell,
@@ -572,9 +572,9 @@ impl Run<'_> {
             after,
             loads: [loads[0].as_ref(), loads[1].as_ref()],
         };
-        let acting = Acting { nominal: &arm.nominal, model, knowledge, condition: self.condition };
+        let acting = ActingArm { nominal: &arm.nominal, model, knowledge, condition: self.condition };
         report_step(&format!("running {name}"));
-        let report = judge(&judged, &acting);
+        let report = verify(&judged, &acting);
         if report.points.is_empty() {
             let message = format!("{name}: no motion has a target that is known from the text");
             return Err(Refusal::new(Kind::Program, message));

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::bail;
 use clap::Args;
 use truegrind::compensation::cell::Cell;
-use truegrind::compensation::cell::template::{Asking, skeleton};
+use truegrind::compensation::cell::template::{TemplateProgram, cell_template};
 use truegrind::programs::reading::Program;
 
 use super::exit_status::ExitStatus;
@@ -49,10 +49,10 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let read = jobs.iter().map(|job| Programs::read(&job.paths)).collect::<anyhow::Result<Vec<_>>>()?;
     let names: Vec<String> = read.iter().map(Programs::name).collect();
     let tasks: Vec<Program<'_>> = read.iter().map(|programs| programs.task(&setup)).collect();
-    let asking: Vec<Asking<'_>> = tasks
+    let asking: Vec<TemplateProgram<'_>> = tasks
         .iter()
         .zip(&names)
-        .map(|(task, name)| Asking { name, language: task.language(), listing: task.listing() })
+        .map(|(task, name)| TemplateProgram { name, language: task.language(), listing: task.listing() })
         .collect();
     for comment in asking.iter().flat_map(|program| &program.listing.misstated) {
         print_message(format_args!("note: {comment}"));
@@ -60,7 +60,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     if asking.iter().all(|program| program.listing.motions.is_empty()) {
         bail!("these programs contain no motion, so they use no tool and no work object");
     }
-    let made = skeleton(&asking, robot.as_ref().map(|robot| robot.sheet.name.as_str()));
+    let made = cell_template(&asking, robot.as_ref().map(|robot| robot.sheet.name.as_str()));
     let mut batch =
         Batch::sparing(read.iter().flat_map(|programs| programs.files.iter().map(|(path, _)| path)));
     batch.add(&arguments.output, made.text);

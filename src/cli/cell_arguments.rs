@@ -10,7 +10,7 @@ use truegrind::arm::estimated::Estimated;
 use truegrind::arm::model::Model;
 use truegrind::compensation::cell::{Cell, Used};
 use truegrind::compensation::condition::payload::Loads;
-use truegrind::compensation::frames::surface_frames::misplaced;
+use truegrind::compensation::frames::surface_frames::surface_frame_contradictions;
 use truegrind::compensation::frames::taught::contradictions;
 use truegrind::programs::motion::Listing;
 use truegrind::programs::reading::Program;
@@ -117,6 +117,6 @@ pub(super) fn refuse_contradictions(
     nominal: &Model,
 ) -> anyhow::Result<()> {
     let mut found = contradictions(listing, cell, nominal);
-    found.extend(surface.iter().flat_map(|surface| misplaced(listing, surface)));
+    found.extend(surface.iter().flat_map(|surface| surface_frame_contradictions(listing, surface)));
     if found.is_empty() { Ok(()) } else { bail!("{}", found.join("; ")) }
 }

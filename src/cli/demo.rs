@@ -19,7 +19,7 @@ use truegrind::compensation::cell::Cell;
 use truegrind::compensation::compensate::compensate;
 use truegrind::compensation::deviation::{After, Deviation, PathPoint, PathReport};
 use truegrind::compensation::options::Options as RewriteBounds;
-use truegrind::compensation::verify::{Acting, Judged, judge};
+use truegrind::compensation::verify::{ActingArm, VerificationTask, verify};
 use truegrind::planning::taught_cell::taught_cell;
 use truegrind::planning::toolpath::toolpath;
 use truegrind::programs::motion::Mark;
@@ -92,7 +92,7 @@ impl Job<'_> {
         let planned = done.plan;
         let program = done.rewritten.files[0].edits.apply(self.program)?;
         let after = Task::read(&[("blade.mod", program.as_slice())]);
-        let judged = Judged {
+        let judged = VerificationTask {
             original: self.task.listing(),
             rewritten: Some(&after.listing),
             cell: self.cell,
@@ -102,9 +102,13 @@ impl Job<'_> {
             after: After::Achieved,
             loads: [None, None],
         };
-        let acting =
-            Acting { nominal: self.nominal, model: self.actual, knowledge: None, condition: self.condition };
-        let mut report = judge(&judged, &acting);
+        let acting = ActingArm {
+            nominal: self.nominal,
+            model: self.actual,
+            knowledge: None,
+            condition: self.condition,
+        };
+        let mut report = verify(&judged, &acting);
         report.held_out_mm = Some(estimated.geometry.held_out.rmse);
         for (point, planned) in report.points.iter_mut().zip(&planned.points) {
             (point.sigma_mm, point.outside) = (planned.sigma_mm, planned.outside);

@@ -11,7 +11,7 @@ use truegrind::arm::estimated::Estimated;
 use truegrind::arm::model::Model;
 use truegrind::compensation::cell::{Cell, Used};
 use truegrind::compensation::deviation::{After, PathReport};
-use truegrind::compensation::verify::{Acting, Judged, judge};
+use truegrind::compensation::verify::{ActingArm, VerificationTask, verify};
 use truegrind::programs::nc::setup::Setup;
 use truegrind::report::deviation as view;
 use truegrind::surfaces::SurfaceFile;
@@ -310,7 +310,7 @@ impl DeviationContext<'_> {
             .runners
             .iter()
             .map(|runner| {
-                let judged = Judged {
+                let judged = VerificationTask {
                     original: original.as_ref().map_or(task.listing(), |o| o.listing()),
                     rewritten: original.as_ref().map(|_| task.listing()),
                     cell: self.cell,
@@ -320,13 +320,13 @@ impl DeviationContext<'_> {
                     after: runner.after,
                     loads: [loads[0].as_ref(), loads[1].as_ref()],
                 };
-                let acting = Acting {
+                let acting = ActingArm {
                     nominal: &runner.nominal,
                     model: &runner.model,
                     knowledge: runner.knowledge.as_deref(),
                     condition: self.condition,
                 };
-                judge(&judged, &acting)
+                verify(&judged, &acting)
             })
             .collect();
         if reports.iter().all(|report| report.points.is_empty()) {

@@ -18,7 +18,7 @@ use super::files::{self, Batch};
 use super::inputs;
 use super::output_extension;
 use super::terminal::print_message;
-use truegrind::compensation::cell::nc_setup::angles;
+use truegrind::compensation::cell::nc_setup::angle_convention;
 
 /// Arguments of `path`.
 #[derive(Debug, Args)]
@@ -70,7 +70,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
 
 /// Meaning of A, B and C: that of the robot file, or else rotations about the fixed x, y and z axes (W, P, R).
 fn angles_of(robot: &Robot) -> Angles {
-    robot.sheet.orientation().and_then(angles).unwrap_or(Angles::Wpr)
+    robot.sheet.orientation().and_then(angle_convention).unwrap_or(Angles::Wpr)
 }
 
 fn report_toolpath(path: &Toolpath, robot: &Robot, output: &Path) {

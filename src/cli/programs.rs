@@ -327,5 +327,5 @@ impl Programs {
 pub(super) fn setup(cell: &Cell, robot: Option<&str>) -> Setup {
     let orientation =
         robot.and_then(|name| inputs::robot(name).ok()).and_then(|robot| robot.sheet.orientation());
-    compensation::cell::nc_setup::setup(cell, orientation)
+    compensation::cell::nc_setup::cell_setup(cell, orientation)
 }

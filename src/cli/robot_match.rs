@@ -3,20 +3,20 @@
 use anyhow::bail;
 use truegrind::arm::model::Model;
 use truegrind::compensation::cell::Cell;
-use truegrind::compensation::cell::robot_match::{cell_of_another, program_of_another};
+use truegrind::compensation::cell::robot_match::{cell_robot_mismatch, program_robot_mismatch};
 
 use super::files;
 use super::programs::Programs;
 
 /// Refuses the cell file of another robot.
 pub(super) fn refuse_other_cell(cell: &Cell, robot: &str, nominal: &Model) -> anyhow::Result<()> {
-    cell_of_another(cell, robot, nominal).map_or(Ok(()), |fault| bail!("{fault}"))
+    cell_robot_mismatch(cell, robot, nominal).map_or(Ok(()), |fault| bail!("{fault}"))
 }
 
 /// Refuses programs that name another robot.
 pub(super) fn refuse_other_program(programs: &Programs, robot: &str, nominal: &Model) -> anyhow::Result<()> {
     for (path, source) in &programs.files {
-        if let Some(fault) = program_of_another(&files::name(path), source, robot, nominal) {
+        if let Some(fault) = program_robot_mismatch(&files::name(path), source, robot, nominal) {
             bail!("{fault}");
         }
     }

@@ -14,7 +14,7 @@ use truegrind::calibration::identification::solver::SOLVERS;
 use truegrind::calibration::identification::tolerance::Tolerance;
 use truegrind::compensation::cell::Used;
 use truegrind::compensation::deviation::{After, Deviation, PathPoint, PathReport, Status};
-use truegrind::compensation::verify::{Acting, Judged, judge};
+use truegrind::compensation::verify::{ActingArm, VerificationTask, verify};
 use truegrind::math::se3::Pose;
 use truegrind::pictures::measured::Residuals;
 use truegrind::pictures::{self, MeasuredScene, PathScene, Recording};
@@ -304,11 +304,15 @@ fn program(arguments: &Arguments, paths: &[PathBuf]) -> anyhow::Result<Recording
     }
     note_unused_entries([&Some(Used::by(task.listing(), &cell))], &cell, surface.as_ref());
     let program = programs.name();
-    let acting =
-        Acting { nominal: &nominal, model: knowledge.map_or(&nominal, |k| &k.model), knowledge, condition };
+    let acting = ActingArm {
+        nominal: &nominal,
+        model: knowledge.map_or(&nominal, |k| &k.model),
+        knowledge,
+        condition,
+    };
     let loads = arguments.cell.loads(&task);
-    let report = judge(
-        &Judged {
+    let report = verify(
+        &VerificationTask {
             original: task.listing(),
             rewritten: None,
             cell: &cell,

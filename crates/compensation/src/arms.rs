@@ -1,6 +1,6 @@
 //! The arm as the controller believes it to be and the better one, with what all targets share of them.
 
-use crate::condition::arm_conditions::Circumstances;
+use crate::condition::arm_conditions::ArmConditions;
 use crate::condition::payload::{Load, Loads};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::effect::Effect;
@@ -10,7 +10,7 @@ use truegrind_arm::model::Model;
 use truegrind_programs::motion::Listing;
 
 /// Whether an effect moves the arm by what it carries.
-pub(crate) fn yields(effect: &Effect) -> bool {
+pub(crate) fn is_load_dependent(effect: &Effect) -> bool {
     effect.needs_torque() && !effect.is_zero()
 }
 
@@ -20,7 +20,7 @@ pub(crate) struct Arms<'a> {
     /// The arm in the middle of every play, under the stated condition.
     pub(crate) estimated: Inverse<'a>,
     /// The same under each condition that the program brings about.
-    pub(crate) acting: Circumstances<'a>,
+    pub(crate) conditions: ArmConditions<'a>,
     pub(crate) knowledge: Option<&'a Estimated>,
 }
 
@@ -35,7 +35,7 @@ impl<'a> Arms<'a> {
         Self {
             nominal: Inverse::new(nominal, &Condition::default(), nominal),
             estimated: Inverse::new(actual, &condition, nominal),
-            acting: Circumstances::new(actual, nominal, &condition),
+            conditions: ArmConditions::new(actual, nominal, &condition),
             knowledge: None,
         }
     }
@@ -43,7 +43,7 @@ impl<'a> Arms<'a> {
     /// What the arm carries at each motion, where the program says so and the arm yields under it; empty elsewhere.
     pub(crate) fn loads(&self, listing: &Listing, loads: Option<&Loads>) -> Vec<Option<Load>> {
         let model = self.estimated.arm().model;
-        let Some(loads) = loads.filter(|_| model.effects.iter().any(yields)) else {
+        let Some(loads) = loads.filter(|_| model.effects.iter().any(is_load_dependent)) else {
             return Vec::new();
         };
         let motions = listing.motions.iter().enumerate();

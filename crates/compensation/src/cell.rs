@@ -421,17 +421,17 @@ impl Cell {
 
 /// A cell file beside a program, by names: which of its frames mean one of the program.
 #[derive(Debug)]
-pub(crate) struct Stated<'a> {
+pub(crate) struct CellLookup<'a> {
     pub(crate) cell: &'a Cell,
-    tools: Names<'a>,
-    objects: Names<'a>,
+    tools: NameIndex<'a>,
+    objects: NameIndex<'a>,
     /// How comments of an NC program call a tool or frame, by its plain name.
     labels: HashMap<String, Vec<&'a str>>,
 }
 
 /// Frames of a cell file by their names.
 #[derive(Debug)]
-struct Names<'a> {
+struct NameIndex<'a> {
     frames: &'a [CellFrame],
     /// By name in lower case.
     lower: HashMap<String, Vec<usize>>,
@@ -439,7 +439,7 @@ struct Names<'a> {
     plain: HashMap<String, Vec<usize>>,
 }
 
-impl<'a> Names<'a> {
+impl<'a> NameIndex<'a> {
     fn of(frames: &'a [CellFrame]) -> Self {
         let (mut lower, mut plain) = (HashMap::new(), HashMap::new());
         for (place, frame) in frames.iter().enumerate() {
@@ -467,13 +467,13 @@ impl<'a> Names<'a> {
     }
 }
 
-impl<'a> Stated<'a> {
+impl<'a> CellLookup<'a> {
     pub(crate) fn of(cell: &'a Cell, listing: &'a Listing) -> Self {
         let mut labels: HashMap<String, Vec<&str>> = HashMap::new();
         for (number, label) in &listing.labels {
             labels.entry(setup::plain(number)).or_default().push(label);
         }
-        Self { cell, tools: Names::of(&cell.tool), objects: Names::of(&cell.wobj), labels }
+        Self { cell, tools: NameIndex::of(&cell.tool), objects: NameIndex::of(&cell.wobj), labels }
     }
 
     /// How comments call what the program's text does not declare.
@@ -522,7 +522,7 @@ impl Used {
     /// By one program: what stands for a tool or work object of it, the tools that touched its teaching points (any, where
     /// that is not said), and the external axes that its targets state.
     pub fn by(listing: &Listing, cell: &Cell) -> Self {
-        let stated = Stated::of(cell, listing);
+        let stated = CellLookup::of(cell, listing);
         let place =
             |list: &[CellFrame], found: &CellFrame| list.iter().position(|one| std::ptr::eq(one, found));
         let mut out = Self::default();

@@ -15,8 +15,8 @@ use crate::frames::taught::contradictions;
 use crate::frames::undeclared;
 use crate::options::Options;
 use crate::plan::Plan;
-use crate::plan::planner::Targets;
-use crate::plan::reason::Why;
+use crate::plan::planner::SolvedProgram;
+use crate::plan::reason::OutcomeReason;
 use crate::plan::single_precision::single_precision;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::estimated::Estimated;
@@ -72,8 +72,8 @@ pub fn compensate(
     let partial = options.cuts == Cuts::Partial;
     let mark = mark.map(|mark| Mark { partial, ..mark });
     let rewrite = RewriteOptions { mark, ..RewriteOptions::default() };
-    let mut targets = Targets::of(listing, arm, cell, options);
-    let mut refused: BTreeMap<u32, Why> = BTreeMap::new();
+    let mut targets = SolvedProgram::of(listing, arm, cell, options);
+    let mut refused: BTreeMap<u32, OutcomeReason> = BTreeMap::new();
     let mut round = 0;
     let play =
         arm.model.effects.iter().any(|effect| matches!(effect, Effect::Backlash(_)) && !effect.is_zero());
@@ -101,7 +101,7 @@ pub fn compensate(
         {
             // A program of which every round takes away another piece is left as it is.
             let line = listing.motions[*first as usize].place.line;
-            let rest = Why::PartOfCut { line, because: why.kind() };
+            let rest = OutcomeReason::PartOfCut { line, because: why.kind() };
             for change in &planned.changes {
                 refused.entry(change.motion).or_insert(rest);
             }
@@ -116,7 +116,7 @@ const MOST_ROUNDS: usize = 16;
 fn agreed(
     mut planned: Plan,
     rewritten: Rewritten,
-    refused: &BTreeMap<u32, Why>,
+    refused: &BTreeMap<u32, OutcomeReason>,
     program: &Program<'_>,
 ) -> Compensated {
     reconcile(&mut planned, &rewritten, refused);
@@ -130,28 +130,28 @@ fn agreed(
 }
 
 /// What the writer refused.
-fn refusals(planned: &Plan, rewritten: &Rewritten, listing: &Listing) -> BTreeMap<u32, Why> {
+fn refusals(planned: &Plan, rewritten: &Rewritten, listing: &Listing) -> BTreeMap<u32, OutcomeReason> {
     let outcomes = planned.changes.iter().zip(&rewritten.outcomes);
     let refused = outcomes.filter_map(|(change, outcome)| match outcome {
         // An arc that no circle fits once it is written.
         Outcome::Refused(Reason::WrongShape)
             if listing.motions[change.motion as usize].kind == MotionKind::Circular =>
         {
-            Some((change.motion, Why::NoCircle))
+            Some((change.motion, OutcomeReason::NoCircle))
         }
-        Outcome::Refused(reason) => Some((change.motion, Why::Program(*reason))),
+        Outcome::Refused(reason) => Some((change.motion, OutcomeReason::Program(*reason))),
         _ => None,
     });
     refused.collect()
 }
 
 /// Brings the plan in line with what was written.
-fn reconcile(planned: &mut Plan, rewritten: &Rewritten, refused: &BTreeMap<u32, Why>) {
+fn reconcile(planned: &mut Plan, rewritten: &Rewritten, refused: &BTreeMap<u32, OutcomeReason>) {
     for (change, outcome) in planned.changes.iter().zip(&rewritten.outcomes) {
         let row = &mut planned.outcomes[change.motion as usize];
         if *outcome == Outcome::Unchanged && row.status == Status::Changed {
             row.status = Status::Left;
-            row.reason = Some(Why::Same);
+            row.reason = Some(OutcomeReason::NoChange);
         }
         if let Some(why) = refused.get(&change.motion) {
             row.status = Status::Refused;

@@ -1,6 +1,6 @@
 //! Which joints the controller takes for a pose and the configuration that is stated with it.
 
-use crate::plan::reason::Why;
+use crate::plan::reason::OutcomeReason;
 use truegrind_arm::inverse::configuration::Configuration;
 use truegrind_arm::inverse::{Inverse, InverseError};
 use truegrind_arm::model::Joints;
@@ -14,13 +14,13 @@ pub(crate) fn configured(
     target: &RobTarget,
     monitored: Switch,
     near: Option<&Joints>,
-) -> Result<Joints, Why> {
+) -> Result<Joints, OutcomeReason> {
     let [cf1, cf4, cf6, cfx] = target.conf;
     let wanted = Configuration { cf1, cf4, cf6, cfx };
     if monitored == Switch::Off
         && let Some(near) = near
     {
-        return nominal.solve_near(flange, near).map(|s| s.joints).map_err(Why::of_inverse);
+        return nominal.solve_near(flange, near).map(|s| s.joints).map_err(OutcomeReason::of_inverse);
     }
     match nominal.solve_configured(flange, &wanted, near) {
         Ok(solution) => Ok(solution.joints),
@@ -30,7 +30,7 @@ pub(crate) fn configured(
             // Where no configuration reaches it, none was asked for in vain: what forbids the nearest is the reason.
             if all.is_empty() {
                 let other = nominal.solve_configured(flange, &nearest, near).err();
-                return Err(Why::of_inverse(other.unwrap_or(error)));
+                return Err(OutcomeReason::of_inverse(other.unwrap_or(error)));
             }
             let mut fitting = all.iter().filter(|s| wanted.overshoot_rad(&s.joints) <= 1e-6);
             match (fitting.next(), fitting.next(), monitored) {
@@ -42,11 +42,11 @@ pub(crate) fn configured(
                         wanted.overshoot_rad(&a.joints).total_cmp(&wanted.overshoot_rad(&b.joints))
                     })
                     .map(|s| s.joints)
-                    .ok_or_else(|| Why::of_inverse(error)),
-                _ => Err(Why::of_inverse(error)),
+                    .ok_or_else(|| OutcomeReason::of_inverse(error)),
+                _ => Err(OutcomeReason::of_inverse(error)),
             }
         }
-        Err(error) => Err(Why::of_inverse(error)),
+        Err(error) => Err(OutcomeReason::of_inverse(error)),
     }
 }
 

@@ -11,7 +11,7 @@
 //! them are cuts of their own.
 
 use crate::deviation::Status;
-use crate::plan::reason::Why;
+use crate::plan::reason::OutcomeReason;
 use truegrind_programs::motion::{Listing, Motion, MotionKind, Reason};
 
 /// What becomes of a cut of which not every motion can be corrected.
@@ -98,25 +98,29 @@ fn one_cut(before: &Motion, motion: &Motion, listing: &Listing) -> bool {
 }
 
 /// Why a motion stays as it is, with the status it has for that.
-type Obstacle<'a> = &'a dyn Fn(u32) -> Option<(Status, Why)>;
+type Obstacle<'a> = &'a dyn Fn(u32) -> Option<(Status, OutcomeReason)>;
 
 /// The motions that could be corrected but stay with the rest of their cut.
-pub(crate) fn rest_of_cuts(listing: &Listing, cuts: &CutsOf, obstacle: Obstacle<'_>) -> Vec<(u32, Why)> {
+pub(crate) fn rest_of_cuts(
+    listing: &Listing,
+    cuts: &CutsOf,
+    blocking_reason: Obstacle<'_>,
+) -> Vec<(u32, OutcomeReason)> {
     // The first motion of each cut that stays for a reason of its own.
-    let mut cause: Vec<Option<Why>> = vec![None; cuts.of.len()];
+    let mut cause: Vec<Option<OutcomeReason>> = vec![None; cuts.of.len()];
     for (index, cut) in (0_u32..).zip(&cuts.of) {
         let Some(cut) = cut.map(|cut| cut as usize) else { continue };
         if cause[cut].is_none()
-            && let Some((_, why)) = obstacle(index)
+            && let Some((_, why)) = blocking_reason(index)
         {
             let line = listing.motions[index as usize].place.line;
-            cause[cut] = Some(Why::PartOfCut { line, because: why.kind() });
+            cause[cut] = Some(OutcomeReason::PartOfCut { line, because: why.kind() });
         }
     }
     (0_u32..)
         .zip(&cuts.of)
         .filter_map(|(index, cut)| Some((index, cause[(*cut)? as usize]?)))
-        .filter(|(index, _)| obstacle(*index).is_none())
+        .filter(|(index, _)| blocking_reason(*index).is_none())
         .collect()
 }
 
@@ -126,17 +130,17 @@ pub(crate) fn rest_of_cuts(listing: &Listing, cuts: &CutsOf, obstacle: Obstacle<
 pub(crate) fn steps(
     listing: &Listing,
     cuts: &CutsOf,
-    obstacle: Obstacle<'_>,
+    blocking_reason: Obstacle<'_>,
     tolerance_mm: f64,
     shift_mm: &dyn Fn(u32) -> f64,
-) -> Vec<(u32, Why)> {
+) -> Vec<(u32, OutcomeReason)> {
     let count = listing.motions.len();
     let mut neighbours: Vec<Vec<u32>> = vec![Vec::new(); count];
     for (a, b) in &cuts.runs_into {
         neighbours[*a as usize].push(*b);
         neighbours[*b as usize].push(*a);
     }
-    let mut stays: Vec<bool> = (0..count as u32).map(|index| obstacle(index).is_some()).collect();
+    let mut stays: Vec<bool> = (0..count as u32).map(|index| blocking_reason(index).is_some()).collect();
     let mut open: Vec<u32> = (0..count as u32).filter(|index| stays[*index as usize]).collect();
     let mut out = Vec::new();
     while let Some(index) = open.pop() {
@@ -144,7 +148,7 @@ pub(crate) fn steps(
             let mm = shift_mm(beside);
             if !stays[beside as usize] && !(mm <= tolerance_mm) {
                 let line = listing.motions[index as usize].place.line;
-                out.push((beside, Why::Step { line, mm }));
+                out.push((beside, OutcomeReason::Step { line, mm }));
                 stays[beside as usize] = true;
                 open.push(beside);
             }

@@ -40,7 +40,7 @@ pub struct Options {
     /// Largest correction of a position that is written (mm).
     pub max_correction_mm: f64,
     /// Largest correction of an orientation that is written (rad).
-    pub max_turn_rad: f64,
+    pub max_rotation_rad: f64,
     /// A pose with a smaller distance to singularity is refused (scaled smallest singular value, of order sin θ5 / 10).
     pub min_singularity: f64,
     /// How far a correction may turn a joint: so many times the size of the correction, which is the shift of the flange
@@ -49,7 +49,7 @@ pub struct Options {
     pub joint_gain: f64,
     /// A joint may turn by this for any correction (rad), so that rounding and small corrections are let through where
     /// what they cost does no harm.
-    pub joint_free_rad: f64,
+    pub free_joint_change_rad: f64,
     /// Whether joint targets are rewritten too: a home position says joints, not a pose.
     pub joint_targets: bool,
     /// Decimals of positions as they will be written, to state what rounding leaves.
@@ -64,9 +64,9 @@ pub struct Options {
     pub placement: Placement,
     /// A cut that the correction makes worse with a larger probability is left.
     pub max_risk: f64,
-    /// Whether motions are flagged one by one ([`Why::OpenStart`](crate::plan::reason::Why::OpenStart)) that rest on a configuration which the
+    /// Whether motions are flagged one by one ([`OutcomeReason::UnknownStart`](crate::plan::reason::OutcomeReason::UnknownStart)) that rest on a configuration which the
     /// controller does not check, from a start that the text does not tell. Otherwise a note says where such a way begins.
-    pub open_starts: bool,
+    pub flag_unknown_starts: bool,
     /// Whether [`Plan::points`](crate::plan::Plan::points) are filled: tables and pictures of the path need them, the rewrite itself
     /// does not.
     pub points: bool,
@@ -82,10 +82,10 @@ impl Default for Options {
             circles: Circles::Keep,
             tolerance_mm: 0.05,
             max_correction_mm: 10.0,
-            max_turn_rad: 2.0_f64.to_radians(),
+            max_rotation_rad: 2.0_f64.to_radians(),
             min_singularity: 1e-3,
             joint_gain: 8.0,
-            joint_free_rad: 0.5_f64.to_radians(),
+            free_joint_change_rad: 0.5_f64.to_radians(),
             joint_targets: false,
             position_decimals: 4,
             condition: Condition::default(),
@@ -93,7 +93,7 @@ impl Default for Options {
             cuts: Cuts::Whole,
             placement: Placement::Auto,
             max_risk: 0.1,
-            open_starts: false,
+            flag_unknown_starts: false,
             points: true,
             remedies: true,
         }
@@ -101,6 +101,6 @@ impl Default for Options {
 }
 
 /// Whether a motion is of a kind that is rewritten at all.
-pub(crate) fn may_change(motion: &Motion, options: &Options) -> bool {
+pub(crate) fn is_rewritable(motion: &Motion, options: &Options) -> bool {
     motion.left.is_none() && (motion.kind != MotionKind::AbsoluteJoint || options.joint_targets)
 }

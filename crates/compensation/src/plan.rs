@@ -8,7 +8,7 @@ pub mod single_precision;
 mod surface_normals;
 
 use crate::deviation::{PathPoint, Status};
-use crate::plan::reason::Why;
+use crate::plan::reason::OutcomeReason;
 use crate::risk::cut_risk::CutRisk;
 use crate::risk::placement::ObjectPlacement;
 use truegrind_programs::rewrite::Change;
@@ -21,7 +21,7 @@ pub struct MotionOutcome {
     /// What became of it.
     pub status: Status,
     /// Why.
-    pub reason: Option<Why>,
+    pub reason: Option<OutcomeReason>,
     /// Deviation of its end before and after (mm).
     pub before_mm: Option<f64>,
     /// See `before_mm`; a predicted remainder.
@@ -31,7 +31,7 @@ pub struct MotionOutcome {
     /// The same of the shape of its cut, after the best rigid registration (mm); absent outside cuts.
     pub shape_sigma_mm: Option<f64>,
     /// Largest bend of the path to this end that is left between targets (mm).
-    pub bend_mm: Option<f64>,
+    pub path_deviation_mm: Option<f64>,
     /// Targets put in before it.
     pub inserted: usize,
 }
@@ -47,7 +47,7 @@ impl MotionOutcome {
             after_mm: None,
             sigma_mm: None,
             shape_sigma_mm: None,
-            bend_mm: None,
+            path_deviation_mm: None,
             inserted: 0,
         }
     }
@@ -69,5 +69,5 @@ pub struct Plan {
     /// What is known of each cut.
     pub cuts: Vec<CutRisk>,
     /// Probability that the cuts that are corrected get worse, taken together; absent where nothing is known of them.
-    pub chance_of_worse: Option<f64>,
+    pub probability_of_harm: Option<f64>,
 }

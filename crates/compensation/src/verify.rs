@@ -6,13 +6,13 @@
 use nalgebra::{Point3, Vector3};
 
 use crate::arms::Arms;
-use crate::backlash::sides::{Reached, Stop, courses};
+use crate::backlash::sides::{MotionEnd, ReachedEnd, backlash_sides};
 use crate::cell::Cell;
 use crate::condition::payload::Loads;
 use crate::configuration::{configured, monitored};
 use crate::deviation::{After, Deviation, PathPoint, PathReport, Status};
-use crate::frames::frame_table::Mountings;
-use crate::plan::reason::Why;
+use crate::frames::frame_table::FrameTable;
+use crate::plan::reason::OutcomeReason;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::estimated::{Estimated, RegisteredFrame};
 use truegrind_arm::model::{Joints, Model};
@@ -22,20 +22,20 @@ use truegrind_surfaces::Surface;
 
 /// Where the controller sends the arm at the end of a motion.
 #[derive(Debug, Clone)]
-struct Sent {
+struct CommandedEnd {
     motion: usize,
-    mounted: usize,
+    frames_index: usize,
     /// Told pose in the work object.
-    told: Pose,
+    commanded: Pose,
     joints: Joints,
 }
 
 /// One end of a motion, run.
 #[derive(Debug, Clone)]
-struct Run {
+struct ExecutedEnd {
     motion: usize,
     /// Told pose in the work object.
-    told: Pose,
+    commanded: Pose,
     joints: Joints,
     /// Reached pose in the work object.
     reached: Pose,
@@ -43,12 +43,12 @@ struct Run {
     flange_from_tool: Pose,
     carried: Option<RegisteredFrame>,
     /// The condition under which the arm came there.
-    place: usize,
+    condition_index: usize,
 }
 
 /// The arm that runs a program.
 #[derive(Debug, Clone, Copy)]
-pub struct Acting<'a> {
+pub struct ActingArm<'a> {
     /// What the controller computes with.
     pub nominal: &'a Model,
     /// The arm that moves.
@@ -61,7 +61,7 @@ pub struct Acting<'a> {
 
 /// A program with what it is judged by.
 #[derive(Debug, Clone, Copy)]
-pub struct Judged<'a> {
+pub struct VerificationTask<'a> {
     /// States what was meant, and gives the deviations before.
     pub original: &'a Listing,
     /// The rewritten program, which gives the deviations after; absent when only the original is judged.
@@ -81,9 +81,9 @@ pub struct Judged<'a> {
 }
 
 /// Runs a program on an arm.
-pub fn judge(task: &Judged<'_>, acting: &Acting<'_>) -> PathReport {
-    let mut arms = Arms::simulated(acting.nominal, acting.model, &acting.condition);
-    arms.knowledge = acting.knowledge;
+pub fn verify(task: &VerificationTask<'_>, conditions: &ActingArm<'_>) -> PathReport {
+    let mut arms = Arms::simulated(conditions.nominal, conditions.model, &conditions.condition);
+    arms.knowledge = conditions.knowledge;
     let before = run(task.original, task.loads[0], &mut arms, task.cell);
     let after = task.rewritten.map(|listing| (listing, run(listing, task.loads[1], &mut arms, task.cell)));
     let partners = after.as_ref().map(|(_, runs)| align(&before, runs));
@@ -92,16 +92,19 @@ pub fn judge(task: &Judged<'_>, acting: &Acting<'_>) -> PathReport {
         .enumerate()
         .map(|(index, first)| {
             let motion = &task.original.motions[first.motion];
-            let contact = task.surface.and_then(|s| s.foot(&Point3::from(first.told.translation.vector)));
+            let contact =
+                task.surface.and_then(|s| s.foot(&Point3::from(first.commanded.translation.vector)));
             let on_surface = contact.as_ref().is_some_and(|f| f.normal_mm.abs() < ON_SURFACE_MM);
             let normal: Option<Vector3<f64>> = contact.map(|f| f.contact.normal.into_inner());
-            let deviation =
-                |reached: &Pose| Deviation::between(&first.told, reached, &Pose::identity(), normal.as_ref());
+            let deviation = |reached: &Pose| {
+                Deviation::between(&first.commanded, reached, &Pose::identity(), normal.as_ref())
+            };
             let second = match (&after, &partners) {
                 (Some((_, runs)), Some(partners)) => partners[index].map(|k| &runs[k]),
                 _ => None,
             };
-            let (joints, place) = second.map_or((first.joints, first.place), |s| (s.joints, s.place));
+            let (joints, condition_index) =
+                second.map_or((first.joints, first.condition_index), |s| (s.joints, s.condition_index));
             let linear = matches!(motion.kind, MotionKind::Linear | MotionKind::Circular);
             PathPoint {
                 index,
@@ -111,19 +114,20 @@ pub fn judge(task: &Judged<'_>, acting: &Acting<'_>) -> PathReport {
                 cutting: if task.surface.is_some() { linear && on_surface } else { linear },
                 base_from_object: first.base_from_object,
                 flange_from_tool: first.flange_from_tool,
-                intended: first.base_from_object * first.told,
+                intended: first.base_from_object * first.commanded,
                 normal,
                 joints_before: Some(first.joints),
                 joints_after: second.map(|s| s.joints),
                 before: Some(deviation(&first.reached)),
                 after: second.map(|s| deviation(&s.reached)),
-                sigma_mm: acting.knowledge.map(|k| {
+                sigma_mm: conditions.knowledge.map(|k| {
                     let (tool, carried) = (&first.flange_from_tool, first.carried.as_ref());
-                    let known = k.position_sigma_mm(arms.acting.arm(place), &joints, tool, carried);
-                    known.hypot(arms.acting.in_play_mm(place, &joints, tool))
+                    let known =
+                        k.position_sigma_mm(arms.conditions.arm(condition_index), &joints, tool, carried);
+                    known.hypot(arms.conditions.play_uncertainty_mm(condition_index, &joints, tool))
                 }),
                 shape_sigma_mm: None,
-                outside: acting.knowledge.and_then(|k| k.region.outside(&joints)),
+                outside: conditions.knowledge.and_then(|k| k.region.outside(&joints)),
                 status: if second.is_some() { Status::Changed } else { Status::Left },
                 reason: None,
             }
@@ -134,118 +138,121 @@ pub fn judge(task: &Judged<'_>, acting: &Acting<'_>) -> PathReport {
         model: task.name.to_owned(),
         after: task.after,
         points,
-        held_out_mm: acting.knowledge.map(|k| k.geometry.held_out.rmse),
+        held_out_mm: conditions.knowledge.map(|k| k.geometry.held_out.rmse),
     }
 }
 
 /// A point nearer to the surface than this is a cut (mm).
 const ON_SURFACE_MM: f64 = 0.5;
 
-fn run(listing: &Listing, loads: Option<&Loads>, arms: &mut Arms<'_>, cell: &Cell) -> Vec<Run> {
-    let mountings = Mountings::of(listing, arms, cell);
-    let mut sent: Vec<Sent> = Vec::new();
+fn run(listing: &Listing, loads: Option<&Loads>, arms: &mut Arms<'_>, cell: &Cell) -> Vec<ExecutedEnd> {
+    let frame_table = FrameTable::of(listing, arms, cell);
+    let mut sent: Vec<CommandedEnd> = Vec::new();
     let mut near: Option<Joints> = None;
     for (index, motion) in listing.motions.iter().enumerate() {
         if motion.left.is_some() {
             continue;
         }
-        if let Ok(there) = send(index, listing, arms, &mountings, near.as_ref()) {
+        if let Ok(there) = commanded_end(index, listing, arms, &frame_table, near.as_ref()) {
             near = Some(there.joints);
             sent.push(there);
         }
     }
-    let places = places(listing, loads, &sent, arms, &mountings);
+    let condition_indices = condition_indices(listing, loads, &sent, arms, &frame_table);
     let joints: Vec<Joints> = sent.iter().map(|s| s.joints).collect();
-    let flanges = arms.acting.forward(&places, &joints);
+    let flanges = arms.conditions.forward(&condition_indices, &joints);
     sent.into_iter()
         .zip(flanges)
-        .zip(places)
-        .map(|((sent, flange), place)| {
-            let mounted = &mountings.list[sent.mounted];
-            Run {
+        .zip(condition_indices)
+        .map(|((sent, flange), condition_index)| {
+            let frames_index = &frame_table.list[sent.frames_index];
+            ExecutedEnd {
                 motion: sent.motion,
-                told: sent.told,
+                commanded: sent.commanded,
                 joints: sent.joints,
-                reached: mounted.real.target_of(&flange),
-                base_from_object: mounted.real.base_from_object(&flange),
-                flange_from_tool: mounted.real.flange_from_tool(&flange),
-                carried: mounted.carried.clone(),
-                place,
+                reached: frames_index.real.target_of(&flange),
+                base_from_object: frames_index.real.base_from_object(&flange),
+                flange_from_tool: frames_index.real.flange_from_tool(&flange),
+                carried: frames_index.carried.clone(),
+                condition_index,
             }
         })
         .collect()
 }
 
 /// The condition under which the arm comes to each end.
-fn places(
+fn condition_indices(
     listing: &Listing,
     loads: Option<&Loads>,
-    sent: &[Sent],
+    sent: &[CommandedEnd],
     arms: &mut Arms<'_>,
-    mountings: &Mountings,
+    frame_table: &FrameTable,
 ) -> Vec<usize> {
     let loads = arms.loads(listing, loads);
     let load = |motion: usize| loads.get(motion).and_then(Option::as_ref);
-    if !arms.acting.has_play() {
-        return sent.iter().map(|s| arms.acting.place([0; 6], load(s.motion))).collect();
+    if !arms.conditions.has_play() {
+        return sent.iter().map(|s| arms.conditions.condition_index([0; 6], load(s.motion))).collect();
     }
-    let mut stops: Vec<Stop<'_>> = listing
+    let mut stops: Vec<MotionEnd<'_>> = listing
         .motions
         .iter()
-        .map(|m| if m.kind == MotionKind::External { Stop::Stays } else { Stop::Lost })
+        .map(|m| if m.kind == MotionKind::External { MotionEnd::Unmoved } else { MotionEnd::Unknown })
         .collect();
     for there in sent {
         let motion = &listing.motions[there.motion];
         let via = motion.targets.iter().find(|target| target.role == Role::Via);
-        stops[there.motion] = Stop::At(Reached {
+        stops[there.motion] = MotionEnd::At(ReachedEnd {
             motion,
-            mounted: there.mounted,
-            told: there.told,
+            frames_index: there.frames_index,
+            commanded: there.commanded,
             joints: there.joints,
             via: via.and_then(|via| via.value.ok()?.cartesian().map(|t| t.pose())),
             links: None,
             as_joints: false,
-            may_cut: false,
+            may_insert: false,
         });
     }
     let before: Vec<Option<u32>> = listing.motions.iter().map(|m| m.previous).collect();
-    let told = |mounted: usize| mountings.list[mounted].told;
-    let courses = courses(&stops, &before, &arms.nominal, &arms.acting.play_rad, &told, &[]);
-    sent.iter().map(|s| arms.acting.place(courses[s.motion].end, load(s.motion))).collect()
+    let commanded = |frames_index: usize| frame_table.list[frames_index].commanded;
+    let backlash_sides =
+        backlash_sides(&stops, &before, &arms.nominal, &arms.conditions.play_rad, &commanded, &[]);
+    sent.iter()
+        .map(|s| arms.conditions.condition_index(backlash_sides[s.motion].end, load(s.motion)))
+        .collect()
 }
 
-fn send(
+fn commanded_end(
     index: usize,
     listing: &Listing,
     arms: &Arms<'_>,
-    mountings: &Mountings,
+    frame_table: &FrameTable,
     near: Option<&Joints>,
-) -> Result<Sent, Why> {
+) -> Result<CommandedEnd, OutcomeReason> {
     let motion = &listing.motions[index];
-    let target = motion.to().ok_or(Why::Program(Reason::ExternalOnly))?;
-    let value = target.value.map_err(Why::Program)?;
-    let mounted = mountings.of_motion(motion)?;
-    let mounting = &mountings.list[mounted].told;
-    let (told, joints) = match value {
+    let target = motion.to().ok_or(OutcomeReason::Program(Reason::ExternalOnly))?;
+    let value = target.value.map_err(OutcomeReason::Program)?;
+    let frames_index = frame_table.of_motion(motion)?;
+    let mounting = &frame_table.list[frames_index].commanded;
+    let (commanded, joints) = match value {
         TargetValue::Cartesian(t) => {
-            if let Some(why) = mountings.moving_base(&t) {
+            if let Some(why) = frame_table.moving_base(&t) {
                 return Err(why);
             }
-            let told = t.pose();
-            let flange = mounting.flange_for(&told);
-            (told, configured(&arms.nominal, &flange, &t, monitored(motion), near)?)
+            let commanded = t.pose();
+            let flange = mounting.flange_for(&commanded);
+            (commanded, configured(&arms.nominal, &flange, &t, monitored(motion), near)?)
         }
         TargetValue::Joint(t) => {
             let joints = Joints::from_fn(|i, _| t.robot_deg[i].to_radians());
             (mounting.target_of(&arms.nominal.arm().forward(&joints)), joints)
         }
     };
-    Ok(Sent { motion: index, mounted, told, joints })
+    Ok(CommandedEnd { motion: index, frames_index, commanded, joints })
 }
 
 /// The rewritten run that belongs to each original one: the same number means one to one; where targets were put in,
 /// the monotone matching with the least total distance, by dynamic programming over the targets put in.
-fn align(before: &[Run], after: &[Run]) -> Vec<Option<usize>> {
+fn align(before: &[ExecutedEnd], after: &[ExecutedEnd]) -> Vec<Option<usize>> {
     let (n, m) = (before.len(), after.len());
     if n == m {
         return (0..n).map(Some).collect();
@@ -254,8 +261,9 @@ fn align(before: &[Run], after: &[Run]) -> Vec<Option<usize>> {
         return vec![None; n];
     }
     let extra = m - n;
-    let distance =
-        |i: usize, k: usize| (before[i].told.translation.vector - after[k].told.translation.vector).norm();
+    let distance = |i: usize, k: usize| {
+        (before[i].commanded.translation.vector - after[k].commanded.translation.vector).norm()
+    };
     // cost[e]: least total distance with runs 0..=i matched and e of the extra runs passed so far.
     let mut cost: Vec<f64> = (0..=extra).map(|e| distance(0, e)).collect();
     let mut from: Vec<Vec<usize>> = vec![(0..=extra).collect()];

@@ -30,7 +30,7 @@ use truegrind_compensation::cut::Cuts;
 use truegrind_compensation::deviation::{After, Block, PathPoint, PathReport, Status};
 use truegrind_compensation::options::Options as RewriteBounds;
 use truegrind_compensation::risk::placement::Placement;
-use truegrind_compensation::verify::{Acting, Judged, judge};
+use truegrind_compensation::verify::{ActingArm, VerificationTask, verify};
 use truegrind_estimation::estimate::Termination;
 use truegrind_math::statistics::ErrorSummary;
 use truegrind_planning::taught_cell::taught_cell;
@@ -351,7 +351,7 @@ fn ground(shop: &Shop<'_>, id: &str, solver: &'static Solver, dataset: &Dataset,
     let bounds = RewriteBounds {
         condition: shop.condition,
         max_correction_mm: LARGEST_CORRECTION_MM,
-        max_turn_rad: LARGEST_TURN_RAD,
+        max_rotation_rad: LARGEST_TURN_RAD,
         cuts: Cuts::Single,
         joint_gain: f64::INFINITY,
         placement: Placement::Absolute,
@@ -373,7 +373,7 @@ fn ground(shop: &Shop<'_>, id: &str, solver: &'static Solver, dataset: &Dataset,
     let refused = |p: &&PathPoint| p.status == Status::Refused;
     case.refused = planned.points.iter().filter(refused).count();
     let changed = Program::read(&[(shop.name, bytes.as_slice())], shop.setup);
-    let judged = Judged {
+    let judged = VerificationTask {
         original: shop.task.listing(),
         rewritten: Some(changed.listing()),
         cell: shop.cell,
@@ -384,8 +384,8 @@ fn ground(shop: &Shop<'_>, id: &str, solver: &'static Solver, dataset: &Dataset,
         loads: [None, None],
     };
     let acting =
-        Acting { nominal: shop.nominal, model: shop.model, knowledge: None, condition: shop.condition };
-    let mut report = judge(&judged, &acting);
+        ActingArm { nominal: shop.nominal, model: shop.model, knowledge: None, condition: shop.condition };
+    let mut report = verify(&judged, &acting);
     report.held_out_mm = Some(case.held_out.rmse);
     for (point, planned) in report.points.iter_mut().zip(&planned.points) {
         (point.status, point.reason) = (planned.status, planned.reason.clone());

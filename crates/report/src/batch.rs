@@ -13,7 +13,7 @@ use super::table::{Cell, Column, Table};
 use truegrind_compensation::deviation::Status as Fate;
 use truegrind_compensation::frames::undeclared::undeclared;
 use truegrind_compensation::plan::Plan;
-use truegrind_compensation::plan::reason::Why;
+use truegrind_compensation::plan::reason::OutcomeReason;
 use truegrind_programs::motion::Listing;
 
 /// What became of one program.
@@ -164,7 +164,7 @@ fn most_usual(plan: &Plan) -> Option<String> {
                 .filter_map(|outcome| outcome.reason);
             let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
             reasons
-                .filter(|why| *why != Why::Same)
+                .filter(|why| *why != OutcomeReason::NoChange)
                 .for_each(|why| *counts.entry(why.kind()).or_default() += 1);
             let (reason, count) = counts.into_iter().max_by_key(|(_, count)| *count)?;
             Some(format!("{count} {word}: {reason}"))

@@ -11,7 +11,7 @@ use super::placement;
 use super::table::{Cell, Column, Table};
 use truegrind_arm::inverse::InverseError;
 use truegrind_compensation::deviation::{PathReport, Status as Fate};
-use truegrind_compensation::plan::reason::Why;
+use truegrind_compensation::plan::reason::OutcomeReason;
 use truegrind_compensation::plan::{MotionOutcome, Plan};
 use truegrind_programs::motion::{Listing, Place};
 
@@ -64,7 +64,7 @@ pub fn table(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Table {
             outcome.after_mm.into(),
             outcome.shape_sigma_mm.into(),
             outcome.sigma_mm.into(),
-            outcome.bend_mm.into(),
+            outcome.path_deviation_mm.into(),
             if outcome.inserted > 0 { outcome.inserted.into() } else { Cell::Missing },
             outcome.reason.map(|reason| reason.to_string()).into(),
         ];
@@ -186,7 +186,7 @@ pub fn json(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Value {
         "programs": programs,
         "placements": placements,
         "cuts": cuts,
-        "chance_of_worse": plan.chance_of_worse,
+        "chance_of_worse": plan.probability_of_harm,
     })
 }
 
@@ -337,28 +337,30 @@ fn grouped(plan: &Plan) -> Vec<Group<'_>> {
 }
 
 /// A reason without the numbers of one motion, and its number.
-fn kind(why: &Why) -> (String, Option<(f64, &'static str)>) {
+fn kind(why: &OutcomeReason) -> (String, Option<(f64, &'static str)>) {
     let plain = |text: &str| (text.to_owned(), None);
     let sized = |text: String, value: f64, unit| (text, Some((value, unit)).filter(|_| value.is_finite()));
     match *why {
-        Why::Inverse(InverseError::Unreachable { beyond_mm }) => {
+        OutcomeReason::Inverse(InverseError::Unreachable { beyond_mm }) => {
             sized("target is out of reach".to_owned(), beyond_mm, "mm")
         }
-        Why::Inverse(InverseError::OtherConfiguration { .. }) => {
+        OutcomeReason::Inverse(InverseError::OtherConfiguration { .. }) => {
             plain("target is not reachable in its configuration")
         }
-        Why::Inverse(InverseError::OtherBranch { .. }) => {
+        OutcomeReason::Inverse(InverseError::OtherBranch { .. }) => {
             plain("target is reachable only in another configuration")
         }
-        Why::Inverse(InverseError::Abandoned) => {
+        OutcomeReason::Inverse(InverseError::Abandoned) => {
             plain("its joints were not sought to the end: too many targets had to be searched for")
         }
-        Why::Inverse(InverseError::NotConverged { .. }) => plain("no joints were found"),
-        Why::TooFar { mm } => sized("correction exceeds the bound (--max-correction)".to_owned(), mm, "mm"),
-        Why::TooMuchTurn { deg } => {
+        OutcomeReason::Inverse(InverseError::NotConverged { .. }) => plain("no joints were found"),
+        OutcomeReason::CorrectionTooLarge { mm } => {
+            sized("correction exceeds the bound (--max-correction)".to_owned(), mm, "mm")
+        }
+        OutcomeReason::RotationTooLarge { deg } => {
             sized("correction of the orientation exceeds the bound".to_owned(), deg, "°")
         }
-        Why::JointJump { joint, deg, on_the_way, .. } => sized(
+        OutcomeReason::JointJump { joint, deg, on_the_way, .. } => sized(
             format!(
                 "{}the correction would turn joint {} too far near a singularity",
                 if on_the_way { "on the way to it " } else { "" },
@@ -367,28 +369,32 @@ fn kind(why: &Why) -> (String, Option<(f64, &'static str)>) {
             deg,
             "°",
         ),
-        Why::Bend { mm } => sized("the path between targets leaves the intended one".to_owned(), mm, "mm"),
-        Why::TooFast { joint, ratio } => sized(
+        OutcomeReason::PathDeviation { mm } => {
+            sized("the path between targets leaves the intended one".to_owned(), mm, "mm")
+        }
+        OutcomeReason::TooFast { joint, ratio } => sized(
             format!("at the programmed speed joint {} turns faster than it can", joint + 1),
             ratio,
             "× limit",
         ),
-        Why::JointNotMeasured { joint, by_deg } => sized(
+        OutcomeReason::JointNotMeasured { joint, by_deg } => sized(
             format!("joint {} is outside the range in which the arm was measured", joint + 1),
             by_deg,
             "°",
         ),
-        Why::PartOfCut { because, .. } => plain(&format!(
+        OutcomeReason::PartOfCut { because, .. } => plain(&format!(
             "its cut is corrected as a whole or not at all, and another motion stays: {because}"
         )),
-        Why::Step { mm, .. } => {
+        OutcomeReason::Step { mm, .. } => {
             sized("the step to a motion of the same cut that stays exceeds --tolerance".to_owned(), mm, "mm")
         }
-        Why::Risk { chance } => {
+        OutcomeReason::Risk { chance } => {
             sized("the correction may well make the cut worse (--max-risk)".to_owned(), 100.0 * chance, "%")
         }
-        Why::NotCovered { ratio } => sized("no measured pose is near".to_owned(), ratio, "×"),
-        Why::Uncertain { sigma_mm } => sized("the model is uncertain here".to_owned(), sigma_mm, "mm σ"),
+        OutcomeReason::NotCovered { ratio } => sized("no measured pose is near".to_owned(), ratio, "×"),
+        OutcomeReason::Uncertain { sigma_mm } => {
+            sized("the model is uncertain here".to_owned(), sigma_mm, "mm σ")
+        }
         ref other => (other.to_string(), None),
     }
 }

@@ -33,11 +33,11 @@ fn object_word(listing: &Listing) -> &'static str {
 }
 
 fn sentence(placement: &ObjectPlacement, what: &str) -> String {
-    let ObjectPlacement { work_object, taken, off_mm, sigma_mm, remedy, .. } = placement;
+    let ObjectPlacement { work_object, applied, deviation_mm, sigma_mm, remedy, .. } = placement;
     let known = format!(
-        "the path as a whole lies {off_mm:.3} mm from where it is meant, which the model knows to ± {sigma_mm:.3} mm (1σ)"
+        "the path as a whole lies {deviation_mm:.3} mm from where it is meant, which the model knows to ± {sigma_mm:.3} mm (1σ)"
     );
-    if *taken == Placement::Absolute {
+    if *applied == Placement::Absolute {
         return format!("{what} {work_object}: shape and place are corrected; {known}");
     }
     let remedy =
@@ -50,7 +50,7 @@ fn sentence(placement: &ObjectPlacement, what: &str) -> String {
 
 /// What is to be measured so that a place becomes known, what it costs and what it leaves.
 fn to_be_measured(remedy: &Remedy, what: &str) -> String {
-    let what = remedy.measurements.iter().map(|m| m.told(what)).collect::<Vec<_>>().join(", and ");
+    let what = remedy.measurements.iter().map(|m| m.instruction(what)).collect::<Vec<_>>().join(", and ");
     let (minutes, left) = (remedy.minutes(), remedy.sigma_mm);
     if remedy.suffices {
         format!(
@@ -83,15 +83,15 @@ pub fn cut_table(plan: &Plan, listing: &Listing) -> Option<Table> {
         ],
     );
     let mut order: Vec<&CutRisk> = plan.cuts.iter().collect();
-    order.sort_by(|a, b| b.chance.total_cmp(&a.chance));
+    order.sort_by(|a, b| b.probability_of_harm.total_cmp(&a.probability_of_harm));
     for cut in order.iter().take(NAMED) {
         table.push([
             lines(cut, listing).into(),
             cut.motions.len().into(),
-            word(cut.judged).into(),
-            cut.off_mm.into(),
+            word(cut.assessed).into(),
+            cut.deviation_mm.into(),
             cut.sigma_mm.into(),
-            (100.0 * cut.chance).into(),
+            (100.0 * cut.probability_of_harm).into(),
             fate(cut).into(),
         ]);
     }
@@ -109,7 +109,7 @@ pub fn cut_table(plan: &Plan, listing: &Listing) -> Option<Table> {
 
 /// What became of a cut.
 fn fate(cut: &CutRisk) -> &'static str {
-    match (cut.corrected, cut.left) {
+    match (cut.corrected, cut.left_for_risk) {
         (true, _) => "corrected",
         (false, true) => "left as it is",
         // Why is said of its motions.
@@ -129,12 +129,12 @@ fn lines(cut: &CutRisk, listing: &Listing) -> String {
 
 /// How many cuts stay since their correction may well make them worse, of how many.
 pub fn left(plan: &Plan) -> (usize, usize) {
-    (plan.cuts.iter().filter(|cut| cut.left).count(), plan.cuts.len())
+    (plan.cuts.iter().filter(|cut| cut.left_for_risk).count(), plan.cuts.len())
 }
 
 /// Predicted 1σ that counts for a motion: of the shape where its cut is judged by that, else of its place.
 pub fn leads_with_shape(plan: &Plan) -> bool {
-    plan.placements.iter().any(|placement| placement.taken == Placement::Shape)
+    plan.placements.iter().any(|placement| placement.applied == Placement::Shape)
 }
 
 fn rewritten(plan: &Plan) -> impl Iterator<Item = &MotionOutcome> {
@@ -161,8 +161,9 @@ pub fn expected_mm(plan: &Plan) -> Option<f64> {
 
 /// The chance that what is written gets worse, in words; `None` where nothing is known of it.
 pub fn chance(plan: &Plan) -> Option<String> {
-    let all = percent_of(plan.chance_of_worse?);
-    let largest = plan.cuts.iter().filter(|cut| cut.corrected).map(|cut| cut.chance).fold(0.0, f64::max);
+    let all = percent_of(plan.probability_of_harm?);
+    let largest =
+        plan.cuts.iter().filter(|cut| cut.corrected).map(|cut| cut.probability_of_harm).fold(0.0, f64::max);
     Some(format!(
         "the probability that the corrected cuts are farther off than the cuts as they were is {all}, of any one of them {}",
         match percent_of(largest) {
@@ -177,7 +178,7 @@ fn remedy_json(remedy: &Remedy, what: &str) -> Value {
         .measurements
         .iter()
         .map(
-            |m| json!({ "name": m.name(), "poses": m.poses(), "minutes": m.minutes(), "what": m.told(what) }),
+            |m| json!({ "name": m.name(), "poses": m.poses(), "minutes": m.minutes(), "what": m.instruction(what) }),
         )
         .collect();
     json!({
@@ -191,14 +192,14 @@ pub fn json(plan: &Plan, listing: &Listing) -> [Value; 2] {
     let what = object_word(listing);
     let placements = plan.placements.iter().map(|p| {
         json!({
-            "work_object": p.work_object, "corrected": word(p.taken), "off_mm": p.off_mm, "sigma_mm": p.sigma_mm,
+            "work_object": p.work_object, "corrected": word(p.applied), "off_mm": p.deviation_mm, "sigma_mm": p.sigma_mm,
             "taught": p.taught, "remedy": p.remedy.as_ref().map(|remedy| remedy_json(remedy, what)),
         })
     });
     let cuts = plan.cuts.iter().map(|cut| {
         json!({
-            "lines": lines(cut, listing), "motions": cut.motions.len(), "judged": word(cut.judged), "off_mm": cut.off_mm,
-            "sigma_mm": cut.sigma_mm, "shape_sigma_mm": cut.shape_sigma_mm, "chance_of_worse": cut.chance, "left": cut.left, "corrected": cut.corrected,
+            "lines": lines(cut, listing), "motions": cut.motions.len(), "judged": word(cut.assessed), "off_mm": cut.deviation_mm,
+            "sigma_mm": cut.sigma_mm, "shape_sigma_mm": cut.shape_sigma_mm, "chance_of_worse": cut.probability_of_harm, "left": cut.left_for_risk, "corrected": cut.corrected,
         })
     });
     [placements.collect(), cuts.collect()]

@@ -206,7 +206,7 @@ impl Arguments {
             tolerance_mm: self.tolerance,
             max_correction_mm: self.max_correction,
             joint_targets: self.joint_targets,
-            open_starts: self.flag_open_starts,
+            flag_unknown_starts: self.flag_open_starts,
             cuts: if self.partial { Cuts::Partial } else { Cuts::Whole },
             placement: match self.placement {
                 PlacementArgument::Auto => Placement::Auto,

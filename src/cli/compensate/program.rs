@@ -4,13 +4,13 @@ use std::path::PathBuf;
 
 use anyhow::bail;
 use truegrind::compensation::cell::Used;
-use truegrind::compensation::cell::robot_match::none_in_reach;
+use truegrind::compensation::cell::robot_match::unreachable_motions;
 use truegrind::compensation::compensate::{Compensated, compensate};
-use truegrind::compensation::frames::surface_frames::misplaced;
+use truegrind::compensation::frames::surface_frames::surface_frame_contradictions;
 use truegrind::compensation::options::Options;
 use truegrind::compensation::plan::Plan;
-use truegrind::compensation::plan::listing_only_plan::untouched;
-use truegrind::compensation::plan::reason::Why;
+use truegrind::compensation::plan::listing_only_plan::listing_only_plan;
+use truegrind::compensation::plan::reason::OutcomeReason;
 use truegrind::programs::diff::unified;
 use truegrind::programs::motion::{Listing, Mark, Reason};
 use truegrind::programs::reading::{Language, Program};
@@ -54,8 +54,11 @@ pub(super) fn rewrite_program(
     }
     if let Some(corrector) = context.corrector {
         robot_match::refuse_other_program(programs, &corrector.arm.robot, &corrector.arm.nominal)?;
-        let found: Vec<String> =
-            context.surface.iter().flat_map(|surface| misplaced(listing, surface)).collect();
+        let found: Vec<String> = context
+            .surface
+            .iter()
+            .flat_map(|surface| surface_frame_contradictions(listing, surface))
+            .collect();
         if !found.is_empty() {
             bail!("{}: {}", programs.name(), found.join("; "));
         }
@@ -63,7 +66,7 @@ pub(super) fn rewrite_program(
     let used = Some(Used::by(listing, &context.cell));
     let Compensated { mut plan, rewritten } =
         compensated(context, &program, Options { loads, ..context.options.clone() })?;
-    if let (Some(motions), Some(corrector)) = (none_in_reach(&plan), context.corrector) {
+    if let (Some(motions), Some(corrector)) = (unreachable_motions(&plan), context.corrector) {
         bail!(
             "{}: hardly any of the {motions} motions is in reach of {} ({}): the program belongs to another robot, or its tool \
              and work object are somewhere else (--cell); use the model of the robot that runs it",
@@ -102,7 +105,8 @@ pub(super) fn rewrite_program(
     let output = Some(outputs.join(", ")).filter(|output| !output.is_empty());
     let ended = if result.changed { Ended::Changed } else { Ended::Unchanged };
     result.row = Row::of(names.join(", "), output, ended, &plan, listing);
-    let undeclared = [Reason::Undeclared, Reason::ToolUnknown, Reason::WorkObjectUnknown].map(Why::Program);
+    let undeclared =
+        [Reason::Undeclared, Reason::ToolUnknown, Reason::WorkObjectUnknown].map(OutcomeReason::Program);
     result.undeclared =
         plan.outcomes.iter().filter(|o| o.reason.is_some_and(|why| undeclared.contains(&why))).count();
     result.clean = is_clean(context, &plan, listing, result.changed);
@@ -182,7 +186,7 @@ fn compensated(
 ) -> anyhow::Result<Compensated> {
     let Some(corrector) = context.corrector else {
         return Ok(Compensated {
-            plan: untouched(program.listing(), &options),
+            plan: listing_only_plan(program.listing(), &options),
             rewritten: program.rewrite(&[], &RewriteOptions::default())?,
         });
     };
@@ -229,7 +233,7 @@ fn is_clean(context: &CompensateContext<'_>, plan: &Plan, listing: &Listing, cha
         return listing.opaque.is_empty();
     }
     if context.arguments.check && !changed {
-        return plan.outcomes.iter().all(|o| o.reason == Some(Why::Same));
+        return plan.outcomes.iter().all(|o| o.reason == Some(OutcomeReason::NoChange));
     }
     view::verdict(plan, listing).status == Judged::Good
 }

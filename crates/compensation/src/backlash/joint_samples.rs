@@ -1,8 +1,8 @@
 //! Samples of the joints between the ends of motions.
 
-use crate::backlash::motion_end::{Reached, Sampled, Stop};
+use crate::backlash::motion_end::{MotionEnd, ReachedEnd, SampledJoints};
 use crate::backlash::reversals::agrees;
-use crate::frames::frame_pair::Mounting;
+use crate::frames::frame_pair::FramePair;
 use crate::search_budget;
 use crate::segment::curve::Curve;
 use crate::segment::wrist_interpolation;
@@ -31,47 +31,50 @@ const MOST_STEP_RAD: f64 = 0.6;
 /// The samples of all motions, none where the arm cannot go along, and at which share each circle point is passed. Where
 /// every other sample tells of other turns than all of them there are too few, and more are taken.
 pub(crate) fn sampled(
-    stops: &[Stop<'_>],
+    stops: &[MotionEnd<'_>],
     before: &[Option<u32>],
     nominal: &Inverse<'_>,
     half: &[f64; 6],
-    mounting: &dyn Fn(usize) -> Mounting,
-) -> (Vec<Option<Sampled>>, Vec<f64>) {
+    mounting: &dyn Fn(usize) -> FramePair,
+) -> (Vec<Option<SampledJoints>>, Vec<f64>) {
     let start = |m: usize| before[m].and_then(|from| stops.get(from as usize));
     let mut samples = Samples::default();
     for (m, stop) in stops.iter().enumerate() {
         samples.of(start(m), stop, 1, mounting);
     }
-    let mut ways = samples.passed(nominal);
-    let settled = |m: &usize, way: &Option<Sampled>| match (start(*m), &stops[*m], way) {
-        (Some(Stop::At(from)), Stop::At(to), Some(way)) => agrees(&from.joints, way, &to.joints, half),
+    let mut paths = samples.passed(nominal);
+    let settled = |m: &usize, samples: &Option<SampledJoints>| match (start(*m), &stops[*m], samples) {
+        (Some(MotionEnd::At(from)), MotionEnd::At(to), Some(samples)) => {
+            agrees(&from.joints, samples, &to.joints, half)
+        }
         _ => true,
     };
-    let mut rough: Vec<usize> = (0..stops.len()).filter(|m| !settled(m, &ways[*m])).collect();
+    let mut rough: Vec<usize> = (0..stops.len()).filter(|m| !settled(m, &paths[*m])).collect();
     for refinement in 1..=REFINEMENTS {
         let mut finer = Samples::default();
         for &m in &rough {
             finer.of(start(m), &stops[m], 4_usize.pow(refinement), mounting);
         }
-        for (&m, way) in rough.iter().zip(finer.passed(nominal)) {
-            ways[m] = way;
+        for (&m, samples) in rough.iter().zip(finer.passed(nominal)) {
+            paths[m] = samples;
         }
-        rough.retain(|m| !settled(m, &ways[*m]));
+        rough.retain(|m| !settled(m, &paths[*m]));
     }
-    (ways, samples.passes)
+    (paths, samples.passes)
 }
 
 /// The samples of motions on which the wrist may be interpolated by itself, nothing for all others; none where the arm cannot
 /// go so.
 pub(crate) fn by_wrist(
-    stops: &[Stop<'_>],
+    stops: &[MotionEnd<'_>],
     before: &[Option<u32>],
     nominal: &Inverse<'_>,
     half: &[f64; 6],
-    mounting: &dyn Fn(usize) -> Mounting,
-) -> Vec<Option<Option<Sampled>>> {
-    let of = |(stop, before): (&Stop<'_>, &Option<u32>)| {
-        let (Some(Stop::At(from)), Stop::At(to)) = (before.and_then(|from| stops.get(from as usize)), stop)
+    mounting: &dyn Fn(usize) -> FramePair,
+) -> Vec<Option<Option<SampledJoints>>> {
+    let of = |(stop, before): (&MotionEnd<'_>, &Option<u32>)| {
+        let (Some(MotionEnd::At(from)), MotionEnd::At(to)) =
+            (before.and_then(|from| stops.get(from as usize)), stop)
         else {
             return None;
         };
@@ -80,10 +83,17 @@ pub(crate) fn by_wrist(
         let ends = [&from.joints, &to.joints];
         let mut count = pieces_of(&curve);
         loop {
-            let way = wrist_interpolation::along(nominal.arm(), &within, &curve, ends, count, MOST_STEP_RAD);
-            let settled = |way: &Sampled| agrees(&from.joints, way, &to.joints, half);
-            if count >= MOST_REFINED || way.as_ref().is_some_and(settled) {
-                return Some(way);
+            let samples = wrist_interpolation::joint_samples(
+                nominal.arm(),
+                &within,
+                &curve,
+                ends,
+                count,
+                MOST_STEP_RAD,
+            );
+            let settled = |samples: &SampledJoints| agrees(&from.joints, samples, &to.joints, half);
+            if count >= MOST_REFINED || samples.as_ref().is_some_and(settled) {
+                return Some(samples);
             }
             count = (4 * count).min(MOST_REFINED);
         }
@@ -93,23 +103,23 @@ pub(crate) fn by_wrist(
 
 /// The path of a motion that goes along one, in its object, with its tool and object.
 fn path(
-    from: &Reached<'_>,
-    to: &Reached<'_>,
-    mounting: &dyn Fn(usize) -> Mounting,
-) -> Option<(Curve, Mounting)> {
-    if !to.ways().0 {
+    from: &ReachedEnd<'_>,
+    to: &ReachedEnd<'_>,
+    mounting: &dyn Fn(usize) -> FramePair,
+) -> Option<(Curve, FramePair)> {
+    if !to.path_kinds().0 {
         return None;
     }
     // The path is one of the tool and in the object of the motion, also where it begins under others.
-    let within = mounting(to.mounted);
-    let mut begin = from.told;
-    if from.mounted != to.mounted {
-        begin = within.target_of(&mounting(from.mounted).flange_for(&from.told));
+    let within = mounting(to.frames_index);
+    let mut begin = from.commanded;
+    if from.frames_index != to.frames_index {
+        begin = within.target_of(&mounting(from.frames_index).flange_for(&from.commanded));
     }
     let curve = match (to.motion.kind, to.via) {
-        (MotionKind::Circular, Some(via)) => Curve::round(begin, &via, to.told, to.motion),
+        (MotionKind::Circular, Some(via)) => Curve::round(begin, &via, to.commanded, to.motion),
         (MotionKind::Circular, None) => None,
-        _ => Some(Curve::line(begin, to.told)),
+        _ => Some(Curve::line(begin, to.commanded)),
     };
     Some((curve?, within))
 }
@@ -139,13 +149,13 @@ impl Samples {
     /// The samples of one motion, so many times as densely as motions are sampled at first.
     fn of(
         &mut self,
-        from: Option<&Stop<'_>>,
-        stop: &Stop<'_>,
+        from: Option<&MotionEnd<'_>>,
+        stop: &MotionEnd<'_>,
         density: usize,
-        mounting: &dyn Fn(usize) -> Mounting,
+        mounting: &dyn Fn(usize) -> FramePair,
     ) {
         let mut passes = 0.5;
-        if let (Some(Stop::At(from)), Stop::At(to)) = (from, stop)
+        if let (Some(MotionEnd::At(from)), MotionEnd::At(to)) = (from, stop)
             && let Some((curve, within)) = path(from, to, mounting)
         {
             passes = to.via.map_or(passes, |via| curve.passes(&via));
@@ -156,8 +166,8 @@ impl Samples {
                 self.flanges.push(within.flange_for(&curve.at(s)));
             }
         }
-        let joints = |stop: Option<&Stop<'_>>| match stop {
-            Some(Stop::At(reached)) => reached.joints,
+        let joints = |stop: Option<&MotionEnd<'_>>| match stop {
+            Some(MotionEnd::At(reached)) => reached.joints,
             _ => Joints::zeros(),
         };
         self.ends_rad.push([joints(from), joints(Some(stop))]);
@@ -167,7 +177,7 @@ impl Samples {
 
     /// The joints at the samples of each motion, each reached from the one before; `None` where the arm cannot go along: a joint would
     /// leap, or the way crosses a singularity, as between solutions of two branches it must, however near they lie.
-    fn passed(&self, nominal: &Inverse<'_>) -> Vec<Option<Sampled>> {
+    fn passed(&self, nominal: &Inverse<'_>) -> Vec<Option<SampledJoints>> {
         let of = |motion: usize| {
             let [start, end] = &self.ends_rad[motion];
             let flanges = &self.flanges[self.range(motion)];

@@ -5,29 +5,29 @@ use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{Motion, MotionKind, Switch};
 
 /// The side from which each joint came: −1 from below, +1 from above, 0 not known.
-pub(crate) type Sides = [i8; 6];
+pub(crate) type JointSides = [i8; 6];
 
 /// Where a motion ends.
 #[derive(Debug, Clone, Copy)]
 #[expect(clippy::large_enum_variant, reason = "nearly all are `At`")]
-pub(crate) enum Stop<'a> {
+pub(crate) enum MotionEnd<'a> {
     /// The arm does not move (external axes alone).
-    Stays,
+    Unmoved,
     /// The text does not tell where the arm is afterwards.
-    Lost,
+    Unknown,
     /// At joints that are known.
-    At(Reached<'a>),
+    At(ReachedEnd<'a>),
 }
 
 /// The end of a motion with what is known of the way to it.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Reached<'a> {
+pub(crate) struct ReachedEnd<'a> {
     /// The motion.
     pub(crate) motion: &'a Motion,
     /// Index of the mounting.
-    pub(crate) mounted: usize,
+    pub(crate) frames_index: usize,
     /// What the controller is told, in the work object.
-    pub(crate) told: Pose,
+    pub(crate) commanded: Pose,
     /// Joints there.
     pub(crate) joints: Joints,
     /// The point on the arc of a circular motion.
@@ -37,12 +37,12 @@ pub(crate) struct Reached<'a> {
     /// Whether it is written as joints.
     pub(crate) as_joints: bool,
     /// Whether targets may be put in before it.
-    pub(crate) may_cut: bool,
+    pub(crate) may_insert: bool,
 }
 
-impl Reached<'_> {
+impl ReachedEnd<'_> {
     /// Whether its joints may go along a path, and whether they may go in proportion.
-    pub(crate) fn ways(&self) -> (bool, bool) {
+    pub(crate) fn path_kinds(&self) -> (bool, bool) {
         let wrist = self.motion.modal.wrist_interpolation != Switch::Off;
         match self.motion.kind {
             MotionKind::Linear | MotionKind::Circular => (true, wrist || self.as_joints),
@@ -54,16 +54,16 @@ impl Reached<'_> {
 
 /// The sides on the way to the end of a motion.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Course {
+pub(crate) struct BacklashSides {
     /// At the share 0 of the way, and from each share on at which a joint turns.
-    pub(crate) turns: Vec<(f64, Sides)>,
+    pub(crate) turns: Vec<(f64, JointSides)>,
     /// At the end.
-    pub(crate) end: Sides,
+    pub(crate) end: JointSides,
     /// At the circle point, where there is one.
-    pub(crate) via: Sides,
+    pub(crate) via: JointSides,
 }
 
-impl Course {
+impl BacklashSides {
     /// The side of a joint is not known.
     pub(crate) fn forget(&mut self, joint: usize) {
         (self.end[joint], self.via[joint]) = (0, 0);
@@ -72,4 +72,4 @@ impl Course {
 }
 
 /// The joints at places between the ends of a motion, by its share.
-pub(crate) type Sampled = Vec<(f64, Joints)>;
+pub(crate) type SampledJoints = Vec<(f64, Joints)>;

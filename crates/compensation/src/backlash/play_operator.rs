@@ -9,8 +9,8 @@
 //! Source: M. A. Krasnosel'skii, A. V. Pokrovskii, Systems with Hysteresis, 1989, the play.
 //! Checked against: an independent simulation of a controller in small steps (tests/it/compensation/play.rs).
 
-use crate::backlash::sides::Sides;
-use crate::condition::arm_conditions::Circumstances;
+use crate::backlash::sides::JointSides;
+use crate::condition::arm_conditions::ArmConditions;
 use crate::segment::condition_schedule::CHORD_MM;
 use truegrind_arm::model::{Joints, PreparedModel};
 use truegrind_math::se3::Pose;
@@ -26,7 +26,7 @@ const DOUBLINGS: usize = 6;
 
 /// Links that follow their motors with play.
 #[derive(Clone, Copy)]
-pub(crate) struct Slack<'a> {
+pub(crate) struct PlayOperator<'a> {
     /// The arm in the middle of its play, with its load on this way.
     arm: &'a PreparedModel<'a>,
     play_rad: [f64; 6],
@@ -35,14 +35,19 @@ pub(crate) struct Slack<'a> {
     behind: Joints,
 }
 
-impl<'a> Slack<'a> {
-    /// At rest at joints `motor`, to which the arm came under the condition `came`. `now`: a condition with the load that
+impl<'a> PlayOperator<'a> {
+    /// At rest at joints `motor`, to which the arm came under the condition `arrival`. `onward`: a condition with the load that
     /// it carries from here on. A joint of which no side is known stands in the middle of its play.
-    pub(crate) fn at(motor: &Joints, came: usize, now: usize, acting: &'a Circumstances<'_>) -> Self {
-        let sides = acting.arm(came).condition.approach;
-        let play_rad = acting.play_rad;
+    pub(crate) fn at(
+        motor: &Joints,
+        arrival: usize,
+        onward: usize,
+        conditions: &'a ArmConditions<'_>,
+    ) -> Self {
+        let sides = conditions.arm(arrival).condition.approach;
+        let play_rad = conditions.play_rad;
         let behind = Joints::from_fn(|j, _| 0.5 * play_rad[j].abs() * f64::from(sides[j]));
-        Self { arm: acting.arm(acting.middle(now)), play_rad, motor: *motor, behind }
+        Self { arm: conditions.arm(conditions.middle(onward)), play_rad, motor: *motor, behind }
     }
 
     /// The motors go on to other joints.
@@ -63,7 +68,7 @@ impl<'a> Slack<'a> {
     }
 
     /// On which flank each link lies, 0 for none.
-    fn contact(&self) -> Sides {
+    fn contact(&self) -> JointSides {
         std::array::from_fn(|j| {
             let half = 0.5 * self.play_rad[j].abs();
             i8::from(half > 0.0 && self.behind[j] >= half) - i8::from(half > 0.0 && self.behind[j] <= -half)
@@ -93,9 +98,9 @@ impl<'a> Slack<'a> {
 
     /// Whether each link comes to lie, at the end of a way in so many `steps`, on the side that is told of it there (0 where none
     /// is), wherever in its play one lies at the start of which none was known. The play keeps order, so both flanks tell that.
-    pub(crate) fn comes_to(
+    pub(crate) fn ends_on_sides(
         &self,
-        sides: &Sides,
+        sides: &JointSides,
         steps: usize,
         motor: &dyn Fn(f64) -> Option<Joints>,
     ) -> bool {
@@ -117,7 +122,7 @@ impl<'a> Slack<'a> {
 
     /// Largest distance on a way from here: `motor(s)` where the motors are at its share s, `off(s, flange)` how far off
     /// the tool is with the flange there. Infinite where the motors cannot go. Begins with so many `steps`.
-    pub(crate) fn most_off(
+    pub(crate) fn largest_deviation(
         &self,
         steps: usize,
         motor: &dyn Fn(f64) -> Option<Joints>,

@@ -1,6 +1,6 @@
 //! What each joint with play did last, taken along the ways of motions.
 
-use crate::backlash::motion_end::{Reached, Sampled, Sides};
+use crate::backlash::motion_end::{JointSides, ReachedEnd, SampledJoints};
 use crate::backlash::reversals::{DEAD_BAND_RAD, turning_point};
 use truegrind_arm::model::Joints;
 
@@ -9,7 +9,7 @@ const STILL_RAD: f64 = 1e-6;
 
 /// What one joint did last.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Track {
+pub(crate) struct PlayTrack {
     /// The flank on which the link lies, 0 where that is not known, or on neither.
     pub(crate) side: i8,
     /// The turning point of the motor (rad).
@@ -23,7 +23,7 @@ pub(crate) struct Track {
     pub(crate) half: f64,
 }
 
-impl Track {
+impl PlayTrack {
     /// A link of which nothing is known but where its motor stands.
     pub(crate) fn unknown(motor: f64, half: f64) -> Self {
         Self { side: 0, farthest: motor, since: 0.0, low: motor - half, high: motor + half, half }
@@ -101,22 +101,26 @@ impl Track {
 }
 
 /// From each share of the way on, from which side each joint comes.
-pub(crate) type Turns = Vec<(f64, Sides)>;
+pub(crate) type SideChanges = Vec<(f64, JointSides)>;
 
 /// The sides on which all ways agree.
-pub(crate) fn agreed(mut sides: impl Iterator<Item = Sides>) -> Sides {
+pub(crate) fn agreed(mut sides: impl Iterator<Item = JointSides>) -> JointSides {
     let first = sides.next().unwrap_or([0; 6]);
     sides.fold(first, |all, one| std::array::from_fn(|j| if all[j] == one[j] { all[j] } else { 0 }))
 }
 
-/// Takes all joints to the end of a motion, by every way that it may go. `ways`: its start and the samples between, along
+/// Takes all joints to the end of a motion, by every way that it may go. `paths`: its start and the samples between, along
 /// the path and, where it may go so, with a wrist that goes by itself.
-pub(crate) fn arrive(start: [Track; 6], reached: &Reached<'_>, ways: &[Sampled]) -> (Turns, [Track; 6]) {
-    let (path, straight) = reached.ways();
-    let way = ways[0].as_slice();
-    let path = path && way.len() > 1;
-    let mut found: Option<(Turns, [Track; 6])> = None;
-    let mut add = |turns: Turns, end: [Track; 6]| match &mut found {
+pub(crate) fn arrive(
+    start: [PlayTrack; 6],
+    reached: &ReachedEnd<'_>,
+    paths: &[SampledJoints],
+) -> (SideChanges, [PlayTrack; 6]) {
+    let (path, straight) = reached.path_kinds();
+    let samples = paths[0].as_slice();
+    let path = path && samples.len() > 1;
+    let mut found: Option<(SideChanges, [PlayTrack; 6])> = None;
+    let mut add = |turns: SideChanges, end: [PlayTrack; 6]| match &mut found {
         None => found = Some((turns, end)),
         Some((_, first)) => {
             for (j, (one, other)) in first.iter_mut().zip(&end).enumerate() {
@@ -127,25 +131,25 @@ pub(crate) fn arrive(start: [Track; 6], reached: &Reached<'_>, ways: &[Sampled])
             }
         }
     };
-    let mut once = |way: &[(f64, Joints)]| {
+    let mut once = |samples: &[(f64, Joints)]| {
         let mut tracks = start;
-        let turns = follow(&mut tracks, way, reached);
+        let turns = follow(&mut tracks, samples, reached);
         add(turns, tracks);
     };
     if path {
-        ways.iter().for_each(|way| once(way));
+        paths.iter().for_each(|samples| once(samples));
     }
     if straight || !path {
-        once(&way[..way.len().min(1)]);
+        once(&samples[..samples.len().min(1)]);
     }
     let (turns, mut end) = found.unwrap_or((Vec::new(), start));
     // Targets that are put in make the link go as was meant: it may turn near the end by less than its play.
     if path
-        && reached.may_cut
+        && reached.may_insert
         && let Some(links) = reached.links
     {
         for (joint, (track, begin)) in end.iter_mut().zip(&start).enumerate() {
-            let side = side_of_link(begin, way, joint, reached.joints[joint], links[joint]);
+            let side = side_of_link(begin, samples, joint, reached.joints[joint], links[joint]);
             if side.is_some_and(|side| side != track.side) {
                 track.forget(Some(links[joint]), reached.joints[joint]);
             }
@@ -157,17 +161,17 @@ pub(crate) fn arrive(start: [Track; 6], reached: &Reached<'_>, ways: &[Sampled])
 /// On which flank each link lies where the circle point is passed: on none of them while a joint that has turned before it
 /// takes up its play.
 pub(crate) fn passing(
-    mut tracks: [Track; 6],
-    reached: &Reached<'_>,
-    way: &[(f64, Joints)],
+    mut tracks: [PlayTrack; 6],
+    reached: &ReachedEnd<'_>,
+    samples: &[(f64, Joints)],
     passes: f64,
-) -> Sides {
+) -> JointSides {
     if reached.via.is_none() {
         return [0; 6];
     }
     let mut sides = [0; 6];
     for (joint, track) in tracks.iter_mut().enumerate() {
-        let inner = way.iter().map(|(share, joints)| (*share, joints[joint]));
+        let inner = samples.iter().map(|(share, joints)| (*share, joints[joint]));
         let angles: Vec<(f64, f64)> = inner.chain([(1.0, reached.joints[joint])]).collect();
         let after = angles.iter().position(|(share, _)| *share >= passes).unwrap_or(angles.len() - 1);
         for k in 0..after {
@@ -191,17 +195,24 @@ pub(crate) fn passing(
 }
 
 /// From which side a link comes to its end that goes along a way as was meant; `None` where it does not turn on the way.
-fn side_of_link(begin: &Track, way: &[(f64, Joints)], joint: usize, motor: f64, link: f64) -> Option<i8> {
-    if begin.half == 0.0 || way.is_empty() {
+fn side_of_link(
+    begin: &PlayTrack,
+    samples: &[(f64, Joints)],
+    joint: usize,
+    motor: f64,
+    link: f64,
+) -> Option<i8> {
+    if begin.half == 0.0 || samples.is_empty() {
         return None;
     }
-    let behind = [0.5 * (begin.low + begin.high) - way[0].1[joint], link - motor];
-    let links: Vec<(f64, f64)> = way
+    let behind = [0.5 * (begin.low + begin.high) - samples[0].1[joint], link - motor];
+    let links: Vec<(f64, f64)> = samples
         .iter()
         .map(|(s, q)| (*s, q[joint] + behind[0] * (1.0 - s) + behind[1] * s))
         .chain([(1.0, link)])
         .collect();
-    let mut track = Track { half: 0.0, low: links[0].1, high: links[0].1, farthest: links[0].1, ..*begin };
+    let mut track =
+        PlayTrack { half: 0.0, low: links[0].1, high: links[0].1, farthest: links[0].1, ..*begin };
     track.side = 0;
     let mut turned = false;
     for k in 1..links.len() {
@@ -220,14 +231,14 @@ fn side_of_link(begin: &Track, way: &[(f64, Joints)], joint: usize, motor: f64, 
 }
 
 /// Takes all joints along a way and to its end; hands back where sides changed.
-fn follow(tracks: &mut [Track; 6], way: &[(f64, Joints)], reached: &Reached<'_>) -> Turns {
+fn follow(tracks: &mut [PlayTrack; 6], samples: &[(f64, Joints)], reached: &ReachedEnd<'_>) -> SideChanges {
     let mut sides = tracks.map(|t| t.side);
     let mut turned: Vec<(f64, usize, i8)> = Vec::new();
     for (joint, track) in tracks.iter_mut().enumerate() {
         let end = reached.joints[joint];
         let angles: Vec<(f64, f64)> =
-            way.iter().map(|(share, joints)| (*share, joints[joint])).chain([(1.0, end)]).collect();
-        let mut go = |track: &mut Track, share: f64, angle: f64| {
+            samples.iter().map(|(share, joints)| (*share, joints[joint])).chain([(1.0, end)]).collect();
+        let mut go = |track: &mut PlayTrack, share: f64, angle: f64| {
             if let Some(at) = track.go(angle, share) {
                 turned.push((at, joint, track.side));
             }

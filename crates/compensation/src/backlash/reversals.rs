@@ -6,29 +6,29 @@ use truegrind_arm::model::Joints;
 pub(crate) const DEAD_BAND_RAD: f64 = 1e-5;
 
 /// Where between samples k − 1 and k a joint turns: the vertex of a parabola through these two and a neighbour.
-pub(crate) fn turning_point(way: &[(f64, f64)], k: usize) -> Option<(f64, f64)> {
+pub(crate) fn turning_point(samples: &[(f64, f64)], k: usize) -> Option<(f64, f64)> {
     let first = match k {
-        _ if way.len() < 3 || k == 0 => return None,
+        _ if samples.len() < 3 || k == 0 => return None,
         1 => 0,
         _ => k - 2,
     };
-    let [a, b, c] = [way[first], way[first + 1], way[first + 2]];
+    let [a, b, c] = [samples[first], samples[first + 1], samples[first + 2]];
     // Newton's form: f(s) = f(a) + d1 (s − a) + d2 (s − a)(s − b).
     let d1 = (b.1 - a.1) / (b.0 - a.0);
     let d2 = ((c.1 - b.1) / (c.0 - b.0) - d1) / (c.0 - a.0);
     let vertex = 0.5 * (a.0 + b.0) - 0.5 * d1 / d2;
-    let within = vertex > way[k - 1].0 && vertex < way[k].0;
+    let within = vertex > samples[k - 1].0 && vertex < samples[k].0;
     within.then_some((vertex, a.1 + d1 * (vertex - a.0) + d2 * (vertex - a.0) * (vertex - b.0)))
 }
 
 /// Whether every other sample of a way tells of the same turns as all of them, for joints with play, and of none near its
 /// end.
-pub(crate) fn agrees(start: &Joints, way: &[(f64, Joints)], end: &Joints, half: &[f64; 6]) -> bool {
-    if way.len() < 3 {
+pub(crate) fn agrees(start: &Joints, samples: &[(f64, Joints)], end: &Joints, half: &[f64; 6]) -> bool {
+    if samples.len() < 3 {
         return true;
     }
     (0..6).filter(|&joint| half[joint] > 0.0).all(|joint| {
-        let inner = way.iter().map(|(share, joints)| (*share, joints[joint]));
+        let inner = samples.iter().map(|(share, joints)| (*share, joints[joint]));
         let all: Vec<(f64, f64)> =
             [(0.0, start[joint])].into_iter().chain(inner).chain([(1.0, end[joint])]).collect();
         let other: Vec<(f64, f64)> = all.iter().copied().step_by(2).collect();
@@ -45,18 +45,18 @@ pub(crate) fn agrees(start: &Joints, way: &[(f64, Joints)], end: &Joints, half: 
 }
 
 /// How fast a joint goes at the end of a way (rad per share), by the parabola through its last three samples.
-fn last_slope(way: &[(f64, f64)]) -> f64 {
-    let [.., a, b, c] = way else { return 0.0 };
+fn last_slope(samples: &[(f64, f64)]) -> f64 {
+    let [.., a, b, c] = samples else { return 0.0 };
     let (first, last) = ((b.1 - a.1) / (b.0 - a.0), (c.1 - b.1) / (c.0 - b.0));
     last + (last - first) / (c.0 - a.0) * (c.0 - b.0)
 }
 
 /// In which directions a joint goes in turn, and how far each time.
-fn turns(way: &[(f64, f64)]) -> Vec<(i8, f64)> {
+fn turns(samples: &[(f64, f64)]) -> Vec<(i8, f64)> {
     let mut out: Vec<(i8, f64)> = Vec::new();
-    let mut farthest = way[0].1;
-    for k in 1..way.len() {
-        for (_, angle) in turning_point(way, k).into_iter().chain([way[k]]) {
+    let mut farthest = samples[0].1;
+    for k in 1..samples.len() {
+        for (_, angle) in turning_point(samples, k).into_iter().chain([samples[k]]) {
             let gone = angle - farthest;
             let direction = if gone > 0.0 { 1 } else { -1 };
             match out.last_mut() {

@@ -2,7 +2,7 @@
 
 use crate::cell::Cell;
 use crate::plan::Plan;
-use crate::plan::reason::Why;
+use crate::plan::reason::OutcomeReason;
 use truegrind_arm::inverse::InverseError;
 use truegrind_arm::model::Model;
 use truegrind_arm::robots;
@@ -15,7 +15,7 @@ fn is_same(stated: &str, robot: &str, nominal: &Model) -> bool {
 }
 
 /// What is wrong with a cell file that is another robot's.
-pub fn cell_of_another(cell: &Cell, robot: &str, nominal: &Model) -> Option<String> {
+pub fn cell_robot_mismatch(cell: &Cell, robot: &str, nominal: &Model) -> Option<String> {
     let stated = cell.robot.as_ref().filter(|stated| !is_same(stated, robot, nominal))?;
     Some(format!(
         "cell file: robot = \"{stated}\", but the model is one of {robot}: give the model of the robot that runs the programs, or \
@@ -24,7 +24,7 @@ pub fn cell_of_another(cell: &Cell, robot: &str, nominal: &Model) -> Option<Stri
 }
 
 /// What is wrong with a program that says that it was made for another robot; `name` is what its file is called.
-pub fn program_of_another(name: &str, source: &[u8], robot: &str, nominal: &Model) -> Option<String> {
+pub fn program_robot_mismatch(name: &str, source: &[u8], robot: &str, nominal: &Model) -> Option<String> {
     let stated = robot_of(source).filter(|stated| !is_same(stated, robot, nominal))?;
     Some(format!(
         "{name}: its heading says that it was made for {stated}, but the model is one of {robot}: give the model of the robot \
@@ -37,12 +37,18 @@ const FEWEST: usize = 5;
 
 /// How many motions there are where hardly one has joints on the arm that was asked: the program is another arm's. A program
 /// that a few targets of which are out of reach is its own.
-pub fn none_in_reach(plan: &Plan) -> Option<usize> {
-    let untold = |why: &Why| {
-        matches!(why, Why::Program(_) | Why::MovingBase { .. } | Why::Contradicted | Why::JointTarget)
-            || *why == Why::Inverse(InverseError::Abandoned)
+pub fn unreachable_motions(plan: &Plan) -> Option<usize> {
+    let untold = |why: &OutcomeReason| {
+        matches!(
+            why,
+            OutcomeReason::Program(_)
+                | OutcomeReason::MovingBase { .. }
+                | OutcomeReason::CellContradiction
+                | OutcomeReason::JointTarget
+        ) || *why == OutcomeReason::Inverse(InverseError::Abandoned)
     };
-    let unreached = |why: &Why| matches!(why, Why::Inverse(_) | Why::OutsideLimits { .. });
+    let unreached =
+        |why: &OutcomeReason| matches!(why, OutcomeReason::Inverse(_) | OutcomeReason::OutsideLimits { .. });
     let judged = || plan.outcomes.iter().filter(|outcome| !outcome.reason.as_ref().is_some_and(untold));
     let all = judged().count();
     let without = judged().filter(|outcome| outcome.reason.as_ref().is_some_and(unreached)).count();

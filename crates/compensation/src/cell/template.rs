@@ -13,7 +13,7 @@ use truegrind_programs::reading::Language;
 
 /// A program whose cell is asked for.
 #[derive(Debug, Clone, Copy)]
-pub struct Asking<'a> {
+pub struct TemplateProgram<'a> {
     /// Its name, for comments.
     pub name: &'a str,
     /// Its language.
@@ -24,7 +24,7 @@ pub struct Asking<'a> {
 
 /// A cell file to fill in.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Skeleton {
+pub struct CellTemplate {
     /// The file.
     pub text: String,
     /// How many values a person has to fill in.
@@ -38,7 +38,7 @@ struct Named {
     label: Option<String>,
     language: Language,
     /// Where it lies, as the program says it, or why that is not known.
-    told: Result<Pose, Reason>,
+    commanded: Result<Pose, Reason>,
     motions: usize,
     /// The program and the line that use it first.
     first: (String, u32),
@@ -48,7 +48,7 @@ struct Named {
 type Key = (bool, String);
 
 /// The cell file of these programs. `robot`, where it is known, is written into it.
-pub fn skeleton(programs: &[Asking<'_>], robot: Option<&str>) -> Skeleton {
+pub fn cell_template(programs: &[TemplateProgram<'_>], robot: Option<&str>) -> CellTemplate {
     let mut found: BTreeMap<Key, Named> = BTreeMap::new();
     let mut axes = [false; 6];
     for program in programs {
@@ -75,21 +75,21 @@ pub fn skeleton(programs: &[Asking<'_>], robot: Option<&str>) -> Skeleton {
         out.line(&format!("axis = \"{letter}\""), "");
         out.ask("carries", "base (it carries the robot: a track, a gantry) | other");
     }
-    Skeleton { text: out.text, open: out.open }
+    CellTemplate { text: out.text, open: out.open }
 }
 
 /// Takes down tool and work object of a motion.
-fn note(program: &Asking<'_>, motion: &Motion, found: &mut BTreeMap<Key, Named>) {
+fn note(program: &TemplateProgram<'_>, motion: &Motion, found: &mut BTreeMap<Key, Named>) {
     let listing = program.listing;
     let tool = listing.tool(motion).map(|tool| {
-        let told = tool.value.as_ref().map(|value| value.frame.pose()).map_err(|reason| *reason);
-        (true, tool.name.as_str(), told)
+        let commanded = tool.value.as_ref().map(|value| value.frame.pose()).map_err(|reason| *reason);
+        (true, tool.name.as_str(), commanded)
     });
     let object = listing.work_object(motion).map(|object| {
-        let told = object.value.as_ref().map(|value| value.user_frame.pose()).map_err(|reason| *reason);
-        (false, object.name.as_str(), told)
+        let commanded = object.value.as_ref().map(|value| value.user_frame.pose()).map_err(|reason| *reason);
+        (false, object.name.as_str(), commanded)
     });
-    for (is_tool, name, told) in tool.into_iter().chain(object) {
+    for (is_tool, name, commanded) in tool.into_iter().chain(object) {
         // The controller's own, and what a control calls no tool (G49).
         let own = ["tool0", "wobj0"].iter().any(|own| name.eq_ignore_ascii_case(own));
         if own || is_tool && program.language == Language::Nc && !name.starts_with(['T', 't']) {
@@ -103,14 +103,14 @@ fn note(program: &Asking<'_>, motion: &Motion, found: &mut BTreeMap<Key, Named>)
             name: name.to_owned(),
             label: listing.labels_of(name).next().map(str::to_owned),
             language: program.language,
-            told,
+            commanded,
             motions: 0,
             first: (program.name.to_owned(), motion.place.line),
         };
         let named = found.entry((is_tool, key)).or_insert_with(new);
         named.motions += 1;
-        if named.told.is_err() && told.is_ok() {
-            named.told = told;
+        if named.commanded.is_err() && commanded.is_ok() {
+            named.commanded = commanded;
         }
     }
 }
@@ -149,7 +149,7 @@ impl Writer {
         self.line(&format!("{key} = \"?\""), comment);
     }
 
-    fn head(&mut self, programs: &[Asking<'_>], robot: Option<&str>, convention: bool) {
+    fn head(&mut self, programs: &[TemplateProgram<'_>], robot: Option<&str>, convention: bool) {
         let names = match programs {
             [] => "no program".to_owned(),
             [one] => one.name.to_owned(),
@@ -186,7 +186,7 @@ impl Writer {
         let uses = format!("{motions}, first in {}, line {}", named.first.0, named.first.1)
             .replace(['\n', '\r'], " ");
         self.line("", "");
-        if let (Language::Rapid, Err(reason)) = (named.language, named.told) {
+        if let (Language::Rapid, Err(reason)) = (named.language, named.commanded) {
             let remedy = match reason {
                 Reason::Undeclared => "give the module that declares it, too",
                 _ => "a cell file cannot say it",
@@ -200,9 +200,9 @@ impl Writer {
         self.line(&format!("name = {}", quoted(&named.name)), &called.replace(['\n', '\r'], " "));
         self.ask("origin", "metrology | taught");
         let place = if is_tool { "the tool's tip on the flange" } else { "its zero in the robot's base" };
-        match named.told {
-            Ok(told) => {
-                let Frame { position_mm: p, quaternion: q } = Frame::from_pose(&told);
+        match named.commanded {
+            Ok(commanded) => {
+                let Frame { position_mm: p, quaternion: q } = Frame::from_pose(&commanded);
                 self.line(
                     &format!(
                         "# the program has it at [{}, {}, {}] mm, turned by [{}, {}, {}, {}]",

@@ -7,7 +7,7 @@ use std::collections::HashMap;
 
 use nalgebra::Vector3;
 
-use crate::backlash::sides::Sides;
+use crate::backlash::sides::JointSides;
 use crate::condition::payload::Load;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::effect::Effect;
@@ -19,19 +19,19 @@ use truegrind_math::se3::Pose;
 type LoadKey = Option<[u64; 4]>;
 
 /// The conditions of one program, with the arm under each.
-pub(crate) struct Circumstances<'a> {
+pub(crate) struct ArmConditions<'a> {
     model: &'a Model,
     nominal: &'a Model,
     base: Condition,
     /// Play of each joint (rad); none for a joint without.
     pub(crate) play_rad: [f64; 6],
-    places: HashMap<(Sides, LoadKey), usize>,
+    condition_indices: HashMap<(JointSides, LoadKey), usize>,
     list: Vec<Inverse<'a>>,
     /// For each place the one with the same load and every joint in the middle of its play.
     middles: Vec<usize>,
 }
 
-impl<'a> Circumstances<'a> {
+impl<'a> ArmConditions<'a> {
     pub(crate) fn new(model: &'a Model, nominal: &'a Model, base: &Condition) -> Self {
         let mut play_rad = [0.0; 6];
         for effect in &model.effects {
@@ -39,8 +39,8 @@ impl<'a> Circumstances<'a> {
                 play_rad[backlash.joint] += backlash.play_rad;
             }
         }
-        let (places, list, middles) = (HashMap::new(), Vec::new(), Vec::new());
-        Self { model, nominal, base: *base, play_rad, places, list, middles }
+        let (condition_indices, list, middles) = (HashMap::new(), Vec::new(), Vec::new());
+        Self { model, nominal, base: *base, play_rad, condition_indices, list, middles }
     }
 
     /// Whether it matters from which side a joint comes.
@@ -50,50 +50,55 @@ impl<'a> Circumstances<'a> {
 
     /// The place of a condition in the list. Sides of joints without play make no difference, and without a load the
     /// base condition's counts.
-    pub(crate) fn place(&mut self, sides: Sides, load: Option<&Load>) -> usize {
-        let sides: Sides = std::array::from_fn(|j| if self.play_rad[j] == 0.0 { 0 } else { sides[j] });
+    pub(crate) fn condition_index(&mut self, sides: JointSides, load: Option<&Load>) -> usize {
+        let sides: JointSides = std::array::from_fn(|j| if self.play_rad[j] == 0.0 { 0 } else { sides[j] });
         let [x, y, z] = load.map_or([0.0; 3], |load| load.centre_mm);
         let key = (sides, load.map(|load| [load.mass_kg, x, y, z].map(f64::to_bits)));
-        if let Some(place) = self.places.get(&key) {
-            return *place;
+        if let Some(condition_index) = self.condition_indices.get(&key) {
+            return *condition_index;
         }
-        let middle = if sides == [0; 6] { self.list.len() } else { self.place([0; 6], load) };
+        let middle = if sides == [0; 6] { self.list.len() } else { self.condition_index([0; 6], load) };
         let mut condition = Condition { approach: sides, ..self.base };
         if let Some(load) = load {
             (condition.payload_kg, condition.payload_centre_mm) = (Some(load.mass_kg), load.centre_mm);
         }
-        let place = self.list.len();
+        let condition_index = self.list.len();
         self.list.push(Inverse::new(self.model, &condition, self.nominal));
         self.middles.push(middle);
-        self.places.insert(key, place);
-        place
+        self.condition_indices.insert(key, condition_index);
+        condition_index
     }
 
-    /// The place with the same load as `place` and every joint in the middle of its play.
-    pub(crate) fn middle(&self, place: usize) -> usize {
-        self.middles[place]
+    /// The place with the same load as `condition_index` and every joint in the middle of its play.
+    pub(crate) fn middle(&self, condition_index: usize) -> usize {
+        self.middles[condition_index]
     }
 
     /// The inverse of the arm under a condition.
-    pub(crate) fn inverse(&self, place: usize) -> &Inverse<'a> {
-        &self.list[place]
+    pub(crate) fn inverse(&self, condition_index: usize) -> &Inverse<'a> {
+        &self.list[condition_index]
     }
 
     /// The arm under a condition.
-    pub(crate) fn arm(&self, place: usize) -> &PreparedModel<'a> {
-        self.list[place].arm()
+    pub(crate) fn arm(&self, condition_index: usize) -> &PreparedModel<'a> {
+        self.list[condition_index].arm()
     }
 
     /// Where the links stand under a condition with the motors at `joints`, load apart.
-    pub(crate) fn links(&self, place: usize, joints: &Joints) -> Joints {
-        let sides = self.arm(place).condition.approach;
+    pub(crate) fn links(&self, condition_index: usize, joints: &Joints) -> Joints {
+        let sides = self.arm(condition_index).condition.approach;
         Joints::from_fn(|j, _| joints[j] + 0.5 * self.play_rad[j] * f64::from(sides[j]))
     }
 
     /// How far a point on the flange stands from where the flanks would have it, where the sides of joints with play are
     /// not known: half the play of each, as independent displacements (mm).
-    pub(crate) fn in_play_mm(&self, place: usize, joints: &Joints, flange_from_tool: &Pose) -> f64 {
-        let arm = self.arm(place);
+    pub(crate) fn play_uncertainty_mm(
+        &self,
+        condition_index: usize,
+        joints: &Joints,
+        flange_from_tool: &Pose,
+    ) -> f64 {
+        let arm = self.arm(condition_index);
         let open = |j: usize| self.play_rad[j] != 0.0 && arm.condition.approach[j] == 0;
         if !(0..6).any(open) {
             return 0.0;
@@ -107,21 +112,21 @@ impl<'a> Circumstances<'a> {
         (0..6).filter(|&j| open(j)).map(square).sum::<f64>().sqrt()
     }
 
-    /// Runs `work` on the items under each condition together: `work(place, items)` answers in the order of `items`.
+    /// Runs `work` on the items under each condition together: `work(condition_index, items)` answers in the order of `items`.
     pub(crate) fn each<T>(
         &self,
-        places: &[usize],
+        condition_indices: &[usize],
         mut work: impl FnMut(usize, Option<&[usize]>) -> Vec<T>,
     ) -> Vec<T> {
-        let Some(&first) = places.first() else { return Vec::new() };
-        if places.iter().all(|place| *place == first) {
+        let Some(&first) = condition_indices.first() else { return Vec::new() };
+        if condition_indices.iter().all(|condition_index| *condition_index == first) {
             return work(first, None);
         }
-        let mut out: Vec<Option<T>> = places.iter().map(|_| None).collect();
-        let mut order: Vec<usize> = (0..places.len()).collect();
-        order.sort_by_key(|&i| places[i]);
-        for items in order.chunk_by(|&a, &b| places[a] == places[b]) {
-            for (i, found) in items.iter().zip(work(places[items[0]], Some(items))) {
+        let mut out: Vec<Option<T>> = condition_indices.iter().map(|_| None).collect();
+        let mut order: Vec<usize> = (0..condition_indices.len()).collect();
+        order.sort_by_key(|&i| condition_indices[i]);
+        for items in order.chunk_by(|&a, &b| condition_indices[a] == condition_indices[b]) {
+            for (i, found) in items.iter().zip(work(condition_indices[items[0]], Some(items))) {
                 out[*i] = Some(found);
             }
         }
@@ -129,15 +134,15 @@ impl<'a> Circumstances<'a> {
     }
 
     /// Poses of the flange, each under its condition.
-    pub(crate) fn forward(&self, places: &[usize], joints: &[Joints]) -> Vec<Pose> {
-        self.each(places, |place, items| match items {
-            None => self.arm(place).forward_many(joints),
-            Some(items) => self.arm(place).forward_many(&picked(joints, items)),
+    pub(crate) fn forward(&self, condition_indices: &[usize], joints: &[Joints]) -> Vec<Pose> {
+        self.each(condition_indices, |condition_index, items| match items {
+            None => self.arm(condition_index).forward_many(joints),
+            Some(items) => self.arm(condition_index).forward_many(&select(joints, items)),
         })
     }
 }
 
 /// The items at some places.
-pub(crate) fn picked<T: Clone>(all: &[T], items: &[usize]) -> Vec<T> {
+pub(crate) fn select<T: Clone>(all: &[T], items: &[usize]) -> Vec<T> {
     items.iter().map(|&i| all[i].clone()).collect()
 }

@@ -65,7 +65,7 @@ impl Loads {
 
     /// The loads of RAPID modules.
     pub fn of_task(task: &Task<'_>) -> Self {
-        if says_nothing(task) { Self::default() } else { Walk::new(task).run() }
+        if states_no_load(task) { Self::default() } else { GripAnalysis::new(task).run() }
     }
 
     fn grip(&self, motion: usize) -> Grip {
@@ -107,7 +107,7 @@ fn together(a: &Load, b: &Load) -> Load {
 }
 
 /// Whether no statement grips anything and no motion states its load.
-fn says_nothing(task: &Task<'_>) -> bool {
+fn states_no_load(task: &Task<'_>) -> bool {
     const PORTION: usize = 1 << 16;
     let names = |tree: &RapidTree<'_>, token: usize| {
         let text = tree.text(token as u32);
@@ -130,7 +130,7 @@ fn joined(a: State, b: State) -> State {
 }
 
 /// One walk through all statements of a task.
-struct Walk<'t, 's> {
+struct GripAnalysis<'t, 's> {
     task: &'t Task<'s>,
     evaluator: Evaluator<'t, 's>,
     /// Motions by file and first byte.
@@ -152,7 +152,7 @@ const NOTHING_KG: f64 = 0.001;
 /// How deeply calls are followed.
 const DEPTH: usize = 12;
 
-impl<'t, 's> Walk<'t, 's> {
+impl<'t, 's> GripAnalysis<'t, 's> {
     fn new(task: &'t Task<'s>) -> Self {
         let motions = task.listing.motions.iter().enumerate();
         Self {

@@ -6,12 +6,12 @@
 
 use std::collections::BTreeMap;
 
-use crate::frames::frame_table::Mountings;
-use crate::options::{Options, may_change};
-use crate::plan::reason::Why;
+use crate::frames::frame_table::FrameTable;
+use crate::options::{Options, is_rewritable};
+use crate::plan::reason::OutcomeReason;
 use crate::segment::curve::{CLOSED_MM, Curve};
-use crate::segment::line::gap;
-use crate::target::solved_target::{Solved, SolvedTargets};
+use crate::segment::line::distance;
+use crate::target::solved_target::{SolvedTarget, SolvedTargets};
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{Listing, Motion, MotionKind, MotionTarget, TargetValue};
 
@@ -32,37 +32,38 @@ const SAMPLES: u8 = 12;
 
 /// The motions of a listing that cannot be corrected for such a reason, by index. `stays`: motions that are not corrected
 /// for other reasons than their own targets.
-pub(crate) fn strayed(
+pub(crate) fn infeasible_arcs(
     listing: &Listing,
     solved: &SolvedTargets,
-    mountings: &Mountings,
+    frame_table: &FrameTable,
     options: &Options,
-    stays: &BTreeMap<u32, Why>,
-) -> BTreeMap<u32, Why> {
-    let mut strayed = circles(listing, solved, mountings, options, stays);
-    let corrected = |index: u32, strayed: &BTreeMap<u32, Why>| {
-        may_change(&listing.motions[index as usize], options)
+    stays: &BTreeMap<u32, OutcomeReason>,
+) -> BTreeMap<u32, OutcomeReason> {
+    let mut infeasible_arcs = circles(listing, solved, frame_table, options, stays);
+    let corrected = |index: u32, infeasible_arcs: &BTreeMap<u32, OutcomeReason>| {
+        is_rewritable(&listing.motions[index as usize], options)
             && all_corrected(solved.of(index as usize))
             && !stays.contains_key(&index)
-            && !strayed.contains_key(&index)
+            && !infeasible_arcs.contains_key(&index)
     };
     for (index, motion) in (0_u32..).zip(&listing.motions) {
         if motion.kind == MotionKind::Circular
             && let Some(previous) = motion.previous
-            && corrected(previous, &strayed)
-            && !corrected(index, &strayed)
+            && corrected(previous, &infeasible_arcs)
+            && !corrected(index, &infeasible_arcs)
             && let Some(Ok(start)) = solved.of(previous as usize).last()
-            && turned(start, motion, mountings)
+            && changes_unmodified_arc(start, motion, frame_table)
         {
-            strayed.insert(previous, Why::BeforeCircle { line: motion.place.line });
+            infeasible_arcs.insert(previous, OutcomeReason::StartOfUnchangedArc { line: motion.place.line });
         }
     }
-    strayed
+    infeasible_arcs
 }
 
 /// Whether all targets of a motion can be corrected.
-fn all_corrected(targets: &[Result<Solved, Why>]) -> bool {
-    let can = |target: &Result<Solved, _>| target.as_ref().is_ok_and(|solved| solved.forbidden.is_none());
+fn all_corrected(targets: &[Result<SolvedTarget, OutcomeReason>]) -> bool {
+    let can =
+        |target: &Result<SolvedTarget, _>| target.as_ref().is_ok_and(|solved| solved.forbidden.is_none());
     !targets.is_empty() && targets.iter().all(can)
 }
 
@@ -70,13 +71,16 @@ fn all_corrected(targets: &[Result<Solved, Why>]) -> bool {
 fn circles(
     listing: &Listing,
     solved: &SolvedTargets,
-    mountings: &Mountings,
+    frame_table: &FrameTable,
     options: &Options,
-    stays: &BTreeMap<u32, Why>,
-) -> BTreeMap<u32, Why> {
-    let mut strayed = BTreeMap::new();
+    stays: &BTreeMap<u32, OutcomeReason>,
+) -> BTreeMap<u32, OutcomeReason> {
+    let mut infeasible_arcs = BTreeMap::new();
     for (index, motion) in (0_u32..).zip(&listing.motions) {
-        if motion.kind != MotionKind::Circular || !may_change(motion, options) || stays.contains_key(&index) {
+        if motion.kind != MotionKind::Circular
+            || !is_rewritable(motion, options)
+            || stays.contains_key(&index)
+        {
             continue;
         }
         let ([Ok(via), Ok(to)], Some(previous)) = (solved.of(index as usize), motion.previous) else {
@@ -84,60 +88,61 @@ fn circles(
         };
         let before = &listing.motions[previous as usize];
         let targets = solved.of(previous as usize);
-        let from = solved.end_as_it_is(previous as usize).filter(|from| from.mounted == to.mounted);
-        if from.is_some_and(|from| no_circle(&from.meant, via, to, motion)) {
-            strayed.insert(index, Why::NoCircle);
+        let from = solved.original_end(previous as usize).filter(|from| from.frames_index == to.frames_index);
+        if from.is_some_and(|from| no_circle(&from.intended, via, to, motion)) {
+            infeasible_arcs.insert(index, OutcomeReason::NoCircle);
             continue;
         }
-        let corrected = may_change(before, options)
+        let corrected = is_rewritable(before, options)
             && all_corrected(targets)
-            && !strayed.contains_key(&previous)
+            && !infeasible_arcs.contains_key(&previous)
             && !stays.contains_key(&previous);
         if corrected {
             continue;
         }
         let start = match from {
-            Some(from) => Some(from.meant),
-            None => stated(before, to.mounted, mountings),
+            Some(from) => Some(from.intended),
+            None => stated(before, to.frames_index, frame_table),
         };
-        if strays(start, via, to, motion) {
-            strayed.insert(index, Why::NoCircle);
+        if changes_arc(start, via, to, motion) {
+            infeasible_arcs.insert(index, OutcomeReason::NoCircle);
         }
     }
-    strayed
+    infeasible_arcs
 }
 
 /// Whether a circle has a known start with which its points make none. One that closes is another matter: its ends say
 /// nothing of its plane.
-fn no_circle(from: &Pose, via: &Solved, to: &Solved, motion: &Motion) -> bool {
-    gap(&from.translation.vector, &to.meant.translation.vector) >= CLOSED_MM
-        && Curve::round(*from, &via.meant, to.meant, motion).is_none()
+fn no_circle(from: &Pose, via: &SolvedTarget, to: &SolvedTarget, motion: &Motion) -> bool {
+    distance(&from.translation.vector, &to.intended.translation.vector) >= CLOSED_MM
+        && Curve::round(*from, &via.intended, to.intended, motion).is_none()
 }
 
 /// Where a motion that stays ends, in the frames of the one after it.
-fn stated(before: &Motion, mounted: usize, mountings: &Mountings) -> Option<Pose> {
+fn stated(before: &Motion, frames_index: usize, frame_table: &FrameTable) -> Option<Pose> {
     let Ok(TargetValue::Cartesian(target)) = before.to()?.value else { return None };
-    (mountings.of_motion(before).ok()? == mounted).then(|| target.pose())
+    (frame_table.of_motion(before).ok()? == frames_index).then(|| target.pose())
 }
 
 /// Whether the circle from a start that is not corrected through two corrected points is another one than was meant.
-fn strays(start: Option<Pose>, via: &Solved, to: &Solved, motion: &Motion) -> bool {
+fn changes_arc(start: Option<Pose>, via: &SolvedTarget, to: &SolvedTarget, motion: &Motion) -> bool {
     let shift = via.shift_mm().max(to.shift_mm());
     let Some(start) = start else {
-        return shift > UNKNOWN_SHARE * gap(&via.meant.translation.vector, &to.meant.translation.vector);
+        return shift
+            > UNKNOWN_SHARE * distance(&via.intended.translation.vector, &to.intended.translation.vector);
     };
-    if gap(&start.translation.vector, &to.meant.translation.vector) < CLOSED_MM {
+    if distance(&start.translation.vector, &to.intended.translation.vector) < CLOSED_MM {
         // A whole circle whose ends do not meet is none.
         return shift > CLOSED_MM;
     }
-    let meant = Curve::round(start, &via.meant, to.meant, motion);
-    let told = Curve::round(start, &via.told, to.told, motion);
-    is_another(meant, told, shift)
+    let intended = Curve::round(start, &via.intended, to.intended, motion);
+    let commanded = Curve::round(start, &via.commanded, to.commanded, motion);
+    is_another_arc(intended, commanded, shift)
 }
 
 /// Whether a circle that stays becomes another one where its start alone is corrected; also where the text does not tell its
 /// points.
-fn turned(start: &Solved, motion: &Motion, mountings: &Mountings) -> bool {
+fn changes_unmodified_arc(start: &SolvedTarget, motion: &Motion, frame_table: &FrameTable) -> bool {
     let shift = start.shift_mm();
     let pose = |target: &MotionTarget| match target.value {
         Ok(TargetValue::Cartesian(target)) => Some(target.pose()),
@@ -146,24 +151,25 @@ fn turned(start: &Solved, motion: &Motion, mountings: &Mountings) -> bool {
     let [Some(via), Some(to)] = [0, 1].map(|k| motion.targets.get(k).and_then(pose)) else {
         return shift > NEAR_MM;
     };
-    if !mountings.of_motion(motion).is_ok_and(|mounted| mounted == start.mounted) {
-        return shift > UNKNOWN_SHARE * gap(&via.translation.vector, &to.translation.vector);
+    if !frame_table.of_motion(motion).is_ok_and(|frames_index| frames_index == start.frames_index) {
+        return shift > UNKNOWN_SHARE * distance(&via.translation.vector, &to.translation.vector);
     }
-    if gap(&start.meant.translation.vector, &to.translation.vector) < CLOSED_MM {
+    if distance(&start.intended.translation.vector, &to.translation.vector) < CLOSED_MM {
         return shift > CLOSED_MM;
     }
-    let meant = Curve::round(start.meant, &via, to, motion);
+    let intended = Curve::round(start.intended, &via, to, motion);
     // Points that make no circle stop the controller as the program is.
-    meant.is_some() && is_another(meant, Curve::round(start.told, &via, to, motion), shift)
+    intended.is_some() && is_another_arc(intended, Curve::round(start.commanded, &via, to, motion), shift)
 }
 
 /// Whether a told circle is another one than was meant, where what is corrected moves by `shift` (mm).
-fn is_another(meant: Option<Curve>, told: Option<Curve>, shift: f64) -> bool {
-    let (Some(meant), Some(told)) = (meant, told) else { return true };
+fn is_another_arc(intended: Option<Curve>, commanded: Option<Curve>, shift: f64) -> bool {
+    let (Some(intended), Some(commanded)) = (intended, commanded) else { return true };
     let turn = |curve: &Curve| curve.arc().map_or(0.0, |arc| arc.sweep);
     let off = |k: u8| {
         let s = f64::from(k) / f64::from(SAMPLES);
-        meant.distance(&told.at(s), s)
+        intended.distance(&commanded.at(s), s)
     };
-    (turn(&meant) - turn(&told)).abs() > TURN_RAD || (1..SAMPLES).any(|k| off(k) > SHARE * shift + NEAR_MM)
+    (turn(&intended) - turn(&commanded)).abs() > TURN_RAD
+        || (1..SAMPLES).any(|k| off(k) > SHARE * shift + NEAR_MM)
 }

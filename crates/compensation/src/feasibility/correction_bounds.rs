@@ -2,33 +2,33 @@
 
 use crate::arms::Arms;
 use crate::options::Options;
-use crate::plan::reason::Why;
-use crate::target::solved_target::Solved;
+use crate::plan::reason::OutcomeReason;
+use crate::target::solved_target::SolvedTarget;
 
 /// Why a corrected target must not be written. `singularity`: how far its joints are from one.
 pub(crate) fn forbidden(
-    solved: &Solved,
+    solved: &SolvedTarget,
     singularity: f64,
     arms: &Arms<'_>,
     options: &Options,
-) -> Option<Why> {
+) -> Option<OutcomeReason> {
     let shift = solved.shift_mm();
     if !(shift <= options.max_correction_mm) {
-        return Some(Why::TooFar { mm: shift });
+        return Some(OutcomeReason::CorrectionTooLarge { mm: shift });
     }
-    let turn = solved.told.rotation.angle_to(&solved.meant.rotation);
-    if !(turn <= options.max_turn_rad) {
-        return Some(Why::TooMuchTurn { deg: turn.to_degrees() });
+    let turn = solved.commanded.rotation.angle_to(&solved.intended.rotation);
+    if !(turn <= options.max_rotation_rad) {
+        return Some(OutcomeReason::RotationTooLarge { deg: turn.to_degrees() });
     }
     if let Some(joint) = arms.nominal.arm().model.limits.violated(&solved.after) {
-        return Some(Why::OutsideLimits { joint });
+        return Some(OutcomeReason::OutsideLimits { joint });
     }
     if singularity < options.min_singularity {
-        return Some(Why::NearSingularity);
+        return Some(OutcomeReason::NearSingularity);
     }
     // Without branches cfx is 0 everywhere.
     if solved.cfx_before != solved.conf.cfx {
-        return Some(Why::OtherBranch);
+        return Some(OutcomeReason::OtherBranch);
     }
     None
 }

@@ -18,18 +18,23 @@ const CARE: f64 = 1.5;
 
 /// Whether no joint can leave its range on a way between two places that lie within it.
 ///
-/// `margins`: distances to the singularities there; `way`: how far the flange goes (half arm lengths and rad).
-pub(crate) fn keeps(limits: &Limits, joints: [&Joints; 2], margins: [&[f64; 3]; 2], way: f64) -> bool {
+/// `margins`: distances to the singularities there; `flange_travel`: how far the flange goes (half arm lengths and rad).
+pub(crate) fn within_limits(
+    limits: &Limits,
+    joints: [&Joints; 2],
+    margins: [&[f64; 3]; 2],
+    flange_travel: f64,
+) -> bool {
     let least = margins.iter().flat_map(|m| m.iter()).fold(f64::INFINITY, |least, m| least.min(m.abs()));
     let [a, b] = joints;
     (0..6).all(|j| {
-        let beyond = 0.5 * (RATE * way / least - (a[j] - b[j]).abs()).max(0.0);
+        let beyond = 0.5 * (RATE * flange_travel / least - (a[j] - b[j]).abs()).max(0.0);
         a[j].min(b[j]) - beyond >= limits.min_rad[j] && a[j].max(b[j]) + beyond <= limits.max_rad[j]
     })
 }
 
 /// The same of a short piece, of which the middle is known too.
-pub(crate) fn keeps_curved(limits: &Limits, [a, middle, b]: [&Joints; 3]) -> bool {
+pub(crate) fn within_limits_curved(limits: &Limits, [a, middle, b]: [&Joints; 3]) -> bool {
     (0..6).all(|j| {
         let bent = (a[j] - 2.0 * middle[j] + b[j]).abs();
         let short = (a[j] - middle[j]).abs().max((b[j] - middle[j]).abs()) < SHORT_RAD;

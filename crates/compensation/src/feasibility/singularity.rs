@@ -23,13 +23,13 @@ use rayon::prelude::*;
 use crate::arms::Arms;
 use crate::configuration::{configured, monitored};
 use crate::feasibility::joint_limits;
-use crate::frames::frame_pair::Mounting;
-use crate::frames::frame_table::Mountings;
-use crate::options::{Emit, Options, may_change};
-use crate::plan::reason::Why;
+use crate::frames::frame_pair::FramePair;
+use crate::frames::frame_table::FrameTable;
+use crate::options::{Emit, Options, is_rewritable};
+use crate::plan::reason::OutcomeReason;
 use crate::search_budget;
 use crate::segment::curve::Curve;
-use crate::target::solved_target::{Solved, SolvedTargets, as_joints};
+use crate::target::solved_target::{SolvedTarget, SolvedTargets, as_joints};
 use truegrind_arm::inverse::budget::{SearchBudget, with_budget};
 use truegrind_arm::inverse::{Inverse, InverseError};
 use truegrind_arm::model::Joints;
@@ -61,11 +61,11 @@ const SAME_RAD: f64 = 1e-6;
 const WATCHED: f64 = 20.0;
 
 /// What the controller makes of the numbers of one target.
-pub(crate) struct Replay<'a> {
+pub(crate) struct WrittenTarget<'a> {
     /// Poses of the flange that the controller computes, before and after.
     pub(crate) flanges: [Pose; 2],
     /// The latter of the numbers as they are written.
-    pub(crate) heard: &'a Pose,
+    pub(crate) read_back: &'a Pose,
     /// Its joints for them.
     pub(crate) joints: &'a Joints,
     /// The target, where its configuration counts.
@@ -74,42 +74,48 @@ pub(crate) struct Replay<'a> {
 
 /// Why a target must not be corrected, for what its joints do or because the controller takes others. `singularity`: how far
 /// the joints after are from one.
-pub(crate) fn at_target(
-    solved: &Solved,
+pub(crate) fn target_fault(
+    solved: &SolvedTarget,
     singularity: f64,
-    replay: &Replay<'_>,
+    replay: &WrittenTarget<'_>,
     arms: &Arms<'_>,
     options: &Options,
-) -> Option<Why> {
+) -> Option<OutcomeReason> {
     let [from, to] = &replay.flanges;
     let joints = [&solved.before, replay.joints];
-    if let Some(jump) = jump([from, to], joints, &arms.nominal, options) {
-        return Some(jump);
+    if let Some(joint_jump) = joint_jump([from, to], joints, &arms.nominal, options) {
+        return Some(joint_jump);
     }
     if singularity < WATCHED * options.min_singularity
         && arms.nominal.singularity(&solved.before) < options.min_singularity
     {
-        return Some(Why::NearSingularity);
+        return Some(OutcomeReason::NearSingularity);
     }
     let stated = replay.stated.filter(|stated| stated.conf[3] != solved.conf.cfx)?;
     // The quarters are written as they are; cfx is not the one of these joints, so others may fit better.
     let conf = [solved.conf.cf1, solved.conf.cf4, solved.conf.cf6, stated.conf[3]];
     let written = RobTarget { conf, ..*stated };
-    let taken = configured(&arms.nominal, replay.heard, &written, Switch::On, Some(replay.joints));
+    let taken = configured(&arms.nominal, replay.read_back, &written, Switch::On, Some(replay.joints));
     let same = taken.is_ok_and(|taken| (taken - replay.joints).amax() < SAME_RAD);
-    (!same).then_some(Why::OtherBranch)
+    (!same).then_some(OutcomeReason::OtherBranch)
 }
 
 /// The joint that a correction turns too far.
-fn jump(flanges: [&Pose; 2], joints: [&Joints; 2], nominal: &Inverse<'_>, options: &Options) -> Option<Why> {
+fn joint_jump(
+    flanges: [&Pose; 2],
+    joints: [&Joints; 2],
+    nominal: &Inverse<'_>,
+    options: &Options,
+) -> Option<OutcomeReason> {
     let change = joints[1] - joints[0];
     let joint = change.iamax();
     let turned = change[joint].abs();
-    if turned <= options.joint_free_rad {
+    if turned <= options.free_joint_change_rad {
         return None;
     }
-    let most = (options.joint_gain * way(flanges[0], flanges[1], nominal)).max(options.joint_free_rad);
-    (!(turned <= most)).then(|| Why::JointJump {
+    let most = (options.joint_gain * flange_travel(flanges[0], flanges[1], nominal))
+        .max(options.free_joint_change_rad);
+    (!(turned <= most)).then(|| OutcomeReason::JointJump {
         joint,
         deg: turned.to_degrees(),
         most_deg: most.to_degrees(),
@@ -117,23 +123,24 @@ fn jump(flanges: [&Pose; 2], joints: [&Joints; 2], nominal: &Inverse<'_>, option
     })
 }
 
-/// Whether a target that is put in turns a joint too far against where the arm stands with the program as it is. `meant`
-/// and `told`: the poses in the work object.
-pub(crate) fn leaps(
-    [meant, told]: [&Pose; 2],
+/// Whether a target that is put in turns a joint too far against where the arm stands with the program as it is. `intended`
+/// and `commanded`: the poses in the work object.
+pub(crate) fn jumps_joint(
+    [intended, commanded]: [&Pose; 2],
     joints: &Joints,
-    mounting: &Mounting,
+    mounting: &FramePair,
     arms: &Arms<'_>,
     options: &Options,
 ) -> bool {
-    let [meant, told] = [meant, told].map(|pose| mounting.flange_for(pose));
-    let before = arms.nominal.solve_near(&meant, joints);
-    before
-        .is_ok_and(|before| jump([&meant, &told], [&before.joints, joints], &arms.nominal, options).is_some())
+    let [intended, commanded] = [intended, commanded].map(|pose| mounting.flange_for(pose));
+    let before = arms.nominal.solve_near(&intended, joints);
+    before.is_ok_and(|before| {
+        joint_jump([&intended, &commanded], [&before.joints, joints], &arms.nominal, options).is_some()
+    })
 }
 
 /// How far a pose is from another: the shift over half an arm's length, and the turn (rad).
-fn way(from: &Pose, to: &Pose, nominal: &Inverse<'_>) -> f64 {
+fn flange_travel(from: &Pose, to: &Pose, nominal: &Inverse<'_>) -> f64 {
     let shift = (to.translation.vector - from.translation.vector).norm();
     shift / nominal.length_mm() + from.rotation.angle_to(&to.rotation)
 }
@@ -142,22 +149,23 @@ fn way(from: &Pose, to: &Pose, nominal: &Inverse<'_>) -> f64 {
 ///
 /// `stays`: absent, all motions are looked at as if each corrected one stood beside corrected ones; present, those that
 /// start where a motion stays, in the order of the program.
-pub(crate) fn forbid_ways(
+pub(crate) fn forbid_segments(
     listing: &Listing,
     solved: &mut SolvedTargets,
-    mountings: &Mountings,
+    frame_table: &FrameTable,
     arms: &Arms<'_>,
     options: &Options,
-    stays: Option<&BTreeMap<u32, Why>>,
+    stays: Option<&BTreeMap<u32, OutcomeReason>>,
     budget: &mut SearchBudget,
 ) -> bool {
     let none = BTreeMap::new();
-    let mut ways = Ways { listing, solved, left: stays.unwrap_or(&none), mountings, arms, options };
+    let mut ways =
+        SegmentChecker { listing, solved, left: stays.unwrap_or(&none), frame_table, arms, options };
     let found = match stays {
         None => ways.forbid_each(),
         Some(stays) => stays.keys().map(|motion| *motion as usize).collect(),
     };
-    ways.forbid_behind(&found, budget) || (stays.is_none() && !found.is_empty())
+    ways.forbid_after_unchanged(&found, budget) || (stays.is_none() && !found.is_empty())
 }
 
 /// Suspect motions that one thread takes at a time.
@@ -169,20 +177,20 @@ const SAMPLES: usize = 300_000;
 const SAMPLES_EACH: usize = 2;
 
 /// The ways between the targets of a program.
-struct Ways<'a> {
+struct SegmentChecker<'a> {
     listing: &'a Listing,
     solved: &'a mut SolvedTargets,
     /// Motions that stay although their targets could be corrected.
-    left: &'a BTreeMap<u32, Why>,
-    mountings: &'a Mountings,
+    left: &'a BTreeMap<u32, OutcomeReason>,
+    frame_table: &'a FrameTable,
     arms: &'a Arms<'a>,
     options: &'a Options,
 }
 
 /// Where a motion starts.
-struct From {
-    mounted: usize,
-    told: Pose,
+struct SegmentStart {
+    frames_index: usize,
+    commanded: Pose,
     /// Before and after.
     joints: [Joints; 2],
     /// After.
@@ -198,20 +206,21 @@ fn margins(branches: [f64; 3], joints: &Joints, nominal: &Inverse<'_>) -> [f64; 
     if branches == [1.0; 3] { [nominal.singularity(joints) * WITHOUT_BRANCHES; 3] } else { branches }
 }
 
-impl Ways<'_> {
+impl SegmentChecker<'_> {
     /// All motions side by side; hands back those that are forbidden.
     fn forbid_each(&mut self) -> HashSet<usize> {
         let count = self.listing.motions.len();
-        let found: Vec<(usize, Why)> = {
+        let found: Vec<(usize, OutcomeReason)> = {
             let here = &*self;
-            let suspects: Vec<usize> = (0..count).into_par_iter().filter(|m| here.suspect(*m)).collect();
+            let suspects: Vec<usize> = (0..count).into_par_iter().filter(|m| here.needs_check(*m)).collect();
             let samples = here.samples(suspects.len());
             let whole = SearchBudget::of(search_budget::WAYS);
             let found =
                 search_budget::shared_out(whole, suspects.len().div_ceil(PORTION), |portion, budget| {
-                    let judge = |motion: &usize| Some((*motion, here.judge(*motion, samples, budget)?));
+                    let segment_fault =
+                        |motion: &usize| Some((*motion, here.segment_fault(*motion, samples, budget)?));
                     let mine = suspects.iter().skip(portion * PORTION).take(PORTION);
-                    mine.filter_map(judge).collect::<Vec<_>>()
+                    mine.filter_map(segment_fault).collect::<Vec<_>>()
                 });
             found.into_iter().flatten().collect()
         };
@@ -228,16 +237,20 @@ impl Ways<'_> {
     }
 
     /// In order, those that start where another one stays; whether any is forbidden.
-    fn forbid_behind(&mut self, staying: &HashSet<usize>, budget: &mut SearchBudget) -> bool {
-        let mut stay = staying.clone();
-        let samples = self.samples(staying.len());
+    fn forbid_after_unchanged(
+        &mut self,
+        unchanged_motions: &HashSet<usize>,
+        budget: &mut SearchBudget,
+    ) -> bool {
+        let mut stay = unchanged_motions.clone();
+        let samples = self.samples(unchanged_motions.len());
         let mut found = false;
         let mut open = HashSet::new();
         for motion in 0..self.listing.motions.len() {
-            if self.ends_open(motion, &open) {
+            if self.leaves_branch_ambiguous(motion, &open) {
                 open.insert(motion);
                 if self.corrected(motion).is_some() && !self.left.contains_key(&(motion as u32)) {
-                    self.solved.forbid(motion, Why::OpenBranch);
+                    self.solved.forbid(motion, OutcomeReason::AmbiguousBranch);
                     stay.insert(motion);
                     found = true;
                 }
@@ -248,17 +261,19 @@ impl Ways<'_> {
             };
             if stay.contains(&previous)
                 && !self.left.contains_key(&(motion as u32))
-                && let Some(why) = self.judge(motion, samples, budget)
+                && let Some(why) = self.segment_fault(motion, samples, budget)
             {
                 self.solved.forbid(motion, why);
                 stay.insert(motion);
                 found = true;
             }
-            if let Some(why) = self.leads_astray(motion, samples, budget) {
+            if let Some(why) = self.endangers_unchanged(motion, samples, budget) {
                 let line = self.listing.motions[motion].place.line;
                 let why = match why {
-                    Why::WayOutsideLimits { joint } => Why::BeforeLimitedWay { line, joint },
-                    _ => Why::BeforeSingularWay { line },
+                    OutcomeReason::PathOutsideLimits { joint } => {
+                        OutcomeReason::StartOfLimitedPath { line, joint }
+                    }
+                    _ => OutcomeReason::StartOfSingularPath { line },
                 };
                 self.solved.forbid(previous, why);
                 stay.insert(previous);
@@ -270,7 +285,7 @@ impl Ways<'_> {
 
     /// Whether the text leaves open to which of several solutions a motion leads: no configuration is checked there for
     /// certain, and it goes on from where that is `open`, or is one of those for which it is.
-    fn ends_open(&self, index: usize, open: &HashSet<usize>) -> bool {
+    fn leaves_branch_ambiguous(&self, index: usize, open: &HashSet<usize>) -> bool {
         let motion = &self.listing.motions[index];
         let pose = |target: &MotionTarget| matches!(target.value, Ok(TargetValue::Cartesian(_)));
         if monitored(motion) == Switch::On || !motion.to().is_some_and(pose) {
@@ -278,31 +293,36 @@ impl Ways<'_> {
         }
         let goes_on = motion.previous.is_some_and(|previous| open.contains(&(previous as usize)));
         let forbidden = self.solved.of(index).last().and_then(|to| to.as_ref().ok()?.forbidden);
-        if goes_on || forbidden == Some(Why::OpenBranch) {
+        if goes_on || forbidden == Some(OutcomeReason::AmbiguousBranch) {
             return true;
         }
         // A motion that stays for another reason has not been asked yet.
         if self.corrected(index).is_some() && !self.left.contains_key(&(index as u32)) {
             return false;
         }
-        match (self.solved.end_as_it_is(index), self.from(motion)) {
+        match (self.solved.original_end(index), self.from(motion)) {
             (None, _) => false,
             (Some(end), None) => end.margins.iter().any(|margin| margin.abs() < OPEN),
             (Some(end), Some(from)) => {
                 motion.kind == MotionKind::Joint
-                    && self.not_nearest(&from.joints[1], end.mounted, &end.meant, &end.joints)
+                    && self.not_nearest(&from.joints[1], end.frames_index, &end.intended, &end.joints)
             }
         }
     }
 
     /// Why a motion that stays must not start where another one is corrected: its way would come too close to a singularity
     /// from there, or a joint leave its range.
-    fn leads_astray(&self, index: usize, samples: usize, budget: &mut SearchBudget) -> Option<Why> {
+    fn endangers_unchanged(
+        &self,
+        index: usize,
+        samples: usize,
+        budget: &mut SearchBudget,
+    ) -> Option<OutcomeReason> {
         let left = Cell::new(samples);
-        with_budget(budget, || self.strayed_way(index, &left))
+        with_budget(budget, || self.unchanged_segment_fault(index, &left))
     }
 
-    fn strayed_way(&self, index: usize, samples: &Cell<usize>) -> Option<Why> {
+    fn unchanged_segment_fault(&self, index: usize, samples: &Cell<usize>) -> Option<OutcomeReason> {
         let motion = &self.listing.motions[index];
         let stays = self.left.contains_key(&(index as u32)) || self.corrected(index).is_none();
         let curve = matches!(motion.kind, MotionKind::Linear | MotionKind::Circular);
@@ -310,12 +330,12 @@ impl Ways<'_> {
             return None;
         }
         let from = self.from(motion).filter(|from| from.corrected)?;
-        let targets = self.solved.as_it_is(index);
+        let targets = self.solved.original_targets(index);
         let to = targets.last()?;
         let nominal = &self.arms.nominal;
-        let told = self.mountings.list[to.mounted].told;
-        let start = from.joints.map(|joints| told.target_of(&nominal.arm().forward(&joints)));
-        let far = way(&start[1], &to.meant, nominal) * LEVER;
+        let commanded = self.frame_table.list[to.frames_index].commanded;
+        let start = from.joints.map(|joints| commanded.target_of(&nominal.arm().forward(&joints)));
+        let far = flange_travel(&start[1], &to.intended, nominal) * LEVER;
         let end = margins(to.margins, &to.joints, nominal);
         if motion.kind == MotionKind::Linear
             && self.free([&from.joints[1], &to.joints], [&from.margins, &end], far)
@@ -323,42 +343,50 @@ impl Ways<'_> {
             return None;
         }
         let curves = match (motion.kind, targets.as_slice()) {
-            (MotionKind::Linear, _) => start.map(|start| Curve::line(start, to.meant)),
+            (MotionKind::Linear, _) => start.map(|start| Curve::line(start, to.intended)),
             (_, [via, _]) => {
-                let round = |start| Curve::round(start, &via.meant, to.meant, motion);
+                let round = |start| Curve::round(start, &via.intended, to.intended, motion);
                 [round(start[0])?, round(start[1])?]
             }
             _ => return None,
         };
-        let cost = cost(&curves[1], &told, nominal);
-        let walk = Walk { nominal, told, curves, cost, samples, options: self.options };
+        let cost = cost(&curves[1], &commanded, nominal);
+        let walk = PathCheck { nominal, commanded, curves, cost, samples, options: self.options };
         walk.between(&walk.reached(0.0, from.joints[1]), &walk.reached(1.0, to.joints))
     }
 
     /// The motion with its last target, if it is to be corrected.
-    fn corrected(&self, index: usize) -> Option<(&Motion, &Solved)> {
+    fn corrected(&self, index: usize) -> Option<(&Motion, &SolvedTarget)> {
         let motion = &self.listing.motions[index];
-        let all = |solved: &Result<Solved, Why>| solved.as_ref().is_ok_and(|s| s.forbidden.is_none());
+        let all = |solved: &Result<SolvedTarget, OutcomeReason>| {
+            solved.as_ref().is_ok_and(|s| s.forbidden.is_none())
+        };
         let targets = self.solved.of(index);
         let to = targets.last()?.as_ref().ok()?;
-        (may_change(motion, self.options) && targets.iter().all(all)).then_some((motion, to))
+        (is_rewritable(motion, self.options) && targets.iter().all(all)).then_some((motion, to))
     }
 
     /// Where a motion starts, if that is known.
-    fn from(&self, motion: &Motion) -> Option<From> {
+    fn from(&self, motion: &Motion) -> Option<SegmentStart> {
         let previous = motion.previous?;
         let nominal = &self.arms.nominal;
         let corrected = self.corrected(previous as usize).is_some() && !self.left.contains_key(&previous);
         if let (true, Some(Ok(end))) = (corrected, self.solved.of(previous as usize).last()) {
             let margins = margins(end.margins[1], &end.after, nominal);
             let joints = [end.before, end.after];
-            return Some(From { mounted: end.mounted, told: end.told, joints, margins, corrected });
+            return Some(SegmentStart {
+                frames_index: end.frames_index,
+                commanded: end.commanded,
+                joints,
+                margins,
+                corrected,
+            });
         }
-        let end = self.solved.end_as_it_is(previous as usize)?;
+        let end = self.solved.original_end(previous as usize)?;
         let margins = margins(end.margins, &end.joints, nominal);
-        Some(From {
-            mounted: end.mounted,
-            told: end.meant,
+        Some(SegmentStart {
+            frames_index: end.frames_index,
+            commanded: end.intended,
             joints: [end.joints; 2],
             margins,
             corrected: false,
@@ -366,7 +394,7 @@ impl Ways<'_> {
     }
 
     /// Whether the way of a motion, or the choice of its configuration, needs a closer look.
-    fn suspect(&self, index: usize) -> bool {
+    fn needs_check(&self, index: usize) -> bool {
         let Some((motion, to)) = self.corrected(index) else { return false };
         let from = self.from(motion);
         let open = self.written(motion) && monitored(motion) != Switch::On;
@@ -381,18 +409,19 @@ impl Ways<'_> {
         }
         // The told way of a circle is longer than between its ends.
         motion.kind == MotionKind::Circular
-            || from.mounted != to.mounted
+            || from.frames_index != to.frames_index
             || !self.free(
                 [&from.joints[1], &to.after],
                 [&there, &here],
-                way(&from.told, &to.told, &self.arms.nominal) * LEVER,
+                flange_travel(&from.commanded, &to.commanded, &self.arms.nominal) * LEVER,
             )
     }
 
     /// Whether nothing can happen on a way between these joints.
-    fn free(&self, joints: [&Joints; 2], margins: [&[f64; 3]; 2], way: f64) -> bool {
+    fn free(&self, joints: [&Joints; 2], margins: [&[f64; 3]; 2], flange_travel: f64) -> bool {
         let limits = &self.arms.nominal.arm().model.limits;
-        clear(margins[0], margins[1], way) && joint_limits::keeps(limits, joints, margins, way)
+        clear(margins[0], margins[1], flange_travel)
+            && joint_limits::within_limits(limits, joints, margins, flange_travel)
     }
 
     /// Whether the end is written as a pose.
@@ -411,55 +440,70 @@ impl Ways<'_> {
 
     /// Why a motion must not be corrected for its way, or for the choice of its configuration; also where that could not be
     /// looked at to the end.
-    fn judge(&self, index: usize, samples: usize, budget: &mut SearchBudget) -> Option<Why> {
-        if !self.suspect(index) {
+    fn segment_fault(
+        &self,
+        index: usize,
+        samples: usize,
+        budget: &mut SearchBudget,
+    ) -> Option<OutcomeReason> {
+        if !self.needs_check(index) {
             return None;
         }
         let left = Cell::new(samples);
-        let found = with_budget(budget, || self.judged(index, &left));
+        let found = with_budget(budget, || self.segment_fault_within(index, &left));
         let unfinished = budget.exhausted || (left.get() == 0 && samples < MOST_SAMPLES);
-        if unfinished { Some(Why::Inverse(InverseError::Abandoned)) } else { found }
+        if unfinished { Some(OutcomeReason::Inverse(InverseError::Abandoned)) } else { found }
     }
 
-    fn judged(&self, index: usize, samples: &Cell<usize>) -> Option<Why> {
+    fn segment_fault_within(&self, index: usize, samples: &Cell<usize>) -> Option<OutcomeReason> {
         let (motion, to) = self.corrected(index)?;
         let open = self.written(motion) && monitored(motion) != Switch::On;
         let Some(from) = self.from(motion) else {
-            return (open && to.margins[1].iter().any(|m| m.abs() < OPEN)).then_some(Why::OpenBranch);
+            return (open && to.margins[1].iter().any(|m| m.abs() < OPEN))
+                .then_some(OutcomeReason::AmbiguousBranch);
         };
         if open && motion.kind == MotionKind::Joint {
-            let another = self.not_nearest(&from.joints[1], to.mounted, &to.told, &to.after);
-            return another.then_some(Why::OpenBranch);
+            let another = self.not_nearest(&from.joints[1], to.frames_index, &to.commanded, &to.after);
+            return another.then_some(OutcomeReason::AmbiguousBranch);
         }
         // With SingArea \Wrist the wrist goes in joints, past its singularity.
         if !self.curve(motion) || motion.modal.wrist_interpolation == Switch::On {
             return None;
         }
-        let told = self.mountings.list[to.mounted].told;
-        let start = from.joints.map(|joints| told.target_of(&self.arms.nominal.arm().forward(&joints)));
+        let commanded = self.frame_table.list[to.frames_index].commanded;
+        let start = from.joints.map(|joints| commanded.target_of(&self.arms.nominal.arm().forward(&joints)));
         let curves = match (motion.kind, self.solved.of(index)) {
-            (MotionKind::Linear, _) => [Curve::line(start[0], to.meant), Curve::line(start[1], to.told)],
+            (MotionKind::Linear, _) => {
+                [Curve::line(start[0], to.intended), Curve::line(start[1], to.commanded)]
+            }
             (_, [Ok(via), _]) => [
-                Curve::round(start[0], &via.meant, to.meant, motion)?,
-                Curve::round(start[1], &via.told, to.told, motion)?,
+                Curve::round(start[0], &via.intended, to.intended, motion)?,
+                Curve::round(start[1], &via.commanded, to.commanded, motion)?,
             ],
             _ => return None,
         };
-        let cost = cost(&curves[1], &told, &self.arms.nominal);
-        let walk = Walk { nominal: &self.arms.nominal, told, curves, cost, samples, options: self.options };
+        let cost = cost(&curves[1], &commanded, &self.arms.nominal);
+        let walk = PathCheck {
+            nominal: &self.arms.nominal,
+            commanded,
+            curves,
+            cost,
+            samples,
+            options: self.options,
+        };
         let begin = walk.reached(0.0, from.joints[1]);
         let end = walk.reached(1.0, to.after);
         walk.between(&begin, &end)
     }
 
     /// Whether another solution is as near to where a joint motion starts as the one that was meant.
-    fn not_nearest(&self, near: &Joints, mounted: usize, told: &Pose, joints: &Joints) -> bool {
-        let flange = self.mountings.list[mounted].told.flange_for(told);
+    fn not_nearest(&self, near: &Joints, frames_index: usize, commanded: &Pose, joints: &Joints) -> bool {
+        let flange = self.frame_table.list[frames_index].commanded.flange_for(commanded);
         let distance = |joints: &Joints| [(joints - near).norm(), (joints - near).amax()];
-        let [meant, meant_most] = distance(joints);
+        let [intended, meant_most] = distance(joints);
         self.arms.nominal.solve_all_branches(&flange, near).iter().any(|other| {
             let [far, most] = distance(other);
-            (other - joints).amax() > SAME && (far <= meant || most <= meant_most)
+            (other - joints).amax() > SAME && (far <= intended || most <= meant_most)
         })
     }
 }
@@ -482,23 +526,24 @@ fn alone(margins: &[f64; 3]) -> f64 {
 const LONE: f64 = 0.28;
 
 /// Whether a piece of a way with these margins at its ends keeps clear of singularities.
-fn clear(from: &[f64; 3], to: &[f64; 3], way: f64) -> bool {
+fn clear(from: &[f64; 3], to: &[f64; 3], flange_travel: f64) -> bool {
     (0..3).all(|k| {
-        (from[k] < 0.0) == (to[k] < 0.0) && from[k].abs() + to[k].abs() - STEEP * way > 2.0 * CLEAR[k]
+        (from[k] < 0.0) == (to[k] < 0.0)
+            && from[k].abs() + to[k].abs() - STEEP * flange_travel > 2.0 * CLEAR[k]
     })
 }
 
-/// Length of a curve as the flange goes it (see [`way`]), from eight pieces.
-fn cost(curve: &Curve, told: &Mounting, nominal: &Inverse<'_>) -> f64 {
+/// Length of a curve as the flange goes it (see [`flange_travel`]), from eight pieces.
+fn cost(curve: &Curve, commanded: &FramePair, nominal: &Inverse<'_>) -> f64 {
     const PIECES: usize = 8;
-    let at = |k: usize| told.flange_for(&curve.at(k as f64 / PIECES as f64));
-    (0..PIECES).map(|k| way(&at(k), &at(k + 1), nominal)).sum()
+    let at = |k: usize| commanded.flange_for(&curve.at(k as f64 / PIECES as f64));
+    (0..PIECES).map(|k| flange_travel(&at(k), &at(k + 1), nominal)).sum()
 }
 
 /// One corrected way, beside the one of the program as it is.
-struct Walk<'a> {
+struct PathCheck<'a> {
     nominal: &'a Inverse<'a>,
-    told: Mounting,
+    commanded: FramePair,
     /// As it is, and as it is told.
     curves: [Curve; 2],
     /// See [`cost`].
@@ -509,55 +554,63 @@ struct Walk<'a> {
 }
 
 /// Why a way ends where it has no joints.
-fn nowhere(error: InverseError) -> Why {
+fn nowhere(error: InverseError) -> OutcomeReason {
     match error {
-        InverseError::OutsideLimits { joint, .. } => Why::WayOutsideLimits { joint },
-        _ => Why::SingularWay,
+        InverseError::OutsideLimits { joint, .. } => OutcomeReason::PathOutsideLimits { joint },
+        _ => OutcomeReason::SingularPath,
     }
 }
 
 /// A place on the corrected way.
-struct Place {
+struct PathSample {
     share: f64,
     joints: Joints,
     margins: [f64; 3],
 }
 
-impl Walk<'_> {
-    fn reached(&self, share: f64, joints: Joints) -> Place {
+impl PathCheck<'_> {
+    fn reached(&self, share: f64, joints: Joints) -> PathSample {
         let margins = match self.nominal.has_branches() {
             true => self.nominal.branch_margins(&joints),
             false => [self.nominal.singularity(&joints) * WITHOUT_BRANCHES; 3],
         };
-        Place { share, joints, margins }
+        PathSample { share, joints, margins }
     }
 
     /// Why a piece of the way must not be gone.
-    fn between(&self, a: &Place, b: &Place) -> Option<Why> {
-        let way = (b.share - a.share) * self.cost;
+    fn between(&self, a: &PathSample, b: &PathSample) -> Option<OutcomeReason> {
+        let flange_travel = (b.share - a.share) * self.cost;
         let least = a.margins.iter().chain(&b.margins).fold(f64::INFINITY, |least, m| least.min(m.abs()));
         let crosses = (0..3).any(|k| (a.margins[k] < 0.0) != (b.margins[k] < 0.0));
-        let regular = clear(&a.margins, &b.margins, way) || (!crosses && way < SHARP * least);
+        let regular =
+            clear(&a.margins, &b.margins, flange_travel) || (!crosses && flange_travel < SHARP * least);
         let limits = &self.nominal.arm().model.limits;
-        let keeps = || joint_limits::keeps(limits, [&a.joints, &b.joints], [&a.margins, &b.margins], way);
-        if way < FINEST || (regular && keeps()) || self.samples.get() == 0 {
-            return crosses.then_some(Why::SingularWay);
+        let keeps = || {
+            joint_limits::within_limits(
+                limits,
+                [&a.joints, &b.joints],
+                [&a.margins, &b.margins],
+                flange_travel,
+            )
+        };
+        if flange_travel < FINEST || (regular && keeps()) || self.samples.get() == 0 {
+            return crosses.then_some(OutcomeReason::SingularPath);
         }
         self.samples.set(self.samples.get() - 1);
         let middle = match self.place(0.5 * (a.share + b.share), a) {
             Ok(middle) => middle,
             Err(why) => return why,
         };
-        if regular && joint_limits::keeps_curved(limits, [&a.joints, &middle.joints, &b.joints]) {
+        if regular && joint_limits::within_limits_curved(limits, [&a.joints, &middle.joints, &b.joints]) {
             return None;
         }
         self.between(a, &middle).or_else(|| self.between(&middle, b))
     }
 
     /// A place on the way, reached from one nearby; else what is to be said of the way.
-    fn place(&self, share: f64, near: &Place) -> Result<Place, Option<Why>> {
-        let [meant, flange] = [0, 1].map(|k| self.told.flange_for(&self.curves[k].at(share)));
-        let before = || self.nominal.solve_near(&meant, &near.joints).ok();
+    fn place(&self, share: f64, near: &PathSample) -> Result<PathSample, Option<OutcomeReason>> {
+        let [intended, flange] = [0, 1].map(|k| self.commanded.flange_for(&self.curves[k].at(share)));
+        let before = || self.nominal.solve_near(&intended, &near.joints).ok();
         let solution = match self.nominal.solve_near(&flange, &near.joints) {
             Ok(solution) => solution,
             // Where the program as it is cannot go either, the bend of the way says so.
@@ -568,13 +621,14 @@ impl Walk<'_> {
             return Ok(place);
         }
         if self.nominal.singularity(&place.joints) < self.options.min_singularity {
-            return Err(Some(Why::SingularWay));
+            return Err(Some(OutcomeReason::SingularPath));
         }
-        let jumped = before()
-            .and_then(|s| jump([&meant, &flange], [&s.joints, &place.joints], self.nominal, self.options));
+        let jumped = before().and_then(|s| {
+            joint_jump([&intended, &flange], [&s.joints, &place.joints], self.nominal, self.options)
+        });
         match jumped {
-            Some(Why::JointJump { joint, deg, most_deg, .. }) => {
-                Err(Some(Why::JointJump { joint, deg, most_deg, on_the_way: true }))
+            Some(OutcomeReason::JointJump { joint, deg, most_deg, .. }) => {
+                Err(Some(OutcomeReason::JointJump { joint, deg, most_deg, on_the_way: true }))
             }
             _ => Ok(place),
         }

@@ -5,13 +5,13 @@ use std::collections::BTreeMap;
 use crate::arms::Arms;
 use crate::cut::{self, Cuts};
 use crate::deviation::Status;
-use crate::feasibility::arc_feasibility::strayed;
-use crate::feasibility::singularity::forbid_ways;
-use crate::frames::frame_table::Mountings;
+use crate::feasibility::arc_feasibility::infeasible_arcs;
+use crate::feasibility::singularity::forbid_segments;
+use crate::frames::frame_table::FrameTable;
 use crate::options::Options;
-use crate::plan::reason::Why;
+use crate::plan::reason::OutcomeReason;
 use crate::search_budget;
-use crate::target::solved_target::{Solved, SolvedTargets};
+use crate::target::solved_target::{SolvedTarget, SolvedTargets};
 use truegrind_arm::inverse::InverseError;
 use truegrind_arm::inverse::budget::SearchBudget;
 use truegrind_programs::motion::{Listing, MotionKind, Reason};
@@ -19,25 +19,25 @@ use truegrind_programs::motion::{Listing, MotionKind, Reason};
 /// The motions whose targets could be corrected and that stay all the same, with the reason: what the writer refused,
 /// circles that would become others, and the rest of a cut of which a part stays; ways past a singularity are forbidden
 /// among the targets. What stays moves the start of what follows, so each may bring about another, until none does.
-pub(crate) fn staying(
+pub(crate) fn unchanged_motions(
     listing: &Listing,
     solved: &mut SolvedTargets,
-    mountings: &Mountings,
+    frame_table: &FrameTable,
     arms: &Arms<'_>,
     options: &Options,
-    refused: &BTreeMap<u32, Why>,
-) -> BTreeMap<u32, Why> {
+    refused: &BTreeMap<u32, OutcomeReason>,
+) -> BTreeMap<u32, OutcomeReason> {
     let mut stays = refused.clone();
     let cuts = cut::of(listing);
     // For ways that start where another motion stays, over all rounds.
     let mut budget = SearchBudget::of(search_budget::WAYS);
-    let mut forbidden = forbid_ways(listing, solved, mountings, arms, options, None, &mut budget);
+    let mut forbidden = forbid_segments(listing, solved, frame_table, arms, options, None, &mut budget);
     let mut rounds = (MOST_VISITS / listing.motions.len().max(1)).clamp(FEWEST_ROUNDS, MOST_ROUNDS);
     loop {
         let before = stays.len();
-        stays.extend(strayed(listing, solved, mountings, options, &stays));
+        stays.extend(infeasible_arcs(listing, solved, frame_table, options, &stays));
         let solved_so_far = &*solved;
-        let kept = |motion: u32| obstacle(motion, listing, solved_so_far, options, &stays);
+        let kept = |motion: u32| blocking_reason(motion, listing, solved_so_far, options, &stays);
         let more = match options.cuts {
             Cuts::Whole => cut::rest_of_cuts(listing, &cuts, &kept),
             Cuts::Partial => cut::steps(listing, &cuts, &kept, options.tolerance_mm, &|motion| {
@@ -45,7 +45,7 @@ pub(crate) fn staying(
                     .of(motion as usize)
                     .last()
                     .and_then(|to| to.as_ref().ok())
-                    .map_or(0.0, Solved::shift_mm)
+                    .map_or(0.0, SolvedTarget::shift_mm)
             }),
             Cuts::Single => Vec::new(),
         };
@@ -60,7 +60,7 @@ pub(crate) fn staying(
             stays.extend(all.filter(|m| !stays.contains_key(m)).map(|m| (m, ABANDONED)).collect::<Vec<_>>());
             return stays;
         }
-        forbidden = forbid_ways(listing, solved, mountings, arms, options, Some(&stays), &mut budget);
+        forbidden = forbid_segments(listing, solved, frame_table, arms, options, Some(&stays), &mut budget);
     }
 }
 
@@ -70,43 +70,43 @@ const MOST_VISITS: usize = 4_000_000;
 const FEWEST_ROUNDS: usize = 16;
 /// More are never made: cut after cut would stay, each for the one before it.
 const MOST_ROUNDS: usize = 1000;
-const ABANDONED: Why = Why::Inverse(InverseError::Abandoned);
+const ABANDONED: OutcomeReason = OutcomeReason::Inverse(InverseError::Abandoned);
 
 /// Why a motion stays as it is, first what the text does not tell, then what no arm reaches; `None` where it is corrected.
-pub(crate) fn obstacle(
+pub(crate) fn blocking_reason(
     index: u32,
     listing: &Listing,
     solved: &SolvedTargets,
     options: &Options,
-    stays: &BTreeMap<u32, Why>,
-) -> Option<(Status, Why)> {
+    stays: &BTreeMap<u32, OutcomeReason>,
+) -> Option<(Status, OutcomeReason)> {
     let motion = &listing.motions[index as usize];
     if let Some(reason) = motion.left {
-        let why = Why::Program(reason);
+        let why = OutcomeReason::Program(reason);
         return Some((unchanged(why), why));
     }
     let targets = solved.of(index as usize);
     let errors = || targets.iter().filter_map(|target| target.as_ref().err().copied());
-    let unknown = errors().find(|why| matches!(why, Why::Program(_)));
+    let unknown = errors().find(|why| matches!(why, OutcomeReason::Program(_)));
     if let Some(why) = unknown.or_else(|| errors().next()) {
         return Some((unchanged(why), why));
     }
     if targets.is_empty() {
-        return Some((Status::Left, Why::Program(Reason::ExternalOnly)));
+        return Some((Status::Left, OutcomeReason::Program(Reason::ExternalOnly)));
     }
     if motion.kind == MotionKind::AbsoluteJoint && !options.joint_targets {
-        return Some((Status::Left, Why::JointTarget));
+        return Some((Status::Left, OutcomeReason::JointTarget));
     }
     let forbidden = targets.iter().find_map(|target| target.as_ref().ok().and_then(|s| s.forbidden));
     let why = forbidden.or_else(|| stays.get(&index).copied())?;
-    Some((if matches!(why, Why::Risk { .. }) { Status::Left } else { Status::Refused }, why))
+    Some((if matches!(why, OutcomeReason::Risk { .. }) { Status::Left } else { Status::Refused }, why))
 }
 
 /// What a motion is that stays as it is: left where the text does not tell enough, refused where what it says cannot be.
-fn unchanged(why: Why) -> Status {
+fn unchanged(why: OutcomeReason) -> Status {
     match why {
-        Why::Program(Reason::BeyondReach | Reason::NumberRange) => Status::Refused,
-        Why::Program(_) => Status::Left,
+        OutcomeReason::Program(Reason::BeyondReach | Reason::NumberRange) => Status::Refused,
+        OutcomeReason::Program(_) => Status::Left,
         _ => Status::Refused,
     }
 }

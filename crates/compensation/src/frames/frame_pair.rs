@@ -12,7 +12,7 @@ use truegrind_programs::motion::{Tool, ToolValue, WorkObject, WorkObjectValue};
 
 /// Frames between flange and target, for either kind of cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Mounting {
+pub(crate) struct FramePair {
     /// The tool on the flange, or in the world for a tool that stands.
     pub(crate) tool: Pose,
     /// The work object in the base, or on the flange where the robot holds the part.
@@ -21,7 +21,7 @@ pub(crate) struct Mounting {
     pub(crate) holds_part: bool,
 }
 
-impl Mounting {
+impl FramePair {
     /// Where the flange must be for a target in the work object.
     pub(crate) fn flange_for(&self, object_from_tool: &Pose) -> Pose {
         if self.holds_part {
@@ -53,11 +53,11 @@ impl Mounting {
 
 /// A mounting as told and as true, with what was assumed.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Mounted {
+pub(crate) struct ResolvedFrames {
     /// As the controller holds it.
-    pub told: Mounting,
+    pub commanded: FramePair,
     /// As it is, as far as is known.
-    pub real: Mounting,
+    pub real: FramePair,
     /// How a taught work object moves with the arm's parameters; absent for any other.
     pub carried: Option<RegisteredFrame>,
     /// What was assumed, one sentence each.
@@ -65,7 +65,7 @@ pub(crate) struct Mounted {
 }
 
 /// What a mounting is worked out from.
-pub(crate) struct Mounts<'a> {
+pub(crate) struct ResolveContext<'a> {
     pub(crate) teaching: &'a Teaching<'a>,
     pub(crate) knowledge: Option<&'a Estimated>,
     /// The inverse of the nominal arm.
@@ -81,9 +81,9 @@ pub(crate) struct Mounts<'a> {
 pub(crate) fn mount(
     (tool, tool_value): (&Tool, &ToolValue),
     (object, object_value): (&WorkObject, &WorkObjectValue),
-    with: &Mounts<'_>,
-) -> Result<Mounted, String> {
-    let told = Mounting {
+    with: &ResolveContext<'_>,
+) -> Result<ResolvedFrames, String> {
+    let commanded = FramePair {
         tool: tool_value.frame.pose(),
         object: object_value.user_frame.pose() * object_value.object_frame.pose(),
         holds_part: object_value.robhold,
@@ -91,13 +91,15 @@ pub(crate) fn mount(
     let teaching = with.teaching;
     let real_tool = teaching.tool(tool, tool_value)?;
     let real_object = teaching.object(object, object_value)?;
-    let real = Mounting { tool: real_tool.pose, object: real_object.pose, ..told };
-    let notes =
-        [tool_note(tool, &real_tool, &told, with), object_note(object, &real, &told, &real_object, with)];
+    let real = FramePair { tool: real_tool.pose, object: real_object.pose, ..commanded };
+    let notes = [
+        tool_note(tool, &real_tool, &commanded, with),
+        object_note(object, &real, &commanded, &real_object, with),
+    ];
     // A frame on the flange stays with the arm: it has no place of its own in the base.
-    let taught = real_object.taught.filter(|_| !told.holds_part);
+    let taught = real_object.taught.filter(|_| !commanded.holds_part);
     let carried = taught.zip(with.knowledge).and_then(|(t, k)| carried_frame(k, teaching.estimated, &t));
-    Ok(Mounted { told, real, carried, notes: notes.into_iter().flatten().collect() })
+    Ok(ResolvedFrames { commanded, real, carried, notes: notes.into_iter().flatten().collect() })
 }
 
 fn built_in(name: &str) -> bool {
@@ -105,7 +107,12 @@ fn built_in(name: &str) -> bool {
 }
 
 /// What was assumed of a tool.
-fn tool_note(tool: &Tool, real: &RealTool, told: &Mounting, with: &Mounts<'_>) -> Option<String> {
+fn tool_note(
+    tool: &Tool,
+    real: &RealTool,
+    commanded: &FramePair,
+    with: &ResolveContext<'_>,
+) -> Option<String> {
     let name = &tool.name;
     match with.teaching.stated.tool(tool) {
         Some(frame) if frame.origin == FrameOrigin::Metrology => None,
@@ -113,13 +120,13 @@ fn tool_note(tool: &Tool, real: &RealTool, told: &Mounting, with: &Mounts<'_>) -
             Some(shift) => format!("tool {name} was taught: re-evaluated, its TCP moves by {shift:.3} mm"),
             None => format!(
                 "tool {name} was taught, but its teaching points are not given: taken as it stands; {}",
-                tool_estimate(told, with)
+                tool_estimate(commanded, with)
             ),
         }),
         None if built_in(name) => None,
         None => Some(format!(
             "tool {name}: origin not stated, taken as metrology (true as it stands); {}",
-            tool_estimate(told, with)
+            tool_estimate(commanded, with)
         )),
     }
 }
@@ -127,28 +134,28 @@ fn tool_note(tool: &Tool, real: &RealTool, told: &Mounting, with: &Mounts<'_>) -
 /// What was assumed of a work object.
 fn object_note(
     object: &WorkObject,
-    real: &Mounting,
-    told: &Mounting,
+    real: &FramePair,
+    commanded: &FramePair,
     found: &RealObject,
-    with: &Mounts<'_>,
+    with: &ResolveContext<'_>,
 ) -> Option<String> {
     let name = &object.name;
     let what = if with.teaching.listing.numbered { "work offset" } else { "work object" };
     match with.teaching.stated.object(object) {
         Some(frame) if frame.origin == FrameOrigin::Metrology => None,
         Some(_) if found.taught.is_some() => {
-            let shift = (real.object.translation.vector - told.object.translation.vector).norm();
-            let turn = real.object.rotation.angle_to(&told.object.rotation).to_degrees();
+            let shift = (real.object.translation.vector - commanded.object.translation.vector).norm();
+            let turn = real.object.rotation.angle_to(&commanded.object.rotation).to_degrees();
             Some(format!("{what} {name} was taught: re-evaluated, it moves by {shift:.3} mm and {turn:.4}°"))
         }
         Some(_) => Some(format!(
             "{what} {name} was taught, but its teaching points are not given: taken as it stands; {}",
-            object_estimate(told, with)
+            object_estimate(commanded, with)
         )),
         None if built_in(name) => None,
         None => Some(format!(
             "{what} {name}: origin not stated, taken as metrology (true as it stands in the robot's base); {}",
-            object_estimate(told, with)
+            object_estimate(commanded, with)
         )),
     }
 }
@@ -195,27 +202,27 @@ const NOT_TOLD: &str = "how far it would move had it been taught cannot be told 
 
 /// How far a taught TCP would move: four orientations about a typical pose, TCP fixed under the nominal model. A tool that
 /// stands is touched once with the middle of the flange.
-fn tool_estimate(told: &Mounting, with: &Mounts<'_>) -> String {
+fn tool_estimate(commanded: &FramePair, with: &ResolveContext<'_>) -> String {
     let Teaching { nominal, estimated, .. } = with.teaching;
     let usual = &with.usual;
-    if told.holds_part {
+    if commanded.holds_part {
         let flange = |arm: &PreparedModel<'_>| arm.forward(usual).translation.vector;
         let shift = (flange(estimated) - flange(nominal)).norm();
         return format!("had it been taught with this arm, its TCP would move by about {shift:.2} mm");
     }
     let turns = [[0.0, 0.0, 0.0], [0.5, 0.3, 0.0], [-0.5, 0.3, 0.6], [0.0, -0.5, -0.6]];
     let inverse = with.inverse;
-    let at = nominal.forward(usual) * told.tool;
+    let at = nominal.forward(usual) * commanded.tool;
     let teaching: Vec<Joints> = turns
         .iter()
         .filter_map(|w| {
             let turned = at * Pose::new(Vector3::zeros(), Vector3::from(*w));
-            inverse.solve_near(&(turned * told.tool.inverse()), usual).ok().map(|s| s.joints)
+            inverse.solve_near(&(turned * commanded.tool.inverse()), usual).ok().map(|s| s.joints)
         })
         .collect();
     match taught_tcp(estimated, &teaching) {
         Some(tcp) => {
-            let shift = (tcp - told.tool.translation.vector).norm();
+            let shift = (tcp - commanded.tool.translation.vector).norm();
             format!("had it been taught with this arm, its TCP would move by about {shift:.2} mm")
         }
         None => NOT_TOLD.to_owned(),
@@ -223,25 +230,25 @@ fn tool_estimate(told: &Mounting, with: &Mounts<'_>) -> String {
 }
 
 /// How far a taught work object would move: its origin and 100 mm along x and y, touched near a typical pose.
-fn object_estimate(told: &Mounting, with: &Mounts<'_>) -> String {
+fn object_estimate(commanded: &FramePair, with: &ResolveContext<'_>) -> String {
     let Teaching { nominal, estimated, .. } = with.teaching;
     let usual = &with.usual;
     let inverse = with.inverse;
-    let orientation = told.target_of(&nominal.forward(usual)).rotation;
+    let orientation = commanded.target_of(&nominal.forward(usual)).rotation;
     let touched: Vec<Point3<f64>> = [[0.0, 0.0], [100.0, 0.0], [0.0, 100.0]]
         .iter()
         .filter_map(|[x, y]| {
             let target = Pose::from_parts(Vector3::new(*x, *y, 0.0).into(), orientation);
-            let joints = inverse.solve_near(&told.flange_for(&target), usual).ok()?.joints;
-            let tip = Point3::from(told.tool.translation.vector);
+            let joints = inverse.solve_near(&commanded.flange_for(&target), usual).ok()?.joints;
+            let tip = Point3::from(commanded.tool.translation.vector);
             let flange = estimated.forward(&joints);
-            Some(if told.holds_part { flange.inverse() * tip } else { flange * tip })
+            Some(if commanded.holds_part { flange.inverse() * tip } else { flange * tip })
         })
         .collect();
     match <[Point3<f64>; 3]>::try_from(touched).ok().and_then(|p| taught_frame(&p)) {
         Some(pose) => {
-            let shift = (pose.translation.vector - told.object.translation.vector).norm();
-            let turn = pose.rotation.angle_to(&told.object.rotation).to_degrees();
+            let shift = (pose.translation.vector - commanded.object.translation.vector).norm();
+            let turn = pose.rotation.angle_to(&commanded.object.rotation).to_degrees();
             format!("had it been taught with this arm, it would move by about {shift:.2} mm and {turn:.3}°")
         }
         None => NOT_TOLD.to_owned(),

@@ -5,9 +5,9 @@ use std::collections::{HashMap, HashSet};
 use crate::arms::Arms;
 use crate::cell::{Carries, Cell};
 use crate::configuration::configured;
-use crate::frames::frame_pair::{Mounted, Mounting, Mounts, mount};
+use crate::frames::frame_pair::{FramePair, ResolveContext, ResolvedFrames, mount};
 use crate::frames::taught::Teaching;
-use crate::plan::reason::Why;
+use crate::plan::reason::OutcomeReason;
 use crate::search_budget;
 use truegrind_arm::inverse::budget::{SearchBudget, with_budget};
 use truegrind_arm::model::Joints;
@@ -15,10 +15,10 @@ use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{Listing, Motion, Reason, RobTarget, Switch, WorkObjectValue};
 
 /// Mountings by (tool, work object) as motions use them.
-pub(crate) struct Mountings {
+pub(crate) struct FrameTable {
     /// The place of each in the list, or why there is none.
-    places: HashMap<(u32, u32), Result<usize, Why>>,
-    pub(crate) list: Vec<Mounted>,
+    places: HashMap<(u32, u32), Result<usize, OutcomeReason>>,
+    pub(crate) list: Vec<ResolvedFrames>,
     /// The work object of each.
     objects: Vec<u32>,
     /// External axes that carry the base.
@@ -27,7 +27,7 @@ pub(crate) struct Mountings {
     assumed: Vec<String>,
 }
 
-impl Mountings {
+impl FrameTable {
     pub(crate) fn of(listing: &Listing, arms: &Arms<'_>, cell: &Cell) -> Self {
         let mut out = Self {
             places: HashMap::new(),
@@ -51,24 +51,28 @@ impl Mountings {
             let (Some(t), Some(o)) = (listing.tool(motion), listing.work_object(motion)) else { continue };
             let (Ok(tv), Ok(ov)) = (&t.value, &o.value) else {
                 let reason = listing.left_by_frames(motion).unwrap_or(Reason::ToolUnknown);
-                out.places.insert((tool, object), Err(Why::Program(reason)));
+                out.places.insert((tool, object), Err(OutcomeReason::Program(reason)));
                 continue;
             };
             let here = typical.get(&(tool, object)).map_or(&[][..], Vec::as_slice);
             let found = with_budget(&mut budget, || {
                 let usual = usual_joints(here, tv.frame.pose(), ov, arms);
                 let (teaching, inverse) = (&teaching, &arms.nominal);
-                mount((t, tv), (o, ov), &Mounts { teaching, knowledge: arms.knowledge, inverse, usual })
+                mount(
+                    (t, tv),
+                    (o, ov),
+                    &ResolveContext { teaching, knowledge: arms.knowledge, inverse, usual },
+                )
             });
             let found = match found {
-                Ok(mounted) => {
-                    out.list.push(mounted);
+                Ok(frames_index) => {
+                    out.list.push(frames_index);
                     out.objects.push(object);
                     Ok(out.list.len() - 1)
                 }
                 Err(fault) => {
                     out.assumed.push(fault);
-                    Err(Why::Contradicted)
+                    Err(OutcomeReason::CellContradiction)
                 }
             };
             out.places.insert((tool, object), found);
@@ -90,8 +94,8 @@ impl Mountings {
                 if target.external == [None; 6] {
                     continue;
                 }
-                let far = self.of_motion(motion).is_ok_and(|mounted| {
-                    let flange = self.list[mounted].told.flange_for(&target.pose());
+                let far = self.of_motion(motion).is_ok_and(|frames_index| {
+                    let flange = self.list[frames_index].commanded.flange_for(&target.pose());
                     !(flange.translation.vector.norm() <= longest)
                 });
                 for (axis, value) in target.external.iter().enumerate() {
@@ -118,14 +122,14 @@ impl Mountings {
     }
 
     /// The external axis of a target that carries the base.
-    pub(crate) fn moving_base(&self, target: &RobTarget) -> Option<Why> {
+    pub(crate) fn moving_base(&self, target: &RobTarget) -> Option<OutcomeReason> {
         let axis = (0..6).find(|&axis| self.base[axis] && target.external[axis].is_some())?;
-        Some(Why::MovingBase { axis })
+        Some(OutcomeReason::MovingBase { axis })
     }
 
     /// The mounting of a motion, or why its tool or work object tells none.
-    pub(crate) fn of_motion(&self, motion: &Motion) -> Result<usize, Why> {
-        let missing = Err(Why::Program(Reason::MissingArgument));
+    pub(crate) fn of_motion(&self, motion: &Motion) -> Result<usize, OutcomeReason> {
+        let missing = Err(OutcomeReason::Program(Reason::MissingArgument));
         let (Some(tool), Some(object)) = (motion.tool, motion.work_object) else { return missing };
         self.places.get(&(tool, object)).copied().unwrap_or(missing)
     }
@@ -158,7 +162,7 @@ fn typical(listing: &Listing) -> HashMap<(u32, u32), Vec<&Motion>> {
 
 /// Joints of the first target of these motions that is reached, at which the effect of unknown origins is estimated.
 fn usual_joints(motions: &[&Motion], tool: Pose, object: &WorkObjectValue, arms: &Arms<'_>) -> Joints {
-    let mounting = Mounting {
+    let mounting = FramePair {
         tool,
         object: object.user_frame.pose() * object.object_frame.pose(),
         holds_part: object.robhold,

@@ -8,7 +8,7 @@ use truegrind_programs::nc::setup;
 
 /// A tool whose value is known.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Known<'a> {
+pub(crate) struct KnownTool<'a> {
     pub(crate) name: String,
     /// Whether the program's text declares it.
     pub(crate) in_text: bool,
@@ -21,16 +21,16 @@ pub(crate) struct Known<'a> {
 
 /// The tools whose value is known, by every name that they go by.
 #[derive(Debug)]
-pub(crate) struct Tools<'a> {
-    pub(crate) list: Vec<Known<'a>>,
+pub(crate) struct KnownTools<'a> {
+    pub(crate) list: Vec<KnownTool<'a>>,
     /// Places in the list, by names in lower case.
     lower: HashMap<String, Vec<usize>>,
     /// The same by plain names, where the program's text does not declare the tool.
     plain: HashMap<String, Vec<usize>>,
 }
 
-impl<'a> Tools<'a> {
-    pub(crate) fn of(list: Vec<Known<'a>>) -> Self {
+impl<'a> KnownTools<'a> {
+    pub(crate) fn of(list: Vec<KnownTool<'a>>) -> Self {
         let mut lower: HashMap<String, Vec<usize>> = HashMap::new();
         let mut plain: HashMap<String, Vec<usize>> = HashMap::new();
         for (place, known) in list.iter().enumerate() {
@@ -47,7 +47,7 @@ impl<'a> Tools<'a> {
     }
 
     /// Those of a name, in the order of the list.
-    pub(crate) fn called(&self, name: &str) -> impl Iterator<Item = &Known<'a>> {
+    pub(crate) fn called(&self, name: &str) -> impl Iterator<Item = &KnownTool<'a>> {
         let lower = self.lower.get(&name.to_ascii_lowercase()).into_iter().flatten();
         let plain = self.plain.get(&setup::plain(name)).into_iter().flatten();
         let mut places: Vec<usize> = lower.chain(plain).copied().collect();
@@ -60,7 +60,7 @@ impl<'a> Tools<'a> {
 /// So many names are listed in a sentence.
 pub(crate) const MOST_NAMES: usize = 12;
 
-impl Known<'_> {
+impl KnownTool<'_> {
     pub(crate) fn is(&self, name: &str) -> bool {
         same_name(&self.name, name, self.in_text)
             || self.stated.is_some_and(|stated| stated.name.eq_ignore_ascii_case(name))

@@ -3,7 +3,7 @@
 //! A place from metrology is true as it stands: a program whose frame lies elsewhere grinds elsewhere, and one of the two is
 //! wrong. A place that was taught may differ, since the controller's is what was taught.
 
-use crate::frames::taught::{Apart, WRITTEN, list};
+use crate::frames::taught::{FrameDistance, WRITTEN_TOLERANCE, list};
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{Listing, Tool, WorkObject};
 use truegrind_programs::nc::setup;
@@ -11,13 +11,13 @@ use truegrind_surfaces::SurfaceFile;
 use truegrind_surfaces::file::Origin;
 
 /// What a surface file says from metrology and this program contradicts, one sentence each.
-pub fn misplaced(listing: &Listing, surface: &SurfaceFile) -> Vec<String> {
+pub fn surface_frame_contradictions(listing: &Listing, surface: &SurfaceFile) -> Vec<String> {
     let mut out: Vec<String> = Vec::new();
     let mut add = |fault: Option<String>| out.extend(fault);
     if surface.tool.origin == Some(Origin::Metrology) {
         let means = |tool: &&Tool| named(listing, &tool.name, tool.place.is_some(), &surface.tool.name);
-        let told = listing.tools.iter().filter(means).filter_map(|tool| tool.value.as_ref().ok());
-        let places: Vec<Pose> = told.map(|value| value.frame.pose()).collect();
+        let commanded = listing.tools.iter().filter(means).filter_map(|tool| tool.value.as_ref().ok());
+        let places: Vec<Pose> = commanded.map(|value| value.frame.pose()).collect();
         add(fault("tool", &surface.tool.name, &surface.tool.flange_from_tool, &places));
     }
     if surface.work_object.origin == Some(Origin::Metrology) {
@@ -44,13 +44,13 @@ fn named(listing: &Listing, name: &str, in_text: bool, stated: &str) -> bool {
 }
 
 /// The sentence for a place that no frame of the program bears out.
-fn fault(kind: &str, name: &str, stated: &Pose, told: &[Pose]) -> Option<String> {
-    let apart = |place: &&Pose| Apart::of(stated, place);
-    if told.iter().any(|place| apart(&place).within(WRITTEN)) {
+fn fault(kind: &str, name: &str, stated: &Pose, commanded: &[Pose]) -> Option<String> {
+    let apart = |place: &&Pose| FrameDistance::of(stated, place);
+    if commanded.iter().any(|place| apart(&place).within(WRITTEN_TOLERANCE)) {
         return None;
     }
-    let nearest = told.iter().min_by(|a, b| apart(a).mm.total_cmp(&apart(b).mm))?;
-    let Apart { mm, rad } = Apart::of(stated, nearest);
+    let nearest = commanded.iter().min_by(|a, b| apart(a).mm.total_cmp(&apart(b).mm))?;
+    let FrameDistance { mm, rad } = FrameDistance::of(stated, nearest);
     Some(format!(
         "surface file: {kind} \"{name}\" lies at {} with origin = \"metrology\", {mm:.2} mm and {:.3}° away from where the program \
          tells it, {}: correct the one that is wrong, or write origin = \"taught\" where the controller's was taught",

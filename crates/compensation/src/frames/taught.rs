@@ -6,7 +6,7 @@
 //! frame moves by what the better arm E makes of the same joints: F* = F_E F_N⁻¹ F. What rounding leaves between F_N and
 //! the told F is kept, so that angles of two decimals do as well as those of ten.
 
-pub(crate) use crate::frames::teaching_geometry::{Apart, WRITTEN, list};
+pub(crate) use crate::frames::teaching_geometry::{FrameDistance, WRITTEN_TOLERANCE, list};
 pub use crate::frames::teaching_geometry::{taught_frame, taught_tcp};
 
 use std::cell::OnceCell;
@@ -14,8 +14,8 @@ use std::collections::HashSet;
 
 use nalgebra::{Point3, Vector3};
 
-use crate::cell::{Cell, CellFrame, FrameOrigin, Stated, Teaches};
-use crate::frames::known_tools::{Known, MOST_NAMES, Tools};
+use crate::cell::{Cell, CellFrame, CellLookup, FrameOrigin, Teaches};
+use crate::frames::known_tools::{KnownTool, KnownTools, MOST_NAMES};
 use crate::frames::teaching_geometry::{
     FixedPoint, explained, fixed_point, frame_of, half_step_rad, radians, rounded, touched,
 };
@@ -26,12 +26,12 @@ use truegrind_programs::motion::{Listing, Tool, ToolValue, WorkObject, WorkObjec
 
 /// A tool that touched teaching points.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Pointer {
+pub(crate) struct TouchingTool {
     pub(crate) name: String,
     /// Whether the robot holds it; otherwise it stands.
     pub(crate) held: bool,
     /// Its tip as the controller holds it (mm), on the flange or in the base.
-    told: Vector3<f64>,
+    commanded: Vector3<f64>,
     /// As it is.
     pub(crate) real: Vector3<f64>,
 }
@@ -56,7 +56,7 @@ pub(crate) struct RealObject {
 /// The re-evaluated frame of a work object.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct TaughtFrame {
-    pub(crate) pointer: Pointer,
+    pub(crate) pointer: TouchingTool,
     pub(crate) joints: [Joints; 3],
     pub(crate) points: [Point3<f64>; 3],
     pub(crate) frame: Pose,
@@ -67,18 +67,18 @@ pub(crate) struct TaughtFrame {
 pub(crate) struct Teaching<'a> {
     pub(crate) nominal: &'a PreparedModel<'a>,
     pub(crate) estimated: &'a PreparedModel<'a>,
-    pub(crate) stated: Stated<'a>,
+    pub(crate) stated: CellLookup<'a>,
     pub(crate) listing: &'a Listing,
     /// [`Teaching::tools`], once they were asked for.
-    known: OnceCell<Tools<'a>>,
+    known: OnceCell<KnownTools<'a>>,
 }
 
 /// What the cell file says of tools and work objects and this program does not bear out, what it leaves open, and what the
 /// program's own comments on them misstate, one sentence each; nothing may be corrected before it is put right. `nominal` is the arm that the controller computes with.
 pub fn contradictions(listing: &Listing, cell: &Cell, nominal: &Model) -> Vec<String> {
-    let told = listing.misstated.iter().map(ToString::to_string);
+    let commanded = listing.misstated.iter().map(ToString::to_string);
     let unusable: Vec<String> =
-        cell.open.iter().map(|entry| format!("cell file: {entry}")).chain(told).collect();
+        cell.open.iter().map(|entry| format!("cell file: {entry}")).chain(commanded).collect();
     if !unusable.is_empty() {
         return unusable;
     }
@@ -133,7 +133,7 @@ impl<'a> Teaching<'a> {
         cell: &'a Cell,
         listing: &'a Listing,
     ) -> Self {
-        Self { nominal, estimated, stated: Stated::of(cell, listing), listing, known: OnceCell::new() }
+        Self { nominal, estimated, stated: CellLookup::of(cell, listing), listing, known: OnceCell::new() }
     }
 
     /// A tool as it is.
@@ -141,24 +141,24 @@ impl<'a> Teaching<'a> {
     /// # Errors
     /// What the cell file says of it and cannot be.
     pub(crate) fn tool(&self, tool: &Tool, value: &ToolValue) -> Result<RealTool, String> {
-        let told = value.frame.pose();
-        let stands = RealTool { pose: told, moved_mm: None };
+        let commanded = value.frame.pose();
+        let stands = RealTool { pose: commanded, moved_mm: None };
         let Some(stated) = self.stated.tool(tool) else { return Ok(stands) };
         if tool.place.is_some() {
-            agrees("tool", stated, &told)?;
+            agrees("tool", stated, &commanded)?;
         }
-        self.told_tool(stated, &told, value.robhold)
+        self.told_tool(stated, &commanded, value.robhold)
     }
 
-    /// A tool of the cell file that the controller holds as `told`.
-    fn told_tool(&self, stated: &CellFrame, told: &Pose, held: bool) -> Result<RealTool, String> {
+    /// A tool of the cell file that the controller holds as `commanded`.
+    fn told_tool(&self, stated: &CellFrame, commanded: &Pose, held: bool) -> Result<RealTool, String> {
         if stated.origin == FrameOrigin::Metrology || stated.teaching_deg.is_empty() {
-            return Ok(RealTool { pose: *told, moved_mm: None });
+            return Ok(RealTool { pose: *commanded, moved_mm: None });
         }
         let name = &stated.name;
         let joints = radians(&stated.teaching_deg);
         let half = half_step_rad(&stated.teaching_deg);
-        let told_tip = told.translation.vector;
+        let told_tip = commanded.translation.vector;
         let (nominal, estimated, bound) = match (&stated.taught_with, held) {
             (Some(pointer), true) => {
                 return Err(format!(
@@ -172,12 +172,13 @@ impl<'a> Teaching<'a> {
                     let touched = joints.iter().map(|q| (arm.forward(q) * Point3::from(*tcp)).coords);
                     touched.sum::<Vector3<f64>>() / joints.len() as f64
                 };
-                let nominal = tip(self.nominal, &joints, &pointer.told);
+                let nominal = tip(self.nominal, &joints, &pointer.commanded);
                 let off = |q: &Joints| {
-                    ((self.nominal.forward(q) * Point3::from(pointer.told)).coords - nominal).norm_squared()
+                    ((self.nominal.forward(q) * Point3::from(pointer.commanded)).coords - nominal)
+                        .norm_squared()
                 };
                 let scatter = 3.0 * joints.iter().map(off).sum::<f64>().sqrt() / joints.len() as f64;
-                let round = rounded(&joints, half, |q| Some(at(&tip(self.nominal, q, &pointer.told))));
+                let round = rounded(&joints, half, |q| Some(at(&tip(self.nominal, q, &pointer.commanded))));
                 (nominal, tip(self.estimated, &joints, &pointer.real), explained(round, scatter))
             }
             (None, _) => {
@@ -217,7 +218,7 @@ impl<'a> Teaching<'a> {
             ));
         }
         let shift = estimated - nominal;
-        let mut pose = *told;
+        let mut pose = *commanded;
         pose.translation.vector += shift;
         Ok(RealTool { pose, moved_mm: Some(shift.norm()) })
     }
@@ -248,7 +249,7 @@ impl<'a> Teaching<'a> {
             ));
         };
         let teaches = stated.teaches.unwrap_or_default();
-        let (told, on_top) = match teaches {
+        let (commanded, on_top) = match teaches {
             Teaches::Uframe => (user, within),
             Teaches::Oframe => (undisplaced, displaced),
         };
@@ -260,20 +261,27 @@ impl<'a> Teaching<'a> {
                 stated.name
             )
         };
-        let nominal = frame_of(self.nominal, &joints, &pointer.told, part).ok_or_else(in_line)?;
+        let nominal = frame_of(self.nominal, &joints, &pointer.commanded, part).ok_or_else(in_line)?;
         let half = half_step_rad(&stated.teaching_deg);
-        let round = rounded(&joints, half, |q| frame_of(self.nominal, q, &pointer.told, part));
+        let round = rounded(&joints, half, |q| frame_of(self.nominal, q, &pointer.commanded, part));
         let bound = explained(round, 0.0);
-        if !Apart::of(&nominal, &told).within(bound) {
+        if !FrameDistance::of(&nominal, &commanded).within(bound) {
             let other = match teaches {
                 Teaches::Uframe => undisplaced,
                 Teaches::Oframe => user,
             };
-            return Err(self.other_frame(stated, &joints, part, (&nominal, &told, &other), bound, &pointer));
+            return Err(self.other_frame(
+                stated,
+                &joints,
+                part,
+                (&nominal, &commanded, &other),
+                bound,
+                &pointer,
+            ));
         }
         let points = touched(self.estimated, &joints, &pointer.real, part);
         let frame = taught_frame(&points).ok_or_else(in_line)?;
-        let pose = frame * nominal.inverse() * told * on_top;
+        let pose = frame * nominal.inverse() * commanded * on_top;
         Ok(RealObject { pose, taught: Some(TaughtFrame { pointer, joints, points, frame }) })
     }
 
@@ -284,22 +292,22 @@ impl<'a> Teaching<'a> {
         stated: &CellFrame,
         joints: &[Joints; 3],
         part: bool,
-        (nominal, told, other): (&Pose, &Pose, &Pose),
-        bound: Apart,
-        pointer: &Pointer,
+        (nominal, commanded, other): (&Pose, &Pose, &Pose),
+        bound: FrameDistance,
+        pointer: &TouchingTool,
     ) -> String {
         let teaches = stated.teaches.unwrap_or_default();
         let (frame, instead) = match teaches {
             Teaches::Uframe => ("user frame (uframe)", "oframe"),
             Teaches::Oframe => ("user frame with its object frame (uframe · oframe)", "uframe"),
         };
-        let fits = |known: &&Known| {
+        let fits = |known: &&KnownTool| {
             known.held != part
                 && frame_of(self.nominal, joints, &known.frame.translation.vector, part)
-                    .is_some_and(|found| Apart::of(&found, told).within(bound))
+                    .is_some_and(|found| FrameDistance::of(&found, commanded).within(bound))
         };
         let known = &self.tools().list;
-        let cause = if Apart::of(nominal, other).within(bound) {
+        let cause = if FrameDistance::of(nominal, other).within(bound) {
             let place =
                 if instead == "oframe" { "with its object frame" } else { "without its object frame" };
             format!("they make the frame {place}: write teaches = \"{instead}\"")
@@ -310,7 +318,7 @@ impl<'a> Teaching<'a> {
              taught_with or teaching_deg, or write origin = \"metrology\" without them where the frame's numbers are true"
                 .to_owned()
         };
-        let apart = Apart::of(nominal, told);
+        let apart = FrameDistance::of(nominal, commanded);
         format!(
             "cell file: wobj \"{}\": with the arm of the data sheet and tool {} its teaching points make a frame at {}, {:.2} mm \
              and {:.3}° away from the {frame} that the program tells, at {} (up to {:.2} mm and {:.3}° is explained by rounding): \
@@ -320,14 +328,14 @@ impl<'a> Teaching<'a> {
             list(&nominal.translation.vector),
             apart.mm,
             apart.rad.to_degrees(),
-            list(&told.translation.vector),
+            list(&commanded.translation.vector),
             bound.mm,
             bound.rad.to_degrees()
         )
     }
 
     /// The tool that touched the teaching points of `stated`; `held`: the robot must have held it.
-    fn pointer(&self, kind: &str, stated: &CellFrame, held: bool) -> Result<Pointer, String> {
+    fn pointer(&self, kind: &str, stated: &CellFrame, held: bool) -> Result<TouchingTool, String> {
         let here = format!("cell file: {kind} \"{}\"", stated.name);
         let known = self.tools();
         let holds = if held { "that the robot holds" } else { "that stands" };
@@ -341,7 +349,8 @@ impl<'a> Teaching<'a> {
                          position_mm"
                     ));
                 };
-                if same.any(|other| !Apart::of(&other.frame, &found.frame).within(WRITTEN)) {
+                if same.any(|other| !FrameDistance::of(&other.frame, &found.frame).within(WRITTEN_TOLERANCE))
+                {
                     return Err(format!(
                         "{here}: taught_with = \"{name}\": the program has several tools of that name with different values: \
                          give the module of the one that touched the points alone"
@@ -355,8 +364,9 @@ impl<'a> Teaching<'a> {
                 found
             }
             None => {
-                let fit = |known: &&Known| known.held == held && !known.name.eq_ignore_ascii_case("tool0");
-                let mut fitting: Vec<&Known> = known.list.iter().filter(fit).collect();
+                let fit =
+                    |known: &&KnownTool| known.held == held && !known.name.eq_ignore_ascii_case("tool0");
+                let mut fitting: Vec<&KnownTool> = known.list.iter().filter(fit).collect();
                 fitting.dedup_by(|a, b| a.is(&b.name));
                 match fitting[..] {
                     [only] => only,
@@ -385,22 +395,22 @@ impl<'a> Teaching<'a> {
             Some(stated) => self.told_tool(stated, &found.frame, found.held)?.pose,
             None => found.frame,
         };
-        Ok(Pointer {
+        Ok(TouchingTool {
             name: found.name.clone(),
             held,
-            told: found.frame.translation.vector,
+            commanded: found.frame.translation.vector,
             real: real.translation.vector,
         })
     }
 
     /// Every tool whose value is known, in the order of names: those of the program, those that the cell file places,
     /// and tool0.
-    fn tools(&self) -> &Tools<'a> {
-        self.known.get_or_init(|| Tools::of(self.known()))
+    fn tools(&self) -> &KnownTools<'a> {
+        self.known.get_or_init(|| KnownTools::of(self.known()))
     }
 
-    fn known(&self) -> Vec<Known<'a>> {
-        let mut out: Vec<Known<'a>> = Vec::new();
+    fn known(&self) -> Vec<KnownTool<'a>> {
+        let mut out: Vec<KnownTool<'a>> = Vec::new();
         let mut seen = HashSet::new();
         let tools = self.listing.declared_tools.iter().chain(&self.listing.tools);
         for tool in tools {
@@ -412,16 +422,16 @@ impl<'a> Teaching<'a> {
             if seen.insert((tool.name.as_str(), in_text, held, bits)) {
                 let labels = self.stated.labels_of(&tool.name).to_vec();
                 let stated = self.stated.tool(tool);
-                out.push(Known { name: tool.name.clone(), in_text, frame, held, labels, stated });
+                out.push(KnownTool { name: tool.name.clone(), in_text, frame, held, labels, stated });
             }
         }
-        let declared = Tools::of(std::mem::take(&mut out));
+        let declared = KnownTools::of(std::mem::take(&mut out));
         for stated in &self.stated.cell.tool {
             if let Some(frame) = stated.pose()
                 && declared.called(&stated.name).next().is_none()
             {
                 let name = stated.name.clone();
-                out.push(Known {
+                out.push(KnownTool {
                     name,
                     in_text: false,
                     frame,
@@ -434,7 +444,7 @@ impl<'a> Teaching<'a> {
         out.splice(..0, declared.list);
         if !out.iter().any(|known| known.is("tool0")) {
             let (name, frame) = ("tool0".to_owned(), Pose::identity());
-            out.push(Known { name, in_text: true, frame, held: true, labels: Vec::new(), stated: None });
+            out.push(KnownTool { name, in_text: true, frame, held: true, labels: Vec::new(), stated: None });
         }
         out.sort_by_key(|known| known.name.to_ascii_lowercase());
         out
@@ -442,10 +452,10 @@ impl<'a> Teaching<'a> {
 }
 
 /// Whether the cell file places a frame where the program does, if it places it at all.
-fn agrees(kind: &str, stated: &CellFrame, told: &Pose) -> Result<(), String> {
+fn agrees(kind: &str, stated: &CellFrame, commanded: &Pose) -> Result<(), String> {
     let Some(placed) = stated.pose() else { return Ok(()) };
-    let apart = Apart::of(&placed, told);
-    if apart.within(WRITTEN) {
+    let apart = FrameDistance::of(&placed, commanded);
+    if apart.within(WRITTEN_TOLERANCE) {
         return Ok(());
     }
     let what = if kind == "tool" { "frame" } else { "user frame" };
@@ -455,6 +465,6 @@ fn agrees(kind: &str, stated: &CellFrame, told: &Pose) -> Result<(), String> {
         stated.name,
         apart.mm,
         apart.rad.to_degrees(),
-        list(&told.translation.vector)
+        list(&commanded.translation.vector)
     ))
 }

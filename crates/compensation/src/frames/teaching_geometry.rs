@@ -6,9 +6,10 @@ use truegrind_arm::model::{Joints, PreparedModel};
 use truegrind_math::se3::{Pose, rotation_from_matrix};
 
 /// What programs round away when they write a frame, and constructions of the same frame may differ by (mm, rad).
-pub(crate) const WRITTEN: Apart = Apart { mm: 0.1, rad: 0.02 * std::f64::consts::PI / 180.0 };
+pub(crate) const WRITTEN_TOLERANCE: FrameDistance =
+    FrameDistance { mm: 0.1, rad: 0.02 * std::f64::consts::PI / 180.0 };
 /// However coarsely the teaching joints are written, a told frame that is farther away is not theirs (mm, rad).
-const MOST: Apart = Apart { mm: 5.0, rad: std::f64::consts::PI / 180.0 };
+const MOST: FrameDistance = FrameDistance { mm: 5.0, rad: std::f64::consts::PI / 180.0 };
 /// Controllers show joint angles with two decimals at least (°): coarser ones are not taken for rounded.
 const COARSEST_DEG: f64 = 0.01;
 /// Poses whose orientations tell the TCP less than this are too much alike (smallest singular value).
@@ -16,12 +17,12 @@ const ALIKE: f64 = 1e-3;
 
 /// Distance of two frames.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Apart {
+pub(crate) struct FrameDistance {
     pub(crate) mm: f64,
     pub(crate) rad: f64,
 }
 
-impl Apart {
+impl FrameDistance {
     pub(crate) fn of(one: &Pose, other: &Pose) -> Self {
         Self {
             mm: (one.translation.vector - other.translation.vector).norm(),
@@ -29,7 +30,7 @@ impl Apart {
         }
     }
 
-    pub(crate) fn within(self, bound: Apart) -> bool {
+    pub(crate) fn within(self, bound: FrameDistance) -> bool {
         self.mm <= bound.mm && self.rad <= bound.rad
     }
 }
@@ -158,16 +159,20 @@ pub(crate) fn half_step_rad(deg: &[[f64; 6]]) -> f64 {
 
 /// By how much a frame can move that is worked out from rounded joints: each of them off by half its last decimal, all
 /// of them to the worst side.
-pub(crate) fn rounded(joints: &[Joints], half_rad: f64, frame: impl Fn(&[Joints]) -> Option<Pose>) -> Apart {
-    let mut all = Apart { mm: 0.0, rad: 0.0 };
+pub(crate) fn rounded(
+    joints: &[Joints],
+    half_rad: f64,
+    frame: impl Fn(&[Joints]) -> Option<Pose>,
+) -> FrameDistance {
+    let mut all = FrameDistance { mm: 0.0, rad: 0.0 };
     let Some(base) = frame(joints) else { return all };
     let mut off = joints.to_vec();
     for point in 0..joints.len() {
         for joint in 0..6 {
             off[point][joint] += half_rad;
             if let Some(moved) = frame(&off) {
-                let apart = Apart::of(&base, &moved);
-                all = Apart { mm: all.mm + apart.mm, rad: all.rad + apart.rad };
+                let apart = FrameDistance::of(&base, &moved);
+                all = FrameDistance { mm: all.mm + apart.mm, rad: all.rad + apart.rad };
             }
             off[point][joint] = joints[point][joint];
         }
@@ -176,10 +181,10 @@ pub(crate) fn rounded(joints: &[Joints], half_rad: f64, frame: impl Fn(&[Joints]
 }
 
 /// What is explained: what is written, what rounding makes of the joints, and `scatter_mm`.
-pub(crate) fn explained(rounded: Apart, scatter_mm: f64) -> Apart {
-    Apart {
-        mm: (WRITTEN.mm + rounded.mm + scatter_mm).min(MOST.mm),
-        rad: (WRITTEN.rad + rounded.rad).min(MOST.rad),
+pub(crate) fn explained(rounded: FrameDistance, scatter_mm: f64) -> FrameDistance {
+    FrameDistance {
+        mm: (WRITTEN_TOLERANCE.mm + rounded.mm + scatter_mm).min(MOST.mm),
+        rad: (WRITTEN_TOLERANCE.rad + rounded.rad).min(MOST.rad),
     }
 }
 

@@ -1,13 +1,13 @@
 //! A program without an arm to correct it for: nothing changes, and each motion says what the text tells of it.
 
-use crate::options::{Options, may_change};
-use crate::plan::reason::Why;
+use crate::options::{Options, is_rewritable};
+use crate::plan::reason::OutcomeReason;
 use crate::plan::{MotionOutcome, Plan};
 use truegrind_programs::motion::{Listing, Motion, Reason};
 
-/// The plan that changes nothing. A motion that a model could correct is [`Why::Same`]; any other has the reason that it
+/// The plan that changes nothing. A motion that a model could correct is [`OutcomeReason::NoChange`]; any other has the reason that it
 /// would have with a model too.
-pub fn untouched(listing: &Listing, options: &Options) -> Plan {
+pub fn listing_only_plan(listing: &Listing, options: &Options) -> Plan {
     let outcomes = (0..).zip(&listing.motions).map(|(index, motion)| MotionOutcome {
         reason: Some(why(listing, motion, options)),
         ..MotionOutcome::left(index)
@@ -15,12 +15,12 @@ pub fn untouched(listing: &Listing, options: &Options) -> Plan {
     Plan { outcomes: outcomes.collect(), ..Plan::default() }
 }
 
-fn why(listing: &Listing, motion: &Motion, options: &Options) -> Why {
+fn why(listing: &Listing, motion: &Motion, options: &Options) -> OutcomeReason {
     let unknown = || motion.targets.iter().find_map(|target| target.value.as_ref().err().copied());
     let external = || motion.targets.is_empty().then_some(Reason::ExternalOnly);
     let frames = || listing.left_by_frames(motion);
     if let Some(reason) = motion.left.or_else(unknown).or_else(external).or_else(frames) {
-        return Why::Program(reason);
+        return OutcomeReason::Program(reason);
     }
-    if may_change(motion, options) { Why::Same } else { Why::JointTarget }
+    if is_rewritable(motion, options) { OutcomeReason::NoChange } else { OutcomeReason::JointTarget }
 }

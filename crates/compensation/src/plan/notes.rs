@@ -1,6 +1,6 @@
 //! What a plan says beside its motions: what was not looked at or taken on trust, what backlash and loads mean here.
 
-use crate::arms::{Arms, yields};
+use crate::arms::{Arms, is_load_dependent};
 use crate::options::Options;
 use crate::target::solved_target::SolvedTargets;
 use truegrind_arm::effect::Effect;
@@ -8,7 +8,7 @@ use truegrind_programs::motion::{Listing, Motion, MotionKind, Switch};
 
 /// What backlash means for this program.
 pub(crate) fn play_note(arms: &Arms<'_>, solved: &SolvedTargets) -> Option<String> {
-    let plays = arms.acting.play_rad.iter().enumerate().filter(|(_, play)| **play != 0.0);
+    let plays = arms.conditions.play_rad.iter().enumerate().filter(|(_, play)| **play != 0.0);
     let plays: Vec<String> =
         plays.map(|(j, play)| format!("joint {}: {:.4}°", j + 1, play.abs().to_degrees())).collect();
     if plays.is_empty() {
@@ -108,23 +108,25 @@ fn lines_of(listing: &Listing, motions: &[u32]) -> Option<String> {
 /// What was taken for the load of the arm.
 pub(crate) fn load_notes(listing: &Listing, arms: &Arms<'_>, options: &Options) -> Vec<String> {
     let model = arms.estimated.arm().model;
-    let yields = model.effects.iter().any(yields);
+    let load_dependent = model.effects.iter().any(is_load_dependent);
     let lumped = model.effects.iter().any(|e| matches!(e, Effect::LumpedCompliance(_)) && !e.is_zero());
-    let Some(loads) = options.loads.as_ref().filter(|_| yields || lumped) else { return Vec::new() };
+    let Some(loads) = options.loads.as_ref().filter(|_| load_dependent || lumped) else {
+        return Vec::new();
+    };
     let mut out = Vec::new();
     let motions = || listing.motions.iter().enumerate().filter(|(_, m)| m.left.is_none() && m.tool.is_some());
     let at = |(index, motion): (usize, &Motion)| loads.at(index, motion, listing, model);
     let stated: Vec<f64> = motions().filter_map(at).map(|load| load.mass_kg).collect();
     let silent = motions().count() - stated.len();
     let base = options.condition.payload_kg.map_or("no payload".to_owned(), |kg| format!("{kg} kg"));
-    if yields && let Some(&first) = stated.first() {
+    if load_dependent && let Some(&first) = stated.first() {
         let (low, high) = stated.iter().fold((first, first), |(a, b), kg| (a.min(*kg), b.max(*kg)));
         let range = if low == high { format!("{low} kg") } else { format!("{low} to {high} kg") };
         out.push(format!(
             "payload: {range}, as the program's tools and loads say (--payload states another)"
         ));
     }
-    if yields && silent > 0 {
+    if load_dependent && silent > 0 {
         out.push(format!(
             "payload: at {silent} motions the tool states no mass, and that of the measurement is taken ({base}); \
              --payload states it"

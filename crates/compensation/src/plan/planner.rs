@@ -15,23 +15,23 @@ use crate::cell::Cell;
 use crate::configuration::monitored;
 use crate::cut::Cuts;
 use crate::deviation::{PathPoint, Status};
-use crate::feasibility::unchanged::{obstacle, staying};
-use crate::frames::frame_pair::Mounting;
-use crate::frames::frame_table::Mountings;
-use crate::options::{Options, may_change};
+use crate::feasibility::unchanged::{blocking_reason, unchanged_motions};
+use crate::frames::frame_pair::FramePair;
+use crate::frames::frame_table::FrameTable;
+use crate::options::{Options, is_rewritable};
 use crate::plan::notes::{doubt_note, load_notes, open_notes, play_note};
-use crate::plan::reason::Why;
+use crate::plan::reason::OutcomeReason;
 use crate::plan::{MotionOutcome, Plan};
-use crate::risk::assessment::{Assessment, Chosen, Knowing, assessed};
-use crate::risk::placement::{Commanded, Wanted};
+use crate::risk::assessment::{Assessment, AssessmentSample, EstimateContext, assess_program};
+use crate::risk::placement::{AssessedTarget, PlacementChoice};
 use crate::search_budget;
 use crate::segment::corner::{CUT_MM, cut_of_lines};
 use crate::segment::joint_speed::{Pace, fastest};
-use crate::segment::line::{Ends, Path, middles_off};
-use crate::segment::segment_plan::{Passage, corner};
-use crate::target::original_joints::{AsItIs, Guess};
-use crate::target::solve::{solve_all, take_room};
-use crate::target::solved_target::{Solved, SolvedTargets, as_joints};
+use crate::segment::line::{Segment, SegmentEnd, midpoint_deviations};
+use crate::segment::segment_plan::{SegmentPlan, corner};
+use crate::target::original_joints::{BranchGuess, OriginalProgram};
+use crate::target::solve::{reserve_memory, solve_targets};
+use crate::target::solved_target::{SolvedTarget, SolvedTargets, as_joints};
 use truegrind_arm::estimated::Estimated;
 use truegrind_arm::inverse::InverseError;
 use truegrind_arm::inverse::budget::{SearchBudget, with_budget};
@@ -44,24 +44,24 @@ use truegrind_programs::rewrite::{Change, NewTarget};
 /// Motions are independent but for those without monitored configuration (ConfL\Off), which go from the motion
 /// before; the result does not depend on the number of threads.
 pub fn plan(listing: &Listing, estimated: &Estimated, cell: &Cell, options: &Options) -> Plan {
-    Targets::of(listing, estimated, cell, options).plan(&BTreeMap::new())
+    SolvedProgram::of(listing, estimated, cell, options).plan(&BTreeMap::new())
 }
 
 /// The targets of a program, worked out once for any number of plans.
-pub(crate) struct Targets<'a> {
+pub(crate) struct SolvedProgram<'a> {
     listing: &'a Listing,
     options: &'a Options,
     arms: Arms<'a>,
-    mountings: Mountings,
+    frame_table: FrameTable,
     /// The program as it is, where joints have play: only then targets are worked out once more.
-    program: Option<AsItIs<'a>>,
+    program: Option<OriginalProgram<'a>>,
     assessment: Assessment,
     solved: SolvedTargets,
     /// The motions that stay as they are in `solved`.
-    solved_without: BTreeMap<u32, Why>,
+    solved_without: BTreeMap<u32, OutcomeReason>,
 }
 
-impl<'a> Targets<'a> {
+impl<'a> SolvedProgram<'a> {
     pub(crate) fn of(
         listing: &'a Listing,
         estimated: &'a Estimated,
@@ -69,22 +69,23 @@ impl<'a> Targets<'a> {
         options: &'a Options,
     ) -> Self {
         let mut arms = Arms::of(estimated, &options.condition);
-        let mut mountings = Mountings::of(listing, &arms, cell);
-        let program = AsItIs::of(listing, &arms, &mountings);
-        let assessment = assess(listing, &program, &mut arms, &mut mountings, options);
+        let mut frame_table = FrameTable::of(listing, &arms, cell);
+        let program = OriginalProgram::of(listing, &arms, &frame_table);
+        let assessment = assess(listing, &program, &mut arms, &mut frame_table, options);
         let solved_without = assessment.risky();
         let solved =
-            solve_all(listing, &program, &mut arms, &mountings, &assessment, options, &solved_without);
-        let program = arms.acting.has_play().then_some(program);
-        Self { listing, options, arms, mountings, program, assessment, solved, solved_without }
+            solve_targets(listing, &program, &mut arms, &frame_table, &assessment, options, &solved_without);
+        let program = arms.conditions.has_play().then_some(program);
+        Self { listing, options, arms, frame_table, program, assessment, solved, solved_without }
     }
 
     /// The plan where some motions must stay as they are for reasons of the writer (`refused`, by index), and with them the
     /// cuts that they are part of.
-    pub(crate) fn plan(&mut self, refused: &BTreeMap<u32, Why>) -> Plan {
+    pub(crate) fn plan(&mut self, refused: &BTreeMap<u32, OutcomeReason>) -> Plan {
         let stays = self.settled(refused);
-        let Self { listing, options, arms, mountings, assessment, solved, .. } = self;
-        let mut plan = planned(&Job { listing, solved, stays: &stays, mountings, assessment, arms, options });
+        let Self { listing, options, arms, frame_table, assessment, solved, .. } = self;
+        let mut plan =
+            planned(&Planner { listing, solved, stays: &stays, frame_table, assessment, arms, options });
         plan.placements.clone_from(&assessment.placements);
         plan.cuts.clone_from(&assessment.cuts);
         let rewritten = |motion: &u32| {
@@ -95,15 +96,15 @@ impl<'a> Targets<'a> {
             cut.corrected = cut.motions.iter().any(rewritten);
         }
         let corrected = plan.cuts.iter().filter(|cut| cut.corrected);
-        plan.chance_of_worse =
-            arms.knowledge.and_then(|knowledge| assessment.chance_of(knowledge, corrected));
+        plan.probability_of_harm =
+            arms.knowledge.and_then(|knowledge| assessment.probability_of_harm_of(knowledge, corrected));
         plan
     }
 
     /// The motions that stay. Where joints have play, what stays changes the sides from which the joints come to what
     /// follows: then all targets are worked out again.
-    fn settled(&mut self, refused: &BTreeMap<u32, Why>) -> BTreeMap<u32, Why> {
-        let Self { listing, options, arms, mountings, program, assessment, solved, solved_without } = self;
+    fn settled(&mut self, refused: &BTreeMap<u32, OutcomeReason>) -> BTreeMap<u32, OutcomeReason> {
+        let Self { listing, options, arms, frame_table, program, assessment, solved, solved_without } = self;
         let mut refused = refused.clone();
         for (motion, why) in assessment.risky() {
             refused.entry(motion).or_insert(why);
@@ -112,20 +113,20 @@ impl<'a> Targets<'a> {
             if let Some(program) = program
                 && refused != *solved_without
             {
-                *solved = solve_all(listing, program, arms, mountings, assessment, options, &refused);
+                *solved = solve_targets(listing, program, arms, frame_table, assessment, options, &refused);
                 solved_without.clone_from(&refused);
             } else {
                 solved.allow_again();
             }
-            let stays = staying(listing, solved, mountings, arms, options, &refused);
-            if !arms.acting.has_play() {
+            let stays = unchanged_motions(listing, solved, frame_table, arms, options, &refused);
+            if !arms.conditions.has_play() {
                 return stays;
             }
-            let more: Vec<(u32, Why)> = (0..listing.motions.len() as u32)
+            let more: Vec<(u32, OutcomeReason)> = (0..listing.motions.len() as u32)
                 .filter(|motion| !refused.contains_key(motion))
                 .filter(|motion| !solved.of(*motion as usize).is_empty())
                 .filter(|motion| solved.of(*motion as usize).iter().all(Result::is_ok))
-                .filter_map(|motion| match obstacle(motion, listing, solved, options, &stays) {
+                .filter_map(|motion| match blocking_reason(motion, listing, solved, options, &stays) {
                     Some((Status::Refused, why)) => Some((motion, why)),
                     _ => None,
                 })
@@ -137,7 +138,7 @@ impl<'a> Targets<'a> {
         }
         // A program of which every round takes away another piece is left as it is.
         for motion in 0..listing.motions.len() as u32 {
-            refused.entry(motion).or_insert(Why::Inverse(InverseError::Abandoned));
+            refused.entry(motion).or_insert(OutcomeReason::Inverse(InverseError::Abandoned));
         }
         refused
     }
@@ -147,47 +148,47 @@ impl<'a> Targets<'a> {
 /// path lies.
 fn assess(
     listing: &Listing,
-    program: &AsItIs<'_>,
+    program: &OriginalProgram<'_>,
     arms: &mut Arms<'_>,
-    mountings: &mut Mountings,
+    frame_table: &mut FrameTable,
     options: &Options,
 ) -> Assessment {
     let Some(knowledge) = arms.knowledge else { return Assessment::default() };
-    let chosen = Chosen::of(listing, |motion| program.knows(motion));
+    let chosen = AssessmentSample::of(listing, |motion| program.knows(motion));
     let loads = arms.loads(listing, options.loads.as_ref());
-    let at: BTreeMap<u32, Commanded> = chosen
+    let at: BTreeMap<u32, AssessedTarget> = chosen
         .motions()
         .into_iter()
         .filter_map(|motion| {
             let load = loads.get(motion as usize).and_then(Option::as_ref);
-            Some((motion, program.commanded(motion, arms.acting.place([0; 6], load))?))
+            Some((motion, program.commanded(motion, arms.conditions.condition_index([0; 6], load))?))
         })
         .collect();
-    let objects = mountings.objects();
-    let with = Knowing { acting: &arms.acting, knowledge };
+    let objects = frame_table.objects();
+    let with = EstimateContext { conditions: &arms.conditions, knowledge };
     // Experiments take every motion as it is.
     let max_risk = if options.cuts == Cuts::Single { 1.0 } else { options.max_risk };
-    let wanted = Wanted { placement: options.placement, max_risk, remedies: options.remedies };
-    assessed(listing, &chosen, &at, &mut mountings.list, &objects, &with, wanted)
+    let wanted = PlacementChoice { placement: options.placement, max_risk, remedies: options.remedies };
+    assess_program(listing, &chosen, &at, &mut frame_table.list, &objects, &with, wanted)
 }
 
 /// Rounds in which what stays changes the sides of what follows; more are never made.
 const MOST_SETTLING: usize = 64;
 
-fn planned(job: &Job<'_>) -> Plan {
-    let Job { listing, solved, mountings, arms, options, .. } = *job;
+fn planned(job: &Planner<'_>) -> Plan {
+    let Planner { listing, solved, frame_table, arms, options, .. } = *job;
     let count = listing.motions.len();
     let whole = SearchBudget::of(search_budget::PATHS).with_near_solves(search_budget::path_steps(count));
     // Filled where they stay: lists of portions, put together, would be there twice.
     let mut outcomes: Vec<MotionOutcome> = (0..count as u32).map(MotionOutcome::left).collect();
     let mut changes: Vec<Option<Change>> = (0..count).map(|_| None).collect();
     let mut places: Vec<Places<'_>> = outcomes.chunks_mut(PORTION).zip(changes.chunks_mut(PORTION)).collect();
-    let portions: Vec<Portion> =
+    let portions: Vec<PortionResult> =
         search_budget::shared_out_into(whole, &mut places, |portion, places, budget| {
             let first = portion * PORTION;
             job.portion(first..(first + PORTION).min(count), places, budget)
         });
-    let mut notes = mountings.notes();
+    let mut notes = frame_table.notes();
     notes.extend(play_note(arms, solved));
     notes.extend(doubt_note(arms));
     notes.extend(load_notes(listing, arms, options));
@@ -207,12 +208,12 @@ fn planned(job: &Job<'_>) -> Plan {
 const PORTION: usize = 64;
 
 /// What the motions of a program are worked out from.
-struct Job<'a> {
+struct Planner<'a> {
     listing: &'a Listing,
     solved: &'a SolvedTargets,
     /// Motions that stay though their targets could be corrected.
-    stays: &'a BTreeMap<u32, Why>,
-    mountings: &'a Mountings,
+    stays: &'a BTreeMap<u32, OutcomeReason>,
+    frame_table: &'a FrameTable,
     assessment: &'a Assessment,
     arms: &'a Arms<'a>,
     options: &'a Options,
@@ -222,45 +223,45 @@ struct Job<'a> {
 type Places<'p> = (&'p mut [MotionOutcome], &'p mut [Option<Change>]);
 
 /// What else became of them.
-struct Portion {
+struct PortionResult {
     /// Lines and arcs that are written without their path having been checked.
     unchecked: Vec<u32>,
     points: Vec<PathPoint>,
 }
 
 /// The corrected end of a motion, where its last target was worked out.
-fn ends_of<'a>(
+fn segment_end<'a>(
     motion: &'a Motion,
-    targets: &[Result<Solved, Why>],
-    mountings: &'a Mountings,
-) -> Option<Ends<'a>> {
+    targets: &[Result<SolvedTarget, OutcomeReason>],
+    frame_table: &'a FrameTable,
+) -> Option<SegmentEnd<'a>> {
     let Some(Ok(to)) = targets.last() else { return None };
     let stated = motion.to().and_then(|target| target.value.as_ref().ok());
     let cartesian = stated.and_then(TargetValue::cartesian);
-    Some(Ends {
-        mounted: &mountings.list[to.mounted],
-        index: to.mounted,
-        meant: to.meant,
-        told: to.told,
+    Some(SegmentEnd {
+        frames_index: &frame_table.list[to.frames_index],
+        index: to.frames_index,
+        intended: to.intended,
+        commanded: to.commanded,
         joints: to.after,
-        place: to.place,
+        condition_index: to.condition_index,
         before: to.before,
         conf: cartesian.filter(|_| monitored(motion) != Switch::Off).map(|target| target.conf),
         external: stated.map(TargetValue::external),
     })
 }
 
-struct Worked {
+struct PlannedMotion {
     change: Option<Change>,
     outcome: MotionOutcome,
     point: Option<PathPoint>,
     /// Its way, where its targets are all corrected.
-    passage: Option<Passage>,
+    segment_plan: Option<SegmentPlan>,
 }
 
-impl Worked {
+impl PlannedMotion {
     /// Flags a motion that is written.
-    fn flag(&mut self, why: Why) {
+    fn flag(&mut self, why: OutcomeReason) {
         (self.outcome.status, self.outcome.reason) = (Status::Flagged, Some(why));
         if let Some(point) = &mut self.point {
             (point.status, point.reason) = (Status::Flagged, Some(why.to_string()));
@@ -268,29 +269,29 @@ impl Worked {
     }
 }
 
-impl<'a> Job<'a> {
+impl<'a> Planner<'a> {
     fn portion(
         &self,
         motions: std::ops::Range<usize>,
         (outcomes, changes): &mut Places<'_>,
         budget: &mut SearchBudget,
-    ) -> Portion {
-        take_room();
+    ) -> PortionResult {
+        reserve_memory();
         let count = motions.len();
-        let paths: Vec<Option<Path<'a>>> = motions.clone().map(|index| self.path(index)).collect();
+        let paths: Vec<Option<Segment<'a>>> = motions.clone().map(|index| self.path(index)).collect();
         // Whether lines are straight shows in their middles, which are worked out together.
         let straight = |index: usize| self.listing.motions[index].kind == MotionKind::Linear;
-        let lines: Vec<&Path<'a>> = motions
+        let lines: Vec<&Segment<'a>> = motions
             .clone()
             .zip(&paths)
             .filter(|(i, _)| straight(*i))
             .filter_map(|(_, p)| p.as_ref())
             .collect();
-        let middles = with_budget(budget, || middles_off(&lines, self.arms, self.options.emit));
+        let middles = with_budget(budget, || midpoint_deviations(&lines, self.arms, self.options.emit));
         let mut middles = middles.into_iter();
         // The way of the motion before, which a corner asks for.
-        let mut last: Option<(u32, Passage)> = None;
-        let mut out = Portion {
+        let mut last: Option<(u32, SegmentPlan)> = None;
+        let mut out = PortionResult {
             unchecked: Vec::new(),
             points: Vec::with_capacity(if self.options.points { count } else { 0 }),
         };
@@ -298,11 +299,12 @@ impl<'a> Job<'a> {
         for ((index, path), (outcome, change)) in motions.zip(&paths).zip(places) {
             let middle = if straight(index) && path.is_some() { middles.next() } else { None };
             let middle = middle.unwrap_or(f64::INFINITY);
-            let mut worked = with_budget(budget, || self.work(index, path.as_ref(), middle, last.as_ref()));
+            let mut worked =
+                with_budget(budget, || self.plan_motion(index, path.as_ref(), middle, last.as_ref()));
             if budget.exhausted && worked.change.is_some() {
-                worked.flag(Why::Inverse(InverseError::Abandoned));
+                worked.flag(OutcomeReason::Inverse(InverseError::Abandoned));
             }
-            last = worked.passage.map(|passage| (index as u32, passage));
+            last = worked.segment_plan.map(|segment_plan| (index as u32, segment_plan));
             let motion = &self.listing.motions[index];
             let curve = matches!(motion.kind, MotionKind::Linear | MotionKind::Circular);
             if curve && path.is_none() && worked.change.is_some() {
@@ -316,7 +318,7 @@ impl<'a> Job<'a> {
 
     /// The path to the end of a motion, as one of its tool in its work object; `None` where it is not one between two corrected
     /// ends.
-    fn path(&self, index: usize) -> Option<Path<'a>> {
+    fn path(&self, index: usize) -> Option<Segment<'a>> {
         let motion = &self.listing.motions[index];
         if !matches!(motion.kind, MotionKind::Linear | MotionKind::Circular | MotionKind::Joint) {
             return None;
@@ -324,19 +326,20 @@ impl<'a> Job<'a> {
         let previous = motion.previous? as usize;
         let before = &self.listing.motions[previous];
         let targets = self.solved.of(previous);
-        let changes =
-            |target: &Result<Solved, Why>| target.as_ref().is_ok_and(|solved| solved.forbidden.is_none());
-        if !may_change(before, self.options)
+        let changes = |target: &Result<SolvedTarget, OutcomeReason>| {
+            target.as_ref().is_ok_and(|solved| solved.forbidden.is_none())
+        };
+        if !is_rewritable(before, self.options)
             || !targets.iter().all(changes)
             || self.stays.contains_key(&(previous as u32))
         {
             return None;
         }
-        let from = ends_of(before, targets, self.mountings)?;
-        let to = ends_of(motion, self.solved.of(index), self.mountings)?;
-        let way = self.solved.way(index, to.place);
-        let from = if from.index == to.index { from } else { from.under(&to) };
-        Some(Path { from, to, way })
+        let from = segment_end(before, targets, self.frame_table)?;
+        let to = segment_end(motion, self.solved.of(index), self.frame_table)?;
+        let schedule = self.solved.condition_schedule(index, to.condition_index);
+        let from = if from.index == to.index { from } else { from.with_frames_of(&to) };
+        Some(Segment { from, to, schedule })
     }
 
     /// How far the corner at the start of a motion leaves the intended one, where the robot rounds it. `last`: the way of
@@ -344,62 +347,64 @@ impl<'a> Job<'a> {
     fn corner(
         &self,
         motion: &Motion,
-        path: Option<&Path<'a>>,
-        passage: &Passage,
-        last: Option<&(u32, Passage)>,
+        path: Option<&Segment<'a>>,
+        segment_plan: &SegmentPlan,
+        last: Option<&(u32, SegmentPlan)>,
     ) -> Option<f64> {
-        let Path { from: point, to, way } = path?;
-        passage.courses.as_ref()?;
+        let Segment { from: point, to, schedule } = path?;
+        segment_plan.backlash_sides.as_ref()?;
         let previous = motion.previous? as usize;
         let before = &self.listing.motions[previous];
         let zone_mm = self.listing.zone(before)?.value.as_ref().ok().filter(|zone| !zone.fine)?.tcp_mm;
         // How a corner goes on under another tool or work object is not told.
-        if self.solved.of(previous).last()?.as_ref().ok()?.mounted != point.index {
+        if self.solved.of(previous).last()?.as_ref().ok()?.frames_index != point.index {
             return None;
         }
         if before.kind == MotionKind::Linear && motion.kind == MotionKind::Linear {
             // Nearly all lines go on nearly straight: that is told by three points.
             let first = self.solved.of(before.previous? as usize).last()?.as_ref().ok()?;
-            let points = [&first.meant, &point.meant, &to.meant].map(|pose| pose.translation.vector);
+            let points = [&first.intended, &point.intended, &to.intended].map(|pose| pose.translation.vector);
             if !(cut_of_lines(&points, zone_mm) > CUT_MM) {
                 return None;
             }
         }
-        let places = [point.place, way.at(0.0)];
-        let bend =
-            |way_in: &Passage| corner(point, way_in, passage, zone_mm, places, self.arms, self.options.emit);
-        if let Some((index, way_in)) = last
+        let condition_indices = [point.condition_index, schedule.at(0.0)];
+        let deviation = |segment_in: &SegmentPlan| {
+            corner(point, segment_in, segment_plan, zone_mm, condition_indices, self.arms, self.options.emit)
+        };
+        if let Some((index, segment_in)) = last
             && Some(*index) == motion.previous
         {
-            return bend(way_in);
+            return deviation(segment_in);
         }
         let path = self.path(previous)?;
-        let middle = middles_off(&[&path], self.arms, self.options.emit)[0];
-        let good: Vec<&Solved> = self.solved.of(previous).iter().filter_map(|t| t.as_ref().ok()).collect();
-        bend(&Passage::of(before, Some(&path), &good, middle, self.arms, self.options))
+        let middle = midpoint_deviations(&[&path], self.arms, self.options.emit)[0];
+        let good: Vec<&SolvedTarget> =
+            self.solved.of(previous).iter().filter_map(|t| t.as_ref().ok()).collect();
+        deviation(&SegmentPlan::of(before, Some(&path), &good, middle, self.arms, self.options))
     }
 
     /// What becomes of one motion. `middle_mm`: how far its told line bends in the middle. `last`: the way of the motion
     /// that was worked out before this one.
-    fn work(
+    fn plan_motion(
         &self,
         index: usize,
-        path: Option<&Path<'a>>,
+        path: Option<&Segment<'a>>,
         middle_mm: f64,
-        last: Option<&(u32, Passage)>,
-    ) -> Worked {
-        work(index, self, path, middle_mm, last)
+        last: Option<&(u32, SegmentPlan)>,
+    ) -> PlannedMotion {
+        plan_motion(index, self, path, middle_mm, last)
     }
 }
 
-fn work<'a>(
+fn plan_motion<'a>(
     index: usize,
-    job: &Job<'a>,
-    path: Option<&Path<'a>>,
+    job: &Planner<'a>,
+    path: Option<&Segment<'a>>,
     middle_mm: f64,
-    last: Option<&(u32, Passage)>,
-) -> Worked {
-    let Job { listing, solved, arms, options, .. } = *job;
+    last: Option<&(u32, SegmentPlan)>,
+) -> PlannedMotion {
+    let Planner { listing, solved, arms, options, .. } = *job;
     let motion = &listing.motions[index];
     let mut outcome = MotionOutcome::left(index as u32);
     let finish = |mut outcome: MotionOutcome, status, reason, change, point: Option<PathPoint>| {
@@ -413,49 +418,54 @@ fn work<'a>(
             }
             p
         });
-        Worked { change, outcome, point, passage: None }
+        PlannedMotion { change, outcome, point, segment_plan: None }
     };
     let targets = solved.of(index);
     let point = match targets.last() {
         Some(Ok(to)) => {
-            outcome.before_mm = Some(to.off_mm[0]);
+            outcome.before_mm = Some(to.deviation_mm[0]);
             outcome.after_mm = outcome.before_mm;
             outcome.sigma_mm = Some(to.sigma_mm);
             outcome.shape_sigma_mm = to.shape_sigma_mm;
             options.points.then(|| {
-                let real = &job.mountings.list[to.mounted].real;
+                let real = &job.frame_table.list[to.frames_index].real;
                 path_point(motion, to, real, job.assessment.shape_alone(index as u32))
             })
         }
         _ => None,
     };
-    if let Some((status, why)) = obstacle(index as u32, listing, solved, options, job.stays) {
+    if let Some((status, why)) = blocking_reason(index as u32, listing, solved, options, job.stays) {
         return finish(outcome, status, Some(why), None, point);
     }
-    let good: Vec<&Solved> = targets.iter().filter_map(|t| t.as_ref().ok()).collect();
+    let good: Vec<&SolvedTarget> = targets.iter().filter_map(|t| t.as_ref().ok()).collect();
     // Then the path from the motion before.
-    let passage = Passage::of(motion, path, &good, middle_mm, arms, options);
-    (outcome.bend_mm, outcome.inserted) = (passage.bend_mm, passage.before.len());
+    let segment_plan = SegmentPlan::of(motion, path, &good, middle_mm, arms, options);
+    (outcome.path_deviation_mm, outcome.inserted) =
+        (segment_plan.path_deviation_mm, segment_plan.before.len());
     // What is said of the motion beside this holds for the configuration that was guessed.
-    let guessed = options.open_starts && motion.configures && good.iter().any(|s| s.guess != Guess::No);
-    let mut flag = if guessed { Some(Why::OpenStart) } else { passage.flag };
-    if let Some(corner) = job.corner(motion, path, &passage, last) {
-        outcome.bend_mm = Some(outcome.bend_mm.map_or(corner, |bend| bend.max(corner)));
+    let guessed = options.flag_unknown_starts
+        && motion.configures
+        && good.iter().any(|s| s.guess != BranchGuess::Known);
+    let mut flag = if guessed { Some(OutcomeReason::UnknownStart) } else { segment_plan.flag };
+    if let Some(corner) = job.corner(motion, path, &segment_plan, last) {
+        outcome.path_deviation_mm =
+            Some(outcome.path_deviation_mm.map_or(corner, |deviation| deviation.max(corner)));
         if !(corner <= options.tolerance_mm) {
-            flag = flag.or(Some(Why::Corner { mm: corner }));
+            flag = flag.or(Some(OutcomeReason::CornerDeviation { mm: corner }));
         }
     }
-    let flag = flag.or_else(|| path.and_then(|path| too_fast(index, motion, listing, path, &passage, arms)));
+    let flag =
+        flag.or_else(|| path.and_then(|path| too_fast(index, motion, listing, path, &segment_plan, arms)));
     let flag = flag.or_else(|| good.iter().find_map(|s| doubtful(s, arms)));
-    let new = |(target, solved): (&MotionTarget, &&Solved)| match target.role {
-        Role::Via if passage.straight => NewTarget::Drop,
+    let new = |(target, solved): (&MotionTarget, &&SolvedTarget)| match target.role {
+        Role::Via if segment_plan.straight => NewTarget::Drop,
         _ => new_target(target, solved, motion, options),
     };
     let new_targets: Vec<NewTarget> = motion.targets.iter().zip(&good).map(new).collect();
-    outcome.after_mm = good.last().map(|s| s.off_mm[1]);
-    let change = Change { motion: index as u32, targets: new_targets, before: passage.before.clone() };
+    outcome.after_mm = good.last().map(|s| s.deviation_mm[1]);
+    let change = Change { motion: index as u32, targets: new_targets, before: segment_plan.before.clone() };
     let status = if flag.is_some() { Status::Flagged } else { Status::Changed };
-    Worked { passage: Some(passage), ..finish(outcome, status, flag, Some(change), point) }
+    PlannedMotion { segment_plan: Some(segment_plan), ..finish(outcome, status, flag, Some(change), point) }
 }
 
 /// A joint that would turn faster than it can at the programmed speed: the controller slows down there, or stops.
@@ -463,38 +473,41 @@ fn too_fast(
     index: usize,
     motion: &Motion,
     listing: &Listing,
-    Path { from, to, .. }: &Path<'_>,
-    passage: &Passage,
+    Segment { from, to, .. }: &Segment<'_>,
+    segment_plan: &SegmentPlan,
     arms: &Arms<'_>,
-) -> Option<Why> {
+) -> Option<OutcomeReason> {
     let pace = if motion.timed {
         Pace::Duration(*listing.durations_s.get(&(index as u32))?.as_ref().ok()?)
     } else {
         Pace::Speed(listing.speed(motion)?.value.as_ref().ok()?)
     };
-    let [_, told] = passage.courses.as_ref()?;
-    let (joint, ratio) = fastest(from, to, told, &pace, arms)?;
-    (ratio > 1.0).then_some(Why::TooFast { joint, ratio })
+    let [_, commanded] = segment_plan.backlash_sides.as_ref()?;
+    let (joint, ratio) = fastest(from, to, commanded, &pace, arms)?;
+    (ratio > 1.0).then_some(OutcomeReason::TooFast { joint, ratio })
 }
 
-fn doubtful(solved: &Solved, arms: &Arms<'_>) -> Option<Why> {
+fn doubtful(solved: &SolvedTarget, arms: &Arms<'_>) -> Option<OutcomeReason> {
     match solved.outside {
-        Some(Outside::Joint { joint, by_deg }) => return Some(Why::JointNotMeasured { joint, by_deg }),
-        Some(Outside::Coverage { ratio }) => return Some(Why::NotCovered { ratio }),
+        Some(Outside::Joint { joint, by_deg }) => {
+            return Some(OutcomeReason::JointNotMeasured { joint, by_deg });
+        }
+        Some(Outside::Coverage { ratio }) => return Some(OutcomeReason::NotCovered { ratio }),
         None => {}
     }
     let reference = arms.knowledge.map_or(f64::INFINITY, |k| k.region.sigma_mm);
-    (solved.sigma_mm > SIGMA_GROWTH * reference).then_some(Why::Uncertain { sigma_mm: solved.sigma_mm })
+    (solved.sigma_mm > SIGMA_GROWTH * reference)
+        .then_some(OutcomeReason::Uncertain { sigma_mm: solved.sigma_mm })
 }
 
 /// A pose whose predicted σ exceeds the worst measured pose's by this factor is flagged.
 const SIGMA_GROWTH: f64 = 2.0;
 
-fn new_target(target: &MotionTarget, solved: &Solved, motion: &Motion, options: &Options) -> NewTarget {
+fn new_target(target: &MotionTarget, solved: &SolvedTarget, motion: &Motion, options: &Options) -> NewTarget {
     if as_joints(motion, target, options.emit) {
         return NewTarget::Joint { robot_deg: std::array::from_fn(|i| solved.after[i].to_degrees()) };
     }
-    let q = solved.told.rotation.quaternion();
+    let q = solved.commanded.rotation.quaternion();
     let old = target.value.ok().and_then(|v| v.cartesian().map(|t| t.conf));
     let new = [solved.conf.cf1, solved.conf.cf4, solved.conf.cf6, solved.conf.cfx];
     // A dummy configuration that nobody monitors stays as it is; cfx stays where only the quarters are used.
@@ -505,15 +518,15 @@ fn new_target(target: &MotionTarget, solved: &Solved, motion: &Motion, options: 
         _ => None,
     };
     NewTarget::Cartesian {
-        position_mm: solved.told.translation.vector.into(),
+        position_mm: solved.commanded.translation.vector.into(),
         quaternion: [q.w, q.i, q.j, q.k],
         conf,
     }
 }
 
-fn path_point(motion: &Motion, solved: &Solved, real: &Mounting, shape_alone: bool) -> PathPoint {
+fn path_point(motion: &Motion, solved: &SolvedTarget, real: &FramePair, shape_alone: bool) -> PathPoint {
     let of_shape = solved.shape_sigma_mm.filter(|_| shape_alone);
-    let flange = real.flange_for(&solved.meant);
+    let flange = real.flange_for(&solved.intended);
     let base_from_object = real.base_from_object(&flange);
     PathPoint {
         index: 0,
@@ -523,7 +536,7 @@ fn path_point(motion: &Motion, solved: &Solved, real: &Mounting, shape_alone: bo
         cutting: matches!(motion.kind, MotionKind::Linear | MotionKind::Circular),
         base_from_object,
         flange_from_tool: real.flange_from_tool(&flange),
-        intended: base_from_object * solved.meant,
+        intended: base_from_object * solved.intended,
         normal: None,
         joints_before: Some(solved.before),
         joints_after: Some(solved.after),

@@ -10,14 +10,14 @@ use truegrind_programs::motion::Reason;
 /// ```
 /// use truegrind_compensation::plan::reason::Why;
 ///
-/// assert_eq!(Why::OutsideLimits { joint: 4 }.to_string(), "joint 5 would leave its range");
-/// let far = Why::TooFar { mm: 3.25 };
+/// assert_eq!(OutcomeReason::OutsideLimits { joint: 4 }.to_string(), "joint 5 would leave its range");
+/// let far = OutcomeReason::CorrectionTooLarge { mm: 3.25 };
 /// assert_eq!(far.to_string(), "correction of 3.250 mm exceeds the bound (--max-correction)");
 /// // In a summary, motions are counted by the reason without its figures.
-/// assert_eq!(far.kind(), Why::TooFar { mm: 8.0 }.kind());
+/// assert_eq!(far.kind(), OutcomeReason::CorrectionTooLarge { mm: 8.0 }.kind());
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Why {
+pub enum OutcomeReason {
     /// The program does not say enough, or says what must not be touched.
     Program(Reason),
     /// An external axis carries the robot's base, which is not followed.
@@ -27,11 +27,11 @@ pub enum Why {
     },
     /// The cell file says of its tool or work object what the program does not bear out
     /// ([`contradictions`](crate::frames::taught::contradictions) says what).
-    Contradicted,
+    CellContradiction,
     /// A joint target states joints, not a pose; rewritten only when asked.
     JointTarget,
     /// The new numbers are the old ones, to the decimals that are written; said once the program is rewritten.
-    Same,
+    NoChange,
     /// No joints reach the target.
     Inverse(InverseError),
     /// A joint would leave its range.
@@ -40,17 +40,17 @@ pub enum Why {
         joint: usize,
     },
     /// On the corrected way to it a joint would leave its range, which it keeps on the told way.
-    WayOutsideLimits {
+    PathOutsideLimits {
         /// Joint, 0-based.
         joint: usize,
     },
     /// The correction of the position is larger than the stated bound.
-    TooFar {
+    CorrectionTooLarge {
         /// The correction (mm).
         mm: f64,
     },
     /// The correction of the orientation is larger than the stated bound.
-    TooMuchTurn {
+    RotationTooLarge {
         /// The correction (°).
         deg: f64,
     },
@@ -68,26 +68,26 @@ pub enum Why {
         on_the_way: bool,
     },
     /// The corrected way comes to a singularity.
-    SingularWay,
+    SingularPath,
     /// The corrected target lies in another configuration.
     OtherBranch,
     /// Nothing tells the controller which configuration to take, and the one that was meant is not the nearest.
-    OpenBranch,
+    AmbiguousBranch,
     /// The controller does not check the stated configuration but takes the one next to where the arm stands, which the
     /// text does not tell: the motion is corrected for the stated one.
-    OpenStart,
+    UnknownStart,
     /// The path between two targets leaves the intended one by more than the tolerance.
-    Bend {
+    PathDeviation {
         /// By how much (mm).
         mm: f64,
     },
     /// The robot rounds the point before, and the corner leaves the intended one by more than the tolerance.
-    Corner {
+    CornerDeviation {
         /// By how much (mm).
         mm: f64,
     },
     /// An arc of about half a turn states its radius, whose decimals leave its centre open.
-    OpenCentre {
+    AmbiguousCentre {
         /// By how much (mm).
         mm: f64,
     },
@@ -104,24 +104,24 @@ pub enum Why {
     /// that was meant.
     NoCircle,
     /// A circular motion that stays starts where it ends, and would become another circle.
-    BeforeCircle {
+    StartOfUnchangedArc {
         /// The line of that motion, from 1.
         line: u32,
     },
     /// A motion that stays starts where it ends, and would come too close to a singularity from there.
-    BeforeSingularWay {
+    StartOfSingularPath {
         /// The line of that motion, from 1.
         line: u32,
     },
     /// A motion that stays starts where it ends, and from there a joint would leave its range on the way.
-    BeforeLimitedWay {
+    StartOfLimitedPath {
         /// Its line, 1-based.
         line: u32,
         /// Joint, 0-based.
         joint: usize,
     },
     /// A whole circle: its ends say nothing of its plane, so its path is not checked.
-    WholeCircle,
+    FullCircle,
     /// A joint stands outside the range in which it was measured.
     JointNotMeasured {
         /// Joint, 0-based.
@@ -160,30 +160,30 @@ pub enum Why {
     },
 }
 
-impl Why {
+impl OutcomeReason {
     /// The reason of an inverse that failed.
     pub fn of_inverse(error: InverseError) -> Self {
         match error {
-            InverseError::OutsideLimits { joint, .. } => Why::OutsideLimits { joint },
-            InverseError::NearSingularity { .. } => Why::NearSingularity,
-            other => Why::Inverse(other),
+            InverseError::OutsideLimits { joint, .. } => OutcomeReason::OutsideLimits { joint },
+            InverseError::NearSingularity { .. } => OutcomeReason::NearSingularity,
+            other => OutcomeReason::Inverse(other),
         }
     }
 
     /// Why it stays for the motion behind it.
     fn before_one_that_stays(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Why::BeforeCircle { line } => write!(
+            OutcomeReason::StartOfUnchangedArc { line } => write!(
                 f,
                 "the circular motion of line {line} stays as it is and starts here: from a corrected start it would be another \
                  circle"
             ),
-            Why::BeforeSingularWay { line } => write!(
+            OutcomeReason::StartOfSingularPath { line } => write!(
                 f,
                 "the motion of line {line} stays as it is and starts here: from a corrected start it would come too close to a \
                  singularity"
             ),
-            Why::BeforeLimitedWay { line, joint } => write!(
+            OutcomeReason::StartOfLimitedPath { line, joint } => write!(
                 f,
                 "the motion of line {line} stays as it is and starts here: from a corrected start joint {} would leave its \
                  range on the way",
@@ -196,155 +196,169 @@ impl Why {
     /// The reason without the figures of one motion.
     pub fn kind(&self) -> &'static str {
         match self {
-            Why::Program(reason) => reason.text(),
-            Why::MovingBase { .. } => "an external axis carries the robot's base",
-            Why::Contradicted => "cell file and program contradict each other",
-            Why::JointTarget => "a joint target",
-            Why::Same => "nothing to change",
-            Why::Inverse(InverseError::Unreachable { .. }) => "out of reach",
-            Why::Inverse(InverseError::OtherConfiguration { .. } | InverseError::OtherBranch { .. }) => {
-                "not reachable in its configuration"
+            OutcomeReason::Program(reason) => reason.text(),
+            OutcomeReason::MovingBase { .. } => "an external axis carries the robot's base",
+            OutcomeReason::CellContradiction => "cell file and program contradict each other",
+            OutcomeReason::JointTarget => "a joint target",
+            OutcomeReason::NoChange => "nothing to change",
+            OutcomeReason::Inverse(InverseError::Unreachable { .. }) => "out of reach",
+            OutcomeReason::Inverse(
+                InverseError::OtherConfiguration { .. } | InverseError::OtherBranch { .. },
+            ) => "not reachable in its configuration",
+            OutcomeReason::Inverse(InverseError::Abandoned) => "too many targets had to be searched for",
+            OutcomeReason::Inverse(_) => "no joints were found",
+            OutcomeReason::OutsideLimits { .. } => "a joint would leave its range",
+            OutcomeReason::PathOutsideLimits { .. } => "a joint would leave its range on the way to it",
+            OutcomeReason::CorrectionTooLarge { .. } => "correction exceeds the bound (--max-correction)",
+            OutcomeReason::RotationTooLarge { .. } => "correction of the orientation exceeds the bound",
+            OutcomeReason::NearSingularity => "too close to a singularity",
+            OutcomeReason::OtherBranch => "the corrected target lies in another configuration",
+            OutcomeReason::PathDeviation { .. } => "the path between targets leaves the intended one",
+            OutcomeReason::CornerDeviation { .. } => "the rounded corner leaves the intended one",
+            OutcomeReason::AmbiguousCentre { .. } => {
+                "told by its radius, the centre of a half circle is left open"
             }
-            Why::Inverse(InverseError::Abandoned) => "too many targets had to be searched for",
-            Why::Inverse(_) => "no joints were found",
-            Why::OutsideLimits { .. } => "a joint would leave its range",
-            Why::WayOutsideLimits { .. } => "a joint would leave its range on the way to it",
-            Why::TooFar { .. } => "correction exceeds the bound (--max-correction)",
-            Why::TooMuchTurn { .. } => "correction of the orientation exceeds the bound",
-            Why::NearSingularity => "too close to a singularity",
-            Why::OtherBranch => "the corrected target lies in another configuration",
-            Why::Bend { .. } => "the path between targets leaves the intended one",
-            Why::Corner { .. } => "the rounded corner leaves the intended one",
-            Why::OpenCentre { .. } => "told by its radius, the centre of a half circle is left open",
-            Why::CircleKept => "the circle stays a circle",
-            Why::TooFast { .. } => "a joint turns faster than it can",
-            Why::NoCircle => "no circle through its points keeps to the way that was meant",
-            Why::BeforeCircle { .. } => "a circular motion that stays starts where it ends",
-            Why::BeforeSingularWay { .. } => {
+            OutcomeReason::CircleKept => "the circle stays a circle",
+            OutcomeReason::TooFast { .. } => "a joint turns faster than it can",
+            OutcomeReason::NoCircle => "no circle through its points keeps to the way that was meant",
+            OutcomeReason::StartOfUnchangedArc { .. } => "a circular motion that stays starts where it ends",
+            OutcomeReason::StartOfSingularPath { .. } => {
                 "a motion that stays and passes a singularity starts where it ends"
             }
-            Why::BeforeLimitedWay { .. } => {
+            OutcomeReason::StartOfLimitedPath { .. } => {
                 "a joint would leave its range on a motion that stays and starts here"
             }
-            Why::WholeCircle => "a whole circle",
-            Why::JointNotMeasured { .. } => "a joint is outside the range in which the arm was measured",
-            Why::JointJump { .. } => "near a singularity the correction turns a joint too far",
-            Why::SingularWay => "the way to it passes too close to a singularity",
-            Why::OpenBranch => "which configuration the controller takes is open",
-            Why::OpenStart => {
+            OutcomeReason::FullCircle => "a whole circle",
+            OutcomeReason::JointNotMeasured { .. } => {
+                "a joint is outside the range in which the arm was measured"
+            }
+            OutcomeReason::JointJump { .. } => "near a singularity the correction turns a joint too far",
+            OutcomeReason::SingularPath => "the way to it passes too close to a singularity",
+            OutcomeReason::AmbiguousBranch => "which configuration the controller takes is open",
+            OutcomeReason::UnknownStart => {
                 "corrected for the stated configuration, which is not checked, from a start that is not known"
             }
-            Why::PartOfCut { because, .. } => because,
-            Why::Step { .. } => "the step to its neighbour is too large",
-            Why::Risk { .. } => "the correction may well make the cut worse (--max-risk)",
-            Why::NotCovered { .. } => "no measured pose is near",
-            Why::Uncertain { .. } => "the model is uncertain here",
+            OutcomeReason::PartOfCut { because, .. } => because,
+            OutcomeReason::Step { .. } => "the step to its neighbour is too large",
+            OutcomeReason::Risk { .. } => "the correction may well make the cut worse (--max-risk)",
+            OutcomeReason::NotCovered { .. } => "no measured pose is near",
+            OutcomeReason::Uncertain { .. } => "the model is uncertain here",
         }
     }
 
     /// The whole sentence, where it has no numbers in it and says more than [`Self::kind`].
     fn sentence(&self) -> Option<&'static str> {
         Some(match self {
-            Why::Same => "its numbers are right to the last decimal that is written",
-            Why::JointTarget => "joint target: states joints, not a pose (--joint-targets rewrites it too)",
-            Why::Contradicted => {
+            OutcomeReason::NoChange => "its numbers are right to the last decimal that is written",
+            OutcomeReason::JointTarget => {
+                "joint target: states joints, not a pose (--joint-targets rewrites it too)"
+            }
+            OutcomeReason::CellContradiction => {
                 "what the cell file says of its tool or work object and what the program says do not agree"
             }
-            Why::SingularWay => "on the corrected way to it the arm comes too close to a singularity",
-            Why::OpenBranch => {
+            OutcomeReason::SingularPath => {
+                "on the corrected way to it the arm comes too close to a singularity"
+            }
+            OutcomeReason::AmbiguousBranch => {
                 "the controller may take another configuration, since none is stated and another lies as near: state it, or \
                  come nearer before"
             }
-            Why::OpenStart => {
+            OutcomeReason::UnknownStart => {
                 "its configuration is not checked (ConfL \\Off, ConfJ \\Off): the controller takes the one next to where the \
                  arm stands, and where it comes from the text does not tell. It is corrected for the stated one, or the one \
                  that leads on from there: check that, or begin with a joint target"
             }
-            Why::Bend { mm } if !mm.is_finite() => "the arm cannot follow the path to it",
-            Why::Corner { mm } if !mm.is_finite() => {
+            OutcomeReason::PathDeviation { mm } if !mm.is_finite() => "the arm cannot follow the path to it",
+            OutcomeReason::CornerDeviation { mm } if !mm.is_finite() => {
                 "the arm cannot follow the rounded corner before it: round it less (zone, path tolerance)"
             }
-            Why::CircleKept => {
+            OutcomeReason::CircleKept => {
                 "the circle stays: its start is not known or not corrected, the instruction may not be split, or no \
                  straight pieces keep to it"
             }
-            Why::NoCircle => "its three points make no circle, or none that keeps to the way that was meant",
-            Why::WholeCircle => "a whole circle: the path between its ends is not checked",
+            OutcomeReason::NoCircle => {
+                "its three points make no circle, or none that keeps to the way that was meant"
+            }
+            OutcomeReason::FullCircle => "a whole circle: the path between its ends is not checked",
             _ => return None,
         })
     }
 }
 
-impl fmt::Display for Why {
+impl fmt::Display for OutcomeReason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Some(sentence) = self.sentence() {
             return f.write_str(sentence);
         }
         match self {
-            Why::Program(reason) => reason.fmt(f),
-            Why::MovingBase { axis } => write!(
+            OutcomeReason::Program(reason) => reason.fmt(f),
+            OutcomeReason::MovingBase { axis } => write!(
                 f,
                 "external axis {} carries the robot's base: where that stands is not followed",
                 char::from(b'a' + *axis as u8)
             ),
-            Why::Inverse(error) => error.fmt(f),
-            Why::OutsideLimits { joint } => write!(f, "joint {} would leave its range", joint + 1),
-            Why::WayOutsideLimits { joint } => {
+            OutcomeReason::Inverse(error) => error.fmt(f),
+            OutcomeReason::OutsideLimits { joint } => write!(f, "joint {} would leave its range", joint + 1),
+            OutcomeReason::PathOutsideLimits { joint } => {
                 write!(f, "on the corrected way to it joint {} would leave its range", joint + 1)
             }
-            Why::TooFar { mm } => write!(f, "correction of {mm:.3} mm exceeds the bound (--max-correction)"),
-            Why::TooMuchTurn { deg } => write!(f, "correction of {deg:.3}° exceeds the bound"),
-            Why::JointJump { joint, deg, most_deg, on_the_way } => write!(
+            OutcomeReason::CorrectionTooLarge { mm } => {
+                write!(f, "correction of {mm:.3} mm exceeds the bound (--max-correction)")
+            }
+            OutcomeReason::RotationTooLarge { deg } => write!(f, "correction of {deg:.3}° exceeds the bound"),
+            OutcomeReason::JointJump { joint, deg, most_deg, on_the_way } => write!(
                 f,
                 "{}the correction would turn joint {} by {deg:.1}°, more than {most_deg:.1}°, which is enough away from \
                  singularities: keep farther from the singular configuration",
                 if *on_the_way { "on the way to it " } else { "" },
                 joint + 1
             ),
-            Why::Bend { mm } => write!(f, "the path to it leaves the intended one by {mm:.3} mm"),
-            Why::Corner { mm } => {
+            OutcomeReason::PathDeviation { mm } => {
+                write!(f, "the path to it leaves the intended one by {mm:.3} mm")
+            }
+            OutcomeReason::CornerDeviation { mm } => {
                 write!(
                     f,
                     "the rounded corner before it leaves the intended one by {mm:.3} mm: round it less (zone, path tolerance)"
                 )
             }
-            Why::OpenCentre { mm } => write!(
+            OutcomeReason::AmbiguousCentre { mm } => write!(
                 f,
                 "an arc of about half a turn that states its radius: the decimals that are written leave its centre open by \
                  {mm:.3} mm; state the centre instead (I, J, K; CC)"
             ),
-            Why::TooFast { joint, ratio } => write!(
+            OutcomeReason::TooFast { joint, ratio } => write!(
                 f,
                 "at the programmed speed joint {} turns {ratio:.2} times as fast as it can",
                 joint + 1
             ),
-            Why::BeforeCircle { .. } | Why::BeforeSingularWay { .. } | Why::BeforeLimitedWay { .. } => {
-                self.before_one_that_stays(f)
-            }
-            Why::JointNotMeasured { joint, by_deg } => write!(
+            OutcomeReason::StartOfUnchangedArc { .. }
+            | OutcomeReason::StartOfSingularPath { .. }
+            | OutcomeReason::StartOfLimitedPath { .. } => self.before_one_that_stays(f),
+            OutcomeReason::JointNotMeasured { joint, by_deg } => write!(
                 f,
                 "joint {} is {by_deg:.1}° outside the range in which the arm was measured",
                 joint + 1
             ),
-            Why::PartOfCut { line, because } => write!(
+            OutcomeReason::PartOfCut { line, because } => write!(
                 f,
                 "the cut is corrected as a whole or not at all, and line {line} stays as it is: {because} (--partial \
                  corrects the rest)"
             ),
-            Why::Step { line, mm } => write!(
+            OutcomeReason::Step { line, mm } => write!(
                 f,
                 "line {line} of the same cut stays as it is: the step of {mm:.3} mm between the two exceeds --tolerance"
             ),
-            Why::Risk { chance } => write!(
+            OutcomeReason::Risk { chance } => write!(
                 f,
                 "with a probability of {:.0} % the correction makes this cut worse than it is, more than --max-risk takes: the \
                  measurement does not tell the arm well enough here",
                 100.0 * chance
             ),
-            Why::NotCovered { ratio } => {
+            OutcomeReason::NotCovered { ratio } => {
                 write!(f, "no measured pose is near: {ratio:.1} times the distance of measured poses")
             }
-            Why::Uncertain { sigma_mm } => {
+            OutcomeReason::Uncertain { sigma_mm } => {
                 write!(f, "the model is uncertain here: predicted standard deviation {sigma_mm:.3} mm")
             }
             _ => f.write_str(self.kind()),

@@ -8,14 +8,17 @@ use std::collections::BTreeMap;
 use nalgebra::DVector;
 use rayon::prelude::*;
 
-use crate::condition::arm_conditions::Circumstances;
+use crate::condition::arm_conditions::ArmConditions;
 use crate::cut::{self, CutsOf};
-use crate::frames::frame_pair::Mounted;
-use crate::plan::reason::Why;
+use crate::frames::frame_pair::ResolvedFrames;
+use crate::plan::reason::OutcomeReason;
 use crate::risk::cut_risk::{self, CutRisk, Judgement};
-use crate::risk::placement::{self, Commanded, ObjectPlacement, Off, Placement, Wanted, placed, spread};
-use crate::risk::probability::chance;
-use crate::risk::remedy_search::{self, Place};
+use crate::risk::placement::{
+    self, AssessedTarget, ObjectPlacement, Placement, PlacementChoice, TargetDeviation, assess_placement,
+    evenly_spaced,
+};
+use crate::risk::probability::probability_of_harm;
+use crate::risk::remedy_search::{self, UnknownPlacement};
 use truegrind_arm::estimated::{Estimated, RegisteredFrame};
 use truegrind_programs::motion::Listing;
 
@@ -27,7 +30,7 @@ pub(crate) struct Assessment {
     /// One for each cut.
     pub(crate) cuts: Vec<CutRisk>,
     /// What each cut has a part in, taken together.
-    shares: Vec<Share>,
+    shares: Vec<CutContribution>,
     /// The cut of each motion, as its place in `cuts`; empty without any.
     cut_of: Vec<Option<u32>>,
     /// The best registration of each cut, in the base; absent where the robot holds the part.
@@ -36,10 +39,14 @@ pub(crate) struct Assessment {
 
 impl Assessment {
     /// The motions that stay since their cut would too likely get worse.
-    pub(crate) fn risky(&self) -> BTreeMap<u32, Why> {
-        let left = self.cuts.iter().filter(|cut| cut.left);
-        left.flat_map(|cut| cut.motions.iter().map(|motion| (*motion, Why::Risk { chance: cut.chance })))
-            .collect()
+    pub(crate) fn risky(&self) -> BTreeMap<u32, OutcomeReason> {
+        let left = self.cuts.iter().filter(|cut| cut.left_for_risk);
+        left.flat_map(|cut| {
+            cut.motions
+                .iter()
+                .map(|motion| (*motion, OutcomeReason::Risk { chance: cut.probability_of_harm }))
+        })
+        .collect()
     }
 
     /// Against what the shape of a motion's cut is known: a frame that moves with the arm's parameters as the cut does.
@@ -55,19 +62,19 @@ impl Assessment {
 
     /// Whether the shape of a motion's cut is corrected, and its place not.
     pub(crate) fn shape_alone(&self, motion: u32) -> bool {
-        self.place(motion).is_some_and(|place| self.cuts[place].judged == Placement::Shape)
+        self.place(motion).is_some_and(|place| self.cuts[place].assessed == Placement::Shape)
     }
 
     /// Probability that these cuts get worse, taken together; absent without any.
-    pub(crate) fn chance_of<'c>(
+    pub(crate) fn probability_of_harm_of<'c>(
         &self,
         knowledge: &Estimated,
         cuts: impl IntoIterator<Item = &'c CutRisk>,
     ) -> Option<f64> {
-        let mut whole = Whole::of(knowledge);
+        let mut total = ProgramTotal::of(knowledge);
         let places = cuts.into_iter().filter_map(|cut| self.place(*cut.motions.first()?));
-        places.filter_map(|place| self.shares.get(place)).for_each(|share| whole.add(share));
-        whole.chance(knowledge)
+        places.filter_map(|place| self.shares.get(place)).for_each(|share| total.add(share));
+        total.probability_of_harm(knowledge)
     }
 
     fn place(&self, motion: u32) -> Option<usize> {
@@ -76,18 +83,18 @@ impl Assessment {
 }
 
 /// What is asked: the estimated arm, under each condition that the targets were given.
-pub(crate) struct Knowing<'a, 'm> {
-    pub(crate) acting: &'a Circumstances<'m>,
+pub(crate) struct EstimateContext<'a, 'm> {
+    pub(crate) conditions: &'a ArmConditions<'m>,
     pub(crate) knowledge: &'a Estimated,
 }
 
 /// The targets that are looked at: of each work object and of each cut, the point included at which it begins.
-pub(crate) struct Chosen {
+pub(crate) struct AssessmentSample {
     objects: Vec<(u32, Vec<u32>)>,
     cuts: Vec<(Vec<u32>, Vec<u32>)>,
 }
 
-impl Chosen {
+impl AssessmentSample {
     /// Those of the motions that `reached` says something of.
     pub(crate) fn of(listing: &Listing, reached: impl Fn(usize) -> bool) -> Self {
         let cuts: CutsOf = cut::of(listing);
@@ -112,11 +119,12 @@ impl Chosen {
         }
         // Where something is cut, the way through the air does not count.
         let objects = of_object.into_iter().map(|(object, [cuts, rest])| {
-            (object, spread(if cuts.is_empty() { &rest } else { &cuts }, placement::MOST_POINTS))
+            (object, evenly_spaced(if cuts.is_empty() { &rest } else { &cuts }, placement::MOST_POINTS))
         });
         let cuts = of_cut.into_values().filter_map(|[all, begin]| {
-            let told: Vec<u32> = begin.iter().chain(&all).copied().filter(|m| reached(*m as usize)).collect();
-            (!told.is_empty()).then(|| (all, spread(&told, cut_risk::MOST_POINTS)))
+            let commanded: Vec<u32> =
+                begin.iter().chain(&all).copied().filter(|m| reached(*m as usize)).collect();
+            (!commanded.is_empty()).then(|| (all, evenly_spaced(&commanded, cut_risk::MOST_POINTS)))
         });
         Self { objects: objects.collect(), cuts: cuts.collect() }
     }
@@ -124,80 +132,83 @@ impl Chosen {
     /// Every motion that is looked at, once.
     pub(crate) fn motions(&self) -> Vec<u32> {
         let objects = self.objects.iter().flat_map(|(_, motions)| motions);
-        let mut all: Vec<u32> = objects.chain(self.cuts.iter().flat_map(|(_, told)| told)).copied().collect();
+        let mut all: Vec<u32> =
+            objects.chain(self.cuts.iter().flat_map(|(_, commanded)| commanded)).copied().collect();
         all.sort_unstable();
         all.dedup();
         all
     }
 }
 
-/// Assesses a program. `at` are the targets of [`Chosen::motions`], by motion. Work objects of which the shape alone is
+/// Assesses a program. `at` are the targets of [`AssessmentSample::motions`], by motion. Work objects of which the shape alone is
 /// corrected are displaced in `list` to where the path lies.
-pub(crate) fn assessed(
+pub(crate) fn assess_program(
     listing: &Listing,
-    chosen: &Chosen,
-    at: &BTreeMap<u32, Commanded>,
-    list: &mut [Mounted],
+    chosen: &AssessmentSample,
+    at: &BTreeMap<u32, AssessedTarget>,
+    list: &mut [ResolvedFrames],
     objects: &[u32],
-    with: &Knowing<'_, '_>,
-    wanted: Wanted,
+    with: &EstimateContext<'_, '_>,
+    wanted: PlacementChoice,
 ) -> Assessment {
-    let Knowing { acting, knowledge } = *with;
+    let EstimateContext { conditions, knowledge } = *with;
     let mut out = Assessment { cut_of: vec![None; listing.motions.len()], ..Assessment::default() };
     let mut taken: BTreeMap<u32, Placement> = BTreeMap::new();
     for (object, motions) in &chosen.objects {
-        let targets: Vec<Commanded> = motions.iter().filter_map(|m| at.get(m).copied()).collect();
+        let targets: Vec<AssessedTarget> = motions.iter().filter_map(|m| at.get(m).copied()).collect();
         let name = &listing.work_objects[*object as usize].name;
-        let found = placed(name, &targets, list, acting, knowledge, wanted);
+        let found = assess_placement(name, &targets, list, conditions, knowledge, wanted);
         let Some((mut placement, displaced)) = found else { continue };
-        if placement.taken == Placement::Shape && wanted.remedies {
+        if placement.applied == Placement::Shape && wanted.remedies {
             let max_risk = wanted.max_risk;
-            let place = Place { targets: &targets, list: &*list, acting, knowledge, max_risk };
+            let place = UnknownPlacement { targets: &targets, list: &*list, conditions, knowledge, max_risk };
             placement.remedy = remedy_search::remedy(&place);
         }
-        taken.insert(*object, placement.taken);
+        taken.insert(*object, placement.applied);
         out.placements.push(placement);
         if let Some(motion) = displaced {
-            for (mounted, _) in list.iter_mut().zip(objects).filter(|(_, of)| **of == *object) {
-                mounted.real.object *= motion;
+            for (frames_index, _) in list.iter_mut().zip(objects).filter(|(_, of)| **of == *object) {
+                frames_index.real.object *= motion;
             }
         }
     }
-    let list: &[Mounted] = list;
-    let judged: Vec<Option<(Judged, Judgement)>> = chosen
+    let list: &[ResolvedFrames] = list;
+    let judged: Vec<Option<(JudgedCut, Judgement)>> = chosen
         .cuts
         .par_iter()
-        .map(|(motions, told)| {
-            let targets: Vec<&Commanded> = told.iter().filter_map(|m| at.get(m)).collect();
-            let mounted = &list[targets.first()?.mounted];
+        .map(|(motions, commanded)| {
+            let targets: Vec<&AssessedTarget> = commanded.iter().filter_map(|m| at.get(m)).collect();
+            let frames_index = &list[targets.first()?.frames_index];
             let object = listing.motions[motions[0] as usize].work_object?;
             let placement = *taken.get(&object)?;
-            let off: Vec<Off> = targets.iter().map(|t| Off::of(t, mounted, acting, knowledge)).collect();
-            let judgement = cut_risk::judged(&off, knowledge, placement)?;
+            let off: Vec<TargetDeviation> =
+                targets.iter().map(|t| TargetDeviation::of(t, frames_index, conditions, knowledge)).collect();
+            let judgement = cut_risk::assess_cut(&off, knowledge, placement)?;
             let weight = motions.len() as f64 / off.len() as f64;
-            let carried = (!mounted.real.holds_part)
-                .then(|| cut_risk::in_base(&judgement.registered, &mounted.real.object));
-            Some((Judged { placement, points: off.len(), weight, carried }, judgement))
+            let carried = (!frames_index.real.holds_part)
+                .then(|| cut_risk::in_base(&judgement.registered, &frames_index.real.object));
+            Some((JudgedCut { placement, points: off.len(), weight, carried }, judgement))
         })
         .collect();
     for ((motions, _), judged) in chosen.cuts.iter().zip(judged) {
         let Some((judged, judgement)) = judged else { continue };
-        let chance = chance(judgement.square, &judgement.toward, knowledge, judged.points);
-        let left = !(chance <= wanted.max_risk);
+        let probability_of_harm =
+            probability_of_harm(judgement.square, &judgement.toward, knowledge, judged.points);
+        let left_for_risk = !(probability_of_harm <= wanted.max_risk);
         let place = out.cuts.len() as u32;
         motions.iter().for_each(|m| out.cut_of[*m as usize] = Some(place));
         out.cuts.push(CutRisk {
             motions: motions.clone(),
-            judged: judged.placement,
-            off_mm: judgement.off_mm,
+            assessed: judged.placement,
+            deviation_mm: judgement.deviation_mm,
             sigma_mm: judgement.sigma_mm,
             shape_sigma_mm: judgement.shape_sigma_mm,
-            chance,
-            left,
+            probability_of_harm,
+            left_for_risk,
             corrected: false,
         });
         out.registered.push(judged.carried);
-        out.shares.push(Share {
+        out.shares.push(CutContribution {
             points: judged.weight * judged.points as f64,
             square: judged.weight * judgement.square,
             toward: judgement.toward * judged.weight,
@@ -207,7 +218,7 @@ pub(crate) fn assessed(
 }
 
 /// How a cut was judged.
-struct Judged {
+struct JudgedCut {
     placement: Placement,
     points: usize,
     /// Motions for each point that was asked.
@@ -217,28 +228,28 @@ struct Judged {
 
 /// What a cut weighs among others: points, |d|² (mm²), and Jᵀ d.
 #[derive(Debug, Clone)]
-struct Share {
+struct CutContribution {
     points: f64,
     square: f64,
     toward: DVector<f64>,
 }
 
 /// Cuts together.
-struct Whole(Share);
+struct ProgramTotal(CutContribution);
 
-impl Whole {
+impl ProgramTotal {
     fn of(knowledge: &Estimated) -> Self {
-        Self(Share { points: 0.0, square: 0.0, toward: DVector::zeros(knowledge.order.len()) })
+        Self(CutContribution { points: 0.0, square: 0.0, toward: DVector::zeros(knowledge.order.len()) })
     }
 
-    fn add(&mut self, cut: &Share) {
+    fn add(&mut self, cut: &CutContribution) {
         self.0.points += cut.points;
         self.0.square += cut.square;
         self.0.toward += &cut.toward;
     }
 
-    fn chance(&self, knowledge: &Estimated) -> Option<f64> {
-        let Share { points, square, toward } = &self.0;
-        (*points > 0.0).then(|| chance(*square, toward, knowledge, points.round() as usize))
+    fn probability_of_harm(&self, knowledge: &Estimated) -> Option<f64> {
+        let CutContribution { points, square, toward } = &self.0;
+        (*points > 0.0).then(|| probability_of_harm(*square, toward, knowledge, points.round() as usize))
     }
 }

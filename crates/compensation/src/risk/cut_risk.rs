@@ -5,7 +5,7 @@
 
 use nalgebra::{DVector, Matrix3xX, Vector3, Vector6};
 
-use crate::risk::placement::{Off, Placement};
+use crate::risk::placement::{Placement, TargetDeviation};
 use crate::risk::registration::Registration;
 use truegrind_arm::estimated::{Estimated, RegisteredFrame};
 use truegrind_math::se3::Pose;
@@ -16,17 +16,17 @@ pub struct CutRisk {
     /// Its motions, by index, in order.
     pub motions: Vec<u32>,
     /// Whether its shape is judged, or its place too.
-    pub judged: Placement,
+    pub assessed: Placement,
     /// How far it is off as it is (RMS, mm).
-    pub off_mm: f64,
+    pub deviation_mm: f64,
     /// Predicted standard deviation of its correction (RMS, mm).
     pub sigma_mm: f64,
     /// Predicted standard deviation of its shape, after its best rigid registration (RMS, mm).
     pub shape_sigma_mm: f64,
     /// Probability that the correction makes it worse.
-    pub chance: f64,
+    pub probability_of_harm: f64,
     /// Whether it is left as it is for that.
-    pub left: bool,
+    pub left_for_risk: bool,
     /// Whether it is rewritten, or with [`Cuts::Partial`](crate::cut::Cuts::Partial) a part of it: a cut of which no motion is
     /// likely to get worse may stay for another reason, which its motions say.
     pub corrected: bool,
@@ -34,7 +34,7 @@ pub struct CutRisk {
 
 /// A cut, judged.
 pub(crate) struct Judgement {
-    pub(crate) off_mm: f64,
+    pub(crate) deviation_mm: f64,
     pub(crate) sigma_mm: f64,
     pub(crate) shape_sigma_mm: f64,
     /// |d|² (mm²), and Jᵀ d: added up they judge the program.
@@ -48,8 +48,12 @@ pub(crate) struct Judgement {
 pub(crate) const MOST_POINTS: usize = 32;
 
 /// Judges the points of a cut.
-pub(crate) fn judged(off: &[Off], knowledge: &Estimated, placement: Placement) -> Option<Judgement> {
-    let registration = Registration::of(&off.iter().map(|o| o.meant).collect::<Vec<_>>())?;
+pub(crate) fn assess_cut(
+    off: &[TargetDeviation],
+    knowledge: &Estimated,
+    placement: Placement,
+) -> Option<Judgement> {
+    let registration = Registration::of(&off.iter().map(|o| o.intended).collect::<Vec<_>>())?;
     let twists = registration.twists(off.iter().map(|o| &o.jacobian));
     let twist = registration.twist(off.iter().map(|o| &o.shift));
     let (mut square, mut variance, mut of_shape) = (0.0, 0.0, 0.0);
@@ -76,7 +80,7 @@ pub(crate) fn judged(off: &[Off], knowledge: &Estimated, placement: Placement) -
         twists: twists.column_iter().map(|twist| twist.into_owned()).collect(),
     };
     Some(Judgement {
-        off_mm: rms(square),
+        deviation_mm: rms(square),
         sigma_mm: rms(variance),
         shape_sigma_mm: rms(of_shape),
         square,

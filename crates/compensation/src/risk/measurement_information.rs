@@ -17,19 +17,19 @@ use truegrind_math::se3::Pose;
 
 /// How well something of the measurement is known before it is fitted (mm, rad).
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Spread {
+pub(crate) struct PriorSigma {
     pub(crate) mm: f64,
     pub(crate) rad: f64,
 }
 
 /// What is fitted freely, as in an identification.
-pub(crate) const FREE: Spread = Spread { mm: 2000.0, rad: 3.0 };
+pub(crate) const FREE: PriorSigma = PriorSigma { mm: 2000.0, rad: 3.0 };
 /// A target that sits anywhere near the flange.
-const MOUNTED: Spread = Spread { mm: 50.0, rad: 1.0 };
+const MOUNTED: PriorSigma = PriorSigma { mm: 50.0, rad: 1.0 };
 
 /// Where a sensor stands (mm, in the base).
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Stand {
+pub(crate) enum SensorPosition {
     /// A tracker, about which its frame turns.
     Tracker(Vector3<f64>),
     /// The outlet of a cable.
@@ -41,9 +41,9 @@ pub(crate) struct Readings<'a> {
     pub(crate) poses: &'a [Joints],
     /// What each pose counts.
     pub(crate) weight: f64,
-    pub(crate) stand: Stand,
+    pub(crate) stand: SensorPosition,
     /// How well it is known where the sensor stands.
-    pub(crate) stand_known: Spread,
+    pub(crate) stand_known: PriorSigma,
     /// Targets on the flange (mm).
     pub(crate) targets: &'a [Vector3<f64>],
     /// How well their places on the flange are known (mm); `None` for targets that sit anywhere.
@@ -53,13 +53,13 @@ pub(crate) struct Readings<'a> {
 }
 
 /// AᵀWA, AᵀWB and BᵀWB of readings.
-pub(crate) struct Normal {
+pub(crate) struct NormalEquations {
     arms: DMatrix<f64>,
     mixed: DMatrix<f64>,
     owns: DMatrix<f64>,
 }
 
-impl Normal {
+impl NormalEquations {
     /// The information on the arm's parameters, with the standard deviations that the measurement's own have beforehand.
     pub(crate) fn information(&self, own: &[f64]) -> DMatrix<f64> {
         let Self { arms, mixed, owns } = self;
@@ -76,7 +76,7 @@ impl Normal {
 
 impl Readings<'_> {
     /// Their normal equations, on the parameters of `knowledge` and on their own.
-    pub(crate) fn normal(&self, knowledge: &Estimated, arm: &PreparedModel<'_>) -> Normal {
+    pub(crate) fn normal(&self, knowledge: &Estimated, arm: &PreparedModel<'_>) -> NormalEquations {
         let (parameters, own) = (knowledge.order.len(), self.own().len());
         let mut arms = DMatrix::zeros(parameters, parameters);
         let (mut mixed, mut owns) = (DMatrix::zeros(parameters, own), DMatrix::zeros(own, own));
@@ -90,8 +90,8 @@ impl Readings<'_> {
                     knowledge.position_jacobian(arm, q, &Pose::translation(target.x, target.y, target.z));
                 let by_own = self.by_own(&point, turn.matrix(), k);
                 let (by_arm, by_own) = match self.stand {
-                    Stand::Tracker(_) => (by_arm, by_own),
-                    Stand::Outlet(outlet) => {
+                    SensorPosition::Tracker(_) => (by_arm, by_own),
+                    SensorPosition::Outlet(outlet) => {
                         let along = (point - outlet).normalize();
                         let along = DMatrix::from_row_slice(1, 3, along.as_slice());
                         let mut by_own = &along * by_own;
@@ -104,16 +104,16 @@ impl Readings<'_> {
                 owns += by_own.tr_mul(&by_own) * weight;
             }
         }
-        Normal { arms, mixed, owns }
+        NormalEquations { arms, mixed, owns }
     }
 
     /// Standard deviations of the measurement's own parameters: six of the frame, or three of the outlet and the zero of its
     /// cable, then three for each target.
     pub(crate) fn own(&self) -> Vec<f64> {
-        let Spread { mm, rad } = self.stand_known;
+        let PriorSigma { mm, rad } = self.stand_known;
         let mut out = match self.stand {
-            Stand::Tracker(_) => vec![mm, mm, mm, rad, rad, rad],
-            Stand::Outlet(_) => vec![mm; 4],
+            SensorPosition::Tracker(_) => vec![mm, mm, mm, rad, rad, rad],
+            SensorPosition::Outlet(_) => vec![mm; 4],
         };
         let target = self.target_known_mm.unwrap_or(MOUNTED.mm);
         out.extend(vec![target; 3 * self.targets.len()]);
@@ -123,12 +123,12 @@ impl Readings<'_> {
     /// How the place at which a target is read moves with the measurement's own parameters (3 × own).
     fn by_own(&self, point: &Vector3<f64>, turn: &Matrix3<f64>, target: usize) -> DMatrix<f64> {
         let first = match self.stand {
-            Stand::Tracker(_) => 6,
-            Stand::Outlet(_) => 4,
+            SensorPosition::Tracker(_) => 6,
+            SensorPosition::Outlet(_) => 4,
         };
         let mut out = DMatrix::zeros(3, first + 3 * self.targets.len());
         out.view_mut((0, 0), (3, 3)).copy_from(&-Matrix3::<f64>::identity());
-        if let Stand::Tracker(at) = self.stand {
+        if let SensorPosition::Tracker(at) = self.stand {
             out.view_mut((0, 3), (3, 3)).copy_from(&(point - at).cross_matrix());
         }
         out.view_mut((0, first + 3 * target), (3, 3)).copy_from(turn);
@@ -158,8 +158,9 @@ pub(crate) fn updated(
     information: &DMatrix<f64>,
     seen: &DMatrix<f64>,
 ) -> Option<DMatrix<f64>> {
-    let told = factor.tr_mul(&(information * factor));
-    let whole = DMatrix::identity(told.nrows(), told.ncols()) + (&told + told.transpose()) * 0.5;
+    let commanded = factor.tr_mul(&(information * factor));
+    let whole =
+        DMatrix::identity(commanded.nrows(), commanded.ncols()) + (&commanded + commanded.transpose()) * 0.5;
     let lower = Cholesky::new(whole)?;
     let part = lower.l().solve_lower_triangular(&(seen * factor).transpose())?;
     Some(part.tr_mul(&part))

@@ -9,9 +9,9 @@
 use nalgebra::{Matrix3xX, Matrix6, Point3, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 
-use crate::condition::arm_conditions::Circumstances;
-use crate::frames::frame_pair::Mounted;
-use crate::risk::probability::chance;
+use crate::condition::arm_conditions::ArmConditions;
+use crate::frames::frame_pair::ResolvedFrames;
+use crate::risk::probability::probability_of_harm;
 use crate::risk::registration::Registration;
 use crate::risk::remedy::Remedy;
 use truegrind_arm::estimated::Estimated;
@@ -35,7 +35,7 @@ pub enum Placement {
 
 /// How a program is to be placed, and what chance is taken.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Wanted {
+pub(crate) struct PlacementChoice {
     pub(crate) placement: Placement,
     /// Cuts, and places, that get worse with a larger probability are left.
     pub(crate) max_risk: f64,
@@ -49,9 +49,9 @@ pub struct ObjectPlacement {
     /// Its name.
     pub work_object: String,
     /// [`Placement::Shape`] or [`Placement::Absolute`].
-    pub taken: Placement,
+    pub applied: Placement,
     /// How far the path as a whole lies from where it is meant (RMS over its points, mm).
-    pub off_mm: f64,
+    pub deviation_mm: f64,
     /// Predicted standard deviation of that (RMS over the points, mm).
     pub sigma_mm: f64,
     /// Whether the arm itself placed the work object, by touching it.
@@ -62,44 +62,44 @@ pub struct ObjectPlacement {
 
 /// A target of the program as it is.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Commanded {
+pub(crate) struct AssessedTarget {
     /// Tool and work object.
-    pub(crate) mounted: usize,
+    pub(crate) frames_index: usize,
     /// Pose of the tool in the work object.
-    pub(crate) meant: Pose,
+    pub(crate) intended: Pose,
     /// Controller joints (rad).
     pub(crate) joints: Joints,
     /// The condition under which the arm stands there.
-    pub(crate) place: usize,
+    pub(crate) condition_index: usize,
 }
 
 /// How far a target is off, and how that depends on the arm's parameters, in the axes of the work object.
 #[derive(Debug, Clone)]
-pub(crate) struct Off {
+pub(crate) struct TargetDeviation {
     /// Where it is meant (mm).
-    pub(crate) meant: Point3<f64>,
+    pub(crate) intended: Point3<f64>,
     /// Reached minus meant (mm).
     pub(crate) shift: Vector3<f64>,
     /// Derivative of the position (3 × p), against the frame that the arm taught where there is one.
     pub(crate) jacobian: Matrix3xX<f64>,
 }
 
-impl Off {
+impl TargetDeviation {
     /// Under the estimated arm.
     pub(crate) fn of(
-        target: &Commanded,
-        mounted: &Mounted,
-        acting: &Circumstances<'_>,
+        target: &AssessedTarget,
+        frames_index: &ResolvedFrames,
+        conditions: &ArmConditions<'_>,
         knowledge: &Estimated,
     ) -> Self {
-        let arm = acting.arm(target.place);
+        let arm = conditions.arm(target.condition_index);
         let flange = arm.forward(&target.joints);
-        let real = &mounted.real;
+        let real = &frames_index.real;
         let reached = real.target_of(&flange).translation.vector;
         let tool = real.flange_from_tool(&flange);
         let found = knowledge.position_jacobian(arm, &target.joints, &tool);
         let mut jacobian = Matrix3xX::from_fn(found.ncols(), |i, k| found[(i, k)]);
-        if let Some(carried) = &mounted.carried {
+        if let Some(carried) = &frames_index.carried {
             let lever = (flange * tool).translation.vector - carried.origin_mm;
             for (k, twist) in carried.twists.iter().enumerate() {
                 let moved = twist.fixed_rows::<3>(0) + twist.fixed_rows::<3>(3).cross(&lever);
@@ -107,8 +107,8 @@ impl Off {
             }
         }
         let into_object = real.base_from_object(&flange).rotation.inverse().to_rotation_matrix();
-        let meant = Point3::from(target.meant.translation.vector);
-        Self { meant, shift: reached - meant.coords, jacobian: into_object.matrix() * jacobian }
+        let intended = Point3::from(target.intended.translation.vector);
+        Self { intended, shift: reached - intended.coords, jacobian: into_object.matrix() * jacobian }
     }
 }
 
@@ -116,52 +116,61 @@ impl Off {
 pub(crate) const MOST_POINTS: usize = 200;
 
 /// At most `most` of `items`, evenly spread, in their order.
-pub(crate) fn spread<T: Copy>(items: &[T], most: usize) -> Vec<T> {
+pub(crate) fn evenly_spaced<T: Copy>(items: &[T], most: usize) -> Vec<T> {
     let count = items.len().min(most);
     (0..count).map(|k| items[k * items.len() / count]).collect()
 }
 
 /// Where the path over one work object lies, from some of its targets, and the motion of the work object under which the
 /// correction is what `wanted` asks for (`None`: it stays where it is).
-pub(crate) fn placed(
+pub(crate) fn assess_placement(
     name: &str,
-    targets: &[Commanded],
-    list: &[Mounted],
-    acting: &Circumstances<'_>,
+    targets: &[AssessedTarget],
+    list: &[ResolvedFrames],
+    conditions: &ArmConditions<'_>,
     knowledge: &Estimated,
-    wanted: Wanted,
+    wanted: PlacementChoice,
 ) -> Option<(ObjectPlacement, Option<Pose>)> {
-    let taught = targets.iter().any(|target| list[target.mounted].carried.is_some());
-    let off: Vec<Off> =
-        targets.iter().map(|target| Off::of(target, &list[target.mounted], acting, knowledge)).collect();
-    let registration = Registration::of(&off.iter().map(|o| o.meant).collect::<Vec<_>>())?;
+    let taught = targets.iter().any(|target| list[target.frames_index].carried.is_some());
+    let off: Vec<TargetDeviation> = targets
+        .iter()
+        .map(|target| TargetDeviation::of(target, &list[target.frames_index], conditions, knowledge))
+        .collect();
+    let registration = Registration::of(&off.iter().map(|o| o.intended).collect::<Vec<_>>())?;
     let twist = registration.twist(off.iter().map(|o| &o.shift));
     let squares = (0..off.len()).map(|k| registration.shift(&twist, k).norm_squared());
-    let off_mm = (squares.sum::<f64>() / off.len() as f64).sqrt();
+    let deviation_mm = (squares.sum::<f64>() / off.len() as f64).sqrt();
     let twists = registration.twists(off.iter().map(|o| &o.jacobian));
     let covariance: Matrix6<f64> = &twists * &knowledge.covariance * twists.transpose();
     let sigma_mm = registration.mean_square(&covariance).max(0.0).sqrt();
     let toward = twists.tr_mul(&registration.weighed(&twist));
-    let chance = chance(off_mm * off_mm * off.len() as f64, &toward, knowledge, off.len());
-    let taken = match wanted.placement {
-        Placement::Auto if sigma_mm <= off_mm && chance <= wanted.max_risk => Placement::Absolute,
+    let probability =
+        probability_of_harm(deviation_mm * deviation_mm * off.len() as f64, &toward, knowledge, off.len());
+    let applied = match wanted.placement {
+        Placement::Auto if sigma_mm <= deviation_mm && probability <= wanted.max_risk => Placement::Absolute,
         Placement::Auto => Placement::Shape,
         other => other,
     };
-    let placement =
-        ObjectPlacement { work_object: name.to_owned(), taken, off_mm, sigma_mm, taught, remedy: None };
-    if taken == Placement::Absolute || !off_mm.is_finite() {
+    let placement = ObjectPlacement {
+        work_object: name.to_owned(),
+        applied,
+        deviation_mm,
+        sigma_mm,
+        taught,
+        remedy: None,
+    };
+    if applied == Placement::Absolute || !deviation_mm.is_finite() {
         return Some((placement, None));
     }
     Some((placement, Some(displacement(&registration, &off, twist))))
 }
 
 /// The rigid motion that carries the meant points onto the reached ones best: the linear one, twice improved.
-fn displacement(registration: &Registration, off: &[Off], first: Vector6<f64>) -> Pose {
+fn displacement(registration: &Registration, off: &[TargetDeviation], first: Vector6<f64>) -> Pose {
     let mut motion = registration.motion(&first);
     for _ in 0..2 {
         let left: Vec<Vector3<f64>> =
-            off.iter().map(|o| motion.inverse() * (o.meant + o.shift) - o.meant).collect();
+            off.iter().map(|o| motion.inverse() * (o.intended + o.shift) - o.intended).collect();
         motion *= registration.motion(&registration.twist(left.iter()));
     }
     motion

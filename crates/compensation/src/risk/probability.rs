@@ -1,20 +1,25 @@
-//! The probability that a correction makes what it corrects worse.
+//! The probability that a correction increases the deviation that it is meant to remove.
 //!
-//! What is off by d (all coordinates of some points in one vector, mm) is corrected by the estimate of d. With P its error
-//! covariance, it gets worse where the error along d exceeds half of it: with c = |d| and s² = dᵀ P d / c² the probability is
-//! Φ(−c / 2s). P = J Σ Jᵀ follows from the covariance Σ of the arm's parameters, so s² needs the one vector Jᵀ d alone.
+//! Let d be the deviation (all coordinates of the assessed points in one vector, mm) and P the covariance of its estimate. The
+//! correction does harm where the error along d exceeds half of d: with c = |d| and s² = dᵀ P d / c², the probability is
+//! Φ(−c / 2s). P = J Σ Jᵀ follows from the covariance Σ of the arm's parameters, so s² needs only the vector Jᵀ d.
 
 use nalgebra::DVector;
 
 use truegrind_arm::estimated::Estimated;
 use truegrind_math::tail::normal_two_sided;
 
-/// What is off by less is not made worse by what is written (mm).
-const NOTHING_MM: f64 = 5e-4;
+/// Deviations below this are zero as far as a program can express them (mm).
+const ZERO_DEVIATION_MM: f64 = 5e-4;
 
-/// Probability that what is off by `square` = |d|² (mm², of `points` points) gets worse, with `toward` = Jᵀ d.
-pub(crate) fn chance(square: f64, toward: &DVector<f64>, knowledge: &Estimated, points: usize) -> f64 {
-    if square <= NOTHING_MM * NOTHING_MM * points as f64 {
+/// Probability that correcting a deviation does harm: `square` = |d|² (mm², summed over `points` points), `toward` = Jᵀ d.
+pub(crate) fn probability_of_harm(
+    square: f64,
+    toward: &DVector<f64>,
+    knowledge: &Estimated,
+    points: usize,
+) -> f64 {
+    if square <= ZERO_DEVIATION_MM * ZERO_DEVIATION_MM * points as f64 {
         return 0.0;
     }
     let variance = toward.dot(&(&knowledge.covariance * toward));

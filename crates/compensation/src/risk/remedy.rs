@@ -83,7 +83,7 @@ impl Measurement {
     }
 
     /// What to do, with the name that a program of this language has for what is cut (work object, work offset).
-    pub fn told(&self, object: &str) -> String {
+    pub fn instruction(&self, object: &str) -> String {
         match self {
             Measurement::Touch => format!(
                 "touch three points of the {object} with this arm and give their joints (cell file, origin = \"taught\")"

@@ -11,11 +11,11 @@
 use nalgebra::{DMatrix, Matrix3, Matrix6, Point3, Vector3, Vector6};
 use rayon::prelude::*;
 
-use crate::condition::arm_conditions::Circumstances;
-use crate::frames::frame_pair::{Mounted, carried_through};
+use crate::condition::arm_conditions::ArmConditions;
+use crate::frames::frame_pair::{ResolvedFrames, carried_through};
 use crate::frames::taught::taught_frame;
-use crate::risk::measurement_information::{FREE, Readings, Spread, Stand, factor, updated};
-use crate::risk::placement::{Commanded, Off, spread};
+use crate::risk::measurement_information::{FREE, PriorSigma, Readings, SensorPosition, factor, updated};
+use crate::risk::placement::{AssessedTarget, TargetDeviation, evenly_spaced};
 use crate::risk::registration::Registration;
 use crate::risk::remedy::{Measurement, Remedy};
 use truegrind_arm::estimated::{Estimated, RegisteredFrame};
@@ -24,7 +24,7 @@ use truegrind_math::se3::{Pose, difference};
 use truegrind_math::tail::normal_two_sided;
 
 /// How well a sensor's frame is measured in the base, as `--frame-sigma 0.1` has it (mm, rad).
-const FRAME_KNOWN: Spread = Spread { mm: 0.1, rad: 1e-4 };
+const FRAME_KNOWN: PriorSigma = PriorSigma { mm: 0.1, rad: 1e-4 };
 /// How well a coordinate measuring machine tells where a target sits on the flange (mm).
 const PLATE_KNOWN_MM: f64 = 0.03;
 /// How well a point of a part is touched by hand (mm, each coordinate).
@@ -46,21 +46,21 @@ const POSES: u32 = 30;
 const MORE_POSES: u32 = 100;
 
 /// A path whose place is not taken: what was asked of it.
-pub(crate) struct Place<'a, 'm> {
-    pub(crate) targets: &'a [Commanded],
-    pub(crate) list: &'a [Mounted],
-    pub(crate) acting: &'a Circumstances<'m>,
+pub(crate) struct UnknownPlacement<'a, 'm> {
+    pub(crate) targets: &'a [AssessedTarget],
+    pub(crate) list: &'a [ResolvedFrames],
+    pub(crate) conditions: &'a ArmConditions<'m>,
     pub(crate) knowledge: &'a Estimated,
     pub(crate) max_risk: f64,
 }
 
 /// The cheapest measurement, or two, that would make its place known; the best one where none would. `None` where nothing can be
 /// foreseen: a covariance that is none.
-pub(crate) fn remedy(place: &Place<'_, '_>) -> Option<Remedy> {
-    let known = Known::of(place)?;
+pub(crate) fn remedy(place: &UnknownPlacement<'_, '_>) -> Option<Remedy> {
+    let known = CurrentKnowledge::of(place)?;
     let touched = place.touched().map(|touched| known.touching(place, &touched));
     let candidates = candidates(touched.is_some(), place.has_rows());
-    let informations = Informations::of(place, &candidates);
+    let informations = InformationTable::of(place, &candidates);
     let foreseen: Vec<(f64, Remedy)> = candidates
         .into_par_iter()
         .filter_map(|measurements| {
@@ -95,10 +95,10 @@ fn candidates(touch: bool, rows: bool) -> Vec<Vec<Measurement>> {
 
 /// What each measurement tells of the arm's parameters, once for all candidates: it is the same beside any other, but that a
 /// sensor's frame that is stated is known to all of them.
-struct Informations(Vec<((Measurement, bool), DMatrix<f64>)>);
+struct InformationTable(Vec<((Measurement, bool), DMatrix<f64>)>);
 
-impl Informations {
-    fn of(place: &Place<'_, '_>, candidates: &[Vec<Measurement>]) -> Self {
+impl InformationTable {
+    fn of(place: &UnknownPlacement<'_, '_>, candidates: &[Vec<Measurement>]) -> Self {
         let mut asked: Vec<(Measurement, bool)> = Vec::new();
         for set in candidates {
             let stated = set.contains(&Measurement::Frame);
@@ -122,14 +122,14 @@ impl Informations {
 }
 
 /// Where the work object's frame goes with the arm once the arm has touched it, and by how much touching is unsure, in the base.
-struct Touched {
+struct TouchedFrame {
     carried: RegisteredFrame,
     /// Twists of the frame by each coordinate of each touched point, of one standard deviation.
-    unsure: Vec<Vector6<f64>>,
+    touch_sigma_twists: Vec<Vector6<f64>>,
 }
 
 /// What touching changes of what is known.
-struct Touching {
+struct TouchEffect {
     /// How the path hangs on the arm's parameters, against the frame that the arm has touched.
     twists: DMatrix<f64>,
     /// The covariance that the hand adds.
@@ -137,9 +137,9 @@ struct Touching {
 }
 
 /// What is known now of where the path lies.
-struct Known {
+struct CurrentKnowledge {
     registration: Registration,
-    off: Vec<Off>,
+    off: Vec<TargetDeviation>,
     /// Where it lies, and how that hangs on the arm's parameters.
     twist: Vector6<f64>,
     twists: DMatrix<f64>,
@@ -149,10 +149,10 @@ struct Known {
     factor: DMatrix<f64>,
 }
 
-impl Known {
-    fn of(place: &Place<'_, '_>) -> Option<Self> {
+impl CurrentKnowledge {
+    fn of(place: &UnknownPlacement<'_, '_>) -> Option<Self> {
         let off = place.off(None);
-        let registration = Registration::of(&off.iter().map(|o| o.meant).collect::<Vec<_>>())?;
+        let registration = Registration::of(&off.iter().map(|o| o.intended).collect::<Vec<_>>())?;
         let twist = registration.twist(off.iter().map(|o| &o.shift));
         let twists = twists_of(&registration, &off);
         let mut weights = Matrix6::zeros();
@@ -169,8 +169,8 @@ impl Known {
     fn with(
         &self,
         measurements: Vec<Measurement>,
-        informations: &Informations,
-        touching: Option<&Touching>,
+        informations: &InformationTable,
+        touching: Option<&TouchEffect>,
         max_risk: f64,
     ) -> Option<Remedy> {
         let information = informations.sum(&measurements, self.factor.nrows());
@@ -190,26 +190,26 @@ impl Known {
     }
 
     /// What touching changes.
-    fn touching(&self, place: &Place<'_, '_>, touched: &Touched) -> Touching {
+    fn touching(&self, place: &UnknownPlacement<'_, '_>, touched: &TouchedFrame) -> TouchEffect {
         let twists = twists_of(&self.registration, &place.off(Some(&touched.carried)));
         let mut adds = Matrix6::zeros();
-        let Some(first) = place.targets.first() else { return Touching { twists, adds } };
-        let object = place.list[first.mounted].real.object;
-        for unsure in &touched.unsure {
+        let Some(first) = place.targets.first() else { return TouchEffect { twists, adds } };
+        let object = place.list[first.frames_index].real.object;
+        for touch_sigma_twists in &touched.touch_sigma_twists {
             let shifts: Vec<Vector3<f64>> = self
                 .off
                 .iter()
                 .map(|o| {
-                    let lever = (object * o.meant).coords - touched.carried.origin_mm;
-                    let moved: Vector3<f64> =
-                        unsure.fixed_rows::<3>(0) + unsure.fixed_rows::<3>(3).cross(&lever);
+                    let lever = (object * o.intended).coords - touched.carried.origin_mm;
+                    let moved: Vector3<f64> = touch_sigma_twists.fixed_rows::<3>(0)
+                        + touch_sigma_twists.fixed_rows::<3>(3).cross(&lever);
                     object.rotation.inverse() * moved
                 })
                 .collect();
             let twist = self.registration.twist(shifts.iter());
             adds += twist * twist.transpose();
         }
-        Touching { twists, adds }
+        TouchEffect { twists, adds }
     }
 
     /// Whether the place has to be expected to be corrected with `left` for its covariance.
@@ -221,19 +221,19 @@ impl Known {
         let square = total(&expected);
         let along = (self.weights * left * self.weights * expected).trace() / square;
         let chance = 0.5 * normal_two_sided(0.5 * (square / along).sqrt());
-        let off_mm = (square / self.off.len() as f64).sqrt();
-        sigma_mm <= off_mm && chance <= max_risk
+        let deviation_mm = (square / self.off.len() as f64).sqrt();
+        sigma_mm <= deviation_mm && chance <= max_risk
     }
 }
 
-fn twists_of(registration: &Registration, off: &[Off]) -> DMatrix<f64> {
+fn twists_of(registration: &Registration, off: &[TargetDeviation]) -> DMatrix<f64> {
     let twists = registration.twists(off.iter().map(|o| &o.jacobian));
     DMatrix::from_fn(6, twists.ncols(), |i, k| twists[(i, k)])
 }
 
-impl Place<'_, '_> {
+impl UnknownPlacement<'_, '_> {
     fn arm(&self) -> Option<&PreparedModel<'_>> {
-        self.targets.first().map(|target| self.acting.arm(target.place))
+        self.targets.first().map(|target| self.conditions.arm(target.condition_index))
     }
 
     fn has_rows(&self) -> bool {
@@ -241,13 +241,16 @@ impl Place<'_, '_> {
     }
 
     /// How far each target is off, against a frame that moves with the arm where there is one.
-    fn off(&self, carried: Option<&RegisteredFrame>) -> Vec<Off> {
-        let against = |mounted: &Mounted| match carried {
-            Some(carried) => Mounted { carried: Some(carried.clone()), ..mounted.clone() },
-            None => mounted.clone(),
+    fn off(&self, carried: Option<&RegisteredFrame>) -> Vec<TargetDeviation> {
+        let against = |frames_index: &ResolvedFrames| match carried {
+            Some(carried) => ResolvedFrames { carried: Some(carried.clone()), ..frames_index.clone() },
+            None => frames_index.clone(),
         };
-        let list: Vec<Mounted> = self.list.iter().map(against).collect();
-        self.targets.iter().map(|t| Off::of(t, &list[t.mounted], self.acting, self.knowledge)).collect()
+        let list: Vec<ResolvedFrames> = self.list.iter().map(against).collect();
+        self.targets
+            .iter()
+            .map(|t| TargetDeviation::of(t, &list[t.frames_index], self.conditions, self.knowledge))
+            .collect()
     }
 
     /// The measured poses, `count` of them.
@@ -255,7 +258,7 @@ impl Place<'_, '_> {
         let samples = &self.knowledge.region.samples_deg;
         let joints = |deg: &[f64; 6]| Joints::from_fn(|i, _| deg[i].to_radians());
         (0..count.div_ceil(samples.len()))
-            .flat_map(|_| spread(samples, count))
+            .flat_map(|_| evenly_spaced(samples, count))
             .take(count)
             .map(|deg| joints(&deg))
             .collect()
@@ -276,8 +279,8 @@ impl Place<'_, '_> {
     }
 
     /// Where a sensor stands, the second one a quarter turn about the base from the first.
-    fn stand(&self, second: bool) -> Stand {
-        let Some(arm) = self.arm() else { return Stand::Tracker(Vector3::zeros()) };
+    fn stand(&self, second: bool) -> SensorPosition {
+        let Some(arm) = self.arm() else { return SensorPosition::Tracker(Vector3::zeros()) };
         let points: Vec<Vector3<f64>> =
             self.poses(POSES as usize).iter().map(|q| arm.forward(q).translation.vector).collect();
         let middle = points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64;
@@ -285,9 +288,9 @@ impl Place<'_, '_> {
         let out = if second { Vector3::z().cross(&out) } else { out };
         if self.knowledge.provenance.sensor == "cable" {
             let farthest = points.iter().map(|p| p.xy().norm()).fold(0.0, f64::max);
-            Stand::Outlet(out * (OUTLET_FARTHER * farthest))
+            SensorPosition::Outlet(out * (OUTLET_FARTHER * farthest))
         } else {
-            Stand::Tracker(out * TRACKER_MM)
+            SensorPosition::Tracker(out * TRACKER_MM)
         }
     }
 
@@ -341,36 +344,40 @@ impl Place<'_, '_> {
 
     /// Three points of the work object that the arm can touch: across the path, and no nearer to each other than a hand would
     /// choose them. `None` where the arm taught the frame already, the robot holds the part, or they are out of reach.
-    fn touched(&self) -> Option<Touched> {
+    fn touched(&self) -> Option<TouchedFrame> {
         let first = self.targets.first()?;
-        let mounted = &self.list[first.mounted];
-        if mounted.carried.is_some() || mounted.real.holds_part {
+        let frames_index = &self.list[first.frames_index];
+        if frames_index.carried.is_some() || frames_index.real.holds_part {
             return None;
         }
-        let (place, arm) = (first.place, self.arm()?);
+        let (condition_index, arm) = (first.condition_index, self.arm()?);
         let (middle, [along, across]) = self.extent();
         [1.0, 0.5, 0.25].iter().find_map(|share| {
             let corners = [middle - along * *share, middle + along * *share, middle + across * *share];
             let joints = corners.map(|corner| {
-                let distance = |t: &&Commanded| (t.meant.translation.vector - corner).norm_squared();
+                let distance = |t: &&AssessedTarget| (t.intended.translation.vector - corner).norm_squared();
                 let near = self.targets.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
-                let pose = Pose::from_parts(corner.into(), near.meant.rotation);
-                let flange = mounted.real.flange_for(&pose);
-                self.acting.inverse(place).solve_near(&flange, &near.joints).ok().map(|s| s.joints)
+                let pose = Pose::from_parts(corner.into(), near.intended.rotation);
+                let flange = frames_index.real.flange_for(&pose);
+                self.conditions
+                    .inverse(condition_index)
+                    .solve_near(&flange, &near.joints)
+                    .ok()
+                    .map(|s| s.joints)
             });
             let [Some(a), Some(b), Some(c)] = joints else { return None };
             let joints = [a, b, c];
-            let tip = mounted.real.tool.translation.vector;
+            let tip = frames_index.real.tool.translation.vector;
             let points = joints.map(|q| arm.forward(&q) * Point3::from(tip));
             let frame = taught_frame(&points)?;
             let carried = carried_through(self.knowledge, arm, &tip, &joints, &points, &frame)?;
-            Some(Touched { carried, unsure: unsure(&points)? })
+            Some(TouchedFrame { carried, touch_sigma_twists: touch_sigma_twists(&points)? })
         })
     }
 
     /// The middle of the path in its work object, and half of what is touched along and across it (mm).
     fn extent(&self) -> (Vector3<f64>, [Vector3<f64>; 2]) {
-        let points: Vec<Vector3<f64>> = self.targets.iter().map(|t| t.meant.translation.vector).collect();
+        let points: Vec<Vector3<f64>> = self.targets.iter().map(|t| t.intended.translation.vector).collect();
         let middle = points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64;
         let scatter: Matrix3<f64> = points.iter().map(|p| (p - middle) * (p - middle).transpose()).sum();
         let eigen = scatter.symmetric_eigen();
@@ -386,7 +393,7 @@ impl Place<'_, '_> {
 }
 
 /// How a frame through three points moves with each coordinate of each of them, by as much as touching is unsure.
-fn unsure(points: &[Point3<f64>; 3]) -> Option<Vec<Vector6<f64>>> {
+fn touch_sigma_twists(points: &[Point3<f64>; 3]) -> Option<Vec<Vector6<f64>>> {
     const STEP_MM: f64 = 1e-3;
     let moved = |point: usize, axis: usize, step: f64| {
         let mut off = *points;

@@ -7,11 +7,11 @@
 //! Stops: after [`ROUNDS`] raises, or where the arm cannot go; the circle then stays.
 
 use crate::arms::Arms;
-use crate::feasibility::singularity::leaps;
+use crate::feasibility::singularity::jumps_joint;
 use crate::options::{Emit, Options};
 use crate::segment::condition_schedule::CHORD_MM;
 use crate::segment::curve::{Curve, between};
-use crate::segment::line::{Ends, PIECE_MM, Path, STEPS, extra_of, largest};
+use crate::segment::line::{PIECE_MM, STEPS, Segment, SegmentEnd, extra_of, largest};
 use truegrind_arm::model::Joints;
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::Motion;
@@ -19,44 +19,45 @@ use truegrind_programs::rewrite::Extra;
 
 /// A circular motion: what was meant, and what the controller is told.
 pub(crate) struct Circle {
-    pub(crate) meant: Curve,
-    pub(crate) told: Curve,
+    pub(crate) intended: Curve,
+    pub(crate) commanded: Curve,
 }
 
 impl Circle {
     /// From its three corrected points; `None` where they make no circle.
     pub(crate) fn of(
-        from: &Ends<'_>,
+        from: &SegmentEnd<'_>,
         via_meant: &Pose,
         via_told: &Pose,
-        to: &Ends<'_>,
+        to: &SegmentEnd<'_>,
         motion: &Motion,
     ) -> Option<Self> {
         Some(Self {
-            meant: Curve::round(from.meant, via_meant, to.meant, motion)?,
-            told: Curve::round(from.told, via_told, to.told, motion)?,
+            intended: Curve::round(from.intended, via_meant, to.intended, motion)?,
+            commanded: Curve::round(from.commanded, via_told, to.commanded, motion)?,
         })
     }
 
     /// Largest distance of the tool from the intended circle, sampled along the arc until the samples tell it to
     /// [`CHORD_MM`]; infinite where the arm cannot go.
-    pub(crate) fn bend(&self, path: &Path<'_>, arms: &Arms<'_>) -> f64 {
-        let Path { from, to, .. } = path;
+    pub(crate) fn deviation(&self, path: &Segment<'_>, arms: &Arms<'_>) -> f64 {
+        let Segment { from, to, .. } = path;
         let motor = |s: f64| {
             let near = from.joints.lerp(&to.joints, s);
-            let solution = arms.nominal.solve_near(&to.mounted.told.flange_for(&self.told.at(s)), &near);
+            let solution =
+                arms.nominal.solve_near(&to.frames_index.commanded.flange_for(&self.commanded.at(s)), &near);
             solution.ok().map(|solution| solution.joints)
         };
-        let off = |s: f64, flange: &Pose| self.meant.distance(&to.mounted.real.target_of(flange), s);
+        let off = |s: f64, flange: &Pose| self.intended.distance(&to.frames_index.real.target_of(flange), s);
         // At least every eighth of a turn, and every piece of a long arc.
-        let sweep = self.meant.arc().map_or(0.0, |arc| arc.sweep);
+        let sweep = self.intended.arc().map_or(0.0, |arc| arc.sweep);
         let pieces = ((sweep / std::f64::consts::FRAC_PI_4).ceil() as usize)
-            .max((self.meant.length_mm() / PIECE_MM).ceil() as usize)
+            .max((self.intended.length_mm() / PIECE_MM).ceil() as usize)
             .clamp(4, 64);
-        match path.slack(arms) {
-            Some(slack) => slack.most_off(STEPS * pieces, &motor, &off),
+        match path.play_operator(arms) {
+            Some(play_operator) => play_operator.largest_deviation(STEPS * pieces, &motor, &off),
             None => largest(pieces, &|s| match motor(s) {
-                Some(joints) => off(s, &arms.acting.arm(to.place).forward(&joints)),
+                Some(joints) => off(s, &arms.conditions.arm(to.condition_index).forward(&joints)),
                 None => f64::INFINITY,
             }),
         }
@@ -66,7 +67,7 @@ impl Circle {
     /// (mm). h² = r² − c²/4 of its distance h from the chord c is known to 2 r δ then: near half a turn, where h is small, h
     /// is known to far less than δ.
     pub(crate) fn open_centre_mm(&self, decimals: u8) -> f64 {
-        let Some(arc) = self.told.arc() else { return 0.0 };
+        let Some(arc) = self.commanded.arc() else { return 0.0 };
         let open = 2.0 * arc.radius * 0.1_f64.powi(i32::from(decimals));
         let height = (arc.radius * (0.5 * arc.sweep).cos()).abs();
         let square = height * height;
@@ -78,15 +79,15 @@ impl Circle {
     /// distance that is left; `None` where that is not reached.
     pub(crate) fn pieces(
         &self,
-        path: &Path<'_>,
+        path: &Segment<'_>,
         arms: &Arms<'_>,
         options: &Options,
     ) -> Option<(Vec<Extra>, f64)> {
-        let arc = self.meant.arc()?;
+        let arc = self.intended.arc()?;
         // The arm's own share of the tolerance is small: what the chords may take.
         let sagitta = (0.8 * options.tolerance_mm / arc.radius).min(1.0);
         let largest_rad = (2.0 * (1.0 - sagitta).acos()).min(LARGEST_PIECE_RAD);
-        let turn_pieces = (self.meant.turn_rad() / LARGEST_PIECE_RAD).ceil();
+        let turn_pieces = (self.intended.turn_rad() / LARGEST_PIECE_RAD).ceil();
         let mut count = (arc.sweep / largest_rad).ceil().max(turn_pieces).max(1.0);
         for _ in 0..ROUNDS {
             if count > MOST_PIECES {
@@ -106,57 +107,61 @@ impl Circle {
     fn cut(
         &self,
         count: usize,
-        path: &Path<'_>,
+        path: &Segment<'_>,
         arms: &Arms<'_>,
         options: &Options,
     ) -> Option<(Option<Vec<Extra>>, f64)> {
-        let Path { from, to, way } = path;
+        let Segment { from, to, schedule } = path;
         let mut corners = Vec::with_capacity(count + 1);
-        corners.push((from.told, from.joints));
+        corners.push((from.commanded, from.joints));
         for k in 1..count {
             let share = k as f64 / count as f64;
-            let flange = to.mounted.real.flange_for(&self.meant.at(share));
+            let flange = to.frames_index.real.flange_for(&self.intended.at(share));
             let near = corners[k - 1].1;
-            let joints = arms.acting.inverse(way.at(share)).solve_near(&flange, &near).ok()?.joints;
-            corners.push((to.mounted.told.target_of(&arms.nominal.arm().forward(&joints)), joints));
+            let joints = arms.conditions.inverse(schedule.at(share)).solve_near(&flange, &near).ok()?.joints;
+            corners.push((to.frames_index.commanded.target_of(&arms.nominal.arm().forward(&joints)), joints));
         }
-        corners.push((to.told, to.joints));
+        corners.push((to.commanded, to.joints));
         // Share of the way to the joints there, along the pieces.
         let motor = |s: f64| {
             let u = s * count as f64;
             let k = (u as usize).min(count - 1);
-            let ((told, joints), (next, after)) = (&corners[k], &corners[k + 1]);
+            let ((commanded, joints), (next, after)) = (&corners[k], &corners[k + 1]);
             let part = u - k as f64;
-            let pose = between(told, next, part);
+            let pose = between(commanded, next, part);
             let near = joints.lerp(after, part);
-            let solution = arms.nominal.solve_near(&to.mounted.told.flange_for(&pose), &near);
+            let solution = arms.nominal.solve_near(&to.frames_index.commanded.flange_for(&pose), &near);
             solution.ok().map(|solution| solution.joints)
         };
-        let off = |s: f64, flange: &Pose| self.meant.distance(&to.mounted.real.target_of(flange), s);
-        let most = match path.slack(arms) {
-            Some(slack) => slack.most_off(STEPS * count, &motor, &off),
+        let off = |s: f64, flange: &Pose| self.intended.distance(&to.frames_index.real.target_of(flange), s);
+        let most = match path.play_operator(arms) {
+            Some(play_operator) => play_operator.largest_deviation(STEPS * count, &motor, &off),
             None => {
                 let mut most = 0.0_f64;
                 for k in 0..count {
                     for part in SAMPLES {
                         let share = (k as f64 + part) / count as f64;
-                        most = most.max(off(share, &arms.acting.arm(to.place).forward(&motor(share)?)));
+                        most = most.max(off(
+                            share,
+                            &arms.conditions.arm(to.condition_index).forward(&motor(share)?),
+                        ));
                     }
                 }
                 most
             }
         };
-        let corner = |(k, (told, joints)): (usize, &(Pose, Joints))| {
-            extra_of((told, joints), k as f64 / count as f64, Emit::Targets, path, arms)
+        let corner = |(k, (commanded, joints)): (usize, &(Pose, Joints))| {
+            extra_of((commanded, joints), k as f64 / count as f64, Emit::Targets, path, arms)
         };
-        let leap = |(k, (told, joints)): (usize, &(Pose, Joints))| {
-            let meant = self.meant.at(k as f64 / count as f64);
-            leaps([&meant, told], joints, &to.mounted.told, arms, options)
+        let leap = |(k, (commanded, joints)): (usize, &(Pose, Joints))| {
+            let intended = self.intended.at(k as f64 / count as f64);
+            jumps_joint([&intended, commanded], joints, &to.frames_index.commanded, arms, options)
         };
         let inner = || (1..).zip(&corners[1..count]);
         let extra = (!inner().any(leap)).then(|| inner().map(corner).collect());
         // More pieces turn where the arc does.
-        let left = if path.ends_as_told(count, &motor, arms) { most + CHORD_MM } else { f64::INFINITY };
+        let left =
+            if path.ends_on_planned_sides(count, &motor, arms) { most + CHORD_MM } else { f64::INFINITY };
         most.is_finite().then_some((extra, left))
     }
 }

@@ -14,9 +14,9 @@
 use nalgebra::Vector3;
 
 use crate::arms::Arms;
-use crate::backlash::play_operator::Slack;
+use crate::backlash::play_operator::PlayOperator;
 use crate::segment::curve::{Curve, beside, between};
-use crate::segment::line::{Ends, STEPS, largest_from};
+use crate::segment::line::{STEPS, SegmentEnd, largest_from};
 use truegrind_arm::model::Joints;
 use truegrind_math::se3::Pose;
 
@@ -32,11 +32,13 @@ pub struct Corner {
 
 impl Corner {
     /// The corner between two courses that a zone of this radius makes.
-    pub fn of(way_in: &Curve, way_out: &Curve, zone_mm: f64) -> Self {
-        let (long_in, long_out) = (way_in.length_mm(), way_out.length_mm());
+    pub fn of(segment_in: &Curve, segment_out: &Curve, zone_mm: f64) -> Self {
+        let (long_in, long_out) = (segment_in.length_mm(), segment_out.length_mm());
         let radius = zone_mm.min(0.5 * long_in).min(0.5 * long_out);
         let share = |long: f64| if long > 1e-9 { radius / long } else { 0.0 };
-        Self { control: [way_in.at(1.0 - share(long_in)), way_in.to, way_out.at(share(long_out))] }
+        Self {
+            control: [segment_in.at(1.0 - share(long_in)), segment_in.to, segment_out.at(share(long_out))],
+        }
     }
 
     /// The pose at a share of the corner.
@@ -81,44 +83,44 @@ impl Corner {
 
 /// [`Corner::cut_mm`] of two lines through three points.
 pub(crate) fn cut_of_lines(points: &[Vector3<f64>; 3], zone_mm: f64) -> f64 {
-    let (way_in, way_out) = (points[1] - points[0], points[2] - points[1]);
-    let (long_in, long_out) = (way_in.norm(), way_out.norm());
+    let (segment_in, segment_out) = (points[1] - points[0], points[2] - points[1]);
+    let (long_in, long_out) = (segment_in.norm(), segment_out.norm());
     let radius = zone_mm.min(0.5 * long_in).min(0.5 * long_out);
-    if radius > 1e-9 { 0.25 * radius * (way_out / long_out - way_in / long_in).norm() } else { 0.0 }
+    if radius > 1e-9 { 0.25 * radius * (segment_out / long_out - segment_in / long_in).norm() } else { 0.0 }
 }
 
 /// The ways in and out of a corner, as meant and as told.
-pub(crate) struct Ways {
-    pub(crate) meant: [Curve; 2],
-    pub(crate) told: [Curve; 2],
+pub(crate) struct CornerSegments {
+    pub(crate) intended: [Curve; 2],
+    pub(crate) commanded: [Curve; 2],
 }
 
 /// Largest distance of the tool from the intended corner at `point`, gone under two conditions before and behind it; `None` where the corner cuts off next to nothing,
 /// infinite where the arm cannot go.
-pub(crate) fn corner_bend(
-    point: &Ends<'_>,
-    ways: &Ways,
+pub(crate) fn corner_deviation(
+    point: &SegmentEnd<'_>,
+    segments: &CornerSegments,
     zone_mm: f64,
-    places: [usize; 2],
+    condition_indices: [usize; 2],
     arms: &Arms<'_>,
 ) -> Option<f64> {
-    let meant = Corner::of(&ways.meant[0], &ways.meant[1], zone_mm);
-    if !(meant.cut_mm() > CUT_MM) {
+    let intended = Corner::of(&segments.intended[0], &segments.intended[1], zone_mm);
+    if !(intended.cut_mm() > CUT_MM) {
         return None;
     }
-    let told = Corner::of(&ways.told[0], &ways.told[1], zone_mm);
-    let flange = |t: f64| point.mounted.told.flange_for(&told.at(t));
+    let commanded = Corner::of(&segments.commanded[0], &segments.commanded[1], zone_mm);
+    let flange = |t: f64| point.frames_index.commanded.flange_for(&commanded.at(t));
     let motor = |t: f64| {
         let solution = arms.nominal.solve_near(&flange(t), &point.joints);
         solution.ok().map(|solution| solution.joints)
     };
-    let off = |t: f64, flange: &Pose| meant.distance(&point.mounted.real.target_of(flange), t);
-    if places[0] != places[1] {
+    let off = |t: f64, flange: &Pose| intended.distance(&point.frames_index.real.target_of(flange), t);
+    if condition_indices[0] != condition_indices[1] {
         let Some(start) = motor(0.0) else { return Some(f64::INFINITY) };
-        let links = Slack::at(&start, places[0], places[1], &arms.acting);
-        return Some(links.most_off(2 * STEPS, &motor, &off));
+        let links = PlayOperator::at(&start, condition_indices[0], condition_indices[1], &arms.conditions);
+        return Some(links.largest_deviation(2 * STEPS, &motor, &off));
     }
-    let arm = arms.acting.arm(places[0]);
+    let arm = arms.conditions.arm(condition_indices[0]);
     // The samples that every corner needs, in lanes.
     let solved = arms.nominal.solve_seeded_joints(&FIRST.map(flange), &[point.joints; FIRST.len()]);
     let joints: Vec<Joints> =

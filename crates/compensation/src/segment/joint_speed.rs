@@ -7,7 +7,7 @@
 
 use crate::arms::Arms;
 use crate::segment::curve::Curve;
-use crate::segment::line::Ends;
+use crate::segment::line::SegmentEnd;
 use truegrind_programs::motion::SpeedValue;
 
 /// What the program says of how fast a motion goes.
@@ -21,8 +21,8 @@ pub(crate) enum Pace<'a> {
 /// The joint that turns fastest for what it can, with its speed over its limit, on a told course; `None` where the
 /// course or the limits say nothing.
 pub(crate) fn fastest(
-    from: &Ends<'_>,
-    to: &Ends<'_>,
+    from: &SegmentEnd<'_>,
+    to: &SegmentEnd<'_>,
     course: &Curve,
     pace: &Pace<'_>,
     arms: &Arms<'_>,
@@ -47,7 +47,10 @@ pub(crate) fn fastest(
         let joints = if part == parts {
             to.joints
         } else {
-            arms.nominal.solve_near(&to.mounted.told.flange_for(&course.at(s)), &before).ok()?.joints
+            arms.nominal
+                .solve_near(&to.frames_index.commanded.flange_for(&course.at(s)), &before)
+                .ok()?
+                .joints
         };
         for joint in 0..6 {
             let ratio = (joints[joint] - before[joint]).abs() * parts as f64 / duration_s / limits[joint];

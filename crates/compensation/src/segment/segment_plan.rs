@@ -2,60 +2,68 @@
 
 use crate::arms::Arms;
 use crate::options::{Circles, Emit, Options};
-use crate::plan::reason::Why;
+use crate::plan::reason::OutcomeReason;
 use crate::segment::circle::Circle;
-use crate::segment::corner::{Ways, corner_bend};
+use crate::segment::corner::{CornerSegments, corner_deviation};
 use crate::segment::curve::{CLOSED_MM, Curve};
-use crate::segment::line::{Ends, Path, gap, insertions, joint_bend, straight_bend};
-use crate::target::solved_target::Solved;
+use crate::segment::line::{
+    Segment, SegmentEnd, distance, insertions, joint_motion_deviation, line_deviation,
+};
+use crate::target::solved_target::SolvedTarget;
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{Motion, MotionKind, Switch};
 use truegrind_programs::rewrite::{Extra, NewTarget};
 
 /// What the way of one motion needs.
 #[derive(Default)]
-pub(crate) struct Passage {
+pub(crate) struct SegmentPlan {
     /// Largest distance from the intended way that is left (mm); `None` where it is not checked.
-    pub(crate) bend_mm: Option<f64>,
+    pub(crate) path_deviation_mm: Option<f64>,
     /// Targets that are put in.
     pub(crate) before: Vec<Extra>,
     /// Whether a circle becomes straight pieces.
     pub(crate) straight: bool,
-    pub(crate) flag: Option<Why>,
+    pub(crate) flag: Option<OutcomeReason>,
     /// The whole way as meant and as told, targets that are put in left aside; `None` for joint motions.
-    pub(crate) courses: Option<[Curve; 2]>,
+    pub(crate) backlash_sides: Option<[Curve; 2]>,
 }
 
-impl Passage {
+impl SegmentPlan {
     /// Of a motion whose targets are all corrected. `middle_mm`: how far its told line bends in the middle.
     pub(crate) fn of(
         motion: &Motion,
-        path: Option<&Path<'_>>,
-        good: &[&Solved],
+        path: Option<&Segment<'_>>,
+        good: &[&SolvedTarget],
         middle_mm: f64,
         arms: &Arms<'_>,
         options: &Options,
-    ) -> Passage {
+    ) -> SegmentPlan {
         let segments = options.circles == Circles::Segments && motion.kind == MotionKind::Circular;
         let Some(path) = path else {
-            return Passage { flag: segments.then_some(Why::CircleKept), ..Passage::default() };
+            return SegmentPlan {
+                flag: segments.then_some(OutcomeReason::CircleKept),
+                ..SegmentPlan::default()
+            };
         };
         match (motion.kind, good) {
             (MotionKind::Linear, _) => line(motion, path, middle_mm, arms, options),
-            (MotionKind::Joint, _) => Passage { bend_mm: Some(joint_bend(path, arms)), ..Passage::default() },
+            (MotionKind::Joint, _) => SegmentPlan {
+                path_deviation_mm: Some(joint_motion_deviation(path, arms)),
+                ..SegmentPlan::default()
+            },
             (MotionKind::Circular, [via, _]) => circle(motion, path, via, segments, arms, options),
-            _ => Passage::default(),
+            _ => SegmentPlan::default(),
         }
     }
 
     /// The last told piece of the way, or the first.
     fn piece(&self, last: bool) -> Option<Curve> {
-        let [_, told] = self.courses.as_ref()?;
+        let [_, commanded] = self.backlash_sides.as_ref()?;
         let told_at = |extra: Option<&Extra>| extra.and_then(pose_of);
         Some(match (last, told_at(if last { self.before.last() } else { self.before.first() })) {
-            (true, Some(pose)) => Curve::line(pose, told.to),
-            (false, Some(pose)) => Curve::line(told.from, pose),
-            (_, None) => *told,
+            (true, Some(pose)) => Curve::line(pose, commanded.to),
+            (false, Some(pose)) => Curve::line(commanded.from, pose),
+            (_, None) => *commanded,
         })
     }
 }
@@ -69,70 +77,94 @@ fn pose_of(extra: &Extra) -> Option<Pose> {
     }
 }
 
-fn line(motion: &Motion, path: &Path<'_>, middle_mm: f64, arms: &Arms<'_>, options: &Options) -> Passage {
-    let Path { from, to, .. } = path;
-    let bend = straight_bend(path, arms, options.emit, middle_mm);
-    let courses = Some([Curve::line(from.meant, to.meant), Curve::line(from.told, to.told)]);
-    let mut out = Passage { bend_mm: Some(bend), courses, ..Passage::default() };
-    if bend <= options.tolerance_mm {
+fn line(
+    motion: &Motion,
+    path: &Segment<'_>,
+    middle_mm: f64,
+    arms: &Arms<'_>,
+    options: &Options,
+) -> SegmentPlan {
+    let Segment { from, to, .. } = path;
+    let deviation = line_deviation(path, arms, options.emit, middle_mm);
+    let backlash_sides =
+        Some([Curve::line(from.intended, to.intended), Curve::line(from.commanded, to.commanded)]);
+    let mut out =
+        SegmentPlan { path_deviation_mm: Some(deviation), backlash_sides, ..SegmentPlan::default() };
+    if deviation <= options.tolerance_mm {
         return out;
     }
-    let mut left = bend;
+    let mut left = deviation;
     // Where the wrist is interpolated by itself, a target on the line would say how the tool turns, which nobody did.
     if motion.insertable
         && motion.modal.wrist_interpolation != Switch::On
         && let Some(cut) = insertions(path, arms, options)
     {
         (out.before, left) = cut;
-        out.bend_mm = Some(left);
+        out.path_deviation_mm = Some(left);
     }
-    out.flag = (!(left <= options.tolerance_mm)).then_some(Why::Bend { mm: left });
+    out.flag = (!(left <= options.tolerance_mm)).then_some(OutcomeReason::PathDeviation { mm: left });
     out
 }
 
 fn circle(
     motion: &Motion,
-    path: &Path<'_>,
-    via: &Solved,
+    path: &Segment<'_>,
+    via: &SolvedTarget,
     segments: bool,
     arms: &Arms<'_>,
     options: &Options,
-) -> Passage {
-    let Path { from, to, .. } = path;
-    let Some(circle) = Circle::of(from, &via.meant, &via.told, to, motion) else {
-        let closed = gap(&from.meant.translation.vector, &to.meant.translation.vector) < CLOSED_MM;
-        let flag = if closed { Why::WholeCircle } else { Why::Bend { mm: f64::INFINITY } };
-        return Passage { flag: Some(flag), ..Passage::default() };
+) -> SegmentPlan {
+    let Segment { from, to, .. } = path;
+    let Some(circle) = Circle::of(from, &via.intended, &via.commanded, to, motion) else {
+        let closed = distance(&from.intended.translation.vector, &to.intended.translation.vector) < CLOSED_MM;
+        let flag = if closed {
+            OutcomeReason::FullCircle
+        } else {
+            OutcomeReason::PathDeviation { mm: f64::INFINITY }
+        };
+        return SegmentPlan { flag: Some(flag), ..SegmentPlan::default() };
     };
-    let courses = Some([circle.meant, circle.told]);
+    let backlash_sides = Some([circle.intended, circle.commanded]);
     // How the tool turns on the way must be known to be written out.
     let may = segments
         && motion.straightens
         && motion.modal.circle_point_orientation != Switch::Either
         && motion.modal.wrist_interpolation != Switch::On;
     if may && let Some((before, left)) = circle.pieces(path, arms, options) {
-        return Passage { bend_mm: Some(left), before, straight: true, flag: None, courses };
+        return SegmentPlan {
+            path_deviation_mm: Some(left),
+            before,
+            straight: true,
+            flag: None,
+            backlash_sides,
+        };
     }
-    let along = circle.bend(path, arms);
+    let along = circle.deviation(path, arms);
     let open = if motion.by_radius { circle.open_centre_mm(options.position_decimals) } else { 0.0 };
-    let bend = along + open;
+    let deviation = along + open;
     let flag = if !(along <= options.tolerance_mm) {
-        Some(Why::Bend { mm: bend })
-    } else if !(bend <= options.tolerance_mm) {
-        Some(Why::OpenCentre { mm: open })
+        Some(OutcomeReason::PathDeviation { mm: deviation })
+    } else if !(deviation <= options.tolerance_mm) {
+        Some(OutcomeReason::AmbiguousCentre { mm: open })
     } else {
-        segments.then_some(Why::CircleKept)
+        segments.then_some(OutcomeReason::CircleKept)
     };
-    Passage { bend_mm: Some(bend), before: Vec::new(), straight: false, flag, courses }
+    SegmentPlan {
+        path_deviation_mm: Some(deviation),
+        before: Vec::new(),
+        straight: false,
+        flag,
+        backlash_sides,
+    }
 }
 
 /// How far the corner between two ways leaves the intended one; `None` where it is as the ways themselves.
 pub(crate) fn corner(
-    point: &Ends<'_>,
-    way_in: &Passage,
-    way_out: &Passage,
+    point: &SegmentEnd<'_>,
+    segment_in: &SegmentPlan,
+    segment_out: &SegmentPlan,
     zone_mm: f64,
-    places: [usize; 2],
+    condition_indices: [usize; 2],
     arms: &Arms<'_>,
     emit: Emit,
 ) -> Option<f64> {
@@ -140,7 +172,7 @@ pub(crate) fn corner(
     if emit == Emit::Joints {
         return None;
     }
-    let meant = [way_in.courses.as_ref()?[0], way_out.courses.as_ref()?[0]];
-    let told = [way_in.piece(true)?, way_out.piece(false)?];
-    corner_bend(point, &Ways { meant, told }, zone_mm, places, arms)
+    let intended = [segment_in.backlash_sides.as_ref()?[0], segment_out.backlash_sides.as_ref()?[0]];
+    let commanded = [segment_in.piece(true)?, segment_out.piece(false)?];
+    corner_deviation(point, &CornerSegments { intended, commanded }, zone_mm, condition_indices, arms)
 }

@@ -7,7 +7,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::frames::frame_pair::Mounting;
+use crate::frames::frame_pair::FramePair;
 use crate::segment::curve::Curve;
 use truegrind_arm::model::{Joints, PreparedModel};
 
@@ -22,9 +22,9 @@ const DIFFERENCE_RAD: f64 = 1e-6;
 
 /// Joints between the ends of a motion, in so many pieces; `None` where the arm cannot go along, or a joint goes farther than
 /// `most_step_rad` between neighbouring samples.
-pub(crate) fn along(
+pub(crate) fn joint_samples(
     arm: &PreparedModel<'_>,
-    within: &Mounting,
+    within: &FramePair,
     curve: &Curve,
     [start, end]: [&Joints; 2],
     pieces: usize,
@@ -36,7 +36,7 @@ pub(crate) fn along(
         let share = k as f64 / pieces as f64;
         let mut near = last;
         (3..6).for_each(|j| near[j] = start[j] + (end[j] - start[j]) * share);
-        let joints = reach(arm, within, &curve.at(share).translation.vector, near)?;
+        let joints = solve_arm_joints(arm, within, &curve.at(share).translation.vector, near)?;
         if (joints - last).amax() >= most_step_rad {
             return None;
         }
@@ -49,9 +49,9 @@ pub(crate) fn along(
 }
 
 /// Joints whose last three are given, with the tool's point at a place in the work object.
-fn reach(
+fn solve_arm_joints(
     arm: &PreparedModel<'_>,
-    within: &Mounting,
+    within: &FramePair,
     place: &Vector3<f64>,
     mut joints: Joints,
 ) -> Option<Joints> {

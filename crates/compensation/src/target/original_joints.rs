@@ -8,9 +8,9 @@ use rayon::prelude::*;
 
 use crate::arms::Arms;
 use crate::configuration::{configured, monitored};
-use crate::frames::frame_table::Mountings;
-use crate::plan::reason::Why;
-use crate::risk::placement::Commanded;
+use crate::frames::frame_table::FrameTable;
+use crate::plan::reason::OutcomeReason;
+use crate::risk::placement::AssessedTarget;
 use crate::search_budget;
 use truegrind_arm::inverse::budget::{SearchBudget, with_budget};
 use truegrind_arm::inverse::configuration::Configuration;
@@ -24,7 +24,7 @@ const STRETCH: usize = 4096;
 
 /// A target and the motion to which it belongs.
 #[derive(Clone, Copy)]
-pub(crate) struct Asked<'a> {
+pub(crate) struct TargetRef<'a> {
     pub(crate) index: u32,
     pub(crate) motion: &'a Motion,
     pub(crate) target: &'a MotionTarget,
@@ -32,69 +32,69 @@ pub(crate) struct Asked<'a> {
 
 /// What a target means, and the joints that the program as it is leads to.
 #[derive(Clone, Copy)]
-pub(crate) struct Start {
-    pub(crate) mounted: usize,
-    pub(crate) meant: Pose,
+pub(crate) struct OriginalTarget {
+    pub(crate) frames_index: usize,
+    pub(crate) intended: Pose,
     pub(crate) joints: Joints,
     /// The branch of the arm.
     pub(crate) cfx: i32,
-    /// [`Solved::margins`](crate::target::solved_target::Solved::margins) before.
+    /// [`SolvedTarget::margins`](crate::target::solved_target::Solved::margins) before.
     pub(crate) margins: [f64; 3],
-    pub(crate) guess: Guess,
+    pub(crate) guess: BranchGuess,
 }
 
 /// Whether joints rest on a guess: where no configuration is checked the controller takes the solution next to where the
 /// arm stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Guess {
+pub(crate) enum BranchGuess {
     /// They follow from the text.
-    No,
+    Known,
     /// Where the arm stands is not known, and there are other solutions.
-    Here,
+    Guessed,
     /// They go on, unchecked, from joints that were guessed.
-    Before,
+    Inherited,
 }
 
 /// Joints that are gone on from.
 #[derive(Clone, Copy)]
-struct Near {
+struct ReferenceJoints {
     joints: Joints,
     /// Whether they rest on a guess.
     guessed: bool,
 }
 
-impl Near {
-    fn of(start: &Start) -> Self {
-        Near { joints: start.joints, guessed: start.guess != Guess::No }
+impl ReferenceJoints {
+    fn of(start: &OriginalTarget) -> Self {
+        ReferenceJoints { joints: start.joints, guessed: start.guess != BranchGuess::Known }
     }
 
     /// What the guess is for what goes on from here.
-    fn guess(&self, monitored: Switch) -> Guess {
-        if self.guessed && monitored == Switch::Off { Guess::Before } else { Guess::No }
+    fn guess(&self, monitored: Switch) -> BranchGuess {
+        if self.guessed && monitored == Switch::Off { BranchGuess::Inherited } else { BranchGuess::Known }
     }
 }
 
 /// The program as it is: the joints that each target leads to.
-pub(crate) struct AsItIs<'a> {
+pub(crate) struct OriginalProgram<'a> {
     /// Where the targets of each motion begin, and the end of the last.
     pub(crate) first: Vec<usize>,
-    pub(crate) asked: Vec<Asked<'a>>,
-    pub(crate) starts: Starts,
+    pub(crate) target_refs: Vec<TargetRef<'a>>,
+    pub(crate) originals: Originals,
 }
 
-impl<'a> AsItIs<'a> {
-    pub(crate) fn of(listing: &'a Listing, arms: &Arms<'_>, mountings: &Mountings) -> Self {
+impl<'a> OriginalProgram<'a> {
+    pub(crate) fn of(listing: &'a Listing, arms: &Arms<'_>, frame_table: &FrameTable) -> Self {
         let mut first = Vec::with_capacity(listing.motions.len() + 1);
-        let mut asked: Vec<Asked<'_>> = Vec::with_capacity(listing.motions.len());
+        let mut target_refs: Vec<TargetRef<'_>> = Vec::with_capacity(listing.motions.len());
         for (index, motion) in (0..).zip(&listing.motions) {
-            first.push(asked.len());
+            first.push(target_refs.len());
             if motion.left.is_none() {
-                asked.extend(motion.targets.iter().map(|target| Asked { index, motion, target }));
+                target_refs.extend(motion.targets.iter().map(|target| TargetRef { index, motion, target }));
             }
         }
-        first.push(asked.len());
-        let starts = starts(listing, &first, &asked, arms, mountings);
-        Self { first, asked, starts }
+        first.push(target_refs.len());
+        let originals = originals(listing, &first, &target_refs, arms, frame_table);
+        Self { first, target_refs, originals }
     }
 
     /// Whether the end of a motion is known.
@@ -102,41 +102,41 @@ impl<'a> AsItIs<'a> {
         self.end(motion).is_some()
     }
 
-    /// The end of a motion under the condition at `place`.
-    pub(crate) fn commanded(&self, motion: u32, place: usize) -> Option<Commanded> {
-        let Start { mounted, meant, joints, .. } = *self.end(motion as usize)?;
-        Some(Commanded { mounted, meant, joints, place })
+    /// The end of a motion under the condition at `condition_index`.
+    pub(crate) fn commanded(&self, motion: u32, condition_index: usize) -> Option<AssessedTarget> {
+        let OriginalTarget { frames_index, intended, joints, .. } = *self.end(motion as usize)?;
+        Some(AssessedTarget { frames_index, intended, joints, condition_index })
     }
 
-    fn end(&self, motion: usize) -> Option<&Start> {
-        self.starts[self.first[motion]..self.first[motion + 1]].last()?.as_ref().ok()
+    fn end(&self, motion: usize) -> Option<&OriginalTarget> {
+        self.originals[self.first[motion]..self.first[motion + 1]].last()?.as_ref().ok()
     }
 }
 
-pub(crate) type Starts = Vec<Result<Start, Why>>;
+pub(crate) type Originals = Vec<Result<OriginalTarget, OutcomeReason>>;
 
 /// The joints of the program as it is. A target whose configuration the controller checks says by itself where the arm
 /// goes; one whose configuration it does not check is reached from the motion before.
-fn starts(
+fn originals(
     listing: &Listing,
     first: &[usize],
-    asked: &[Asked<'_>],
+    target_refs: &[TargetRef<'_>],
     arms: &Arms<'_>,
-    mountings: &Mountings,
-) -> Starts {
-    let depends = |asked: &Asked<'_>| monitored(asked.motion) == Switch::Off;
+    frame_table: &FrameTable,
+) -> Originals {
+    let depends = |target_refs: &TargetRef<'_>| monitored(target_refs.motion) == Switch::Off;
     // A place holder for those that depend on the motion before.
-    let mut out: Starts = asked.par_iter().map(|_| Err(Why::JointTarget)).collect();
-    let stretches = asked.len().div_ceil(STRETCH);
-    let each = out.par_chunks_mut(STRETCH).zip(asked.par_chunks(STRETCH)).enumerate();
-    each.for_each(|(stretch, (mut out, asked))| {
+    let mut out: Originals = target_refs.par_iter().map(|_| Err(OutcomeReason::JointTarget)).collect();
+    let stretches = target_refs.len().div_ceil(STRETCH);
+    let each = out.par_chunks_mut(STRETCH).zip(target_refs.par_chunks(STRETCH)).enumerate();
+    each.for_each(|(stretch, (mut out, target_refs))| {
         let mut near = None;
         let mut budget = SearchBudget::of(search_budget::STARTS).share(stretch, stretches);
-        for run in asked.chunk_by(|a, b| depends(a) == depends(b)) {
+        for run in target_refs.chunk_by(|a, b| depends(a) == depends(b)) {
             let (here, rest) = out.split_at_mut(run.len());
             out = rest;
             if !depends(&run[0]) {
-                along(run, &mut near, arms, mountings, &mut budget, here);
+                solve_run(run, &mut near, arms, frame_table, &mut budget, here);
             }
         }
     });
@@ -161,13 +161,13 @@ fn starts(
         let previous = listing.motions[motion].previous.map(|p| p as usize);
         let mut near = previous.and_then(|p| {
             let reached = &out[first[p]..first[p + 1]];
-            reached.last().and_then(|start| start.as_ref().ok().map(Near::of))
+            reached.last().and_then(|start| start.as_ref().ok().map(ReferenceJoints::of))
         });
         let run = first[motion]..first[end];
-        along(&asked[run.clone()], &mut near, arms, mountings, &mut budget, &mut out[run]);
+        solve_run(&target_refs[run.clone()], &mut near, arms, frame_table, &mut budget, &mut out[run]);
         motion = end;
     }
-    guess_unsure(listing, asked, first, arms, mountings, &mut out);
+    guess_unsure(listing, target_refs, first, arms, frame_table, &mut out);
     out
 }
 
@@ -175,27 +175,28 @@ fn starts(
 /// start that the text does not tell, or that is guessed itself.
 fn guess_unsure(
     listing: &Listing,
-    asked: &[Asked<'_>],
+    target_refs: &[TargetRef<'_>],
     first: &[usize],
     arms: &Arms<'_>,
-    mountings: &Mountings,
-    out: &mut Starts,
+    frame_table: &FrameTable,
+    out: &mut Originals,
 ) {
     for (index, motion) in listing.motions.iter().enumerate() {
         if motion.left.is_some() || monitored(motion) != Switch::Either {
             continue;
         }
         let before = match motion.previous.map(|previous| previous as usize) {
-            None => Some(Guess::Here),
+            None => Some(BranchGuess::Guessed),
             Some(previous) => match out[first[previous]..first[previous + 1]].last() {
-                Some(Ok(start)) => (start.guess != Guess::No).then_some(Guess::Before),
-                _ => Some(Guess::Here),
+                Some(Ok(start)) => (start.guess != BranchGuess::Known).then_some(BranchGuess::Inherited),
+                _ => Some(BranchGuess::Guessed),
             },
         };
         let Some(guess) = before else { continue };
         for at in first[index]..first[index + 1] {
             let several = || {
-                Told::of(&asked[at], mountings).is_some_and(|told| arms.nominal.all(&told.flange).len() > 1)
+                CommandedFlange::of(&target_refs[at], frame_table)
+                    .is_some_and(|commanded| arms.nominal.all(&commanded.flange).len() > 1)
             };
             if let Ok(start) = &mut out[at]
                 && several()
@@ -211,23 +212,25 @@ const RUNS: [usize; 2] = [8, 64];
 
 /// The starts of targets that follow each other. `near`: the joints from which the first one is reached, if known; left
 /// at the joints of the last. `budget`: for those that have to be searched for.
-fn along(
-    asked: &[Asked<'_>],
-    near: &mut Option<Near>,
+fn solve_run(
+    target_refs: &[TargetRef<'_>],
+    near: &mut Option<ReferenceJoints>,
     arms: &Arms<'_>,
-    mountings: &Mountings,
+    frame_table: &FrameTable,
     budget: &mut SearchBudget,
-    out: &mut [Result<Start, Why>],
+    out: &mut [Result<OriginalTarget, OutcomeReason>],
 ) {
     let mut at = 0;
     let mut run = RUNS[0];
-    while at < asked.len() {
-        let here = &asked[at..(at + run).min(asked.len())];
+    while at < target_refs.len() {
+        let here = &target_refs[at..(at + run).min(target_refs.len())];
         let whole = match near {
             Some(last) => {
-                let cartesian: Vec<Told<'_>> =
-                    here.iter().map_while(|asked| Told::of(asked, mountings)).collect();
-                let taken = together(&cartesian, last, arms, &mut out[at..]);
+                let cartesian: Vec<CommandedFlange<'_>> = here
+                    .iter()
+                    .map_while(|target_refs| CommandedFlange::of(target_refs, frame_table))
+                    .collect();
+                let taken = follow_seed(&cartesian, last, arms, &mut out[at..]);
                 at += taken;
                 taken == here.len()
             }
@@ -238,12 +241,12 @@ fn along(
             continue;
         }
         run = RUNS[0];
-        if at < asked.len() {
-            let start = with_budget(budget, || start(&asked[at], near.as_ref(), arms, mountings));
+        if at < target_refs.len() {
+            let start = with_budget(budget, || start(&target_refs[at], near.as_ref(), arms, frame_table));
             match &start {
-                Ok(start) => *near = Some(Near::of(start)),
+                Ok(start) => *near = Some(ReferenceJoints::of(start)),
                 // What goes on from there does not go on from the one before.
-                Err(_) if monitored(asked[at].motion) == Switch::Off => *near = None,
+                Err(_) if monitored(target_refs[at].motion) == Switch::Off => *near = None,
                 Err(_) => {}
             }
             out[at] = start;
@@ -253,24 +256,24 @@ fn along(
 }
 
 /// A Cartesian target with the pose of the flange that the controller computes.
-struct Told<'a> {
+struct CommandedFlange<'a> {
     target: &'a RobTarget,
     monitored: Switch,
-    mounted: usize,
-    meant: Pose,
+    frames_index: usize,
+    intended: Pose,
     flange: Pose,
 }
 
-impl<'a> Told<'a> {
-    fn of(asked: &Asked<'a>, mountings: &Mountings) -> Option<Self> {
-        let Ok(TargetValue::Cartesian(target)) = &asked.target.value else { return None };
-        let mounted = mountings.of_motion(asked.motion).ok()?;
-        if mountings.moving_base(target).is_some() {
+impl<'a> CommandedFlange<'a> {
+    fn of(target_refs: &TargetRef<'a>, frame_table: &FrameTable) -> Option<Self> {
+        let Ok(TargetValue::Cartesian(target)) = &target_refs.target.value else { return None };
+        let frames_index = frame_table.of_motion(target_refs.motion).ok()?;
+        if frame_table.moving_base(target).is_some() {
             return None;
         }
-        let meant = target.pose();
-        let flange = mountings.list[mounted].told.flange_for(&meant);
-        Some(Self { target, monitored: monitored(asked.motion), mounted, meant, flange })
+        let intended = target.pose();
+        let flange = frame_table.list[frames_index].commanded.flange_for(&intended);
+        Some(Self { target, monitored: monitored(target_refs.motion), frames_index, intended, flange })
     }
 }
 
@@ -281,21 +284,33 @@ fn wanted(target: &RobTarget) -> Configuration {
 
 /// Goes from `last` along targets as far as they are reached in the configurations that they state; hands back how many
 /// were, and leaves `last` at the joints of the last of them.
-fn together(told: &[Told<'_>], last: &mut Near, arms: &Arms<'_>, out: &mut [Result<Start, Why>]) -> usize {
-    if told.is_empty() {
+fn follow_seed(
+    commanded: &[CommandedFlange<'_>],
+    last: &mut ReferenceJoints,
+    arms: &Arms<'_>,
+    out: &mut [Result<OriginalTarget, OutcomeReason>],
+) -> usize {
+    if commanded.is_empty() {
         return 0;
     }
-    let flanges: Vec<Pose> = told.iter().map(|t| t.flange).collect();
+    let flanges: Vec<Pose> = commanded.iter().map(|t| t.flange).collect();
     let mut taken = 0;
     // One that has to be searched for is started by itself.
-    for (told, reached) in told.iter().zip(arms.nominal.solve_path_prefix(&flanges, &last.joints)) {
-        if told.monitored != Switch::Off && !reached.matches_exactly(&wanted(told.target)) {
+    for (commanded, reached) in commanded.iter().zip(arms.nominal.solve_path_prefix(&flanges, &last.joints)) {
+        if commanded.monitored != Switch::Off && !reached.matches_exactly(&wanted(commanded.target)) {
             break;
         }
         let (joints, cfx, margins) = (reached.joints, reached.configuration.cfx, reached.margins());
-        let guess = last.guess(told.monitored);
-        let start = Start { mounted: told.mounted, meant: told.meant, joints, cfx, margins, guess };
-        *last = Near::of(&start);
+        let guess = last.guess(commanded.monitored);
+        let start = OriginalTarget {
+            frames_index: commanded.frames_index,
+            intended: commanded.intended,
+            joints,
+            cfx,
+            margins,
+            guess,
+        };
+        *last = ReferenceJoints::of(&start);
         out[taken] = Ok(start);
         taken += 1;
     }
@@ -304,42 +319,44 @@ fn together(told: &[Told<'_>], last: &mut Near, arms: &Arms<'_>, out: &mut [Resu
 
 /// One target by itself.
 fn start(
-    asked: &Asked<'_>,
-    near: Option<&Near>,
+    target_refs: &TargetRef<'_>,
+    near: Option<&ReferenceJoints>,
     arms: &Arms<'_>,
-    mountings: &Mountings,
-) -> Result<Start, Why> {
-    let value = asked.target.value.map_err(Why::Program)?;
-    let mounted = mountings.of_motion(asked.motion)?;
-    let told = &mountings.list[mounted].told;
+    frame_table: &FrameTable,
+) -> Result<OriginalTarget, OutcomeReason> {
+    let value = target_refs.target.value.map_err(OutcomeReason::Program)?;
+    let frames_index = frame_table.of_motion(target_refs.motion)?;
+    let commanded = &frame_table.list[frames_index].commanded;
     match value {
         TargetValue::Cartesian(t) => {
-            if let Some(why) = mountings.moving_base(&t) {
+            if let Some(why) = frame_table.moving_base(&t) {
                 return Err(why);
             }
-            let meant = t.pose();
-            let flange = told.flange_for(&meant);
-            let monitored = monitored(asked.motion);
+            let intended = t.pose();
+            let flange = commanded.flange_for(&intended);
+            let monitored = monitored(target_refs.motion);
             let joints = configured(&arms.nominal, &flange, &t, monitored, near.map(|near| &near.joints))?;
             let cfx = arms.nominal.configuration(&joints).cfx;
             let guess = match near {
                 Some(near) => near.guess(monitored),
-                None if monitored == Switch::Off && arms.nominal.all(&flange).len() > 1 => Guess::Here,
-                None => Guess::No,
+                None if monitored == Switch::Off && arms.nominal.all(&flange).len() > 1 => {
+                    BranchGuess::Guessed
+                }
+                None => BranchGuess::Known,
             };
             let margins = arms.nominal.branch_margins(&joints);
-            Ok(Start { mounted, meant, joints, cfx, margins, guess })
+            Ok(OriginalTarget { frames_index, intended, joints, cfx, margins, guess })
         }
         TargetValue::Joint(t) => {
             let joints = Joints::from_fn(|i, _| t.robot_deg[i].to_radians());
             let nominal = arms.nominal.arm();
             if let Some(joint) = nominal.model.limits.violated(&joints) {
-                return Err(Why::OutsideLimits { joint });
+                return Err(OutcomeReason::OutsideLimits { joint });
             }
-            let meant = told.target_of(&nominal.forward(&joints));
+            let intended = commanded.target_of(&nominal.forward(&joints));
             let cfx = arms.nominal.configuration(&joints).cfx;
             let margins = arms.nominal.branch_margins(&joints);
-            Ok(Start { mounted, meant, joints, cfx, margins, guess: Guess::No })
+            Ok(OriginalTarget { frames_index, intended, joints, cfx, margins, guess: BranchGuess::Known })
         }
     }
 }

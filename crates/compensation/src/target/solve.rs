@@ -1,7 +1,7 @@
 //! Every target worked out: which joints reach what was meant, and what the controller must be told for them.
 //!
-//! The joints of the program as it is are there already ([`AsItIs`]). From them target by target, each under the
-//! condition in which the arm comes there ([`Circumstances`](crate::condition::arm_conditions::Circumstances)), in blocks, so that
+//! The joints of the program as it is are there already ([`OriginalProgram`]). From them target by target, each under the
+//! condition in which the arm comes there ([`ArmConditions`](crate::condition::arm_conditions::Circumstances)), in blocks, so that
 //! the kinematics runs in lanes. Blocks are cut by count alone, so the result does not depend on the number of threads.
 //!
 //! Where joints have play, the sides from which they come follow from the motion, and the corrected motion depends on the
@@ -13,21 +13,21 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 use crate::arms::Arms;
-use crate::backlash::sides::{Course, Reached, Sides, Stop, courses};
-use crate::condition::arm_conditions::picked;
+use crate::backlash::sides::{BacklashSides, JointSides, MotionEnd, ReachedEnd, backlash_sides};
+use crate::condition::arm_conditions::select;
 use crate::condition::payload::Load;
 use crate::configuration::monitored;
 use crate::deviation::Deviation;
 use crate::feasibility::correction_bounds::forbidden;
-use crate::feasibility::singularity::{Replay, at_target};
-use crate::frames::frame_table::Mountings;
-use crate::options::{Circles, Options, may_change};
-use crate::plan::reason::Why;
+use crate::feasibility::singularity::{WrittenTarget, target_fault};
+use crate::frames::frame_table::FrameTable;
+use crate::options::{Circles, Options, is_rewritable};
+use crate::plan::reason::OutcomeReason;
 use crate::risk::assessment::Assessment;
 use crate::search_budget;
-use crate::segment::condition_schedule::Way;
-use crate::target::original_joints::{AsItIs, Asked, Guess, Start};
-use crate::target::solved_target::{PORTION, Solved, SolvedTargets, as_joints};
+use crate::segment::condition_schedule::ConditionSchedule;
+use crate::target::original_joints::{BranchGuess, OriginalProgram, OriginalTarget, TargetRef};
+use crate::target::solved_target::{PORTION, SolvedTarget, SolvedTargets, as_joints};
 use truegrind_arm::estimated::{FlangePoint, RegisteredFrame};
 use truegrind_arm::inverse::budget::{SearchBudget, with_budget};
 use truegrind_arm::inverse::configuration::Configuration;
@@ -41,34 +41,35 @@ const KEPT: usize = 100 << 10;
 
 /// Makes the allocator take the room for a portion from the system at once. Left alone it asks for each few thousand bytes
 /// by themselves, and every thread waits while it does.
-pub(crate) fn take_room() {
+pub(crate) fn reserve_memory() {
     drop(std::hint::black_box(Vec::<u8>::with_capacity(KEPT)));
 }
 
 /// Works out all targets. `stays`: motions that stay as they are though their targets could be corrected.
-pub(crate) fn solve_all(
+pub(crate) fn solve_targets(
     listing: &Listing,
-    program: &AsItIs<'_>,
+    program: &OriginalProgram<'_>,
     arms: &mut Arms<'_>,
-    mountings: &Mountings,
+    frame_table: &FrameTable,
     assessment: &Assessment,
     options: &Options,
-    stays: &BTreeMap<u32, Why>,
+    stays: &BTreeMap<u32, OutcomeReason>,
 ) -> SolvedTargets {
-    let AsItIs { first, asked, starts } = program;
-    Work { listing, first, asked, starts, mountings, assessment, options, stays }.solve(arms)
+    let OriginalProgram { first, target_refs, originals } = program;
+    TargetSolver { listing, first, target_refs, originals, frame_table, assessment, options, stays }
+        .solve(arms)
 }
 
 /// What all targets are worked out from.
-struct Work<'a> {
+struct TargetSolver<'a> {
     listing: &'a Listing,
     first: &'a [usize],
-    asked: &'a [Asked<'a>],
-    starts: &'a [Result<Start, Why>],
-    mountings: &'a Mountings,
+    target_refs: &'a [TargetRef<'a>],
+    originals: &'a [Result<OriginalTarget, OutcomeReason>],
+    frame_table: &'a FrameTable,
     assessment: &'a Assessment,
     options: &'a Options,
-    stays: &'a BTreeMap<u32, Why>,
+    stays: &'a BTreeMap<u32, OutcomeReason>,
 }
 
 /// How often sides and motion are worked out in turn before a side that still changes is called unknown.
@@ -77,30 +78,30 @@ const ROUNDS: usize = 4;
 /// How often they are worked out at most.
 const MOST_ROUNDS: usize = 24;
 
-impl Work<'_> {
+impl TargetSolver<'_> {
     fn solve(self, arms: &mut Arms<'_>) -> SolvedTargets {
         let count = self.listing.motions.len();
         let loads = arms.loads(self.listing, self.options.loads.as_ref());
         let load = |motion: usize| loads.get(motion).and_then(Option::as_ref);
-        if !arms.acting.has_play() {
-            let places: Vec<usize> = if loads.iter().all(Option::is_none) {
-                let only = arms.acting.place([0; 6], None);
-                vec![only; self.asked.len()]
+        if !arms.conditions.has_play() {
+            let condition_indices: Vec<usize> = if loads.iter().all(Option::is_none) {
+                let only = arms.conditions.condition_index([0; 6], None);
+                vec![only; self.target_refs.len()]
             } else {
                 let motions = (0..count).flat_map(|m| (self.first[m]..self.first[m + 1]).map(move |_| m));
-                motions.map(|m| arms.acting.place([0; 6], load(m))).collect()
+                motions.map(|m| arms.conditions.condition_index([0; 6], load(m))).collect()
             };
             let mut targets = self.unsolved();
-            self.fill(&mut targets, arms, &places, &places, None);
+            self.fill(&mut targets, arms, &condition_indices, &condition_indices, None);
             return self.solved(targets, Vec::new());
         }
         let mut doubted: Vec<[bool; 6]> = vec![[false; 6]; count];
         let as_is = self.sides(arms, None, &doubted);
-        let before = self.places(arms, &as_is, &load);
+        let before = self.condition_indices(arms, &as_is, &load);
         let mut sides = as_is;
-        let mut places = before.clone();
+        let mut condition_indices = before.clone();
         let mut targets = self.unsolved();
-        self.fill(&mut targets, arms, &before, &places, None);
+        self.fill(&mut targets, arms, &before, &condition_indices, None);
         for round in 1..=MOST_ROUNDS {
             let next = self.sides(arms, Some(&targets), &doubted);
             if round > ROUNDS {
@@ -110,55 +111,74 @@ impl Work<'_> {
                 }
             }
             sides = if round > ROUNDS { self.sides(arms, Some(&targets), &doubted) } else { next };
-            let new = self.places(arms, &sides, &load);
-            if new == places {
+            let new = self.condition_indices(arms, &sides, &load);
+            if new == condition_indices {
                 break;
             }
             let stale: Vec<bool> = (0..count)
                 .step_by(PORTION)
                 .map(|begin| {
                     let targets = self.targets(begin);
-                    new[targets.clone()] != places[targets]
+                    new[targets.clone()] != condition_indices[targets]
                 })
                 .collect();
-            places = new;
-            self.fill(&mut targets, arms, &before, &places, Some(&stale));
+            condition_indices = new;
+            self.fill(&mut targets, arms, &before, &condition_indices, Some(&stale));
         }
-        let ways = sides.iter().enumerate().map(|(m, course)| {
-            let mut later =
-                course.turns.iter().map(|(share, sides)| (*share, arms.acting.place(*sides, load(m))));
+        let schedules = sides.iter().enumerate().map(|(m, course)| {
+            let mut later = course
+                .turns
+                .iter()
+                .map(|(share, sides)| (*share, arms.conditions.condition_index(*sides, load(m))));
             let first = later.next().map(|turn| turn.1);
             let later: Vec<(f64, usize)> = later.collect();
-            Way { first: first.unwrap_or_else(|| arms.acting.place(course.end, load(m))), later }
+            ConditionSchedule {
+                first: first.unwrap_or_else(|| arms.conditions.condition_index(course.end, load(m))),
+                later,
+            }
         });
-        let ways = ways.collect();
-        self.solved(targets, ways)
+        let schedules = schedules.collect();
+        self.solved(targets, schedules)
     }
 
-    fn solved(&self, targets: Vec<Result<Solved, Why>>, ways: Vec<Way>) -> SolvedTargets {
+    fn solved(
+        &self,
+        targets: Vec<Result<SolvedTarget, OutcomeReason>>,
+        schedules: Vec<ConditionSchedule>,
+    ) -> SolvedTargets {
         let unreached = self.unreached(&targets);
         let guessed = self.guessed();
-        SolvedTargets { forbade: Vec::new(), first: self.first.to_vec(), targets, ways, unreached, guessed }
+        SolvedTargets {
+            forbade: Vec::new(),
+            first: self.first.to_vec(),
+            targets,
+            schedules,
+            unreached,
+            guessed,
+        }
     }
 
     /// The starts of motions of which a target failed though all are known as the program is.
-    fn unreached(&self, solved: &[Result<Solved, Why>]) -> BTreeMap<u32, Vec<Start>> {
-        let starts = |motion: usize| {
+    fn unreached(
+        &self,
+        solved: &[Result<SolvedTarget, OutcomeReason>],
+    ) -> BTreeMap<u32, Vec<OriginalTarget>> {
+        let originals = |motion: usize| {
             let targets = self.first[motion]..self.first[motion + 1];
             let failed = solved[targets.clone()].iter().any(Result::is_err);
-            let starts = || self.starts[targets].iter().cloned().collect::<Result<_, _>>().ok();
-            Some((motion as u32, failed.then(starts)??))
+            let originals = || self.originals[targets].iter().cloned().collect::<Result<_, _>>().ok();
+            Some((motion as u32, failed.then(originals)??))
         };
-        (0..self.listing.motions.len()).filter_map(starts).collect()
+        (0..self.listing.motions.len()).filter_map(originals).collect()
     }
 
     /// Motions of which a target was reached by guess.
     fn guessed(&self) -> Vec<u32> {
         let guessed = |m: &usize| {
-            self.starts[self.first[*m]..self.first[m + 1]]
+            self.originals[self.first[*m]..self.first[m + 1]]
                 .iter()
                 .flatten()
-                .any(|start| start.guess == Guess::Here)
+                .any(|start| start.guess == BranchGuess::Guessed)
         };
         (0..self.listing.motions.len()).filter(guessed).map(|m| m as u32).collect()
     }
@@ -169,21 +189,21 @@ impl Work<'_> {
     }
 
     /// A place for each target.
-    fn unsolved(&self) -> Vec<Result<Solved, Why>> {
-        self.asked.par_iter().map(|_| Err(Why::JointTarget)).collect()
+    fn unsolved(&self) -> Vec<Result<SolvedTarget, OutcomeReason>> {
+        self.target_refs.par_iter().map(|_| Err(OutcomeReason::JointTarget)).collect()
     }
 
     /// All targets, `before` under the conditions of the program as it is, or those portions that are `stale`.
     fn fill(
         &self,
-        solved: &mut [Result<Solved, Why>],
+        solved: &mut [Result<SolvedTarget, OutcomeReason>],
         arms: &Arms<'_>,
         before: &[usize],
-        places: &[usize],
+        condition_indices: &[usize],
         stale: Option<&[bool]>,
     ) {
         let mut rest = solved;
-        let mut portions: Vec<&mut [Result<Solved, Why>]> = Vec::new();
+        let mut portions: Vec<&mut [Result<SolvedTarget, OutcomeReason>]> = Vec::new();
         for begin in (0..self.listing.motions.len()).step_by(PORTION) {
             let (here, after) = rest.split_at_mut(self.targets(begin).len());
             portions.push(here);
@@ -194,11 +214,13 @@ impl Work<'_> {
             if stale.is_some_and(|stale| !stale[portion]) {
                 return;
             }
-            take_room();
+            reserve_memory();
             let targets = self.targets(portion * PORTION);
-            let places = [&before[targets.clone()], &places[targets.clone()]];
-            let (asked, starts) = (&self.asked[targets.clone()], &self.starts[targets]);
-            with_budget(budget, || finish(asked, starts, places, arms, self, solved));
+            let condition_indices = [&before[targets.clone()], &condition_indices[targets.clone()]];
+            let (target_refs, originals) = (&self.target_refs[targets.clone()], &self.originals[targets]);
+            with_budget(budget, || {
+                solve_portion(target_refs, originals, condition_indices, arms, self, solved)
+            });
         });
     }
 
@@ -206,17 +228,17 @@ impl Work<'_> {
     fn sides(
         &self,
         arms: &Arms<'_>,
-        solved: Option<&[Result<Solved, Why>]>,
+        solved: Option<&[Result<SolvedTarget, OutcomeReason>]>,
         doubted: &[[bool; 6]],
-    ) -> Vec<Course> {
+    ) -> Vec<BacklashSides> {
         let motions = &self.listing.motions;
         let stop = |m: usize| {
             let motion = &motions[m];
             if motion.kind == MotionKind::External {
-                return Stop::Stays;
+                return MotionEnd::Unmoved;
             }
             let stays = self.stays.contains_key(&(m as u32));
-            let rewritten = solved.filter(|_| may_change(motion, self.options) && !stays);
+            let rewritten = solved.filter(|_| is_rewritable(motion, self.options) && !stays);
             let targets = self.first[m]..self.first[m + 1];
             let solved = |target: usize| match &rewritten?[target] {
                 Ok(solved) if solved.forbidden.is_none() => Some(solved),
@@ -227,50 +249,64 @@ impl Work<'_> {
             // What the controller is told, and the joints there.
             let at = |target: usize| match solved(target).filter(|_| changes) {
                 Some(solved) => {
-                    let links = arms.acting.links(solved.place, &solved.after);
-                    Some((solved.mounted, solved.told, solved.after, Some(links)))
+                    let links = arms.conditions.links(solved.condition_index, &solved.after);
+                    Some((solved.frames_index, solved.commanded, solved.after, Some(links)))
                 }
-                None => self.starts[target].as_ref().ok().map(|s| (s.mounted, s.meant, s.joints, None)),
+                None => {
+                    self.originals[target].as_ref().ok().map(|s| (s.frames_index, s.intended, s.joints, None))
+                }
             };
-            let role = |target: &usize| self.asked[*target].target.role;
-            let Some((mounted, told, joints, links)) =
+            let role = |target: &usize| self.target_refs[*target].target.role;
+            let Some((frames_index, commanded, joints, links)) =
                 targets.clone().rev().find(|t| role(t) == Role::To).and_then(at)
             else {
-                return Stop::Lost;
+                return MotionEnd::Unknown;
             };
             let via = targets.clone().find(|t| role(t) == Role::Via).and_then(at).map(|via| via.1);
             let straightens = motion.straightens && self.options.circles == Circles::Segments;
             let as_joints = changes && motion.to().is_some_and(|to| as_joints(motion, to, self.options.emit));
-            let may_cut = motion.insertable || straightens;
-            Stop::At(Reached { motion, mounted, told, joints, via, links, as_joints, may_cut })
+            let may_insert = motion.insertable || straightens;
+            MotionEnd::At(ReachedEnd {
+                motion,
+                frames_index,
+                commanded,
+                joints,
+                via,
+                links,
+                as_joints,
+                may_insert,
+            })
         };
-        let stops: Vec<Stop<'_>> = (0..motions.len()).map(stop).collect();
+        let stops: Vec<MotionEnd<'_>> = (0..motions.len()).map(stop).collect();
         // From guessed joints, which may be whole turns elsewhere, one does not know which way a joint comes to where it is told.
         let guessed = |m: usize| {
             let targets = self.first[m]..self.first[m + 1];
-            targets.rev().find_map(|t| self.starts[t].as_ref().ok()).is_some_and(|s| s.guess != Guess::No)
+            targets
+                .rev()
+                .find_map(|t| self.originals[t].as_ref().ok())
+                .is_some_and(|s| s.guess != BranchGuess::Known)
         };
         let follows = |m: usize| motions[m].previous.filter(|from| guessed(m) || !guessed(*from as usize));
         let before: Vec<Option<u32>> = (0..motions.len()).map(follows).collect();
-        let told = |mounted: usize| self.mountings.list[mounted].told;
-        courses(&stops, &before, &arms.nominal, &arms.acting.play_rad, &told, doubted)
+        let commanded = |frames_index: usize| self.frame_table.list[frames_index].commanded;
+        backlash_sides(&stops, &before, &arms.nominal, &arms.conditions.play_rad, &commanded, doubted)
     }
 
     /// The condition of each target.
-    fn places<'l>(
+    fn condition_indices<'l>(
         &self,
         arms: &mut Arms<'_>,
-        sides: &[Course],
+        sides: &[BacklashSides],
         load: &dyn Fn(usize) -> Option<&'l Load>,
     ) -> Vec<usize> {
-        let mut out = Vec::with_capacity(self.asked.len());
+        let mut out = Vec::with_capacity(self.target_refs.len());
         for (m, course) in sides.iter().enumerate() {
             for target in self.first[m]..self.first[m + 1] {
-                let sides: Sides = match self.asked[target].target.role {
+                let sides: JointSides = match self.target_refs[target].target.role {
                     Role::Via => course.via,
                     Role::To => course.end,
                 };
-                out.push(arms.acting.place(sides, load(m)));
+                out.push(arms.conditions.condition_index(sides, load(m)));
             }
         }
         out
@@ -278,160 +314,170 @@ impl Work<'_> {
 }
 
 /// The rest of the work on one portion of targets, into `out`.
-fn finish(
-    asked: &[Asked<'_>],
-    starts: &[Result<Start, Why>],
-    places: [&[usize]; 2],
+fn solve_portion(
+    target_refs: &[TargetRef<'_>],
+    originals: &[Result<OriginalTarget, OutcomeReason>],
+    condition_indices: [&[usize]; 2],
     arms: &Arms<'_>,
-    work: &Work<'_>,
-    out: &mut [Result<Solved, Why>],
+    work: &TargetSolver<'_>,
+    out: &mut [Result<SolvedTarget, OutcomeReason>],
 ) {
-    let Work { mountings, assessment, options, .. } = *work;
-    let acting = &arms.acting;
+    let TargetSolver { frame_table, assessment, options, .. } = *work;
+    let conditions = &arms.conditions;
     // A place holder for those on their way.
-    let waiting = |start: &Result<Start, Why>| Err(start.as_ref().err().copied().unwrap_or(Why::JointTarget));
-    out.iter_mut().zip(starts).for_each(|(out, start)| *out = waiting(start));
-    let way = on_their_way(starts, places, arms, mountings, out);
-    let joint_form = |w: &OnItsWay| as_joints(asked[w.index].motion, asked[w.index].target, options.emit);
-    let Replayed { told_flanges, told, heard, branches, last, failed } =
-        replayed(&way, &joint_form, arms, mountings, options);
-    let real = |start: &Start| &mountings.list[start.mounted].real;
-    let places: Vec<usize> = way.iter().map(|w| w.place).collect();
-    let reached_after = acting.forward(&places, &last);
-    let tools: Vec<Pose> = way.iter().map(|w| real(&w.start).flange_from_tool(&w.flange)).collect();
-    let cut_of = |w: &OnItsWay| asked[w.index].index;
-    let frames = way.iter().map(|w| Some(mountings.list[w.start.mounted].carried.as_ref())).collect();
-    let absolute = sigmas(&way, &tools, frames, arms);
-    let registered = way.iter().map(|w| assessment.registered(cut_of(w)).map(Some)).collect();
-    let of_shape = sigmas(&way, &tools, registered, arms);
+    let waiting = |start: &Result<OriginalTarget, OutcomeReason>| {
+        Err(start.as_ref().err().copied().unwrap_or(OutcomeReason::JointTarget))
+    };
+    out.iter_mut().zip(originals).for_each(|(out, start)| *out = waiting(start));
+    let reachable = reachable_targets(originals, condition_indices, arms, frame_table, out);
+    let joint_form = |w: &ReachableTarget| {
+        as_joints(target_refs[w.index].motion, target_refs[w.index].target, options.emit)
+    };
+    let ControllerReplay { told_flanges, commanded, read_back, branches, last, failed } =
+        replay_controller(&reachable, &joint_form, arms, frame_table, options);
+    let real = |start: &OriginalTarget| &frame_table.list[start.frames_index].real;
+    let condition_indices: Vec<usize> = reachable.iter().map(|w| w.condition_index).collect();
+    let reached_after = conditions.forward(&condition_indices, &last);
+    let tools: Vec<Pose> = reachable.iter().map(|w| real(&w.start).flange_from_tool(&w.flange)).collect();
+    let cut_of = |w: &ReachableTarget| target_refs[w.index].index;
+    let frames =
+        reachable.iter().map(|w| Some(frame_table.list[w.start.frames_index].carried.as_ref())).collect();
+    let absolute = sigmas(&reachable, &tools, frames, arms);
+    let registered = reachable.iter().map(|w| assessment.registered(cut_of(w)).map(Some)).collect();
+    let of_shape = sigmas(&reachable, &tools, registered, arms);
     let mut near = NearestSample::default();
-    for (k, w) in way.iter().enumerate() {
+    for (k, w) in reachable.iter().enumerate() {
         if let Some(why) = failed[k] {
             out[w.index] = Err(why);
             continue;
         }
         let real = real(&w.start);
-        let meant = w.start.meant;
-        let in_object = |reached: &Pose| Deviation::between(&meant, reached, &Pose::identity(), None);
+        let intended = w.start.intended;
+        let in_object = |reached: &Pose| Deviation::between(&intended, reached, &Pose::identity(), None);
         let deviations =
             [w.reached_before, real.target_of(&reached_after[k])].map(|reached| in_object(&reached));
-        let in_play_mm = acting.in_play_mm(w.place, &w.after, &tools[k]);
+        let play_uncertainty_mm = conditions.play_uncertainty_mm(w.condition_index, &w.after, &tools[k]);
         let (conf, margins) = branches[k];
-        let mut solved = Solved {
-            mounted: w.start.mounted,
-            meant,
+        let mut solved = SolvedTarget {
+            frames_index: w.start.frames_index,
+            intended,
             before: w.start.joints,
             after: w.after,
-            told: told[k],
+            commanded: commanded[k],
             cfx_before: w.start.cfx,
             conf,
             margins: [w.start.margins, margins],
-            off_mm: deviations.map(|deviation| deviation.norm_mm()),
+            deviation_mm: deviations.map(|deviation| deviation.norm_mm()),
             deviations: options.points.then(|| Box::new(deviations)),
-            sigma_mm: absolute[k].unwrap_or(0.0).hypot(in_play_mm),
+            sigma_mm: absolute[k].unwrap_or(0.0).hypot(play_uncertainty_mm),
             shape_sigma_mm: of_shape[k]
                 .or_else(|| assessment.sigma_of_cut_mm(cut_of(w)))
-                .map(|sigma| sigma.hypot(in_play_mm)),
-            in_play_mm,
-            place: w.place,
+                .map(|sigma| sigma.hypot(play_uncertainty_mm)),
+            play_uncertainty_mm,
+            condition_index: w.condition_index,
             guess: w.start.guess,
             outside: arms.knowledge.and_then(|k| k.region.outside_along(&w.after, &mut near)),
             forbidden: None,
         };
         solved.forbidden = forbidden(&solved, w.singularity, arms, options).or_else(|| {
-            let told = &mountings.list[solved.mounted].told;
-            let flanges = [told.flange_for(&meant), told_flanges[k]];
-            let stated = if joint_form(w) { None } else { stated(&asked[w.index]) };
-            let replay = Replay { flanges, heard: &heard[k], joints: &last[k], stated };
-            at_target(&solved, w.singularity, &replay, arms, options)
+            let commanded = &frame_table.list[solved.frames_index].commanded;
+            let flanges = [commanded.flange_for(&intended), told_flanges[k]];
+            let stated = if joint_form(w) { None } else { stated(&target_refs[w.index]) };
+            let replay = WrittenTarget { flanges, read_back: &read_back[k], joints: &last[k], stated };
+            target_fault(&solved, w.singularity, &replay, arms, options)
         });
         out[w.index] = Ok(solved);
     }
 }
 
 /// The targets for which joints were found that reach what was meant; the others say in `out` why not.
-fn on_their_way(
-    starts: &[Result<Start, Why>],
-    places: [&[usize]; 2],
+fn reachable_targets(
+    originals: &[Result<OriginalTarget, OutcomeReason>],
+    condition_indices: [&[usize]; 2],
     arms: &Arms<'_>,
-    mountings: &Mountings,
-    out: &mut [Result<Solved, Why>],
-) -> Vec<OnItsWay> {
-    let acting = &arms.acting;
-    let open: Vec<(usize, Start)> =
-        starts.iter().enumerate().filter_map(|(index, start)| Some((index, *start.as_ref().ok()?))).collect();
+    frame_table: &FrameTable,
+    out: &mut [Result<SolvedTarget, OutcomeReason>],
+) -> Vec<ReachableTarget> {
+    let conditions = &arms.conditions;
+    let open: Vec<(usize, OriginalTarget)> = originals
+        .iter()
+        .enumerate()
+        .filter_map(|(index, start)| Some((index, *start.as_ref().ok()?)))
+        .collect();
     let before: Vec<Joints> = open.iter().map(|(_, s)| s.joints).collect();
-    let real = |start: &Start| &mountings.list[start.mounted].real;
-    let flanges: Vec<Pose> = open.iter().map(|(_, s)| real(s).flange_for(&s.meant)).collect();
-    let [places_before, places] = places.map(|all| open.iter().map(|(k, _)| all[*k]).collect::<Vec<usize>>());
-    let reached_before = acting.forward(&places_before, &before);
-    let solutions = acting.each(&places, |place, items| match items {
-        None => acting.inverse(place).solve_offset_seeded(&flanges, &before),
-        Some(items) => {
-            acting.inverse(place).solve_offset_seeded(&picked(&flanges, items), &picked(&before, items))
-        }
+    let real = |start: &OriginalTarget| &frame_table.list[start.frames_index].real;
+    let flanges: Vec<Pose> = open.iter().map(|(_, s)| real(s).flange_for(&s.intended)).collect();
+    let [places_before, condition_indices] =
+        condition_indices.map(|all| open.iter().map(|(k, _)| all[*k]).collect::<Vec<usize>>());
+    let reached_before = conditions.forward(&places_before, &before);
+    let solutions = conditions.each(&condition_indices, |condition_index, items| match items {
+        None => conditions.inverse(condition_index).solve_offset_seeded(&flanges, &before),
+        Some(items) => conditions
+            .inverse(condition_index)
+            .solve_offset_seeded(&select(&flanges, items), &select(&before, items)),
     });
-    let mut way: Vec<OnItsWay> = Vec::with_capacity(open.len());
+    let mut reachable: Vec<ReachableTarget> = Vec::with_capacity(open.len());
     for (k, ((index, start), solution)) in open.iter().zip(solutions).enumerate() {
         match solution {
-            Ok(solution) => way.push(OnItsWay {
+            Ok(solution) => reachable.push(ReachableTarget {
                 index: *index,
                 start: *start,
-                place: places[k],
+                condition_index: condition_indices[k],
                 flange: flanges[k],
                 after: solution.joints,
                 singularity: solution.singularity,
                 reached_before: real(start).target_of(&reached_before[k]),
             }),
-            Err(error) => out[*index] = Err(Why::of_inverse(error)),
+            Err(error) => out[*index] = Err(OutcomeReason::of_inverse(error)),
         }
     }
-    way
+    reachable
 }
 
 /// What the controller is told, and where it goes when the told numbers are rounded.
-struct Replayed {
+struct ControllerReplay {
     told_flanges: Vec<Pose>,
-    told: Vec<Pose>,
+    commanded: Vec<Pose>,
     /// The flanges of the rounded numbers.
-    heard: Vec<Pose>,
+    read_back: Vec<Pose>,
     /// Configuration and margins of what it makes of them.
     branches: Vec<(Configuration, [f64; 3])>,
     /// Its joints.
     last: Vec<Joints>,
-    failed: Vec<Option<Why>>,
+    failed: Vec<Option<OutcomeReason>>,
 }
 
-fn replayed(
-    way: &[OnItsWay],
-    joint_form: &dyn Fn(&OnItsWay) -> bool,
+fn replay_controller(
+    reachable: &[ReachableTarget],
+    joint_form: &dyn Fn(&ReachableTarget) -> bool,
     arms: &Arms<'_>,
-    mountings: &Mountings,
+    frame_table: &FrameTable,
     options: &Options,
-) -> Replayed {
-    let after: Vec<Joints> = way.iter().map(|w| w.after).collect();
+) -> ControllerReplay {
+    let after: Vec<Joints> = reachable.iter().map(|w| w.after).collect();
     let told_flanges = arms.nominal.arm().forward_many(&after);
-    let mounting = |w: &OnItsWay| &mountings.list[w.start.mounted].told;
-    let told: Vec<Pose> =
-        way.iter().zip(&told_flanges).map(|(w, flange)| mounting(w).target_of(flange)).collect();
-    let hears =
-        |(w, told): (&OnItsWay, &Pose)| mounting(w).flange_for(&rounded(told, options.position_decimals));
-    let heard: Vec<Pose> = way.iter().zip(&told).map(hears).collect();
-    let reached = if way.iter().all(joint_form) {
+    let mounting = |w: &ReachableTarget| &frame_table.list[w.start.frames_index].commanded;
+    let commanded: Vec<Pose> =
+        reachable.iter().zip(&told_flanges).map(|(w, flange)| mounting(w).target_of(flange)).collect();
+    let hears = |(w, commanded): (&ReachableTarget, &Pose)| {
+        mounting(w).flange_for(&rounded(commanded, options.position_decimals))
+    };
+    let read_back: Vec<Pose> = reachable.iter().zip(&commanded).map(hears).collect();
+    let reached = if reachable.iter().all(joint_form) {
         Vec::new()
     } else {
-        arms.nominal.solve_seeded_joints(&heard, &after)
+        arms.nominal.solve_seeded_joints(&read_back, &after)
     };
-    let mut last: Vec<Joints> = Vec::with_capacity(way.len());
-    let mut branches = Vec::with_capacity(way.len());
-    let mut failed: Vec<Option<Why>> = vec![None; way.len()];
+    let mut last: Vec<Joints> = Vec::with_capacity(reachable.len());
+    let mut branches = Vec::with_capacity(reachable.len());
+    let mut failed: Vec<Option<OutcomeReason>> = vec![None; reachable.len()];
     let of_joints =
         |joints: &Joints| (arms.nominal.configuration(joints), arms.nominal.branch_margins(joints));
-    for (k, w) in way.iter().enumerate() {
+    for (k, w) in reachable.iter().enumerate() {
         let (joints, branch) = match reached.get(k).filter(|_| !joint_form(w)) {
             Some(Ok(reached)) => (reached.joints, (reached.configuration, reached.margins())),
             Some(Err(error)) => {
-                failed[k] = Some(Why::of_inverse(*error));
+                failed[k] = Some(OutcomeReason::of_inverse(*error));
                 (w.after, of_joints(&w.after))
             }
             None => (w.after, of_joints(&w.after)),
@@ -439,45 +485,48 @@ fn replayed(
         last.push(joints);
         branches.push(branch);
     }
-    Replayed { told_flanges, told, heard, branches, last, failed }
+    ControllerReplay { told_flanges, commanded, read_back, branches, last, failed }
 }
 
 /// How well each point is known (mm) against what it is measured from; `None` where that is not asked for.
 fn sigmas(
-    way: &[OnItsWay],
+    reachable: &[ReachableTarget],
     tools: &[Pose],
     against: Vec<Option<Option<&RegisteredFrame>>>,
     arms: &Arms<'_>,
 ) -> Vec<Option<f64>> {
-    let Some(knowledge) = arms.knowledge else { return vec![None; way.len()] };
-    let (mut places, mut points) = (Vec::with_capacity(way.len()), Vec::with_capacity(way.len()));
-    let mut at = Vec::with_capacity(way.len());
-    for ((k, w), carried) in way.iter().enumerate().zip(against) {
+    let Some(knowledge) = arms.knowledge else { return vec![None; reachable.len()] };
+    let (mut condition_indices, mut points) =
+        (Vec::with_capacity(reachable.len()), Vec::with_capacity(reachable.len()));
+    let mut at = Vec::with_capacity(reachable.len());
+    for ((k, w), carried) in reachable.iter().enumerate().zip(against) {
         let Some(carried) = carried else { continue };
         points.push(FlangePoint { joints: w.after, flange_from_tool: tools[k], carried });
-        places.push(w.place);
+        condition_indices.push(w.condition_index);
         at.push(k);
     }
-    let found = arms.acting.each(&places, |place, items| match items {
-        None => knowledge.position_sigmas_mm(arms.acting.arm(place), &points),
-        Some(items) => knowledge.position_sigmas_mm(arms.acting.arm(place), &picked(&points, items)),
+    let found = arms.conditions.each(&condition_indices, |condition_index, items| match items {
+        None => knowledge.position_sigmas_mm(arms.conditions.arm(condition_index), &points),
+        Some(items) => {
+            knowledge.position_sigmas_mm(arms.conditions.arm(condition_index), &select(&points, items))
+        }
     });
-    let mut out = vec![None; way.len()];
+    let mut out = vec![None; reachable.len()];
     at.into_iter().zip(found).for_each(|(k, sigma)| out[k] = Some(sigma));
     out
 }
 
 /// The target, where the controller may go by the configuration that it states.
-fn stated<'a>(asked: &Asked<'a>) -> Option<&'a RobTarget> {
-    let Ok(TargetValue::Cartesian(target)) = &asked.target.value else { return None };
-    (monitored(asked.motion) != Switch::Off).then_some(target)
+fn stated<'a>(target_refs: &TargetRef<'a>) -> Option<&'a RobTarget> {
+    let Ok(TargetValue::Cartesian(target)) = &target_refs.target.value else { return None };
+    (monitored(target_refs.motion) != Switch::Off).then_some(target)
 }
 
 /// A target whose joints are found.
-struct OnItsWay {
+struct ReachableTarget {
     index: usize,
-    start: Start,
-    place: usize,
+    start: OriginalTarget,
+    condition_index: usize,
     flange: Pose,
     after: Joints,
     singularity: f64,

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use crate::deviation::Deviation;
 use crate::options::Emit;
-use crate::plan::reason::Why;
-use crate::segment::condition_schedule::Way;
-use crate::target::original_joints::{Guess, Start};
+use crate::plan::reason::OutcomeReason;
+use crate::segment::condition_schedule::ConditionSchedule;
+use crate::target::original_joints::{BranchGuess, OriginalTarget};
 use truegrind_arm::inverse::configuration::Configuration;
 use truegrind_arm::model::Joints;
 use truegrind_arm::region::Outside;
@@ -18,46 +18,46 @@ pub(crate) const PORTION: usize = 64;
 
 /// One target worked out.
 #[derive(Debug, Clone)]
-pub(crate) struct Solved {
-    pub(crate) mounted: usize,
-    pub(crate) meant: Pose,
+pub(crate) struct SolvedTarget {
+    pub(crate) frames_index: usize,
+    pub(crate) intended: Pose,
     pub(crate) before: Joints,
     pub(crate) after: Joints,
-    pub(crate) told: Pose,
+    pub(crate) commanded: Pose,
     /// The branch before.
     pub(crate) cfx_before: i32,
     pub(crate) conf: Configuration,
     /// How far the tool is off before and after (mm).
-    pub(crate) off_mm: [f64; 2],
+    pub(crate) deviation_mm: [f64; 2],
     /// The same with its direction and the turn; only where points are asked for.
     pub(crate) deviations: Option<Box<[Deviation; 2]>>,
     pub(crate) sigma_mm: f64,
     /// The same of the shape of its cut, after the best rigid registration; absent outside cuts.
     pub(crate) shape_sigma_mm: Option<f64>,
     /// What of either comes from joints whose side is not known (mm).
-    pub(crate) in_play_mm: f64,
+    pub(crate) play_uncertainty_mm: f64,
     pub(crate) outside: Option<Outside>,
     /// [`Inverse::branch_margins`](truegrind_arm::inverse::Inverse::branch_margins) of the nominal arm, before and after.
     pub(crate) margins: [[f64; 3]; 2],
     /// Why it must not be written.
-    pub(crate) forbidden: Option<Why>,
+    pub(crate) forbidden: Option<OutcomeReason>,
     /// The condition under which the arm comes there.
-    pub(crate) place: usize,
+    pub(crate) condition_index: usize,
     /// Whether `before` rests on a guess.
-    pub(crate) guess: Guess,
+    pub(crate) guess: BranchGuess,
 }
 
-impl Solved {
+impl SolvedTarget {
     /// How far the commanded position lies from the intended one (mm): what the program's numbers move by.
     pub(crate) fn shift_mm(&self) -> f64 {
-        (self.told.translation.vector - self.meant.translation.vector).norm()
+        (self.commanded.translation.vector - self.intended.translation.vector).norm()
     }
 
     /// Where the target leads as the program is.
-    fn as_it_is(&self) -> Start {
-        Start {
-            mounted: self.mounted,
-            meant: self.meant,
+    fn original_targets(&self) -> OriginalTarget {
+        OriginalTarget {
+            frames_index: self.frames_index,
+            intended: self.intended,
             joints: self.before,
             cfx: self.cfx_before,
             margins: self.margins[0],
@@ -69,22 +69,22 @@ impl Solved {
 /// The targets of all motions.
 pub(crate) struct SolvedTargets {
     /// What [`SolvedTargets::forbid`] did: at which target, and what was forbidden there before.
-    pub(crate) forbade: Vec<(usize, Option<Why>)>,
+    pub(crate) forbade: Vec<(usize, Option<OutcomeReason>)>,
     /// Where the targets of each motion begin, and the end of the last.
     pub(crate) first: Vec<usize>,
     /// All of them, in one list: it goes back to the system as a whole.
-    pub(crate) targets: Vec<Result<Solved, Why>>,
+    pub(crate) targets: Vec<Result<SolvedTarget, OutcomeReason>>,
     /// The conditions on the way to the end of each motion; empty where no joint has play.
-    pub(crate) ways: Vec<Way>,
+    pub(crate) schedules: Vec<ConditionSchedule>,
     /// Where the targets of motions lead of which one is not reached on the actual arm: as the program is.
-    pub(crate) unreached: BTreeMap<u32, Vec<Start>>,
+    pub(crate) unreached: BTreeMap<u32, Vec<OriginalTarget>>,
     /// Motions of which the configuration is not checked and the start not known; not those that go on from there.
     pub(crate) guessed: Vec<u32>,
 }
 
 impl SolvedTargets {
     /// Forbids that a motion is changed; of no effect where its last target was not worked out.
-    pub(crate) fn forbid(&mut self, motion: usize, why: Why) {
+    pub(crate) fn forbid(&mut self, motion: usize, why: OutcomeReason) {
         let targets = self.first[motion]..self.first[motion + 1];
         if let Some(last) = targets.last()
             && let Ok(solved) = &mut self.targets[last]
@@ -104,34 +104,37 @@ impl SolvedTargets {
     }
 
     /// The targets of one motion; none where the motion must be left.
-    pub(crate) fn of(&self, motion: usize) -> &[Result<Solved, Why>] {
+    pub(crate) fn of(&self, motion: usize) -> &[Result<SolvedTarget, OutcomeReason>] {
         &self.targets[self.first[motion]..self.first[motion + 1]]
     }
 
     /// Where the targets of a motion lead as the program is; none where that is not known.
-    pub(crate) fn as_it_is(&self, motion: usize) -> Vec<Start> {
-        let known = |targets: &[Result<Solved, Why>]| {
-            targets.iter().map(|target| Some(target.as_ref().ok()?.as_it_is())).collect::<Option<_>>()
+    pub(crate) fn original_targets(&self, motion: usize) -> Vec<OriginalTarget> {
+        let known = |targets: &[Result<SolvedTarget, OutcomeReason>]| {
+            targets.iter().map(|target| Some(target.as_ref().ok()?.original_targets())).collect::<Option<_>>()
         };
         known(self.of(motion)).or_else(|| self.unreached.get(&(motion as u32)).cloned()).unwrap_or_default()
     }
 
     /// Where a motion ends as the program is, if that is known.
-    pub(crate) fn end_as_it_is(&self, motion: usize) -> Option<Start> {
+    pub(crate) fn original_end(&self, motion: usize) -> Option<OriginalTarget> {
         match self.of(motion).last()? {
-            Ok(solved) => Some(solved.as_it_is()),
+            Ok(solved) => Some(solved.original_targets()),
             Err(_) => self.unreached.get(&(motion as u32))?.last().copied(),
         }
     }
 
-    /// The conditions on the way to the end of a motion, at which the arm comes under `place`.
-    pub(crate) fn way(&self, motion: usize, place: usize) -> Way {
-        self.ways.get(motion).cloned().unwrap_or(Way { first: place, later: Vec::new() })
+    /// The conditions on the way to the end of a motion, at which the arm comes under `condition_index`.
+    pub(crate) fn condition_schedule(&self, motion: usize, condition_index: usize) -> ConditionSchedule {
+        self.schedules
+            .get(motion)
+            .cloned()
+            .unwrap_or(ConditionSchedule { first: condition_index, later: Vec::new() })
     }
 
     /// At how many targets a side is not known, and how far the tool may be off for it at most (mm).
     pub(crate) fn in_play(&self) -> (usize, f64) {
-        let open = self.targets.iter().flatten().map(|s| s.in_play_mm).filter(|mm| *mm > 0.0);
+        let open = self.targets.iter().flatten().map(|s| s.play_uncertainty_mm).filter(|mm| *mm > 0.0);
         open.fold((0, 0.0), |(count, most), mm| (count + 1, f64::max(most, mm)))
     }
 }

@@ -81,8 +81,9 @@ fn a_line_that_begins_under_another_tool_is_checked_and_straightened() {
     let loose = Options { tolerance_mm: 5.0, ..Options::default() };
     let (planned, text) = rewrite(&source, &known, &loose);
     let outcome = &planned.outcomes[1];
-    let stated =
-        outcome.bend_mm.unwrap_or_else(|| panic!("it is not checked: {outcome:?}\n{:?}", planned.notes));
+    let stated = outcome
+        .path_deviation_mm
+        .unwrap_or_else(|| panic!("it is not checked: {outcome:?}\n{:?}", planned.notes));
     let found = off_line(&source, &text, &known, 0);
     assert!(found > 0.05 && (found - stated).abs() < 4e-3, "{found} mm, stated {stated}");
     // Nothing tells where the first line begins, and that alone is not checked.

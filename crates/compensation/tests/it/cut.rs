@@ -11,7 +11,7 @@ use truegrind_compensation::compensate::{Compensated, compensate};
 use truegrind_compensation::cut::Cuts;
 use truegrind_compensation::deviation::Status;
 use truegrind_compensation::options::{Emit, Options};
-use truegrind_compensation::plan::reason::Why;
+use truegrind_compensation::plan::reason::OutcomeReason;
 use truegrind_programs::motion::Mark;
 use truegrind_programs::nc;
 use truegrind_programs::nc::orientation::Angles;
@@ -88,7 +88,7 @@ fn a_target_known_only_at_run_time_keeps_its_cut() {
     let body = [line(380.0, "z1"), late.to_owned(), line(390.0, "z1")].concat();
     let (partly, _) = done(&module(&body), Cuts::Whole, 0.05);
     assert_eq!(statuses(&partly), [Refused, Left, Refused]);
-    assert!(matches!(partly.plan.outcomes[0].reason, Some(Why::PartOfCut { line: 6, .. })));
+    assert!(matches!(partly.plan.outcomes[0].reason, Some(OutcomeReason::PartOfCut { line: 6, .. })));
     // All of a cut for one reason: nothing is refused that could have been corrected.
     let (all_left, _) = done(&module(&late.repeat(2)), Cuts::Whole, 0.05);
     assert_eq!(statuses(&all_left), [Left, Left]);
@@ -134,7 +134,7 @@ fn what_the_writer_refuses_keeps_its_cut_too() {
     assert_eq!(statuses(&plan(Cuts::Single)), [Changed, Refused, Changed, Changed]);
     let whole = plan(Cuts::Whole);
     assert_eq!(statuses(&whole), [Refused, Refused, Refused, Changed]);
-    assert!(matches!(whole.plan.outcomes[2].reason, Some(Why::PartOfCut { line: 5, .. })));
+    assert!(matches!(whole.plan.outcomes[2].reason, Some(OutcomeReason::PartOfCut { line: 5, .. })));
     let text = whole.rewritten.files[0].edits.apply(source.as_bytes()).unwrap();
     assert!(String::from_utf8(text).unwrap().contains(&line(400.0, "fine")));
 }
@@ -165,7 +165,7 @@ fn in_part_a_step_between_neighbours_stays_below_the_tolerance() {
     // The correction is some tenths of a millimetre: nothing of the cut may be moved alone.
     let (tight, bytes) = done(&source, Cuts::Partial, 0.01);
     assert!(statuses(&tight).iter().all(|status| *status == Refused));
-    assert!(matches!(tight.plan.outcomes[3].reason, Some(Why::Step { line: 8, mm }) if mm > 0.01));
+    assert!(matches!(tight.plan.outcomes[3].reason, Some(OutcomeReason::Step { line: 8, mm }) if mm > 0.01));
     assert_eq!(bytes, source.as_bytes());
     let (loose, bytes) = done(&source, Cuts::Partial, 5.0);
     let changed = statuses(&loose).iter().filter(|status| **status == Changed).count();

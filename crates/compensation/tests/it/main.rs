@@ -30,8 +30,8 @@ use truegrind_compensation::frames::taught::{taught_frame, taught_tcp};
 use truegrind_compensation::options::{Emit, Options};
 use truegrind_compensation::plan::Plan;
 use truegrind_compensation::plan::planner::plan;
-use truegrind_compensation::plan::reason::Why;
-use truegrind_compensation::verify::{Acting, Judged, judge};
+use truegrind_compensation::plan::reason::OutcomeReason;
+use truegrind_compensation::verify::{ActingArm, VerificationTask, verify};
 use truegrind_math::se3::Pose;
 use truegrind_math::statistics::ErrorSummary;
 use truegrind_planning::toolpath::toolpath;
@@ -96,7 +96,7 @@ fn rewritten(source: &[u8], estimated: &Estimated, cell: &Cell, options: &Option
 
 fn run_on(actual: &Model, original: &[u8], program: &[u8], cell: &Cell) -> PathReport {
     let (before, after) = (Task::read(&[("p.mod", original)]), Task::read(&[("p.mod", program)]));
-    let judged = Judged {
+    let judged = VerificationTask {
         original: &before.listing,
         rewritten: Some(&after.listing),
         cell,
@@ -108,8 +108,8 @@ fn run_on(actual: &Model, original: &[u8], program: &[u8], cell: &Cell) -> PathR
     };
     let nominal = nominal();
     let acting =
-        Acting { nominal: &nominal, model: actual, knowledge: None, condition: Condition::default() };
-    judge(&judged, &acting)
+        ActingArm { nominal: &nominal, model: actual, knowledge: None, condition: Condition::default() };
+    verify(&judged, &acting)
 }
 
 fn worst(report: &PathReport, after: bool) -> f64 {
@@ -182,7 +182,12 @@ fn a_large_correction_is_refused_and_named() {
     let (planned, program) = rewritten(&source, &known, &Cell::default(), &options);
     assert!(program == source, "nothing may be written beyond the bound");
     assert!(planned.outcomes.iter().all(|o| o.status == Status::Refused));
-    assert!(planned.outcomes.iter().all(|o| matches!(o.reason, Some(Why::TooFar { mm }) if mm > 0.01)));
+    assert!(
+        planned
+            .outcomes
+            .iter()
+            .all(|o| matches!(o.reason, Some(OutcomeReason::CorrectionTooLarge { mm }) if mm > 0.01))
+    );
 }
 
 #[test]
@@ -207,7 +212,7 @@ fn a_joint_outside_its_measured_range_is_flagged() {
     let by = flagged
         .iter()
         .filter_map(|o| match o.reason {
-            Some(Why::JointNotMeasured { joint: 4, by_deg }) => Some(by_deg),
+            Some(OutcomeReason::JointNotMeasured { joint: 4, by_deg }) => Some(by_deg),
             _ => None,
         })
         .fold(0.0, f64::max);
@@ -223,12 +228,12 @@ fn a_long_line_gets_targets_only_where_the_tolerance_would_be_broken() {
     let loose =
         plan(&task.listing, &known, &Cell::default(), &Options { tolerance_mm: 5.0, ..Options::default() });
     assert_eq!(loose.outcomes[1].inserted, 0, "{:?}", loose.outcomes);
-    let bend = loose.outcomes[1].bend_mm.unwrap();
+    let bend = loose.outcomes[1].path_deviation_mm.unwrap();
     assert!(bend > 0.02, "the line bends by {bend} mm");
     let options = Options { tolerance_mm: bend / 3.0, ..Options::default() };
     let tight = plan(&task.listing, &known, &Cell::default(), &options);
     assert!(tight.outcomes[1].inserted > 0);
-    assert!(tight.outcomes[1].bend_mm.unwrap() <= options.tolerance_mm);
+    assert!(tight.outcomes[1].path_deviation_mm.unwrap() <= options.tolerance_mm);
     let edits = task.rewrite(&tight.changes, &RewriteOptions::default()).unwrap();
     let text = edits.files[0].edits.apply(source).unwrap();
     let again = Task::read(&[("p.mod", text.as_slice())]);

@@ -14,7 +14,7 @@ use truegrind_compensation::deviation::Status;
 use truegrind_compensation::options::{Circles, Options};
 use truegrind_compensation::plan::Plan;
 use truegrind_compensation::plan::planner::plan;
-use truegrind_compensation::plan::reason::Why;
+use truegrind_compensation::plan::reason::OutcomeReason;
 use truegrind_compensation::segment::corner::Corner;
 use truegrind_compensation::segment::curve::{Arc, Curve};
 use truegrind_math::se3::Pose;
@@ -136,7 +136,7 @@ fn a_circle_is_kept_and_its_path_checked() {
         .iter()
         .map(|pose| off_circle(&pose.translation.vector, CENTRE, RADIUS))
         .fold(0.0, f64::max);
-    let stated = outcome.bend_mm.unwrap();
+    let stated = outcome.path_deviation_mm.unwrap();
     assert!(most > 1e-4 && (most - stated).abs() < 4e-3, "{most} stated as {stated}");
 }
 
@@ -222,13 +222,13 @@ fn a_circle_that_may_not_be_split_stays_and_is_flagged() {
     let options = Options { circles: Circles::Segments, ..Options::default() };
     let (planned, text) =
         rewrite(&arc_program("", "MoveC").replace("v50,", "v50\\T:=3,"), &known(&actual), &options);
-    assert_eq!(planned.outcomes[1].reason, Some(Why::CircleKept));
+    assert_eq!(planned.outcomes[1].reason, Some(OutcomeReason::CircleKept));
     assert_eq!(planned.outcomes[1].status, Status::Flagged);
     assert!(text.contains("MoveC"));
     // Nor one whose start nobody knows.
     let alone = module(&format!("  MoveC {},{},v50,z5,tool0;\n", on_circle(-90.0), on_circle(-20.0)));
     let (planned, _) = rewrite(&alone, &known(&actual), &options);
-    assert_eq!(planned.outcomes[0].reason, Some(Why::CircleKept));
+    assert_eq!(planned.outcomes[0].reason, Some(OutcomeReason::CircleKept));
     // Three points that make no circle.
     let line = module(&format!(
         "  MoveL {0},v50,fine,tool0;\n  MoveC {1},{0},v50,fine,tool0;\n",
@@ -236,7 +236,7 @@ fn a_circle_that_may_not_be_split_stays_and_is_flagged() {
         on_circle(-90.0)
     ));
     let (planned, _) = rewrite(&line, &known(&actual), &Options::default());
-    assert_eq!(planned.outcomes[1].reason, Some(Why::WholeCircle));
+    assert_eq!(planned.outcomes[1].reason, Some(OutcomeReason::FullCircle));
 }
 
 #[test]
@@ -263,7 +263,7 @@ fn a_circle_whose_start_stays_is_no_other_circle() {
     let start = pose(374.0, 0.0);
     let (plain, corrected) = (format!("{start},v50,fine,tool0;"), format!("{start},v50,fine,tool0 \\Corr;"));
     let unknown = "Offs(p0,0,0,found()),v50,fine,tool0;".to_owned();
-    let sensor = Some(Why::Program(Reason::SensorGuided));
+    let sensor = Some(OutcomeReason::Program(Reason::SensorGuided));
     let mut strayed = 0;
     for seed in 11..19 {
         for radius in [0.5, 100.0] {
@@ -271,10 +271,13 @@ fn a_circle_whose_start_stays_is_no_other_circle() {
         }
         // With all that begins where it ends.
         let small = of(seed, 0.5, &corrected);
-        assert!(small == [sensor, None, None] || small[..2] == [sensor, Some(Why::NoCircle)], "{small:?}");
+        assert!(
+            small == [sensor, None, None] || small[..2] == [sensor, Some(OutcomeReason::NoCircle)],
+            "{small:?}"
+        );
         strayed += usize::from(small[1].is_some());
         assert_eq!(of(seed, 100.0, &corrected), [sensor, None, None]);
-        assert_eq!(of(seed, 0.5, &unknown)[1], Some(Why::NoCircle));
+        assert_eq!(of(seed, 0.5, &unknown)[1], Some(OutcomeReason::NoCircle));
         assert_eq!(of(seed, 100.0, &unknown)[1..], [None; 2]);
     }
     assert!(strayed > 3, "{strayed}");
@@ -298,10 +301,12 @@ fn a_circle_that_stays_starts_where_it_did() {
         assert!(text.contains(circle), "{text}");
         let reasons: Vec<_> = planned.outcomes.iter().map(|outcome| outcome.reason).collect();
         assert!(reasons[0].is_none() && planned.outcomes[0].before_mm.unwrap() > 0.5, "{reasons:?}");
-        assert!(matches!(reasons[2], Some(Why::Program(Reason::SensorGuided))), "{reasons:?}");
+        assert!(matches!(reasons[2], Some(OutcomeReason::Program(Reason::SensorGuided))), "{reasons:?}");
         reasons[1]
     };
-    let stays = |seed: u64, circle: &str| matches!(first(seed, circle), Some(Why::BeforeCircle { .. }));
+    let stays = |seed: u64, circle: &str| {
+        matches!(first(seed, circle), Some(OutcomeReason::StartOfUnchangedArc { .. }))
+    };
     let mut small = 0;
     for seed in 11..19 {
         assert!(!stays(seed, &format!("{},{}", pose(474.0, 100.0), pose(574.0, 0.0))));
@@ -320,7 +325,7 @@ fn every_circular_instruction_has_a_straight_form_of_the_same_process() {
     // What is triggered along the whole of a circle would be triggered along its last piece.
     let original = Task::read(&[("p.mod", source.as_bytes())]);
     for (motion, outcome) in original.listing.motions.iter().zip(&planned.outcomes) {
-        let kept = (Status::Flagged, Some(Why::CircleKept));
+        let kept = (Status::Flagged, Some(OutcomeReason::CircleKept));
         let expected = if &*motion.instruction == "TriggC" { kept } else { (Status::Changed, None) };
         assert_eq!((outcome.status, outcome.reason), expected, "{outcome:?}");
     }
@@ -376,7 +381,7 @@ fn nc_arcs_helices_and_whole_circles_are_checked_and_become_straight_pieces_when
             let planned = plan(&task.listing, &known, &Cell::default(), &options);
             let outcome = &planned.outcomes[1];
             assert_eq!(outcome.status, Status::Changed, "{body}: {outcome:?}");
-            assert!(outcome.bend_mm.unwrap() <= options.tolerance_mm, "{body}: {outcome:?}");
+            assert!(outcome.path_deviation_mm.unwrap() <= options.tolerance_mm, "{body}: {outcome:?}");
             assert_eq!(outcome.inserted > 10, circles == Circles::Segments, "{body}: {outcome:?}");
             let rewritten = task.rewrite(&planned.changes, &RewriteOptions::default()).unwrap();
             let text = rewritten.files[0].edits.apply(source.as_bytes()).unwrap();
@@ -420,7 +425,7 @@ fn an_arc_told_by_its_radius_leaves_its_centre_open_near_half_a_turn() {
         let task = truegrind_programs::nc::Task::read(&[("p.ngc", source.as_bytes())], &nc_setup());
         let options = Options { tolerance_mm, ..Options::default() };
         let outcome = plan(&task.listing, &known, &Cell::default(), &options).outcomes.remove(1);
-        (outcome.bend_mm.unwrap(), outcome.reason)
+        (outcome.path_deviation_mm.unwrap(), outcome.reason)
     };
     let [(centre, _), (radius, wide)] =
         ["G2 X320 Y0 I-60 J0", "G2 X320 Y0 R60"].map(|body| planned(body, 1.0));
@@ -429,7 +434,7 @@ fn an_arc_told_by_its_radius_leaves_its_centre_open_near_half_a_turn() {
     let about = |mm: f64| (0.6 * open..1.001 * open).contains(&mm);
     assert!(about(radius - centre) && wide.is_none(), "{centre} {radius} {wide:?}");
     let (_, why) = planned("G2 X320 Y0 R60", centre + 0.5 * open);
-    assert!(matches!(why, Some(Why::OpenCentre { mm }) if about(mm)), "{why:?}");
+    assert!(matches!(why, Some(OutcomeReason::AmbiguousCentre { mm }) if about(mm)), "{why:?}");
     let [(centre, _), (radius, _)] =
         ["G2 X380 Y-60 I-60 J0", "G2 X380 Y-60 R60"].map(|body| planned(body, 1.0));
     assert!((0.0..3e-4).contains(&(radius - centre)), "{centre} {radius}");
@@ -581,8 +586,8 @@ fn a_rounded_corner_is_checked_along_its_parabola() {
         let near = |point: &Vector3<f64>| (point - pose.translation.vector).norm();
         most = most.max(dense.iter().map(near).fold(f64::INFINITY, f64::min));
     }
-    let stated = planned.outcomes[2].bend_mm.unwrap();
-    let line = stop.outcomes[2].bend_mm.unwrap();
+    let stated = planned.outcomes[2].path_deviation_mm.unwrap();
+    let line = stop.outcomes[2].path_deviation_mm.unwrap();
     // The dense corner has only points of the corner to be near to, spaced by 0.004 mm.
     assert!(
         most > 1e-3 && stated >= line && (most.max(line) - stated).abs() < 5e-3,
@@ -604,7 +609,7 @@ fn a_zone_that_inserted_targets_cut_short_is_flagged() {
     let (planned, _) = rewrite(&source, &known, &Options { tolerance_mm: 0.005, ..Options::default() });
     let outcome = &planned.outcomes[2];
     assert!(outcome.inserted > 0, "{outcome:?}");
-    assert!(matches!(outcome.reason, Some(Why::Corner { mm }) if mm > 1.0), "{outcome:?}");
+    assert!(matches!(outcome.reason, Some(OutcomeReason::CornerDeviation { mm }) if mm > 1.0), "{outcome:?}");
     assert_eq!(outcome.status, Status::Flagged);
 }
 
@@ -641,7 +646,9 @@ fn a_joint_that_cannot_follow_is_named_with_its_ratio() {
         let (planned, _) = rewrite(&source, &known(&nominal()), &Options::default());
         let reason = planned.outcomes[1].reason;
         if flagged {
-            let Some(Why::TooFast { joint, ratio }) = reason else { panic!("{:?}", planned.outcomes) };
+            let Some(OutcomeReason::TooFast { joint, ratio }) = reason else {
+                panic!("{:?}", planned.outcomes)
+            };
             assert_eq!(joint, 0);
             assert!((ratio - speed).abs() < 1e-6, "{ratio}");
         } else {
@@ -659,7 +666,7 @@ fn a_joint_that_cannot_follow_is_named_with_its_ratio() {
     let ratio = |x: f64| {
         let (planned, _) = rewrite(&far(x), &known(&nominal()), &Options::default());
         match planned.outcomes[1].reason {
-            Some(Why::TooFast { joint: 0, ratio }) => Some(ratio),
+            Some(OutcomeReason::TooFast { joint: 0, ratio }) => Some(ratio),
             _ => None,
         }
     };
@@ -681,7 +688,7 @@ fn the_speed_that_an_option_states_counts() {
         let source = source.replace("MODULE M\n", "MODULE M\n CONST num slow:=100;\n");
         let (planned, _) = rewrite(&source, &known(&nominal()), &Options::default());
         match planned.outcomes[1].reason {
-            Some(Why::TooFast { joint: 0, ratio }) => Some(ratio),
+            Some(OutcomeReason::TooFast { joint: 0, ratio }) => Some(ratio),
             None => None,
             other => panic!("{speed}: {other:?}"),
         }
@@ -720,7 +727,7 @@ fn a_joint_motion_states_how_far_it_is_from_that_of_the_sheet() {
             (posed.1.forward(&a[0].lerp(&a[1], s)).translation.vector - meant).norm()
         })
         .fold(0.0, f64::max);
-    let stated = planned.outcomes[1].bend_mm.unwrap();
+    let stated = planned.outcomes[1].path_deviation_mm.unwrap();
     assert!(most > 1e-3 && (most - stated).abs() < 4e-3, "{most} stated as {stated}");
     assert_eq!(planned.outcomes[1].reason, None);
 }
@@ -786,7 +793,7 @@ fn nothing_is_put_in_where_the_wrist_is_interpolated_by_itself() {
     let (wrist, text) = rewrite(&body("\\Wrist"), &known(&actual), &options);
     assert_eq!(wrist.outcomes[1].inserted, 0);
     assert_eq!(text.matches("MoveL").count(), 2);
-    assert!(matches!(wrist.outcomes[1].reason, Some(Why::Bend { mm }) if mm > 0.001));
+    assert!(matches!(wrist.outcomes[1].reason, Some(OutcomeReason::PathDeviation { mm }) if mm > 0.001));
     let note = wrist.notes.iter().find(|note| note.contains("SingArea")).unwrap();
     assert!(note.starts_with("on 2 of the lines and arcs") && note.ends_with("(lines 4, 5)"), "{note}");
 }

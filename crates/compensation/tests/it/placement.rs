@@ -11,7 +11,7 @@ use truegrind_compensation::cell::Cell;
 use truegrind_compensation::deviation::{PathPoint, PathReport, Status};
 use truegrind_compensation::options::Options;
 use truegrind_compensation::plan::Plan;
-use truegrind_compensation::plan::reason::Why;
+use truegrind_compensation::plan::reason::OutcomeReason;
 use truegrind_compensation::risk::cut_risk::CutRisk;
 use truegrind_compensation::risk::placement::Placement;
 
@@ -58,8 +58,8 @@ fn a_place_that_is_not_known_stays_and_the_shape_is_corrected() {
         let known = placed_somewhere(seed, &joints);
         let (plan, program) = rewritten(&source, &known, &Cell::default(), &with(Placement::Auto));
         let [placement] = plan.placements.as_slice() else { panic!("{:?}", plan.placements) };
-        assert_eq!(placement.taken, Placement::Shape);
-        assert!(placement.sigma_mm > placement.off_mm && !placement.taught);
+        assert_eq!(placement.applied, Placement::Shape);
+        assert!(placement.sigma_mm > placement.deviation_mm && !placement.taught);
         let report = run_on(&known.model, &source, &program, &Cell::default());
         let points = cut_points(&report);
         let places: Vec<Vector3<f64>> = points.iter().map(|p| p.intended.translation.vector).collect();
@@ -72,7 +72,8 @@ fn a_place_that_is_not_known_stays_and_the_shape_is_corrected() {
         let moved = (&projector * &before - &after).amax();
         assert!(moved < 5e-3, "the place moved by {moved} mm");
         assert!(
-            (after.norm() / (points.len() as f64).sqrt() - placement.off_mm).abs() < 0.02 * placement.off_mm
+            (after.norm() / (points.len() as f64).sqrt() - placement.deviation_mm).abs()
+                < 0.02 * placement.deviation_mm
         );
     }
 }
@@ -86,7 +87,7 @@ fn a_place_that_is_known_is_corrected_and_can_be_asked_for() {
     ] {
         let options = Options { max_risk: 1.0, ..with(placement) };
         let (plan, program) = rewritten(&source, &known, &Cell::default(), &options);
-        assert_eq!(plan.placements[0].taken, Placement::Absolute);
+        assert_eq!(plan.placements[0].applied, Placement::Absolute);
         let report = run_on(&known.model, &source, &program, &Cell::default());
         assert!(worst(&report, true) < 5e-4, "{}", worst(&report, true));
     }
@@ -175,8 +176,9 @@ fn the_chance_that_a_cut_gets_worse_is_the_share_of_drawn_arms_on_which_it_does(
         let options = Options { max_risk: 1.0, ..with(placement) };
         let (plan, _) = rewritten(&source, &drawn.known, &Cell::default(), &options);
         let arms: Vec<Model> = (0..400).map(|_| drawn.arm()).collect();
-        let telling: Vec<&CutRisk> = plan.cuts.iter().filter(|c| (0.02..0.45).contains(&c.chance)).collect();
-        let chances: Vec<f64> = plan.cuts.iter().map(|c| c.chance).collect();
+        let telling: Vec<&CutRisk> =
+            plan.cuts.iter().filter(|c| (0.02..0.45).contains(&c.probability_of_harm)).collect();
+        let chances: Vec<f64> = plan.cuts.iter().map(|c| c.probability_of_harm).collect();
         assert!(telling.len() > 2, "{placement:?}: {chances:?} show nothing");
         for cut in telling {
             let (places, estimate) = reached(&drawn.known.model, &plan, cut);
@@ -190,11 +192,12 @@ fn the_chance_that_a_cut_gets_worse_is_the_share_of_drawn_arms_on_which_it_does(
                 counts(&truth - &estimate).norm() > counts(&truth - &told).norm()
             });
             let share = worse.count() as f64 / arms.len() as f64;
-            let sigma = (cut.chance * (1.0 - cut.chance) / arms.len() as f64).sqrt();
+            let sigma =
+                (cut.probability_of_harm * (1.0 - cut.probability_of_harm) / arms.len() as f64).sqrt();
             assert!(
-                (share - cut.chance).abs() < 3.5 * sigma + 0.01,
+                (share - cut.probability_of_harm).abs() < 3.5 * sigma + 0.01,
                 "{placement:?}: {share} against {}",
-                cut.chance
+                cut.probability_of_harm
             );
         }
     }
@@ -206,27 +209,27 @@ fn a_cut_that_would_too_likely_get_worse_is_left_whole_with_that_reason() {
     let (source, joints) = blade();
     let drawn = Drawn::about(7, &joints, 2.0);
     let (plan, program) = rewritten(&source, &drawn.known, &Cell::default(), &with(Placement::Shape));
-    let left: Vec<&CutRisk> = plan.cuts.iter().filter(|cut| cut.left).collect();
-    assert!(left.len() > 3, "{:?}", plan.cuts.iter().map(|c| c.chance).collect::<Vec<_>>());
+    let left: Vec<&CutRisk> = plan.cuts.iter().filter(|cut| cut.left_for_risk).collect();
+    assert!(left.len() > 3, "{:?}", plan.cuts.iter().map(|c| c.probability_of_harm).collect::<Vec<_>>());
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).lines().map(str::to_owned).collect::<Vec<_>>();
     let (before, after) = (text(&source), text(&program));
     let task = truegrind_programs::rapid::Task::read(&[("p.mod", source.as_slice())]);
     for cut in &left {
-        assert!(cut.chance > 0.1);
+        assert!(cut.probability_of_harm > 0.1);
         for motion in &cut.motions {
             let outcome = &plan.outcomes[*motion as usize];
             assert_eq!(
                 (outcome.status, outcome.reason),
-                (Status::Left, Some(Why::Risk { chance: cut.chance }))
+                (Status::Left, Some(OutcomeReason::Risk { chance: cut.probability_of_harm }))
             );
             let line = &before[task.listing.motions[*motion as usize].place.line as usize - 1];
             assert!(after.contains(line), "{line}");
         }
     }
     // A larger chance may be taken.
-    let largest = left.iter().map(|cut| cut.chance).fold(0.0, f64::max);
+    let largest = left.iter().map(|cut| cut.probability_of_harm).fold(0.0, f64::max);
     let options = Options { max_risk: largest + 0.01, ..with(Placement::Shape) };
     let (taken, _) = rewritten(&source, &drawn.known, &Cell::default(), &options);
-    assert!(taken.outcomes.iter().all(|outcome| !matches!(outcome.reason, Some(Why::Risk { .. }))));
-    assert!(taken.chance_of_worse.unwrap() < 0.5);
+    assert!(taken.outcomes.iter().all(|outcome| !matches!(outcome.reason, Some(OutcomeReason::Risk { .. }))));
+    assert!(taken.probability_of_harm.unwrap() < 0.5);
 }

@@ -15,7 +15,7 @@ use truegrind_compensation::deviation::Status;
 use truegrind_compensation::options::Options;
 use truegrind_compensation::plan::Plan;
 use truegrind_compensation::plan::planner::plan;
-use truegrind_compensation::plan::reason::Why;
+use truegrind_compensation::plan::reason::OutcomeReason;
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{Listing, MotionKind, TargetValue};
 use truegrind_programs::rapid::Task;
@@ -223,7 +223,7 @@ fn the_path_between_targets_takes_up_the_play_where_joints_turn() {
     // A link does not jump from flank to flank, it waits, and so it is stated.
     let stated = |planned: &Plan| {
         let without_part = planned.outcomes.iter().enumerate().filter(|(k, _)| *k > 3 && *k != 6);
-        without_part.filter_map(|(_, o)| o.bend_mm).fold(0.0, f64::max)
+        without_part.filter_map(|(_, o)| o.path_deviation_mm).fold(0.0, f64::max)
     };
     assert!(loose > 0.05, "play bends the path: {loose}");
     assert!((stated(&planned) - loose).abs() < CHORD_MM, "stated {}, found {loose}", stated(&planned));
@@ -235,7 +235,7 @@ fn the_path_between_targets_takes_up_the_play_where_joints_turn() {
     assert!((stated(&planned) - left).abs() < CHORD_MM, "stated {}, found {left}", stated(&planned));
     // Where the part is taken more than the tolerance is left for a moment, and that is said.
     for (k, outcome) in planned.outcomes.iter().enumerate() {
-        let bent = matches!(outcome.reason, Some(Why::Bend { mm }) if mm > tolerance);
+        let bent = matches!(outcome.reason, Some(OutcomeReason::PathDeviation { mm }) if mm > tolerance);
         assert_eq!(bent, k == 6, "{outcome:?}");
     }
 }

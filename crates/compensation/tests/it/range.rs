@@ -87,9 +87,10 @@ fn no_joint_leaves_its_range_on_a_corrected_way() {
         assert!(goes(&program, &arm.nominal, &near), "{round}: {:?}", plan.outcomes);
         written += usize::from(plan.outcomes.iter().all(corrected));
         let ways = plan.outcomes.iter().filter(|outcome| match outcome.reason {
-            Some(Why::WayOutsideLimits { joint: named } | Why::BeforeLimitedWay { joint: named, .. }) => {
-                named == joint
-            }
+            Some(
+                OutcomeReason::PathOutsideLimits { joint: named }
+                | OutcomeReason::StartOfLimitedPath { joint: named, .. },
+            ) => named == joint,
             _ => false,
         });
         refused += usize::from(ways.count() > 0);

@@ -11,54 +11,54 @@ use truegrind_compensation::deviation::Status;
 use truegrind_compensation::options::{Circles, Options};
 use truegrind_compensation::plan::Plan;
 use truegrind_compensation::plan::planner::plan;
-use truegrind_compensation::plan::reason::Why;
+use truegrind_compensation::plan::reason::OutcomeReason;
 use truegrind_programs::rapid::Task;
 
 use super::{estimated, nominal, perturbed};
 
 /// Every variant by name: a new one does not compile until it stands here.
-fn name(why: &Why) -> &'static str {
+fn name(why: &OutcomeReason) -> &'static str {
     match why {
-        Why::Program(_) => "program",
-        Why::MovingBase { .. } => "moving base",
+        OutcomeReason::Program(_) => "program",
+        OutcomeReason::MovingBase { .. } => "moving base",
         // Only with a cell file (tests/it/compensation/taught.rs).
-        Why::Contradicted => "contradicted",
+        OutcomeReason::CellContradiction => "contradicted",
         // Only where a program is rewritten (tests/it/programs.rs).
-        Why::Same => "same",
-        Why::JointTarget => "joint target",
-        Why::Inverse(_) => "inverse",
-        Why::OutsideLimits { .. } => "outside limits",
+        OutcomeReason::NoChange => "same",
+        OutcomeReason::JointTarget => "joint target",
+        OutcomeReason::Inverse(_) => "inverse",
+        OutcomeReason::OutsideLimits { .. } => "outside limits",
         // tests/it/range.rs.
-        Why::WayOutsideLimits { .. } => "way outside limits",
-        Why::BeforeLimitedWay { .. } => "before limited way",
-        Why::TooFar { .. } => "too far",
-        Why::TooMuchTurn { .. } => "too much turn",
-        Why::NearSingularity => "near singularity",
-        Why::JointJump { .. } => "joint jump",
-        Why::SingularWay => "singular way",
-        Why::OtherBranch => "other branch",
-        Why::OpenBranch => "open branch",
+        OutcomeReason::PathOutsideLimits { .. } => "way outside limits",
+        OutcomeReason::StartOfLimitedPath { .. } => "before limited way",
+        OutcomeReason::CorrectionTooLarge { .. } => "too far",
+        OutcomeReason::RotationTooLarge { .. } => "too much turn",
+        OutcomeReason::NearSingularity => "near singularity",
+        OutcomeReason::JointJump { .. } => "joint jump",
+        OutcomeReason::SingularPath => "singular way",
+        OutcomeReason::OtherBranch => "other branch",
+        OutcomeReason::AmbiguousBranch => "open branch",
         // Only where the start is unknown (tests/it/singular.rs).
-        Why::OpenStart => "open start",
-        Why::Bend { .. } => "bend",
-        Why::Corner { .. } => "corner",
+        OutcomeReason::UnknownStart => "open start",
+        OutcomeReason::PathDeviation { .. } => "bend",
+        OutcomeReason::CornerDeviation { .. } => "corner",
         // tests/it/path.rs.
-        Why::OpenCentre { .. } => "open centre",
-        Why::CircleKept => "circle kept",
-        Why::TooFast { .. } => "too fast",
-        Why::NoCircle => "no circle",
+        OutcomeReason::AmbiguousCentre { .. } => "open centre",
+        OutcomeReason::CircleKept => "circle kept",
+        OutcomeReason::TooFast { .. } => "too fast",
+        OutcomeReason::NoCircle => "no circle",
         // tests/it/path.rs.
-        Why::BeforeCircle { .. } => "before circle",
+        OutcomeReason::StartOfUnchangedArc { .. } => "before circle",
         // tests/it/singular.rs.
-        Why::BeforeSingularWay { .. } => "before singular way",
-        Why::WholeCircle => "whole circle",
-        Why::JointNotMeasured { .. } => "joint not measured",
-        Why::PartOfCut { .. } => "part of cut",
-        Why::Step { .. } => "step",
+        OutcomeReason::StartOfSingularPath { .. } => "before singular way",
+        OutcomeReason::FullCircle => "whole circle",
+        OutcomeReason::JointNotMeasured { .. } => "joint not measured",
+        OutcomeReason::PartOfCut { .. } => "part of cut",
+        OutcomeReason::Step { .. } => "step",
         // tests/it/placement.rs.
-        Why::Risk { .. } => "risk",
-        Why::NotCovered { .. } => "not covered",
-        Why::Uncertain { .. } => "uncertain",
+        OutcomeReason::Risk { .. } => "risk",
+        OutcomeReason::NotCovered { .. } => "not covered",
+        OutcomeReason::Uncertain { .. } => "uncertain",
     }
 }
 
@@ -140,7 +140,7 @@ fn scene(name: &str, source: &[u8]) -> Vec<Plan> {
     let (mut arm, mut options) = (known(), Options::default());
     match name {
         "bound" => options.max_correction_mm = 1e-4,
-        "turn" => options.max_turn_rad = 1e-7,
+        "turn" => options.max_rotation_rad = 1e-7,
         "singular" => options.min_singularity = 1.0,
         "unsure" => arm.region.sigma_mm = 1e-12,
         "elsewhere" => (arm.region.spacing_deg, arm.region.samples_deg) = (1.0, vec![[150.0; 6]]),
@@ -149,7 +149,7 @@ fn scene(name: &str, source: &[u8]) -> Vec<Plan> {
         "joints" => options.joint_targets = true,
         "branch" => {
             options.min_singularity = 0.0;
-            (options.max_turn_rad, options.max_correction_mm) = (1.0, 50.0);
+            (options.max_rotation_rad, options.max_correction_mm) = (1.0, 50.0);
             let arms = (0..12).map(|seed| estimated(perturbed(seed, 1.0), &[Joints::zeros()]));
             return arms.map(|arm| planned(source, &arm, &cell, &options)).collect();
         }
@@ -203,7 +203,7 @@ fn every_reason_there_is_shows_in_a_program() {
     look(&planned(&sample("track.mod"), &known(), &cell, &fine()));
     let bounds = [
         Options { max_correction_mm: 1e-4, ..fine() },
-        Options { max_turn_rad: 1e-7, ..fine() },
+        Options { max_rotation_rad: 1e-7, ..fine() },
         Options { joint_targets: true, ..fine() },
         Options { min_singularity: 1.0, ..fine() },
         Options { tolerance_mm: 0.5, ..fine() },
@@ -244,7 +244,7 @@ fn every_reason_there_is_shows_in_a_program() {
         );
     }
     near += " ENDPROC\nENDMODULE\n";
-    let options = Options { min_singularity: 0.0, max_turn_rad: 1.0, max_correction_mm: 50.0, ..fine() };
+    let options = Options { min_singularity: 0.0, max_rotation_rad: 1.0, max_correction_mm: 50.0, ..fine() };
     for seed in 0..12 {
         look(&planned(
             near.as_bytes(),
@@ -286,21 +286,21 @@ fn singular() -> String {
 #[test]
 fn an_axis_that_carries_the_base_refuses_its_motions() {
     let source = sample("track.mod");
-    let reasons = |cell: &Cell| -> Vec<Option<Why>> {
+    let reasons = |cell: &Cell| -> Vec<Option<OutcomeReason>> {
         planned(&source, &known(), cell, &Options::default()).outcomes.iter().map(|o| o.reason).collect()
     };
-    let base = Some(Why::MovingBase { axis: 0 });
+    let base = Some(OutcomeReason::MovingBase { axis: 0 });
     // Farther away than the arm is long: the axis must carry the base, there and where it stands at 0.
     let found = reasons(&Cell::default());
     assert_eq!(found, [base, base, base, None]);
     let stated = |text: &str| Cell::from_toml(&format!("[[external]]\naxis = \"{text}")).unwrap();
     assert_eq!(reasons(&stated("a\"\ncarries = \"base\"\n")), [base, base, base, None]);
     let both = stated("b\"\ncarries = \"base\"\n");
-    assert_eq!(reasons(&both)[3], Some(Why::MovingBase { axis: 1 }));
+    assert_eq!(reasons(&both)[3], Some(OutcomeReason::MovingBase { axis: 1 }));
     // Stated not to: then the far target is out of reach, and says so.
     let other = reasons(&stated("a\"\ncarries = \"other\"\n"));
     assert_eq!(other[0], None);
-    assert!(matches!(other[1], Some(Why::Inverse(_))), "{other:?}");
+    assert!(matches!(other[1], Some(OutcomeReason::Inverse(_))), "{other:?}");
     assert!(Cell::from_toml("[[external]]\naxis = \"g\"\ncarries = \"base\"\n").is_err());
     let notes = planned(&source, &known(), &Cell::default(), &Options::default()).notes;
     assert!(
@@ -320,7 +320,11 @@ fn where_no_configuration_reaches_a_target_the_reason_is_what_forbids_the_neares
         let planned = planned(source.as_bytes(), &known(), &Cell::default(), &Options::default());
         let outcome = &planned.outcomes[0];
         assert_eq!(outcome.status, Status::Refused);
-        assert!(matches!(outcome.reason, Some(Why::OutsideLimits { .. })), "{conf} {:?}", outcome.reason);
+        assert!(
+            matches!(outcome.reason, Some(OutcomeReason::OutsideLimits { .. })),
+            "{conf} {:?}",
+            outcome.reason
+        );
     }
 }
 

@@ -149,13 +149,13 @@ impl Scene {
     fn not_placed(&self, seed: u64, mut arm: impl FnMut(&Dataset) -> Estimated) -> Estimated {
         let arms = (seed..seed + 12).map(|seed| arm(&rows(seed, 150, BESIDE).0));
         let mut shape =
-            arms.filter(|known| self.planned(known, &Cell::default(), 0.1).taken == Placement::Shape);
+            arms.filter(|known| self.planned(known, &Cell::default(), 0.1).applied == Placement::Shape);
         shape.next().unwrap()
     }
 
     fn remedy(&self, known: &Estimated) -> Remedy {
         let placement = self.planned(known, &Cell::default(), 0.1);
-        assert_eq!(placement.taken, Placement::Shape, "{placement:?}");
+        assert_eq!(placement.applied, Placement::Shape, "{placement:?}");
         placement.remedy.unwrap()
     }
 }

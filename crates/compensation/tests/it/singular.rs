@@ -185,7 +185,7 @@ fn bound(arm: &Model, from: &Pose, to: &Pose) -> f64 {
     let half: f64 = arm.links[1..].iter().map(|l| l.a_mm.abs() + l.d_mm.abs()).sum::<f64>() / 2.0;
     let off = twist(from, to);
     let size = off.fixed_rows::<3>(0).norm() / half + off.fixed_rows::<3>(3).norm();
-    (options.joint_gain * size).max(options.joint_free_rad)
+    (options.joint_gain * size).max(options.free_joint_change_rad)
 }
 
 /// Joints whose margin to one singularity (0 shoulder, 1 elbow, 2 wrist) is about `margin`, anywhere else at random.
@@ -251,7 +251,7 @@ fn near_each_singularity_the_controller_takes_the_joints_that_were_meant_or_noth
                 for (k, q) in places.iter().enumerate() {
                     let outcome = &plan.outcomes[k];
                     count += 1;
-                    jumps += usize::from(matches!(outcome.reason, Some(Why::JointJump { .. })));
+                    jumps += usize::from(matches!(outcome.reason, Some(OutcomeReason::JointJump { .. })));
                     let margins = inverse.branch_margins(q);
                     if (0..3).all(|k| margins[k].abs() > FAR[k]) {
                         far += 1;
@@ -378,9 +378,12 @@ fn lines_past_a_singularity_keep_their_joints_or_stay() {
             count += 1;
             on_the_way += usize::from(matches!(
                 plan.outcomes[1].reason,
-                Some(Why::SingularWay | Why::JointJump { on_the_way: true, .. })
+                Some(OutcomeReason::SingularPath | OutcomeReason::JointJump { on_the_way: true, .. })
             ));
-            before_one += usize::from(matches!(plan.outcomes[0].reason, Some(Why::BeforeSingularWay { .. })));
+            before_one += usize::from(matches!(
+                plan.outcomes[0].reason,
+                Some(OutcomeReason::StartOfSingularPath { .. })
+            ));
             if !corrected(&plan.outcomes[0]) || plan.outcomes[1].inserted > 0 {
                 continue;
             }
@@ -443,7 +446,7 @@ fn without_a_stated_configuration_the_nearest_solution_is_the_one_that_was_meant
             let known = known(robot, round as u64);
             let (plan, program) = rewritten(source.as_bytes(), &known, &Cell::default(), &Options::default());
             count += 1;
-            open += usize::from(plan.outcomes[1].reason == Some(Why::OpenBranch));
+            open += usize::from(plan.outcomes[1].reason == Some(OutcomeReason::AmbiguousBranch));
             if !corrected(&plan.outcomes[1]) {
                 continue;
             }
@@ -488,13 +491,16 @@ fn motions_that_rest_on_a_guess_are_flagged_one_by_one() {
         "ConfL\\On;\n".into(),
         line(5),
     ]);
-    let options = Options { open_starts: true, ..Options::default() };
+    let options = Options { flag_unknown_starts: true, ..Options::default() };
     let (plan, _) = rewritten(text.as_bytes(), &known(robot, 1), &Cell::default(), &options);
     let motions = &plan.outcomes;
-    let open: Vec<bool> = motions.iter().map(|o| o.reason == Some(Why::OpenStart)).collect();
+    let open: Vec<bool> = motions.iter().map(|o| o.reason == Some(OutcomeReason::UnknownStart)).collect();
     assert_eq!(open[..4], [true, true, false, false], "{motions:#?}");
     let targets: Vec<_> = motions.iter().filter(|o| o.before_mm.is_some()).collect();
     assert_eq!(targets.len(), 6, "{motions:#?}");
     assert!(targets.iter().all(|o| corrected(o)), "{motions:#?}");
-    assert!(targets[4].reason == Some(Why::OpenStart) && targets[5].reason.is_none(), "{motions:#?}");
+    assert!(
+        targets[4].reason == Some(OutcomeReason::UnknownStart) && targets[5].reason.is_none(),
+        "{motions:#?}"
+    );
 }

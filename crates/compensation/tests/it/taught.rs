@@ -16,7 +16,7 @@ use truegrind_compensation::frames::taught::{taught_frame, taught_tcp};
 use truegrind_compensation::options::Options;
 use truegrind_compensation::plan::Plan;
 use truegrind_compensation::plan::planner::plan;
-use truegrind_compensation::plan::reason::Why;
+use truegrind_compensation::plan::reason::OutcomeReason;
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{Reason, TargetValue};
 use truegrind_programs::nc::setup::Setup;
@@ -370,7 +370,11 @@ fn the_tool_that_touched_must_be_known_and_fit() {
         assert_eq!(found.len(), 1, "{found:?}");
         // A plan without the check refuses every motion.
         let (plan, told) = planned(source, &cell, &scene.actual);
-        assert!(plan.outcomes.iter().all(|o| o.reason == Some(Why::Contradicted)), "{:?}", plan.outcomes);
+        assert!(
+            plan.outcomes.iter().all(|o| o.reason == Some(OutcomeReason::CellContradiction)),
+            "{:?}",
+            plan.outcomes
+        );
         assert!(plan.changes.is_empty() && plan.notes.contains(&found[0]));
         assert_eq!(told.len(), 3);
         found[0].clone()
@@ -477,7 +481,8 @@ fn immense_numbers_are_refused_by_line() {
         );
         let (plan, _) = planned(&source, &Cell::default(), &perturbed(1, 1.0));
         // What does not fit into single precision has a reason of its own.
-        let beyond = [Reason::BeyondReach, Reason::NumberRange].map(|reason| Some(Why::Program(reason)));
+        let beyond =
+            [Reason::BeyondReach, Reason::NumberRange].map(|reason| Some(OutcomeReason::Program(reason)));
         let refused = plan
             .outcomes
             .iter()

@@ -6,7 +6,7 @@ use crate::placement;
 use crate::status::Status;
 use truegrind_compensation::deviation::Status as Fate;
 use truegrind_compensation::plan::Plan;
-use truegrind_compensation::plan::reason::Why;
+use truegrind_compensation::plan::reason::OutcomeReason;
 use truegrind_programs::motion::Listing;
 
 /// All, in the order in which a reader wants them.
@@ -17,7 +17,8 @@ pub fn verdict(plan: &Plan, listing: &Listing) -> Verdict {
     let (refused, flagged) = (count(plan, Fate::Refused), count(plan, Fate::Flagged));
     let written = count(plan, Fate::Changed) + flagged;
     let (left, cuts) = placement::left(plan);
-    let same = !plan.outcomes.is_empty() && plan.outcomes.iter().all(|o| o.reason == Some(Why::Same));
+    let same =
+        !plan.outcomes.is_empty() && plan.outcomes.iter().all(|o| o.reason == Some(OutcomeReason::NoChange));
     let (status, headline) = match (written, refused + flagged) {
         (0, 0) if same => {
             (Status::NotEvaluated, "Nothing was rewritten: every number is right to its last decimal")
@@ -51,7 +52,8 @@ pub fn verdict(plan: &Plan, listing: &Listing) -> Verdict {
                 .to_owned(),
         );
     }
-    let steps = count_why(plan, |why| matches!(why, Why::PartOfCut { .. } | Why::Step { .. }));
+    let steps =
+        count_reason(plan, |why| matches!(why, OutcomeReason::PartOfCut { .. } | OutcomeReason::Step { .. }));
     if steps > 0 {
         reasons.push(format!(
             "{steps} motions could be corrected but stay, since another motion of their cut stays: half a correction would be \
@@ -73,7 +75,7 @@ pub fn verdict(plan: &Plan, listing: &Listing) -> Verdict {
     Verdict::new(status, headline, reasons)
 }
 
-fn count_why(plan: &Plan, is: impl Fn(&Why) -> bool) -> usize {
+fn count_reason(plan: &Plan, is: impl Fn(&OutcomeReason) -> bool) -> usize {
     plan.outcomes.iter().filter(|outcome| outcome.reason.as_ref().is_some_and(&is)).count()
 }
 
@@ -101,7 +103,7 @@ pub(super) fn key_figures(plan: &Plan) -> Vec<KeyFigure> {
         Some(_) => format!("{shape}, 1σ of the model: largest of what is rewritten"),
         None => "nothing is rewritten, or the model has no σ".to_owned(),
     }));
-    if let Some(chance) = plan.chance_of_worse {
+    if let Some(chance) = plan.probability_of_harm {
         figures.push(
             KeyFigure::new("Chance to be worse", 100.0 * chance, 1, "%").note("the corrected cuts together"),
         );

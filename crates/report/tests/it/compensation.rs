@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use serde_json::Value;
 use truegrind_arm::inverse::InverseError;
 use truegrind_compensation::deviation::Status;
-use truegrind_compensation::plan::reason::Why;
+use truegrind_compensation::plan::reason::OutcomeReason;
 use truegrind_compensation::plan::{MotionOutcome, Plan};
 use truegrind_programs::motion::{Listing, Reason};
 use truegrind_programs::rapid::Task;
@@ -36,7 +36,7 @@ const SECOND: &[u8] = b"MODULE Other
 ENDMODULE
 ";
 
-fn outcome(motion: u32, status: Status, reason: Option<Why>) -> MotionOutcome {
+fn outcome(motion: u32, status: Status, reason: Option<OutcomeReason>) -> MotionOutcome {
     MotionOutcome {
         motion,
         status,
@@ -45,7 +45,7 @@ fn outcome(motion: u32, status: Status, reason: Option<Why>) -> MotionOutcome {
         after_mm: Some(if status == Status::Changed { 0.0004 } else { 1.5 }),
         sigma_mm: Some(0.12),
         shape_sigma_mm: None,
-        bend_mm: None,
+        path_deviation_mm: None,
         inserted: 0,
     }
 }
@@ -54,13 +54,17 @@ fn outcome(motion: u32, status: Status, reason: Option<Why>) -> MotionOutcome {
 fn example() -> (Plan, Listing, Vec<ProgramFile>) {
     let task = Task::read(&[("grind.mod", PROGRAM), ("other.mod", SECOND)]);
     let mut outcomes = vec![
-        outcome(0, Status::Left, Some(Why::JointTarget)),
+        outcome(0, Status::Left, Some(OutcomeReason::JointTarget)),
         outcome(1, Status::Changed, None),
-        outcome(2, Status::Flagged, Some(Why::JointNotMeasured { joint: 4, by_deg: 5.0 })),
-        outcome(3, Status::Flagged, Some(Why::JointNotMeasured { joint: 4, by_deg: 7.25 })),
-        outcome(4, Status::Refused, Some(Why::TooFar { mm: 12.345 })),
-        outcome(5, Status::Refused, Some(Why::Inverse(InverseError::Unreachable { beyond_mm: f64::NAN }))),
-        outcome(6, Status::Left, Some(Why::Program(Reason::Displacement))),
+        outcome(2, Status::Flagged, Some(OutcomeReason::JointNotMeasured { joint: 4, by_deg: 5.0 })),
+        outcome(3, Status::Flagged, Some(OutcomeReason::JointNotMeasured { joint: 4, by_deg: 7.25 })),
+        outcome(4, Status::Refused, Some(OutcomeReason::CorrectionTooLarge { mm: 12.345 })),
+        outcome(
+            5,
+            Status::Refused,
+            Some(OutcomeReason::Inverse(InverseError::Unreachable { beyond_mm: f64::NAN })),
+        ),
+        outcome(6, Status::Left, Some(OutcomeReason::Program(Reason::Displacement))),
     ];
     outcomes[0].before_mm = None;
     outcomes[0].after_mm = None;
@@ -125,7 +129,10 @@ fn the_json_is_the_contract_field_by_field() {
     assert!(motion["before_mm"].is_null() && motion["sigma_mm"].is_null(), "absent is null, never 0");
     assert!(programs[0]["motions"][1]["reason"].is_null());
     assert_eq!(programs[0]["motions"][1]["after_mm"], 0.0004);
-    assert_eq!(programs[0]["motions"][4]["reason"], Why::TooFar { mm: 12.345 }.to_string());
+    assert_eq!(
+        programs[0]["motions"][4]["reason"],
+        OutcomeReason::CorrectionTooLarge { mm: 12.345 }.to_string()
+    );
     let opaque = programs[0]["opaque_regions"].as_array().unwrap();
     assert!(!opaque.is_empty() && opaque[0]["line"] == 12, "{opaque:?}");
 }
@@ -148,7 +155,8 @@ left,1,a program displacement or external offset is or may be active,,other.mod 
 #[test]
 fn many_lines_are_cut_short() {
     let (mut plan, listing, files) = example();
-    plan.outcomes = (0..7).map(|i| outcome(i, Status::Refused, Some(Why::NearSingularity))).collect();
+    plan.outcomes =
+        (0..7).map(|i| outcome(i, Status::Refused, Some(OutcomeReason::NearSingularity))).collect();
     let text = csv::table(&view::reason_table(&plan, &listing, &files[..1]));
     assert!(text.contains("\"5, 6, 7, 8, 9, 10 and 1 more\""), "{text}");
 }
