@@ -68,7 +68,7 @@ fn main() {
     for (name, rows) in [("calm", &calm), ("burst", &burst), ("jump", &jump)] {
         let mut tracker = Tracker::begin(&arm, "hash", rows, &Options::default()).unwrap();
         let begun = Instant::now();
-        let alarms = tracker.take(rows).unwrap();
+        let alarms = tracker.process_file(rows).unwrap();
         let ms = begun.elapsed().as_secs_f64() * 1e3;
         println!(
             "{name}: {:.3} ms per pose, {} alarms, {} of {} set aside",

@@ -122,7 +122,7 @@ pub use truegrind_programs::rewrite::{Change, FileEdits, NewTarget, Outcome, Rew
 
 // Surfaces, and paths over them.
 pub use truegrind_planning::poses::{
-    Options as PosesOptions, Plan as PosesPlan, PlanError, Wanted as PosesWanted, plan as plan_poses,
+    MeasurementSetup, Options as PosesOptions, Plan as PosesPlan, PlanError, plan as plan_poses,
 };
 pub use truegrind_planning::taught_cell::taught_cell;
 pub use truegrind_planning::toolpath::{Toolpath, ToolpathError, toolpath};

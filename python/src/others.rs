@@ -8,14 +8,14 @@ use pyo3::prelude::*;
 use truegrind::calibration::tracking::first_poses as first_of;
 use truegrind::math::work::report_step;
 use truegrind::planning::poses::candidate::Bounds;
-use truegrind::planning::poses::drive::{Drive, draft};
+use truegrind::planning::poses::program::{ProgramSettings, draft};
 use truegrind::planning::poses::rows::Noise;
 use truegrind::planning::poses::schedule::Visits;
-use truegrind::planning::poses::space::Space;
+use truegrind::planning::poses::keep_out::KeepOut;
 use truegrind::report::{format, planning, tracking};
 use truegrind::robots::foreign::ImportOptions;
 use truegrind::{
-    Alarm, Frames, Pose, PosesOptions, PosesPlan, PosesWanted, Recipe, Robot, Sensor, Simulation,
+    Alarm, Frames, MeasurementSetup, Pose, PosesOptions, PosesPlan, Recipe, Robot, Sensor, Simulation,
     TrackOptions, TrackState, Tracker, plan_poses, read_measurements, robots, write_rapid,
 };
 
@@ -101,8 +101,8 @@ pub(crate) struct PyPlan {
 }
 
 impl PyPlan {
-    fn wanted(&self) -> PosesWanted<'_> {
-        PosesWanted { nominal: &self.robot.model, sensor: self.sensor, frames: &self.frames }
+    fn setup(&self) -> MeasurementSetup<'_> {
+        MeasurementSetup { nominal: &self.robot.model, sensor: self.sensor, frames: &self.frames }
     }
 }
 
@@ -111,31 +111,31 @@ impl PyPlan {
     /// The poses in the order of measuring, one list for each column of the table.
     #[getter]
     fn poses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let csv = format::csv::table(&planning::table(&self.plan, &self.wanted()));
+        let csv = format::csv::table(&planning::table(&self.plan, &self.setup()));
         py.import("truegrind._results")?.call_method1("table", (csv,))
     }
 
     /// The program that moves there (RAPID).
     fn program(&self) -> PyResult<String> {
-        let drive = Drive {
+        let drive = ProgramSettings {
             robot: self.robot.sheet.name.clone(),
             travel_mm_s: self.speed_mm_s,
             settle_s: self.settle_s,
-            ..Drive::default()
+            ..ProgramSettings::default()
         };
-        let bytes = write_rapid(&draft(&self.plan, &self.wanted(), &drive))
+        let bytes = write_rapid(&draft(&self.plan, &self.setup(), &drive))
             .map_err(|error| Refusal::new(Kind::Plan, error))?;
         Ok(String::from_utf8_lossy(&bytes).into_owned())
     }
 
     /// Everything as JSON text, schema ``truegrind.plan/1``: the bytes that ``truegrind plan --json`` writes.
     fn to_json(&self) -> PyResult<String> {
-        crate::json(&planning::json(&self.plan, &self.wanted(), &self.robot.sheet.name))
+        crate::json(&planning::json(&self.plan, &self.setup(), &self.robot.sheet.name))
     }
 
     /// The page, as HTML.
     fn to_html(&self) -> String {
-        format::html::document(&planning::document(&self.plan, &self.wanted(), &self.robot.sheet.name))
+        format::html::document(&planning::document(&self.plan, &self.setup(), &self.robot.sheet.name))
     }
 
     fn _repr_html_(&self) -> String {
@@ -245,7 +245,7 @@ pub(crate) fn plan_(
             box_mm: None,
             distance_mm: None,
             clearance_mm: (sensor == Sensor::Cable).then_some(reach_mm / 12.0),
-            space: Space {
+            space: KeepOut {
                 floor_mm: Some(floor_mm),
                 boxes_mm: Vec::new(),
                 radius_mm: reach_mm / 12.0,
@@ -260,8 +260,8 @@ pub(crate) fn plan_(
     let speed_mm_s = positive("speed_mm_s", speed_mm_s)?;
     run(py, threads, progress, || {
         report_step(&format!("choosing {poses} of {candidates} poses"));
-        let wanted = PosesWanted { nominal: &robot.model, sensor, frames: &frames };
-        let plan = plan_poses(&wanted, &options)
+        let setup = MeasurementSetup { nominal: &robot.model, sensor, frames: &frames };
+        let plan = plan_poses(&setup, &options)
             .map_err(|error| Refusal::new(Kind::Plan, format!("{}: {error}", robot.sheet.name)))?;
         Ok(PyPlan { plan, robot, sensor, frames, speed_mm_s, settle_s })
     })
@@ -399,7 +399,7 @@ pub(crate) fn track_(
         let mut alarms = Vec::new();
         for dataset in &rows {
             report_step(&format!("taking in {}", dataset.file));
-            alarms.extend(tracker.take(dataset)?);
+            alarms.extend(tracker.process_file(dataset)?);
         }
         let fresh = tracker.state().poses - before;
         Ok(PyTrack { tracker, fresh, alarms })

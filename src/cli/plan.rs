@@ -7,11 +7,11 @@ use clap::{Args, ValueEnum};
 use truegrind::calibration::measurement::dataset::Sensor;
 use truegrind::planning::poses::candidate::Bounds;
 use truegrind::planning::poses::design::Index;
-use truegrind::planning::poses::drive::{Drive, draft};
+use truegrind::planning::poses::keep_out::KeepOut;
+use truegrind::planning::poses::program::{ProgramSettings, draft};
 use truegrind::planning::poses::rows::Noise;
 use truegrind::planning::poses::schedule::Visits;
-use truegrind::planning::poses::space::Space;
-use truegrind::planning::poses::{Options, Wanted, plan, rival};
+use truegrind::planning::poses::{MeasurementSetup, Options, plan, questions};
 use truegrind::programs::rapid::writer;
 use truegrind::report::planning as view;
 
@@ -149,9 +149,9 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let frames = arguments.stated.planned(sensor)?;
     let reach: f64 = robot.model.links[1..].iter().map(|l| l.a_mm.abs() + l.d_mm.abs()).sum();
     let options = options(arguments, sensor, reach)?;
-    let wanted = Wanted { nominal: &robot.model, sensor, frames: &frames };
+    let setup = MeasurementSetup { nominal: &robot.model, sensor, frames: &frames };
     let work = Spinner::start(format!("choosing {} of {} poses", arguments.poses, arguments.candidates));
-    let planned = on_threads(arguments.common.threads, || plan(&wanted, &options))?
+    let planned = on_threads(arguments.common.threads, || plan(&setup, &options))?
         .map_err(|e| anyhow!("{}: {e}", robot.sheet.name))?;
     drop(work);
     arguments.outputs.print(&view::summary(&planned, &robot.sheet.name))?;
@@ -159,25 +159,25 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let name = robot.sheet.name.as_str();
     arguments.outputs.add_made(
         &mut batch,
-        || view::document(&planned, &wanted, name),
-        || view::table(&planned, &wanted),
-        || view::json(&planned, &wanted, name),
+        || view::document(&planned, &setup, name),
+        || view::table(&planned, &setup),
+        || view::json(&planned, &setup, name),
     )?;
     #[cfg(feature = "visual")]
     if let Some(path) = &arguments.outputs.rrd {
-        batch.add(path, super::recording::plan(&planned, &wanted, name, &arguments.robot)?);
+        batch.add(path, super::recording::plan(&planned, &setup, name, &arguments.robot)?);
     }
     if let Some(path) = &arguments.output {
-        let drive = Drive {
+        let drive = ProgramSettings {
             robot: name.to_owned(),
             travel_mm_s: arguments.speed,
             settle_s: arguments.settle,
-            ..Drive::default()
+            ..ProgramSettings::default()
         };
-        batch.add(path, writer::write(&draft(&planned, &wanted, &drive))?);
+        batch.add(path, writer::write(&draft(&planned, &setup, &drive))?);
     }
     batch.write()?;
-    let rough = planned.rows.iter().any(|row| row.rough_way);
+    let rough = planned.rows.iter().any(|row| row.cable_unclear);
     Ok(if rough { ExitStatus::Flagged } else { ExitStatus::Done })
 }
 
@@ -188,7 +188,7 @@ const MAX_POSES: usize = 2000;
 const MAX_CANDIDATES: usize = 100_000;
 
 /// The space that the arm must keep out of.
-fn space(arguments: &Arguments, reach_mm: f64) -> anyhow::Result<Space> {
+fn space(arguments: &Arguments, reach_mm: f64) -> anyhow::Result<KeepOut> {
     let mut boxes_mm = Vec::new();
     for text in &arguments.keep_out {
         match numbers("--keep-out", text)?[..] {
@@ -206,7 +206,7 @@ fn space(arguments: &Arguments, reach_mm: f64) -> anyhow::Result<Space> {
         bail!("--link-radius {radius_mm}: expected 0 up to the reach of {reach_mm:.0} mm");
     }
     let approach_rad = arguments.approach.to_radians();
-    Ok(Space { floor_mm: Some(arguments.floor), boxes_mm, radius_mm, approach_rad })
+    Ok(KeepOut { floor_mm: Some(arguments.floor), boxes_mm, radius_mm, approach_rad })
 }
 
 /// Refuses numbers and counts out of range.
@@ -254,12 +254,12 @@ fn check_numbers(arguments: &Arguments, sigma: f64) -> anyhow::Result<()> {
 }
 
 /// The questions that a diagnosis left open.
-fn questions(arguments: &Arguments) -> anyhow::Result<Vec<rival::Question>> {
+fn questions(arguments: &Arguments) -> anyhow::Result<Vec<questions::Question>> {
     Ok(match &arguments.diagnosis {
         None => Vec::new(),
         Some(path) => {
-            let found =
-                rival::questions(&files::read_text(path)?).map_err(|e| anyhow!("{}: {e}", path.display()))?;
+            let found = questions::questions(&files::read_text(path)?)
+                .map_err(|e| anyhow!("{}: {e}", path.display()))?;
             if found.is_empty() {
                 print_message(format_args!(
                     "note: {}: the diagnosis left nothing ambiguous or untested; the poses are chosen for the geometry",

@@ -17,9 +17,9 @@ use truegrind::calibration::tracking::{Alarm, Tracker};
 use truegrind::compensation::deviation::PathReport;
 use truegrind::pictures::measured::Residuals;
 use truegrind::pictures::{self, LinkMesh, MeasuredScene, PathScene, Recording, Workpiece};
-use truegrind::planning::poses::drive::{checked, reading};
+use truegrind::planning::poses::program::{checked, reading};
 use truegrind::planning::poses::schedule::FIRST_ROW;
-use truegrind::planning::poses::{Plan, Wanted};
+use truegrind::planning::poses::{MeasurementSetup, Plan};
 use truegrind::report::document::{Block, Document};
 use truegrind::robots::foreign::{ImportOptions, Kind, Visual, import};
 use truegrind::surfaces::{Mesh, SurfaceFile};
@@ -93,16 +93,15 @@ pub(super) fn diagnosis(found: &Diagnosed, dataset: &Dataset, robot: &str) -> an
 }
 
 /// The bytes of the recording of a plan: the arm at each row, the expected readings, and the forbidden boxes.
-pub(super) fn plan(plan: &Plan, wanted: &Wanted<'_>, name: &str, robot: &str) -> anyhow::Result<Vec<u8>> {
+pub(super) fn plan(plan: &Plan, setup: &MeasurementSetup<'_>, name: &str, robot: &str) -> anyhow::Result<Vec<u8>> {
     let rows = (FIRST_ROW..).zip(&plan.rows).filter_map(|(number, row)| {
         let pose = &plan.poses[row.pose];
-        let mut out = Row::new(number, pose.joints, reading(plan, wanted, row)?);
+        let mut out = Row::new(number, pose.joints, reading(plan, setup, row)?);
         out.anchor = pose.anchor;
         Some(out)
     });
-    let dataset =
-        Dataset::new(&format!("What to measure on {name}"), wanted.sensor, rows.collect::<Vec<_>>());
-    let rough = plan.rows.iter().filter(|row| row.rough_way).count();
+    let dataset = Dataset::new(&format!("What to measure on {name}"), setup.sensor, rows.collect::<Vec<_>>());
+    let rough = plan.rows.iter().filter(|row| row.cable_unclear).count();
     let mut answer = vec![
         format!("{} rows at {} poses, in this order", plan.rows.len(), plan.poses.len()),
         format!(
@@ -115,14 +114,14 @@ pub(super) fn plan(plan: &Plan, wanted: &Wanted<'_>, name: &str, robot: &str) ->
     }
     let scene = MeasuredScene {
         dataset: &dataset,
-        arm: wanted.nominal,
+        arm: setup.nominal,
         arm_is: &format!("nominal {name}"),
         nominal: None,
         meshes: &meshes(Some(robot))?,
         planned: true,
         keep_out_mm: &plan.space.boxes_mm,
         answer: &answer,
-        frames: Some(wanted.frames),
+        frames: Some(setup.frames),
         residuals: &[],
         held_out: &[],
         set_aside: &[],
@@ -143,7 +142,7 @@ pub(super) fn track(
 ) -> anyhow::Result<Option<Vec<u8>>> {
     let Some(first) = datasets.first() else { return Ok(None) };
     let begun = &arm.model;
-    let (model, frames) = tracker.standing();
+    let (model, frames) = tracker.current();
     // A single outlier would dominate the scale.
     let tame = tracker.state().history.iter().filter(|seen| seen.nis < MAX_NIS);
     let seen: BTreeSet<(&str, usize)> = tame.map(|seen| (seen.file.as_str(), seen.row)).collect();

@@ -11,7 +11,7 @@ use truegrind::calibration::measurement::convention::AngleConvention;
 use truegrind::calibration::measurement::dataset::Dataset;
 use truegrind::calibration::measurement::import;
 use truegrind::calibration::measurement::plausibility::{ComparedReading, plausibility};
-use truegrind::calibration::tracking::state::Consumed;
+use truegrind::calibration::tracking::state::ConsumedFile;
 use truegrind::calibration::tracking::{Alarm, Options, State, TrackError, Tracker, first_poses};
 use truegrind::report::tracking as view;
 use truegrind::robots::sheet;
@@ -175,7 +175,7 @@ impl TrackContext<'_> {
                 let begun = Instant::now();
                 // After a panic on one file, continue with the state before that file.
                 let before = tracker.clone();
-                match catch_panic(|| Ok(tracker.take(dataset))) {
+                match catch_panic(|| Ok(tracker.process_file(dataset))) {
                     Ok(raised) => alarms.extend(raised?),
                     Err(defect) if self.arguments.data.is_dir() || arguments.follow.is_some() => {
                         *tracker = before;
@@ -278,7 +278,7 @@ impl TrackContext<'_> {
     /// yet are retried at the next update.
     fn datasets(
         &self,
-        known: &[Consumed],
+        known: &[ConsumedFile],
         said: &mut BTreeSet<String>,
     ) -> anyhow::Result<(Vec<Dataset>, bool)> {
         let waits = self.arguments.follow.is_some();

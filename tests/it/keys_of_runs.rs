@@ -7,7 +7,7 @@ use truegrind::papers::grinding::Actual;
 use truegrind::papers::protocol::Options;
 use truegrind::papers::views::{self, Origin};
 use truegrind::papers::{Results, degradation, grinding, protocol, signed_rank, simulated, uniformity};
-use truegrind::planning::poses::rival::questions;
+use truegrind::planning::poses::questions::questions;
 use truegrind::report::format::markdown;
 use truegrind_testing::keys::unread;
 

@@ -57,4 +57,4 @@ pub use alarm::{Alarm, Course};
 pub use error::{StateError, TrackError};
 pub use options::Options;
 pub use state::State;
-pub use tracker::{Taken, Tracker, first_poses};
+pub use tracker::{PoseUpdate, Tracker, first_poses};

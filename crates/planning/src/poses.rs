@@ -4,7 +4,7 @@
 //!   [`space`]: what it must not enter;
 //! - [`rows`]: what a reading at a pose tells of every parameter;
 //! - [`design`]: which of the candidates to take;
-//! - `roads`: ways round what is kept out of;
+//! - `roadmap`: ways round what is kept out of;
 //! - [`schedule`]: repeats, both sides of approach, warm-up, and the order;
 //! - [`power`]: which effects the measurement can decide, and from which size on;
 //! - [`rival`]: what a diagnosis could not tell apart;
@@ -12,38 +12,38 @@
 
 mod blank;
 mod options;
-mod roads;
-mod wanted;
+mod roadmap;
+mod setup;
 pub mod candidate;
-pub mod sight;
-pub mod space;
+pub mod cable;
+pub mod keep_out;
 pub mod rows;
 pub mod design;
 pub mod schedule;
 pub mod power;
-pub mod rival;
-pub mod drive;
+pub mod questions;
+pub mod program;
 
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use thiserror::Error;
 
-use self::blank::blank;
-use self::candidate::{Candidate, Passed};
+use self::blank::blank_row;
+use self::candidate::{Candidate, RejectionCounts};
 use self::design::{Design, Index};
-use self::power::Decidable;
-use self::roads::Roads;
-use self::rows::Told;
-use self::schedule::{Row, Ways};
-use self::space::{Space, Watch};
+use self::keep_out::{CollisionChecker, KeepOut};
+use self::power::Detectability;
+use self::roadmap::Roadmap;
+use self::rows::ReadingJacobian;
+use self::schedule::{Connections, Row};
 use truegrind_arm::model::{Joints, Model};
 use truegrind_arm::parameter::{Parameter, arm_parameters};
 use truegrind_calibration::identification::fit::frame_parameters;
 use truegrind_calibration::measurement::dataset::{Dataset, Sensor};
 
 pub use self::options::Options;
-pub use self::wanted::Wanted;
+pub use self::setup::MeasurementSetup;
 
 /// A plan.
 #[derive(Debug, Clone, PartialEq)]
@@ -59,11 +59,11 @@ pub struct Plan {
     /// How good the chosen poses are, and as many random ones.
     pub quality: Quality,
     /// What became of the random poses.
-    pub passed: Passed,
+    pub rejections: RejectionCounts,
     /// What the rows can decide.
-    pub decidable: Vec<Decidable>,
+    pub detectability: Vec<Detectability>,
     /// What was kept out of, at every pose and on every way.
-    pub space: Space,
+    pub space: KeepOut,
 }
 
 /// How much a set of poses tells.
@@ -86,7 +86,7 @@ pub struct Quality {
 pub enum PlanError {
     /// Too few poses are allowed.
     #[error(
-        "{found} of {drawn} random poses are allowed, expected at least {wanted} to choose from ({passed}): widen the box, \
+        "{found} of {drawn} random poses are allowed, expected at least {wanted} to choose from ({rejections}): widen the box, \
          the cable's range or the joint margin, lower the floor or make the boxes to keep out of smaller"
     )]
     TooFew {
@@ -97,7 +97,7 @@ pub enum PlanError {
         /// Needed.
         wanted: usize,
         /// What the others failed.
-        passed: Passed,
+        rejections: RejectionCounts,
     },
     /// What is kept out of cuts the poses that are allowed into parts, and none of them is large enough.
     #[error(
@@ -135,33 +135,34 @@ const JUDGES: usize = 300;
 ///
 /// # Errors
 /// [`PlanError`], when too few poses are allowed.
-pub fn plan(wanted: &Wanted<'_>, options: &Options) -> Result<Plan, PlanError> {
-    if wanted.sensor == Sensor::Cable && wanted.frames.outlets_mm.is_empty() {
+pub fn plan(setup: &MeasurementSetup<'_>, options: &Options) -> Result<Plan, PlanError> {
+    if setup.sensor == Sensor::Cable && setup.frames.outlets_mm.is_empty() {
         return Err(PlanError::NoOutlet);
     }
     if options.index == Index::O1 && !options.questions.is_empty() {
         return Err(PlanError::IndexOfQuestions);
     }
-    let nominal = Model { effects: Vec::new(), ..wanted.nominal.clone() };
-    let wanted = &Wanted { nominal: &nominal, ..wanted.clone() };
-    let (candidates, passed) = candidate::draw(wanted, &options.bounds, options.candidates, options.seed);
+    let nominal = Model { effects: Vec::new(), ..setup.nominal.clone() };
+    let setup = &MeasurementSetup { nominal: &nominal, ..setup.clone() };
+    let (candidates, rejections) = candidate::draw(setup, &options.bounds, options.candidates, options.seed);
     if candidates.len() < options.poses.max(1) {
         return Err(PlanError::TooFew {
             found: candidates.len(),
-            drawn: passed.drawn,
+            drawn: rejections.drawn,
             wanted: options.poses.max(1),
-            passed,
+            rejections,
         });
     }
-    let parameters = parameters(wanted);
-    let watch = Watch::of(wanted, &options.bounds.space);
-    let laid = match laid(wanted, &parameters, &candidates, None, options)? {
+    let parameters = parameters(setup);
+    let checker = CollisionChecker::of(setup, &options.bounds.space);
+    let laid = match choose_and_order(setup, &parameters, &candidates, None, options)? {
         Some(laid) => laid,
         // Some of the poses lie behind a box: then only those count that hang together.
         None => {
-            let roads = Roads::between(candidates.iter().map(|candidate| candidate.joints).collect(), &watch);
+            let roadmap =
+                Roadmap::between(candidates.iter().map(|candidate| candidate.joints).collect(), &checker);
             let together: Vec<Candidate> =
-                roads.largest().into_iter().map(|i| candidates[i].clone()).collect();
+                roadmap.largest().into_iter().map(|i| candidates[i].clone()).collect();
             let parted = PlanError::NoWay {
                 allowed: candidates.len(),
                 found: together.len(),
@@ -170,56 +171,59 @@ pub fn plan(wanted: &Wanted<'_>, options: &Options) -> Result<Plan, PlanError> {
             if together.len() < options.poses.max(1) {
                 return Err(parted);
             }
-            laid(wanted, &parameters, &together, Some(&roads), options)?.ok_or(parted)?
+            choose_and_order(setup, &parameters, &together, Some(&roadmap), options)?.ok_or(parted)?
         }
     };
-    let Laid { poses, rows, quality } = laid;
+    let OrderedChoice { poses, rows, quality } = laid;
     let measured = schedule::data(&rows, &poses);
-    let final_told = rows::told(wanted, &parameters, &measured, &[], options);
-    let sigmas = final_told.sigmas().ok_or(PlanError::NotFinite)?;
-    let decidable = power::decidable(wanted, &parameters, &measured, options);
+    let final_jacobian = rows::reading_jacobian(setup, &parameters, &measured, &[], options);
+    let sigmas = final_jacobian.sigmas().ok_or(PlanError::NotFinite)?;
+    let detectability = power::detectability(setup, &parameters, &measured, options);
     let space = options.bounds.space.clone();
-    Ok(Plan { poses, rows, parameters, sigmas, quality, passed, decidable, space })
+    Ok(Plan { poses, rows, parameters, sigmas, quality, rejections, detectability, space })
 }
 
 /// Poses that were chosen, and the order of their rows.
-struct Laid {
+struct OrderedChoice {
     poses: Vec<Candidate>,
     rows: Vec<Row>,
     quality: Quality,
 }
 
-/// Chooses among candidates and puts them in order; `None` where no way is found from one to the next. `roads`: along which ways.
-fn laid(
-    wanted: &Wanted<'_>,
+/// Chooses among candidates and puts them in order; `None` where no way is found from one to the next. `roadmap`: along which ways.
+fn choose_and_order(
+    setup: &MeasurementSetup<'_>,
     parameters: &[Parameter],
     candidates: &[Candidate],
-    roads: Option<&Roads>,
+    roadmap: Option<&Roadmap>,
     options: &Options,
-) -> Result<Option<Laid>, PlanError> {
-    let visits = options.visits.asked(&options.questions);
+) -> Result<Option<OrderedChoice>, PlanError> {
+    let visits = options.visits.with_questions(&options.questions);
     // The rows that each candidate would give, with the effects in question beside the geometry.
     let still = candidate::rows(candidates);
-    let told = rows::told(wanted, parameters, &still, &options.questions, options);
-    let design = Design { told: &told, index: options.index };
+    let jacobian = rows::reading_jacobian(setup, parameters, &still, &options.questions, options);
+    let design = Design { jacobian: &jacobian, index: options.index };
     let chosen = design.choose(options.poses).ok_or(PlanError::NotFinite)?;
-    let geometry = Told { interest: Vec::new(), ..rows::told(wanted, parameters, &still, &[], options) };
+    let geometry = ReadingJacobian {
+        interest: Vec::new(),
+        ..rows::reading_jacobian(setup, parameters, &still, &[], options)
+    };
     let quality = quality(&geometry, &chosen, options).ok_or(PlanError::NotFinite)?;
     let poses: Vec<Candidate> = chosen.iter().map(|&i| candidates[i].clone()).collect();
     let known: Vec<Joints> = candidates.iter().map(|candidate| candidate.joints).collect();
-    let ways = Ways { known: &known, roads };
-    let ordered = schedule::schedule(wanted, poses, &visits, &options.bounds, &ways, options.seed);
-    Ok(ordered.map(|(poses, rows)| Laid { poses, rows, quality }))
+    let ways = Connections { known: &known, roadmap };
+    let ordered = schedule::schedule(setup, poses, &visits, &options.bounds, &ways, options.seed);
+    Ok(ordered.map(|(poses, rows)| OrderedChoice { poses, rows, quality }))
 }
 
 /// What is fitted: links, then frames.
-fn parameters(wanted: &Wanted<'_>) -> Vec<Parameter> {
-    let mut out = arm_parameters(wanted.nominal);
-    let mut empty = Dataset::new("plan", wanted.sensor, Vec::new());
-    if wanted.sensor == Sensor::Cable {
+fn parameters(setup: &MeasurementSetup<'_>) -> Vec<Parameter> {
+    let mut out = arm_parameters(setup.nominal);
+    let mut empty = Dataset::new("plan", setup.sensor, Vec::new());
+    if setup.sensor == Sensor::Cable {
         // One row of the last cable says how many there are.
-        let anchor = wanted.frames.outlets_mm.len() - 1;
-        let mut row = blank(0, nalgebra::Vector6::zeros(), wanted.sensor);
+        let anchor = setup.frames.outlets_mm.len() - 1;
+        let mut row = blank_row(0, nalgebra::Vector6::zeros(), setup.sensor);
         row.anchor = anchor;
         empty.rows.push(row);
     }
@@ -227,14 +231,14 @@ fn parameters(wanted: &Wanted<'_>) -> Vec<Parameter> {
     out
 }
 
-fn quality(told: &Told, chosen: &[usize], options: &Options) -> Option<Quality> {
-    let rest: Vec<usize> = (0..told.rows()).filter(|i| !chosen.contains(i)).collect();
-    let all: Vec<usize> = (0..told.rows()).collect();
+fn quality(jacobian: &ReadingJacobian, chosen: &[usize], options: &Options) -> Option<Quality> {
+    let rest: Vec<usize> = (0..jacobian.rows()).filter(|i| !chosen.contains(i)).collect();
+    let all: Vec<usize> = (0..jacobian.rows()).collect();
     let pool = if rest.is_empty() { &all } else { &rest };
     let judges: Vec<usize> = pool.iter().copied().step_by(pool.len().div_ceil(JUDGES).max(1)).collect();
     let of = |set: &[usize]| -> Option<(f64, f64)> {
-        let information = told.information(set);
-        let sigma = told.reading_sigma(&information, &judges)? * options.noise.reading_mm;
+        let information = jacobian.information(set);
+        let sigma = jacobian.reading_sigma(&information, &judges)? * options.noise.reading_mm;
         Some((design::log_det(&information)?, sigma))
     };
     let (log_det, reading_sigma_mm) = of(chosen)?;

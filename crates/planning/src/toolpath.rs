@@ -87,8 +87,8 @@ pub struct Toolpath {
 /// assert!(path.joints.iter().all(|joints| arm.limits.violated(joints).is_none()));
 /// // Its joints put the tool where the path wants it.
 /// let tool = arm.forward(&path.joints[0], &Condition::default()) * file.tool.flange_from_tool;
-/// let wanted = file.work_object.base_from_work_object * path.points[0].work_object_from_tool();
-/// assert!((tool.translation.vector - wanted.translation.vector).norm() < 1e-6);
+/// let setup = file.work_object.base_from_work_object * path.points[0].work_object_from_tool();
+/// assert!((tool.translation.vector - setup.translation.vector).norm() < 1e-6);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///

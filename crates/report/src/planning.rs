@@ -7,23 +7,23 @@ use super::status::Status;
 use super::table::{Cell, Column, Table};
 use truegrind_arm::parameter::Parameter;
 use truegrind_calibration::measurement::dataset::Reading;
-use truegrind_planning::poses::drive::{checked, reading};
-use truegrind_planning::poses::power::Decidable;
+use truegrind_planning::poses::power::Detectability;
+use truegrind_planning::poses::program::{checked, reading};
 use truegrind_planning::poses::schedule::{FIRST_ROW, Purpose};
-use truegrind_planning::poses::{Plan, Wanted};
+use truegrind_planning::poses::{MeasurementSetup, Plan};
 
 /// Rows on a page; all are in the CSV file.
 const ROWS_ON_PAGE: usize = 60;
 
 /// One row per reading to take. As CSV it is the log to fill in: joint angles, sides of approach and time under the names
 /// that `identify` reads, and what the nominal arm would give beside it.
-pub fn table(plan: &Plan, wanted: &Wanted<'_>) -> Table {
+pub fn table(plan: &Plan, setup: &MeasurementSetup<'_>) -> Table {
     let mut columns =
         vec![Column::count("row", "Row"), Column::count("pose", "Pose"), Column::text("purpose", "Purpose")];
     columns.extend((1..=6).map(|j| Column::number(format!("q{j}"), format!("q{j}"), "°", 3)));
     columns.extend((1..=6).map(|j| Column::number(format!("approach{j}"), format!("side {j}"), "", 0)));
     columns.push(Column::number("t", "Time", "h", 3));
-    let expected: &[&str] = match plan_reading(plan, wanted) {
+    let expected: &[&str] = match plan_reading(plan, setup) {
         Some(Reading::Cable(_)) => &["expected_L"],
         _ => &["expected_x", "expected_y", "expected_z"],
     };
@@ -38,11 +38,11 @@ pub fn table(plan: &Plan, wanted: &Wanted<'_>) -> Table {
     let mut table = Table::new("Rows to measure", columns);
     for (number, row) in (FIRST_ROW..).zip(&plan.rows) {
         let pose = &plan.poses[row.pose];
-        let mut cells: Vec<Cell> = vec![number.into(), (row.pose + 1).into(), row.purpose.word().into()];
+        let mut cells: Vec<Cell> = vec![number.into(), (row.pose + 1).into(), row.purpose.label().into()];
         cells.extend(pose.joints.iter().map(|q| Cell::from(q.to_degrees())));
         cells.extend(row.approach.iter().map(|side| Cell::from(f64::from(*side))));
         cells.push(row.time_h.into());
-        match reading(plan, wanted, row) {
+        match reading(plan, setup, row) {
             Some(Reading::Cable(length)) => cells.push(length.into()),
             Some(Reading::Position(p)) => cells.extend(p.iter().map(|v| Cell::from(*v))),
             Some(Reading::Pose(p)) => cells.extend(p.translation.vector.iter().map(|v| Cell::from(*v))),
@@ -51,14 +51,14 @@ pub fn table(plan: &Plan, wanted: &Wanted<'_>) -> Table {
         if cables {
             cells.push((pose.anchor).into());
         }
-        cells.push(if row.rough_way { "unhook the cable on the way".into() } else { Cell::Missing });
+        cells.push(if row.cable_unclear { "unhook the cable on the way".into() } else { Cell::Missing });
         table.push(cells);
     }
     table
 }
 
-fn plan_reading(plan: &Plan, wanted: &Wanted<'_>) -> Option<Reading> {
-    plan.rows.first().and_then(|row| reading(plan, wanted, row))
+fn plan_reading(plan: &Plan, setup: &MeasurementSetup<'_>) -> Option<Reading> {
+    plan.rows.first().and_then(|row| reading(plan, setup, row))
 }
 
 /// Every effect with the smallest size that the plan decides.
@@ -76,7 +76,7 @@ pub fn effect_table(plan: &Plan) -> Table {
             Column::text("decided", "Decided"),
         ],
     );
-    for found in &plan.decidable {
+    for found in &plan.detectability {
         table.push([
             found.effect.into(),
             found.which.as_str().into(),
@@ -98,7 +98,7 @@ pub fn effect_table(plan: &Plan) -> Table {
     table
 }
 
-fn judged(found: &Decidable) -> Cell {
+fn judged(found: &Detectability) -> Cell {
     if found.shows.is_none() {
         Cell::Judged(Status::Bad, "at no size".to_owned())
     } else if found.is_decided() {
@@ -158,7 +158,7 @@ fn verdict(plan: &Plan) -> Verdict {
          {:.3} mm",
         quality.reading_sigma_mm, quality.random_reading_sigma_mm
     ));
-    let undecided: Vec<&Decidable> = plan.decidable.iter().filter(|d| !d.is_decided()).collect();
+    let undecided: Vec<&Detectability> = plan.detectability.iter().filter(|d| !d.is_decided()).collect();
     if !undecided.is_empty() {
         let names: Vec<String> =
             undecided.iter().take(6).map(|d| format!("{} ({})", d.effect, d.which)).collect();
@@ -170,7 +170,7 @@ fn verdict(plan: &Plan) -> Verdict {
         "checked: {}; the way to the first pose and anything else in the cell are not",
         checked(plan)
     ));
-    let rough = plan.rows.iter().filter(|row| row.rough_way).count();
+    let rough = plan.rows.iter().filter(|row| row.cable_unclear).count();
     if rough > 0 {
         reasons.insert(
             1,
@@ -193,7 +193,7 @@ pub fn summary(plan: &Plan, robot: &str) -> Document {
 }
 
 /// The page.
-pub fn document(plan: &Plan, wanted: &Wanted<'_>, robot: &str) -> Document {
+pub fn document(plan: &Plan, setup: &MeasurementSetup<'_>, robot: &str) -> Document {
     let mut page = Document::new(format!("What to measure on {robot}"));
     page.push(verdict(plan));
     page.push(vec![
@@ -202,19 +202,24 @@ pub fn document(plan: &Plan, wanted: &Wanted<'_>, robot: &str) -> Document {
             .note("predicted 1σ of a reading anywhere else"),
         KeyFigure::new("After random poses", plan.quality.random_reading_sigma_mm, 3, "mm")
             .note(format!("as many, {} of them", plan.poses.len())),
-        KeyFigure::new("Effects decided", plan.decidable.iter().filter(|d| d.is_decided()).count(), 0, "")
-            .note(format!("of {}, at sizes met in practice", plan.decidable.len())),
+        KeyFigure::new(
+            "Effects decided",
+            plan.detectability.iter().filter(|d| d.is_decided()).count(),
+            0,
+            "",
+        )
+        .note(format!("of {}, at sizes met in practice", plan.detectability.len())),
     ]);
     page.paragraph("No program can know what else stands in the cell: state it as boxes (--keep-out).");
     page.push(effect_table(plan));
     page.heading(2, "Rows");
-    page.push(table(plan, wanted).excerpt(ROWS_ON_PAGE));
+    page.push(table(plan, setup).excerpt(ROWS_ON_PAGE));
     page.push(Block::Details { summary: "Parameters".to_owned(), blocks: vec![sigma_table(plan).into()] });
     page
 }
 
 /// Everything; schema `truegrind.plan/1`.
-pub fn json(plan: &Plan, wanted: &Wanted<'_>, robot: &str) -> Value {
+pub fn json(plan: &Plan, setup: &MeasurementSetup<'_>, robot: &str) -> Value {
     let rows: Vec<Value> = plan
         .rows
         .iter()
@@ -224,13 +229,13 @@ pub fn json(plan: &Plan, wanted: &Wanted<'_>, robot: &str) -> Value {
             json!({
                 "row": number,
                 "pose": row.pose,
-                "purpose": row.purpose.word(),
+                "purpose": row.purpose.label(),
                 "joints_deg": pose.joints.iter().map(|q| q.to_degrees()).collect::<Vec<_>>(),
                 "approach": row.approach,
                 "anchor": pose.anchor,
                 "t_h": row.time_h,
-                "stops_deg": row.stops.iter().map(|q| q.map(f64::to_degrees).as_slice().to_vec()).collect::<Vec<_>>(),
-                "expected": match reading(plan, wanted, row) {
+                "stops_deg": row.waypoints.iter().map(|q| q.map(f64::to_degrees).as_slice().to_vec()).collect::<Vec<_>>(),
+                "expected": match reading(plan, setup, row) {
                     Some(Reading::Cable(length)) => json!(length),
                     Some(Reading::Position(p)) => json!([p.x, p.y, p.z]),
                     Some(Reading::Pose(p)) => {
@@ -239,12 +244,12 @@ pub fn json(plan: &Plan, wanted: &Wanted<'_>, robot: &str) -> Value {
                     None => Value::Null,
                 },
                 "singularity": pose.singularity,
-                "rough_way": row.rough_way,
+                "rough_way": row.cable_unclear,
             })
         })
         .collect();
     let effects: Vec<Value> = plan
-        .decidable
+        .detectability
         .iter()
         .map(|found| {
             json!({

@@ -7,7 +7,7 @@ use super::number::handy;
 use super::plot::{Axis, Graph, Reference, Series};
 use super::status::Status;
 use super::table::{Cell, Column, Table};
-use truegrind_calibration::tracking::state::Consumed;
+use truegrind_calibration::tracking::state::ConsumedFile;
 use truegrind_calibration::tracking::{Alarm, Tracker};
 use truegrind_math::statistics::median;
 
@@ -55,7 +55,7 @@ pub fn document(tracker: &Tracker, fresh: usize, alarms: &[Alarm], model: &str) 
 
 /// The files that were taken in.
 fn sources(tracker: &Tracker) -> Vec<Source> {
-    let of = |consumed: &Consumed| Source {
+    let of = |consumed: &ConsumedFile| Source {
         name: consumed.file.clone(),
         role: "Measurements".to_owned(),
         sha256: None,

@@ -9,8 +9,8 @@
 //!
 //! Parameters that move together, such as the six of a sensor that was knocked, are one change of several: with l and S the
 //! vector and matrix of the same expressions, ratio = lᵀ (S + Λ⁻¹)⁻¹ l, Λ how far such a thing may move. It is preferred to
-//! the best single parameter where it is the more surprising if nothing had moved ([`surprise`]), and that by far
-//! ([`CLEARLY`]): what a model does not hold is smooth in the joints, and six numbers follow it where one cannot.
+//! the best single parameter where it is the more surprising if nothing had moved ([`surprisal`]), and that by far
+//! ([`GROUP_MARGIN`]): what a model does not hold is smooth in the joints, and six numbers follow it where one cannot.
 //!
 //! The sums of a drift are sums of those of a jump: B_s = B_{s+1} + A_s, and Σ w² = 2 Σ w(w + 1)/2 − Σ w. With CCᵀ = P⁻¹ + A
 //! the product C⁻¹B is carried along in place of B, since B(:,k)ᵀ M B(:,l) is what its columns k and l make: a pose costs its
@@ -27,11 +27,11 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use truegrind_math::distribution::ln_gamma;
 
 /// Ratios within this of the largest are alternatives: e^−2 of its likelihood.
-pub const ALTERNATIVE: f64 = 4.0;
+pub const ALTERNATIVE_MARGIN: f64 = 4.0;
 
-/// A group is preferred to a single parameter where its surprise is larger by this, and by this share of the parameter's
+/// A group is preferred to a single parameter where its surprisal is larger by this, and by this share of the parameter's
 /// ratio.
-pub const CLEARLY: (f64, f64) = (30.0, 0.25);
+pub const GROUP_MARGIN: (f64, f64) = (30.0, 0.25);
 
 /// How a parameter changes from a pose on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -70,7 +70,7 @@ pub struct Group {
 
 /// Several parameters that jumped at once.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Together {
+pub struct GroupChange {
     /// Index of the group.
     pub group: usize,
     /// First changed pose.
@@ -85,14 +85,14 @@ pub struct Together {
 
 /// −2 ln of the probability that χ² with so many degrees of freedom is beyond `ratio`, far out: what makes changes of one
 /// parameter and of several comparable.
-pub fn surprise(freedom: usize, ratio: f64) -> f64 {
+pub fn surprisal(freedom: usize, ratio: f64) -> f64 {
     let half = (ratio / 2.0).max(1.0).ln();
     ratio - (freedom as f64 - 2.0) * half + 2.0 * ln_gamma(0.5 * freedom.max(1) as f64)
 }
 
 /// The change that explains the history best, and what else would.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Found {
+pub struct Explanation {
     /// The best.
     pub best: Change,
     /// The other form of the same parameter, where it explains the history nearly as well.
@@ -100,13 +100,13 @@ pub struct Found {
     /// Other parameters that explain the history nearly as well, each at its best.
     pub alternatives: Vec<Change>,
     /// A group that explains it far better than any single parameter.
-    pub together: Option<Together>,
+    pub together: Option<GroupChange>,
     /// A group that explains it about as well as the best single parameter, or better, but not clearly.
     pub nearly: Option<usize>,
 }
 
 /// The poses as they bear on each other: `j` and `r` are Jacobian and residuals with `per` rows for each.
-struct Seen {
+struct History {
     per: usize,
     j: DMatrix<f64>,
     r: DVector<f64>,
@@ -147,8 +147,8 @@ impl Sums {
     }
 
     /// Takes in the pose before those so far.
-    fn add(&mut self, seen: &Seen, since: usize) {
-        let Seen { per, j, r, rooted, towards } = seen;
+    fn add(&mut self, history: &History, since: usize) {
+        let History { per, j, r, rooted, towards } = history;
         let rows = j.rows(since * per, *per);
         self.jump.gemm_tr(1.0, &rows, &rows, 1.0);
         self.of_jump.gemm(1.0, &rooted.columns(since * per, *per), &rows, 1.0);
@@ -206,7 +206,7 @@ pub fn locate(
     per: usize,
     covariance: &DMatrix<f64>,
     groups: &[Group],
-) -> Option<Found> {
+) -> Option<Explanation> {
     let (p, n) = (covariance.nrows(), residuals.len() / per.max(1));
     let j = DMatrix::from_column_slice(n * per, p, jacobian);
     let r = DVector::from_column_slice(residuals);
@@ -215,19 +215,19 @@ pub fn locate(
     let mg = factor.solve(&j.tr_mul(&r));
     let rooted = factor.l_dirty().solve_lower_triangular(&j.transpose())?;
     let towards = &j * &mg;
-    let seen = Seen { per, j, r, rooted, towards };
+    let history = History { per, j, r, rooted, towards };
     let mut best: Vec<[Option<Change>; 2]> = vec![[None; 2]; p];
-    let mut together: Option<Together> = None;
+    let mut together: Option<GroupChange> = None;
     let mut sums = Sums::new(p);
     for since in (0..n).rev() {
-        sums.add(&seen, since);
+        sums.add(&history, since);
         for (index, group) in groups.iter().enumerate() {
             let Some((shifts, factor, ratio)) = sums.together(group) else { continue };
-            let gain = |t: &Together| surprise(groups[t.group].members.len(), t.ratio);
-            if together.as_ref().is_none_or(|t| surprise(group.members.len(), ratio) > gain(t)) {
+            let gain = |t: &GroupChange| surprisal(groups[t.group].members.len(), t.ratio);
+            if together.as_ref().is_none_or(|t| surprisal(group.members.len(), ratio) > gain(t)) {
                 let shifts = shifts.iter().map(|s| -s).collect();
                 together =
-                    Some(Together { group: index, since, shifts, covariance: factor.inverse(), ratio });
+                    Some(GroupChange { group: index, since, shifts, covariance: factor.inverse(), ratio });
             }
         }
         for (parameter, best) in best.iter_mut().enumerate() {
@@ -244,11 +244,15 @@ pub fn locate(
             }
         }
     }
-    compared(&best, together, groups)
+    compare_changes(&best, together, groups)
 }
 
 /// The best change, with what explains the history nearly as well, from the best of each parameter and form and of the groups.
-fn compared(best: &[[Option<Change>; 2]], together: Option<Together>, groups: &[Group]) -> Option<Found> {
+fn compare_changes(
+    best: &[[Option<Change>; 2]],
+    together: Option<GroupChange>,
+    groups: &[Group],
+) -> Option<Explanation> {
     let better = |[a, b]: &[Option<Change>; 2]| match (a, b) {
         (Some(a), Some(b)) => Some(if b.ratio > a.ratio { *b } else { *a }),
         (a, b) => a.or(*b),
@@ -256,15 +260,16 @@ fn compared(best: &[[Option<Change>; 2]], together: Option<Together>, groups: &[
     let mut all: Vec<Change> = best.iter().filter_map(better).collect();
     all.sort_by(|a, b| b.ratio.total_cmp(&a.ratio).then(a.parameter.cmp(&b.parameter)));
     let first = *all.first()?;
-    let near = |c: &Change| c.ratio > first.ratio - ALTERNATIVE;
-    let gain = |t: &Together| surprise(groups[t.group].members.len(), t.ratio) - surprise(1, first.ratio);
-    let (clear, nearly): (Option<Together>, Option<usize>) = match together {
-        Some(t) if gain(&t) > CLEARLY.0.max(CLEARLY.1 * first.ratio) => (Some(t), None),
-        Some(t) if gain(&t) > -ALTERNATIVE => (None, Some(t.group)),
+    let near = |c: &Change| c.ratio > first.ratio - ALTERNATIVE_MARGIN;
+    let gain =
+        |t: &GroupChange| surprisal(groups[t.group].members.len(), t.ratio) - surprisal(1, first.ratio);
+    let (clear, nearly): (Option<GroupChange>, Option<usize>) = match together {
+        Some(t) if gain(&t) > GROUP_MARGIN.0.max(GROUP_MARGIN.1 * first.ratio) => (Some(t), None),
+        Some(t) if gain(&t) > -ALTERNATIVE_MARGIN => (None, Some(t.group)),
         _ => (None, None),
     };
     let other = best[first.parameter].iter().flatten().find(|c| c.form != first.form).copied();
-    Some(Found {
+    Some(Explanation {
         best: first,
         other_form: other.filter(near),
         alternatives: all[1..].iter().take_while(|c| near(c)).copied().collect(),

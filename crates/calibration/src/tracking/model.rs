@@ -9,27 +9,27 @@ use truegrind_math::statistics::ErrorSummary;
 
 impl Tracker {
     /// The arm and the sensor's frames as they stand now.
-    pub fn standing(&self) -> (Model, Frames) {
+    pub fn current(&self) -> (Model, Frames) {
         let problem = CalibrationProblem::new(
             &Dataset::new("track", Sensor::Position, Vec::new()),
-            &self.begun.model,
+            &self.initial.model,
             &self.frames,
             &self.parameters,
             &[],
             &[],
         );
-        problem.apply(self.recursion.x.as_slice())
+        problem.apply(self.filter.x.as_slice())
     }
 
     /// The model as it stands now.
     pub fn model(&self) -> Estimated {
-        let x = self.recursion.x.as_slice();
-        let (model, _) = self.standing();
-        let arm = self.begun.order.len();
-        let whole = self.recursion.covariance();
+        let x = self.filter.x.as_slice();
+        let (model, _) = self.current();
+        let arm = self.initial.order.len();
+        let whole = self.filter.covariance();
         let covariance = whole.view((0, 0), (arm, arm)).into_owned();
-        let mut out = self.begun.clone();
-        for (k, parameter) in self.begun.order.iter().enumerate() {
+        let mut out = self.initial.clone();
+        for (k, parameter) in self.initial.order.iter().enumerate() {
             let name = parameter.to_string();
             if let Some(row) = out.parameters.iter_mut().find(|p| p.name == name) {
                 update_row(row, x[k], covariance[(k, k)].max(0.0).sqrt());
@@ -38,7 +38,7 @@ impl Tracker {
         out.model = model;
         out.covariance = covariance;
         out.provenance.method = "track".to_owned();
-        out.provenance.rows = self.begun.provenance.rows + self.state.poses;
+        out.provenance.rows = self.initial.provenance.rows + self.state.poses;
         if let Some(last) = self.state.consumed.last() {
             out.provenance.file.clone_from(&last.file);
             out.provenance.sha256.clone_from(&last.digest);
@@ -49,7 +49,7 @@ impl Tracker {
         out.condition = self.condition;
         out.region.clone_from(&self.state.region);
         out.verdict = Verdict {
-            status: match self.begun.verdict.status {
+            status: match self.initial.verdict.status {
                 // What was wrong with the beginning is not mended by following it.
                 bad @ (Judgement::Fail | Judgement::Doubtful) => bad,
                 Judgement::Pass | Judgement::NotEvaluated => Judgement::NotEvaluated,
@@ -63,7 +63,7 @@ impl Tracker {
         let mut reasons = vec![format!(
             "tracked over {} poses since {}, {} set aside as accidents; held-out errors are those of the first \
              identification",
-            self.state.poses, self.begun.provenance.file, self.state.accidents
+            self.state.poses, self.initial.provenance.file, self.state.accidents
         )];
         reasons.extend(self.state.alarms.iter().map(ToString::to_string));
         reasons

@@ -1,6 +1,6 @@
 //! A target or a sensor that was mounted anew: poses that were all set aside, and agree with one other place.
 //!
-//! What was knocked lies near where it lay and is found as parameters that moved ([`super::locate`]). What was taken off and
+//! What was knocked lies agreement where it lay and is found as parameters that moved ([`super::locate`]). What was taken off and
 //! put on again lies anywhere, often turned by a quarter, where no linearisation holds. So the poses that were set aside one
 //! after the other say each by itself where the target (or the sensor) would be; where they agree, to what readings scatter
 //! by, it is there. Poses that do not agree are a burst of outliers.
@@ -9,7 +9,7 @@ use nalgebra::{Point3, UnitQuaternion, Vector3};
 
 use super::alarm::{Alarm, Course, Part};
 use super::bounds::accident_bound;
-use super::state::{Seen, Snapshot, reach};
+use super::state::{PoseRecord, Snapshot, extend_region};
 use super::tracker::Tracker;
 use crate::identification::calibration::Frames;
 use crate::measurement::registration::points;
@@ -38,7 +38,7 @@ enum Mounted {
 
 /// A place that poses agree on.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Agreed {
+struct Remount {
     what: Mounted,
     place: Pose,
     /// Root mean square of what the places of single poses differ from it by (mm).
@@ -48,31 +48,33 @@ struct Agreed {
 
 impl Tracker {
     /// Poses at the end of the history that were set aside without one between them that was not.
-    pub(super) fn set_aside_in_a_row(&self) -> usize {
+    pub(super) fn trailing_accidents(&self) -> usize {
         let bound = accident_bound(self.rows_per_pose());
-        self.state.history.iter().rev().take_while(|seen| !(seen.nis <= bound)).count()
+        self.state.history.iter().rev().take_while(|record| !(record.nis <= bound)).count()
     }
 
     /// Where the latest poses agree that target or sensor was mounted anew: the alarm, with the track going on from there.
-    pub(super) fn mounted_anew(&mut self) -> Option<Alarm> {
-        let run = self.set_aside_in_a_row();
+    pub(super) fn detect_remount(&mut self) -> Option<Alarm> {
+        let run = self.trailing_accidents();
         if run < FEWEST || self.state.sensor == "cable" {
             return None;
         }
         let history = &self.state.history;
-        let poses: Vec<Seen> = history[history.len() - run..].to_vec();
-        let (found, old) = self.agreed(&poses)?;
+        let poses: Vec<PoseRecord> = history[history.len() - run..].to_vec();
+        let (found, old) = self.find_remount(&poses)?;
         let alarm = alarm_of(&found, &old, &poses, self.rows_per_pose());
-        self.go_on_from(&found, poses);
+        self.apply_remount(&found, poses);
         Some(alarm)
     }
 
     /// The place that the poses agree on, and where it was.
-    fn agreed(&self, poses: &[Seen]) -> Option<(Agreed, Pose)> {
-        let (model, frames) = self.standing();
-        let flanges: Vec<Pose> =
-            poses.iter().map(|seen| model.forward(&Joints::from(seen.joints), &seen.condition)).collect();
-        let near = Near {
+    fn find_remount(&self, poses: &[PoseRecord]) -> Option<(Remount, Pose)> {
+        let (model, frames) = self.current();
+        let flanges: Vec<Pose> = poses
+            .iter()
+            .map(|record| model.forward(&Joints::from(record.joints), &record.condition))
+            .collect();
+        let agreement = Agreement {
             mm: AGREE * self.state.sigma_mm * 3f64.sqrt(),
             rad: AGREE * self.state.sigma_rad.max(1e-5) * 3f64.sqrt(),
         };
@@ -86,9 +88,9 @@ impl Tracker {
             };
             let target = each(&|flange, reading| flange.inverse() * frames.base_from_sensor * reading);
             let sensor = each(&|flange, reading| flange * frames.flange_from_target * reading.inverse());
-            (near.middle(&target), near.middle(&sensor))
+            (agreement.consensus(&target), agreement.consensus(&sensor))
         } else {
-            of_points(poses, &flanges, &frames, &near)
+            of_points(poses, &flanges, &frames, &agreement)
         };
         let candidates = [
             (Mounted::Target, target, frames.flange_from_target),
@@ -100,13 +102,13 @@ impl Tracker {
         };
         let all = candidates.into_iter().filter_map(|(what, found, old)| {
             let (place, scatter_mm, poses) = found?;
-            far(&place, &old).then_some((Agreed { what, place, scatter_mm, poses }, old))
+            far(&place, &old).then_some((Remount { what, place, scatter_mm, poses }, old))
         });
         all.min_by(|(a, _), (b, _)| a.scatter_mm.total_cmp(&b.scatter_mm))
     }
 
     /// Puts the place in, with what is known of the rest kept, and takes the poses in again.
-    fn go_on_from(&mut self, found: &Agreed, poses: Vec<Seen>) {
+    fn apply_remount(&mut self, found: &Remount, poses: Vec<PoseRecord>) {
         let members: Vec<usize> = (0..self.parameters.len())
             .filter(|&k| match self.parameters[k] {
                 Parameter::Target(_) => found.what == Mounted::Target,
@@ -114,8 +116,8 @@ impl Tracker {
                 _ => false,
             })
             .collect();
-        let Some(mut root) = self.recursion.root() else { return };
-        let mut x = self.recursion.x.clone();
+        let Some(mut root) = self.filter.root() else { return };
+        let mut x = self.filter.x.clone();
         let mut room = vec![0.0; x.len()];
         for &k in &members {
             x[k] = 0.0;
@@ -133,25 +135,25 @@ impl Tracker {
                 self.frames.base_from_sensor = pose_from_vector(&self.state.base_from_sensor);
             }
         }
-        self.recursion = RecursiveLeastSquares::from_root(x, root);
-        self.recursion.predict(&room);
+        self.filter = RecursiveLeastSquares::from_root(x, root);
+        self.filter.predict(&room);
         let problem = self.problem(&poses);
-        for (at, seen) in poses.iter().enumerate() {
+        for (at, record) in poses.iter().enumerate() {
             if !self.update(&problem, at).set_aside {
                 self.state.accidents = self.state.accidents.saturating_sub(1);
-                reach(&mut self.state.region, &seen.joints);
+                extend_region(&mut self.state.region, &record.joints);
             }
         }
         // What came before the change is settled.
         self.state.history.clear();
-        let snapshot = Snapshot::of(&self.recursion, 0);
+        let snapshot = Snapshot::of(&self.filter, 0);
         (self.state.reference, self.state.middle) = (snapshot.clone(), snapshot);
         (self.state.pending_since, self.state.burst_since) = (0, 0);
     }
 }
 
 /// The alarm that says so.
-fn alarm_of(found: &Agreed, old: &Pose, poses: &[Seen], per: usize) -> Alarm {
+fn alarm_of(found: &Remount, old: &Pose, poses: &[PoseRecord], per: usize) -> Alarm {
     let (first, last) = (&poses[0], &poses[poses.len() - 1]);
     let many = (found.poses.max(1) as f64).sqrt();
     Alarm {
@@ -185,18 +187,23 @@ fn alarm_of(found: &Agreed, old: &Pose, poses: &[Seen], per: usize) -> Alarm {
     }
 }
 
-fn pose_of(seen: &Seen) -> Option<Pose> {
-    let [x, y, z, a, b, c] = seen.reading.as_slice() else { return None };
+fn pose_of(record: &PoseRecord) -> Option<Pose> {
+    let [x, y, z, a, b, c] = record.reading.as_slice() else { return None };
     Some(pose_from_vector(&[*x, *y, *z, *a, *b, *c]))
 }
 
-type Found = Option<(Pose, f64, usize)>;
+type Consensus = Option<(Pose, f64, usize)>;
 
 /// Target and sensor from readings that are points.
-fn of_points(poses: &[Seen], flanges: &[Pose], frames: &Frames, near: &Near) -> (Found, Found) {
+fn of_points(
+    poses: &[PoseRecord],
+    flanges: &[Pose],
+    frames: &Frames,
+    agreement: &Agreement,
+) -> (Consensus, Consensus) {
     let readings: Vec<Point3<f64>> = poses
         .iter()
-        .filter_map(|seen| <[f64; 3]>::try_from(seen.reading.as_slice()).ok())
+        .filter_map(|record| <[f64; 3]>::try_from(record.reading.as_slice()).ok())
         .map(|[x, y, z]| Point3::new(x, y, z))
         .collect();
     if readings.len() != poses.len() {
@@ -212,19 +219,22 @@ fn of_points(poses: &[Seen], flanges: &[Pose], frames: &Frames, near: &Near) -> 
     let target = Point3::from(frames.flange_from_target.translation.vector);
     let in_base: Vec<Vector3<f64>> = flanges.iter().map(|flange| (flange * target).coords).collect();
     let read: Vec<Vector3<f64>> = readings.iter().map(|point| point.coords).collect();
-    let sensor = points(&in_base, &read).filter(|found| found.rmse_mm <= near.mm);
-    (near.middle(&on_flange), sensor.map(|found| (found.base_from_sensor, found.rmse_mm, poses.len())))
+    let sensor = points(&in_base, &read).filter(|found| found.rmse_mm <= agreement.mm);
+    (
+        agreement.consensus(&on_flange),
+        sensor.map(|found| (found.base_from_sensor, found.rmse_mm, poses.len())),
+    )
 }
 
-/// How near places lie that are one.
-struct Near {
+/// How agreement places lie that are one.
+struct Agreement {
     mm: f64,
     rad: f64,
 }
 
-impl Near {
+impl Agreement {
     /// The middle of places of which four in five agree, their scatter (mm), and how many they are.
-    fn middle(&self, places: &[Pose]) -> Found {
+    fn consensus(&self, places: &[Pose]) -> Consensus {
         let agrees = |a: &Pose, b: &Pose| {
             (a.translation.vector - b.translation.vector).norm() <= self.mm
                 && a.rotation.angle_to(&b.rotation) <= self.rad

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::alarm::{Alarm, Course, Part};
 use super::bounds::{accident_bound, window_bound};
-use super::locate::{Form, Found, Group, Together, locate};
+use super::locate::{Explanation, Form, Group, GroupChange, locate};
 use super::state::Snapshot;
 use super::tracker::Tracker;
 use truegrind_arm::parameter::Parameter;
@@ -25,7 +25,7 @@ impl Tracker {
     /// Looks at the window, and where it is out of bounds finds out what moved.
     pub(super) fn alarm(&mut self) -> Option<Alarm> {
         if self.state.burst_since > 0 {
-            return self.in_a_burst();
+            return self.continue_burst();
         }
         let window = self.state.options.window.max(1);
         let history = &self.state.history;
@@ -50,12 +50,12 @@ impl Tracker {
             return None;
         }
         self.state.pending_since = 0;
-        if let Some(alarm) = self.mounted_anew() {
+        if let Some(alarm) = self.detect_remount() {
             return Some(alarm);
         }
         let history = &self.state.history;
         let groups = self.groups();
-        let found = self.what_moved(&groups)?;
+        let found = self.locate_change(&groups)?;
         let ratio = found.together.as_ref().map_or(found.best.ratio, |t| t.ratio);
         // Poses that scatter more than they should are no parameter's doing, however well one of them fits a few: what moved
         // explains most of what was too much (0.7).
@@ -66,23 +66,30 @@ impl Tracker {
         };
         let all: f64 = (history.len() - window..history.len()).map(measured).sum();
         if !(ratio >= SURE.max(0.7 * (all - (window * per) as f64))) {
-            if self.set_aside_in_a_row() > SETTLE {
-                let alarm = self.unnamed(Course::Burst, self.set_aside_in_a_row(), [sum, bound], ratio);
+            if self.trailing_accidents() > SETTLE {
+                let alarm =
+                    self.unexplained_alarm(Course::Burst, self.trailing_accidents(), [sum, bound], ratio);
                 self.state.burst_since = self.state.poses;
                 return alarm;
             }
-            let alarm = self.unnamed(Course::Open, 0, [sum, bound], ratio)?;
+            let alarm = self.unexplained_alarm(Course::Open, 0, [sum, bound], ratio)?;
             // The same poses are not complained of again.
             self.state.quiet_until = self.state.poses + window;
             return Some(alarm);
         }
-        let alarm = self.named(&found, &groups, [sum, bound], ratio)?;
-        self.reopen(&found, &groups);
+        let alarm = self.change_alarm(&found, &groups, [sum, bound], ratio)?;
+        self.restart_from_change(&found, &groups);
         Some(alarm)
     }
 
     /// An alarm that names what moved.
-    fn named(&self, found: &Found, groups: &[Group], window_nis: [f64; 2], ratio: f64) -> Option<Alarm> {
+    fn change_alarm(
+        &self,
+        found: &Explanation,
+        groups: &[Group],
+        window_nis: [f64; 2],
+        ratio: f64,
+    ) -> Option<Alarm> {
         let (history, last) = (&self.state.history, self.state.history.last()?);
         let since = found.together.as_ref().map_or(found.best.since, |t| t.since);
         let onset = &history[since];
@@ -115,14 +122,20 @@ impl Tracker {
             parts: Vec::new(),
         };
         if let Some(together) = &found.together {
-            self.as_a_whole(&mut alarm, &groups[together.group], together);
+            self.describe_group(&mut alarm, &groups[together.group], together);
         }
         Some(alarm)
     }
 
     /// An alarm that names no parameter: readings are off that no change explains, the last `poses` of them one after the
     /// other.
-    fn unnamed(&self, course: Course, poses: usize, window_nis: [f64; 2], ratio: f64) -> Option<Alarm> {
+    fn unexplained_alarm(
+        &self,
+        course: Course,
+        poses: usize,
+        window_nis: [f64; 2],
+        ratio: f64,
+    ) -> Option<Alarm> {
         let history = &self.state.history;
         let (first, last) = (&history[history.len() - poses.max(1)], history.last()?);
         Some(Alarm {
@@ -146,13 +159,13 @@ impl Tracker {
 
     /// While a burst goes on nothing more is said, unless what follows agrees on a new place of target or sensor; it is over
     /// once so many poses fit again as it takes to settle.
-    fn in_a_burst(&mut self) -> Option<Alarm> {
-        let run = self.set_aside_in_a_row();
+    fn continue_burst(&mut self) -> Option<Alarm> {
+        let run = self.trailing_accidents();
         if run > 0 {
-            return run.is_multiple_of(SETTLE).then(|| self.mounted_anew()).flatten();
+            return run.is_multiple_of(SETTLE).then(|| self.detect_remount()).flatten();
         }
         let bound = accident_bound(self.rows_per_pose());
-        let fitting = self.state.history.iter().rev().take_while(|seen| seen.nis <= bound).count();
+        let fitting = self.state.history.iter().rev().take_while(|record| record.nis <= bound).count();
         if fitting >= SETTLE {
             self.state.burst_since = 0;
             // The poses of the burst are not complained of again.
@@ -162,7 +175,7 @@ impl Tracker {
     }
 
     /// Writes into an alarm what moved as a whole.
-    fn as_a_whole(&self, alarm: &mut Alarm, group: &Group, together: &Together) {
+    fn describe_group(&self, alarm: &mut Alarm, group: &Group, together: &GroupChange) {
         let part = |(a, (k, _)): (usize, &(usize, f64))| Part {
             parameter: self.parameters[*k].to_string(),
             unit: self.parameters[*k].unit().to_owned(),
@@ -170,14 +183,14 @@ impl Tracker {
             sigma: together.covariance[(a, a)].max(0.0).sqrt(),
         };
         alarm.parts = group.members.iter().enumerate().map(part).collect();
-        (alarm.shift, alarm.sigma) = self.displaced(group, together);
+        (alarm.shift, alarm.sigma) = self.mean_displacement(group, together);
         (alarm.parameter, alarm.unit, alarm.course) = (group.name.clone(), "mm".to_owned(), Course::Jump);
         alarm.alternatives.clear();
     }
 
     /// By how much the readings of the changed poses moved on average (mm), and its standard deviation: a frame that turned
     /// far from where it is measured has no place of its own where a distance would mean anything.
-    fn displaced(&self, group: &Group, together: &Together) -> (f64, f64) {
+    fn mean_displacement(&self, group: &Group, together: &GroupChange) -> (f64, f64) {
         let poses = &self.state.history;
         let (per, p) = (self.rows_per_pose(), self.parameters.len());
         let rows = poses.len() * per;
@@ -227,15 +240,15 @@ impl Tracker {
         aside(Some(at)) && !aside(at.checked_sub(1)) && !aside(Some(at + 1))
     }
 
-    fn what_moved(&self, groups: &[Group]) -> Option<Found> {
+    fn locate_change(&self, groups: &[Group]) -> Option<Explanation> {
         let poses = &self.state.history;
         let per = self.rows_per_pose();
         let reference = &self.state.reference;
         let (rows, p) = (poses.len() * per, self.parameters.len());
         let (mut r, mut j) = (vec![0.0; rows], vec![0.0; rows * p]);
         self.problem(poses).jacobian(&reference.x, 0..rows, &mut r, &mut j);
-        for (pose, seen) in poses.iter().enumerate() {
-            if self.is_lone_accident(pose) || !seen.nis.is_finite() {
+        for (pose, record) in poses.iter().enumerate() {
+            if self.is_lone_accident(pose) || !record.nis.is_finite() {
                 let of_pose = pose * per..(pose + 1) * per;
                 r[of_pose.clone()].fill(0.0);
                 j.chunks_mut(rows).for_each(|column| column[of_pose.clone()].fill(0.0));
@@ -246,9 +259,9 @@ impl Tracker {
 
     /// Takes the history in again, with room for what moved. What looks alike may have moved alike, each by its own
     /// measure. What drifts may go on: its process noise becomes what it drifted by from pose to pose, and stays so.
-    fn reopen(&mut self, found: &Found, groups: &[Group]) {
-        let Some(recursion) = self.state.reference.recursion() else { return };
-        self.recursion = recursion;
+    fn restart_from_change(&mut self, found: &Explanation, groups: &[Group]) {
+        let Some(filter) = self.state.reference.filter() else { return };
+        self.filter = filter;
         let poses = std::mem::take(&mut self.state.history);
         let problem = self.problem(&poses);
         let single = found.together.is_none();
@@ -276,12 +289,12 @@ impl Tracker {
                 }
             }
             if any {
-                self.recursion.predict(&room);
+                self.filter.predict(&room);
             }
             self.update(&problem, at);
         }
         // What came before the change is settled.
-        let snapshot = Snapshot::of(&self.recursion, 0);
+        let snapshot = Snapshot::of(&self.filter, 0);
         (self.state.reference, self.state.middle) = (snapshot.clone(), snapshot);
     }
 }

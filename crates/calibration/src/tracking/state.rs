@@ -19,7 +19,7 @@ pub const SCHEMA: &str = "truegrind.track/1";
 /// One pose as it is kept in the history.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Seen {
+pub struct PoseRecord {
     /// File it came from.
     pub file: String,
     /// Its row, as the spreadsheet counts.
@@ -41,7 +41,7 @@ pub struct Seen {
     pub error_mm: f64,
 }
 
-impl Seen {
+impl PoseRecord {
     pub(super) fn row_of(&self, sensor: &str) -> Row {
         let reading = match (sensor, self.reading.as_slice()) {
             ("cable", [length, ..]) => Reading::Cable(*length),
@@ -61,7 +61,7 @@ impl Seen {
 /// Rows of a file that were taken in.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Consumed {
+pub struct ConsumedFile {
     /// Name of the file.
     pub file: String,
     /// Rows.
@@ -82,11 +82,11 @@ pub(super) struct Snapshot {
 }
 
 impl Snapshot {
-    pub(super) fn of(recursion: &RecursiveLeastSquares, before: usize) -> Self {
+    pub(super) fn of(filter: &RecursiveLeastSquares, before: usize) -> Self {
         let rows = |s: &DMatrix<f64>| s.row_iter().map(|r| r.iter().copied().collect()).collect();
         Self {
-            x: recursion.x.as_slice().to_vec(),
-            root: recursion.root().as_ref().map(rows).unwrap_or_default(),
+            x: filter.x.as_slice().to_vec(),
+            root: filter.root().as_ref().map(rows).unwrap_or_default(),
             before,
         }
     }
@@ -102,7 +102,7 @@ impl Snapshot {
         self.root().map(|s| &s * s.transpose())
     }
 
-    pub(super) fn recursion(&self) -> Option<RecursiveLeastSquares> {
+    pub(super) fn filter(&self) -> Option<RecursiveLeastSquares> {
         Some(RecursiveLeastSquares::from_root(DVector::from_column_slice(&self.x), self.root()?))
     }
 }
@@ -144,11 +144,11 @@ pub struct State {
     #[serde(default)]
     pub burst_since: usize,
     /// Files and rows taken in.
-    pub consumed: Vec<Consumed>,
+    pub consumed: Vec<ConsumedFile>,
     /// Changes noticed so far.
     pub alarms: Vec<Alarm>,
     /// The latest poses.
-    pub history: Vec<Seen>,
+    pub history: Vec<PoseRecord>,
 }
 
 impl State {
@@ -212,21 +212,21 @@ impl State {
             "position" => 3,
             _ => 6,
         };
-        for (k, seen) in self.history.iter().enumerate() {
+        for (k, record) in self.history.iter().enumerate() {
             let key = |name: &str| format!("history {}: {name}", k + 1);
-            if seen.reading.len() != numbers {
-                let found = format!("{} numbers for the sensor {}", seen.reading.len(), self.sensor);
+            if record.reading.len() != numbers {
+                let found = format!("{} numbers for the sensor {}", record.reading.len(), self.sensor);
                 return wrong(&key("reading"), found, "1 of a cable, 3 of a position, 6 of a pose");
             }
-            if seen.anchor >= self.outlets_mm.len().max(1) {
+            if record.anchor >= self.outlets_mm.len().max(1) {
                 return wrong(
                     &key("anchor"),
-                    seen.anchor.to_string(),
+                    record.anchor.to_string(),
                     "an outlet of the track, counted from 0",
                 );
             }
-            if !(seen.per_mm >= 0.0 && seen.per_rad >= 0.0) {
-                let found = format!("{} and {}", seen.per_mm, seen.per_rad);
+            if !(record.per_mm >= 0.0 && record.per_rad >= 0.0) {
+                let found = format!("{} and {}", record.per_mm, record.per_rad);
                 return wrong(&key("per_mm, per_rad"), found, "weights of 0 or more");
             }
         }
@@ -265,7 +265,7 @@ const SAMPLES: usize = 2_000;
 
 /// Adds a pose to the measured region: a sample where none is within the samples' own spacing. One pose after the other, so
 /// that the region does not depend on how the poses were divided among runs.
-pub(super) fn reach(region: &mut Region, joints: &[f64; 6]) {
+pub(super) fn extend_region(region: &mut Region, joints: &[f64; 6]) {
     let degrees = joints.map(f64::to_degrees);
     for (i, q) in degrees.iter().enumerate() {
         region.min_deg[i] = region.min_deg[i].min(*q);

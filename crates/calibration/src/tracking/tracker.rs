@@ -6,7 +6,7 @@ use super::alarm::{Alarm, Course};
 use super::bounds::accident_bound;
 use super::error::TrackError;
 use super::options::Options;
-use super::state::{Consumed, SCHEMA, Seen, Snapshot, State, digest, reach};
+use super::state::{ConsumedFile, PoseRecord, SCHEMA, Snapshot, State, digest, extend_region};
 use crate::identification::calibration::{CalibrationProblem, Frames, Weight};
 use crate::identification::fit::{Observations, frame_parameters};
 use crate::identification::identify::{prepare_observations, sensor_name};
@@ -64,18 +64,18 @@ fn first_covariance(model: &Estimated, parameters: &[Parameter]) -> DMatrix<f64>
 #[derive(Debug, Clone)]
 pub struct Tracker {
     /// The model that tracking began with.
-    pub(super) begun: Estimated,
+    pub(super) initial: Estimated,
     pub(super) parameters: Vec<Parameter>,
     pub(super) drift: Vec<f64>,
     pub(super) frames: Frames,
-    pub(super) recursion: RecursiveLeastSquares,
+    pub(super) filter: RecursiveLeastSquares,
     pub(super) state: State,
     pub(super) condition: Condition,
 }
 
 /// What one pose said.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Taken {
+pub struct PoseUpdate {
     /// Normalised innovation squared.
     pub nis: f64,
     /// Whether the pose was set aside as an accident.
@@ -125,13 +125,13 @@ impl Tracker {
         let sensing = frame_parameters(dataset);
         let parameters: Vec<Parameter> = model.order.iter().copied().chain(sensing).collect();
         let covariance = first_covariance(model, &parameters);
-        let recursion =
+        let filter =
             RecursiveLeastSquares::new(DVector::zeros(parameters.len()), covariance, Memory::SquareRoot)
                 .ok_or_else(|| TrackError::State {
                     file: model.provenance.file.clone(),
                     why: "the model's covariance is not positive definite".to_owned(),
                 })?;
-        let snapshot = Snapshot::of(&recursion, 0);
+        let snapshot = Snapshot::of(&filter, 0);
         let state = State {
             schema: SCHEMA.to_owned(),
             model_hash: model_hash.to_owned(),
@@ -190,18 +190,17 @@ impl Tracker {
                 "the number of parameters is another than the model's: it belongs to another model",
             ));
         }
-        let recursion =
-            state.now.recursion().ok_or_else(|| wrong("the root of the covariance is damaged"))?;
-        let drift = parameters.iter().map(|p| drift_of(p, &state.options)).collect();
+        let filter = state.now.filter().ok_or_else(|| wrong("the root of the covariance is damaged"))?;
+        let drift = parameters.iter().map(|p| process_noise(p, &state.options)).collect();
         let condition = model.condition;
-        Ok(Self { begun: model.clone(), parameters, drift, frames, recursion, state, condition })
+        Ok(Self { initial: model.clone(), parameters, drift, frames, filter, state, condition })
     }
 
-    /// Takes in the rows of a file that it has not seen yet. Gives the alarms that this raised.
+    /// Takes in the rows of a file that it has not record yet. Gives the alarms that this raised.
     ///
     /// # Errors
     /// [`TrackError`] where the file has another sensor, or rows that were taken in have changed.
-    pub fn take(&mut self, dataset: &Dataset) -> Result<Vec<Alarm>, TrackError> {
+    pub fn process_file(&mut self, dataset: &Dataset) -> Result<Vec<Alarm>, TrackError> {
         let sensor = sensor_name(dataset.sensor);
         if sensor != self.state.sensor {
             return Err(TrackError::Sensor {
@@ -229,21 +228,21 @@ impl Tracker {
             return Ok(Vec::new());
         }
         let fresh = dataset.subset(&(from..dataset.rows.len()).collect::<Vec<_>>());
-        let (observed, _) = prepare_observations(&fresh, &self.begun.nominal, false);
-        let mut seen = self.seen(&observed);
-        let mut problem = self.problem(&seen);
+        let (observed, _) = prepare_observations(&fresh, &self.initial.nominal, false);
+        let mut record = self.pose_records(&observed);
+        let mut problem = self.problem(&record);
         let mut alarms = Vec::new();
         for (at, row) in observed.dataset.rows.iter().enumerate() {
             self.condition = *row.condition;
-            let alarm = self.pose(&problem, at, seen[at].clone());
+            let alarm = self.process_pose(&problem, at, record[at].clone());
             if alarm.as_ref().is_some_and(|alarm| alarm.course == Course::Mounted) {
                 // Its frames are others now, and with them what rounded angles cost.
-                seen = self.seen(&observed);
-                problem = self.problem(&seen);
+                record = self.pose_records(&observed);
+                problem = self.problem(&record);
             }
             alarms.extend(alarm);
         }
-        let consumed = Consumed {
+        let consumed = ConsumedFile {
             file: dataset.file.clone(),
             rows: dataset.rows.len(),
             digest: digest(dataset.rows.iter()),
@@ -252,21 +251,26 @@ impl Tracker {
             Some(at) => self.state.consumed[at] = consumed,
             None => self.state.consumed.push(consumed),
         }
-        self.state.now = Snapshot::of(&self.recursion, self.state.history.len());
+        self.state.now = Snapshot::of(&self.filter, self.state.history.len());
         Ok(alarms)
     }
 
-    /// Observation `at` of `problem`, which is `seen`. Gives the alarm, where it raises one.
-    pub(super) fn pose(&mut self, problem: &CalibrationProblem, at: usize, mut seen: Seen) -> Option<Alarm> {
+    /// Observation `at` of `problem`, which is `record`. Gives the alarm, where it raises one.
+    pub(super) fn process_pose(
+        &mut self,
+        problem: &CalibrationProblem,
+        at: usize,
+        mut record: PoseRecord,
+    ) -> Option<Alarm> {
         let taken = self.update(problem, at);
-        seen.nis = taken.nis;
+        record.nis = taken.nis;
         self.state.poses += 1;
         self.state.accidents += usize::from(taken.set_aside);
-        seen.error_mm = self.error_mm(problem, at, seen.per_mm);
+        record.error_mm = self.error_mm(problem, at, record.per_mm);
         if !taken.set_aside {
-            reach(&mut self.state.region, &seen.joints);
+            extend_region(&mut self.state.region, &record.joints);
         }
-        self.state.history.push(seen);
+        self.state.history.push(record);
         if let Some(alarm) = self.alarm() {
             self.state.alarms.push(alarm.clone());
             return Some(alarm);
@@ -274,22 +278,22 @@ impl Tracker {
         let options = &self.state.options;
         let length = self.state.history.len();
         if length == options.history / 2 && self.state.middle.before == 0 {
-            self.state.middle = Snapshot::of(&self.recursion, length);
+            self.state.middle = Snapshot::of(&self.filter, length);
         } else if length >= options.history.max(2) {
             let half = self.state.middle.before;
             self.state.history.drain(..half);
             self.state.reference = Snapshot { before: 0, ..self.state.middle.clone() };
-            self.state.middle = Snapshot::of(&self.recursion, self.state.history.len());
+            self.state.middle = Snapshot::of(&self.filter, self.state.history.len());
         }
         None
     }
 
     /// Takes in observation `pose` of `problem`: process noise, linearisation, one update for each row. This is the whole
     /// cost of a pose but for the alarm.
-    pub fn update(&mut self, problem: &CalibrationProblem, pose: usize) -> Taken {
+    pub fn update(&mut self, problem: &CalibrationProblem, pose: usize) -> PoseUpdate {
         let (p, per) = (self.parameters.len(), problem.rows_per_observation());
-        self.recursion.predict(&self.drift);
-        let mut trial = self.recursion.clone();
+        self.filter.predict(&self.drift);
+        let mut trial = self.filter.clone();
         let (mut r, mut j) = (vec![0.0; per], vec![0.0; per * p]);
         let at = trial.x.clone();
         problem.jacobian(at.as_slice(), pose * per..(pose + 1) * per, &mut r, &mut j);
@@ -305,13 +309,13 @@ impl Tracker {
         // Written so that not-a-number is set aside too.
         let set_aside = !(finite && nis <= accident_bound(per));
         if !set_aside {
-            self.recursion = trial;
+            self.filter = trial;
         }
-        Taken { nis, set_aside }
+        PoseUpdate { nis, set_aside }
     }
 
-    pub(super) fn problem(&self, poses: &[Seen]) -> CalibrationProblem {
-        let rows: Vec<Row> = poses.iter().map(|seen| seen.row_of(&self.state.sensor)).collect();
+    pub(super) fn problem(&self, poses: &[PoseRecord]) -> CalibrationProblem {
+        let rows: Vec<Row> = poses.iter().map(|record| record.row_of(&self.state.sensor)).collect();
         let sensor = match self.state.sensor.as_str() {
             "cable" => Sensor::Cable,
             "position" => Sensor::Position,
@@ -319,19 +323,19 @@ impl Tracker {
         };
         let dataset = Dataset::new("track", sensor, rows);
         let weights: Vec<_> = poses.iter().map(|s| Weight { per_mm: s.per_mm, per_rad: s.per_rad }).collect();
-        CalibrationProblem::new(&dataset, &self.begun.model, &self.frames, &self.parameters, &[], &weights)
+        CalibrationProblem::new(&dataset, &self.initial.model, &self.frames, &self.parameters, &[], &weights)
     }
 
-    pub(super) fn seen(&self, observed: &Observations) -> Vec<Seen> {
+    pub(super) fn pose_records(&self, observed: &Observations) -> Vec<PoseRecord> {
         let weights = rounding::weights(
             &observed.dataset,
-            &self.begun.model,
+            &self.initial.model,
             &self.frames,
             &observed.angles,
             self.state.sigma_mm,
             self.state.sigma_rad,
         );
-        let one = |(row, weight): (&Row, &Weight)| Seen {
+        let one = |(row, weight): (&Row, &Weight)| PoseRecord {
             file: observed.dataset.file.clone(),
             row: row.number,
             time_h: row.condition.time_h,
@@ -355,7 +359,7 @@ impl Tracker {
     pub(super) fn error_mm(&self, problem: &CalibrationProblem, at: usize, per_mm: f64) -> f64 {
         let per = problem.rows_per_observation();
         let mut r = vec![0.0; per];
-        problem.residuals(self.recursion.x.as_slice(), at * per..(at + 1) * per, &mut r);
+        problem.residuals(self.filter.x.as_slice(), at * per..(at + 1) * per, &mut r);
         match r.as_slice() {
             [length] => length / per_mm,
             rows => rows.iter().take(3).map(|v| v * v).sum::<f64>().sqrt() / per_mm,
@@ -372,7 +376,7 @@ impl Tracker {
 
     /// Name of the robot.
     pub fn robot(&self) -> &str {
-        &self.begun.robot
+        &self.initial.robot
     }
 
     /// Whether so many poses were set aside that the track says little: more than one in ten.
@@ -392,18 +396,18 @@ impl Tracker {
 
     /// Deviations of the parameters from the model that tracking began with.
     pub fn deviations(&self) -> &[f64] {
-        self.recursion.x.as_slice()
+        self.filter.x.as_slice()
     }
 
     /// Standard deviations of these.
     pub fn sigmas(&self) -> Vec<f64> {
-        self.recursion.covariance().diagonal().iter().map(|v| v.max(0.0).sqrt()).collect()
+        self.filter.covariance().diagonal().iter().map(|v| v.max(0.0).sqrt()).collect()
     }
 
     /// A problem of rows for [`Tracker::update`], with the weights that tracking gives them.
     pub fn prepare(&self, dataset: &Dataset) -> CalibrationProblem {
-        let (observed, _) = prepare_observations(dataset, &self.begun.nominal, false);
-        self.problem(&self.seen(&observed))
+        let (observed, _) = prepare_observations(dataset, &self.initial.nominal, false);
+        self.problem(&self.pose_records(&observed))
     }
 }
 
@@ -417,7 +421,7 @@ const FOREIGN_MM: f64 = 0.05;
 /// A covariance of an identification may be singular to rounding; this is nothing beside any tolerance (mm², rad²).
 const SMALLEST_VARIANCE: f64 = 1e-14;
 
-fn drift_of(parameter: &Parameter, options: &Options) -> f64 {
+fn process_noise(parameter: &Parameter, options: &Options) -> f64 {
     if let Some(own) = options.drift.get(&parameter.to_string()) {
         return *own;
     }

@@ -94,7 +94,7 @@ fn zero_of_joint_3() -> LinkDeviation {
 fn a_joint_that_lost_its_zero_is_named_with_its_size_and_its_pose() {
     let dataset = with_jump(70, zero_of_joint_3());
     let mut tracker = Tracker::begin(model(), "hash", &dataset, &Options::default()).unwrap();
-    let alarms = tracker.take(&dataset).unwrap();
+    let alarms = tracker.process_file(&dataset).unwrap();
     assert_eq!(alarms.len(), 1, "{alarms:?}");
     let alarm = &alarms[0];
     assert!(
@@ -123,7 +123,7 @@ fn a_sensor_that_was_knocked_is_named_as_a_whole() {
         *p += shift;
     }
     let mut tracker = Tracker::begin(model(), "hash", &dataset, &Options::default()).unwrap();
-    let alarms = tracker.take(&dataset).unwrap();
+    let alarms = tracker.process_file(&dataset).unwrap();
     assert_eq!(alarms.len(), 1, "{alarms:#?}");
     let alarm = &alarms[0];
     assert_eq!(alarm.parameter, "the sensor against the arm's base", "{alarm}");
@@ -134,7 +134,7 @@ fn a_sensor_that_was_knocked_is_named_as_a_whole() {
     // from its frame, and the last from the touched point.
     let calm = measured(2, None);
     let mut undisturbed = Tracker::begin(model(), "hash", &calm, &Options::default()).unwrap();
-    undisturbed.take(&calm).unwrap();
+    undisturbed.process_file(&calm).unwrap();
     let (after, calm) = (tracker.model(), undisturbed.model());
     for joint in 1..5 {
         let off = after.model.links[joint].theta_rad - calm.model.links[joint].theta_rad;
@@ -176,7 +176,7 @@ fn a_slow_drift_is_named_with_its_rate_and_followed() {
     let rate = 0.001;
     let dataset = with_drift(80, rate);
     let mut tracker = Tracker::begin(model(), "hash", &dataset, &Options::default()).unwrap();
-    let alarms = tracker.take(&dataset).unwrap();
+    let alarms = tracker.process_file(&dataset).unwrap();
     let alarm = alarms.first().expect("the drift is noticed");
     assert!(
         alarm.parameter == "link3.theta" || alarm.alternatives.contains(&"link3.theta".to_owned()),
@@ -261,7 +261,7 @@ fn a_model_that_leaves_effects_unexplained_raises_no_alarm_on_the_arm_that_it_wa
         let division = |d: &Dataset| split::random(d, 0.2, 0);
         let found = identify(&first, "abb-irb-120", &robot, &frames, &division, &settings()).unwrap();
         let mut tracker = Tracker::begin(&found.estimated, "hash", &second, &Options::default()).unwrap();
-        let alarms = tracker.take(&second).unwrap();
+        let alarms = tracker.process_file(&second).unwrap();
         assert!(alarms.is_empty(), "{name}: {alarms:#?}");
     }
 }
@@ -275,7 +275,7 @@ fn accidents_that_nothing_explains_raise_an_alarm_that_says_so_and_move_nothing(
         dataset.rows[at].reading = other.rows[at].reading.clone();
     }
     let mut tracker = Tracker::begin(model(), "hash", &dataset, &Options::default()).unwrap();
-    assert!(tracker.take(&dataset).unwrap().is_empty());
+    assert!(tracker.process_file(&dataset).unwrap().is_empty());
     assert_eq!(tracker.state().accidents, 2);
     // Readings that scatter five times as much as they should are no parameter's doing.
     let mut dataset = measured(2, None);
@@ -285,7 +285,7 @@ fn accidents_that_nothing_explains_raise_an_alarm_that_says_so_and_move_nothing(
         *p += nalgebra::Vector3::new(sign(7), sign(11), sign(13));
     }
     let mut tracker = Tracker::begin(model(), "hash", &dataset, &Options::default()).unwrap();
-    let alarms = tracker.take(&dataset).unwrap();
+    let alarms = tracker.process_file(&dataset).unwrap();
     let first = alarms.first().expect("it is noticed");
     assert!(first.parameter.is_empty(), "{first}");
     assert!(first.to_string().contains("no single parameter explains it"), "{first}");
@@ -304,9 +304,9 @@ fn files_of_a_few_poses_each_begin_a_track_together() {
     assert_eq!((first.rows.len(), first.file.as_str()), (36, "day-0.csv and 2 more"));
     assert!(first_poses(&[], 30).is_none());
     let mut apart = Tracker::begin(model(), "hash", &first, &Options::default()).unwrap();
-    files.iter().for_each(|f| assert!(apart.take(f).unwrap().is_empty()));
+    files.iter().for_each(|f| assert!(apart.process_file(f).unwrap().is_empty()));
     let mut whole = Tracker::begin(model(), "hash", &day, &Options::default()).unwrap();
-    whole.take(&day).unwrap();
+    whole.process_file(&day).unwrap();
     assert_eq!(apart.deviations(), whole.deviations());
     assert_eq!(apart.state().consumed.len(), 10);
 }
@@ -318,13 +318,13 @@ fn where_the_arm_was_measured_grows_with_the_track_and_outlives_a_stop() {
     day.rows[70].reading = day.rows[71].reading.clone();
     let far = measured(2, None);
     let mut tracker = Tracker::begin(model(), "hash", &far, &Options::default()).unwrap();
-    tracker.take(&far).unwrap();
+    tracker.process_file(&far).unwrap();
     let (before, after) = (&model().region, tracker.model().region);
     assert!(after.samples_deg.len() > before.samples_deg.len());
     assert!((0..6).all(|i| after.min_deg[i] <= before.min_deg[i] && after.max_deg[i] >= before.max_deg[i]));
     // A reading that was set aside says nothing of where the arm is known.
     let mut tracker = Tracker::begin(model(), "hash", &day, &Options::default()).unwrap();
-    tracker.take(&day).unwrap();
+    tracker.process_file(&day).unwrap();
     assert_eq!(tracker.state().accidents, 1);
     assert!(tracker.model().region.max_deg[0] < 149.0);
 }
@@ -334,7 +334,7 @@ fn an_arm_that_stays_raises_no_alarm_and_the_bounds_hold() {
     for seed in 2..6 {
         let dataset = measured(seed, None);
         let mut tracker = Tracker::begin(model(), "hash", &dataset, &Options::default()).unwrap();
-        let alarms = tracker.take(&dataset).unwrap();
+        let alarms = tracker.process_file(&dataset).unwrap();
         assert!(alarms.is_empty(), "seed {seed}: {alarms:?}");
         let history = &tracker.state().history;
         let mean = history.iter().map(|s| s.nis).sum::<f64>() / history.len() as f64;
@@ -349,7 +349,7 @@ fn one_wrong_reading_is_an_accident_and_no_alarm() {
     let other = measured(7, None);
     dataset.rows[60].reading = other.rows[3].reading.clone();
     let mut tracker = Tracker::begin(model(), "hash", &dataset, &Options::default()).unwrap();
-    assert!(tracker.take(&dataset).unwrap().is_empty());
+    assert!(tracker.process_file(&dataset).unwrap().is_empty());
     assert_eq!(tracker.state().accidents, 1);
 }
 
@@ -358,10 +358,10 @@ fn a_stop_in_the_middle_changes_no_bit() {
     let dataset = with_jump(70, zero_of_joint_3());
     let rows = |n: usize| dataset.subset(&(0..n).collect::<Vec<_>>());
     let mut whole = Tracker::begin(model(), "hash", &rows(40), &Options::default()).unwrap();
-    whole.take(&dataset).unwrap();
+    whole.process_file(&dataset).unwrap();
     let mut parts = Tracker::begin(model(), "hash", &rows(40), &Options::default()).unwrap();
     for n in [40, 41, 75, 90, 120] {
-        parts.take(&rows(n)).unwrap();
+        parts.process_file(&rows(n)).unwrap();
         let text = parts.state().to_toml().unwrap();
         parts = Tracker::resume(model(), State::from_toml(&text).unwrap(), "state.toml").unwrap();
     }
@@ -378,10 +378,10 @@ fn what_cannot_be_tracked_is_said() {
     let error = Tracker::begin(model(), "hash", &few, &Options::default()).unwrap_err();
     assert!(error.to_string().contains("12 poses so far, 30 are needed"), "{error}");
     let mut tracker = Tracker::begin(model(), "hash", &dataset, &Options::default()).unwrap();
-    tracker.take(&few).unwrap();
+    tracker.process_file(&few).unwrap();
     let mut edited = dataset.clone();
     edited.rows[3].joints[0] += 1e-3;
-    let error = tracker.take(&edited).unwrap_err();
+    let error = tracker.process_file(&edited).unwrap_err();
     assert!(error.to_string().contains("12 rows that were taken in have changed"), "{error}");
     let cable = import::read(
         "cable.csv",
@@ -389,7 +389,7 @@ fn what_cannot_be_tracked_is_said() {
         &import::Options::default(),
     )
     .unwrap();
-    assert!(matches!(tracker.take(&cable), Err(TrackError::Sensor { .. })));
+    assert!(matches!(tracker.process_file(&cable), Err(TrackError::Sensor { .. })));
     let mut state = tracker.state().to_toml().unwrap();
     state = state.replace("truegrind.track/1", "truegrind.track/9");
     let state = State::from_toml(&state).unwrap();
@@ -407,15 +407,15 @@ fn every_key_of_the_state_is_kept_or_refused_and_no_number_is_nan() {
     // A change that was noticed, and few poses, so that there are not too many keys.
     let options = Options { window: 10, history: 24, sigma_mm: Some(0.02), ..Options::default() };
     let mut tracker = Tracker::begin(model(), "hash", &dataset, &options).unwrap();
-    let noticed = (41..110).find(|n| !tracker.take(&rows(*n)).unwrap().is_empty()).unwrap() + 6;
-    tracker.take(&rows(noticed)).unwrap();
+    let noticed = (41..110).find(|n| !tracker.process_file(&rows(*n)).unwrap().is_empty()).unwrap() + 6;
+    tracker.process_file(&rows(noticed)).unwrap();
     let state = tracker.state().to_toml().unwrap();
     assert!(state.contains("[[alarms]]") && state.contains("[[history]]"), "{state}");
     let state = state.replace("alternatives = []", "alternatives = [\"link3.d\"]");
     let next = |text: &str| -> Result<String, String> {
         let state = State::from_toml(text).map_err(|error| error.to_string())?;
         let mut track = Tracker::resume(model(), state, "state.toml").map_err(|error| error.to_string())?;
-        let alarms = track.take(&rows(noticed + 1)).map_err(|error| error.to_string())?;
+        let alarms = track.process_file(&rows(noticed + 1)).map_err(|error| error.to_string())?;
         let after = track.model().to_toml().map_err(|error| error.to_string())?;
         Ok(format!("{alarms:?}{after}{}", track.state().to_toml().map_err(|error| error.to_string())?))
     };
@@ -473,7 +473,7 @@ fn a_target_that_was_mounted_anew_is_one_alarm_and_the_track_goes_on() {
     ] {
         let dataset = spliced(&first, &second, 70);
         let mut tracker = Tracker::begin(model(), "hash", &dataset, &Options::default()).unwrap();
-        let alarms = tracker.take(&dataset).unwrap();
+        let alarms = tracker.process_file(&dataset).unwrap();
         let said: Vec<String> = alarms.iter().map(ToString::to_string).collect();
         assert_eq!(alarms.len(), 1, "{said:#?}");
         assert_eq!((alarms[0].course, alarms[0].since_row), (Course::Mounted, 72), "{said:#?}");
@@ -492,7 +492,7 @@ fn a_target_that_was_mounted_anew_is_one_alarm_and_the_track_goes_on() {
         let rows = |n: usize| dataset.subset(&(0..n).collect::<Vec<_>>());
         let mut parts = Tracker::begin(model(), "hash", &rows(40), &Options::default()).unwrap();
         for n in [40, 74, 76, 90, 120] {
-            parts.take(&rows(n)).unwrap();
+            parts.process_file(&rows(n)).unwrap();
             let text = parts.state().to_toml().unwrap();
             parts = Tracker::resume(model(), State::from_toml(&text).unwrap(), "state.toml").unwrap();
         }
@@ -513,14 +513,14 @@ fn a_burst_of_outliers_is_one_alarm_and_no_change() {
         dataset.rows[at].reading = other.rows[at].reading.clone();
     }
     let mut tracker = Tracker::begin(model(), "hash", &dataset, &Options::default()).unwrap();
-    let alarms = tracker.take(&dataset).unwrap();
+    let alarms = tracker.process_file(&dataset).unwrap();
     let said: Vec<String> = alarms.iter().map(ToString::to_string).collect();
     assert_eq!(alarms.len(), 1, "{said:#?}");
     assert_eq!((alarms[0].course, alarms[0].since_row), (Course::Burst, 62), "{said:#?}");
     assert_eq!(tracker.state().accidents, 32);
     assert!(tracker.mostly_set_aside());
     let mut undisturbed = Tracker::begin(model(), "hash", &calm, &Options::default()).unwrap();
-    undisturbed.take(&calm).unwrap();
+    undisturbed.process_file(&calm).unwrap();
     assert!(!undisturbed.mostly_set_aside());
     // Joints 2 to 5, which a sensor tells from its frame and from the touched point.
     let (after, calm) = (tracker.model(), undisturbed.model());

@@ -6,10 +6,10 @@ use nalgebra::{Point3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::blank::blank;
-use super::sight::clearance_mm;
-use super::space::{Space, Watch};
-use super::wanted::Wanted;
+use super::blank::blank_row;
+use super::cable::clearance_mm;
+use super::keep_out::{CollisionChecker, KeepOut};
+use super::setup::MeasurementSetup;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::inverse::Inverse;
 use truegrind_arm::model::Joints;
@@ -31,7 +31,7 @@ pub struct Bounds {
     /// Distance that a cable keeps from the lines between the joints (mm); `None` does not look.
     pub clearance_mm: Option<f64>,
     /// What the arm must not enter.
-    pub space: Space,
+    pub space: KeepOut,
 }
 
 impl Default for Bounds {
@@ -42,7 +42,7 @@ impl Default for Bounds {
             box_mm: None,
             distance_mm: None,
             clearance_mm: None,
-            space: Space::default(),
+            space: KeepOut::default(),
         }
     }
 }
@@ -62,7 +62,7 @@ pub struct Candidate {
 
 /// What became of random poses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Passed {
+pub struct RejectionCounts {
     /// Drawn.
     pub drawn: usize,
     /// Too near to a singularity.
@@ -77,7 +77,7 @@ pub struct Passed {
     pub blocked: usize,
 }
 
-impl fmt::Display for Passed {
+impl fmt::Display for RejectionCounts {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
@@ -88,24 +88,29 @@ impl fmt::Display for Passed {
     }
 }
 
-/// Random poses drawn for each that is wanted, before giving up.
+/// Random poses drawn for each that is setup, before giving up.
 const DRAWS_PER_CANDIDATE: usize = 60;
 
 /// Stretch of the cable before the hook that may pass the wrist (mm).
 pub(super) const FREE_MM: f64 = 120.0;
 
 /// Draws until `count` poses are allowed, or enough is enough. Cables take turns.
-pub fn draw(wanted: &Wanted<'_>, bounds: &Bounds, count: usize, seed: u64) -> (Vec<Candidate>, Passed) {
+pub fn draw(
+    setup: &MeasurementSetup<'_>,
+    bounds: &Bounds,
+    count: usize,
+    seed: u64,
+) -> (Vec<Candidate>, RejectionCounts) {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let limits = &wanted.nominal.limits;
-    let posed = wanted.nominal.at_condition(&Condition::default());
-    let inverse = Inverse::new(wanted.nominal, &Condition::default(), wanted.nominal);
+    let limits = &setup.nominal.limits;
+    let posed = setup.nominal.at_condition(&Condition::default());
+    let inverse = Inverse::new(setup.nominal, &Condition::default(), setup.nominal);
     let mut out: Vec<Candidate> = Vec::with_capacity(count);
-    let mut passed = Passed::default();
-    let watch = Watch::of(wanted, &bounds.space);
-    let anchors = if wanted.sensor == Sensor::Cable { wanted.frames.outlets_mm.len() } else { 1 };
-    while out.len() < count && passed.drawn < DRAWS_PER_CANDIDATE * count.max(20) {
-        passed.drawn += 1;
+    let mut rejections = RejectionCounts::default();
+    let checker = CollisionChecker::of(setup, &bounds.space);
+    let anchors = if setup.sensor == Sensor::Cable { setup.frames.outlets_mm.len() } else { 1 };
+    while out.len() < count && rejections.drawn < DRAWS_PER_CANDIDATE * count.max(20) {
+        rejections.drawn += 1;
         let joints = Joints::from_fn(|i, _| {
             let (low, high) = (limits.min_rad[i] + bounds.margin_rad, limits.max_rad[i] - bounds.margin_rad);
             // Joints that turn more than once say nothing new on the second turn.
@@ -114,40 +119,40 @@ pub fn draw(wanted: &Wanted<'_>, bounds: &Bounds, count: usize, seed: u64) -> (V
         });
         let singularity = inverse.smallest_singular_value(&joints);
         if !(singularity >= bounds.min_singularity) {
-            passed.singular += 1;
+            rejections.singular += 1;
             continue;
         }
         let frames = posed.frames(&joints);
-        let flange = frames.last() * wanted.nominal.flange;
-        let touched = flange * Point3::from(wanted.frames.flange_from_target.translation.vector);
+        let flange = frames.last() * setup.nominal.flange;
+        let touched = flange * Point3::from(setup.frames.flange_from_target.translation.vector);
         if let Some([low, high]) = bounds.box_mm
             && !(0..3).all(|k| (low[k]..=high[k]).contains(&touched[k]))
         {
-            passed.outside += 1;
+            rejections.outside += 1;
             continue;
         }
         let anchor = out.len() % anchors;
-        let origin = sensor_mm(wanted.sensor, wanted.frames, anchor);
+        let origin = sensor_mm(setup.sensor, setup.frames, anchor);
         let distance = (touched.coords - origin).norm();
         if let Some([low, high]) = bounds.distance_mm
             && !(low..=high).contains(&distance)
         {
-            passed.distance += 1;
+            rejections.distance += 1;
             continue;
         }
-        if let Some(wanted) = bounds.clearance_mm
-            && clearance_mm(&frames, &origin, &touched.coords, FREE_MM) < wanted
+        if let Some(required) = bounds.clearance_mm
+            && clearance_mm(&frames, &origin, &touched.coords, FREE_MM) < required
         {
-            passed.hidden += 1;
+            rejections.hidden += 1;
             continue;
         }
-        if watch.sides(&joints, [1; 6]).is_none() {
-            passed.blocked += 1;
+        if checker.sides(&joints, [1; 6]).is_none() {
+            rejections.blocked += 1;
             continue;
         }
         out.push(Candidate { joints, touched_mm: touched.coords, singularity, anchor });
     }
-    (out, passed)
+    (out, rejections)
 }
 
 /// Where the sensor stands in the base (mm).
@@ -164,7 +169,7 @@ pub(super) fn rows(candidates: &[Candidate]) -> Vec<Row> {
         .iter()
         .enumerate()
         .map(|(number, candidate)| {
-            let mut row = blank(number, candidate.joints, Sensor::Cable);
+            let mut row = blank_row(number, candidate.joints, Sensor::Cable);
             row.anchor = candidate.anchor;
             row
         })

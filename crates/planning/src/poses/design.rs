@@ -17,7 +17,7 @@
 use nalgebra::{Cholesky, DMatrix};
 use rayon::prelude::*;
 
-use super::rows::Told;
+use super::rows::ReadingJacobian;
 use truegrind_math::spectral;
 use truegrind_math::work::checkpoint;
 
@@ -27,8 +27,8 @@ pub use super::options::Index;
 #[derive(Debug, Clone, Copy)]
 pub struct Design<'a> {
     /// What each candidate would tell.
-    pub told: &'a Told,
-    /// What is wanted.
+    pub jacobian: &'a ReadingJacobian,
+    /// What is setup.
     pub index: Index,
 }
 
@@ -94,9 +94,9 @@ impl Part {
 
 impl Design<'_> {
     fn parts(&self) -> Option<Vec<Part>> {
-        let told = self.told;
+        let jacobian = self.jacobian;
         if self.index == Index::O1 {
-            let total = &told.readings * told.readings.transpose();
+            let total = &jacobian.readings * jacobian.readings.transpose();
             let eigen = spectral::symmetric_eigen(total)?;
             let largest = eigen.eigenvalues.max();
             let kept: Vec<usize> = (0..eigen.eigenvalues.len())
@@ -104,24 +104,25 @@ impl Design<'_> {
                 .collect();
             let basis = eigen.eigenvectors.select_columns(&kept);
             let ridge = DETERMINED * largest;
-            let readings = basis.transpose() * &told.readings;
+            let readings = basis.transpose() * &jacobian.readings;
             return (largest > 0.0).then(|| vec![Part { weight: 1.0, ridge, readings }]);
         }
-        let whole = Part { weight: 1.0, ridge: 1.0, readings: told.readings.clone() };
-        if told.interest.is_empty() {
+        let whole = Part { weight: 1.0, ridge: 1.0, readings: jacobian.readings.clone() };
+        if jacobian.interest.is_empty() {
             return Some(vec![whole]);
         }
-        let others: Vec<usize> = (0..told.readings.nrows()).filter(|k| !told.interest.contains(k)).collect();
-        let rest = Part { weight: -QUESTIONS, ridge: 1.0, readings: told.readings.select_rows(&others) };
+        let others: Vec<usize> =
+            (0..jacobian.readings.nrows()).filter(|k| !jacobian.interest.contains(k)).collect();
+        let rest = Part { weight: -QUESTIONS, ridge: 1.0, readings: jacobian.readings.select_rows(&others) };
         Some(vec![Part { weight: 1.0 + QUESTIONS, ..whole }, rest])
     }
 
     /// `count` different candidates, rising; `None` where a reading is not finite.
     pub fn choose(&self, count: usize) -> Option<Vec<usize>> {
-        let (told, parts) = (self.told, self.parts()?);
-        let per = told.per_row;
+        let (jacobian, parts) = (self.jacobian, self.parts()?);
+        let per = jacobian.per_row;
         let gains = |chosen: &[usize], without: Option<usize>| -> Option<Vec<f64>> {
-            let mut sum = vec![0.0; told.rows()];
+            let mut sum = vec![0.0; jacobian.rows()];
             for part in &parts {
                 let some = part.gains(per, &part.information(per, chosen, without))?;
                 sum.iter_mut().zip(some).for_each(|(s, g)| *s += part.weight * g);
@@ -131,9 +132,9 @@ impl Design<'_> {
         let best = |gains: &[f64], taken: &[bool]| {
             (0..gains.len()).filter(|&i| !taken[i]).reduce(|a, b| if gains[b] > gains[a] { b } else { a })
         };
-        let mut taken = vec![false; told.rows()];
+        let mut taken = vec![false; jacobian.rows()];
         let mut chosen: Vec<usize> = Vec::with_capacity(count);
-        while chosen.len() < count.min(told.rows()) {
+        while chosen.len() < count.min(jacobian.rows()) {
             let next = best(&gains(&chosen, None)?, &taken)?;
             taken[next] = true;
             chosen.push(next);
@@ -163,7 +164,7 @@ impl Design<'_> {
         let parts = self.parts()?;
         parts
             .iter()
-            .map(|part| Some(part.weight * log_det(&part.information(self.told.per_row, chosen, None))?))
+            .map(|part| Some(part.weight * log_det(&part.information(self.jacobian.per_row, chosen, None))?))
             .sum()
     }
 }

@@ -1,7 +1,7 @@
 //! How to plan.
 
 use super::candidate::Bounds;
-use super::rival::Question;
+use super::questions::Question;
 use super::schedule::Visits;
 use truegrind_calibration::identification::tolerance::Tolerance;
 

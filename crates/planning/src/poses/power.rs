@@ -11,9 +11,9 @@
 use nalgebra::{Cholesky, DMatrix};
 
 use super::options::Options;
-use super::rival::{Suspect, coupling, effects_of, harmonic, thermal};
+use super::questions::{CandidateCause, coupling, effects_of, harmonic, thermal};
 use super::rows::{jacobian, rig};
-use super::wanted::Wanted;
+use super::setup::MeasurementSetup;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::model::Model;
@@ -23,7 +23,7 @@ use truegrind_math::spectral;
 
 /// An effect with the smallest size that the rows decide.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Decidable {
+pub struct Detectability {
     /// Contract name.
     pub effect: &'static str,
     /// Which one: joint, order, cable.
@@ -42,7 +42,7 @@ pub struct Decidable {
     pub usual: f64,
 }
 
-impl Decidable {
+impl Detectability {
     /// Whether an effect of the size that is met in practice is decided.
     pub fn is_decided(&self) -> bool {
         self.shows.is_some_and(|shows| shows <= self.usual)
@@ -57,7 +57,7 @@ const USUAL_MM: f64 = 0.3;
 const ABSURD: f64 = 20.0;
 
 /// One effect, as columns.
-struct Asked {
+struct EffectColumns {
     effect: &'static str,
     which: String,
     joint: Option<usize>,
@@ -72,21 +72,21 @@ struct Asked {
 }
 
 /// Every effect of the catalogue, at the rows as planned.
-pub(super) fn decidable(
-    wanted: &Wanted<'_>,
+pub(super) fn detectability(
+    setup: &MeasurementSetup<'_>,
     parameters: &[Parameter],
     rows: &[Row],
     options: &Options,
-) -> Vec<Decidable> {
-    let (raw, scale) = jacobian(wanted, wanted.nominal, parameters, rows, options);
+) -> Vec<Detectability> {
+    let (raw, scale) = jacobian(setup, setup.nominal, parameters, rows, options);
     let mut x = raw.clone();
     for (mut column, scale) in x.column_iter_mut().zip(&scale) {
         column *= *scale;
     }
     let p = x.ncols();
     let Some(factor) = Cholesky::new(DMatrix::identity(p, p) + x.tr_mul(&x)) else { return Vec::new() };
-    let mut asked = of_arm(wanted, rows, options);
-    asked.extend(of_sensor(wanted, parameters, rows, &raw, options));
+    let mut asked = of_arm(setup, rows, options);
+    asked.extend(of_sensor(setup, parameters, rows, &raw, options));
     asked
         .into_iter()
         .map(|a| {
@@ -98,7 +98,7 @@ pub(super) fn decidable(
             let size = (options.decisive / weakest).sqrt();
             let shows = size * a.to_shows;
             let known = weakest > 0.0 && shows.is_finite() && shows < ABSURD;
-            Decidable {
+            Detectability {
                 effect: a.effect,
                 which: a.which,
                 joint: a.joint,
@@ -113,13 +113,13 @@ pub(super) fn decidable(
 }
 
 /// The effects of the arm.
-fn of_arm(wanted: &Wanted<'_>, rows: &[Row], options: &Options) -> Vec<Asked> {
+fn of_arm(setup: &MeasurementSetup<'_>, rows: &[Row], options: &Options) -> Vec<EffectColumns> {
     let mut out = Vec::new();
     let degrees = 1.0_f64.to_degrees();
     let all: Vec<Effect> = ["joint-compliance", "gear-ratio", "backlash"]
         .iter()
         .flat_map(|name| {
-            (0..6).flat_map(|j| effects_of(&Suspect { effect: (*name).to_owned(), joints: vec![j] }))
+            (0..6).flat_map(|j| effects_of(&CandidateCause { effect: (*name).to_owned(), joints: vec![j] }))
         })
         .chain((0..6).flat_map(|j| [harmonic(j, 1.0), harmonic(j, 2.0)]))
         .chain([(4, 3), (5, 4), (5, 3)].map(|(joint, driver)| coupling(joint, driver)))
@@ -143,10 +143,10 @@ fn of_arm(wanted: &Wanted<'_>, rows: &[Row], options: &Options) -> Vec<Asked> {
             Effect::ThermalDrift(_) => (0..1, "µm/m", 1e6, "all links, by the clock".to_owned()),
             _ => continue,
         };
-        let model = Model { effects: vec![effect.clone()], ..wanted.nominal.clone() };
+        let model = Model { effects: vec![effect.clone()], ..setup.nominal.clone() };
         let parameters: Vec<Parameter> =
             shown.map(|parameter| Parameter::Effect { index: 0, parameter }).collect();
-        let (columns, _) = jacobian(wanted, &model, &parameters, rows, options);
+        let (columns, _) = jacobian(setup, &model, &parameters, rows, options);
         let (to_shows, shows_unit, usual) = match &effect {
             // Growth over a metre, about the length of a small arm.
             Effect::ThermalDrift(_) => (1e3, "mm", USUAL_MM),
@@ -155,7 +155,17 @@ fn of_arm(wanted: &Wanted<'_>, rows: &[Row], options: &Options) -> Vec<Asked> {
         };
         let name = effect.name();
         let joint = effect.joint();
-        out.push(Asked { effect: name, which, joint, unit, shows_unit, usual, to_unit, to_shows, columns });
+        out.push(EffectColumns {
+            effect: name,
+            which,
+            joint,
+            unit,
+            shows_unit,
+            usual,
+            to_unit,
+            to_shows,
+            columns,
+        });
     }
     out
 }
@@ -172,12 +182,12 @@ fn largest_turn(model: &Model, rows: &[Row]) -> f64 {
 
 /// The effects of the measurement: what moves in the middle of the run, and a scale.
 fn of_sensor(
-    wanted: &Wanted<'_>,
+    setup: &MeasurementSetup<'_>,
     parameters: &[Parameter],
     rows: &[Row],
     raw: &DMatrix<f64>,
     options: &Options,
-) -> Vec<Asked> {
+) -> Vec<EffectColumns> {
     let per = raw.nrows() / rows.len().max(1);
     let mut out = Vec::new();
     let mut step = |effect, which: &str, of: &dyn Fn(&Parameter) -> bool| {
@@ -188,7 +198,7 @@ fn of_sensor(
         let mut columns = raw.select_columns(&places);
         let half = raw.nrows() / (2 * per) * per;
         columns.rows_mut(0, half).fill(0.0);
-        out.push(Asked {
+        out.push(EffectColumns {
             effect,
             which: which.to_owned(),
             joint: None,
@@ -200,7 +210,7 @@ fn of_sensor(
             columns,
         });
     };
-    if wanted.sensor == Sensor::Cable {
+    if setup.sensor == Sensor::Cable {
         step("sensor-zero-shift", "in the middle of the run", &|p| {
             matches!(p, Parameter::Zero { anchor: 0 })
         });
@@ -215,8 +225,8 @@ fn of_sensor(
         );
     }
     step("tool-shift", "in the middle of the run", &|p| matches!(p, Parameter::Target(k) if *k < 3));
-    let (columns, longest) = scale_column(wanted, rows, per, options);
-    out.push(Asked {
+    let (columns, longest) = scale_column(setup, rows, per, options);
+    out.push(EffectColumns {
         effect: "sensor-scale",
         which: "all readings".to_owned(),
         joint: None,
@@ -231,9 +241,14 @@ fn of_sensor(
 }
 
 /// What a relative error of the sensor's lengths adds to each whitened reading, and the longest reading (mm).
-fn scale_column(wanted: &Wanted<'_>, rows: &[Row], per: usize, options: &Options) -> (DMatrix<f64>, f64) {
-    let rig = rig(wanted);
-    let posed = wanted.nominal.at_condition(&Condition::default());
+fn scale_column(
+    setup: &MeasurementSetup<'_>,
+    rows: &[Row],
+    per: usize,
+    options: &Options,
+) -> (DMatrix<f64>, f64) {
+    let rig = rig(setup);
+    let posed = setup.nominal.at_condition(&Condition::default());
     let mut column = DMatrix::zeros(per * rows.len(), 1);
     let mut longest = 0.0_f64;
     let weight = 1.0 / options.noise.reading_mm;
@@ -241,13 +256,13 @@ fn scale_column(wanted: &Wanted<'_>, rows: &[Row], per: usize, options: &Options
         let flange = posed.forward(&row.joints);
         let Some(distance) = rig.distance_mm(&flange, row.anchor) else { continue };
         longest = longest.max(distance);
-        if wanted.sensor == Sensor::Cable {
+        if setup.sensor == Sensor::Cable {
             // Residuals are model minus reading; the sign does not matter.
             column[(i, 0)] = distance * weight;
             continue;
         }
         let point = flange * nalgebra::Point3::from(rig.target_on_flange_mm());
-        let from_sensor = point.coords - wanted.frames.base_from_sensor.translation.vector;
+        let from_sensor = point.coords - setup.frames.base_from_sensor.translation.vector;
         for k in 0..3 {
             column[(i * per + k, 0)] = from_sensor[k] * weight;
         }

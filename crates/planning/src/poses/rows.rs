@@ -7,8 +7,8 @@
 use nalgebra::{Cholesky, DMatrix};
 
 use super::options::Options;
-use super::rival::{Question, columns_of};
-use super::wanted::Wanted;
+use super::questions::{Question, columns_of};
+use super::setup::MeasurementSetup;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Model;
 use truegrind_arm::parameter::Parameter;
@@ -21,7 +21,7 @@ pub use super::options::Noise;
 
 /// What a list of rows tells.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Told {
+pub struct ReadingJacobian {
     /// p × (rows · scalars per row): one column for each scalar reading.
     pub readings: DMatrix<f64>,
     /// Scalar readings of a row.
@@ -35,9 +35,9 @@ pub struct Told {
 }
 
 /// The sensor as the simulator knows it.
-pub fn rig(wanted: &Wanted<'_>) -> Rig {
-    let frames = wanted.frames;
-    match wanted.sensor {
+pub fn rig(setup: &MeasurementSetup<'_>) -> Rig {
+    let frames = setup.frames;
+    match setup.sensor {
         Sensor::Cable => Rig::Cable {
             outlets_mm: frames.outlets_mm.clone(),
             zeros_mm: frames.zeros_mm.clone(),
@@ -57,14 +57,14 @@ pub fn rig(wanted: &Wanted<'_>) -> Rig {
 /// Whitened Jacobian, one row per scalar reading, and the priors of its columns. `rows` need no readings: the nominal ones
 /// are put in.
 pub(super) fn jacobian(
-    wanted: &Wanted<'_>,
+    setup: &MeasurementSetup<'_>,
     model: &Model,
     parameters: &[Parameter],
     rows: &[Row],
     options: &Options,
 ) -> (DMatrix<f64>, Vec<f64>) {
-    let rig = rig(wanted);
-    let posed = wanted.nominal.at_condition(&Condition::default());
+    let rig = rig(setup);
+    let posed = setup.nominal.at_condition(&Condition::default());
     let rows: Vec<Row> = rows
         .iter()
         .map(|row| {
@@ -77,8 +77,8 @@ pub(super) fn jacobian(
     let weight = Weight { per_mm: 1.0 / noise.reading_mm, per_rad: 1.0 / noise.reading_rad };
     let weights = vec![weight; rows.len()];
     let priors = options.tolerance.priors(parameters, model);
-    let dataset = Dataset::new("plan", wanted.sensor, rows);
-    let problem = CalibrationProblem::new(&dataset, model, wanted.frames, parameters, &priors, &weights);
+    let dataset = Dataset::new("plan", setup.sensor, rows);
+    let problem = CalibrationProblem::new(&dataset, model, setup.frames, parameters, &priors, &weights);
     let count = problem.rows();
     let mut residuals = vec![0.0; count];
     let mut columns = vec![0.0; count * parameters.len()];
@@ -88,36 +88,36 @@ pub(super) fn jacobian(
 }
 
 /// What rows tell of the geometry, and of what `questions` are about.
-pub(super) fn told(
-    wanted: &Wanted<'_>,
+pub(super) fn reading_jacobian(
+    setup: &MeasurementSetup<'_>,
     parameters: &[Parameter],
     rows: &[Row],
     questions: &[Question],
     options: &Options,
-) -> Told {
-    let (effects, of_frames) = columns_of(questions);
-    let model = Model { effects, ..wanted.nominal.clone() };
+) -> ReadingJacobian {
+    let (effects, frame_part) = columns_of(questions);
+    let model = Model { effects, ..setup.nominal.clone() };
     let mut all = parameters.to_vec();
     for (index, effect) in model.effects.iter().enumerate() {
         let count = effect.parameters().len();
         all.extend((0..count).map(|parameter| Parameter::Effect { index, parameter }));
     }
-    let (mut jacobian, scale) = jacobian(wanted, &model, &all, rows, options);
+    let (mut jacobian, scale) = jacobian(setup, &model, &all, rows, options);
     for (mut column, scale) in jacobian.column_iter_mut().zip(&scale) {
         column *= *scale;
     }
     let interest = (0..all.len())
-        .filter(|&k| k >= parameters.len() || of_frames.iter().any(|frame| frame.holds(&all[k])))
+        .filter(|&k| k >= parameters.len() || frame_part.iter().any(|frame| frame.contains(&all[k])))
         .collect();
-    let per_row = match wanted.sensor {
+    let per_row = match setup.sensor {
         Sensor::Cable => 1,
         Sensor::Position => 3,
         Sensor::Pose => 6,
     };
-    Told { readings: jacobian.transpose(), per_row, parameters: all, scale, interest }
+    ReadingJacobian { readings: jacobian.transpose(), per_row, parameters: all, scale, interest }
 }
 
-impl Told {
+impl ReadingJacobian {
     /// Number of rows.
     pub fn rows(&self) -> usize {
         self.readings.ncols() / self.per_row

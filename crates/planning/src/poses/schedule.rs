@@ -13,13 +13,13 @@ use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::blank::blank;
+use super::blank::blank_row;
+use super::cable::clearance_mm;
 use super::candidate::{Bounds, Candidate, FREE_MM, sensor_mm};
-use super::rival::{Question, asks};
-use super::roads::Roads;
-use super::sight::clearance_mm;
-use super::space::Watch;
-use super::wanted::Wanted;
+use super::keep_out::CollisionChecker;
+use super::questions::{Question, any_about};
+use super::roadmap::Roadmap;
+use super::setup::MeasurementSetup;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Joints;
 use truegrind_calibration::measurement::dataset::{Row as MeasuredRow, Sensor};
@@ -53,15 +53,15 @@ impl Default for Visits {
 
 impl Visits {
     /// More of what a diagnosis asks for.
-    pub(super) fn asked(&self, questions: &[Question]) -> Self {
+    pub(super) fn with_questions(&self, questions: &[Question]) -> Self {
         let mut out = *self;
-        if asks(questions, "backlash") {
+        if any_about(questions, "backlash") {
             out.both_sides = out.both_sides.max(20);
         }
-        if asks(questions, "thermal-drift") {
+        if any_about(questions, "thermal-drift") {
             out.warm_up = out.warm_up.max(16);
         }
-        if ["sensor-zero-shift", "sensor-frame-shift", "tool-shift"].iter().any(|e| asks(questions, e)) {
+        if ["sensor-zero-shift", "sensor-frame-shift", "tool-shift"].iter().any(|e| any_about(questions, e)) {
             // A pose that comes back tells when something moved.
             out.repeats = out.repeats.max(8);
         }
@@ -85,7 +85,7 @@ pub enum Purpose {
 
 impl Purpose {
     /// A word for tables.
-    pub fn word(self) -> &'static str {
+    pub fn label(self) -> &'static str {
         match self {
             Purpose::Geometry => "geometry",
             Purpose::OtherSide => "other side",
@@ -112,44 +112,44 @@ pub struct Row {
     /// When, from the start (h).
     pub time_h: f64,
     /// Whether a cable leaves its range or comes too near to a link on the way here.
-    pub rough_way: bool,
-    /// Joints (rad) that are passed on the way here, where the straight one would enter what is kept out of.
-    pub stops: Vec<Joints>,
+    pub cable_unclear: bool,
+    /// Joints (rad) that are rejections on the way here, where the straight one would enter what is kept out of.
+    pub waypoints: Vec<Joints>,
 }
 
 /// By which ways the arm goes from pose to pose where the straight one is not clear.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Ways<'a> {
+pub(super) struct Connections<'a> {
     /// Places to stop at: one, or two.
     pub(super) known: &'a [Joints],
     /// What is gone along where those do not do.
-    pub(super) roads: Option<&'a Roads>,
+    pub(super) roadmap: Option<&'a Roadmap>,
 }
 
 /// Orders the poses and their visits. Hands back the poses in the order in which they are first visited; `None` where no way
 /// between two of them is found.
 pub(super) fn schedule(
-    wanted: &Wanted<'_>,
+    setup: &MeasurementSetup<'_>,
     poses: Vec<Candidate>,
     visits: &Visits,
     bounds: &Bounds,
-    ways: &Ways<'_>,
+    connections: &Connections<'_>,
     seed: u64,
 ) -> Option<(Vec<Candidate>, Vec<Row>)> {
     let mut random = ChaCha8Rng::seed_from_u64(seed ^ 0x006f_7264_6572);
     let mut order: Vec<usize> = (0..poses.len()).collect();
     order.shuffle(&mut random);
-    let order = smoothed(wanted, bounds, &poses, order);
+    let order = smoothed(setup, bounds, &poses, order);
     let poses: Vec<Candidate> = order.into_iter().map(|i| poses[i].clone()).collect();
     let count = poses.len();
     let sides: Vec<[i8; 6]> =
         poses.iter().map(|_| std::array::from_fn(|_| if random.random_bool(0.5) { 1 } else { -1 })).collect();
-    let watch = Watch::of(wanted, &bounds.space);
+    let checker = CollisionChecker::of(setup, &bounds.space);
     // Every candidate has such sides.
     let sides: Vec<[i8; 6]> = poses
         .iter()
         .zip(sides)
-        .map(|(pose, sides)| watch.sides(&pose.joints, sides).unwrap_or(sides))
+        .map(|(pose, sides)| checker.sides(&pose.joints, sides).unwrap_or(sides))
         .collect();
     // Pose and purpose, with the sides of the pose or the other ones.
     let other = visits.both_sides.min(count);
@@ -190,31 +190,37 @@ pub(super) fn schedule(
             approach,
             purpose,
             time_h: number as f64 * visits.seconds_per_row / 3600.0,
-            rough_way: false,
-            stops: Vec::new(),
+            cable_unclear: false,
+            waypoints: Vec::new(),
         }
     });
     let mut rows: Vec<Row> = posed_rows.collect();
     for k in 1..rows.len() {
         let (from, to) = (poses[rows[k - 1].pose].joints, rows[k].approach_from);
         let pose = &poses[rows[k].pose].joints;
-        let stops = watch.stops(&from, &to, ways.known);
-        rows[k].stops = stops.or_else(|| ways.roads?.stops(&watch, &from, pose, &to))?;
+        let waypoints = checker.waypoints(&from, &to, connections.known);
+        rows[k].waypoints =
+            waypoints.or_else(|| connections.roadmap?.waypoints(&checker, &from, pose, &to))?;
         let places: Vec<Joints> =
-            std::iter::once(from).chain(rows[k].stops.iter().copied()).chain([to]).collect();
+            std::iter::once(from).chain(rows[k].waypoints.iter().copied()).chain([to]).collect();
         let anchor = poses[rows[k].pose].anchor;
-        rows[k].rough_way = !places.windows(2).all(|way| clear(wanted, bounds, &way[0], &way[1], anchor));
+        rows[k].cable_unclear = !places.windows(2).all(|way| clear(setup, bounds, &way[0], &way[1], anchor));
     }
     Some((poses, rows))
 }
 
 /// The same order with poses put off that are not reached clearly from the one before.
-fn smoothed(wanted: &Wanted<'_>, bounds: &Bounds, poses: &[Candidate], mut order: Vec<usize>) -> Vec<usize> {
+fn smoothed(
+    setup: &MeasurementSetup<'_>,
+    bounds: &Bounds,
+    poses: &[Candidate],
+    mut order: Vec<usize>,
+) -> Vec<usize> {
     for k in 1..order.len() {
         let from = poses[order[k - 1]].joints;
         let good = (k..order.len()).find(|&other| {
             let to = &poses[order[other]];
-            clear(wanted, bounds, &from, &to.joints, to.anchor)
+            clear(setup, bounds, &from, &to.joints, to.anchor)
         });
         if let Some(good) = good {
             let pose = order.remove(good);
@@ -228,17 +234,17 @@ fn smoothed(wanted: &Wanted<'_>, bounds: &Bounds, poses: &[Candidate], mut order
 const ON_THE_WAY: usize = 16;
 
 /// Whether a cable stays in its range and off the links while the joints run from one pose to another.
-fn clear(wanted: &Wanted<'_>, bounds: &Bounds, from: &Joints, to: &Joints, anchor: usize) -> bool {
-    if wanted.sensor != Sensor::Cable {
+fn clear(setup: &MeasurementSetup<'_>, bounds: &Bounds, from: &Joints, to: &Joints, anchor: usize) -> bool {
+    if setup.sensor != Sensor::Cable {
         return true;
     }
-    let posed = wanted.nominal.at_condition(&Condition::default());
-    let origin = sensor_mm(wanted.sensor, wanted.frames, anchor);
+    let posed = setup.nominal.at_condition(&Condition::default());
+    let origin = sensor_mm(setup.sensor, setup.frames, anchor);
     (0..=ON_THE_WAY).all(|k| {
         let joints = from.lerp(to, k as f64 / ON_THE_WAY as f64);
         let frames = posed.frames(&joints);
-        let flange = frames.last() * wanted.nominal.flange;
-        let touched = flange * Point3::from(wanted.frames.flange_from_target.translation.vector);
+        let flange = frames.last() * setup.nominal.flange;
+        let touched = flange * Point3::from(setup.frames.flange_from_target.translation.vector);
         let distance = (touched.coords - origin).norm();
         bounds.distance_mm.is_none_or(|[low, high]| (low..=high).contains(&distance))
             && bounds
@@ -254,7 +260,7 @@ pub(super) fn data(planned: &[Row], poses: &[Candidate]) -> Vec<MeasuredRow> {
         .enumerate()
         .map(|(number, row)| {
             let pose = &poses[row.pose];
-            let mut out = blank(number, pose.joints, Sensor::Cable);
+            let mut out = blank_row(number, pose.joints, Sensor::Cable);
             out.anchor = pose.anchor;
             let condition =
                 Condition { time_h: Some(row.time_h), approach: row.approach, ..Condition::default() };

@@ -12,14 +12,14 @@ use truegrind_calibration::identification::calibration::{CalibrationProblem, Fra
 use truegrind_calibration::identification::tolerance::Tolerance;
 use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row, Sensor};
 use truegrind_estimation::least_squares::lm;
+use truegrind_planning::poses::cable::{clearance_mm, segment_distance};
 use truegrind_planning::poses::candidate::Bounds;
 use truegrind_planning::poses::design::{Design, Index};
-use truegrind_planning::poses::drive::{Drive, draft};
-use truegrind_planning::poses::rival::{Suspect, effects_of, questions};
-use truegrind_planning::poses::rows::{Noise, Told, rig};
+use truegrind_planning::poses::program::{ProgramSettings, draft};
+use truegrind_planning::poses::questions::{CandidateCause, effects_of, questions};
+use truegrind_planning::poses::rows::{Noise, ReadingJacobian, rig};
 use truegrind_planning::poses::schedule::Purpose;
-use truegrind_planning::poses::sight::{clearance_mm, segment_distance};
-use truegrind_planning::poses::{Options, Plan, PlanError, Wanted, plan};
+use truegrind_planning::poses::{MeasurementSetup, Options, Plan, PlanError, plan};
 use truegrind_programs::motion::{MotionKind, TargetValue};
 use truegrind_programs::rapid::{Task, writer};
 
@@ -53,7 +53,7 @@ fn small() -> Options {
 
 fn planned(sensor: Sensor, frames: &Frames, options: &Options) -> Plan {
     let nominal = nominal();
-    plan(&Wanted { nominal: &nominal, sensor, frames }, options).unwrap()
+    plan(&MeasurementSetup { nominal: &nominal, sensor, frames }, options).unwrap()
 }
 
 #[test]
@@ -89,10 +89,15 @@ fn exchange_finds_the_best_pair_and_weighs_what_is_asked() {
     let mut asked_more = 0;
     for _ in 0..20 {
         let readings = DMatrix::from_fn(5, 24, |_, _| random.random_range(-3.0..3.0));
-        let mut told =
-            Told { readings, per_row: 1, parameters: Vec::new(), scale: vec![1.0; 5], interest: Vec::new() };
-        let best = |told: &Told| {
-            let design = Design { told, index: Index::D };
+        let mut jacobian = ReadingJacobian {
+            readings,
+            per_row: 1,
+            parameters: Vec::new(),
+            scale: vec![1.0; 5],
+            interest: Vec::new(),
+        };
+        let best = |jacobian: &ReadingJacobian| {
+            let design = Design { jacobian, index: Index::D };
             let pairs = (0..24).flat_map(|a| (0..a).map(move |b| [b, a]));
             let best = pairs
                 .map(|pair| (design.value(&pair).unwrap(), pair))
@@ -103,18 +108,22 @@ fn exchange_finds_the_best_pair_and_weighs_what_is_asked() {
             assert!(value <= best.0 + 1e-12);
             // A local optimum, at the worst a few percent of a parameter's information below the best.
             assert!(
-                told.interest.is_empty().then_some(value).is_none_or(|v| ((v - best.0) / 5.0).exp() > 0.85)
+                jacobian
+                    .interest
+                    .is_empty()
+                    .then_some(value)
+                    .is_none_or(|v| ((v - best.0) / 5.0).exp() > 0.85)
             );
             (value > best.0 - 1e-9, found)
         };
         // One exchange at a time may end beside the best pair.
-        let (plain, without) = best(&told);
-        told.interest = vec![4];
-        let (asked, with) = best(&told);
+        let (plain, without) = best(&jacobian);
+        jacobian.interest = vec![4];
+        let (asked, with) = best(&jacobian);
         asked_more += usize::from(plain) + usize::from(asked);
         // What is known of the fifth parameter alone does not become less.
         let sigma = |set: &[usize]| {
-            let covariance = told.covariance(&told.information(set)).unwrap();
+            let covariance = jacobian.covariance(&jacobian.information(set)).unwrap();
             covariance[(4, 4)]
         };
         assert!(sigma(&with) <= sigma(&without) + 1e-9, "{} {}", sigma(&with), sigma(&without));
@@ -148,7 +157,7 @@ fn every_row_is_within_its_bounds_and_the_cable_clears_the_arm() {
             assert!((off - f64::from(*side) * 3.0_f64.to_radians()).abs() < 1e-12);
         }
     }
-    assert!(found.passed.hidden > 0 && found.passed.distance > 0, "{:?}", found.passed);
+    assert!(found.rejections.hidden > 0 && found.rejections.distance > 0, "{:?}", found.rejections);
 }
 
 #[test]
@@ -179,16 +188,16 @@ fn repeats_other_sides_and_warm_up_are_there() {
 #[test]
 fn the_program_goes_to_every_pose_and_reads_back_byte_for_byte() {
     let (frames, nominal) = (cable(), nominal());
-    let wanted = Wanted { nominal: &nominal, sensor: Sensor::Cable, frames: &frames };
-    let found = plan(&wanted, &small()).unwrap();
-    let program = writer::write(&draft(&found, &wanted, &Drive::default())).unwrap();
+    let setup = MeasurementSetup { nominal: &nominal, sensor: Sensor::Cable, frames: &frames };
+    let found = plan(&setup, &small()).unwrap();
+    let program = writer::write(&draft(&found, &setup, &ProgramSettings::default())).unwrap();
     let task = Task::read(&[("poses.mod", program.as_slice())]);
     assert_eq!(task.trees[0].source(), program.as_slice());
     assert!(task.listing.opaque.is_empty());
     let motions = &task.listing.motions;
     assert_eq!(motions.len(), 2 * found.rows.len());
     for (pair, row) in motions.chunks(2).zip(&found.rows) {
-        for (motion, wanted) in pair.iter().zip([&row.approach_from, &found.poses[row.pose].joints]) {
+        for (motion, setup) in pair.iter().zip([&row.approach_from, &found.poses[row.pose].joints]) {
             assert_eq!(motion.kind, MotionKind::AbsoluteJoint);
             let Ok(TargetValue::Joint(target)) = motion.targets[0].value else { panic!("no joints") };
             for k in 0..6 {
@@ -206,7 +215,7 @@ fn the_program_goes_to_every_pose_and_reads_back_byte_for_byte() {
 fn left_by_geometry(found: &Plan, sensor: Sensor, frames: &Frames, effect: Effect, options: &Options) -> f64 {
     let nominal = nominal();
     let actual = Model { effects: vec![effect], ..nominal.clone() };
-    let rig = rig(&Wanted { nominal: &nominal, sensor, frames });
+    let rig = rig(&MeasurementSetup { nominal: &nominal, sensor, frames });
     let rows: Vec<Row> = found
         .rows
         .iter()
@@ -233,10 +242,10 @@ fn what_the_plan_promises_to_decide_it_decides() {
     for (sensor, frames) in [(Sensor::Cable, cable()), (Sensor::Position, tracker())] {
         let found = planned(sensor, &frames, &options);
         let smallest = |effect: &str, joint: usize| {
-            let of = |d: &&truegrind_planning::poses::power::Decidable| {
+            let of = |d: &&truegrind_planning::poses::power::Detectability| {
                 d.effect == effect && d.joint == Some(joint)
             };
-            found.decidable.iter().find(of).and_then(|d| d.smallest).unwrap()
+            found.detectability.iter().find(of).and_then(|d| d.smallest).unwrap()
         };
         for (name, joint, unit) in [
             ("joint-compliance", 1, 1e-6),
@@ -244,14 +253,15 @@ fn what_the_plan_promises_to_decide_it_decides() {
             ("backlash", 1, 1.0_f64.to_radians()),
             ("backlash", 3, 1.0_f64.to_radians()),
         ] {
-            let mut effect = effects_of(&Suspect { effect: name.into(), joints: vec![joint] }).remove(0);
+            let mut effect =
+                effects_of(&CandidateCause { effect: name.into(), joints: vec![joint] }).remove(0);
             effect.set(0, smallest(name, joint) * unit);
             let lambda = 2.0 * left_by_geometry(&found, sensor, &frames, effect, &options);
             assert!((lambda / 25.0 - 1.0).abs() < 0.1, "{sensor:?} {name} {joint}: λ = {lambda}");
         }
         // Of two parameters the worst direction: any other phase shows more.
         let mut effect =
-            effects_of(&Suspect { effect: "gear-eccentricity".into(), joints: vec![2] }).remove(0);
+            effects_of(&CandidateCause { effect: "gear-eccentricity".into(), joints: vec![2] }).remove(0);
         let size = smallest("gear-eccentricity", 2).to_radians();
         for phase in [0.0_f64, 0.8, 1.6, 2.4] {
             effect.set(0, size * phase.cos());
@@ -260,7 +270,7 @@ fn what_the_plan_promises_to_decide_it_decides() {
             assert!(lambda > 22.0, "{sensor:?}, phase {phase}: λ = {lambda}");
         }
         // The offset of joint 6 and what turns with it cannot be seen by a cable at the flange's axis, for one.
-        assert!(found.decidable.iter().all(|d| d.smallest.is_none_or(|s| s > 0.0 && s.is_finite())));
+        assert!(found.detectability.iter().all(|d| d.smallest.is_none_or(|s| s > 0.0 && s.is_finite())));
     }
 }
 
@@ -274,13 +284,14 @@ fn a_diagnosis_that_is_ambiguous_gets_the_poses_that_decide() {
         "not_testable": [{"effect": "backlash", "reason": "no approach columns", "remedy": "both sides"}] }"#;
     let asked = questions(text).unwrap();
     assert_eq!(asked.len(), 2, "{asked:?}");
-    assert_eq!(asked[0].suspects[0], Suspect { effect: "joint-compliance".into(), joints: vec![1] });
+    assert_eq!(asked[0].causes[0], CandidateCause { effect: "joint-compliance".into(), joints: vec![1] });
     let plain = Options { poses: 24, ..small() };
     let deciding = Options { questions: asked, ..plain.clone() };
     let shows = |options: &Options, effect: &str| {
         let found = planned(Sensor::Cable, &cable(), options);
-        let of = |d: &&truegrind_planning::poses::power::Decidable| d.effect == effect && d.joint == Some(1);
-        found.decidable.iter().find(of).and_then(|d| d.shows).unwrap()
+        let of =
+            |d: &&truegrind_planning::poses::power::Detectability| d.effect == effect && d.joint == Some(1);
+        found.detectability.iter().find(of).and_then(|d| d.shows).unwrap()
     };
     let (before, after) = (shows(&plain, "joint-compliance"), shows(&deciding, "joint-compliance"));
     assert!(after < before, "smaller compliance is decided: {after:.4} against {before:.4} degrees");
@@ -294,15 +305,15 @@ fn a_diagnosis_that_is_ambiguous_gets_the_poses_that_decide() {
 #[test]
 fn too_narrow_bounds_say_what_failed() {
     let (frames, nominal) = (cable(), nominal());
-    let wanted = Wanted { nominal: &nominal, sensor: Sensor::Cable, frames: &frames };
+    let setup = MeasurementSetup { nominal: &nominal, sensor: Sensor::Cable, frames: &frames };
     let mut options = small();
     options.bounds.box_mm = Some([[5000.0, 0.0, 0.0], [5001.0, 1.0, 1.0]]);
-    let error = plan(&wanted, &options).unwrap_err();
+    let error = plan(&setup, &options).unwrap_err();
     assert!(matches!(error, PlanError::TooFew { found: 0, .. }));
     assert!(error.to_string().contains("outside the box"), "{error}");
-    let questions = vec![truegrind_planning::poses::rival::Question { suspects: Vec::new() }];
+    let questions = vec![truegrind_planning::poses::questions::Question { causes: Vec::new() }];
     let options = Options { index: Index::O1, questions, ..small() };
-    assert_eq!(plan(&wanted, &options), Err(PlanError::IndexOfQuestions));
+    assert_eq!(plan(&setup, &options), Err(PlanError::IndexOfQuestions));
 }
 
 /// Boxes that stand between the poses: the arm goes round them over as many stops as it takes, and what lies behind a box is not
@@ -311,7 +322,7 @@ fn too_narrow_bounds_say_what_failed() {
 fn boxes_between_the_poses_are_gone_round() {
     let (mut frames, nominal) = (tracker(), nominal());
     frames.flange_from_target.translation.vector = Vector3::new(38.0, 12.0, 61.0);
-    let wanted = Wanted { nominal: &nominal, sensor: Sensor::Position, frames: &frames };
+    let setup = MeasurementSetup { nominal: &nominal, sensor: Sensor::Position, frames: &frames };
     // Walls before and behind the arm.
     let boxes =
         [[[150.0, -20.0, 0.0], [900.0, 20.0, 2000.0]], [[-900.0, -20.0, 0.0], [-150.0, 20.0, 2000.0]]];
@@ -321,14 +332,14 @@ fn boxes_between_the_poses_are_gone_round() {
     options.bounds.space.floor_mm = Some(0.0);
     for seed in 0..2 {
         options.seed = seed;
-        let found = plan(&wanted, &options).unwrap();
+        let found = plan(&setup, &options).unwrap();
         assert_eq!(found.poses.len(), options.poses);
-        let away = least_on_the_way(&wanted, &found, &boxes, 60.0);
+        let away = least_on_the_way(&setup, &found, &boxes, 60.0);
         assert!(away >= 0.0, "seed {seed}: {away} mm");
     }
     // Neither side has as many as are asked for.
     (options.poses, options.seed) = (150, 0);
-    let error = plan(&wanted, &options).unwrap_err();
+    let error = plan(&setup, &options).unwrap_err();
     assert!(matches!(error, PlanError::NoWay { allowed: 200, found: 50..150, wanted: 150 }), "{error}");
     assert!(error.to_string().contains("ask for fewer poses"), "{error}");
 }
@@ -339,28 +350,35 @@ fn boxes_between_the_poses_are_gone_round() {
 fn thin_sheets_are_not_passed_between_two_looks() {
     let (mut frames, nominal) = (tracker(), nominal());
     frames.flange_from_target.translation.vector = Vector3::new(38.0, 12.0, 61.0);
-    let wanted = Wanted { nominal: &nominal, sensor: Sensor::Position, frames: &frames };
+    let setup = MeasurementSetup { nominal: &nominal, sensor: Sensor::Position, frames: &frames };
     let boxes = [[[350.0, -0.5, 0.0], [900.0, 0.5, 2000.0]], [[-0.5, 350.0, 0.0], [0.5, 900.0, 2000.0]]];
     let mut options = Options { poses: 15, candidates: 100, ..Options::default() };
     options.bounds.space.boxes_mm = boxes.to_vec();
     (options.bounds.space.radius_mm, options.bounds.space.approach_rad) = (4.0, options.visits.approach_rad);
-    let found = plan(&wanted, &options).unwrap();
-    let away = least_on_the_way(&wanted, &found, &boxes, 4.0);
+    let found = plan(&setup, &options).unwrap();
+    let away = least_on_the_way(&setup, &found, &boxes, 4.0);
     assert!(away >= 0.0, "{away} mm");
 }
 
 /// How far the links stay from boxes beyond their radius on all ways of a plan (mm), looked at elsewhere than the plan looks.
-fn least_on_the_way(wanted: &Wanted<'_>, found: &Plan, boxes: &[[[f64; 3]; 2]], radius_mm: f64) -> f64 {
+fn least_on_the_way(
+    setup: &MeasurementSetup<'_>,
+    found: &Plan,
+    boxes: &[[[f64; 3]; 2]],
+    radius_mm: f64,
+) -> f64 {
     let mut least = f64::INFINITY;
     for k in 1..found.rows.len() {
         let row = &found.rows[k];
         let (before, to) = (found.poses[found.rows[k - 1].pose].joints, found.poses[row.pose].joints);
-        let places: Vec<Joints> =
-            std::iter::once(before).chain(row.stops.iter().copied()).chain([row.approach_from, to]).collect();
+        let places: Vec<Joints> = std::iter::once(before)
+            .chain(row.waypoints.iter().copied())
+            .chain([row.approach_from, to])
+            .collect();
         for way in places.windows(2) {
             for share in (0..=150).map(|k| f64::from(k) / 150.0) {
                 let joints = way[0].lerp(&way[1], share);
-                least = least.min(least_away(wanted, &joints, boxes, radius_mm));
+                least = least.min(least_away(setup, &joints, boxes, radius_mm));
             }
         }
     }
@@ -368,8 +386,8 @@ fn least_on_the_way(wanted: &Wanted<'_>, found: &Plan, boxes: &[[[f64; 3]; 2]], 
 }
 
 /// The same where the arm stands, by points on the lines of its links; the wrist has half the radius.
-fn least_away(wanted: &Wanted<'_>, joints: &Joints, boxes: &[[[f64; 3]; 2]], radius_mm: f64) -> f64 {
-    let Wanted { nominal, frames, .. } = *wanted;
+fn least_away(setup: &MeasurementSetup<'_>, joints: &Joints, boxes: &[[[f64; 3]; 2]], radius_mm: f64) -> f64 {
+    let MeasurementSetup { nominal, frames, .. } = *wanted;
     let chain = nominal.at_condition(&Condition::default()).frames(joints);
     let flange = nominal.forward(joints, &Condition::default());
     let mut points: Vec<Vector3<f64>> = chain.origin.iter().map(|o| Vector3::from(*o)).collect();
@@ -408,10 +426,10 @@ fn segments_have_the_distance_of_their_closest_points() {
 #[test]
 fn a_pose_target_reads_what_it_should() {
     let (frames, nominal) = (tracker(), nominal());
-    let wanted = Wanted { nominal: &nominal, sensor: Sensor::Pose, frames: &frames };
+    let setup = MeasurementSetup { nominal: &nominal, sensor: Sensor::Pose, frames: &frames };
     let q = Joints::from([0.1, 0.2, -0.3, 0.4, 0.5, 0.6]);
     let flange = nominal.forward(&q, &Condition::default());
-    let Some(Reading::Pose(pose)) = rig(&wanted).predict(&flange, 0) else { panic!("no pose") };
+    let Some(Reading::Pose(pose)) = rig(&setup).predict(&flange, 0) else { panic!("no pose") };
     let back = frames.base_from_sensor * *pose * frames.flange_from_target.inverse();
     assert!((back.translation.vector - flange.translation.vector).norm() < 1e-9);
 }

@@ -22,7 +22,7 @@ pub const SCHEMA: &str = "truegrind.diagnosis/1";
 
 /// An effect that may be the cause.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Suspect {
+pub struct CandidateCause {
     /// Contract name.
     pub effect: String,
     /// Joints, 0-based; empty where it has none.
@@ -33,13 +33,13 @@ pub struct Suspect {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Question {
     /// The finding, then its alternatives; one alone where an effect could not be tested.
-    pub suspects: Vec<Suspect>,
+    pub causes: Vec<CandidateCause>,
 }
 
 /// Why a text is no diagnosis.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
-pub enum NoDiagnosis {
+pub enum DiagnosisFileError {
     /// Not JSON, or a key that is missing or of the wrong type.
     #[error("not a diagnosis: {0}")]
     Syntax(String),
@@ -53,7 +53,7 @@ pub enum NoDiagnosis {
 
 /// A part of the measurement whose place is in question.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum OfFrames {
+pub enum FramePart {
     /// A cable's zero.
     Zero,
     /// The sensor's frame or outlet.
@@ -62,13 +62,13 @@ pub enum OfFrames {
     Touched,
 }
 
-impl OfFrames {
+impl FramePart {
     /// Whether a parameter belongs to it.
-    pub fn holds(self, parameter: &Parameter) -> bool {
+    pub fn contains(self, parameter: &Parameter) -> bool {
         match parameter {
-            Parameter::Zero { .. } => self == OfFrames::Zero,
-            Parameter::SensorFrame(_) | Parameter::Outlet { .. } => self == OfFrames::Sensor,
-            Parameter::Target(_) => self == OfFrames::Touched,
+            Parameter::Zero { .. } => self == FramePart::Zero,
+            Parameter::SensorFrame(_) | Parameter::Outlet { .. } => self == FramePart::Sensor,
+            Parameter::Target(_) => self == FramePart::Touched,
             _ => false,
         }
     }
@@ -101,18 +101,18 @@ struct Named {
     joints: Option<Vec<usize>>,
 }
 
-fn suspect(effect: &str, joints: Option<&Vec<usize>>) -> Result<Suspect, NoDiagnosis> {
+fn cause(effect: &str, joints: Option<&Vec<usize>>) -> Result<CandidateCause, DiagnosisFileError> {
     let joints = joints.into_iter().flatten().map(|&joint| match joint {
         1..=6 => Ok(joint - 1),
-        _ => Err(NoDiagnosis::Syntax(format!("{effect}: joints: found {joint}, expected 1 to 6"))),
+        _ => Err(DiagnosisFileError::Syntax(format!("{effect}: joints: found {joint}, expected 1 to 6"))),
     });
-    Ok(Suspect { effect: effect.to_owned(), joints: joints.collect::<Result<_, _>>()? })
+    Ok(CandidateCause { effect: effect.to_owned(), joints: joints.collect::<Result<_, _>>()? })
 }
 
 /// The questions that a diagnosis leaves: ambiguous findings with their alternatives, and what was not testable.
 ///
 /// ```
-/// use truegrind_planning::poses::rival::{NoDiagnosis, questions};
+/// use truegrind_planning::poses::questions::{DiagnosisFileError, questions};
 ///
 /// let diagnosis = r#"{"schema": "truegrind.diagnosis/1", "findings": [
 ///     {"effect": "gear-ratio", "joints": [4], "confidence": "identified", "alternatives": []},
@@ -120,43 +120,43 @@ fn suspect(effect: &str, joints: Option<&Vec<usize>>) -> Result<Suspect, NoDiagn
 /// ], "not_testable": []}"#;
 /// let asked = questions(diagnosis)?;
 /// assert_eq!(asked.len(), 1);
-/// assert_eq!(asked[0].suspects[0].joints, [1]);
-/// assert_eq!(asked[0].suspects[1].effect, "thermal-drift");
-/// assert_eq!(questions(r#"{"schema": "other/1"}"#), Err(NoDiagnosis::Schema { found: "other/1".into() }));
-/// # Ok::<(), NoDiagnosis>(())
+/// assert_eq!(asked[0].causes[0].joints, [1]);
+/// assert_eq!(asked[0].causes[1].effect, "thermal-drift");
+/// assert_eq!(questions(r#"{"schema": "other/1"}"#), Err(DiagnosisFileError::Schema { found: "other/1".into() }));
+/// # Ok::<(), DiagnosisFileError>(())
 /// ```
 ///
 /// # Errors
-/// [`NoDiagnosis`], where the text is none.
-pub fn questions(text: &str) -> Result<Vec<Question>, NoDiagnosis> {
-    let fault = |error: serde_json::Error| NoDiagnosis::Syntax(error.to_string());
+/// [`DiagnosisFileError`], where the text is none.
+pub fn questions(text: &str) -> Result<Vec<Question>, DiagnosisFileError> {
+    let fault = |error: serde_json::Error| DiagnosisFileError::Syntax(error.to_string());
     let Kind { schema } = serde_json::from_str(text).map_err(fault)?;
     if schema != SCHEMA {
-        return Err(NoDiagnosis::Schema { found: schema });
+        return Err(DiagnosisFileError::Schema { found: schema });
     }
     let file: File = serde_json::from_str(text).map_err(fault)?;
-    let of = |named: &Named| suspect(&named.effect, named.joints.as_ref());
+    let of = |named: &Named| cause(&named.effect, named.joints.as_ref());
     let mut out = Vec::new();
     for finding in &file.findings {
         // Of one that is certain nothing is asked, but it must be one.
-        let first = suspect(&finding.effect, finding.joints.as_ref())?;
+        let first = cause(&finding.effect, finding.joints.as_ref())?;
         let others = finding.alternatives.iter().map(of).collect::<Result<Vec<_>, _>>()?;
         if finding.confidence == Confidence::Ambiguous {
-            out.push(Question { suspects: std::iter::once(first).chain(others).collect() });
+            out.push(Question { causes: std::iter::once(first).chain(others).collect() });
         }
     }
     for untested in &file.not_testable {
-        out.push(Question { suspects: vec![of(untested)?] });
+        out.push(Question { causes: vec![of(untested)?] });
     }
     Ok(out)
 }
 
 /// What an effect of that name looks like, at size zero; nothing for effects of the measurement.
-pub fn effects_of(suspect: &Suspect) -> Vec<Effect> {
+pub fn effects_of(cause: &CandidateCause) -> Vec<Effect> {
     // Where no joint is named, those that carry the arm.
-    let joints: &[usize] = if suspect.joints.is_empty() { &[1, 2] } else { &suspect.joints };
+    let joints: &[usize] = if cause.joints.is_empty() { &[1, 2] } else { &cause.joints };
     let each = |make: fn(usize) -> Effect| joints.iter().map(|&j| make(j)).collect();
-    match suspect.effect.as_str() {
+    match cause.effect.as_str() {
         "joint-compliance" => {
             each(|joint| Effect::JointCompliance(Compliance { joint, compliance_rad_per_nm: 0.0 }))
         }
@@ -189,27 +189,27 @@ pub(super) fn thermal() -> Effect {
 }
 
 /// What stands in the place of sensor effects, where the poses decide.
-fn of_frames(effect: &str) -> Option<OfFrames> {
+fn frame_part(effect: &str) -> Option<FramePart> {
     match effect {
-        "sensor-zero-shift" => Some(OfFrames::Zero),
-        "sensor-frame-shift" => Some(OfFrames::Sensor),
-        "tool-shift" => Some(OfFrames::Touched),
+        "sensor-zero-shift" => Some(FramePart::Zero),
+        "sensor-frame-shift" => Some(FramePart::Sensor),
+        "tool-shift" => Some(FramePart::Touched),
         _ => None,
     }
 }
 
 /// Parameters that the questions are about, as far as poses can answer: effects to be added, and frames.
-pub(super) fn columns_of(questions: &[Question]) -> (Vec<Effect>, Vec<OfFrames>) {
-    let (mut effects, mut frames): (Vec<Effect>, Vec<OfFrames>) = (Vec::new(), Vec::new());
-    for suspect in questions.iter().flat_map(|q| &q.suspects) {
-        for effect in effects_of(suspect) {
+pub(super) fn columns_of(questions: &[Question]) -> (Vec<Effect>, Vec<FramePart>) {
+    let (mut effects, mut frames): (Vec<Effect>, Vec<FramePart>) = (Vec::new(), Vec::new());
+    for cause in questions.iter().flat_map(|q| &q.causes) {
+        for effect in effects_of(cause) {
             // Poses at rest know neither time nor side.
             let by_order = matches!(effect, Effect::Backlash(_) | Effect::ThermalDrift(_));
             if !by_order && !effects.contains(&effect) {
                 effects.push(effect);
             }
         }
-        if let Some(frame) = of_frames(&suspect.effect)
+        if let Some(frame) = frame_part(&cause.effect)
             && !frames.contains(&frame)
         {
             frames.push(frame);
@@ -219,6 +219,6 @@ pub(super) fn columns_of(questions: &[Question]) -> (Vec<Effect>, Vec<OfFrames>)
 }
 
 /// Whether an effect is asked about.
-pub(super) fn asks(questions: &[Question], effect: &str) -> bool {
-    questions.iter().flat_map(|q| &q.suspects).any(|s| s.effect == effect)
+pub(super) fn any_about(questions: &[Question], effect: &str) -> bool {
+    questions.iter().flat_map(|q| &q.causes).any(|s| s.effect == effect)
 }

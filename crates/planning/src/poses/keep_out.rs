@@ -10,13 +10,13 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::wanted::Wanted;
+use super::setup::MeasurementSetup;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::{Joints, PreparedModel};
 
 /// What the arm must not enter, in its base.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Space {
+pub struct KeepOut {
     /// Nothing goes below this height (mm); `None` does not look.
     pub floor_mm: Option<f64>,
     /// Boxes that nothing enters: lower and upper corner (mm).
@@ -29,9 +29,9 @@ pub struct Space {
 
 /// The arm that must not enter it.
 #[derive(Debug)]
-pub(super) struct Watch<'a> {
-    space: &'a Space,
-    wanted: &'a Wanted<'a>,
+pub(super) struct CollisionChecker<'a> {
+    space: &'a KeepOut,
+    setup: &'a MeasurementSetup<'a>,
     arm: PreparedModel<'a>,
     /// How far the ends of the segments can be from the axis of each joint that moves them (mm).
     levers_mm: [[f64; 6]; ENDS],
@@ -43,11 +43,11 @@ const ENDS: usize = 9;
 /// Moving less than this between two looks tells nothing more: a way that comes so near to what is stated counts as blocked (mm).
 const FINEST_MM: f64 = 0.2;
 
-impl<'a> Watch<'a> {
-    pub(super) fn of(wanted: &'a Wanted<'a>, space: &'a Space) -> Self {
-        let arm = wanted.nominal.at_condition(&Condition::default());
+impl<'a> CollisionChecker<'a> {
+    pub(super) fn of(setup: &'a MeasurementSetup<'a>, space: &'a KeepOut) -> Self {
+        let arm = setup.nominal.at_condition(&Condition::default());
         let levers_mm = [[0.0; 6]; ENDS];
-        let mut out = Self { space, wanted, arm, levers_mm };
+        let mut out = Self { space, setup, arm, levers_mm };
         out.levers_mm = out.levers();
         out
     }
@@ -78,15 +78,15 @@ impl<'a> Watch<'a> {
     }
 
     /// Whether there is anything to look for.
-    pub(super) fn looks(&self) -> bool {
+    pub(super) fn is_active(&self) -> bool {
         self.space.floor_mm.is_some() || !self.space.boxes_mm.is_empty()
     }
 
     /// Base, ends of the links, flange and touched point (mm).
     fn ends(&self, joints: &Joints) -> [Vector3<f64>; ENDS] {
         let frames = self.arm.frames(joints);
-        let flange = frames.last() * self.wanted.nominal.flange;
-        let touched = flange * Point3::from(self.wanted.frames.flange_from_target.translation.vector);
+        let flange = frames.last() * self.setup.nominal.flange;
+        let touched = flange * Point3::from(self.setup.frames.flange_from_target.translation.vector);
         std::array::from_fn(|end| match end {
             FLANGE => flange.translation.vector,
             TOUCHED => touched.coords,
@@ -95,12 +95,12 @@ impl<'a> Watch<'a> {
     }
 
     /// Whether the arm stands clear with these joints.
-    pub(super) fn stands_clear(&self, joints: &Joints) -> bool {
-        !self.looks() || self.has_room(&self.ends(joints), &[0.0; ENDS])
+    pub(super) fn pose_is_clear(&self, joints: &Joints) -> bool {
+        !self.is_active() || self.has_clearance(&self.ends(joints), &[0.0; ENDS])
     }
 
     /// Whether all that moves has room about it: the radius of the link, and as much more as its ends may move (mm).
-    fn has_room(&self, ends: &[Vector3<f64>; ENDS], moved_mm: &[f64; ENDS]) -> bool {
+    fn has_clearance(&self, ends: &[Vector3<f64>; ENDS], moved_mm: &[f64; ENDS]) -> bool {
         (1..ENDS - 1).all(|segment| {
             let (a, b) = (&ends[segment], &ends[segment + 1]);
             let radius = self.space.radius_mm * if segment < WRIST { 1.0 } else { 0.5 };
@@ -113,27 +113,27 @@ impl<'a> Watch<'a> {
     }
 
     /// Whether it stays clear while all joints run evenly from one place to another.
-    pub(super) fn way_is_clear(&self, from: &Joints, to: &Joints) -> bool {
-        if !self.looks() {
+    pub(super) fn motion_is_clear(&self, from: &Joints, to: &Joints) -> bool {
+        if !self.is_active() {
             return true;
         }
-        let turns = self.wanted.nominal.joint_map * (to - from);
+        let turns = self.setup.nominal.joint_map * (to - from);
         let moved =
             |levers: &[f64; 6]| levers.iter().zip(&turns).map(|(lever, turn)| lever * turn.abs()).sum();
-        self.stretch_is_clear(from, to, &self.levers_mm.each_ref().map(moved))
+        self.interval_is_clear(from, to, &self.levers_mm.each_ref().map(moved))
     }
 
     /// The same of a stretch on which the ends of the segments move by no more than `moved_mm`.
-    fn stretch_is_clear(&self, from: &Joints, to: &Joints, moved_mm: &[f64; ENDS]) -> bool {
+    fn interval_is_clear(&self, from: &Joints, to: &Joints, moved_mm: &[f64; ENDS]) -> bool {
         let middle = from.lerp(to, 0.5);
         let (ends, half) = (self.ends(&middle), moved_mm.map(|moved| 0.5 * moved));
-        if self.has_room(&ends, &half) {
+        if self.has_clearance(&ends, &half) {
             return true;
         }
         half.iter().any(|half| *half > FINEST_MM)
-            && self.has_room(&ends, &[0.0; ENDS])
-            && self.stretch_is_clear(from, &middle, &half)
-            && self.stretch_is_clear(&middle, to, &half)
+            && self.has_clearance(&ends, &[0.0; ENDS])
+            && self.interval_is_clear(from, &middle, &half)
+            && self.interval_is_clear(&middle, to, &half)
     }
 
     /// Whether a pose can be approached from these sides, and from the opposite ones.
@@ -141,13 +141,13 @@ impl<'a> Watch<'a> {
         [1.0, -1.0].iter().all(|sign| {
             let begin =
                 Joints::from_fn(|i, _| pose[i] + sign * f64::from(sides[i]) * self.space.approach_rad);
-            self.way_is_clear(&begin, pose)
+            self.motion_is_clear(&begin, pose)
         })
     }
 
     /// Sides from which a pose can be approached, and from the opposite ones: `first` where they will do.
     pub(super) fn sides(&self, pose: &Joints, first: [i8; 6]) -> Option<[i8; 6]> {
-        if !self.stands_clear(pose) {
+        if !self.pose_is_clear(pose) {
             return None;
         }
         // The opposite sides are looked at together with them.
@@ -158,8 +158,8 @@ impl<'a> Watch<'a> {
     }
 
     /// Stops between two places that make the way clear, taken from these: none, one or two. `None` where they do not.
-    pub(super) fn stops(&self, from: &Joints, to: &Joints, known: &[Joints]) -> Option<Vec<Joints>> {
-        if self.way_is_clear(from, to) {
+    pub(super) fn waypoints(&self, from: &Joints, to: &Joints, known: &[Joints]) -> Option<Vec<Joints>> {
+        if self.motion_is_clear(from, to) {
             return Some(Vec::new());
         }
         let length = |a: &Joints, b: &Joints| (a - b).amax();
@@ -167,14 +167,15 @@ impl<'a> Watch<'a> {
         near.sort_by(|a, b| (length(from, a) + length(a, to)).total_cmp(&(length(from, b) + length(b, to))));
         near.truncate(MOST_STOPS);
         let reached: Vec<&Joints> =
-            near.iter().copied().filter(|stop| self.way_is_clear(from, stop)).collect();
-        let leaving: Vec<&Joints> = near.iter().copied().filter(|stop| self.way_is_clear(stop, to)).collect();
+            near.iter().copied().filter(|stop| self.motion_is_clear(from, stop)).collect();
+        let leaving: Vec<&Joints> =
+            near.iter().copied().filter(|stop| self.motion_is_clear(stop, to)).collect();
         if let Some(stop) = reached.iter().find(|stop| leaving.contains(stop)) {
             return Some(vec![**stop]);
         }
         let pairs = reached.iter().flat_map(|first| leaving.iter().map(move |second| (*first, *second)));
         let found =
-            pairs.into_iter().take(MOST_PAIRS).find(|(first, second)| self.way_is_clear(first, second));
+            pairs.into_iter().take(MOST_PAIRS).find(|(first, second)| self.motion_is_clear(first, second));
         found.map(|(first, second)| vec![*first, *second])
     }
 }
@@ -193,7 +194,7 @@ const WRIST: usize = 4;
 const MOST_STOPS: usize = 200;
 const MOST_PAIRS: usize = 2000;
 
-/// Whether a capsule keeps off a box. Most are told by their middles.
+/// Whether a capsule keeps off a box. Most are jacobian by their middles.
 fn keeps_off(a: &Vector3<f64>, b: &Vector3<f64>, corners: &[[f64; 3]; 2], radius: f64) -> bool {
     let middle = (a + b) * 0.5;
     let away = outside(&middle, corners);

@@ -4,7 +4,7 @@
 //! is involved.
 
 use super::schedule::{FIRST_ROW, Row};
-use super::{Plan, Wanted, rows};
+use super::{MeasurementSetup, Plan, rows};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Joints;
 use truegrind_calibration::measurement::dataset::Reading;
@@ -13,7 +13,7 @@ use truegrind_programs::motion::{Frame, JointTarget, MotionKind, TargetValue, To
 
 /// How to go.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Drive {
+pub struct ProgramSettings {
     /// Name of the module.
     pub name: String,
     /// Name of the robot, for the comments.
@@ -26,7 +26,7 @@ pub struct Drive {
     pub settle_s: f64,
 }
 
-impl Default for Drive {
+impl Default for ProgramSettings {
     fn default() -> Self {
         Self {
             name: "Measure".to_owned(),
@@ -39,7 +39,7 @@ impl Default for Drive {
 }
 
 /// The program of a plan.
-pub fn draft(plan: &Plan, wanted: &Wanted<'_>, drive: &Drive) -> Draft {
+pub fn draft(plan: &Plan, setup: &MeasurementSetup<'_>, drive: &ProgramSettings) -> Draft {
     let target = |joints: &Joints| {
         TargetValue::Joint(JointTarget {
             robot_deg: std::array::from_fn(|i| joints[i].to_degrees()),
@@ -57,8 +57,8 @@ pub fn draft(plan: &Plan, wanted: &Wanted<'_>, drive: &Drive) -> Draft {
     };
     let mut steps = Vec::with_capacity(2 * plan.rows.len());
     for (number, row) in (FIRST_ROW..).zip(&plan.rows) {
-        let said = comment(plan, wanted, row, number);
-        for stop in &row.stops {
+        let said = comment(plan, setup, row, number);
+        for stop in &row.waypoints {
             steps.push(step(stop, drive.travel_mm_s, Some("on the way, to keep clear".to_owned()), None));
         }
         steps.push(step(&row.approach_from, drive.travel_mm_s, Some(said), None));
@@ -103,13 +103,13 @@ pub fn draft(plan: &Plan, wanted: &Wanted<'_>, drive: &Drive) -> Draft {
     }
 }
 
-fn comment(plan: &Plan, wanted: &Wanted<'_>, row: &Row, number: usize) -> String {
+fn comment(plan: &Plan, setup: &MeasurementSetup<'_>, row: &Row, number: usize) -> String {
     let sides: String = row.approach.iter().map(|side| if *side > 0 { '+' } else { '-' }).collect();
-    let mut text = format!("row {number}: pose {} ({}), from {sides}", row.pose + 1, row.purpose.word());
-    if let Some(Reading::Cable(length)) = reading(plan, wanted, row) {
+    let mut text = format!("row {number}: pose {} ({}), from {sides}", row.pose + 1, row.purpose.label());
+    if let Some(Reading::Cable(length)) = reading(plan, setup, row) {
         text.push_str(&format!(", cable about {length:.1} mm"));
     }
-    if row.rough_way {
+    if row.cable_unclear {
         text.push_str("; on the way here the cable leaves its range or nears a link: unhook it");
     }
     text
@@ -128,21 +128,21 @@ pub fn checked(plan: &Plan) -> String {
     if floor.is_empty() && boxes.is_empty() {
         return "not where the arm is in the cell".to_owned();
     }
-    let stops: usize = plan.rows.iter().map(|row| row.stops.len()).sum();
-    let passed = match stops {
+    let stops: usize = plan.rows.iter().map(|row| row.waypoints.len()).sum();
+    let rejections = match stops {
         0 => String::new(),
         1 => ", with 1 stop on the way".to_owned(),
         stops => format!(", with {stops} stops on the way"),
     };
     format!(
-        "links (as capsules of {:.0} mm radius) and target stay {floor}{and}{boxes} at every pose and on every way between them{passed}",
+        "links (as capsules of {:.0} mm radius) and target stay {floor}{and}{boxes} at every pose and on every way between them{rejections}",
         space.radius_mm
     )
 }
 
 /// What the sensor will read of the nominal arm.
-pub fn reading(plan: &Plan, wanted: &Wanted<'_>, row: &Row) -> Option<Reading> {
+pub fn reading(plan: &Plan, setup: &MeasurementSetup<'_>, row: &Row) -> Option<Reading> {
     let pose = &plan.poses[row.pose];
-    let flange = wanted.nominal.forward(&pose.joints, &Condition::default());
-    rows::rig(wanted).predict(&flange, pose.anchor)
+    let flange = setup.nominal.forward(&pose.joints, &Condition::default());
+    rows::rig(setup).predict(&flange, pose.anchor)
 }

@@ -6,7 +6,7 @@ use truegrind_calibration::measurement::dataset::Sensor;
 
 /// What shall be measured, with what.
 #[derive(Debug, Clone)]
-pub struct Wanted<'a> {
+pub struct MeasurementSetup<'a> {
     /// What the controller computes with.
     pub nominal: &'a Model,
     /// The sensor.

@@ -1,11 +1,11 @@
-//! Ways between poses where boxes stand between them: along poses that are clear of each other's way.
+//! Connections between poses where boxes stand between them: along poses that are clear of each other's way.
 //!
 //! Method: a probabilistic roadmap (Kavraki et al. 1996) over the candidates, whose joints are random and clear already; each is
 //! joined to the nearest ones that it reaches straight. What hangs together can be visited in any order; the rest is left out of the choice.
 //! Departures: near is counted in the first three joints, since the wrist seldom stands in its own way; the way that is found is
 //! shortened where a straight one is clear.
 
-use super::space::Watch;
+use super::keep_out::CollisionChecker;
 use truegrind_arm::model::Joints;
 
 /// Neighbours that each place is joined to, where the way is clear.
@@ -16,15 +16,15 @@ const WRIST: f64 = 0.2;
 
 /// Places, and the straight ways between them that are clear.
 #[derive(Debug)]
-pub(super) struct Roads {
+pub(super) struct Roadmap {
     places: Vec<Joints>,
     /// For each place, the places that are reached, with the largest turn of a joint (rad).
     ways: Vec<Vec<(usize, f64)>>,
 }
 
-impl Roads {
+impl Roadmap {
     /// The ways between places that are clear themselves.
-    pub(super) fn between(places: Vec<Joints>, watch: &Watch<'_>) -> Self {
+    pub(super) fn between(places: Vec<Joints>, checker: &CollisionChecker<'_>) -> Self {
         let mut ways: Vec<Vec<(usize, f64)>> = vec![Vec::new(); places.len()];
         for (i, from) in places.iter().enumerate() {
             let mut near: Vec<(usize, f64)> =
@@ -33,7 +33,7 @@ impl Roads {
             near.truncate(NEAREST);
             for (j, _) in near {
                 let known = ways[i].iter().any(|(other, _)| *other == j);
-                if !known && watch.way_is_clear(from, &places[j]) {
+                if !known && checker.motion_is_clear(from, &places[j]) {
                     let turn = (from - places[j]).amax();
                     ways[i].push((j, turn));
                     ways[j].push((i, turn));
@@ -71,9 +71,9 @@ impl Roads {
     }
 
     /// Stops between a place and where the approach to another begins. `None` where no way leads there.
-    pub(super) fn stops(
+    pub(super) fn waypoints(
         &self,
-        watch: &Watch<'_>,
+        checker: &CollisionChecker<'_>,
         from: &Joints,
         to: &Joints,
         approach: &Joints,
@@ -85,7 +85,7 @@ impl Roads {
         all.push(*approach);
         let (mut out, mut at) = (Vec::new(), 0);
         while at + 1 < all.len() {
-            let next = (at + 2..all.len()).rev().find(|&next| watch.way_is_clear(&all[at], &all[next]));
+            let next = (at + 2..all.len()).rev().find(|&next| checker.motion_is_clear(&all[at], &all[next]));
             at = next.unwrap_or(at + 1);
             out.push(all[at]);
         }
