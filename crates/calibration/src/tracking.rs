@@ -1,46 +1,45 @@
-//! Continuous calibration: a model that is kept accurate as measurements come in, and says when and why it had to change.
+//! Continuous calibration: recursive estimation of the arm's parameters from incoming measurements, with change detection.
 //!
-//! **Method.** The state is the arm's parameters with the model's own covariance, and the sensor's frames with a wide
-//! prior, linearised anew at every pose and updated row by row by Potter's square-root form
-//! ([`rls`](truegrind_estimation::filter::rls)), which cannot lose positive definiteness. Every parameter drifts by a
-//! random walk of its own between two poses (process noise), so that the filter never stops listening.
+//! **Method.** The state vector holds the arm's parameters, with the model's covariance, and the sensor's frames, with a wide
+//! prior. It is linearised at every pose and updated row by row in Potter's square-root form
+//! ([`rls`](truegrind_estimation::filter::rls)), which stays positive definite. Each parameter performs a random walk between
+//! poses (process noise), so the gain never vanishes.
 //!
-//! **Alarm.** The normalised innovations squared (NIS) of a pose are χ² with as many degrees of freedom as the pose has
-//! rows, where arm, sensor and noise are what the filter believes. A single pose beyond the 1 in 10⁹ bound is set aside
-//! as an accident; the sum over a sliding window beyond the 1 in 10⁵ bound raises the alarm. Poses set aside one after
-//! the other count in the window, each up to a quarter of its bound, so that a jump of the arm cannot hide as a series of
-//! accidents; a lone one counts as expected, since what a model does not hold has longer tails than χ². An alarm that
-//! no single parameter explains says so and changes nothing.
+//! **Change detection.** The normalised innovation squared (NIS) of a pose is χ² with as many degrees of freedom as the pose
+//! has rows, if the model holds. A pose beyond the 1 in 10⁹ quantile is rejected as an outlier; a sum over a sliding window
+//! beyond the 1 in 10⁵ quantile raises the alarm. Consecutive outliers count in the window, each up to a quarter of its
+//! bound, so that a jump of the arm is not mistaken for a series of outliers. An isolated outlier counts as its expectation,
+//! since unmodelled effects have longer tails than χ². An alarm that no single parameter explains changes nothing in the
+//! model.
 //!
-//! **Which parameter, since when.** A few poses after the bound was left: a jump or a drift of one parameter from one pose of
-//! the history on, or the sensor, its target or an outlet moved as a whole, whichever explains the history best
-//! ([`locate`]). Parameters that explain it nearly as well are named as alternatives: a sensor that was
-//! knocked and a joint that lost its zero can look the same. Lone accidents have no say.
+//! **Change localisation.** A few poses after the bound was exceeded, [`locate`] finds the change that explains the history
+//! best: a jump or a drift of one parameter from some pose on, or a displacement of the whole sensor, target or outlet.
+//! Parameters that explain it nearly as well are reported as alternatives: a knocked sensor and a lost joint zero can look the
+//! same. Isolated outliers are ignored.
 //!
-//! **Mounted anew, and bursts.** Before that, poses that were set aside one after the other are asked where each of them puts
-//! target and sensor (`mounting`): where they agree on a place far from the old one, it was taken off and put on again, which
-//! is one alarm, and the track goes on from there. Where nothing explains them they are a burst of outliers: one alarm for all
-//! of them, until poses fit again.
+//! **Remounting and bursts.** Consecutive outliers are first tested for a remounted target or sensor (`mounting`): each pose
+//! gives the location of target and sensor, and if these agree on one far from the old one, a single alarm is raised and
+//! tracking continues there. Outliers without an explanation are a burst: one alarm until readings fit again.
 //!
-//! **After an alarm.** The filter goes back to where the history began, what moved gets room (three times a jump; the
-//! process noise of a drift), and the history is taken in again: nothing is lost, and the model follows within a few
-//! poses ([`alarm`]).
+//! **After an alarm.** The filter restarts at the beginning of the history with a wider covariance for the changed parameters
+//! (three times a jump; the process noise of a drift) and processes the history again, so that no reading is lost and the
+//! model follows within a few poses ([`alarm`]).
 //!
-//! **Another arm.** First poses that leave far more than the model had on held-out rows are refused: a filter that takes all
-//! of it for noise would never notice anything.
+//! **Wrong arm.** First poses with residuals far above the model's held-out error are refused: a filter that took them for
+//! noise would never detect a change.
 //!
-//! **A stop.** [`state`] holds every bit that matters, so that a track that was stopped anywhere and goes on ends in the same
-//! bits as one that was not.
+//! **Interruption.** [`state`] stores the filter exactly: a track that was interrupted and resumed gives the same bits as one
+//! that was not.
 //!
 //! **Shapes.** p parameters, k of which drift; a pose has 1, 3 or 6 rows. A pose costs one row evaluation with derivatives, k³
 //! for the process noise and p² for each row. An alarm costs p³, and p² for each row of the history.
 //!
-//! **Source and departures.** rls-2025 keeps its arm accurate by RLS without forgetting, which stops listening; process
-//! noise and alarm are ours. Bar-Shalom, Li, Kirubarajan, *Estimation with Applications to Tracking and Navigation*,
+//! **Source and departures.** rls-2025 uses RLS without forgetting, whose gain vanishes; process noise and alarm are added
+//! here. Bar-Shalom, Li, Kirubarajan, *Estimation with Applications to Tracking and Navigation*,
 //! 2001, ch. 5 for the NIS test.
 //!
-//! **Checked against** a simulated arm whose parameters jump at a known pose or drift from one on, one that stays, and
-//! resumption to the bit, also of a process that was killed.
+//! **Checked against** simulated arms whose parameters jump at a known pose, drift from one on, or stay constant, and
+//! bit-exact resumption, also of a killed process.
 
 pub mod alarm;
 mod mounting;

@@ -1,4 +1,4 @@
-//! An alarm: what moved, since when, by how much.
+//! A detected change: which parameter, since which pose, by how much.
 
 use std::fmt;
 
@@ -18,24 +18,24 @@ pub struct Part {
     pub sigma: f64,
 }
 
-/// How a parameter changed, as far as the poses tell.
+/// Kind of change, as far as the poses determine it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Course {
-    /// A jump or a drift: so far both explain it.
+    /// Undecided: a jump and a drift both explain the poses.
     #[default]
     Open,
-    /// At once.
+    /// A step at one pose.
     Jump,
-    /// Steadily, and it may go on.
+    /// A steady drift, possibly still going on.
     Drift,
-    /// Taken off and put on again elsewhere.
+    /// The target or sensor was remounted elsewhere.
     Mounted,
-    /// Readings that are far off and agree with no one change.
+    /// Outliers that no single change explains.
     Burst,
 }
 
-/// A change that was noticed.
+/// A detected change.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Alarm {
@@ -50,33 +50,33 @@ pub struct Alarm {
     /// Its time, where logged (h).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub since_time_h: Option<f64>,
-    /// Name of the parameter that moved, or of what moved as a whole; empty where nothing explains the poses.
+    /// Name of the changed parameter or group; empty where nothing explains the poses.
     pub parameter: String,
     /// Unit.
     pub unit: String,
-    /// Whether it jumped or drifts.
+    /// Kind of change.
     #[serde(default)]
     pub course: Course,
-    /// By how much so far.
+    /// Size of the change so far.
     pub shift: f64,
     /// Standard deviation of that.
     pub sigma: f64,
     /// Poses from the first changed one to the last.
     #[serde(default)]
     pub poses: usize,
-    /// Likelihood ratio: χ² with one degree of freedom if nothing had moved.
+    /// Likelihood ratio: χ² with one degree of freedom under the hypothesis of no change.
     pub ratio: f64,
     /// Parameters that would explain it nearly as well.
     pub alternatives: Vec<String>,
-    /// Sum of the window's NIS, and what it should not exceed.
+    /// Sum of the window's NIS, and its bound.
     pub window_nis: [f64; 2],
-    /// Of something that moved as a whole its parameters; the shift is then what the readings moved by on average.
+    /// The parameters of a group that moved together; `shift` is then the mean displacement of the readings.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub parts: Vec<Part>,
 }
 
-/// Number and unit for people.
-fn shown(unit: &str) -> (f64, &str) {
+/// Factor to the displayed unit, and that unit.
+fn display_unit(unit: &str) -> (f64, &str) {
     match unit {
         "rad" => (1f64.to_degrees(), "°"),
         "" => (1.0, ""),
@@ -86,7 +86,7 @@ fn shown(unit: &str) -> (f64, &str) {
 
 impl fmt::Display for Alarm {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (scale, unit) = shown(&self.unit);
+        let (scale, unit) = display_unit(&self.unit);
         if self.course == Course::Burst {
             return write!(
                 f,
@@ -139,7 +139,7 @@ impl fmt::Display for Alarm {
         write!(f, ", noticed at row {} of {}", self.noticed_row, self.noticed_file)?;
         let sure = self.parts.iter().filter(|p| p.shift.abs() > 3.0 * p.sigma);
         for (k, part) in sure.enumerate() {
-            let (scale, unit) = shown(&part.unit);
+            let (scale, unit) = display_unit(&part.unit);
             let lead = if k == 0 { ": " } else { ", " };
             write!(
                 f,

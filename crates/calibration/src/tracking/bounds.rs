@@ -2,13 +2,13 @@
 
 use truegrind_math::distribution::chi_square_quantile;
 
-/// A pose beyond this share of χ² is an accident.
+/// Tail probability beyond which a pose is an outlier.
 const ACCIDENT: f64 = 1e-9;
 
-/// A window beyond so many standard deviations, 1 in 10⁵, raises the alarm.
+/// Normal quantile of the window's bound: 1 in 10⁵.
 const ALARM_DEVIATIONS: f64 = 4.265;
 
-/// The NIS beyond which a pose of so many rows is an accident: the quantile, worked out once.
+/// The NIS beyond which a pose of `rows` rows is an outlier: the χ² quantile, computed once.
 pub(super) fn accident_bound(rows: usize) -> f64 {
     use std::sync::OnceLock;
     static CUTS: OnceLock<[f64; 7]> = OnceLock::new();
@@ -17,8 +17,8 @@ pub(super) fn accident_bound(rows: usize) -> f64 {
     cuts[rows.min(6)]
 }
 
-/// The bound of a window with so many rows, by Wilson and Hilferty's cube (1931): good to a per cent out here, and
-/// cheap enough for every pose.
+/// Bound of the NIS sum of `rows` rows by the Wilson–Hilferty approximation (1931): accurate to a per cent here, and cheap
+/// enough for every pose.
 pub(super) fn window_bound(rows: usize) -> f64 {
     let (n, z) = (rows as f64, ALARM_DEVIATIONS);
     let spread = 2.0 / (9.0 * n);

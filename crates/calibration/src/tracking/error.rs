@@ -21,7 +21,7 @@ pub enum TrackError {
         /// Poses needed.
         asked: usize,
     },
-    /// The rows do not place the sensor.
+    /// The rows do not determine the sensor's frame.
     #[error(transparent)]
     Placing(#[from] StartError),
     /// The first poses do not fit the model.
@@ -35,9 +35,9 @@ pub enum TrackError {
         file: String,
         /// Poses that placed the sensor.
         poses: usize,
-        /// What they leave, of one coordinate or length (mm).
+        /// RMS residual of one coordinate or length (mm).
         left_mm: f64,
-        /// What the model left on held-out rows, likewise (mm).
+        /// The model's held-out error, likewise (mm).
         held_out_mm: f64,
     },
     /// Another sensor than before.
@@ -72,7 +72,7 @@ pub enum StateError {
     /// Not TOML, or a key that is missing, misspelt or of the wrong type.
     #[error("not a track of truegrind: {0}")]
     Syntax(String),
-    /// A number that no track has.
+    /// An invalid number.
     #[error(
         "{key}: found {found}, expected {expected}: the file was damaged; keep it and begin a new track with another --state"
     )]

@@ -1,27 +1,27 @@
-//! Which parameter moved, since when, and whether it jumped or drifts.
+//! Change localisation by generalised likelihood ratios: which parameter changed, since which pose, as a jump or a drift.
 //!
 //! **Method.** For every parameter k and every pose s of the history, the generalised likelihood ratio (Willsky and Jones
-//! 1976) of a change of k from s on, against what was known before the history began: a *jump* adds the same to every
-//! later pose, a *drift* as much more with each. With Jᵢ and rᵢ of pose i at the state before the history, P its covariance
+//! 1976) of a change of k from s on, given the filter's state before the history: a *jump* is constant from s on, a *drift*
+//! grows by the same amount with each pose. With Jᵢ and rᵢ of pose i at the state before the history, P its covariance
 //! and weights wᵢ (jump 1, drift i − s + 1): B = Σ wᵢ JᵢᵀJᵢ, D = Σ wᵢ² JᵢᵀJᵢ, h = Σ wᵢ Jᵢᵀrᵢ over i ≥ s, A and g the sums
 //! over all poses with weight 1, and M = (P⁻¹ + A)⁻¹:
 //! ratio = (h(k) − B(:,k)ᵀ M g)² / (D(k,k) − B(:,k)ᵀ M B(:,k)), exact for rows of unit noise.
 //!
-//! Parameters that move together, such as the six of a sensor that was knocked, are one change of several: with l and S the
-//! vector and matrix of the same expressions, ratio = lᵀ (S + Λ⁻¹)⁻¹ l, Λ how far such a thing may move. It is preferred to
-//! the best single parameter where it is the more surprising if nothing had moved ([`surprisal`]), and that by far
-//! ([`GROUP_MARGIN`]): what a model does not hold is smooth in the joints, and six numbers follow it where one cannot.
+//! Parameters that move together, such as the six of a knocked sensor, form a group: with l and S the vector and matrix of the
+//! same expressions, ratio = lᵀ (S + Λ⁻¹)⁻¹ l, Λ the prior covariance of the displacement. A group is preferred to the best
+//! single parameter where its [`surprisal`] is larger by [`GROUP_MARGIN`]: unmodelled effects are smooth in the joints, and six
+//! parameters follow them where one cannot.
 //!
 //! The sums of a drift are sums of those of a jump: B_s = B_{s+1} + A_s, and Σ w² = 2 Σ w(w + 1)/2 − Σ w. With CCᵀ = P⁻¹ + A
-//! the product C⁻¹B is carried along in place of B, since B(:,k)ᵀ M B(:,l) is what its columns k and l make: a pose costs its
-//! rows times p², and nothing costs p³ more than once.
+//! the product C⁻¹B is accumulated in place of B, since B(:,k)ᵀ M B(:,l) is the product of its columns k and l: a pose costs
+//! its rows times p², and p³ is spent only once.
 //!
 //! **Shapes.** n poses of m rows, p parameters: J is nm × p, column-major. n m p² + p³ operations.
 //!
 //! **Source and departures.** Willsky and Jones, "A generalized likelihood ratio approach to the detection and estimation
 //! of jumps in linear systems", IEEE TAC 21, 1976, with the drift beside the jump.
 //!
-//! **Checked against** least squares that has the change as one parameter more.
+//! **Checked against** least squares with the change as an additional parameter.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use truegrind_math::distribution::ln_gamma;
@@ -29,16 +29,16 @@ use truegrind_math::distribution::ln_gamma;
 /// Ratios within this of the largest are alternatives: e^−2 of its likelihood.
 pub const ALTERNATIVE_MARGIN: f64 = 4.0;
 
-/// A group is preferred to a single parameter where its surprisal is larger by this, and by this share of the parameter's
-/// ratio.
+/// A group is preferred to a single parameter where its surprisal is larger by the first number, and by the second as a share
+/// of the parameter's ratio.
 pub const GROUP_MARGIN: (f64, f64) = (30.0, 0.25);
 
 /// How a parameter changes from a pose on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Form {
-    /// At once.
+    /// Constant from the first changed pose on.
     Jump,
-    /// As much more with each pose.
+    /// Growing by the same amount with each pose.
     Drift,
 }
 
@@ -51,7 +51,7 @@ pub struct Change {
     pub since: usize,
     /// How it changes.
     pub form: Form,
-    /// By how much so far; a drift by the last pose.
+    /// Size of the change; of a drift, at the last pose.
     pub shift: f64,
     /// Standard deviation of that.
     pub sigma: f64,
@@ -59,12 +59,12 @@ pub struct Change {
     pub ratio: f64,
 }
 
-/// Parameters that may move together, each with how far (one standard deviation).
+/// Parameters that can move together, each with its prior standard deviation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Group {
     /// Its name.
     pub name: String,
-    /// Parameter and reach.
+    /// Index and prior standard deviation of each parameter.
     pub members: Vec<(usize, f64)>,
 }
 
@@ -75,7 +75,7 @@ pub struct GroupChange {
     pub group: usize,
     /// First changed pose.
     pub since: usize,
-    /// By how much each member, in the order of the group.
+    /// Size of each member's jump, in the order of the group.
     pub shifts: Vec<f64>,
     /// Covariance of these.
     pub covariance: DMatrix<f64>,
@@ -83,14 +83,14 @@ pub struct GroupChange {
     pub ratio: f64,
 }
 
-/// −2 ln of the probability that χ² with so many degrees of freedom is beyond `ratio`, far out: what makes changes of one
-/// parameter and of several comparable.
+/// −2 ln of the probability that χ² with `freedom` degrees of freedom exceeds `ratio`, asymptotically for large ratios: makes
+/// changes of one parameter and of several comparable.
 pub fn surprisal(freedom: usize, ratio: f64) -> f64 {
     let half = (ratio / 2.0).max(1.0).ln();
     ratio - (freedom as f64 - 2.0) * half + 2.0 * ln_gamma(0.5 * freedom.max(1) as f64)
 }
 
-/// The change that explains the history best, and what else would.
+/// The change that explains the history best, and its alternatives.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Explanation {
     /// The best.
@@ -105,18 +105,18 @@ pub struct Explanation {
     pub nearly: Option<usize>,
 }
 
-/// The poses as they bear on each other: `j` and `r` are Jacobian and residuals with `per` rows for each.
+/// The linearised history: `j` and `r` are Jacobian and residuals with `per` rows for each pose.
 struct History {
     per: usize,
     j: DMatrix<f64>,
     r: DVector<f64>,
-    /// L⁻¹Jᵀ with LLᵀ the information that all poses and the filter have together.
-    rooted: DMatrix<f64>,
-    /// What the unchanged parameters explain of the residuals.
-    towards: DVector<f64>,
+    /// L⁻¹Jᵀ, with LLᵀ the information of the filter and all poses.
+    whitened: DMatrix<f64>,
+    /// J M g: the residuals explained without a change.
+    explained: DVector<f64>,
 }
 
-/// Sums from the end to a pose: of a jump there (weights 1), of a drift from there (weights 1, 2, …).
+/// Sums from the last pose back to pose s: of a jump (weights 1) and a drift (weights 1, 2, …) from s on.
 struct Sums {
     jump: DMatrix<f64>,
     of_jump: DMatrix<f64>,
@@ -146,22 +146,22 @@ impl Sums {
         }
     }
 
-    /// Takes in the pose before those so far.
+    /// Adds the preceding pose.
     fn add(&mut self, history: &History, since: usize) {
-        let History { per, j, r, rooted, towards } = history;
+        let History { per, j, r, whitened, explained } = history;
         let rows = j.rows(since * per, *per);
         self.jump.gemm_tr(1.0, &rows, &rows, 1.0);
-        self.of_jump.gemm(1.0, &rooted.columns(since * per, *per), &rows, 1.0);
+        self.of_jump.gemm(1.0, &whitened.columns(since * per, *per), &rows, 1.0);
         self.of_drift += &self.of_jump;
         self.jump_gradient.gemv_tr(1.0, &rows, &r.rows(since * per, *per), 1.0);
         self.drift_gradient += &self.jump_gradient;
-        self.jump_cross.gemv_tr(1.0, &rows, &towards.rows(since * per, *per), 1.0);
+        self.jump_cross.gemv_tr(1.0, &rows, &explained.rows(since * per, *per), 1.0);
         self.drift_cross += &self.jump_cross;
         self.drift_square += self.jump.diagonal();
         self.triangle += &self.drift_square;
     }
 
-    /// What the members of a group would have jumped by, with the factor of the information on it and the likelihood ratio.
+    /// Estimated jump of a group, the Cholesky factor of its information, and the likelihood ratio.
     fn together(&self, group: &Group) -> Option<(DVector<f64>, Cholesky<f64, Dyn>, f64)> {
         let at = |a: usize| group.members[a].0;
         let d = group.members.len();
@@ -176,7 +176,7 @@ impl Sums {
         Some((shifts, factor, ratio))
     }
 
-    /// What parameter `k` would have changed by over the last `poses`, and how much of the residuals that explains.
+    /// Estimated change of parameter `k` over the last `poses`, its standard deviation and likelihood ratio.
     fn change(&self, k: usize, form: Form, poses: usize) -> Option<(f64, f64, f64)> {
         let (left, square, own, far) = match form {
             Form::Jump => (
@@ -193,13 +193,14 @@ impl Sums {
             ),
         };
         let seen = square - own;
-        // A change that the history hardly sees says nothing.
+        // A change that the history hardly determines is skipped.
         (seen > 1e-9 * square).then(|| (-left / seen * far, far / seen.sqrt(), left * left / seen))
     }
 }
 
-/// Looks through all parameters, poses and forms. `residuals` and `jacobian` (column-major) have `per` rows for each pose,
-/// at the state of which `covariance` is the covariance; `groups` may move as one. `None` where that is not positive definite, or nothing is seen.
+/// Searches all parameters, poses and forms. `residuals` and `jacobian` (column-major) have `per` rows for each pose, at the
+/// state with covariance `covariance`; `groups` can move together. `None` where the covariance is not positive definite or no
+/// change is determined.
 pub fn locate(
     residuals: &[f64],
     jacobian: &[f64],
@@ -213,9 +214,9 @@ pub fn locate(
     let whole = j.tr_mul(&j);
     let factor = (covariance.clone().cholesky()?.inverse() + whole).cholesky()?;
     let mg = factor.solve(&j.tr_mul(&r));
-    let rooted = factor.l_dirty().solve_lower_triangular(&j.transpose())?;
-    let towards = &j * &mg;
-    let history = History { per, j, r, rooted, towards };
+    let whitened = factor.l_dirty().solve_lower_triangular(&j.transpose())?;
+    let explained = &j * &mg;
+    let history = History { per, j, r, whitened, explained };
     let mut best: Vec<[Option<Change>; 2]> = vec![[None; 2]; p];
     let mut together: Option<GroupChange> = None;
     let mut sums = Sums::new(p);
@@ -232,7 +233,7 @@ pub fn locate(
         }
         for (parameter, best) in best.iter_mut().enumerate() {
             for form in [Form::Jump, Form::Drift] {
-                // With one pose left both forms are the same.
+                // With one pose both forms are the same.
                 if form == Form::Drift && since + 1 == n {
                     continue;
                 }
@@ -247,7 +248,7 @@ pub fn locate(
     compare_changes(&best, together, groups)
 }
 
-/// The best change, with what explains the history nearly as well, from the best of each parameter and form and of the groups.
+/// Selects the best change and its alternatives from the best of each parameter, form and group.
 fn compare_changes(
     best: &[[Option<Change>; 2]],
     together: Option<GroupChange>,

@@ -1,4 +1,4 @@
-//! The model that a track writes: the one it began with, moved to where the filter stands, with its covariance.
+//! The tracked model: the initial one with the filter's current parameters and covariance.
 
 use super::tracker::Tracker;
 use crate::identification::calibration::{CalibrationProblem, Frames};
@@ -8,7 +8,7 @@ use truegrind_arm::model::Model;
 use truegrind_math::statistics::ErrorSummary;
 
 impl Tracker {
-    /// The arm and the sensor's frames as they stand now.
+    /// The current arm and sensor frames.
     pub fn current(&self) -> (Model, Frames) {
         let problem = CalibrationProblem::new(
             &Dataset::new("track", Sensor::Position, Vec::new()),
@@ -21,7 +21,7 @@ impl Tracker {
         problem.apply(self.filter.x.as_slice())
     }
 
-    /// The model as it stands now.
+    /// The current model.
     pub fn model(&self) -> Estimated {
         let x = self.filter.x.as_slice();
         let (model, _) = self.current();
@@ -50,7 +50,7 @@ impl Tracker {
         out.region.clone_from(&self.state.region);
         out.verdict = Verdict {
             status: match self.initial.verdict.status {
-                // What was wrong with the beginning is not mended by following it.
+                // Tracking does not repair a bad initial model.
                 bad @ (Judgement::Fail | Judgement::Doubtful) => bad,
                 Judgement::Pass | Judgement::NotEvaluated => Judgement::NotEvaluated,
             },

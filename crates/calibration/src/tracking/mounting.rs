@@ -1,9 +1,9 @@
-//! A target or a sensor that was mounted anew: poses that were all set aside, and agree with one other place.
+//! Detects a remounted target or sensor from consecutive outliers that agree on one new location.
 //!
-//! What was knocked lies agreement where it lay and is found as parameters that moved ([`super::locate`]). What was taken off and
-//! put on again lies anywhere, often turned by a quarter, where no linearisation holds. So the poses that were set aside one
-//! after the other say each by itself where the target (or the sensor) would be; where they agree, to what readings scatter
-//! by, it is there. Poses that do not agree are a burst of outliers.
+//! A knocked target or sensor moves little and is found as a parameter change ([`super::locate`]). A remounted one can be
+//! anywhere, often rotated by 90°, outside the range of the linearisation. So each consecutive outlier is solved separately for
+//! the location of the target (or the sensor); if the locations agree within the scatter of the readings, that is the new
+//! one. Otherwise the poses are a burst of outliers.
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 
@@ -18,42 +18,42 @@ use truegrind_arm::parameter::Parameter;
 use truegrind_estimation::filter::rls::RecursiveLeastSquares;
 use truegrind_math::se3::{Pose, pose_from_vector, vector_from_pose};
 
-/// So many poses set aside one after the other are no lone accidents.
+/// Fewest consecutive outliers that are tested.
 const FEWEST: usize = 6;
-/// Places agree within so many standard deviations of a reading.
+/// Locations agree within this number of standard deviations of a reading.
 const AGREE: f64 = 6.0;
-/// What lies within this of where it lay was knocked, not mounted anew (mm, rad).
+/// A displacement below this is a knock, not a remount (mm, rad).
 const KNOCKED_MM: f64 = 10.0;
 const KNOCKED_RAD: f64 = 0.05;
-/// How far the new place may still be off (mm, rad).
+/// Standard deviation of the new location (mm, rad).
 const ROOM_MM: f64 = 1.0;
 const ROOM_RAD: f64 = 0.005;
 
-/// What was mounted anew.
+/// The remounted part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Mounted {
     Target,
     Sensor,
 }
 
-/// A place that poses agree on.
+/// A location that the poses agree on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Remount {
     what: Mounted,
     place: Pose,
-    /// Root mean square of what the places of single poses differ from it by (mm).
+    /// RMS distance of the single poses' locations from it (mm).
     scatter_mm: f64,
     poses: usize,
 }
 
 impl Tracker {
-    /// Poses at the end of the history that were set aside without one between them that was not.
+    /// Number of consecutive outliers at the end of the history.
     pub(super) fn trailing_accidents(&self) -> usize {
         let bound = accident_bound(self.rows_per_pose());
         self.state.history.iter().rev().take_while(|record| !(record.nis <= bound)).count()
     }
 
-    /// Where the latest poses agree that target or sensor was mounted anew: the alarm, with the track going on from there.
+    /// If the latest poses agree on a remounted target or sensor, continues the track there and returns the alarm.
     pub(super) fn detect_remount(&mut self) -> Option<Alarm> {
         let run = self.trailing_accidents();
         if run < FEWEST || self.state.sensor == "cable" {
@@ -67,7 +67,7 @@ impl Tracker {
         Some(alarm)
     }
 
-    /// The place that the poses agree on, and where it was.
+    /// The location that the poses agree on, and the old one.
     fn find_remount(&self, poses: &[PoseRecord]) -> Option<(Remount, Pose)> {
         let (model, frames) = self.current();
         let flanges: Vec<Pose> = poses
@@ -107,7 +107,7 @@ impl Tracker {
         all.min_by(|(a, _), (b, _)| a.scatter_mm.total_cmp(&b.scatter_mm))
     }
 
-    /// Puts the place in, with what is known of the rest kept, and takes the poses in again.
+    /// Sets the new location, keeps the covariance of all other parameters, and filters the poses again.
     fn apply_remount(&mut self, found: &Remount, poses: Vec<PoseRecord>) {
         let members: Vec<usize> = (0..self.parameters.len())
             .filter(|&k| match self.parameters[k] {
@@ -118,13 +118,13 @@ impl Tracker {
             .collect();
         let Some(mut root) = self.filter.root() else { return };
         let mut x = self.filter.x.clone();
-        let mut room = vec![0.0; x.len()];
+        let mut widening = vec![0.0; x.len()];
         for &k in &members {
             x[k] = 0.0;
             root.row_mut(k).fill(0.0);
-            room[k] = if self.parameters[k].unit() == "mm" { ROOM_MM } else { ROOM_RAD };
+            widening[k] = if self.parameters[k].unit() == "mm" { ROOM_MM } else { ROOM_RAD };
         }
-        // As the state says it, to the bit: a track that was stopped goes on from there.
+        // Through the state's own numbers, so that a resumed track gives the same bits.
         match found.what {
             Mounted::Target => {
                 self.state.flange_from_target = vector_from_pose(&found.place);
@@ -136,7 +136,7 @@ impl Tracker {
             }
         }
         self.filter = RecursiveLeastSquares::from_root(x, root);
-        self.filter.predict(&room);
+        self.filter.predict(&widening);
         let problem = self.problem(&poses);
         for (at, record) in poses.iter().enumerate() {
             if !self.update(&problem, at).set_aside {
@@ -144,7 +144,7 @@ impl Tracker {
                 extend_region(&mut self.state.region, &record.joints);
             }
         }
-        // What came before the change is settled.
+        // Changes before this one are settled.
         self.state.history.clear();
         let snapshot = Snapshot::of(&self.filter, 0);
         (self.state.reference, self.state.middle) = (snapshot.clone(), snapshot);
@@ -152,7 +152,7 @@ impl Tracker {
     }
 }
 
-/// The alarm that says so.
+/// Alarm of a remount.
 fn alarm_of(found: &Remount, old: &Pose, poses: &[PoseRecord], per: usize) -> Alarm {
     let (first, last) = (&poses[0], &poses[poses.len() - 1]);
     let many = (found.poses.max(1) as f64).sqrt();
@@ -174,7 +174,7 @@ fn alarm_of(found: &Remount, old: &Pose, poses: &[PoseRecord], per: usize) -> Al
         ratio: 0.0,
         alternatives: Vec::new(),
         window_nis: [0.0; 2],
-        // A point has no turn.
+        // A point has no orientation.
         parts: (per == 6 || found.what == Mounted::Sensor)
             .then(|| Part {
                 parameter: "turn".to_owned(),
@@ -226,14 +226,14 @@ fn of_points(
     )
 }
 
-/// How agreement places lie that are one.
+/// Tolerance within which two locations agree.
 struct Agreement {
     mm: f64,
     rad: f64,
 }
 
 impl Agreement {
-    /// The middle of places of which four in five agree, their scatter (mm), and how many they are.
+    /// Mean of the locations if at least four in five agree, their RMS scatter (mm), and their number.
     fn consensus(&self, places: &[Pose]) -> Consensus {
         let agrees = |a: &Pose, b: &Pose| {
             (a.translation.vector - b.translation.vector).norm() <= self.mm

@@ -1,10 +1,10 @@
-//! How an arm is watched.
+//! Settings of a track.
 
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-/// How an arm is watched.
+/// Settings of a track.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Options {
@@ -18,14 +18,14 @@ pub struct Options {
     pub drift_frame_rad: f64,
     /// Random walks of single parameters in place of the above, by name (`link2.theta`), in mm or rad.
     pub drift: BTreeMap<String, f64>,
-    /// Standard deviation of a reading (mm), with what the model does not explain; where not stated, what the first poses
-    /// leave, but no less than the model's held-out error.
+    /// Standard deviation of a reading (mm), unmodelled effects included. Where not stated: the residual of the first poses, but
+    /// at least the model's held-out error.
     pub sigma_mm: Option<f64>,
-    /// Poses that place the sensor before tracking begins.
+    /// Poses that register the sensor before tracking begins.
     pub first_poses: usize,
     /// Poses of the alarm's window.
     pub window: usize,
-    /// Poses of the history in which a change is looked for.
+    /// Poses of the history that is searched for a change.
     pub history: usize,
 }
 

@@ -1,4 +1,4 @@
-//! When a track raises an alarm, and how the filter goes on from there.
+//! Raises alarms, and restarts the filter after one.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -10,33 +10,33 @@ use super::tracker::Tracker;
 use truegrind_arm::parameter::Parameter;
 use truegrind_estimation::problem::Problem;
 
-/// A change of one parameter is named where its likelihood ratio is above this: 1 in 10⁵ for one parameter and one pose,
-/// still 1 in a hundred after looking through them all; and where it explains most of the window's excess.
+/// Smallest likelihood ratio of a change that is reported: 1 in 10⁵ for one parameter and one pose, 1 in a hundred after the
+/// search over all of them. The change must also explain most of the window's excess.
 const SURE: f64 = 20.0;
 
-/// Poses that are waited for after the bound was left, before what moved is named: a few poses fit many explanations.
+/// Poses between exceeding the bound and localising the change: too few poses fit many explanations.
 const SETTLE: usize = 5;
 
-/// How far a frame of the sensor may have been moved (mm, rad), for [`Group`].
+/// Prior standard deviation of a displacement of the sensor or target (mm, rad), for [`Group`].
 const REACH_MM: f64 = 10.0;
 const REACH_RAD: f64 = 0.05;
 
 impl Tracker {
-    /// Looks at the window, and where it is out of bounds finds out what moved.
+    /// Tests the window, and localises the change where its bound was exceeded.
     pub(super) fn alarm(&mut self) -> Option<Alarm> {
         if self.state.burst_since > 0 {
             return self.continue_burst();
         }
         let window = self.state.options.window.max(1);
         let history = &self.state.history;
-        // The window never reaches back behind the first poses, which place the sensor.
+        // The window starts after the first poses, which registered the sensor.
         let earliest = self.state.quiet_until.max(self.state.options.first_poses + window);
         if history.len() < window || self.state.poses < earliest {
             return None;
         }
         let per = self.rows_per_pose();
         let bound = window_bound(window * per);
-        // A lone accident says nothing; of those that follow each other it takes three or four.
+        // An isolated outlier is ignored; three or four consecutive ones exceed the bound.
         let counted = |at: usize| match history[at].nis {
             _ if self.is_lone_accident(at) => per as f64,
             nis if nis.is_finite() => nis.min(bound / 4.0),
@@ -57,8 +57,8 @@ impl Tracker {
         let groups = self.groups();
         let found = self.locate_change(&groups)?;
         let ratio = found.together.as_ref().map_or(found.best.ratio, |t| t.ratio);
-        // Poses that scatter more than they should are no parameter's doing, however well one of them fits a few: what moved
-        // explains most of what was too much (0.7).
+        // Excess scatter is no change of a parameter, however well one fits a few poses: a change must explain most (0.7) of
+        // the window's excess.
         let measured = |at: usize| match history[at].nis {
             _ if self.is_lone_accident(at) => per as f64,
             nis if nis.is_finite() => nis,
@@ -73,7 +73,7 @@ impl Tracker {
                 return alarm;
             }
             let alarm = self.unexplained_alarm(Course::Open, 0, [sum, bound], ratio)?;
-            // The same poses are not complained of again.
+            // These poses raise no further alarm.
             self.state.quiet_until = self.state.poses + window;
             return Some(alarm);
         }
@@ -82,7 +82,7 @@ impl Tracker {
         Some(alarm)
     }
 
-    /// An alarm that names what moved.
+    /// Alarm of an explained change.
     fn change_alarm(
         &self,
         found: &Explanation,
@@ -127,8 +127,7 @@ impl Tracker {
         Some(alarm)
     }
 
-    /// An alarm that names no parameter: readings are off that no change explains, the last `poses` of them one after the
-    /// other.
+    /// Alarm without an explanation; the last `poses` poses were consecutive outliers.
     fn unexplained_alarm(
         &self,
         course: Course,
@@ -157,8 +156,7 @@ impl Tracker {
         })
     }
 
-    /// While a burst goes on nothing more is said, unless what follows agrees on a new place of target or sensor; it is over
-    /// once so many poses fit again as it takes to settle.
+    /// During a burst the only alarm is a remounted target or sensor. The burst ends after [`SETTLE`] consecutive poses that fit.
     fn continue_burst(&mut self) -> Option<Alarm> {
         let run = self.trailing_accidents();
         if run > 0 {
@@ -168,13 +166,13 @@ impl Tracker {
         let fitting = self.state.history.iter().rev().take_while(|record| record.nis <= bound).count();
         if fitting >= SETTLE {
             self.state.burst_since = 0;
-            // The poses of the burst are not complained of again.
+            // The poses of the burst raise no further alarm.
             self.state.quiet_until = self.state.poses + self.state.options.window;
         }
         None
     }
 
-    /// Writes into an alarm what moved as a whole.
+    /// Describes the displacement of a group in an alarm.
     fn describe_group(&self, alarm: &mut Alarm, group: &Group, together: &GroupChange) {
         let part = |(a, (k, _)): (usize, &(usize, f64))| Part {
             parameter: self.parameters[*k].to_string(),
@@ -188,15 +186,15 @@ impl Tracker {
         alarm.alternatives.clear();
     }
 
-    /// By how much the readings of the changed poses moved on average (mm), and its standard deviation: a frame that turned
-    /// far from where it is measured has no place of its own where a distance would mean anything.
+    /// Mean displacement of the changed poses' readings (mm), and its standard deviation. The displacement of a frame's origin
+    /// would be meaningless: the frame can rotate far from the measured points.
     fn mean_displacement(&self, group: &Group, together: &GroupChange) -> (f64, f64) {
         let poses = &self.state.history;
         let (per, p) = (self.rows_per_pose(), self.parameters.len());
         let rows = poses.len() * per;
         let (mut r, mut j) = (vec![0.0; rows], vec![0.0; rows * p]);
         self.problem(poses).jacobian(&self.state.reference.x, 0..rows, &mut r, &mut j);
-        // The rows of position; a pose has three more.
+        // Position rows only; a pose has three more.
         let axes = per.min(3);
         let changed = (poses.len() - together.since).max(1) as f64;
         let mean = DMatrix::from_fn(axes, group.members.len(), |axis, a| {
@@ -204,13 +202,13 @@ impl Tracker {
             let of = |pose: usize| column[pose * per + axis] / poses[pose].per_mm;
             (together.since..poses.len()).map(of).sum::<f64>() / changed
         });
-        let way = &mean * DVector::from_column_slice(&together.shifts);
-        let length = way.norm();
-        let along = mean.tr_mul(&(way / length.max(f64::MIN_POSITIVE)));
+        let displacement = &mean * DVector::from_column_slice(&together.shifts);
+        let length = displacement.norm();
+        let along = mean.tr_mul(&(displacement / length.max(f64::MIN_POSITIVE)));
         (length, (&together.covariance * &along).dot(&along).max(0.0).sqrt())
     }
 
-    /// What may move as a whole: the sensor against the arm's base, the point that it touches, the outlet of a cable.
+    /// Groups that can move together: the sensor frame, the target, each cable outlet.
     fn groups(&self) -> Vec<Group> {
         let mut groups: Vec<Group> = Vec::new();
         for (k, parameter) in self.parameters.iter().enumerate() {
@@ -230,8 +228,7 @@ impl Tracker {
         groups
     }
 
-    /// Whether a pose of the history was set aside and its neighbours were not. After a jump one pose after the other is
-    /// set aside; one alone is an accident and has no say.
+    /// Whether a pose of the history is an isolated outlier. After a jump, consecutive poses are outliers.
     fn is_lone_accident(&self, at: usize) -> bool {
         let bound = accident_bound(self.rows_per_pose());
         let aside = |at: Option<usize>| {
@@ -257,8 +254,8 @@ impl Tracker {
         locate(&r, &j, per, &reference.covariance()?, groups)
     }
 
-    /// Takes the history in again, with room for what moved. What looks alike may have moved alike, each by its own
-    /// measure. What drifts may go on: its process noise becomes what it drifted by from pose to pose, and stays so.
+    /// Filters the history again with a wider covariance of the changed parameter and its alternatives, each by its own
+    /// estimated change. A drifting parameter keeps its drift per pose as process noise from then on.
     fn restart_from_change(&mut self, found: &Explanation, groups: &[Group]) {
         let Some(filter) = self.state.reference.filter() else { return };
         self.filter = filter;
@@ -267,12 +264,12 @@ impl Tracker {
         let single = found.together.is_none();
         let all = || std::iter::once(&found.best).chain(&found.alternatives).filter(|_| single);
         for at in 0..poses.len() {
-            let mut room = vec![0.0; self.parameters.len()];
+            let mut widening = vec![0.0; self.parameters.len()];
             let mut any = false;
             for change in all().filter(|c| c.since == at) {
                 any = true;
                 match change.form {
-                    Form::Jump => room[change.parameter] = 3.0 * change.shift.abs(),
+                    Form::Jump => widening[change.parameter] = 3.0 * change.shift.abs(),
                     Form::Drift => {
                         let rate = change.shift.abs() / (poses.len() - at) as f64;
                         let drift = &mut self.drift[change.parameter];
@@ -285,15 +282,15 @@ impl Tracker {
             if let Some(together) = found.together.as_ref().filter(|t| t.since == at) {
                 any = true;
                 for ((k, _), shift) in groups[together.group].members.iter().zip(&together.shifts) {
-                    room[*k] = 3.0 * shift.abs();
+                    widening[*k] = 3.0 * shift.abs();
                 }
             }
             if any {
-                self.filter.predict(&room);
+                self.filter.predict(&widening);
             }
             self.update(&problem, at);
         }
-        // What came before the change is settled.
+        // Changes before this one are settled.
         let snapshot = Snapshot::of(&self.filter, 0);
         (self.state.reference, self.state.middle) = (snapshot.clone(), snapshot);
     }

@@ -1,4 +1,4 @@
-//! What must outlive a stop: the filter with every bit of its root, the latest poses, the files taken in.
+//! Persistent state of a track: the filter with the exact bits of its covariance root, the latest poses, the processed files.
 
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
@@ -16,7 +16,7 @@ use truegrind_math::se3::{pose_from_vector, vector_from_pose};
 /// Schema of the state file.
 pub const SCHEMA: &str = "truegrind.track/1";
 
-/// One pose as it is kept in the history.
+/// One pose of the history.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PoseRecord {
@@ -35,9 +35,9 @@ pub struct PoseRecord {
     pub(super) anchor: usize,
     pub(super) per_mm: f64,
     pub(super) per_rad: f64,
-    /// Normalised innovation squared when the pose came.
+    /// Normalised innovation squared when the pose was filtered.
     pub nis: f64,
-    /// Error of the pose with the state after it (mm): signed for a cable, the norm otherwise.
+    /// Residual at the updated state (mm): signed for a cable, the norm otherwise.
     pub error_mm: f64,
 }
 
@@ -58,7 +58,7 @@ impl PoseRecord {
     }
 }
 
-/// Rows of a file that were taken in.
+/// A processed file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ConsumedFile {
@@ -66,18 +66,18 @@ pub struct ConsumedFile {
     pub file: String,
     /// Rows.
     pub rows: usize,
-    /// Hash of these rows: a file that is changed behind its end is noticed.
+    /// Hash of these rows, to detect a later change of the file.
     pub digest: String,
 }
 
-/// A state with a root of its covariance, as it stands in the file: every bit of both, so that a stop changes nothing.
+/// State vector and root of its covariance, bit-exact in the file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Snapshot {
     pub(super) x: Vec<f64>,
     /// S with SSᵀ the covariance, row by row.
     pub(super) root: Vec<Vec<f64>>,
-    /// Poses of the history that came before.
+    /// Number of history poses before the snapshot.
     pub(super) before: usize,
 }
 
@@ -107,7 +107,7 @@ impl Snapshot {
     }
 }
 
-/// Everything that must outlive a stop.
+/// Persistent state of a track.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct State {
@@ -116,9 +116,9 @@ pub struct State {
     pub model_hash: String,
     /// Sensor.
     pub sensor: String,
-    /// Poses taken in.
+    /// Poses processed.
     pub poses: usize,
-    /// Poses set aside as accidents.
+    /// Poses rejected as outliers.
     pub accidents: usize,
     /// Settings.
     pub options: Options,
@@ -130,29 +130,29 @@ pub struct State {
     pub(super) sigma_rad: f64,
     /// The present state.
     pub(super) now: Snapshot,
-    /// Where the history begins, and where its middle stood.
+    /// Snapshots at the beginning and in the middle of the history.
     pub(super) reference: Snapshot,
     pub(super) middle: Snapshot,
-    /// Where the arm was measured: the model's region, and what the track reached beyond it.
+    /// Measured region: the model's, extended by the track.
     pub region: Region,
-    /// Number of poses before which no further alarm is raised, after one that no parameter explained.
+    /// Pose number before which no further alarm is raised, after an unexplained one.
     pub quiet_until: usize,
-    /// Number of poses when the window left its bounds, while what moved is waited for; 0 otherwise.
+    /// Pose number at which the window exceeded its bound, while the change is not localised yet; 0 otherwise.
     #[serde(default)]
     pub pending_since: usize,
-    /// Number of poses when a burst of outliers was noticed, while it goes on; 0 otherwise.
+    /// Pose number at which the current burst of outliers was detected; 0 without a burst.
     #[serde(default)]
     pub burst_since: usize,
-    /// Files and rows taken in.
+    /// Processed files.
     pub consumed: Vec<ConsumedFile>,
-    /// Changes noticed so far.
+    /// Changes detected so far.
     pub alarms: Vec<Alarm>,
     /// The latest poses.
     pub history: Vec<PoseRecord>,
 }
 
 impl State {
-    /// The file.
+    /// Serialises to TOML.
     ///
     /// # Errors
     /// [`StateError::Unwritable`], when a number cannot be written.
@@ -161,10 +161,10 @@ impl State {
         Ok(format!("# The state of a track, written by truegrind {}.\n{text}", env!("CARGO_PKG_VERSION")))
     }
 
-    /// Reads the file.
+    /// Reads TOML.
     ///
     /// # Errors
-    /// [`StateError`] says what cannot be used.
+    /// [`StateError`] for a syntax error or an invalid value.
     pub fn from_toml(text: &str) -> Result<Self, StateError> {
         let fault = |e: toml::de::Error| StateError::Syntax(e.message().replace('\n', " "));
         let state: Self = toml::from_str(text).map_err(fault)?;
@@ -178,7 +178,7 @@ impl State {
         Ok(state)
     }
 
-    /// Finds numbers that no track has.
+    /// Rejects invalid values.
     fn check(&self) -> Result<(), StateError> {
         let wrong = |key: &str, found: String, expected| {
             Err(StateError::Value { key: key.to_owned(), found, expected })
@@ -234,7 +234,7 @@ impl State {
     }
 }
 
-/// A number in a value that is none.
+/// A non-finite number in a value.
 fn not_finite(value: &toml::Value) -> Option<f64> {
     match value {
         toml::Value::Float(x) => (!x.is_finite()).then_some(*x),
@@ -244,7 +244,7 @@ fn not_finite(value: &toml::Value) -> Option<f64> {
     }
 }
 
-/// A short hash of rows, by their bits.
+/// Hash of joints and readings, by their bits.
 pub(super) fn digest<'r>(rows: impl Iterator<Item = &'r Row>) -> String {
     use sha2::{Digest, Sha256};
     let mut hash = Sha256::new();
@@ -260,11 +260,11 @@ pub(super) fn digest<'r>(rows: impl Iterator<Item = &'r Row>) -> String {
     hash.finalize().iter().map(|b| format!("{b:02x}")).collect()
 }
 
-/// Most samples of a region that a track adds to.
+/// Limit of a region's samples.
 const SAMPLES: usize = 2_000;
 
-/// Adds a pose to the measured region: a sample where none is within the samples' own spacing. One pose after the other, so
-/// that the region does not depend on how the poses were divided among runs.
+/// Extends the measured region by a pose, as a new sample where none is within the samples' spacing. Sequential, so that the
+/// region does not depend on how the poses are divided among runs.
 pub(super) fn extend_region(region: &mut Region, joints: &[f64; 6]) {
     let degrees = joints.map(f64::to_degrees);
     for (i, q) in degrees.iter().enumerate() {

@@ -22,7 +22,7 @@ use truegrind_estimation::filter::rls::{Memory, RecursiveLeastSquares};
 use truegrind_estimation::problem::Problem;
 use truegrind_math::se3::{pose_from_vector, vector_from_pose};
 
-/// The first poses of files that are tracked together: those of the first file, or of as many as it takes. `None` without
+/// At least `poses` first rows of files that are tracked together: the first file, and further ones as needed. `None` without
 /// a file.
 pub fn first_poses(datasets: &[Dataset], poses: usize) -> Option<Dataset> {
     let mut out = datasets.first()?.clone();
@@ -40,11 +40,11 @@ pub fn first_poses(datasets: &[Dataset], poses: usize) -> Option<Dataset> {
     Some(out)
 }
 
-/// How uncertain the parameters are before a track begins: those of the arm as the model says.
+/// Covariance at the start of a track: the model's for the arm, a wide prior for the sensor.
 fn first_covariance(model: &Estimated, parameters: &[Parameter]) -> DMatrix<f64> {
     let (arm, p) = (model.order.len(), parameters.len());
-    // The sensor was placed by a few poses under this very model: from there its frame may lie within what links of
-    // ordinary tolerance can shift it by, and the poses that placed it are taken in like all others.
+    // The sensor was registered with a few poses under this model, so its frame is off by no more than links of ordinary
+    // tolerance can shift it. The poses used for registration are filtered like all others.
     let priors = Tolerance {
         target_mm: 10.0,
         target_rad: 0.02,
@@ -60,7 +60,7 @@ fn first_covariance(model: &Estimated, parameters: &[Parameter]) -> DMatrix<f64>
     })
 }
 
-/// A model that follows its arm.
+/// Recursive estimator of one arm's parameters.
 #[derive(Debug, Clone)]
 pub struct Tracker {
     /// The model that tracking began with.
@@ -73,20 +73,20 @@ pub struct Tracker {
     pub(super) condition: Condition,
 }
 
-/// What one pose said.
+/// Result of one filter update.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PoseUpdate {
     /// Normalised innovation squared.
     pub nis: f64,
-    /// Whether the pose was set aside as an accident.
+    /// Whether the pose was rejected as an outlier.
     pub set_aside: bool,
 }
 
 impl Tracker {
-    /// Places the sensor with the first poses of `dataset` and begins; no pose is taken in yet.
+    /// Registers the sensor with the first poses of `dataset`; no pose is filtered yet.
     ///
     /// # Errors
-    /// [`TrackError`] where the poses are too few or do not place the sensor.
+    /// [`TrackError`] where the poses are too few or do not determine the sensor's frame.
     pub fn begin(
         model: &Estimated,
         model_hash: &str,
@@ -103,8 +103,8 @@ impl Tracker {
         let first = dataset.subset(&(0..options.first_poses).collect::<Vec<_>>());
         let (observed, _) = prepare_observations(&first, &model.nominal, false);
         let fitted = register(&observed, &model.model, &Tolerance::default())?.fitted;
-        // A reading cannot agree better with the model than held-out readings did when it was identified; a few poses that
-        // have just placed the sensor seem to.
+        // Residuals of the few poses that registered the sensor underestimate the noise; the held-out error of the
+        // identification is its lower bound.
         let axes: f64 = if dataset.sensor == Sensor::Cable { 1.0 } else { 3.0 };
         let unexplained_mm = model.geometry.held_out.rmse / axes.sqrt();
         let left_mm = fitted.sigma_mm;
@@ -159,7 +159,7 @@ impl Tracker {
         Self::resume(model, state, "a new track")
     }
 
-    /// Goes on from a state; `file` is named in errors.
+    /// Resumes from a saved state; `file` is named in errors.
     ///
     /// # Errors
     /// [`TrackError::State`] where the state does not belong to the model or is damaged.
@@ -179,7 +179,7 @@ impl Tracker {
             "pose" => Sensor::Pose,
             other => return Err(wrong(&format!("unknown sensor \"{other}\""))),
         };
-        // A row of the last cable makes as many outlets as the track has.
+        // One row of the last cable defines the number of outlets.
         let mut shape = Row::new(0, Joints::zeros(), Reading::Cable(0.0));
         shape.anchor = state.outlets_mm.len().saturating_sub(1);
         let sensing = frame_parameters(&Dataset::new(file, sensor, vec![shape]));
@@ -196,10 +196,10 @@ impl Tracker {
         Ok(Self { initial: model.clone(), parameters, drift, frames, filter, state, condition })
     }
 
-    /// Takes in the rows of a file that it has not record yet. Gives the alarms that this raised.
+    /// Filters the new rows of a file and returns the alarms raised.
     ///
     /// # Errors
-    /// [`TrackError`] where the file has another sensor, or rows that were taken in have changed.
+    /// [`TrackError`] where the file has another sensor, or rows already processed have changed.
     pub fn process_file(&mut self, dataset: &Dataset) -> Result<Vec<Alarm>, TrackError> {
         let sensor = sensor_name(dataset.sensor);
         if sensor != self.state.sensor {
@@ -236,7 +236,7 @@ impl Tracker {
             self.condition = *row.condition;
             let alarm = self.process_pose(&problem, at, record[at].clone());
             if alarm.as_ref().is_some_and(|alarm| alarm.course == Course::Mounted) {
-                // Its frames are others now, and with them what rounded angles cost.
+                // The frames have changed, and with them the weights of rounded angles.
                 record = self.pose_records(&observed);
                 problem = self.problem(&record);
             }
@@ -288,8 +288,8 @@ impl Tracker {
         None
     }
 
-    /// Takes in observation `pose` of `problem`: process noise, linearisation, one update for each row. This is the whole
-    /// cost of a pose but for the alarm.
+    /// Filters observation `pose` of `problem`: process noise, linearisation, one update per row. This is the whole cost of a
+    /// pose apart from an alarm.
     pub fn update(&mut self, problem: &CalibrationProblem, pose: usize) -> PoseUpdate {
         let (p, per) = (self.parameters.len(), problem.rows_per_observation());
         self.filter.predict(&self.drift);
@@ -306,7 +306,7 @@ impl Tracker {
             nis += e * e / variance;
         }
         let finite = nis.is_finite() && trial.x.iter().all(|x| x.is_finite());
-        // Written so that not-a-number is set aside too.
+        // NaN is rejected too.
         let set_aside = !(finite && nis <= accident_bound(per));
         if !set_aside {
             self.filter = trial;
@@ -355,7 +355,7 @@ impl Tracker {
         observed.dataset.rows.iter().zip(&weights).map(one).collect()
     }
 
-    /// Error of a pose with the state after it (mm): signed for a cable, the norm otherwise.
+    /// Residual of a pose at the updated state (mm): signed for a cable, the norm otherwise.
     pub(super) fn error_mm(&self, problem: &CalibrationProblem, at: usize, per_mm: f64) -> f64 {
         let per = problem.rows_per_observation();
         let mut r = vec![0.0; per];
@@ -379,17 +379,17 @@ impl Tracker {
         &self.initial.robot
     }
 
-    /// Whether so many poses were set aside that the track says little: more than one in ten.
+    /// Whether the track is unreliable: more than one pose in ten was rejected.
     pub fn mostly_set_aside(&self) -> bool {
         self.state.accidents > FEW_ACCIDENTS && 10 * self.state.accidents > self.state.poses
     }
 
-    /// What must be saved.
+    /// The state to save.
     pub fn state(&self) -> &State {
         &self.state
     }
 
-    /// What moves, in the order of the state.
+    /// The tracked parameters, in the order of the state vector.
     pub fn parameters(&self) -> &[Parameter] {
         &self.parameters
     }
@@ -404,21 +404,21 @@ impl Tracker {
         self.filter.covariance().diagonal().iter().map(|v| v.max(0.0).sqrt()).collect()
     }
 
-    /// A problem of rows for [`Tracker::update`], with the weights that tracking gives them.
+    /// The rows of `dataset` as a weighted problem for [`Tracker::update`].
     pub fn prepare(&self, dataset: &Dataset) -> CalibrationProblem {
         let (observed, _) = prepare_observations(dataset, &self.initial.nominal, false);
         self.problem(&self.pose_records(&observed))
     }
 }
 
-/// Accidents that say nothing of a track.
+/// Up to this number of outliers a track is reliable whatever their share.
 const FEW_ACCIDENTS: usize = 5;
 
-/// First poses that leave so many times what the model left on held-out rows, and more than so many mm, are no noise.
+/// Residuals of the first poses above this multiple of the held-out error, and above this size, mean a wrong arm.
 const FOREIGN: f64 = 5.0;
 const FOREIGN_MM: f64 = 0.05;
 
-/// A covariance of an identification may be singular to rounding; this is nothing beside any tolerance (mm², rad²).
+/// Added to the model's variances, as its covariance can be singular to rounding; negligible beside any tolerance (mm², rad²).
 const SMALLEST_VARIANCE: f64 = 1e-14;
 
 fn process_noise(parameter: &Parameter, options: &Options) -> f64 {
@@ -428,7 +428,7 @@ fn process_noise(parameter: &Parameter, options: &Options) -> f64 {
     match (parameter.is_of_arm(), parameter.unit()) {
         (true, "mm") => options.drift_length_mm,
         (true, "rad") => options.drift_angle_rad,
-        // Parameters of effects have units of their own: they stay unless a drift is stated for them.
+        // Parameters of effects have various units: constant unless a drift is stated for them.
         (true, _) => 0.0,
         (false, "mm") => options.drift_frame_mm,
         (false, _) => options.drift_frame_rad,

@@ -197,11 +197,11 @@ fn the_program_goes_to_every_pose_and_reads_back_byte_for_byte() {
     let motions = &task.listing.motions;
     assert_eq!(motions.len(), 2 * found.rows.len());
     for (pair, row) in motions.chunks(2).zip(&found.rows) {
-        for (motion, setup) in pair.iter().zip([&row.approach_from, &found.poses[row.pose].joints]) {
+        for (motion, expected) in pair.iter().zip([&row.approach_from, &found.poses[row.pose].joints]) {
             assert_eq!(motion.kind, MotionKind::AbsoluteJoint);
             let Ok(TargetValue::Joint(target)) = motion.targets[0].value else { panic!("no joints") };
             for k in 0..6 {
-                assert!((target.robot_deg[k] - wanted[k].to_degrees()).abs() < 1e-6);
+                assert!((target.robot_deg[k] - expected[k].to_degrees()).abs() < 1e-6);
             }
         }
     }
@@ -387,7 +387,7 @@ fn least_on_the_way(
 
 /// The same where the arm stands, by points on the lines of its links; the wrist has half the radius.
 fn least_away(setup: &MeasurementSetup<'_>, joints: &Joints, boxes: &[[[f64; 3]; 2]], radius_mm: f64) -> f64 {
-    let MeasurementSetup { nominal, frames, .. } = *wanted;
+    let MeasurementSetup { nominal, frames, .. } = *setup;
     let chain = nominal.at_condition(&Condition::default()).frames(joints);
     let flange = nominal.forward(joints, &Condition::default());
     let mut points: Vec<Vector3<f64>> = chain.origin.iter().map(|o| Vector3::from(*o)).collect();
