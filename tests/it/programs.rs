@@ -352,7 +352,7 @@ fn the_nominal_arm_lists_every_motion_and_changes_no_byte() {
     let says = [
         "its numbers are right to the last decimal",
         "known only at run time",
-        "the value of the tool is not known",
+        "the tool frame is unknown",
         "joint target",
     ];
     // The reasons are those that an estimated arm gives, but for what it corrects.

@@ -82,7 +82,7 @@ fn find(root: &mut [u32], mut index: u32) -> u32 {
 fn cuts(motion: &Motion) -> bool {
     let path = matches!(motion.kind, MotionKind::Linear | MotionKind::Circular)
         // A path that is in the text though it is not made of lines and arcs, or an instruction that nobody knows.
-        || matches!(motion.left, Some(Reason::NotFollowed | Reason::UnknownInstruction | Reason::NoMotionCode));
+        || matches!(motion.left, Some(Reason::UnsupportedPath | Reason::UnknownInstruction | Reason::NoMotionCode));
     // A search ends, and stands, where its signal comes.
     path && motion.left != Some(Reason::Probe) && !motion.instruction.contains("Search")
 }

@@ -1,7 +1,6 @@
 //! Edits as a unified diff.
 //!
-//! What changed is known from the edits, so nothing is searched: the lines that edits touch are the lines that differ,
-//! and a file of a hundred thousand changed lines costs what it takes to print them.
+//! The edits already determine which lines differ, so no search is needed, and the cost is that of printing.
 
 use std::ops::Range;
 
@@ -10,13 +9,13 @@ use crate::edit::{EditError, Edits};
 /// Lines of context around a change.
 const CONTEXT: usize = 3;
 
-/// One run of changed lines: lines of the source, and the text that stands there instead.
+/// A run of changed lines: lines of the source and the replacing text.
 struct Piece {
     lines: Range<usize>,
     text: Vec<u8>,
 }
 
-/// The unified diff of a file and what its edits make of it; empty where nothing changes.
+/// The unified diff of a file and its edited version; empty if nothing changes.
 ///
 /// ```
 /// use truegrind_programs::diff::unified;
@@ -35,7 +34,7 @@ struct Piece {
 /// # Errors
 /// As [`Edits::apply`].
 pub fn unified(source: &[u8], edits: &Edits, old_name: &str, new_name: &str) -> Result<Vec<u8>, EditError> {
-    // Where each line begins, and the end.
+    // The start of each line, and the end.
     let mut begins = vec![0];
     begins.extend(source.iter().enumerate().filter(|&(_, &byte)| byte == b'\n').map(|(at, _)| at + 1));
     if begins.last() != Some(&source.len()) {
@@ -48,7 +47,7 @@ pub fn unified(source: &[u8], edits: &Edits, old_name: &str, new_name: &str) -> 
         return Ok(out);
     }
     out.extend_from_slice(format!("--- {old_name}\n+++ {new_name}\n").as_bytes());
-    // By how many lines the new file is ahead.
+    // The line offset of the new file.
     let mut shift = 0_isize;
     let mut at = 0;
     while at < pieces.len() {
@@ -89,7 +88,7 @@ pub fn unified(source: &[u8], edits: &Edits, old_name: &str, new_name: &str) -> 
 fn pieces(source: &[u8], edits: &Edits, begins: &[usize]) -> Result<Vec<Piece>, EditError> {
     let mut sorted: Vec<(Range<usize>, &[u8])> = edits.iter().collect();
     sorted.sort_by_key(|(range, _)| (range.start, range.end));
-    // The same checks that applying makes.
+    // The same checks as in [`Edits::apply`].
     if let Some((range, _)) =
         sorted.iter().find(|(range, _)| range.start > range.end || range.end > source.len())
     {
@@ -103,11 +102,11 @@ fn pieces(source: &[u8], edits: &Edits, begins: &[usize]) -> Result<Vec<Piece>, 
     let count = begins.len() - 1;
     let open_end = source.last().is_some_and(|&byte| byte != b'\n');
     let line_of = |byte: usize| match begins.partition_point(|&begin| begin <= byte) - 1 {
-        // Text at the end of a last line that does not end belongs to that line.
+        // Text at the end of an unterminated last line belongs to that line.
         line if line == count && open_end => count - 1,
         line => line.min(count),
     };
-    // The lines that an edit touches: none where whole lines are put in between two.
+    // The lines that an edit touches: none if whole lines are inserted between two.
     let touched = |range: &Range<usize>, text: &[u8]| {
         let first = line_of(range.start);
         let between = range.is_empty() && begins[first] == range.start && text.ends_with(b"\n");
@@ -143,7 +142,7 @@ fn pieces(source: &[u8], edits: &Edits, begins: &[usize]) -> Result<Vec<Piece>, 
             if text.is_empty() || text.ends_with(b"\n") || lines.end == count {
                 break text;
             }
-            // Its line end is gone: the next line is part of this one now.
+            // Its line end is removed, so the next line joins it.
             lines.end += 1;
         };
         out.push(Piece { lines, text });
@@ -157,7 +156,7 @@ fn line_count(text: &[u8]) -> usize {
     ends + usize::from(!text.is_empty() && !text.ends_with(b"\n"))
 }
 
-/// Lines with a sign before each.
+/// Appends lines with a sign before each.
 fn put(out: &mut Vec<u8>, sign: u8, text: &[u8]) {
     for line in text.split_inclusive(|&byte| byte == b'\n') {
         out.push(sign);

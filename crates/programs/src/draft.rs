@@ -1,4 +1,4 @@
-//! A program that does not exist yet, said without its language: what a dialect's writer makes a file of.
+//! New programs, independent of the language, for the writers of the dialects.
 
 use crate::motion::{MotionKind, RobTarget, TargetValue, ToolValue, WorkObjectValue};
 
@@ -7,15 +7,15 @@ use crate::motion::{MotionKind, RobTarget, TargetValue, ToolValue, WorkObjectVal
 pub struct Draft {
     /// The name of the module.
     pub name: String,
-    /// Lines that say at the top what the program is.
+    /// Comment lines at the top.
     pub comments: Vec<String>,
     /// The tool; declared in the program unless it is the controller's own (`tool0`).
     pub tool: (String, ToolValue),
     /// The work object; declared in the program unless it is the controller's own (`wobj0`).
     pub work_object: (String, WorkObjectValue),
-    /// Whether targets get names (p10, p20, …) that can be taught anew, or stand in the instructions.
+    /// Whether targets are named (p10, p20, …), so that they can be taught, or inline in the instructions.
     pub named_targets: bool,
-    /// Whether the controller shall hold the programmed configuration (ConfL, ConfJ).
+    /// Whether the controller monitors the programmed configuration (ConfL, ConfJ).
     pub monitor_configuration: bool,
     /// The motions.
     pub steps: Vec<Step>,
@@ -24,7 +24,7 @@ pub struct Draft {
 /// One motion.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Step {
-    /// How to go. [`MotionKind::Circular`] needs `via`; [`MotionKind::AbsoluteJoint`] a joint target.
+    /// The kind of motion. [`MotionKind::Circular`] needs `via`; [`MotionKind::AbsoluteJoint`] a joint target.
     pub kind: MotionKind,
     /// The end.
     pub to: TargetValue,
@@ -36,16 +36,16 @@ pub struct Step {
     pub zone_mm: Option<f64>,
     /// A comment line before it.
     pub comment: Option<String>,
-    /// Time at rest after it (s).
+    /// Dwell after it (s).
     pub wait_s: Option<f64>,
 }
 
-/// The comment that says of a path which robot it was made for.
+/// The comment that states the surface and the robot of a generated path.
 pub fn heading(surface: &str, robot: &str, targets: usize) -> String {
     format!("{PATH}{surface}{ROBOT}{robot}, {targets} targets.")
 }
 
-/// The robot that a program says it was made for, in the [`heading`] among its first lines.
+/// The robot that a program was generated for, by the [`heading`] among its first lines.
 ///
 /// ```
 /// use truegrind_programs::draft::{heading, robot_of};

@@ -1,8 +1,7 @@
-//! Edits: byte ranges of one file and what shall stand there instead.
+//! Edits: byte ranges of one file and their replacements.
 //!
-//! Edits are sorted and disjoint; bytes outside them never change. Two that overlap are an error of the caller and
-//! are reported, never resolved silently. New text stands in few buffers, so that a million edits cost no million
-//! allocations.
+//! Edits are sorted and disjoint; bytes outside them never change. Overlapping edits are reported as an error of the
+//! caller. New text is kept in few buffers, so that a million edits need no million allocations.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -30,12 +29,12 @@ pub enum EditError {
         /// Length of the file.
         length: usize,
     },
-    /// Offsets are 32 bits.
+    /// Offsets are limited to 32 bits.
     #[error("more than 4 GiB of file or of new text: nothing was changed")]
     TooLong,
 }
 
-/// Offsets of 32 bits: there may be millions.
+/// 32-bit offsets, because there may be millions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Entry {
     start: u32,
@@ -54,7 +53,7 @@ impl Entry {
     }
 }
 
-/// Edits that were made one after the other: their new text stands in one buffer.
+/// Edits made one after the other, with one buffer for their text.
 #[derive(Debug, Clone, Default)]
 struct Part {
     entries: Vec<Entry>,
@@ -63,11 +62,11 @@ struct Part {
 
 /// The edits of one file, in any order until they are applied.
 ///
-/// They stand in parts, so that lists made by several threads are put behind each other without copying them.
+/// They are kept in parts, so that lists made by several threads are concatenated without copying.
 #[derive(Debug, Clone, Default)]
 pub struct Edits {
     parts: Vec<Part>,
-    /// Whether an offset did not fit.
+    /// Whether an offset exceeded 32 bits.
     too_long: bool,
 }
 
@@ -79,7 +78,7 @@ impl PartialEq for Edits {
 
 impl Eq for Edits {}
 
-/// Edits that one thread carries out at a time.
+/// Edits applied by one thread at a time.
 const PORTION: usize = 1 << 15;
 
 impl Edits {
@@ -88,18 +87,18 @@ impl Edits {
         Edits::default()
     }
 
-    /// No edits yet, with room for so many and so many bytes of new text.
+    /// No edits, with capacity for this many edits and bytes of new text.
     pub fn with_capacity(entries: usize, text: usize) -> Edits {
         let part = Part { entries: Vec::with_capacity(entries), text: Vec::with_capacity(text) };
         Edits { parts: vec![part], too_long: false }
     }
 
-    /// Whether nothing changes.
+    /// Whether there are no edits.
     pub fn is_empty(&self) -> bool {
         self.parts.iter().all(|part| part.entries.is_empty())
     }
 
-    /// How many edits there are.
+    /// The number of edits.
     pub fn len(&self) -> usize {
         self.parts.iter().map(|part| part.entries.len()).sum()
     }
@@ -109,7 +108,7 @@ impl Edits {
         self.replace_with(range, |out| out.extend_from_slice(text));
     }
 
-    /// Puts `text` before the byte `at`.
+    /// Inserts `text` before the byte `at`.
     pub fn insert(&mut self, at: usize, text: &[u8]) {
         self.replace(at..at, text);
     }
@@ -132,7 +131,7 @@ impl Edits {
         }
     }
 
-    /// Adds the edits of another list behind those of this one.
+    /// Appends the edits of another list.
     pub fn append(&mut self, other: Edits) {
         self.too_long |= other.too_long;
         self.parts.extend(other.parts.into_iter().filter(|part| !part.entries.is_empty()));
@@ -142,20 +141,20 @@ impl Edits {
         self.parts.iter().flat_map(|part| &part.entries)
     }
 
-    /// Each edit: the bytes to replace and what shall stand there.
+    /// Each edit: the range and its replacement.
     pub fn iter(&self) -> impl Iterator<Item = (Range<usize>, &[u8])> {
         let parts = self.parts.iter();
         parts.flat_map(|part| part.entries.iter().map(|entry| (entry.range(), entry.text(&part.text))))
     }
 
-    /// The lines of a source that the edits make longer, and longer than `most` bytes; the edits are sorted.
+    /// The lines of a source that the edits lengthen to more than `most` bytes. The edits must be sorted.
     ///
     /// ```
     /// use truegrind_programs::edit::Edits;
     ///
     /// let source = b"X1 Y2\nX1 Y2 Z3\nX1 Y2\n";
     /// let mut edits = Edits::new();
-    /// // A block that is put in is a line of its own.
+    /// // An inserted block is a line of its own.
     /// edits.insert(0, b"G1 X1 Y2 Z3 A0 B0 C0\n");
     /// edits.replace(1..2, b"1.5");
     /// edits.replace(10..11, b"2.5");
@@ -168,7 +167,7 @@ impl Edits {
     pub fn grown_lines(&self, source: &[u8], most: usize) -> Vec<Range<usize>> {
         let mut out = Vec::new();
         let mut line = 0..0;
-        // The bytes that new text puts in after the last line end that it brings along, less those it takes away.
+        // The bytes that new text adds to the line after its last line end, less the replaced ones.
         let mut more = 0isize;
         let mut close = |line: &Range<usize>, more: isize| {
             let length = line.len() as isize + more;
@@ -184,7 +183,7 @@ impl Edits {
                 let end = source[range.start..].iter().position(|byte| *byte == b'\n');
                 (line, more) = (begin..end.map_or(source.len(), |at| range.start + at + 1), 0);
             }
-            // Blocks that are put in are lines of their own.
+            // Inserted blocks are lines of their own.
             let own = text.iter().rposition(|byte| *byte == b'\n').map_or(text, |at| &text[at + 1..]);
             more += own.len() as isize - range.len() as isize;
         }
@@ -192,12 +191,12 @@ impl Edits {
         out
     }
 
-    /// Sorts the edits by place and checks that no two overlap. An insertion at the first byte of a replacement goes
-    /// before it.
+    /// Sorts the edits by position and checks that no two overlap. An insertion at the first byte of a replacement
+    /// goes before it.
     pub fn sort(&mut self) -> Result<(), EditError> {
         let key = |entry: &Entry| (entry.start, entry.end);
         if !self.entries().is_sorted_by_key(key) {
-            // As one part; those of one place stay in the order in which they were made.
+            // Merge into one part; edits at the same position keep their order.
             let mut whole =
                 Edits::with_capacity(self.len(), self.parts.iter().map(|part| part.text.len()).sum());
             self.iter().for_each(|(range, text)| whole.replace(range, text));
@@ -218,7 +217,7 @@ impl Edits {
         Ok(())
     }
 
-    /// The new bytes. Sorts a copy of the list where it is not sorted.
+    /// The new bytes. Sorts a copy if the list is not sorted.
     ///
     /// ```
     /// use truegrind_programs::edit::Edits;
@@ -229,7 +228,7 @@ impl Edits {
     /// edits.insert(0, b"! slower\n");
     /// assert_eq!(edits.apply(source)?, b"! slower\nMoveL p10,v50,fine,tool0;");
     ///
-    /// // Two edits of the same bytes are nobody's to settle.
+    /// // Overlapping edits are an error.
     /// edits.replace(12..16, b"x");
     /// let refused = edits.apply(source).map_err(|error| error.to_string());
     /// assert_eq!(refused, Err("edits of bytes 10..14 and 12..16 overlap: nothing was changed".into()));
@@ -243,7 +242,7 @@ impl Edits {
         if !self.entries().is_sorted_by_key(|entry| (entry.start, entry.end)) {
             sorted.to_mut().sort()?;
         }
-        // For each portion of edits the bytes of the source before the first of them, and how long its new bytes are.
+        // For each portion: the start of the source bytes before its first edit, and the length of its output.
         let chunks = || {
             sorted
                 .parts

@@ -1,6 +1,6 @@
-//! Names of tools and work offsets: one name, however many zeros and blanks a control writes.
+//! Names of tools and work offsets, compared without regard to leading zeros and blanks.
 
-/// Whether two names are one: in any case, T08 is T8.
+/// Whether two names are equal: ignoring case, T08 is T8.
 ///
 /// ```
 /// use truegrind_programs::label::same;
@@ -12,7 +12,7 @@ pub fn same(one: &str, other: &str) -> bool {
     plain(one) == plain(other)
 }
 
-/// A name in upper case without blanks, and its number without leading zeros.
+/// The canonical form: upper case without blanks, the number without leading zeros.
 pub fn plain(name: &str) -> String {
     let name: String = name.split_whitespace().collect::<String>().to_ascii_uppercase();
     match name.strip_prefix('T') {

@@ -1,14 +1,14 @@
-//! Robot programs as bytes: read without loss, understood as motions, changed by edits. Knows no robot.
+//! Robot programs: lossless reading, interpretation as motions, rewriting by edits. Knows no robot.
 //!
-//! - [`tree`]: a lossless syntax tree over bytes in flat arrays; reading never fails.
+//! - [`tree`]: lossless syntax trees over bytes in flat arrays; parsing never fails.
 //! - [`edit`]: sorted, disjoint edits; bytes outside them never change; [`diff`] prints them.
-//! - [`motion`]: what a program tells the robot to do, whatever its language: the [`motion::Listing`].
-//! - [`rewrite`]: what shall change, whatever the language, and what became of it.
-//! - [`shared`]: maps of which copies cost nothing, for what is known where ways part and meet.
-//! - [`draft`]: a program that does not exist yet, for a dialect to write.
+//! - [`motion`]: the motions of a program in any language, as a [`motion::Listing`].
+//! - [`rewrite`]: changes to motions in any language, and their outcomes.
+//! - [`shared`]: persistent maps with cheap copies and joins, for abstract states.
+//! - [`draft`]: new programs, independent of the language.
 //! - [`rapid`]: ABB's RAPID: front end, evaluation, rewriting, writing.
 //! - [`nc`]: G-code of five-axis machines: the same.
-//! - [`reading`]: a program in whichever of them it is written.
+//! - [`reading`]: detects the language of a program.
 //!
 //! ```
 //! use truegrind_programs::motion::TargetValue;

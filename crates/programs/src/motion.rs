@@ -1,11 +1,11 @@
-//! What a program tells the robot to do, whatever language it is written in.
+//! The motions of a program, independent of its language.
 //!
-//! A dialect (RAPID in [`crate::rapid`]) reads bytes and hands back one [`Listing`]: every motion
-//! instruction with its targets, speed, zone, tool and work object, where each number stands, and for everything
-//! that cannot be known from the text alone the [`Reason`]. Nothing is ever guessed.
+//! A dialect (such as [`crate::rapid`]) reads bytes and returns one [`Listing`]: every motion instruction with its
+//! targets, speed, zone, tool and work object, the location of each number, and a [`Reason`] for every value that the
+//! text does not determine. Nothing is guessed.
 //!
-//! Units are those of the file's edge: mm, degrees for joint targets, quaternions scalar first and exactly as
-//! written (not normalised; [`RobTarget::pose`] and [`Frame::pose`] normalise).
+//! Units are those of the file: mm, degrees for joint targets, quaternions scalar first and exactly as written (not
+//! normalised; [`RobTarget::pose`] and [`Frame::pose`] normalise).
 
 mod reason;
 mod target;
@@ -27,13 +27,13 @@ pub struct Span {
 }
 
 impl Span {
-    /// The span as a range that indexes the bytes of its file.
+    /// The span as an index range into the bytes of its file.
     pub fn range(self) -> std::ops::Range<usize> {
         self.start as usize..self.end as usize
     }
 }
 
-/// A place in one of the files that were read together; lines and columns count from 1, columns in bytes.
+/// A location in one of the files; lines and columns count from 1, columns in bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub struct Place {
     /// Index of the file in the order in which the files were given.
@@ -44,73 +44,72 @@ pub struct Place {
     pub column: u32,
 }
 
-/// How the robot goes to the target.
+/// The path to the target.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum MotionKind {
     /// TCP on a straight line (MoveL, G1).
     Linear,
-    /// Joints in proportion to a Cartesian target (MoveJ).
+    /// Joint interpolation to a Cartesian target (MoveJ).
     Joint,
     /// TCP on a circle (MoveC, G2, G3).
     Circular,
-    /// Joints in proportion to a joint target (MoveAbsJ).
+    /// Joint interpolation to a joint target (MoveAbsJ).
     AbsoluteJoint,
     /// Only external axes move (MoveExtJ).
     External,
-    /// A routine or instruction that takes targets but whose path is not known.
+    /// A routine or instruction with targets whose path is unknown.
     Unknown,
 }
 
-/// What a target is to its motion.
+/// The role of a target in its motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Role {
     /// The end of the motion.
     To,
-    /// The point on the arc between start and end of a circular motion.
+    /// The circle point between start and end of a circular motion.
     Via,
 }
 
-/// Where the numbers of a target stand.
+/// Where the numbers of a target are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Origin {
-    /// A literal in the instruction itself.
+    /// A literal in the instruction.
     Inline,
-    /// A declaration of its own, index into [`Listing::declarations`].
+    /// A declaration, index into [`Listing::declarations`].
     Declared(u32),
-    /// One element of a declared array: the declaration, and where the element's literal stands in it.
+    /// An element of a declared array.
     Element {
         /// Index into [`Listing::declarations`].
         declaration: u32,
-        /// The bytes of the element in the declaration's file.
+        /// The bytes of the element's literal in the declaration's file.
         literal: Span,
     },
-    /// The text computes it (Offs, RelTool, assignments, arithmetic): a new value replaces the whole argument by a
-    /// literal.
+    /// Computed (Offs, RelTool, assignments, arithmetic): a new value replaces the whole argument by a literal.
     Computed,
-    /// Not known from the text.
+    /// Unknown.
     Unknown,
 }
 
 /// One target of a motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MotionTarget {
-    /// What it is to the motion.
+    /// Its role in the motion.
     pub role: Role,
-    /// Its value, or why that is not known.
+    /// Its value, or why it is unknown.
     pub value: Result<TargetValue, Reason>,
-    /// Where its numbers stand.
+    /// Where its numbers are written.
     pub origin: Origin,
     /// The bytes of the argument in the instruction.
     pub argument: Span,
 }
 
-/// A named target: one declaration that any number of motions use.
+/// A named target: one declaration, used by any number of motions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Declaration {
     /// The name as declared.
     pub name: String,
-    /// Where the name stands in the declaration.
+    /// The location of the name in the declaration.
     pub place: Place,
     /// The bytes of the whole declaration, `;` included.
     pub statement: Span,
@@ -120,17 +119,17 @@ pub struct Declaration {
     pub array: bool,
     /// Each use by a motion: (motion, target of that motion).
     pub uses: Vec<(u32, u32)>,
-    /// Uses by anything but a motion's own target argument (base of `Offs`, read in an expression, argument of a
-    /// routine): an edit of the declaration would reach them too.
+    /// Uses other than as a motion's own target argument (base of `Offs`, operand of an expression, argument of a
+    /// routine), which an edit of the declaration would also affect.
     pub other_uses: Vec<OtherUse>,
 }
 
 /// A use of a declared target other than as a motion's own target.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct OtherUse {
-    /// The motion whose target is computed from it, where it is one.
+    /// The motion whose target is computed from it, if any.
     pub motion: Option<(u32, u32)>,
-    /// Where.
+    /// Its location.
     pub place: Place,
 }
 
@@ -139,18 +138,18 @@ pub struct OtherUse {
 pub struct Tool {
     /// The name as the program writes it.
     pub name: String,
-    /// Its value, or why it is not known.
+    /// Its value, or why it is unknown.
     pub value: Result<ToolValue, Reason>,
-    /// Where it is declared; `None` for a built-in tool and for one that is declared nowhere.
+    /// Its declaration; `None` if it is built in or undeclared.
     pub place: Option<Place>,
 }
 
-/// What a tool is.
+/// The value of a tool.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ToolValue {
-    /// Whether the robot holds it; otherwise it stands and `frame` is in the world.
+    /// Whether the robot holds it; otherwise it is stationary and `frame` is in the world.
     pub robhold: bool,
-    /// The TCP in the flange (wrist) frame, or in the world for a standing tool.
+    /// The TCP in the flange (wrist) frame, or in the world for a stationary tool.
     pub frame: Frame,
     /// Mass (kg).
     pub mass_kg: f64,
@@ -161,25 +160,25 @@ pub struct ToolValue {
 /// A work object.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WorkObject {
-    /// The name as the program writes it (`wobj0` where the motion names none).
+    /// The name as the program writes it (`wobj0` if the motion names none).
     pub name: String,
-    /// Its value, or why it is not known.
+    /// Its value, or why it is unknown.
     pub value: Result<WorkObjectValue, Reason>,
-    /// Where it is declared; `None` for `wobj0` and for one that is declared nowhere.
+    /// Its declaration; `None` for `wobj0` or if it is undeclared.
     pub place: Option<Place>,
-    /// A displacement within it that the program sets (PDispSet, TRANS, ROT) and the text tells; the object frame of
-    /// `value` has it in it already.
+    /// A known displacement within it that the program sets (PDispSet, TRANS, ROT). The object frame of `value`
+    /// already includes it.
     pub displacement: Option<Frame>,
 }
 
-/// What a work object is. Targets stand in `user_frame * object_frame`.
+/// The value of a work object. Targets are relative to `user_frame * object_frame`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WorkObjectValue {
     /// Whether the robot holds it; then the user frame is in the flange frame.
     pub robhold: bool,
     /// Whether the user frame is fixed (TRUE) or moved by `mechanical_unit` (FALSE).
     pub fixed: bool,
-    /// The unit that moves the user frame; empty where none does.
+    /// The unit that moves the user frame; empty if none does.
     pub mechanical_unit: String,
     /// The user frame in the world (or flange).
     pub user_frame: Frame,
@@ -192,7 +191,7 @@ pub struct WorkObjectValue {
 pub struct Speed {
     /// The argument as the program writes it.
     pub text: String,
-    /// Its value, or why it is not known.
+    /// Its value, or why it is unknown.
     pub value: Result<SpeedValue, Reason>,
 }
 
@@ -214,7 +213,7 @@ pub struct SpeedValue {
 pub struct Zone {
     /// The argument as the program writes it.
     pub text: String,
-    /// Its value, or why it is not known.
+    /// Its value, or why it is unknown.
     pub value: Result<ZoneValue, Reason>,
 }
 
@@ -231,7 +230,7 @@ pub struct ZoneValue {
     pub orientation_deg: f64,
 }
 
-/// What is known of a switch that acts in execution order.
+/// The abstract state of a switch that takes effect in execution order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Switch {
@@ -239,11 +238,11 @@ pub enum Switch {
     Off,
     /// Certainly on.
     On,
-    /// On or off depending on what ran before.
+    /// On or off, depending on the path of control flow.
     Either,
 }
 
-/// The modal state in which a motion runs.
+/// The modal state of a motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Modal {
     /// Whether the configuration of linear and circular motions is monitored (ConfL).
@@ -254,13 +253,13 @@ pub struct Modal {
     pub displacement: Switch,
     /// Whether the wrist may deviate near singularities (SingArea \Wrist or \LockAxis4).
     pub wrist_interpolation: Switch,
-    /// Whether circular motions take the orientation of the circle point (CirPathMode).
+    /// Whether circular motions follow the orientation of the circle point (CirPathMode).
     pub circle_point_orientation: Switch,
-    /// Whether other robots move in step (SyncMoveOn).
+    /// Whether other robots move synchronously (SyncMoveOn).
     pub synchronised: Switch,
     /// Whether sensors or forces move the path (soft servo).
     pub sensor_guided: Switch,
-    /// Whether an axis stands where no target says (independent mode, SingArea \LockAxis4).
+    /// Whether the position of an axis is independent of the targets (independent mode, SingArea \LockAxis4).
     pub axis_apart: Switch,
 }
 
@@ -281,13 +280,13 @@ impl Modal {
 /// One motion instruction.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Motion {
-    /// Where the instruction begins.
+    /// The location of the instruction.
     pub place: Place,
     /// The bytes of the instruction, `;` included.
     pub statement: Span,
-    /// Its name: in the manual's spelling where known, else as written.
+    /// Its name: in the manual's spelling if known, else as written.
     pub instruction: Arc<str>,
-    /// How the robot goes.
+    /// The kind of path.
     pub kind: MotionKind,
     /// The targets in the order of the arguments (the circle point before the end).
     pub targets: Vec<MotionTarget>,
@@ -301,30 +300,30 @@ pub struct Motion {
     pub work_object: Option<u32>,
     /// Whether the speed is overridden by a time for the whole motion (`\T`), which forbids extra targets.
     pub timed: bool,
-    /// Whether the language lets targets be put in before it.
+    /// Whether the language allows targets to be inserted before it.
     pub insertable: bool,
-    /// Whether the language lets a circular motion be replaced by straight ones.
+    /// Whether the language allows a circular motion to be replaced by straight ones.
     pub straightens: bool,
-    /// Whether the language lets a target state the configuration of the arm.
+    /// Whether the language allows a target to state the configuration of the arm.
     pub configures: bool,
-    /// Whether the control goes as fast as it can (G0, FMAX): on a line or joint by joint, as it is set up.
+    /// Rapid motion (G0, FMAX): linear or joint by joint, depending on the control.
     pub rapid: bool,
-    /// The axis about which a circular motion turns, positively, in the axes of its targets; `None` where its three
-    /// points alone say it (RAPID).
+    /// The axis of positive rotation of a circular motion, in the axes of its targets; `None` if only its three
+    /// points determine it (RAPID).
     pub axis: Option<[f64; 3]>,
-    /// Whether a circular motion states its radius and no centre: that leaves the centre open near half a turn.
+    /// Whether a circular motion is programmed by its radius, so that the centre is ill-conditioned near half a turn.
     pub by_radius: bool,
-    /// The modal state in which it runs.
+    /// The modal state.
     pub modal: Modal,
-    /// Whether it stands in a loop.
+    /// Whether it is in a loop.
     pub in_loop: bool,
     /// Whether it may be skipped (in IF, TEST or an error handler).
     pub conditional: bool,
-    /// The motion that ended where this one starts, where that is the same on every way to it.
+    /// The motion that ends where this one starts, if every path of control flow has the same one.
     pub previous: Option<u32>,
     /// Index into [`Listing::routines`]; `None` outside routines.
     pub routine: Option<u32>,
-    /// Why the motion as a whole must be left as it is, targets apart; the first that holds.
+    /// Why the motion as a whole must stay unmodified, apart from its targets; the first reason that applies.
     pub left: Option<Reason>,
 }
 
@@ -334,8 +333,8 @@ impl Motion {
         self.targets.iter().rev().find(|target| target.role == Role::To)
     }
 
-    /// Why this motion cannot be rewritten, or `None` where it can: first the motion's own reason, then those of its
-    /// targets.
+    /// Why this motion cannot be rewritten: first the motion's own reason, then those of its targets. `None` if it
+    /// can.
     pub fn reason(&self) -> Option<Reason> {
         self.left.or_else(|| self.targets.iter().find_map(|target| target.value.err()))
     }
@@ -346,18 +345,18 @@ impl Motion {
 pub struct Routine {
     /// Its name.
     pub name: String,
-    /// The module it stands in, empty for a fragment.
+    /// Its module, empty for a fragment.
     pub module: String,
-    /// Where its name stands.
+    /// The location of its name.
     pub place: Place,
 }
 
-/// A region that could not be read; it is never edited.
+/// A region that could not be parsed; it is never edited.
 ///
 /// ```
 /// use truegrind_programs::rapid::Task;
 ///
-/// // What cannot be read is listed with its line, and the motions around it are read all the same.
+/// // An unreadable region is listed with its line, and the motions around it are read.
 /// let source = b"MODULE M
 ///   PROC main()
 ///     MoveL [[500,0,300],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v50,fine,tool0;
@@ -372,7 +371,7 @@ pub struct Routine {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct OpaqueRegion {
-    /// Where it begins.
+    /// Its location.
     pub place: Place,
     /// Its bytes.
     pub span: Span,
@@ -380,7 +379,7 @@ pub struct OpaqueRegion {
     pub reason: OpaqueReason,
 }
 
-/// Everything that a program, given as one or several files of one task, does with the robot.
+/// The motions of a program of one or several files.
 ///
 /// ```
 /// use truegrind_programs::motion::Reason;
@@ -399,7 +398,7 @@ pub struct OpaqueRegion {
 /// let speed = listing.speed(first).ok_or("none")?;
 /// assert_eq!((speed.text.as_str(), speed.value.map(|value| value.tcp_mm_s)), ("v50", Ok(50.0)));
 /// assert_eq!(listing.zone(first).ok_or("none")?.value.map(|zone| (zone.fine, zone.tcp_mm)), Ok((false, 1.0)));
-/// // What only the caller knows is never guessed.
+/// // A value that only the caller knows is never guessed.
 /// assert_eq!((first.reason(), second.reason()), (None, Some(Reason::Parameter)));
 /// # Ok::<(), &str>(())
 /// ```
@@ -411,42 +410,42 @@ pub struct Listing {
     pub declarations: Vec<Declaration>,
     /// Tools that motions use.
     pub tools: Vec<Tool>,
-    /// Tools that are declared in the files, or stated beside them, whether motions use them or not: a work object may
-    /// have been taught with one that this program never moves.
+    /// Tools that are declared in the files or stated beside them, used or not: a work object may have been taught
+    /// with a tool that this program never uses.
     pub declared_tools: Vec<Tool>,
-    /// How comments of an NC program call its numbered tools and work offsets: number (`T1`, `G54`), name.
+    /// Names in comments of an NC program for its numbered tools and work offsets: number (`T1`, `G54`), name.
     pub labels: Vec<(String, String)>,
     /// Work objects that motions use.
     pub work_objects: Vec<WorkObject>,
     /// Speeds that motions use.
     pub speeds: Vec<Speed>,
-    /// How long motions take (s), where the program says so (`\T`), by motion.
+    /// Programmed durations of motions (s, `\T`), by motion.
     pub durations_s: BTreeMap<u32, Result<f64, Reason>>,
     /// Zones that motions use.
     pub zones: Vec<Zone>,
     /// Routines that hold motions.
     pub routines: Vec<Routine>,
-    /// Whether it is of NC programs, which know tools by number and work offsets.
+    /// Whether it is of NC programs, with numbered tools and work offsets.
     pub numbered: bool,
-    /// Motions that call a program which does not stand in their file (NC).
+    /// Motions that call a program outside their file (NC).
     pub outside: Vec<u32>,
-    /// What could not be read.
+    /// Regions that could not be parsed.
     pub opaque: Vec<OpaqueRegion>,
     /// The marks of earlier compensations, per file.
     pub marks: Vec<Option<Mark>>,
-    /// Comments that state something for the correction (`truegrind angles …`) and cannot be used: nothing may be corrected
-    /// before they are put right.
+    /// Unusable comments that state something for the correction (`truegrind angles …`); nothing may be corrected
+    /// before they are fixed.
     pub misstated: Vec<Misstated>,
 }
 
-/// A comment that states something for the correction, and does not.
+/// A comment that states something for the correction and cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Misstated {
     /// Name of its file.
     pub file: String,
     /// Its line, from 1.
     pub line: u32,
-    /// The comment as it stands there.
+    /// The comment as written.
     pub text: String,
     /// What was expected.
     pub expected: String,
@@ -459,7 +458,7 @@ impl fmt::Display for Misstated {
 }
 
 impl Listing {
-    /// How comments of an NC program call a tool or work offset.
+    /// The names in comments for a tool or work offset.
     pub fn labels_of(&self, number: &str) -> impl Iterator<Item = &str> {
         let here = self.labels.iter().filter(move |(other, _)| super::label::same(other, number));
         here.map(|(_, label)| label.as_str())
@@ -475,7 +474,7 @@ impl Listing {
         motion.work_object.and_then(|index| self.work_objects.get(index as usize))
     }
 
-    /// Why tool and work object of a motion do not tell where its targets are.
+    /// Why the tool and work object of a motion do not determine where its targets are.
     pub fn left_by_frames(&self, motion: &Motion) -> Option<Reason> {
         let tool = match self.tool(motion).map(|tool| &tool.value) {
             Some(Ok(tool)) => tool,
@@ -509,10 +508,10 @@ impl Listing {
     }
 }
 
-/// What a program that was made for the nominal arm says of itself in a comment; the line goes when the program is corrected.
+/// The comment in a program that was made for the nominal arm; the correction removes it.
 pub const UNCORRECTED: &str = "Written for the nominal arm: run truegrind compensate before grinding.";
 
-/// Whether a comment is that one, in whichever signs a language puts comments.
+/// Whether a comment is [`UNCORRECTED`], in the comment syntax of any language.
 pub(crate) fn says_uncorrected(comment: &[u8]) -> bool {
     let said = comment.trim_ascii_start();
     let said =
@@ -522,7 +521,7 @@ pub(crate) fn says_uncorrected(comment: &[u8]) -> bool {
     said.eq_ignore_ascii_case(UNCORRECTED.as_bytes())
 }
 
-/// The comment line that says that a file was compensated, by which version, with which model.
+/// The mark of a compensated file: by which version, with which model.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Mark {
     /// The version of truegrind that wrote the file.

@@ -1,19 +1,19 @@
-//! NC programs (G-code) of five-axis machines and of robots that run them: read without loss, followed block by block,
-//! rewritten word by word.
+//! NC programs (G-code) of five-axis machines and of robots that run them: lossless reading, block-by-block
+//! interpretation, rewriting word by word.
 //!
-//! The way of the data: bytes → [`dialect`] (which control) → [`lexer`] → [`parser`] (a
-//! [`crate::tree::Tree`] of blocks and words; never fails) → [`Task::read`], which follows the modal state of
-//! the control, [`expression`]s and [`arc`]s → [`Task::listing`], the same [`crate::motion::Listing`] that
-//! RAPID gives → [`Task::rewrite`] → and the other way round, [`writer`].
+//! Data flow: bytes → [`dialect`] (which control) → [`lexer`] → [`parser`] (a [`crate::tree::Tree`] of blocks and
+//! words; never fails) → [`Task::read`], an abstract interpreter of the control's modal state, [`expression`]s and
+//! [`arc`]s → [`Task::listing`], the same [`crate::motion::Listing`] as of RAPID → [`Task::rewrite`]. [`writer`]
+//! makes new programs.
 //!
-//! A pose is X Y Z with A B C in the convention of the robot file ([`orientation::Angles`]), or with a tool vector. What
-//! the text does not tell (work offsets, tools) comes from the [`setup`].
+//! A pose is X Y Z with A B C in the convention of the robot file ([`orientation::Angles`]), or with a tool vector.
+//! Work offsets and tools that the text does not hold come from the [`setup`].
 //!
-//! Source: ISO 6983-1 (words, G00 to G03, G17 to G19, G90, G91); Fanuc series 30i operator's manual (G43.4, G43.5, G92,
-//! custom macros); Siemens SINUMERIK 840D sl programming manuals "Fundamentals" and "Job planning" (AC, IC, frames,
-//! TRAORI, A3 B3 C3); LinuxCNC G-code reference; Heidenhain iTNC 530 user's manual (conversational). Departures: a path
-//! that is more than lines and arcs (splines, cycles, threads, contours) is listed and left; without a sign of a jump
-//! blocks are followed in the order of the text.
+//! Source: ISO 6983-1 (words, G00 to G03, G17 to G19, G90, G91); Fanuc series 30i operator's manual (G43.4, G43.5,
+//! G92, custom macros); Siemens SINUMERIK 840D sl programming manuals "Fundamentals" and "Job planning" (AC, IC,
+//! frames, TRAORI, A3 B3 C3); LinuxCNC G-code reference; Heidenhain iTNC 530 user's manual (conversational).
+//! Departures: paths other than lines and arcs (splines, cycles, threads, contours) are listed and not modified;
+//! blocks are interpreted in the order of the text, with joins at every possible jump target.
 
 pub mod token;
 pub mod dialect;

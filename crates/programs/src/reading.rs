@@ -1,4 +1,4 @@
-//! A program in whichever language it is written.
+//! Programs in either language, detected by file name or content.
 
 use crate::edit::EditError;
 use crate::motion::Listing;
@@ -15,22 +15,22 @@ pub enum Language {
     Nc,
 }
 
-/// Endings of file names that are certainly RAPID.
+/// Extensions of file names that are certainly RAPID.
 const RAPID: [&str; 7] = ["mod", "modx", "prg", "sys", "sysx", "modb", "pgf"];
 
-/// Endings of file names that are certainly NC.
+/// Extensions of file names that are certainly NC.
 const NC: [&str; 22] = [
     "nc", "mpf", "spf", "ngc", "ptp", "h", "tap", "cnc", "gcode", "eia", "din", "iso", "min", "mcd", "nci",
     "ncc", "ncp", "pim", "apt", "hnc", "i", "g",
 ];
 
 impl Language {
-    /// The language of a file by the ending of its name, else by what it says.
+    /// The language of a file by the extension of its name, else by its content.
     ///
     /// ```
     /// use truegrind_programs::reading::Language;
     ///
-    /// // By the ending, else by what the file says.
+    /// // By the extension, else by the content.
     /// assert_eq!(Language::of("blade.MOD", b""), Language::Rapid);
     /// assert_eq!(Language::of("blade.mpf", b""), Language::Nc);
     /// assert_eq!(Language::of("blade.txt", b"MODULE M\nENDMODULE\n"), Language::Rapid);
@@ -58,7 +58,7 @@ impl Language {
         }
     }
 
-    /// Whether a file of this name is a program at all, by the ending.
+    /// The language by the extension of a file name; `None` if it is not of a program.
     pub fn by_name(name: &str) -> Option<Language> {
         let ending = name.rsplit_once('.')?.1.to_ascii_lowercase();
         if RAPID.contains(&ending.as_str()) {
@@ -71,7 +71,7 @@ impl Language {
     }
 }
 
-/// The files of one task, read.
+/// The files of one task, parsed and interpreted.
 #[derive(Debug)]
 pub enum Program<'s> {
     /// RAPID modules.
@@ -81,8 +81,8 @@ pub enum Program<'s> {
 }
 
 impl<'s> Program<'s> {
-    /// Reads files of one language, given by name and bytes. The first one says which. Never fails: what cannot be read
-    /// is listed.
+    /// Reads files of one language, given by name and bytes; the first file determines the language. Never fails:
+    /// unreadable regions are listed.
     ///
     /// ```
     /// use truegrind_programs::motion::MotionKind;
@@ -111,14 +111,14 @@ impl<'s> Program<'s> {
         }
     }
 
-    /// Lets go of what only reading and walking through the statements ask for; listing and rewrites stay as they are.
+    /// Frees the syntax trees, which listing and rewriting do not need.
     pub fn forget_trees(&mut self) {
         if let Program::Rapid(task) = self {
             task.forget_trees();
         }
     }
 
-    /// What it tells the robot to do.
+    /// Its motions.
     pub fn listing(&self) -> &Listing {
         match self {
             Program::Rapid(task) => &task.listing,
@@ -126,16 +126,16 @@ impl<'s> Program<'s> {
         }
     }
 
-    /// Whether it is known before they are written that none of the changes will be refused.
+    /// Whether it is known in advance that none of the changes will be refused.
     pub fn takes(&self, changes: &[Change]) -> bool {
         match self {
             Program::Rapid(task) => task.takes(changes),
-            // Of an NC block that shows only in the text that comes of it.
+            // For NC this depends on the written text.
             Program::Nc(_) => false,
         }
     }
 
-    /// The edits that make changes.
+    /// The edits that make the changes.
     ///
     /// # Errors
     /// [`EditError`] where two changes touch the same bytes.

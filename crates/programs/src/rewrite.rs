@@ -1,8 +1,8 @@
-//! What shall change in a program, said without its language, and what became of it.
+//! Changes to a program, independent of its language, and their outcomes.
 //!
-//! The caller states per motion new values ([`Change`]); the dialect finds the bytes that carry them. Only numbers are
-//! replaced where numbers stand; a declaration that several motions share is edited once where all agree on the new
-//! value and nothing else reads it, and split otherwise; a computed target is replaced at its instruction.
+//! The caller states new values per motion ([`Change`]); the dialect finds the bytes to edit. Only numbers are
+//! replaced where numbers are written. A declaration that several motions share is edited once if all agree on the
+//! new value and nothing else reads it, and split otherwise. A computed target is replaced in its instruction.
 
 use crate::edit::Edits;
 use crate::motion::{Mark, MotionKind, Reason};
@@ -10,33 +10,33 @@ use crate::motion::{Mark, MotionKind, Reason};
 /// A new value for one target.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum NewTarget {
-    /// Leave it as it is.
+    /// Unchanged.
     Keep,
-    /// Take it out: a circular motion without its circle point becomes a straight one.
+    /// Removed: a circular motion without its circle point becomes straight.
     Drop,
-    /// A new pose; external axes stay.
+    /// A new pose; external axes are unchanged.
     Cartesian {
         /// Position in the object frame (mm).
         position_mm: [f64; 3],
         /// Quaternion w, x, y, z; the sign is chosen to agree with the old one.
         quaternion: [f64; 4],
-        /// New configuration; `None` leaves the old.
+        /// New configuration; `None` keeps the old one.
         conf: Option<[i32; 4]>,
     },
-    /// New joint angles (degrees); external axes stay. On an instruction with a Cartesian target this turns the
-    /// instruction into its joint form (MoveL to MoveAbsJ).
+    /// New joint angles (degrees); external axes are unchanged. An instruction with a Cartesian target is replaced by
+    /// its joint form (MoveL by MoveAbsJ).
     Joint {
         /// Robot axes (degrees).
         robot_deg: [f64; 6],
     },
 }
 
-/// Beyond these no arm stands, and no control reads what would be written (mm, degrees).
+/// Limits of positions (mm) and angles (°) that a control can read.
 const FARTHEST_MM: f64 = 1e7;
 const FARTHEST_DEG: f64 = 1e6;
 
 impl NewTarget {
-    /// Whether a control can hold its numbers.
+    /// Whether a control can represent its numbers.
     pub fn is_held(&self) -> bool {
         match self {
             NewTarget::Keep | NewTarget::Drop => true,
@@ -50,13 +50,13 @@ impl NewTarget {
 }
 
 impl Change {
-    /// Whether a control can hold its numbers.
+    /// Whether a control can represent its numbers.
     pub fn is_held(&self) -> bool {
         self.targets.iter().chain(self.before.iter().map(|extra| &extra.target)).all(NewTarget::is_held)
     }
 }
 
-/// A motion to put before another; it takes speed, tool, work object and the process arguments from that one.
+/// A motion to insert before another, from which it takes speed, tool, work object and process arguments.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Extra {
     /// [`MotionKind::Linear`] or [`MotionKind::Joint`] with a Cartesian target, [`MotionKind::AbsoluteJoint`] with joints.
@@ -67,14 +67,14 @@ pub struct Extra {
     pub external: Option<[Option<f64>; 6]>,
 }
 
-/// What shall change at one motion.
+/// The change of one motion.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Change {
     /// Index into [`crate::motion::Listing::motions`].
     pub motion: u32,
-    /// One per target of the motion, in the same order; empty leaves all.
+    /// One per target of the motion, in the same order; empty keeps all.
     pub targets: Vec<NewTarget>,
-    /// Motions to put before it, in the order in which the robot shall reach them.
+    /// Motions to insert before it, in the order of execution.
     pub before: Vec<Extra>,
 }
 
@@ -94,9 +94,9 @@ pub struct RewriteOptions {
     pub quaternion_decimals: u8,
     /// Decimals of joint angles in degrees.
     pub joint_decimals: u8,
-    /// The zone of motions that are put in; fly-by.
+    /// The zone of inserted motions; fly-by.
     pub extra_zone: String,
-    /// The mark to write into every file in which something changed.
+    /// The mark to write into every changed file.
     pub mark: Option<Mark>,
 }
 
@@ -112,14 +112,14 @@ impl Default for RewriteOptions {
     }
 }
 
-/// What became of one change.
+/// The outcome of one change.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Outcome {
-    /// Equal to the source to the printed decimals: no byte changed.
+    /// Equal to the source within the written decimals: no byte changed.
     Unchanged,
-    /// The numbers were replaced where they stand (in the instruction or in the declaration).
+    /// The numbers were replaced in place (in the instruction or in the declaration).
     InPlace,
-    /// A declaration that others use with another value was cloned under this name.
+    /// A declaration that other motions use with another value was cloned under this name.
     Split(String),
     /// The argument was replaced by a literal in the instruction.
     Inlined,

@@ -1,27 +1,27 @@
-//! A map of which copies share what they have in common: a copy costs nothing, a change a few small nodes, and two copies of
-//! one map are joined in the time that they differ by.
+//! A persistent map: copies share structure, so that a copy is free, an insertion copies a few small nodes, and
+//! joining two copies takes time proportional to their difference.
 //!
-//! Method: a trie over four bits of the hash at a time, its nodes counted by reference (Bagwell, Ideal Hash Trees, 2001,
-//! without the compressed nodes).
+//! Method: a reference-counted hash trie with four bits per level (Bagwell, Ideal Hash Trees, 2001, without the
+//! compressed nodes).
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
 
-/// Bits of the hash for each step.
+/// Bits of the hash per level.
 const STEP: u32 = 4;
 /// Children of a node.
 const FAN: usize = 1 << STEP;
 
 #[derive(Debug)]
 enum Node<K, V> {
-    /// Entries of one hash.
+    /// Entries with the same hash.
     Leaf(u64, Vec<(K, V)>),
     Branch([Option<Arc<Node<K, V>>>; FAN]),
 }
 
 type Link<K, V> = Option<Arc<Node<K, V>>>;
 
-/// A map with cheap copies.
+/// A persistent map.
 #[derive(Debug)]
 pub struct Map<K, V> {
     root: Link<K, V>,
@@ -68,7 +68,7 @@ impl<K: Hash + Eq + Clone, V: Clone> Map<K, V> {
         self.get_from(key, 0)
     }
 
-    /// The value of a key in a part that begins at these bits of the hash.
+    /// Looks up a key in a subtree that begins at bit `shift` of the hash.
     fn get_from(&self, key: &K, mut shift: u32) -> Option<&V> {
         let hash = hash(key);
         let mut at = self.root.as_deref()?;
@@ -121,7 +121,7 @@ impl<K: Hash + Eq + Clone, V: Clone> Map<K, V> {
         *link = Some(Arc::new(next));
     }
 
-    /// Takes a key out.
+    /// Removes a key.
     pub fn remove(&mut self, key: &K) {
         if self.contains_key(key) {
             Self::take(&mut self.root, hash(key), 0, key);
@@ -144,7 +144,7 @@ impl<K: Hash + Eq + Clone, V: Clone> Map<K, V> {
         *link = next.map(Arc::new);
     }
 
-    /// Each key with its value, in no order that means anything, but always the same.
+    /// Visits every entry, in an arbitrary but reproducible order.
     pub fn for_each(&self, mut take: impl FnMut(&K, &V)) {
         let mut open: Vec<&Node<K, V>> = self.root.as_deref().into_iter().collect();
         while let Some(node) = open.pop() {
@@ -155,7 +155,7 @@ impl<K: Hash + Eq + Clone, V: Clone> Map<K, V> {
         }
     }
 
-    /// Leaves the entries for which `keep` holds.
+    /// Keeps the entries for which `keep` holds.
     pub fn retain(&mut self, mut keep: impl FnMut(&K, &V) -> bool) {
         let mut gone = Vec::new();
         self.for_each(|key, value| {
@@ -166,7 +166,7 @@ impl<K: Hash + Eq + Clone, V: Clone> Map<K, V> {
         gone.iter().for_each(|key| self.remove(key));
     }
 
-    /// What `agree` makes of the values of each key that the two maps do not share; `None` leaves the key out.
+    /// The join of two maps: `agree` merges the values of each key in which they differ; `None` removes the key.
     pub fn joined(&self, other: &Self, agree: &impl Fn(Option<&V>, Option<&V>) -> Option<V>) -> Self {
         let mut out = self.clone();
         Self::differences((&self.root, &other.root), 0, &mut |key, a, b| match agree(a, b) {
@@ -176,7 +176,7 @@ impl<K: Hash + Eq + Clone, V: Clone> Map<K, V> {
         out
     }
 
-    /// Goes through the keys of parts that are not shared.
+    /// Visits the keys of subtrees that are not shared.
     fn differences(
         (a, b): (&Link<K, V>, &Link<K, V>),
         shift: u32,

@@ -1,18 +1,18 @@
 //! A lossless syntax tree over bytes, in flat arrays.
 //!
-//! Tokens tile the file: the end of one is the start of the next, white space and comments included, so that the
-//! tokens in order are the file, whatever bytes it holds. Nodes stand in the order in which they begin (preorder);
-//! each knows how many nodes its subtree has and which tokens it covers, so that walking costs no pointer and
-//! building no allocation. The tree knows no language: a dialect brings its kinds of token (`T`) and node (`N`) and
-//! gives the nodes their meaning in typed views.
+//! Tokens tile the file: each ends where the next starts, white space and comments included, so that the concatenated
+//! tokens are the file, whatever its bytes. Nodes are in preorder; each has the size of its subtree and its range of
+//! tokens, so that traversal follows no pointers and construction needs no allocation per node. The tree is
+//! independent of the language: a dialect supplies the kinds of token (`T`) and node (`N`) and typed views of the
+//! nodes.
 //!
-//! Offsets are 32 bits. A file of 4 GiB or more becomes one single token (the dialect marks it as opaque).
+//! Offsets are 32 bits. A file of 4 GiB or more becomes a single token (the dialect marks it as opaque).
 
 use std::ops::Range;
 
 use crate::motion::{OpaqueReason, Span};
 
-/// A range with the blanks before it and its line end, where it has the line to itself; else as it is.
+/// A range extended to its whole line, with blanks and line end, if nothing else is on the line.
 pub(crate) fn whole_line(source: &[u8], range: Range<usize>) -> Range<usize> {
     let before = source[..range.start].iter().rposition(|byte| !matches!(byte, b' ' | b'\t'));
     let after = source[range.end..].iter().position(|byte| !matches!(byte, b' ' | b'\t' | b'\r'));
@@ -23,12 +23,12 @@ pub(crate) fn whole_line(source: &[u8], range: Range<usize>) -> Range<usize> {
     }
 }
 
-/// A node: what it is, how many nodes it and its descendants are, which tokens they cover.
+/// A node: its kind, the size of its subtree, and its tokens.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Node<N> {
-    /// What it is.
+    /// Its kind.
     pub kind: N,
-    /// How many nodes the subtree has, itself included.
+    /// The number of nodes in the subtree, itself included.
     pub size: u32,
     /// Its first token.
     pub first: u32,
@@ -45,7 +45,7 @@ pub struct Opaque {
     pub end: u32,
     /// Why.
     pub reason: OpaqueReason,
-    /// The token at which reading failed.
+    /// The token at which parsing failed.
     pub at: u32,
 }
 
@@ -58,7 +58,7 @@ pub struct Tree<'s, T, N> {
     lines: Vec<u32>,
     /// The nodes in preorder.
     pub nodes: Vec<Node<N>>,
-    /// What could not be read, in the order of the file.
+    /// The regions that could not be parsed, in file order.
     pub opaque: Vec<Opaque>,
 }
 
@@ -72,7 +72,7 @@ pub enum Child {
 }
 
 impl<'s, T: Copy, N: Copy> Tree<'s, T, N> {
-    /// A tree of tokens alone. `estimate` is how many tokens to expect.
+    /// A tree of tokens without nodes. `estimate` is the expected number of tokens.
     pub fn new(source: &'s [u8], estimate: usize) -> Self {
         Tree {
             source,
@@ -112,7 +112,7 @@ impl<'s, T: Copy, N: Copy> Tree<'s, T, N> {
         self.starts.push(start as u32);
     }
 
-    /// Notes that a line begins at `start`.
+    /// Records that a line begins at `start`.
     #[inline]
     pub fn line_starts(&mut self, start: usize) {
         self.lines.push(start as u32);
@@ -128,7 +128,7 @@ impl<'s, T: Copy, N: Copy> Tree<'s, T, N> {
         self.kinds.len()
     }
 
-    /// Whether the file has no token, which is to say no byte.
+    /// Whether the file is empty.
     pub fn is_empty(&self) -> bool {
         self.kinds.is_empty()
     }
@@ -203,7 +203,7 @@ impl<'s, T: Copy, N: Copy> Tree<'s, T, N> {
         })
     }
 
-    /// The tokens put together: the file.
+    /// The concatenated tokens: the file.
     pub fn print(&self) -> Vec<u8> {
         (0..self.len() as u32).flat_map(|token| self.text(token).iter().copied()).collect()
     }

@@ -59,7 +59,7 @@ pub fn cell_template(programs: &[TemplateProgram<'_>], robot: Option<&str>) -> C
     }
     let convention = programs.iter().any(|program| {
         let targets = program.listing.motions.iter().flat_map(|motion| &motion.targets);
-        targets.map(|target| &target.value).any(|value| *value == Err(Reason::Convention))
+        targets.map(|target| &target.value).any(|value| *value == Err(Reason::UnknownConvention))
     });
     let mut out = Writer { text: String::new(), open: 0 };
     out.head(programs, robot, convention);

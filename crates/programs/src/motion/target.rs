@@ -1,12 +1,11 @@
-//! Where a motion goes, in numbers as a program writes them: frames, poses, joint angles.
+//! Targets in the numbers of a program: frames, poses, joint angles.
 
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 
 use super::reason::Reason;
 use truegrind_math::se3::Pose;
 
-/// A coordinate of a frame or target beyond this (mm) is no place that an arm has to do with, nor is a joint angle beyond
-/// it (°).
+/// The largest plausible coordinate of a frame or target (mm), and joint angle (°).
 pub const FARTHEST_MM: f64 = 1e6;
 
 /// A frame as a program writes it: position and scalar-first quaternion.
@@ -19,7 +18,7 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// The frame that changes nothing.
+    /// The identity.
     pub const IDENTITY: Frame = Frame { position_mm: [0.0; 3], quaternion: [1.0, 0.0, 0.0, 0.0] };
 
     /// The rigid motion, with the quaternion normalised.
@@ -32,10 +31,10 @@ impl Frame {
         )
     }
 
-    /// Itself, where an arm can have to do with it.
+    /// Checks that the frame is plausible.
     ///
     /// # Errors
-    /// [`Reason::BeyondReach`] for a coordinate beyond [`FARTHEST_MM`], or one that is no number.
+    /// [`Reason::BeyondReach`] for a coordinate beyond [`FARTHEST_MM`], or one that is not finite.
     pub fn within_reach(self) -> Result<Frame, Reason> {
         let near = self.position_mm.iter().all(|coordinate| coordinate.abs() <= FARTHEST_MM);
         let turned = self.quaternion.iter().all(|part| part.is_finite());
@@ -58,7 +57,7 @@ impl Frame {
     }
 }
 
-/// A Cartesian target: where the tool frame shall be in the work object.
+/// A Cartesian target: the tool frame in the work object.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RobTarget {
     /// Position of the TCP in the object frame (mm).
@@ -102,7 +101,7 @@ pub enum TargetValue {
 }
 
 impl TargetValue {
-    /// The Cartesian target, where it is one.
+    /// The Cartesian target, if it is one.
     pub fn cartesian(&self) -> Option<&RobTarget> {
         match self {
             TargetValue::Cartesian(target) => Some(target),
@@ -118,7 +117,7 @@ impl TargetValue {
         }
     }
 
-    /// The joint target, where it is one.
+    /// The joint target, if it is one.
     pub fn joint(&self) -> Option<&JointTarget> {
         match self {
             TargetValue::Joint(target) => Some(target),

@@ -1,71 +1,73 @@
-//! Arcs in a plane: from centre or radius to the point half way, and back from three points to a centre.
+//! Arcs in a plane: from centre or radius to the midpoint, and from three points to a centre.
 //!
-//! The two axes of a plane and its normal are right-handed (G17 x y, G18 z x, G19 y z), so that G3 turns positively.
+//! The two axes of a plane and its normal are right-handed (G17 x y, G18 z x, G19 y z), so that G3 rotates
+//! positively.
 
 use std::f64::consts::{PI, TAU};
 
-/// Ends that lie in one direction from the centre to this angle make a whole turn: LinuxCNC takes a millionth (rad).
-const SAME_RAD: f64 = 1e-6;
+/// Ends in the same direction from the centre within this angle make a full circle, as on LinuxCNC (rad).
+const FULL_TURN_RAD: f64 = 1e-6;
 
-/// Ends farther apart than this share of the radius tell the circle with the point between.
-const FAR: f64 = 0.1;
+/// Ends farther apart than this fraction of the radius determine the circle together with the midpoint.
+const LONG_CHORD: f64 = 0.1;
 
-/// Points within this distance do not tell how they are turned (mm).
-const NEAR_MM: f64 = 0.05;
+/// Points within this distance do not determine a rotation (mm).
+const COINCIDENT_MM: f64 = 0.05;
 
-/// The largest change by a correction of direction or scale.
-const MOST_TURN: f64 = 0.01;
+/// The largest change of direction or scale by a correction.
+const MAX_CHANGE: f64 = 0.01;
 
-/// Radii at both ends that differ by less are the same to every control (mm).
-const SAME_MM: f64 = 5e-4;
+/// Every control accepts radii at both ends that differ by less than this (mm).
+const EQUAL_RADII_MM: f64 = 5e-4;
 
-/// Radii at the ends of a nearly closed arc that differ by no more than as they did, and this, are taken by every control (mm).
-const ALIKE_MM: f64 = 2e-3;
+/// Every control accepts radii at the ends of a nearly closed arc that differ by less than in the original plus this
+/// (mm).
+const SIMILAR_RADII_MM: f64 = 2e-3;
 
-/// Pieces between which two arcs are compared.
+/// Samples for comparing two arcs.
 const SAMPLES: u8 = 12;
 
-/// The axes of a plane: first, second, and the one across.
+/// The axes of a plane: first, second, and normal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Plane {
     /// First axis, 0 for X.
     pub a: usize,
     /// Second axis.
     pub b: usize,
-    /// The axis across.
-    pub across: usize,
+    /// The normal.
+    pub normal: usize,
 }
 
 impl Plane {
     /// G17.
-    pub const XY: Plane = Plane { a: 0, b: 1, across: 2 };
+    pub const XY: Plane = Plane { a: 0, b: 1, normal: 2 };
     /// G18.
-    pub const ZX: Plane = Plane { a: 2, b: 0, across: 1 };
+    pub const ZX: Plane = Plane { a: 2, b: 0, normal: 1 };
     /// G19.
-    pub const YZ: Plane = Plane { a: 1, b: 2, across: 0 };
+    pub const YZ: Plane = Plane { a: 1, b: 2, normal: 0 };
 
-    /// The axis about which G3 (`positive`) or G2 turns positively.
+    /// The axis about which G3 (`positive`) or G2 rotates positively.
     pub fn axis(&self, positive: bool) -> [f64; 3] {
         let mut axis = [0.0; 3];
-        axis[self.across] = if positive { 1.0 } else { -1.0 };
+        axis[self.normal] = if positive { 1.0 } else { -1.0 };
         axis
     }
 }
 
-/// An arc, perhaps rising across its plane.
+/// An arc or helix.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Arc {
     /// Its plane.
     pub plane: Plane,
-    /// The centre, along the plane's two axes (mm).
+    /// The centre along the plane's two axes (mm).
     pub centre_mm: [f64; 2],
-    /// The angle that it sweeps, positive for G3 (rad).
+    /// The sweep, positive for G3 (rad).
     pub sweep_rad: f64,
 }
 
 impl Arc {
-    /// An arc about a centre. Ends that coincide are a whole circle.
-    pub fn about(
+    /// An arc about a centre. Coincident ends make a full circle.
+    pub fn from_centre(
         plane: Plane,
         start: [f64; 3],
         end: [f64; 3],
@@ -75,22 +77,22 @@ impl Arc {
         let angle = |p: [f64; 3]| (p[plane.b] - centre_mm[1]).atan2(p[plane.a] - centre_mm[0]);
         let radius = |p: [f64; 3]| (p[plane.b] - centre_mm[1]).hypot(p[plane.a] - centre_mm[0]);
         let (first, last) = (radius(start), radius(end));
-        // Controls take centres that fit both ends to some hundredths; more is a mistake of the program.
+        // Controls accept centres whose radii agree within some hundredths of a mm; more is an error of the program.
         if first < 1e-9 || (first - last).abs() > 0.5_f64.max(0.01 * first) {
             return None;
         }
         let chord = (start[plane.a] - end[plane.a]).hypot(start[plane.b] - end[plane.b]);
         let turned = if positive { angle(end) - angle(start) } else { angle(start) - angle(end) };
         let mut sweep_rad = turned.rem_euclid(TAU);
-        // Ends in one direction from the centre, if not at one distance.
-        if chord < 1e-6 || !(SAME_RAD..=TAU - SAME_RAD).contains(&sweep_rad) {
+        // Ends in the same direction, even at different distances.
+        if chord < 1e-6 || !(FULL_TURN_RAD..=TAU - FULL_TURN_RAD).contains(&sweep_rad) {
             sweep_rad = TAU;
         }
         Some(Arc { plane, centre_mm, sweep_rad: if positive { sweep_rad } else { -sweep_rad } })
     }
 
-    /// An arc of a radius; a negative one takes the longer way.
-    pub fn of_radius(
+    /// An arc of a radius; a negative radius takes the longer arc.
+    pub fn from_radius(
         plane: Plane,
         start: [f64; 3],
         end: [f64; 3],
@@ -103,7 +105,7 @@ impl Arc {
             return None;
         }
         let square = radius_mm * radius_mm - 0.25 * chord * chord;
-        // A radius rounded a little below half the chord is a half circle.
+        // A radius rounded to slightly below half the chord is a half circle.
         if square < -1e-3 * chord {
             return None;
         }
@@ -114,27 +116,27 @@ impl Arc {
             start[plane.a] + 0.5 * da - side * height * db / chord,
             start[plane.b] + 0.5 * db + side * height * da / chord,
         ];
-        Arc::about(plane, start, end, centre, positive)
+        Arc::from_centre(plane, start, end, centre, positive)
     }
 
-    /// The point at a share of the way, 0 at the start.
-    pub fn at(&self, start: [f64; 3], end: [f64; 3], share: f64) -> [f64; 3] {
-        let Plane { a, b, across } = self.plane;
+    /// The point at a fraction of the arc, 0 at the start.
+    pub fn point_at(&self, start: [f64; 3], end: [f64; 3], share: f64) -> [f64; 3] {
+        let Plane { a, b, normal: normal_axis } = self.plane;
         let [u, v] = [start[a] - self.centre_mm[0], start[b] - self.centre_mm[1]];
         let (sin, cos) = (self.sweep_rad * share).sin_cos();
-        // Ends whose radii differ a little are spiralled between, as controls do.
+        // Unequal radii are interpolated along a spiral, as controls do.
         let first = u.hypot(v);
         let last = (end[a] - self.centre_mm[0]).hypot(end[b] - self.centre_mm[1]);
         let scale = if first > 0.0 { 1.0 + share * (last / first - 1.0) } else { 1.0 };
         let mut point = [0.0; 3];
         point[a] = self.centre_mm[0] + scale * (u * cos - v * sin);
         point[b] = self.centre_mm[1] + scale * (u * sin + v * cos);
-        point[across] = start[across] + share * (end[across] - start[across]);
+        point[normal_axis] = start[normal_axis] + share * (end[normal_axis] - start[normal_axis]);
         point
     }
 
-    /// The arc through three points, the second on the way, that turns as asked; `None` where they are in line. For a
-    /// whole circle the second point is the one opposite.
+    /// The arc through three points, the second in the middle, in the given direction; `None` if they are collinear.
+    /// For a full circle the second point is opposite.
     pub fn through(
         plane: Plane,
         start: [f64; 3],
@@ -146,9 +148,9 @@ impl Arc {
         let Plane { a, b, .. } = plane;
         if file_effects {
             let centre = [0.5 * (start[a] + via[a]), 0.5 * (start[b] + via[b])];
-            return Arc::about(plane, start, start, centre, positive);
+            return Arc::from_centre(plane, start, start, centre, positive);
         }
-        // From the chord's middle along its normal, so that both ends have the same radius.
+        // From the middle of the chord along its normal, so that both ends have the same radius.
         let [da, db] = [end[a] - start[a], end[b] - start[b]];
         let chord = da.hypot(db);
         if chord < 1e-6 {
@@ -163,7 +165,7 @@ impl Arc {
         }
         // |centre − start| = |centre − via| with centre = middle + h normal.
         let h = (along * along + off * off - 0.25 * chord * chord) / (2.0 * off);
-        Arc::about(plane, start, end, [middle[0] + h * normal[0], middle[1] + h * normal[1]], positive)
+        Arc::from_centre(plane, start, end, [middle[0] + h * normal[0], middle[1] + h * normal[1]], positive)
     }
 
     /// The arc that goes from where `told` begins to where it ends as this one goes between `meant` (start, middle, end);
@@ -171,43 +173,48 @@ impl Arc {
     ///
     /// Where the ends are far apart for the radius the three points tell the circle. Where they are not, be the arc short or
     /// nearly closed, what is rounded of them would turn it: the centre then moves with the points, as a whole.
-    pub fn moved(&self, intended: [[f64; 3]; 3], commanded: [[f64; 3]; 3], positive: bool) -> Option<Arc> {
+    pub fn displaced(
+        &self,
+        intended: [[f64; 3]; 3],
+        commanded: [[f64; 3]; 3],
+        positive: bool,
+    ) -> Option<Arc> {
         let Plane { a, b, .. } = self.plane;
         let [start, via, end] = commanded;
         let chord = [end[a] - start[a], end[b] - start[b]];
         let length = chord[0].hypot(chord[1]);
         let radius = (intended[0][a] - self.centre_mm[0]).hypot(intended[0][b] - self.centre_mm[1]);
-        if self.is_whole() || length >= FAR * radius {
-            return Arc::through(self.plane, start, via, end, positive, self.is_whole());
+        if self.is_full_circle() || length >= LONG_CHORD * radius {
+            return Arc::through(self.plane, start, via, end, positive, self.is_full_circle());
         }
-        let mut centre_mm = self.moved_centre(intended, commanded);
+        let mut centre_mm = self.displaced_centre(intended, commanded);
         if length < 1e-6 {
             return None;
         }
-        // Where both ends are as far, unless they are anyway, to what controls allow.
+        // Equalise the radii at both ends unless they already agree within the tolerance of controls.
         let along = chord.map(|x| x / length);
         let middle = [start[a] + 0.5 * chord[0], start[b] + 0.5 * chord[1]];
         let off = along[0] * (centre_mm[0] - middle[0]) + along[1] * (centre_mm[1] - middle[1]);
         let end_radius = (intended[2][a] - self.centre_mm[0]).hypot(intended[2][b] - self.centre_mm[1]);
         let apart_mm = off.abs() * length / radius - (end_radius - radius).abs();
         if self.sweep_rad.abs() < PI {
-            if apart_mm > SAME_MM {
+            if apart_mm > EQUAL_RADII_MM {
                 centre_mm = [centre_mm[0] - off * along[0], centre_mm[1] - off * along[1]];
             }
-        } else if apart_mm > ALIKE_MM {
-            // That centre would take the far side of a nearly closed arc along by twice its way.
+        } else if apart_mm > SIMILAR_RADII_MM {
+            // That would displace the far side of a nearly closed arc by twice the change.
             return None;
         }
-        Arc::about(self.plane, start, end, centre_mm, positive)
+        Arc::from_centre(self.plane, start, end, centre_mm, positive)
     }
 
-    /// The centre, moved and turned as the points are (least squares over turn, scale and shift).
-    fn moved_centre(&self, intended: [[f64; 3]; 3], commanded: [[f64; 3]; 3]) -> [f64; 2] {
+    /// The centre, displaced and rotated with the points (least squares over rotation, scale and shift).
+    fn displaced_centre(&self, intended: [[f64; 3]; 3], commanded: [[f64; 3]; 3]) -> [f64; 2] {
         let Plane { a, b, .. } = self.plane;
         let mean =
             |points: &[[f64; 3]; 3]| [a, b].map(|axis| points.iter().map(|p| p[axis]).sum::<f64>() / 3.0);
         let (old, new) = (mean(&intended), mean(&commanded));
-        // The complex factor that takes the one to the other.
+        // The complex factor from one to the other.
         let (mut real, mut imaginary, mut square) = (0.0, 0.0, 0.0);
         for (from, to) in intended.iter().zip(&commanded) {
             let [x, y] = [from[a] - old[0], from[b] - old[1]];
@@ -217,23 +224,24 @@ impl Arc {
             square += x * x + y * y;
         }
         (real, imaginary) = (real / square, imaginary / square);
-        // Points that nearly coincide tell no turn, and no correction turns more.
-        if square < NEAR_MM * NEAR_MM || (real - 1.0).hypot(imaginary) > MOST_TURN {
+        // Nearly coincident points determine no rotation, and no correction rotates by more.
+        if square < COINCIDENT_MM * COINCIDENT_MM || (real - 1.0).hypot(imaginary) > MAX_CHANGE {
             (real, imaginary) = (1.0, 0.0);
         }
         let [x, y] = [self.centre_mm[0] - old[0], self.centre_mm[1] - old[1]];
         [new[0] + real * x - imaginary * y, new[1] + imaginary * x + real * y]
     }
 
-    /// How far an arc that goes between `told` (start, middle, end) leaves this one, moved as its points are: the largest
-    /// distance in the plane (mm).
-    pub fn leaves(&self, intended: [[f64; 3]; 3], commanded: [[f64; 3]; 3], new: &Arc) -> f64 {
+    /// The largest in-plane distance (mm) of an arc between `commanded` (start, middle, end) from this arc displaced
+    /// with its points (quadratic interpolation).
+    pub fn deviation_mm(&self, intended: [[f64; 3]; 3], commanded: [[f64; 3]; 3], new: &Arc) -> f64 {
         let axes = [self.plane.a, self.plane.b];
         let moved = |point: usize, axis: usize| commanded[point][axis] - intended[point][axis];
         (1..SAMPLES).fold(0.0, |most, k| {
             let t = f64::from(k) / f64::from(SAMPLES);
             let weights = [2.0 * (t - 0.5) * (t - 1.0), 4.0 * t * (1.0 - t), 2.0 * t * (t - 0.5)];
-            let (was, is) = (self.at(intended[0], intended[2], t), new.at(commanded[0], commanded[2], t));
+            let (was, is) =
+                (self.point_at(intended[0], intended[2], t), new.point_at(commanded[0], commanded[2], t));
             let off = axes.map(|axis| {
                 let shift: f64 = (0..3).map(|point| weights[point] * moved(point, axis)).sum();
                 is[axis] - was[axis] - shift
@@ -242,13 +250,13 @@ impl Arc {
         })
     }
 
-    /// Whether it goes more than half round.
-    pub fn is_long(&self) -> bool {
+    /// Whether it sweeps more than half a turn.
+    pub fn is_major(&self) -> bool {
         self.sweep_rad.abs() > PI + 1e-9
     }
 
-    /// Whether it is a whole circle.
-    pub fn is_whole(&self) -> bool {
+    /// Whether it is a full circle.
+    pub fn is_full_circle(&self) -> bool {
         self.sweep_rad.abs() > TAU - 1e-9
     }
 }

@@ -1,14 +1,14 @@
-//! Which control a file is written for.
+//! Detection of the control that a file is written for.
 //!
-//! The dialects differ in what a bracket is, in what a number without a point means, and in how a tool is turned. The
-//! signs are looked for in the first 64 KiB outside comments; where none is found the file is plain ISO 6983.
+//! The dialects differ in the meaning of brackets, of numbers without a decimal point, and of orientation words.
+//! Detection looks for distinctive words in the first 64 KiB outside comments; a file without them is plain ISO 6983.
 
 /// A family of controls.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Dialect {
-    /// ISO 6983 without a sign of its own: parentheses are comments, numbers are mm with or without a point.
+    /// ISO 6983 without distinctive words: parentheses are comments, numbers are mm with or without a decimal point.
     Iso,
-    /// Fanuc and those like it (Haas, Mitsubishi): as ISO, but a number without a point may count increments.
+    /// Fanuc and similar (Haas, Mitsubishi): as ISO, but a number without a decimal point may count increments.
     Fanuc,
     /// LinuxCNC.
     LinuxCnc,
@@ -35,7 +35,7 @@ impl Dialect {
         matches!(self, Dialect::Iso | Dialect::Fanuc | Dialect::LinuxCnc)
     }
 
-    /// The dialect of a file by the ending of its name, where its text says nothing else, and by its signs.
+    /// The dialect by the distinctive words of a file, else by the extension of its name.
     pub fn of_named(name: &str, source: &[u8]) -> Dialect {
         let ending = name.rsplit_once('.').map(|(_, ending)| ending.to_ascii_lowercase()).unwrap_or_default();
         let named = match &*ending {
@@ -46,13 +46,13 @@ impl Dialect {
         };
         match Dialect::of(source) {
             Dialect::Iso => named,
-            // Numbered parameters, M98 and program numbers are LinuxCNC's as well.
+            // LinuxCNC also has numbered parameters, M98 and program numbers.
             Dialect::Fanuc if named == Dialect::LinuxCnc && !only_fanuc(source) => named,
             said => said,
         }
     }
 
-    /// The dialect of a file by its signs.
+    /// The dialect by the distinctive words of a file.
     pub fn of(source: &[u8]) -> Dialect {
         let sample = &source[..source.len().min(1 << 16)];
         let mut fanuc = false;
@@ -88,7 +88,7 @@ fn lines(sample: &[u8]) -> impl Iterator<Item = &[u8]> {
     sample.split(move |&byte| byte == end)
 }
 
-/// Whether a text has signs that only a Fanuc has.
+/// Whether a text has words that only a Fanuc has.
 fn only_fanuc(source: &[u8]) -> bool {
     const SIGNS: [&str; 6] = ["G43.4", "G43.5", "WHILE[", "G68.2", "G08P1", "G05P10000"];
     let sample = &source[..source.len().min(1 << 16)];
@@ -110,7 +110,7 @@ fn heidenhain(line: &[u8]) -> bool {
     rest.starts_with(b"BEGIN PGM")
 }
 
-/// A line without what stands in parentheses after white space, a digit or its beginning (arguments follow a name).
+/// A line without parentheses that follow white space, a digit or the line start (arguments follow a name).
 fn without_comments(line: &[u8]) -> Vec<u8> {
     let mut out = Vec::with_capacity(line.len());
     let mut inside = false;
@@ -125,7 +125,7 @@ fn without_comments(line: &[u8]) -> Vec<u8> {
     out
 }
 
-/// Whether a parenthesis here would hold the arguments of a name: two letters or more stand before it.
+/// Whether a parenthesis here would open arguments: a name of two letters or more precedes it.
 fn last_is_name(before: &[u8]) -> bool {
     let name: Vec<u8> = before
         .iter()
@@ -136,7 +136,7 @@ fn last_is_name(before: &[u8]) -> bool {
     name.iter().filter(|byte| byte.is_ascii_alphabetic()).count() >= 2
 }
 
-/// `$NAME.MIN%`, the head of a file of Okuma's.
+/// `$NAME.MIN%`, the header of an Okuma file.
 pub(super) fn is_okuma(line: &[u8]) -> bool {
     line.starts_with(b"$") && line.trim_ascii_end().ends_with(b"%")
 }
@@ -150,7 +150,7 @@ fn siemens(code: &[u8]) -> bool {
     if SIGNS.iter().any(|sign| contains(code, sign)) {
         return true;
     }
-    // A3= B3= C3=, X1=, R12=: an address with a number and an equals sign, which no other control writes.
+    // A3= B3= C3=, X1=, R12=: an address with a number and an equals sign, unique to Siemens.
     code.windows(2).enumerate().any(|(at, pair)| {
         pair[0].is_ascii_digit()
             && pair[1] == b'='

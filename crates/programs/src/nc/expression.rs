@@ -1,8 +1,8 @@
-//! Expressions: where they end, and what they are worth where the text tells it.
+//! Parsing and evaluation of expressions.
 //!
-//! One reader for all controls: `[ … ]` (Fanuc, LinuxCNC) and `( … )` (Siemens) group, `#5`, `R5`, `R[5]`, `Q5`,
+//! One evaluator for all controls: `[ … ]` (Fanuc, LinuxCNC) and `( … )` (Siemens) group, `#5`, `R5`, `R[5]`, `Q5`,
 //! `#<depth>` and names are variables, functions take their argument in either bracket, angles are degrees. Operators
-//! by priority: powers; `*` `/` MOD DIV; `+` `-`; relations; AND OR XOR.
+//! by precedence: powers; `*` `/` MOD DIV; `+` `-`; relations; AND OR XOR.
 
 use super::dialect::Dialect;
 use super::syntax::NcTree;
@@ -10,29 +10,29 @@ use super::token::Token;
 use crate::motion::Reason;
 use crate::rapid::number;
 
-/// A control holds no larger number in a word.
+/// The largest number that a control holds in a word.
 pub(super) const LARGEST: f64 = 1e9;
 
-/// How deeply expressions may nest.
+/// The largest nesting depth.
 const DEPTH: u32 = 64;
 
-/// What a variable is called, in one form for all its spellings: `#5`, `R5`, `<depth>` in upper case.
+/// The canonical name of a variable: `#5`, `R5`, `<depth>` in upper case.
 pub type Variable = Vec<u8>;
 
-/// What an expression is worth, or why that is not known.
+/// The value of an expression, or why it is unknown.
 pub type Evaluated = Result<f64, Reason>;
 
-/// The bytes are no expression.
+/// The tokens are not an expression.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct NotAnExpression;
 
-type Read = Result<Evaluated, NotAnExpression>;
+type Parsed = Result<Evaluated, NotAnExpression>;
 
-/// Reads one expression.
+/// Parses and evaluates one expression.
 pub struct Evaluator<'r, 's> {
     tree: &'r NcTree<'s>,
     dialect: Dialect,
-    /// The next token that is no white space.
+    /// The next token that is not white space.
     pub at: u32,
     end: u32,
     depth: u32,
@@ -40,16 +40,16 @@ pub struct Evaluator<'r, 's> {
 }
 
 impl<'r, 's> Evaluator<'r, 's> {
-    /// Reads tokens `first..end` with what is known of variables.
+    /// Evaluates tokens `first..end` with the known values of variables.
     pub fn new(
         tree: &'r NcTree<'s>,
         dialect: Dialect,
         (first, end): (u32, u32),
         variables: &'r dyn Fn(&Variable) -> Evaluated,
     ) -> Self {
-        let mut reader = Evaluator { tree, dialect, at: first, end, depth: 0, variables };
-        reader.skip();
-        reader
+        let mut evaluator = Evaluator { tree, dialect, at: first, end, depth: 0, variables };
+        evaluator.skip();
+        evaluator
     }
 
     fn skip(&mut self) {
@@ -75,12 +75,12 @@ impl<'r, 's> Evaluator<'r, 's> {
         self.tree.text(self.at)
     }
 
-    /// Whether the next token is a name like this.
+    /// Whether the next token is this name.
     fn is(&self, name: &str) -> bool {
         self.peek() == Token::Name && self.text().eq_ignore_ascii_case(name.as_bytes())
     }
 
-    fn nested(&mut self, inner: impl FnOnce(&mut Self) -> Read) -> Read {
+    fn nested(&mut self, inner: impl FnOnce(&mut Self) -> Parsed) -> Parsed {
         if self.depth >= DEPTH {
             return Err(NotAnExpression);
         }
@@ -91,14 +91,14 @@ impl<'r, 's> Evaluator<'r, 's> {
     }
 
     /// A whole expression.
-    pub fn expression(&mut self) -> Read {
-        self.nested(|reader| reader.chain(0))
+    pub fn expression(&mut self) -> Parsed {
+        self.nested(|evaluator| evaluator.chain(0))
     }
 
-    /// Operators of this priority and all above: 0 logic, 1 relations, 2 sums, 3 products, 4 powers.
-    fn chain(&mut self, level: u8) -> Read {
+    /// Operators of this precedence and above: 0 logic, 1 relations, 2 sums, 3 products, 4 powers.
+    fn chain(&mut self, level: u8) -> Parsed {
         if level > 4 {
-            return self.signed();
+            return self.unary();
         }
         let mut left = self.chain(level + 1)?;
         while let Some(operator) = self.operator(level) {
@@ -125,16 +125,16 @@ impl<'r, 's> Evaluator<'r, 's> {
             (3, Token::Slash) => |a, b| if b == 0.0 { Err(Reason::WrongShape) } else { Ok(a / b) },
             (3, Token::Percent) => remainder,
             (4, Token::Power) => |a, b| Ok(a.powf(b)),
-            // A chain of frames: known only as a whole.
-            (0, Token::Colon) if self.dialect == Dialect::Siemens => |_, _| Err(Reason::Variable),
+            // A chain of frames, which has no numeric value.
+            (0, Token::Colon) if self.dialect == Dialect::Siemens => |_, _| Err(Reason::UnknownVariable),
             (_, Token::Name) => {
                 let name = self.text().to_ascii_uppercase();
                 let bitwise = matches!(self.dialect, Dialect::Fanuc | Dialect::Iso);
                 let divides = self.dialect == Dialect::Heidenhain;
                 let floors = self.dialect == Dialect::LinuxCnc;
                 let found: fn(f64, f64) -> Evaluated = match (level, &*name) {
-                    // Bit by bit, and of other priority: known only where they are not asked for.
-                    (0, b"AND" | b"OR" | b"XOR") if bitwise => |_, _| Err(Reason::Variable),
+                    // Bitwise and of another precedence: unknown.
+                    (0, b"AND" | b"OR" | b"XOR") if bitwise => |_, _| Err(Reason::UnknownVariable),
                     (3, b"DIV") if divides => {
                         |a, b| if b == 0.0 { Err(Reason::WrongShape) } else { Ok(a / b) }
                     }
@@ -163,7 +163,7 @@ impl<'r, 's> Evaluator<'r, 's> {
         let twice = level == 1 && self.peek() == Token::Less;
         self.bump();
         if twice && self.peek() == Token::Less {
-            // `<<` joins texts.
+            // `<<` concatenates strings.
             self.bump();
             return Some(|_, _| Err(Reason::WrongShape));
         }
@@ -171,29 +171,29 @@ impl<'r, 's> Evaluator<'r, 's> {
     }
 
     /// One operand, sign included, without operators after it: `X#1`, `X-[#2+1]`.
-    pub fn primary_only(&mut self) -> Read {
-        self.nested(Self::signed)
+    pub fn primary_only(&mut self) -> Parsed {
+        self.nested(Self::unary)
     }
 
-    fn signed(&mut self) -> Read {
+    fn unary(&mut self) -> Parsed {
         match self.peek() {
             Token::Minus => {
                 self.bump();
-                Ok(self.nested(Self::signed)?.map(|value| -value))
+                Ok(self.nested(Self::unary)?.map(|value| -value))
             }
             Token::Plus => {
                 self.bump();
-                self.nested(Self::signed)
+                self.nested(Self::unary)
             }
             Token::Name if self.is("NOT") => {
                 self.bump();
-                Ok(self.nested(Self::signed)?.map(|value| f64::from(u8::from(value == 0.0))))
+                Ok(self.nested(Self::unary)?.map(|value| f64::from(u8::from(value == 0.0))))
             }
             _ => self.primary(),
         }
     }
 
-    fn primary(&mut self) -> Read {
+    fn primary(&mut self) -> Parsed {
         match self.peek() {
             Token::Number => {
                 let text = self.text();
@@ -214,7 +214,7 @@ impl<'r, 's> Evaluator<'r, 's> {
                 let number = match self.peek() {
                     Token::Number => self.primary()?,
                     Token::BracketOpen => self.group(Token::BracketClose)?,
-                    _ => return Ok(Err(Reason::Variable)),
+                    _ => return Ok(Err(Reason::UnknownVariable)),
                 };
                 Ok(number.and_then(|number| (self.variables)(&numbered(&[letter], number))))
             }
@@ -223,16 +223,16 @@ impl<'r, 's> Evaluator<'r, 's> {
         }
     }
 
-    fn group(&mut self, close: Token) -> Read {
+    fn group(&mut self, close: Token) -> Parsed {
         self.bump();
         let mut inner = self.expression()?;
         while self.peek() == Token::Comma {
-            // Several values: an index or arguments of something that is not known here.
+            // Several values: an index, or arguments of an unknown function.
             self.bump();
             if self.peek() != Token::Comma && self.peek() != close {
                 let _ = self.expression()?;
             }
-            inner = Err(Reason::Variable);
+            inner = Err(Reason::UnknownVariable);
         }
         if self.peek() != close {
             return Err(NotAnExpression);
@@ -242,7 +242,7 @@ impl<'r, 's> Evaluator<'r, 's> {
     }
 
     /// `#5`, `##5`, `#[…]`, `#<name>`.
-    fn variable(&mut self) -> Read {
+    fn variable(&mut self) -> Parsed {
         self.bump();
         let key = match self.peek() {
             Token::Name => {
@@ -258,20 +258,20 @@ impl<'r, 's> Evaluator<'r, 's> {
         Ok(key.and_then(|key| (self.variables)(&key)))
     }
 
-    /// A function, or a variable with a name.
-    fn named(&mut self) -> Read {
+    /// A function, or a named variable.
+    fn named(&mut self) -> Parsed {
         let name = self.text().to_ascii_uppercase();
         self.bump();
         let close = match self.peek() {
             Token::BracketOpen => Token::BracketClose,
             Token::ParenOpen => Token::ParenClose,
-            // QL1, QR1: sets of their own.
+            // QL1, QR1: separate sets.
             Token::Number if self.dialect == Dialect::Heidenhain && matches!(&*name, b"QL" | b"QR") => {
                 return Ok(self.primary()?.and_then(|number| (self.variables)(&numbered(&name, number))));
             }
-            // SIN 30: a function takes the operand that follows.
+            // SIN 30: a function takes the next operand.
             _ if self.dialect == Dialect::Heidenhain && FUNCTIONS.contains(&&*name) => {
-                return Ok(self.nested(Self::signed)?.and_then(|x| function(&name, x, None, self.dialect)));
+                return Ok(self.nested(Self::unary)?.and_then(|x| function(&name, x, None, self.dialect)));
             }
             _ if self.dialect == Dialect::Heidenhain && &*name == b"PI" => {
                 return Ok(Ok(std::f64::consts::PI));
@@ -279,7 +279,7 @@ impl<'r, 's> Evaluator<'r, 's> {
             _ => return Ok((self.variables)(&name)),
         };
         if !FUNCTIONS.contains(&&*name) {
-            return self.skip_group(close).map(|()| Err(Reason::Variable));
+            return self.skip_group(close).map(|()| Err(Reason::UnknownVariable));
         }
         let first = {
             self.bump();
@@ -306,7 +306,7 @@ impl<'r, 's> Evaluator<'r, 's> {
         Ok(first.and_then(|x| function(&name, x, second, self.dialect)))
     }
 
-    /// Brackets whose content is not looked at, to the end of the line at most.
+    /// Skips brackets, at most to the end of the line.
     fn skip_group(&mut self, close: Token) -> Result<(), NotAnExpression> {
         let open = self.peek();
         let mut depth = 0_u32;
@@ -328,11 +328,11 @@ impl<'r, 's> Evaluator<'r, 's> {
     }
 }
 
-/// What is left of a division; its sign differs between controls.
+/// The remainder of a division; its sign differs between controls.
 fn remainder(a: f64, b: f64) -> Evaluated {
     match () {
         () if b == 0.0 => Err(Reason::WrongShape),
-        () if a < 0.0 || b < 0.0 => Err(Reason::Variable),
+        () if a < 0.0 || b < 0.0 => Err(Reason::UnknownVariable),
         () => Ok(a % b),
     }
 }
@@ -344,7 +344,7 @@ pub fn numbered(set: &[u8], number: f64) -> Variable {
     name
 }
 
-/// The value of a number token; a comma is a point.
+/// The value of a number token, with a decimal point or comma.
 pub fn literal(text: &[u8]) -> Option<f64> {
     // 1.5EX-3 of Siemens.
     if let Some(at) = text.iter().position(|byte| byte.eq_ignore_ascii_case(&b'E')) {
@@ -361,7 +361,7 @@ pub fn literal(text: &[u8]) -> Option<f64> {
     }
 }
 
-/// Whether a name is one of a function.
+/// Whether a name is a function.
 pub fn is_function(name: &[u8]) -> bool {
     FUNCTIONS.iter().any(|known| name.eq_ignore_ascii_case(known))
 }
@@ -372,7 +372,7 @@ const FUNCTIONS: [&[u8]; 23] = [
 ];
 
 fn function(name: &[u8], x: f64, second: Option<f64>, dialect: Dialect) -> Evaluated {
-    // A parameter of a Fanuc says where the range of an angle begins; what plain ISO means is not certain either.
+    // A Fanuc parameter sets the range of angles; for plain ISO it is unknown too.
     let fanuc = matches!(dialect, Dialect::Fanuc | Dialect::Iso);
     let iso = dialect == Dialect::Iso;
     let turns = |angle: f64| if fanuc && angle < 0.0 { f64::NAN } else { angle };
@@ -387,8 +387,8 @@ fn function(name: &[u8], x: f64, second: Option<f64>, dialect: Dialect) -> Evalu
         (b"SQRT", None) => x.sqrt(),
         (b"ABS", None) => x.abs(),
         (b"ROUND", None) => x.round(),
-        // LinuxCNC goes down and up, Fanuc towards zero and away from it.
-        (b"FIX" | b"FUP", None) if iso && x < 0.0 && x.fract() != 0.0 => return Err(Reason::Variable),
+        // LinuxCNC rounds down and up, Fanuc towards and away from zero.
+        (b"FIX" | b"FUP", None) if iso && x < 0.0 && x.fract() != 0.0 => return Err(Reason::UnknownVariable),
         (b"FIX", None) if fanuc => x.trunc(),
         (b"FUP", None) if fanuc => x.abs().ceil().copysign(x),
         (b"FIX", None) => x.floor(),
@@ -403,12 +403,12 @@ fn function(name: &[u8], x: f64, second: Option<f64>, dialect: Dialect) -> Evalu
         (b"EXP", None) => x.exp(),
         (b"TRUNC", None) => x.trunc(),
         (b"POT" | b"SQR", None) => x * x,
-        (b"EXISTS", _) => return Err(Reason::Variable),
+        (b"EXISTS", _) => return Err(Reason::UnknownVariable),
         _ => return Err(Reason::WrongShape),
     };
     match value.is_finite() {
         true => Ok(value),
-        false if fanuc && (name == b"ASIN" || second.is_some()) => Err(Reason::Variable),
+        false if fanuc && (name == b"ASIN" || second.is_some()) => Err(Reason::UnknownVariable),
         false => Err(Reason::WrongShape),
     }
 }

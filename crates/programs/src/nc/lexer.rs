@@ -1,7 +1,7 @@
-//! Bytes to tokens.
+//! The lexer: bytes to tokens.
 //!
-//! Every byte ends up in exactly one token, whatever the file holds. A comment in parentheses ends at its line; a line
-//! that begins with `%` is one token.
+//! Every byte belongs to exactly one token. A comment in parentheses ends with its line; a line that begins with `%`
+//! is one token.
 
 use super::dialect::{Dialect, is_okuma};
 use super::expression::is_function;
@@ -21,17 +21,17 @@ pub fn lex(source: &[u8], dialect: Dialect) -> Tree<'_, Token, Syntax> {
     let cr = !source.contains(&b'\n');
     let mut at = 0;
     let mut line_begins = true;
-    // What stood before in the line: a name in pointed brackets only follows `#` or the O of a subprogram.
+    // The last token of the line: a name in angle brackets only follows `#` or the O of a subprogram.
     let mut before = Token::LineEnd;
-    // Whether the line before is a comment that goes on (Heidenhain).
-    let mut goes_on = false;
-    // Up to here no pointed bracket closes: it is looked for once in a line.
-    let mut open_to = 0;
+    // Whether the line before is a comment that continues (Heidenhain).
+    let mut comment_continues = false;
+    // No closing angle bracket before this byte; avoids repeated searches of a line.
+    let mut unclosed_to = 0;
     while at < source.len() {
         let rest = &source[at..];
         let (kind, length) = match rest[0] {
-            // A block number begins a block of its own.
-            byte if goes_on
+            // A block number begins a new block.
+            byte if comment_continues
                 && !is_space(byte)
                 && !byte.is_ascii_digit()
                 && !matches!(byte, b'\r' | b'\n') =>
@@ -43,18 +43,18 @@ pub fn lex(source: &[u8], dialect: Dialect) -> Tree<'_, Token, Syntax> {
                 (Token::Comment, to_line_end(rest, cr))
             }
             b'<' if dialect == Dialect::LinuxCnc && matches!(before, Token::Hash | Token::Address) => {
-                pointed(source, at, &mut open_to)
+                angle_bracket_name(source, at, &mut unclosed_to)
             }
             _ => token(rest, dialect, line_begins, cr),
         };
-        goes_on = match kind {
+        comment_continues = match kind {
             Token::Comment => {
                 dialect == Dialect::Heidenhain
                     && rest[..length].trim_ascii_end().ends_with(b"~")
-                    && (goes_on || is_numbered_comment(&source[..at]))
+                    && (comment_continues || is_numbered_comment(&source[..at]))
             }
-            Token::LineEnd => goes_on && before == Token::Comment,
-            _ => goes_on && kind == Token::Space,
+            Token::LineEnd => comment_continues && before == Token::Comment,
+            _ => comment_continues && kind == Token::Space,
         };
         tree.push(kind, at);
         if kind == Token::LineEnd {
@@ -113,15 +113,15 @@ fn token(rest: &[u8], dialect: Dialect, line_begins: bool, cr: bool) -> (Token, 
     }
 }
 
-/// A name in pointed brackets, or one that does not close on its line.
-fn pointed(source: &[u8], at: usize, open_to: &mut usize) -> (Token, usize) {
+/// A name in angle brackets, or a `<` that is not closed on its line.
+fn angle_bracket_name(source: &[u8], at: usize, unclosed_to: &mut usize) -> (Token, usize) {
     let rest = &source[at..];
-    if at >= *open_to {
+    if at >= *unclosed_to {
         let end = rest.iter().position(|&byte| matches!(byte, b'>' | b'\n' | b'\r'));
         if let Some(end) = end.filter(|&end| rest[end] == b'>') {
             return (Token::Name, end + 1);
         }
-        *open_to = at + end.unwrap_or(rest.len());
+        *unclosed_to = at + end.unwrap_or(rest.len());
     }
     match rest.get(1) {
         Some(b'>') => (Token::NotEqual, 2),
@@ -129,14 +129,14 @@ fn pointed(source: &[u8], at: usize, open_to: &mut usize) -> (Token, usize) {
     }
 }
 
-/// Whether nothing but a block number stands before in the line: there a star begins a heading, elsewhere it multiplies.
+/// Whether only a block number precedes on the line: there a star begins a heading, elsewhere it multiplies.
 fn begins_block(before: &[u8]) -> bool {
     let last = before.iter().rev().find(|byte| !byte.is_ascii_digit() && !is_space(**byte));
     last.is_none_or(|byte| matches!(byte, b'\n' | b'\r'))
 }
 
-/// Whether a comment that begins after these bytes is a block of its own, with a number, and no part of a block that goes on:
-/// only then the lines after a `~` belong to it.
+/// Whether a comment after these bytes is a numbered block of its own, and not a continuation: only then do the lines
+/// after its `~` belong to it.
 fn is_numbered_comment(before: &[u8]) -> bool {
     let line = before.iter().rposition(|&byte| matches!(byte, b'\n' | b'\r')).map_or(0, |at| at + 1);
     let number = before[line..].trim_ascii();
@@ -149,7 +149,7 @@ fn is_space(byte: u8) -> bool {
     matches!(byte, b' ' | b'\t' | 0x0B | 0x0C | 0x1A | 0x00 | 0xA0)
 }
 
-/// Whether nothing but white space follows on the line.
+/// Whether only white space follows on the line.
 fn ends_line(rest: &[u8], cr: bool) -> bool {
     let next = rest.iter().find(|&&byte| !matches!(byte, b' ' | b'\t') && (cr || byte != b'\r'));
     next.is_none_or(|&byte| byte == b'\n' || byte == b'\r')
@@ -170,13 +170,13 @@ fn paren_comment(rest: &[u8]) -> usize {
     if rest.get(end) != Some(&b')') {
         return end;
     }
-    // A bracket within: what closes it too many times to the end of the line belongs to the comment.
+    // Nested brackets: surplus closing ones at the end of the line belong to the comment.
     let more = rest[end..].iter().take_while(|&&byte| matches!(byte, b')' | b' ' | b'\t')).count();
     let closes = rest[end..end + more].iter().rposition(|&byte| byte == b')').map_or(1, |last| last + 1);
     if matches!(rest.get(end + more), None | Some(b'\r' | b'\n')) { end + closes } else { end + 1 }
 }
 
-/// A quoted piece to its closing mark, at most to the end of the line.
+/// A string to its closing quote, at most to the end of the line.
 fn quoted(rest: &[u8], mark: u8) -> usize {
     let end = rest[1..].iter().position(|&byte| byte == mark || matches!(byte, b'\n' | b'\r'));
     match end {
@@ -186,7 +186,7 @@ fn quoted(rest: &[u8], mark: u8) -> usize {
     }
 }
 
-/// Digits with at most one point; Heidenhain also writes a comma.
+/// Digits with at most one decimal point, or a comma (Heidenhain).
 fn number(rest: &[u8], dialect: Dialect) -> usize {
     let digits = |from: usize| from + rest[from..].iter().take_while(|byte| byte.is_ascii_digit()).count();
     let whole = digits(0);
@@ -216,7 +216,7 @@ fn word(rest: &[u8], dialect: Dialect) -> (Token, usize) {
     let letter = |byte: u8| byte.is_ascii_alphabetic() || matches!(byte, b'_' | b'$');
     let letters = run(rest, letter);
     if dialect != Dialect::Siemens {
-        // XSQRT[16]: an address with a function.
+        // XSQRT[16]: an address followed by a function.
         let applies = dialect == Dialect::LinuxCnc
             && letters > 2
             && !is_function(&rest[..letters])
@@ -231,7 +231,7 @@ fn word(rest: &[u8], dialect: Dialect) -> (Token, usize) {
     if letters > 1 || !rest[0].is_ascii_alphabetic() {
         return (Token::Name, all);
     }
-    // A3=, R12=, M3=3: one letter with a number is a name where a value is assigned to it.
+    // A3=, R12=, M3=3: one letter with a number is a name if a value is assigned to it.
     let numbered = 1 + rest[1..].iter().take_while(|byte| byte.is_ascii_digit()).count();
     let after = rest[numbered..].iter().position(|byte| !matches!(byte, b' ' | b'\t'));
     let next = after.map(|after| &rest[numbered + after..]);
@@ -242,7 +242,7 @@ fn word(rest: &[u8], dialect: Dialect) -> (Token, usize) {
     (Token::Address, 1)
 }
 
-/// Whether the bytes are no text.
+/// Whether the bytes are not text.
 fn is_binary(source: &[u8]) -> bool {
     let sample = &source[..source.len().min(4096)];
     let control = sample

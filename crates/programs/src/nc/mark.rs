@@ -1,8 +1,7 @@
-//! The comment line that says that a file was compensated.
+//! The comment line that marks a compensated file.
 //!
-//! `; truegrind 0.1.0 model 3f9a…` or `(truegrind 0.1.0 model 3f9a…)`, and `partial` behind it where
-//! cuts may be corrected in part, on a line of its own after the lines with which
-//! a file begins (tape start, program number, `BEGIN PGM`).
+//! `; truegrind 0.1.0 model 3f9a…` or `(truegrind 0.1.0 model 3f9a…)`, followed by `partial` if cuts may be corrected
+//! in part, on its own line after the header lines of a file (tape start, program number, `BEGIN PGM`).
 
 use std::ops::Range;
 
@@ -12,7 +11,7 @@ use super::token::Token;
 use crate::motion::{Mark, says_uncorrected};
 use crate::tree::whole_line;
 
-/// The mark of a file, where it has one.
+/// The mark of a file, if it has one.
 pub fn find(tree: &NcTree<'_>) -> Option<Mark> {
     read(tree.text(token(tree)?))
 }
@@ -23,14 +22,14 @@ pub fn token(tree: &NcTree<'_>) -> Option<u32> {
     tokens.find(|&token| tree.kind(token) == Some(Token::Comment) && read(tree.text(token)).is_some())
 }
 
-/// The lines that say that the program is still to be corrected.
+/// The lines that state that the program is not corrected yet.
 pub(super) fn uncorrected(tree: &NcTree<'_>) -> Vec<Range<usize>> {
     let comments = (0..tree.len() as u32).filter(|&token| tree.kind(token) == Some(Token::Comment));
     let meant = comments.filter(|&token| says_uncorrected(tree.text(token)));
     meant.map(|token| whole_line(tree.source(), tree.range(token, token + 1))).collect()
 }
 
-/// Reads a comment as a mark.
+/// Parses a comment as a mark.
 ///
 /// ```
 /// use truegrind_programs::motion::Mark;
@@ -65,15 +64,15 @@ pub fn read(comment: &[u8]) -> Option<Mark> {
     })
 }
 
-/// The comment of a mark, as the dialect writes comments.
+/// The comment of a mark in the syntax of the dialect.
 pub fn text(mark: &Mark, dialect: Dialect) -> String {
     let partial = if mark.partial { " partial" } else { "" };
     let text = format!("truegrind {} model {}{partial}", mark.version, mark.model);
-    // Fanuc knows `;` only as the end of a block.
+    // On a Fanuc `;` is only the end of a block.
     if matches!(dialect, Dialect::Fanuc | Dialect::Iso) { format!("({text})") } else { format!("; {text}") }
 }
 
-/// Where the line of the mark goes: after the first lines that must stay the first.
+/// The byte at which the mark is inserted: after the header lines.
 pub fn place(tree: &NcTree<'_>, dialect: Dialect) -> usize {
     let source = tree.source();
     let mut place = 0;
@@ -96,7 +95,7 @@ pub fn place(tree: &NcTree<'_>, dialect: Dialect) -> usize {
                         && upper.get(1).is_some_and(u8::is_ascii_digit)
             }
         };
-        // Empty lines before those lines are passed over.
+        // Empty lines before header lines are skipped.
         if stays {
             place = end;
         } else if !line.is_empty() {

@@ -226,7 +226,7 @@ pub(super) struct Variables {
 
 impl Default for Variables {
     fn default() -> Self {
-        Variables { known: Map::new(), unknown: Reason::Variable }
+        Variables { known: Map::new(), unknown: Reason::UnknownVariable }
     }
 }
 
@@ -235,8 +235,8 @@ impl Variables {
     pub(super) fn get(&self, name: &Variable, assigned: impl FnOnce() -> bool) -> Evaluated {
         match self.known.get(name) {
             Some(value) => *value,
-            None if self.unknown != Reason::Variable && assigned() => Err(self.unknown),
-            None => Err(Reason::Variable),
+            None if self.unknown != Reason::UnknownVariable && assigned() => Err(self.unknown),
+            None => Err(Reason::UnknownVariable),
         }
     }
 
@@ -418,7 +418,7 @@ impl ModalState {
             modal_call: None,
             mode_before_cycle: MotionMode::Unset,
             saved: None,
-            feed: Err(Reason::Variable),
+            feed: Err(Reason::UnknownVariable),
             feed_per_minute: true,
             exact_stop: false,
             exact_stop_modal: false,
@@ -602,9 +602,9 @@ impl ModalState {
             OrientationMode::Unknown(reason) => Err(reason),
             OrientationMode::Angles => {
                 let values = all_known(self.abc)?;
-                Ok(angles.ok_or(Reason::Convention)?.rotation(values))
+                Ok(angles.ok_or(Reason::UnknownConvention)?.rotation(values))
             }
-            OrientationMode::Rpy if !self.rpy_convention_stated => Err(Reason::Convention),
+            OrientationMode::Rpy if !self.rpy_convention_stated => Err(Reason::UnknownConvention),
             OrientationMode::Rpy => Ok(Angles::Wpr.rotation(all_known(self.rpy)?)),
             OrientationMode::Vector => spun(all_known(self.vector)?, self.spin?).ok_or(Reason::WrongShape),
         }

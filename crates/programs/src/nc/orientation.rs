@@ -1,15 +1,15 @@
-//! How three words turn a tool.
+//! Tool orientations from three words.
 //!
-//! Angles are degrees. A *tool vector* points from the tip to the spindle, as `A3= B3= C3=` (Siemens), `I J K` with
-//! G43.5 (Fanuc) and `TX TY TZ` (Heidenhain) have it; the z axis of a tool frame points the other way, out of the
-//! tool. A vector leaves the turn about itself open: it is [`spun`], the angle from the frame whose x axis lies in the
-//! plane of z and the work object's x (y, where z is along x).
+//! Angles are degrees. A *tool vector* points from the tip to the spindle: `A3= B3= C3=` (Siemens), `I J K` with
+//! G43.5 (Fanuc), `TX TY TZ` (Heidenhain). The z axis of a tool frame points the opposite way, out of the tool. The
+//! rotation about the vector is the *spin*, the angle from the frame whose x axis lies in the plane of z and the work
+//! object's x (or y, where z is along x); see [`spun`].
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use truegrind_math::se3::rotation_from_matrix;
 
-/// What the words A, B and C mean.
+/// The convention of A, B and C.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Angles {
     /// About z by A, the new y by B, the new x by C (KUKA).
@@ -23,7 +23,7 @@ pub enum Angles {
 }
 
 impl Angles {
-    /// The word for it in a comment.
+    /// Its name in comments and files.
     pub fn text(self) -> &'static str {
         match self {
             Angles::Abc => "abc",
@@ -36,12 +36,12 @@ impl Angles {
     /// Every convention.
     pub const ALL: [Angles; 4] = [Angles::Abc, Angles::Wpr, Angles::Rxyz, Angles::RotationVector];
 
-    /// The convention of that word.
+    /// The convention of a name.
     pub fn of(text: &str) -> Option<Angles> {
         Angles::ALL.into_iter().find(|angles| angles.text().eq_ignore_ascii_case(text))
     }
 
-    /// The words that there are, for messages.
+    /// The names of all conventions, for messages.
     pub fn words() -> String {
         Angles::ALL.map(Angles::text).join(", ")
     }
@@ -65,7 +65,7 @@ impl Angles {
     /// ```
     /// use truegrind_programs::nc::orientation::Angles;
     ///
-    /// // Of all angles that mean one rotation, those nearest to where the machine stands.
+    /// // Of all equivalent angles, those nearest to the machine's current ones.
     /// for convention in [Angles::Abc, Angles::Wpr, Angles::Rxyz] {
     ///     let stood = [30.0, -40.0, 200.0];
     ///     let found = convention.angles(&convention.rotation(stood), [25.0, -35.0, 190.0]);
@@ -77,7 +77,7 @@ impl Angles {
             return rotation_vector(rotation, near);
         }
         let m = rotation.to_rotation_matrix();
-        // First, middle and last angle of the product of three turns.
+        // First, middle and last angle of the product of three rotations.
         let (first, middle, last) = match self {
             // Rz(f) Ry(m) Rx(l).
             Angles::Abc | Angles::Wpr => (
@@ -95,7 +95,7 @@ impl Angles {
         let [first, middle, last] = [first, middle, last].map(f64::to_degrees);
         let near = if self == Angles::Wpr { [near[2], near[1], near[0]] } else { near };
         let candidates = if middle.abs() > 90.0 - 1e-7 {
-            // Only the sum or difference of first and last is known: the last stays.
+            // Gimbal lock: only the sum or difference of first and last is determined; the last is kept.
             let keep = near[2];
             let first = match (self, middle > 0.0) {
                 (Angles::Rxyz, true) => m[(1, 0)].atan2(m[(1, 1)]).to_degrees() - keep,
@@ -120,13 +120,13 @@ impl Angles {
     }
 }
 
-/// The rotation vector (°) nearest to an old one: its direction, or the other way round.
+/// The rotation vector (°) nearest to an old one, in its direction or the opposite one.
 fn rotation_vector(rotation: &UnitQuaternion<f64>, near: [f64; 3]) -> [f64; 3] {
     let vector = rotation.scaled_axis().map(f64::to_degrees);
     let near = Vector3::from(near);
     let length = vector.norm();
     if length < 1e-9 {
-        // A whole turn keeps its axis.
+        // A full turn keeps its axis.
         return match near.try_normalize(1e-9) {
             Some(axis) => (axis * 360.0 * (near.norm() / 360.0).round()).into(),
             None => vector.into(),
@@ -137,7 +137,7 @@ fn rotation_vector(rotation: &UnitQuaternion<f64>, near: [f64; 3]) -> [f64; 3] {
     (axis * (length + 360.0 * turns)).into()
 }
 
-/// A tool orientation from a tool vector and the turn about it (°); `None` where the vector has no length.
+/// The tool orientation of a tool vector and the spin about it (°); `None` for a zero vector.
 pub fn spun(vector: [f64; 3], spin_deg: f64) -> Option<UnitQuaternion<f64>> {
     let z = -Vector3::from(vector).try_normalize(1e-9)?;
     let along = if z.x.abs() < PARALLEL { Vector3::x() } else { Vector3::y() };
@@ -146,10 +146,10 @@ pub fn spun(vector: [f64; 3], spin_deg: f64) -> Option<UnitQuaternion<f64>> {
     Some(base * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), spin_deg.to_radians()))
 }
 
-/// Beyond this share of x in a tool's axis its turn is counted from y.
+/// Above this x component of the tool axis, the spin is relative to y.
 const PARALLEL: f64 = 0.999;
 
-/// Tool vector and turn about it (°, the nearest to `near_deg`) of an orientation.
+/// Tool vector and spin (°, the equivalent nearest to `near_deg`) of an orientation.
 pub fn vector_and_spin(rotation: &UnitQuaternion<f64>, near_deg: f64) -> ([f64; 3], f64) {
     let vector: [f64; 3] = (-(rotation * Vector3::z())).into();
     let spin = match spun(vector, 0.0) {

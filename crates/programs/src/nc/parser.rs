@@ -1,4 +1,5 @@
-//! Tokens to tree: lines to blocks, blocks to words. Never fails: what cannot be read is opaque to the end of its line.
+//! The parser: tokens to a tree of blocks (lines) and words. Never fails: unreadable text is opaque to the end of its
+//! line.
 
 use super::dialect::Dialect;
 use super::expression::{Evaluated, Evaluator, is_function};
@@ -8,7 +9,7 @@ use super::token::Token;
 use crate::motion::{OpaqueReason, Reason};
 use crate::tree::{Node, Opaque};
 
-/// Reads one file.
+/// Parses one file.
 pub fn parse(source: &[u8], dialect: Dialect) -> NcTree<'_> {
     let mut tree = lex(source, dialect);
     let (nodes, opaque) = {
@@ -27,7 +28,7 @@ struct Parser<'t, 's> {
     at: u32,
     nodes: Vec<Node<Syntax>>,
     opaque: Vec<Opaque>,
-    /// Whether the block has names beside which numbers and brackets stand alone.
+    /// Whether the block has names, beside which numbers and brackets may stand alone.
     free: bool,
 }
 
@@ -36,7 +37,7 @@ impl Parser<'_, '_> {
         self.tree.kind(self.at).unwrap_or(Token::End)
     }
 
-    /// Over white space and comments, not over the end of the line.
+    /// Skips white space and comments within the line.
     fn skip(&mut self) {
         while matches!(self.peek(), Token::Space | Token::Comment) {
             self.at += 1;
@@ -70,7 +71,7 @@ impl Parser<'_, '_> {
         if self.peek() == Token::Slash {
             self.nodes[node].kind = Syntax::Skippable;
             self.bump();
-            // The level of the skip.
+            // The skip level.
             if self.peek() == Token::Number {
                 self.bump();
             }
@@ -79,7 +80,7 @@ impl Parser<'_, '_> {
             if self.peek() == Token::Number {
                 self.bump();
             }
-            // `5 /L X+60`: the mark stands after the block number too.
+            // `5 /L X+60`: the skip mark may follow the block number.
             if self.peek() == Token::Slash {
                 self.nodes[node].kind = Syntax::Skippable;
                 self.bump();
@@ -90,7 +91,7 @@ impl Parser<'_, '_> {
         let mut free = false;
         while !matches!(self.peek(), Token::LineEnd | Token::End) {
             if self.peek() == Token::Slash && self.at > begins && self.dialect != Dialect::Heidenhain {
-                // `N10 /X5`: what follows may be skipped.
+                // `N10 /X5`: the rest of the block may be skipped.
                 self.nodes[node].kind = Syntax::Skippable;
                 let slash = self.at;
                 self.bump();
@@ -100,7 +101,7 @@ impl Parser<'_, '_> {
                 continue;
             }
             let (word, at) = (self.nodes.len(), self.at);
-            // Numbers, texts and brackets stand alone only beside names: IF, CASE, DEF, o100 call.
+            // Numbers, strings and brackets stand alone only beside names: IF, CASE, DEF, o100 call.
             free |= self.peek() == Token::Name
                 || self.peek() == Token::Address && self.at == begins && self.is_o()
                 || self.peek() == Token::Hash && self.dialect == Dialect::Siemens;
@@ -132,10 +133,10 @@ impl Parser<'_, '_> {
         (block.size, block.end) = (size, last.max(first + 1));
     }
 
-    /// One word; answers one past its last token.
+    /// Parses one word; returns one past its last token.
     fn word(&mut self, begins: bool) -> Option<u32> {
         if begins && self.dialect == Dialect::Heidenhain && !self.is_path() {
-            // Everything but path blocks is looked at by its first words only.
+            // Other than path blocks, Heidenhain blocks are one word.
             let at = self.at;
             return Some(self.line(at));
         }
@@ -192,18 +193,18 @@ impl Parser<'_, '_> {
                 self.bump();
                 Some(end)
             }
-            // An expression of a control structure goes on: TO 10, OF 1, REPEAT 3.
+            // The operand of a control structure: TO 10, OF 1, REPEAT 3.
             Token::Number | Token::Minus | Token::String if self.free => self.expression(),
             _ => None,
         }
     }
 
-    /// Whether the block begins with an O word, whose line has words of its own.
+    /// Whether the block begins with an O word, whose line has other words.
     fn is_o(&self) -> bool {
         self.dialect == Dialect::LinuxCnc && matches!(self.tree.text(self.at), b"O" | b"o")
     }
 
-    /// Whether a name is one that these dialects have; `XY5` is none.
+    /// Whether a name belongs to these dialects; `XY5` does not.
     fn is_name(&self) -> bool {
         const WORDS: [&str; 26] = [
             "IF",
@@ -239,7 +240,7 @@ impl Parser<'_, '_> {
             || WORDS.iter().any(|word| text.eq_ignore_ascii_case(word.as_bytes()))
     }
 
-    /// Whether a Heidenhain block goes along a path or sets something that these readers follow.
+    /// Whether a Heidenhain block is a path or sets something that is interpreted word by word.
     fn is_path(&self) -> bool {
         let text = self.tree.text(self.at).to_ascii_uppercase();
         matches!(&*text, b"L" | b"LN" | b"C" | b"CC" | b"CR" | b"CT" | b"M" | b"R" | b"F")
@@ -247,7 +248,7 @@ impl Parser<'_, '_> {
             || matches!(&*text, [b'I', b'X' | b'Y' | b'Z' | b'A' | b'B' | b'C' | b'U' | b'V' | b'W'])
     }
 
-    /// What follows an address: a literal, an expression, nothing.
+    /// The value of an address: a literal, an expression, or nothing.
     fn value(&mut self, after: u32) -> Option<u32> {
         match self.peek() {
             Token::Number => {
@@ -360,7 +361,7 @@ impl Parser<'_, '_> {
         }
     }
 
-    /// A synchronised action of Siemens, which the control carries out beside the blocks.
+    /// A synchronised action of Siemens, which runs concurrently with the blocks.
     fn is_action(&self, token: u32) -> bool {
         self.dialect == Dialect::Siemens
             && ["WHEN", "WHENEVER", "FROM", "EVERY"]
@@ -368,7 +369,7 @@ impl Parser<'_, '_> {
                 .any(|word| self.tree.text(token).eq_ignore_ascii_case(word.as_bytes()))
     }
 
-    /// Over the rest of the line; answers one past its last token that is no trivia.
+    /// Consumes the rest of the line; returns one past its last token that is not trivia.
     fn line(&mut self, after: u32) -> u32 {
         let mut end = after;
         while !matches!(self.peek(), Token::LineEnd | Token::End) {
@@ -385,7 +386,7 @@ impl Parser<'_, '_> {
                 .any(|word| self.tree.text(token).eq_ignore_ascii_case(word.as_bytes()))
     }
 
-    /// Brackets whose content is not looked at.
+    /// Skips brackets.
     fn group(&mut self, open: Token, close: Token) -> Option<u32> {
         let mut depth = 0_u32;
         loop {
@@ -407,12 +408,13 @@ impl Parser<'_, '_> {
     }
 
     fn read(&mut self, whole: bool) -> Option<u32> {
-        let unknown = |_: &Vec<u8>| -> Evaluated { Err(Reason::Variable) };
+        let unknown = |_: &Vec<u8>| -> Evaluated { Err(Reason::UnknownVariable) };
         let first = self.at;
-        let mut reader = Evaluator::new(self.tree, self.dialect, (first, self.tree.len() as u32), &unknown);
-        let read = if whole { reader.expression() } else { reader.primary_only() };
+        let mut evaluator =
+            Evaluator::new(self.tree, self.dialect, (first, self.tree.len() as u32), &unknown);
+        let read = if whole { evaluator.expression() } else { evaluator.primary_only() };
         let _ = read.ok()?;
-        self.at = reader.at;
+        self.at = evaluator.at;
         let mut end = self.at;
         while end > first + 1 && self.tree.kind(end - 1).is_some_and(Token::is_trivia) {
             end -= 1;
@@ -430,7 +432,7 @@ impl Parser<'_, '_> {
     }
 }
 
-/// The view of a word node.
+/// The typed view of a word node.
 pub fn word<'s>(tree: &NcTree<'s>, node: u32) -> Word<'s> {
     let Node { first, end, .. } = tree.nodes[node as usize];
     let mut at = first;
@@ -446,7 +448,7 @@ pub fn word<'s>(tree: &NcTree<'s>, node: u32) -> Word<'s> {
     let hash = kind(at) == Token::Hash;
     next(&mut at);
     if hash {
-        // `#5 = …`: the index is what says which.
+        // `#5 = …`: the index names the variable.
         let index = at;
         while !matches!(kind(at), Token::Equal | Token::End) {
             next(&mut at);
@@ -493,7 +495,7 @@ pub fn word<'s>(tree: &NcTree<'s>, node: u32) -> Word<'s> {
     word
 }
 
-/// Whether the bracket that opens at `at` is an index: an equals sign follows it.
+/// Whether the bracket at `at` is an index: an equals sign follows it.
 fn indexed(tree: &NcTree<'_>, at: u32, end: u32) -> bool {
     let mut depth = 0_u32;
     for token in at..end {

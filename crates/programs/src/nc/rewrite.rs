@@ -1,9 +1,9 @@
-//! New values to edits of NC text.
+//! Rewriting of NC text.
 //!
-//! Words keep their order, spacing and at least their decimals; a word that was left out because it held on is put in
-//! where its axis must now change, and a word of a motion that stays is put in where the motion before it has moved, so
-//! that what is left as it is goes where it always went. Arcs get the centre (or radius) of the circle through their new
-//! start, middle and end, as long as it keeps to the way that was meant, with the numbers as they are written.
+//! Words keep their order, spacing and at least their decimals. An omitted modal word is added where its axis must
+//! change, and to an unmodified motion where the motion before it has moved, so that its end point does not change.
+//! An arc gets the centre (or radius) of the circle through its commanded start, middle and end, if with the written
+//! decimals it stays close to the intended path.
 
 mod restate;
 mod arcs;
@@ -33,11 +33,11 @@ use crate::edit::{EditError, Edits};
 use crate::motion::{Frame, Motion, MotionKind, Reason, RobTarget, Role, TargetValue};
 use crate::rewrite::{Change, Extra, FileEdits, NewTarget, Outcome, RewriteOptions, Rewritten};
 
-/// How often a rewrite begins anew because an arc does not fit; a file that asks for more is left as it is.
-const ROUNDS: u32 = 32;
+/// The most passes over a file whose arcs do not fit; then the file is left unmodified.
+const MAX_PASSES: u32 = 32;
 
 impl Task<'_> {
-    /// The edits that make the changes; per file sorted and disjoint.
+    /// The edits that make the changes, sorted and disjoint for each file.
     ///
     /// # Errors
     /// Edits that overlap, which is a defect of this module.
@@ -58,17 +58,17 @@ impl Task<'_> {
             }
         }
         let mut edits = vec![Edits::new(); self.trees.len()];
-        let mut rounds = 0;
+        let mut passes = 0;
         while !wanted.is_empty() {
             edits.iter_mut().for_each(|edits| *edits = Edits::new());
             let pinned = self.find_pinned_ends(changes, &mut wanted, &mut outcomes);
             if self.refuse_position_dependents(&pinned, &mut wanted, &mut outcomes) {
-                // What is refused now stays, and with it what it hangs on.
+                // A refused motion becomes unmodified and may depend on other motions.
                 continue;
             }
             let unfit_arcs =
                 self.rewrite_motions((changes, &wanted), options, &pinned, &mut edits, &mut outcomes);
-            // An arc that no circle fits stays, and with it what ends where it starts.
+            // An arc that no circle fits becomes unmodified, and so does the motion that ends at its start.
             let mut again = false;
             for motion in unfit_arcs {
                 if let Some(index) = wanted.remove(&motion) {
@@ -90,23 +90,23 @@ impl Task<'_> {
             if !again {
                 break;
             }
-            rounds += 1;
-            if rounds == ROUNDS {
+            passes += 1;
+            if passes == MAX_PASSES {
                 wanted.clear();
                 for outcome in outcomes.iter_mut().filter(|outcome| !matches!(outcome, Outcome::Refused(_))) {
-                    *outcome = Outcome::Refused(Reason::BeforeLeftArc);
+                    *outcome = Outcome::Refused(Reason::BeforeUnmodifiedArc);
                 }
                 edits.iter_mut().for_each(|edits| *edits = Edits::new());
             }
         }
         if wanted.is_empty() {
-            // What the last round wrote was for motions that stay after all.
+            // Discard edits of motions that are unmodified after all.
             edits.iter_mut().for_each(|edits| *edits = Edits::new());
         }
         Ok(Rewritten { files: self.marked(edits, options)?, outcomes })
     }
 
-    /// Writes all motions in their order: those of `wanted`, and what the others must say again. Hands back the arcs that no
+    /// Writes all motions in order: those of `wanted`, and restated words of the others. Returns the arcs that no
     /// circle fits.
     fn rewrite_motions(
         &self,
@@ -128,14 +128,14 @@ impl Task<'_> {
             match *event {
                 StateEvent::FileStart => rewriter.control = ControlState::default(),
                 StateEvent::PoseUnknown | StateEvent::Join => {
-                    // A shift that is set where the tool stands elsewhere stays where it is.
-                    let ControlState { straightened, moved, .. } = rewriter.control;
-                    rewriter.control = ControlState { straightened, moved, ..ControlState::default() };
+                    // A shift that was set at a corrected position keeps its change.
+                    let ControlState { straightened, shift_change, .. } = rewriter.control;
+                    rewriter.control = ControlState { straightened, shift_change, ..ControlState::default() };
                 }
-                StateEvent::AxesUnknown(axes) => rewriter.control.lose(axes),
-                StateEvent::OriginSet { stated, .. } => rewriter.control.shift_at(stated),
-                StateEvent::ShiftStated(axes) => rewriter.control.place(axes),
-                // Nothing has moved there: the motions that end there stay.
+                StateEvent::AxesUnknown(axes) => rewriter.control.invalidate_axes(axes),
+                StateEvent::OriginSet { stated, .. } => rewriter.control.set_origin(stated),
+                StateEvent::ShiftStated(axes) => rewriter.control.shift_stated(axes),
+                // No position changes there: the motions that end there are refused.
                 StateEvent::ShiftMaybeStated(_)
                 | StateEvent::ShiftRestored
                 | StateEvent::PositionUsed { .. }
@@ -205,10 +205,10 @@ impl Task<'_> {
     }
 }
 
-/// Where a motion shall go.
+/// Where a motion is commanded to go.
 struct Goal {
     position: [f64; 3],
-    /// `None` keeps the words of the orientation.
+    /// `None` keeps the orientation words.
     rotation: Option<UnitQuaternion<f64>>,
     via: Option<[f64; 3]>,
 }
@@ -220,12 +220,12 @@ struct Rewriter<'f, 's> {
     control: ControlState,
     /// Arcs that no circle fits.
     unfit_arcs: Vec<u32>,
-    /// Motions that end where they always did, whatever is asked.
+    /// Motions with a pinned end point.
     pinned: &'f BTreeSet<u32>,
 }
 
 impl<'s> Rewriter<'_, 's> {
-    /// Writes one motion; what was asked for it, if anything.
+    /// Writes one motion, with its change if it has one.
     fn motion(&mut self, index: u32, change: Option<&Change>) -> Outcome {
         let task = self.task;
         let motion = &task.listing.motions[index as usize];
@@ -268,7 +268,7 @@ impl<'s> Rewriter<'_, 's> {
             arc = intended.and_then(|intended| self.arc(&mut goal, start, context, (intended, by_radius)));
             if arc.is_none() {
                 self.unfit_arcs.push(index);
-                // No circle goes there: the motion stays.
+                // No circle fits: the motion is refused.
                 if change.is_some() {
                     outcome = Outcome::Refused(Reason::WrongShape);
                     goal = Goal { position: to.position_mm, rotation: None, via: via_of(motion) };
@@ -294,7 +294,7 @@ impl<'s> Rewriter<'_, 's> {
         if matches!(outcome, Outcome::Refused(_)) || done == Outcome::Unchanged { outcome } else { done }
     }
 
-    /// After a motion: as meant, or where it has been told to go.
+    /// The control state after a motion that was written, or that is unmodified (`commanded` is `None`).
     fn update_after_motion(
         &mut self,
         to: &RobTarget,
@@ -348,7 +348,7 @@ impl<'s> Rewriter<'_, 's> {
         let intended = to.map_or(goal.position, |to| to.position_mm);
         let mut reached = goal.position;
         for axis in 0..3 {
-            let shift = context.shift[axis].unwrap_or(0.0) + self.control.moved[axis];
+            let shift = context.shift[axis].unwrap_or(0.0) + self.control.shift_change[axis];
             let from = start[axis].unwrap_or(0.0);
             let word = slots.axes[axis];
             let increment =
@@ -359,7 +359,7 @@ impl<'s> Rewriter<'_, 's> {
             let old_base = if increment { context.start[axis] } else { context.shift[axis] };
             let was = old_base.map_or(f64::NAN, |old| (intended[axis] - old) / unit);
             let name = [b"X", b"Y", b"Z"][axis];
-            let value = writer.put(AXES + axis, name, value, keep, was, decimals);
+            let value = writer.write_word(AXES + axis, name, value, keep, was, decimals);
             reached[axis] = value * unit + base;
         }
         let commanded = self.orientation(&mut writer, context, slots, goal, file);
@@ -372,25 +372,25 @@ impl<'s> Rewriter<'_, 's> {
                     let length = (context.start[a]? - old.centre_mm[0])
                         .hypot(context.start[b]? - old.centre_mm[1])
                         / unit;
-                    Some(if old.is_long() { -length } else { length })
+                    Some(if old.is_major() { -length } else { length })
                 });
                 let length = (begin[a] - arc.centre_mm[0]).hypot(begin[b] - arc.centre_mm[1]) / unit;
-                let length = if arc.is_long() { -length } else { length };
-                writer.put(RADIUS, b"R", length, length, was.unwrap_or(f64::NAN), decimals);
+                let length = if arc.is_major() { -length } else { length };
+                writer.write_word(RADIUS, b"R", length, length, was.unwrap_or(f64::NAN), decimals);
             } else if dialect != Dialect::Heidenhain {
                 for (place, axis) in [a, b].into_iter().enumerate() {
                     let word = slots.centre[axis];
                     let increment = word
                         .and_then(|word| states_increment(tree, dialect, &word))
                         .unwrap_or(!absolute_centre);
-                    let shift = context.shift[axis].unwrap_or(0.0) + self.control.moved[axis];
+                    let shift = context.shift[axis].unwrap_or(0.0) + self.control.shift_change[axis];
                     let base = if increment { begin[axis] } else { shift };
                     let value = (arc.centre_mm[place] - base) / unit;
-                    // A centre that is left out is that of the start.
+                    // An omitted centre word is that of the start.
                     let keep = (begin[axis] - base) / unit;
                     let old_base = if increment { context.start[axis] } else { context.shift[axis] };
                     let was = old.and_then(|old| Some((old.centre_mm[place] - old_base?) / unit));
-                    writer.put(
+                    writer.write_word(
                         CENTRE + axis,
                         [b"I", b"J", b"K"][axis],
                         value,
@@ -436,29 +436,35 @@ impl<'s> Rewriter<'_, 's> {
                         .and_then(|word| states_increment(writer.tree, writer.dialect, &word))
                         .unwrap_or(!context.absolute);
                     let base = if increment { from.unwrap_or(0.0) } else { 0.0 };
-                    // An angle that was never stated before this block has a word in it.
+                    // An angle that no block before has stated has a word in this block.
                     let keep = from.map_or(angles[axis], |from| from - base);
                     let old_base = if increment { context.start_angles[axis] } else { Some(0.0) };
                     let was = old_base.map_or(f64::NAN, |old| intended[axis] - old);
                     let decimals = self.options.joint_decimals;
-                    let value =
-                        writer.put(ANGLES + axis, names[axis], angles[axis] - base, keep, was, decimals);
+                    let value = writer.write_word(
+                        ANGLES + axis,
+                        names[axis],
+                        angles[axis] - base,
+                        keep,
+                        was,
+                        decimals,
+                    );
                     reached[axis] = value + base;
                 }
                 CommandedOrientation::Angles(reached)
             }
             OrientationMode::Vector => {
-                let Some((intended, meant_spin)) = context.vector else {
+                let Some((intended, intended_spin)) = context.vector else {
                     return CommandedOrientation::Unchanged;
                 };
                 let length = intended.iter().map(|x| x * x).sum::<f64>().sqrt();
                 let (vector, spin) = match &goal.rotation {
                     Some(rotation) => {
-                        let (vector, spin) = vector_and_spin(rotation, meant_spin);
-                        // As long as the old one, which need not have length 1.
+                        let (vector, spin) = vector_and_spin(rotation, intended_spin);
+                        // Keep the length of the vector, which need not be 1.
                         (vector.map(|x| x * length), spin)
                     }
-                    None => (intended, meant_spin),
+                    None => (intended, intended_spin),
                 };
                 let decimals = self.options.quaternion_decimals;
                 let names = vector_names(writer.dialect, context);
@@ -468,20 +474,27 @@ impl<'s> Rewriter<'_, 's> {
                     before.is_some_and(|(old, _)| (0..3).all(|i| !differs(old[i], vector[i], decimals)));
                 if stated || !holds {
                     for axis in 0..3 {
-                        // A component that is left out is 0.
-                        writer.put(VECTOR + axis, names[axis], vector[axis], 0.0, intended[axis], decimals);
+                        // An omitted component is 0.
+                        writer.write_word(
+                            VECTOR + axis,
+                            names[axis],
+                            vector[axis],
+                            0.0,
+                            intended[axis],
+                            decimals,
+                        );
                     }
                 }
                 if writer.dialect == Dialect::Siemens {
                     let held = before.map_or(0.0, |(_, spin)| spin);
-                    writer.put(SPIN, b"THETA", spin, held, meant_spin, self.options.joint_decimals);
+                    writer.write_word(SPIN, b"THETA", spin, held, intended_spin, self.options.joint_decimals);
                 }
                 CommandedOrientation::Vector(vector, spin)
             }
         }
     }
 
-    /// Blocks before a block, in the words of that block.
+    /// Inserts blocks before a block, in the style of its words.
     fn extras(
         &mut self,
         motion: &Motion,
@@ -516,11 +529,17 @@ impl<'s> Rewriter<'_, 's> {
             let mut reached = position_mm;
             for axis in 0..3 {
                 let from = self.control.position[axis].or(context.start[axis]).unwrap_or(0.0);
-                let shift = context.shift[axis].unwrap_or(0.0) + self.control.moved[axis];
+                let shift = context.shift[axis].unwrap_or(0.0) + self.control.shift_change[axis];
                 let base = if context.absolute { shift } else { from };
                 let value = (position_mm[axis] - base) / unit;
-                let value =
-                    writer.put(AXES + axis, [b"X", b"Y", b"Z"][axis], value, f64::NAN, f64::NAN, decimals);
+                let value = writer.write_word(
+                    AXES + axis,
+                    [b"X", b"Y", b"Z"][axis],
+                    value,
+                    f64::NAN,
+                    f64::NAN,
+                    decimals,
+                );
                 reached[axis] = value * unit + base;
             }
             let none = WordSlots::default();
@@ -544,7 +563,7 @@ impl<'s> Rewriter<'_, 's> {
     }
 }
 
-/// How the orientation was written.
+/// The orientation as it was written.
 enum CommandedOrientation {
     Unchanged,
     Angles([f64; 3]),
@@ -564,18 +583,18 @@ fn all(values: [Option<f64>; 3]) -> Option<[f64; 3]> {
     Some([values[0]?, values[1]?, values[2]?])
 }
 
-/// Whether a motion that is left for this reason still goes to the point that its words say in the work frame, so that
-/// words which the motions before it have changed must be said again.
+/// Whether a motion that is left for this reason still ends where its words state in the work frame, so that omitted
+/// words must be restated.
 fn keeps_endpoint(reason: Reason) -> bool {
     matches!(
         reason,
         Reason::RadiusCompensation
-            | Reason::NoTipControl
+            | Reason::NoTcpMode
             | Reason::ToolUnknown
             | Reason::WorkObjectUnknown
             | Reason::CentreElsewhere
-            | Reason::BeforeLeftArc
-            | Reason::BeforeLeftPath
+            | Reason::BeforeUnmodifiedArc
+            | Reason::BeforeUnmodifiedPath
     )
 }
 

@@ -1,6 +1,6 @@
-//! What an NC file does not say itself: how A, B and C turn the tool, where work offsets lie, what tools are.
+//! What an NC file does not hold: the convention of A, B and C, work offsets, and tools.
 //!
-//! A cell or robot file may say it, or comment lines of the program, which the control passes over:
+//! A cell or robot file may state it, or comment lines of the program, which the control ignores:
 //!
 //! ```text
 //! ; truegrind angles wpr
@@ -14,12 +14,12 @@ use crate::motion::{FARTHEST_MM, Frame, ToolValue};
 
 pub use crate::label::{plain, same};
 
-/// What is known beside the program. What is given here goes before what the program's comments say.
+/// What is known from other sources than the program. It overrides comments of the program.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Setup {
-    /// The dialect; found by its signs where left out.
+    /// The dialect; detected if omitted.
     pub dialect: Option<Dialect>,
-    /// What A, B and C mean.
+    /// The convention of A, B and C.
     pub angles: Option<Angles>,
     /// Tools by name (`T1`).
     pub tools: Vec<(String, Frame)>,
@@ -28,25 +28,25 @@ pub struct Setup {
 }
 
 impl Setup {
-    /// The tool frame of a name, in any case.
+    /// The tool frame of a name.
     pub fn tool(&self, name: &str) -> Option<Frame> {
         find(&self.tools, name)
     }
 
-    /// The work offset of a name, in any case.
+    /// The work offset of a name.
     pub fn frame(&self, name: &str) -> Option<Frame> {
         find(&self.frames, name)
     }
 }
 
-/// The last frame of a name: in any case, T08 is T8, `G54.1 P1` is G54.1P1.
+/// The last frame of a name. Names ignore case, T08 is T8, `G54.1 P1` is G54.1P1.
 fn find(list: &[(String, Frame)], name: &str) -> Option<Frame> {
     let name = plain(name);
     list.iter().rev().find(|(other, _)| plain(other) == name).map(|(_, frame)| *frame)
 }
 
-/// A tool on the flange of which only the frame is known.
-pub(super) fn held(frame: Frame) -> ToolValue {
+/// A tool on the flange with a known frame and no mass.
+pub(super) fn flange_tool(frame: Frame) -> ToolValue {
     ToolValue { robhold: true, frame, mass_kg: 0.0, centre_of_gravity_mm: [0.0; 3] }
 }
 
@@ -56,25 +56,24 @@ pub(super) enum Statement {
     /// `angles wpr`
     Angles(Angles),
     /// `tool T1 name [[…],[…]]`
-    Tool(Stated),
+    Tool(StatedFrame),
     /// `frame G54 name [[…],[…]]`
-    Frame(Stated),
+    Frame(StatedFrame),
 }
 
 /// A tool or work offset that a comment states.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Stated {
-    /// As blocks call it: `T1`, `G54`.
+pub(super) struct StatedFrame {
+    /// Its name in blocks: `T1`, `G54`.
     pub(super) number: String,
-    /// As people call it, and a cell file may.
+    /// Its name for people and cell files.
     pub(super) name: String,
     pub(super) frame: Frame,
 }
 
-/// Reads a comment as a statement of a frame, tool or convention; where it begins as one and cannot be read, what was
-/// expected.
+/// Parses a comment as a statement of a frame, tool or convention; the error is what was expected.
 pub(super) fn statement(comment: &[u8]) -> Result<Option<Statement>, String> {
-    // Nearly every comment is turned away here.
+    // Fast exit for nearly every comment.
     let text = comment.trim_ascii();
     let text = text.strip_prefix(b";").or_else(|| text.strip_prefix(b"(")).unwrap_or(text).trim_ascii();
     if text.len() < 12 || !text[..10].eq_ignore_ascii_case(b"truegrind ") {
@@ -92,7 +91,7 @@ pub(super) fn statement(comment: &[u8]) -> Result<Option<Statement>, String> {
         return Angles::of(angles).map(|angles| Some(Statement::Angles(angles))).ok_or_else(expected);
     }
     if !matches!(&*what, "tool" | "frame") {
-        // A slip of the pen would be passed over as any comment.
+        // A misspelt statement must not be ignored like any comment.
         let meant = ["angles", "tool", "frame"].into_iter().find(|word| what.starts_with(&word[..3]));
         let known = "`truegrind angles …`, `truegrind tool …` or `truegrind frame …`";
         return meant.map_or(Ok(None), |_| Err(known.to_owned()));
@@ -108,7 +107,7 @@ pub(super) fn statement(comment: &[u8]) -> Result<Option<Statement>, String> {
         [first, second, name] => (format!("{first} {second}"), name),
         _ => return Err(expected()),
     };
-    let stated = Stated { number, name: name.to_owned(), frame: frame(tail).ok_or_else(expected)? };
+    let stated = StatedFrame { number, name: name.to_owned(), frame: frame(tail).ok_or_else(expected)? };
     Ok(Some(if what == "tool" { Statement::Tool(stated) } else { Statement::Frame(stated) }))
 }
 

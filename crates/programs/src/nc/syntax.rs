@@ -1,12 +1,12 @@
-//! The kinds of NC node, and the typed view of a word.
+//! The node kinds of NC syntax trees, and the typed view of a word.
 //!
-//! A file is a list of blocks (lines), a block a list of words. A word is a name with what belongs to it: a number, an
-//! expression, an index, arguments.
+//! A file is a list of blocks (lines), a block a list of words. A word is a name with a value: a number, an
+//! expression, or arguments.
 
 use super::token::Token;
 use crate::tree::Tree;
 
-/// The tree of one NC file.
+/// The syntax tree of one NC file.
 pub type NcTree<'s> = Tree<'s, Token, Syntax>;
 
 /// A kind of node.
@@ -17,20 +17,20 @@ pub enum Syntax {
     File,
     /// One line with at least one word.
     Block,
-    /// A block that may be skipped (`/`).
+    /// A block with block skip (`/`).
     Skippable,
     /// A word.
     Word,
-    /// What could not be read, to the end of the line.
+    /// Unreadable text, to the end of the line.
     Opaque,
 }
 
-/// What belongs to a word.
+/// The value of a word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum WordValue {
-    /// Nothing: a bare word.
+    /// None: a bare word.
     Absent,
-    /// A literal: its sign, where one is written, and its number.
+    /// A literal: its sign, if any, and its number.
     Literal {
         /// The token of the sign.
         sign: Option<u32>,
@@ -64,19 +64,19 @@ pub struct Word<'s> {
     pub name: &'s [u8],
     /// The index in brackets after the name (`$P_UIFR[1]`, `R[5]`), as tokens without the brackets.
     pub index: Option<(u32, u32)>,
-    /// What belongs to it.
+    /// Its value.
     pub value: WordValue,
-    /// Whether an equals sign stands before what belongs to it.
+    /// Whether an equals sign precedes the value.
     pub assigned: bool,
 }
 
 impl Word<'_> {
-    /// Whether the name is this, in any case.
+    /// Whether this is its name, ignoring case.
     pub fn is(&self, name: &str) -> bool {
         self.name.eq_ignore_ascii_case(name.as_bytes())
     }
 
-    /// The address in upper case, where the name is one letter.
+    /// The address in upper case, if the name is one letter.
     pub fn address(&self) -> Option<u8> {
         match self.name {
             [letter] => Some(letter.to_ascii_uppercase()),

@@ -1,8 +1,9 @@
-//! From a file to the listing: every block that moves, with what holds in it.
+//! Abstract interpretation of NC files: every motion block, with the modal state in which it runs.
 //!
-//! Blocks are followed in the order of the text. Where they can be reached from elsewhere (labels, loops, the begin of a
-//! subprogram), what went before holds no more, but for groups that the whole file sets to one thing only. A block that
-//! may be skipped leaves known only what it does not change.
+//! Blocks are interpreted in the order of the text; [`Interpreter::transfer`] is the transfer function of a block. At
+//! a label, a loop or the start of a subprogram the state is joined with states of unseen predecessors, so that only
+//! modal groups which the whole file sets to one value stay known. A block that may be skipped is joined with the
+//! state before it.
 
 mod modal_codes;
 mod siemens_commands;
@@ -32,7 +33,7 @@ use super::mark;
 use super::modal_state::{ModalGroup, ModalState, MotionMode, WordSemantics};
 use super::orientation::Angles;
 use super::parser::parse;
-use super::setup::{self, Setup, Stated, Statement, held, statement};
+use super::setup::{self, Setup, StatedFrame, Statement, flange_tool, statement};
 use super::syntax::{NcTree, Word, WordValue};
 use super::token::Token;
 use crate::motion::{
@@ -42,27 +43,27 @@ use block::Block;
 pub(super) use block_context::{BlockArc, BlockContext, StartDependency, StateEvent};
 use file_effects::FileEffects;
 
-/// NC files, read together: each runs on its own, the setup holds for all.
+/// NC files that are read together: each runs on its own, the setup is common to all.
 #[derive(Debug)]
 pub struct Task<'s> {
     /// The names of the files, as given.
     pub names: Vec<String>,
-    /// The files, as trees.
+    /// The syntax trees of the files.
     pub trees: Vec<NcTree<'s>>,
-    /// Their dialects.
+    /// The dialects of the files.
     pub dialects: Vec<Dialect>,
-    /// What A, B and C mean in each.
+    /// The convention of A, B and C in each file.
     pub angles: Vec<Option<Angles>>,
-    /// What they tell the machine to do.
+    /// The motions of all files.
     pub listing: Listing,
-    /// What happens to the position, in the order of files and lines.
+    /// Events that concern positions and origins, in the order of files and lines.
     pub(super) events: Vec<StateEvent>,
-    /// How each motion is written; by motion.
+    /// The context of each motion's block, by motion.
     pub(super) contexts: Vec<BlockContext>,
 }
 
 impl Task<'_> {
-    /// What the way of a motion hangs on, where it stays or does not.
+    /// What the path of a motion depends on, if it is not modified (`stays`).
     pub(super) fn start_dependency(&self, motion: usize, stays: bool) -> StartDependency {
         let own = self.contexts[motion].start_dependency;
         match self.listing.motions[motion].kind {
@@ -74,7 +75,7 @@ impl Task<'_> {
 }
 
 impl<'s> Task<'s> {
-    /// Reads files, given by name and bytes. Never fails: what cannot be read is listed.
+    /// Reads files, given by name and bytes. Never fails: unreadable regions are listed.
     pub fn read(files: &[(&str, &'s [u8])], setup: &Setup) -> Task<'s> {
         let dialects: Vec<Dialect> = files
             .iter()
@@ -93,7 +94,7 @@ impl<'s> Task<'s> {
         for file in 0..files.len() {
             let mut interpreter =
                 Interpreter::new(&task.trees[file], file as u32, task.dialects[file], setup);
-            // Siemens: a subprogram by the ending of its name.
+            // Siemens: the extension of a subprogram.
             interpreter.is_subprogram = task.names[file].to_ascii_lowercase().ends_with(".spf");
             interpreter.listing = std::mem::take(&mut task.listing);
             interpreter.events = std::mem::take(&mut task.events);
@@ -116,55 +117,55 @@ pub(super) struct Interpreter<'t, 's> {
     dialect: Dialect,
     setup: &'t Setup,
     angles: Option<Angles>,
-    /// Tools and work offsets as setup and comments state them, by name.
+    /// Tools and work offsets that the setup and comments state, by name.
     tools: HashMap<String, Frame>,
     frames: HashMap<String, Frame>,
-    /// Variables that the file sets before here.
+    /// Variables that the file has assigned so far.
     assigned_variables: HashSet<Variable>,
     state: ModalState,
-    /// What the file sets; found while it is followed.
+    /// The side effects of the blocks interpreted so far.
     effects: FileEffects,
-    /// What the whole file sets, where it has been followed before.
+    /// The side effects of the whole file, from a first pass.
     file_effects: Option<FileEffects>,
-    /// Groups that are set before the way can first part.
+    /// Groups that are set before the first branch or join, as bits.
     set_before_branch: u32,
-    /// Whether the way has parted: jumps, calls, labels.
+    /// Whether control flow has branched or joined: jumps, calls, labels.
     branched: bool,
-    /// Whether the block that is being followed may be skipped.
+    /// Whether the current block may be skipped.
     in_skippable_block: bool,
-    /// Whether the program has ended (M30): what comes next belongs to another.
+    /// Whether the program has ended (M30): the next block belongs to another one.
     program_ended: bool,
-    /// Whether synchronised actions may set variables.
+    /// Whether synchronised actions may assign variables.
     synchronised_actions: bool,
-    /// What numbers and words meant before the block that is being followed.
+    /// The semantics of words before the current block.
     meaning: WordSemantics,
-    /// What held before the subprogram that is being state_before_subprogram.
+    /// The state before the subprogram that is being read.
     state_before_subprogram: Option<ModalState>,
-    /// Whether tools come in with M6.
+    /// Whether the file changes tools by M6.
     tool_change_by_m6: bool,
-    /// Whether a cycle that is called may be a program (cycle 12 of Heidenhain).
+    /// Whether the active cycle may be a program (cycle 12 of Heidenhain).
     cycle_is_program: bool,
-    /// Whether a block has words of NC and no others.
+    /// Whether a block has been read completely.
     has_nc_blocks: bool,
-    /// Whether the program begins again at its end.
+    /// Whether the program starts again at its end.
     restarts_at_end: bool,
-    /// Whether the file is a subprogram and no more: what holds at its begin is its caller's.
+    /// Whether the file is only a subprogram: its initial state is that of an unknown caller.
     is_subprogram: bool,
-    /// Whether the file is of a control of which no reader here knows the words (DIN/ISO of Heidenhain).
+    /// Whether the file is of a control whose words are not supported (DIN/ISO of Heidenhain, Okuma).
     unknown_control: bool,
-    /// Contours that cycles of lathes read, from block to block.
+    /// Contours that lathe cycles read: first block number to last.
     contours: HashMap<u64, u64>,
-    /// The block that ends the contour which is being read.
+    /// The last block of the contour that is being read.
     contour_end: Option<u64>,
     /// Names that the file declares (Siemens).
     declared: BTreeSet<Vec<u8>>,
-    /// Those of them that hold whole numbers only.
+    /// Declared names of an integer type.
     integer_variables: BTreeSet<Vec<u8>>,
-    /// The programs and subprograms that stand in the file, by their O.
+    /// Programs and subprograms in the file, by their O word.
     programs: BTreeSet<Variable>,
-    /// Blocks that jumps go to.
+    /// Block numbers that are targets of jumps.
     jump_targets: BTreeSet<u64>,
-    /// Whether a jump goes to a computed block.
+    /// Whether a jump has a computed target.
     computed_jump: bool,
     listing: Listing,
     events: Vec<StateEvent>,
@@ -175,7 +176,7 @@ pub(super) struct Interpreter<'t, 's> {
     frame_index: Option<(String, Option<truegrind_math::se3::Pose>, u32)>,
 }
 
-/// How long the lists were before a file.
+/// The lengths of the lists before a file.
 struct Lengths([usize; 7]);
 
 impl<'t, 's> Interpreter<'t, 's> {
@@ -243,8 +244,8 @@ impl<'t, 's> Interpreter<'t, 's> {
         let start = self.state.clone();
         self.interpret_file();
         if self.branched {
-            // Now it is known what the whole file sets, which tells what still holds where ways meet.
-            self.back_to(&lengths);
+            // The side effects of the whole file are known now; they determine what stays known at joins.
+            self.truncate_to(&lengths);
             self.state = start;
             self.file_effects = Some(std::mem::take(&mut self.effects));
             (self.set_before_branch, self.branched, self.program_ended, self.synchronised_actions) =
@@ -252,10 +253,10 @@ impl<'t, 's> Interpreter<'t, 's> {
             (self.state_before_subprogram, self.contour_end) = (None, None);
             self.interpret_file();
         }
-        // A text of which not one block is NC is no program: nothing in it moves.
-        let unread = |motion: &Motion| matches!(motion.left, Some(Reason::Unread | Reason::UnknownWord));
+        // A text without one readable NC block is no program and has no motions.
+        let unread = |motion: &Motion| matches!(motion.left, Some(Reason::Unreadable | Reason::UnknownWord));
         if !self.has_nc_blocks && self.listing.motions[lengths.0[0]..].iter().all(unread) {
-            self.back_to(&lengths);
+            self.truncate_to(&lengths);
             self.events.push(StateEvent::FileStart);
         }
     }
@@ -263,7 +264,7 @@ impl<'t, 's> Interpreter<'t, 's> {
     fn interpret_file(&mut self) {
         self.events.push(StateEvent::FileStart);
         if self.is_subprogram {
-            self.enter_subprogram();
+            self.start_subprogram();
         } else if self.restarts_at_end() {
             self.join_unseen_predecessors();
         }
@@ -287,7 +288,10 @@ impl<'t, 's> Interpreter<'t, 's> {
         ])
     }
 
-    fn back_to(&mut self, &Lengths([motions, speeds, zones, tools, objects, events, contexts]): &Lengths) {
+    fn truncate_to(
+        &mut self,
+        &Lengths([motions, speeds, zones, tools, objects, events, contexts]): &Lengths,
+    ) {
         self.listing.motions.truncate(motions);
         self.listing.outside.retain(|call| (*call as usize) < motions);
         self.listing.speeds.truncate(speeds);
@@ -301,7 +305,7 @@ impl<'t, 's> Interpreter<'t, 's> {
         self.frame_index = None;
     }
 
-    /// Frames, tools and conventions that comments state.
+    /// Reads frames, tools and conventions that comments state.
     fn comments(&mut self) {
         let (mut tools, mut frames) = (Vec::new(), Vec::new());
         for token in 0..self.tree.len() as u32 {
@@ -314,17 +318,17 @@ impl<'t, 's> Interpreter<'t, 's> {
                 Ok(Some(Statement::Frame(stated))) => frames.push((token, stated)),
                 Ok(None) => {}
                 Err(expected) => {
-                    self.unread_comment(token);
-                    self.misstated(token, expected);
+                    self.list_unusable_comment(token);
+                    self.list_invalid_statement(token, expected);
                 }
             }
         }
         let tool = |(name, frame): &(String, Frame)| {
-            let value = frame.within_reach().map(held);
+            let value = frame.within_reach().map(flange_tool);
             Tool { name: name.clone(), value, place: None }
         };
-        self.tools = self.stated(&tools);
-        self.frames = self.stated(&frames);
+        self.tools = self.frames_by_name(&tools);
+        self.frames = self.frames_by_name(&frames);
         let told = tools.iter().map(|(_, stated)| (stated.number.clone(), stated.frame));
         let beforehand: HashSet<String> =
             self.setup.tools.iter().map(|(name, _)| setup::plain(name)).collect();
@@ -337,7 +341,7 @@ impl<'t, 's> Interpreter<'t, 's> {
         self.listing.declared_tools.extend(declared);
         let labels = tools.into_iter().chain(frames).map(|(_, stated)| (stated.number, stated.name));
         self.listing.labels.extend(labels);
-        // What is known beside the program goes before.
+        // The setup overrides comments.
         let beside = |list: &[(String, Frame)]| -> Vec<(String, Frame)> {
             list.iter().map(|(name, frame)| (setup::plain(name), *frame)).collect()
         };
@@ -345,15 +349,15 @@ impl<'t, 's> Interpreter<'t, 's> {
         self.frames.extend(beside(&self.setup.frames));
     }
 
-    /// Tools or work offsets that comments state, by plain name. One that is stated with two frames is not known.
-    fn stated(&mut self, all: &[(u32, Stated)]) -> HashMap<String, Frame> {
+    /// Tools or work offsets that comments state, by plain name. Contradicting statements make a name unknown.
+    fn frames_by_name(&mut self, all: &[(u32, StatedFrame)]) -> HashMap<String, Frame> {
         let mut found: HashMap<String, Frame> = HashMap::new();
         let mut contradicted = Vec::new();
         for (token, stated) in all {
             let name = setup::plain(&stated.number);
             match found.get(&name) {
                 Some(before) if *before != stated.frame => {
-                    self.unread_comment(*token);
+                    self.list_unusable_comment(*token);
                     contradicted.push(name);
                 }
                 _ => drop(found.insert(name, stated.frame)),
@@ -365,15 +369,15 @@ impl<'t, 's> Interpreter<'t, 's> {
         found
     }
 
-    fn misstated(&mut self, token: u32, expected: String) {
+    fn list_invalid_statement(&mut self, token: u32, expected: String) {
         let text = String::from_utf8_lossy(self.tree.text(token)).trim().to_owned();
-        // The file is named where all are read.
+        // [`Task::read`] fills in the name of the file.
         let (file, line) = (String::new(), self.place(token).line);
         self.listing.misstated.push(Misstated { file, line, text, expected });
     }
 
-    /// A comment that was meant for this program and cannot be used is listed, not state_before_subprogram over.
-    fn unread_comment(&mut self, token: u32) {
+    /// Lists a comment that states something for this program and cannot be used.
+    fn list_unusable_comment(&mut self, token: u32) {
         self.listing.opaque.push(OpaqueRegion {
             place: self.place(token),
             span: self.tree.span(token, token + 1),
@@ -381,10 +385,8 @@ impl<'t, 's> Interpreter<'t, 's> {
         });
     }
 
-    // ---- blocks ----
-
     fn block(&mut self, node: u32, block: &mut Block<'s>) {
-        self.gather(node, block);
+        self.collect_words(node, block);
         self.has_nc_blocks |=
             !block.opaque && (!block.g.is_empty() || !block.m.is_empty() || block.has_motion_words());
         if !block.skippable {
@@ -395,7 +397,7 @@ impl<'t, 's> Interpreter<'t, 's> {
         self.in_skippable_block = true;
         self.interpret(block);
         self.in_skippable_block = false;
-        // What ends the program or goes elsewhere does so only where it is not skipped.
+        // A program end or jump in it happens only where it is not skipped.
         self.program_ended = false;
         let after = std::mem::replace(&mut self.state, before);
         self.state = after.join(&self.state);
@@ -403,7 +405,7 @@ impl<'t, 's> Interpreter<'t, 's> {
         self.tool_index.clear();
     }
 
-    /// What a block does.
+    /// Interprets a block in the state before it.
     fn interpret(&mut self, block: &Block<'s>) {
         if std::mem::take(&mut self.program_ended) {
             self.join_unseen_predecessors();
@@ -414,11 +416,11 @@ impl<'t, 's> Interpreter<'t, 's> {
         }
         self.contour_of(block);
         self.mark_position_reads(block);
-        let values = self.values(block);
+        let values = self.evaluate_assignments(block);
         let before = self.effects.joins;
         self.meaning = self.state.word_semantics();
         self.transfer(block);
-        self.assign(values, self.effects.joins != before);
+        self.apply_assignments(values, self.effects.joins != before);
     }
 
     fn transfer(&mut self, block: &Block<'s>) {
@@ -430,9 +432,9 @@ impl<'t, 's> Interpreter<'t, 's> {
             return;
         }
         if self.is_action(block) {
-            // What it sets, it sets at any time from here on.
+            // A synchronised action may set its variables at any time from here on.
             self.synchronised_actions = true;
-            self.state.variables.invalidate(Reason::Variable);
+            self.state.variables.invalidate(Reason::UnknownVariable);
             self.join_unseen_predecessors();
             return;
         }
@@ -451,7 +453,7 @@ impl<'t, 's> Interpreter<'t, 's> {
             return;
         }
         if block.opaque && block.opaque_may_set {
-            self.list_unknown_word(block, "?", Reason::Unread);
+            self.list_unknown_word(block, "?", Reason::Unreadable);
             self.end_of_block(block);
             return;
         }
@@ -468,11 +470,11 @@ impl<'t, 's> Interpreter<'t, 's> {
         }
         if let Some(index) = block.feed {
             let feed = self.evaluate_word(&block.words[index]).0;
-            // A feed has no decimals on any control.
-            let feed = self.literal(&block.words[index]).ok_or(Reason::Variable).or(feed);
+            // F words are literals: a whole number needs no decimal point on any control.
+            let feed = self.literal(&block.words[index]).ok_or(Reason::UnknownVariable).or(feed);
             let feed = feed.and_then(|feed| match feed > 0.0 && feed < LARGEST {
                 true => Ok(feed),
-                // F0 and F-5 go nowhere, and what is too large is read as something else.
+                // Controls reject F0 and F-5, and read a number that is too large differently.
                 false => Err(Reason::NumberRange),
             });
             self.state.feed = self.length_in_mm(feed).map(|feed| feed / 60.0);
@@ -481,7 +483,8 @@ impl<'t, 's> Interpreter<'t, 's> {
         self.end_of_block(block);
     }
 
-    /// M2, M30, M99, M17 of Siemens: what comes after belongs to another program. M6 goes to change the tool.
+    /// M2, M30, M99, M17 of Siemens: the blocks after them belong to another program. M6 moves to the tool change
+    /// position.
     fn end_of_block(&mut self, block: &Block<'s>) {
         let dialect = self.dialect;
         let end = |m: &u32| match m {
@@ -490,12 +493,12 @@ impl<'t, 's> Interpreter<'t, 's> {
             99 => dialect != Dialect::Heidenhain,
             _ => false,
         };
-        // M99 P100 jumps, perhaps over what comes next, and so do M96 and M46 of Haas.
+        // M99 P100, and M96 and M46 of Haas, jump, perhaps past the next blocks.
         if block.m.iter().any(|m| matches!(m, 46 | 96 | 99)) {
             self.branch();
         }
         if self.dialect == Dialect::Heidenhain && block.m.contains(&129) {
-            // It acts at the end of its block.
+            // It takes effect at the end of its block.
             self.set_tcp_mode(false, false);
         }
         if block.m.iter().any(end) || block.words.iter().any(|word| word.is("RET")) {
@@ -505,7 +508,7 @@ impl<'t, 's> Interpreter<'t, 's> {
         }
     }
 
-    /// Tools: T, with M6 where the file changes them so.
+    /// T, with M6 where the file changes tools by it.
     fn select_tool(&mut self, block: &Block<'s>) {
         for word in &block.words {
             if word.address() != Some(b'T') {
@@ -523,7 +526,7 @@ impl<'t, 's> Interpreter<'t, 's> {
             };
             self.state.next_tool = Some(name);
         }
-        // LinuxCNC: M61 says which tool is in; T alone only makes one ready, whatever else the file has.
+        // LinuxCNC: M61 sets the current tool; T alone only prepares one, whatever else the file has.
         let linux = self.dialect == Dialect::LinuxCnc;
         if linux && block.m.contains(&61) {
             let number = block.q.and_then(|index| self.literal(&block.words[index]));
@@ -538,12 +541,12 @@ impl<'t, 's> Interpreter<'t, 's> {
             && let Some(index) = block.d
         {
             let edge = self.literal(&block.words[index]).map_or(u32::MAX, |edge| edge.round() as u32);
-            self.length_is(|state| state.cutting_edge = edge);
+            self.change_tool_length(|state| state.cutting_edge = edge);
         }
     }
 }
 
-/// Whether a letter is that of an axis or of what goes with one.
+/// Whether a letter is an axis address or one that accompanies it.
 fn is_axis(letter: u8) -> bool {
     b"XYZABCIJKRUVWEF".contains(&letter.to_ascii_uppercase())
 }
@@ -558,7 +561,7 @@ fn named_axes(block: &Block<'_>) -> u8 {
         .fold(0, |all, (axis, word)| all | u8::from(word.is_some()) << axis)
 }
 
-/// The name of an axis, with or without the I of an increment.
+/// Whether this is the name of an axis, with or without the I of an increment.
 fn is_axis_name(name: &[u8]) -> bool {
     match name {
         [letter] | [b'I' | b'i', letter] => b"XYZABCUVW".contains(&letter.to_ascii_uppercase()),
@@ -566,16 +569,16 @@ fn is_axis_name(name: &[u8]) -> bool {
     }
 }
 
-/// All axes, for the same and for [`Event::Held`].
+/// All axes, for [`StateEvent::PositionUsed`].
 const EVERYWHERE: u8 = POSITION | ORIENTATION;
 
-/// All of X, Y and Z, for [`Event::Lost`].
+/// X, Y and Z, for [`StateEvent::AxesUnknown`].
 const POSITION: u8 = 7;
 
-/// All of A, B and C, for the same.
+/// A, B and C, for the same.
 const ORIENTATION: u8 = 7 << 3;
 
-/// A G number in tenths: 540 for G54, 434 for G43.4.
+/// A G code in tenths: 540 for G54, 434 for G43.4.
 fn code(number: f64) -> u32 {
     (number * 10.0).round().clamp(0.0, 1e6) as u32
 }

@@ -1,6 +1,7 @@
 //! The kinds of NC token.
 
-/// A kind of token. White space, line ends, comments and tape lines come first, so that one comparison tells them.
+/// A kind of token. Trivia (white space, line ends, comments, tape lines) come first, so that one comparison detects
+/// them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(u8)]
 #[allow(missing_docs)]

@@ -1,8 +1,8 @@
-//! A fresh NC program from a draft.
+//! New NC programs from a draft.
 //!
-//! Fanuc style: X Y Z and the angles A B C under G43.4. Siemens: TRAORI with the tool vector A3 B3 C3 and the turn about
-//! it, THETA. Words that do not change are left out, as post-processors do. Where tool and work offset lie stands in
-//! comments, which the control passes over and `compensate` reads: their numbers must be entered at the control.
+//! Fanuc style: X Y Z and the angles A B C under G43.4. Siemens: TRAORI with the tool vector A3 B3 C3 and the spin
+//! THETA. Unchanged modal words are omitted, as by post-processors. Comments state the tool and the work offset; the
+//! control ignores them and `compensate` reads them. The same values must be entered at the control.
 
 use thiserror::Error;
 
@@ -17,7 +17,7 @@ use crate::rewrite::RewriteOptions;
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum WriteError {
-    /// A dialect that is read only.
+    /// A dialect without a writer.
     #[error(
         "{dialect} programs are read and rewritten, not written anew: name a .nc (Fanuc) or .mpf (Siemens) file"
     )]
@@ -25,7 +25,7 @@ pub enum WriteError {
         /// Its name.
         dialect: &'static str,
     },
-    /// A step that five axes do not do.
+    /// A motion that five axes cannot make.
     #[error("step {step}: a {kind:?} motion is not written as NC: expected linear or joint motions to poses")]
     Step {
         /// The index of the step.
@@ -41,7 +41,7 @@ pub enum WriteError {
     },
 }
 
-/// Writes a program. `angles` says what A, B and C mean; Siemens programs carry a tool vector instead.
+/// Writes a program. `angles` is the convention of A, B and C; Siemens programs use a tool vector instead.
 ///
 /// ```
 /// use truegrind_programs::draft::{Draft, Step};
@@ -78,7 +78,7 @@ pub enum WriteError {
 ///     monitor_configuration: true,
 ///     steps: vec![step],
 /// };
-/// // Each dialect says the same place in its own words.
+/// // Both dialects express the same position.
 /// for (name, dialect) in [("blade.nc", Dialect::Fanuc), ("blade.mpf", Dialect::Siemens)] {
 ///     let file = writer::write(&draft, dialect, Angles::Wpr)?;
 ///     let program = Program::read(&[(name, &file[..])], &Setup::default());
@@ -127,7 +127,7 @@ struct Writer {
     angles: Angles,
     options: RewriteOptions,
     number: u32,
-    /// What each address last said, as text.
+    /// The last value of each address, as text.
     held: Vec<(&'static str, Vec<u8>)>,
     near: [f64; 3],
     mode: &'static str,
@@ -135,7 +135,7 @@ struct Writer {
 
 impl Writer {
     fn comment(&mut self, text: &str) {
-        // One line, without what ends a comment, in ASCII.
+        // One line of ASCII, without characters that end a comment.
         let text: String = text
             .chars()
             .map(|c| match c {
@@ -226,7 +226,7 @@ impl Writer {
             self.mode = mode;
         }
         let texts = self.target_words(target);
-        // The three components of a vector are said together: one that is left out is 0.
+        // The three components of a vector are written together, because an omitted one is 0.
         let vector_moves = texts.iter().any(|(name, text)| is_vector(name) && !self.holds(name, text));
         let before = words.len();
         for (name, text) in texts {
@@ -243,7 +243,7 @@ impl Writer {
             self.held.push((name, text));
         }
         if words.len() == before {
-            // Where the tool stands already.
+            // The tool is there already.
             self.wait(step.wait_s);
             return;
         }
@@ -262,7 +262,7 @@ impl Writer {
         self.wait(step.wait_s);
     }
 
-    /// The words that say where to go, with their values.
+    /// The target words with their values.
     fn target_words(&mut self, target: &Frame) -> Vec<(&'static str, Vec<u8>)> {
         let rotation = target.pose().rotation;
         let [x, y, z] = target.position_mm;
@@ -301,7 +301,7 @@ impl Writer {
             .collect()
     }
 
-    /// Time at rest: milliseconds for Fanuc, seconds for Siemens.
+    /// Dwell: milliseconds for Fanuc, seconds for Siemens.
     fn wait(&mut self, seconds: Option<f64>) {
         let Some(seconds) = seconds.filter(|seconds| *seconds > 0.0) else { return };
         match self.dialect {

@@ -377,7 +377,7 @@ fn computed_jumps_and_synchronised_actions_leave_nothing_known() {
         format!("TRAORI\nR5=4\nG1 X=R5 Y2 Z3 A0 B0 C0\n{action}R5=4\nG1 X=R5 Y2 Z3 A0 B0 C0\nX1 Y2 Z3\n");
     assert!(parse(body.as_bytes(), Dialect::Siemens).opaque.is_empty());
     let found = ends(&body, Dialect::Siemens);
-    assert_eq!(found[..2], [Ok([4.0, 2.0, 3.0]), Err(Reason::Variable)]);
+    assert_eq!(found[..2], [Ok([4.0, 2.0, 3.0]), Err(Reason::UnknownVariable)]);
     for call in ["G65 <MY_SUB> A1.", "M98 <O1000>"] {
         assert!(parse(call.as_bytes(), Dialect::Fanuc).opaque.is_empty(), "{call}");
     }

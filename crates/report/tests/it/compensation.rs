@@ -147,7 +147,7 @@ refused,1,correction exceeds the bound (--max-correction),12.345 mm,grind.mod 9
 refused,1,target is out of reach,,grind.mod 10
 flagged,2,joint 5 is outside the range in which the arm was measured,7.25°,\"grind.mod 7, 8\"
 left,1,\"joint target: states joints, not a pose (--joint-targets rewrites it too)\",,grind.mod 5
-left,1,a program displacement or external offset is or may be active,,other.mod 3
+left,1,a program displacement or external axis offset is or may be active,,other.mod 3
 ";
     assert_eq!(text, expected);
 }

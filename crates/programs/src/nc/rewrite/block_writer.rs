@@ -1,4 +1,4 @@
-//! Writing the words of one block: numbers in place, words that were left out at their place in the order.
+//! Writes the words of one block: numbers in place, added words at their place in the word order.
 
 use super::word_slots::{ORDER, WordSlots, spaced};
 use crate::edit::Edits;
@@ -13,26 +13,26 @@ use crate::rewrite::Outcome;
 /// Changes smaller than this are numerical noise, whatever the decimals of the source.
 const NOISE: f64 = 1e-9;
 
-/// Writes words of one block.
+/// Writes the words of one block.
 pub(super) struct BlockWriter<'p, 's> {
     pub(super) tree: &'p NcTree<'s>,
     pub(super) dialect: Dialect,
     pub(super) edits: &'p mut Edits,
-    /// The words of the block in the order in which controls list them.
+    /// The words of the block in standard order.
     pub(super) order: [Option<Word<'p>>; ORDER],
-    /// After which token new words go where the block has none of these.
+    /// New words go after this token if the block has none of these words.
     pub(super) end: u32,
-    /// The words of a block that does not exist yet.
+    /// The words of a block that is inserted.
     pub(super) added: Vec<u8>,
     pub(super) replaced: Outcome,
-    /// Whether white space stands between words here.
+    /// Whether words are separated by white space here.
     pub(super) spaced: bool,
-    /// The token before which L must come where a positioning block of Heidenhain gets words.
+    /// The token before which L must be inserted if a paraxial block of Heidenhain gets words.
     pub(super) lead: Option<u32>,
 }
 
 impl<'p, 's: 'p> BlockWriter<'p, 's> {
-    /// A pen for a block that there is.
+    /// A writer for an existing block.
     pub(super) fn new(
         tree: &'p NcTree<'s>,
         dialect: Dialect,
@@ -53,7 +53,7 @@ impl<'p, 's: 'p> BlockWriter<'p, 's> {
         }
     }
 
-    /// What has become of the block.
+    /// The outcome for the block.
     pub(super) fn finish(mut self) -> Outcome {
         if let Some(token) = self.lead.take()
             && self.replaced != Outcome::Unchanged
@@ -65,7 +65,7 @@ impl<'p, 's: 'p> BlockWriter<'p, 's> {
 }
 
 impl BlockWriter<'_, '_> {
-    /// Puts a word in at its place among the others: before the next of them, else after the last.
+    /// Adds a word before the next one in standard order, else after the last.
     fn insert(&mut self, place: usize, mut text: Vec<u8>) {
         if self.end == 0 {
             self.added.push(b' ');
@@ -91,15 +91,15 @@ impl BlockWriter<'_, '_> {
                 if self.spaced {
                     text.insert(0, b' ');
                 }
-                // After the last byte of the word: white space belongs to what follows.
+                // After the last byte of the word: white space belongs to the next token.
                 let at = self.tree.start(last - 1) + self.tree.text(last - 1).len();
                 self.edits.insert(at, &text);
             }
         }
     }
 
-    /// How many decimals a word can have: a Fanuc takes eight digits.
-    fn fitting(&self, value: f64, decimals: u8) -> u8 {
+    /// The decimals of a word: a Fanuc takes eight digits.
+    fn fitting_decimals(&self, value: f64, decimals: u8) -> u8 {
         const DIGITS: u8 = 8;
         if self.dialect != Dialect::Fanuc {
             return decimals;
@@ -108,9 +108,9 @@ impl BlockWriter<'_, '_> {
         decimals.min(DIGITS.saturating_sub(whole))
     }
 
-    /// Gives a word a value, or puts it in where it is left out and what holds without it (`keep`) is another. An
-    /// expression that is worth that value already (`was`) stays. Answers the value that the control reads.
-    pub(super) fn put(
+    /// Gives a word a value. An omitted word is added if the value in effect without it (`keep`) differs; an
+    /// expression with that value already (`was`) is kept. Returns the value that the control reads.
+    pub(super) fn write_word(
         &mut self,
         place: usize,
         name: &[u8],
@@ -122,7 +122,7 @@ impl BlockWriter<'_, '_> {
         if !value.is_finite() {
             return keep;
         }
-        let least = self.fitting(value, least);
+        let least = self.fitting_decimals(value, least);
         let Some(word) = self.order[place] else {
             if !differs(keep, value, least) {
                 return keep;
@@ -143,7 +143,7 @@ impl BlockWriter<'_, '_> {
                 let text = self.tree.text(token);
                 let minus = sign.is_some_and(|sign| self.tree.kind(sign) == Some(Token::Minus));
                 let old = literal(text).map_or(f64::NAN, |old| if minus { -old } else { old });
-                let decimals = self.fitting(value, decimals(text).max(least));
+                let decimals = self.fitting_decimals(value, decimals(text).max(least));
                 if !differs(old, value, decimals) {
                     return old;
                 }
@@ -185,14 +185,14 @@ impl BlockWriter<'_, '_> {
     }
 }
 
-/// Half a unit of the last decimal, and never less than noise. What is not known differs from everything.
+/// Half a unit of the last decimal, and at least the noise. NaN differs from everything.
 pub(super) fn differs(old: f64, new: f64, decimals: u8) -> bool {
     let half = 0.5 * 10_f64.powi(-i32::from(decimals));
     !((new - old).abs() <= half.max(NOISE))
 }
 
 fn decimals(text: &[u8]) -> u8 {
-    // 1.5EX1 of Siemens is written anew without its exponent.
+    // 1.5EX1 of Siemens is rewritten without its exponent.
     if text.iter().any(|byte| byte.eq_ignore_ascii_case(&b'E')) {
         return 0;
     }

@@ -1,22 +1,22 @@
-//! What the control holds while a rewritten file runs.
+//! The state of the control while a rewritten file runs.
 
-/// What the control will hold at a block, where the rewritten file says something else than the original.
+/// The state of the control at a block, where the rewritten file differs from the original. NaN: restate in any case.
 #[derive(Debug, Clone, Default)]
 pub(super) struct ControlState {
-    /// Position (mm); `None` where it is as the original says.
+    /// Position (mm); `None` where it is as in the original.
     pub(super) position: [Option<f64>; 3],
-    /// What the original says there.
+    /// The position in the original.
     pub(super) intended: [Option<f64>; 3],
     pub(super) angles: [Option<f64>; 3],
     pub(super) vector: Option<([f64; 3], f64)>,
-    /// By how much a shift of G92 has moved, because it was set where the tool now stands elsewhere.
-    pub(super) moved: [f64; 3],
-    /// Whether G1 holds where the original has G2 or G3, because an arc before has become straight.
+    /// The change of a G92 shift that is set at a corrected position (mm).
+    pub(super) shift_change: [f64; 3],
+    /// Whether G1 is in effect instead of G2 or G3, because an arc before has become straight.
     pub(super) straightened: bool,
 }
 
 impl ControlState {
-    pub(super) fn lose(&mut self, axes: u8) {
+    pub(super) fn invalidate_axes(&mut self, axes: u8) {
         for axis in 0..3 {
             if axes & 1 << axis != 0 {
                 (self.position[axis], self.intended[axis]) = (None, None);
@@ -27,17 +27,17 @@ impl ControlState {
         }
     }
 
-    pub(super) fn place(&mut self, axes: [bool; 3]) {
-        for (moved, _) in self.moved.iter_mut().zip(axes).filter(|(_, placed)| *placed) {
-            *moved = 0.0;
+    pub(super) fn shift_stated(&mut self, axes: [bool; 3]) {
+        for (shift_change, _) in self.shift_change.iter_mut().zip(axes).filter(|(_, placed)| *placed) {
+            *shift_change = 0.0;
         }
     }
 
-    pub(super) fn shift_at(&mut self, stated: [Option<f64>; 3]) {
+    pub(super) fn set_origin(&mut self, stated: [Option<f64>; 3]) {
         for (axis, _) in stated.iter().enumerate().filter(|(_, stated)| stated.is_some()) {
-            self.moved[axis] = match (self.position[axis], self.intended[axis]) {
-                (Some(now), Some(intended)) if !now.is_nan() => now - intended,
-                // It stands where the original says.
+            self.shift_change[axis] = match (self.position[axis], self.intended[axis]) {
+                (Some(current), Some(intended)) if !current.is_nan() => current - intended,
+                // The position is as in the original.
                 _ => 0.0,
             };
         }

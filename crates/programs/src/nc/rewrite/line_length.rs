@@ -1,7 +1,7 @@
-//! Lines that a correction makes longer than the control takes.
+//! Lines that a correction makes longer than the control accepts.
 //!
-//! Sources: Siemens, 840D sl Programming Manual Fundamentals, "Block length" (512 characters with comment and line end);
-//! LinuxCNC, a line is read into 255 bytes, and one that fills them is an error. Fanuc and Heidenhain state no bound.
+//! Sources: Siemens, 840D sl Programming Manual Fundamentals, "Block length" (512 characters with comment and line
+//! end); LinuxCNC reads a line into 255 bytes and rejects one that fills them. Fanuc and Heidenhain state no limit.
 
 use std::collections::HashMap;
 
@@ -9,7 +9,7 @@ use crate::edit::Edits;
 use crate::nc::dialect::Dialect;
 use crate::nc::task::Task;
 
-/// The most bytes of a line, its end among them; `None` where the control states no bound.
+/// The longest line in bytes, line end included; `None` if the control states no limit.
 fn most(dialect: Dialect) -> Option<usize> {
     match dialect {
         Dialect::Siemens => Some(512),
@@ -19,8 +19,8 @@ fn most(dialect: Dialect) -> Option<usize> {
 }
 
 impl Task<'_> {
-    /// The motions that must stay because a line becomes longer than the control takes: the one that is written there, or,
-    /// where the line only says again what has changed before it, the last of `wanted` before it.
+    /// The motions to refuse because a line becomes too long: the one written there, or, if the line only restates
+    /// words, the last of `wanted` before it.
     pub(super) fn motions_on_long_lines(&self, edits: &[Edits], wanted: &HashMap<u32, usize>) -> Vec<u32> {
         let mut out = Vec::new();
         for (file, edits) in edits.iter().enumerate() {

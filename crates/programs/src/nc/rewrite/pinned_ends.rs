@@ -1,4 +1,4 @@
-//! Ends that stay because what comes after them stays and hangs on where it begins.
+//! Endpoints pinned because a later unmodified move starts there.
 
 use std::collections::{BTreeSet, HashMap};
 
@@ -12,31 +12,32 @@ use crate::rewrite::{Change, Outcome};
 const ALL: u8 = 0b111;
 
 impl Task<'_> {
-    /// An arc or another path that stays as it is needs its start: the straight motion that ends there stays too, and where it
-    /// goes on in the direction of that, so does the start of that. Where an arc ends there it is the rewrite that sees to it,
-    /// because that arc may become straight.
+    /// Leaves straight motions unmodified whose end point an unmodified arc or unsupported path needs as its start;
+    /// for a tangential path also the start of that motion. Arcs that end there are pinned by the rewrite, because
+    /// they may become straight.
     pub(in crate::nc) fn leave_pinned_ends(&mut self) {
         let mut held = vec![0; self.listing.motions.len()];
         for index in (0..self.listing.motions.len()).rev() {
             let motion = &self.listing.motions[index];
             let stays = motion.reason().is_some();
             let dependency = self.start_dependency(index, stays);
-            let axes = self.start_axes(index, stays, held[index]);
+            let axes = self.pinned_start_axes(index, stays, held[index]);
             if axes == 0 {
                 continue;
             }
             let (file, circular) = (motion.place.file, motion.kind == MotionKind::Circular);
             let Some(at) = motion.previous.or((index as u32).checked_sub(1)) else { continue };
-            let turns = self.turns_between(at, index as u32);
+            let turns = self.axes_differ(at, index as u32);
             let before = &mut self.listing.motions[at as usize];
             if before.place.file != file {
                 continue;
             }
             held[at as usize] |= if turns { ALL } else { axes };
             if before.kind != MotionKind::Circular && before.reason().is_none() {
-                before.left = Some(if circular { Reason::BeforeLeftArc } else { Reason::BeforeLeftPath });
+                before.left =
+                    Some(if circular { Reason::BeforeUnmodifiedArc } else { Reason::BeforeUnmodifiedPath });
             }
-            // Where the block before may be skipped, the one before that ends here too.
+            // If the motion before may be skipped, the one before that also ends here.
             let context = &mut self.contexts[at as usize];
             if dependency == StartDependency::Tangent || before.conditional || context.may_omit_words {
                 context.start_dependency = context.start_dependency.max(StartDependency::Position);
@@ -44,8 +45,8 @@ impl Task<'_> {
         }
     }
 
-    /// An arc or other path that stays starts where the one before it ends: that one stays too, or, where it becomes straight pieces, the
-    /// last of them ends where it always did. Hands back the latter.
+    /// Refuses motions whose end point an unmodified motion needs as its start. Returns those that become straight
+    /// pieces instead, the last of which must end at the original point.
     pub(super) fn find_pinned_ends(
         &self,
         changes: &[Change],
@@ -54,7 +55,7 @@ impl Task<'_> {
     ) -> BTreeSet<u32> {
         let mut pinned = BTreeSet::new();
         let mut refused = BTreeSet::new();
-        // Motions whose start stays because what comes after them goes on in their direction.
+        // Motions whose start is pinned because a tangential path follows.
         let mut directed = BTreeSet::new();
         let mut held = vec![0; self.listing.motions.len()];
         for index in (1..self.listing.motions.len() as u32).rev() {
@@ -62,7 +63,7 @@ impl Task<'_> {
             let arc_stays = motion.kind == MotionKind::Circular && !wanted.contains_key(&index);
             let stays = motion.reason().is_some() || refused.contains(&index) || arc_stays;
             let dependency = self.start_dependency(index as usize, stays);
-            let axes = self.start_axes(index as usize, stays, held[index as usize]);
+            let axes = self.pinned_start_axes(index as usize, stays, held[index as usize]);
             if axes == 0 && !directed.contains(&index) {
                 continue;
             }
@@ -70,7 +71,7 @@ impl Task<'_> {
             if self.listing.motions[before as usize].place.file != motion.place.file {
                 continue;
             }
-            let mixed = axes != 0 && self.turns_between(before, index);
+            let mixed = axes != 0 && self.axes_differ(before, index);
             held[before as usize] |= if mixed { ALL } else { axes };
             let perhaps = self.listing.motions[before as usize].conditional
                 || self.contexts[before as usize].may_omit_words;
@@ -85,8 +86,8 @@ impl Task<'_> {
                     wanted.remove(&before);
                     let arc = motion.kind == MotionKind::Circular;
                     outcomes[change] = Outcome::Refused(match arc {
-                        true => Reason::BeforeLeftArc,
-                        false => Reason::BeforeLeftPath,
+                        true => Reason::BeforeUnmodifiedArc,
+                        false => Reason::BeforeUnmodifiedPath,
                     });
                     refused.insert(before);
                 }
@@ -96,9 +97,9 @@ impl Task<'_> {
         pinned
     }
 
-    /// Whether the axes of one motion point elsewhere than those of another (ROT, another work offset), or that is not known: then
-    /// each axis of the one hangs on all of the other.
-    fn turns_between(&self, one: u32, other: u32) -> bool {
+    /// Whether the axes of two motions have different or unknown directions (ROT, another work offset): then each
+    /// axis of one depends on all axes of the other.
+    fn axes_differ(&self, one: u32, other: u32) -> bool {
         let listing = &self.listing;
         let [Some(a), Some(b)] = [one, other].map(|index| listing.motions[index as usize].work_object) else {
             return false;
@@ -114,9 +115,9 @@ impl Task<'_> {
         }
     }
 
-    /// The axes in which a motion must begin where it always did: those that its own way hangs on, and those of `held`,
-    /// in which it must end there, that it takes from the motion before.
-    pub(super) fn start_axes(&self, index: usize, stays: bool, held: u8) -> u8 {
+    /// The axes in which a motion must start at the original point: those that its path depends on, and those of
+    /// `held`, in which it must end there, that it does not state itself.
+    pub(super) fn pinned_start_axes(&self, index: usize, stays: bool, held: u8) -> u8 {
         let (motion, context) = (&self.listing.motions[index], &self.contexts[index]);
         let own = match self.start_dependency(index, stays) {
             StartDependency::Independent => 0,
@@ -125,12 +126,12 @@ impl Task<'_> {
             }
             _ => ALL,
         };
-        // Behind a call the tool stands where that has left it; a cycle begins where the tool stands.
+        // After a call the position is that of the subprogram; a cycle starts at the tool position.
         let moves = motion.kind != MotionKind::Unknown || motion.reason() == Some(Reason::Cycle);
-        own | if stays && moves && held != 0 { held & !self.own_ends(index) } else { 0 }
+        own | if stays && moves && held != 0 { held & !self.axes_with_own_end(index) } else { 0 }
     }
 
-    /// The axes of an arc as far as its words tell them; all where they do not.
+    /// The axes that the words of an arc name; all if fewer than two.
     fn arc_axes(&self, index: usize) -> u8 {
         let file = self.listing.motions[index].place.file as usize;
         let slots = slots(&self.trees[file], self.dialects[file], &self.contexts[index]);
@@ -139,9 +140,9 @@ impl Task<'_> {
         if u8::count_ones(axes) < 2 { ALL } else { axes }
     }
 
-    /// The axes in which a motion that stays ends where it says, whatever is before it: it states them, or what it leaves out
-    /// is said again.
-    fn own_ends(&self, index: usize) -> u8 {
+    /// The axes in which an unmodified motion ends at its programmed position whatever the start: it states them, or
+    /// omitted ones are restated.
+    fn axes_with_own_end(&self, index: usize) -> u8 {
         let (motion, context) = (&self.listing.motions[index], &self.contexts[index]);
         let file = motion.place.file as usize;
         let (tree, dialect) = (&self.trees[file], self.dialects[file]);

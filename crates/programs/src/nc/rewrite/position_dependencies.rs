@@ -1,11 +1,11 @@
-//! Ends that stay because something that stays counts from them: an origin that is set where the tool stands (G92), an
-//! increment, a position that the program reads.
+//! Endpoints pinned because unmodified words depend on them: an origin set at the tool position (G92), an increment,
+//! a position that the program reads.
 //!
-//! Method: for each axis, which motions that shall move the place of the tool hangs on, and which the origin; followed
-//! through the events of the file. A motion that stays and cannot be mended by the words that are said again is told by its own
-//! words: a value counts from the origin, an increment from the place. Where ways meet, the place may hang on what holds
-//! wherever a jump may begin, and the origin on every place where one is set: both are gathered over the whole file
-//! and put in at its end, so that loops and jumps back are counted.
+//! Method: a reaching-definitions analysis over the events of a file. For each axis it tracks the set of modified
+//! motions on which the tool position, and the origin, depend. In an unmodified motion that cannot be restated, an
+//! absolute value depends on the origin and an increment on the position. At a join the position depends on the
+//! positions at all branches, and the origin on all places where origins are set; both sets are collected over the
+//! whole file and substituted at its end, which accounts for loops and backward jumps.
 
 use std::collections::{BTreeSet, HashMap};
 
@@ -17,87 +17,92 @@ use crate::nc::syntax::{NcTree, Word, WordValue};
 use crate::nc::task::{StartDependency, StateEvent, Task};
 use crate::rewrite::Outcome;
 
-/// More single motions are not told apart: all of the file then.
+/// The most motions in one dependency set; beyond it the set is all motions of the file.
 const SINGLE: usize = 4;
 
-/// Axes: X, Y, Z, A, B, C.
+/// X, Y, Z, A, B, C.
 const AXES: usize = 6;
 
-/// What a coordinate hangs on.
+/// What a coordinate depends on.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 struct Dependencies {
-    on: [Option<u32>; SINGLE],
-    /// All motions of the file that move.
-    on_all: bool,
-    /// On the places where jumps may begin.
-    places: bool,
-    /// On the places where origins are set.
+    motions: [Option<u32>; SINGLE],
+    /// All modified motions of the file.
+    all_motions: bool,
+    /// The positions at branches.
+    branches: bool,
+    /// The positions where origins are set.
     origins: bool,
-    /// Whether how far it has moved differs from way to way.
-    unsettled: bool,
+    /// Whether its displacement differs between paths.
+    path_dependent: bool,
 }
 
 impl Dependencies {
-    const NOTHING: Dependencies =
-        Dependencies { on: [None; SINGLE], on_all: false, places: false, origins: false, unsettled: false };
+    const NONE: Dependencies = Dependencies {
+        motions: [None; SINGLE],
+        all_motions: false,
+        branches: false,
+        origins: false,
+        path_dependent: false,
+    };
 
-    fn only(motion: u32) -> Dependencies {
-        let mut on = [None; SINGLE];
-        on[0] = Some(motion);
-        Dependencies { on, ..Dependencies::NOTHING }
+    fn on_motion(motion: u32) -> Dependencies {
+        let mut motions = [None; SINGLE];
+        motions[0] = Some(motion);
+        Dependencies { motions, ..Dependencies::NONE }
     }
 
-    fn is_nothing(&self) -> bool {
-        self.on[0].is_none() && !self.on_all && !self.places && !self.origins
+    fn is_empty(&self) -> bool {
+        self.motions[0].is_none() && !self.all_motions && !self.branches && !self.origins
     }
 
-    fn and(mut self, other: Dependencies) -> Dependencies {
-        for motion in other.on.into_iter().flatten() {
-            if self.on.contains(&Some(motion)) {
+    fn union(mut self, other: Dependencies) -> Dependencies {
+        for motion in other.motions.into_iter().flatten() {
+            if self.motions.contains(&Some(motion)) {
                 continue;
             }
-            match self.on.iter_mut().find(|place| place.is_none()) {
+            match self.motions.iter_mut().find(|position| position.is_none()) {
                 Some(free) => *free = Some(motion),
-                None => self.on_all = true,
+                None => self.all_motions = true,
             }
         }
-        self.on_all |= other.on_all;
-        self.places |= other.places;
+        self.all_motions |= other.all_motions;
+        self.branches |= other.branches;
         self.origins |= other.origins;
-        self.unsettled |= other.unsettled;
+        self.path_dependent |= other.path_dependent;
         self
     }
 }
 
-/// The same over many places.
+/// The union of dependencies over many places.
 #[derive(Debug, Clone, Default)]
 struct DependencySet {
-    on: BTreeSet<u32>,
-    on_all: bool,
-    places: bool,
+    motions: BTreeSet<u32>,
+    all_motions: bool,
+    branches: bool,
     origins: bool,
 }
 
 impl DependencySet {
-    fn add(&mut self, hangs: &Dependencies) {
-        self.on.extend(hangs.on.iter().flatten());
-        self.on_all |= hangs.on_all;
-        self.places |= hangs.places;
-        self.origins |= hangs.origins;
+    fn add(&mut self, dependencies: &Dependencies) {
+        self.motions.extend(dependencies.motions.iter().flatten());
+        self.all_motions |= dependencies.all_motions;
+        self.branches |= dependencies.branches;
+        self.origins |= dependencies.origins;
     }
 
     fn join(&mut self, other: &DependencySet) {
-        self.on.extend(&other.on);
-        self.on_all |= other.on_all;
-        self.places |= other.places;
+        self.motions.extend(&other.motions);
+        self.all_motions |= other.all_motions;
+        self.branches |= other.branches;
         self.origins |= other.origins;
     }
 
-    /// With the places and origins that it names.
-    fn whole(mut self, places: &DependencySet, origins: &DependencySet) -> DependencySet {
+    /// Substitutes the sets of branches and origins that it refers to.
+    fn resolved(mut self, branches: &DependencySet, origins: &DependencySet) -> DependencySet {
         for _ in 0..2 {
-            if self.places {
-                self.join(places);
+            if self.branches {
+                self.join(branches);
             }
             if self.origins {
                 self.join(origins);
@@ -107,96 +112,96 @@ impl DependencySet {
     }
 }
 
-/// One file while its events are followed.
+/// The analysis state within one file.
 #[derive(Default)]
 struct FileDependencies {
-    place: [Dependencies; AXES],
+    position: [Dependencies; AXES],
     origin: [Dependencies; 3],
-    /// Where jumps may begin.
-    places: [DependencySet; AXES],
-    /// Where origins are set.
+    /// The positions at branches.
+    branches: [DependencySet; AXES],
+    /// The positions where origins are set.
     origins: [DependencySet; 3],
-    /// What must not move: because of origins, because of increments.
-    held: [[DependencySet; AXES]; 2],
-    motions: std::ops::Range<u32>,
-    /// Whether the axes may turn anywhere in the file: where ways meet they may come from another frame.
-    turns: bool,
+    /// What must not move, by cause.
+    pinned: [[DependencySet; AXES]; 2],
+    file_motions: std::ops::Range<u32>,
+    /// Whether the axis directions may change anywhere in the file: joins then mix axes.
+    mixes_axes: bool,
 }
 
-/// The two reasons in [`Course::held`].
-const BY_ORIGIN: usize = 0;
-const BY_INCREMENT: usize = 1;
+/// The two causes in [`FileDependencies::held`].
+const ORIGIN: usize = 0;
+const INCREMENT: usize = 1;
 
 impl FileDependencies {
-    fn hold_place(&mut self, why: usize, axis: usize) {
-        self.held[why][axis].add(&self.place[axis]);
+    fn pin_position(&mut self, why: usize, axis: usize) {
+        self.pinned[why][axis].add(&self.position[axis]);
     }
 
-    fn hold_origin(&mut self, axis: usize) {
-        self.held[BY_ORIGIN][axis].add(&self.origin[axis]);
+    fn pin_origin(&mut self, axis: usize) {
+        self.pinned[ORIGIN][axis].add(&self.origin[axis]);
     }
 
     fn event(&mut self, event: &StateEvent) {
         match *event {
             StateEvent::OriginSet { stated, named } => {
                 for axis in (0..3).filter(|&axis| named[axis]) {
-                    if stated[axis].is_none() || self.place[axis].unsettled {
-                        // By how much it moves cannot be counted.
-                        self.hold_place(BY_ORIGIN, axis);
+                    if stated[axis].is_none() || self.position[axis].path_dependent {
+                        // The displacement of the origin is not computable.
+                        self.pin_position(ORIGIN, axis);
                     }
-                    self.origin[axis] = self.place[axis];
-                    self.origins[axis].add(&self.place[axis]);
+                    self.origin[axis] = self.position[axis];
+                    self.origins[axis].add(&self.position[axis]);
                 }
             }
             StateEvent::ShiftStated(axes) => {
-                (0..3).filter(|&axis| axes[axis]).for_each(|axis| self.origin[axis] = Dependencies::NOTHING);
+                (0..3).filter(|&axis| axes[axis]).for_each(|axis| self.origin[axis] = Dependencies::NONE);
             }
             StateEvent::ShiftMaybeStated(axes) => {
-                (0..3).filter(|&axis| axes[axis]).for_each(|axis| self.hold_origin(axis));
+                (0..3).filter(|&axis| axes[axis]).for_each(|axis| self.pin_origin(axis));
             }
             StateEvent::ShiftRestored => self.origin.iter_mut().for_each(|origin| origin.origins = true),
             StateEvent::PositionUsed { axes, read } => {
-                let why = if read { BY_INCREMENT } else { BY_ORIGIN };
-                (0..AXES).filter(|axis| axes & 1 << axis != 0).for_each(|axis| self.hold_place(why, axis));
+                let why = if read { INCREMENT } else { ORIGIN };
+                (0..AXES).filter(|axis| axes & 1 << axis != 0).for_each(|axis| self.pin_position(why, axis));
             }
-            StateEvent::Branch => self.leave(),
+            StateEvent::Branch => self.branch(),
             StateEvent::Join => {
-                self.leave();
-                for place in &mut self.place {
-                    (place.places, place.unsettled) = (true, true);
+                self.branch();
+                for position in &mut self.position {
+                    (position.branches, position.path_dependent) = (true, true);
                 }
                 self.origin.iter_mut().for_each(|origin| origin.origins = true);
             }
-            StateEvent::PoseUnknown => self.turn(),
+            StateEvent::PoseUnknown => self.mix_axes(),
             StateEvent::FileStart | StateEvent::AxesUnknown(_) | StateEvent::Motion(_) => {}
         }
     }
 
-    /// X, Y and Z may be other directions from here on.
-    fn turn(&mut self) {
-        let [x, y, z, ..] = self.place;
-        self.place[..3].fill(x.and(y).and(z));
+    /// X, Y and Z may have other directions from here on.
+    fn mix_axes(&mut self) {
+        let [x, y, z, ..] = self.position;
+        self.position[..3].fill(x.union(y).union(z));
         let [x, y, z] = self.origin;
-        self.origin.fill(x.and(y).and(z));
+        self.origin.fill(x.union(y).union(z));
     }
 
-    fn leave(&mut self) {
-        if self.turns {
-            self.turn();
+    fn branch(&mut self) {
+        if self.mixes_axes {
+            self.mix_axes();
         }
-        for (all, place) in self.places.iter_mut().zip(&self.place) {
-            all.add(place);
+        for (all, position) in self.branches.iter_mut().zip(&self.position) {
+            all.add(position);
         }
     }
 
-    /// The motions that must not move, and why.
-    fn ends(&self) -> [DependencySet; 2] {
+    /// The motions that must not move, by cause.
+    fn pinned_motions(&self) -> [DependencySet; 2] {
         std::array::from_fn(|why| {
             let mut all = DependencySet::default();
-            for (axis, held) in self.held[why].iter().enumerate() {
+            for (axis, pinned) in self.pinned[why].iter().enumerate() {
                 let none = DependencySet::default();
                 let origins = self.origins.get(axis).unwrap_or(&none);
-                all.join(&held.clone().whole(&self.places[axis], origins));
+                all.join(&pinned.clone().resolved(&self.branches[axis], origins));
             }
             all
         })
@@ -204,43 +209,47 @@ impl FileDependencies {
 }
 
 impl Task<'_> {
-    /// Refuses the motions from whose ends something counts that stays. Whether there is one.
+    /// Refuses the motions on whose end points unmodified words depend. Returns whether there are any.
     pub(super) fn refuse_position_dependents(
         &self,
         pinned: &BTreeSet<u32>,
         wanted: &mut HashMap<u32, usize>,
         outcomes: &mut [Outcome],
     ) -> bool {
-        let mut course = FileDependencies::default();
+        let mut state = FileDependencies::default();
         let mut refused: Vec<(u32, Reason)> = Vec::new();
-        let mut end = |course: &FileDependencies| {
-            for (gathered, reason) in
-                course.ends().iter().zip([Reason::BeforeOrigin, Reason::BeforeIncrement])
+        let mut end = |state: &FileDependencies| {
+            for (set, reason) in
+                state.pinned_motions().iter().zip([Reason::BeforeOrigin, Reason::BeforeIncrement])
             {
-                let all = course.motions.clone().filter(|_| gathered.on_all);
-                refused.extend(gathered.on.iter().copied().chain(all).map(|motion| (motion, reason)));
+                let all = state.file_motions.clone().filter(|_| set.all_motions);
+                refused.extend(set.motions.iter().copied().chain(all).map(|motion| (motion, reason)));
             }
         };
         for (at, event) in self.events.iter().enumerate() {
             match *event {
                 StateEvent::FileStart => {
-                    end(&course);
-                    let next = course.motions.end;
+                    end(&state);
+                    let next = state.file_motions.end;
                     let of_file =
                         self.events[at + 1..].iter().take_while(|event| **event != StateEvent::FileStart);
                     let mut moving = of_file.skip_while(|event| !matches!(event, StateEvent::Motion(_)));
-                    let turns = moving.any(|event| *event == StateEvent::PoseUnknown);
-                    course = FileDependencies { motions: next..next, turns, ..FileDependencies::default() };
+                    let mixes_axes = moving.any(|event| *event == StateEvent::PoseUnknown);
+                    state = FileDependencies {
+                        file_motions: next..next,
+                        mixes_axes,
+                        ..FileDependencies::default()
+                    };
                 }
                 StateEvent::Motion(motion) => {
-                    course.motions.end = motion + 1;
+                    state.file_motions.end = motion + 1;
                     let moves = wanted.contains_key(&motion) && !pinned.contains(&motion);
-                    self.goes(motion, moves, &mut course);
+                    self.transfer(motion, moves, &mut state);
                 }
-                _ => course.event(event),
+                _ => state.event(event),
             }
         }
-        end(&course);
+        end(&state);
         let mut any = false;
         for (motion, reason) in refused {
             if let Some(change) = wanted.remove(&motion) {
@@ -251,10 +260,10 @@ impl Task<'_> {
         any
     }
 
-    /// After a block that may be skipped the tool stands as corrected or as it always did: no increment can be written from
-    /// there that is right on both ways.
-    fn hold_unsettled(&self, index: u32, course: &mut FileDependencies) {
-        if !course.place.iter().any(|place| place.unsettled) {
+    /// After a skippable block the tool is at the corrected or the original position, so that no increment from there
+    /// is right on both paths.
+    fn pin_path_dependent_increments(&self, index: u32, state: &mut FileDependencies) {
+        if !state.position.iter().any(|position| position.path_dependent) {
             return;
         }
         let (motion, context) = (&self.listing.motions[index as usize], &self.contexts[index as usize]);
@@ -266,23 +275,23 @@ impl Task<'_> {
                 .as_ref()
                 .and_then(|word| states_increment(tree, dialect, word))
                 .unwrap_or(!context.absolute);
-            if counts && course.place[axis].unsettled {
-                course.hold_place(BY_INCREMENT, axis);
+            if counts && state.position[axis].path_dependent {
+                state.pin_position(INCREMENT, axis);
             }
         }
     }
 
-    /// What a motion makes of place and origin.
-    fn goes(&self, index: u32, moves: bool, course: &mut FileDependencies) {
+    /// The transfer function of a motion.
+    fn transfer(&self, index: u32, moves: bool, state: &mut FileDependencies) {
         let (motion, context) = (&self.listing.motions[index as usize], &self.contexts[index as usize]);
         let known = motion.to().is_some_and(|target| target.value.is_ok());
         if known {
-            self.hold_unsettled(index, course);
+            self.pin_path_dependent_increments(index, state);
         }
         if known && motion.left.is_none_or(keeps_endpoint) {
-            // It is written anew, or says again what must be said again.
-            let hangs = if moves { Dependencies::only(index) } else { Dependencies::NOTHING };
-            course.place = [hangs; AXES];
+            // It is rewritten, or omitted words are restated.
+            let dependencies = if moves { Dependencies::on_motion(index) } else { Dependencies::NONE };
+            state.position = [dependencies; AXES];
             return;
         }
         let file = motion.place.file as usize;
@@ -291,8 +300,8 @@ impl Task<'_> {
         let reason = motion.reason();
         let machine = reason == Some(Reason::MachineCoordinates);
         let returns = reason == Some(Reason::ReferenceReturn);
-        let mends = context.can_restate && known && slots.axes.iter().any(Option::is_some);
-        let before = course.place;
+        let restates = context.can_restate && known && slots.axes.iter().any(Option::is_some);
+        let before = state.position;
         for (axis, was) in before.iter().enumerate() {
             let linear = axis < 3;
             let word = if linear { slots.axes[axis] } else { slots.angles[axis - 3] };
@@ -300,48 +309,49 @@ impl Task<'_> {
             let increment =
                 word.map(|word| states_increment(tree, dialect, &word).unwrap_or(!context.absolute));
             match (word, increment) {
-                _ if mends && linear && start.is_some() => course.place[axis] = Dependencies::NOTHING,
-                (Some(_), Some(false)) if mends && linear => course.place[axis] = Dependencies::NOTHING,
+                _ if restates && linear && start.is_some() => state.position[axis] = Dependencies::NONE,
+                (Some(_), Some(false)) if restates && linear => state.position[axis] = Dependencies::NONE,
                 (Some(word), Some(true)) if returns && is_zero(tree, &word) => {
-                    course.place[axis] = Dependencies::NOTHING;
+                    state.position[axis] = Dependencies::NONE;
                 }
-                (Some(_), _) if machine => course.place[axis] = Dependencies::NOTHING,
-                // It may count from the place or from the origin.
+                (Some(_), _) if machine => state.position[axis] = Dependencies::NONE,
+                // It may be relative to the position or to the origin.
                 (Some(word), _)
                     if context.distance_mode_unknown && states_increment(tree, dialect, &word).is_none() =>
                 {
-                    course.hold_place(BY_INCREMENT, axis);
+                    state.pin_position(INCREMENT, axis);
                     if linear {
-                        course.hold_origin(axis);
-                        course.place[axis] = was.and(course.origin[axis]);
+                        state.pin_origin(axis);
+                        state.position[axis] = was.union(state.origin[axis]);
                     }
                 }
-                (Some(_), Some(true)) => course.hold_place(BY_INCREMENT, axis),
+                (Some(_), Some(true)) => state.pin_position(INCREMENT, axis),
                 (Some(_), _) => {
                     if linear {
-                        course.hold_origin(axis);
+                        state.pin_origin(axis);
                     }
-                    course.place[axis] =
-                        if linear && !returns { course.origin[axis] } else { Dependencies::NOTHING };
+                    state.position[axis] =
+                        if linear && !returns { state.origin[axis] } else { Dependencies::NONE };
                 }
                 (None, _) => {}
             }
             if motion.conditional || context.may_omit_words {
-                let hangs = course.place[axis].and(*was);
-                course.place[axis] = Dependencies { unsettled: !hangs.is_nothing(), ..hangs };
+                let dependencies = state.position[axis].union(*was);
+                state.position[axis] =
+                    Dependencies { path_dependent: !dependencies.is_empty(), ..dependencies };
             }
         }
         if self.start_dependency(index as usize, true) != StartDependency::Independent {
-            let axes = self.start_axes(index as usize, true, 0);
+            let axes = self.pinned_start_axes(index as usize, true, 0);
             for axis in (0..3).filter(|axis| axes & 1 << axis != 0) {
-                course.held[BY_INCREMENT][axis].add(&before[axis]);
+                state.pinned[INCREMENT][axis].add(&before[axis]);
             }
         }
         let elsewhere = machine || returns || reason == Some(Reason::ExternalOnly);
         let absolute_centre = motion.kind == MotionKind::Circular && !known;
         if motion.kind == MotionKind::Unknown && !elsewhere || absolute_centre {
-            // Its words, or what it calls, may count from the origin in any axis.
-            (0..3).for_each(|axis| course.hold_origin(axis));
+            // Its words, or the subprogram, may be relative to the origin in any axis.
+            (0..3).for_each(|axis| state.pin_origin(axis));
         }
     }
 }

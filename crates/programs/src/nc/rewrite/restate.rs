@@ -1,5 +1,4 @@
-//! What stays as it is written while what is before it has moved: where the control stands now, and the words that are said
-//! again.
+//! Unmodified motions after modified ones: omitted words are restated, so that the end points do not change.
 
 use super::block_writer::{BlockWriter, differs};
 use super::word_slots::{ANGLES, AXES, SPIN, VECTOR, WordSlots, slots, states_increment};
@@ -11,17 +10,17 @@ use crate::nc::syntax::NcTree;
 use crate::nc::task::BlockContext;
 
 impl<'s> Rewriter<'_, 's> {
-    /// Whether the control stands where the original has it, so that a motion that stays needs nothing.
+    /// Whether the control state is as in the original, so that an unmodified motion needs no words.
     pub(super) fn is_as_intended(&self, context: &BlockContext, start: &[Option<f64>; 3]) -> bool {
-        self.control.moved == [0.0; 3]
+        self.control.shift_change == [0.0; 3]
             && start == &context.start
             && (0..3).all(|axis| {
-                self.control.angles[axis].is_none_or(|now| Some(now) == context.start_angles[axis])
+                self.control.angles[axis].is_none_or(|current| Some(current) == context.start_angles[axis])
             })
-            && self.control.vector.is_none_or(|now| Some(now) == context.start_vector)
+            && self.control.vector.is_none_or(|current| Some(current) == context.start_vector)
     }
 
-    /// What a motion that stays leaves out and the one before it has changed is put in, so that it goes where it always went.
+    /// Adds the words that an unmodified motion omits and the motion before it has changed.
     pub(super) fn restate_words(&mut self, motion: &Motion, context: &BlockContext) {
         let task = self.task;
         let file = motion.place.file as usize;
@@ -34,40 +33,50 @@ impl<'s> Rewriter<'_, 's> {
         let mut writer = BlockWriter::new(tree, dialect, &mut edits, &slots, context);
         let decimals = self.options.position_decimals + u8::from(context.unit_mm != 1.0) * 2;
         let unit = context.unit_mm;
-        let mut again = [false; 6];
+        let mut restated = [false; 6];
         let to =
             motion.to().and_then(|target| target.value.ok().and_then(|value| value.cartesian().copied()));
         for axis in 0..3 {
-            let stands = self.control.position[axis].zip(context.start[axis]);
+            let positions = self.control.position[axis].zip(context.start[axis]);
             if let Some(word) = slots.axes[axis] {
                 let Some(to) = to.map(|to| to.position_mm[axis]) else { continue };
-                // An increment counts from where the tool stands now, a value from a shift that may have moved with it.
+                // An increment is relative to the commanded position, an absolute value to a shift that may have
+                // moved with it.
                 let (base, old) =
-                    match (states_increment(tree, dialect, &word).unwrap_or(!context.absolute), stands) {
-                        (true, Some((now, intended))) => (now, intended),
+                    match (states_increment(tree, dialect, &word).unwrap_or(!context.absolute), positions) {
+                        (true, Some((current, intended))) => (current, intended),
                         (true, None) => continue,
                         (false, _) => {
                             let shift = context.shift[axis].unwrap_or(0.0);
-                            (shift + self.control.moved[axis], shift)
+                            (shift + self.control.shift_change[axis], shift)
                         }
                     };
                 if base != old {
                     let (value, was) = ((to - base) / unit, (to - old) / unit);
-                    writer.put(AXES + axis, b"X", value, value, was, decimals);
+                    writer.write_word(AXES + axis, b"X", value, value, was, decimals);
                 }
                 continue;
             }
-            let Some((now, intended)) = stands.filter(|(now, intended)| differs(*now, *intended, 9)) else {
+            let Some((current, intended)) =
+                positions.filter(|(current, intended)| differs(*current, *intended, 9))
+            else {
                 continue;
             };
             let base = if context.absolute {
-                context.shift[axis].unwrap_or(0.0) + self.control.moved[axis]
+                context.shift[axis].unwrap_or(0.0) + self.control.shift_change[axis]
             } else {
-                now
+                current
             };
             let name = [b"X", b"Y", b"Z"][axis];
-            writer.put(AXES + axis, name, (intended - base) / unit, (now - base) / unit, f64::NAN, decimals);
-            again[axis] = true;
+            writer.write_word(
+                AXES + axis,
+                name,
+                (intended - base) / unit,
+                (current - base) / unit,
+                f64::NAN,
+                decimals,
+            );
+            restated[axis] = true;
         }
         let names: Option<[&[u8]; 3]> = match context.orientation_mode {
             OrientationMode::Angles => Some([b"A", b"B", b"C"]),
@@ -75,32 +84,33 @@ impl<'s> Rewriter<'_, 's> {
             _ => None,
         };
         for (axis, name) in names.into_iter().flatten().enumerate() {
-            let (Some(now), Some(intended)) = (self.control.angles[axis], context.start_angles[axis]) else {
+            let (Some(current), Some(intended)) = (self.control.angles[axis], context.start_angles[axis])
+            else {
                 continue;
             };
-            if slots.angles[axis].is_some() || !differs(now, intended, 9) {
+            if slots.angles[axis].is_some() || !differs(current, intended, 9) {
                 continue;
             }
-            let base = if context.absolute { 0.0 } else { now };
+            let base = if context.absolute { 0.0 } else { current };
             let decimals = self.options.joint_decimals;
-            writer.put(ANGLES + axis, name, intended - base, now - base, f64::NAN, decimals);
-            again[3 + axis] = true;
+            writer.write_word(ANGLES + axis, name, intended - base, current - base, f64::NAN, decimals);
+            restated[3 + axis] = true;
         }
         self.restate_vector(&mut writer, context, &slots, motion.conditional);
         self.edits[file] = edits;
         for axis in 0..3 {
-            // Where the block may be skipped it is said again by whatever comes next.
-            let now = motion.conditional.then_some(f64::NAN);
-            if again[axis] {
-                self.control.position[axis] = now;
+            // If the block may be skipped, the next one must restate the words again.
+            let current = motion.conditional.then_some(f64::NAN);
+            if restated[axis] {
+                self.control.position[axis] = current;
             }
-            if again[3 + axis] {
-                self.control.angles[axis] = now;
+            if restated[3 + axis] {
+                self.control.angles[axis] = current;
             }
         }
     }
 
-    /// The same for a tool vector and the turn about it.
+    /// The same for the tool vector and the spin about it.
     fn restate_vector(
         &mut self,
         writer: &mut BlockWriter<'_, 's>,
@@ -108,7 +118,7 @@ impl<'s> Rewriter<'_, 's> {
         slots: &WordSlots<'s>,
         conditional: bool,
     ) {
-        let (OrientationMode::Vector, Some((now, now_spin)), Some((intended, meant_spin))) =
+        let (OrientationMode::Vector, Some((current, current_spin)), Some((intended, intended_spin))) =
             (context.orientation_mode, self.control.vector, context.start_vector)
         else {
             return;
@@ -116,24 +126,24 @@ impl<'s> Rewriter<'_, 's> {
         // Only LN of Heidenhain takes a vector.
         let takes = writer.dialect != Dialect::Heidenhain || slots.first.is_some_and(|word| word.is("LN"));
         let stated = slots.vector.iter().any(Option::is_some);
-        if !takes || (now, now_spin) == (intended, meant_spin) {
+        if !takes || (current, current_spin) == (intended, intended_spin) {
             return;
         }
-        if !stated && now != intended {
+        if !stated && current != intended {
             let names = vector_names(writer.dialect, context);
             for axis in 0..3 {
                 let decimals = self.options.quaternion_decimals;
-                writer.put(VECTOR + axis, names[axis], intended[axis], f64::NAN, f64::NAN, decimals);
+                writer.write_word(VECTOR + axis, names[axis], intended[axis], f64::NAN, f64::NAN, decimals);
             }
         }
-        if writer.dialect == Dialect::Siemens && slots.spin.is_none() && now_spin != meant_spin {
-            writer.put(SPIN, b"THETA", meant_spin, f64::NAN, f64::NAN, self.options.joint_decimals);
+        if writer.dialect == Dialect::Siemens && slots.spin.is_none() && current_spin != intended_spin {
+            writer.write_word(SPIN, b"THETA", intended_spin, f64::NAN, f64::NAN, self.options.joint_decimals);
         }
         self.control.vector = conditional.then_some(([f64::NAN; 3], f64::NAN));
     }
 
-    /// After a motion that stays as it is written: its words say again what the original says, the others hold on. Where the block
-    /// may be skipped, what it states may be either: it is said again by whatever comes next.
+    /// The control state after an unmodified motion: axes with a word are as in the original, the others unchanged.
+    /// After a block that may be skipped they are uncertain, and the next block must restate them.
     pub(super) fn skip_unmodified(
         &mut self,
         tree: &NcTree<'s>,
@@ -145,25 +155,25 @@ impl<'s> Rewriter<'_, 's> {
         for axis in 0..3 {
             if slots.axes[axis].is_some() {
                 match (self.control.position[axis], self.control.intended[axis]) {
-                    (Some(now), Some(intended)) if conditional && now != intended => {
+                    (Some(current), Some(intended)) if conditional && current != intended => {
                         self.control.position[axis] = Some(f64::NAN);
                     }
                     _ => (self.control.position[axis], self.control.intended[axis]) = (None, None),
                 }
             }
             if slots.angles[axis].is_some() {
-                let moved =
-                    self.control.angles[axis].is_some_and(|now| Some(now) != context.start_angles[axis]);
+                let moved = self.control.angles[axis]
+                    .is_some_and(|current| Some(current) != context.start_angles[axis]);
                 self.control.angles[axis] = (conditional && moved).then_some(f64::NAN);
             }
         }
         if slots.vector.iter().any(Option::is_some) {
-            // A turn about the vector that is not said holds on.
+            // The spin stays in effect if it is omitted.
             self.control.vector = match (self.control.vector, context.start_vector, context.vector) {
-                (Some((_, now)), Some((_, intended)), Some((vector, _)))
-                    if slots.spin.is_none() && now != intended =>
+                (Some((_, current)), Some((_, intended)), Some((vector, _)))
+                    if slots.spin.is_none() && current != intended =>
                 {
-                    Some((vector, now))
+                    Some((vector, current))
                 }
                 _ => None,
             };

@@ -1,4 +1,4 @@
-//! The words of one block, by what they say.
+//! The words of one block, by what they state.
 
 use crate::nc::dialect::Dialect;
 use crate::nc::expression::literal;
@@ -8,7 +8,7 @@ use crate::nc::syntax::{NcTree, Syntax, Word, WordValue};
 use crate::nc::task::BlockContext;
 use crate::nc::token::Token;
 
-/// The words of a block that say where to go.
+/// The target words of a block.
 #[derive(Default)]
 pub(super) struct WordSlots<'s> {
     pub(super) axes: [Option<Word<'s>>; 3],
@@ -24,13 +24,13 @@ pub(super) struct WordSlots<'s> {
     pub(super) mode: Option<Word<'s>>,
     /// The first word after a block number.
     pub(super) first: Option<Word<'s>>,
-    /// After which token new words go.
+    /// New words go after this token.
     pub(super) end: u32,
-    /// The last word before that.
+    /// The first token of the word before that.
     pub(super) last: u32,
 }
 
-/// Places in the order of words.
+/// Indices into the standard word order.
 pub(super) const AXES: usize = 0;
 pub(super) const ANGLES: usize = 3;
 pub(super) const VECTOR: usize = 6;
@@ -40,7 +40,7 @@ pub(super) const RADIUS: usize = 13;
 pub(super) const ORDER: usize = 14;
 
 impl<'s> WordSlots<'s> {
-    /// In the order in which controls list them.
+    /// The words in standard order.
     pub(super) fn order(&self) -> [Option<Word<'s>>; ORDER] {
         let mut order = [None; ORDER];
         order[AXES..ANGLES].copy_from_slice(&self.axes);
@@ -52,7 +52,7 @@ impl<'s> WordSlots<'s> {
         order
     }
 
-    /// The place of a word that says where to go; after CR (`radius_block`) an R is a radius.
+    /// The slot of a target word; after CR (`radius_block`) an R is a radius.
     fn slot(
         &mut self,
         tree: &NcTree<'_>,
@@ -83,7 +83,7 @@ impl<'s> WordSlots<'s> {
             [letter @ b'I'..=b'K'] => &mut self.centre[at(letter, b'I')],
             [b'T', b'H', b'E', b'T', b'A'] => &mut self.spin,
             [b'R'] if heidenhain => match word.value {
-                // R0: no correction by the radius.
+                // R0: no radius compensation.
                 WordValue::Literal { sign: None, .. }
                     if !radius_block || number_of(tree, word) == Some(0.0) =>
                 {
@@ -99,7 +99,7 @@ impl<'s> WordSlots<'s> {
     }
 }
 
-/// The words of a block by what they are.
+/// Sorts the words of a block into slots.
 pub(super) fn slots<'s>(tree: &NcTree<'s>, dialect: Dialect, context: &BlockContext) -> WordSlots<'s> {
     let mut slots = WordSlots::default();
     let node = tree.nodes[context.node as usize];
@@ -161,7 +161,7 @@ fn is_axis_name(name: &[u8]) -> bool {
         || matches!(name, [b'I', b'X'..=b'Z' | b'A'..=b'C' | b'U'..=b'W'])
 }
 
-/// Whether a word says by itself that it is an increment (IC, IX) or not (AC).
+/// Whether a word itself states an increment (IC, IX) or an absolute value (AC).
 pub(super) fn states_increment(tree: &NcTree<'_>, dialect: Dialect, word: &Word<'_>) -> Option<bool> {
     if dialect == Dialect::Heidenhain {
         return Some(word.name.len() == 2 && word.name[0] | 32 == b'i');
@@ -177,7 +177,7 @@ pub(super) fn states_increment(tree: &NcTree<'_>, dialect: Dialect, word: &Word<
     }
 }
 
-/// Whether white space stands before the word that begins with this token (or it begins its line).
+/// Whether white space or the line start precedes the word that begins with this token.
 pub(super) fn spaced(tree: &NcTree<'_>, token: u32) -> bool {
     token == 0 || tree.kind(token - 1).is_some_and(|kind| kind.is_trivia() || kind == Token::Slash)
 }

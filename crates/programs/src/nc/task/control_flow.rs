@@ -1,16 +1,16 @@
-//! Jumps, loops, subprograms, and the values of variables.
+//! Control flow (jumps, loops, subprogram calls), and assignments to variables.
 
 use super::super::dialect::Dialect;
 use super::super::expression::{Evaluated, Variable, numbered};
 use super::super::modal_state::ModalGroup;
 use super::super::syntax::WordValue;
 use super::super::token::Token;
-use super::siemens_names::{Address, address};
+use super::siemens_names::{AddressEffect, address_effect};
 use super::{Block, Interpreter, StateEvent};
 use crate::motion::Reason;
 
 impl Interpreter<'_, '_> {
-    /// Whether a block can be reached from elsewhere than the block before.
+    /// Whether a block has predecessors other than the block before it.
     pub(super) fn is_reached_by_jumps(&self, block: &Block<'_>) -> bool {
         let Some(first) = block.words.first() else { return false };
         if first.name.len() > 1
@@ -30,11 +30,11 @@ impl Interpreter<'_, '_> {
                 .is_some_and(|number| self.computed_jump || self.jump_targets.contains(&(number as u64)))
     }
 
-    /// Whether a block stands in the contour that a cycle of a lathe reads.
+    /// Tracks whether the block lies in the contour that a lathe cycle reads.
     pub(super) fn contour_of(&mut self, block: &Block<'_>) {
         let number = block.words.iter().take(2).find(|word| word.address() == Some(b'N'));
         let number = number.and_then(|word| self.literal(word)).map(|number| number as u64);
-        // The block before was the last one.
+        // The block before was the last of the contour.
         if self.contour_end == Some(u64::MAX) {
             self.contour_end = None;
         }
@@ -55,11 +55,11 @@ impl Interpreter<'_, '_> {
                 .any(|word| ["WHEN", "WHENEVER", "FROM", "EVERY"].iter().any(|name| word.is(name)))
     }
 
-    /// What a block assigns to variables. One that is assigned only where a condition holds is not known from here on.
+    /// The assignments of a block. A conditional assignment makes its variable unknown.
     ///
-    /// LinuxCNC reads the whole line before it assigns; what others do with a value in the line that assigns it is not
-    /// certain, so that it is not known there where the line moves as well.
-    pub(super) fn values(&mut self, block: &Block<'_>) -> Vec<(Option<Variable>, Evaluated)> {
+    /// LinuxCNC reads the whole line before it assigns. Other controls differ in the value that a variable has in the
+    /// line which assigns it; there it is unknown if the line also moves.
+    pub(super) fn evaluate_assignments(&mut self, block: &Block<'_>) -> Vec<(Option<Variable>, Evaluated)> {
         let mut values = Vec::new();
         let conditional = block.words.iter().any(|word| word.is("IF"));
         let moves =
@@ -74,7 +74,7 @@ impl Interpreter<'_, '_> {
                         Some(self.tree.text(first).to_ascii_uppercase())
                     }
                     Some(range) => self.evaluate_tokens(range).ok().map(|number| {
-                        self.system_parameter(number);
+                        self.assign_system_parameter(number);
                         numbered(b"#", number)
                     }),
                     None => None,
@@ -92,31 +92,32 @@ impl Interpreter<'_, '_> {
                 _ => continue,
             };
             let value = match word.value {
-                _ if self.synchronised_actions => Err(Reason::Variable),
+                _ if self.synchronised_actions => Err(Reason::UnknownVariable),
                 _ if conditional => Err(Reason::UnknownFlow),
                 WordValue::Literal { .. } => self.literal(word).ok_or(Reason::WrongShape),
                 WordValue::Expression { first, end } => self.evaluate_tokens((first, end)),
                 _ => Err(Reason::WrongShape),
             };
             let value = match &name {
-                // An INT rounds what it is given; in which direction is left to the control.
-                Some(name) if self.integer_variables.contains(name) => value
-                    .and_then(|value| if value.fract() == 0.0 { Ok(value) } else { Err(Reason::Variable) }),
+                // An INT rounds its value, in a direction that depends on the control.
+                Some(name) if self.integer_variables.contains(name) => value.and_then(|value| {
+                    if value.fract() == 0.0 { Ok(value) } else { Err(Reason::UnknownVariable) }
+                }),
                 _ => value,
             };
             if name.is_none() && word.name == b"#" {
-                // It may be one that the control itself reads: offsets, tools, settings.
-                self.frames_assigned();
-                self.tools_assigned();
-                self.invalidate_group(ModalGroup::CoordinateShift, Reason::Variable);
+                // The number is unknown: it may be a system variable for offsets, tools or settings.
+                self.invalidate_offsets();
+                self.invalidate_tools();
+                self.invalidate_group(ModalGroup::CoordinateShift, Reason::UnknownVariable);
             }
             match &name {
                 _ if self.dialect == Dialect::LinuxCnc => {}
                 Some(name) => {
-                    let now = if moves { Err(Reason::Variable) } else { value };
+                    let now = if moves { Err(Reason::UnknownVariable) } else { value };
                     self.set_variable(name.clone(), now);
                 }
-                None => self.state.variables.invalidate(Reason::Variable),
+                None => self.state.variables.invalidate(Reason::UnknownVariable),
             }
             values.push((name, value));
         }
@@ -128,65 +129,70 @@ impl Interpreter<'_, '_> {
         self.state.variables.insert(name, value);
     }
 
-    /// After the block its variables have their values, but where the way has parted in it.
-    pub(super) fn assign(&mut self, values: Vec<(Option<Variable>, Evaluated)>, parted: bool) {
+    /// Applies the assignments after the block, unless the block contains a branch or join.
+    pub(super) fn apply_assignments(&mut self, values: Vec<(Option<Variable>, Evaluated)>, parted: bool) {
         for (name, value) in values {
             match name {
                 Some(name) => {
                     let value = if parted { Err(Reason::UnknownFlow) } else { value };
                     self.set_variable(name, value);
                 }
-                // Any of them.
-                None => self.state.variables.invalidate(Reason::Variable),
+                // Any variable may have been assigned.
+                None => self.state.variables.invalidate(Reason::UnknownVariable),
             }
         }
     }
 
-    /// `#5221=`: numbers that the control itself reads.
-    fn system_parameter(&mut self, number: f64) {
+    /// Assignments to system variables: `#5221=`.
+    fn assign_system_parameter(&mut self, number: f64) {
         let number = number.round() as i64;
         let linux = self.dialect == Dialect::LinuxCnc;
         match number {
-            // Own ones, signals, timers, messages.
+            // User variables, signals, timers, messages.
             ..=1199 | 3000..=3004 | 3006..=3012 | 3901 | 3902 => {}
             5061..=5070 | 5161..=5190 | 1200..=5000 | 5391.. if linux => {}
-            5211..=5219 if linux => self.invalidate_group(ModalGroup::CoordinateShift, Reason::Variable),
-            5220 if linux => self.invalidate_group(ModalGroup::WorkOffset, Reason::Variable),
+            5211..=5219 if linux => {
+                self.invalidate_group(ModalGroup::CoordinateShift, Reason::UnknownVariable)
+            }
+            5220 if linux => self.invalidate_group(ModalGroup::WorkOffset, Reason::UnknownVariable),
             5221..=5390 if linux || number <= 5340 => {
                 let name = match (number - 5221) / 20 {
                     frame @ 0..=5 => format!("G{}", 54 + frame),
                     frame => format!("G59.{}", frame - 5),
                 };
-                // X Y Z A B C, and the turn about Z of LinuxCNC as the tenth; other axes are none of the robot's.
+                // X Y Z A B C, and as the tenth the rotation about Z of LinuxCNC; other axes do not belong to the
+                // robot.
                 if matches!((number - 5221) % 20, 3..=5) {
-                    self.has_rotary(&name, true);
+                    self.set_rotary_offset(&name, true);
                 }
-                self.offset_is(&name, None);
+                self.assign_offset(&name, None);
             }
-            2500..=2999 | 5201..=5220 | 7001..=7999 | 14001..=19999 | 20001..=29999 => self.frames_assigned(),
-            2001..=2499 | 10001..=13999 => self.tools_assigned(),
+            2500..=2999 | 5201..=5220 | 7001..=7999 | 14001..=19999 | 20001..=29999 => {
+                self.invalidate_offsets()
+            }
+            2001..=2499 | 10001..=13999 => self.invalidate_tools(),
             _ => {
-                self.frames_assigned();
-                self.tools_assigned();
+                self.invalidate_offsets();
+                self.invalidate_tools();
                 self.state.invalidate_all(Reason::UnknownWord);
                 self.effects.set_all_varying();
             }
         }
     }
 
-    /// Names of Siemens with a value, or alone.
-    pub(super) fn gather_siemens(&self, block: &mut Block<'_>, index: usize, name: &[u8]) {
+    /// Siemens names with or without a value.
+    pub(super) fn collect_siemens_name(&self, block: &mut Block<'_>, index: usize, name: &[u8]) {
         let word = block.words[index];
         if !word.assigned || name.starts_with(b"$") || self.is_variable(name) {
             return;
         }
-        match address(name) {
-            Some(Address::Setting) => {}
-            Some(Address::Aside(reason)) => block.unmodelled = Some(reason),
-            Some(Address::External) => block.other_axes = true,
-            // What it sets is told by the words of the block, in `tool_words`.
-            Some(Address::Tool) => {}
-            // A name of the control or of the machine's axes, or a variable of another file.
+        match address_effect(name) {
+            Some(AddressEffect::None) => {}
+            Some(AddressEffect::Unmodelled(reason)) => block.unmodelled = Some(reason),
+            Some(AddressEffect::OtherAxes) => block.other_axes = true,
+            // Handled by `tool_words`.
+            Some(AddressEffect::Tool) => {}
+            // A name of the control or of a machine axis, or a variable of another file.
             None => {
                 let text = String::from_utf8_lossy(name).into_owned();
                 block.unknown_word = Some((text, Reason::UnknownWord));
@@ -194,24 +200,27 @@ impl Interpreter<'_, '_> {
         }
     }
 
-    /// TOFFL=, TCARR=: the tool is no more what its name says, or is again.
+    /// TOFFL=, TCARR=: the tool offsets deviate from the tool's data, or no longer do.
     pub(super) fn tool_words(&mut self, block: &Block<'_>) {
         for word in &block.words {
             let name = word.name.to_ascii_uppercase();
-            if self.dialect == Dialect::Siemens && word.assigned && address(&name) == Some(Address::Tool) {
-                self.tools_assigned();
+            if self.dialect == Dialect::Siemens
+                && word.assigned
+                && address_effect(&name) == Some(AddressEffect::Tool)
+            {
+                self.invalidate_tools();
             }
         }
     }
 
-    /// Whether a name with a value is a variable of the program: one that it declares, or one with the underscore of the
-    /// parameters of cycles.
+    /// Whether a name with a value is a variable of the program: declared, or with the leading underscore of cycle
+    /// parameters.
     pub(super) fn is_variable(&self, name: &[u8]) -> bool {
         self.dialect == Dialect::Siemens
             && (name.first() == Some(&b'_') || self.declared.contains(&name.to_ascii_uppercase()))
     }
 
-    /// Jumps, loops and subprograms. True where the block does nothing else.
+    /// Jumps, loops and subprogram calls. True if the block does nothing else.
     pub(super) fn control_flow(&mut self, block: &Block<'_>) -> bool {
         let Some(first) = block.words.iter().find(|word| word.address() != Some(b'N')) else { return false };
         let name = first.name.to_ascii_uppercase();
@@ -221,14 +230,14 @@ impl Interpreter<'_, '_> {
         }
         match (&*name, first.address()) {
             (_, Some(b'O')) if matches!(self.dialect, Dialect::Fanuc | Dialect::Iso) => {
-                // The number of a program: the first one is where the machine starts.
+                // A program number: execution starts at the first one.
                 if !self.contexts.is_empty() {
                     self.join_unseen_predecessors();
                 }
-                // Words may stand on its line.
+                // Other words may follow on its line.
                 block.words.iter().filter(|word| word.address() != Some(b'N')).count() == 1
             }
-            // A program number stands alone; with words it is a block number.
+            // A program number stands alone; with other words it is a block number.
             (b":", _) if block.words.len() == 1 => {
                 if !self.contexts.is_empty() {
                     self.join_unseen_predecessors();
@@ -240,7 +249,7 @@ impl Interpreter<'_, '_> {
                 true
             }
             (b"IF", _) => {
-                // A jump may go away; what stands here holds where it does not.
+                // The branch may jump away; the state here is that of the path that does not.
                 self.branch();
                 true
             }
@@ -293,7 +302,7 @@ impl Interpreter<'_, '_> {
                 self.join_unseen_predecessors();
                 self.state_before_subprogram = Some(state_before_subprogram);
             }
-            // The way goes past a subprogram; what stands in it holds only where it is called.
+            // The main path bypasses a subprogram, whose state holds only where it is called.
             b"ENDSUB" if self.state_before_subprogram.is_some() => {
                 if let Some(state) = self.state_before_subprogram.take() {
                     self.state = state;
@@ -307,18 +316,18 @@ impl Interpreter<'_, '_> {
         }
     }
 
-    /// A call: listed, and where it leaves the axes is not known. What a program that does not stand in the file may set
-    /// beside is not known either; it is taken to set nothing, and noted.
+    /// A call is listed; the pose after it is unknown. A program that is not in the file may also change the modal
+    /// state: it is assumed not to, and the call is listed in [`crate::motion::Listing::outside`].
     pub(super) fn subprogram(&mut self, block: &Block<'_>, name: &str) {
-        if !self.stands_here(block) {
+        if !self.calls_own_file(block) {
             self.listing.outside.push(self.listing.motions.len() as u32);
         }
         self.list_left(block, name, Reason::Subprogram);
         self.join_unseen_predecessors();
     }
 
-    /// Whether what a block calls stands in the file.
-    fn stands_here(&self, block: &Block<'_>) -> bool {
+    /// Whether the program that a block calls is in the file.
+    fn calls_own_file(&self, block: &Block<'_>) -> bool {
         let Some(first) = block.words.iter().find(|word| word.address() != Some(b'N')) else { return false };
         let text = self.tree.source()[self.tree.range(first.first, first.end)].to_ascii_uppercase();
         match self.dialect {

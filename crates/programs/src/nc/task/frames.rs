@@ -1,11 +1,11 @@
-//! Work offsets, frames within them, tools: what sets them, and each distinct one once in the listing.
+//! Work offsets, programmable frames and tools: what sets them, and their entries in the listing.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::super::dialect::Dialect;
 use super::super::modal_state::{ModalGroup, ModalState, TOOL_GROUPS};
 use super::super::orientation::Angles;
-use super::super::setup::{self, held};
+use super::super::setup::{self, flange_tool};
 use super::super::syntax::{Word, WordValue};
 use super::super::token::Token;
 use super::{Block, Interpreter};
@@ -13,7 +13,7 @@ use crate::motion::{Frame, Reason, Tool, WorkObject, WorkObjectValue};
 use truegrind_math::se3::Pose;
 
 impl Interpreter<'_, '_> {
-    /// TRANS, ROT and those that add to them. True where the block is one.
+    /// TRANS, ROT and their additive forms. True if the block is one of them.
     pub(super) fn programmable_frame(&mut self, block: &Block<'_>) -> bool {
         let Some(word) = block.words.iter().find(|word| {
             [
@@ -31,13 +31,13 @@ impl Interpreter<'_, '_> {
         let turned = |state: &ModalState| state.is_transform_active(ModalGroup::ProgrammableFrame);
         let was = turned(&self.state);
         let unknown = self.state.unknown_reason(ModalGroup::ProgrammableFrame.bit()).is_some();
-        self.programmable_is_set();
+        self.mark_programmable_frame_set();
         if adds && unknown {
-            // To what it adds is not known.
+            // The frame to which it adds is unknown.
             self.state.set_transform(ModalGroup::ProgrammableFrame, true);
         }
         if !adds {
-            // Whatever is not added replaces all of the programmable frame, and nothing else.
+            // A command that does not add replaces the whole programmable frame, and nothing else.
             self.state.programmable_frame = None;
             self.state.set_transform(ModalGroup::ProgrammableFrame, false);
         }
@@ -52,7 +52,7 @@ impl Interpreter<'_, '_> {
             block.axes.iter().map(|word| word.map(value).transpose()).collect();
         let rpl = block.words.iter().find(|word| word.is("RPL"));
         let stated = block.has_motion_words() || rpl.is_some();
-        // Shifts of rotary axes turn what A, B and C mean.
+        // Offsets of rotary axes change the orientation that A, B and C state.
         let rotary = block.abc.iter().any(Option::is_some) || block.other_axes;
         let pose = match (&*name, values) {
             (_, Err(_)) => None,
@@ -65,18 +65,18 @@ impl Interpreter<'_, '_> {
                 let mut angles: Vec<f64> = angles.iter().map(|value| value.unwrap_or(0.0)).collect();
                 match rpl.map(|word| self.evaluate_word(word).0) {
                     None => {}
-                    // About the axis across the plane.
+                    // RPL rotates about the normal of the plane.
                     Some(_) if self.state.unknown_reason(ModalGroup::Plane.bit()).is_some() => {
                         angles[0] = f64::NAN
                     }
-                    Some(Ok(turn)) => angles[self.state.plane.across] = turn,
+                    Some(Ok(turn)) => angles[self.state.plane.normal] = turn,
                     Some(Err(_)) => angles[0] = f64::NAN,
                 }
                 let [x, y, z] = [angles[0], angles[1], angles[2]];
                 let turn = Angles::Wpr.rotation([x, y, z]);
                 x.is_finite().then(|| Pose::from_parts(Vector3::zeros().into(), turn))
             }
-            // Scaling and mirroring without values end; with values they are no rigid motion.
+            // Without values SCALE and MIRROR are cancelled; with values they are not rigid motions.
             _ if !stated => Some(Pose::identity()),
             _ => None,
         };
@@ -96,19 +96,19 @@ impl Interpreter<'_, '_> {
         true
     }
 
-    /// The programmable frame is set: where ways meet it is known no more.
-    pub(super) fn programmable_is_set(&mut self) {
+    /// The programmable frame is set: at joins it is unknown.
+    pub(super) fn mark_programmable_frame_set(&mut self) {
         self.set_group_varying(ModalGroup::ProgrammableFrame);
         self.frame_index = None;
     }
 
-    /// G58 and G59 of Siemens: shifts within the work offset, no motion.
+    /// G58 and G59 of Siemens: shifts within the work offset; no motion.
     pub(super) fn axial_shift(&mut self, block: &Block<'_>, absolute: bool) {
         let alone = self.state.programmable_frame.is_none()
             && self.state.unknown_reason(ModalGroup::ProgrammableFrame.bit()).is_none()
             && absolute
             && block.abc.iter().all(Option::is_none);
-        self.programmable_is_set();
+        self.mark_programmable_frame_set();
         self.invalidate_position();
         let mut shift = Vector3::zeros();
         for axis in 0..3 {
@@ -141,19 +141,19 @@ impl Interpreter<'_, '_> {
                 Some(0) => "G500".to_owned(),
                 Some(number @ 1..=4) => format!("G{}", 53 + number),
                 Some(number @ 5..=99) => format!("G{}", 500 + number),
-                _ => return self.frames_assigned(),
+                _ => return self.invalidate_offsets(),
             };
             let pose = self.frame_expression(word).filter(|_| self.is_index_alone(word));
-            // The offset that holds goes on as it was until it is called again.
+            // The active offset keeps its old value until it is selected again.
             self.state.offset_pending |= frame == self.state.work_offset;
-            self.assign_frame(&frame, pose.map(|pose| Frame::from_pose(&pose)));
+            self.assign_offset_value(&frame, pose.map(|pose| Frame::from_pose(&pose)));
         } else if word.is("$P_PFRAME") {
-            self.programmable_is_set();
+            self.mark_programmable_frame_set();
             self.state.programmable_frame = self.frame_expression(word);
             self.state.set_transform(ModalGroup::ProgrammableFrame, self.state.programmable_frame.is_none());
             self.invalidate_pose();
         } else if word.is("$TC_DP3") || word.is("$TC_DP4") || word.is("$TC_DP5") {
-            let (Some(number), Some(1)) = (index(0), index(1)) else { return self.tools_assigned() };
+            let (Some(number), Some(1)) = (index(0), index(1)) else { return self.invalidate_tools() };
             let tool = format!("T{number}");
             let axis = match word.name[6] {
                 b'3' => 2,
@@ -162,7 +162,7 @@ impl Interpreter<'_, '_> {
             };
             // Under G70 the data of the control stay in its own unit, under G700 they do not.
             let value = self.evaluate_word(word).0.ok().filter(|_| self.counts_in_mm());
-            // What the control holds of a tool that nobody has stated is not known: each length until it is said.
+            // The lengths that the control holds are unknown: each is NaN until the program sets it.
             let held = match (self.state.assigned_tools.get(&tool), self.tool_value(&tool)) {
                 (_, Ok(frame)) | (Some(Some(frame)), _) => Some(frame),
                 (None, Err(Reason::ToolUnknown)) => {
@@ -170,7 +170,7 @@ impl Interpreter<'_, '_> {
                 }
                 _ => None,
             };
-            // The tool that is in keeps its lengths until it is called again.
+            // The active tool keeps its lengths until it is selected again.
             let open = self.state.unknown_reason(TOOL_GROUPS).is_some() || self.state.tool == tool;
             let frame = value.zip(held).filter(|_| !open).map(|(value, mut frame)| {
                 frame.position_mm[axis] = value;
@@ -185,11 +185,11 @@ impl Interpreter<'_, '_> {
         } else if matches!(&*name, b"$TC_DP1" | b"$TC_DP2" | b"$TC_DP6" | b"$TC_DP24" | b"$TC_DP25")
             || starts(&["$A_", "$AC_TIMER", "$AC_MARKER", "$AC_PARAM", "$AC_FIFO", "$TC_MPP", "$TC_TP"])
         {
-            // Kinds and radii of tools, signals, timers: neither frames nor lengths.
+            // Types and radii of tools, signals, timers: neither frames nor lengths.
         } else if starts(&["$TC_"]) {
-            self.tools_assigned();
+            self.invalidate_tools();
         } else if starts(&["$P_"]) {
-            self.frames_assigned();
+            self.invalidate_offsets();
         } else {
             self.state.invalidate_all(Reason::UnknownWord);
             self.effects.set_all_varying();
@@ -197,24 +197,24 @@ impl Interpreter<'_, '_> {
         }
     }
 
-    /// Whether lengths are certainly mm here.
+    /// Whether lengths are certainly in mm.
     fn counts_in_mm(&self) -> bool {
         self.state.unit_mm == 1.0 && self.state.unknown_reason(ModalGroup::Unit.bit()).is_none()
     }
 
-    /// Whether a word has one index and no more: `$P_UIFR[1,X,TR]` sets one component.
+    /// Whether a word has exactly one index: `$P_UIFR[1,X,TR]` sets one component.
     fn is_index_alone(&self, word: &Word<'_>) -> bool {
         word.index.is_some_and(|(first, end)| (first..end).all(|at| self.tree.kind(at) != Some(Token::Comma)))
     }
 
-    /// The program gives a work offset a value, or one that is not known.
-    pub(super) fn assign_frame(&mut self, name: &str, frame: Option<Frame>) {
+    /// The program assigns a work offset; `None` if the value is unknown.
+    pub(super) fn assign_offset_value(&mut self, name: &str, frame: Option<Frame>) {
         self.state.assigned_offsets.set(name, frame);
         self.effects.assigned.offsets |= self.is_conditional();
         self.frame_index = None;
     }
 
-    /// A chain of CTRANS and CROT with plain numbers.
+    /// A chain of CTRANS and CROT with literal numbers.
     fn frame_expression(&self, word: &Word<'_>) -> Option<Pose> {
         let WordValue::Expression { first, end } = word.value else { return None };
         if !self.counts_in_mm() {
@@ -259,7 +259,7 @@ impl Interpreter<'_, '_> {
         Some(pose)
     }
 
-    /// A number that is written or can be worked out; whole numbers need no point.
+    /// A literal or computable number; whole numbers need no decimal point.
     pub(super) fn number(&self, word: &Word<'_>) -> Option<f64> {
         self.literal(word).or_else(|| match word.value {
             WordValue::Expression { first, end } => self.evaluate_tokens((first, end)).ok(),
@@ -267,7 +267,7 @@ impl Interpreter<'_, '_> {
         })
     }
 
-    /// G10: L2 P1 X sets a work offset, L20 one from where the tool stands, others tools and parameters.
+    /// G10: L2 P1 X sets a work offset, L20 sets one from the current position, other L set tools and parameters.
     pub(super) fn set_offset(&mut self, block: &Block<'_>) {
         let number = |at: Option<usize>| at.and_then(|index| self.number(&block.words[index]));
         let linux = self.dialect == Dialect::LinuxCnc;
@@ -280,57 +280,57 @@ impl Interpreter<'_, '_> {
         match number(block.l) {
             Some(2.0) => {
                 let name = match p {
-                    Some(0.0) if linux => self.frame_that_holds(),
+                    Some(0.0) if linux => self.active_work_offset(),
                     Some(p) => named(p),
                     None => None,
                 };
-                // The external offset of a Fanuc is added to all.
-                let Some(name) = name else { return self.frames_assigned() };
-                self.state_offset(block, &name);
+                // The external offset of a Fanuc is added to all work offsets.
+                let Some(name) = name else { return self.invalidate_offsets() };
+                self.set_offset_values(block, &name);
             }
             Some(20.0) => {
                 self.mark_position_used(super::named_axes(block));
-                let here = p.filter(|p| linux && *p == 0.0).and_then(|_| self.frame_that_holds());
+                let here = p.filter(|p| linux && *p == 0.0).and_then(|_| self.active_work_offset());
                 match p.and_then(named).filter(|_| linux).or(here) {
                     Some(name) => {
                         if block.abc.iter().any(Option::is_some) {
-                            self.has_rotary(&name, true);
+                            self.set_rotary_offset(&name, true);
                         }
-                        self.offset_is(&name, None);
+                        self.assign_offset(&name, None);
                     }
-                    None => self.frames_assigned(),
+                    None => self.invalidate_offsets(),
                 }
             }
             Some(number @ (1.0 | 3.0 | 10.0 | 11.0 | 12.0 | 13.0 | 14.0)) => {
                 if linux && (number == 10.0 || number == 11.0) {
-                    // A length with which the tool would stand there.
+                    // A length that gives the current position these coordinates.
                     self.mark_position_used(super::named_axes(block));
                 }
-                self.tools_assigned();
+                self.invalidate_tools();
             }
-            None if block.p.is_some() && block.l.is_none() => self.tools_assigned(),
-            // Parameters of the control, or what is not known.
+            None if block.p.is_some() && block.l.is_none() => self.invalidate_tools(),
+            // Parameters of the control, or unknown.
             _ => self.list_unknown_word(block, "G10", Reason::UnknownWord),
         }
     }
 
-    /// The work offset that holds, where that is known.
-    fn frame_that_holds(&self) -> Option<String> {
+    /// The name of the active work offset, if it is known.
+    fn active_work_offset(&self) -> Option<String> {
         self.state
             .unknown_reason(ModalGroup::WorkOffset.bit())
             .is_none()
             .then(|| self.state.work_offset.clone())
     }
 
-    fn state_offset(&mut self, block: &Block<'_>, name: &str) {
+    fn set_offset_values(&mut self, block: &Block<'_>, name: &str) {
         let known = self.frame_value(name).ok();
         let mut frame = known.unwrap_or(Frame::IDENTITY);
-        // What is not said stays: on LinuxCNC, for which a plain file may be, an offset has a turn as well.
+        // Omitted components keep their values. An offset of LinuxCNC, for which an ISO file may be, also has a
+        // rotation.
         let turns = matches!(self.dialect, Dialect::LinuxCnc | Dialect::Iso);
         let whole = block.axes.iter().all(Option::is_some) && (block.radius.is_some() || !turns);
         let mut good = whole || known.is_some();
-        // LinuxCNC takes the values as they are in G91 too, Fanuc and Haas add them; which of them a plain file is for is
-        // not known.
+        // In G91 LinuxCNC takes the values as absolute, Fanuc and Haas add them; for an ISO file this is unknown.
         let absolute = self.state.absolute || self.dialect == Dialect::LinuxCnc;
         good &= absolute || self.dialect != Dialect::Iso;
         for (axis, word) in block.axes.iter().enumerate() {
@@ -343,16 +343,16 @@ impl Interpreter<'_, '_> {
         }
         let distance = if self.dialect == Dialect::LinuxCnc { 0 } else { ModalGroup::DistanceMode.bit() };
         good &= self.state.unknown_reason(distance | ModalGroup::Unit.bit()).is_none();
-        // Offsets of rotary axes turn what A, B and C mean; they stay until each is said to be 0.
+        // Offsets of rotary axes change what A, B and C mean, until each is set to 0.
         let zero = |index: usize| self.number(&block.words[index]) == Some(0.0);
         if !block.abc.iter().flatten().all(|&index| zero(index)) {
-            self.has_rotary(name, true);
+            self.set_rotary_offset(name, true);
         } else if absolute && block.abc.iter().all(Option::is_some) {
-            self.has_rotary(name, false);
+            self.set_rotary_offset(name, false);
         }
         good &= !self.state.assigned_offsets.is_rotary(name);
         match block.radius.map(|index| self.number(&block.words[index])) {
-            // The turn of the work frame about z (LinuxCNC).
+            // The rotation of the work frame about z (LinuxCNC).
             Some(Some(turn)) => {
                 let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turn.to_radians());
                 frame.quaternion = [turn.w, turn.i, turn.j, turn.k];
@@ -360,19 +360,19 @@ impl Interpreter<'_, '_> {
             Some(None) => good = false,
             None => {}
         }
-        self.offset_is(name, good.then_some(frame));
+        self.assign_offset(name, good.then_some(frame));
     }
 
-    /// Whether a work offset has offsets of rotary axes, which its value does not say.
-    pub(super) fn has_rotary(&mut self, name: &str, rotary: bool) {
+    /// Notes whether a work offset has offsets of rotary axes, which its frame does not hold.
+    pub(super) fn set_rotary_offset(&mut self, name: &str, rotary: bool) {
         self.state.assigned_offsets.set_rotary(name, rotary);
         self.effects.assigned.rotary |= rotary && self.is_conditional();
     }
 
-    /// A work offset gets a value; where it is the one that holds, the tool stands elsewhere in it now.
-    pub(super) fn offset_is(&mut self, name: &str, frame: Option<Frame>) {
+    /// A work offset gets a value. If it is the active one, the coordinates of the tool position change.
+    pub(super) fn assign_offset(&mut self, name: &str, frame: Option<Frame>) {
         let before = self.frame_value(name).ok();
-        self.assign_frame(name, frame);
+        self.assign_offset_value(name, frame);
         let holds = name.eq_ignore_ascii_case(&self.state.work_offset);
         if !holds && self.state.unknown_reason(ModalGroup::WorkOffset.bit()).is_none() {
             return;
@@ -388,7 +388,7 @@ impl Interpreter<'_, '_> {
     /// The tool of a name, as the program, the setup or a comment states it.
     pub(super) fn tool_value(&self, name: &str) -> Result<Frame, Reason> {
         match self.state.assigned_tools.get(name) {
-            // A length of it has not been said yet.
+            // One of its lengths has not been set yet.
             Some(Some(frame)) if frame.position_mm.iter().any(|mm| mm.is_nan()) => Err(Reason::ToolUnknown),
             Some(Some(frame)) => Ok(frame),
             Some(None) => Err(Reason::Assigned),
@@ -401,7 +401,7 @@ impl Interpreter<'_, '_> {
         match self.state.assigned_offsets.get(name) {
             Some(Some(frame)) => Ok(frame),
             Some(None) => Err(Reason::Assigned),
-            // Without a settable offset Siemens counts from the base.
+            // Without a settable offset Siemens uses the basic frame.
             None => self
                 .frames
                 .get(&setup::plain(name))
@@ -411,7 +411,7 @@ impl Interpreter<'_, '_> {
         }
     }
 
-    /// The tool that is in.
+    /// The active tool.
     pub(super) fn tool(&mut self) -> u32 {
         let name = self.state.tool_name(self.dialect);
         if let Some(&index) = self.tool_index.get(&name) {
@@ -419,7 +419,7 @@ impl Interpreter<'_, '_> {
         }
         let tool = Tool {
             name: name.clone(),
-            value: self.tool_value(&name).and_then(Frame::within_reach).map(held),
+            value: self.tool_value(&name).and_then(Frame::within_reach).map(flange_tool),
             place: None,
         };
         let index = intern(&mut self.listing.tools, tool);
@@ -427,7 +427,7 @@ impl Interpreter<'_, '_> {
         index
     }
 
-    /// The work frame that holds.
+    /// The active work frame.
     pub(super) fn work_object(&mut self) -> u32 {
         if let Some((name, pose, index)) = &self.frame_index
             && *name == self.state.work_offset

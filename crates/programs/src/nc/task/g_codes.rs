@@ -1,10 +1,10 @@
-//! The G words that are known, by dialect. One that is not in these lists is never passed over.
+//! The supported G codes by dialect. A code that is missing here makes the whole modal state unknown.
 //!
 //! Codes are in tenths: 540 for G54, 434 for G43.4.
 
 use super::super::dialect::Dialect;
 
-/// What kinds of word a block has.
+/// The kinds of word in a block, for codes whose meaning depends on them.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct WordKinds {
     /// X, Y, Z, A, B, C and the like.
@@ -13,7 +13,7 @@ pub(super) struct WordKinds {
     pub(super) centre: bool,
 }
 
-/// Whether a G word is known to the reader of this dialect, in a block with these words.
+/// Whether a G code is supported in this dialect, in a block with these words.
 pub(super) fn is_g(code: u32, dialect: Dialect, word_kinds: WordKinds) -> bool {
     match code {
         0 | 10 | 20 | 30 | 40 | 90 | 170 | 180 | 190 | 330 | 400 | 410 | 420 | 530 => true,
@@ -23,11 +23,11 @@ pub(super) fn is_g(code: u32, dialect: Dialect, word_kinds: WordKinds) -> bool {
             Dialect::LinuxCnc => linux_cnc(code),
             Dialect::Fanuc => fanuc(code, word_kinds),
             Dialect::Iso => {
-                // G5 with a centre is a spline of LinuxCNC; alone it is a switch of Fanuc's.
+                // G5 with a centre is a spline of LinuxCNC; alone it is a mode switch of Fanuc.
                 let either = !matches!(code, 50 | 51) || word_kinds.centre || !word_kinds.axes;
                 (fanuc(code, word_kinds) || linux_cnc(code)) && either
             }
-            // It has no G words.
+            // Heidenhain conversational has no G codes.
             Dialect::Heidenhain => false,
         },
     }

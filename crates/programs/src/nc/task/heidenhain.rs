@@ -1,4 +1,4 @@
-//! Heidenhain conversational: blocks that are no words of an address each.
+//! Heidenhain conversational blocks, which are not built of address words.
 
 use super::super::arc::Plane;
 use super::super::dialect::Dialect;
@@ -11,7 +11,7 @@ use crate::motion::Reason;
 use truegrind_math::se3::Pose;
 
 impl<'s> Interpreter<'_, 's> {
-    /// What the first word of a block says. True where the block does nothing else.
+    /// Interprets a block by its first word. True if the block does nothing else.
     pub(super) fn heidenhain(&mut self, block: &Block<'s>) -> bool {
         debug_assert_eq!(self.dialect, Dialect::Heidenhain);
         let Some(first) = block.words.first() else { return false };
@@ -39,13 +39,13 @@ impl<'s> Interpreter<'_, 's> {
                 });
                 self.state.mode = match direction {
                     Some(_) => MotionMode::Circular(!negative),
-                    None => MotionMode::Unsupported(Reason::NotFollowed),
+                    None => MotionMode::Unsupported(Reason::UnsupportedPath),
                 };
                 self.state.starts_tangent = false;
                 false
             }
             b"CT" => {
-                self.state.mode = MotionMode::Unsupported(Reason::NotFollowed);
+                self.state.mode = MotionMode::Unsupported(Reason::UnsupportedPath);
                 self.state.starts_tangent = true;
                 false
             }
@@ -55,7 +55,7 @@ impl<'s> Interpreter<'_, 's> {
                 if block.axes.iter().all(Option::is_none)
                     || !(0..2).all(|axis| whole(axis) || block.axes[axis].is_none())
                 {
-                    // The pole is where the tool stands, or counts from there.
+                    // The pole is at, or relative to, the tool position.
                     self.mark_position_used(super::POSITION);
                 }
                 for axis in 0..2 {
@@ -92,7 +92,7 @@ impl<'s> Interpreter<'_, 's> {
         }
     }
 
-    /// Blocks that are not looked into word by word.
+    /// Blocks that are read as text and not word by word.
     fn other_block(&mut self, block: &Block<'_>, first: &Word<'_>, name: &[u8]) {
         let text = self.tree.source()[self.tree.range(first.first, first.end)].to_ascii_uppercase();
         let words: Vec<&[u8]> =
@@ -120,22 +120,24 @@ impl<'s> Interpreter<'_, 's> {
                     self.state.unit_mm = 25.4;
                 }
             }
-            // Blanks, stops, texts, tables, declarations: nothing that moves.
+            // Blanks, stops, strings, tables, declarations: no motion.
             b"BLK" | b"STOP" | b"QS" | b"DECLARE" | b"OPEN" | b"CLOSE" | b"SECTION" | b"SEL" | b"TABDATA"
             | b"PATTERN" | b"POS" => {}
-            // The rest of a cycle's definition in lines of its own.
+            // Continuation lines of a cycle definition.
             _ if !first.name.first().is_some_and(u8::is_ascii_alphabetic) => {}
             _ if self.path_block(block, name) => {}
             _ => self.list_unknown_word(block, &String::from_utf8_lossy(name), Reason::UnknownWord),
         }
     }
 
-    /// `TOOL CALL` and `TOOL DEF`. Whether the block is one of these.
+    /// `TOOL CALL` and `TOOL DEF`. True if the block is one of them.
     fn tool_block(&mut self, text: &[u8], words: &[&[u8]]) -> bool {
         match words.get(1).copied() {
             Some(b"CALL") => self.tool_call(text),
             // A length that the program states.
-            Some(b"DEF") if words.iter().skip(3).any(|word| word.starts_with(b"L")) => self.tools_assigned(),
+            Some(b"DEF") if words.iter().skip(3).any(|word| word.starts_with(b"L")) => {
+                self.invalidate_tools()
+            }
             Some(b"DEF") => {}
             _ => return false,
         }
@@ -154,14 +156,15 @@ impl<'s> Interpreter<'_, 's> {
         self.cycle_definition(block, first, &number, words.get(2..).unwrap_or_default());
     }
 
-    /// `PLANE`, `FUNCTION TCPM`, `TRANS`: frames, and functions that none of them hangs on. Whether the block is one of these.
+    /// `PLANE`, `FUNCTION TCPM`, `TRANS`: frames, and functions that affect none of them. True if the block is one of
+    /// them.
     fn transformation_block(&mut self, block: &Block<'_>, name: &[u8], words: &[&[u8]]) -> bool {
         let second = words.get(1).copied().unwrap_or_default();
         let third = words.get(2).copied();
         let on = third != Some(b"RESET");
         match (name, second) {
             (b"PLANE", _) => {
-                // TURN moves the rotary axes to the plane, MOVE the others as well.
+                // TURN moves the rotary axes to the plane, MOVE the linear ones too.
                 let moves = words.iter().any(|word| matches!(*word, b"TURN" | b"MOVE"));
                 if moves {
                     self.list_left(block, "PLANE", Reason::Cycle);
@@ -173,17 +176,17 @@ impl<'s> Interpreter<'_, 's> {
             }
             (b"FUNCTION", b"TCPM") => self.set_tcp_mode(true, false),
             (b"FUNCTION", _) if words.contains(&&b"TCPM"[..]) => self.set_tcp_mode(false, false),
-            // What a mill does anyway; the name of a kinematic may follow, which is not known.
+            // The default mode of a mill. The name of a kinematic model may follow, whose effect is unknown.
             (b"FUNCTION", b"MODE") => return words[2..] == [b"MILL"],
             (b"FUNCTION", b"FEED" | b"S-PULSE" | b"DWELL" | b"FILE" | b"COUNT") => {}
             (b"TRANS", b"DATUM") => {
                 match third {
                     Some(b"RESET") => {
-                        self.datum_is([Some(0.0); 3]);
+                        self.set_datum_shift([Some(0.0); 3]);
                         self.switch_transform(ModalGroup::RotaryOffset, false);
                     }
                     Some(b"AXIS") => self.datum_shift(&words[3..]),
-                    _ => self.datum_is([None; 3]),
+                    _ => self.set_datum_shift([None; 3]),
                 }
                 self.invalidate_position();
             }
@@ -195,7 +198,7 @@ impl<'s> Interpreter<'_, 's> {
         true
     }
 
-    /// Blocks whose path is not followed. Whether the block is one of these.
+    /// Blocks with unsupported paths. True if the block is one of them.
     fn path_block(&mut self, block: &Block<'_>, name: &[u8]) -> bool {
         let dependency = match name {
             b"RND" | b"CHF" | b"FPOL" => StartDependency::Independent,
@@ -206,7 +209,7 @@ impl<'s> Interpreter<'_, 's> {
         let previous = self.state.previous;
         self.list_left_path(block, &String::from_utf8_lossy(name), dependency);
         if matches!(name, b"RND" | b"CHF") {
-            // They round or cut the corner that their neighbours make; the next block counts from the corner.
+            // They round or chamfer the corner of their neighbours; the next block is relative to the corner.
             self.state.previous = previous;
         } else {
             self.invalidate_position();
@@ -221,14 +224,14 @@ impl<'s> Interpreter<'_, 's> {
             Some(17) => return self.list_unknown_word(block, "FN 17", Reason::UnknownWord),
             Some(25) => {
                 self.mark_position_used(super::EVERYWHERE);
-                return self.frames_assigned();
+                return self.invalidate_offsets();
             }
             Some(18) if text.windows(3).any(|id| id == b"270" || id == b"240") => {
                 self.events.push(super::StateEvent::PositionUsed { axes: super::EVERYWHERE, read: true });
             }
             _ => {}
         }
-        // FN 9 to FN 12 jump: what is set from here on may be passed over.
+        // FN 9 to FN 12 jump: later settings may be bypassed.
         if words.contains(&&b"GOTO"[..]) {
             self.branch();
         }
@@ -253,21 +256,21 @@ impl<'s> Interpreter<'_, 's> {
                         let zero = if number.is_empty() { "0" } else { number };
                         (Some(if whole { format!("T{zero}") } else { format!("T{word}") }), after)
                     }
-                    // Only speed or axis: the tool stays.
+                    // Only speed or axis: the tool is unchanged.
                     Some(b'X' | b'Y' | b'Z' | b'S' | b'F' | b'D') => (None, rest),
                     None => (Some(self.state.tool.clone()), rest),
                     _ => (Some(format!("T {word}")), after),
                 }
             }
         };
-        // The working plane goes with the axis of the tool.
+        // The working plane is perpendicular to the tool axis.
         match after.split_whitespace().next() {
-            Some("X") => self.plane_is(Plane::YZ, 190),
-            Some("Y") => self.plane_is(Plane::ZX, 180),
-            Some("Z") => self.plane_is(Plane::XY, 170),
+            Some("X") => self.set_plane(Plane::YZ, 190),
+            Some("Y") => self.set_plane(Plane::ZX, 180),
+            Some("Z") => self.set_plane(Plane::XY, 170),
             _ => {}
         }
-        // A tool that is longer than its table says.
+        // A length allowance that is added to the tool table.
         let longer = |word: &&str| {
             let delta = word.strip_prefix("DL").map(|delta| delta.trim_start_matches(['+', '-']));
             delta.is_some_and(|delta| literal(delta.as_bytes()) != Some(0.0))
@@ -278,13 +281,13 @@ impl<'s> Interpreter<'_, 's> {
                 self.change_tool(tool + &longer);
                 self.invalidate_pose();
             }
-            // Which tool that is may not be known.
+            // The active tool may be unknown.
             None if !longer.is_empty() => self.change_tool(format!("T?{longer}")),
             None => {}
         }
     }
 
-    /// `CYCL DEF 8.1 X`: the number with what stands after the point, and the words from it on.
+    /// `CYCL DEF 8.1 X`: the cycle number, and the words after it.
     fn cycle_definition(&mut self, block: &Block<'_>, first: &Word<'_>, number: &[u8], words: &[&[u8]]) {
         let title = words.first().is_some_and(|word| word.ends_with(b".0"));
         let values = words.get(1..).unwrap_or_default();
@@ -298,7 +301,7 @@ impl<'s> Interpreter<'_, 's> {
                 self.datum_shift(values);
                 self.invalidate_position();
             }
-            // A title begins the definition; what it sets stands in the lines after it.
+            // The title starts the definition; the lines after it hold the values.
             b"8" => self.switch_transform(ModalGroup::Mirror, title || !values.is_empty()),
             b"10" => {
                 let ends = values.len() == 1
@@ -322,16 +325,16 @@ impl<'s> Interpreter<'_, 's> {
                 self.switch_transform(ModalGroup::AxisScaling, title || !ends);
             }
             b"247" => {
-                self.frame_is(self.preset(first));
-                self.shift_may_end();
+                self.select_work_offset(self.preset(first));
+                self.invalidate_datum_shift();
             }
             b"220" | b"221" => {
                 self.list_left(block, "CYCL DEF", Reason::Cycle);
                 self.invalidate_pose();
             }
-            // A program takes the place of the cycle.
+            // A program replaces the cycle.
             b"12" => self.cycle_is_program = true,
-            // Definitions that CYCL CALL, M89 and M99 carry out, and settings.
+            // Definitions that CYCL CALL, M89 and M99 execute, and settings.
             b"1"
             | b"2"
             | b"3"
@@ -363,8 +366,8 @@ impl<'s> Interpreter<'_, 's> {
         }
     }
 
-    /// A preset ends the shift within the one before on some controls, and not on others.
-    fn shift_may_end(&mut self) {
+    /// A preset cancels the datum shift on some controls, and not on others.
+    fn invalidate_datum_shift(&mut self) {
         if self.state.datum_shift != [Some(0.0); 3] {
             self.state.programmable_frame = None;
             self.frame_index = None;
@@ -373,11 +376,11 @@ impl<'s> Interpreter<'_, 's> {
         }
     }
 
-    /// `CYCL DEF 7.1 X+10` and `TRANS DATUM AXIS X+10 Y-5`: a shift within the preset. Axes that are not named keep theirs,
-    /// known or not: it may be told in several lines. A row of the datum table is not known here.
+    /// `CYCL DEF 7.1 X+10` and `TRANS DATUM AXIS X+10 Y-5`: a shift within the preset. The definition may span
+    /// several lines, so omitted axes keep their shift, known or not. Rows of the datum table are unknown.
     fn datum_shift(&mut self, words: &[&[u8]]) {
         if words.first().is_none_or(|word| word.len() > 3 && word.iter().all(u8::is_ascii_alphabetic)) {
-            // The title: what it sets stands in the lines after it.
+            // The title; the lines after it hold the values.
             return;
         }
         let doubts = ModalGroup::DatumShift.bit() | ModalGroup::ProgrammableFrame.bit();
@@ -405,7 +408,7 @@ impl<'s> Interpreter<'_, 's> {
                     let old = if increment { *entry } else { Some(0.0) };
                     *entry = old.zip(value).map(|(old, value)| old + value);
                 }
-                // A, B and C are counted from elsewhere, until the whole shift ends.
+                // A, B and C have an offset until the whole shift ends.
                 b'A'..=b'C' if value != Some(0.0) => self.switch_transform(ModalGroup::RotaryOffset, true),
                 b'A'..=b'C' | b'U'..=b'W' => {}
                 _ => {
@@ -414,12 +417,12 @@ impl<'s> Interpreter<'_, 's> {
                 }
             }
         }
-        self.datum_is(shift);
+        self.set_datum_shift(shift);
     }
 
-    /// The datum shift is this, as far as it is known.
-    fn datum_is(&mut self, shift: [Option<f64>; 3]) {
-        self.programmable_is_set();
+    /// Sets the datum shift, as far as it is known.
+    fn set_datum_shift(&mut self, shift: [Option<f64>; 3]) {
+        self.mark_programmable_frame_set();
         self.state.datum_shift = shift;
         self.state.programmable_frame = match shift {
             [Some(x), Some(y), Some(z)] if shift != [Some(0.0); 3] => Some(Pose::translation(x, y, z)),
@@ -428,7 +431,7 @@ impl<'s> Interpreter<'_, 's> {
         self.switch_transform(ModalGroup::DatumShift, shift.iter().any(Option::is_none));
     }
 
-    /// The name of the preset that `CYCL DEF 247 … Q339=n` takes: `PRESET1`; the number may stand in the next line.
+    /// The name of the preset in `CYCL DEF 247 … Q339=n`: `PRESET1`; the number may be in the next line.
     fn preset(&self, first: &Word<'_>) -> String {
         const NEAR: usize = 200;
         let start = self.tree.start(first.first);
@@ -452,13 +455,13 @@ impl<'s> Interpreter<'_, 's> {
         let at = (word.first..equal).rev().find(|&token| self.tree.kind(token) == Some(Token::Number));
         let number = at.and_then(|token| literal(self.tree.text(token)));
         let (Some(at), Some(number)) = (at, number) else { return };
-        // Q, QL and QR are three sets.
+        // Q, QL and QR are three separate sets.
         let set = self.tree.text(at.saturating_sub(1)).to_ascii_uppercase();
         let value: Evaluated = self.evaluate_tokens((equal + 1, word.end));
         if matches!(&*set, b"Q" | b"QL" | b"QR") {
             self.set_variable(numbered(&set, number), value);
         } else {
-            self.state.variables.invalidate(Reason::Variable);
+            self.state.variables.invalidate(Reason::UnknownVariable);
         }
     }
 }

@@ -1,4 +1,4 @@
-//! What is not certain: default-deny for words that are not known, and what still holds where ways meet.
+//! Setting and invalidating modal state: which groups survive a join, and default-deny for unknown words.
 
 use super::super::dialect::Dialect;
 use super::super::expression::{Evaluated, literal};
@@ -11,19 +11,19 @@ use super::{Block, Interpreter, StateEvent};
 use crate::motion::Reason;
 
 impl Interpreter<'_, '_> {
-    /// A group is set to something.
+    /// Sets a group to a value.
     pub(super) fn set_group(&mut self, group: ModalGroup, value: u64) {
         if self.branched || self.in_skippable_block {
             self.effects.record(group, value);
         } else {
-            // Before ways part only the last one counts.
+            // Before the first branch only the last value counts.
             self.effects.overwrite(group, value);
             self.set_before_branch |= group.bit();
         }
         self.state.mark_known(group);
     }
 
-    /// A group is set to what depends on where the tool stands.
+    /// Sets a group to a value that depends on the tool position.
     pub(super) fn set_group_varying(&mut self, group: ModalGroup) {
         if self.branched || self.in_skippable_block {
             self.effects.set_varying(group);
@@ -34,7 +34,7 @@ impl Interpreter<'_, '_> {
         self.state.mark_known(group);
     }
 
-    /// A group that turns, scales or bends coordinates begins or ends. What ends where nothing is on changes nothing.
+    /// Switches a coordinate transform. Cancelling one that is not active changes nothing.
     pub(super) fn switch_transform(&mut self, group: ModalGroup, on: bool) {
         let bit = group.bit();
         if !on && !self.state.is_transform_active(group) && self.state.unknown_reason(bit).is_none() {
@@ -48,8 +48,8 @@ impl Interpreter<'_, '_> {
         }
     }
 
-    /// A place that can be reached from elsewhere: a group that the whole file sets to one thing only keeps that once it has been
-    /// set before ways part, and one that it never sets keeps what the control starts with.
+    /// Joins with predecessors elsewhere in the file. A group stays known if the whole file sets it to one value and
+    /// this happens before the first branch or equals the power-on value, or if the file never sets it.
     pub(super) fn join_unseen_predecessors(&mut self) {
         self.branched = true;
         self.effects.joins += 1;
@@ -71,7 +71,7 @@ impl Interpreter<'_, '_> {
                 };
                 let settled = self.set_before_branch & bit != 0;
                 let held = match effects.value[group] {
-                    // What the file never sets is the caller's where it has one.
+                    // A group that the file never sets has the caller's value in a subprogram.
                     None => !self.is_subprogram,
                     Some(value) => settled || value == start && !self.is_subprogram,
                 };
@@ -81,33 +81,34 @@ impl Interpreter<'_, '_> {
             }
         }
         self.state.join_unseen_predecessors(constant, assigned);
-        // What was found for a name before says nothing of what it stands for now.
+        // Cached indices belong to the values before the join.
         self.frame_index = None;
         self.tool_index.clear();
-        // Elsewhere an origin may have been set, or a tool made ready.
+        // An unseen predecessor may have set an origin or prepared a tool.
         self.state.origin_set |= self.file_effects.as_ref().is_none_or(|effects| effects.sets_origin);
         self.state.next_tool =
             (self.tool_change_by_m6 || self.dialect == Dialect::LinuxCnc).then(|| "T?".to_owned());
         self.events.push(StateEvent::Join);
     }
 
-    /// Whether what a block sets is not set once and for all: the way has parted before it, or may pass it by.
+    /// Whether a block's settings hold only on some paths: after a branch, in a skippable block, or with synchronised
+    /// actions.
     pub(super) fn is_conditional(&self) -> bool {
         self.branched || self.in_skippable_block || self.synchronised_actions
     }
 
-    /// The way parts: it may go on elsewhere in the file.
+    /// A branch: control flow may continue elsewhere in the file.
     pub(super) fn branch(&mut self) {
         self.branched = true;
         self.events.push(StateEvent::Branch);
     }
 
-    /// Something that is not followed counts from where the tool stands.
+    /// Records that a block which is never modified depends on the tool position.
     pub(super) fn mark_position_used(&mut self, axes: u8) {
         self.events.push(StateEvent::PositionUsed { axes, read: false });
     }
 
-    /// A block that reads where the tool stands: what it makes of that moves with it.
+    /// Records blocks whose expressions read the tool position.
     pub(super) fn mark_position_reads(&mut self, block: &Block<'_>) {
         let reads = block.words.iter().any(|word| match word.value {
             WordValue::Expression { first, end } | WordValue::Arguments { first, end } => {
@@ -120,16 +121,16 @@ impl Interpreter<'_, '_> {
         }
     }
 
-    /// Whether a token begins the name of a position that the control keeps.
+    /// Whether a token begins the name of a system variable that holds a position.
     fn is_position_variable(&self, token: u32, end: u32) -> bool {
         match self.tree.kind(token) {
             Some(Token::Hash) => match self.tree.kind(token + 1) {
                 Some(Token::Number) => {
                     let number = literal(self.tree.text(token + 1)).unwrap_or(0.0);
-                    // Ends of blocks, machine and work positions, where a probe touched; LinuxCNC: 5420 on.
+                    // Block ends, machine and work positions, probe contacts; LinuxCNC: 5420 on.
                     matches!(number as u32, 5001..=5120 | 5420..=5428)
                 }
-                // The number is worked out: it may be one of them where it is near.
+                // A computed number may be one of them if it has a literal near them.
                 Some(Token::BracketOpen) => {
                     let near = |token: u32| {
                         let number = literal(self.tree.text(token)).unwrap_or(0.0);
@@ -157,14 +158,14 @@ impl Interpreter<'_, '_> {
         }
     }
 
-    /// The begin of a file that others call: everything is as they have left it.
-    pub(super) fn enter_subprogram(&mut self) {
+    /// The start of a subprogram file: every group has the unknown value of the caller.
+    pub(super) fn start_subprogram(&mut self) {
         self.state.join_unseen_predecessors(0, AssignedKinds::default());
         self.state.next_tool = Some("T?".to_owned());
         self.events.push(StateEvent::Join);
     }
 
-    /// A length as it is written, in mm; that of what is not 0 is not known where the unit is not.
+    /// A programmed length in mm; unknown where the unit is, unless it is 0.
     pub(super) fn length_in_mm(&self, value: Evaluated) -> Evaluated {
         match (value?, self.state.unknown_reason(ModalGroup::Unit.bit())) {
             (0.0, _) => Ok(0.0),
@@ -173,30 +174,30 @@ impl Interpreter<'_, '_> {
         }
     }
 
-    /// After the machine has gone where the text does not tell.
+    /// The pose is unknown from here on.
     pub(super) fn invalidate_pose(&mut self) {
         self.state.invalidate_position();
         self.state.invalidate_orientation();
         self.events.push(StateEvent::PoseUnknown);
     }
 
-    /// After the same, of X, Y and Z only.
+    /// X, Y and Z are unknown from here on.
     pub(super) fn invalidate_position(&mut self) {
         self.state.invalidate_position();
         self.events.push(StateEvent::AxesUnknown(super::POSITION));
     }
 
-    /// A block with a word that is not known: it is listed, and whatever the word may do and set is not known from here on.
+    /// Default-deny: a block with an unknown word is listed, and the whole modal state is unknown from here on.
     pub(super) fn list_unknown_word(&mut self, block: &Block<'_>, word: &str, reason: Reason) {
         self.list_left(block, word, reason);
         self.state.invalidate_all(reason);
-        // It may have been a motion word.
+        // It may have been a motion code.
         self.state.mode = MotionMode::Unknown(reason);
         self.effects.set_all_varying();
         self.events.push(StateEvent::PoseUnknown);
     }
 
-    /// The same for one group only: the word is no motion.
+    /// Makes one group unknown; the word is not a motion.
     pub(super) fn invalidate_group(&mut self, group: ModalGroup, because: Reason) {
         self.effects.set_varying(group);
         self.state.unknown_by_word |= group.bit();
@@ -204,7 +205,7 @@ impl Interpreter<'_, '_> {
         self.invalidate_pose();
     }
 
-    /// The first word of a block that is not known, and why.
+    /// The first unknown word of a block, and why it is unknown.
     pub(super) fn unknown_word(&self, block: &Block<'_>) -> Option<(String, Reason)> {
         if let Some((word, reason)) = &block.unknown_word {
             return Some((word.clone(), *reason));
@@ -216,7 +217,7 @@ impl Interpreter<'_, '_> {
         }
     }
 
-    /// What kinds of word a block has, for codes that mean different things with and without.
+    /// The kinds of word in a block.
     pub(super) fn word_kinds(&self, block: &Block<'_>) -> super::g_codes::WordKinds {
         super::g_codes::WordKinds {
             axes: block.has_motion_words() || block.other_axes,
@@ -224,7 +225,7 @@ impl Interpreter<'_, '_> {
         }
     }
 
-    /// M72: what M70 has kept holds again.
+    /// M72: restores the state that M70 has saved.
     pub(super) fn restore_saved_state(&mut self) {
         let Some(kept) = self.state.saved.clone() else {
             self.state.invalidate_all(Reason::UnknownWord);

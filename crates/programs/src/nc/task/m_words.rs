@@ -1,6 +1,6 @@
-//! M words: which are not known, whose values stand beside them, what they set.
+//! M words: which are unknown, which take other words as values, and what they set.
 //!
-//! Source: LinuxCNC, M codes and "Switchable Kinematics" (M128 to M130 and M428 to M430 choose what X to C mean, by the
+//! Source: LinuxCNC, M codes and "Switchable Kinematics" (M128 to M130 and M428 to M430 choose what X to C mean, by
 //! analogue output 3); Marlin, M92 to M205 (rates and limits, whose X and Y name motors); Haas mill operator's manual
 //! (M96, M97, M19 R); Heidenhain iTNC 530 (M99, M104, M114, M142, M144).
 
@@ -10,14 +10,14 @@ use super::{Block, Interpreter};
 use crate::motion::Reason;
 
 impl Interpreter<'_, '_> {
-    /// Takes from a block the words that are values of its M word, so that they are no motion.
+    /// Removes the words that are values of an M word, so that they are not read as motion.
     pub(super) fn values_of_m(&self, block: &mut Block<'_>) {
         if !self.dialect.paren_comments() {
             return;
         }
         let linux_like = matches!(self.dialect, Dialect::LinuxCnc | Dialect::Iso);
         if linux_like && block.m.iter().any(|m| is_output(*m)) {
-            // The number of an output.
+            // E is the number of an output.
             block.other_axes =
                 block.words.iter().any(|word| matches!(word.address(), Some(b'U' | b'V' | b'W')));
         }
@@ -25,7 +25,7 @@ impl Interpreter<'_, '_> {
             && !block.has_motion_words()
             && !block.g.iter().any(|code| matches!(code, 20 | 30))
         {
-            // The angle of the spindle.
+            // R is the angle of the spindle.
             block.radius = None;
         }
         if self.dialect == Dialect::Iso && block.g.is_empty() && block.m.iter().any(|m| is_setting(*m)) {
@@ -35,7 +35,7 @@ impl Interpreter<'_, '_> {
         }
     }
 
-    /// The first M word of a block of which it is not known what it does.
+    /// The first M word of a block whose effect is unknown.
     pub(super) fn unknown_m_word(&self, block: &Block<'_>) -> Option<(String, Reason)> {
         let unknown = |m: &u32| -> bool {
             match self.dialect {
@@ -43,7 +43,7 @@ impl Interpreter<'_, '_> {
                 Dialect::Iso => {
                     matches!(m, 128..=130 | 200..) && !is_setting(*m) || self.takes_axes(block, *m)
                 }
-                // The last datum again, tilted axes counted in, what is modal erased.
+                // They restore the last datum, include tilted axes, or reset modal functions.
                 Dialect::Heidenhain => matches!(m, 104 | 114 | 142 | 144),
                 Dialect::Fanuc | Dialect::Siemens => false,
             }
@@ -51,7 +51,7 @@ impl Interpreter<'_, '_> {
         if let Some(m) = block.m.iter().find(|m| unknown(m)) {
             return Some((format!("M{m}"), Reason::UnknownWord));
         }
-        // M96 P of a Fanuc: a program that a signal may call at any time from here on. That of Haas names a signal (Q).
+        // M96 P of a Fanuc: from here on a signal may call a program at any time. M96 of Haas names the signal (Q).
         if matches!(self.dialect, Dialect::Fanuc | Dialect::Iso)
             && block.m.contains(&96)
             && block.p.is_some()
@@ -68,7 +68,8 @@ impl Interpreter<'_, '_> {
         block.words.iter().any(switch).then(|| (format!("M{m} E3"), Reason::UnknownWord))
     }
 
-    /// Whether the axis words of a block may be values of its M word: it stands first, and is none of machine tools.
+    /// Whether the axis words of a block may be values of its M word: it comes first, and is not a machine tool
+    /// function.
     fn takes_axes(&self, block: &Block<'_>, m: u32) -> bool {
         let first = block.words.iter().find(|word| word.address() != Some(b'N'));
         (block.has_motion_words() || block.other_axes)
@@ -78,7 +79,7 @@ impl Interpreter<'_, '_> {
             && !matches!(m, 0..=91 | 97..=99 | 198)
     }
 
-    /// M words that set something at the begin of their block.
+    /// M words that take effect at the start of their block.
     pub(super) fn m_words(&mut self, block: &Block<'_>) {
         let heidenhain = self.dialect == Dialect::Heidenhain;
         let linux = self.dialect == Dialect::LinuxCnc;
@@ -86,12 +87,12 @@ impl Interpreter<'_, '_> {
             match m {
                 128 if heidenhain => self.set_tcp_mode(true, false),
                 // The basic rotation of the preset ends.
-                143 if heidenhain => self.frames_assigned(),
-                // These end at the next M99, the others set what is not followed here.
+                143 if heidenhain => self.invalidate_offsets(),
+                // Others end at the next M99 or have unmodelled effects.
                 89 if heidenhain => self.state.modal_call = Some(Reason::Cycle),
                 70 | 73 if linux => {
                     self.state.saved = None;
-                    // Neither variables nor work offsets and tools come back.
+                    // Variables, work offsets and tools are not restored.
                     let kept = ModalState {
                         variables: Variables::default(),
                         assigned_offsets: AssignedFrames::default(),
@@ -107,7 +108,7 @@ impl Interpreter<'_, '_> {
         }
     }
 
-    /// M99 of Heidenhain in a block that goes nowhere: the cycle runs where the tool stands, and ends where it says.
+    /// M99 of Heidenhain in a block without motion: the cycle runs at the tool position, and its end is unknown.
     pub(super) fn calls_cycle(&mut self, block: &Block<'_>) -> bool {
         if self.dialect != Dialect::Heidenhain || !block.m.contains(&99) {
             return false;
@@ -116,7 +117,7 @@ impl Interpreter<'_, '_> {
         true
     }
 
-    /// The cycle that is defined runs.
+    /// Runs the active cycle.
     pub(super) fn cycle_call(&mut self, block: &Block<'_>, name: &str) {
         if self.cycle_is_program {
             self.subprogram(block, name);
@@ -132,7 +133,7 @@ fn is_output(m: u32) -> bool {
     matches!(m, 62..=68)
 }
 
-/// Rates and limits of printers' controls: they move nothing and change no coordinate.
+/// Rates and limits of 3D printers: no motion, and no effect on coordinates.
 fn is_setting(m: u32) -> bool {
     matches!(m, 201 | 203..=205 | 220 | 221 | 566)
 }

@@ -1,4 +1,4 @@
-//! G words that hold on: the path, transformations, offsets, and how numbers are read.
+//! Modal G codes: motion, transforms, offsets, and how numbers are read.
 
 use super::super::arc::Plane;
 use super::super::dialect::Dialect;
@@ -10,10 +10,10 @@ use super::{Block, Interpreter};
 use crate::motion::Reason;
 
 impl Interpreter<'_, '_> {
-    /// G words that hold on. True where the block's axis words are no motion.
+    /// Applies the modal G codes of a block. True if its axis words are not a motion.
     pub(super) fn modal_codes(&mut self, block: &Block<'_>) -> bool {
         self.state.exact_stop &= self.state.exact_stop_modal;
-        // Of the paths with a number only the cubic spline goes on in the direction of the one before.
+        // Of the numbered paths only the cubic spline (G5) continues in the direction of the motion before.
         if block
             .g
             .iter()
@@ -31,13 +31,13 @@ impl Interpreter<'_, '_> {
         })
     }
 
-    /// How the numbers of a block are read: plane, unit, counting.
+    /// How the numbers of a block are read: plane, unit, distance mode.
     fn reading_code(&mut self, block: &Block<'_>, code: u32) {
         let siemens = self.dialect == Dialect::Siemens;
         match code {
-            170 => self.plane_is(Plane::XY, code),
-            180 => self.plane_is(Plane::ZX, code),
-            190 => self.plane_is(Plane::YZ, code),
+            170 => self.set_plane(Plane::XY, code),
+            180 => self.set_plane(Plane::ZX, code),
+            190 => self.set_plane(Plane::YZ, code),
             200 if !siemens => self.unit(25.4),
             210 if !siemens => self.unit(1.0),
             700 | 710 if siemens || self.is_unit(block) => self.unit(if code == 700 { 25.4 } else { 1.0 }),
@@ -55,7 +55,7 @@ impl Interpreter<'_, '_> {
         }
     }
 
-    /// How the path is run: exact stops, the correction by the radius, the feed.
+    /// Path control: exact stop, radius compensation, feed mode.
     fn path_control_code(&mut self, code: u32) {
         match code {
             90 => self.state.exact_stop = true,
@@ -73,7 +73,7 @@ impl Interpreter<'_, '_> {
         }
     }
 
-    /// Transformations that a G word alone switches.
+    /// Transforms that a G code alone switches.
     fn transform_switch_code(&mut self, block: &Block<'_>, code: u32) {
         let siemens = self.dialect == Dialect::Siemens;
         let fanuc = self.dialect == Dialect::Fanuc;
@@ -94,8 +94,7 @@ impl Interpreter<'_, '_> {
         }
     }
 
-    /// Transformations whose values are the words of the block. True where the code is one of these: its axis words are no
-    /// motion.
+    /// Transforms whose values are words of the block. True if the axis words are not a motion.
     fn transform_value_code(&mut self, block: &Block<'_>, code: u32) -> bool {
         let siemens = self.dialect == Dialect::Siemens;
         let zero = |index: usize| self.literal(&block.words[index]) == Some(0.0);
@@ -115,7 +114,7 @@ impl Interpreter<'_, '_> {
             }
             500 | 510 => {
                 if code == 510 && block.axes.contains(&None) {
-                    // Centres that are left out are where the tool stands.
+                    // Omitted centre words are at the tool position.
                     self.mark_position_used(super::POSITION);
                 }
                 self.switch_transform(ModalGroup::Scaling, code == 510);
@@ -131,7 +130,7 @@ impl Interpreter<'_, '_> {
         true
     }
 
-    /// Which way the axes take. True where the code is a switch of the control, and axis words only name axes.
+    /// The motion group. True if the code is a mode switch and axis words only name axes.
     fn motion_code(&mut self, block: &Block<'_>, code: u32) -> bool {
         let siemens = self.dialect == Dialect::Siemens;
         let linux = self.dialect == Dialect::LinuxCnc;
@@ -143,10 +142,10 @@ impl Interpreter<'_, '_> {
             50 | 51 if !siemens && !linux && (fanuc || block.centre.iter().all(Option::is_none)) => {
                 return true;
             }
-            50 | 51 if !siemens => MotionMode::Unsupported(Reason::NotFollowed),
+            50 | 51 if !siemens => MotionMode::Unsupported(Reason::UnsupportedPath),
             350 | 630 if !siemens => return false,
             22..=24 | 32..=34 | 52 | 53 | 62 | 320 | 330 | 340 | 350 | 630 | 3310 | 3320 | 3350 | 3360 => {
-                MotionMode::Unsupported(Reason::NotFollowed)
+                MotionMode::Unsupported(Reason::UnsupportedPath)
             }
             730..=790 | 810..=899 | 1530 | 1550 | 1610..=1690 | 1740 | 1840
                 if !siemens && !self.reads_contour(block, code) =>
@@ -156,10 +155,10 @@ impl Interpreter<'_, '_> {
                 }
                 MotionMode::Unsupported(Reason::Cycle)
             }
-            // Beside a motion word it only ends the cycle.
+            // Beside a motion code it only ends the cycle.
             800 if block.g.iter().any(|code| matches!(code, 0 | 10 | 20 | 30)) => return false,
-            // The motion word of before holds on a Fanuc, or the rapid motion of the cycle, which controls tell differently;
-            // LinuxCNC wants a new one.
+            // On a Fanuc the motion mode before the cycle holds again, or, depending on the control, the rapid motion
+            // of the cycle. LinuxCNC requires a new motion code.
             800 if fanuc && self.state.mode != MotionMode::Unsupported(Reason::Cycle) => return false,
             800 if fanuc && self.state.mode_before_cycle == MotionMode::Rapid => MotionMode::Rapid,
             800 => MotionMode::Unknown(Reason::NoMotionCode),
@@ -168,11 +167,11 @@ impl Interpreter<'_, '_> {
         false
     }
 
-    /// Lengths of tools, and work offsets. True where the axis words of the block are values of these.
+    /// Tool lengths and work offsets. True if the axis words are their values.
     fn offset_code(&mut self, block: &Block<'_>, code: u32) -> bool {
         let siemens = self.dialect == Dialect::Siemens;
         match code {
-            // One group on a control: G43, G44, G43.1, G43.4, G43.5, G49. G234 is Haas's.
+            // One group on a control: G43, G44, G43.1, G43.4, G43.5, G49. G234 is of Haas.
             430 | 431 | 432 | 434 | 435 | 440 | 490 | 2340 if !siemens => {
                 self.set_tcp_mode(matches!(code, 434 | 435 | 2340), code == 435);
                 return self.length(block, code);
@@ -187,7 +186,7 @@ impl Interpreter<'_, '_> {
         false
     }
 
-    /// As [`Self::turn`], where the axes stay where they are and keep their values.
+    /// As [`Self::switch_transform`], for transforms that leave the axes and their values unchanged.
     pub(super) fn switch_transform_in_place(&mut self, group: ModalGroup, on: bool) {
         let was = self.state.is_transform_active(group);
         if was == on && self.state.unknown_reason(group.bit()).is_none() {
@@ -197,23 +196,23 @@ impl Interpreter<'_, '_> {
         }
     }
 
-    /// Every work offset is or may be changed to what the text does not tell.
-    pub(super) fn frames_assigned(&mut self) {
+    /// Every work offset is or may be assigned an unknown value.
+    pub(super) fn invalidate_offsets(&mut self) {
         self.state.assigned_offsets.invalidate();
         self.effects.assigned.offsets |= self.is_conditional();
         self.effects.assigned.rotary |= self.is_conditional();
         self.frame_index = None;
         self.invalidate_pose();
     }
-    /// Whether G50 or G92 states the greatest speed of the spindle, and no place.
+    /// Whether G50 or G92 states a spindle speed limit, and not a position.
     pub(super) fn limits_spindle(&self, block: &Block<'_>) -> bool {
         !block.has_motion_words()
             && !block.other_axes
             && block.words.iter().any(|word| word.address() == Some(b'S'))
     }
 
-    /// The plane of arcs.
-    pub(super) fn plane_is(&mut self, plane: Plane, code: u32) {
+    /// Sets the plane of arcs.
+    pub(super) fn set_plane(&mut self, plane: Plane, code: u32) {
         self.state.plane = plane;
         self.set_group(ModalGroup::Plane, u64::from(code));
     }
@@ -223,13 +222,13 @@ impl Interpreter<'_, '_> {
         self.set_group(ModalGroup::Unit, if mm == 1.0 { 21 } else { 20 });
     }
 
-    /// Whether G70 or G71 says a unit: on lathes and mills of Fanuc, Haas and LinuxCNC they are cycles, with words of their own.
+    /// Whether G70 or G71 is a unit: on Fanuc, Haas and LinuxCNC they are cycles, with words of their own.
     pub(super) fn is_unit(&self, block: &Block<'_>) -> bool {
         let bare = |word: &Word<'_>| matches!(word.address(), Some(b'G' | b'N' | b'M' | b'S' | b'T' | b'F'));
         self.dialect == Dialect::Iso && block.words.iter().all(bare)
     }
 
-    /// Whether a cycle of a lathe reads a contour from P to Q, or is a pattern of Haas: no motion word that holds on.
+    /// Whether this is a lathe cycle that reads a contour from P to Q, or a pattern of Haas: neither is modal.
     pub(super) fn reads_contour(&self, block: &Block<'_>, code: u32) -> bool {
         matches!(code, 700..=729) || matches!(code, 730 | 740..=769) && block.p.is_some() && block.q.is_some()
     }
@@ -240,7 +239,8 @@ impl Interpreter<'_, '_> {
         let number = match code {
             150 | 160 => number(block.h).map(|number| (" H", number)),
             541 | 1540 => number(block.p).map(|number| (" P", number)),
-            // On some controls that is G54.1 P, on others P means nothing: a name of its own, which only the setup can know.
+            // P means G54.1 P on some controls and nothing on others: the name is distinct, so that only a setup can
+            // state it.
             540 if !self.p_belongs_elsewhere(block) => number(block.p).map(|number| (" P", number)),
             _ => None,
         };
@@ -249,18 +249,19 @@ impl Interpreter<'_, '_> {
             Some((letter, None)) => name += &format!("{letter}?"),
             None => {}
         }
-        self.frame_is(name);
+        self.select_work_offset(name);
     }
 
-    /// Whether P of a block is a value of another word than its work offset: a call, a dwell, a cycle.
+    /// Whether P belongs to another word than the work offset: a call, a dwell, a cycle.
     fn p_belongs_elsewhere(&self, block: &Block<'_>) -> bool {
         matches!(self.dialect, Dialect::Siemens | Dialect::LinuxCnc)
             || block.m.iter().any(|m| matches!(m, 46 | 62..=68 | 96..=99 | 198))
             || block.g.iter().any(|g| matches!(g, 20 | 30 | 40 | 50..=52 | 80 | 100 | 510 | 470 | 650..=661 | 680..=689 | 700..=769 | 810..=899 | 1500))
     }
 
-    /// Another work offset holds: where the tool stands has other coordinates now, and turns otherwise where the frames do.
-    pub(super) fn frame_is(&mut self, name: String) {
+    /// Selects a work offset. The coordinates of the tool position change, and its orientation if the frames are
+    /// rotated.
+    pub(super) fn select_work_offset(&mut self, name: String) {
         let before = self.frame_value(&self.state.work_offset.clone());
         let stale = std::mem::take(&mut self.state.offset_pending);
         let doubtful = self.state.unknown_reason(ModalGroup::WorkOffset.bit()).is_some();

@@ -1,4 +1,4 @@
-//! Where a block goes, and with what.
+//! The motion of a block: targets, speed, zone, tool and work offset, and why it is left unmodified.
 
 use std::sync::Arc as Shared;
 
@@ -63,7 +63,7 @@ impl Interpreter<'_, '_> {
         index
     }
 
-    /// A motion that is listed and left.
+    /// Lists a motion that is never modified.
     pub(super) fn list_left(&mut self, block: &Block<'_>, name: &str, reason: Reason) {
         let mut motion = self.new_motion(block, name, MotionKind::Unknown);
         motion.left = Some(reason);
@@ -71,30 +71,31 @@ impl Interpreter<'_, '_> {
         self.push(motion, context);
         self.state.previous = None;
         if block.spin.is_some() {
-            // It holds beyond what makes the orientation unknown.
+            // The spin stays unknown even if later words state the rest of the orientation.
             self.state.spin = Err(Reason::OrientationUnknown);
         }
     }
 
-    /// A path of its own kind that is listed and left.
+    /// Lists an unsupported path.
     pub(super) fn list_left_path(&mut self, block: &Block<'_>, name: &str, dependency: StartDependency) {
-        self.list_left(block, name, Reason::NotFollowed);
+        self.list_left(block, name, Reason::UnsupportedPath);
         if let Some(context) = self.contexts.last_mut() {
             context.start_dependency = dependency;
         }
     }
 
-    /// What the way of a block hangs on where it is no line and no arc, or a line that its words say by an angle.
+    /// What the path of a block depends on if it is neither line nor arc, or a line given by an angle.
     fn start_dependency_of(&self, block: &Block<'_>, mode: MotionMode) -> StartDependency {
         match mode {
-            MotionMode::Unsupported(Reason::NotFollowed) if self.state.starts_tangent => {
+            MotionMode::Unsupported(Reason::UnsupportedPath) if self.state.starts_tangent => {
                 StartDependency::Tangent
             }
-            MotionMode::Unsupported(Reason::NotFollowed) => StartDependency::Position,
-            _ if block.unmodelled == Some(Reason::NotFollowed) => StartDependency::Position,
-            // No word can be put into a block with R+, and none of A, B, C into this LN: what they leave out holds on.
+            MotionMode::Unsupported(Reason::UnsupportedPath) => StartDependency::Position,
+            _ if block.unmodelled == Some(Reason::UnsupportedPath) => StartDependency::Position,
+            // No word can be added to a block with R+, and no A, B, C to such an LN: the omitted values stay in
+            // effect.
             _ if block.paraxial_compensation => StartDependency::Position,
-            _ if block.unmodelled == Some(Reason::AlongNormal) && block.axes.contains(&None) => {
+            _ if block.unmodelled == Some(Reason::AlignedToNormal) && block.axes.contains(&None) => {
                 StartDependency::Position
             }
             _ => StartDependency::Independent,
@@ -130,7 +131,7 @@ impl Interpreter<'_, '_> {
         }
     }
 
-    /// Whether a word of the block may say nothing: Fanuc passes over a word whose variable has never been set.
+    /// Whether the control may ignore a word: Fanuc ignores one whose variable has never been set.
     fn may_omit_words(&self, block: &Block<'_>) -> bool {
         let words = block.axes.iter().chain(&block.abc).chain(&block.centre).chain([&block.radius]).flatten();
         let unset = |&index: &usize| {
@@ -161,7 +162,7 @@ impl Interpreter<'_, '_> {
         })
     }
 
-    /// Where the axes stand at the end of a block.
+    /// The end position of a block.
     fn end_position(&self, block: &Block<'_>, from: &[Evaluated; 3]) -> [Evaluated; 3] {
         let mut to = self.axis_values(block, &block.axes, from, self.state.unit_mm);
         for (axis, to) in to.iter_mut().enumerate() {
@@ -174,7 +175,7 @@ impl Interpreter<'_, '_> {
         to
     }
 
-    /// Whether a target stands in the block as numbers.
+    /// Whether the numbers of a target are literals in the block.
     fn origin(&self, block: &Block<'_>, value: &Result<TargetValue, Reason>) -> Origin {
         let words = block.axes.iter().chain(&block.abc).chain(&block.rpy).chain(&block.vector);
         let literal = words.flatten().all(|&index| self.literal(&block.words[index]).is_some());
@@ -185,7 +186,7 @@ impl Interpreter<'_, '_> {
         }
     }
 
-    /// Where a block goes.
+    /// Interprets the motion of a block.
     pub(super) fn motion(&mut self, block: &Block<'_>, machine: bool) {
         let heidenhain = self.dialect == Dialect::Heidenhain;
         let mode = if heidenhain && block.rapid && self.state.mode == MotionMode::Linear {
@@ -197,7 +198,7 @@ impl Interpreter<'_, '_> {
         let vector_words = self.state.vector_words && straight;
         let has_centre = block.centre.iter().any(Option::is_some);
         let bends = has_centre && !vector_words || block.radius.is_some();
-        // R, I and K of a straight block round or cut its corner, on controls that take them.
+        // On controls with `,R` and `,C`, R, I and K of a straight block may round or chamfer its corner.
         let cut = self.dialect.paren_comments() && straight && bends;
         let circular = matches!(mode, MotionMode::Circular(_));
         if !(block.has_motion_words() || circular && bends || vector_words && has_centre) {
@@ -229,7 +230,7 @@ impl Interpreter<'_, '_> {
         motion.work_object = Some(self.work_object());
         motion.left = self.reason_to_leave(block, mode, machine, &motion);
         if cut && motion.left.is_none() {
-            motion.left = Some(Reason::NotFollowed);
+            motion.left = Some(Reason::UnsupportedPath);
         }
         motion.timed = !self.state.feed_per_minute && kind != MotionKind::Joint;
         let splits = !motion.timed && self.can_split(block, &before);
@@ -242,20 +243,20 @@ impl Interpreter<'_, '_> {
             insertable: motion.insertable,
             can_restate: self.can_restate(block, &motion),
             start_dependency: self.start_dependency_of(block, mode),
-            ..before.until(&after)
+            ..before.joined_with(&after)
         };
         let index = self.push(motion, context);
         self.state.previous = Some(index);
         self.state.position = to;
         self.update_after_motion(block, mode, machine);
-        // A tool vector holds in its own LN: the blocks after it have no word that says how the tool is turned now.
+        // A tool vector holds only in its own LN; later blocks have no word that states the orientation.
         if heidenhain && self.state.orientation_mode == OrientationMode::Vector {
             self.state.invalidate_orientation();
             self.events.push(StateEvent::AxesUnknown(super::ORIENTATION));
         }
     }
 
-    /// The targets of a motion, and its arc with whether it turns positively and whether its centre is absolute.
+    /// Adds the targets of a motion; returns its arc.
     fn targets(
         &self,
         block: &Block<'_>,
@@ -273,7 +274,7 @@ impl Interpreter<'_, '_> {
         let mut arc = None;
         if let MotionMode::Circular(positive) = mode {
             let found = self.arc(block, from, to, positive);
-            let via = middle(found, [from, to], rotations);
+            let via = arc_midpoint(found, [from, to], rotations);
             let via_origin = if via.is_ok() { Origin::Computed } else { Origin::Unknown };
             motion.targets.push(MotionTarget { role: Role::Via, value: via, origin: via_origin, argument });
             arc =
@@ -285,7 +286,8 @@ impl Interpreter<'_, '_> {
         arc
     }
 
-    /// Whether a block may stand before this one: the words of this block that change what numbers mean would come after it.
+    /// Whether a block may be inserted before this one: words of this block that change how numbers are read would
+    /// act too late.
     fn can_split(&self, block: &Block<'_>, before: &BlockContext) -> bool {
         self.meaning == self.state.word_semantics()
             && !begins_something(block)
@@ -294,16 +296,16 @@ impl Interpreter<'_, '_> {
             && before.start.iter().all(Option::is_some)
     }
 
-    /// What is not where the words of the block say.
+    /// Invalidates what the words of the block do not determine after it.
     fn update_after_motion(&mut self, block: &Block<'_>, mode: MotionMode, machine: bool) {
         if let MotionMode::Unsupported(_) = mode {
-            // A spline ends at its last point, whatever its way.
+            // A spline ends at its last point, whatever its path.
             self.state.previous = None;
         }
         let call = self.modal_call(block);
         if call == Some(Reason::Subprogram) || call == Some(Reason::Cycle) && self.cycle_is_program {
             let held = self.state.modal_call;
-            // G66 has been noted itself.
+            // G66 has been listed itself.
             if !self.dialect.paren_comments() {
                 self.listing.outside.push(self.listing.motions.len() as u32 - 1);
             }
@@ -316,18 +318,18 @@ impl Interpreter<'_, '_> {
         } else if mode == MotionMode::Unsupported(Reason::Cycle)
             || machine
             || call.is_some()
-            || matches!(block.unmodelled, Some(Reason::Transformed | Reason::NotFollowed | Reason::Probe))
+            || matches!(block.unmodelled, Some(Reason::Transformed | Reason::UnsupportedPath | Reason::Probe))
             || block.opaque
-            || block.other_axes && self.parallel()
+            || block.other_axes && self.has_incremental_uvw()
         {
             self.invalidate_position();
-        } else if block.unmodelled == Some(Reason::AlongNormal) {
-            // How the tool is turned at the end of this is not what the block before says.
+        } else if block.unmodelled == Some(Reason::AlignedToNormal) {
+            // The orientation at the end of this block is unknown.
             self.state.invalidate_orientation();
             self.state.previous = None;
             self.events.push(StateEvent::AxesUnknown(super::ORIENTATION));
         } else if block.unmodelled.is_some() {
-            // The place is as before in the axes that the block leaves out, with what has been corrected there.
+            // Omitted axes keep the corrected position of the motion before.
             self.state.invalidate_orientation();
             self.events.push(StateEvent::AxesUnknown(super::ORIENTATION));
         }
@@ -337,7 +339,7 @@ impl Interpreter<'_, '_> {
         if block.opaque || self.contour_end.is_some() {
             self.invalidate_pose();
         }
-        // Where it is not known what the numbers mean, where they lead is not known either.
+        // If it is unknown how numbers are read, so is the end position.
         let meaning = [
             ModalGroup::DistanceMode,
             ModalGroup::Unit,
@@ -350,14 +352,14 @@ impl Interpreter<'_, '_> {
         }
     }
 
-    /// Whether a straight motion that stays can have the words said again that it leaves out.
+    /// Whether words that an unmodified straight motion omits can be added to it.
     fn can_restate(&self, block: &Block<'_>, motion: &Motion) -> bool {
         let straight = matches!(motion.kind, MotionKind::Linear | MotionKind::Joint);
         let plain = straight && !block.opaque && block.unmodelled.is_none() && self.contour_end.is_none();
         let set_before_branch = !(ModalGroup::RadiusCompensation.bit() | TOOL_GROUPS) & MOTION_GROUPS;
-        // A cycle runs where the words of the block say.
+        // A cycle runs at the position that the words state.
         let call = self.modal_call(block);
-        // With words put in, a block would move that does not where its variable has never been set.
+        // With added words, a block would move that otherwise does not because its variable has never been set.
         plain
             && !self.may_omit_words(block)
             && call.is_none_or(|call| call == Reason::Cycle)
@@ -365,14 +367,14 @@ impl Interpreter<'_, '_> {
             && self.state.unknown_reason(set_before_branch).is_none()
             && match motion.left {
                 None | Some(Reason::Skippable | Reason::UnknownFlow | Reason::UnknownWord) => true,
-                Some(Reason::NotFollowed) => block.corner,
+                Some(Reason::UnsupportedPath) => block.corner,
                 Some(Reason::Cycle) => call.is_some(),
                 _ => false,
             }
     }
 
     /// Whether U, V and W may be increments of X, Y and Z (lathes).
-    fn parallel(&self) -> bool {
+    fn has_incremental_uvw(&self) -> bool {
         matches!(self.dialect, Dialect::Fanuc | Dialect::Iso)
     }
 
@@ -382,13 +384,13 @@ impl Interpreter<'_, '_> {
         self.state.modal_call.or(here.then_some(Reason::Cycle))
     }
 
-    /// A block without words of the axes that are followed: it may move others, or what it does could not be read.
+    /// A block without modelled axis words: it may move other axes, or could not be read.
     fn block_without_axes(&mut self, block: &Block<'_>) {
         if !block.opaque && self.calls_cycle(block) {
             return;
         }
         if block.opaque {
-            self.list_left(block, "?", Reason::Unread);
+            self.list_left(block, "?", Reason::Unreadable);
             self.invalidate_pose();
         } else if let Some(reason) = block.unmodelled {
             self.list_left(block, "path", reason);
@@ -398,7 +400,7 @@ impl Interpreter<'_, '_> {
             }
         } else if block.other_axes {
             self.list_left(block, "axes", Reason::ExternalOnly);
-            if self.parallel() {
+            if self.has_incremental_uvw() {
                 self.invalidate_position();
             }
         }
@@ -446,7 +448,7 @@ impl Interpreter<'_, '_> {
         let more = self.dialect != Dialect::Siemens
             && (block.p.is_some_and(|index| !one(index)) || block.q.is_some() || block.l.is_some());
         if block.special_arc || more {
-            return Err(Reason::NotFollowed);
+            return Err(Reason::UnsupportedPath);
         }
         let (start, end) = (all_known(from)?, all_known(to)?);
         let plane = self.state.plane;
@@ -456,11 +458,11 @@ impl Interpreter<'_, '_> {
         }
         if self.dialect == Dialect::Heidenhain && block.radius.is_none() {
             let centre = [self.state.pole[0]?, self.state.pole[1]?];
-            return Arc::about(plane, start, end, centre, positive).ok_or(Reason::WrongShape);
+            return Arc::from_centre(plane, start, end, centre, positive).ok_or(Reason::WrongShape);
         }
         if let Some(index) = block.radius {
             let radius = self.evaluate_word(&block.words[index]).0? * unit;
-            return Arc::of_radius(plane, start, end, radius, positive).ok_or(Reason::WrongShape);
+            return Arc::from_radius(plane, start, end, radius, positive).ok_or(Reason::WrongShape);
         }
         let mut centre = [0.0; 2];
         for (place, axis) in [plane.a, plane.b].into_iter().enumerate() {
@@ -481,10 +483,10 @@ impl Interpreter<'_, '_> {
         if block.centre[plane.a].is_none() && block.centre[plane.b].is_none() {
             return Err(Reason::MissingArgument);
         }
-        Arc::about(plane, start, end, centre, positive).ok_or(Reason::WrongShape)
+        Arc::from_centre(plane, start, end, centre, positive).ok_or(Reason::WrongShape)
     }
 
-    /// From the first to the last word that says where to go.
+    /// The span from the first to the last target word.
     fn argument(&self, block: &Block<'_>) -> Span {
         let words = block
             .axes
@@ -511,11 +513,11 @@ impl Interpreter<'_, '_> {
         let turns = !matches!(state.orientation_mode, OrientationMode::Unknown(Reason::OrientationUnknown));
         let needs_tip = matches!(self.dialect, Dialect::Fanuc | Dialect::Siemens | Dialect::Heidenhain);
         if block.opaque {
-            Some(Reason::Unread)
+            Some(Reason::Unreadable)
         } else if block.skippable {
             Some(Reason::Skippable)
         } else if block.corner {
-            Some(Reason::NotFollowed)
+            Some(Reason::UnsupportedPath)
         } else if let MotionMode::Unsupported(reason) = mode {
             Some(reason)
         } else if machine {
@@ -530,18 +532,18 @@ impl Interpreter<'_, '_> {
             Some(reason)
         } else if state.active_transforms != 0 {
             Some(Reason::Transformed)
-        } else if block.other_axes && self.parallel() {
+        } else if block.other_axes && self.has_incremental_uvw() {
             Some(Reason::UnknownWord)
         } else if self.dialect == Dialect::Heidenhain
             && matches!(mode, MotionMode::Circular(_))
             && state.plane != Plane::XY
         {
-            // The working plane goes with the axis of the tool.
+            // The working plane is perpendicular to the tool axis.
             Some(Reason::Transformed)
         } else if state.radius_compensation {
             Some(Reason::RadiusCompensation)
         } else if turns && needs_tip && !state.tcp_mode {
-            Some(Reason::NoTipControl)
+            Some(Reason::NoTcpMode)
         } else if self.dialect == Dialect::Heidenhain
             && matches!(mode, MotionMode::Circular(_))
             && block.radius.is_none()
@@ -589,8 +591,8 @@ impl Interpreter<'_, '_> {
 }
 
 impl BlockContext {
-    /// From where the tool stands before a block to how it is turned after it.
-    fn until(self, after: &BlockContext) -> BlockContext {
+    /// Joins this context before the block with the one after it.
+    fn joined_with(self, after: &BlockContext) -> BlockContext {
         let same_angles = (self.orientation_mode == OrientationMode::Rpy)
             == (after.orientation_mode == OrientationMode::Rpy);
         BlockContext {
@@ -604,7 +606,7 @@ impl BlockContext {
     }
 }
 
-/// What a motion of this mode is called in lists, and what kind it is.
+/// The listed name and kind of a motion mode.
 fn name_and_kind(mode: MotionMode, heidenhain: bool) -> (&'static str, MotionKind) {
     match mode {
         MotionMode::Rapid if heidenhain => ("L FMAX", MotionKind::Joint),
@@ -623,7 +625,7 @@ fn name_and_kind(mode: MotionMode, heidenhain: bool) -> (&'static str, MotionKin
 
 type Rotation = Result<UnitQuaternion<f64>, Reason>;
 
-/// The pose at these axes, turned so.
+/// The target at this position and orientation.
 fn target(position: [Evaluated; 3], rotation: Rotation) -> Result<TargetValue, Reason> {
     let position_mm = all_known(position)?;
     if !position_mm.iter().all(|coordinate| coordinate.abs() <= FARTHEST_MM) {
@@ -635,7 +637,7 @@ fn target(position: [Evaluated; 3], rotation: Rotation) -> Result<TargetValue, R
 }
 
 /// The pose half way along an arc.
-fn middle(
+fn arc_midpoint(
     arc: Result<Arc, Reason>,
     [from, to]: [[Evaluated; 3]; 2],
     rotations: [Rotation; 2],
@@ -646,11 +648,11 @@ fn middle(
         [Ok(a), Ok(b)] => Ok(a.try_slerp(&b, 0.5, 1e-9).unwrap_or(b)),
         [Err(reason), _] | [_, Err(reason)] => Err(reason),
     };
-    target(arc.at(a, b, 0.5).map(Ok), half)
+    target(arc.point_at(a, b, 0.5).map(Ok), half)
 }
 
-/// Whether a block starts the spindle, the coolant or what else an M word may: a block that is put in before it would move
-/// without. Stops and ends come when the motion is done.
+/// Whether a block starts the spindle, the coolant or another function: an inserted block would run without it. Stops
+/// take effect after the motion.
 fn begins_something(block: &Block<'_>) -> bool {
     block.m.iter().any(|m| !matches!(m, 0..=2 | 5 | 9 | 30))
         || block.words.iter().any(|word| word.address() == Some(b'S'))

@@ -1,4 +1,4 @@
-//! G words of one block.
+//! One-shot (non-modal) G codes.
 
 use super::super::dialect::Dialect;
 use super::super::modal_state::MotionMode;
@@ -7,7 +7,7 @@ use super::{Block, Interpreter, StateEvent};
 use crate::motion::Reason;
 
 impl Interpreter<'_, '_> {
-    /// G words of one block. True where the block's axis words are no motion that is followed.
+    /// Applies the one-shot G codes of a block. True if its axis words are not a modelled motion.
     pub(super) fn one_shot_codes(&mut self, block: &Block<'_>) -> bool {
         block.g.iter().any(|&code| {
             self.non_moving_code(block, code)
@@ -17,30 +17,30 @@ impl Interpreter<'_, '_> {
         }) || self.m_motion(block)
     }
 
-    /// G words whose block does not move: dwells, settings, poles, places that are stored.
+    /// G codes whose block does not move: dwells, settings, poles, saved positions.
     fn non_moving_code(&mut self, block: &Block<'_>, code: u32) -> bool {
         let siemens = self.dialect == Dialect::Siemens;
         match code {
-            // LinuxCNC dwells, stores the place, and then moves.
+            // LinuxCNC dwells or stores the position, and then moves.
             40 | 281 | 301 if self.dialect == Dialect::LinuxCnc => return false,
-            // A motion on LinuxCNC, none on a Fanuc: a plain file does not tell which.
+            // A motion on LinuxCNC, none on Fanuc; for an ISO file this is unknown.
             40 if self.dialect == Dialect::Iso && block.has_motion_words() && block.p.is_some() => {
                 self.leave_unknown_end(block, code, Reason::UnknownWord);
             }
             40 | 220 | 230 | 250 | 260 | 1030 | 1870 => {}
             110 if !siemens => {}
             100 if !siemens => self.set_offset(block),
-            // A pole: no motion. That of G110 counts from where the tool stands.
+            // A pole: no motion. G110 is relative to the tool position.
             1100 if siemens => self.mark_position_used(super::POSITION),
             1110 | 1120 if siemens => {}
-            // grbl: where the tool stands is stored.
+            // grbl stores the tool position.
             281 | 301 if self.dialect != Dialect::Fanuc && !block.has_motion_words() => {}
             _ => return false,
         }
         true
     }
 
-    /// Motions to where the text does not tell: cycles, reference points, probes.
+    /// Motions whose end the text does not determine: cycles, reference points, probes.
     fn unpredictable_code(&mut self, block: &Block<'_>, code: u32) -> bool {
         let siemens = self.dialect == Dialect::Siemens;
         let reason = match code {
@@ -50,34 +50,34 @@ impl Interpreter<'_, '_> {
             740 | 750 if siemens => Reason::ReferenceReturn,
             350 | 360 | 370 | 1360 if !siemens => Reason::Probe,
             310..=318 | 382..=385 => Reason::Probe,
-            331 => Reason::NotFollowed,
-            1470 | 1480 | 2470 | 2480 | 3470 | 3480 if siemens => Reason::NotFollowed,
+            331 => Reason::UnsupportedPath,
+            1470 | 1480 | 2470 | 2480 | 3470 | 3480 if siemens => Reason::UnsupportedPath,
             _ => return false,
         };
         self.leave_unknown_end(block, code, reason);
         match code {
             // Measuring cycles set tools or work offsets.
             350 | 360 | 370 | 1360 => {
-                self.frames_assigned();
-                self.tools_assigned();
+                self.invalidate_offsets();
+                self.invalidate_tools();
             }
-            // The spindle turns back to where it began.
-            331 => self.state.mode = MotionMode::Unsupported(Reason::NotFollowed),
+            // Rigid tapping: the spindle reverses back to the start.
+            331 => self.state.mode = MotionMode::Unsupported(Reason::UnsupportedPath),
             _ => {}
         }
         true
     }
 
-    /// What the control works out from other blocks, or does by a program of its own.
+    /// Motions that the control derives from other blocks or a program of its own.
     fn cycle_code(&mut self, block: &Block<'_>, code: u32) -> bool {
         match code {
-            // Contours and patterns, where they are no units.
+            // Contours and patterns, unless they are units.
             700 | 710 if self.is_unit(block) => return false,
             700..=769 if self.dialect != Dialect::Siemens && self.reads_contour(block, code) => {
                 self.list_left(block, &code_name(code), Reason::Cycle);
                 self.invalidate_pose();
             }
-            // The axes turn into the tilted plane.
+            // The rotary axes move to the tilted plane.
             531 | 536 => {
                 self.list_left(block, &code_name(code), Reason::Cycle);
                 self.invalidate_pose();
@@ -96,10 +96,10 @@ impl Interpreter<'_, '_> {
         true
     }
 
-    /// M words that move or call by themselves. True where the block's axis words are no motion that is followed.
+    /// M words that move or call. True if the axis words are not a modelled motion.
     fn m_motion(&mut self, block: &Block<'_>) -> bool {
         if self.dialect == Dialect::Heidenhain && block.m.contains(&140) {
-            // Back along the tool to the end of the range.
+            // Retraction along the tool axis to the end of the range.
             self.list_left(block, "M140", Reason::ReferenceReturn);
             self.invalidate_position();
             return true;
@@ -114,7 +114,7 @@ impl Interpreter<'_, '_> {
         false
     }
 
-    /// A motion to where the text does not tell.
+    /// Lists a motion whose end the text does not determine.
     pub(super) fn leave_unknown_end(&mut self, block: &Block<'_>, code: u32, reason: Reason) {
         let name = code_name(code);
         self.list_left(block, &name, reason);
@@ -126,7 +126,7 @@ impl Interpreter<'_, '_> {
         self.invalidate_named_axes(block);
     }
 
-    /// Where the axes go that a block names is not known.
+    /// The axes that a block names are unknown from here on.
     pub(super) fn invalidate_named_axes(&mut self, block: &Block<'_>) {
         let mut lost = 0;
         for axis in 0..3 {

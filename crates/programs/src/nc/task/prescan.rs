@@ -1,4 +1,4 @@
-//! What the whole file sets, and where its jumps go: read once before the blocks are followed.
+//! A first scan of the whole file before interpretation: jump targets, declarations, programs, kinds of tool change.
 
 use super::super::dialect::Dialect;
 use super::super::expression::{Variable, literal, numbered};
@@ -8,7 +8,7 @@ use super::super::token::Token;
 use super::{Interpreter, code};
 
 impl Interpreter<'_, '_> {
-    /// What the whole file sets, and where its jumps go.
+    /// Scans the whole file.
     pub(super) fn prescan(&mut self) {
         self.prescan_tape();
         let mut prescan = Prescan::default();
@@ -23,7 +23,7 @@ impl Interpreter<'_, '_> {
             }
         }
         self.prescan_block(&mut prescan);
-        self.restarts_at_end = prescan.back && prescan.programs <= 1;
+        self.restarts_at_end = prescan.m99_alone && prescan.programs <= 1;
         let subs = prescan.subs;
         self.is_subprogram |= match self.dialect {
             Dialect::Heidenhain => false,
@@ -32,8 +32,8 @@ impl Interpreter<'_, '_> {
         };
     }
 
-    /// What the first line says: `%NAME G71 *` is DIN/ISO of Heidenhain, `$NAME.MIN%` Okuma, whose G words have meanings of their
-    /// own; `%_N_NAME_SPF` is a subprogram of Siemens.
+    /// The tape line: `%NAME G71 *` is DIN/ISO of Heidenhain, `$NAME.MIN%` Okuma, both with G codes of other
+    /// meanings; `%_N_NAME_SPF` is a subprogram of Siemens.
     fn prescan_tape(&mut self) {
         let tape = (0..self.tree.len() as u32).find(|&token| self.tree.kind(token) == Some(Token::Tape));
         let text = tape.map(|token| self.tree.text(token).to_ascii_uppercase()).unwrap_or_default();
@@ -53,7 +53,7 @@ impl Interpreter<'_, '_> {
         let address = word.address();
         let moves_or_sets =
             address.is_some_and(|letter| b"GXYZABCUVWTFS".contains(&letter)) || word.is("CALL");
-        block.does |= moves_or_sets;
+        block.acts |= moves_or_sets;
         block.sub |= word.is("SUB");
         block.endsub |= word.is("ENDSUB");
         block.returns |= word.is("RET");
@@ -64,7 +64,7 @@ impl Interpreter<'_, '_> {
             });
         }
         if std::mem::take(jump) {
-            // GOTO N100: the block number stands in a word of its own.
+            // GOTO N100: the block number is a separate word.
             match (address, number) {
                 (Some(b'N'), Some(number)) => {
                     self.jump_targets.insert(number as u64);
@@ -85,7 +85,7 @@ impl Interpreter<'_, '_> {
             (Some(b'P'), None) => block.computed.0 |= word.value != WordValue::Absent,
             (Some(b'Q' | b'H'), None) => block.computed.1 |= word.value != WordValue::Absent,
             (Some(b'O'), Some(_)) => *programs += 1,
-            // What the caller hands over has names too.
+            // Parameters of a procedure are declared names too.
             (None, _) if word.is("PROC") => {
                 block.declares = true;
                 self.is_subprogram |= self.dialect == Dialect::Siemens && !subs.outside;
@@ -118,13 +118,13 @@ impl Interpreter<'_, '_> {
         self.tool_change_by_m6 |= number == 6.0;
         block.ends |= number == 2.0 || number == 30.0;
         block.returns |= number == 17.0 && self.dialect == Dialect::Siemens;
-        block.back |= number == 99.0;
-        // Haas: to a block of the same program. Fanuc and Mitsubishi begin a subprogram at a block, which may be here.
+        block.m99 |= number == 99.0;
+        // Haas: a jump within the program. Fanuc and Mitsubishi start a subprogram at a block that may be here.
         block.jumps |= matches!(number as u32, 46 | 96 | 97);
         block.calls |= matches!(number as u32, 98 | 198);
     }
 
-    /// A name of a declaration: a type, or what is of that type.
+    /// A name in a declaration: a type, or a variable of that type.
     fn declare(&mut self, block: &mut BlockSummary, name: &[u8]) {
         let name = name.to_ascii_uppercase();
         match &*name {
@@ -138,25 +138,25 @@ impl Interpreter<'_, '_> {
         self.declared.insert(name);
     }
 
-    /// A block is read: what it says together.
+    /// Evaluates a block after its last word.
     fn prescan_block(&mut self, prescan: &mut Prescan) {
         let block = std::mem::take(&mut prescan.block);
         prescan.subs.add(&block);
-        prescan.back |= block.back && block.p.is_none();
+        prescan.m99_alone |= block.m99 && block.p.is_none();
         if self.dialect == Dialect::Heidenhain {
             return;
         }
         if block.sub || self.dialect != Dialect::LinuxCnc {
             self.programs.extend(block.program);
         }
-        if block.back || block.jumps {
+        if block.m99 || block.jumps {
             self.jump_targets.extend(block.p);
         }
         if block.calls {
             self.jump_targets.extend([block.q, block.h].into_iter().flatten());
         }
         self.computed_jump |=
-            block.computed.0 && (block.back || block.jumps) || block.computed.1 && block.calls;
+            block.computed.0 && (block.m99 || block.jumps) || block.computed.1 && block.calls;
         if block.cycle
             && let (Some(p), Some(q)) = (block.p, block.q)
         {
@@ -164,31 +164,31 @@ impl Interpreter<'_, '_> {
         }
     }
 
-    /// Whether the program begins again at its end (M99 in one that calls nothing).
+    /// Whether the program starts again at its end (M99 in a main program).
     pub(super) fn restarts_at_end(&self) -> bool {
         self.dialect != Dialect::Heidenhain && self.restarts_at_end
     }
 }
 
-/// What has been read so far.
+/// The state of the scan.
 #[derive(Default)]
 struct Prescan {
-    /// The block that is being read.
+    /// The current block.
     block: BlockSummary,
     subs: Subs,
-    /// GOTO has been read, and not yet where to.
+    /// GOTO has been read, but not its target.
     jump: bool,
     /// How many programs begin (O and a number).
     programs: usize,
-    /// Whether M99 stands in it without a block to go to.
-    back: bool,
+    /// Whether there is an M99 without a target block.
+    m99_alone: bool,
 }
 
-/// What a block says that the survey looks at.
+/// The words of a block that matter to the scan.
 #[derive(Default)]
 struct BlockSummary {
     /// M99.
-    back: bool,
+    m99: bool,
     /// M46, M96, M97.
     jumps: bool,
     /// M98.
@@ -199,7 +199,7 @@ struct BlockSummary {
     declares: bool,
     /// INT, BOOL or CHAR.
     integer_type: bool,
-    /// The block may be skipped.
+    /// Block skip.
     skippable: bool,
     /// M2, M30.
     ends: bool,
@@ -209,24 +209,24 @@ struct BlockSummary {
     sub: bool,
     endsub: bool,
     /// Words that set or move something.
-    does: bool,
+    acts: bool,
     /// O and its number or name.
     program: Option<Variable>,
     p: Option<u64>,
     q: Option<u64>,
     h: Option<u64>,
-    /// Whether P, and Q or H, are worked out while the program runs.
+    /// Whether P, and Q or H, are computed at run time.
     computed: (bool, bool),
 }
 
-/// Whether a file is a subprogram and no more.
+/// Whether a file is only a subprogram.
 #[derive(Default)]
 struct Subs {
-    /// Whether its first end goes back to a caller.
+    /// Whether its first end returns to a caller.
     returns: Option<bool>,
     /// Whether it has O sub.
     has: bool,
-    /// Whether anything is done outside of these.
+    /// Whether anything is done outside of subprograms.
     outside: bool,
     within: bool,
 }
@@ -235,14 +235,14 @@ impl Subs {
     fn add(&mut self, block: &BlockSummary) {
         self.has |= block.sub;
         self.within |= block.sub;
-        self.outside |= block.does && !self.within;
+        self.outside |= block.acts && !self.within;
         self.within &= !block.endsub;
         if block.skippable || self.returns.is_some() {
             return;
         }
         if block.ends {
             self.returns = Some(false);
-        } else if block.returns || block.back && block.p.is_none() && !block.computed.0 {
+        } else if block.returns || block.m99 && block.p.is_none() && !block.computed.0 {
             self.returns = Some(true);
         }
     }

@@ -1,4 +1,4 @@
-//! What is added to programmed values (G52, G92), and where the tool stands after it.
+//! Coordinate shifts (G52, G92), and the tool position after them.
 
 use super::super::dialect::Dialect;
 use super::super::expression::Evaluated;
@@ -7,37 +7,37 @@ use super::{Block, Interpreter, StateEvent};
 use crate::motion::Reason;
 
 impl Interpreter<'_, '_> {
-    /// G52, G92 and what ends them. True where the block's axis words are no motion that is followed.
+    /// G52, G92 and their cancellation. True if the axis words are not a modelled motion.
     pub(super) fn shift_code(&mut self, block: &Block<'_>, code: u32) -> bool {
         let linux = self.dialect == Dialect::LinuxCnc;
         match code {
-            // Within what G92 has shifted, or in its place: the controls differ.
-            520 if self.state.origin_set && !linux => self.shift_is_lost(),
+            // Added to the shift of G92 or replacing it: the controls differ.
+            520 if self.state.origin_set && !linux => self.invalidate_shift(),
             520 if self.dialect != Dialect::Siemens => self.shift_frame(block),
-            // The greatest speed of the spindle.
+            // A spindle speed limit.
             920 if self.limits_spindle(block) => {}
             920 => self.set_shift(block),
-            // Fanuc ends the shift of the axes that are named, LinuxCNC all.
-            921 if !self.ends_all(block) => {
-                self.may_move(block, code);
-                self.shift_is_lost();
+            // Fanuc cancels the shift of the named axes, LinuxCNC of all.
+            921 if !self.cancels_all_shifts(block) => {
+                self.leave_if_motion(block, code);
+                self.invalidate_shift();
             }
             921 | 922 => {
                 self.state.shift = [Ok(0.0); 3];
                 self.state.origin_set = false;
-                self.placed([true; 3]);
+                self.mark_shift_stated([true; 3]);
                 self.set_group_varying(ModalGroup::CoordinateShift);
                 if self.state.is_transform_active(ModalGroup::RotaryOffset) {
                     self.switch_transform(ModalGroup::RotaryOffset, false);
                 }
-                self.may_move(block, code);
+                self.leave_if_motion(block, code);
                 return !linux;
             }
             923 => {
                 self.events.push(StateEvent::ShiftRestored);
-                self.state.shift = [Err(Reason::Variable); 3];
-                self.invalidate_group(ModalGroup::RotaryOffset, Reason::Variable);
-                self.may_move(block, code);
+                self.state.shift = [Err(Reason::UnknownVariable); 3];
+                self.invalidate_group(ModalGroup::RotaryOffset, Reason::UnknownVariable);
+                self.leave_if_motion(block, code);
                 return !linux;
             }
             _ => return false,
@@ -45,28 +45,28 @@ impl Interpreter<'_, '_> {
         true
     }
 
-    /// What is a motion on LinuxCNC and none on a Fanuc: a plain file does not tell which.
-    fn may_move(&mut self, block: &Block<'_>, code: u32) {
+    /// A motion on LinuxCNC, none on Fanuc; for an ISO file this is unknown.
+    fn leave_if_motion(&mut self, block: &Block<'_>, code: u32) {
         if self.dialect == Dialect::Iso && block.has_motion_words() {
             self.leave_unknown_end(block, code, Reason::UnknownWord);
         }
     }
 
-    /// G52: a shift of the work frame itself, in which the tool stands elsewhere then.
+    /// G52: a shift of the work frame, in which the tool position gets other coordinates.
     fn shift_frame(&mut self, block: &Block<'_>) {
-        self.shift_so_far();
+        self.keep_unknown_shift();
         for axis in 0..3 {
             if let Some(index) = block.axes[axis] {
                 self.state.shift[axis] = self.length_in_mm(self.evaluate_word(&block.words[index]).0);
             }
         }
-        self.placed(block.axes.map(|axis| axis.is_some()));
-        self.rotary(block, |_, value| value == Ok(0.0));
+        self.mark_shift_stated(block.axes.map(|axis| axis.is_some()));
+        self.set_rotary_shift(block, |_, value| value == Ok(0.0));
         self.set_group_varying(ModalGroup::CoordinateShift);
     }
 
-    /// G92.1: whether every shift ends by it, or there is none.
-    fn ends_all(&self, block: &Block<'_>) -> bool {
+    /// G92.1: whether it cancels every shift, or there is none.
+    fn cancels_all_shifts(&self, block: &Block<'_>) -> bool {
         let rotary = self.state.is_transform_active(ModalGroup::RotaryOffset);
         let none = self.state.shift == [Ok(0.0); 3]
             && !rotary
@@ -82,23 +82,22 @@ impl Interpreter<'_, '_> {
             || named
     }
 
-    /// What has been added to programmed values so far: where that is in doubt, of the axes that are not said now it stays
-    /// unknown.
-    fn shift_so_far(&mut self) {
+    /// Where the shift is unknown before, it stays unknown for the axes that are not named.
+    fn keep_unknown_shift(&mut self) {
         if let Some(reason) = self.state.unknown_reason(ModalGroup::CoordinateShift.bit()) {
             self.state.shift = [Err(reason); 3];
         }
     }
 
-    /// What is added to programmed values is not known until it ends.
-    fn shift_is_lost(&mut self) {
+    /// The shift is unknown until it is cancelled.
+    fn invalidate_shift(&mut self) {
         self.state.shift = [Err(Reason::Displacement); 3];
         self.set_group_varying(ModalGroup::CoordinateShift);
         self.invalidate_pose();
     }
 
-    /// A, B and C are counted from elsewhere, where `same` does not say that nothing changes.
-    fn rotary(&mut self, block: &Block<'_>, same: impl Fn(usize, Evaluated) -> bool) {
+    /// Offsets of A, B and C, unless `same` shows that a value changes nothing.
+    fn set_rotary_shift(&mut self, block: &Block<'_>, same: impl Fn(usize, Evaluated) -> bool) {
         let mut any = false;
         let mut changes = false;
         for axis in 0..3 {
@@ -113,10 +112,10 @@ impl Interpreter<'_, '_> {
         }
     }
 
-    /// G92: the place where the tool stands is called this from here on.
+    /// G92: the tool position gets these coordinates.
     fn set_shift(&mut self, block: &Block<'_>) {
         let mut stated = [None; 3];
-        self.shift_so_far();
+        self.keep_unknown_shift();
         self.effects.sets_origin = true;
         for (axis, stated) in stated.iter_mut().enumerate() {
             let Some(index) = block.axes[axis] else { continue };
@@ -133,7 +132,7 @@ impl Interpreter<'_, '_> {
         self.state.origin_set = true;
         self.set_group_varying(ModalGroup::CoordinateShift);
         let named = block.axes.map(|axis| axis.is_some());
-        // Angles are counted from how the tool is turned here.
+        // Angles are set at the current orientation.
         let turned = super::named_axes(block) & super::ORIENTATION;
         if turned != 0 {
             self.mark_position_used(turned);
@@ -144,11 +143,11 @@ impl Interpreter<'_, '_> {
         } else {
             self.events.push(StateEvent::OriginSet { stated, named });
         }
-        self.rotary(block, |axis, value| value.is_ok() && abc[axis] == value);
+        self.set_rotary_shift(block, |axis, value| value.is_ok() && abc[axis] == value);
     }
 
-    /// The shift of these axes is said whole.
-    fn placed(&mut self, axes: [bool; 3]) {
+    /// The shift of these axes is stated in full.
+    fn mark_shift_stated(&mut self, axes: [bool; 3]) {
         self.events.push(if self.in_skippable_block {
             StateEvent::ShiftMaybeStated(axes)
         } else {

@@ -1,4 +1,4 @@
-//! Siemens: commands with a name.
+//! Siemens: named commands.
 
 use super::super::dialect::Dialect;
 use super::super::modal_state::{ModalGroup, MotionMode};
@@ -9,7 +9,7 @@ use super::{Block, Interpreter};
 use crate::motion::Reason;
 
 impl Interpreter<'_, '_> {
-    /// Commands with a name. True where nothing else is done in the block.
+    /// Applies the named commands of a block. True if the block does nothing else.
     pub(super) fn named_commands(&mut self, block: &Block<'_>) -> bool {
         if self.dialect != Dialect::Siemens {
             return false;
@@ -60,7 +60,7 @@ impl Interpreter<'_, '_> {
         done
     }
 
-    /// What lies between the axes of the program and those of the machine. Whether the command is one of these.
+    /// Transforms between programmed and machine axes. True if the command is one of them.
     fn transformation_command(&mut self, name: &[u8]) -> bool {
         match name {
             b"TRAORI" | b"TRAFOOF" => {
@@ -86,7 +86,7 @@ impl Interpreter<'_, '_> {
         true
     }
 
-    /// How the tool is turned, and which way it goes. Whether the command is one of these.
+    /// Orientation and path commands. True if the command is one of them.
     fn orientation_command(&mut self, name: &[u8]) -> bool {
         match name {
             b"ORIMKS" | b"ORIWKS" => {
@@ -107,7 +107,7 @@ impl Interpreter<'_, '_> {
             }
             b"ORIPATH" | b"ORIPATHS" | b"ORIRESET" => self.state.invalidate_orientation(),
             b"CIP" | b"CT" | b"BSPLINE" | b"ASPLINE" | b"CSPLINE" | b"POLY" | b"INVCW" | b"INVCCW" => {
-                self.state.mode = MotionMode::Unsupported(Reason::NotFollowed);
+                self.state.mode = MotionMode::Unsupported(Reason::UnsupportedPath);
                 self.state.starts_tangent = !matches!(name, b"CIP" | b"POLY" | b"INVCW" | b"INVCCW");
             }
             _ => return false,
@@ -115,23 +115,23 @@ impl Interpreter<'_, '_> {
         true
     }
 
-    /// Corrections of the tool and of the axes to what the text does not tell. Whether the command is one of these.
+    /// Corrections of tool and axes by values that the text does not hold. True if the command is one of them.
     fn correction_command(&mut self, name: &[u8]) -> bool {
         match name {
             b"TOFF" | b"FTOCON" | b"FTOCOF" | b"TOFFON" | b"TOFFOF" | b"PUTFTOC" | b"PUTFTOCF"
             | b"TOWSTD" | b"TOWMCS" | b"TOWWCS" | b"TOWBCS" | b"TOWTCS" | b"TOWKCS" | b"TCOABS"
-            | b"TCOFR" | b"TCOFRX" | b"TCOFRY" | b"TCOFRZ" => self.tool_assigned(),
-            b"GEOAX" => self.frames_assigned(),
+            | b"TCOFR" | b"TCOFRX" | b"TCOFRY" | b"TCOFRZ" => self.invalidate_active_tool(),
+            b"GEOAX" => self.invalidate_offsets(),
             b"PRESETON" | b"PRESETONS" => {
                 self.mark_position_used(super::EVERYWHERE);
-                self.frames_assigned();
+                self.invalidate_offsets();
             }
             _ => return false,
         }
         true
     }
 
-    /// `CYCLE800(…)` tilts the plane; with nothing in its brackets it ends that.
+    /// `CYCLE800(…)` tilts the plane; with empty brackets it cancels the tilt.
     fn swivel_cycle(&mut self, block: &Block<'_>, word: &Word<'_>) {
         let empty = matches!(word.value, WordValue::Arguments { first, end } if end == first + 2);
         if !empty {
@@ -140,7 +140,7 @@ impl Interpreter<'_, '_> {
         self.switch_transform(ModalGroup::TiltedPlane, !empty);
     }
 
-    /// Whether a name that is not known calls a subprogram: it stands first, alone or with how often (P).
+    /// Whether an unknown name is a subprogram call: it comes first, alone or with a repeat count (P).
     fn is_call(&self, block: &Block<'_>, index: usize) -> bool {
         !block.opaque
             && block.words.iter().enumerate().all(|(at, word)| {

@@ -1,57 +1,59 @@
-//! Names in Siemens programs that are no subprograms of the user.
+//! Names in Siemens programs that are not subprograms of the user.
 
 use std::collections::HashMap;
 use std::sync::LazyLock;
 
 use crate::motion::Reason;
 
-/// Where a name of `siemens.txt` says nothing that a reader must follow.
+/// The uses in which a name of `siemens.txt` has no effect on motions.
 #[derive(Debug, Clone, Copy, Default)]
-struct Nothing {
+struct HarmlessUses {
     alone: bool,
     call: bool,
     value: bool,
 }
 
-static NAMES: LazyLock<HashMap<&'static [u8], Nothing>> = LazyLock::new(|| {
+static NAMES: LazyLock<HashMap<&'static [u8], HarmlessUses>> = LazyLock::new(|| {
     let lines = include_str!("../siemens.txt").lines().filter(|line| !line.starts_with('#'));
     let new_motion = lines.filter_map(|line| line.split_once(' '));
     new_motion
         .map(|(name, places)| {
             let is = |place: &str| places.split(',').any(|one| one.trim() == place);
-            (name.as_bytes(), Nothing { alone: is("alone"), call: is("call"), value: is("value") })
+            (name.as_bytes(), HarmlessUses { alone: is("alone"), call: is("call"), value: is("value") })
         })
         .collect()
 });
 
-fn nothing(name: &[u8]) -> Nothing {
+fn harmless_uses(name: &[u8]) -> HarmlessUses {
     NAMES.get(name).copied().unwrap_or_default()
 }
 
-/// Whether a name (in capitals) that is one word in its block is no subprogram of the user, and moves nothing.
+/// Whether a name (in capitals) that stands alone is a keyword without effect on motions.
 pub(super) fn is_keyword(name: &[u8]) -> bool {
-    nothing(name).alone
+    harmless_uses(name).alone
 }
 
-/// Whether a name (in capitals) with arguments moves nothing.
+/// Whether a call of a name (in capitals) has no effect on motions.
 pub(super) fn is_harmless_call(name: &[u8]) -> bool {
-    nothing(name).call
+    harmless_uses(name).call
 }
 
-/// What an address of Siemens with a value does, where that is known.
-pub(super) fn address(name: &[u8]) -> Option<Address> {
-    if nothing(name).value {
-        return Some(Address::Setting);
+/// The effect of a named address with a value, where known.
+pub(super) fn address_effect(name: &[u8]) -> Option<AddressEffect> {
+    if harmless_uses(name).value {
+        return Some(AddressEffect::None);
     }
     let numbered = name.len() > 1 && name[1..].iter().all(u8::is_ascii_digit);
     Some(match name {
-        // S2=, M3=, H1=, F1=: spindles and helping functions.
-        [b'S' | b'M' | b'H' | b'F' | b'R' | b'L' | b'Q', ..] if numbered => Address::Setting,
-        b"MEAS" | b"MEAW" | b"MEASA" | b"MEAWA" | b"MEAC" | b"FXS" => Address::Aside(Reason::Probe),
-        b"ANG" | b"ANG1" | b"ANG2" | b"PO" | b"OSCILL" => Address::Aside(Reason::NotFollowed),
-        b"POS" | b"POSA" | b"POSP" | b"POSM" => Address::Aside(Reason::NotFollowed),
-        b"AP" | b"RP" => Address::Aside(Reason::Transformed),
-        // Orientation by the normal of the surface, cones, courses of angles.
+        // S2=, M3=, H1=, F1=: spindles and auxiliary functions.
+        [b'S' | b'M' | b'H' | b'F' | b'R' | b'L' | b'Q', ..] if numbered => AddressEffect::None,
+        b"MEAS" | b"MEAW" | b"MEASA" | b"MEAWA" | b"MEAC" | b"FXS" => {
+            AddressEffect::Unmodelled(Reason::Probe)
+        }
+        b"ANG" | b"ANG1" | b"ANG2" | b"PO" | b"OSCILL" => AddressEffect::Unmodelled(Reason::UnsupportedPath),
+        b"POS" | b"POSA" | b"POSP" | b"POSM" => AddressEffect::Unmodelled(Reason::UnsupportedPath),
+        b"AP" | b"RP" => AddressEffect::Unmodelled(Reason::Transformed),
+        // Orientation by surface normal or cone, angle profiles.
         [b'A' | b'B' | b'C', b'4'..=b'7']
         | b"LEAD"
         | b"TILT"
@@ -61,29 +63,29 @@ pub(super) fn address(name: &[u8]) -> Option<Address> {
         | b"XH"
         | b"YH"
         | b"ZH"
-        | b"ORIS" => Address::Aside(Reason::OrientationUnknown),
-        b"SPOS" | b"SPOSA" => Address::External,
+        | b"ORIS" => AddressEffect::Unmodelled(Reason::OrientationUnknown),
+        b"SPOS" | b"SPOSA" => AddressEffect::OtherAxes,
         b"TOFF" | b"TOFFL" | b"TOFFR" | b"TOFFLR" | b"TCARR" | b"CUTMOD" | b"CUTMODK" | b"DL" => {
-            Address::Tool
+            AddressEffect::Tool
         }
         _ => return None,
     })
 }
 
-/// What an address of Siemens with a value does.
+/// The effect of a named address with a value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Address {
-    /// Nothing that these readers must follow.
-    Setting,
-    /// The block goes elsewhere than its words say.
-    Aside(Reason),
-    /// Other axes.
-    External,
-    /// The tool.
+pub(super) enum AddressEffect {
+    /// None on motions.
+    None,
+    /// The motion does not follow from the axis words alone.
+    Unmodelled(Reason),
+    /// It moves other axes.
+    OtherAxes,
+    /// It changes the tool.
     Tool,
 }
 
-/// Cycles of the control.
+/// Whether a name is a cycle of the control.
 pub(super) fn is_cycle(name: &[u8]) -> bool {
     ["CYCLE", "POCKET", "HOLES", "SLOT", "LONGHOLE"].iter().any(|kind| name.starts_with(kind.as_bytes()))
 }

@@ -1,4 +1,4 @@
-//! The words of a block, gathered by what they say, and what their values are worth.
+//! Collects the words of a block, and evaluates their values.
 
 use super::super::dialect::Dialect;
 use super::super::expression::{Evaluated, Evaluator, LARGEST, Variable, literal};
@@ -10,16 +10,16 @@ use super::{Block, Interpreter, code, is_axis, is_axis_name};
 use crate::motion::Reason;
 use crate::tree::Node;
 
-/// A value that a control can hold.
+/// A value that a control can represent.
 fn held(value: Evaluated) -> Evaluated {
     value.and_then(|value| if value.abs() < LARGEST { Ok(value) } else { Err(Reason::NumberRange) })
 }
 
-/// A block of more words is not read: controls take some hundred characters.
+/// The largest number of words that is read; controls take some hundred characters.
 const BLOCK_WORDS: u32 = 1000;
 
 impl<'s> Interpreter<'_, 's> {
-    pub(super) fn gather(&mut self, node: u32, block: &mut Block<'s>) {
+    pub(super) fn collect_words(&mut self, node: u32, block: &mut Block<'s>) {
         let mut words = std::mem::take(&mut block.words);
         let (mut g, mut m) = (std::mem::take(&mut block.g), std::mem::take(&mut block.m));
         words.clear();
@@ -30,7 +30,6 @@ impl<'s> Interpreter<'_, 's> {
         block.skippable = kind == Syntax::Skippable;
         block.opaque = kind == Syntax::Opaque;
         if self.tree.nodes[node as usize].size > BLOCK_WORDS {
-            // No control takes a block of so many words.
             (block.opaque, block.opaque_may_set) = (true, true);
             return;
         }
@@ -45,20 +44,20 @@ impl<'s> Interpreter<'_, 's> {
             block.words.push(found);
         }
         for index in 0..block.words.len() {
-            self.gather_word(block, index);
+            self.collect_word(block, index);
         }
         self.values_of_m(block);
         if block.surface_normal && block.vector.iter().all(Option::is_none) && self.may_turn_to_normal(block)
         {
-            block.unmodelled.get_or_insert(Reason::AlongNormal);
+            block.unmodelled.get_or_insert(Reason::AlignedToNormal);
         }
-        // The control takes no tool vector elsewhere.
+        // Elsewhere the control rejects a tool vector.
         let heidenhain = self.dialect == Dialect::Heidenhain;
         block.opaque |= heidenhain && !block.is_ln && block.vector.iter().any(Option::is_some);
         let first = block.words.first();
         block.paraxial = heidenhain
             && first.is_some_and(|word| is_axis_name(word.name) && word.value != WordValue::Absent);
-        // Two motion words that differ: which of them holds is not certain.
+        // Two different motion codes: which one holds depends on the control.
         let mut modes = block.g.iter().filter(|&&code| matches!(code, 0 | 10 | 20 | 30));
         if let Some(first) = modes.next()
             && modes.any(|other| other != first)
@@ -67,14 +66,14 @@ impl<'s> Interpreter<'_, 's> {
         }
     }
 
-    /// Whether the control may turn the tool to the normal of a surface: it does under M128 and TCPM.
+    /// Whether the control may align the tool with the surface normal, as under M128 and TCPM.
     fn may_turn_to_normal(&self, block: &Block<'_>) -> bool {
         self.state.tcp_mode
             || block.m.contains(&128)
             || self.state.unknown_reason(ModalGroup::TcpMode.bit()).is_some()
     }
 
-    /// Whether a part that could not be read may hold more than axis words.
+    /// Whether an unreadable part may hold more than axis words.
     fn may_set(&self, first: u32, end: u32) -> bool {
         (first..end).any(|token| match self.tree.kind(token) {
             Some(Token::Name) => self.tree.text(token).iter().any(|byte| !is_axis(*byte)),
@@ -84,7 +83,7 @@ impl<'s> Interpreter<'_, 's> {
         })
     }
 
-    fn gather_word(&mut self, block: &mut Block<'s>, index: usize) {
+    fn collect_word(&mut self, block: &mut Block<'s>, index: usize) {
         let word = block.words[index];
         let at = Some(index);
         let mut twice = false;
@@ -94,7 +93,7 @@ impl<'s> Interpreter<'_, 's> {
         };
         let heidenhain = self.dialect == Dialect::Heidenhain;
         let comma = index > 0 && block.words[index - 1].name == b",";
-        // Conversational: what follows one of these M words are its own values.
+        // The words after some M words are their values.
         if heidenhain && word.address() != Some(b'M') && self.is_value_of_m(block, index) {
             return;
         }
@@ -104,14 +103,14 @@ impl<'s> Interpreter<'_, 's> {
                 _ => match self.evaluate_word(&word).0 {
                     Ok(number) if number >= 0.0 => block.g.push(code(number)),
                     Ok(_) => block.unknown_word = Some(("G".to_owned(), Reason::UnknownWord)),
-                    Err(_) => block.unknown_word = Some(("G".to_owned(), Reason::Variable)),
+                    Err(_) => block.unknown_word = Some(("G".to_owned(), Reason::UnknownVariable)),
                 },
             },
             Some(b'M') => match self.literal(&word) {
                 Some(number) => block.m.push(number.round() as u32),
-                // A path block may end with M alone.
+                // A path block may end with a bare M.
                 None if heidenhain && word.value == WordValue::Absent => {}
-                None => block.unknown_word = Some(("M".to_owned(), Reason::Variable)),
+                None => block.unknown_word = Some(("M".to_owned(), Reason::UnknownVariable)),
             },
             Some(b'X') => put(&mut block.axes[0]),
             Some(b'Y') => put(&mut block.axes[1]),
@@ -119,7 +118,7 @@ impl<'s> Interpreter<'_, 's> {
             Some(b'C') if heidenhain && word.value == WordValue::Absent => {}
             Some(b'C' | b'R') if comma => block.corner = true,
             // `,A45.`: the angle of the line.
-            Some(_) if comma => (block.corner, block.unmodelled) = (true, Some(Reason::NotFollowed)),
+            Some(_) if comma => (block.corner, block.unmodelled) = (true, Some(Reason::UnsupportedPath)),
             Some(letter @ (b'A' | b'B' | b'C')) => put(&mut block.abc[usize::from(letter - b'A')]),
             Some(letter @ (b'I' | b'J' | b'K')) => put(&mut block.centre[usize::from(letter - b'I')]),
             Some(b'R') if heidenhain => match (word.value, self.literal(&word)) {
@@ -128,7 +127,7 @@ impl<'s> Interpreter<'_, 's> {
                 {
                     block.radius_compensation = Some(value != 0.0);
                 }
-                // R+ and R- make the way of a positioning block longer or shorter.
+                // R+ and R- lengthen or shorten the motion of a paraxial block.
                 (WordValue::Absent, _) => {
                     (block.radius_compensation, block.paraxial_compensation) = (Some(true), true)
                 }
@@ -144,12 +143,13 @@ impl<'s> Interpreter<'_, 's> {
             Some(b'U' | b'V' | b'W') => block.other_axes = true,
             Some(b'E') if self.dialect != Dialect::Fanuc => block.other_axes = true,
             Some(_) => {}
-            None => self.gather_name(block, index),
+            None => self.collect_name(block, index),
         }
         block.opaque |= twice && (self.dialect != Dialect::Siemens || word.value != WordValue::Absent);
     }
 
-    /// Whether a word of a Heidenhain block is a value of an M word before it (M118 X1, M94 C), or of one of unknown kind.
+    /// Whether a word of a Heidenhain block is a value of an M word before it (M118 X1, M94 C), or of one of unknown
+    /// kind.
     fn is_value_of_m(&self, block: &mut Block<'s>, index: usize) -> bool {
         let before = block.words[..index].iter().rev().find(|word| word.address() == Some(b'M'));
         let Some(m) = before.and_then(|word| self.literal(word)) else { return false };
@@ -162,7 +162,7 @@ impl<'s> Interpreter<'_, 's> {
         true
     }
 
-    fn gather_name(&mut self, block: &mut Block<'s>, index: usize) {
+    fn collect_name(&mut self, block: &mut Block<'s>, index: usize) {
         let word = block.words[index];
         let at = Some(index);
         let name = word.name.to_ascii_uppercase();
@@ -175,7 +175,7 @@ impl<'s> Interpreter<'_, 's> {
             (Dialect::Siemens, b"RND" | b"CHF" | b"CHR") => block.corner = true,
             (Dialect::Siemens, b"RNDM") => block.corner = self.evaluate_word(&word).0 != Ok(0.0),
             (Dialect::Siemens, b"SUPA" | b"G153") => block.machine_coordinates = true,
-            (Dialect::Siemens, _) => self.gather_siemens(block, index, &name),
+            (Dialect::Siemens, _) => self.collect_siemens_name(block, index, &name),
             (Dialect::Heidenhain, [b'I', letter @ b'X'..=b'Z']) => {
                 block.axes[usize::from(letter - b'X')] = at
             }
@@ -201,7 +201,7 @@ impl<'s> Interpreter<'_, 's> {
         }
     }
 
-    /// The number of a word that is a plain literal.
+    /// The number of a word that is a literal.
     pub(super) fn literal(&self, word: &Word<'_>) -> Option<f64> {
         match word.value {
             WordValue::Literal { sign, number } => {
@@ -213,7 +213,7 @@ impl<'s> Interpreter<'_, 's> {
         }
     }
 
-    /// What a word is worth, and whether it says that it is an increment (IC, IX) or not (AC).
+    /// The value of a word, and whether the word itself states an increment (IC, IX) or an absolute value (AC).
     pub(super) fn evaluate_word(&self, word: &Word<'_>) -> (Evaluated, Option<bool>) {
         let increment =
             (self.dialect == Dialect::Heidenhain && word.name.len() == 2 && word.name[0] | 32 == b'i')
@@ -222,7 +222,7 @@ impl<'s> Interpreter<'_, 's> {
             WordValue::Absent | WordValue::Arguments { .. } => (Err(Reason::MissingArgument), increment),
             WordValue::Literal { number, .. } => {
                 let value = self.literal(word).ok_or(Reason::WrongShape);
-                // Fanuc counts increments or mm where no point is written, by a parameter of the control.
+                // Without a decimal point a Fanuc counts increments or mm, by a parameter of the control.
                 let counted = self.dialect == Dialect::Fanuc
                     && !self.tree.text(number).contains(&b'.')
                     && value != Ok(0.0);
@@ -248,9 +248,9 @@ impl<'s> Interpreter<'_, 's> {
         let variables = |name: &Variable| -> Evaluated {
             self.state.variables.get(name, || self.assigned_variables.contains(name))
         };
-        let mut reader = Evaluator::new(self.tree, self.dialect, range, &variables);
-        match reader.expression() {
-            Ok(value) if reader.at >= range.1 => held(value),
+        let mut evaluator = Evaluator::new(self.tree, self.dialect, range, &variables);
+        match evaluator.expression() {
+            Ok(value) if evaluator.at >= range.1 => held(value),
             _ => Err(Reason::WrongShape),
         }
     }

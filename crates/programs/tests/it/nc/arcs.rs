@@ -41,7 +41,7 @@ fn number(line: &str, letter: char) -> f64 {
 
 #[test]
 fn an_arc_whose_start_stays_is_no_circle_of_another_radius() {
-    let refused = [Outcome::Refused(Reason::BeforeLeftArc), Outcome::Refused(WrongShape)];
+    let refused = [Outcome::Refused(Reason::BeforeUnmodifiedArc), Outcome::Refused(WrongShape)];
     // The quarter begins where an arc that is left has ended: its end alone would move.
     let (text, outcomes) =
         run(Heidenhain, "CC X+6 Y+2\nC X+1 Y+2 DR+\nCR X+0 Y+3 R+1 DR+\nL X+0 Y+9", [0.0; 2]);
@@ -100,8 +100,8 @@ fn a_whole_circle_stays_whole_where_its_end_is_rounded() {
         assert_eq!(number(&text[0], 'X'), 1.0 + BY[0], "{}", text[0]);
         assert!((number(&text[0], 'I') - number(line, 'I')).abs() < 2e-3, "{}", text[0]);
     }
-    let whole = Arc::about(Plane::XY, [10.0, 0.0, 0.0], [10.001, 0.0, 0.0], [60.0, 0.0], true).unwrap();
-    assert!(whole.is_whole());
+    let whole = Arc::from_centre(Plane::XY, [10.0, 0.0, 0.0], [10.001, 0.0, 0.0], [60.0, 0.0], true).unwrap();
+    assert!(whole.is_full_circle());
 }
 
 #[test]
@@ -134,14 +134,14 @@ fn what_is_refused_keeps_every_word() {
         });
         let arc = body.lines().nth(1).unwrap();
         assert!(text.lines().any(|line| line == arc), "{text}");
-        assert_eq!(rewritten.outcomes[1], Outcome::Refused(BeforeLeftArc));
+        assert_eq!(rewritten.outcomes[1], Outcome::Refused(BeforeUnmodifiedArc));
         assert_eq!(rewritten.outcomes[2], Outcome::InPlace);
     }
 }
 
 #[test]
 fn an_arc_behind_other_motions_that_stay_begins_where_it_always_did() {
-    let before = left(BeforeLeftPath);
+    let before = left(BeforeUnmodifiedPath);
     let unknown = left(PositionUnknown);
     check(
         LinuxCnc,

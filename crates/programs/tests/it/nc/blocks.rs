@@ -11,8 +11,8 @@ use super::ends;
 
 #[test]
 fn the_end_of_a_block_is_where_m129_acts() {
-    check(Heidenhain, &[("L X+20\nL X+30 M129\nL X+40 Y+0 Z+0", &[None, None, left(NoTipControl)])]);
-    check(Heidenhain, &[("M129\nL X+40 Y+0 Z+0", &[left(NoTipControl)])]);
+    check(Heidenhain, &[("L X+20\nL X+30 M129\nL X+40 Y+0 Z+0", &[None, None, left(NoTcpMode)])]);
+    check(Heidenhain, &[("M129\nL X+40 Y+0 Z+0", &[left(NoTcpMode)])]);
 }
 
 #[test]
@@ -74,11 +74,11 @@ fn arcs_lie_in_the_plane_across_the_tool() {
         &[
             (
                 &format!("TOOL CALL 1 Y S1000\n{go}\nCR X+20 Z+60 R+10 DR+"),
-                &[left(BeforeLeftArc), left(Transformed)],
+                &[left(BeforeUnmodifiedArc), left(Transformed)],
             ),
             (
                 &format!("TOOL CALL 1 X\n{go}\nCR Y+10 Z+60 R+10 DR+"),
-                &[left(BeforeLeftArc), left(Transformed)],
+                &[left(BeforeUnmodifiedArc), left(Transformed)],
             ),
             (
                 &format!("TOOL CALL 1 Y\nTOOL CALL 1 Z\n{go}\nCR X+20 Y+10 R+10 DR+\nTOOL CALL S500"),
@@ -92,7 +92,7 @@ fn arcs_lie_in_the_plane_across_the_tool() {
 fn a_whole_number_is_rounded_by_the_control() {
     let body = "DEF INT NK=5, MK=4\nDEF REAL A=3\nTRAORI\nG1 X1 Y2 Z3 A0 B0 C0\n";
     let found = ends(&format!("{body}NK=NK/2\nMK=MK/2\nX=MK\nX=NK\n"), Siemens);
-    assert_eq!(found, [Ok([1.0, 2.0, 3.0]), Ok([2.0, 2.0, 3.0]), Err(Variable)]);
+    assert_eq!(found, [Ok([1.0, 2.0, 3.0]), Ok([2.0, 2.0, 3.0]), Err(UnknownVariable)]);
 }
 
 #[test]
@@ -128,7 +128,7 @@ fn linuxcnc_moves_beside_a_dwell_and_the_end_of_a_shift() {
         let found = ends(&format!("{go}G92 X0\n{code} X30\nY5\n"), LinuxCnc);
         assert_eq!(found[1..], [Ok([30.0, 2.0, 3.0]), Ok([30.0, 5.0, 3.0])], "{code}");
     }
-    check(LinuxCnc, &[("G4 P1\nX5", &[None]), ("G92.3 X30", &[left(Variable)])]);
+    check(LinuxCnc, &[("G4 P1\nX5", &[None]), ("G92.3 X30", &[left(UnknownVariable)])]);
     // On a Fanuc X is the time; a plain file does not tell what it is where P says the time.
     let found = ends(&format!("{}G4 X30.\nY5.\n", begin(Fanuc)), Fanuc);
     assert_eq!(found[1..], [Ok([1.0, 5.0, 3.0])]);

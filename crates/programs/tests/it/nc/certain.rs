@@ -28,7 +28,7 @@ pub(super) fn reasons(dialect: Dialect, body: &str) -> Vec<Option<Reason>> {
     let task = Task::read(&[("x", source.as_bytes())], &setup);
     let found: Vec<_> = task.listing.motions.iter().map(|motion| motion.reason()).collect();
     // An arc that stays keeps the first motion where it was.
-    assert!(matches!(found[0], None | Some(BeforeLeftArc | BeforeLeftPath)), "{body}: {found:?}");
+    assert!(matches!(found[0], None | Some(BeforeUnmodifiedArc | BeforeUnmodifiedPath)), "{body}: {found:?}");
     found[1..].to_vec()
 }
 
@@ -64,7 +64,7 @@ fn words_that_are_not_known_are_never_passed_over() {
         check(Heidenhain, &[(&format!("{block}\nL X+5 Y+5 Z+5 A+180 B+0 C+0"), unknown)]);
     }
     // A computed code may be any; what it set holds on until each is said again.
-    check(LinuxCnc, &[(&format!("G[#<c>]\n{G}"), &[left(Variable), left(Variable)])]);
+    check(LinuxCnc, &[(&format!("G[#<c>]\n{G}"), &[left(UnknownVariable), left(UnknownVariable)])]);
     // A value that is worked out is as good as a written one.
     check(LinuxCnc, &[("#1=0\nG[#1] X5", &[None])]);
 }
@@ -80,7 +80,7 @@ fn states_end_with_their_own_word() {
             (&format!("G12.1\n{F}\nG13.1\n{F}"), &[t, None]),
             (&format!("G07.1 C50.\n{F}\nG07.1 C0\n{F}"), &[t, None]),
             (&format!("G101 X0.\n{F}\nG100 X0.\n{F}"), &[t, None]),
-            (&format!("G43 H1\n{F}\nG43.4 H1\n{F}"), &[left(NoTipControl), None]),
+            (&format!("G43 H1\n{F}\nG43.4 H1\n{F}"), &[left(NoTcpMode), None]),
             (&format!("G41.2 D1\n{F}\nG40\n{F}"), &[left(RadiusCompensation), None]),
             (&format!("G154 P2\n{F}\nG54\n{F}"), &[left(WorkObjectUnknown), None]),
             (&format!("G66 P9010\n{F}\nG67\n{F}"), &[left(Subprogram), left(Subprogram), None]),
@@ -133,7 +133,7 @@ fn where_the_tool_stands_is_not_known_after_what_changes_coordinates() {
             ("G49\nG43.4 H1\nZ5.", &[p]),
             ("G10 L2 P1 X510. Y0. Z0.\nX5.", &[p]),
             ("G1 U-2.\nX5.", &[left(ExternalOnly), p]),
-            ("X30. ,A45.\nX5.", &[left(NotFollowed), p]),
+            ("X30. ,A45.\nX5.", &[left(UnsupportedPath), p]),
             (&format!("/M99 P100\nG55\nN100 {F}"), &[left(UnknownFlow)]),
             // In a program that leaves G91 behind, where a first block of a subprogram leads is not known.
             (
@@ -146,11 +146,11 @@ fn where_the_tool_stands_is_not_known_after_what_changes_coordinates() {
         LinuxCnc,
         &[
             ("G10 L2 P1 X510 Y0 Z0\nX5", &[p]),
-            ("G33.1 Z-5 K1\nG1 X5", &[left(NotFollowed), p]),
+            ("G33.1 Z-5 K1\nG1 X5", &[left(UnsupportedPath), p]),
             ("G55\nX5 Y5 Z5", &[o]),
             ("T1 M6\nX5 Y5 Z5", &[o]),
             ("G53 G0 X4 A10\nG1 X5 Y5 Z5", &[left(MachineCoordinates), o]),
-            ("X1.2.3\nX5", &[left(Unread), p]),
+            ("X1.2.3\nX5", &[left(Unreadable), p]),
             // Of what a program says before its ways part only the last counts.
             (&format!("G49\nT1 M6\nG43 H1\n{G}\no100 while [#1 lt 5]\no100 endwhile\n{G}"), &[None, None]),
             (
@@ -158,19 +158,19 @@ fn where_the_tool_stands_is_not_known_after_what_changes_coordinates() {
                 &[left(UnknownFlow), left(UnknownFlow)],
             ),
             // R, I and K of a straight block round or cut its corner.
-            ("X5 R2\nG0 X6 K1\nX7", &[left(NotFollowed), left(NotFollowed), None]),
-            ("X EXISTS[#<a>]\nX5", &[left(Variable), None]),
+            ("X5 R2\nG0 X6 K1\nX7", &[left(UnsupportedPath), left(UnsupportedPath), None]),
+            ("X EXISTS[#<a>]\nX5", &[left(UnknownVariable), None]),
         ],
     );
     check(
         Siemens,
         &[
             ("G111 X0 Y0\nAP=30 RP=20\nZ5", &[left(Transformed), p]),
-            ("POS[X]=30\nZ5", &[left(NotFollowed), p]),
-            ("X30 ANG=45\nZ5", &[left(NotFollowed), p]),
+            ("POS[X]=30\nZ5", &[left(UnsupportedPath), p]),
+            ("X30 ANG=45\nZ5", &[left(UnsupportedPath), p]),
             ("X30 MEAS=1\nX5", &[left(Probe), p]),
             ("X30 A5=0 B5=0 C5=1\nX5 Y5 Z5", &[o, o]),
-            ("POLY PO[X]=(20,1) PL=3\nX5 Y5 Z5", &[left(NotFollowed), left(NotFollowed)]),
+            ("POLY PO[X]=(20,1) PL=3\nX5 Y5 Z5", &[left(UnsupportedPath), left(UnsupportedPath)]),
         ],
     );
     check(
@@ -253,13 +253,13 @@ fn values_are_those_of_the_control() {
     let at = |x, y, z| Ok([x, y, z]);
     // LinuxCNC reads the whole line before it assigns.
     assert_eq!(after("#3=15\n#3=6 X#3\nX#3", LinuxCnc), [at(15.0, 2.0, 3.0), at(6.0, 2.0, 3.0)]);
-    assert_eq!(after("#3=15\n#3=6 X#3", Iso), [Err(Variable)]);
+    assert_eq!(after("#3=15\n#3=6 X#3", Iso), [Err(UnknownVariable)]);
     assert_eq!(after("XSQRT[16]", LinuxCnc), [at(4.0, 2.0, 3.0)]);
     let rounds = "#1=-1.2\n#2=FIX[#1]\n#3=FUP[#1]\nG1 X#2 Y#3";
     assert_eq!(after(rounds, LinuxCnc), [at(-2.0, -1.0, 3.0)]);
     assert_eq!(after(rounds, Fanuc), [at(-1.0, -2.0, 3.0)]);
-    assert_eq!(after(rounds, Iso), [Err(Variable)]);
-    assert_eq!(after("#1=[7 AND 3]\nX#1", Fanuc), [Err(Variable)]);
+    assert_eq!(after(rounds, Iso), [Err(UnknownVariable)]);
+    assert_eq!(after("#1=[7 AND 3]\nX#1", Fanuc), [Err(UnknownVariable)]);
     assert_eq!(after("R1=2EX1\nX=R1 Y=1.5EX-1", Siemens), [at(20.0, 0.15, 3.0)]);
     let sets = "QL1 = 7\nQ1 = +20\nQ2 = SIN 30 * Q1\nQ4 = Q1 DIV +8\nL X+Q1 Y+QL1 Z+Q2\nL X+Q4";
     let heidenhain = ends(
@@ -277,7 +277,7 @@ fn numbers_and_words_that_do_not_fit_are_never_edited() {
             let source = format!("{HEAD}{}{block}\nG1 X9. Y9. Z9. A180. B0. C0.\n", begin(dialect));
             let (text, _) = rewrite_as(&source, dialect, |listing| moved(listing, [1.0, -1.0, 0.5]));
             assert!(text.contains(&format!("\n{block}\n")), "{dialect:?}: {text}");
-            assert_eq!(reasons(dialect, block), [left(Unread)], "{dialect:?}: {block}");
+            assert_eq!(reasons(dialect, block), [left(Unreadable)], "{dialect:?}: {block}");
         }
     }
 }
@@ -364,7 +364,10 @@ fn what_is_left_goes_where_it_always_went() {
             change_of(listing, 2, [0.5, 0.0, 0.0]),
         ]
     });
-    assert_eq!(rewritten.outcomes[..2], [Outcome::Refused(BeforeLeftArc), Outcome::Refused(WrongShape)]);
+    assert_eq!(
+        rewritten.outcomes[..2],
+        [Outcome::Refused(BeforeUnmodifiedArc), Outcome::Refused(WrongShape)]
+    );
     assert_eq!(text, source.replace("G1 X5\n", "G1 X5.5000\n"));
     // Without TRAORI a tool vector is no word.
     let vector = "TRAORI\nG1 X1 Y2 Z3 A3=0 B3=0.3 C3=0.95 THETA=0 F600\n";
@@ -383,7 +386,7 @@ fn what_is_left_goes_where_it_always_went() {
     let rewritten = task.rewrite(&[change], &RewriteOptions::default()).unwrap();
     let text = rewritten.files[0].edits.apply(source.as_bytes()).unwrap();
     assert!(String::from_utf8_lossy(&text).contains("A180.12346 "), "{}", String::from_utf8_lossy(&text));
-    assert_eq!(Reason::BeforeLeftArc.text(), "an arc that stays as it is starts where this ends");
+    assert_eq!(Reason::BeforeUnmodifiedArc.text(), "an unmodified arc starts at the end of this motion");
 }
 
 /// The class: a word that holds on, in a block that is left before its words are taken. What it set is not known after it.
@@ -470,7 +473,10 @@ fn what_is_set_in_part_leaves_the_rest_in_doubt() {
         &[
             (&format!("T1 M6\nG43\no100 while [#1 LT 3]\nG49\nG43\n{G}\nT2 M6\no100 endwhile"), &[u]),
             (&format!("{}T1 M6\n{G}\nG43 H1\n{G}", maybe("G49")), &[u, None]),
-            (&format!("{}G17\n{arc}\nG91.1\n{arc}", maybe("G90.1")), &[left(BeforeLeftArc), u, None, None]),
+            (
+                &format!("{}G17\n{arc}\nG91.1\n{arc}", maybe("G90.1")),
+                &[left(BeforeUnmodifiedArc), u, None, None],
+            ),
         ],
     );
     let maybe = |what: &str| format!("IF R1>0\n{what}\nENDIF\n");
@@ -494,7 +500,7 @@ fn a_word_that_may_be_an_increment_hands_on_where_it_begins() {
         begin(Siemens)
     );
     let (_, rewritten) = rewrite_as(&source, Siemens, |listing| vec![change_of(listing, 1, [0.5, 0.4, 0.3])]);
-    let stays = |reason| matches!(reason, BeforeLeftPath | BeforeIncrement);
+    let stays = |reason| matches!(reason, BeforeUnmodifiedPath | BeforeIncrement);
     assert!(matches!(rewritten.outcomes[0], Outcome::Refused(reason) if stays(reason)), "{rewritten:?}");
 }
 

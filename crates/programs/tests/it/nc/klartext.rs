@@ -74,10 +74,10 @@ fn a_surface_normal_alone_turns_the_tool() {
     check(
         Heidenhain,
         &[
-            (&format!("LN X+11 Y+0 Z+50 {n}\nL X+12"), &[left(AlongNormal), left(OrientationUnknown)]),
+            (&format!("LN X+11 Y+0 Z+50 {n}\nL X+12"), &[left(AlignedToNormal), left(OrientationUnknown)]),
             (
                 &format!("LN X+11 Y+0 Z+50 {n}\nL X+12 A+180 B+0 C+90\nL X+13"),
-                &[left(AlongNormal), None, None],
+                &[left(AlignedToNormal), None, None],
             ),
             // With a tool vector it goes where that says.
             (&format!("LN X+11 Y+0 Z+50 {n} TX+0 TY+0 TZ+1"), &[None]),
@@ -86,10 +86,10 @@ fn a_surface_normal_alone_turns_the_tool() {
                 &format!("LN X+11 Y+0 Z+50 {n} TX+0 TY+0 TZ+1\nL X+12\nL X+12 A+180 B+0 C+90"),
                 &[None, left(OrientationUnknown), None],
             ),
-            ("L X+11 TX+0 TY+0 TZ+1", &[left(Unread)]),
-            (&format!("M129\nM128\nLN X+11 Y+0 Z+50 {n}"), &[left(AlongNormal)]),
-            (&format!("M129\nLN X+11 Y+0 Z+50 {n} M128"), &[left(AlongNormal)]),
-            (&format!("M129\nLN X+11 Y+0 Z+50 {n}"), &[left(NoTipControl)]),
+            ("L X+11 TX+0 TY+0 TZ+1", &[left(Unreadable)]),
+            (&format!("M129\nM128\nLN X+11 Y+0 Z+50 {n}"), &[left(AlignedToNormal)]),
+            (&format!("M129\nLN X+11 Y+0 Z+50 {n} M128"), &[left(AlignedToNormal)]),
+            (&format!("M129\nLN X+11 Y+0 Z+50 {n}"), &[left(NoTcpMode)]),
         ],
     );
 }
@@ -129,7 +129,7 @@ fn what_names_no_tool_keeps_tool_and_place() {
 
 #[test]
 fn a_corner_that_is_rounded_or_cut_keeps_its_ends() {
-    let path = left(NotFollowed);
+    let path = left(UnsupportedPath);
     for corner in ["RND R2", "RND R2 F100", "CHF 3"] {
         check(Heidenhain, &[(&format!("L X+20\n{corner}\nL Y+30\nL IX+5"), &[None, path, None, None])]);
         assert_eq!(after(&format!("L X+20\n{corner}\nL IY+30"))[2], Ok([20.0, 32.0, 3.0]));
@@ -138,7 +138,7 @@ fn a_corner_that_is_rounded_or_cut_keeps_its_ends() {
             Heidenhain,
             &[(
                 &format!("L X+20 Y+0\n{corner}\nCC X+20 Y+10\nC X+30 Y+10 DR+\nL Z+9"),
-                &[left(BeforeLeftArc), path, left(CentreElsewhere), None],
+                &[left(BeforeUnmodifiedArc), path, left(CentreElsewhere), None],
             )],
         );
     }
@@ -169,6 +169,6 @@ fn formulas_have_powers_remainders_and_pi() {
         let found = after(&format!("Q1 = +5\nQ6 = {formula}\nL X+Q6"));
         assert_eq!(found, [Ok([(value * 1e6_f64).round() / 1e6, 2.0, 3.0])], "{formula}");
     }
-    assert_eq!(after("Q6 = -7 % 4\nL X+Q6"), [Err(Variable)]);
+    assert_eq!(after("Q6 = -7 % 4\nL X+Q6"), [Err(UnknownVariable)]);
     assert_eq!(after("Q6 = 7 % 0\nL X+Q6"), [Err(WrongShape)]);
 }

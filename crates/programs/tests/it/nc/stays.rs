@@ -19,8 +19,8 @@ fn rewritten(dialect: Dialect, body: &str) -> String {
 
 #[test]
 fn the_start_of_a_path_that_is_left_stays() {
-    let path = left(BeforeLeftPath);
-    let other = left(NotFollowed);
+    let path = left(BeforeUnmodifiedPath);
+    let other = left(UnsupportedPath);
     check(
         Siemens,
         &[
@@ -44,13 +44,13 @@ fn the_start_of_a_path_that_is_left_stays() {
 /// What a path that stays needs of one axis hangs on every axis of the motions before a turn of the frame.
 #[test]
 fn a_turned_frame_passes_on_every_axis() {
-    let (path, open) = (left(BeforeLeftPath), left(PositionUnknown));
+    let (path, open) = (left(BeforeUnmodifiedPath), left(PositionUnknown));
     let cip = "CIP X40 Y0 I1=30 J1=10 K1=50";
     let turned = format!("X10 Y5\n$P_PFRAME=CTRANS(X,10)\nX20\nAROT Z90\nY=30 Z5\n{cip}");
     let plain = format!("X10 Y5\nX20 Y10 Z1\nX30 Y12 Z2\n{cip}");
-    let listed = [path, open, open, left(NotFollowed)];
+    let listed = [path, open, open, left(UnsupportedPath)];
     // Without a turn each axis stands for itself: what states all of them ends where it says.
-    check(Siemens, &[(&turned, &listed), (&plain, &[None, None, path, left(NotFollowed)])]);
+    check(Siemens, &[(&turned, &listed), (&plain, &[None, None, path, left(UnsupportedPath)])]);
 }
 
 /// The same where the motion comes from a jump: what a path that stays hangs on is followed on every way to it.
@@ -227,7 +227,7 @@ proptest! {
             // Where a path that is neither line nor arc begins nothing has moved.
             let path = before.listing.motions.get(index + 1);
             if let Some(path) = path
-                && path.left == Some(NotFollowed)
+                && path.left == Some(UnsupportedPath)
                 && !["RND", "G1", "G0"].contains(&&*path.instruction)
             {
                 prop_assert!(!taken(index), "motion {}\n{}\n{}", index, source, text);
