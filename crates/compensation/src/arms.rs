@@ -1,4 +1,4 @@
-//! The arm as the controller believes it to be and the better one, with what all targets share of them.
+//! The nominal arm, which the controller computes with, and the estimated arm.
 
 use crate::condition::arm_conditions::ArmConditions;
 use crate::condition::payload::{Load, Loads};
@@ -9,17 +9,17 @@ use truegrind_arm::inverse::Inverse;
 use truegrind_arm::model::Model;
 use truegrind_programs::motion::Listing;
 
-/// Whether an effect moves the arm by what it carries.
+/// Whether an effect depends on the payload.
 pub(crate) fn is_load_dependent(effect: &Effect) -> bool {
     effect.needs_torque() && !effect.is_zero()
 }
 
-/// The two arms and their inverses, shared by all targets.
+/// Both arms with their inverses, shared by all targets.
 pub(crate) struct Arms<'a> {
     pub(crate) nominal: Inverse<'a>,
-    /// The arm in the middle of every play, under the stated condition.
+    /// The estimated arm at mid-play of every joint, under the stated condition.
     pub(crate) estimated: Inverse<'a>,
-    /// The same under each condition that the program brings about.
+    /// The estimated arm under each condition that occurs in the program.
     pub(crate) conditions: ArmConditions<'a>,
     pub(crate) knowledge: Option<&'a Estimated>,
 }
@@ -40,7 +40,7 @@ impl<'a> Arms<'a> {
         }
     }
 
-    /// What the arm carries at each motion, where the program says so and the arm yields under it; empty elsewhere.
+    /// The payload at each motion, where the program states it and the arm is compliant; empty otherwise.
     pub(crate) fn loads(&self, listing: &Listing, loads: Option<&Loads>) -> Vec<Option<Load>> {
         let model = self.estimated.arm().model;
         let Some(loads) = loads.filter(|_| model.effects.iter().any(is_load_dependent)) else {

@@ -1,8 +1,8 @@
-//! The main job: a program that was read, an arm and a cell in; the planned and the written program out.
+//! The main job: corrects a parsed program for an estimated arm and a cell.
 //!
-//! The plan says what shall change; the dialect that writes it may still refuse a motion, since no text of the language
-//! carries the new value. Such a motion stays, and with it the cut that it is part of: the plan is made again without it,
-//! until both agree. So what the report says is what was written.
+//! The dialect's writer may refuse a planned change that its language cannot express. Such a motion remains unmodified, and
+//! with it its cut: planning is repeated without it until plan and writer agree. The report therefore states exactly what was
+//! written.
 
 use std::collections::BTreeMap;
 
@@ -25,10 +25,10 @@ use truegrind_programs::motion::{Listing, Mark, MotionKind, Reason};
 use truegrind_programs::reading::{Language, Program};
 use truegrind_programs::rewrite::{Outcome, RewriteOptions, Rewritten};
 
-/// A program, corrected.
+/// A corrected program.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Compensated {
-    /// What became of each motion, with what the writer refused.
+    /// Outcome of each motion, including the writer's refusals.
     pub plan: Plan,
     /// The edits of each file; [`truegrind_programs::edit::Edits::apply`] makes the new bytes.
     pub rewritten: Rewritten,
@@ -41,19 +41,19 @@ impl Compensated {
     }
 }
 
-/// Why nothing was corrected.
+/// Reason why nothing was corrected.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum CompensateError {
-    /// Cell file and program contradict each other: sentences that name both.
+    /// Cell file and program contradict each other; the sentences name both.
     #[error("{0}")]
     Cell(String),
-    /// Edits of one file overlap: a defect of the dialect, of which nothing must be written.
+    /// Edits of one file overlap: a defect of the dialect; nothing may be written.
     #[error(transparent)]
     Edits(#[from] EditError),
 }
 
-/// Corrects a program so that the estimated arm follows it. `mark` is written into every file in which something changes.
+/// Corrects a program so that the estimated arm follows it. `mark` is written into every changed file.
 ///
 /// # Errors
 /// [`CompensateError`].
@@ -80,15 +80,15 @@ pub fn compensate(
     loop {
         let planned = targets.plan(&refused);
         if program.takes(&planned.changes) {
-            // No second plan: what was worked out of the targets makes room for the edits.
+            // Frees the solved targets before the edits are made; no second plan is needed.
             drop(targets);
             let rewritten = program.rewrite(&planned.changes, &rewrite)?;
             return Ok(agreed(planned, rewritten, &BTreeMap::new(), program));
         }
         let rewritten = program.rewrite(&planned.changes, &rewrite)?;
         let found = refusals(&planned, &rewritten, listing);
-        // What is judged motion by motion needs no second plan, unless what stays changes from which sides joints with play
-        // come to what follows; nor does a program of which nothing else could change.
+        // Motions judged one by one need no second plan, unless an unmodified motion changes the backlash
+        // sides of later ones.
         if found.is_empty() || options.cuts == Cuts::Single && !play {
             return Ok(agreed(planned, rewritten, &found, program));
         }
@@ -99,7 +99,8 @@ pub fn compensate(
         if round >= MOST_ROUNDS
             && let Some((first, why)) = refused.iter().next()
         {
-            // A program of which every round takes away another piece is left as it is.
+            // No agreement was reached: every round removed more motions, so the whole program remains
+            // unmodified.
             let line = listing.motions[*first as usize].place.line;
             let rest = OutcomeReason::PartOfCut { line, because: why.kind() };
             for change in &planned.changes {
@@ -109,10 +110,10 @@ pub fn compensate(
     }
 }
 
-/// Rounds of plan and writing before all that is still open is refused.
+/// Rounds of planning and writing before every remaining change is refused.
 const MOST_ROUNDS: usize = 16;
 
-/// The plan as it was written.
+/// The plan, reconciled with what was written.
 fn agreed(
     mut planned: Plan,
     rewritten: Rewritten,
@@ -129,11 +130,11 @@ fn agreed(
     Compensated { plan: planned, rewritten }
 }
 
-/// What the writer refused.
+/// The changes that the writer refused.
 fn refusals(planned: &Plan, rewritten: &Rewritten, listing: &Listing) -> BTreeMap<u32, OutcomeReason> {
     let outcomes = planned.changes.iter().zip(&rewritten.outcomes);
     let refused = outcomes.filter_map(|(change, outcome)| match outcome {
-        // An arc that no circle fits once it is written.
+        // Rounded to the written decimals, the points make no circle.
         Outcome::Refused(Reason::WrongShape)
             if listing.motions[change.motion as usize].kind == MotionKind::Circular =>
         {

@@ -1,4 +1,4 @@
-//! Which joints the controller takes for a pose and the configuration that is stated with it.
+//! The joints that the controller selects for a pose and its stated configuration.
 
 use crate::plan::reason::OutcomeReason;
 use truegrind_arm::inverse::configuration::Configuration;
@@ -7,7 +7,7 @@ use truegrind_arm::model::Joints;
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{Motion, MotionKind, RobTarget, Switch};
 
-/// The joints that the controller takes for a flange pose with a target's configuration.
+/// The joints that the controller selects for a flange pose with the configuration of a target.
 pub(crate) fn configured(
     nominal: &Inverse<'_>,
     flange: &Pose,
@@ -24,10 +24,10 @@ pub(crate) fn configured(
     }
     match nominal.solve_configured(flange, &wanted, near) {
         Ok(solution) => Ok(solution.joints),
-        // Some arms do not use cfx: the quarter turns alone may still single out one solution.
+        // Some arms do not use cfx: the quarter turns alone may still select one solution.
         Err(error @ InverseError::OtherConfiguration { nearest, .. }) => {
             let all = nominal.all(flange);
-            // Where no configuration reaches it, none was asked for in vain: what forbids the nearest is the reason.
+            // Where no configuration reaches the pose, report what prevents the nearest one.
             if all.is_empty() {
                 let other = nominal.solve_configured(flange, &nearest, near).err();
                 return Err(OutcomeReason::of_inverse(other.unwrap_or(error)));
@@ -35,7 +35,7 @@ pub(crate) fn configured(
             let mut fitting = all.iter().filter(|s| wanted.overshoot_rad(&s.joints) <= 1e-6);
             match (fitting.next(), fitting.next(), monitored) {
                 (Some(only), None, _) => Ok(only.joints),
-                // Not monitored and nothing to be near to: the branch that keeps to the quarters best.
+                // Unmonitored and without reference joints: the branch that matches the quarter turns best.
                 (_, _, Switch::Off) => all
                     .iter()
                     .min_by(|a, b| {

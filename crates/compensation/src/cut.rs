@@ -1,42 +1,41 @@
-//! Cuts: motions that run into each other at process speed, corrected as a whole or not at all.
+//! Cuts: sequences of motions at process speed without a stop, corrected as a whole or not at all.
 //!
-//! A cut goes from one air move (MoveJ, MoveAbsJ, G0), stop (zone `fine`) or change of tool, work object or frame to the
-//! next. Where one of its motions stays as it is and its neighbours were moved, the tool would step by the whole
-//! correction in the middle of the part.
+//! A cut extends from one air move (MoveJ, MoveAbsJ, G0), stop (zone `fine`) or change of tool, work object or frame to the
+//! next. If one of its motions remained unmodified beside corrected neighbours, the tool would step by the whole correction
+//! in the middle of the part.
 //!
-//! Which motion runs into which: the one that the text tells to run before ([`Motion::previous`]); and, since loops,
-//! branches and labels leave that open, the one that stands before it in the same routine. So branches that exclude each
-//! other are one cut, which refuses too much rather than too little. A call of a routine that several others call too
-//! parts a cut; so do instructions whose path is not in the text (calls with targets, cycles), since the motions behind
-//! them are cuts of their own.
+//! Predecessor of a motion: the one that the text executes before it ([`Motion::previous`]) and, where loops, branches and
+//! labels leave that open, the preceding one in the same routine. Mutually exclusive branches therefore form one cut, which
+//! refuses too much rather than too little. A call of a routine with several callers separates cuts; so do instructions whose
+//! path is not in the text (calls with targets, cycles), since the motions after them belong to other cuts.
 
 use crate::deviation::Status;
 use crate::plan::reason::OutcomeReason;
 use truegrind_programs::motion::{Listing, Motion, MotionKind, Reason};
 
-/// What becomes of a cut of which not every motion can be corrected.
+/// Treatment of a cut in which some motion cannot be corrected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub enum Cuts {
-    /// It stays as it is, as a whole.
+    /// The whole cut remains unmodified.
     #[default]
     Whole,
-    /// What can be corrected is, but for steps between neighbours that are larger than the tolerance.
+    /// Every motion that can be corrected is, unless the step to an unmodified neighbour exceeds the tolerance.
     Partial,
-    /// Each motion is judged by itself: for experiments, never for a program that shall run.
+    /// Each motion is judged on its own: for experiments, never for a program that will run.
     Single,
 }
 
-/// The cut that each motion belongs to, as the index of one of its motions, and which motions run into each other.
+/// The cut of each motion, as the index of a representative motion, and which motions follow each other.
 pub(crate) struct CutsOf {
     /// By motion; `None` outside cuts.
     of: Vec<Option<u32>>,
-    /// Pairs of motions of one cut, the second starting where the first ends.
+    /// Consecutive motions of one cut: the second starts where the first ends.
     runs_into: Vec<(u32, u32)>,
 }
 
 impl CutsOf {
-    /// The cut of a motion, as the index of one of its motions; `None` outside cuts.
+    /// Representative motion of a motion's cut; `None` outside cuts.
     pub(crate) fn root(&self, motion: u32) -> Option<u32> {
         self.of[motion as usize]
     }
@@ -69,7 +68,7 @@ pub(crate) fn of(listing: &Listing) -> CutsOf {
     CutsOf { of, runs_into }
 }
 
-/// The representative of a motion's cut; the way to it is halved as it is walked.
+/// Union-find representative, with path halving.
 fn find(root: &mut [u32], mut index: u32) -> u32 {
     while root[index as usize] != index {
         root[index as usize] = root[root[index as usize] as usize];
@@ -78,16 +77,17 @@ fn find(root: &mut [u32], mut index: u32) -> u32 {
     index
 }
 
-/// Whether the tool may cut on the way to the end of a motion.
+/// Whether the tool may cut during a motion.
 fn cuts(motion: &Motion) -> bool {
     let path = matches!(motion.kind, MotionKind::Linear | MotionKind::Circular)
-        // A path that is in the text though it is not made of lines and arcs, or an instruction that nobody knows.
+        // A path that is given in the text but consists of neither lines nor arcs, or an unknown
+        // instruction.
         || matches!(motion.left, Some(Reason::UnsupportedPath | Reason::UnknownInstruction | Reason::NoMotionCode));
-    // A search ends, and stands, where its signal comes.
+    // A search motion ends, and stops, at its signal.
     path && motion.left != Some(Reason::Probe) && !motion.instruction.contains("Search")
 }
 
-/// Whether a motion goes on, without a stop, in the cut of the one before it.
+/// Whether a motion continues the cut of the previous one without a stop.
 fn one_cut(before: &Motion, motion: &Motion, listing: &Listing) -> bool {
     let stops = listing.zone(before).is_some_and(|zone| zone.value.as_ref().is_ok_and(|zone| zone.fine));
     cuts(before)
@@ -97,16 +97,16 @@ fn one_cut(before: &Motion, motion: &Motion, listing: &Listing) -> bool {
         && before.work_object == motion.work_object
 }
 
-/// Why a motion stays as it is, with the status it has for that.
+/// Why a motion remains unmodified, with its status.
 type Obstacle<'a> = &'a dyn Fn(u32) -> Option<(Status, OutcomeReason)>;
 
-/// The motions that could be corrected but stay with the rest of their cut.
+/// The motions that could be corrected but remain unmodified with the rest of their cut.
 pub(crate) fn rest_of_cuts(
     listing: &Listing,
     cuts: &CutsOf,
     blocking_reason: Obstacle<'_>,
 ) -> Vec<(u32, OutcomeReason)> {
-    // The first motion of each cut that stays for a reason of its own.
+    // The first motion of each cut that remains unmodified for its own reason.
     let mut cause: Vec<Option<OutcomeReason>> = vec![None; cuts.of.len()];
     for (index, cut) in (0_u32..).zip(&cuts.of) {
         let Some(cut) = cut.map(|cut| cut as usize) else { continue };
@@ -124,9 +124,8 @@ pub(crate) fn rest_of_cuts(
         .collect()
 }
 
-/// The motions that must not be corrected since the one that they run into, or that runs into them, is not: the step
-/// between them, which is the whole correction (`shift_mm`), would exceed `tolerance_mm`. What stays for this makes its
-/// own neighbours stay in turn.
+/// The motions that must not be corrected because an adjacent one is not: the step between them, the whole correction
+/// (`shift_mm`), would exceed `tolerance_mm`. Each such motion pins its own neighbours in turn.
 pub(crate) fn steps(
     listing: &Listing,
     cuts: &CutsOf,

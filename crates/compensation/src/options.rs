@@ -1,4 +1,4 @@
-//! What a rewrite may do.
+//! Bounds and choices of a correction.
 
 use crate::condition::payload::Loads;
 use crate::cut::Cuts;
@@ -6,72 +6,72 @@ use crate::risk::placement::Placement;
 use truegrind_arm::condition::Condition;
 use truegrind_programs::motion::{Motion, MotionKind};
 
-/// What is written.
+/// How corrected targets are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub enum Emit {
     /// Moved robtargets: the program keeps its form.
     #[default]
     Targets,
-    /// Joint targets, for controllers whose own model should have no say.
+    /// Joint targets, for controllers whose own kinematic model should not be used.
     Joints,
 }
 
-/// What becomes of circular motions.
+/// Treatment of circular motions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub enum Circles {
-    /// Three corrected points make a circle again; the path is checked by sampling it.
+    /// Three corrected points define the new circle; its path is checked by sampling.
     #[default]
     Keep,
-    /// Straight pieces within the tolerance, where the language and the arm allow it.
+    /// Straight segments within the tolerance, where the language and the arm allow it.
     Segments,
 }
 
-/// Bounds of a rewrite.
+/// Bounds and choices of a correction.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Options {
-    /// What is written.
+    /// How corrected targets are written.
     pub emit: Emit,
-    /// What becomes of circular motions.
+    /// Treatment of circular motions.
     pub circles: Circles,
-    /// How far the path between two targets may leave the intended line (mm).
+    /// Largest deviation of the path between two targets from the intended one (mm).
     pub tolerance_mm: f64,
-    /// Largest correction of a position that is written (mm).
+    /// Largest position correction that is written (mm).
     pub max_correction_mm: f64,
-    /// Largest correction of an orientation that is written (rad).
+    /// Largest orientation correction that is written (rad).
     pub max_rotation_rad: f64,
-    /// A pose with a smaller distance to singularity is refused (scaled smallest singular value, of order sin θ5 / 10).
+    /// A pose closer to a singularity than this is refused (scaled smallest singular value, of order sin θ5 / 10).
     pub min_singularity: f64,
-    /// How far a correction may turn a joint: so many times the size of the correction, which is the shift of the flange
-    /// over half the length of the arm's links (so that it is in rad) plus its turn (rad). An arm far from singularities
-    /// needs once that, hardly ever five times; 1/sin θ5 and the like make it more near a singularity.
+    /// Largest joint change per size of the correction. The size is the flange displacement over half the length of the arm's
+    /// links (hence in rad) plus its rotation (rad). Far from singularities the ratio is about 1 and rarely reaches 5; near
+    /// one, factors such as 1/sin θ5 increase it.
     pub joint_gain: f64,
-    /// A joint may turn by this for any correction (rad), so that rounding and small corrections are let through where
-    /// what they cost does no harm.
+    /// A joint change below this is always allowed (rad), so that rounding and small corrections pass where they do no harm.
     pub free_joint_change_rad: f64,
-    /// Whether joint targets are rewritten too: a home position says joints, not a pose.
+    /// Whether joint targets are rewritten too: a home position means joints, not a pose.
     pub joint_targets: bool,
-    /// Decimals of positions as they will be written, to state what rounding leaves.
+    /// Decimals of written positions, to predict the rounding error.
     pub position_decimals: u8,
-    /// What circumstances the program will run under. The sides from which joints come follow from its motion.
+    /// Condition under which the program will run. Backlash sides follow from the program's own motion.
     pub condition: Condition,
-    /// What the program says that the arm carries; absent where the payload of `condition` counts throughout.
+    /// Payloads that the program states; absent where the payload of `condition` applies throughout.
     pub loads: Option<Loads>,
-    /// What becomes of a cut of which not every motion can be corrected.
+    /// Treatment of a cut in which some motion cannot be corrected.
     pub cuts: Cuts,
-    /// Whether the place of a path is corrected, or its shape alone.
+    /// Whether the position of a path is corrected, or only its shape.
     pub placement: Placement,
-    /// A cut that the correction makes worse with a larger probability is left.
+    /// A cut that the correction makes worse with a higher probability remains unmodified.
     pub max_risk: f64,
-    /// Whether motions are flagged one by one ([`OutcomeReason::UnknownStart`](crate::plan::reason::OutcomeReason::UnknownStart)) that rest on a configuration which the
-    /// controller does not check, from a start that the text does not tell. Otherwise a note says where such a way begins.
+    /// Whether each motion that relies on an unchecked configuration from an unknown start is flagged
+    /// ([`OutcomeReason::UnknownStart`](crate::plan::reason::OutcomeReason::UnknownStart)). Otherwise one note lists where
+    /// such sequences begin.
     pub flag_unknown_starts: bool,
-    /// Whether [`Plan::points`](crate::plan::Plan::points) are filled: tables and pictures of the path need them, the rewrite itself
-    /// does not.
+    /// Whether [`Plan::points`](crate::plan::Plan::points) is filled: needed for tables and pictures of the path, not for the
+    /// rewrite.
     pub points: bool,
-    /// Whether [`ObjectPlacement::remedy`](crate::risk::placement::ObjectPlacement::remedy) is worked out, which takes longer than a small
-    /// program: who reads of many programs at once does not see it.
+    /// Whether [`ObjectPlacement::remedy`](crate::risk::placement::ObjectPlacement::remedy) is computed. It takes longer than
+    /// correcting a small program and is not shown in batch reports.
     pub remedies: bool,
 }
 
@@ -100,7 +100,7 @@ impl Default for Options {
     }
 }
 
-/// Whether a motion is of a kind that is rewritten at all.
+/// Whether a motion is of a kind that can be rewritten.
 pub(crate) fn is_rewritable(motion: &Motion, options: &Options) -> bool {
     motion.left.is_none() && (motion.kind != MotionKind::AbsoluteJoint || options.joint_targets)
 }

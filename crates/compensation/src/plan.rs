@@ -1,4 +1,4 @@
-//! A planned rewrite: what shall change, and what became of each motion.
+//! A planned rewrite: the changes, and the outcome of every motion.
 
 pub mod listing_only_plan;
 pub(crate) mod notes;
@@ -13,31 +13,31 @@ use crate::risk::cut_risk::CutRisk;
 use crate::risk::placement::ObjectPlacement;
 use truegrind_programs::rewrite::Change;
 
-/// What became of one motion, for the contract's JSON and the table.
+/// Outcome of one motion; feeds the JSON contract and the table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MotionOutcome {
     /// Index into the listing.
     pub motion: u32,
-    /// What became of it.
+    /// Changed, flagged, refused or left.
     pub status: Status,
-    /// Why.
+    /// Reason for that status.
     pub reason: Option<OutcomeReason>,
     /// Deviation of its end before and after (mm).
     pub before_mm: Option<f64>,
-    /// See `before_mm`; a predicted remainder.
+    /// See `before_mm`; predicted.
     pub after_mm: Option<f64>,
-    /// Predicted standard deviation of its place (mm).
+    /// Predicted standard deviation of the end position (mm).
     pub sigma_mm: Option<f64>,
-    /// The same of the shape of its cut, after the best rigid registration (mm); absent outside cuts.
+    /// Predicted standard deviation of the shape of its cut, after the best rigid registration (mm); absent outside cuts.
     pub shape_sigma_mm: Option<f64>,
-    /// Largest bend of the path to this end that is left between targets (mm).
+    /// Largest deviation from the intended path on the segment to this end that remains (mm).
     pub path_deviation_mm: Option<f64>,
-    /// Targets put in before it.
+    /// Targets inserted before it.
     pub inserted: usize,
 }
 
 impl MotionOutcome {
-    /// A motion of which nothing is worked out.
+    /// A motion that nothing is computed for.
     pub(crate) fn left(motion: u32) -> Self {
         Self {
             motion,
@@ -56,18 +56,18 @@ impl MotionOutcome {
 /// A planned rewrite.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Plan {
-    /// What shall change.
+    /// Changes to write.
     pub changes: Vec<Change>,
-    /// One entry for each motion of the listing.
+    /// One entry per motion of the listing.
     pub outcomes: Vec<MotionOutcome>,
-    /// The ends of all motions that have a pose, in order; empty unless [`Options::points`](crate::options::Options::points).
+    /// End points of all motions that have a pose, in order; empty unless [`Options::points`](crate::options::Options::points).
     pub points: Vec<PathPoint>,
-    /// What was assumed of tools and work objects.
+    /// Assumptions about tools, work objects, payload, backlash and configurations.
     pub notes: Vec<String>,
-    /// What was done about the place of each work object.
+    /// How the position of each work object was treated.
     pub placements: Vec<ObjectPlacement>,
-    /// What is known of each cut.
+    /// Risk assessment of each cut.
     pub cuts: Vec<CutRisk>,
-    /// Probability that the cuts that are corrected get worse, taken together; absent where nothing is known of them.
+    /// Probability that the correction does harm, over all corrected cuts together; absent without an assessment.
     pub probability_of_harm: Option<f64>,
 }

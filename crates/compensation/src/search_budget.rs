@@ -1,18 +1,18 @@
-//! How many evaluations of the arm one program may cost beyond those that every target costs: what is sought for targets out
-//! of reach, beside singularities and in configurations that are not theirs.
+//! Search budget of one program: evaluations of the arm for targets that are out of reach, near a singularity or in another
+//! configuration, beyond the few evaluations that every target costs.
 //!
-//! Counted, not timed, and shared out by the number of motions alone, so that the result depends neither on the machine nor on
-//! the number of threads. Some hundred targets that cannot be reached are told one by one; a program of many thousand
-//! would take minutes for it, and those that are left are refused for that
-//! ([`InverseError::Abandoned`](truegrind_arm::inverse::InverseError::Abandoned)).
+//! The budget counts evaluations, not time, and is divided by the number of motions alone, so the result depends neither on
+//! the machine nor on the number of threads. A few hundred unreachable targets are each diagnosed; in a program with many
+//! thousands that would take minutes, so the remaining ones are refused with
+//! [`InverseError::Abandoned`](truegrind_arm::inverse::InverseError::Abandoned).
 
 use rayon::prelude::*;
 
 use truegrind_arm::inverse::budget::SearchBudget;
 use truegrind_math::work::checkpoint;
 
-/// Works through pieces in parallel, each with its part of the whole; those that fell short are done again, one after the
-/// other, with what the others left.
+/// Runs pieces in parallel, each with its share of the budget; pieces that ran out are repeated one after the other with the
+/// budget that others left over.
 pub(crate) fn shared_out<T: Send>(
     whole: SearchBudget,
     pieces: usize,
@@ -21,7 +21,7 @@ pub(crate) fn shared_out<T: Send>(
     shared_out_into(whole, &mut vec![(); pieces], |piece, (), budget| work(piece, budget))
 }
 
-/// The same where each piece has a place of its own that its work fills.
+/// As [`shared_out`], where each piece fills its own slot.
 pub(crate) fn shared_out_into<P: Send, T: Send>(
     whole: SearchBudget,
     places: &mut [P],
@@ -42,19 +42,19 @@ pub(crate) fn shared_out_into<P: Send, T: Send>(
     done.into_iter().enumerate().map(again).collect()
 }
 
-/// For the joints of the program as it is.
+/// Joints of the original program.
 pub(crate) const STARTS: u64 = 1_500_000;
-/// For the corrected targets.
+/// Corrected targets.
 pub(crate) const TARGETS: u64 = 1_000_000;
-/// For ways past singularities.
+/// Segments near singularities.
 pub(crate) const WAYS: u64 = 1_000_000;
-/// For the paths between targets.
+/// Paths between targets.
 pub(crate) const PATHS: u64 = 1_000_000;
-/// Steps along the paths between targets: so many, and beyond what goes into a megabyte so many for each motion.
+/// Near solves along the paths between targets: a fixed number, plus some per motion for programs above about a megabyte.
 pub(crate) fn path_steps(motions: usize) -> u64 {
     800_000 + 40 * motions.saturating_sub(300_000) as u64
 }
-/// For what is said of tools and work objects whose origin is not stated, all together.
+/// Estimates for tools and work objects of unstated origin, all together.
 pub(crate) const FRAMES: u64 = 300_000;
-/// For the sides from which joints with play come.
+/// Backlash sides.
 pub(crate) const SIDES: u64 = 500_000;

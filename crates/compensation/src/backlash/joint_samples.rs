@@ -1,4 +1,4 @@
-//! Samples of the joints between the ends of motions.
+//! Joint samples along the segments of a program.
 
 use crate::backlash::motion_end::{MotionEnd, ReachedEnd, SampledJoints};
 use crate::backlash::reversals::agrees;
@@ -12,24 +12,24 @@ use truegrind_arm::model::Joints;
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{MotionKind, Switch};
 
-/// Samples on a path are no farther apart than this (mm, rad).
+/// Largest distance between samples of a path (mm, rad).
 const SAMPLE_MM: f64 = 25.0;
 const SAMPLE_RAD: f64 = 0.1;
-/// No path has more samples.
+/// Most samples of a path.
 const MOST_SAMPLES: usize = 64;
-/// A path that is shorter has one sample (mm, rad): its joints hardly depart from a parabola.
+/// A shorter path has one sample (mm, rad): its joints are almost a parabola.
 const SHORT_MM: f64 = 5.0;
 const SHORT_RAD: f64 = 0.02;
-/// How often a path is sampled four times as densely, where its samples do not agree on where a joint turns.
+/// How often the sampling is made four times denser where the samples disagree on where a joint reverses.
 const REFINEMENTS: u32 = 3;
-/// No path that is sampled so has more samples.
+/// Most samples of a refined path.
 const MOST_REFINED: usize = 256;
 
-/// A joint that goes farther between neighbouring samples comes past a singularity (rad).
+/// A larger joint step between neighbouring samples means that the path passes a singularity (rad).
 const MOST_STEP_RAD: f64 = 0.6;
 
-/// The samples of all motions, none where the arm cannot go along, and at which share each circle point is passed. Where
-/// every other sample tells of other turns than all of them there are too few, and more are taken.
+/// Samples of all motions (`None` where the arm cannot follow) and the share at which each circle point is passed. Where
+/// every other sample implies other reversals than all samples do, the sampling is refined.
 pub(crate) fn sampled(
     stops: &[MotionEnd<'_>],
     before: &[Option<u32>],
@@ -63,8 +63,8 @@ pub(crate) fn sampled(
     (paths, samples.passes)
 }
 
-/// The samples of motions on which the wrist may be interpolated by itself, nothing for all others; none where the arm cannot
-/// go so.
+/// Samples of motions whose wrist may be interpolated separately, `None` for all others; the inner `None` where the arm
+/// cannot follow.
 pub(crate) fn by_wrist(
     stops: &[MotionEnd<'_>],
     before: &[Option<u32>],
@@ -101,7 +101,7 @@ pub(crate) fn by_wrist(
     stops.iter().zip(before).map(of).collect()
 }
 
-/// The path of a motion that goes along one, in its object, with its tool and object.
+/// The path of a motion in its work object, with its frames; `None` for joint motions.
 fn path(
     from: &ReachedEnd<'_>,
     to: &ReachedEnd<'_>,
@@ -110,7 +110,7 @@ fn path(
     if !to.path_kinds().0 {
         return None;
     }
-    // The path is one of the tool and in the object of the motion, also where it begins under others.
+    // The path belongs to the tool and work object of the motion, even where it starts under others.
     let within = mounting(to.frames_index);
     let mut begin = from.commanded;
     if from.frames_index != to.frames_index {
@@ -124,19 +124,19 @@ fn path(
     Some((curve?, within))
 }
 
-/// Motions that one thread takes at a time.
+/// Motions per parallel work item.
 const PORTION: usize = 64;
 
-/// Points between the ends of all motions.
+/// Sample points between the ends of all motions.
 #[derive(Default)]
 struct Samples {
-    /// Where those of each motion end.
+    /// End of each motion's range of samples.
     ends: Vec<usize>,
     shares: Vec<f64>,
     flanges: Vec<Pose>,
-    /// The joints at the start of each motion, and at its end.
+    /// Joints at the start and at the end of each motion.
     ends_rad: Vec<[Joints; 2]>,
-    /// At which share of each motion its circle point is passed.
+    /// Share of each motion at which its circle point is passed.
     passes: Vec<f64>,
 }
 
@@ -146,7 +146,7 @@ impl Samples {
         begin..self.ends[motion]
     }
 
-    /// The samples of one motion, so many times as densely as motions are sampled at first.
+    /// Samples of one motion, `density` times as dense as in the first pass.
     fn of(
         &mut self,
         from: Option<&MotionEnd<'_>>,
@@ -175,8 +175,9 @@ impl Samples {
         self.passes.push(passes);
     }
 
-    /// The joints at the samples of each motion, each reached from the one before; `None` where the arm cannot go along: a joint would
-    /// leap, or the way crosses a singularity, as between solutions of two branches it must, however near they lie.
+    /// Joints at the samples of each motion, each solved from the previous sample; `None` where the arm cannot follow: a
+    /// joint would jump, or the path would cross a singularity, as it must between solutions of different branches, however
+    /// close.
     fn passed(&self, nominal: &Inverse<'_>) -> Vec<Option<SampledJoints>> {
         let of = |motion: usize| {
             let [start, end] = &self.ends_rad[motion];
@@ -216,8 +217,8 @@ fn pieces_of(curve: &Curve) -> usize {
     pieces(curve.length_mm(), turn)
 }
 
-/// Pieces of a path: at least two, so that one sample tells of a joint that turns half way; four and an even number where
-/// every other sample must tell the same.
+/// Number of pieces of a path: at least two, so that one sample sees a joint reverse half way; otherwise even and at least
+/// four, so that every other sample can be compared.
 fn pieces(length_mm: f64, turn_rad: f64) -> usize {
     if length_mm < SHORT_MM && turn_rad < SHORT_RAD {
         return 2;

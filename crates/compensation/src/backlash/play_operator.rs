@@ -1,13 +1,13 @@
-//! Where the links are on a way on which joints with play turn.
+//! Position of links with backlash along a segment on which joints reverse.
 //!
-//! Method. The play operator: a link stays where it is until one of its flanks takes it along,
-//! θ ← clamp(θ, q − b/2, q + b/2). A joint that turns so leaves its link behind for as long as it takes up the play; the
-//! path in between is worked out in steps, from the flanks on which the links lie at the start of the way.
-//! Shapes: joints q of the motors and θ of the links (rad), play b of each (rad).
-//! Stops: steps are halved until the largest distance changes by less than a quarter of [`CHORD_MM`], [`DOUBLINGS`] times
-//! at most; one in which a link leaves its flank or is taken along again is halved by itself, since the path has a corner there.
+//! Method. The play operator: a link rests until a flank engages, θ ← clamp(θ, q − b/2, q + b/2). A joint that reverses
+//! leaves its link behind until the backlash is taken up; the path in between is computed in steps from the flanks on which
+//! the links lie at the start.
+//! Shapes: motor joints q and link joints θ (rad), backlash b of each joint (rad).
+//! Stops: steps are halved until the largest deviation changes by less than a quarter of [`CHORD_MM`], at most [`DOUBLINGS`]
+//! times; a step in which a link leaves its flank or engages again is halved separately, since the path has a corner there.
 //! Source: M. A. Krasnosel'skii, A. V. Pokrovskii, Systems with Hysteresis, 1989, the play.
-//! Checked against: an independent simulation of a controller in small steps (tests/it/compensation/play.rs).
+//! Checked against: an independent simulation of a controller in small steps (crates/compensation/tests/it/play.rs).
 
 use crate::backlash::sides::JointSides;
 use crate::condition::arm_conditions::ArmConditions;
@@ -15,29 +15,29 @@ use crate::segment::condition_schedule::CHORD_MM;
 use truegrind_arm::model::{Joints, PreparedModel};
 use truegrind_math::se3::Pose;
 
-/// A link that is nearer to its flank lies on it (rad): 0.005 mm on the largest arms.
+/// A link closer to its flank than this lies on it (rad): 0.005 mm on the largest arms.
 const ON_FLANK_RAD: f64 = 2e-6;
 
-/// How often a step is halved in which a link leaves its flank or is taken along again.
+/// How often a step is halved in which a link leaves its flank or engages again.
 const CLOSER: u32 = 8;
 
-/// How often steps are halved.
+/// How often all steps are halved.
 const DOUBLINGS: usize = 6;
 
-/// Links that follow their motors with play.
+/// Links that follow their motors with backlash.
 #[derive(Clone, Copy)]
 pub(crate) struct PlayOperator<'a> {
-    /// The arm in the middle of its play, with its load on this way.
+    /// The arm at mid-play, with its payload on this segment.
     arm: &'a PreparedModel<'a>,
     play_rad: [f64; 6],
     motor: Joints,
-    /// θ − q as the play operator has it; where a play was estimated below 0 the arm shows its opposite.
+    /// θ − q of the play operator; where the estimated backlash is negative the arm shows its opposite.
     behind: Joints,
 }
 
 impl<'a> PlayOperator<'a> {
-    /// At rest at joints `motor`, to which the arm came under the condition `arrival`. `onward`: a condition with the load that
-    /// it carries from here on. A joint of which no side is known stands in the middle of its play.
+    /// At rest at motor joints `motor`, where the arm arrived under condition `arrival`. `onward`: a condition with the
+    /// payload from here on. A joint of unknown side is at mid-play.
     pub(crate) fn at(
         motor: &Joints,
         arrival: usize,
@@ -50,7 +50,7 @@ impl<'a> PlayOperator<'a> {
         Self { arm: conditions.arm(conditions.middle(onward)), play_rad, motor: *motor, behind }
     }
 
-    /// The motors go on to other joints.
+    /// Moves the motors.
     fn take(&mut self, motor: &Joints) {
         let moved = motor - self.motor;
         self.motor = *motor;
@@ -60,14 +60,14 @@ impl<'a> PlayOperator<'a> {
         });
     }
 
-    /// The motors go on to other joints; hands back where the flange comes.
+    /// Moves the motors and returns the flange pose.
     fn go(&mut self, motor: &Joints) -> Pose {
         self.take(motor);
         let link = Joints::from_fn(|j, _| motor[j] + self.behind[j] * self.play_rad[j].signum());
         self.arm.forward(&link)
     }
 
-    /// On which flank each link lies, 0 for none.
+    /// Engaged flank of each link, 0 for none.
     fn contact(&self) -> JointSides {
         std::array::from_fn(|j| {
             let half = 0.5 * self.play_rad[j].abs();
@@ -75,8 +75,8 @@ impl<'a> PlayOperator<'a> {
         })
     }
 
-    /// Goes a step of a way; hands back how far off the tool is at most, at its end and where, to so many halvings, a link leaves
-    /// its flank or is taken along again: there the path has a corner.
+    /// Moves along one step; returns the largest deviation of the tool, at its end and, to so many halvings, where a link
+    /// leaves its flank or engages again: the path has a corner there.
     fn span(
         &mut self,
         [from, to]: [f64; 2],
@@ -96,8 +96,8 @@ impl<'a> PlayOperator<'a> {
         first.max(self.span([middle, to], halvings - 1, motor, off))
     }
 
-    /// Whether each link comes to lie, at the end of a way in so many `steps`, on the side that is told of it there (0 where none
-    /// is), wherever in its play one lies at the start of which none was known. The play keeps order, so both flanks tell that.
+    /// Whether each link ends a segment of so many `steps` on its planned side (0: none planned), wherever within its
+    /// backlash a link of unknown side starts. The play operator is monotone, so testing both flanks suffices.
     pub(crate) fn ends_on_sides(
         &self,
         sides: &JointSides,
@@ -120,8 +120,8 @@ impl<'a> PlayOperator<'a> {
         })
     }
 
-    /// Largest distance on a way from here: `motor(s)` where the motors are at its share s, `off(s, flange)` how far off
-    /// the tool is with the flange there. Infinite where the motors cannot go. Begins with so many `steps`.
+    /// Largest deviation along a segment from here: `motor(s)` are the motor joints at share s, `off(s, flange)` the
+    /// deviation of the tool with that flange. Infinite where the motors cannot follow. Starts with so many `steps`.
     pub(crate) fn largest_deviation(
         &self,
         steps: usize,

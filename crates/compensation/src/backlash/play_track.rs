@@ -1,41 +1,41 @@
-//! What each joint with play did last, taken along the ways of motions.
+//! State of each joint with backlash, followed along the segments of a program.
 
 use crate::backlash::motion_end::{JointSides, ReachedEnd, SampledJoints};
 use crate::backlash::reversals::{DEAD_BAND_RAD, turning_point};
 use truegrind_arm::model::Joints;
 
-/// A link that would have to turn by less stays where it is (rad): 0.003 mm on the largest arms.
+/// A link that would have to move by less rests (rad): 0.003 mm on the largest arms.
 const STILL_RAD: f64 = 1e-6;
 
-/// What one joint did last.
+/// Backlash state of one joint.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PlayTrack {
-    /// The flank on which the link lies, 0 where that is not known, or on neither.
+    /// Flank on which the link lies; 0 if unknown or on neither.
     pub(crate) side: i8,
-    /// The turning point of the motor (rad).
+    /// Reversal point of the motor (rad).
     pub(crate) farthest: f64,
-    /// At which share of the present motion that was.
+    /// Share of the current motion at which that was.
     pub(crate) since: f64,
-    /// Where the link can be (rad).
+    /// Interval that contains the link (rad).
     pub(crate) low: f64,
     pub(crate) high: f64,
-    /// Half of its play (rad).
+    /// Half of its backlash (rad).
     pub(crate) half: f64,
 }
 
 impl PlayTrack {
-    /// A link of which nothing is known but where its motor stands.
+    /// A link of unknown position within the backlash around its motor.
     pub(crate) fn unknown(motor: f64, half: f64) -> Self {
         Self { side: 0, farthest: motor, since: 0.0, low: motor - half, high: motor + half, half }
     }
 
-    /// The link is taken along by its flanks.
+    /// The flanks move the link along.
     fn take(&mut self, motor: f64) {
         let (low, high) = (motor - self.half, motor + self.half);
         (self.low, self.high) = (self.low.clamp(low, high), self.high.clamp(low, high));
     }
 
-    /// The flank on which the link certainly lies, its motor being there.
+    /// Flank on which the link certainly lies for this motor position.
     fn flank(&self, motor: f64) -> i8 {
         let near = DEAD_BAND_RAD.min(0.1 * self.half);
         if self.high - (motor - self.half) <= near {
@@ -47,7 +47,7 @@ impl PlayTrack {
         }
     }
 
-    /// The motor goes on; hands back where the side changed, if it did.
+    /// Moves the motor; returns the share at which the side changed, if it did.
     fn go(&mut self, motor: f64, share: f64) -> Option<f64> {
         self.take(motor);
         if self.side == 0 {
@@ -56,7 +56,7 @@ impl PlayTrack {
             return (self.side != 0).then_some(share);
         }
         let gone = motor - self.farthest;
-        // A joint that moves up came from below.
+        // A joint that moves up arrives from below.
         let side = if gone > 0.0 { -1 } else { 1 };
         if self.side == side {
             (self.farthest, self.since) = (motor, share);
@@ -68,14 +68,14 @@ impl PlayTrack {
         None
     }
 
-    /// The motor comes to rest as told; hands back whether the side is another.
+    /// The motor stops as commanded; returns whether the side changed.
     fn rest(&mut self, motor: f64) -> bool {
         let before = self.side;
         (self.side, self.farthest) = (self.flank(motor), motor);
         self.side != before
     }
 
-    /// The motor brings the link to where it shall stand; hands back whether the side is another than on the way.
+    /// The motor moves the link to its required position; returns whether the side differs from that along the segment.
     fn arrive(&mut self, motor: f64, link: f64) -> bool {
         let before = self.side;
         let (low, high) = (self.low - STILL_RAD, self.high + STILL_RAD);
@@ -93,24 +93,24 @@ impl PlayTrack {
         self.side != before
     }
 
-    /// The side is not known after all.
+    /// Marks the side as unknown.
     pub(crate) fn forget(&mut self, link: Option<f64>, motor: f64) {
         let middle = link.unwrap_or(motor);
         *self = Self { farthest: motor, ..Self::unknown(middle, self.half) };
     }
 }
 
-/// From each share of the way on, from which side each joint comes.
+/// From each share on, the side from which each joint arrives.
 pub(crate) type SideChanges = Vec<(f64, JointSides)>;
 
-/// The sides on which all ways agree.
+/// The sides on which all paths agree.
 pub(crate) fn agreed(mut sides: impl Iterator<Item = JointSides>) -> JointSides {
     let first = sides.next().unwrap_or([0; 6]);
     sides.fold(first, |all, one| std::array::from_fn(|j| if all[j] == one[j] { all[j] } else { 0 }))
 }
 
-/// Takes all joints to the end of a motion, by every way that it may go. `paths`: its start and the samples between, along
-/// the path and, where it may go so, with a wrist that goes by itself.
+/// Moves all joints to the end of a motion along every possible path. `paths`: the start and the samples between, along the
+/// path and, where possible, with separate wrist interpolation.
 pub(crate) fn arrive(
     start: [PlayTrack; 6],
     reached: &ReachedEnd<'_>,
@@ -143,7 +143,8 @@ pub(crate) fn arrive(
         once(&samples[..samples.len().min(1)]);
     }
     let (turns, mut end) = found.unwrap_or((Vec::new(), start));
-    // Targets that are put in make the link go as was meant: it may turn near the end by less than its play.
+    // Inserted targets make the link follow the intended motion: it can reverse near the end by less than
+    // its backlash.
     if path
         && reached.may_insert
         && let Some(links) = reached.links
@@ -158,8 +159,7 @@ pub(crate) fn arrive(
     (turns, end)
 }
 
-/// On which flank each link lies where the circle point is passed: on none of them while a joint that has turned before it
-/// takes up its play.
+/// Flank of each link where the circle point is passed: none while a joint that reversed before it takes up its backlash.
 pub(crate) fn passing(
     mut tracks: [PlayTrack; 6],
     reached: &ReachedEnd<'_>,
@@ -194,7 +194,7 @@ pub(crate) fn passing(
     sides
 }
 
-/// From which side a link comes to its end that goes along a way as was meant; `None` where it does not turn on the way.
+/// Side from which a link arrives that follows the intended motion; `None` where it does not reverse on the way.
 fn side_of_link(
     begin: &PlayTrack,
     samples: &[(f64, Joints)],
@@ -230,7 +230,7 @@ fn side_of_link(
     turned.then_some(track.side)
 }
 
-/// Takes all joints along a way and to its end; hands back where sides changed.
+/// Moves all joints along a path to its end; returns where sides changed.
 fn follow(tracks: &mut [PlayTrack; 6], samples: &[(f64, Joints)], reached: &ReachedEnd<'_>) -> SideChanges {
     let mut sides = tracks.map(|t| t.side);
     let mut turned: Vec<(f64, usize, i8)> = Vec::new();

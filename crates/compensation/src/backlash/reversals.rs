@@ -1,11 +1,11 @@
-//! Where a joint turns on its way, by a parabola through neighbouring samples.
+//! Where a joint reverses along a path, by a parabola through neighbouring samples.
 
 use truegrind_arm::model::Joints;
 
-/// A motor that comes back by less on a way has not turned (rad): what a drive at rest may stray by.
+/// A motor that moves back by less has not reversed (rad): the position noise of a drive at rest.
 pub(crate) const DEAD_BAND_RAD: f64 = 1e-5;
 
-/// Where between samples k − 1 and k a joint turns: the vertex of a parabola through these two and a neighbour.
+/// Where a joint reverses between samples k − 1 and k: vertex of the parabola through these two and a neighbour.
 pub(crate) fn turning_point(samples: &[(f64, f64)], k: usize) -> Option<(f64, f64)> {
     let first = match k {
         _ if samples.len() < 3 || k == 0 => return None,
@@ -21,8 +21,8 @@ pub(crate) fn turning_point(samples: &[(f64, f64)], k: usize) -> Option<(f64, f6
     within.then_some((vertex, a.1 + d1 * (vertex - a.0) + d2 * (vertex - a.0) * (vertex - b.0)))
 }
 
-/// Whether every other sample of a way tells of the same turns as all of them, for joints with play, and of none near its
-/// end.
+/// Whether every other sample of a path implies the same reversals as all samples, for joints with backlash, and none hidden
+/// near its end.
 pub(crate) fn agrees(start: &Joints, samples: &[(f64, Joints)], end: &Joints, half: &[f64; 6]) -> bool {
     if samples.len() < 3 {
         return true;
@@ -33,7 +33,7 @@ pub(crate) fn agrees(start: &Joints, samples: &[(f64, Joints)], end: &Joints, ha
             [(0.0, start[joint])].into_iter().chain(inner).chain([(1.0, end[joint])]).collect();
         let other: Vec<(f64, f64)> = all.iter().copied().step_by(2).collect();
         let [fine, coarse] = [last_slope(&all), last_slope(&other)];
-        // What a turn could come to that lies between the last two samples.
+        // Largest travel of a reversal hidden between the last two samples.
         let hidden = 0.5 * (fine - coarse).abs() * (1.0 - all[all.len() - 2].0);
         let certain = (fine - coarse).abs() < 0.5 * fine.abs() || hidden < 0.1 * DEAD_BAND_RAD;
         let [all, other] = [turns(&all), turns(&other)];
@@ -44,14 +44,14 @@ pub(crate) fn agrees(start: &Joints, samples: &[(f64, Joints)], end: &Joints, ha
     })
 }
 
-/// How fast a joint goes at the end of a way (rad per share), by the parabola through its last three samples.
+/// Joint velocity at the end of a path (rad per share), by the parabola through its last three samples.
 fn last_slope(samples: &[(f64, f64)]) -> f64 {
     let [.., a, b, c] = samples else { return 0.0 };
     let (first, last) = ((b.1 - a.1) / (b.0 - a.0), (c.1 - b.1) / (c.0 - b.0));
     last + (last - first) / (c.0 - a.0) * (c.0 - b.0)
 }
 
-/// In which directions a joint goes in turn, and how far each time.
+/// Successive directions of a joint, and the reversal points.
 fn turns(samples: &[(f64, f64)]) -> Vec<(i8, f64)> {
     let mut out: Vec<(i8, f64)> = Vec::new();
     let mut farthest = samples[0].1;

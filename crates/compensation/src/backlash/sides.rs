@@ -1,17 +1,15 @@
-//! From which side each joint comes to rest, from the program's own motion.
+//! Backlash sides: from which side each joint arrives at every target, derived from the program's own motion.
 //!
-//! A link with play stays where it is until one of its flanks takes it along, so where it can be follows from the joints on
-//! the way: a range, as wide as the play where nothing is known (the start of a program, a motion that the text does not
-//! tell), a point from there on where its motor has moved by more than that. A target that is corrected says where the link
-//! shall stand. The motor pushes it there from below if it is above all places where the link can be before, from above if
-//! it is below all of them, and comes by the whole play farther where it turns; where it is between, no side is known, and
-//! side 0 stands for the middle of the play. So a target whose link turns by less than its play is told from one whose
-//! motor alone turns. What stays as it was told leaves a link that turns by less than its play between its flanks.
+//! A link with backlash rests until a flank engages. Its position follows from the joints along the path: an interval as wide
+//! as the backlash where nothing is known (start of a program, a motion that the text does not determine), a point once its
+//! motor has moved by more than that. A corrected target prescribes the link position. The motor pushes the link there from
+//! below if it is above the whole interval, from above if it is below, and travels the backlash in addition where it
+//! reverses; in between no side is known, and side 0 means mid-play. A target whose link reverses by less than the backlash
+//! is thus distinguished from one whose motor alone reverses: an unmodified target leaves such a link between its flanks.
 //!
-//! Lines and arcs are sampled between their ends, and a parabola through neighbouring samples tells where between them
-//! a joint turned. Where the text leaves open how the joints go (rapid motions of NC; lines and arcs of which the wrist goes
-//! joint by joint; lines written as joints or cut by targets that are put in), each way is followed, and a side is known
-//! where they agree.
+//! Lines and arcs are sampled between their ends; a parabola through neighbouring samples locates reversals. Where the text
+//! leaves the joint path open (rapid motions of NC; lines and arcs with separate wrist interpolation; lines written as joints
+//! or split by inserted targets), each possible path is followed, and a side is known where all agree.
 
 pub(crate) use crate::backlash::motion_end::{BacklashSides, JointSides, MotionEnd, ReachedEnd};
 
@@ -21,8 +19,8 @@ use crate::backlash::play_track::{PlayTrack, agreed, arrive, passing};
 use crate::frames::frame_pair::FramePair;
 use truegrind_arm::inverse::Inverse;
 
-/// The sides along all motions. `before[m]`: the motion that ended where motion m starts. `doubted[m]`: the joints of which
-/// no side is to be known at the end of motion m; all others where it is empty.
+/// The sides along all motions. `before[m]`: the motion that ended where motion m starts. `doubted[m]`: the joints whose side
+/// counts as unknown at the end of motion m; none where it is empty.
 pub(crate) fn backlash_sides(
     stops: &[MotionEnd<'_>],
     before: &[Option<u32>],
@@ -61,7 +59,7 @@ pub(crate) fn backlash_sides(
                     );
                 }
                 if along.len() < 1 + by_wrist[m].iter().count() {
-                    // The arm cannot go along the path: how it comes to the end is not known.
+                    // The arm cannot follow the path, so how it arrives is unknown.
                     here = std::array::from_fn(|j| PlayTrack::unknown(reached.joints[j], half[j]));
                     along = vec![Vec::new()];
                 }

@@ -1,7 +1,6 @@
-//! The estimated arm under every condition that a program brings about: from which sides its joints come, and what it
-//! carries.
+//! The estimated arm under every condition that a program brings about: backlash sides and payload.
 //!
-//! A condition is prepared once and shared by all targets under it, so that they still go side by side in lanes.
+//! A condition is prepared once and shared by all its targets, so that they are still computed in lanes.
 
 use std::collections::HashMap;
 
@@ -15,19 +14,19 @@ use truegrind_arm::inverse::Inverse;
 use truegrind_arm::model::{Joints, Model, PreparedModel};
 use truegrind_math::se3::Pose;
 
-/// A load as a key: the bits of mass and centre.
+/// A payload as a hash key: the bits of mass and centre.
 type LoadKey = Option<[u64; 4]>;
 
-/// The conditions of one program, with the arm under each.
+/// The conditions of one program, with the prepared arm for each.
 pub(crate) struct ArmConditions<'a> {
     model: &'a Model,
     nominal: &'a Model,
     base: Condition,
-    /// Play of each joint (rad); none for a joint without.
+    /// Backlash of each joint (rad); 0 without.
     pub(crate) play_rad: [f64; 6],
     condition_indices: HashMap<(JointSides, LoadKey), usize>,
     list: Vec<Inverse<'a>>,
-    /// For each place the one with the same load and every joint in the middle of its play.
+    /// For each condition the one with the same payload and every joint at mid-play.
     middles: Vec<usize>,
 }
 
@@ -43,13 +42,13 @@ impl<'a> ArmConditions<'a> {
         Self { model, nominal, base: *base, play_rad, condition_indices, list, middles }
     }
 
-    /// Whether it matters from which side a joint comes.
+    /// Whether the side from which a joint arrives matters.
     pub(crate) fn has_play(&self) -> bool {
         self.play_rad.iter().any(|play| *play != 0.0)
     }
 
-    /// The place of a condition in the list. Sides of joints without play make no difference, and without a load the
-    /// base condition's counts.
+    /// Index of a condition. Sides of joints without backlash make no difference; without a payload that of the base
+    /// condition applies.
     pub(crate) fn condition_index(&mut self, sides: JointSides, load: Option<&Load>) -> usize {
         let sides: JointSides = std::array::from_fn(|j| if self.play_rad[j] == 0.0 { 0 } else { sides[j] });
         let [x, y, z] = load.map_or([0.0; 3], |load| load.centre_mm);
@@ -69,7 +68,7 @@ impl<'a> ArmConditions<'a> {
         condition_index
     }
 
-    /// The place with the same load as `condition_index` and every joint in the middle of its play.
+    /// The condition with the same payload and every joint at mid-play.
     pub(crate) fn middle(&self, condition_index: usize) -> usize {
         self.middles[condition_index]
     }
@@ -84,14 +83,14 @@ impl<'a> ArmConditions<'a> {
         self.list[condition_index].arm()
     }
 
-    /// Where the links stand under a condition with the motors at `joints`, load apart.
+    /// Link angles under a condition with motor joints `joints`, without compliance.
     pub(crate) fn links(&self, condition_index: usize, joints: &Joints) -> Joints {
         let sides = self.arm(condition_index).condition.approach;
         Joints::from_fn(|j, _| joints[j] + 0.5 * self.play_rad[j] * f64::from(sides[j]))
     }
 
-    /// How far a point on the flange stands from where the flanks would have it, where the sides of joints with play are
-    /// not known: half the play of each, as independent displacements (mm).
+    /// Position uncertainty of a point on the flange from joints of unknown backlash side: half the backlash of each, as
+    /// independent displacements (mm).
     pub(crate) fn play_uncertainty_mm(
         &self,
         condition_index: usize,
@@ -112,7 +111,8 @@ impl<'a> ArmConditions<'a> {
         (0..6).filter(|&j| open(j)).map(square).sum::<f64>().sqrt()
     }
 
-    /// Runs `work` on the items under each condition together: `work(condition_index, items)` answers in the order of `items`.
+    /// Runs `work` on the items of each condition together: `work(condition_index, items)` returns results in the order of
+    /// `items`.
     pub(crate) fn each<T>(
         &self,
         condition_indices: &[usize],
@@ -133,7 +133,7 @@ impl<'a> ArmConditions<'a> {
         out.into_iter().flatten().collect()
     }
 
-    /// Poses of the flange, each under its condition.
+    /// Flange poses, each under its condition.
     pub(crate) fn forward(&self, condition_indices: &[usize], joints: &[Joints]) -> Vec<Pose> {
         self.each(condition_indices, |condition_index, items| match items {
             None => self.arm(condition_index).forward_many(joints),
@@ -142,7 +142,7 @@ impl<'a> ArmConditions<'a> {
     }
 }
 
-/// The items at some places.
+/// The items at the given indices.
 pub(crate) fn select<T: Clone>(all: &[T], items: &[usize]) -> Vec<T> {
     items.iter().map(|&i| all[i].clone()).collect()
 }

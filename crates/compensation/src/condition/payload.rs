@@ -1,9 +1,9 @@
-//! What the arm carries at each motion: the load of the tool, and what the program says that it grips.
+//! Payload at each motion: the tool's own load, and what the program states that it grips.
 //!
-//! A tool brings its own load (`tload`). `GripLoad` adds what the gripper holds until the next one, its centre in the
-//! tool frame (in the work object where the robot holds that); `\TLoad` of a motion stands for both together, unless it
-//! is `load0`. The grip is followed statement by statement through branches, loops, calls and functions, and from the end
-//! of main to its next cycle; where ways that join do not agree it is not known, and the tool alone is counted.
+//! A tool has its own load (`tload`). `GripLoad` adds the gripped load until the next `GripLoad`, with its centre in the tool
+//! frame (in the work object where the robot holds that); `\TLoad` of a motion replaces both, unless it is `load0`. The
+//! gripped load is followed as abstract state through branches, loops, calls and functions, and from the end of main to its
+//! next cycle; where the states of a join differ it is unknown, and only the tool is counted.
 //!
 //! Source: ABB RAPID instruction reference (RobotWare 6), GripLoad, MoveL, loaddata, tooldata.
 
@@ -30,7 +30,7 @@ use truegrind_programs::tree::Child;
 pub struct Load {
     /// Mass (kg).
     pub mass_kg: f64,
-    /// Its centre in the last frame of the arm (mm).
+    /// Centre of mass in the last frame of the arm (mm).
     pub centre_mm: [f64; 3],
 }
 
@@ -39,23 +39,23 @@ pub struct Load {
 pub enum Grip {
     /// Nothing.
     Empty,
-    /// This much, its centre in the tool frame (or in the work object that the robot holds).
+    /// This load, its centre in the tool frame (or in the work object that the robot holds).
     Holds(Load),
-    /// Not known from the text.
+    /// The program does not determine it.
     Unknown,
 }
 
-/// The loads that a program states beside those of its tools, one entry for each motion of the listing.
+/// The loads that a program states in addition to those of its tools.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Loads {
-    /// What the gripper holds; shorter than the listing where nothing is ever gripped.
+    /// Gripped load at each motion; shorter than the listing where nothing is ever gripped.
     pub grips: Vec<Grip>,
-    /// `\TLoad` of a motion: tool and grip together, its centre on the flange.
+    /// `\TLoad` of a motion: tool and gripped load together, centre on the flange.
     pub totals: HashMap<usize, Load>,
 }
 
 impl Loads {
-    /// The loads of a program. NC programs do not state any.
+    /// The loads of a program. NC programs state none.
     pub fn of(program: &Program<'_>) -> Self {
         match program {
             Program::Rapid(task) => Self::of_task(task),
@@ -72,7 +72,7 @@ impl Loads {
         self.grips.get(motion).copied().unwrap_or(Grip::Empty)
     }
 
-    /// What the arm carries at a motion, in the last frame of `arm`; `None` where the program does not say.
+    /// Payload at a motion, in the last frame of `arm`; `None` where the program does not state it.
     pub fn at(&self, index: usize, motion: &Motion, listing: &Listing, arm: &Model) -> Option<Load> {
         let in_last = |centre: Point3<f64>| -> [f64; 3] { (arm.flange * centre).coords.into() };
         if let Some(total) = self.totals.get(&index) {
@@ -91,13 +91,13 @@ impl Loads {
         })
     }
 
-    /// At how many motions it is not known what the gripper holds.
+    /// Number of motions at which the gripped load is unknown.
     pub fn unknown(&self) -> usize {
         self.grips.iter().filter(|grip| **grip == Grip::Unknown).count()
     }
 }
 
-/// Two loads as one.
+/// Combines two loads.
 fn together(a: &Load, b: &Load) -> Load {
     let mass_kg = a.mass_kg + b.mass_kg;
     let centre_mm = std::array::from_fn(|k| {
@@ -121,35 +121,35 @@ fn states_no_load(task: &Task<'_>) -> bool {
     })
 }
 
-/// What is held at a place of a routine. `None`: as at the entry of the routine.
+/// Gripped load at a statement of a routine. `None`: as at entry of the routine.
 type State = Option<Grip>;
 
-/// What a way that joins another leaves known.
+/// Join of two states.
 fn joined(a: State, b: State) -> State {
     if a == b { a } else { Some(Grip::Unknown) }
 }
 
-/// One walk through all statements of a task.
+/// Abstract interpretation of all statements of a task.
 struct GripAnalysis<'t, 's> {
     task: &'t Task<'s>,
     evaluator: Evaluator<'t, 's>,
-    /// Motions by file and first byte.
+    /// Motions by file and first byte of their statement.
     motions: HashMap<(u32, u32), usize>,
-    /// At each motion met: its index, what is held, and the unit.
+    /// Each visited motion: its index, the state and the unit.
     met: Vec<(usize, State, usize)>,
-    /// Calls of routines: the unit called, what is held there, and the calling unit.
+    /// Calls: called unit, state at the call, calling unit.
     calls: Vec<(usize, State, usize)>,
-    /// What is held when a unit ends; asked for while it is worked out it is not known.
+    /// State at the end of each unit; unknown while it is being computed.
     exits: Vec<Option<State>>,
     totals: HashMap<usize, Load>,
     unit: usize,
-    silent: bool,
+    dry_run: bool,
 }
 
-/// What `load0` weighs, which stands for no load (kg).
+/// Mass of `load0`, which means no load (kg).
 const NOTHING_KG: f64 = 0.001;
 
-/// How deeply calls are followed.
+/// Largest call depth.
 const DEPTH: usize = 12;
 
 impl<'t, 's> GripAnalysis<'t, 's> {
@@ -164,7 +164,7 @@ impl<'t, 's> GripAnalysis<'t, 's> {
             exits: vec![None; task.symbols.units.len()],
             totals: HashMap::new(),
             unit: 0,
-            silent: false,
+            dry_run: false,
         }
     }
 
@@ -175,7 +175,7 @@ impl<'t, 's> GripAnalysis<'t, 's> {
             self.exits[unit] = Some(exit);
         }
         for unit in 0..self.exits.len() {
-            // The next cycle begins with what this one holds.
+            // The next cycle starts with the load of this one.
             if let Some(exit) = self.exits[unit].filter(|_| self.is_main(unit)) {
                 self.calls.push((unit, exit, unit));
             }
@@ -191,14 +191,14 @@ impl<'t, 's> GripAnalysis<'t, 's> {
         Loads { grips, totals: self.totals }
     }
 
-    /// What is held where each unit begins: nothing at the start of main; elsewhere what all calls agree on.
+    /// Gripped load at entry of each unit: none at the start of main; elsewhere the join over all calls.
     fn entries(&self) -> Vec<Grip> {
         let symbols = &self.task.symbols;
         let units = &symbols.units;
         let begins = |unit: usize| units[unit].routine.is_none() || self.is_main(unit);
         let mut entries: Vec<Option<Grip>> =
             (0..units.len()).map(|unit| begins(unit).then_some(Grip::Empty)).collect();
-        // What a computed name calls, and what interrupts, begins with whatever is held then.
+        // Computed calls and interrupts can occur with any load.
         let late = symbols.late.iter().flat_map(|late| late.iter().copied());
         let interrupting = (0..).zip(&symbols.interrupts).filter(|(_, interrupts)| **interrupts);
         for routine in late.chain(interrupting.map(|(routine, _)| routine)) {
@@ -220,7 +220,7 @@ impl<'t, 's> GripAnalysis<'t, 's> {
                 break;
             }
         }
-        // Nothing in these files calls it.
+        // Never called in these files.
         entries.into_iter().map(|entry| entry.unwrap_or(Grip::Unknown)).collect()
     }
 
@@ -240,7 +240,7 @@ impl<'t, 's> GripAnalysis<'t, 's> {
         all.reduce(joined).flatten()
     }
 
-    /// The statements under a node; the state is `None` where no way leads on.
+    /// The statements under a node; the state is `None` where control does not continue.
     fn block(
         &mut self,
         unit: Unit,
@@ -274,20 +274,21 @@ impl<'t, 's> GripAnalysis<'t, 's> {
             (Some(a), Some(b)) => Some(joined(a, b)),
             (a, b) => a.or(b),
         };
-        let unsure = |changes: bool| if changes { Some(Some(Grip::Unknown)) } else { state };
+        let unsure =
+            |statements_may_grip: bool| if statements_may_grip { Some(Some(Grip::Unknown)) } else { state };
         match tree.nodes[node as usize].kind {
             Syntax::Body => self.block(unit, node, state, exits, depth),
             Syntax::Call => self.call(unit, node, state, depth),
             Syntax::LateCall => unsure(true),
             Syntax::CompactIf => {
-                let state = unsure(self.asks_first(unit, node));
+                let state = unsure(self.condition_may_grip(unit, node));
                 either(self.block(unit, node, state, exits, depth), state)
             }
             Syntax::If | Syntax::Test => {
                 let (mut out, mut complete) = (None, false);
-                // The conditions are asked first.
-                let asks = |node: u32| self.asks_first(unit, node);
-                let state = unsure(asks(node) || tree.child_nodes(node).any(asks));
+                // Conditions are evaluated first.
+                let function_may_grip = |node: u32| self.condition_may_grip(unit, node);
+                let state = unsure(function_may_grip(node) || tree.child_nodes(node).any(function_may_grip));
                 for branch in tree.child_nodes(node) {
                     if !matches!(tree.nodes[branch as usize].kind, Syntax::Branch | Syntax::Case) {
                         continue;
@@ -299,18 +300,19 @@ impl<'t, 's> GripAnalysis<'t, 's> {
                 if complete { out } else { either(out, state) }
             }
             Syntax::For | Syntax::While => {
-                // What the loop grips is held, or not yet, where it begins again.
-                let entry = unsure(self.changes(unit, node));
-                let passed = if self.asks_first(unit, node) { entry } else { state };
+                // On re-entry the load gripped in the loop may or may not be held.
+                let entry = unsure(self.statements_may_grip(unit, node));
+                let passed = if self.condition_may_grip(unit, node) { entry } else { state };
                 either(self.block(unit, node, entry, exits, depth), passed)
             }
             Syntax::ErrorClause | Syntax::UndoClause | Syntax::BackwardClause => {
-                let anywhere = if self.changes(unit, unit.node) { Some(Some(Grip::Unknown)) } else { state };
+                let anywhere =
+                    if self.statements_may_grip(unit, unit.node) { Some(Some(Grip::Unknown)) } else { state };
                 self.block(unit, node, anywhere, exits, depth);
                 state
             }
             Syntax::Label => {
-                if self.changes(unit, unit.node) {
+                if self.statements_may_grip(unit, unit.node) {
                     Some(Some(Grip::Unknown))
                 } else {
                     state.or(Some(None))
@@ -322,25 +324,26 @@ impl<'t, 's> GripAnalysis<'t, 's> {
             }
             Syntax::Goto => None,
             Syntax::Opaque | Syntax::Unwritten => unsure(true),
-            _ => unsure(self.asks(unit, node)),
+            _ => unsure(self.function_may_grip(unit, node)),
         }
     }
 
-    /// Whether a condition or bound of a statement may grip something else.
-    fn asks_first(&self, unit: Unit, node: u32) -> bool {
+    /// Whether evaluating a condition or bound of a statement may change the gripped load.
+    fn condition_may_grip(&self, unit: Unit, node: u32) -> bool {
         let tree = self.tree(unit);
-        tree.child_nodes(node)
-            .any(|child| tree.nodes[child as usize].kind.is_expression() && self.asks(unit, child))
+        tree.child_nodes(node).any(|child| {
+            tree.nodes[child as usize].kind.is_expression() && self.function_may_grip(unit, child)
+        })
     }
 
-    /// Whether a function under a node may grip something else.
-    fn asks(&self, unit: Unit, node: u32) -> bool {
+    /// Whether a function call under a node may change the gripped load.
+    fn function_may_grip(&self, unit: Unit, node: u32) -> bool {
         let tree = self.tree(unit);
         (node..node + tree.nodes[node as usize].size)
             .any(|node| tree.nodes[node as usize].kind == Syntax::Function && self.may_grip(unit, node))
     }
 
-    /// Whether a call or function may grip something else.
+    /// Whether a call may change the gripped load.
     fn may_grip(&self, unit: Unit, node: u32) -> bool {
         let tree = self.tree(unit);
         let name = tree.text(tree.nodes[node as usize].first);
@@ -351,13 +354,13 @@ impl<'t, 's> GripAnalysis<'t, 's> {
                 && self.task.symbols.late_of(unit).iter().any(|routine| self.may_grip_in(*routine))
     }
 
-    /// Whether a routine may grip something else, by itself or in what it calls.
+    /// Whether a routine may change the gripped load, directly or in what it calls.
     fn may_grip_in(&self, routine: u32) -> bool {
         self.task.symbols.routines[routine as usize].reach.grips
     }
 
-    /// Whether statements under a node may grip something else.
-    fn changes(&self, unit: Unit, node: u32) -> bool {
+    /// Whether statements under a node may change the gripped load.
+    fn statements_may_grip(&self, unit: Unit, node: u32) -> bool {
         let tree = self.tree(unit);
         let end = node + tree.nodes[node as usize].size;
         (node..end).any(|node| match tree.nodes[node as usize].kind {
@@ -390,7 +393,7 @@ impl<'t, 's> GripAnalysis<'t, 's> {
         }
         let start = tree.node_span(node).start;
         if let Some(&motion) = self.motions.get(&(unit.file, start))
-            && !self.silent
+            && !self.dry_run
         {
             self.met.push((motion, state, self.unit));
             let option = arguments(tree, node)
@@ -401,13 +404,13 @@ impl<'t, 's> GripAnalysis<'t, 's> {
                 self.totals.insert(motion, total);
             }
         }
-        let state = if self.asks(unit, node) { Some(Grip::Unknown) } else { state };
+        let state = if self.function_may_grip(unit, node) { Some(Grip::Unknown) } else { state };
         let routine = match *self.task.symbols.called(unit.scope, name) {
             [] if self.may_grip(unit, node) => return Some(Some(Grip::Unknown)),
             [] => return Some(state),
             [routine] => routine,
-            // One of several.
-            ref several if !self.silent => {
+            // One of several possible callees.
+            ref several if !self.dry_run => {
                 for routine in several {
                     let callee = self.task.symbols.routines[*routine as usize].unit as usize;
                     self.calls.push((callee, state, self.unit));
@@ -418,7 +421,7 @@ impl<'t, 's> GripAnalysis<'t, 's> {
         };
         let callee = self.task.symbols.units.iter().position(|unit| unit.routine == Some(routine));
         let Some(callee) = callee else { return Some(Some(Grip::Unknown)) };
-        if !self.silent {
+        if !self.dry_run {
             self.calls.push((callee, state, self.unit));
         }
         Some(match self.exit_of(callee, depth) {
@@ -427,7 +430,7 @@ impl<'t, 's> GripAnalysis<'t, 's> {
         })
     }
 
-    /// What is held when a unit ends.
+    /// State at the end of a unit.
     fn exit_of(&mut self, unit: usize, depth: usize) -> State {
         if let Some(exit) = self.exits[unit] {
             return exit;
@@ -435,11 +438,11 @@ impl<'t, 's> GripAnalysis<'t, 's> {
         if depth >= DEPTH {
             return Some(Grip::Unknown);
         }
-        // A routine that calls itself is not followed further.
+        // Recursive calls are not followed further.
         self.exits[unit] = Some(Some(Grip::Unknown));
-        let silent = std::mem::replace(&mut self.silent, true);
+        let dry_run = std::mem::replace(&mut self.dry_run, true);
         let exit = self.walk(self.task.symbols.units[unit], depth + 1);
-        self.silent = silent;
+        self.dry_run = dry_run;
         self.exits[unit] = Some(exit);
         exit
     }

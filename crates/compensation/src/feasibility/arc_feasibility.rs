@@ -1,8 +1,8 @@
-//! Circular motions that stay because their corrected points make no circle, or one that strays from what was meant.
+//! Arcs that must remain unmodified, or that pin the start before them, because correction would make them different arcs.
 //!
-//! A circle hangs on where it starts. Where the motion before is corrected as well the circle moves as a whole; where it
-//! is not, two points of three move, and of a circle that is small against the correction another one becomes. The same
-//! holds the other way round: a circle that stays becomes another one where the motion before it is corrected.
+//! An arc depends on its start. If the previous motion is corrected too, the arc moves as a whole; otherwise two of its three
+//! points move, and an arc that is small compared with the correction becomes a different one. Conversely, an unmodified arc
+//! becomes a different one where the motion before it is corrected.
 
 use std::collections::BTreeMap;
 
@@ -15,23 +15,23 @@ use crate::target::solved_target::{SolvedTarget, SolvedTargets};
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{Listing, Motion, MotionKind, MotionTarget, TargetValue};
 
-/// How much more or less of a turn the told circle may be than the one that was meant (rad).
+/// Largest difference in swept angle between commanded and intended arc (rad).
 const TURN_RAD: f64 = 0.5;
 
-/// How far it may leave that one, in corrections.
+/// Largest distance from the intended arc, in corrections.
 const SHARE: f64 = 1.5;
 
-/// The same for points that are not corrected at all (mm).
+/// Additional distance allowed for uncorrected points (mm).
 const NEAR_MM: f64 = 5e-3;
 
-/// The largest correction of a circle whose start is not known, in distances of its two points.
+/// Largest correction of an arc with unknown start, relative to the distance of its two points.
 const UNKNOWN_SHARE: f64 = 0.25;
 
-/// Places on a circle that are looked at.
+/// Number of samples on an arc.
 const SAMPLES: u8 = 12;
 
-/// The motions of a listing that cannot be corrected for such a reason, by index. `stays`: motions that are not corrected
-/// for other reasons than their own targets.
+/// The motions that arcs forbid to correct, by index. `stays`: motions that remain unmodified for reasons other than their
+/// own targets.
 pub(crate) fn infeasible_arcs(
     listing: &Listing,
     solved: &SolvedTargets,
@@ -67,7 +67,7 @@ fn all_corrected(targets: &[Result<SolvedTarget, OutcomeReason>]) -> bool {
     !targets.is_empty() && targets.iter().all(can)
 }
 
-/// The circular motions among them.
+/// The arcs themselves that must remain unmodified.
 fn circles(
     listing: &Listing,
     solved: &SolvedTargets,
@@ -111,20 +111,20 @@ fn circles(
     infeasible_arcs
 }
 
-/// Whether a circle has a known start with which its points make none. One that closes is another matter: its ends say
-/// nothing of its plane.
+/// Whether the points of an arc with known start make no circle. Full circles are a separate case: their coincident ends do
+/// not determine their plane.
 fn no_circle(from: &Pose, via: &SolvedTarget, to: &SolvedTarget, motion: &Motion) -> bool {
     distance(&from.translation.vector, &to.intended.translation.vector) >= CLOSED_MM
         && Curve::round(*from, &via.intended, to.intended, motion).is_none()
 }
 
-/// Where a motion that stays ends, in the frames of the one after it.
+/// End of an unmodified motion, in the frames of the following one.
 fn stated(before: &Motion, frames_index: usize, frame_table: &FrameTable) -> Option<Pose> {
     let Ok(TargetValue::Cartesian(target)) = before.to()?.value else { return None };
     (frame_table.of_motion(before).ok()? == frames_index).then(|| target.pose())
 }
 
-/// Whether the circle from a start that is not corrected through two corrected points is another one than was meant.
+/// Whether two corrected points and an uncorrected start make a different arc than intended.
 fn changes_arc(start: Option<Pose>, via: &SolvedTarget, to: &SolvedTarget, motion: &Motion) -> bool {
     let shift = via.shift_mm().max(to.shift_mm());
     let Some(start) = start else {
@@ -132,7 +132,7 @@ fn changes_arc(start: Option<Pose>, via: &SolvedTarget, to: &SolvedTarget, motio
             > UNKNOWN_SHARE * distance(&via.intended.translation.vector, &to.intended.translation.vector);
     };
     if distance(&start.translation.vector, &to.intended.translation.vector) < CLOSED_MM {
-        // A whole circle whose ends do not meet is none.
+        // Full circles need coincident ends.
         return shift > CLOSED_MM;
     }
     let intended = Curve::round(start, &via.intended, to.intended, motion);
@@ -140,8 +140,8 @@ fn changes_arc(start: Option<Pose>, via: &SolvedTarget, to: &SolvedTarget, motio
     is_another_arc(intended, commanded, shift)
 }
 
-/// Whether a circle that stays becomes another one where its start alone is corrected; also where the text does not tell its
-/// points.
+/// Whether an unmodified arc becomes a different one if only its start is corrected; also where the program does not
+/// determine its points.
 fn changes_unmodified_arc(start: &SolvedTarget, motion: &Motion, frame_table: &FrameTable) -> bool {
     let shift = start.shift_mm();
     let pose = |target: &MotionTarget| match target.value {
@@ -158,11 +158,11 @@ fn changes_unmodified_arc(start: &SolvedTarget, motion: &Motion, frame_table: &F
         return shift > CLOSED_MM;
     }
     let intended = Curve::round(start.intended, &via, to, motion);
-    // Points that make no circle stop the controller as the program is.
+    // Points that make no circle already stop the controller in the original program.
     intended.is_some() && is_another_arc(intended, Curve::round(start.commanded, &via, to, motion), shift)
 }
 
-/// Whether a told circle is another one than was meant, where what is corrected moves by `shift` (mm).
+/// Whether a commanded arc differs from the intended one, for corrections of size `shift` (mm).
 fn is_another_arc(intended: Option<Curve>, commanded: Option<Curve>, shift: f64) -> bool {
     let (Some(intended), Some(commanded)) = (intended, commanded) else { return true };
     let turn = |curve: &Curve| curve.arc().map_or(0.0, |arc| arc.sweep);

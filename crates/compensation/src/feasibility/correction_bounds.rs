@@ -1,11 +1,11 @@
-//! Corrections that are not written, whatever they are worth: too far, out of reach, in another configuration.
+//! Bounds that forbid writing a correction: too large, outside joint limits, singular, or in another configuration.
 
 use crate::arms::Arms;
 use crate::options::Options;
 use crate::plan::reason::OutcomeReason;
 use crate::target::solved_target::SolvedTarget;
 
-/// Why a corrected target must not be written. `singularity`: how far its joints are from one.
+/// Why a corrected target must not be written. `singularity`: distance of its joints from a singularity.
 pub(crate) fn forbidden(
     solved: &SolvedTarget,
     singularity: f64,
@@ -26,7 +26,7 @@ pub(crate) fn forbidden(
     if singularity < options.min_singularity {
         return Some(OutcomeReason::NearSingularity);
     }
-    // Without branches cfx is 0 everywhere.
+    // For arms without branches, cfx is always 0.
     if solved.cfx_before != solved.conf.cfx {
         return Some(OutcomeReason::OtherBranch);
     }

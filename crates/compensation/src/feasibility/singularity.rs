@@ -1,19 +1,19 @@
-//! What a correction does near a singularity, and which of the solutions there the controller takes.
+//! Effect of a correction near a singularity, and which solution the controller selects there.
 //!
-//! Method. Elsewhere a correction of a millimetre costs each joint about a millimetre over half an arm's length; at a
-//! distance d from a singularity it costs 1/d of it or more. A correction is written where no joint changes by more than
-//! [`Options::joint_gain`] times its size, and nowhere nearer to a singularity than [`Options::min_singularity`]: at the
-//! target before and after, and at samples of lines and arcs. The margins of the branches are 0 at the singularities and
-//! change by at most about [`STEEP`] with the way that the flange goes (in half arm lengths and rad); a piece of a way at
-//! whose ends they are larger than that cannot come near one and is not looked at further.
+//! Method. Far from singularities a correction of 1 mm moves each joint by about 1 mm over half an arm's length; at distance
+//! d from a singularity, by 1/d times that or more. A correction is written only where no joint changes by more than
+//! [`Options::joint_gain`] times its size, and nowhere closer to a singularity than [`Options::min_singularity`]: at the
+//! target before and after, and at samples of lines and arcs. Branch margins are 0 at the singularities and change by at most
+//! about [`MARGIN_RATE`] per flange travel (half arm lengths and rad); a piece of a segment with larger margins at its ends
+//! cannot come near one and is not sampled further.
 //!
-//! On the same samples joints must stay in their ranges ([`joint_limits`]): between targets within them a corrected
-//! way can leave one where the told way just kept to it.
+//! On the same samples joints must stay within their limits ([`joint_limits`]): between targets within the limits a corrected
+//! segment can exceed one that the original segment just kept.
 //!
-//! The configuration that is written is read again as the controller reads it. To the sign cfx is that of one solution
-//! only; where the text states another one (some arms do not use it) the written numbers are solved again. Where no
-//! configuration counts, lines stay on their branch, and a joint motion goes to the solution nearest to where it starts.
-//! Checked against: a controller of its own in the tests, with all branches by Newton's method from spread seeds.
+//! The written configuration is read again as the controller reads it. With its sign, cfx identifies one solution; where the
+//! text states another cfx (some arms do not use it), the written numbers are solved again. Where no configuration applies,
+//! lines stay on their branch, and a joint motion goes to the solution nearest to its start.
+//! Checked against: an independent controller in the tests, with all branches by Newton's method from spread seeds.
 
 use std::cell::Cell;
 use std::collections::{BTreeMap, HashSet};
@@ -36,44 +36,44 @@ use truegrind_arm::model::Joints;
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{Listing, Motion, MotionKind, MotionTarget, RobTarget, Switch, TargetValue};
 
-/// How fast a margin changes with the way of the flange, at most: the sine of the wrist by as much as the tool turns and
-/// as joints 2 and 3 turn the forearm below it.
-const STEEP: f64 = 3.0;
+/// Largest rate of change of a margin with flange travel: the sine of the wrist angle changes with the rotation of the tool
+/// and with the rotation of the forearm by joints 2 and 3.
+const MARGIN_RATE: f64 = 3.0;
 
-/// Margins of shoulder, elbow and wrist beyond which joints turn no more than a few times as far as elsewhere.
-const CLEAR: [f64; 3] = [0.05, 0.12, 0.15];
+/// Margins of shoulder, elbow and wrist beyond which joints move at most a few times as far as elsewhere.
+const CLEAR_MARGIN: [f64; 3] = [0.05, 0.12, 0.15];
 
-/// No piece of a way is cut finer than this (in half arm lengths and rad), nor than [`SHARP`] of its smallest margin.
+/// Shortest piece of a segment (half arm lengths and rad), together with [`FINEST_SHARE`] of its smallest margin.
 const FINEST: f64 = 3e-4;
 /// See [`FINEST`]: the joints sweep within about the margin itself.
-const SHARP: f64 = 0.2;
+const FINEST_SHARE: f64 = 0.2;
 
-/// Samples of one way at most.
+/// Most samples of one segment.
 const MOST_SAMPLES: usize = 400;
 
-/// What stands next to a border of branches, where a start that is not known decides between them.
-const OPEN: f64 = 0.05;
+/// Margin below which an unknown start decides between two branches.
+const BORDER_MARGIN: f64 = 0.05;
 
-/// The joints that the controller takes for written numbers may differ by this from those that were meant (rad).
+/// Largest difference between the joints that the controller computes from written numbers and the intended ones (rad).
 const SAME_RAD: f64 = 1e-6;
 
-/// The distance to the singularity of the pose before is worked out where that after is below so many times the bound.
-const WATCHED: f64 = 20.0;
+/// The singularity distance before the correction is computed where that after is below so many times the bound.
+const SINGULARITY_WATCH: f64 = 20.0;
 
-/// What the controller makes of the numbers of one target.
+/// What the controller computes from the numbers of one target.
 pub(crate) struct WrittenTarget<'a> {
-    /// Poses of the flange that the controller computes, before and after.
+    /// Flange poses that the controller computes, before and after.
     pub(crate) flanges: [Pose; 2],
-    /// The latter of the numbers as they are written.
+    /// The latter, from the numbers as written.
     pub(crate) read_back: &'a Pose,
     /// Its joints for them.
     pub(crate) joints: &'a Joints,
-    /// The target, where its configuration counts.
+    /// The target, where its configuration applies.
     pub(crate) stated: Option<&'a RobTarget>,
 }
 
-/// Why a target must not be corrected, for what its joints do or because the controller takes others. `singularity`: how far
-/// the joints after are from one.
+/// Why a target must not be corrected, because of its joint motion or because the controller selects other joints.
+/// `singularity`: singularity distance of the corrected joints.
 pub(crate) fn target_fault(
     solved: &SolvedTarget,
     singularity: f64,
@@ -86,13 +86,14 @@ pub(crate) fn target_fault(
     if let Some(joint_jump) = joint_jump([from, to], joints, &arms.nominal, options) {
         return Some(joint_jump);
     }
-    if singularity < WATCHED * options.min_singularity
+    if singularity < SINGULARITY_WATCH * options.min_singularity
         && arms.nominal.singularity(&solved.before) < options.min_singularity
     {
         return Some(OutcomeReason::NearSingularity);
     }
     let stated = replay.stated.filter(|stated| stated.conf[3] != solved.conf.cfx)?;
-    // The quarters are written as they are; cfx is not the one of these joints, so others may fit better.
+    // The quarter turns are written, but cfx is not that of these joints, so another solution can match
+    // better.
     let conf = [solved.conf.cf1, solved.conf.cf4, solved.conf.cf6, stated.conf[3]];
     let written = RobTarget { conf, ..*stated };
     let taken = configured(&arms.nominal, replay.read_back, &written, Switch::On, Some(replay.joints));
@@ -123,8 +124,8 @@ fn joint_jump(
     })
 }
 
-/// Whether a target that is put in turns a joint too far against where the arm stands with the program as it is. `intended`
-/// and `commanded`: the poses in the work object.
+/// Whether an inserted target turns a joint too far relative to the original program. `intended` and `commanded`: poses in
+/// the work object.
 pub(crate) fn jumps_joint(
     [intended, commanded]: [&Pose; 2],
     joints: &Joints,
@@ -139,16 +140,16 @@ pub(crate) fn jumps_joint(
     })
 }
 
-/// How far a pose is from another: the shift over half an arm's length, and the turn (rad).
+/// Distance of two flange poses: displacement over half an arm's length, plus rotation (rad).
 fn flange_travel(from: &Pose, to: &Pose, nominal: &Inverse<'_>) -> f64 {
     let shift = (to.translation.vector - from.translation.vector).norm();
     shift / nominal.length_mm() + from.rotation.angle_to(&to.rotation)
 }
 
-/// Forbids the motions whose ways or starts do not allow their correction; whether any was.
+/// Forbids motions whose segment or start does not allow their correction; returns whether any was.
 ///
-/// `stays`: absent, all motions are looked at as if each corrected one stood beside corrected ones; present, those that
-/// start where a motion stays, in the order of the program.
+/// `stays`: if absent, every motion is checked as if its neighbours were corrected too; if present, those that start at an
+/// unmodified motion, in program order.
 pub(crate) fn forbid_segments(
     listing: &Listing,
     solved: &mut SolvedTargets,
@@ -160,7 +161,7 @@ pub(crate) fn forbid_segments(
 ) -> bool {
     let none = BTreeMap::new();
     let mut ways =
-        SegmentChecker { listing, solved, left: stays.unwrap_or(&none), frame_table, arms, options };
+        SegmentChecker { listing, solved, unchanged: stays.unwrap_or(&none), frame_table, arms, options };
     let found = match stays {
         None => ways.forbid_each(),
         Some(stays) => stays.keys().map(|motion| *motion as usize).collect(),
@@ -168,26 +169,26 @@ pub(crate) fn forbid_segments(
     ways.forbid_after_unchanged(&found, budget) || (stays.is_none() && !found.is_empty())
 }
 
-/// Suspect motions that one thread takes at a time.
+/// Suspect motions per parallel work item.
 const PORTION: usize = 64;
 
-/// Samples for all ways of a program, so many at least, and so many for each motion.
+/// Samples for all segments of a program: at least so many, and so many per motion.
 const SAMPLES: usize = 300_000;
 /// See [`SAMPLES`].
 const SAMPLES_EACH: usize = 2;
 
-/// The ways between the targets of a program.
+/// The segments between the targets of a program.
 struct SegmentChecker<'a> {
     listing: &'a Listing,
     solved: &'a mut SolvedTargets,
-    /// Motions that stay although their targets could be corrected.
-    left: &'a BTreeMap<u32, OutcomeReason>,
+    /// Motions that remain unmodified although their targets could be corrected.
+    unchanged: &'a BTreeMap<u32, OutcomeReason>,
     frame_table: &'a FrameTable,
     arms: &'a Arms<'a>,
     options: &'a Options,
 }
 
-/// Where a motion starts.
+/// Start of a motion.
 struct SegmentStart {
     frames_index: usize,
     commanded: Pose,
@@ -198,16 +199,16 @@ struct SegmentStart {
     corrected: bool,
 }
 
-/// A margin is about so many times the distance to singularity.
+/// Ratio of a branch margin to the singularity distance.
 const WITHOUT_BRANCHES: f64 = 5.0;
 
-/// Margins at some joints of the data-sheet arm; for one without branches what its distance to singularity says.
+/// Branch margins at joints of the nominal arm; for an arm without branches, from its singularity distance.
 fn margins(branches: [f64; 3], joints: &Joints, nominal: &Inverse<'_>) -> [f64; 3] {
     if branches == [1.0; 3] { [nominal.singularity(joints) * WITHOUT_BRANCHES; 3] } else { branches }
 }
 
 impl SegmentChecker<'_> {
-    /// All motions side by side; hands back those that are forbidden.
+    /// Checks all motions in parallel; returns those that are forbidden.
     fn forbid_each(&mut self) -> HashSet<usize> {
         let count = self.listing.motions.len();
         let found: Vec<(usize, OutcomeReason)> = {
@@ -230,13 +231,13 @@ impl SegmentChecker<'_> {
         found.into_iter().map(|(motion, _)| motion).collect()
     }
 
-    /// Samples of each way, where so many have to be looked at.
+    /// Samples per segment for so many suspects.
     fn samples(&self, suspects: usize) -> usize {
         let all = SAMPLES.max(SAMPLES_EACH * self.listing.motions.len());
         (all / suspects.max(1)).clamp(1, MOST_SAMPLES)
     }
 
-    /// In order, those that start where another one stays; whether any is forbidden.
+    /// Checks, in order, motions that start at an unmodified one; returns whether any is forbidden.
     fn forbid_after_unchanged(
         &mut self,
         unchanged_motions: &HashSet<usize>,
@@ -249,7 +250,7 @@ impl SegmentChecker<'_> {
         for motion in 0..self.listing.motions.len() {
             if self.leaves_branch_ambiguous(motion, &open) {
                 open.insert(motion);
-                if self.corrected(motion).is_some() && !self.left.contains_key(&(motion as u32)) {
+                if self.corrected(motion).is_some() && !self.unchanged.contains_key(&(motion as u32)) {
                     self.solved.forbid(motion, OutcomeReason::AmbiguousBranch);
                     stay.insert(motion);
                     found = true;
@@ -260,7 +261,7 @@ impl SegmentChecker<'_> {
                 continue;
             };
             if stay.contains(&previous)
-                && !self.left.contains_key(&(motion as u32))
+                && !self.unchanged.contains_key(&(motion as u32))
                 && let Some(why) = self.segment_fault(motion, samples, budget)
             {
                 self.solved.forbid(motion, why);
@@ -283,8 +284,8 @@ impl SegmentChecker<'_> {
         found
     }
 
-    /// Whether the text leaves open to which of several solutions a motion leads: no configuration is checked there for
-    /// certain, and it goes on from where that is `open`, or is one of those for which it is.
+    /// Whether the program leaves open which of several solutions a motion reaches: no configuration is certainly checked
+    /// there, and it continues from a motion in `open` or is ambiguous itself.
     fn leaves_branch_ambiguous(&self, index: usize, open: &HashSet<usize>) -> bool {
         let motion = &self.listing.motions[index];
         let pose = |target: &MotionTarget| matches!(target.value, Ok(TargetValue::Cartesian(_)));
@@ -296,22 +297,22 @@ impl SegmentChecker<'_> {
         if goes_on || forbidden == Some(OutcomeReason::AmbiguousBranch) {
             return true;
         }
-        // A motion that stays for another reason has not been asked yet.
-        if self.corrected(index).is_some() && !self.left.contains_key(&(index as u32)) {
+        // A motion that remains unmodified for another reason has not been checked yet.
+        if self.corrected(index).is_some() && !self.unchanged.contains_key(&(index as u32)) {
             return false;
         }
-        match (self.solved.original_end(index), self.from(motion)) {
+        match (self.solved.original_end(index), self.segment_start(motion)) {
             (None, _) => false,
-            (Some(end), None) => end.margins.iter().any(|margin| margin.abs() < OPEN),
+            (Some(end), None) => end.margins.iter().any(|margin| margin.abs() < BORDER_MARGIN),
             (Some(end), Some(from)) => {
                 motion.kind == MotionKind::Joint
-                    && self.not_nearest(&from.joints[1], end.frames_index, &end.intended, &end.joints)
+                    && self.is_not_nearest(&from.joints[1], end.frames_index, &end.intended, &end.joints)
             }
         }
     }
 
-    /// Why a motion that stays must not start where another one is corrected: its way would come too close to a singularity
-    /// from there, or a joint leave its range.
+    /// Why a motion must not be corrected because the next, unmodified one starts there: its segment would come too close to
+    /// a singularity, or a joint would exceed its limits.
     fn endangers_unchanged(
         &self,
         index: usize,
@@ -324,12 +325,12 @@ impl SegmentChecker<'_> {
 
     fn unchanged_segment_fault(&self, index: usize, samples: &Cell<usize>) -> Option<OutcomeReason> {
         let motion = &self.listing.motions[index];
-        let stays = self.left.contains_key(&(index as u32)) || self.corrected(index).is_none();
+        let stays = self.unchanged.contains_key(&(index as u32)) || self.corrected(index).is_none();
         let curve = matches!(motion.kind, MotionKind::Linear | MotionKind::Circular);
         if !stays || !curve || motion.modal.wrist_interpolation == Switch::On {
             return None;
         }
-        let from = self.from(motion).filter(|from| from.corrected)?;
+        let from = self.segment_start(motion).filter(|from| from.corrected)?;
         let targets = self.solved.original_targets(index);
         let to = targets.last()?;
         let nominal = &self.arms.nominal;
@@ -338,7 +339,7 @@ impl SegmentChecker<'_> {
         let far = flange_travel(&start[1], &to.intended, nominal) * LEVER;
         let end = margins(to.margins, &to.joints, nominal);
         if motion.kind == MotionKind::Linear
-            && self.free([&from.joints[1], &to.joints], [&from.margins, &end], far)
+            && self.is_clear([&from.joints[1], &to.joints], [&from.margins, &end], far)
         {
             return None;
         }
@@ -350,12 +351,12 @@ impl SegmentChecker<'_> {
             }
             _ => return None,
         };
-        let cost = cost(&curves[1], &commanded, nominal);
-        let walk = PathCheck { nominal, commanded, curves, cost, samples, options: self.options };
-        walk.between(&walk.reached(0.0, from.joints[1]), &walk.reached(1.0, to.joints))
+        let curve_travel = curve_travel(&curves[1], &commanded, nominal);
+        let check = PathCheck { nominal, commanded, curves, curve_travel, samples, options: self.options };
+        check.check_piece(&check.reached(0.0, from.joints[1]), &check.reached(1.0, to.joints))
     }
 
-    /// The motion with its last target, if it is to be corrected.
+    /// The motion with its last target, if it is corrected.
     fn corrected(&self, index: usize) -> Option<(&Motion, &SolvedTarget)> {
         let motion = &self.listing.motions[index];
         let all = |solved: &Result<SolvedTarget, OutcomeReason>| {
@@ -366,11 +367,12 @@ impl SegmentChecker<'_> {
         (is_rewritable(motion, self.options) && targets.iter().all(all)).then_some((motion, to))
     }
 
-    /// Where a motion starts, if that is known.
-    fn from(&self, motion: &Motion) -> Option<SegmentStart> {
+    /// Start of a motion, if known.
+    fn segment_start(&self, motion: &Motion) -> Option<SegmentStart> {
         let previous = motion.previous?;
         let nominal = &self.arms.nominal;
-        let corrected = self.corrected(previous as usize).is_some() && !self.left.contains_key(&previous);
+        let corrected =
+            self.corrected(previous as usize).is_some() && !self.unchanged.contains_key(&previous);
         if let (true, Some(Ok(end))) = (corrected, self.solved.of(previous as usize).last()) {
             let margins = margins(end.margins[1], &end.after, nominal);
             let joints = [end.before, end.after];
@@ -393,32 +395,32 @@ impl SegmentChecker<'_> {
         })
     }
 
-    /// Whether the way of a motion, or the choice of its configuration, needs a closer look.
+    /// Whether the segment of a motion, or the choice of its configuration, must be checked closely.
     fn needs_check(&self, index: usize) -> bool {
         let Some((motion, to)) = self.corrected(index) else { return false };
-        let from = self.from(motion);
+        let from = self.segment_start(motion);
         let open = self.written(motion) && monitored(motion) != Switch::On;
         let here = margins(to.margins[1], &to.after, &self.arms.nominal);
-        let Some(from) = from else { return open && here.iter().any(|m| m.abs() < OPEN) };
+        let Some(from) = from else { return open && here.iter().any(|m| m.abs() < BORDER_MARGIN) };
         let there = from.margins;
         if open && motion.kind == MotionKind::Joint {
-            return (to.after - from.joints[1]).amax() > LONE * alone(&here);
+            return (to.after - from.joints[1]).amax() > NEAREST_SHARE * nearest_branch_rad(&here);
         }
         if !self.curve(motion) {
             return false;
         }
-        // The told way of a circle is longer than between its ends.
+        // The commanded circle is longer than its chord.
         motion.kind == MotionKind::Circular
             || from.frames_index != to.frames_index
-            || !self.free(
+            || !self.is_clear(
                 [&from.joints[1], &to.after],
                 [&there, &here],
                 flange_travel(&from.commanded, &to.commanded, &self.arms.nominal) * LEVER,
             )
     }
 
-    /// Whether nothing can happen on a way between these joints.
-    fn free(&self, joints: [&Joints; 2], margins: [&[f64; 3]; 2], flange_travel: f64) -> bool {
+    /// Whether a segment between these joints is certainly free of faults.
+    fn is_clear(&self, joints: [&Joints; 2], margins: [&[f64; 3]; 2], flange_travel: f64) -> bool {
         let limits = &self.arms.nominal.arm().model.limits;
         clear(margins[0], margins[1], flange_travel)
             && joint_limits::within_limits(limits, joints, margins, flange_travel)
@@ -429,7 +431,7 @@ impl SegmentChecker<'_> {
         motion.to().is_some_and(|target| !as_joints(motion, target, self.options.emit))
     }
 
-    /// Whether the controller interpolates the pose on the way.
+    /// Whether the controller interpolates the pose along the segment.
     fn curve(&self, motion: &Motion) -> bool {
         match motion.kind {
             MotionKind::Linear => self.options.emit == Emit::Targets,
@@ -438,8 +440,8 @@ impl SegmentChecker<'_> {
         }
     }
 
-    /// Why a motion must not be corrected for its way, or for the choice of its configuration; also where that could not be
-    /// looked at to the end.
+    /// Why a motion must not be corrected because of its segment or the choice of its configuration; also where the check
+    /// could not be completed.
     fn segment_fault(
         &self,
         index: usize,
@@ -458,15 +460,15 @@ impl SegmentChecker<'_> {
     fn segment_fault_within(&self, index: usize, samples: &Cell<usize>) -> Option<OutcomeReason> {
         let (motion, to) = self.corrected(index)?;
         let open = self.written(motion) && monitored(motion) != Switch::On;
-        let Some(from) = self.from(motion) else {
-            return (open && to.margins[1].iter().any(|m| m.abs() < OPEN))
+        let Some(from) = self.segment_start(motion) else {
+            return (open && to.margins[1].iter().any(|m| m.abs() < BORDER_MARGIN))
                 .then_some(OutcomeReason::AmbiguousBranch);
         };
         if open && motion.kind == MotionKind::Joint {
-            let another = self.not_nearest(&from.joints[1], to.frames_index, &to.commanded, &to.after);
+            let another = self.is_not_nearest(&from.joints[1], to.frames_index, &to.commanded, &to.after);
             return another.then_some(OutcomeReason::AmbiguousBranch);
         }
-        // With SingArea \Wrist the wrist goes in joints, past its singularity.
+        // With SingArea \Wrist the wrist is interpolated in joints, through its singularity.
         if !self.curve(motion) || motion.modal.wrist_interpolation == Switch::On {
             return None;
         }
@@ -482,22 +484,22 @@ impl SegmentChecker<'_> {
             ],
             _ => return None,
         };
-        let cost = cost(&curves[1], &commanded, &self.arms.nominal);
-        let walk = PathCheck {
+        let curve_travel = curve_travel(&curves[1], &commanded, &self.arms.nominal);
+        let check = PathCheck {
             nominal: &self.arms.nominal,
             commanded,
             curves,
-            cost,
+            curve_travel,
             samples,
             options: self.options,
         };
-        let begin = walk.reached(0.0, from.joints[1]);
-        let end = walk.reached(1.0, to.after);
-        walk.between(&begin, &end)
+        let begin = check.reached(0.0, from.joints[1]);
+        let end = check.reached(1.0, to.after);
+        check.check_piece(&begin, &end)
     }
 
-    /// Whether another solution is as near to where a joint motion starts as the one that was meant.
-    fn not_nearest(&self, near: &Joints, frames_index: usize, commanded: &Pose, joints: &Joints) -> bool {
+    /// Whether another solution is as near to the start of a joint motion as the intended one.
+    fn is_not_nearest(&self, near: &Joints, frames_index: usize, commanded: &Pose, joints: &Joints) -> bool {
         let flange = self.frame_table.list[frames_index].commanded.flange_for(commanded);
         let distance = |joints: &Joints| [(joints - near).norm(), (joints - near).amax()];
         let [intended, meant_most] = distance(joints);
@@ -508,60 +510,60 @@ impl SegmentChecker<'_> {
     }
 }
 
-/// Solutions that differ by less are one (rad): rounding moves them by less, branches lie farther apart.
+/// Solutions closer than this are the same (rad): rounding moves them by less, branches are farther apart.
 const SAME: f64 = 1e-4;
 
-/// The flange goes farther than the tool where that turns: by so much of its length and turn, which only decides which
-/// ways are looked at.
+/// The flange travels farther than the tool where the tool rotates: factor on its travel, which only selects the segments to
+/// check.
 const LEVER: f64 = 1.5;
 
-/// How far the nearest other solution is from one with these margins, at least (rad): joint 3 or 1 on the other side, or
-/// joint 4 half a turn away.
-fn alone(margins: &[f64; 3]) -> f64 {
+/// Smallest distance to the nearest other solution with these margins (rad): joint 3 or 1 on the other side, or joint 4 half
+/// a turn away.
+fn nearest_branch_rad(margins: &[f64; 3]) -> f64 {
     margins[0].abs().min(margins[1].abs()).min(1.0) * 1.5
 }
 
-/// Share of that within which the start cannot be nearer to the other one, by the largest joint or by the sum of squares:
-/// 1/(1 + √6).
-const LONE: f64 = 0.28;
+/// Share of that within which the start cannot be nearer to the other solution, by the largest joint change or by the sum of
+/// squares: 1/(1 + √6).
+const NEAREST_SHARE: f64 = 0.28;
 
-/// Whether a piece of a way with these margins at its ends keeps clear of singularities.
+/// Whether a piece of a segment with these margins at its ends is clear of singularities.
 fn clear(from: &[f64; 3], to: &[f64; 3], flange_travel: f64) -> bool {
     (0..3).all(|k| {
         (from[k] < 0.0) == (to[k] < 0.0)
-            && from[k].abs() + to[k].abs() - STEEP * flange_travel > 2.0 * CLEAR[k]
+            && from[k].abs() + to[k].abs() - MARGIN_RATE * flange_travel > 2.0 * CLEAR_MARGIN[k]
     })
 }
 
-/// Length of a curve as the flange goes it (see [`flange_travel`]), from eight pieces.
-fn cost(curve: &Curve, commanded: &FramePair, nominal: &Inverse<'_>) -> f64 {
+/// Flange travel along a curve (see [`flange_travel`]), from eight pieces.
+fn curve_travel(curve: &Curve, commanded: &FramePair, nominal: &Inverse<'_>) -> f64 {
     const PIECES: usize = 8;
     let at = |k: usize| commanded.flange_for(&curve.at(k as f64 / PIECES as f64));
     (0..PIECES).map(|k| flange_travel(&at(k), &at(k + 1), nominal)).sum()
 }
 
-/// One corrected way, beside the one of the program as it is.
+/// A corrected segment beside the original one.
 struct PathCheck<'a> {
     nominal: &'a Inverse<'a>,
     commanded: FramePair,
-    /// As it is, and as it is told.
+    /// Original and commanded.
     curves: [Curve; 2],
-    /// See [`cost`].
-    cost: f64,
-    /// Samples that may still be taken.
+    /// See [`curve_travel`].
+    curve_travel: f64,
+    /// Remaining samples.
     samples: &'a Cell<usize>,
     options: &'a Options,
 }
 
-/// Why a way ends where it has no joints.
-fn nowhere(error: InverseError) -> OutcomeReason {
+/// Reason where a segment has no solution.
+fn unreachable_reason(error: InverseError) -> OutcomeReason {
     match error {
         InverseError::OutsideLimits { joint, .. } => OutcomeReason::PathOutsideLimits { joint },
         _ => OutcomeReason::SingularPath,
     }
 }
 
-/// A place on the corrected way.
+/// A sample of the corrected segment.
 struct PathSample {
     share: f64,
     joints: Joints,
@@ -577,13 +579,13 @@ impl PathCheck<'_> {
         PathSample { share, joints, margins }
     }
 
-    /// Why a piece of the way must not be gone.
-    fn between(&self, a: &PathSample, b: &PathSample) -> Option<OutcomeReason> {
-        let flange_travel = (b.share - a.share) * self.cost;
+    /// Why a piece of the segment must not be executed.
+    fn check_piece(&self, a: &PathSample, b: &PathSample) -> Option<OutcomeReason> {
+        let flange_travel = (b.share - a.share) * self.curve_travel;
         let least = a.margins.iter().chain(&b.margins).fold(f64::INFINITY, |least, m| least.min(m.abs()));
         let crosses = (0..3).any(|k| (a.margins[k] < 0.0) != (b.margins[k] < 0.0));
-        let regular =
-            clear(&a.margins, &b.margins, flange_travel) || (!crosses && flange_travel < SHARP * least);
+        let regular = clear(&a.margins, &b.margins, flange_travel)
+            || (!crosses && flange_travel < FINEST_SHARE * least);
         let limits = &self.nominal.arm().model.limits;
         let keeps = || {
             joint_limits::within_limits(
@@ -597,27 +599,27 @@ impl PathCheck<'_> {
             return crosses.then_some(OutcomeReason::SingularPath);
         }
         self.samples.set(self.samples.get() - 1);
-        let middle = match self.place(0.5 * (a.share + b.share), a) {
+        let middle = match self.sample_at(0.5 * (a.share + b.share), a) {
             Ok(middle) => middle,
             Err(why) => return why,
         };
         if regular && joint_limits::within_limits_curved(limits, [&a.joints, &middle.joints, &b.joints]) {
             return None;
         }
-        self.between(a, &middle).or_else(|| self.between(&middle, b))
+        self.check_piece(a, &middle).or_else(|| self.check_piece(&middle, b))
     }
 
-    /// A place on the way, reached from one nearby; else what is to be said of the way.
-    fn place(&self, share: f64, near: &PathSample) -> Result<PathSample, Option<OutcomeReason>> {
+    /// A sample solved from a nearby one; otherwise the reason, if any.
+    fn sample_at(&self, share: f64, near: &PathSample) -> Result<PathSample, Option<OutcomeReason>> {
         let [intended, flange] = [0, 1].map(|k| self.commanded.flange_for(&self.curves[k].at(share)));
         let before = || self.nominal.solve_near(&intended, &near.joints).ok();
         let solution = match self.nominal.solve_near(&flange, &near.joints) {
             Ok(solution) => solution,
-            // Where the program as it is cannot go either, the bend of the way says so.
-            Err(error) => return Err(before().map(|_| nowhere(error))),
+            // Where the original segment has no solution either, the path deviation reports it.
+            Err(error) => return Err(before().map(|_| unreachable_reason(error))),
         };
         let place = self.reached(share, solution.joints);
-        if (0..3).all(|k| place.margins[k].abs() > CLEAR[k]) {
+        if (0..3).all(|k| place.margins[k].abs() > CLEAR_MARGIN[k]) {
             return Ok(place);
         }
         if self.nominal.singularity(&place.joints) < self.options.min_singularity {

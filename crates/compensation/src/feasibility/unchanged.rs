@@ -1,4 +1,4 @@
-//! Which motions stay as they are, and why: each for a reason of its own, or since another one stays.
+//! Which motions remain unmodified, and why: for a reason of their own, or because another one does.
 
 use std::collections::BTreeMap;
 
@@ -16,9 +16,9 @@ use truegrind_arm::inverse::InverseError;
 use truegrind_arm::inverse::budget::SearchBudget;
 use truegrind_programs::motion::{Listing, MotionKind, Reason};
 
-/// The motions whose targets could be corrected and that stay all the same, with the reason: what the writer refused,
-/// circles that would become others, and the rest of a cut of which a part stays; ways past a singularity are forbidden
-/// among the targets. What stays moves the start of what follows, so each may bring about another, until none does.
+/// The motions that remain unmodified although their targets could be corrected, with reasons: refused by the writer, arcs
+/// that would change, and the rest of a cut with an unmodified motion; segments near a singularity are forbidden among the
+/// targets. An unmodified motion moves the start of the next one, so this repeats until no motion is added.
 pub(crate) fn unchanged_motions(
     listing: &Listing,
     solved: &mut SolvedTargets,
@@ -29,7 +29,7 @@ pub(crate) fn unchanged_motions(
 ) -> BTreeMap<u32, OutcomeReason> {
     let mut stays = refused.clone();
     let cuts = cut::of(listing);
-    // For ways that start where another motion stays, over all rounds.
+    // For segments that start where another motion remains unmodified, over all rounds.
     let mut budget = SearchBudget::of(search_budget::WAYS);
     let mut forbidden = forbid_segments(listing, solved, frame_table, arms, options, None, &mut budget);
     let mut rounds = (MOST_VISITS / listing.motions.len().max(1)).clamp(FEWEST_ROUNDS, MOST_ROUNDS);
@@ -55,7 +55,8 @@ pub(crate) fn unchanged_motions(
         }
         rounds -= 1;
         if rounds == 0 {
-            // A program of which every round takes away another piece is left as it is.
+            // No fixpoint was reached: every round pinned more motions, so the whole program remains
+            // unmodified.
             let all = 0..listing.motions.len() as u32;
             stays.extend(all.filter(|m| !stays.contains_key(m)).map(|m| (m, ABANDONED)).collect::<Vec<_>>());
             return stays;
@@ -64,15 +65,15 @@ pub(crate) fn unchanged_motions(
     }
 }
 
-/// Motions that are looked at again, over all rounds, for what stays because another one does.
+/// Motions visited over all rounds.
 const MOST_VISITS: usize = 4_000_000;
-/// So many rounds are always made.
+/// Smallest number of rounds.
 const FEWEST_ROUNDS: usize = 16;
-/// More are never made: cut after cut would stay, each for the one before it.
+/// Largest number of rounds: otherwise cut after cut could be pinned, each by the previous one.
 const MOST_ROUNDS: usize = 1000;
 const ABANDONED: OutcomeReason = OutcomeReason::Inverse(InverseError::Abandoned);
 
-/// Why a motion stays as it is, first what the text does not tell, then what no arm reaches; `None` where it is corrected.
+/// Why a motion remains unmodified: first what the text leaves open, then what no arm reaches; `None` where it is corrected.
 pub(crate) fn blocking_reason(
     index: u32,
     listing: &Listing,
@@ -102,7 +103,7 @@ pub(crate) fn blocking_reason(
     Some((if matches!(why, OutcomeReason::Risk { .. }) { Status::Left } else { Status::Refused }, why))
 }
 
-/// What a motion is that stays as it is: left where the text does not tell enough, refused where what it says cannot be.
+/// Status of an unmodified motion: left where the text states too little, refused where what it states is impossible.
 fn unchanged(why: OutcomeReason) -> Status {
     match why {
         OutcomeReason::Program(Reason::BeyondReach | Reason::NumberRange) => Status::Refused,

@@ -1,12 +1,12 @@
-//! A program without an arm to correct it for: nothing changes, and each motion says what the text tells of it.
+//! The plan of a program without an estimated arm: nothing changes, and each motion has the reason that its text alone gives.
 
 use crate::options::{Options, is_rewritable};
 use crate::plan::reason::OutcomeReason;
 use crate::plan::{MotionOutcome, Plan};
 use truegrind_programs::motion::{Listing, Motion, Reason};
 
-/// The plan that changes nothing. A motion that a model could correct is [`OutcomeReason::NoChange`]; any other has the reason that it
-/// would have with a model too.
+/// The plan that changes nothing. A motion that a model could correct has [`OutcomeReason::NoChange`]; every other motion has
+/// the reason that it would also have with a model.
 pub fn listing_only_plan(listing: &Listing, options: &Options) -> Plan {
     let outcomes = (0..).zip(&listing.motions).map(|(index, motion)| MotionOutcome {
         reason: Some(why(listing, motion, options)),

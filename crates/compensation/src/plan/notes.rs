@@ -1,4 +1,4 @@
-//! What a plan says beside its motions: what was not looked at or taken on trust, what backlash and loads mean here.
+//! Notes of a plan: what was not checked, what was assumed, and how backlash and payload enter.
 
 use crate::arms::{Arms, is_load_dependent};
 use crate::options::Options;
@@ -6,7 +6,7 @@ use crate::target::solved_target::SolvedTargets;
 use truegrind_arm::effect::Effect;
 use truegrind_programs::motion::{Listing, Motion, MotionKind, Switch};
 
-/// What backlash means for this program.
+/// How backlash enters this program.
 pub(crate) fn play_note(arms: &Arms<'_>, solved: &SolvedTargets) -> Option<String> {
     let plays = arms.conditions.play_rad.iter().enumerate().filter(|(_, play)| **play != 0.0);
     let plays: Vec<String> =
@@ -27,7 +27,7 @@ pub(crate) fn play_note(arms: &Arms<'_>, solved: &SolvedTargets) -> Option<Strin
     ))
 }
 
-/// What may be wrong with the arm besides what is corrected.
+/// Doubtful effects: not corrected, but counted in every σ.
 pub(crate) fn doubt_note(arms: &Arms<'_>) -> Option<String> {
     let still = arms.estimated.arm().model.effects.iter().filter(|effect| effect.is_zero());
     let named: Vec<String> = still
@@ -40,7 +40,7 @@ pub(crate) fn doubt_note(arms: &Arms<'_>) -> Option<String> {
         .then(|| format!("in doubt, so not corrected for, but counted in every σ: {}", named.join(", ")))
 }
 
-/// What was not looked at, or taken on trust, and where.
+/// What was not checked or was assumed, with line numbers.
 pub(crate) fn open_notes(listing: &Listing, solved: &SolvedTargets, unchecked: &[u32]) -> Vec<String> {
     let mut out = Vec::new();
     if let Some(lines) = lines_of(listing, unchecked) {
@@ -88,9 +88,9 @@ pub(crate) fn open_notes(listing: &Listing, solved: &SolvedTargets, unchecked: &
     out
 }
 
-/// The lines of motions, the first few; `None` where there are none.
+/// Line numbers of motions, the first few; `None` without any.
 fn lines_of(listing: &Listing, motions: &[u32]) -> Option<String> {
-    /// How many lines are named.
+    /// How many lines are listed.
     const NAMED: usize = 8;
     let mut lines: Vec<String> =
         motions.iter().map(|m| listing.motions[*m as usize].place.line.to_string()).take(4 * NAMED).collect();
@@ -105,7 +105,7 @@ fn lines_of(listing: &Listing, motions: &[u32]) -> Option<String> {
     Some(format!("{word} {}{more}", lines.join(", ")))
 }
 
-/// What was taken for the load of the arm.
+/// Which payload was assumed.
 pub(crate) fn load_notes(listing: &Listing, arms: &Arms<'_>, options: &Options) -> Vec<String> {
     let model = arms.estimated.arm().model;
     let load_dependent = model.effects.iter().any(is_load_dependent);

@@ -1,12 +1,13 @@
-//! Rewriting: for every target what was meant, which joints make the estimated arm reach it, and what the controller
-//! must be told.
+//! The planner: for every target the intended pose, the joints with which the estimated arm reaches it, and the commanded
+//! pose.
 //!
-//! With P the target in the work object, T and W tool and work object (as told t, w; as real t*, w*), N the nominal and
-//! E the estimated forward map: the program as it is reaches E(N⁻¹(w P t⁻¹)); meant is w* P in the base; the joints that
-//! reach it are q = E⁻¹(w* P t*⁻¹); the controller goes there when it is told P′ = w⁻¹ N(q) t, or q itself.
+//! Let P be the target in the work object; t and w tool and work object as programmed, t* and w* the real ones; N and E the
+//! nominal and the estimated forward map. The original program reaches E(N⁻¹(w P t⁻¹)); the intended pose in the base is w*
+//! P; the joints that reach it are q = E⁻¹(w* P t*⁻¹); the controller moves there when commanded P′ = w⁻¹ N(q) t, or q
+//! itself.
 //!
-//! Between two ends of a straight line the told path is a straight line of the *nominal* arm; the estimated arm bends
-//! it a little. The bend is sampled, and where it exceeds the tolerance targets are put in, by bisection.
+//! Between two corrected ends the commanded line is straight for the *nominal* arm; the estimated arm deviates slightly from
+//! it. The deviation is sampled, and where it exceeds the tolerance, targets are inserted by bisection.
 
 use std::collections::BTreeMap;
 
@@ -41,23 +42,23 @@ use truegrind_programs::rewrite::{Change, NewTarget};
 
 /// Plans the rewrite of a program.
 ///
-/// Motions are independent but for those without monitored configuration (ConfL\Off), which go from the motion
-/// before; the result does not depend on the number of threads.
+/// Motions are independent, except those with unmonitored configuration (ConfL\Off), which continue from the previous motion;
+/// the result does not depend on the number of threads.
 pub fn plan(listing: &Listing, estimated: &Estimated, cell: &Cell, options: &Options) -> Plan {
     SolvedProgram::of(listing, estimated, cell, options).plan(&BTreeMap::new())
 }
 
-/// The targets of a program, worked out once for any number of plans.
+/// The solved targets of a program; they serve any number of plans.
 pub(crate) struct SolvedProgram<'a> {
     listing: &'a Listing,
     options: &'a Options,
     arms: Arms<'a>,
     frame_table: FrameTable,
-    /// The program as it is, where joints have play: only then targets are worked out once more.
+    /// The original program, if joints have backlash: only then are targets solved again.
     program: Option<OriginalProgram<'a>>,
     assessment: Assessment,
     solved: SolvedTargets,
-    /// The motions that stay as they are in `solved`.
+    /// The unmodified motions that `solved` was computed with.
     solved_without: BTreeMap<u32, OutcomeReason>,
 }
 
@@ -79,8 +80,8 @@ impl<'a> SolvedProgram<'a> {
         Self { listing, options, arms, frame_table, program, assessment, solved, solved_without }
     }
 
-    /// The plan where some motions must stay as they are for reasons of the writer (`refused`, by index), and with them the
-    /// cuts that they are part of.
+    /// The plan in which the motions that the writer refused (`refused`, by index) remain unmodified, and with them their
+    /// cuts.
     pub(crate) fn plan(&mut self, refused: &BTreeMap<u32, OutcomeReason>) -> Plan {
         let stays = self.settled(refused);
         let Self { listing, options, arms, frame_table, assessment, solved, .. } = self;
@@ -101,8 +102,8 @@ impl<'a> SolvedProgram<'a> {
         plan
     }
 
-    /// The motions that stay. Where joints have play, what stays changes the sides from which the joints come to what
-    /// follows: then all targets are worked out again.
+    /// The motions that remain unmodified. With backlash, an unmodified motion changes the sides from which joints arrive at
+    /// later targets: all targets are then solved again.
     fn settled(&mut self, refused: &BTreeMap<u32, OutcomeReason>) -> BTreeMap<u32, OutcomeReason> {
         let Self { listing, options, arms, frame_table, program, assessment, solved, solved_without } = self;
         let mut refused = refused.clone();
@@ -136,7 +137,8 @@ impl<'a> SolvedProgram<'a> {
             }
             refused.extend(more);
         }
-        // A program of which every round takes away another piece is left as it is.
+        // No agreement was reached: every round pinned more motions, so the whole program remains
+        // unmodified.
         for motion in 0..listing.motions.len() as u32 {
             refused.entry(motion).or_insert(OutcomeReason::Inverse(InverseError::Abandoned));
         }
@@ -144,8 +146,8 @@ impl<'a> SolvedProgram<'a> {
     }
 }
 
-/// What the model knows of the program. Work objects of which the shape alone is corrected are displaced to where the
-/// path lies.
+/// Assesses what the model knows of the program. Work objects whose shape alone is corrected are displaced to where the path
+/// really lies.
 fn assess(
     listing: &Listing,
     program: &OriginalProgram<'_>,
@@ -166,20 +168,20 @@ fn assess(
         .collect();
     let objects = frame_table.objects();
     let with = EstimateContext { conditions: &arms.conditions, knowledge };
-    // Experiments take every motion as it is.
+    // Experiments correct every motion regardless of risk.
     let max_risk = if options.cuts == Cuts::Single { 1.0 } else { options.max_risk };
     let wanted = PlacementChoice { placement: options.placement, max_risk, remedies: options.remedies };
     assess_program(listing, &chosen, &at, &mut frame_table.list, &objects, &with, wanted)
 }
 
-/// Rounds in which what stays changes the sides of what follows; more are never made.
+/// Largest number of rounds in which unmodified motions change the backlash sides of later ones.
 const MOST_SETTLING: usize = 64;
 
 fn planned(job: &Planner<'_>) -> Plan {
     let Planner { listing, solved, frame_table, arms, options, .. } = *job;
     let count = listing.motions.len();
     let whole = SearchBudget::of(search_budget::PATHS).with_near_solves(search_budget::path_steps(count));
-    // Filled where they stay: lists of portions, put together, would be there twice.
+    // Filled in place: concatenating per-portion lists would hold everything twice.
     let mut outcomes: Vec<MotionOutcome> = (0..count as u32).map(MotionOutcome::left).collect();
     let mut changes: Vec<Option<Change>> = (0..count).map(|_| None).collect();
     let mut places: Vec<Places<'_>> = outcomes.chunks_mut(PORTION).zip(changes.chunks_mut(PORTION)).collect();
@@ -204,14 +206,14 @@ fn planned(job: &Planner<'_>) -> Plan {
     plan
 }
 
-/// Motions that one thread takes at a time.
+/// Motions per parallel work item.
 const PORTION: usize = 64;
 
-/// What the motions of a program are worked out from.
+/// Inputs of the plan.
 struct Planner<'a> {
     listing: &'a Listing,
     solved: &'a SolvedTargets,
-    /// Motions that stay though their targets could be corrected.
+    /// Motions that remain unmodified although their targets could be corrected.
     stays: &'a BTreeMap<u32, OutcomeReason>,
     frame_table: &'a FrameTable,
     assessment: &'a Assessment,
@@ -219,17 +221,17 @@ struct Planner<'a> {
     options: &'a Options,
 }
 
-/// Where what becomes of some motions that follow each other goes.
+/// Output slots of consecutive motions.
 type Places<'p> = (&'p mut [MotionOutcome], &'p mut [Option<Change>]);
 
-/// What else became of them.
+/// Remaining results of a portion.
 struct PortionResult {
-    /// Lines and arcs that are written without their path having been checked.
+    /// Lines and arcs that are written although their path was not checked.
     unchecked: Vec<u32>,
     points: Vec<PathPoint>,
 }
 
-/// The corrected end of a motion, where its last target was worked out.
+/// The corrected end of a motion; `None` where its last target was not solved.
 fn segment_end<'a>(
     motion: &'a Motion,
     targets: &[Result<SolvedTarget, OutcomeReason>],
@@ -255,7 +257,7 @@ struct PlannedMotion {
     change: Option<Change>,
     outcome: MotionOutcome,
     point: Option<PathPoint>,
-    /// Its way, where its targets are all corrected.
+    /// The segment to it, where all its targets are corrected.
     segment_plan: Option<SegmentPlan>,
 }
 
@@ -279,7 +281,7 @@ impl<'a> Planner<'a> {
         reserve_memory();
         let count = motions.len();
         let paths: Vec<Option<Segment<'a>>> = motions.clone().map(|index| self.path(index)).collect();
-        // Whether lines are straight shows in their middles, which are worked out together.
+        // The midpoint of a line shows whether it is straight; midpoints are computed together in lanes.
         let straight = |index: usize| self.listing.motions[index].kind == MotionKind::Linear;
         let lines: Vec<&Segment<'a>> = motions
             .clone()
@@ -289,7 +291,7 @@ impl<'a> Planner<'a> {
             .collect();
         let middles = with_budget(budget, || midpoint_deviations(&lines, self.arms, self.options.emit));
         let mut middles = middles.into_iter();
-        // The way of the motion before, which a corner asks for.
+        // Segment plan of the previous motion, needed for the corner.
         let mut last: Option<(u32, SegmentPlan)> = None;
         let mut out = PortionResult {
             unchecked: Vec::new(),
@@ -316,8 +318,7 @@ impl<'a> Planner<'a> {
         out
     }
 
-    /// The path to the end of a motion, as one of its tool in its work object; `None` where it is not one between two corrected
-    /// ends.
+    /// The segment to the end of a motion, in the frames of that motion; `None` unless both ends are corrected.
     fn path(&self, index: usize) -> Option<Segment<'a>> {
         let motion = &self.listing.motions[index];
         if !matches!(motion.kind, MotionKind::Linear | MotionKind::Circular | MotionKind::Joint) {
@@ -342,8 +343,8 @@ impl<'a> Planner<'a> {
         Some(Segment { from, to, schedule })
     }
 
-    /// How far the corner at the start of a motion leaves the intended one, where the robot rounds it. `last`: the way of
-    /// the motion that was worked out before this one.
+    /// Deviation from the intended corner at the start of a motion, where the robot rounds it. `last`: segment plan of the
+    /// previously planned motion.
     fn corner(
         &self,
         motion: &Motion,
@@ -352,16 +353,16 @@ impl<'a> Planner<'a> {
         last: Option<&(u32, SegmentPlan)>,
     ) -> Option<f64> {
         let Segment { from: point, to, schedule } = path?;
-        segment_plan.backlash_sides.as_ref()?;
+        segment_plan.curves.as_ref()?;
         let previous = motion.previous? as usize;
         let before = &self.listing.motions[previous];
         let zone_mm = self.listing.zone(before)?.value.as_ref().ok().filter(|zone| !zone.fine)?.tcp_mm;
-        // How a corner goes on under another tool or work object is not told.
+        // The manuals do not specify how a corner continues under another tool or work object.
         if self.solved.of(previous).last()?.as_ref().ok()?.frames_index != point.index {
             return None;
         }
         if before.kind == MotionKind::Linear && motion.kind == MotionKind::Linear {
-            // Nearly all lines go on nearly straight: that is told by three points.
+            // Nearly all lines continue almost straight; three points show that.
             let first = self.solved.of(before.previous? as usize).last()?.as_ref().ok()?;
             let points = [&first.intended, &point.intended, &to.intended].map(|pose| pose.translation.vector);
             if !(cut_of_lines(&points, zone_mm) > CUT_MM) {
@@ -384,8 +385,8 @@ impl<'a> Planner<'a> {
         deviation(&SegmentPlan::of(before, Some(&path), &good, middle, self.arms, self.options))
     }
 
-    /// What becomes of one motion. `middle_mm`: how far its told line bends in the middle. `last`: the way of the motion
-    /// that was worked out before this one.
+    /// Plans one motion. `middle_mm`: deviation of its commanded line at the midpoint. `last`: segment plan of the previously
+    /// planned motion.
     fn plan_motion(
         &self,
         index: usize,
@@ -438,11 +439,11 @@ fn plan_motion<'a>(
         return finish(outcome, status, Some(why), None, point);
     }
     let good: Vec<&SolvedTarget> = targets.iter().filter_map(|t| t.as_ref().ok()).collect();
-    // Then the path from the motion before.
+    // The segment from the previous motion.
     let segment_plan = SegmentPlan::of(motion, path, &good, middle_mm, arms, options);
     (outcome.path_deviation_mm, outcome.inserted) =
         (segment_plan.path_deviation_mm, segment_plan.before.len());
-    // What is said of the motion beside this holds for the configuration that was guessed.
+    // All other flags hold only for the guessed configuration, so this one takes precedence.
     let guessed = options.flag_unknown_starts
         && motion.configures
         && good.iter().any(|s| s.guess != BranchGuess::Known);
@@ -468,7 +469,7 @@ fn plan_motion<'a>(
     PlannedMotion { segment_plan: Some(segment_plan), ..finish(outcome, status, flag, Some(change), point) }
 }
 
-/// A joint that would turn faster than it can at the programmed speed: the controller slows down there, or stops.
+/// A joint that would exceed its speed limit at the programmed speed: the controller slows down there, or stops.
 fn too_fast(
     index: usize,
     motion: &Motion,
@@ -482,7 +483,7 @@ fn too_fast(
     } else {
         Pace::Speed(listing.speed(motion)?.value.as_ref().ok()?)
     };
-    let [_, commanded] = segment_plan.backlash_sides.as_ref()?;
+    let [_, commanded] = segment_plan.curves.as_ref()?;
     let (joint, ratio) = fastest(from, to, commanded, &pace, arms)?;
     (ratio > 1.0).then_some(OutcomeReason::TooFast { joint, ratio })
 }
@@ -510,7 +511,8 @@ fn new_target(target: &MotionTarget, solved: &SolvedTarget, motion: &Motion, opt
     let q = solved.commanded.rotation.quaternion();
     let old = target.value.ok().and_then(|v| v.cartesian().map(|t| t.conf));
     let new = [solved.conf.cf1, solved.conf.cf4, solved.conf.cf6, solved.conf.cfx];
-    // A dummy configuration that nobody monitors stays as it is; cfx stays where only the quarters are used.
+    // An unmonitored dummy configuration remains unchanged; so does cfx where only the quarter turns are
+    // used.
     let conf = match old {
         Some(old) if monitored(motion) != Switch::Off && old[..3] != new[..3] => {
             Some([new[0], new[1], new[2], old[3]])

@@ -1,11 +1,11 @@
-//! Why a motion was left, refused or flagged: a closed list.
+//! Reasons why a motion was left, refused or flagged: a closed list.
 
 use std::fmt;
 
 use truegrind_arm::inverse::InverseError;
 use truegrind_programs::motion::Reason;
 
-/// A reason.
+/// Reason for the status of a motion.
 ///
 /// ```
 /// use truegrind_compensation::plan::reason::Why;
@@ -18,142 +18,143 @@ use truegrind_programs::motion::Reason;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum OutcomeReason {
-    /// The program does not say enough, or says what must not be touched.
+    /// The program states too little, or something that must not be changed.
     Program(Reason),
-    /// An external axis carries the robot's base, which is not followed.
+    /// An external axis carries the robot's base; the moving base is not modelled.
     MovingBase {
-        /// Its place among the external axes, 0-based.
+        /// Index among the external axes, 0-based.
         axis: usize,
     },
-    /// The cell file says of its tool or work object what the program does not bear out
-    /// ([`contradictions`](crate::frames::taught::contradictions) says what).
+    /// Cell file and program disagree about its tool or work object; see
+    /// [`contradictions`](crate::frames::taught::contradictions).
     CellContradiction,
-    /// A joint target states joints, not a pose; rewritten only when asked.
+    /// A joint target states joints, not a pose; rewritten only with `joint_targets`.
     JointTarget,
-    /// The new numbers are the old ones, to the decimals that are written; said once the program is rewritten.
+    /// The new numbers equal the old ones to the decimals written; known only after the rewrite.
     NoChange,
     /// No joints reach the target.
     Inverse(InverseError),
-    /// A joint would leave its range.
+    /// A joint would exceed its limits.
     OutsideLimits {
         /// Joint, 0-based.
         joint: usize,
     },
-    /// On the corrected way to it a joint would leave its range, which it keeps on the told way.
+    /// A joint would exceed its limits on the corrected segment to this target, but not on the original one.
     PathOutsideLimits {
         /// Joint, 0-based.
         joint: usize,
     },
-    /// The correction of the position is larger than the stated bound.
+    /// The position correction exceeds the stated bound.
     CorrectionTooLarge {
         /// The correction (mm).
         mm: f64,
     },
-    /// The correction of the orientation is larger than the stated bound.
+    /// The orientation correction exceeds the stated bound.
     RotationTooLarge {
         /// The correction (°).
         deg: f64,
     },
-    /// Near a singularity small corrections become large joint motions.
+    /// Near a singularity, where small corrections cause large joint motions.
     NearSingularity,
-    /// The correction turns a joint by much more than it would elsewhere on the arm: at the target, or on the way to it.
+    /// The correction turns a joint far more than the same correction would elsewhere in the workspace: at the target or on
+    /// the segment.
     JointJump {
         /// Joint, 0-based.
         joint: usize,
-        /// By how much the correction turns it (°).
+        /// Joint change caused by the correction (°).
         deg: f64,
-        /// The most that a correction of this size may turn it by (°).
+        /// Largest joint change allowed for a correction of this size (°).
         most_deg: f64,
-        /// Whether this happens on the way, not at the target.
+        /// Whether this occurs on the segment rather than at the target.
         on_the_way: bool,
     },
-    /// The corrected way comes to a singularity.
+    /// The corrected segment passes too close to a singularity.
     SingularPath,
     /// The corrected target lies in another configuration.
     OtherBranch,
-    /// Nothing tells the controller which configuration to take, and the one that was meant is not the nearest.
+    /// The program does not determine the configuration that the controller selects, and the intended one is not the nearest.
     AmbiguousBranch,
-    /// The controller does not check the stated configuration but takes the one next to where the arm stands, which the
-    /// text does not tell: the motion is corrected for the stated one.
+    /// The controller does not check the stated configuration but selects the one nearest to the current joints, which the
+    /// program does not determine: the motion is corrected for the stated configuration.
     UnknownStart,
-    /// The path between two targets leaves the intended one by more than the tolerance.
+    /// The path between two targets deviates from the intended one by more than the tolerance.
     PathDeviation {
-        /// By how much (mm).
+        /// Largest deviation (mm).
         mm: f64,
     },
-    /// The robot rounds the point before, and the corner leaves the intended one by more than the tolerance.
+    /// The robot rounds the previous point, and the corner deviates from the intended one by more than the tolerance.
     CornerDeviation {
-        /// By how much (mm).
+        /// Largest deviation (mm).
         mm: f64,
     },
-    /// An arc of about half a turn states its radius, whose decimals leave its centre open.
+    /// An arc of about half a turn is programmed by its radius, whose decimals leave the centre ambiguous.
     AmbiguousCentre {
-        /// By how much (mm).
+        /// Uncertainty of the centre (mm).
         mm: f64,
     },
-    /// Straight pieces were asked for, but the circle stays.
+    /// Straight segments were requested, but the circle was kept.
     CircleKept,
-    /// At the programmed speed a joint turns faster than it can.
+    /// At the programmed speed a joint would exceed its speed limit.
     TooFast {
         /// Joint, 0-based.
         joint: usize,
-        /// Its speed over its limit, above 1.
+        /// Joint speed over its limit, above 1.
         ratio: f64,
     },
-    /// The three points of a circular motion lie on a line, two of them coincide, or the circle through them leaves the way
-    /// that was meant.
+    /// The three points of a circular motion are collinear, two of them coincide, or the circle through them deviates from
+    /// the intended path.
     NoCircle,
-    /// A circular motion that stays starts where it ends, and would become another circle.
+    /// The next circular motion remains unmodified and starts here; from a corrected start it would be a different circle.
     StartOfUnchangedArc {
-        /// The line of that motion, from 1.
+        /// Line of that motion, 1-based.
         line: u32,
     },
-    /// A motion that stays starts where it ends, and would come too close to a singularity from there.
+    /// The next motion remains unmodified and starts here; from a corrected start it would pass too close to a singularity.
     StartOfSingularPath {
-        /// The line of that motion, from 1.
+        /// Line of that motion, 1-based.
         line: u32,
     },
-    /// A motion that stays starts where it ends, and from there a joint would leave its range on the way.
+    /// The next motion remains unmodified and starts here; from a corrected start a joint would exceed its limits on the way.
     StartOfLimitedPath {
-        /// Its line, 1-based.
+        /// Line of that motion, 1-based.
         line: u32,
         /// Joint, 0-based.
         joint: usize,
     },
-    /// A whole circle: its ends say nothing of its plane, so its path is not checked.
+    /// A full circle: its coincident ends do not determine its plane, so its path is not checked.
     FullCircle,
-    /// A joint stands outside the range in which it was measured.
+    /// A joint is outside the range covered by the measurement.
     JointNotMeasured {
         /// Joint, 0-based.
         joint: usize,
-        /// By how much (°).
+        /// Distance beyond that range (°).
         by_deg: f64,
     },
-    /// It is part of a cut of which another motion stays as it is: half a correction would be a step in the part.
+    /// Another motion of its cut remains unmodified: a partial correction would leave a step in the part.
     PartOfCut {
-        /// The line of the motion that stays for a reason of its own, from 1.
+        /// Line of the first motion that remains unmodified for its own reason, 1-based.
         line: u32,
-        /// That reason, without its figures.
+        /// That reason, without figures.
         because: &'static str,
     },
-    /// The motion before or after it in the same cut stays as it is, and the step to that one would be too large.
+    /// An adjacent motion of the same cut remains unmodified, and the step to it would be too large.
     Step {
-        /// The line of that motion, from 1.
+        /// Line of that motion, 1-based.
         line: u32,
         /// The step (mm).
         mm: f64,
     },
-    /// The correction makes the cut worse with a probability that is too large.
+    /// The probability that the correction makes the cut worse is too high.
     Risk {
         /// That probability.
         chance: f64,
     },
-    /// No measured pose is near.
+    /// No measured pose is nearby.
     NotCovered {
-        /// Distance over that of measured poses, above 1.
+        /// Distance to the nearest measured pose over the usual distance between measured poses, above 1.
         ratio: f64,
     },
-    /// The model is much less certain here than where the arm was measured.
+    /// The model is much less certain here than at the measured poses.
     Uncertain {
         /// Predicted σ (mm).
         sigma_mm: f64,
@@ -161,7 +162,7 @@ pub enum OutcomeReason {
 }
 
 impl OutcomeReason {
-    /// The reason of an inverse that failed.
+    /// Reason for a failed inverse solution.
     pub fn of_inverse(error: InverseError) -> Self {
         match error {
             InverseError::OutsideLimits { joint, .. } => OutcomeReason::OutsideLimits { joint },
@@ -170,7 +171,7 @@ impl OutcomeReason {
         }
     }
 
-    /// Why it stays for the motion behind it.
+    /// Text of the reasons that pin an endpoint because a later unmodified motion starts there.
     fn before_one_that_stays(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             OutcomeReason::StartOfUnchangedArc { line } => write!(
@@ -193,7 +194,7 @@ impl OutcomeReason {
         }
     }
 
-    /// The reason without the figures of one motion.
+    /// The reason without the figures of one motion, for counting.
     pub fn kind(&self) -> &'static str {
         match self {
             OutcomeReason::Program(reason) => reason.text(),
@@ -246,7 +247,7 @@ impl OutcomeReason {
         }
     }
 
-    /// The whole sentence, where it has no numbers in it and says more than [`Self::kind`].
+    /// The whole sentence, where it contains no figures and says more than [`Self::kind`].
     fn sentence(&self) -> Option<&'static str> {
         Some(match self {
             OutcomeReason::NoChange => "its numbers are right to the last decimal that is written",

@@ -1,11 +1,11 @@
-//! What a controller makes of numbers that it holds in single precision, as RAPID's `num` is.
+//! Rounding error of targets that a controller stores in single precision, as RAPID's `num` does.
 
 use rayon::prelude::*;
 
 use truegrind_programs::motion::Frame;
 use truegrind_programs::rewrite::{Change, NewTarget};
 
-/// The most by which a target moves when its numbers are rounded to single precision.
+/// Largest change of a target when its numbers are rounded to single precision.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SinglePrecision {
     /// Of the position (mm).
@@ -16,10 +16,10 @@ pub struct SinglePrecision {
     pub joint_deg: f64,
 }
 
-/// Changes that one thread takes at a time.
+/// Changes per parallel work item.
 const PORTION: usize = 4096;
 
-/// The largest of all new targets; `None` without any.
+/// The maximum over all new targets; `None` without any.
 pub fn single_precision(changes: &[Change]) -> Option<SinglePrecision> {
     let most = changes.par_chunks(PORTION).map(|changes| {
         let targets = changes
@@ -30,7 +30,7 @@ pub fn single_precision(changes: &[Change]) -> Option<SinglePrecision> {
     most.flatten().reduce_with(SinglePrecision::max)
 }
 
-/// By how much one target moves.
+/// Rounding error of one target.
 fn of(target: &NewTarget) -> Option<SinglePrecision> {
     let short = |value: f64| f64::from(value as f32);
     match *target {
@@ -53,7 +53,7 @@ fn of(target: &NewTarget) -> Option<SinglePrecision> {
 }
 
 impl SinglePrecision {
-    /// The larger of each.
+    /// Component-wise maximum.
     fn max(self, other: Self) -> Self {
         Self {
             position_mm: self.position_mm.max(other.position_mm),
@@ -64,7 +64,7 @@ impl SinglePrecision {
 
     /// One sentence for a report.
     pub fn text(&self) -> String {
-        // A bound is rounded up.
+        // Upper bounds are rounded up.
         let up = |value: f64, decimals: i32| (value * 10f64.powi(decimals)).ceil() / 10f64.powi(decimals);
         let mut parts = Vec::new();
         if self.position_mm > 0.0 || self.orientation_deg > 0.0 {

@@ -1,16 +1,16 @@
-//! Deviations along the normal of the surface that is ground.
+//! Deviations along the normal of the machined surface.
 
 use nalgebra::Point3;
 
 use crate::plan::Plan;
 use truegrind_surfaces::SurfaceFile;
 
-/// A point this close to the surface is on it (mm).
+/// A point closer to the surface than this is on it (mm).
 const ON_MM: f64 = 0.5;
 
 impl Plan {
-    /// Adds the normal of the surface to every point that stands over it, and what each is off along it. Points that stand away
-    /// from the surface cut nothing.
+    /// Adds the surface normal, and the deviation along it, to every point above the surface. Points away from the surface are
+    /// not counted as cutting.
     pub fn add_normals(&mut self, surface: &SurfaceFile) {
         for point in &mut self.points {
             let in_object = point.base_from_object.inverse() * point.intended;

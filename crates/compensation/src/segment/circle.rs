@@ -1,10 +1,10 @@
-//! Circular motions: how far the told circle leaves the intended one, and the straight pieces that replace it when asked.
+//! Circular motions: deviation of the commanded circle from the intended one, and its replacement by straight segments.
 //!
-//! Method. The circle is kept: the told circle through the three corrected points is sampled, more densely until the
-//! samples tell the distance from the intended circle. The circle is replaced: n equal pieces of the intended arc, each
-//! corner a corrected pose on it, with n from the sagitta r (1 − cos(θ / 2n)) and raised until no sample of the told
-//! pieces, gone by the estimated arm, is farther from the intended arc than the tolerance.
-//! Stops: after [`ROUNDS`] raises, or where the arm cannot go; the circle then stays.
+//! Method. Kept circle: the commanded circle through the three corrected points is sampled ever more densely until the
+//! samples determine the deviation from the intended circle. Replaced circle: n equal chords of the intended arc whose
+//! corners are corrected poses on it; n starts from the sagitta r (1 − cos(θ / 2n)) and grows until no sample of the
+//! commanded chords, followed by the estimated arm, deviates from the intended arc by more than the tolerance.
+//! Stops: after [`ROUNDS`] increases, or where the arm cannot follow; the circle is then kept.
 
 use crate::arms::Arms;
 use crate::feasibility::singularity::jumps_joint;
@@ -17,7 +17,7 @@ use truegrind_math::se3::Pose;
 use truegrind_programs::motion::Motion;
 use truegrind_programs::rewrite::Extra;
 
-/// A circular motion: what was meant, and what the controller is told.
+/// A circular motion, as intended and as commanded.
 pub(crate) struct Circle {
     pub(crate) intended: Curve,
     pub(crate) commanded: Curve,
@@ -38,8 +38,8 @@ impl Circle {
         })
     }
 
-    /// Largest distance of the tool from the intended circle, sampled along the arc until the samples tell it to
-    /// [`CHORD_MM`]; infinite where the arm cannot go.
+    /// Largest deviation of the tool from the intended circle (mm), sampled until the samples determine it to [`CHORD_MM`];
+    /// infinite where the arm cannot follow.
     pub(crate) fn deviation(&self, path: &Segment<'_>, arms: &Arms<'_>) -> f64 {
         let Segment { from, to, .. } = path;
         let motor = |s: f64| {
@@ -49,7 +49,7 @@ impl Circle {
             solution.ok().map(|solution| solution.joints)
         };
         let off = |s: f64, flange: &Pose| self.intended.distance(&to.frames_index.real.target_of(flange), s);
-        // At least every eighth of a turn, and every piece of a long arc.
+        // At least one sample per eighth of a turn and per piece of a long arc.
         let sweep = self.intended.arc().map_or(0.0, |arc| arc.sweep);
         let pieces = ((sweep / std::f64::consts::FRAC_PI_4).ceil() as usize)
             .max((self.intended.length_mm() / PIECE_MM).ceil() as usize)
@@ -63,9 +63,9 @@ impl Circle {
         }
     }
 
-    /// How far the decimals that are written leave the centre of the told circle open where the motion states its radius
-    /// (mm). h² = r² − c²/4 of its distance h from the chord c is known to 2 r δ then: near half a turn, where h is small, h
-    /// is known to far less than δ.
+    /// How far the written decimals leave the centre of the commanded circle ambiguous where the motion states its radius
+    /// (mm). From h² = r² − c²/4, the squared distance h² of the centre from the chord c is then uncertain by 2 r δ: near
+    /// half a turn, where h is small, h is uncertain by far more than δ.
     pub(crate) fn open_centre_mm(&self, decimals: u8) -> f64 {
         let Some(arc) = self.commanded.arc() else { return 0.0 };
         let open = 2.0 * arc.radius * 0.1_f64.powi(i32::from(decimals));
@@ -75,8 +75,8 @@ impl Circle {
         nearer.max((square + open).sqrt() - height)
     }
 
-    /// Targets between the ends such that straight pieces keep to the intended arc within the tolerance, and the
-    /// distance that is left; `None` where that is not reached.
+    /// Targets between the ends such that straight segments follow the intended arc within the tolerance, and the remaining
+    /// deviation; `None` where that is not achieved.
     pub(crate) fn pieces(
         &self,
         path: &Segment<'_>,
@@ -84,7 +84,7 @@ impl Circle {
         options: &Options,
     ) -> Option<(Vec<Extra>, f64)> {
         let arc = self.intended.arc()?;
-        // The arm's own share of the tolerance is small: what the chords may take.
+        // Most of the tolerance is available to the chords; the arm's own deviation is small.
         let sagitta = (0.8 * options.tolerance_mm / arc.radius).min(1.0);
         let largest_rad = (2.0 * (1.0 - sagitta).acos()).min(LARGEST_PIECE_RAD);
         let turn_pieces = (self.intended.turn_rad() / LARGEST_PIECE_RAD).ceil();
@@ -102,8 +102,8 @@ impl Circle {
         None
     }
 
-    /// So many pieces, none where a target of theirs would turn a joint too far near a singularity, and how far they leave
-    /// the intended arc; `None` where the arm cannot go.
+    /// The corrected corners of `count` chords and their deviation from the intended arc; no corners where one of them would
+    /// turn a joint too far near a singularity; `None` where the arm cannot follow.
     fn cut(
         &self,
         count: usize,
@@ -122,7 +122,7 @@ impl Circle {
             corners.push((to.frames_index.commanded.target_of(&arms.nominal.arm().forward(&joints)), joints));
         }
         corners.push((to.commanded, to.joints));
-        // Share of the way to the joints there, along the pieces.
+        // Joints at a share of the path along the chords.
         let motor = |s: f64| {
             let u = s * count as f64;
             let k = (u as usize).min(count - 1);
@@ -159,21 +159,21 @@ impl Circle {
         };
         let inner = || (1..).zip(&corners[1..count]);
         let extra = (!inner().any(leap)).then(|| inner().map(corner).collect());
-        // More pieces turn where the arc does.
+        // With more chords the joint reversals coincide with those of the arc.
         let left =
             if path.ends_on_planned_sides(count, &motor, arms) { most + CHORD_MM } else { f64::INFINITY };
         most.is_finite().then_some((extra, left))
     }
 }
 
-/// Where each piece is sampled.
+/// Shares of each chord that are sampled.
 const SAMPLES: [f64; 3] = [0.25, 0.5, 0.75];
 
-/// Largest angle of one piece, whatever the tolerance (rad): beyond, the tool would turn in visible corners.
+/// Largest angle of one chord, whatever the tolerance (rad): beyond it, the tool would visibly turn in corners.
 const LARGEST_PIECE_RAD: f64 = std::f64::consts::PI / 12.0;
 
-/// How often the count of pieces is raised by half.
+/// How often the number of chords is increased by half.
 const ROUNDS: usize = 8;
 
-/// More pieces than this are no replacement for a circle.
+/// A circle is not replaced by more chords than this.
 const MOST_PIECES: f64 = 2000.0;

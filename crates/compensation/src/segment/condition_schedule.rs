@@ -1,15 +1,15 @@
-//! A way from target to target: under which condition the arm goes along it, and how finely it is told.
+//! Condition of the arm along a segment, and the sampling accuracy of segments.
 
-/// Between two samples the distance from the intended path is known to this (mm): their chord leaves the distance half
-/// way by no more.
+/// Accuracy to which sampled deviations are determined between samples (mm): the midpoint deviates from the chord of two
+/// samples by no more.
 pub(crate) const CHORD_MM: f64 = 0.002;
 
-/// Under which condition the arm goes along a path: from a share of the way on, a place in the list of conditions.
+/// Index of the condition along a segment, piecewise constant in the share of the path.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ConditionSchedule {
-    /// From the start on.
+    /// From the start.
     pub(crate) first: usize,
-    /// Where it changes, because a joint turns: share of the way, and from there on.
+    /// Changes caused by joint reversals: share of the path, and the condition from there.
     pub(crate) later: Vec<(f64, usize)>,
 }
 

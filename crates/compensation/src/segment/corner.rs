@@ -1,12 +1,13 @@
-//! Corners that the robot rounds: the path in the zone of a fly-by point.
+//! Corners that the robot rounds: the path within the zone of a fly-by point.
 //!
-//! Method. Within its zone of radius r a fly-by point is not gone to: the path leaves the way in at the distance r before
-//! the point and meets the way out at the distance r behind it, on a parabola whose tangents are the two ways, that is
-//! the quadratic Bézier curve with the point as its middle control point, orientation by repeated slerp alike. r is at
-//! most half of each way. The told corner, gone by the estimated arm, is compared with the intended one, so it shows
-//! when targets that were put in shorten a zone and so change the shape of the corner.
+//! Method. Within its zone of radius r a fly-by point is not reached: the path leaves the incoming segment at distance r
+//! before the point and joins the outgoing one at distance r after it, on a parabola tangent to both, that is, the quadratic
+//! Bézier curve with the point as its middle control point; orientations by repeated slerp likewise. r is at most half of
+//! each segment. The commanded corner, followed by the estimated arm, is compared with the intended one; this also reveals
+//! when inserted targets shorten a zone and so change the shape of the corner.
 //! Shapes: poses of the tool in the work object (mm).
-//! Stops: sampled to the chord error of lines (0.002 mm); corners that cut off less than `CUT_MM` are as the lines they join.
+//! Stops: sampled to the chord error of lines (0.002 mm); corners that cut off less than `CUT_MM` are treated as the lines
+//! they join.
 //! Source: ABB, RAPID reference manual, zonedata and motion principles (corner path a parabola, zones cut to half the
 //! distance). Departure: the larger zones of reorientation and external axes are taken as that of the position.
 //! Checked against: a right angle in closed form, dense samples of the corner in the tests.
@@ -20,18 +21,18 @@ use crate::segment::line::{STEPS, SegmentEnd, largest_from};
 use truegrind_arm::model::Joints;
 use truegrind_math::se3::Pose;
 
-/// A corner that cuts off less than this has the shape of the lines that it joins (mm): over so short a way an arm's
-/// error changes by less than the lines are told to.
+/// A corner that cuts off less than this is treated as the lines that it joins (mm): over so short a distance the arm's error
+/// changes by less than the sampling accuracy of lines.
 pub(crate) const CUT_MM: f64 = 0.2;
 
-/// A rounded corner: where it leaves the way in, the point that it rounds, where it meets the way out.
+/// A rounded corner: exit from the incoming segment, rounded point, entry into the outgoing segment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Corner {
     control: [Pose; 3],
 }
 
 impl Corner {
-    /// The corner between two courses that a zone of this radius makes.
+    /// The corner that a zone of this radius makes between two segments.
     pub fn of(segment_in: &Curve, segment_out: &Curve, zone_mm: f64) -> Self {
         let (long_in, long_out) = (segment_in.length_mm(), segment_out.length_mm());
         let radius = zone_mm.min(0.5 * long_in).min(0.5 * long_out);
@@ -47,20 +48,20 @@ impl Corner {
         between(&between(a, b, t), &between(b, c, t), t)
     }
 
-    /// How far the path stays from the point that it rounds (mm).
+    /// Smallest distance of the path from the rounded point (mm).
     pub fn cut_mm(&self) -> f64 {
         let [a, b, c] = self.control.map(|pose| pose.translation.vector);
         (0.25 * (a + c) - 0.5 * b).norm()
     }
 
-    /// How far a pose lies beside the corner and the ways that it joins (mm), near the share `t`.
+    /// Distance of a pose from the corner and the segments that it joins (mm), near the share `t`.
     pub fn distance(&self, pose: &Pose, t: f64) -> f64 {
         let [a, b, c] = self.control.map(|pose| pose.translation.vector);
         let point = pose.translation.vector;
         let curve = a - 2.0 * b + c;
         let along = |t: f64| 2.0 * ((b - a) + curve * t);
         let at = |t: f64| a + 2.0 * (b - a) * t + curve * (t * t);
-        // The nearest share, by Gauss-Newton steps: the point lies close by, and they never go the wrong way.
+        // The nearest share by Gauss-Newton steps: the point is close, so they never go the wrong way.
         let mut t = t;
         for _ in 0..12 {
             let (off, first) = (at(t) - point, along(t));
@@ -76,7 +77,7 @@ impl Corner {
             }
         }
         let off: Vector3<f64> = point - at(t);
-        // Before and behind the corner its tangents are the ways themselves.
+        // Before and after the corner the path continues along its tangents.
         if t <= 0.0 || t >= 1.0 { beside(&off, &along(t)) } else { off.norm() }
     }
 }
@@ -89,14 +90,14 @@ pub(crate) fn cut_of_lines(points: &[Vector3<f64>; 3], zone_mm: f64) -> f64 {
     if radius > 1e-9 { 0.25 * radius * (segment_out / long_out - segment_in / long_in).norm() } else { 0.0 }
 }
 
-/// The ways in and out of a corner, as meant and as told.
+/// The segments into and out of a corner, as intended and as commanded.
 pub(crate) struct CornerSegments {
     pub(crate) intended: [Curve; 2],
     pub(crate) commanded: [Curve; 2],
 }
 
-/// Largest distance of the tool from the intended corner at `point`, gone under two conditions before and behind it; `None` where the corner cuts off next to nothing,
-/// infinite where the arm cannot go.
+/// Largest deviation of the tool from the intended corner at `point` (mm), under one condition before and another after it;
+/// `None` where the corner cuts off almost nothing, infinite where the arm cannot follow.
 pub(crate) fn corner_deviation(
     point: &SegmentEnd<'_>,
     segments: &CornerSegments,
@@ -121,7 +122,7 @@ pub(crate) fn corner_deviation(
         return Some(links.largest_deviation(2 * STEPS, &motor, &off));
     }
     let arm = arms.conditions.arm(condition_indices[0]);
-    // The samples that every corner needs, in lanes.
+    // The samples that every corner needs, computed in lanes.
     let solved = arms.nominal.solve_seeded_joints(&FIRST.map(flange), &[point.joints; FIRST.len()]);
     let joints: Vec<Joints> =
         solved.iter().map(|found| found.as_ref().map_or(point.joints, |found| found.joints)).collect();
@@ -135,9 +136,9 @@ pub(crate) fn corner_deviation(
     Some(largest_from([even(0.0), even(1.0)], PIECES, &even))
 }
 
-/// Equal pieces of a corner that are halved until their chords tell enough: so many that what is asked for first fills
-/// the lanes once.
+/// Number of equal pieces of a corner that are bisected adaptively, chosen so that the first samples fill the lanes exactly
+/// once.
 const PIECES: usize = 3;
 
-/// The ends, the pieces' ends and their middles: what [`largest_from`] asks for first.
+/// Ends of the pieces and their midpoints: the first samples that [`largest_from`] takes.
 const FIRST: [f64; 2 * PIECES + 1] = [0.0, 1.0 / 6.0, 2.0 / 6.0, 0.5, 4.0 / 6.0, 5.0 / 6.0, 1.0];

@@ -1,16 +1,16 @@
-//! The course of the tool from one target to the next, as controllers interpolate it.
+//! The path of the tool from one target to the next, as controllers interpolate it.
 //!
-//! Method. Line: position straight, orientation by the shortest turn (slerp). Arc: position on the circle through
-//! start, circle point and end, or, where the program names the axis it turns about (G2, G3), on the circle in the
-//! plane across that axis, rising along it in proportion to the angle. Orientation on an arc of an NC program: slerp. On
-//! one of RAPID: in proportion within the frame that goes along with the path, R(s) = turn(axis, s θ) R₀ exp(s v) with
-//! exp(v) = R₀⁻¹ turn(axis, −θ) R₁, of whose turns v, v ± 2π the one is taken that passes nearest to the orientation of
-//! the circle point; with CirPathMode \CirPointOri from start over circle point to end.
-//! Shapes: poses of the tool in the work object (mm), shares s of the way from 0 to 1.
-//! Source: ABB, RAPID reference manual, MoveC and CirPathMode; DIN 66025 for G2 and G3. Departure: CirPathMode
-//! \ObjectFrame and the wrist modes are taken as the standard mode; the position on the circle is the same in all.
-//! Checked against: circles and helices in closed form, whole circles, a tool that keeps its orientation, one that turns
-//! with the path.
+//! Method. Line: straight position, orientation by the shortest rotation (slerp). Arc: position on the circle through start,
+//! circle point and end, or, where the program names the axis (G2, G3), on the circle in the plane normal to that axis,
+//! rising along it in proportion to the angle. Orientation on an arc of an NC program: slerp. On one of RAPID: in proportion
+//! within the frame that moves along the path, R(s) = turn(axis, s θ) R₀ exp(s v) with exp(v) = R₀⁻¹ turn(axis, −θ) R₁; among
+//! v, v ± 2π the rotation that passes nearest to the orientation of the circle point is taken; with CirPathMode \CirPointOri
+//! from start over circle point to end.
+//! Shapes: poses of the tool in the work object (mm), shares s of the path from 0 to 1.
+//! Source: ABB, RAPID reference manual, MoveC and CirPathMode; DIN 66025 for G2 and G3. Departure: CirPathMode \ObjectFrame
+//! and the wrist modes are taken as the standard mode; the position on the circle is the same in all.
+//! Checked against: circles and helices in closed form, full circles, a tool that keeps its orientation, one that turns with
+//! the path.
 
 use std::f64::consts::TAU;
 
@@ -19,30 +19,30 @@ use nalgebra::{Point3, Unit, UnitQuaternion, Vector3};
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{Motion, Switch};
 
-/// Ends of an arc that are nearer than this make it a whole circle (mm). Never less than what the writers of NC close: a
-/// corrected whole circle whose ends are so near is written as one, and must be followed as one here.
+/// An arc whose ends are closer than this is a full circle (mm). Never less than what the NC writers close: a corrected full
+/// circle whose ends are this close is written as one, and must be followed as one here.
 pub(crate) const CLOSED_MM: f64 = 2e-3;
 
-/// An arc from its start over a point to its end, perhaps rising along its axis.
+/// An arc from its start over a point to its end, possibly rising along its axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Arc {
     /// On the axis, at the height of the start (mm).
     pub centre: Point3<f64>,
     /// The axis; the arc turns positively about it.
     pub axis: Unit<Vector3<f64>>,
-    /// From the axis to the start, of length 1.
+    /// Unit vector from the axis to the start.
     x: Vector3<f64>,
     y: Vector3<f64>,
     /// Its radius (mm).
     pub radius: f64,
-    /// The angle that it sweeps (rad), above 0.
+    /// Swept angle (rad), positive.
     pub sweep: f64,
-    /// How far it rises along the axis on the whole way (mm).
+    /// Total rise along the axis (mm).
     rise: f64,
 }
 
 impl Arc {
-    /// The arc through three points, about the axis where one is stated; `None` where they are in line or coincide.
+    /// The arc through three points, about the axis where one is stated; `None` where the points are collinear or coincide.
     pub fn through(
         start: &Point3<f64>,
         via: &Point3<f64>,
@@ -82,7 +82,7 @@ impl Arc {
         Some(Self { centre: start + to_centre, axis, x, y, radius, sweep, rise })
     }
 
-    /// The point at a share of the way.
+    /// The point at a share of the arc.
     pub fn at(&self, s: f64) -> Point3<f64> {
         let (sin, cos) = (self.sweep * s).sin_cos();
         self.centre + (self.x * cos + self.y * sin) * self.radius + self.axis.into_inner() * (self.rise * s)
@@ -93,7 +93,7 @@ impl Arc {
         (self.radius * self.sweep).hypot(self.rise)
     }
 
-    /// The share of the way that is level with a point near `near`.
+    /// The share of the arc nearest in angle to a point, close to `near`.
     fn share(&self, point: &Point3<f64>, near: f64) -> f64 {
         let off = point - self.centre;
         let angle = off.dot(&self.y).atan2(off.dot(&self.x));
@@ -101,7 +101,7 @@ impl Arc {
         (angle + turns * TAU) / self.sweep
     }
 
-    /// Distance of a point from the arc and its continuation (mm), at about the share `near`.
+    /// Distance of a point from the arc and its continuation (mm), close to the share `near`.
     pub fn distance(&self, point: &Point3<f64>, near: f64) -> f64 {
         let s = self.share(point, near);
         let off = point - self.at(s);
@@ -116,7 +116,7 @@ impl Arc {
     }
 }
 
-/// The part of an offset that is across a direction; all of it where there is no direction.
+/// The component of an offset normal to a direction; the whole offset where there is no direction.
 pub(crate) fn beside(off: &Vector3<f64>, along: &Vector3<f64>) -> f64 {
     match along.try_normalize(1e-6) {
         Some(direction) => (off - direction * direction.dot(off)).norm(),
@@ -124,23 +124,23 @@ pub(crate) fn beside(off: &Vector3<f64>, along: &Vector3<f64>) -> f64 {
     }
 }
 
-/// How the tool turns on an arc.
+/// Orientation of the tool along an arc.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Turning {
-    /// By the shortest turn from start to end.
+    /// By the shortest rotation from start to end.
     Shortest,
-    /// By this much within the frame that goes along with the path (rad).
+    /// By this rotation vector within the frame that moves along the path (rad).
     WithPath(Vector3<f64>),
-    /// Over the orientation of the circle point, at this share.
+    /// Over the orientation of the circle point, reached at this share.
     Over(UnitQuaternion<f64>, f64),
 }
 
-/// The course of the tool from one pose to another.
+/// The path of the tool from one pose to another.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Curve {
-    /// Where it begins.
+    /// Start.
     pub from: Pose,
-    /// Where it ends.
+    /// End.
     pub to: Pose,
     arc: Option<(Arc, Turning)>,
 }
@@ -172,13 +172,13 @@ impl Curve {
         self.arc.as_ref().map(|(arc, _)| arc)
     }
 
-    /// At which share of an arc a point on it is passed; half way on a line.
+    /// The share at which a point on the arc is passed; one half for a line.
     pub(crate) fn passes(&self, via: &Pose) -> f64 {
         let point = Point3::from(via.translation.vector);
         self.arc().map_or(0.5, |arc| arc.share(&point, 0.5).clamp(0.0, 1.0))
     }
 
-    /// The pose at a share of the way.
+    /// The pose at a share of the path.
     pub fn at(&self, s: f64) -> Pose {
         let Some((arc, turning)) = &self.arc else { return between(&self.from, &self.to, s) };
         let rotation = match turning {
@@ -200,7 +200,7 @@ impl Curve {
         }
     }
 
-    /// How far the tool turns (rad), in steps that see a turn of more than half round.
+    /// Total rotation of the tool (rad), in steps so that a rotation beyond half a turn is seen.
     pub fn turn_rad(&self) -> f64 {
         if self.arc.is_none() {
             return self.from.rotation.angle_to(&self.to.rotation);
@@ -209,7 +209,7 @@ impl Curve {
         (0..4).map(|k| at(k).angle_to(&at(k + 1))).sum()
     }
 
-    /// How far a pose lies beside the course (mm), where it should be at about this share.
+    /// Distance of a pose from the path (mm), close to this share.
     pub fn distance(&self, pose: &Pose, near: f64) -> f64 {
         match &self.arc {
             Some((arc, _)) => arc.distance(&Point3::from(pose.translation.vector), near),
@@ -222,7 +222,7 @@ impl Curve {
     }
 }
 
-/// Position straight, orientation by the shortest turn.
+/// Straight position, orientation by the shortest rotation.
 pub(crate) fn between(from: &Pose, to: &Pose, s: f64) -> Pose {
     let position = from.translation.vector.lerp(&to.translation.vector, s);
     Pose::from_parts(position.into(), turned(&from.rotation, &to.rotation, s))
@@ -232,7 +232,7 @@ fn turned(from: &UnitQuaternion<f64>, to: &UnitQuaternion<f64>, s: f64) -> UnitQ
     from.try_slerp(to, s, 1e-9).unwrap_or(*from)
 }
 
-/// The turn within the frame of the path whose course passes nearest to the orientation of the circle point.
+/// The rotation within the moving frame that passes nearest to the orientation of the circle point.
 fn with_path(
     arc: &Arc,
     from: &UnitQuaternion<f64>,
@@ -241,14 +241,14 @@ fn with_path(
     to: &UnitQuaternion<f64>,
 ) -> Turning {
     let short = (from.inverse() * arc.turn(-1.0) * to).scaled_axis();
-    // Once more round the same way, or about the axis of the arc where there is no turn yet.
+    // One full turn more about the same axis, or about the axis of the arc where there is no rotation yet.
     let about = short.try_normalize(1e-3).unwrap_or_else(|| from.inverse() * arc.axis.into_inner());
     let off = |v: &Vector3<f64>| {
         (arc.turn(middle) * from * UnitQuaternion::from_scaled_axis(v * middle)).angle_to(via)
     };
     let mut best = short;
     for other in [short - about * TAU, short + about * TAU] {
-        // The short way unless another is clearly nearer.
+        // The shortest rotation unless another is clearly nearer.
         if off(&other) + 0.1 < off(&best) {
             best = other;
         }

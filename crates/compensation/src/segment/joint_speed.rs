@@ -1,8 +1,8 @@
 //! Whether the joints can follow at the programmed speed.
 //!
-//! Method: the time that the controller gives the motion is that of the slower of position and reorientation at their
-//! programmed speeds, or what the program states; the joints' mean speeds over equal parts of the told course are set against their limits. Ramps
-//! at the ends are not looked at: a motion that is flagged here is slowed down or stopped by the controller.
+//! Method: the controller takes for the motion the longer of the times for position and reorientation at their programmed
+//! speeds, or the stated duration; mean joint speeds over equal parts of the commanded path are compared with their limits.
+//! Acceleration ramps are ignored: the controller slows down or stops a motion that is flagged here.
 //! Checked against: the analytic joint speed of a circle about axis 1.
 
 use crate::arms::Arms;
@@ -10,16 +10,16 @@ use crate::segment::curve::Curve;
 use crate::segment::line::SegmentEnd;
 use truegrind_programs::motion::SpeedValue;
 
-/// What the program says of how fast a motion goes.
+/// Programmed speed of a motion.
 pub(crate) enum Pace<'a> {
     /// Speeds of position and reorientation.
     Speed(&'a SpeedValue),
-    /// How long it takes (s).
+    /// Duration (s).
     Duration(f64),
 }
 
-/// The joint that turns fastest for what it can, with its speed over its limit, on a told course; `None` where the
-/// course or the limits say nothing.
+/// The joint with the highest ratio of speed to limit on a commanded path, and that ratio; `None` where path or limits do not
+/// determine it.
 pub(crate) fn fastest(
     from: &SegmentEnd<'_>,
     to: &SegmentEnd<'_>,
@@ -36,7 +36,7 @@ pub(crate) fn fastest(
     if !(duration_s > 1e-6 && duration_s.is_finite()) {
         return None;
     }
-    // Joints at the ends of a short line are enough; those at the parts of a long or turning one are worked out.
+    // The end joints suffice for a short line; a long or turning path is solved in parts.
     let least = if course.arc().is_some() { 4 } else { 1 };
     let parts = ((length_mm / PART_MM).ceil() as usize).max((turn_deg / PART_DEG).ceil() as usize);
     let parts = parts.clamp(least, 40);
@@ -63,8 +63,8 @@ pub(crate) fn fastest(
     worst
 }
 
-/// Longest part of a course (mm).
+/// Longest part of a path (mm).
 const PART_MM: f64 = 50.0;
 
-/// Largest turn of a part (°).
+/// Largest rotation of a part (°).
 const PART_DEG: f64 = 10.0;

@@ -1,4 +1,5 @@
-//! The path between two targets: how far the told line bends under the estimated arm, and which targets straighten it.
+//! Lines between two targets: deviation of the commanded line when the estimated arm follows it, and the targets inserted to
+//! straighten it.
 
 use nalgebra::Vector3;
 
@@ -22,23 +23,23 @@ pub(crate) struct SegmentEnd<'a> {
     pub(crate) index: usize,
     /// Intended pose in the work object.
     pub(crate) intended: Pose,
-    /// What the controller is told.
+    /// Pose that the controller is commanded, in the work object.
     pub(crate) commanded: Pose,
-    /// Joints there.
+    /// Corrected joints.
     pub(crate) joints: Joints,
-    /// The condition under which the arm comes there.
+    /// Condition under which the arm arrives.
     pub(crate) condition_index: usize,
-    /// Joints there with the program as it is.
+    /// Joints of the original program.
     pub(crate) before: Joints,
-    /// The configuration that its target states, where the controller checks it.
+    /// Stated configuration, where the controller checks it.
     pub(crate) conf: Option<[i32; 4]>,
-    /// The external axes of its target, where that is known.
+    /// External axes of the target, where known.
     pub(crate) external: Option<&'a [Option<f64>; 6]>,
 }
 
 impl<'a> SegmentEnd<'a> {
-    /// The same place of the flange for the tool and in the work object of `other`, as told and as meant. The controller goes
-    /// from there on a path of that tool in that object.
+    /// The same flange pose expressed in the frames of `other`, as commanded and as intended. The controller starts from
+    /// there on a path of that tool in that work object.
     pub(crate) fn with_frames_of(self, other: &SegmentEnd<'a>) -> Self {
         let (old, new) = (self.frames_index, other.frames_index);
         SegmentEnd {
@@ -52,8 +53,8 @@ impl<'a> SegmentEnd<'a> {
 }
 
 impl ConditionSchedule {
-    /// At which shares of the way from `start` a joint has a play to take up, or the load is another: under which
-    /// condition the arm comes there, and under which it goes on.
+    /// Where along the segment from `start` backlash must be taken up or the payload changes, with the condition before and
+    /// after.
     fn changes(&self, start: &SegmentEnd<'_>) -> Vec<ConditionChange> {
         let mut out = Vec::new();
         let mut last = start.condition_index;
@@ -67,14 +68,14 @@ impl ConditionSchedule {
     }
 }
 
-/// A joint turns on the way, and has its play to take up.
+/// A change of condition: a joint reverses and must take up its backlash, or the payload changes.
 struct ConditionChange {
     share: f64,
     before: usize,
     after: usize,
 }
 
-/// A path between two corrected ends.
+/// A segment between two corrected ends.
 pub(crate) struct Segment<'a> {
     pub(crate) from: SegmentEnd<'a>,
     pub(crate) to: SegmentEnd<'a>,
@@ -82,8 +83,8 @@ pub(crate) struct Segment<'a> {
 }
 
 impl Segment<'_> {
-    /// The external axes at a share of the way, on which the controller runs them in proportion; `None` where none moves,
-    /// so that those of the end count.
+    /// The external axes at a share of the segment, interpolated as the controller does; `None` where none moves, so that
+    /// those of the end apply.
     fn external_at(&self, share: f64) -> Option<[Option<f64>; 6]> {
         let (from, to) = (self.from.external?, self.to.external?);
         (from != to).then(|| {
@@ -94,7 +95,7 @@ impl Segment<'_> {
         })
     }
 
-    /// The links at its start, where a joint turns on it or the load is another than before.
+    /// The play operator at its start, where a joint reverses along the segment or the payload differs from before.
     pub(crate) fn play_operator<'s>(&self, arms: &'s Arms<'_>) -> Option<PlayOperator<'s>> {
         let changes = self.schedule.first != self.from.condition_index || !self.schedule.later.is_empty();
         changes.then(|| self.links(arms))
@@ -109,8 +110,8 @@ impl Segment<'_> {
         )
     }
 
-    /// Whether links that are told to lie on a side at its end do so where the motors go in so many `pieces` with targets that
-    /// are put in, which need not turn where the whole way does.
+    /// Whether the links end on their planned backlash sides when the motors follow `pieces` pieces with inserted targets;
+    /// these need not reverse where the whole segment does.
     pub(crate) fn ends_on_planned_sides(
         &self,
         pieces: usize,
@@ -122,7 +123,7 @@ impl Segment<'_> {
     }
 }
 
-/// How far the tool is from the intended line at share `s` of the way; infinite where the nominal arm cannot go.
+/// Offset of the tool from the intended line at share `s`; infinite where the nominal arm cannot follow.
 fn offset_at(
     from: &SegmentEnd<'_>,
     to: &SegmentEnd<'_>,
@@ -137,7 +138,7 @@ fn offset_at(
     }
 }
 
-/// Joints to which the controller goes at share `s` of the told line; `None` where the nominal arm cannot go.
+/// Commanded joints at share `s` of the commanded line; `None` where the nominal arm cannot follow.
 fn motor_joints_at(
     from: &SegmentEnd<'_>,
     to: &SegmentEnd<'_>,
@@ -157,9 +158,9 @@ fn motor_joints_at(
     }
 }
 
-/// How far the tool is from the intended line at share `s` of the way, with the flange where it is then.
+/// Offset of the tool from the intended line (mm) at share `s`, with the flange at the given pose.
 ///
-/// Along the line the tool may be early or late: only what lies beside the line counts, unless it is too short.
+/// The tool may lead or lag along the line: only the normal component counts, unless the line is too short.
 fn line_offset(from: &SegmentEnd<'_>, to: &SegmentEnd<'_>, s: f64, flange: &Pose) -> f64 {
     let reached = to.frames_index.real.target_of(flange);
     let intended = from.intended.translation.vector.lerp(&to.intended.translation.vector, s);
@@ -167,7 +168,7 @@ fn line_offset(from: &SegmentEnd<'_>, to: &SegmentEnd<'_>, s: f64, flange: &Pose
     beside(&off, &(to.intended.translation.vector - from.intended.translation.vector))
 }
 
-/// [`offset_at`] the middle of many lines, in lanes.
+/// [`offset_at`] the midpoints of many lines, in lanes.
 pub(crate) fn midpoint_deviations(lines: &[&Segment<'_>], arms: &Arms<'_>, emit: Emit) -> Vec<f64> {
     let halfway: Vec<Joints> = lines.iter().map(|line| line.from.joints.lerp(&line.to.joints, 0.5)).collect();
     let joints: Vec<Option<Joints>> = match emit {
@@ -205,12 +206,12 @@ pub(crate) fn midpoint_deviations(lines: &[&Segment<'_>], arms: &Arms<'_>, emit:
     })
 }
 
-/// Longest piece of a line that is judged by three samples (mm).
+/// Longest piece of a line that three samples can judge (mm).
 pub(crate) const PIECE_MM: f64 = 100.0;
 
-/// Largest distance from the intended line along a path (mm): that of the `middle`, which is given, and where that is not
-/// clearly straight of samples that get denser until they tell the distance to [`CHORD_MM`]. Where a joint turns, its link
-/// waits until the play is taken up.
+/// Largest deviation from the intended line along a segment (mm): the given `middle` where that clearly shows a straight
+/// line, else from samples that are refined until they determine it to [`CHORD_MM`]. Where a joint reverses, its link rests
+/// until the backlash is taken up.
 pub(crate) fn line_deviation(path: &Segment<'_>, arms: &Arms<'_>, emit: Emit, middle: f64) -> f64 {
     let Segment { from, to, .. } = path;
     match path.play_operator(arms) {
@@ -223,10 +224,10 @@ pub(crate) fn line_deviation(path: &Segment<'_>, arms: &Arms<'_>, emit: Emit, mi
     }
 }
 
-/// Steps of links with play on each piece of a way, to begin with.
+/// Initial play operator steps per piece of a segment.
 pub(crate) const STEPS: usize = 8;
 
-/// The same where no joint turns on the way.
+/// As [`line_deviation`], where no joint reverses.
 fn deviation_without_play(
     from: &SegmentEnd<'_>,
     to: &SegmentEnd<'_>,
@@ -248,16 +249,16 @@ fn pieces_of(from: &SegmentEnd<'_>, to: &SegmentEnd<'_>) -> usize {
     ((length / PIECE_MM).ceil() as usize).clamp(1, 25) * 2
 }
 
-/// How often a piece is halved at most.
+/// Largest number of bisections of a piece.
 const HALVINGS: u32 = 5;
 
-/// The largest value of a function over a path, which is 0 at both ends: equal pieces, each halved until its chord tells
-/// its middle to [`CHORD_MM`].
+/// Largest value of a function along a path whose ends have value 0: equal pieces, each bisected until its chord determines
+/// its midpoint to [`CHORD_MM`].
 pub(crate) fn largest(pieces: usize, off: &dyn Fn(f64) -> f64) -> f64 {
     largest_from([0.0; 2], pieces, off)
 }
 
-/// The same with other values at the ends.
+/// As [`largest`], with other values at the ends.
 pub(crate) fn largest_from(ends: [f64; 2], pieces: usize, off: &dyn Fn(f64) -> f64) -> f64 {
     let at = |k: usize| match k {
         0 => ends[0],
@@ -278,7 +279,7 @@ pub(crate) fn largest_from(ends: [f64; 2], pieces: usize, off: &dyn Fn(f64) -> f
 fn between_samples(a: (f64, f64), b: (f64, f64), off: &dyn Fn(f64) -> f64, halvings: u32) -> f64 {
     let s = 0.5 * (a.0 + b.0);
     let middle = off(s);
-    // A path that cannot be gone is told by its first sample.
+    // A path that the arm cannot follow shows at the first sample.
     if halvings == 0 || !middle.is_finite() || (middle - 0.5 * (a.1 + b.1)).abs() <= CHORD_MM {
         return middle;
     }
@@ -289,17 +290,17 @@ fn between_samples(a: (f64, f64), b: (f64, f64), off: &dyn Fn(f64) -> f64, halvi
     halves[0].max(halves[1]).max(middle)
 }
 
-/// Below this the middle of a short line tells enough: the bend is a parabola to leading order.
+/// Below this the midpoint of a short line suffices: the deviation is a parabola to leading order.
 const CLEARLY_STRAIGHT_MM: f64 = 0.01;
 
-/// Targets that keep the path within tolerance, and the bend that is left: one where a joint turns, at which the arm takes
-/// up its play, and between those by bisection.
+/// Inserted targets that keep the path within tolerance, and the remaining deviation: one at each joint reversal, where the
+/// arm takes up its backlash, and between those by bisection.
 ///
-/// A told line between two of them bends a joint's course a little. Close to where the joint turns it then turns once more,
-/// and the link waits: where this leaves more than the tolerance, the lines are cut finer.
+/// A commanded line between two of them slightly changes the joint motion. Close to a reversal the joint can then reverse
+/// once more while the link rests: where this leaves more than the tolerance, the lines are split more finely.
 ///
-/// `None` where such a target would turn a joint by far more than the correction elsewhere, near a singularity; where the arm
-/// cannot go that way with them either; and where a link with play would not come to lie at the end as is told of it.
+/// `None` where an inserted target would turn a joint far more than the same correction elsewhere, near a singularity; where
+/// the arm cannot follow even with inserted targets; and where a link with backlash would not end on its planned side.
 pub(crate) fn insertions(
     path: &Segment<'_>,
     arms: &Arms<'_>,
@@ -339,24 +340,24 @@ pub(crate) fn insertions(
         .then(|| (best.inserted.iter().map(extra).collect(), best.remaining_mm))
 }
 
-/// How often the lines between targets that are put in are cut finer.
+/// How often the lines between inserted targets are refined.
 const FINER: usize = 4;
 
-/// A target that is put in.
+/// An inserted target.
 #[derive(Clone, Copy)]
 struct InsertedTarget<'a> {
     share: f64,
     at: SegmentEnd<'a>,
 }
 
-/// A line that is cut.
+/// A line split by inserted targets.
 struct SplitLine<'a> {
     inserted: Vec<InsertedTarget<'a>>,
     /// Largest distance from the intended line (mm).
     remaining_mm: f64,
 }
 
-/// Cuts a line so that its pieces, gone with the links on the flanks where they come to lie, keep within `aim_mm`.
+/// Splits a line so that its pieces, with every link on its flank, deviate by at most `aim_mm`.
 fn split_line<'a>(path: &Segment<'a>, arms: &Arms<'_>, emit: Emit, aim_mm: f64) -> SplitLine<'a> {
     let Segment { from, to, schedule } = path;
     let mut out = SplitLine { inserted: Vec::new(), remaining_mm: 0.0 };
@@ -381,8 +382,8 @@ fn split_line<'a>(path: &Segment<'a>, arms: &Arms<'_>, emit: Emit, aim_mm: f64) 
     out
 }
 
-/// Largest distance from the intended line where it is cut, gone by links with play (mm). While a play is taken up on the
-/// spot nothing is judged: the arm may stand off there because it was just loaded.
+/// Largest deviation from the intended line after splitting, with the play operator (mm). While backlash is taken up at rest
+/// nothing is judged: a change of payload can displace the arm there.
 fn deviation_with_play(
     path: &Segment<'_>,
     split_line: &SplitLine<'_>,
@@ -401,8 +402,8 @@ fn deviation_with_play(
     )
 }
 
-/// The piece of a cut line on which `u` lies, of all pieces taken as equally long: both of its ends with their share of the
-/// way, and the share of the piece.
+/// The piece that contains `u` when all pieces count as equally long: both ends with their share of the segment, and the
+/// share within the piece.
 fn piece_of<'c, 'a>(
     path: &'c Segment<'a>,
     split_line: &'c SplitLine<'a>,
@@ -419,7 +420,7 @@ fn piece_of<'c, 'a>(
     (node(k), node(k + 1), u - k as f64)
 }
 
-/// Joints to which the controller goes there.
+/// Commanded joints there.
 fn motor_joints_on(
     path: &Segment<'_>,
     split_line: &SplitLine<'_>,
@@ -451,10 +452,10 @@ fn end_between<'a>(
     Some(SegmentEnd { intended, commanded, joints, condition_index, before: near, ..*to })
 }
 
-/// 63 targets at most on one line: more means that the line cannot be followed.
+/// At most 63 targets on one line: if more are needed, the line cannot be followed.
 const MAX_DEPTH: usize = 6;
 
-/// How a line is cut in halves until they are straight.
+/// Bisection of a line until its pieces are straight.
 struct LineSplitter<'s> {
     arms: &'s Arms<'s>,
     emit: Emit,
@@ -489,8 +490,8 @@ impl LineSplitter<'_> {
     }
 }
 
-/// How far the tool is, half way of a joint motion, from where the data-sheet arm goes with the program as it is (mm),
-/// the largest over the way: a joint motion has no line to keep, so nothing is put in for it.
+/// Largest deviation of the tool over a joint motion (mm) from where the nominal arm goes in the original program: a joint
+/// motion follows no line, so no targets are inserted.
 pub(crate) fn joint_motion_deviation(path: &Segment<'_>, arms: &Arms<'_>) -> f64 {
     let Segment { from, to, .. } = path;
     let motor = |s: f64| from.joints.lerp(&to.joints, s);
@@ -508,7 +509,7 @@ pub(crate) fn joint_motion_deviation(path: &Segment<'_>, arms: &Arms<'_>) -> f64
     }
 }
 
-/// A target that the told path needs at a share of the way.
+/// A target to insert at a share of the commanded path.
 pub(crate) fn extra_of(
     (commanded, joints): (&Pose, &Joints),
     share: f64,
@@ -524,7 +525,8 @@ pub(crate) fn extra_of(
             target: NewTarget::Cartesian {
                 position_mm: commanded.translation.vector.into(),
                 quaternion: [q.w, q.i, q.j, q.k],
-                // cfx stays where only the quarters are used: where the end of the motion does not state its own.
+                // cfx remains unchanged where only the quarter turns are used, i.e. where the end of the
+                // motion does not state its own.
                 conf: path.to.conf.map(|[_, _, _, cfx]| {
                     let here = arms.nominal.configuration(joints);
                     let used = cfx == arms.nominal.configuration(&path.to.joints).cfx;

@@ -1,4 +1,4 @@
-//! The way from the motion before to the end of a motion: how far it leaves the intended one, and what is put in for it.
+//! Plan of one segment: its deviation from the intended path, and the targets inserted to reduce it.
 
 use crate::arms::Arms;
 use crate::options::{Circles, Emit, Options};
@@ -14,22 +14,22 @@ use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{Motion, MotionKind, Switch};
 use truegrind_programs::rewrite::{Extra, NewTarget};
 
-/// What the way of one motion needs.
+/// What one segment needs.
 #[derive(Default)]
 pub(crate) struct SegmentPlan {
-    /// Largest distance from the intended way that is left (mm); `None` where it is not checked.
+    /// Largest remaining deviation from the intended path (mm); `None` where it is not checked.
     pub(crate) path_deviation_mm: Option<f64>,
-    /// Targets that are put in.
+    /// Inserted targets.
     pub(crate) before: Vec<Extra>,
-    /// Whether a circle becomes straight pieces.
+    /// Whether a circle is replaced by straight segments.
     pub(crate) straight: bool,
     pub(crate) flag: Option<OutcomeReason>,
-    /// The whole way as meant and as told, targets that are put in left aside; `None` for joint motions.
-    pub(crate) backlash_sides: Option<[Curve; 2]>,
+    /// The whole segment as intended and as commanded, without inserted targets; `None` for joint motions.
+    pub(crate) curves: Option<[Curve; 2]>,
 }
 
 impl SegmentPlan {
-    /// Of a motion whose targets are all corrected. `middle_mm`: how far its told line bends in the middle.
+    /// For a motion whose targets are all corrected. `middle_mm`: deviation of its commanded line at the midpoint.
     pub(crate) fn of(
         motion: &Motion,
         path: Option<&Segment<'_>>,
@@ -56,9 +56,9 @@ impl SegmentPlan {
         }
     }
 
-    /// The last told piece of the way, or the first.
+    /// The last commanded piece of the segment, or the first.
     fn piece(&self, last: bool) -> Option<Curve> {
-        let [_, commanded] = self.backlash_sides.as_ref()?;
+        let [_, commanded] = self.curves.as_ref()?;
         let told_at = |extra: Option<&Extra>| extra.and_then(pose_of);
         Some(match (last, told_at(if last { self.before.last() } else { self.before.first() })) {
             (true, Some(pose)) => Curve::line(pose, commanded.to),
@@ -86,15 +86,14 @@ fn line(
 ) -> SegmentPlan {
     let Segment { from, to, .. } = path;
     let deviation = line_deviation(path, arms, options.emit, middle_mm);
-    let backlash_sides =
-        Some([Curve::line(from.intended, to.intended), Curve::line(from.commanded, to.commanded)]);
-    let mut out =
-        SegmentPlan { path_deviation_mm: Some(deviation), backlash_sides, ..SegmentPlan::default() };
+    let curves = Some([Curve::line(from.intended, to.intended), Curve::line(from.commanded, to.commanded)]);
+    let mut out = SegmentPlan { path_deviation_mm: Some(deviation), curves, ..SegmentPlan::default() };
     if deviation <= options.tolerance_mm {
         return out;
     }
     let mut left = deviation;
-    // Where the wrist is interpolated by itself, a target on the line would say how the tool turns, which nobody did.
+    // Where the wrist is interpolated separately, an inserted target would impose an orientation that the
+    // program never stated.
     if motion.insertable
         && motion.modal.wrist_interpolation != Switch::On
         && let Some(cut) = insertions(path, arms, options)
@@ -124,20 +123,14 @@ fn circle(
         };
         return SegmentPlan { flag: Some(flag), ..SegmentPlan::default() };
     };
-    let backlash_sides = Some([circle.intended, circle.commanded]);
-    // How the tool turns on the way must be known to be written out.
+    let curves = Some([circle.intended, circle.commanded]);
+    // Straight segments need a known orientation along the path.
     let may = segments
         && motion.straightens
         && motion.modal.circle_point_orientation != Switch::Either
         && motion.modal.wrist_interpolation != Switch::On;
     if may && let Some((before, left)) = circle.pieces(path, arms, options) {
-        return SegmentPlan {
-            path_deviation_mm: Some(left),
-            before,
-            straight: true,
-            flag: None,
-            backlash_sides,
-        };
+        return SegmentPlan { path_deviation_mm: Some(left), before, straight: true, flag: None, curves };
     }
     let along = circle.deviation(path, arms);
     let open = if motion.by_radius { circle.open_centre_mm(options.position_decimals) } else { 0.0 };
@@ -149,16 +142,10 @@ fn circle(
     } else {
         segments.then_some(OutcomeReason::CircleKept)
     };
-    SegmentPlan {
-        path_deviation_mm: Some(deviation),
-        before: Vec::new(),
-        straight: false,
-        flag,
-        backlash_sides,
-    }
+    SegmentPlan { path_deviation_mm: Some(deviation), before: Vec::new(), straight: false, flag, curves }
 }
 
-/// How far the corner between two ways leaves the intended one; `None` where it is as the ways themselves.
+/// Deviation from the intended corner between two segments; `None` where the corner has the shape of the segments themselves.
 pub(crate) fn corner(
     point: &SegmentEnd<'_>,
     segment_in: &SegmentPlan,
@@ -168,11 +155,12 @@ pub(crate) fn corner(
     arms: &Arms<'_>,
     emit: Emit,
 ) -> Option<f64> {
-    // In joints the corner is one of joints, between ways that are told to the same distance already.
+    // Between joint targets the corner is a joint corner, and its segments are already within the same
+    // accuracy.
     if emit == Emit::Joints {
         return None;
     }
-    let intended = [segment_in.backlash_sides.as_ref()?[0], segment_out.backlash_sides.as_ref()?[0]];
+    let intended = [segment_in.curves.as_ref()?[0], segment_out.curves.as_ref()?[0]];
     let commanded = [segment_in.piece(true)?, segment_out.piece(false)?];
     corner_deviation(point, &CornerSegments { intended, commanded }, zone_mm, condition_indices, arms)
 }

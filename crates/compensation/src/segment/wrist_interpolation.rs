@@ -1,9 +1,9 @@
-//! How the joints go along a path on which the wrist is interpolated by itself (ABB, RAPID, `SingArea \Wrist`): joints 4 to
-//! 6 go in proportion from start to end, joints 1 to 3 such that the tool's point keeps to the path.
+//! Joints along a path with separate wrist interpolation (ABB, RAPID, `SingArea \Wrist`): joints 4 to 6 move in proportion
+//! from start to end, joints 1 to 3 keep the tool point on the path.
 //!
-//! Method. Newton's method for the three joints, from the sample before, with differences for the slope.
+//! Method. Newton's method for joints 1 to 3, seeded by the previous sample, with a finite-difference Jacobian.
 //! Shapes: joints (rad) at the shares 1/n … (n − 1)/n of a curve in the work object (mm).
-//! Stops: within [`REACHED_MM`] of the path, or after [`STEPS`] steps: then the arm cannot go along.
+//! Stops: within [`REACHED_MM`] of the path, or after [`STEPS`] steps: the arm then cannot follow.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -11,16 +11,16 @@ use crate::frames::frame_pair::FramePair;
 use crate::segment::curve::Curve;
 use truegrind_arm::model::{Joints, PreparedModel};
 
-/// Steps of Newton's method for one sample.
+/// Newton steps for one sample.
 const STEPS: usize = 12;
 
-/// The tool's point keeps to the path to this (mm).
+/// Accuracy of the tool point on the path (mm).
 const REACHED_MM: f64 = 1e-7;
 
-/// Difference of the slope (rad).
+/// Finite difference of the Jacobian (rad).
 const DIFFERENCE_RAD: f64 = 1e-6;
 
-/// Joints between the ends of a motion, in so many pieces; `None` where the arm cannot go along, or a joint goes farther than
+/// Joints between the ends of a motion in so many pieces; `None` where the arm cannot follow, or a joint moves by more than
 /// `most_step_rad` between neighbouring samples.
 pub(crate) fn joint_samples(
     arm: &PreparedModel<'_>,
@@ -44,11 +44,11 @@ pub(crate) fn joint_samples(
         out.push((share, joints));
     }
     out.pop();
-    // On another branch the arm comes to another end.
+    // On another branch the arm reaches another end.
     ((end - last).amax() < most_step_rad).then_some(out)
 }
 
-/// Joints whose last three are given, with the tool's point at a place in the work object.
+/// Solves joints 1 to 3 for given wrist joints such that the tool point is at a place in the work object.
 fn solve_arm_joints(
     arm: &PreparedModel<'_>,
     within: &FramePair,

@@ -1,8 +1,8 @@
-//! The program as it is: the joints that each target leads to.
+//! Joints of the original program at every target.
 //!
-//! A target whose configuration the controller checks says by itself where the arm goes; one whose configuration it does not check
-//! is reached from the motion before. Runs of neighbours go together, so that the kinematics runs in lanes; they are cut by count
-//! alone, so the result does not depend on the number of threads.
+//! A target whose configuration the controller checks determines its joints on its own; one with an unchecked configuration
+//! is reached from the previous motion. Consecutive targets are solved together, so that the kinematics runs in lanes; runs
+//! are split by count alone, so the result does not depend on the number of threads.
 
 use rayon::prelude::*;
 
@@ -18,11 +18,10 @@ use truegrind_arm::model::Joints;
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{Listing, Motion, MotionTarget, RobTarget, Switch, TargetValue};
 
-/// Targets along which the program as it is is followed in one go: the first one has no neighbour and costs as much as
-/// hundreds of others.
+/// Targets that are followed in one run: the first one has no seed and costs as much as hundreds of others.
 const STRETCH: usize = 4096;
 
-/// A target and the motion to which it belongs.
+/// A target and its motion.
 #[derive(Clone, Copy)]
 pub(crate) struct TargetRef<'a> {
     pub(crate) index: u32,
@@ -30,36 +29,36 @@ pub(crate) struct TargetRef<'a> {
     pub(crate) target: &'a MotionTarget,
 }
 
-/// What a target means, and the joints that the program as it is leads to.
+/// Intended pose of a target, and the joints of the original program.
 #[derive(Clone, Copy)]
 pub(crate) struct OriginalTarget {
     pub(crate) frames_index: usize,
     pub(crate) intended: Pose,
     pub(crate) joints: Joints,
-    /// The branch of the arm.
+    /// Branch of the arm.
     pub(crate) cfx: i32,
-    /// [`SolvedTarget::margins`](crate::target::solved_target::Solved::margins) before.
+    /// [`SolvedTarget::margins`](crate::target::solved_target::SolvedTarget::margins) of the original joints.
     pub(crate) margins: [f64; 3],
     pub(crate) guess: BranchGuess,
 }
 
-/// Whether joints rest on a guess: where no configuration is checked the controller takes the solution next to where the
-/// arm stands.
+/// Whether the branch of joints is guessed: where no configuration is checked, the controller selects the solution nearest to
+/// the current joints.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum BranchGuess {
-    /// They follow from the text.
+    /// The program determines them.
     Known,
-    /// Where the arm stands is not known, and there are other solutions.
+    /// The current joints are unknown, and there are several solutions.
     Guessed,
-    /// They go on, unchecked, from joints that were guessed.
+    /// Reached, unchecked, from joints that were guessed.
     Inherited,
 }
 
-/// Joints that are gone on from.
+/// Joints from which the next target is reached.
 #[derive(Clone, Copy)]
 struct ReferenceJoints {
     joints: Joints,
-    /// Whether they rest on a guess.
+    /// Whether they are guessed.
     guessed: bool,
 }
 
@@ -68,15 +67,15 @@ impl ReferenceJoints {
         ReferenceJoints { joints: start.joints, guessed: start.guess != BranchGuess::Known }
     }
 
-    /// What the guess is for what goes on from here.
+    /// The guess that the next target inherits.
     fn guess(&self, monitored: Switch) -> BranchGuess {
         if self.guessed && monitored == Switch::Off { BranchGuess::Inherited } else { BranchGuess::Known }
     }
 }
 
-/// The program as it is: the joints that each target leads to.
+/// The original program: the joints at each target.
 pub(crate) struct OriginalProgram<'a> {
-    /// Where the targets of each motion begin, and the end of the last.
+    /// Index of the first target of each motion, and the total count.
     pub(crate) first: Vec<usize>,
     pub(crate) target_refs: Vec<TargetRef<'a>>,
     pub(crate) originals: Originals,
@@ -102,7 +101,7 @@ impl<'a> OriginalProgram<'a> {
         self.end(motion).is_some()
     }
 
-    /// The end of a motion under the condition at `condition_index`.
+    /// The end of a motion under a condition.
     pub(crate) fn commanded(&self, motion: u32, condition_index: usize) -> Option<AssessedTarget> {
         let OriginalTarget { frames_index, intended, joints, .. } = *self.end(motion as usize)?;
         Some(AssessedTarget { frames_index, intended, joints, condition_index })
@@ -115,8 +114,8 @@ impl<'a> OriginalProgram<'a> {
 
 pub(crate) type Originals = Vec<Result<OriginalTarget, OutcomeReason>>;
 
-/// The joints of the program as it is. A target whose configuration the controller checks says by itself where the arm
-/// goes; one whose configuration it does not check is reached from the motion before.
+/// The joints of the original program: first the targets with a checked configuration, then those that are reached from the
+/// previous motion.
 fn originals(
     listing: &Listing,
     first: &[usize],
@@ -125,7 +124,7 @@ fn originals(
     frame_table: &FrameTable,
 ) -> Originals {
     let depends = |target_refs: &TargetRef<'_>| monitored(target_refs.motion) == Switch::Off;
-    // A place holder for those that depend on the motion before.
+    // Placeholder for targets that depend on the previous motion.
     let mut out: Originals = target_refs.par_iter().map(|_| Err(OutcomeReason::JointTarget)).collect();
     let stretches = target_refs.len().div_ceil(STRETCH);
     let each = out.par_chunks_mut(STRETCH).zip(target_refs.par_chunks(STRETCH)).enumerate();
@@ -140,7 +139,8 @@ fn originals(
             }
         }
     });
-    // Now those that depend on the motion before, in order: a run is what follows each other in the listing.
+    // Now the targets that depend on the previous motion, in order; a run consists of consecutive motions
+    // of the listing.
     let mut budget = SearchBudget::of(search_budget::STARTS);
     let mut motion = 0;
     while motion < listing.motions.len() {
@@ -171,8 +171,8 @@ fn originals(
     out
 }
 
-/// Where a configuration may be checked or not, by the way on which the program comes there, it is guessed as where it is not: from a
-/// start that the text does not tell, or that is guessed itself.
+/// Where the configuration may or may not be checked, depending on the execution path, the branch counts as guessed as if
+/// unchecked: from an unknown start, or from one that is guessed itself.
 fn guess_unsure(
     listing: &Listing,
     target_refs: &[TargetRef<'_>],
@@ -207,11 +207,11 @@ fn guess_unsure(
     }
 }
 
-/// Shortest and longest run of targets that are taken together.
+/// Shortest and longest run of targets solved together.
 const RUNS: [usize; 2] = [8, 64];
 
-/// The starts of targets that follow each other. `near`: the joints from which the first one is reached, if known; left
-/// at the joints of the last. `budget`: for those that have to be searched for.
+/// Original joints of consecutive targets. `near`: the joints from which the first one is reached, if known; updated to those
+/// of the last. `budget`: for targets that need a search.
 fn solve_run(
     target_refs: &[TargetRef<'_>],
     near: &mut Option<ReferenceJoints>,
@@ -245,7 +245,7 @@ fn solve_run(
             let start = with_budget(budget, || start(&target_refs[at], near.as_ref(), arms, frame_table));
             match &start {
                 Ok(start) => *near = Some(ReferenceJoints::of(start)),
-                // What goes on from there does not go on from the one before.
+                // The target after an unreachable one has no known start.
                 Err(_) if monitored(target_refs[at].motion) == Switch::Off => *near = None,
                 Err(_) => {}
             }
@@ -255,7 +255,7 @@ fn solve_run(
     }
 }
 
-/// A Cartesian target with the pose of the flange that the controller computes.
+/// A Cartesian target with the flange pose that the controller computes.
 struct CommandedFlange<'a> {
     target: &'a RobTarget,
     monitored: Switch,
@@ -282,8 +282,8 @@ fn wanted(target: &RobTarget) -> Configuration {
     Configuration { cf1, cf4, cf6, cfx }
 }
 
-/// Goes from `last` along targets as far as they are reached in the configurations that they state; hands back how many
-/// were, and leaves `last` at the joints of the last of them.
+/// Follows targets from `last` as far as each is reached in its stated configuration; returns their number and leaves `last`
+/// at the last of them.
 fn follow_seed(
     commanded: &[CommandedFlange<'_>],
     last: &mut ReferenceJoints,
@@ -295,7 +295,7 @@ fn follow_seed(
     }
     let flanges: Vec<Pose> = commanded.iter().map(|t| t.flange).collect();
     let mut taken = 0;
-    // One that has to be searched for is started by itself.
+    // A target that needs a search is solved on its own.
     for (commanded, reached) in commanded.iter().zip(arms.nominal.solve_path_prefix(&flanges, &last.joints)) {
         if commanded.monitored != Switch::Off && !reached.matches_exactly(&wanted(commanded.target)) {
             break;
@@ -317,7 +317,7 @@ fn follow_seed(
     taken
 }
 
-/// One target by itself.
+/// Solves one target on its own.
 fn start(
     target_refs: &TargetRef<'_>,
     near: Option<&ReferenceJoints>,

@@ -1,12 +1,12 @@
-//! Every target worked out: which joints reach what was meant, and what the controller must be told for them.
+//! Solves every target: the joints that reach the intended pose, and the pose that the controller must be commanded.
 //!
-//! The joints of the program as it is are there already ([`OriginalProgram`]). From them target by target, each under the
-//! condition in which the arm comes there ([`ArmConditions`](crate::condition::arm_conditions::Circumstances)), in blocks, so that
-//! the kinematics runs in lanes. Blocks are cut by count alone, so the result does not depend on the number of threads.
+//! The original joints are known ([`OriginalProgram`]). From them each target is solved under the condition in which the arm
+//! arrives there ([`ArmConditions`](crate::condition::arm_conditions::ArmConditions)), in blocks, so that the kinematics runs
+//! in lanes. Blocks are split by count alone, so the result does not depend on the number of threads.
 //!
-//! Where joints have play, the sides from which they come follow from the motion, and the corrected motion depends on the
-//! sides: both are worked out in turn, from the sides of the program as it is, until the sides stay as they are. A side
-//! that does not settle counts as not known, and what follows is worked out with that.
+//! With backlash, the sides from which joints arrive follow from the motion, and the corrected motion depends on the sides:
+//! both are computed alternately, starting from the sides of the original program, until the sides no longer change. A side
+//! that does not converge counts as unknown, and later targets are solved with that.
 
 use std::collections::BTreeMap;
 
@@ -36,16 +36,16 @@ use truegrind_arm::region::NearestSample;
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{Listing, MotionKind, RobTarget, Role, Switch, TargetValue};
 
-/// About the memory that a portion keeps (bytes).
+/// Approximate memory that a portion keeps (bytes).
 const KEPT: usize = 100 << 10;
 
-/// Makes the allocator take the room for a portion from the system at once. Left alone it asks for each few thousand bytes
-/// by themselves, and every thread waits while it does.
+/// Makes the allocator obtain the memory of a portion from the system at once. Otherwise it requests each few thousand bytes
+/// separately, and every thread waits meanwhile.
 pub(crate) fn reserve_memory() {
     drop(std::hint::black_box(Vec::<u8>::with_capacity(KEPT)));
 }
 
-/// Works out all targets. `stays`: motions that stay as they are though their targets could be corrected.
+/// Solves all targets. `stays`: motions that remain unmodified although their targets could be corrected.
 pub(crate) fn solve_targets(
     listing: &Listing,
     program: &OriginalProgram<'_>,
@@ -60,7 +60,7 @@ pub(crate) fn solve_targets(
         .solve(arms)
 }
 
-/// What all targets are worked out from.
+/// Inputs of the solver.
 struct TargetSolver<'a> {
     listing: &'a Listing,
     first: &'a [usize],
@@ -72,10 +72,10 @@ struct TargetSolver<'a> {
     stays: &'a BTreeMap<u32, OutcomeReason>,
 }
 
-/// How often sides and motion are worked out in turn before a side that still changes is called unknown.
+/// Iterations before a side that still changes counts as unknown.
 const ROUNDS: usize = 4;
 
-/// How often they are worked out at most.
+/// Largest number of iterations.
 const MOST_ROUNDS: usize = 24;
 
 impl TargetSolver<'_> {
@@ -105,7 +105,7 @@ impl TargetSolver<'_> {
         for round in 1..=MOST_ROUNDS {
             let next = self.sides(arms, Some(&targets), &doubted);
             if round > ROUNDS {
-                // What still goes to and fro is not known.
+                // A side that still alternates counts as unknown.
                 for (doubted, (next, last)) in doubted.iter_mut().zip(next.iter().zip(&sides)) {
                     (0..6).for_each(|j| doubted[j] |= next.end[j] != last.end[j]);
                 }
@@ -158,7 +158,7 @@ impl TargetSolver<'_> {
         }
     }
 
-    /// The starts of motions of which a target failed though all are known as the program is.
+    /// Original targets of the motions of which a target failed although all original joints are known.
     fn unreached(
         &self,
         solved: &[Result<SolvedTarget, OutcomeReason>],
@@ -172,7 +172,7 @@ impl TargetSolver<'_> {
         (0..self.listing.motions.len()).filter_map(originals).collect()
     }
 
-    /// Motions of which a target was reached by guess.
+    /// Motions of which a target has a guessed branch.
     fn guessed(&self) -> Vec<u32> {
         let guessed = |m: &usize| {
             self.originals[self.first[*m]..self.first[m + 1]]
@@ -188,12 +188,12 @@ impl TargetSolver<'_> {
         self.first[begin]..self.first[(begin + PORTION).min(self.listing.motions.len())]
     }
 
-    /// A place for each target.
+    /// One slot per target.
     fn unsolved(&self) -> Vec<Result<SolvedTarget, OutcomeReason>> {
         self.target_refs.par_iter().map(|_| Err(OutcomeReason::JointTarget)).collect()
     }
 
-    /// All targets, `before` under the conditions of the program as it is, or those portions that are `stale`.
+    /// Solves all targets, or only the `stale` portions; `before`: the conditions of the original program.
     fn fill(
         &self,
         solved: &mut [Result<SolvedTarget, OutcomeReason>],
@@ -224,7 +224,7 @@ impl TargetSolver<'_> {
         });
     }
 
-    /// The sides along the program: as it is, or as rewritten.
+    /// Backlash sides along the program: original, or as corrected so far.
     fn sides(
         &self,
         arms: &Arms<'_>,
@@ -244,9 +244,9 @@ impl TargetSolver<'_> {
                 Ok(solved) if solved.forbidden.is_none() => Some(solved),
                 _ => None,
             };
-            // A motion of which a target is refused stays as it is.
+            // A motion with a refused target remains unmodified.
             let changes = targets.clone().all(|target| solved(target).is_some());
-            // What the controller is told, and the joints there.
+            // Commanded pose, and the joints there.
             let at = |target: usize| match solved(target).filter(|_| changes) {
                 Some(solved) => {
                     let links = arms.conditions.links(solved.condition_index, &solved.after);
@@ -278,7 +278,8 @@ impl TargetSolver<'_> {
             })
         };
         let stops: Vec<MotionEnd<'_>> = (0..motions.len()).map(stop).collect();
-        // From guessed joints, which may be whole turns elsewhere, one does not know which way a joint comes to where it is told.
+        // Guessed joints may be whole turns off, so the direction from which a joint arrives from them is
+        // unknown.
         let guessed = |m: usize| {
             let targets = self.first[m]..self.first[m + 1];
             targets
@@ -292,7 +293,7 @@ impl TargetSolver<'_> {
         backlash_sides(&stops, &before, &arms.nominal, &arms.conditions.play_rad, &commanded, doubted)
     }
 
-    /// The condition of each target.
+    /// Condition of each target.
     fn condition_indices<'l>(
         &self,
         arms: &mut Arms<'_>,
@@ -313,7 +314,7 @@ impl TargetSolver<'_> {
     }
 }
 
-/// The rest of the work on one portion of targets, into `out`.
+/// Solves one portion of targets into `out`.
 fn solve_portion(
     target_refs: &[TargetRef<'_>],
     originals: &[Result<OriginalTarget, OutcomeReason>],
@@ -324,7 +325,7 @@ fn solve_portion(
 ) {
     let TargetSolver { frame_table, assessment, options, .. } = *work;
     let conditions = &arms.conditions;
-    // A place holder for those on their way.
+    // Placeholder for targets that are being solved.
     let waiting = |start: &Result<OriginalTarget, OutcomeReason>| {
         Err(start.as_ref().err().copied().unwrap_or(OutcomeReason::JointTarget))
     };
@@ -390,7 +391,7 @@ fn solve_portion(
     }
 }
 
-/// The targets for which joints were found that reach what was meant; the others say in `out` why not.
+/// Solves the joints that reach the intended poses; the reason of each failure goes to `out`.
 fn reachable_targets(
     originals: &[Result<OriginalTarget, OutcomeReason>],
     condition_indices: [&[usize]; 2],
@@ -434,15 +435,15 @@ fn reachable_targets(
     reachable
 }
 
-/// What the controller is told, and where it goes when the told numbers are rounded.
+/// Commanded poses, and what the controller computes from the rounded numbers.
 struct ControllerReplay {
     told_flanges: Vec<Pose>,
     commanded: Vec<Pose>,
-    /// The flanges of the rounded numbers.
+    /// Flange poses of the rounded numbers.
     read_back: Vec<Pose>,
-    /// Configuration and margins of what it makes of them.
+    /// Configuration and branch margins that the controller computes for them.
     branches: Vec<(Configuration, [f64; 3])>,
-    /// Its joints.
+    /// Joints that the controller computes for them.
     last: Vec<Joints>,
     failed: Vec<Option<OutcomeReason>>,
 }
@@ -488,7 +489,7 @@ fn replay_controller(
     ControllerReplay { told_flanges, commanded, read_back, branches, last, failed }
 }
 
-/// How well each point is known (mm) against what it is measured from; `None` where that is not asked for.
+/// Predicted standard deviation of each point (mm) relative to its reference frame; `None` where not required.
 fn sigmas(
     reachable: &[ReachableTarget],
     tools: &[Pose],
@@ -516,13 +517,13 @@ fn sigmas(
     out
 }
 
-/// The target, where the controller may go by the configuration that it states.
+/// The target, where the controller may use its stated configuration.
 fn stated<'a>(target_refs: &TargetRef<'a>) -> Option<&'a RobTarget> {
     let Ok(TargetValue::Cartesian(target)) = &target_refs.target.value else { return None };
     (monitored(target_refs.motion) != Switch::Off).then_some(target)
 }
 
-/// A target whose joints are found.
+/// A target whose corrected joints are known.
 struct ReachableTarget {
     index: usize,
     start: OriginalTarget,

@@ -1,4 +1,4 @@
-//! What is worked out of each target, and where it is found.
+//! Solved targets, and their lookup by motion.
 
 use std::collections::BTreeMap;
 
@@ -13,10 +13,10 @@ use truegrind_arm::region::Outside;
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{Motion, MotionKind, MotionTarget, Role, TargetValue};
 
-/// Motions that one thread takes at a time.
+/// Motions per parallel work item.
 pub(crate) const PORTION: usize = 64;
 
-/// One target worked out.
+/// One solved target.
 #[derive(Debug, Clone)]
 pub(crate) struct SolvedTarget {
     pub(crate) frames_index: usize,
@@ -24,36 +24,36 @@ pub(crate) struct SolvedTarget {
     pub(crate) before: Joints,
     pub(crate) after: Joints,
     pub(crate) commanded: Pose,
-    /// The branch before.
+    /// Branch of the original joints.
     pub(crate) cfx_before: i32,
     pub(crate) conf: Configuration,
-    /// How far the tool is off before and after (mm).
+    /// Deviation of the tool before and after (mm).
     pub(crate) deviation_mm: [f64; 2],
-    /// The same with its direction and the turn; only where points are asked for.
+    /// The same with direction and rotation; only where points are required.
     pub(crate) deviations: Option<Box<[Deviation; 2]>>,
     pub(crate) sigma_mm: f64,
-    /// The same of the shape of its cut, after the best rigid registration; absent outside cuts.
+    /// Predicted standard deviation of the shape of its cut, after the best rigid registration; absent outside cuts.
     pub(crate) shape_sigma_mm: Option<f64>,
-    /// What of either comes from joints whose side is not known (mm).
+    /// Contribution to either from joints of unknown backlash side (mm).
     pub(crate) play_uncertainty_mm: f64,
     pub(crate) outside: Option<Outside>,
     /// [`Inverse::branch_margins`](truegrind_arm::inverse::Inverse::branch_margins) of the nominal arm, before and after.
     pub(crate) margins: [[f64; 3]; 2],
     /// Why it must not be written.
     pub(crate) forbidden: Option<OutcomeReason>,
-    /// The condition under which the arm comes there.
+    /// Condition under which the arm arrives.
     pub(crate) condition_index: usize,
-    /// Whether `before` rests on a guess.
+    /// Whether the original joints are guessed.
     pub(crate) guess: BranchGuess,
 }
 
 impl SolvedTarget {
-    /// How far the commanded position lies from the intended one (mm): what the program's numbers move by.
+    /// Distance of the commanded from the intended position (mm): the change of the program's numbers.
     pub(crate) fn shift_mm(&self) -> f64 {
         (self.commanded.translation.vector - self.intended.translation.vector).norm()
     }
 
-    /// Where the target leads as the program is.
+    /// The target of the original program.
     fn original_targets(&self) -> OriginalTarget {
         OriginalTarget {
             frames_index: self.frames_index,
@@ -68,22 +68,22 @@ impl SolvedTarget {
 
 /// The targets of all motions.
 pub(crate) struct SolvedTargets {
-    /// What [`SolvedTargets::forbid`] did: at which target, and what was forbidden there before.
+    /// Undo log of [`SolvedTargets::forbid`]: target, and its previous reason.
     pub(crate) forbade: Vec<(usize, Option<OutcomeReason>)>,
-    /// Where the targets of each motion begin, and the end of the last.
+    /// Index of the first target of each motion, and the total count.
     pub(crate) first: Vec<usize>,
-    /// All of them, in one list: it goes back to the system as a whole.
+    /// All targets in one list, so that its memory is returned to the system as a whole.
     pub(crate) targets: Vec<Result<SolvedTarget, OutcomeReason>>,
-    /// The conditions on the way to the end of each motion; empty where no joint has play.
+    /// Conditions along the segment to each motion's end; empty without backlash.
     pub(crate) schedules: Vec<ConditionSchedule>,
-    /// Where the targets of motions lead of which one is not reached on the actual arm: as the program is.
+    /// Original targets of motions of which the estimated arm does not reach a target.
     pub(crate) unreached: BTreeMap<u32, Vec<OriginalTarget>>,
-    /// Motions of which the configuration is not checked and the start not known; not those that go on from there.
+    /// Motions with unchecked configuration and unknown start, without those that continue from them.
     pub(crate) guessed: Vec<u32>,
 }
 
 impl SolvedTargets {
-    /// Forbids that a motion is changed; of no effect where its last target was not worked out.
+    /// Forbids a change of a motion; without effect where its last target was not solved.
     pub(crate) fn forbid(&mut self, motion: usize, why: OutcomeReason) {
         let targets = self.first[motion]..self.first[motion + 1];
         if let Some(last) = targets.last()
@@ -94,7 +94,7 @@ impl SolvedTargets {
         }
     }
 
-    /// Takes back all that [`SolvedTargets::forbid`] did: what was worked out serves another round.
+    /// Reverts all calls of [`SolvedTargets::forbid`], so that the solved targets serve another round.
     pub(crate) fn allow_again(&mut self) {
         for (target, before) in self.forbade.drain(..).rev() {
             if let Ok(solved) = &mut self.targets[target] {
@@ -103,12 +103,12 @@ impl SolvedTargets {
         }
     }
 
-    /// The targets of one motion; none where the motion must be left.
+    /// The targets of one motion; empty where the motion must be left.
     pub(crate) fn of(&self, motion: usize) -> &[Result<SolvedTarget, OutcomeReason>] {
         &self.targets[self.first[motion]..self.first[motion + 1]]
     }
 
-    /// Where the targets of a motion lead as the program is; none where that is not known.
+    /// The targets of a motion in the original program; empty where unknown.
     pub(crate) fn original_targets(&self, motion: usize) -> Vec<OriginalTarget> {
         let known = |targets: &[Result<SolvedTarget, OutcomeReason>]| {
             targets.iter().map(|target| Some(target.as_ref().ok()?.original_targets())).collect::<Option<_>>()
@@ -116,7 +116,7 @@ impl SolvedTargets {
         known(self.of(motion)).or_else(|| self.unreached.get(&(motion as u32)).cloned()).unwrap_or_default()
     }
 
-    /// Where a motion ends as the program is, if that is known.
+    /// The end of a motion in the original program, if known.
     pub(crate) fn original_end(&self, motion: usize) -> Option<OriginalTarget> {
         match self.of(motion).last()? {
             Ok(solved) => Some(solved.original_targets()),
@@ -124,7 +124,7 @@ impl SolvedTargets {
         }
     }
 
-    /// The conditions on the way to the end of a motion, at which the arm comes under `condition_index`.
+    /// The conditions along the segment to the end of a motion; constant `condition_index` without backlash.
     pub(crate) fn condition_schedule(&self, motion: usize, condition_index: usize) -> ConditionSchedule {
         self.schedules
             .get(motion)
@@ -132,7 +132,7 @@ impl SolvedTargets {
             .unwrap_or(ConditionSchedule { first: condition_index, later: Vec::new() })
     }
 
-    /// At how many targets a side is not known, and how far the tool may be off for it at most (mm).
+    /// Number of targets with a joint of unknown side, and the largest resulting deviation (mm).
     pub(crate) fn in_play(&self) -> (usize, f64) {
         let open = self.targets.iter().flatten().map(|s| s.play_uncertainty_mm).filter(|mm| *mm > 0.0);
         open.fold((0, 0.0), |(count, most), mm| (count + 1, f64::max(most, mm)))
