@@ -1,7 +1,7 @@
-//! Points of a program's path and how far an arm is off at each.
+//! Points of a program's path and the deviation of an arm at each.
 //!
-//! Frames: the *intended* pose of the tool is where the program's author wants the TCP, in the base. A deviation is
-//! reached minus intended, its vector in the axes of the work object, in which programs and parts are measured.
+//! Frames: the *intended* pose is where the program's author wants the TCP, in the base. A deviation is reached minus
+//! intended, its vector in the axes of the work object, in which programs and parts are measured.
 
 use nalgebra::{Isometry3, Matrix3, Point3, SVD, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
@@ -12,7 +12,7 @@ use truegrind_math::se3::Pose;
 use truegrind_math::statistics::ErrorSummary;
 use truegrind_programs::motion::MotionKind;
 
-/// How far the tool is off at one point.
+/// Deviation of the tool at one point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Deviation {
     /// Reached minus intended, in the axes of the work object (mm).
@@ -24,8 +24,8 @@ pub struct Deviation {
 }
 
 impl Deviation {
-    /// Deviation of `reached` from `intended`, both in the base, seen in the axes of `base_from_object`.
-    /// `normal` is the outward surface normal in the work object.
+    /// Deviation of `reached` from `intended`, both in the base, expressed in the axes of `base_from_object`. `normal`:
+    /// outward surface normal in the work object.
     pub fn between(
         intended: &Pose,
         reached: &Pose,
@@ -46,19 +46,19 @@ impl Deviation {
         self.vector_mm.norm()
     }
 
-    /// The signed figure that a summary uses: along the normal where there is one, else the norm.
+    /// The signed figure used in summaries: along the normal where there is one, else the norm.
     pub fn signed_mm(&self) -> f64 {
         self.normal_mm.unwrap_or_else(|| self.norm_mm())
     }
 }
 
-/// What became of a point.
+/// Outcome of a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Status {
     /// Rewritten.
     Changed,
-    /// Left as it is: nothing to change, or not known before run time.
+    /// Unmodified: nothing to change, or not known before run time.
     Left,
     /// Not rewritten, because that would be wrong or dangerous.
     Refused,
@@ -75,55 +75,54 @@ pub struct PathPoint {
     pub line: u32,
     /// Instruction.
     pub instruction: String,
-    /// How the arm goes to this point.
+    /// How the arm moves to this point.
     pub kind: MotionKind,
-    /// Whether the tool cuts on the way to this point; approaches and links do not.
+    /// Whether the tool cuts on the way to this point; approaches and air moves do not.
     pub cutting: bool,
     /// Work object in the base.
     pub base_from_object: Pose,
     /// Tool on the flange.
     pub flange_from_tool: Pose,
-    /// Where the TCP shall be, in the base.
+    /// Intended pose of the TCP, in the base.
     pub intended: Pose,
     /// Outward surface normal in the work object, where a surface is known.
     pub normal: Option<Vector3<f64>>,
-    /// Controller joints for the program as it was.
+    /// Controller joints in the original program.
     pub joints_before: Option<Joints>,
-    /// Controller joints for the rewritten program.
+    /// Controller joints in the rewritten program.
     pub joints_after: Option<Joints>,
-    /// Where the arm goes with the program as it was.
+    /// Deviation in the original program.
     pub before: Option<Deviation>,
-    /// Where the arm goes with the rewritten program.
+    /// Deviation in the rewritten program.
     pub after: Option<Deviation>,
     /// Predicted standard deviation of the position (mm), from the covariance of the estimate; of the shape where that alone is
     /// corrected.
     pub sigma_mm: Option<f64>,
-    /// The same of the shape of its cut, after the best rigid registration (mm); absent outside cuts.
+    /// Predicted standard deviation of the shape of its cut, after the best rigid registration (mm); absent outside cuts.
     pub shape_sigma_mm: Option<f64>,
     /// How the point leaves the region in which the arm was measured.
     pub outside: Option<Outside>,
-    /// What became of it.
+    /// Outcome of the point.
     pub status: Status,
-    /// Why, where it was not simply rewritten.
+    /// Reason, where it was not simply rewritten.
     pub reason: Option<String>,
 }
 
 impl PathPoint {
-    /// The reason without its measured figures, which have a decimal point; numbers of joints stay. Points with the same
-    /// fate for the same kind of reason are told of together.
+    /// The reason without its measured figures (those with a decimal point; joint numbers remain), for grouping points.
     pub fn kind_of_reason(&self) -> Option<String> {
         let plain = |word: &&str| !(word.contains('.') && word.bytes().any(|b| b.is_ascii_digit()));
         self.reason.as_ref().map(|reason| reason.split(' ').filter(plain).collect::<Vec<_>>().join(" "))
     }
 }
 
-/// What the column "after" of a table is.
+/// Meaning of the column "after" of a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum After {
-    /// Under the model that made the correction: rounding, interpolation and inverse kinematics alone.
+    /// Under the model that made the correction: only rounding, interpolation and inverse kinematics.
     PredictedRemainder,
-    /// On a simulated actual arm that the correction knew nothing of.
+    /// On a simulated actual arm unknown to the correction.
     Achieved,
 }
 
@@ -142,7 +141,7 @@ pub struct PathReport {
     pub held_out_mm: Option<f64>,
 }
 
-/// The summary block of ltlm-2024 Table 8: five points, mean, SD; TRAPS of that table: its mean is signed.
+/// The summary block of ltlm-2024 Table 8: five points, mean, SD. Trap of that table: its mean is signed.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Block {
     /// Signed deviations at five points spread evenly over the cut (mm).
@@ -152,7 +151,7 @@ pub struct Block {
 }
 
 impl PathReport {
-    /// The points by which a path is judged: the cut, or all where nothing cuts.
+    /// The points by which a path is judged: the cutting points, or all where nothing cuts.
     pub fn cut(&self) -> impl Iterator<Item = &PathPoint> {
         let any = self.points.iter().any(|point| point.cutting);
         self.points.iter().filter(move |point| point.cutting || !any)
@@ -169,8 +168,8 @@ impl PathReport {
         (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
     }
 
-    /// How far off the cut has to be expected after the correction (mm): what is left and the predicted 1σ, the largest of all
-    /// points. `None` where what is left was achieved on an arm, or σ is not known.
+    /// Expected deviation of the cut after the correction (mm): remaining deviation and predicted 1σ combined, maximum over
+    /// all points. `None` where the remainder was achieved on an arm, or σ is unknown.
     pub fn expected_mm(&self) -> Option<f64> {
         if self.after == After::Achieved {
             return None;
@@ -188,8 +187,8 @@ impl PathReport {
         Some(Block { five_mm, all: ErrorSummary::of(values) })
     }
 
-    /// What remains of the deviations after the rigid motion that fits them best: the shape error of the path, when
-    /// the base was not measured in the work object. RMS (mm) of the vectors; `None` for fewer than three points.
+    /// RMS of the deviation vectors after the best rigid motion (mm): the shape error of the path, for a base that was not
+    /// measured in the work object. `None` for fewer than three points.
     pub fn registered_rms_mm(&self, which: fn(&PathPoint) -> Option<Deviation>) -> Option<f64> {
         let pairs: Vec<Pair> = self
             .points
@@ -205,10 +204,10 @@ impl PathReport {
     }
 }
 
-/// Where a point should be, and where it is.
+/// Intended and reached point.
 type Pair = (Point3<f64>, Point3<f64>);
 
-/// The rigid motion that carries the second points onto the first best (Kabsch); `None` for fewer than three.
+/// The rigid motion that best maps the second points onto the first (Kabsch); `None` for fewer than three.
 fn best_motion(pairs: &[Pair]) -> Option<Pose> {
     if pairs.len() < 3 {
         return None;
@@ -219,7 +218,7 @@ fn best_motion(pairs: &[Pair]) -> Option<Pose> {
     let (to, from) = (mean(|p| p.0), mean(|p| p.1));
     let spread: Matrix3<f64> =
         pairs.iter().map(|p| (p.1.coords - from) * (p.0.coords - to).transpose()).sum();
-    // Squares of these numbers must stay finite: the iteration does not end otherwise.
+    // Squares of these numbers must stay finite, or the iteration does not end.
     if !spread.iter().all(|v| v.abs() < 1e100) {
         return None;
     }

@@ -1,7 +1,7 @@
-//! Running a program on an arm that is not the controller's: what the tool does, against what was meant.
+//! Verification: runs a program on an arm other than the nominal one and compares the reached with the intended poses.
 //!
-//! The controller computes joints with the nominal arm; the acting arm (estimated, or a simulated actual one) goes
-//! where those joints take it, from the sides from which they come. Intended poses come from the original program.
+//! The controller computes joints with the nominal arm; the acting arm (estimated, or a simulated actual one) moves with
+//! those joints, arriving from their backlash sides. Intended poses come from the original program.
 
 use nalgebra::{Point3, Vector3};
 
@@ -20,21 +20,21 @@ use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{Listing, MotionKind, Reason, Role, TargetValue};
 use truegrind_surfaces::Surface;
 
-/// Where the controller sends the arm at the end of a motion.
+/// Commanded end of a motion.
 #[derive(Debug, Clone)]
 struct CommandedEnd {
     motion: usize,
     frames_index: usize,
-    /// Told pose in the work object.
+    /// Commanded pose in the work object.
     commanded: Pose,
     joints: Joints,
 }
 
-/// One end of a motion, run.
+/// End of a motion as executed.
 #[derive(Debug, Clone)]
 struct ExecutedEnd {
     motion: usize,
-    /// Told pose in the work object.
+    /// Commanded pose in the work object.
     commanded: Pose,
     joints: Joints,
     /// Reached pose in the work object.
@@ -42,7 +42,7 @@ struct ExecutedEnd {
     base_from_object: Pose,
     flange_from_tool: Pose,
     carried: Option<RegisteredFrame>,
-    /// The condition under which the arm came there.
+    /// Condition under which the arm arrived.
     condition_index: usize,
 }
 
@@ -55,20 +55,20 @@ pub struct ActingArm<'a> {
     pub model: &'a Model,
     /// Its covariance and region, where it is an estimate.
     pub knowledge: Option<&'a Estimated>,
-    /// Under what circumstances.
+    /// Condition under which it runs.
     pub condition: Condition,
 }
 
-/// A program with what it is judged by.
+/// A program to verify.
 #[derive(Debug, Clone, Copy)]
 pub struct VerificationTask<'a> {
-    /// States what was meant, and gives the deviations before.
+    /// Defines the intended poses, and gives the deviations before.
     pub original: &'a Listing,
-    /// The rewritten program, which gives the deviations after; absent when only the original is judged.
+    /// The rewritten program, which gives the deviations after; absent when only the original is verified.
     pub rewritten: Option<&'a Listing>,
     /// Origins of tools and work objects.
     pub cell: &'a Cell,
-    /// The surface that is ground, in the frame of the work object.
+    /// The machined surface, in the frame of the work object.
     pub surface: Option<&'a Surface>,
     /// Name of the program.
     pub program: &'a str,
@@ -76,7 +76,7 @@ pub struct VerificationTask<'a> {
     pub name: &'a str,
     /// What "after" means.
     pub after: After,
-    /// What the two programs say that the arm carries; absent where the payload of the condition counts throughout.
+    /// Payloads that the two programs state; absent where the payload of the condition applies throughout.
     pub loads: [Option<&'a Loads>; 2],
 }
 
@@ -142,7 +142,7 @@ pub fn verify(task: &VerificationTask<'_>, conditions: &ActingArm<'_>) -> PathRe
     }
 }
 
-/// A point nearer to the surface than this is a cut (mm).
+/// A point closer to the surface than this is cutting (mm).
 const ON_SURFACE_MM: f64 = 0.5;
 
 fn run(listing: &Listing, loads: Option<&Loads>, arms: &mut Arms<'_>, cell: &Cell) -> Vec<ExecutedEnd> {
@@ -180,7 +180,7 @@ fn run(listing: &Listing, loads: Option<&Loads>, arms: &mut Arms<'_>, cell: &Cel
         .collect()
 }
 
-/// The condition under which the arm comes to each end.
+/// Condition under which the arm arrives at each end.
 fn condition_indices(
     listing: &Listing,
     loads: Option<&Loads>,
@@ -250,8 +250,8 @@ fn commanded_end(
     Ok(CommandedEnd { motion: index, frames_index, commanded, joints })
 }
 
-/// The rewritten run that belongs to each original one: the same number means one to one; where targets were put in,
-/// the monotone matching with the least total distance, by dynamic programming over the targets put in.
+/// The rewritten end that belongs to each original one: one to one for equal numbers; with inserted targets, the monotone
+/// matching of least total distance, by dynamic programming over the inserted targets.
 fn align(before: &[ExecutedEnd], after: &[ExecutedEnd]) -> Vec<Option<usize>> {
     let (n, m) = (before.len(), after.len());
     if n == m {
@@ -264,7 +264,7 @@ fn align(before: &[ExecutedEnd], after: &[ExecutedEnd]) -> Vec<Option<usize>> {
     let distance = |i: usize, k: usize| {
         (before[i].commanded.translation.vector - after[k].commanded.translation.vector).norm()
     };
-    // cost[e]: least total distance with runs 0..=i matched and e of the extra runs passed so far.
+    // cost[e]: least total distance with ends 0..=i matched and e of the extra ends skipped so far.
     let mut cost: Vec<f64> = (0..=extra).map(|e| distance(0, e)).collect();
     let mut from: Vec<Vec<usize>> = vec![(0..=extra).collect()];
     for i in 1..n {

@@ -1,7 +1,7 @@
-//! What the model knows of a program before anything is corrected: where the path over each work object lies, how likely
-//! each cut gets worse, and the best registration of each cut, against which the sigma of its shape is stated.
+//! Risk assessment of a program before correction: where the path over each work object lies, how likely the correction of
+//! each cut does harm, and the best registration of each cut, the reference for the sigma of its shape.
 //!
-//! All of it follows from some targets of the program as it is, evenly spread, with every joint in the middle of its play.
+//! Everything follows from evenly spaced targets of the original program, with every joint at mid-play.
 
 use std::collections::BTreeMap;
 
@@ -22,23 +22,23 @@ use crate::risk::remedy_search::{self, UnknownPlacement};
 use truegrind_arm::estimated::{Estimated, RegisteredFrame};
 use truegrind_programs::motion::Listing;
 
-/// What is known of a program.
+/// Assessment of a program.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Assessment {
-    /// One for each work object.
+    /// One entry per work object.
     pub(crate) placements: Vec<ObjectPlacement>,
-    /// One for each cut.
+    /// One entry per cut.
     pub(crate) cuts: Vec<CutRisk>,
-    /// What each cut has a part in, taken together.
+    /// Contribution of each cut to the program's probability of harm.
     shares: Vec<CutContribution>,
-    /// The cut of each motion, as its place in `cuts`; empty without any.
+    /// The cut of each motion, as an index into `cuts`; empty without cuts.
     cut_of: Vec<Option<u32>>,
     /// The best registration of each cut, in the base; absent where the robot holds the part.
     registered: Vec<Option<RegisteredFrame>>,
 }
 
 impl Assessment {
-    /// The motions that stay since their cut would too likely get worse.
+    /// The motions that remain unmodified because correcting their cut is too likely to do harm.
     pub(crate) fn risky(&self) -> BTreeMap<u32, OutcomeReason> {
         let left = self.cuts.iter().filter(|cut| cut.left_for_risk);
         left.flat_map(|cut| {
@@ -49,23 +49,23 @@ impl Assessment {
         .collect()
     }
 
-    /// Against what the shape of a motion's cut is known: a frame that moves with the arm's parameters as the cut does.
+    /// The reference frame of the shape of a motion's cut: it moves with the arm's parameters as the cut does.
     pub(crate) fn registered(&self, motion: u32) -> Option<&RegisteredFrame> {
         self.registered[self.place(motion)?].as_ref()
     }
 
-    /// The sigma of the shape of a motion's cut (RMS, mm), for parts that the robot holds.
+    /// Sigma of the shape of a motion's cut (RMS, mm), for parts that the robot holds.
     pub(crate) fn sigma_of_cut_mm(&self, motion: u32) -> Option<f64> {
         let place = self.place(motion)?;
         (self.registered[place].is_none()).then_some(self.cuts[place].shape_sigma_mm)
     }
 
-    /// Whether the shape of a motion's cut is corrected, and its place not.
+    /// Whether only the shape of a motion's cut is corrected.
     pub(crate) fn shape_alone(&self, motion: u32) -> bool {
         self.place(motion).is_some_and(|place| self.cuts[place].assessed == Placement::Shape)
     }
 
-    /// Probability that these cuts get worse, taken together; absent without any.
+    /// Probability that correcting these cuts does harm, taken together; absent without any.
     pub(crate) fn probability_of_harm_of<'c>(
         &self,
         knowledge: &Estimated,
@@ -82,24 +82,24 @@ impl Assessment {
     }
 }
 
-/// What is asked: the estimated arm, under each condition that the targets were given.
+/// The estimated arm, under each condition of the targets.
 pub(crate) struct EstimateContext<'a, 'm> {
     pub(crate) conditions: &'a ArmConditions<'m>,
     pub(crate) knowledge: &'a Estimated,
 }
 
-/// The targets that are looked at: of each work object and of each cut, the point included at which it begins.
+/// The sampled targets of each work object and of each cut, including the point where it begins.
 pub(crate) struct AssessmentSample {
     objects: Vec<(u32, Vec<u32>)>,
     cuts: Vec<(Vec<u32>, Vec<u32>)>,
 }
 
 impl AssessmentSample {
-    /// Those of the motions that `reached` says something of.
+    /// From those motions for which `reached` holds.
     pub(crate) fn of(listing: &Listing, reached: impl Fn(usize) -> bool) -> Self {
         let cuts: CutsOf = cut::of(listing);
         let mut of_object: BTreeMap<u32, [Vec<u32>; 2]> = BTreeMap::new();
-        // Its motions, and the ends of others at which it begins.
+        // Motions of each cut, and the ends of other motions at which it begins.
         let mut of_cut: BTreeMap<u32, [Vec<u32>; 2]> = BTreeMap::new();
         for (index, motion) in (0_u32..).zip(&listing.motions) {
             let cut = cuts.root(index);
@@ -117,7 +117,7 @@ impl AssessmentSample {
                 of_object.entry(object).or_default()[usize::from(cut.is_none())].push(index);
             }
         }
-        // Where something is cut, the way through the air does not count.
+        // Air moves do not count where there are cuts.
         let objects = of_object.into_iter().map(|(object, [cuts, rest])| {
             (object, evenly_spaced(if cuts.is_empty() { &rest } else { &cuts }, placement::MOST_POINTS))
         });
@@ -129,7 +129,7 @@ impl AssessmentSample {
         Self { objects: objects.collect(), cuts: cuts.collect() }
     }
 
-    /// Every motion that is looked at, once.
+    /// Every sampled motion, once.
     pub(crate) fn motions(&self) -> Vec<u32> {
         let objects = self.objects.iter().flat_map(|(_, motions)| motions);
         let mut all: Vec<u32> =
@@ -140,8 +140,8 @@ impl AssessmentSample {
     }
 }
 
-/// Assesses a program. `at` are the targets of [`AssessmentSample::motions`], by motion. Work objects of which the shape alone is
-/// corrected are displaced in `list` to where the path lies.
+/// Assesses a program. `at`: the targets of [`AssessmentSample::motions`], by motion. Work objects whose shape alone is
+/// corrected are displaced in `list` to where the path really lies.
 pub(crate) fn assess_program(
     listing: &Listing,
     chosen: &AssessmentSample,
@@ -217,16 +217,16 @@ pub(crate) fn assess_program(
     out
 }
 
-/// How a cut was judged.
+/// How a cut was assessed.
 struct JudgedCut {
     placement: Placement,
     points: usize,
-    /// Motions for each point that was asked.
+    /// Motions per sampled point.
     weight: f64,
     carried: Option<RegisteredFrame>,
 }
 
-/// What a cut weighs among others: points, |d|² (mm²), and Jᵀ d.
+/// Contribution of a cut: points, |d|² (mm²), and Jᵀ d.
 #[derive(Debug, Clone)]
 struct CutContribution {
     points: f64,
@@ -234,7 +234,7 @@ struct CutContribution {
     toward: DVector<f64>,
 }
 
-/// Cuts together.
+/// Sum over cuts.
 struct ProgramTotal(CutContribution);
 
 impl ProgramTotal {

@@ -1,7 +1,7 @@
-//! The chance that a correction makes a cut worse than it is.
+//! The risk that a correction makes a cut worse than it was.
 //!
-//! A path whose shape alone is corrected is judged by what its best rigid registration leaves. The probability itself is in
-//! `probability`.
+//! If only the shape of a path is corrected, the residual after its best rigid registration is assessed. The probability is
+//! in `probability`.
 
 use nalgebra::{DVector, Matrix3xX, Vector3, Vector6};
 
@@ -10,14 +10,14 @@ use crate::risk::registration::Registration;
 use truegrind_arm::estimated::{Estimated, RegisteredFrame};
 use truegrind_math::se3::Pose;
 
-/// What is known of one cut.
+/// Risk assessment of one cut.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CutRisk {
     /// Its motions, by index, in order.
     pub motions: Vec<u32>,
-    /// Whether its shape is judged, or its place too.
+    /// Whether its shape was assessed, or its position too.
     pub assessed: Placement,
-    /// How far it is off as it is (RMS, mm).
+    /// Deviation in the original program (RMS, mm).
     pub deviation_mm: f64,
     /// Predicted standard deviation of its correction (RMS, mm).
     pub sigma_mm: f64,
@@ -25,29 +25,29 @@ pub struct CutRisk {
     pub shape_sigma_mm: f64,
     /// Probability that the correction makes it worse.
     pub probability_of_harm: f64,
-    /// Whether it is left as it is for that.
+    /// Whether it remains unmodified because of that.
     pub left_for_risk: bool,
-    /// Whether it is rewritten, or with [`Cuts::Partial`](crate::cut::Cuts::Partial) a part of it: a cut of which no motion is
-    /// likely to get worse may stay for another reason, which its motions say.
+    /// Whether it is rewritten, or with [`Cuts::Partial`](crate::cut::Cuts::Partial) a part of it. A cut of low risk can
+    /// remain unmodified for another reason, which its motions state.
     pub corrected: bool,
 }
 
-/// A cut, judged.
+/// An assessed cut.
 pub(crate) struct Judgement {
     pub(crate) deviation_mm: f64,
     pub(crate) sigma_mm: f64,
     pub(crate) shape_sigma_mm: f64,
-    /// |d|² (mm²), and Jᵀ d: added up they judge the program.
+    /// |d|² (mm²), and Jᵀ d: summed over cuts they assess the program.
     pub(crate) square: f64,
     pub(crate) toward: DVector<f64>,
-    /// Twists of the best registration per unit of each parameter, in the work object, and the point that they turn about.
+    /// Twists of the best registration per unit of each parameter, in the work object, and their reference point.
     pub(crate) registered: RegisteredFrame,
 }
 
-/// Points of a cut by which it is judged; more are not asked.
+/// Most points by which a cut is assessed.
 pub(crate) const MOST_POINTS: usize = 32;
 
-/// Judges the points of a cut.
+/// Assesses the points of a cut.
 pub(crate) fn assess_cut(
     off: &[TargetDeviation],
     knowledge: &Estimated,
@@ -89,7 +89,7 @@ pub(crate) fn assess_cut(
     })
 }
 
-/// The registration of a cut seen from the base, for a work object that stands.
+/// The registration of a cut expressed in the base, for a stationary work object.
 pub(crate) fn in_base(registered: &RegisteredFrame, base_from_object: &Pose) -> RegisteredFrame {
     let turn = base_from_object.rotation;
     RegisteredFrame {

@@ -1,13 +1,13 @@
-//! What a measurement that is not made yet would tell of the arm's parameters.
+//! Information that a planned measurement would give about the arm's parameters.
 //!
-//! A reading hangs on the arm's parameters a and on some of the measurement's own b (where the sensor stands, where the target
-//! sits): r = A a + B b + noise. With W the weights of the readings and N the inverse covariance that b has beforehand, the
-//! readings tell of a
+//! A reading depends on the arm's parameters a and on nuisance parameters b of the measurement (pose of the sensor, position
+//! of the target): r = A a + B b + noise. With the weights W of the readings and the prior inverse covariance N of b, their
+//! information on a is
 //!
 //! I = AᵀWA − AᵀWB (BᵀWB + N)⁻¹ BᵀWA,
 //!
-//! and a covariance C = F Fᵀ becomes F (1 + Fᵀ I F)⁻¹ Fᵀ (Bayes, linear and normal). To *state* what a measurement of before had
-//! to find out is worth what its readings tell with a narrow N less what they told with a wide one.
+//! and a covariance C = F Fᵀ becomes F (1 + Fᵀ I F)⁻¹ Fᵀ (Bayes, linear and normal). *Stating* what an earlier measurement
+//! had to estimate is worth the information of its readings with a narrow prior less that with a wide one.
 
 use nalgebra::{Cholesky, DMatrix, Matrix3, Vector3};
 
@@ -15,38 +15,38 @@ use truegrind_arm::estimated::Estimated;
 use truegrind_arm::model::{Joints, PreparedModel};
 use truegrind_math::se3::Pose;
 
-/// How well something of the measurement is known before it is fitted (mm, rad).
+/// Prior standard deviation of a nuisance parameter (mm, rad).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PriorSigma {
     pub(crate) mm: f64,
     pub(crate) rad: f64,
 }
 
-/// What is fitted freely, as in an identification.
+/// Freely estimated, as in an identification.
 pub(crate) const FREE: PriorSigma = PriorSigma { mm: 2000.0, rad: 3.0 };
-/// A target that sits anywhere near the flange.
+/// A target anywhere near the flange.
 const MOUNTED: PriorSigma = PriorSigma { mm: 50.0, rad: 1.0 };
 
-/// Where a sensor stands (mm, in the base).
+/// Position of a sensor (mm, in the base).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum SensorPosition {
-    /// A tracker, about which its frame turns.
+    /// A tracker; its frame rotates about this point.
     Tracker(Vector3<f64>),
-    /// The outlet of a cable.
+    /// Outlet of a cable.
     Outlet(Vector3<f64>),
 }
 
-/// Readings to be.
+/// Planned readings.
 pub(crate) struct Readings<'a> {
     pub(crate) poses: &'a [Joints],
-    /// What each pose counts.
+    /// Weight of each pose.
     pub(crate) weight: f64,
     pub(crate) stand: SensorPosition,
-    /// How well it is known where the sensor stands.
+    /// Prior of the sensor's pose.
     pub(crate) stand_known: PriorSigma,
     /// Targets on the flange (mm).
     pub(crate) targets: &'a [Vector3<f64>],
-    /// How well their places on the flange are known (mm); `None` for targets that sit anywhere.
+    /// Standard deviation of the target positions on the flange (mm); `None` for targets anywhere.
     pub(crate) target_known_mm: Option<f64>,
     /// Standard deviation of a reading, for each coordinate (mm).
     pub(crate) sigma_mm: f64,
@@ -60,7 +60,7 @@ pub(crate) struct NormalEquations {
 }
 
 impl NormalEquations {
-    /// The information on the arm's parameters, with the standard deviations that the measurement's own have beforehand.
+    /// Information on the arm's parameters, given the prior standard deviations of the nuisance parameters.
     pub(crate) fn information(&self, own: &[f64]) -> DMatrix<f64> {
         let Self { arms, mixed, owns } = self;
         let mut owns = owns.clone();
@@ -75,7 +75,7 @@ impl NormalEquations {
 }
 
 impl Readings<'_> {
-    /// Their normal equations, on the parameters of `knowledge` and on their own.
+    /// Normal equations for the parameters of `knowledge` and the nuisance parameters.
     pub(crate) fn normal(&self, knowledge: &Estimated, arm: &PreparedModel<'_>) -> NormalEquations {
         let (parameters, own) = (knowledge.order.len(), self.own().len());
         let mut arms = DMatrix::zeros(parameters, parameters);
@@ -107,8 +107,8 @@ impl Readings<'_> {
         NormalEquations { arms, mixed, owns }
     }
 
-    /// Standard deviations of the measurement's own parameters: six of the frame, or three of the outlet and the zero of its
-    /// cable, then three for each target.
+    /// Prior standard deviations of the nuisance parameters: six of the frame, or three of the outlet and the zero of its
+    /// cable, then three per target.
     pub(crate) fn own(&self) -> Vec<f64> {
         let PriorSigma { mm, rad } = self.stand_known;
         let mut out = match self.stand {
@@ -120,7 +120,7 @@ impl Readings<'_> {
         out
     }
 
-    /// How the place at which a target is read moves with the measurement's own parameters (3 × own).
+    /// Derivative of the position of a target by the nuisance parameters (3 × nuisance parameters).
     fn by_own(&self, point: &Vector3<f64>, turn: &Matrix3<f64>, target: usize) -> DMatrix<f64> {
         let first = match self.stand {
             SensorPosition::Tracker(_) => 6,
@@ -136,9 +136,9 @@ impl Readings<'_> {
     }
 }
 
-/// A factor F of a covariance C = F Fᵀ; what rounding took below 0 counts as 0. `None` where it is not finite.
+/// A factor F of a covariance C = F Fᵀ; negative eigenvalues from rounding count as 0. `None` where it is not finite.
 pub(crate) fn factor(covariance: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    // In correlations, so that mm and rad are of one size.
+    // On the correlation matrix, so that mm and rad are of comparable size.
     let scale: Vec<f64> = covariance.diagonal().iter().map(|v| v.max(0.0).sqrt()).collect();
     let unit = |k: usize| if scale[k] > 0.0 { scale[k] } else { 1.0 };
     let n = scale.len();
@@ -152,7 +152,7 @@ pub(crate) fn factor(covariance: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     }))
 }
 
-/// Covariance of `seen` = T a (T: `seen` × parameters) once `information` on a has come, C = `factor` `factor`ᵀ before.
+/// Covariance of T a (`seen` = T, rows × parameters) after `information` on a, where C = `factor` `factor`ᵀ before.
 pub(crate) fn updated(
     factor: &DMatrix<f64>,
     information: &DMatrix<f64>,

@@ -1,10 +1,10 @@
-//! Shape and placement apart: where the path of a work object lies as a whole, and what is left of its error when it lies
-//! right.
+//! Position and shape of a path: where the path over a work object lies as a whole, and the deviation that remains after the
+//! best rigid registration.
 //!
-//! A sensor whose frame was fitted says nothing of where the arm's base stands. So the arm that it gives knows the shape of a
-//! path far better than its place, and a correction of the place would be a guess. *Shape* takes the rigid motion that
-//! explains the path's deviations best as where the work object truly is: what was taught or adjusted in place stays in place,
-//! and its shape is corrected. *Absolute* corrects both.
+//! A sensor whose frame was fitted contains no information about the position of the arm's base. The resulting arm knows the
+//! shape of a path far better than its position, and correcting the position would be a guess. *Shape* takes the rigid motion
+//! that best explains the path's deviations as the real position of the work object: what was taught or adjusted in place
+//! keeps its position, and only its shape is corrected. *Absolute* corrects both.
 
 use nalgebra::{Matrix3xX, Matrix6, Point3, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
@@ -18,69 +18,69 @@ use truegrind_arm::estimated::Estimated;
 use truegrind_arm::model::Joints;
 use truegrind_math::se3::Pose;
 
-/// Whether the place of a path is corrected, or its shape alone.
+/// Whether the position of a path is corrected, or only its shape.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Placement {
-    /// [`Placement::Absolute`] for the work objects whose place the model knows better than it is off, and gets worse with no
-    /// larger probability than is taken, else [`Placement::Shape`].
+    /// [`Placement::Absolute`] for work objects whose position is known better than its deviation and whose correction is
+    /// unlikely enough to do harm, else [`Placement::Shape`].
     #[default]
     Auto,
-    /// The shape of the path over each work object; the path stays where it is.
+    /// Only the shape of the path over each work object; the path keeps its position.
     Shape,
-    /// Shape and place, in the robot's base or in the frame that the arm itself taught.
+    /// Shape and position, in the robot's base or in the frame taught with this arm.
     Absolute,
 }
 
-/// How a program is to be placed, and what chance is taken.
+/// Requested placement and accepted risk.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PlacementChoice {
     pub(crate) placement: Placement,
-    /// Cuts, and places, that get worse with a larger probability are left.
+    /// Cuts and positions that are more likely to be harmed remain unmodified.
     pub(crate) max_risk: f64,
-    /// Whether it is worked out what would make a place known.
+    /// Whether the measurement that would make a position known is searched for.
     pub(crate) remedies: bool,
 }
 
-/// What was done about the place of one work object.
+/// How the position of one work object was treated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ObjectPlacement {
     /// Its name.
     pub work_object: String,
     /// [`Placement::Shape`] or [`Placement::Absolute`].
     pub applied: Placement,
-    /// How far the path as a whole lies from where it is meant (RMS over its points, mm).
+    /// Deviation of the path as a whole from its intended position (RMS over its points, mm).
     pub deviation_mm: f64,
     /// Predicted standard deviation of that (RMS over the points, mm).
     pub sigma_mm: f64,
-    /// Whether the arm itself placed the work object, by touching it.
+    /// Whether the work object was taught with this arm.
     pub taught: bool,
-    /// What would make its place known; absent where it is corrected, and where nothing can be foreseen.
+    /// Measurement that would make its position known; absent where it is corrected, and where none can be predicted.
     pub remedy: Option<Remedy>,
 }
 
-/// A target of the program as it is.
+/// A target of the original program.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct AssessedTarget {
-    /// Tool and work object.
+    /// Index of its frames in the frame table.
     pub(crate) frames_index: usize,
-    /// Pose of the tool in the work object.
+    /// Intended pose of the tool in the work object.
     pub(crate) intended: Pose,
     /// Controller joints (rad).
     pub(crate) joints: Joints,
-    /// The condition under which the arm stands there.
+    /// Condition under which the arm is there.
     pub(crate) condition_index: usize,
 }
 
-/// How far a target is off, and how that depends on the arm's parameters, in the axes of the work object.
+/// Deviation of a target and its derivative by the arm's parameters, in the axes of the work object.
 #[derive(Debug, Clone)]
 pub(crate) struct TargetDeviation {
-    /// Where it is meant (mm).
+    /// Intended position (mm).
     pub(crate) intended: Point3<f64>,
-    /// Reached minus meant (mm).
+    /// Reached minus intended (mm).
     pub(crate) shift: Vector3<f64>,
-    /// Derivative of the position (3 × p), against the frame that the arm taught where there is one.
+    /// Derivative of the position (3 × p), relative to the taught frame where there is one.
     pub(crate) jacobian: Matrix3xX<f64>,
 }
 
@@ -112,17 +112,17 @@ impl TargetDeviation {
     }
 }
 
-/// Points of a work object that tell where its path lies; more are not asked.
+/// Most sampled targets of a work object.
 pub(crate) const MOST_POINTS: usize = 200;
 
-/// At most `most` of `items`, evenly spread, in their order.
+/// At most `most` of `items`, evenly spaced, in order.
 pub(crate) fn evenly_spaced<T: Copy>(items: &[T], most: usize) -> Vec<T> {
     let count = items.len().min(most);
     (0..count).map(|k| items[k * items.len() / count]).collect()
 }
 
-/// Where the path over one work object lies, from some of its targets, and the motion of the work object under which the
-/// correction is what `wanted` asks for (`None`: it stays where it is).
+/// Position of the path over one work object, from sampled targets, and the displacement of the work object that realises the
+/// requested placement (`None`: no displacement).
 pub(crate) fn assess_placement(
     name: &str,
     targets: &[AssessedTarget],
@@ -165,7 +165,7 @@ pub(crate) fn assess_placement(
     Some((placement, Some(displacement(&registration, &off, twist))))
 }
 
-/// The rigid motion that carries the meant points onto the reached ones best: the linear one, twice improved.
+/// The rigid motion that best maps the intended points to the reached ones: the linear solution, refined twice.
 fn displacement(registration: &Registration, off: &[TargetDeviation], first: Vector6<f64>) -> Pose {
     let mut motion = registration.motion(&first);
     for _ in 0..2 {

@@ -1,30 +1,30 @@
-//! The rigid motion that explains displacements of the points of a path best, and what is left of them: its shape error.
+//! The rigid motion that best explains displacements of the points of a path; the residual is its shape error.
 //!
-//! Linear about the points' centre c: a point p that is displaced by d moves by v + ω × (p − c). Least squares gives v, the
-//! mean of d, and ω = (Σ (|r|² I − r rᵀ) + n ℓ² I)⁻¹ Σ r × d with r = p − c (Horn 1987 for small motions). ℓ holds a turn that
-//! the points do not show, about a line or of a single point, at none.
+//! Linearised about the centroid c: a point p displaced by d moves by v + ω × (p − c). Least squares gives v, the mean of d,
+//! and ω = (Σ (|r|² I − r rᵀ) + n ℓ² I)⁻¹ Σ r × d with r = p − c (Horn 1987 for small motions). ℓ keeps rotations that the
+//! points do not determine, about a line or a single point, at zero.
 
 use nalgebra::{Matrix3, Matrix3xX, Matrix6, Matrix6xX, Point3, Vector3, Vector6};
 
 use truegrind_math::se3::Pose;
 
-/// A path narrower than this shows no turn about itself (mm).
+/// Paths narrower than this determine no rotation about themselves (mm).
 const LEAST_LEVER_MM: f64 = 1.0;
 
-/// Some points about their centre.
+/// Points relative to their centroid.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Registration {
-    /// The centre (mm).
+    /// Centroid (mm).
     pub(crate) centre: Point3<f64>,
     levers: Vec<Vector3<f64>>,
     /// Σ (|r|² I − r rᵀ) (mm²).
     inertia: Matrix3<f64>,
-    /// From Σ r × d to the turn.
+    /// Maps Σ r × d to the rotation.
     turning: Matrix3<f64>,
 }
 
 impl Registration {
-    /// Of points in any frame (mm). `None` where there are none, or one is not finite.
+    /// From points in any frame (mm). `None` without points, or where one is not finite.
     pub(crate) fn of(points: &[Point3<f64>]) -> Option<Self> {
         let count = points.len() as f64;
         if points.is_empty() {
@@ -39,7 +39,7 @@ impl Registration {
         Some(Self { centre, levers, inertia, turning })
     }
 
-    /// Velocity of the centre and angular velocity (mm, rad) that explain the displacements `shifts` of the points best.
+    /// Twist (mm, rad) about the centroid that best explains the displacements `shifts` of the points.
     pub(crate) fn twist<'a>(&self, shifts: impl Iterator<Item = &'a Vector3<f64>>) -> Vector6<f64> {
         let (mut sum, mut moment) = (Vector3::zeros(), Vector3::zeros());
         for (shift, lever) in shifts.zip(&self.levers) {
@@ -50,12 +50,12 @@ impl Registration {
         Vector6::new(v.x, v.y, v.z, w.x, w.y, w.z)
     }
 
-    /// What a twist of the centre displaces point `k` by (mm).
+    /// Displacement of point `k` by a twist about the centroid (mm).
     pub(crate) fn shift(&self, twist: &Vector6<f64>, k: usize) -> Vector3<f64> {
         twist.fixed_rows::<3>(0) + twist.fixed_rows::<3>(3).cross(&self.levers[k])
     }
 
-    /// The twists that explain the points' velocities best, one column for each column of `jacobians` (one for each point).
+    /// The twists that best explain the points' velocities, one column per column of `jacobians` (one for each point).
     pub(crate) fn twists<'a>(
         &self,
         jacobians: impl Iterator<Item = &'a Matrix3xX<f64>> + Clone,
@@ -71,21 +71,21 @@ impl Registration {
         out
     }
 
-    /// Mean square of what twists of covariance `covariance` displace the points by (mm²).
+    /// Mean square displacement of the points by twists of the given covariance (mm²).
     pub(crate) fn mean_square(&self, covariance: &Matrix6<f64>) -> f64 {
         let turns = covariance.fixed_view::<3, 3>(3, 3);
         let shifts = covariance.fixed_view::<3, 3>(0, 0).trace();
         shifts + (self.inertia * turns).trace() / self.levers.len() as f64
     }
 
-    /// Σ Wᵀ W g over the points, W what a twist displaces a point by (mm², mm³).
+    /// Σ Wᵀ W g over the points, where W maps a twist to a point's displacement (mm², mm³).
     pub(crate) fn weighed(&self, twist: &Vector6<f64>) -> Vector6<f64> {
         let (v, w) = (twist.fixed_rows::<3>(0), twist.fixed_rows::<3>(3));
         let (v, w) = (v * self.levers.len() as f64, self.inertia * w);
         Vector6::new(v.x, v.y, v.z, w.x, w.y, w.z)
     }
 
-    /// The rigid motion that a twist of the centre is.
+    /// The rigid motion of a twist about the centroid.
     pub(crate) fn motion(&self, twist: &Vector6<f64>) -> Pose {
         let turn = nalgebra::UnitQuaternion::from_scaled_axis(twist.fixed_rows::<3>(3).into_owned());
         let centre = self.centre.coords;

@@ -1,27 +1,28 @@
-//! What could be measured so that the place of a path becomes known, and what it costs.
+//! Measurements that can make the position of a path known, and their cost.
 //!
-//! Which of it is cheapest for a program, and what it would leave, is worked out in `foreseen`.
+//! `remedy_search` computes which of them is cheapest for a program, and the uncertainty that remains.
 
-/// Minutes to touch one point of a part with the tool of the program, and to write its joints down.
+/// Minutes to touch one point of a part with the tool of the program and note its joints.
 const TOUCH_MIN: f64 = 5.0;
-/// Minutes to find out where a sensor stands in the robot's base: three points of the robot's foot, and the fit.
+/// Minutes to measure the pose of a sensor in the robot's base: three points of the robot's foot, and the fit.
 const FRAME_MIN: f64 = 30.0;
 /// Minutes to mount a target beside the axis of joint 6.
 const BESIDE_MIN: f64 = 10.0;
-/// Minutes to have the places of three targets on the flange measured, on a coordinate measuring machine.
+/// Minutes to have the positions of three targets on the flange measured on a coordinate measuring machine.
 const PLATE_MIN: f64 = 90.0;
-/// Minutes to put a sensor, or the outlet of a cable, at a second place.
+/// Minutes to move a sensor, or the outlet of a cable, to a second station.
 const STATION_MIN: f64 = 20.0;
-/// Minutes for one pose: the way there, half a second of rest, the reading.
+/// Minutes per pose: motion, half a second of rest, reading.
 const POSE_MIN: f64 = 0.5;
 
-/// One thing to measure.
+/// A measurement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Measurement {
     /// Three points of the work object, touched with this arm and the tool of the program.
     Touch,
-    /// Where the sensor stands in the robot's base, or the outlet of its cable; the rows that there are count again.
+    /// Pose of the sensor, or position of the outlet of its cable, in the robot's base; makes the existing rows more
+    /// informative.
     Frame,
     /// Poses with a target beside the axis of joint 6, wherever on the flange.
     Beside {
@@ -33,12 +34,12 @@ pub enum Measurement {
         /// How many.
         poses: u32,
     },
-    /// Poses with the sensor, or the outlet of its cable, at a second place.
+    /// Poses with the sensor, or the outlet of its cable, at a second station.
     Station {
         /// How many.
         poses: u32,
     },
-    /// Poses measured as those that there are.
+    /// More poses of the existing kind.
     More {
         /// How many.
         poses: u32,
@@ -46,7 +47,7 @@ pub enum Measurement {
 }
 
 impl Measurement {
-    /// What it costs (minutes of a robot cell and of those who stand in it).
+    /// Cost (minutes of robot cell and staff).
     pub fn minutes(&self) -> f64 {
         let poses = POSE_MIN * f64::from(self.poses());
         match self {
@@ -59,7 +60,7 @@ impl Measurement {
         }
     }
 
-    /// Poses of the arm that are measured for it.
+    /// Poses of the arm that it needs.
     pub fn poses(&self) -> u32 {
         match *self {
             Measurement::Touch | Measurement::Frame => 0,
@@ -70,7 +71,7 @@ impl Measurement {
         }
     }
 
-    /// A short name for files.
+    /// Short name for files.
     pub fn name(&self) -> &'static str {
         match self {
             Measurement::Touch => "touch-work-object",
@@ -82,7 +83,7 @@ impl Measurement {
         }
     }
 
-    /// What to do, with the name that a program of this language has for what is cut (work object, work offset).
+    /// Instruction to the user; `object` is what the program's language calls the workpiece frame (work object, work offset).
     pub fn instruction(&self, object: &str) -> String {
         match self {
             Measurement::Touch => format!(
@@ -105,20 +106,20 @@ impl Measurement {
     }
 }
 
-/// The cheapest measurement that makes a place known, or the best there is.
+/// The cheapest measurement that makes a position known, or the best one available.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Remedy {
-    /// What is to be measured, all of it.
+    /// All measurements to make.
     pub measurements: Vec<Measurement>,
-    /// Predicted standard deviation of the path's place once it is measured (RMS over the points, mm).
+    /// Predicted standard deviation of the path's position afterwards (RMS over the points, mm).
     pub sigma_mm: f64,
-    /// Whether the place has then to be expected to be corrected. Otherwise nothing that was looked at is enough, and this leaves
-    /// the smallest sigma.
+    /// Whether the position is then expected to be corrected. Otherwise no candidate suffices, and this one leaves the
+    /// smallest sigma.
     pub suffices: bool,
 }
 
 impl Remedy {
-    /// What all of it costs (minutes).
+    /// Total cost (minutes).
     pub fn minutes(&self) -> f64 {
         self.measurements.iter().map(Measurement::minutes).sum()
     }

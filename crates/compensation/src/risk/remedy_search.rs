@@ -1,12 +1,12 @@
-//! The cheapest measurement that would make the place of a path known, foreseen from the covariance that the model carries.
+//! Search for the cheapest measurement that would make the position of a path known, predicted from the model's covariance.
 //!
-//! For each of a short list of measurements, alone and by two, the covariance of the path's place is worked out as it would be
-//! with them (`information`). A path that is off by d with covariance P now is then known to P', and d has to be expected where
-//! M = d dᵀ + (1 − tr P' / tr P) P has it. It is enough where the place would be taken at that: sigma no larger than √tr M, and
-//! the chance Φ(−c/2s) to make it worse no larger than is taken, with c² = tr M and s² = tr(P' M) / tr M (all of them of the
-//! points of the path together).
+//! For each of a short list of measurements, alone and in pairs, the covariance of the path's position afterwards is computed
+//! (`measurement_information`). A path with deviation d and covariance P now will have covariance P', and d is expected with
+//! second moment M = d dᵀ + (1 − tr P' / tr P) P. The measurement suffices if the position would then be corrected: sigma at
+//! most √tr M, and the probability of harm Φ(−c/2s) at most the accepted risk, with c² = tr M and s² = tr(P' M) / tr M (all
+//! summed over the points of the path).
 //!
-//! What the model's file does not say is assumed, and stated with the constants below: where sensor and target are.
+//! Sensor and target positions that the model file does not state are assumed; see the constants below.
 
 use nalgebra::{DMatrix, Matrix3, Matrix6, Point3, Vector3, Vector6};
 use rayon::prelude::*;
@@ -23,29 +23,29 @@ use truegrind_arm::model::{Joints, PreparedModel};
 use truegrind_math::se3::{Pose, difference};
 use truegrind_math::tail::normal_two_sided;
 
-/// How well a sensor's frame is measured in the base, as `--frame-sigma 0.1` has it (mm, rad).
+/// Accuracy of a sensor frame measured in the base, as with `--frame-sigma 0.1` (mm, rad).
 const FRAME_KNOWN: PriorSigma = PriorSigma { mm: 0.1, rad: 1e-4 };
-/// How well a coordinate measuring machine tells where a target sits on the flange (mm).
+/// Accuracy of a target position on the flange from a coordinate measuring machine (mm).
 const PLATE_KNOWN_MM: f64 = 0.03;
-/// How well a point of a part is touched by hand (mm, each coordinate).
+/// Accuracy of a point touched by hand (mm, each coordinate).
 const TOUCH_KNOWN_MM: f64 = 0.05;
-/// What a reading scatters by where the model does not tell (mm).
+/// Standard deviation of a reading where the model does not state it (mm).
 const READING_MM: f64 = 0.05;
-/// No sensor reads better (mm).
+/// Smallest standard deviation of any sensor (mm).
 const FINEST_MM: f64 = 1e-3;
-/// A tracker stands that far from the base, the outlet of a cable so many times as far from it as the outermost target.
+/// Distance of a tracker from the base; distance of a cable outlet relative to that of the outermost target.
 const TRACKER_MM: f64 = 2500.0;
 const OUTLET_FARTHER: f64 = 1.6;
-/// A target stands off the flange, one beside the axis of joint 6 that far from it (mm).
+/// Height of a target above the flange, and distance from the axis of joint 6 of one beside it (mm).
 const TARGET_OFF_MM: f64 = 60.0;
 const BESIDE_MM: f64 = 100.0;
-/// Points of a work object that are touched lie no nearer to each other (mm).
+/// Smallest distance between touched points of a work object (mm).
 const TOUCHED_APART_MM: f64 = 100.0;
 
 const POSES: u32 = 30;
 const MORE_POSES: u32 = 100;
 
-/// A path whose place is not taken: what was asked of it.
+/// A path whose position is not corrected.
 pub(crate) struct UnknownPlacement<'a, 'm> {
     pub(crate) targets: &'a [AssessedTarget],
     pub(crate) list: &'a [ResolvedFrames],
@@ -54,8 +54,8 @@ pub(crate) struct UnknownPlacement<'a, 'm> {
     pub(crate) max_risk: f64,
 }
 
-/// The cheapest measurement, or two, that would make its place known; the best one where none would. `None` where nothing can be
-/// foreseen: a covariance that is none.
+/// The cheapest measurement, or pair, that would make its position known; the best one where none suffices. `None` where
+/// nothing can be predicted: invalid covariance.
 pub(crate) fn remedy(place: &UnknownPlacement<'_, '_>) -> Option<Remedy> {
     let known = CurrentKnowledge::of(place)?;
     let touched = place.touched().map(|touched| known.touching(place, &touched));
@@ -73,7 +73,7 @@ pub(crate) fn remedy(place: &UnknownPlacement<'_, '_>) -> Option<Remedy> {
     cheapest.or(best).map(|(_, remedy)| remedy.clone())
 }
 
-/// What is looked at.
+/// The candidates.
 fn candidates(touch: bool, rows: bool) -> Vec<Vec<Measurement>> {
     use Measurement::{Beside, Frame, More, Plate, Station, Touch};
     let (beside, plate) = (Beside { poses: POSES }, Plate { poses: POSES });
@@ -93,8 +93,8 @@ fn candidates(touch: bool, rows: bool) -> Vec<Vec<Measurement>> {
     out
 }
 
-/// What each measurement tells of the arm's parameters, once for all candidates: it is the same beside any other, but that a
-/// sensor's frame that is stated is known to all of them.
+/// Information of each measurement on the arm's parameters, computed once for all candidates: it depends only on whether the
+/// sensor frame is stated.
 struct InformationTable(Vec<((Measurement, bool), DMatrix<f64>)>);
 
 impl InformationTable {
@@ -112,7 +112,7 @@ impl InformationTable {
         Self(asked.into_par_iter().map(one).collect())
     }
 
-    /// What all measurements of a candidate tell, of so many parameters.
+    /// Sum over the measurements of a candidate.
     fn sum(&self, measurements: &[Measurement], parameters: usize) -> DMatrix<f64> {
         let stated = measurements.contains(&Measurement::Frame);
         let of = |m: &Measurement| self.0.iter().find(|(asked, _)| *asked == (*m, stated));
@@ -121,29 +121,30 @@ impl InformationTable {
     }
 }
 
-/// Where the work object's frame goes with the arm once the arm has touched it, and by how much touching is unsure, in the base.
+/// How the work object's frame moves with the arm's parameters once it is taught with this arm, and the uncertainty of
+/// touching, in the base.
 struct TouchedFrame {
     carried: RegisteredFrame,
-    /// Twists of the frame by each coordinate of each touched point, of one standard deviation.
+    /// Twists of the frame by each coordinate of each touched point, for one standard deviation.
     touch_sigma_twists: Vec<Vector6<f64>>,
 }
 
-/// What touching changes of what is known.
+/// Effect of touching the work object.
 struct TouchEffect {
-    /// How the path hangs on the arm's parameters, against the frame that the arm has touched.
+    /// Derivative of the path's position by the arm's parameters, relative to the touched frame.
     twists: DMatrix<f64>,
-    /// The covariance that the hand adds.
+    /// Covariance added by manual touching.
     adds: Matrix6<f64>,
 }
 
-/// What is known now of where the path lies.
+/// Present knowledge of the path's position.
 struct CurrentKnowledge {
     registration: Registration,
     off: Vec<TargetDeviation>,
-    /// Where it lies, and how that hangs on the arm's parameters.
+    /// Present position, and its derivative by the arm's parameters.
     twist: Vector6<f64>,
     twists: DMatrix<f64>,
-    /// Of the points together: gᵀ W h is the sum of the products of what two twists displace them by.
+    /// Over all points: gᵀ W h is the sum of the scalar products of the displacements by two twists.
     weights: Matrix6<f64>,
     covariance: Matrix6<f64>,
     factor: DMatrix<f64>,
@@ -165,7 +166,7 @@ impl CurrentKnowledge {
         Some(Self { registration, off, twist, twists, weights, covariance, factor })
     }
 
-    /// What is known with `measurements` too.
+    /// Knowledge after `measurements`.
     fn with(
         &self,
         measurements: Vec<Measurement>,
@@ -189,7 +190,7 @@ impl CurrentKnowledge {
         })
     }
 
-    /// What touching changes.
+    /// Effect of touching.
     fn touching(&self, place: &UnknownPlacement<'_, '_>, touched: &TouchedFrame) -> TouchEffect {
         let twists = twists_of(&self.registration, &place.off(Some(&touched.carried)));
         let mut adds = Matrix6::zeros();
@@ -212,7 +213,7 @@ impl CurrentKnowledge {
         TouchEffect { twists, adds }
     }
 
-    /// Whether the place has to be expected to be corrected with `left` for its covariance.
+    /// Whether the position is expected to be corrected with the remaining covariance `left`.
     fn would_be_taken(&self, left: &Matrix6<f64>, sigma_mm: f64, max_risk: f64) -> bool {
         let total = |m: &Matrix6<f64>| (self.weights * m).trace();
         let (now, then) = (total(&self.covariance), total(left));
@@ -240,7 +241,7 @@ impl UnknownPlacement<'_, '_> {
         !self.knowledge.region.samples_deg.is_empty()
     }
 
-    /// How far each target is off, against a frame that moves with the arm where there is one.
+    /// Deviation of each target, relative to a frame that moves with the arm where there is one.
     fn off(&self, carried: Option<&RegisteredFrame>) -> Vec<TargetDeviation> {
         let against = |frames_index: &ResolvedFrames| match carried {
             Some(carried) => ResolvedFrames { carried: Some(carried.clone()), ..frames_index.clone() },
@@ -253,7 +254,7 @@ impl UnknownPlacement<'_, '_> {
             .collect()
     }
 
-    /// The measured poses, `count` of them.
+    /// `count` of the measured poses.
     fn poses(&self, count: usize) -> Vec<Joints> {
         let samples = &self.knowledge.region.samples_deg;
         let joints = |deg: &[f64; 6]| Joints::from_fn(|i, _| deg[i].to_radians());
@@ -264,12 +265,12 @@ impl UnknownPlacement<'_, '_> {
             .collect()
     }
 
-    /// The same with joint 6 turned as far as it may, evenly.
+    /// The same poses with joint 6 rotated evenly over its range.
     fn turned(&self, count: usize) -> Vec<Joints> {
         let mut poses = self.poses(count);
         for (k, q) in poses.iter_mut().enumerate() {
             let mut turned = *q;
-            // The golden ratio spreads any number of angles.
+            // Multiples of the golden ratio spread any number of angles evenly.
             turned[5] += std::f64::consts::PI * ((k as f64 * 0.618_033_988_75).fract() - 0.5);
             if self.knowledge.nominal.limits.violated(&turned).is_none() {
                 *q = turned;
@@ -278,7 +279,7 @@ impl UnknownPlacement<'_, '_> {
         poses
     }
 
-    /// Where a sensor stands, the second one a quarter turn about the base from the first.
+    /// Position of the sensor; the second station is a quarter turn about the base from the first.
     fn stand(&self, second: bool) -> SensorPosition {
         let Some(arm) = self.arm() else { return SensorPosition::Tracker(Vector3::zeros()) };
         let points: Vec<Vector3<f64>> =
@@ -294,7 +295,7 @@ impl UnknownPlacement<'_, '_> {
         }
     }
 
-    /// What a reading scatters by, each coordinate (mm): what rows that were held out are off by.
+    /// Standard deviation of a reading, each coordinate (mm), from the held-out error.
     fn reading_mm(&self) -> f64 {
         let rmse = self.knowledge.geometry.held_out.rmse;
         let coordinates: f64 = if self.knowledge.provenance.sensor == "cable" { 1.0 } else { 3.0 };
@@ -302,7 +303,7 @@ impl UnknownPlacement<'_, '_> {
         if sigma > 0.0 && sigma.is_finite() { sigma.max(FINEST_MM) } else { READING_MM }
     }
 
-    /// The information of one measurement on the arm's parameters; `stated` where it is known where the sensor stands.
+    /// Information of one measurement on the arm's parameters; `stated`: whether the sensor frame is stated.
     fn information(&self, measurement: Measurement, stated: bool) -> DMatrix<f64> {
         let n = self.knowledge.order.len();
         let Some(arm) = self.arm() else { return DMatrix::zeros(n, n) };
@@ -332,7 +333,7 @@ impl UnknownPlacement<'_, '_> {
             sigma_mm: self.reading_mm(),
         };
         if measurement == Measurement::Frame {
-            // What there is, counted again with the frame known.
+            // The existing rows again, now with a known frame.
             let rows = self.knowledge.provenance.rows.max(poses.len()) as f64;
             let there = Readings { weight: rows / poses.len() as f64, ..readings };
             let free = Readings { stand_known: FREE, ..there };
@@ -342,8 +343,9 @@ impl UnknownPlacement<'_, '_> {
         readings.normal(self.knowledge, arm).information(&readings.own())
     }
 
-    /// Three points of the work object that the arm can touch: across the path, and no nearer to each other than a hand would
-    /// choose them. `None` where the arm taught the frame already, the robot holds the part, or they are out of reach.
+    /// Three points of the work object that the arm can touch: spread across the path, no closer than one would choose by
+    /// hand. `None` where the frame was already taught with this arm, the robot holds the part, or the points are out of
+    /// reach.
     fn touched(&self) -> Option<TouchedFrame> {
         let first = self.targets.first()?;
         let frames_index = &self.list[first.frames_index];
@@ -375,7 +377,7 @@ impl UnknownPlacement<'_, '_> {
         })
     }
 
-    /// The middle of the path in its work object, and half of what is touched along and across it (mm).
+    /// Centre of the path in its work object, and half the touched extent along and across it (mm).
     fn extent(&self) -> (Vector3<f64>, [Vector3<f64>; 2]) {
         let points: Vec<Vector3<f64>> = self.targets.iter().map(|t| t.intended.translation.vector).collect();
         let middle = points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64;
@@ -392,7 +394,7 @@ impl UnknownPlacement<'_, '_> {
     }
 }
 
-/// How a frame through three points moves with each coordinate of each of them, by as much as touching is unsure.
+/// How a frame through three points moves for one standard deviation of each touched coordinate.
 fn touch_sigma_twists(points: &[Point3<f64>; 3]) -> Option<Vec<Vector6<f64>>> {
     const STEP_MM: f64 = 1e-3;
     let moved = |point: usize, axis: usize, step: f64| {
