@@ -93,7 +93,12 @@ pub(super) fn diagnosis(found: &Diagnosed, dataset: &Dataset, robot: &str) -> an
 }
 
 /// The bytes of the recording of a plan: the arm at each row, the expected readings, and the forbidden boxes.
-pub(super) fn plan(plan: &Plan, setup: &MeasurementSetup<'_>, name: &str, robot: &str) -> anyhow::Result<Vec<u8>> {
+pub(super) fn plan(
+    plan: &Plan,
+    setup: &MeasurementSetup<'_>,
+    name: &str,
+    robot: &str,
+) -> anyhow::Result<Vec<u8>> {
     let rows = (FIRST_ROW..).zip(&plan.rows).filter_map(|(number, row)| {
         let pose = &plan.poses[row.pose];
         let mut out = Row::new(number, pose.joints, reading(plan, setup, row)?);

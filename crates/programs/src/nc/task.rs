@@ -24,7 +24,7 @@ mod tools;
 mod words;
 mod block_context;
 
-use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc as Shared;
 
 use super::dialect::Dialect;
@@ -42,6 +42,7 @@ use crate::motion::{
 use block::Block;
 pub(super) use block_context::{BlockArc, BlockContext, StartDependency, StateEvent};
 use file_effects::FileEffects;
+use prescan::FileScan;
 
 /// NC files that are read together: each runs on its own, the setup is common to all.
 #[derive(Debug)]
@@ -95,7 +96,7 @@ impl<'s> Task<'s> {
             let mut interpreter =
                 Interpreter::new(&task.trees[file], file as u32, task.dialects[file], setup);
             // Siemens: the extension of a subprogram.
-            interpreter.is_subprogram = task.names[file].to_ascii_lowercase().ends_with(".spf");
+            interpreter.scan.is_subprogram = task.names[file].to_ascii_lowercase().ends_with(".spf");
             interpreter.listing = std::mem::take(&mut task.listing);
             interpreter.events = std::mem::take(&mut task.events);
             interpreter.contexts = std::mem::take(&mut task.contexts);
@@ -111,62 +112,31 @@ impl<'s> Task<'s> {
     }
 }
 
+/// The abstract interpreter of one file.
 pub(super) struct Interpreter<'t, 's> {
     tree: &'t NcTree<'s>,
     file: u32,
     dialect: Dialect,
     setup: &'t Setup,
+    scan: FileScan,
     angles: Option<Angles>,
     /// Tools and work offsets that the setup and comments state, by name.
     tools: HashMap<String, Frame>,
     frames: HashMap<String, Frame>,
-    /// Variables that the file has assigned so far.
-    assigned_variables: HashSet<Variable>,
     state: ModalState,
-    /// The side effects of the blocks interpreted so far.
-    effects: FileEffects,
     /// The side effects of the whole file, from a first pass.
     file_effects: Option<FileEffects>,
-    /// Groups that are set before the first branch or join, as bits.
-    set_before_branch: u32,
-    /// Whether control flow has branched or joined: jumps, calls, labels.
-    branched: bool,
+    pass: Pass,
+    /// Variables that the file has assigned so far.
+    assigned_variables: HashSet<Variable>,
     /// Whether the current block may be skipped.
     in_skippable_block: bool,
-    /// Whether the program has ended (M30): the next block belongs to another one.
-    program_ended: bool,
-    /// Whether synchronised actions may assign variables.
-    synchronised_actions: bool,
     /// The semantics of words before the current block.
-    meaning: WordSemantics,
-    /// The state before the subprogram that is being read.
-    state_before_subprogram: Option<ModalState>,
-    /// Whether the file changes tools by M6.
-    tool_change_by_m6: bool,
+    word_semantics: WordSemantics,
     /// Whether the active cycle may be a program (cycle 12 of Heidenhain).
     cycle_is_program: bool,
     /// Whether a block has been read completely.
     has_nc_blocks: bool,
-    /// Whether the program starts again at its end.
-    restarts_at_end: bool,
-    /// Whether the file is only a subprogram: its initial state is that of an unknown caller.
-    is_subprogram: bool,
-    /// Whether the file is of a control whose words are not supported (DIN/ISO of Heidenhain, Okuma).
-    unknown_control: bool,
-    /// Contours that lathe cycles read: first block number to last.
-    contours: HashMap<u64, u64>,
-    /// The last block of the contour that is being read.
-    contour_end: Option<u64>,
-    /// Names that the file declares (Siemens).
-    declared: BTreeSet<Vec<u8>>,
-    /// Declared names of an integer type.
-    integer_variables: BTreeSet<Vec<u8>>,
-    /// Programs and subprograms in the file, by their O word.
-    programs: BTreeSet<Variable>,
-    /// Block numbers that are targets of jumps.
-    jump_targets: BTreeSet<u64>,
-    /// Whether a jump has a computed target.
-    computed_jump: bool,
     listing: Listing,
     events: Vec<StateEvent>,
     contexts: Vec<BlockContext>,
@@ -174,6 +144,25 @@ pub(super) struct Interpreter<'t, 's> {
     speeds: BTreeMap<u64, u32>,
     tool_index: HashMap<String, u32>,
     frame_index: Option<(String, Option<truegrind_math::se3::Pose>, u32)>,
+}
+
+/// What one pass over the blocks of a file has found so far.
+#[derive(Default)]
+struct Pass {
+    /// The side effects of the blocks.
+    effects: FileEffects,
+    /// Groups that are set before the first branch or join, as bits.
+    set_before_branch: u32,
+    /// Whether control flow has branched or joined: jumps, calls, labels.
+    branched: bool,
+    /// Whether the program has ended (M30): the next block belongs to another one.
+    program_ended: bool,
+    /// Whether synchronised actions may assign variables.
+    synchronised_actions: bool,
+    /// The state before the subprogram that is being read.
+    state_before_subprogram: Option<ModalState>,
+    /// The last block of the contour that is being read.
+    contour_end: Option<u64>,
 }
 
 /// The lengths of the lists before a file.
@@ -187,33 +176,18 @@ impl<'t, 's> Interpreter<'t, 's> {
             file,
             dialect,
             setup,
+            scan: FileScan::default(),
             angles: setup.angles,
             tools: HashMap::new(),
             frames: HashMap::new(),
-            assigned_variables: HashSet::new(),
             state,
-            effects: FileEffects::default(),
             file_effects: None,
-            set_before_branch: 0,
-            branched: false,
+            pass: Pass::default(),
+            assigned_variables: HashSet::new(),
             in_skippable_block: false,
-            program_ended: false,
-            synchronised_actions: false,
-            meaning: WordSemantics::default(),
-            state_before_subprogram: None,
-            tool_change_by_m6: false,
+            word_semantics: WordSemantics::default(),
             cycle_is_program: false,
             has_nc_blocks: false,
-            restarts_at_end: false,
-            is_subprogram: false,
-            unknown_control: false,
-            contours: HashMap::new(),
-            contour_end: None,
-            declared: BTreeSet::new(),
-            integer_variables: BTreeSet::new(),
-            programs: BTreeSet::new(),
-            jump_targets: BTreeSet::new(),
-            computed_jump: false,
             listing: Listing { numbered: true, ..Listing::default() },
             events: Vec::new(),
             contexts: Vec::new(),
@@ -243,14 +217,11 @@ impl<'t, 's> Interpreter<'t, 's> {
         let lengths = self.lengths();
         let start = self.state.clone();
         self.interpret_file();
-        if self.branched {
+        if self.pass.branched {
             // The side effects of the whole file are known now; they determine what stays known at joins.
             self.truncate_to(&lengths);
             self.state = start;
-            self.file_effects = Some(std::mem::take(&mut self.effects));
-            (self.set_before_branch, self.branched, self.program_ended, self.synchronised_actions) =
-                (0, false, false, false);
-            (self.state_before_subprogram, self.contour_end) = (None, None);
+            self.file_effects = Some(std::mem::take(&mut self.pass).effects);
             self.interpret_file();
         }
         // A text without one readable NC block is no program and has no motions.
@@ -263,9 +234,9 @@ impl<'t, 's> Interpreter<'t, 's> {
 
     fn interpret_file(&mut self) {
         self.events.push(StateEvent::FileStart);
-        if self.is_subprogram {
+        if self.scan.is_subprogram {
             self.start_subprogram();
-        } else if self.restarts_at_end() {
+        } else if self.scan.restarts_at_end {
             self.join_unseen_predecessors();
         }
         let mut block = Block::default();
@@ -398,7 +369,7 @@ impl<'t, 's> Interpreter<'t, 's> {
         self.interpret(block);
         self.in_skippable_block = false;
         // A program end or jump in it happens only where it is not skipped.
-        self.program_ended = false;
+        self.pass.program_ended = false;
         let after = std::mem::replace(&mut self.state, before);
         self.state = after.join(&self.state);
         self.frame_index = None;
@@ -407,7 +378,7 @@ impl<'t, 's> Interpreter<'t, 's> {
 
     /// Interprets a block in the state before it.
     fn interpret(&mut self, block: &Block<'s>) {
-        if std::mem::take(&mut self.program_ended) {
+        if std::mem::take(&mut self.pass.program_ended) {
             self.join_unseen_predecessors();
         }
         if self.is_reached_by_jumps(block) {
@@ -417,10 +388,10 @@ impl<'t, 's> Interpreter<'t, 's> {
         self.contour_of(block);
         self.mark_position_reads(block);
         let values = self.evaluate_assignments(block);
-        let before = self.effects.joins;
-        self.meaning = self.state.word_semantics();
+        let before = self.pass.effects.joins;
+        self.word_semantics = self.state.word_semantics();
         self.transfer(block);
-        self.apply_assignments(values, self.effects.joins != before);
+        self.apply_assignments(values, self.pass.effects.joins != before);
     }
 
     fn transfer(&mut self, block: &Block<'s>) {
@@ -433,12 +404,12 @@ impl<'t, 's> Interpreter<'t, 's> {
         }
         if self.is_action(block) {
             // A synchronised action may set its variables at any time from here on.
-            self.synchronised_actions = true;
+            self.pass.synchronised_actions = true;
             self.state.variables.invalidate(Reason::UnknownVariable);
             self.join_unseen_predecessors();
             return;
         }
-        if self.unknown_control {
+        if self.scan.unknown_control {
             if !block.words.is_empty() {
                 self.list_unknown_word(block, "?", Reason::UnknownWord);
             }
@@ -502,7 +473,7 @@ impl<'t, 's> Interpreter<'t, 's> {
             self.set_tcp_mode(false, false);
         }
         if block.m.iter().any(end) || block.words.iter().any(|word| word.is("RET")) {
-            self.program_ended = true;
+            self.pass.program_ended = true;
         } else if block.m.contains(&6) {
             self.invalidate_pose();
         }
@@ -532,7 +503,7 @@ impl<'t, 's> Interpreter<'t, 's> {
             let number = block.q.and_then(|index| self.literal(&block.words[index]));
             self.change_tool(number.map_or("T?".to_owned(), |number| format!("T{}", number.round())));
         }
-        if (block.m.contains(&6) || !self.tool_change_by_m6 && !linux)
+        if (block.m.contains(&6) || !self.scan.tool_change_by_m6 && !linux)
             && let Some(name) = self.state.next_tool.take()
         {
             self.change_tool(name);

@@ -364,7 +364,9 @@ fn cable<R: SinCos>(
                         Kind::Target => dot(&in_base(&frames, &state.flange.column(parameter).into()), &u),
                         Kind::Scale => weight * free,
                         Kind::Sag => weight * sagging(&v, length),
-                        Kind::Empirical(_) => -dot(&load(like, &problem.columns.shifts[index][parameter], at), &u),
+                        Kind::Empirical(_) => {
+                            -dot(&load(like, &problem.columns.shifts[index][parameter], at), &u)
+                        }
                         Kind::Load { .. } => none,
                     }
             }

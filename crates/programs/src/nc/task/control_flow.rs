@@ -25,9 +25,9 @@ impl Interpreter<'_, '_> {
             .get(1)
             .is_some_and(|word| self.tree.kind(word.end - 1) == Some(Token::Colon) && word.name.len() > 1);
         labelled
-            || number
-                .and_then(|word| self.literal(word))
-                .is_some_and(|number| self.computed_jump || self.jump_targets.contains(&(number as u64)))
+            || number.and_then(|word| self.literal(word)).is_some_and(|number| {
+                self.scan.computed_jump || self.scan.jump_targets.contains(&(number as u64))
+            })
     }
 
     /// Tracks whether the block lies in the contour that a lathe cycle reads.
@@ -35,14 +35,14 @@ impl Interpreter<'_, '_> {
         let number = block.words.iter().take(2).find(|word| word.address() == Some(b'N'));
         let number = number.and_then(|word| self.literal(word)).map(|number| number as u64);
         // The block before was the last of the contour.
-        if self.contour_end == Some(u64::MAX) {
-            self.contour_end = None;
+        if self.pass.contour_end == Some(u64::MAX) {
+            self.pass.contour_end = None;
         }
         let Some(number) = number else { return };
-        if self.contour_end == Some(number) {
-            self.contour_end = Some(u64::MAX);
-        } else if let Some(&last) = self.contours.get(&number) {
-            self.contour_end = Some(if last == number { u64::MAX } else { last });
+        if self.pass.contour_end == Some(number) {
+            self.pass.contour_end = Some(u64::MAX);
+        } else if let Some(&last) = self.scan.contours.get(&number) {
+            self.pass.contour_end = Some(if last == number { u64::MAX } else { last });
         }
     }
 
@@ -92,7 +92,7 @@ impl Interpreter<'_, '_> {
                 _ => continue,
             };
             let value = match word.value {
-                _ if self.synchronised_actions => Err(Reason::UnknownVariable),
+                _ if self.pass.synchronised_actions => Err(Reason::UnknownVariable),
                 _ if conditional => Err(Reason::UnknownFlow),
                 WordValue::Literal { .. } => self.literal(word).ok_or(Reason::WrongShape),
                 WordValue::Expression { first, end } => self.evaluate_tokens((first, end)),
@@ -100,7 +100,7 @@ impl Interpreter<'_, '_> {
             };
             let value = match &name {
                 // An INT rounds its value, in a direction that depends on the control.
-                Some(name) if self.integer_variables.contains(name) => value.and_then(|value| {
+                Some(name) if self.scan.integer_variables.contains(name) => value.and_then(|value| {
                     if value.fract() == 0.0 { Ok(value) } else { Err(Reason::UnknownVariable) }
                 }),
                 _ => value,
@@ -175,7 +175,7 @@ impl Interpreter<'_, '_> {
                 self.invalidate_offsets();
                 self.invalidate_tools();
                 self.state.invalidate_all(Reason::UnknownWord);
-                self.effects.set_all_varying();
+                self.pass.effects.set_all_varying();
             }
         }
     }
@@ -217,7 +217,7 @@ impl Interpreter<'_, '_> {
     /// parameters.
     pub(super) fn is_variable(&self, name: &[u8]) -> bool {
         self.dialect == Dialect::Siemens
-            && (name.first() == Some(&b'_') || self.declared.contains(&name.to_ascii_uppercase()))
+            && (name.first() == Some(&b'_') || self.scan.declared.contains(&name.to_ascii_uppercase()))
     }
 
     /// Jumps, loops and subprogram calls. True if the block does nothing else.
@@ -300,14 +300,14 @@ impl Interpreter<'_, '_> {
             b"SUB" => {
                 let state_before_subprogram = self.state.clone();
                 self.join_unseen_predecessors();
-                self.state_before_subprogram = Some(state_before_subprogram);
+                self.pass.state_before_subprogram = Some(state_before_subprogram);
             }
             // The main path bypasses a subprogram, whose state holds only where it is called.
-            b"ENDSUB" if self.state_before_subprogram.is_some() => {
-                if let Some(state) = self.state_before_subprogram.take() {
+            b"ENDSUB" if self.pass.state_before_subprogram.is_some() => {
+                if let Some(state) = self.pass.state_before_subprogram.take() {
                     self.state = state;
                 }
-                self.program_ended = false;
+                self.pass.program_ended = false;
                 self.frame_index = None;
                 self.tool_index.clear();
                 self.events.push(StateEvent::Join);
@@ -335,11 +335,12 @@ impl Interpreter<'_, '_> {
                 text.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty()).nth(1) == Some(b"LBL")
             }
             Dialect::Siemens => text.starts_with(b"REPEAT"),
-            Dialect::LinuxCnc if first.address() == Some(b'O') => self.programs.contains(&text),
+            Dialect::LinuxCnc if first.address() == Some(b'O') => self.scan.programs.contains(&text),
             _ => {
                 let number = block.p.and_then(|index| self.literal(&block.words[index]));
                 // M98 P51000 calls O1000 five times.
-                let here = |p: f64| [p, p % 1e4].iter().any(|p| self.programs.contains(&numbered(b"O", *p)));
+                let here =
+                    |p: f64| [p, p % 1e4].iter().any(|p| self.scan.programs.contains(&numbered(b"O", *p)));
                 block.m.contains(&97) || number.is_some_and(here)
             }
         }

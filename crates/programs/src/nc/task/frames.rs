@@ -177,7 +177,7 @@ impl Interpreter<'_, '_> {
                 frame
             });
             self.state.assigned_tools.set(&tool, frame);
-            self.effects.assigned.tools |= self.is_conditional();
+            self.pass.effects.assigned.tools |= self.is_conditional();
             self.tool_index.clear();
             if open {
                 self.invalidate_position();
@@ -192,7 +192,7 @@ impl Interpreter<'_, '_> {
             self.invalidate_offsets();
         } else {
             self.state.invalidate_all(Reason::UnknownWord);
-            self.effects.set_all_varying();
+            self.pass.effects.set_all_varying();
             self.events.push(super::StateEvent::PoseUnknown);
         }
     }
@@ -210,7 +210,7 @@ impl Interpreter<'_, '_> {
     /// The program assigns a work offset; `None` if the value is unknown.
     pub(super) fn assign_offset_value(&mut self, name: &str, frame: Option<Frame>) {
         self.state.assigned_offsets.set(name, frame);
-        self.effects.assigned.offsets |= self.is_conditional();
+        self.pass.effects.assigned.offsets |= self.is_conditional();
         self.frame_index = None;
     }
 
@@ -366,7 +366,7 @@ impl Interpreter<'_, '_> {
     /// Notes whether a work offset has offsets of rotary axes, which its frame does not hold.
     pub(super) fn set_rotary_offset(&mut self, name: &str, rotary: bool) {
         self.state.assigned_offsets.set_rotary(name, rotary);
-        self.effects.assigned.rotary |= rotary && self.is_conditional();
+        self.pass.effects.assigned.rotary |= rotary && self.is_conditional();
     }
 
     /// A work offset gets a value. If it is the active one, the coordinates of the tool position change.

@@ -13,23 +13,23 @@ use crate::motion::Reason;
 impl Interpreter<'_, '_> {
     /// Sets a group to a value.
     pub(super) fn set_group(&mut self, group: ModalGroup, value: u64) {
-        if self.branched || self.in_skippable_block {
-            self.effects.record(group, value);
+        if self.pass.branched || self.in_skippable_block {
+            self.pass.effects.record(group, value);
         } else {
             // Before the first branch only the last value counts.
-            self.effects.overwrite(group, value);
-            self.set_before_branch |= group.bit();
+            self.pass.effects.overwrite(group, value);
+            self.pass.set_before_branch |= group.bit();
         }
         self.state.mark_known(group);
     }
 
     /// Sets a group to a value that depends on the tool position.
     pub(super) fn set_group_varying(&mut self, group: ModalGroup) {
-        if self.branched || self.in_skippable_block {
-            self.effects.set_varying(group);
+        if self.pass.branched || self.in_skippable_block {
+            self.pass.effects.set_varying(group);
         } else {
-            self.effects.overwrite(group, u64::MAX);
-            self.set_before_branch |= group.bit();
+            self.pass.effects.overwrite(group, u64::MAX);
+            self.pass.set_before_branch |= group.bit();
         }
         self.state.mark_known(group);
     }
@@ -51,8 +51,8 @@ impl Interpreter<'_, '_> {
     /// Joins with predecessors elsewhere in the file. A group stays known if the whole file sets it to one value and
     /// this happens before the first branch or equals the power-on value, or if the file never sets it.
     pub(super) fn join_unseen_predecessors(&mut self) {
-        self.branched = true;
-        self.effects.joins += 1;
+        self.pass.branched = true;
+        self.pass.effects.joins += 1;
         let siemens = self.dialect == Dialect::Siemens;
         let (mut constant, mut assigned) = (0, AssignedKinds::ALL);
         if let Some(effects) = &self.file_effects {
@@ -69,11 +69,11 @@ impl Interpreter<'_, '_> {
                     _ if group == ModalGroup::Tool as usize => name_key("T0"),
                     _ => 0,
                 };
-                let settled = self.set_before_branch & bit != 0;
+                let settled = self.pass.set_before_branch & bit != 0;
                 let held = match effects.value[group] {
                     // A group that the file never sets has the caller's value in a subprogram.
-                    None => !self.is_subprogram,
-                    Some(value) => settled || value == start && !self.is_subprogram,
+                    None => !self.scan.is_subprogram,
+                    Some(value) => settled || value == start && !self.scan.is_subprogram,
                 };
                 if held && effects.varying & bit == 0 {
                     constant |= bit;
@@ -87,19 +87,19 @@ impl Interpreter<'_, '_> {
         // An unseen predecessor may have set an origin or prepared a tool.
         self.state.origin_set |= self.file_effects.as_ref().is_none_or(|effects| effects.sets_origin);
         self.state.next_tool =
-            (self.tool_change_by_m6 || self.dialect == Dialect::LinuxCnc).then(|| "T?".to_owned());
+            (self.scan.tool_change_by_m6 || self.dialect == Dialect::LinuxCnc).then(|| "T?".to_owned());
         self.events.push(StateEvent::Join);
     }
 
     /// Whether a block's settings hold only on some paths: after a branch, in a skippable block, or with synchronised
     /// actions.
     pub(super) fn is_conditional(&self) -> bool {
-        self.branched || self.in_skippable_block || self.synchronised_actions
+        self.pass.branched || self.in_skippable_block || self.pass.synchronised_actions
     }
 
     /// A branch: control flow may continue elsewhere in the file.
     pub(super) fn branch(&mut self) {
-        self.branched = true;
+        self.pass.branched = true;
         self.events.push(StateEvent::Branch);
     }
 
@@ -193,13 +193,13 @@ impl Interpreter<'_, '_> {
         self.state.invalidate_all(reason);
         // It may have been a motion code.
         self.state.mode = MotionMode::Unknown(reason);
-        self.effects.set_all_varying();
+        self.pass.effects.set_all_varying();
         self.events.push(StateEvent::PoseUnknown);
     }
 
     /// Makes one group unknown; the word is not a motion.
     pub(super) fn invalidate_group(&mut self, group: ModalGroup, because: Reason) {
-        self.effects.set_varying(group);
+        self.pass.effects.set_varying(group);
         self.state.unknown_by_word |= group.bit();
         self.state.word_reason = because;
         self.invalidate_pose();
@@ -229,7 +229,7 @@ impl Interpreter<'_, '_> {
     pub(super) fn restore_saved_state(&mut self) {
         let Some(kept) = self.state.saved.clone() else {
             self.state.invalidate_all(Reason::UnknownWord);
-            self.effects.set_all_varying();
+            self.pass.effects.set_all_varying();
             self.events.push(StateEvent::PoseUnknown);
             return;
         };
@@ -258,7 +258,7 @@ impl Interpreter<'_, '_> {
             let bit = group.bit();
             state.unknown_after_join = state.unknown_after_join & !bit | kept.unknown_after_join & bit;
             state.unknown_by_word = state.unknown_by_word & !bit | kept.unknown_by_word & bit;
-            self.effects.set_varying(group);
+            self.pass.effects.set_varying(group);
         }
         state.set_transform(ModalGroup::Diameter, kept.is_transform_active(ModalGroup::Diameter));
         if moved {

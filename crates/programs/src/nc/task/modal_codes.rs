@@ -199,8 +199,8 @@ impl Interpreter<'_, '_> {
     /// Every work offset is or may be assigned an unknown value.
     pub(super) fn invalidate_offsets(&mut self) {
         self.state.assigned_offsets.invalidate();
-        self.effects.assigned.offsets |= self.is_conditional();
-        self.effects.assigned.rotary |= self.is_conditional();
+        self.pass.effects.assigned.offsets |= self.is_conditional();
+        self.pass.effects.assigned.rotary |= self.is_conditional();
         self.frame_index = None;
         self.invalidate_pose();
     }

@@ -289,7 +289,7 @@ impl Interpreter<'_, '_> {
     /// Whether a block may be inserted before this one: words of this block that change how numbers are read would
     /// act too late.
     fn can_split(&self, block: &Block<'_>, before: &BlockContext) -> bool {
-        self.meaning == self.state.word_semantics()
+        self.word_semantics == self.state.word_semantics()
             && !begins_something(block)
             && self.dialect != Dialect::Heidenhain
             && !block.skippable
@@ -336,7 +336,7 @@ impl Interpreter<'_, '_> {
         if block.paraxial_compensation {
             self.invalidate_named_axes(block);
         }
-        if block.opaque || self.contour_end.is_some() {
+        if block.opaque || self.pass.contour_end.is_some() {
             self.invalidate_pose();
         }
         // If it is unknown how numbers are read, so is the end position.
@@ -355,7 +355,8 @@ impl Interpreter<'_, '_> {
     /// Whether words that an unmodified straight motion omits can be added to it.
     fn can_restate(&self, block: &Block<'_>, motion: &Motion) -> bool {
         let straight = matches!(motion.kind, MotionKind::Linear | MotionKind::Joint);
-        let plain = straight && !block.opaque && block.unmodelled.is_none() && self.contour_end.is_none();
+        let plain =
+            straight && !block.opaque && block.unmodelled.is_none() && self.pass.contour_end.is_none();
         let set_before_branch = !(ModalGroup::RadiusCompensation.bit() | TOOL_GROUPS) & MOTION_GROUPS;
         // A cycle runs at the position that the words state.
         let call = self.modal_call(block);
@@ -522,7 +523,7 @@ impl Interpreter<'_, '_> {
             Some(reason)
         } else if machine {
             Some(Reason::MachineCoordinates)
-        } else if self.contour_end.is_some() {
+        } else if self.pass.contour_end.is_some() {
             Some(Reason::Cycle)
         } else if let Some(reason) = block.unmodelled.or(self.modal_call(block)) {
             Some(reason)

@@ -1,5 +1,7 @@
 //! A first scan of the whole file before interpretation: jump targets, declarations, programs, kinds of tool change.
 
+use std::collections::{BTreeSet, HashMap};
+
 use super::super::dialect::Dialect;
 use super::super::expression::{Variable, literal, numbered};
 use super::super::parser::word;
@@ -23,9 +25,10 @@ impl Interpreter<'_, '_> {
             }
         }
         self.prescan_block(&mut prescan);
-        self.restarts_at_end = prescan.m99_alone && prescan.programs <= 1;
+        self.scan.restarts_at_end =
+            self.dialect != Dialect::Heidenhain && prescan.m99_alone && prescan.programs <= 1;
         let subs = prescan.subs;
-        self.is_subprogram |= match self.dialect {
+        self.scan.is_subprogram |= match self.dialect {
             Dialect::Heidenhain => false,
             Dialect::LinuxCnc => subs.returns == Some(true) || subs.has && !subs.outside,
             _ => subs.returns == Some(true),
@@ -38,10 +41,10 @@ impl Interpreter<'_, '_> {
         let tape = (0..self.tree.len() as u32).find(|&token| self.tree.kind(token) == Some(Token::Tape));
         let text = tape.map(|token| self.tree.text(token).to_ascii_uppercase()).unwrap_or_default();
         let mut words = text.split(u8::is_ascii_whitespace);
-        self.unknown_control = self.dialect.paren_comments()
+        self.scan.unknown_control = self.dialect.paren_comments()
             && (text.first() == Some(&b'$') || words.any(|word| matches!(word, b"G70" | b"G71")));
-        self.is_subprogram |= text.windows(4).any(|part| part == b"_SPF");
-        self.is_subprogram &= self.dialect == Dialect::Siemens;
+        self.scan.is_subprogram |= text.windows(4).any(|part| part == b"_SPF");
+        self.scan.is_subprogram &= self.dialect == Dialect::Siemens;
     }
 
     fn prescan_word(&mut self, prescan: &mut Prescan, word: &Word<'_>) {
@@ -67,13 +70,13 @@ impl Interpreter<'_, '_> {
             // GOTO N100: the block number is a separate word.
             match (address, number) {
                 (Some(b'N'), Some(number)) => {
-                    self.jump_targets.insert(number as u64);
+                    self.scan.jump_targets.insert(number as u64);
                     return;
                 }
                 // A label; anything else is computed.
                 (None, _)
                     if word.name.first().is_some_and(|byte| byte.is_ascii_alphabetic() || *byte == b'_') => {}
-                _ => self.computed_jump = true,
+                _ => self.scan.computed_jump = true,
             }
         }
         match (address, number) {
@@ -88,7 +91,7 @@ impl Interpreter<'_, '_> {
             // Parameters of a procedure are declared names too.
             (None, _) if word.is("PROC") => {
                 block.declares = true;
-                self.is_subprogram |= self.dialect == Dialect::Siemens && !subs.outside;
+                self.scan.is_subprogram |= self.dialect == Dialect::Siemens && !subs.outside;
             }
             (None, _) if block.declares && matches!(word.value, WordValue::Arguments { .. }) => {
                 for at in word.first..word.end {
@@ -104,10 +107,10 @@ impl Interpreter<'_, '_> {
             (None, number) if word.name.len() >= 4 && word.name[..4].eq_ignore_ascii_case(b"GOTO") => {
                 match number {
                     Some(number) => {
-                        self.jump_targets.insert(number as u64);
+                        self.scan.jump_targets.insert(number as u64);
                     }
                     None if word.value == WordValue::Absent && word.index.is_none() => *jump = true,
-                    None => self.computed_jump = true,
+                    None => self.scan.computed_jump = true,
                 }
             }
             _ => {}
@@ -115,7 +118,7 @@ impl Interpreter<'_, '_> {
     }
 
     fn prescan_m_word(&mut self, block: &mut BlockSummary, number: f64) {
-        self.tool_change_by_m6 |= number == 6.0;
+        self.scan.tool_change_by_m6 |= number == 6.0;
         block.ends |= number == 2.0 || number == 30.0;
         block.returns |= number == 17.0 && self.dialect == Dialect::Siemens;
         block.m99 |= number == 99.0;
@@ -131,11 +134,11 @@ impl Interpreter<'_, '_> {
             b"INT" | b"BOOL" | b"CHAR" => block.integer_type = true,
             b"REAL" | b"STRING" | b"AXIS" | b"FRAME" => block.integer_type = false,
             _ if block.integer_type => {
-                self.integer_variables.insert(name.clone());
+                self.scan.integer_variables.insert(name.clone());
             }
             _ => {}
         }
-        self.declared.insert(name);
+        self.scan.declared.insert(name);
     }
 
     /// Evaluates a block after its last word.
@@ -147,27 +150,47 @@ impl Interpreter<'_, '_> {
             return;
         }
         if block.sub || self.dialect != Dialect::LinuxCnc {
-            self.programs.extend(block.program);
+            self.scan.programs.extend(block.program);
         }
         if block.m99 || block.jumps {
-            self.jump_targets.extend(block.p);
+            self.scan.jump_targets.extend(block.p);
         }
         if block.calls {
-            self.jump_targets.extend([block.q, block.h].into_iter().flatten());
+            self.scan.jump_targets.extend([block.q, block.h].into_iter().flatten());
         }
-        self.computed_jump |=
+        self.scan.computed_jump |=
             block.computed.0 && (block.m99 || block.jumps) || block.computed.1 && block.calls;
         if block.cycle
             && let (Some(p), Some(q)) = (block.p, block.q)
         {
-            self.contours.entry(p).or_insert(q);
+            self.scan.contours.entry(p).or_insert(q);
         }
     }
+}
 
+/// Properties of a whole file that its interpretation needs in advance.
+#[derive(Default)]
+pub(super) struct FileScan {
+    /// Whether the file changes tools by M6.
+    pub(super) tool_change_by_m6: bool,
     /// Whether the program starts again at its end (M99 in a main program).
-    pub(super) fn restarts_at_end(&self) -> bool {
-        self.dialect != Dialect::Heidenhain && self.restarts_at_end
-    }
+    pub(super) restarts_at_end: bool,
+    /// Whether the file is only a subprogram: its initial state is that of an unknown caller.
+    pub(super) is_subprogram: bool,
+    /// Whether the file is of a control whose words are not supported (DIN/ISO of Heidenhain, Okuma).
+    pub(super) unknown_control: bool,
+    /// Contours that lathe cycles read: first block number to last.
+    pub(super) contours: HashMap<u64, u64>,
+    /// Names that the file declares (Siemens).
+    pub(super) declared: BTreeSet<Vec<u8>>,
+    /// Declared names of an integer type.
+    pub(super) integer_variables: BTreeSet<Vec<u8>>,
+    /// Programs and subprograms in the file, by their O word.
+    pub(super) programs: BTreeSet<Variable>,
+    /// Block numbers that are targets of jumps.
+    pub(super) jump_targets: BTreeSet<u64>,
+    /// Whether a jump has a computed target.
+    pub(super) computed_jump: bool,
 }
 
 /// The state of the scan.

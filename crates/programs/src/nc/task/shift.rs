@@ -116,7 +116,7 @@ impl Interpreter<'_, '_> {
     fn set_shift(&mut self, block: &Block<'_>) {
         let mut stated = [None; 3];
         self.keep_unknown_shift();
-        self.effects.sets_origin = true;
+        self.pass.effects.sets_origin = true;
         for (axis, stated) in stated.iter_mut().enumerate() {
             let Some(index) = block.axes[axis] else { continue };
             let value = self.length_in_mm(self.evaluate_word(&block.words[index]).0);

@@ -65,7 +65,7 @@ impl Interpreter<'_, '_> {
         }
         let name = self.state.tool_name(self.dialect);
         self.state.assigned_tools.set(&name, None);
-        self.effects.assigned.tools |= self.is_conditional();
+        self.pass.effects.assigned.tools |= self.is_conditional();
         self.tool_index.clear();
         self.invalidate_position();
     }
@@ -73,7 +73,7 @@ impl Interpreter<'_, '_> {
     /// Every tool is or may be changed.
     pub(super) fn invalidate_tools(&mut self) {
         self.state.assigned_tools.invalidate();
-        self.effects.assigned.tools |= self.is_conditional();
+        self.pass.effects.assigned.tools |= self.is_conditional();
         self.tool_index.clear();
         self.invalidate_position();
     }
