@@ -49,6 +49,23 @@ impl Parser<'_, '_> {
         self.skip();
     }
 
+    /// Consumes one token; returns one past it.
+    fn token(&mut self) -> Option<u32> {
+        let end = self.at + 1;
+        self.bump();
+        Some(end)
+    }
+
+    /// Consumes an index in brackets, and the value that is assigned to it.
+    fn index(&mut self) -> Option<u32> {
+        let end = self.group(Token::BracketOpen, Token::BracketClose)?;
+        if self.peek() != Token::Equal {
+            return Some(end);
+        }
+        self.bump();
+        self.expression()
+    }
+
     fn file(&mut self) {
         self.nodes.push(Node { kind: Syntax::File, size: 0, first: 0, end: self.tree.len() as u32 });
         if self.tree.kinds() == [Token::Unknown] {
@@ -170,9 +187,7 @@ impl Parser<'_, '_> {
                 let token = self.at;
                 self.bump();
                 if self.peek() == Token::Number {
-                    let end = self.at + 1;
-                    self.bump();
-                    return Some(end);
+                    return self.token();
                 }
                 Some(token + 1)
             }
@@ -189,9 +204,7 @@ impl Parser<'_, '_> {
                     self.bump();
                 }
                 (self.peek() == Token::Greater).then_some(())?;
-                let end = self.at + 1;
-                self.bump();
-                Some(end)
+                self.token()
             }
             // The operand of a control structure: TO 10, OF 1, REPEAT 3.
             Token::Number | Token::Minus | Token::String if self.free => self.expression(),
@@ -206,38 +219,12 @@ impl Parser<'_, '_> {
 
     /// Whether a name belongs to these dialects; `XY5` does not.
     fn is_name(&self) -> bool {
-        const WORDS: [&str; 26] = [
-            "IF",
-            "THEN",
-            "ELSE",
-            "ELSEIF",
-            "ENDIF",
-            "WHILE",
-            "ENDWHILE",
-            "DO",
-            "END",
-            "GOTO",
-            "SUB",
-            "ENDSUB",
-            "CALL",
-            "REPEAT",
-            "ENDREPEAT",
-            "RETURN",
-            "BREAK",
-            "CONTINUE",
-            "POPEN",
-            "PCLOS",
-            "DPRNT",
-            "BPRNT",
-            "SETVN",
-            "LT",
-            "GT",
-            "EQ",
-        ];
+        const NAMES: &str = "IF THEN ELSE ELSEIF ENDIF WHILE ENDWHILE DO END GOTO SUB ENDSUB CALL REPEAT ENDREPEAT RETURN \
+            BREAK CONTINUE POPEN PCLOS DPRNT BPRNT SETVN LT GT EQ";
         let text = self.tree.text(self.at);
         !self.dialect.paren_comments()
             || text.starts_with(b"<")
-            || WORDS.iter().any(|word| text.eq_ignore_ascii_case(word.as_bytes()))
+            || NAMES.split(' ').any(|name| text.eq_ignore_ascii_case(name.as_bytes()))
     }
 
     /// Whether a Heidenhain block is a path or sets something that is interpreted word by word.
@@ -251,20 +238,12 @@ impl Parser<'_, '_> {
     /// The value of an address: a literal, an expression, or nothing.
     fn value(&mut self, after: u32) -> Option<u32> {
         match self.peek() {
-            Token::Number => {
-                let end = self.at + 1;
-                self.bump();
-                Some(end)
-            }
+            Token::Number => self.token(),
             Token::Plus | Token::Minus => {
                 let sign = self.at;
                 self.bump();
                 match self.peek() {
-                    Token::Number => {
-                        let end = self.at + 1;
-                        self.bump();
-                        Some(end)
-                    }
+                    Token::Number => self.token(),
                     Token::Hash | Token::BracketOpen => self.primary(),
                     Token::Address | Token::Name
                         if self.dialect == Dialect::Heidenhain && self.at_parameter() =>
@@ -283,14 +262,7 @@ impl Parser<'_, '_> {
             Token::Hash => self.primary(),
             Token::BracketOpen if self.dialect != Dialect::Siemens => self.primary(),
             // R[5]=…
-            Token::BracketOpen => {
-                let end = self.group(Token::BracketOpen, Token::BracketClose)?;
-                if self.peek() == Token::Equal {
-                    self.bump();
-                    return self.expression();
-                }
-                Some(end)
-            }
+            Token::BracketOpen => self.index(),
             // XSQRT[16].
             Token::Name if self.dialect == Dialect::LinuxCnc && is_function(self.tree.text(self.at)) => {
                 self.primary()
@@ -306,9 +278,7 @@ impl Parser<'_, '_> {
                     && self.touches(after) =>
             {
                 // o<name>
-                let end = self.at + 1;
-                self.bump();
-                Some(end)
+                self.token()
             }
             _ => Some(after),
         }
@@ -326,32 +296,14 @@ impl Parser<'_, '_> {
         let after = token + 1;
         match self.peek() {
             // A label.
-            Token::Colon => {
-                let end = self.at + 1;
-                self.bump();
-                Some(end)
-            }
+            Token::Colon => self.token(),
             Token::Equal => {
                 self.bump();
                 self.expression()
             }
-            Token::ParenOpen => {
-                let end = self.group(Token::ParenOpen, Token::ParenClose)?;
-                Some(end)
-            }
-            Token::BracketOpen => {
-                let end = self.group(Token::BracketOpen, Token::BracketClose)?;
-                if self.peek() == Token::Equal {
-                    self.bump();
-                    return self.expression();
-                }
-                Some(end)
-            }
-            Token::Number if self.touches(after) || self.dialect != Dialect::Heidenhain => {
-                let end = self.at + 1;
-                self.bump();
-                Some(end)
-            }
+            Token::ParenOpen => self.group(Token::ParenOpen, Token::ParenClose),
+            Token::BracketOpen => self.index(),
+            Token::Number if self.touches(after) || self.dialect != Dialect::Heidenhain => self.token(),
             Token::Plus | Token::Minus if self.dialect == Dialect::Heidenhain => self.value(after),
             // GOTO#5: to a computed block.
             Token::Hash if self.tree.text(token).to_ascii_uppercase().starts_with(b"GOTO") => self.primary(),

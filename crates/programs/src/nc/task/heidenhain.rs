@@ -335,33 +335,8 @@ impl<'s> Interpreter<'_, 's> {
             // A program replaces the cycle.
             b"12" => self.cycle_is_program = true,
             // Definitions that CYCL CALL, M89 and M99 execute, and settings.
-            b"1"
-            | b"2"
-            | b"3"
-            | b"4"
-            | b"5"
-            | b"6"
-            | b"9"
-            | b"13"
-            | b"14"
-            | b"15"
-            | b"16"
-            | b"17"
-            | b"18"
-            | b"20"
-            | b"21"
-            | b"22"
-            | b"23"
-            | b"24"
-            | b"25"
-            | b"27"
-            | b"28"
-            | b"29"
-            | b"30"
-            | b"32"
-            | b"39"
-            | [b'2', b'0', b'0'..=b'9']
-            | [b'2', b'3' | b'4' | b'5' | b'6' | b'7', b'0'..=b'9'] => {}
+            [b'2', b'0', b'0'..=b'9'] | [b'2', b'3'..=b'7', b'0'..=b'9'] => {}
+            _ if DEFINITIONS.contains(&number) => {}
             _ => self.list_unknown_word(block, "CYCL DEF", Reason::UnknownWord),
         }
     }
@@ -465,6 +440,12 @@ impl<'s> Interpreter<'_, 's> {
         }
     }
 }
+
+/// Cycles of one and two digits that a definition only prepares.
+const DEFINITIONS: [&[u8]; 25] = [
+    b"1", b"2", b"3", b"4", b"5", b"6", b"9", b"13", b"14", b"15", b"16", b"17", b"18", b"20", b"21", b"22",
+    b"23", b"24", b"25", b"27", b"28", b"29", b"30", b"32", b"39",
+];
 
 /// The number of a function: `FN 17: SYSWRITE`, `FN17:`.
 fn number_of_function(text: &[u8]) -> Option<u32> {
