@@ -254,7 +254,7 @@ impl PyDiagnosis {
 
     /// Everything as JSON text, schema ``truegrind.diagnosis/1``: the bytes that ``truegrind diagnose --json`` writes.
     fn to_json(&self) -> PyResult<String> {
-        let counted = self.found.diagnosis.clone().counted_from_0(&self.rows);
+        let counted = self.found.diagnosis.clone().with_rows_from_0(&self.rows);
         let value = serde_json::to_value(counted)
             .map_err(|error| Refusal::new(crate::errors::Kind::Defect, error))?;
         crate::json(&value)

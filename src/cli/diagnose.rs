@@ -103,7 +103,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     }
     arguments.outputs.print(&view::summary(&found))?;
     let mut batch = Batch::sparing(given);
-    let json = serde_json::to_value(found.diagnosis.clone().counted_from_0(&dataset))?;
+    let json = serde_json::to_value(found.diagnosis.clone().with_rows_from_0(&dataset))?;
     arguments.outputs.add_made(
         &mut batch,
         || view::document(&found, &dataset),

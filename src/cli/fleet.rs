@@ -199,7 +199,7 @@ fn diagnose_arm(
     let model = arguments.output.as_ref().map(|folder| folder.join(model_path(job)));
     let mut made = Vec::new();
     if let Some(model) = &model {
-        let json = serde_json::to_value(diagnosis.clone().counted_from_0(&dataset))?;
+        let json = serde_json::to_value(diagnosis.clone().with_rows_from_0(&dataset))?;
         made.push((model.with_extension("json"), format::json::text(&json)?));
         made.push((model.with_extension("html"), format::html::document(&page::document(&found, &dataset))));
         if why.is_none() {

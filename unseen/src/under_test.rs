@@ -9,7 +9,7 @@ use truegrind_arm::estimated::{Estimated, Judgement};
 use truegrind_arm::model::Model;
 use truegrind_arm::robots;
 use truegrind_calibration::diagnosis::diagnose::{Diagnosed, Options, diagnose};
-use truegrind_calibration::diagnosis::rows::prepare;
+use truegrind_calibration::diagnosis::preparation::prepare;
 use truegrind_calibration::identification::fit::errors_on;
 use truegrind_calibration::identification::identify::{self, identify};
 use truegrind_calibration::identification::register::starting_frames;

@@ -1,5 +1,5 @@
-//! Products and factors of large matrices, on as many threads as there are, with the same bits on any number of them: work is
-//! cut into parts of fixed size, each of them done by one thread.
+//! Parallel products and factors of large matrices, bitwise reproducible for any number of threads: work is divided into parts of
+//! fixed size, each of them done by one thread.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt;
@@ -8,13 +8,13 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use truegrind_math::work::checkpoint;
 
-/// Columns of a result that one thread makes.
+/// Columns of a result per thread.
 const PART: usize = 64;
 
-/// Right-hand sides that one thread solves for.
+/// Right-hand sides per thread.
 const SIDES: usize = 256;
 
-/// Multiplications below which handing out parts costs more than it saves.
+/// Multiplications below which parallel work is not worthwhile.
 const SMALL: usize = 2_000_000;
 
 /// AᵀA.
@@ -41,7 +41,7 @@ fn shown(a: &DMatrix<f64>) -> MatRef<'_, f64> {
     MatRef::from_column_major_slice(a.as_slice(), a.nrows(), a.ncols())
 }
 
-/// Fills the columns of a result in parts: `fill` gets the first column of a part and its place.
+/// Fills the columns of a result in parts: `fill` gets the index of the first column and the memory of a part.
 fn in_parts(
     out: &mut DMatrix<f64>,
     width: usize,
@@ -67,7 +67,7 @@ fn in_parts(
 
 fn multiplied(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> DMatrix<f64> {
     let mut out = DMatrix::zeros(a.nrows(), b.ncols());
-    // Long rows of few columns, or few rows of many: what is cut must be worth a part.
+    // Few rows need wider parts to be worthwhile.
     let width = if a.nrows() < PART { SIDES } else { PART };
     let small = a.nrows() * a.ncols() * b.ncols() < SMALL;
     in_parts(&mut out, width, small, |first, place| {
@@ -91,7 +91,7 @@ fn squared(a: MatRef<'_, f64>) -> DMatrix<f64> {
     out
 }
 
-/// Replaces a positive definite matrix by its lower Cholesky factor; `false` for one that is not.
+/// Replaces a positive definite matrix by its lower Cholesky factor; `false` if it is not positive definite.
 pub(super) fn factored(a: &mut DMatrix<f64>) -> bool {
     let n = a.nrows();
     let request = llt::factor::cholesky_in_place_scratch::<f64>(n, Par::Seq, Default::default());
@@ -123,7 +123,7 @@ pub(super) fn solved(lower: &DMatrix<f64>, mut b: DMatrix<f64>) -> DMatrix<f64> 
     b
 }
 
-/// The number, or 0 in place of one that is none.
+/// The number, or 0 for a non-finite one.
 pub(super) fn finite(v: f64) -> f64 {
     if v.is_finite() { v } else { 0.0 }
 }
@@ -145,8 +145,9 @@ pub(super) fn lower_factor(normal: DMatrix<f64>) -> DMatrix<f64> {
     DMatrix::identity(n, n)
 }
 
-/// Eigenvalues and eigenvectors of a symmetric matrix; `None` for one with entries that are no numbers. One thread: faer is
-/// built without any of its own.
+/// Eigenvalues and eigenvectors of a symmetric matrix; `None` for non-finite entries. Single-threaded: faer is built without
+/// threads.
+
 pub(super) fn eigen(a: &DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f64>)> {
     let n = a.nrows();
     let found = shown(a).self_adjoint_eigen(faer::Side::Lower).ok()?;

@@ -1,8 +1,8 @@
 //! Every candidate against one fit, and against the same fit without some of its parameters.
 //!
-//! What costs time (columns of all candidates, their products with the basis of everything free) is done once for a fit.
-//! The model without one cause differs by a few directions of that basis, so judging every candidate there is a matter of
-//! small matrices. Candidates whose rows or orders are found, not listed, are looked for anew in every design.
+//! The expensive part (columns of all candidates, their products with the basis of everything free) is done once for a fit.
+//! The model without one cause differs by a few directions of that basis, so scoring all candidates there takes only small
+//! matrices. Candidates whose rows or orders are searched are searched again in every design.
 
 use std::sync::{Arc, OnceLock};
 
@@ -13,8 +13,8 @@ use super::catalogue::Candidate;
 use super::cause::Cause;
 use super::design::{Design, FullDesign, Linear, Projected};
 use super::extension::{Extended, Subject};
-use super::intervals::{self, Strip};
-use super::lines;
+use super::intervals::{self, ShiftScan};
+use super::order_spectrum;
 use super::score::{score_from, score_projected};
 use crate::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
 use truegrind_arm::effect::Effect;
@@ -32,7 +32,7 @@ impl Entry {
         Self { candidate: Arc::clone(candidate), projected }
     }
 
-    fn scored(&self, design: &Design) -> Scored {
+    fn score(&self, design: &Design) -> Scored {
         let sizes = self.candidate.cause.sizes();
         let score =
             score_from(design.gradient_and_information(&self.projected), &sizes, self.candidate.tried);
@@ -43,31 +43,31 @@ impl Entry {
 /// A kind of shift over all rows.
 struct Shift {
     kind: Kind,
-    strip: Option<Strip>,
+    strip: Option<ShiftScan>,
 }
 
-/// See the module page.
+/// Scores of all candidates against a fit; see the module documentation.
 pub struct CandidateScores<'a> {
-    /// What may be wrong.
+    /// The candidates.
     pub catalogue: &'a Catalogue,
-    /// What is diagnosed.
+    /// The rows and the nominal arm.
     pub subject: &'a Subject<'a>,
     /// The fit.
     pub fit: Arc<Extended>,
-    /// The fit linearised.
+    /// The linearised fit.
     pub linear: Linear,
-    /// Everything free in it.
+    /// Its design with all parameters free.
     pub whole: FullDesign,
     listed: Vec<Entry>,
     shifts: Vec<Shift>,
     fine: Vec<Vec<OnceLock<Entry>>>,
 }
 
-/// Merit that a closer description of an accepted cause has ahead of a new cause: odds of a hundred to one.
-const CLOSER: f64 = 10.0;
+/// Merit bonus of a refined variant of an accepted cause over a new cause: odds of a hundred to one.
+const REFINEMENT_BONUS: f64 = 10.0;
 
 impl<'a> CandidateScores<'a> {
-    /// All candidates of `catalogue` against `fit`.
+    /// Scores all candidates of `catalogue` against `fit`.
     pub fn of(catalogue: &'a Catalogue, subject: &'a Subject<'a>, fit: Arc<Extended>) -> Self {
         let linear = Linear::of(subject, &fit);
         let whole = linear.whole();
@@ -95,7 +95,7 @@ impl<'a> CandidateScores<'a> {
             .into_par_iter()
             .filter_map(|candidate| {
                 let Cause::Measurement(disturbance) = &candidate.cause else { return None };
-                let strip = Strip::of(design, &candidate.columns(design), &candidate.cause.sizes());
+                let strip = ShiftScan::of(design, &candidate.columns(design), &candidate.cause.sizes());
                 Some(Shift { kind: disturbance.kind.clone(), strip })
             })
             .collect();
@@ -103,28 +103,27 @@ impl<'a> CandidateScores<'a> {
         Self { catalogue, subject, fit, linear, whole, listed, shifts, fine }
     }
 
-    /// All candidates against `design`, which is the whole one or a part of it, best first. Without `open` only the listed
-    /// ones: those whose rows and orders need not be looked for.
-    pub fn scored(&self, design: &Design, open: bool) -> Vec<Scored> {
-        let mut out: Vec<Scored> = self.listed.par_iter().map(|entry| entry.scored(design)).collect();
-        if open {
-            self.add_open(design, &mut out);
+    /// Scores against `design` (the full one or a reduction of it), best first. Without `searched` only of listed candidates.
+    pub fn score_all(&self, design: &Design, searched: bool) -> Vec<Scored> {
+        let mut out: Vec<Scored> = self.listed.par_iter().map(|entry| entry.score(design)).collect();
+        if searched {
+            self.add_searched(design, &mut out);
         }
-        // A joint that yields only in an arm that leans is no cause before another one shows that it does.
-        if !Cause::lean_is_seen(&self.fit.causes) {
-            out.retain(|s| !s.candidate.cause.needs_lean());
+        // Tilt deflection of joint 1 is a candidate only once another cause supports a tilt.
+        if !Cause::tilt_is_supported(&self.fit.causes) {
+            out.retain(|s| !s.candidate.cause.requires_tilt());
         }
         for scored in &mut out {
-            if self.fit.causes.iter().any(|c| c.same_story(&scored.candidate.cause)) {
-                scored.score.merit += CLOSER;
+            if self.fit.causes.iter().any(|c| c.is_same_finding(&scored.candidate.cause)) {
+                scored.score.merit += REFINEMENT_BONUS;
             }
         }
         out.sort_by(|a, b| b.score.merit.total_cmp(&a.score.merit));
         out
     }
 
-    /// Shifts between rows that are found, lines of orders that are found, and maps where lines stand out.
-    fn add_open(&self, design: &Design, out: &mut Vec<Scored>) {
+    /// Adds shifts over searched intervals, harmonics of searched orders, and maps where the order spectrum has peaks.
+    fn add_searched(&self, design: &Design, out: &mut Vec<Scored>) {
         let dataset = &self.subject.observed.dataset;
         let tried = intervals::tried(dataset.rows.len() as f64);
         let found: Vec<Candidate> = self
@@ -145,14 +144,14 @@ impl<'a> CandidateScores<'a> {
                 })
             })
             .collect();
-        let (spoken, mapped) = lines::candidates(self.subject, &self.catalogue.turns, design);
-        let open: Vec<Arc<Candidate>> = found.into_iter().chain(spoken).map(Arc::new).collect();
+        let (spectral, mapped) = order_spectrum::candidates(self.subject, &self.catalogue.turns, design);
+        let open: Vec<Arc<Candidate>> = found.into_iter().chain(spectral).map(Arc::new).collect();
         let fine: Vec<&Entry> = mapped
             .into_par_iter()
             .filter_map(|(joint, level)| {
                 let candidate = self.catalogue.fine[joint].get(level)?;
                 let place = &self.fine[joint][level];
-                // Not under the lock: the products hand out work, and who waits for it may come by here again.
+                // Not under the lock: the products spawn parallel work, and a waiting thread can re-enter here.
                 if place.get().is_none() {
                     let _ = place.set(Entry::of(candidate, &self.whole.design));
                 }
@@ -165,11 +164,11 @@ impl<'a> CandidateScores<'a> {
             let score = score_projected(&projected, &candidate.cause.sizes(), candidate.tried);
             Scored { candidate, score }
         }));
-        out.par_extend(fine.par_iter().map(|entry| entry.scored(design)));
+        out.par_extend(fine.par_iter().map(|entry| entry.score(design)));
     }
 }
 
-/// Unlogged payload under the compliances that were already found.
+/// An unlogged payload, with the compliances found so far.
 fn known_load(fit: &Extended) -> Option<Kind> {
     let found: Vec<(usize, f64)> = fit
         .causes

@@ -1,11 +1,11 @@
-//! The candidates of one data set, with what their number costs a p-value.
+//! The candidates of one data set, with the correction of p-values for their number.
 
 use std::sync::Arc;
 
 use super::catalogue::{Candidate, arm_candidates, fine_maps, measurement_candidates};
 use super::design::Design;
 use super::extension::Subject;
-use super::lines::Turns;
+use super::order_spectrum::AngleHarmonics;
 use super::score::{Score, log_p};
 use crate::measurement::dataset::Sensor;
 use crate::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
@@ -21,20 +21,20 @@ pub struct Scored {
 
 /// Candidates that do not depend on a fit, built once.
 pub struct Catalogue {
-    /// Those whose rows and orders are listed.
+    /// Listed candidates.
     pub listed: Vec<Arc<Candidate>>,
-    /// Fine error maps of each joint, by how fine they are.
+    /// Fine error maps of each joint, coarsest first.
     pub fine: Vec<Vec<Arc<Candidate>>>,
     /// Kinds of shifts with their regressors over all rows.
     pub shifts: Vec<Candidate>,
-    /// Kinds of candidates (name and joints).
+    /// Number of candidate families (name and joints).
     pub families: f64,
-    /// Where the joints stood, for lines.
-    pub turns: Turns,
+    /// Harmonics of the joint angles, for the order spectrum.
+    pub turns: AngleHarmonics,
 }
 
 impl Catalogue {
-    /// For a data set.
+    /// The candidates of a data set.
     pub fn of(subject: &Subject<'_>) -> Self {
         let dataset = &subject.observed.dataset;
         let mut listed = arm_candidates(subject);
@@ -53,28 +53,28 @@ impl Catalogue {
                 Candidate::measurement(disturbance, dataset, subject.nominal, subject.frames)
             })
             .collect();
-        let mut stories: Vec<(&str, Vec<usize>)> =
+        let mut families: Vec<(&str, Vec<usize>)> =
             listed.iter().chain(&shifts).map(|c| (c.cause.name(), c.cause.joints())).collect();
-        stories.extend((0..6).map(|j| ("gear-transmission", vec![j])));
-        stories.sort();
-        stories.dedup();
-        let families = stories.len() as f64;
+        families.extend((0..6).map(|j| ("gear-transmission", vec![j])));
+        families.sort();
+        families.dedup();
+        let families = families.len() as f64;
         let fine = fine_maps(subject);
         let listed = listed.into_iter().map(Arc::new).collect();
-        Self { listed, fine, shifts, families, turns: Turns::of(subject) }
+        Self { listed, fine, shifts, families, turns: AngleHarmonics::of(subject) }
     }
 
-    /// The corrected p-value's logarithm, against `design`.
-    pub(super) fn corrected(&self, design: &Design, scored: &Scored) -> f64 {
+    /// Natural logarithm of the p-value against `design`, corrected for variants and families.
+    pub(super) fn corrected_log_p(&self, design: &Design, scored: &Scored) -> f64 {
         let trials = (scored.candidate.tried * self.families).ln();
         (log_p(design, &scored.candidate, &scored.score) + trials).min(0.0)
     }
 
-    /// Whether that lies below the chance that was allowed for; the scatter is looked at only where the model's own noise
-    /// does not settle it.
-    pub(super) fn significant(&self, design: &Design, scored: &Scored, alpha: f64) -> bool {
+    /// Whether the corrected p-value is at most `alpha`. The robust statistic is computed only if the model's own noise does not
+    /// already decide.
+    pub(super) fn is_significant(&self, design: &Design, scored: &Scored, alpha: f64) -> bool {
         let trials = (scored.candidate.tried * self.families).ln();
         let plain = scored.score.plain_log_p(&scored.candidate.cause.sizes());
-        plain + trials <= alpha.ln() && self.corrected(design, scored) <= alpha.ln()
+        plain + trials <= alpha.ln() && self.corrected_log_p(design, scored) <= alpha.ln()
     }
 }

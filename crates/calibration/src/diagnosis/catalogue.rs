@@ -1,8 +1,7 @@
-//! Every cause that is tried, as regressors that do not depend on the fit.
+//! The catalogue of candidate causes, with regressors that do not depend on the fit.
 //!
-//! Lists, not code, where that is possible: a new effect is one more entry of [`arm_candidates`] or
-//! [`measurement_candidates`]. Shifts between unknown rows and reducer lines have rooms of their own (`intervals`, `lines`),
-//! because which rows and which orders is found, not listed.
+//! A new effect is one more entry of [`arm_candidates`] or [`measurement_candidates`]. The rows of shifts and the orders of
+//! reducer harmonics are searched, not listed: see `intervals` and `order_spectrum`.
 
 use std::sync::Arc;
 
@@ -32,43 +31,43 @@ use truegrind_math::work::checkpoint;
 /// A cause with its regressors.
 #[derive(Debug, Clone)]
 pub struct Candidate {
-    /// The cause, at size 0.
+    /// The cause, with all parameters 0.
     pub cause: Cause,
     /// One for each parameter.
     pub regressors: Vec<Regressor>,
-    /// Variants of the same cause that were tried beside it (rows, orders, time constants), itself included.
+    /// Number of variants of the cause that were tried (rows, orders, time constants), itself included.
     pub tried: f64,
 }
 
-/// What one parameter does, row by row, per unit.
+/// Effect of one parameter on each row, per unit.
 #[derive(Debug, Clone)]
 pub enum Regressor {
-    /// Turns joints (by 0-based joint), and lets all lengths grow.
+    /// Rotates joints (0-based) and scales all lengths.
     Arm {
         /// Rotations of joints (rad).
         rotation: Vec<(usize, Vec<f64>)>,
         /// Relative growth; empty where there is none.
         growth: Vec<f64>,
     },
-    /// Pushes one coordinate of a kind of disturbance, as far as the profile says.
+    /// Displaces one coordinate of a disturbance, in proportion to the profile.
     Disturbance {
-        /// Which.
-        along: Along,
-        /// How far in each row.
+        /// The coordinate.
+        coordinate: Coordinate,
+        /// Factor in each row.
         profile: Vec<f64>,
     },
     /// Shifts the sensor in the base.
     Shift([Vec<f64>; 3]),
 }
 
-/// A direction in which a measurement can be pushed.
+/// A coordinate in which a measurement can be displaced.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Along {
+pub enum Coordinate {
     /// The cable's zero.
     Zero,
     /// Coordinate of the sensor's frame.
     Frame(usize),
-    /// Coordinate of the touched point.
+    /// Coordinate of the target.
     Target(usize),
     /// The scale.
     Scale,
@@ -77,7 +76,7 @@ pub enum Along {
 }
 
 impl Candidate {
-    /// A cause as a candidate of its own; its size does not matter.
+    /// A candidate for a cause; its parameter values are irrelevant.
     pub fn of(cause: &Cause, subject: &Subject<'_>) -> Self {
         let (dataset, nominal) = (&subject.observed.dataset, subject.nominal);
         match cause {
@@ -86,7 +85,7 @@ impl Candidate {
         }
     }
 
-    /// A candidate of the arm, its regressors taken at the nominal arm.
+    /// A candidate in the arm, its regressors evaluated at the nominal arm.
     pub fn arm(effect: Effect, dataset: &Dataset, nominal: &Model) -> Self {
         let statics = nominal.statics();
         let count = effect.parameters().len();
@@ -124,7 +123,7 @@ impl Candidate {
         Self { cause: Cause::Arm(effect), regressors, tried: 1.0 }
     }
 
-    /// A candidate of the measurement.
+    /// A candidate in the measurement.
     pub fn measurement(
         disturbance: Disturbance,
         dataset: &Dataset,
@@ -132,15 +131,15 @@ impl Candidate {
         frames: &Frames,
     ) -> Self {
         let profile: Vec<f64> = dataset.rows.iter().map(|r| disturbance.profile.at(r)).collect();
-        let push = |along| Regressor::Disturbance { along, profile: profile.clone() };
+        let push = |coordinate| Regressor::Disturbance { coordinate, profile: profile.clone() };
         let regressors = match &disturbance.kind {
-            Kind::Zero => vec![push(Along::Zero)],
+            Kind::Zero => vec![push(Coordinate::Zero)],
             Kind::Frame { turning } => {
-                (0..if *turning { 6 } else { 3 }).map(|k| push(Along::Frame(k))).collect()
+                (0..if *turning { 6 } else { 3 }).map(|k| push(Coordinate::Frame(k))).collect()
             }
-            Kind::Target => (0..3).map(|k| push(Along::Target(k))).collect(),
-            Kind::Scale => vec![push(Along::Scale)],
-            Kind::Sag => vec![push(Along::Sag)],
+            Kind::Target => (0..3).map(|k| push(Coordinate::Target(k))).collect(),
+            Kind::Scale => vec![push(Coordinate::Scale)],
+            Kind::Sag => vec![push(Coordinate::Sag)],
             Kind::Empirical(form) if !form.rotates_joints() => shifts(*form, dataset, nominal, frames)
                 .into_iter()
                 .map(|v| Regressor::Shift(std::array::from_fn(|k| v.iter().map(|v| v[k]).collect())))
@@ -180,12 +179,12 @@ impl Candidate {
                     }
                     add(growth, &|s| design.slopes.by_growth[s]);
                 }
-                Regressor::Disturbance { along, profile } => match along {
-                    Along::Zero => add(profile, &|s| design.slopes.by_zero[s]),
-                    Along::Frame(axis) => add(profile, &|s| design.slopes.by_frame[(s, *axis)]),
-                    Along::Target(axis) => add(profile, &|s| design.slopes.by_target[(s, *axis)]),
-                    Along::Scale => add(profile, &|s| design.slopes.by_scale[s]),
-                    Along::Sag => add(profile, &|s| design.slopes.by_sag[s]),
+                Regressor::Disturbance { coordinate, profile } => match coordinate {
+                    Coordinate::Zero => add(profile, &|s| design.slopes.by_zero[s]),
+                    Coordinate::Frame(axis) => add(profile, &|s| design.slopes.by_frame[(s, *axis)]),
+                    Coordinate::Target(axis) => add(profile, &|s| design.slopes.by_target[(s, *axis)]),
+                    Coordinate::Scale => add(profile, &|s| design.slopes.by_scale[s]),
+                    Coordinate::Sag => add(profile, &|s| design.slopes.by_sag[s]),
                 },
                 Regressor::Shift(vectors) => {
                     for (axis, profile) in vectors.iter().enumerate() {
@@ -198,21 +197,21 @@ impl Candidate {
     }
 }
 
-/// What the rows can show at all.
+/// Logged columns and ranges, which decide the candidates that a data set can test.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Columns {
-    /// Whether approach sides are logged and differ, for each joint.
+pub struct LoggedColumns {
+    /// For each joint, whether both approach sides occur.
     pub approach: [bool; 6],
-    /// Whether times are logged, and how long the run is (h).
+    /// Duration of the run, where times are logged (h).
     pub hours: Option<f64>,
-    /// Whether temperatures are logged, and their mean and range [°C].
+    /// Mean and range of the temperature, where logged [°C].
     pub temperature: Option<(f64, f64)>,
     /// Range of each joint (rad).
     pub range_rad: [f64; 6],
 }
 
-impl Columns {
-    /// Looks at a data set.
+impl LoggedColumns {
+    /// The logged columns of a data set.
     pub fn of(dataset: &Dataset) -> Self {
         let span = |values: Vec<f64>| {
             let (low, high) =
@@ -238,18 +237,18 @@ impl Columns {
     }
 }
 
-/// Couplings that gear trains have: the wrist's, and the forearm's linkage.
+/// Couplings (driver, joint) of common gear trains: wrist, and forearm linkage.
 const COUPLINGS: [(usize, usize); 10] =
     [(3, 4), (3, 5), (4, 5), (4, 3), (5, 4), (5, 3), (1, 2), (2, 1), (2, 3), (0, 1)];
 
-/// Maps that follow the periods of a reducer's stages, tried where lines of the joint stand out within their reach: knots, and
-/// the highest order that they follow, for which a cubic spline needs nearly two and a half knots.
+/// Fine error maps for the periods of a reducer's stages, tried where the order spectrum has peaks in their range: knots, and the
+/// highest resolved order (a cubic spline needs nearly two and a half knots per period).
 pub const FINE: [(usize, usize); 2] = [(72, 30), (144, 60)];
 
-/// Poses for each knot of the finest map: with fewer, its lines one by one say as much.
+/// Fewest poses for each knot of the finest map: with fewer, single harmonics fit as well.
 const POSES_PER_KNOT: usize = 10;
 
-/// The finely resolved error maps of each joint, coarsest first: those of [`FINE`] for which there are poses enough.
+/// The fine error maps of each joint, coarsest first: those of [`FINE`] with enough poses.
 pub fn fine_maps(subject: &Subject<'_>) -> Vec<Vec<Arc<Candidate>>> {
     let dataset = &subject.observed.dataset;
     let needed = POSES_PER_KNOT * FINE[1].0;
@@ -262,13 +261,13 @@ pub fn fine_maps(subject: &Subject<'_>) -> Vec<Vec<Arc<Candidate>>> {
     (0..6).map(|joint| tried.iter().map(|&(knots, _)| map(joint, knots)).collect()).collect()
 }
 
-/// An axis that moved less than this shows nothing of itself (rad).
+/// Range below which an axis counts as not moving (rad).
 pub const STILL_RAD: f64 = 0.02;
 
-/// Candidates of the arm.
+/// Candidate causes in the arm.
 pub fn arm_candidates(subject: &Subject<'_>) -> Vec<Candidate> {
     let dataset = &subject.observed.dataset;
-    let columns = Columns::of(dataset);
+    let columns = LoggedColumns::of(dataset);
     let nominal = subject.nominal;
     let moves = |j: usize| columns.range_rad[j] > STILL_RAD;
     let mut effects: Vec<(Effect, f64)> = Vec::new();
@@ -295,7 +294,7 @@ pub fn arm_candidates(subject: &Subject<'_>) -> Vec<Candidate> {
         };
         let lumps: Vec<Lump> = frames.iter().map(|&frame| lump(frame, None, None)).collect();
         effects.push((Effect::LumpedCompliance(LumpedCompliance { joint, lump: lumps.clone() }), 1.0));
-        // With the first moments of the links between, the static torque of any masses is spanned.
+        // The first moments of the links between complete the span of the static torques of any masses.
         if (1..4).contains(&joint) {
             let moments = (joint + 1..if joint == 3 { 6 } else { 4 })
                 .flat_map(|frame| (0..3).map(move |m| lump(frame, None, Some(m))));
@@ -303,7 +302,7 @@ pub fn arm_candidates(subject: &Subject<'_>) -> Vec<Candidate> {
             effects.push((Effect::LumpedCompliance(LumpedCompliance { joint, lump: all }), 1.0));
         }
     }
-    // Gravity that does not point down the base's own axis: the same torques along the two other axes of the base.
+    // Gravity that is not along the base's vertical axis: the same torques along the two other axes of the base.
     let down = nominal.gravity.iamax();
     let across: Vec<usize> = (0..3).filter(|&axis| axis != down).collect();
     for joint in 0..5 {
@@ -328,7 +327,7 @@ pub fn arm_candidates(subject: &Subject<'_>) -> Vec<Candidate> {
     for joint in (0..6).filter(|&j| columns.approach[j]) {
         effects.push((Effect::Backlash(Backlash { joint, play_rad: 0.0 }), 1.0));
     }
-    for (time_constant_h, reference_c, tried) in profiles(&columns) {
+    for (time_constant_h, reference_c, tried) in drift_profiles(&columns) {
         let thermal = Thermal { growth: 0.0, time_constant_h, growth_per_k: 0.0, reference_c };
         effects.push((Effect::ThermalDrift(thermal), tried));
     }
@@ -341,14 +340,14 @@ pub fn arm_candidates(subject: &Subject<'_>) -> Vec<Candidate> {
         .collect()
 }
 
-/// Time constants (as shares of the run) that are tried.
+/// Time constants that are tried, as shares of the run.
 const TIME_CONSTANTS: [f64; 5] = [0.05, 0.12, 0.3, 0.8, 3.0];
 
-/// A time constant so long that the clock stands still (h).
+/// A time constant that makes the profile in time constant (h).
 const NEVER_H: f64 = 1e12;
 
-/// Clocks and thermometers that the columns allow: time constant (h), reference [°C], variants tried.
-fn profiles(columns: &Columns) -> Vec<(f64, f64, f64)> {
+/// Drift profiles for the logged columns: time constant (h), reference [°C], variants tried.
+fn drift_profiles(columns: &LoggedColumns) -> Vec<(f64, f64, f64)> {
     let mut out = Vec::new();
     if let Some((mean, _)) = columns.temperature {
         out.push((NEVER_H, mean, 1.0));
@@ -362,10 +361,10 @@ fn profiles(columns: &Columns) -> Vec<(f64, f64, f64)> {
     out
 }
 
-/// Candidates of the measurement whose rows are all of them.
+/// Candidate causes in the measurement that affect all rows.
 pub fn measurement_candidates(subject: &Subject<'_>) -> Vec<Candidate> {
     let dataset = &subject.observed.dataset;
-    let columns = Columns::of(dataset);
+    let columns = LoggedColumns::of(dataset);
     let mut list = vec![(Kind::Scale, Profile::Constant, 1.0)];
     if dataset.sensor == Sensor::Cable {
         list.push((Kind::Sag, Profile::Constant, 1.0));
@@ -387,11 +386,11 @@ pub fn measurement_candidates(subject: &Subject<'_>) -> Vec<Candidate> {
             }
         }
     }
-    let forms = forms(dataset, &columns)
+    let empirical = empirical_faults(dataset, &columns)
         .into_iter()
         .map(|(form, tried)| (Kind::Empirical(form), Profile::Constant, tried));
     list.into_iter()
-        .chain(forms)
+        .chain(empirical)
         .map(|(kind, profile, tried)| Candidate {
             tried,
             ..Candidate::measurement(
@@ -404,11 +403,11 @@ pub fn measurement_candidates(subject: &Subject<'_>) -> Vec<Candidate> {
         .collect()
 }
 
-/// Pairs of joints whose gears may disturb each other.
+/// Pairs of joints for two-joint gear errors.
 const NEIGHBOURS: [(usize, usize); 10] =
     [(0, 1), (1, 0), (1, 2), (2, 1), (2, 3), (3, 2), (3, 4), (4, 3), (4, 5), (5, 4)];
 
-/// A drum between the shortest and the longest of the lengths that were read.
+/// A drum fault over the range of the measured lengths.
 fn drum(dataset: &Dataset) -> EmpiricalFault {
     let lengths = dataset.rows.iter().filter_map(|row| match row.reading {
         Reading::Cable(length) if length.is_finite() => Some(length),
@@ -419,7 +418,7 @@ fn drum(dataset: &Dataset) -> EmpiricalFault {
     EmpiricalFault::Drum { from_mm: low.min(high).max(0.0).floor() as u32, to_mm: high.ceil() as u32 }
 }
 
-/// Late readings, their delay counted from the middle of the times that were logged.
+/// A latency, its drift relative to the middle of the logged times.
 fn latency(dataset: &Dataset) -> EmpiricalFault {
     let times = dataset.rows.iter().filter_map(|row| row.condition.time_h).filter(|t| t.is_finite());
     let (first, last) =
@@ -428,8 +427,8 @@ fn latency(dataset: &Dataset) -> EmpiricalFault {
     EmpiricalFault::Latency { middle_s: if middle_s.is_finite() { middle_s.round() as i64 } else { 0 } }
 }
 
-/// Forms that the columns allow, with the variants tried of each.
-fn forms(dataset: &Dataset, columns: &Columns) -> Vec<(EmpiricalFault, f64)> {
+/// Empirical faults that the logged columns can test, with the number of variants of each.
+fn empirical_faults(dataset: &Dataset, columns: &LoggedColumns) -> Vec<(EmpiricalFault, f64)> {
     let mut out = Vec::new();
     let has =
         |rate: bool| dataset.rows.iter().any(|r| r.motion().is_some_and(|m| !rate || m.rate_per_h.is_some()));

@@ -1,4 +1,4 @@
-//! A candidate cause: physics of the arm or a disturbance of the measurement, by its contract name.
+//! A candidate cause: an effect of the arm or a disturbance of the measurement, by its contract name.
 
 use crate::identification::tolerance::{Tolerance, effect_sigma};
 use crate::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
@@ -6,33 +6,33 @@ use crate::measurement::sensor::empirical::EmpiricalFault;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::model::Model;
 
-/// What may be wrong.
+/// A possible cause of errors.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Cause {
-    /// In the arm: goes into the model and into every program.
+    /// In the arm: part of the model, and thus of every corrected program.
     Arm(Effect),
-    /// In the measurement: fitted, and left behind.
+    /// In the measurement: a nuisance that is fitted but not part of the model.
     Measurement(Disturbance),
 }
 
-/// A part of a joint.
+/// The part of a joint that a cause concerns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Part {
-    /// What yields under load.
+    /// Compliance.
     Spring,
-    /// What transmits the motion.
+    /// Transmission.
     Gear,
-    /// What reverses late.
-    Play,
+    /// Lost motion at reversals.
+    Backlash,
 }
 
-/// Knots of an error map over a turn: a smooth curve.
+/// Knots of a smooth error map over a turn.
 pub const MAP_KNOTS: usize = 24;
 
-/// Cosine of the angle between two axes from which they are parallel.
+/// Cosine of the angle between two axes from which they count as parallel.
 const PARALLEL: f64 = 0.99;
 
-/// Share of its square from which an error of two joints goes with one of sum and difference.
+/// Share of the squared amplitude from which a two-joint error depends on the sum or the difference alone.
 const MOSTLY: f64 = 0.9;
 
 impl Cause {
@@ -53,7 +53,7 @@ impl Cause {
         }
     }
 
-    /// Joints (0-based) that it is about.
+    /// The joints concerned (0-based).
     pub fn joints(&self) -> Vec<usize> {
         match self {
             Cause::Arm(Effect::JointCoupling(c)) => vec![c.driver, c.joint],
@@ -63,7 +63,7 @@ impl Cause {
         }
     }
 
-    /// Data rows that it is about, both ends included.
+    /// The rows of a shift, both ends included.
     pub fn rows(&self) -> Option<[usize; 2]> {
         match self {
             Cause::Measurement(Disturbance { profile: Profile::Rows { from, to }, .. }) => Some([*from, *to]),
@@ -79,7 +79,7 @@ impl Cause {
         }
     }
 
-    /// Standard deviation of each parameter before anything was measured, in its unit.
+    /// Prior standard deviation of each parameter, in its unit.
     pub fn sizes(&self) -> Vec<f64> {
         match self {
             Cause::Arm(effect) => (0..effect.parameters().len()).map(|k| effect_sigma(effect, k)).collect(),
@@ -87,9 +87,8 @@ impl Cause {
         }
     }
 
-    /// Whether its size is one that nature has: a joint does not yield upwards, a reversal does not overshoot, no cable sags
-    /// upwards.
-    pub fn is_possible(&self) -> bool {
+    /// Whether its sign is physically plausible: compliance, backlash and cable sag are not negative.
+    pub fn has_plausible_sign(&self) -> bool {
         match self {
             Cause::Arm(Effect::JointCompliance(c)) => c.compliance_rad_per_nm >= 0.0,
             Cause::Arm(Effect::Backlash(b)) => b.play_rad >= 0.0,
@@ -100,38 +99,38 @@ impl Cause {
         }
     }
 
-    /// Whether it changes slowly over the joint angles, as what a fault that nobody has described does to a reading may too.
+    /// Whether it varies slowly with the joint angles, like the residue of an unknown fault.
     pub fn is_smooth(&self) -> bool {
         match self {
             Cause::Arm(Effect::GearMap(map)) => map.knots_rad.len() <= MAP_KNOTS,
             Cause::Arm(effect) => {
                 !matches!(effect, Effect::Backlash(_) | Effect::GearTransmission(_) | Effect::ThermalDrift(_))
             }
-            Cause::Measurement(Disturbance { kind: Kind::Empirical(form), .. }) => form.is_of_the_arm(),
+            Cause::Measurement(Disturbance { kind: Kind::Empirical(form), .. }) => form.is_in_arm(),
             Cause::Measurement(_) => false,
         }
     }
 
-    /// Whether weight does this only because the arm leans: gravity pulls along axes of the base that are none of its own.
-    pub fn leans(&self) -> bool {
+    /// Whether it is deflection by gravity along horizontal axes of the base, as in an arm mounted at a tilt.
+    pub fn is_tilt(&self) -> bool {
         let Cause::Arm(Effect::LumpedCompliance(load)) = self else { return false };
         load.lump.iter().all(|lump| lump.axis.is_some())
     }
 
-    /// Whether it says that the first joint yields because the arm leans. Its axis is that of the base, along which weight turns
-    /// nothing; in an arm that leans the joints behind it, which carry weight already, yield to that too.
-    pub fn needs_lean(&self) -> bool {
-        self.leans() && self.joints() == [0]
+    /// Whether it is a tilt deflection of joint 1. In an upright arm gravity has no torque about that joint's axis; in a tilted arm the
+    /// later joints, which bear gravity torque anyway, must deflect too.
+    pub fn requires_tilt(&self) -> bool {
+        self.is_tilt() && self.joints() == [0]
     }
 
-    /// Whether another cause says that the arm leans.
-    pub fn lean_is_seen(causes: &[Self]) -> bool {
-        causes.iter().any(|cause| cause.leans() && !cause.needs_lean())
+    /// Whether a tilt is supported by a cause in a joint other than joint 1.
+    pub fn tilt_is_supported(causes: &[Self]) -> bool {
+        causes.iter().any(|cause| cause.is_tilt() && !cause.requires_tilt())
     }
 
-    /// Whether it is an error of two neighbouring joints with parallel axes that goes with the angle in which weight turns: what a
-    /// spring does, or play whose flank follows the load, with a law that nobody has described.
-    pub fn goes_with_weight(&self, nominal: &Model) -> bool {
+    /// Whether it is a two-joint error of neighbouring parallel axes that depends on the angle relative to gravity: the same as a
+    /// compliance, or backlash whose side follows the load, with an unknown law.
+    pub fn follows_gravity_angle(&self, nominal: &Model) -> bool {
         let Cause::Measurement(Disturbance { kind: Kind::Empirical(form), values, .. }) = self else {
             return false;
         };
@@ -148,13 +147,13 @@ impl Cause {
         with_weight > MOSTLY * (sum + difference)
     }
 
-    /// Whether only the shape of it is known, not the law: a form.
-    pub fn is_roughly_described(&self) -> bool {
+    /// Whether it is an [`EmpiricalFault`], whose exact law is unknown.
+    pub fn is_empirical(&self) -> bool {
         matches!(self, Cause::Measurement(Disturbance { kind: Kind::Empirical(_), .. }))
     }
 
-    /// Whether it is a fault of a cable and of what leads it.
-    pub fn is_of_the_cable(&self) -> bool {
+    /// Whether it is a fault of a cable or its guide.
+    pub fn is_in_cable(&self) -> bool {
         match self {
             Cause::Measurement(Disturbance { kind: Kind::Sag, .. }) => true,
             Cause::Measurement(Disturbance { kind: Kind::Empirical(form), .. }) => {
@@ -164,8 +163,8 @@ impl Cause {
         }
     }
 
-    /// Whether it follows the clock or the thermometer.
-    pub fn follows_warmth(&self) -> bool {
+    /// Whether it has a thermal profile, in time or temperature.
+    pub fn is_thermal(&self) -> bool {
         match self {
             Cause::Arm(effect) => matches!(effect, Effect::ThermalDrift(_)),
             Cause::Measurement(d) => {
@@ -174,16 +173,16 @@ impl Cause {
         }
     }
 
-    /// Whether it is in the arm: one of its effects, or a form that its model does not carry.
-    pub fn is_of_the_arm(&self) -> bool {
+    /// Whether it is in the arm: an effect, or an empirical fault of the arm.
+    pub fn is_in_arm(&self) -> bool {
         match self {
             Cause::Arm(_) => true,
-            Cause::Measurement(Disturbance { kind: Kind::Empirical(form), .. }) => form.is_of_the_arm(),
+            Cause::Measurement(Disturbance { kind: Kind::Empirical(form), .. }) => form.is_in_arm(),
             Cause::Measurement(_) => false,
         }
     }
 
-    /// The part of the arm that it sends to: what yields, gear or play, and the joint that has it.
+    /// The part of the arm concerned, with its joint.
     pub fn part(&self) -> Option<(Part, usize)> {
         let joint = match self {
             Cause::Arm(Effect::JointCoupling(c)) => c.joint,
@@ -191,7 +190,7 @@ impl Cause {
         };
         let part = match self {
             Cause::Arm(Effect::JointCompliance(_) | Effect::LumpedCompliance(_)) => Part::Spring,
-            Cause::Arm(Effect::Backlash(_)) => Part::Play,
+            Cause::Arm(Effect::Backlash(_)) => Part::Backlash,
             Cause::Measurement(Disturbance {
                 kind: Kind::Empirical(EmpiricalFault::NonlinearStiffness { .. }),
                 ..
@@ -201,8 +200,8 @@ impl Cause {
         Some((part, joint))
     }
 
-    /// Whether both are in the arm, or push the same thing of the measurement.
-    pub fn moves_the_same(&self, other: &Self) -> bool {
+    /// Whether both are in the arm, or displace the same quantity of the measurement.
+    pub fn affects_same_quantity(&self, other: &Self) -> bool {
         match (self, other) {
             (Cause::Arm(_), Cause::Arm(_)) => true,
             (Cause::Measurement(a), Cause::Measurement(b)) => {
@@ -212,8 +211,8 @@ impl Cause {
         }
     }
 
-    /// Whether two causes would be told to a technician as the same thing: same name, same joints, rows that overlap.
-    pub fn same_story(&self, other: &Self) -> bool {
+    /// Whether two causes would share a finding: same name, same joints, overlapping rows.
+    pub fn is_same_finding(&self, other: &Self) -> bool {
         let rows_meet = match (self.rows(), other.rows()) {
             (Some(a), Some(b)) => a[0] <= b[1] && b[0] <= a[1],
             (None, None) => true,

@@ -22,14 +22,14 @@ use super::algebra::{lower_factor, product, solved};
 use super::candidates::Scored;
 use super::catalogue::Candidate;
 use super::cause::Cause;
-use super::correlated::filter;
 use super::design::{Design, Linear};
 use super::discrepancy::{Discrepancy, Functions};
 use super::extension::{Extended, Subject};
 use super::halves::halves;
-use super::intervals::Strip;
+use super::intervals::ShiftScan;
 use super::score::{Score, log_p_of, score_columns, score_from, score_projected};
 use super::selection::{Accepted, Options, already};
+use super::serial_correlation::prewhiten;
 use crate::measurement::sensor::disturbance::{Disturbance, Profile};
 use truegrind_arm::effect::Effect;
 use truegrind_math::work::checkpoint;
@@ -212,9 +212,9 @@ impl Confirming<'_> {
         let (rho, noise) = (discrepancy.correlation, discrepancy.noise);
         let every: Vec<usize> = (0..self.found.causes.len()).collect();
         let linear = self.linear.beside(&discrepancy.columns).filtered(rho, numbers, noise);
-        let design = linear.design(&self.places(&every));
+        let design = linear.design(&self.parameter_indices(&every));
         let columns: Vec<DMatrix<f64>> =
-            all.par_iter().map(|t| filter(&t.columns, rho, numbers, linear.per) / noise).collect();
+            all.par_iter().map(|t| prewhiten(&t.columns, rho, numbers, linear.per) / noise).collect();
         let projected = design.project_all(&columns);
         all.into_iter()
             .zip(projected)
@@ -245,8 +245,8 @@ impl Confirming<'_> {
         sum * sum > ALIKE * count * square
     }
 
-    fn places(&self, causes: &[usize]) -> Vec<usize> {
-        causes.iter().flat_map(|&k| self.found.places(k)).collect()
+    fn parameter_indices(&self, causes: &[usize]) -> Vec<usize> {
+        causes.iter().flat_map(|&k| self.found.parameter_indices(k)).collect()
     }
 
     /// Takes out causes that do not carry themselves beside the functions, one after the other.
@@ -261,7 +261,7 @@ impl Confirming<'_> {
         let mut confirmations = loop {
             let (rho, noise) = (discrepancy.correlation, discrepancy.noise);
             let whole = self.linear.beside(&discrepancy.columns).filtered(rho, numbers, noise).whole();
-            let whiten = |columns: &DMatrix<f64>| filter(columns, rho, numbers, self.linear.per) / noise;
+            let whiten = |columns: &DMatrix<f64>| prewhiten(columns, rho, numbers, self.linear.per) / noise;
             let judged: Vec<Confirmation> = (0..own.len())
                 .into_par_iter()
                 .map(|k| {
@@ -270,7 +270,7 @@ impl Confirming<'_> {
                     if !out.contains(&k) {
                         dropped.push(k);
                     }
-                    let design = whole.without(&self.places(&dropped));
+                    let design = whole.without(&self.parameter_indices(&dropped));
                     self.judged(k, &own[k], &design, &whiten)
                 })
                 .collect();
@@ -279,8 +279,13 @@ impl Confirming<'_> {
                 .max_by(|&a, &b| judged[a].log_p.total_cmp(&judged[b].log_p).then(b.cmp(&a)));
             let Some(worst) = worst else { break judged };
             out.push(worst);
-            discrepancy =
-                Discrepancy::of(functions, self.linear, &self.places(&out), numbers, Some(&discrepancy));
+            discrepancy = Discrepancy::of(
+                functions,
+                self.linear,
+                &self.parameter_indices(&out),
+                numbers,
+                Some(&discrepancy),
+            );
         };
         for k in &out {
             confirmations[*k].beside = false;
@@ -316,7 +321,7 @@ impl Confirming<'_> {
             came_back: 0,
             asked: 0,
             changed: 0,
-            plausible: own.candidate.cause.is_possible() && !self.told_otherwise(&own.candidate.cause),
+            plausible: own.candidate.cause.has_plausible_sign() && !self.told_otherwise(&own.candidate.cause),
         }
     }
 }
@@ -349,13 +354,13 @@ impl<'a> Half<'a> {
     /// Columns of all rows, in the rows of this half.
     fn columns(&self, of_all: &DMatrix<f64>) -> DMatrix<f64> {
         let per = self.linear.per;
-        filter(&picked(of_all, self.rows, per), self.rho, &self.numbers, per) / self.noise
+        prewhiten(&picked(of_all, self.rows, per), self.rho, &self.numbers, per) / self.noise
     }
 
     /// For each cause whether it came back and whether it had another size; `None` where this half cannot tell.
     fn told(&self, own: &[WithColumns], pool: &[WithColumns], out: &[usize]) -> Vec<Option<(bool, bool)>> {
         let all: Vec<usize> = (0..own.len()).collect();
-        let selected = self.selected(own, pool, &self.confirming.places(&all));
+        let selected = self.selected(own, pool, &self.confirming.parameter_indices(&all));
         let whole = self.linear.whole();
         let columns: Vec<DMatrix<f64>> = own.iter().map(|tried| self.columns(&tried.columns)).collect();
         let projected = whole.design.project_all(&columns);
@@ -364,7 +369,7 @@ impl<'a> Half<'a> {
             .enumerate()
             .map(|(k, (tried, projected))| {
                 let dropped: Vec<usize> = out.iter().copied().filter(|o| *o != k).chain([k]).collect();
-                let design = whole.without(&self.confirming.places(&dropped));
+                let design = whole.without(&self.confirming.parameter_indices(&dropped));
                 let accepted = &self.confirming.accepted[k];
                 let sizes = tried.candidate.cause.sizes();
                 let score = score_from(design.gradient_and_information(projected), &sizes, accepted.tried);
@@ -380,11 +385,11 @@ impl<'a> Half<'a> {
                 let came_back = if cause.rows().is_some() {
                     self.found_again(tried, &design, &score)
                 } else {
-                    let same = selected.iter().any(|s| s.same_story(cause));
+                    let same = selected.iter().any(|s| s.is_same_finding(cause));
                     let displaced = accepted.rivals.iter().any(|r| {
                         let rival = &r.candidate.cause;
-                        selected.iter().any(|s| s.same_story(rival))
-                            && !own.iter().any(|o| o.candidate.cause.same_story(rival))
+                        selected.iter().any(|s| s.is_same_finding(rival))
+                            && !own.iter().any(|o| o.candidate.cause.is_same_finding(rival))
                     });
                     same || (score.evidence > 0.0 && !displaced)
                 };
@@ -404,7 +409,7 @@ impl<'a> Half<'a> {
         let always = Cause::Measurement(Disturbance::new(disturbance.kind.clone(), Profile::Constant));
         let everywhere = Candidate::of(&always, self.confirming.subject).columns(self.confirming.raw);
         let everywhere = self.columns(&everywhere);
-        let Some(strip) = Strip::of(design, &everywhere, &tried.candidate.cause.sizes()) else {
+        let Some(strip) = ShiftScan::of(design, &everywhere, &tried.candidate.cause.sizes()) else {
             return true;
         };
         let best = strip.scan(design, 1);

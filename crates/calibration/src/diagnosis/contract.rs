@@ -1,4 +1,4 @@
-//! A diagnosis as other programs read it: `truegrind.diagnosis/1` counts data rows from 0, people count as the spreadsheet does.
+//! The JSON contract `truegrind.diagnosis/1` counts data rows from 0; reports count as a spreadsheet does.
 
 use std::collections::BTreeMap;
 
@@ -6,14 +6,13 @@ use super::finding::Diagnosis;
 use crate::measurement::dataset::Dataset;
 
 impl Diagnosis {
-    /// The same with rows counted from 0 at the first data row of `dataset`, in every key that holds rows. Sentences are for
-    /// people and stay.
-    pub fn counted_from_0(mut self, dataset: &Dataset) -> Self {
-        let place: BTreeMap<usize, usize> =
+    /// The diagnosis with rows counted from 0 at the first data row of `dataset` in every key with rows. Sentences are unchanged.
+    pub fn with_rows_from_0(mut self, dataset: &Dataset) -> Self {
+        let index: BTreeMap<usize, usize> =
             dataset.rows.iter().enumerate().map(|(i, row)| (row.number, i)).collect();
-        // The end of an interval may be a row that was not read, like a blank one: the last one before it.
-        let at = |number: &usize| place.range(..=*number).next_back().map_or(0, |(_, i)| *i);
-        let first = |number: &usize| place.range(*number..).next().map_or_else(|| at(number), |(_, i)| *i);
+        // An end of an interval can be a skipped row, such as a blank one: then the last row before it.
+        let at = |number: &usize| index.range(..=*number).next_back().map_or(0, |(_, i)| *i);
+        let first = |number: &usize| index.range(*number..).next().map_or_else(|| at(number), |(_, i)| *i);
         let ends = |rows: [usize; 2]| [first(&rows[0]), at(&rows[1])];
         for finding in &mut self.findings {
             finding.rows = finding.rows.map(ends);

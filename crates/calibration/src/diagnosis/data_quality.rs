@@ -1,8 +1,8 @@
-//! Findings about the record itself, which no parameter of the model stands for: rounding, contradicting columns, outliers.
+//! Findings about the quality of the data: rounded angles, contradicting columns, outliers, noise floor.
 
 use super::extension::{Extended, Freedom, Subject, fit};
 use super::finding::{Confidence, Finding, FoundParameter, Gain};
-use super::rows::Prepared;
+use super::preparation::Prepared;
 use super::selection::BLOCKS;
 use super::validation::{StageError, Validation};
 use super::words;
@@ -10,7 +10,7 @@ use crate::identification::rounding::{NotFused, angle_shares};
 use crate::measurement::dataset::{Dataset, Sensor};
 use crate::measurement::split;
 
-/// The rounding counts as a finding when it makes more than this share of the geometric residual's variance.
+/// Rounding is a finding when it causes more than this share of the geometric residual's variance.
 const ROUNDING_SHARE: f64 = 0.25;
 
 pub(super) fn rounding_finding(
@@ -43,14 +43,12 @@ pub(super) fn rounding_finding(
             ),
         ),
         Err(why) => {
-            let there =
+            let available =
                 matches!(why, NotFused::Nothing) && dataset.rows.iter().all(|r| r.readout_mm().is_some());
             let read_out = match why {
-                _ if there => "the read-out was not used to sharpen them (--raw-columns)",
-                NotFused::Nothing => "there is no read-out to sharpen them",
-                NotFused::Mismatch { .. } => {
-                    "the read-out contradicts them, so it was not used to sharpen them"
-                }
+                _ if available => "the read-out was not fused with them (--raw-columns)",
+                NotFused::Nothing => "available is no read-out to fuse with them",
+                NotFused::Mismatch { .. } => "the read-out contradicts them, so it was not fused with them",
             };
             (
                 Gain { cv_rmse_before_mm: before, cv_rmse_after_mm: before },
@@ -65,7 +63,7 @@ pub(super) fn rounding_finding(
     Some(Finding {
         effect: "angle-rounding".to_owned(),
         cause: format!(
-            "the log rounds joint angles to {:.3}°, which alone moves the touched point by {:.3} mm RMS",
+            "the log rounds joint angles to {:.3}°, which alone moves the target by {:.3} mm RMS",
             step.to_degrees(),
             share.sqrt()
         ),
@@ -104,7 +102,7 @@ pub(super) fn mismatch_finding(
     Some(Finding {
         effect: "readout-mismatch".to_owned(),
         cause: format!(
-            "in {} rows the controller's x, y, z belong to another pose than its angles, up to {largest:.2} mm apart",
+            "in {} rows the controller's x, y, z are of another pose than its angles, up to {largest:.2} mm apart",
             rows.len()
         ),
         confidence: Confidence::Identified,
@@ -118,7 +116,7 @@ pub(super) fn mismatch_finding(
             unit: "mm".to_owned(),
         }],
         evidence: format!(
-            "read-out against the nominal forward map of the angles: the other rows scatter by {:.4} mm",
+            "read-out compared with the nominal forward kinematics of the angles: the other rows scatter by {:.4} mm",
             prepared.mismatch.usual_mm
         ),
         p_value: 0.0,
@@ -132,26 +130,25 @@ pub(super) fn mismatch_finding(
     })
 }
 
-/// Where a fault of which only the shape is known moves readings by this many times less than the farthest of them is off, that is
-/// no remainder of the fault.
+/// Ratio of the largest outlier to the RMS of an empirical fault above which the outlier is not a residue of that fault.
 const REMAINDER: f64 = 6.0;
 
-/// Single readings far beyond the others, `off_mm` the farthest of them. `rough_mm` is what faults move readings by (RMS) of which only
-/// the shape is known: where their law is farthest off, readings look wild too.
+/// Outliers, the largest by `off_mm`. `empirical_mm` is the RMS of the largest empirical fault: where its expansion is worst, readings look
+/// like outliers too.
 pub(super) fn outlier_finding(
     dataset: &Dataset,
     wild: &[(usize, f64)],
-    (off_mm, rough_mm): (f64, f64),
+    (off_mm, empirical_mm): (f64, f64),
     after: &StageError,
 ) -> Option<Finding> {
     if wild.is_empty() {
         return None;
     }
-    let remainder = off_mm < REMAINDER * rough_mm;
+    let remainder = off_mm < REMAINDER * empirical_mm;
     let doubts = if remainder {
         vec![format!(
-            "they are off by up to {off_mm:.3} mm where something of which only the shape is known moves readings by {rough_mm:.3} mm: they \
-             may be what its law leaves"
+            "they deviate by up to {off_mm:.3} mm, and a fault whose exact law is unknown moves readings by {empirical_mm:.3} mm: they might be \
+             its residue"
         )]
     } else {
         Vec::new()
@@ -161,7 +158,7 @@ pub(super) fn outlier_finding(
     Some(Finding {
         effect: "outliers".to_owned(),
         cause: format!(
-            "{} single readings lie far beyond the scatter of all others, up to {:.0} times",
+            "{} single readings deviate far more than all others, up to {:.0} times their scatter",
             list.len(),
             wild[0].1
         ),
@@ -170,7 +167,7 @@ pub(super) fn outlier_finding(
         row_list: Some(list),
         joints: None,
         parameters: Vec::new(),
-        evidence: "sizes beyond what the tail of the other residuals gives once in a hundred data sets"
+        evidence: "residuals so large that the tail of the others yields one in a hundred data sets"
             .to_owned(),
         p_value: 1e-2,
         non_centrality: None,
@@ -183,7 +180,7 @@ pub(super) fn outlier_finding(
     })
 }
 
-/// What sensor and rounding leave, and where that is from.
+/// The noise floor (mm) of sensor and rounding, and its source.
 pub(super) fn noise_floor(
     repeated: &Option<split::NoiseFloor>,
     subject: &Subject<'_>,

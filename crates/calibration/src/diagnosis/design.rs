@@ -14,8 +14,8 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
 
 use super::algebra::{finite, gram, lower_factor, outer, product, product_of_transposed, solved};
-use super::correlated::filter;
 use super::extension::{Extended, Subject};
+use super::serial_correlation::prewhiten;
 use crate::identification::calibration::CalibrationProblem;
 use crate::measurement::dataset::{Reading, Sensor};
 use crate::measurement::sensor::disturbance::sag_mm;
@@ -230,7 +230,7 @@ impl Linear {
         if rho == 0.0 {
             return self.with_rows(&self.rows / noise, &self.residual / noise);
         }
-        let whitened = |columns: &DMatrix<f64>| filter(columns, rho, numbers, self.per) / noise;
+        let whitened = |columns: &DMatrix<f64>| prewhiten(columns, rho, numbers, self.per) / noise;
         let residual =
             whitened(&DMatrix::from_columns(std::slice::from_ref(&self.residual))).column(0).into_owned();
         self.with_rows(whitened(&self.rows.transpose()).transpose(), residual)

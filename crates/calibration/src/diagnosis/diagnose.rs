@@ -5,15 +5,15 @@ use super::discrepancy::Discrepancy;
 use super::extension::{Extended, Subject};
 use super::finding::{DiagnoseError, Diagnosis, Fits, RangeNoise, SCHEMA, Source, Stage};
 use super::in_doubt;
+use super::merged;
 pub use super::options::Options;
 use super::picture::Picture;
-use super::remaining;
-use super::rows::{Prepared, prepare};
-use super::search::{Confirmed, Ground, Search};
+use super::preparation::{Prepared, prepare};
+use super::residual_tests;
+use super::search::{Confirmed, Search, SearchContext};
 use super::selection::already;
-use super::sensor_causes::{self, chance_worse};
-use super::stories;
-use super::telling::{self, Told};
+use super::sensor_causes::{self, probability_worse};
+use super::summary::{self, Summary};
 use super::testability::not_testable;
 use super::validation::{StageError, nominal};
 use super::written::{kept, wandered, written};
@@ -34,7 +34,7 @@ use truegrind_arm::parameter::arm_parameters;
 use truegrind_arm::region::Region;
 use truegrind_estimation::problem::Problem;
 
-/// A diagnosis with the fits behind it.
+/// A diagnosis with its fits.
 #[derive(Debug, Clone)]
 pub struct Diagnosed {
     /// The result.
@@ -43,27 +43,27 @@ pub struct Diagnosed {
     pub geometric: Extended,
     /// With all causes.
     pub extended: Extended,
-    /// The arm for compensation; its verdict says whether it may be used.
+    /// The arm for compensation, with its verdict.
     pub estimated: Estimated,
-    /// What that arm promises programs; absent where its equations have no solution.
+    /// Its expected benefit for programs; absent where its equations have no solution.
     pub benefit: Option<Benefit>,
-    /// The rows as they were fitted.
+    /// The rows as fitted.
     pub prepared: Prepared,
     /// Rows set aside, as indices of the data set.
     pub set_aside: Vec<usize>,
-    /// Which finding belongs to which cause of the extended model, in their order; several causes may share one.
+    /// The index of the finding of each cause of the extended model; several causes can share one.
     pub finding_of_cause: Vec<usize>,
-    /// A picture for each finding that has a cause in the model, `None` for the others.
+    /// A picture for each finding with a cause in the model, `None` for the others.
     pub pictures: Vec<Option<Picture>>,
 }
 
-/// With frames alone fitted, an error beyond this is no tolerance but a mistake (mm).
+/// Median error with only the frames fitted above which the rows are not of this arm (mm).
 const WRONG_ARM_MM: f64 = 25.0;
 
 /// Diagnoses `dataset` of the arm `nominal` (by name `robot`), frames starting at `frames`. `tell` hears of each step.
 ///
 /// # Errors
-/// When no fit is possible at all: rows that no arm of this name could give.
+/// If the rows cannot be of this arm.
 pub fn diagnose(
     dataset: &Dataset,
     robot: &str,
@@ -76,7 +76,7 @@ pub fn diagnose(
     let subject =
         Subject { observed: &prepared.observed, nominal: nominal_arm, frames, tolerance: &options.tolerance };
     let registered = nominal(&subject);
-    let typical = remaining::typical_mm(&registered);
+    let typical = residual_tests::median_error_mm(&registered);
     if !(typical < WRONG_ARM_MM) {
         return Err(DiagnoseError::WrongArm {
             file: dataset.file.clone(),
@@ -84,53 +84,54 @@ pub fn diagnose(
             rmse_mm: typical,
         });
     }
-    let needed = scarce(dataset, nominal_arm);
-    let thinned = thinned(&prepared.observed);
-    let searched = Subject { observed: thinned.as_ref().unwrap_or(&prepared.observed), ..subject };
-    let ground = Ground { dataset, prepared: &prepared, subject, searched, options, tell };
+    let needed = poses_needed_at_least(dataset, nominal_arm);
+    let thin_rows = thin_rows(&prepared.observed);
+    let searched = Subject { observed: thin_rows.as_ref().unwrap_or(&prepared.observed), ..subject };
+    let context = SearchContext { dataset, prepared: &prepared, subject, searched, options, tell };
     let most = if needed.is_some() { 0 } else { options.selection.most };
-    let mut search = Search::of(&ground, registered, most);
-    search.drop_what_does_not_carry_over();
-    tell("looking whether the causes come back in halves of the rows");
+    let mut search = Search::run(&context, registered, most);
+    search.drop_unvalidated_causes();
+    tell("stability selection in halves of the rows");
     let mut confirmed = search.confirm();
-    search.hold_out_stretches(&mut confirmed);
-    let structure = remaining::structure(&subject, &search.extended, &search.set_aside);
-    let smoothed = search.smooth(&structure);
-    let told = telling::told(&search, &confirmed, &structure, smoothed);
+    search.purge_validation(&mut confirmed);
+    let structure = residual_tests::structure(&subject, &search.extended, &search.set_aside);
+    let smoothed = search.fit_smooth_correction(&structure);
+    let summary = summary::summarise(&search, &confirmed, &structure, smoothed);
     let mut notes = Vec::new();
     if let Some(needed) = needed {
         notes.push(format!(
-            "{} rows at {} different poses are too few to tell effects from geometry: at least {needed} poses are needed, some hundred are \
-             usual; what is said here rests on the priors",
+            "{} rows at {} distinct poses are too few to separate effects from geometry: at least {needed} poses are needed, some hundred are \
+             usual; these results depend on the priors",
+
             dataset.rows.len(),
             count_distinct_poses(dataset, usize::MAX)
         ));
     }
     notes.append(&mut search.notes);
     let mut finding_of_cause = vec![0; search.found.causes.len()];
-    for (place, story) in told.stories.iter().enumerate() {
-        story.causes.iter().for_each(|&k| finding_of_cause[k] = place);
+    for (index, merged) in summary.findings.iter().enumerate() {
+        merged.causes.iter().for_each(|&k| finding_of_cause[k] = index);
     }
-    let certain = stories::certain(&told.stories, &confirmed.outcome.confirmations);
-    let extended = told.extended.clone();
-    let (mut diagnosis, pictures) = summed_up(&search, &confirmed, told, robot, notes);
+    let certain = merged::certain_causes(&summary.findings, &confirmed.outcome.confirmations);
+    let extended = summary.extended.clone();
+    let (mut diagnosis, pictures) = build_diagnosis(&search, &confirmed, summary, robot, notes);
     diagnosis.poses_needed = needed;
-    let of_all = thinned.is_none().then_some(&confirmed.outcome.discrepancy);
-    let proven = proven(&search, &certain, of_all);
-    let ((written, written_stage), chance) = undisturbed(&search, proven, of_all);
+    let of_all = thin_rows.is_none().then_some(&confirmed.outcome.discrepancy);
+    let certain_model = certain_model(&search, &certain, of_all);
+    let ((written, written_stage), chance) = without_measurement_causes(&search, certain_model, of_all);
     diagnosis.notes.extend(chance.map(|chance| {
         format!(
-            "the arm is written as fitted without the causes of the measurement: beside them its shape would be worse with a \
-             probability of {:.0} %, where {:.0} % is allowed",
+            "the written arm is fitted without the causes of the measurement: with them it would be worse with a probability of {:.0} %, \
+             where {:.0} % is allowed",
             100.0 * chance,
-            100.0 * sensor_causes::MOST
+            100.0 * sensor_causes::MOST_PROBABILITY
         )
     }));
-    let handed = handed_on(&search, &written, of_all);
+    let handed = with_uncertain_causes(&search, &written, of_all);
     let [before, geometry, _] = search.stages;
     let stages = [before, geometry, written_stage];
     let fits = [&written, handed.as_ref().unwrap_or(&written)].map(Fitted::from);
-    let (estimated, benefit) = estimated(&ground, robot, &fits, &stages, &diagnosis, &search.set_aside);
+    let (estimated, benefit) = estimated(&context, robot, &fits, &stages, &diagnosis, &search.set_aside);
     diagnosis.verdict = Some(estimated.verdict.clone());
     let (geometric, set_aside) = (search.geometric, search.set_aside);
     Ok(Diagnosed {
@@ -146,14 +147,14 @@ pub fn diagnose(
     })
 }
 
-/// The arm for compensation, with its errors: its causes only where they are worth it on rows that were held out, at random and in
-/// blocks. Programs are moved by what is proven in this very model, not beside the causes that it leaves out.
-fn proven(
+/// The arm for compensation, with its errors. Its effects are included only if they lower the held-out error of this very model, in
+/// random folds and in blocks; causes that are not part of it do not count.
+fn certain_model(
     search: &Search<'_>,
     certain: &[bool],
     discrepancy: Option<&Discrepancy>,
 ) -> (Extended, StageError) {
-    let subject = &search.ground.subject;
+    let subject = &search.context.subject;
     let of = |certain: &[bool]| {
         let fit = written(subject, &search.extended, &kept(&search.extended, certain), discrepancy);
         let errors = search.validation.stage(&fit);
@@ -174,51 +175,55 @@ fn proven(
     if better(&plain.1) { (fit, errors) } else { plain }
 }
 
-/// The arm that is proven, or, with the reason, the same fitted without the causes of the measurement, where too little speaks for a
-/// better arm beside them.
-fn undisturbed(
+/// `certain_model`, or, with the probability, the same fitted without the causes of the measurement if these make a worse arm too
+/// probable.
+fn without_measurement_causes(
     search: &Search<'_>,
-    proven: (Extended, StageError),
+    certain_model: (Extended, StageError),
     discrepancy: Option<&Discrepancy>,
 ) -> ((Extended, StageError), Option<f64>) {
     let of_the_arm: Vec<Cause> =
-        proven.0.causes.iter().filter(|cause| matches!(cause, Cause::Arm(_))).cloned().collect();
-    if of_the_arm.len() == proven.0.causes.len() && wandered(discrepancy).is_none() {
-        return (proven, None);
+        certain_model.0.causes.iter().filter(|cause| matches!(cause, Cause::Arm(_))).cloned().collect();
+    if of_the_arm.len() == certain_model.0.causes.len() && wandered(discrepancy).is_none() {
+        return (certain_model, None);
     }
-    let Ground { dataset, subject, .. } = search.ground;
+    let SearchContext { dataset, subject, .. } = search.context;
     let without = written(subject, &search.extended, &of_the_arm, None);
     let samples = Region::of(subject.observed.dataset.rows.iter().map(|row| &row.joints), 0.0).samples_deg;
-    let beside = in_doubt::beside(&without, proven.0.clone());
-    match chance_worse(&proven.0, &beside, &mean_condition(dataset), &samples) {
-        Some(chance) if chance > sensor_causes::MOST => {
+    let beside = in_doubt::beside(&without, certain_model.0.clone());
+    match probability_worse(&certain_model.0, &beside, &mean_condition(dataset), &samples) {
+        Some(chance) if chance > sensor_causes::MOST_PROBABILITY => {
             let errors = search.validation.stage(&without);
             ((without, errors), Some(chance))
         }
-        _ => (proven, None),
+        _ => (certain_model, None),
     }
 }
 
-/// The written arm with what was found beside it; `None` where all of that is written.
-fn handed_on(search: &Search<'_>, fit: &Extended, discrepancy: Option<&Discrepancy>) -> Option<Extended> {
+/// The written arm extended by uncertain causes of size 0; `None` if it includes all causes already.
+fn with_uncertain_causes(
+    search: &Search<'_>,
+    fit: &Extended,
+    discrepancy: Option<&Discrepancy>,
+) -> Option<Extended> {
     let all = in_doubt::all(&search.extended.causes, &search.accepted);
     let missing = |cause: &Cause| !already(&fit.causes, cause);
     all.iter()
         .any(missing)
-        .then(|| in_doubt::beside(fit, written(&search.ground.subject, &search.extended, &all, discrepancy)))
+        .then(|| in_doubt::beside(fit, written(&search.context.subject, &search.extended, &all, discrepancy)))
 }
 
-/// The diagnosis in the contract's terms, and a picture for each finding that has one.
-fn summed_up(
+/// Builds the diagnosis, and the pictures of its findings.
+fn build_diagnosis(
     search: &Search<'_>,
     confirmed: &Confirmed,
-    told: Told,
+    summary: Summary,
     robot: &str,
     mut notes: Vec<String>,
 ) -> (Diagnosis, Vec<Option<Picture>>) {
-    let Ground { dataset, prepared, subject, searched, .. } = search.ground;
+    let SearchContext { dataset, prepared, subject, searched, .. } = search.context;
     let (stages, set_aside) = (&search.stages, &search.set_aside);
-    let noise = remaining::noise_model(subject, &search.extended, set_aside);
+    let noise = residual_tests::noise_model(subject, &search.extended, set_aside);
     let names: Vec<String> = search.found.causes.iter().map(|c| c.name().to_owned()).collect();
     let rows = &searched.observed.dataset;
     let not_testable = not_testable(rows, &confirmed.whole.design, &search.left, &names, prepared);
@@ -227,7 +232,7 @@ fn summed_up(
         && let crate::identification::rounding::NotFused::Mismatch { found_mm, expected_mm } = why
     {
         notes.push(format!(
-            "the read-out is {found_mm:.2} mm off the angles where rounding allows {expected_mm:.2}: angles were not sharpened"
+            "the read-out deviates from the angles by {found_mm:.2} mm where rounding allows {expected_mm:.2} mm: it was not fused with them"
         ));
     }
     let mut measure_again: Vec<usize> = set_aside
@@ -237,7 +242,7 @@ fn summed_up(
         .collect();
     measure_again.sort_unstable();
     measure_again.dedup();
-    let (findings, pictures) = told.stories.into_iter().map(|s| (s.finding, s.picture)).unzip();
+    let (findings, pictures) = summary.findings.into_iter().map(|s| (s.finding, s.picture)).unzip();
     let diagnosis = Diagnosis {
         schema: SCHEMA.to_owned(),
         verdict: None,
@@ -248,13 +253,13 @@ fn summed_up(
             robot: robot.to_owned(),
             set_aside: set_aside.len(),
         },
-        noise_floor_mm: told.noise_floor.0,
-        noise_floor_source: told.noise_floor.1,
+        noise_floor_mm: summary.noise_floor.0,
+        noise_floor_source: summary.noise_floor.1,
         fits: Fits { nominal: stage(&stages[0]), geometric: stage(&stages[1]), extended: stage(&stages[2]) },
-        steps: told.steps,
+        steps: summary.steps,
         findings,
         not_testable,
-        remaining: told.remaining,
+        remaining: summary.remaining,
         noise_model: noise.map(|n| RangeNoise {
             sigma_mm: n.sigma_mm,
             per_metre_mm: n.per_metre_mm,
@@ -268,11 +273,11 @@ fn summed_up(
     (diagnosis, pictures)
 }
 
-/// Scalar rows in which causes are looked for, at most.
+/// Most scalar rows in which causes are searched.
 const SEARCHED: usize = 9_000;
 
-/// Rows of a very long data set, drawn by their angles; `None` for one that is searched whole.
-fn thinned(observed: &Observations) -> Option<Observations> {
+/// A random subset of the rows of a very long data set, drawn by their angles; `None` if all rows are searched.
+fn thin_rows(observed: &Observations) -> Option<Observations> {
     let dataset = &observed.dataset;
     let per = match dataset.sensor {
         Sensor::Cable => 1,
@@ -281,7 +286,7 @@ fn thinned(observed: &Observations) -> Option<Observations> {
     };
     let most = SEARCHED / per;
     (dataset.rows.len() > most).then(|| {
-        // Not every so many rows: one row less would then be another choice of all that follow it.
+        // Not every k-th row: one row less would change the choice of all later ones.
         let all = (0..dataset.rows.len()).map(|i| vec![i]).collect();
         let mut rows = split::shuffled_by_angles(dataset, all, 0).concat();
         rows.truncate(most);
@@ -290,8 +295,8 @@ fn thinned(observed: &Observations) -> Option<Observations> {
     })
 }
 
-/// Poses needed, where there are too few.
-fn scarce(dataset: &Dataset, nominal: &Model) -> Option<usize> {
+/// The number of poses needed, if there are too few.
+fn poses_needed_at_least(dataset: &Dataset, nominal: &Model) -> Option<usize> {
     let per = match dataset.sensor {
         Sensor::Cable => 1,
         Sensor::Position => 3,
@@ -312,16 +317,16 @@ fn stage(errors: &StageError) -> Stage {
     }
 }
 
-/// The arm for compensation, and what it promises programs: the fit that is written, and the same as it is handed on.
+/// The arm for compensation and its expected benefit, from the written fit and the same with uncertain causes.
 fn estimated(
-    ground: &Ground<'_>,
+    context: &SearchContext<'_>,
     robot: &str,
     [fitted, handed]: &[Fitted; 2],
     stages: &[StageError; 3],
     diagnosis: &Diagnosis,
     set_aside: &[usize],
 ) -> (Estimated, Option<Benefit>) {
-    let Ground { dataset, prepared, subject, options, .. } = ground;
+    let SearchContext { dataset, prepared, subject, options, .. } = context;
     let nominal_arm = subject.nominal;
     let order = arm_of(handed);
     let estimated = Estimated {
@@ -355,7 +360,7 @@ fn estimated(
     };
     let mut estimated = with_sigma_in_region(estimated, handed);
     let rows = &subject.observed.dataset;
-    // Links and what the model promises are held against the tolerance of arms, not against the wide priors of a diagnosis.
+    // Links and benefit are judged by the tolerances of arms, not by the wide priors of a diagnosis.
     let plausible = Tolerance::default();
     let benefit = benefit(fitted, rows, &estimated, &plausible, variance_inflation(fitted, rows, &stages[2]));
     let parameters = parameter_table(fitted, nominal_arm);
@@ -363,7 +368,7 @@ fn estimated(
     (estimated, benefit)
 }
 
-/// Every verdict of an identification, and that findings may not make geometry worse.
+/// The verdict of an identification, plus: findings must not raise the held-out error of geometry.
 fn judge(
     fitted: &Fitted,
     sensor: Sensor,
@@ -380,22 +385,22 @@ fn judge(
     }
     if stages[2].blocks.rmse > stages[1].blocks.rmse * 1.05 && stages[2].random.rmse > stages[1].random.rmse {
         verdict.fail(format!(
-            "with the findings the held-out error is {:.3} mm, geometry alone has {:.3}",
+            "the held-out error is {:.3} mm with the findings, but {:.3} mm with geometry alone",
             stages[2].random.rmse, stages[1].random.rmse
         ));
     }
-    verdict.check_links(parameters, &Tolerance::default(), SURE);
+    verdict.check_links(parameters, &Tolerance::default(), LINK_Z);
     verdict.check_held_out(stages[0].random.rmse, stages[2].random.rmse);
     verdict.check_benefit(benefit, sensor);
     verdict.check_limits(limits, &stages[2].random);
     verdict.build()
 }
 
-/// With its wide priors a link that the rows hardly see is believed off only beyond this many standard deviations.
-const SURE: f64 = 2.0;
+/// z-score from which a link counts as deviating, since the wide priors of a diagnosis hardly constrain weakly observed links.
+const LINK_Z: f64 = 2.0;
 
-/// How many times larger than it should be the square of the held-out error is: with k parameters determined by n readings
-/// it is (n + k) / (n − k) times that of the fit.
+/// Squared held-out error relative to its expectation: with k parameters determined by n readings it is (n + k) / (n − k) times that of
+/// the fit.
 fn variance_inflation(fitted: &Fitted, dataset: &Dataset, errors: &StageError) -> f64 {
     let per = fitted.problem.rows_per_observation();
     let n = (dataset.rows.len() * per) as f64;

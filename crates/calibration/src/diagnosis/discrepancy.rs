@@ -15,10 +15,10 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::correlated::{correlation, filter, reach};
 use super::design::{Linear, Slopes};
 use super::extension::Subject;
 use super::marginal::{self, Variances};
+use super::serial_correlation::{correlation_range, lag_one_correlation, prewhiten};
 use crate::identification::calibration::flange_torques;
 use crate::measurement::dataset::{Dataset, Sensor};
 use truegrind_arm::model::Model;
@@ -250,7 +250,7 @@ impl Discrepancy {
         before: Option<&Self>,
     ) -> Self {
         let filtered = linear.filtered(rho, numbers, 1.0);
-        let columns = filter(&functions.columns, rho, numbers, linear.per);
+        let columns = prewhiten(&functions.columns, rho, numbers, linear.per);
         let design = filtered.design(dropped);
         let projected = design.project(&columns);
         let freedom = design.rows() as f64 * linear.witnesses - filtered.spent(dropped);
@@ -286,10 +286,16 @@ impl Discrepancy {
             kept.iter().map(|&(k, size)| functions.columns.column(k) * size).collect();
         let columns =
             if scaled.is_empty() { DMatrix::zeros(design.rows(), 0) } else { DMatrix::from_columns(&scaled) };
-        let correlation =
-            if rho == 0.0 { correlation(&left, linear.per, numbers, &linear.slopes.poses) } else { rho };
-        let reach =
-            if rho == 0.0 && correlation != 0.0 { reach(&left, linear.per, &linear.slopes.poses) } else { 0 };
+        let correlation = if rho == 0.0 {
+            lag_one_correlation(&left, linear.per, numbers, &linear.slopes.poses)
+        } else {
+            rho
+        };
+        let reach = if rho == 0.0 && correlation != 0.0 {
+            correlation_range(&left, linear.per, &linear.slopes.poses)
+        } else {
+            0
+        };
         let push_mm =
             push_mm.chunks(linear.per).map(|row| row.iter().map(|l| l * l).sum::<f64>().sqrt()).collect();
         Self { sizes, columns, in_time, carried, push_mm, evidence, noise, correlation, reach }

@@ -11,8 +11,8 @@
 use std::ops::Range;
 
 use super::cause::Cause;
+use super::design_effect::RepeatedPoses;
 use super::newton::{self, Step};
-use super::repeated::Repeated;
 use crate::identification::calibration::{CalibrationProblem, Frames, Weight};
 use crate::identification::fit::{Fitted, Observations, frame_parameters};
 use crate::identification::rounding;
@@ -209,7 +209,7 @@ pub(super) fn warm_fit(
     let mut sigma = near.map_or((0.1, 1e-3), |e| e.sigma);
     let mut robust_weight =
         near.filter(|e| e.robust_weight.len() == n).map_or_else(|| vec![1.0; n], |e| e.robust_weight.clone());
-    let repeated = Repeated::of(dataset);
+    let repeated = RepeatedPoses::of(dataset);
     let mut round = 0;
     let unweighted = vec![Weight { per_mm: 1.0, per_rad: 1.0 }; n];
     let plain_task =
@@ -280,7 +280,7 @@ enum Gone {
 impl Gone {
     /// Goes on by one step where the optimum is nearby and that is taken, else by a few.
     fn one(problem: &CalibrationProblem, x: &mut Vec<f64>, nearby: bool, near: bool) -> Self {
-        if nearby && let Some(step) = Step::taken(problem, x) {
+        if nearby && let Some(step) = Step::take(problem, x) {
             return Self::Step(step);
         }
         // Weights still change: what is beyond a few steps would be thrown away.
@@ -309,7 +309,7 @@ struct Whitened<'a> {
     /// Residuals of a row.
     per: usize,
     /// Which rows are of one pose, where poses were read again.
-    repeated: Option<&'a Repeated>,
+    repeated: Option<&'a RepeatedPoses>,
 }
 
 impl Whitened<'_> {
@@ -364,9 +364,9 @@ impl Whitened<'_> {
         let usual = self.dispersion(range.clone(), robust_weight, ((scalars - spent) / scalars).max(0.05));
         let Some(repeated) = self.repeated else { return (vec![usual; n], 1.0) };
         let share = range.len() as f64 / self.per as f64;
-        let parts = repeated.parts(&range, |i, c| self.scalar(i, c), robust_weight, share * spent);
+        let parts = repeated.components(&range, |i, c| self.scalar(i, c), robust_weight, share * spent);
         let whole = parts.deviation().max(1e-6);
-        let counts = repeated.counts(&parts);
+        let counts = repeated.effective_weights(&parts);
         let witnesses = counts.iter().sum::<f64>() / n as f64;
         (counts.into_iter().map(|counts| whole / counts.sqrt()).collect(), witnesses)
     }
@@ -481,7 +481,7 @@ impl Extended {
     }
 
     /// Places in x of the parameters of cause `index`.
-    pub fn places(&self, index: usize) -> Vec<usize> {
+    pub fn parameter_indices(&self, index: usize) -> Vec<usize> {
         let arm = matches!(self.causes[index], Cause::Arm(_));
         let before = self.causes[..index].iter().filter(|c| matches!(c, Cause::Arm(_)) == arm).count();
         let own = self.causes.iter().filter(|c| matches!(c, Cause::Arm(_))).count();

@@ -1,4 +1,4 @@
-//! The result of a diagnosis, in the terms of the contract `truegrind.diagnosis/1`.
+//! The result of a diagnosis: the JSON contract `truegrind.diagnosis/1`.
 
 use serde::{Deserialize, Serialize};
 
@@ -32,9 +32,9 @@ pub struct Stage {
     pub mean_mm: f64,
     /// Largest.
     pub max_mm: f64,
-    /// FoldErrors out, five random folds.
+    /// Held out, five random folds.
     pub cv_rmse_mm: f64,
-    /// FoldErrors out, contiguous blocks.
+    /// Held out, contiguous blocks.
     pub cv_blocks_rmse_mm: f64,
 }
 
@@ -49,11 +49,11 @@ pub struct Fits {
     pub extended: Stage,
 }
 
-/// How sure a cause is.
+/// Confidence in a cause.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Confidence {
-    /// Its rivals were fitted and beaten.
+    /// It clearly beats all rivals and is confirmed by stability selection.
     Identified,
     /// A rival explains nearly as much.
     Ambiguous,
@@ -66,13 +66,13 @@ pub struct FoundParameter {
     pub name: String,
     /// Value.
     pub value: f64,
-    /// Standard deviation; absent where the number was read, not estimated.
+    /// Standard deviation; absent for numbers that are not estimates.
     pub sigma: Option<f64>,
     /// Unit.
     pub unit: String,
 }
 
-/// FoldErrors-out error without and with the finding, everything else in the model (mm).
+/// Held-out error without and with the finding, everything else in the model (mm).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Gain {
     /// Without.
@@ -81,7 +81,7 @@ pub struct Gain {
     pub cv_rmse_after_mm: f64,
 }
 
-/// Another cause that was fitted in the place of the finding.
+/// A rival cause that was fitted in place of the finding.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Alternative {
     /// Its contract name.
@@ -90,22 +90,22 @@ pub struct Alternative {
     pub joints: Option<Vec<usize>>,
     /// Its rows.
     pub rows: Option<[usize; 2]>,
-    /// FoldErrors-out error with it in the finding's place (mm).
+    /// Held-out error with it in the finding's place (mm).
     pub cv_rmse_mm: f64,
-    /// Twice the log Bayes factor of the finding against it; large is well beaten.
+    /// Twice the log Bayes factor of the finding against it.
     pub beaten_by: f64,
 }
 
-/// Rows in which the set-up stood otherwise.
+/// Rows in which the set-up was displaced.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Session {
     /// Rows as the data set numbers them, both ends included.
     pub rows: [usize; 2],
-    /// What a shift of these rows alone would be called.
+    /// Contract name of a shift of these rows alone.
     pub effect: String,
     /// The same in a sentence.
     pub cause: String,
-    /// By how much it moves the readings (mm RMS over all rows).
+    /// Contribution to the readings (mm RMS over all rows).
     pub worth_mm: f64,
 }
 
@@ -116,7 +116,7 @@ pub struct Finding {
     pub effect: String,
     /// One sentence for a technician.
     pub cause: String,
-    /// How sure.
+    /// Confidence.
     pub confidence: Confidence,
     /// Rows as the data set numbers them, both ends included; the JSON that `diagnose` writes counts data rows from 0.
     pub rows: Option<[usize; 2]>,
@@ -129,38 +129,38 @@ pub struct Finding {
     pub parameters: Vec<FoundParameter>,
     /// The pattern that showed it, with its statistic.
     pub evidence: String,
-    /// Chance of a pattern this strong without a cause, corrected for all trials.
+    /// p-value, corrected for all trials.
     pub p_value: f64,
-    /// Non-centrality of the estimate against everything else that was free: below some 40 it could have been missed.
+    /// Non-centrality of the estimate with everything else free: below some 40 it could have been missed.
     pub non_centrality: Option<f64>,
-    /// What it brought.
+    /// Held-out errors without and with it.
     pub gain: Gain,
-    /// By how much it moves the readings (mm RMS over all rows); absent where that is no question.
+    /// Contribution to the readings (mm RMS over all rows), where applicable.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub worth_mm: Option<f64>,
-    /// Why it is not identified, beside the alternatives; and in how many halves of the rows it came back.
+    /// Reasons why it is not identified, apart from the alternatives.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub doubts: Vec<String>,
-    /// Of a set-up that changed with time: what stood where from which row to which.
+    /// The displacements of a set-up that changed with time.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sessions: Vec<Session>,
-    /// What else was tried in its place, best first.
+    /// Rivals, best first.
     pub alternatives: Vec<Alternative>,
-    /// What to do about it in the workshop.
+    /// Recommended action in the workshop.
     pub remedy: String,
 }
 
-/// An effect that these rows cannot show.
+/// An effect that these rows cannot detect.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NotTestable {
     /// Contract name.
     pub effect: String,
-    /// Joints, from 1, where only some cannot be seen.
+    /// Joints, from 1, if only some are undetectable.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub joints: Option<Vec<usize>>,
     /// Why.
     pub reason: String,
-    /// The measurement that would decide.
+    /// A measurement that would detect it.
     pub remedy: String,
 }
 
@@ -180,11 +180,11 @@ pub struct RangeNoise {
 pub struct Step {
     /// What was added.
     pub added: String,
-    /// FoldErrors-out error after it (mm), five random folds.
+    /// Held-out error after it (mm), five random folds.
     pub cv_rmse_mm: f64,
 }
 
-/// The models on another series of the same arm, with only the frames refitted: RMSE (mm).
+/// Errors of the models on another series of the same arm, with only the frames refitted: RMSE (mm).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Transfer {
     /// File.
@@ -209,33 +209,33 @@ pub struct Diagnosis {
     /// The verdict on the extended model.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub verdict: Option<Verdict>,
-    /// What sensor and rounding leave (mm); absent where it cannot be told.
+    /// Noise floor of sensor and rounding (mm), if known.
     pub noise_floor_mm: Option<f64>,
-    /// Where the floor comes from, in words.
+    /// Source of the noise floor, in words.
     pub noise_floor_source: String,
     /// Errors of the stages.
     pub fits: Fits,
-    /// FoldErrors-out error after each step.
+    /// Held-out error after each step.
     pub steps: Vec<Step>,
-    /// What is wrong.
+    /// The findings.
     pub findings: Vec<Finding>,
-    /// What cannot be told.
+    /// Effects that the data cannot detect.
     pub not_testable: Vec<NotTestable>,
-    /// What the extended model still does not explain.
+    /// The residual that the extended model does not explain.
     pub remaining: Option<String>,
     /// Noise that grows with range.
     pub noise_model: Option<RangeNoise>,
     /// Rows to measure again, as the data set numbers them.
     pub measure_again: Vec<usize>,
-    /// Different poses that causes need to be told from geometry; absent where there are as many.
+    /// Distinct poses required to separate causes from geometry; absent if there are enough.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub poses_needed: Option<usize>,
     /// The models on other series of the same arm.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub transfers: Vec<Transfer>,
-    /// What a reader should know.
+    /// Notes for the user.
     pub notes: Vec<String>,
 }
 
-/// Why nothing could be diagnosed.
+/// Errors of a diagnosis.
 pub type DiagnoseError = IdentifyError;

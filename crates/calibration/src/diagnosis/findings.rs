@@ -1,10 +1,10 @@
-//! A finding for every accepted cause: what it is, how sure that is, what else was fitted in its place.
+//! Builds a finding for every accepted cause: size, evidence, confidence and rivals.
 
 use nalgebra::DVector;
 use rayon::prelude::*;
 
 use super::candidates::Scored;
-use super::catalogue::{Candidate, Columns};
+use super::catalogue::{Candidate, LoggedColumns};
 use super::cause::{Cause, MAP_KNOTS};
 use super::design::{Design, FullDesign};
 use super::extension::{Extended, Subject};
@@ -18,14 +18,14 @@ use super::words;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::effect::error_map::ErrorMap;
 
-/// Twice the log Bayes factor by which a finding must beat its best rival to be called identified: 20 to 1.
+/// Twice the log Bayes factor of a finding against its best rival from which it is called identified: 20 to 1.
 const CLEAR: f64 = 6.0;
 
-/// A rival, the arm without the finding among them, whose held-out error is below this share of the finding's is not beaten,
-/// whatever the Bayes factor says.
+/// A rival (including the model without the finding) whose held-out error is below this share of the finding's is not beaten,
+/// whatever the Bayes factor.
 const BETTER: f64 = 0.99;
 
-/// Part of a harmonic's period (rad) below which it cannot be told from any other smooth error.
+/// Part of a harmonic's period (rad) below which it cannot be distinguished from any other smooth error.
 const SHORT_ARC: f64 = 1.0;
 
 /// Joints as on the teach pendant, from 1.
@@ -33,22 +33,22 @@ pub(super) fn pendant(joints: &[usize]) -> Option<Vec<usize>> {
     (!joints.is_empty()).then(|| joints.iter().map(|j| j + 1).collect())
 }
 
-pub(super) struct Context<'a> {
-    /// Where causes were looked for: all rows, or some of very many.
+pub(super) struct FindingBuilder<'a> {
+    /// The searched rows: all, or a subset of very many.
     pub(super) subject: &'a Subject<'a>,
-    /// The fit there.
+    /// The fit to the searched rows.
     pub(super) found: &'a Extended,
     /// The fit to all rows.
     pub(super) extended: &'a Extended,
-    /// Linearised where causes were looked for.
+    /// The linearised fit to the searched rows.
     pub(super) whole: &'a FullDesign,
-    /// The same with its rows in folds.
+    /// Its cross-validation.
     pub(super) held: &'a FoldErrors<'a>,
     pub(super) set_aside: &'a [usize],
 }
 
-impl Context<'_> {
-    /// A finding for every story, and which finding each cause went into.
+impl FindingBuilder<'_> {
+    /// The findings, the index of each cause's finding, and their pictures. Causes of the same effect and joint share one.
     pub(super) fn findings(
         &self,
         accepted: &[Accepted],
@@ -64,7 +64,7 @@ impl Context<'_> {
             .enumerate()
             .map(|(index, own)| {
                 let later: Vec<usize> =
-                    (index + 1..accepted.len()).flat_map(|k| self.found.places(k)).collect();
+                    (index + 1..accepted.len()).flat_map(|k| self.found.parameter_indices(k)).collect();
                 let step = self.held.without(&later).rmse_mm(None, self.set_aside);
                 let (finding, picture) = self.finding(index, own, after_mm, last);
                 (step, finding, picture)
@@ -72,17 +72,17 @@ impl Context<'_> {
             .collect();
         for (index, (step, finding, picture)) in judged.into_iter().enumerate() {
             let cause = &self.extended.causes[index];
-            steps.push(Step { added: told_short(cause), cv_rmse_mm: step });
+            steps.push(Step { added: short_name(cause), cv_rmse_mm: step });
             let told = findings.iter().position(|f: &Finding| {
                 cause.rows().is_none()
                     && f.effect == cause.name()
                     && f.rows.is_none()
                     && f.joints == pendant(&cause.joints())
             });
-            // What grows in the arm and what moves in the sensor are two stories, though both have the clock's name.
+            // Thermal growth of the arm and thermal drift of the sensor have the same name but are separate findings.
             let told = told.filter(|place| {
                 let first = places.iter().position(|p| p == place).unwrap_or(index);
-                self.extended.causes[first].moves_the_same(cause)
+                self.extended.causes[first].affects_same_quantity(cause)
             });
             if let Some(place) = told {
                 findings[place].cause = format!("{}; {}", findings[place].cause, finding.cause);
@@ -97,10 +97,9 @@ impl Context<'_> {
         (findings, places, pictures)
     }
 
-    /// Whether a joint moved through so small a part of a turn, or of a harmonic's period, that any error of the joint looks like
-    /// this one.
+    /// Whether the joint moved through so small a part of a turn, or of a harmonic's period, that any smooth joint error fits.
     fn is_any_curve(&self, cause: &Cause) -> bool {
-        let range = |joint: usize| Columns::of(&self.subject.observed.dataset).range_rad[joint];
+        let range = |joint: usize| LoggedColumns::of(&self.subject.observed.dataset).range_rad[joint];
         match cause {
             Cause::Arm(Effect::GearEccentricity(h) | Effect::GearTransmission(h)) => {
                 range(h.joint) * h.order < SHORT_ARC
@@ -110,7 +109,7 @@ impl Context<'_> {
         }
     }
 
-    /// For a harmonic of such a joint: the joint's error map, which is any smooth curve.
+    /// For a harmonic of such a joint: the joint's error map as a rival, which fits any smooth curve.
     fn any_curve(&self, cause: &Cause) -> Option<Candidate> {
         let Cause::Arm(Effect::GearEccentricity(harmonic)) = cause else { return None };
         self.is_any_curve(cause).then(|| {
@@ -119,7 +118,7 @@ impl Context<'_> {
         })
     }
 
-    /// The nearest rivals of an accepted cause, each in its place.
+    /// The best rivals of an accepted cause, each fitted in its place.
     fn rivals(&self, own: &Accepted, without: &Design, held: &Reduced<'_>) -> Vec<Alternative> {
         let alternative = |rival: &Scored| {
             let columns = rival.candidate.columns(without);
@@ -137,15 +136,15 @@ impl Context<'_> {
 
     fn finding(&self, index: usize, own: &Accepted, after_mm: f64, last: usize) -> (Finding, Picture) {
         let cause = &self.extended.causes[index];
-        let parameters = words::parameters(self.extended, index);
-        let places = self.found.places(index);
+        let parameters = words::found_parameters(self.extended, index);
+        let places = self.found.parameter_indices(index);
         let without = self.whole.without(&places);
         let held = self.held.without(&places);
         let before_mm = held.rmse_mm(None, self.set_aside);
         let mut alternatives = self.rivals(own, &without, &held);
         let beaten = |a: &Alternative| a.beaten_by >= CLEAR && !(a.cv_rmse_mm < BETTER * after_mm);
         let mut clear = alternatives.iter().all(beaten);
-        // FoldErrors-out rows that are told better without the finding do not confirm it, however well it explains the others.
+        // A finding that raises the held-out error is not confirmed, however well it fits the other rows.
         let unconfirmed = before_mm < BETTER * after_mm;
         if unconfirmed || own.beside_growth.is_some_and(|lambda| lambda < VISIBLE) {
             clear = false;
@@ -162,10 +161,9 @@ impl Context<'_> {
         }
         let mut doubts = Vec::new();
         if self.is_any_curve(cause) {
-            // Over a small part of a turn every smooth error of a joint looks alike.
             clear = false;
             doubts.push(
-                "its joint moved through so small a part of a turn that any fault of the joint looks like this"
+                "the joint moved through too small a part of a turn to distinguish this from other faults of the joint"
                     .to_owned(),
             );
         }
@@ -185,14 +183,14 @@ impl Context<'_> {
         let picture = picture(self.subject, cause, &without, &self.whole.design);
         let finding = Finding {
             effect: cause.name().to_owned(),
-            cause: words::cause(cause, &parameters, last),
+            cause: words::describe_cause(cause, &parameters, last),
             confidence: if clear { Confidence::Identified } else { Confidence::Ambiguous },
             rows: cause.rows(),
             row_list: None,
             joints: pendant(&cause.joints()),
             evidence: format!(
-                "{}: χ² falls by {:.0} for {}, everything else refitted; twice the log Bayes factor {:.0} with {} tried",
-                words::pattern(cause),
+                "{}: χ² falls by {:.0} for {} with everything else refitted; twice the log Bayes factor {:.0} with {} tried",
+                words::describe_pattern(cause),
                 own.own.gain,
                 counted(own.own.estimate.len(), "parameter"),
                 own.own.evidence,
@@ -216,7 +214,7 @@ fn counted(count: usize, what: &str) -> String {
     format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }
 
-pub(super) fn told_short(cause: &Cause) -> String {
+pub(super) fn short_name(cause: &Cause) -> String {
     let joints = cause.joints();
     match (joints.as_slice(), cause.rows()) {
         ([], Some([from, to])) => format!("{} in rows {from} to {to}", cause.name()),

@@ -1,7 +1,7 @@
-//! Halves of the rows in which a diagnosis is looked for again: what is there comes back in them.
+//! Complementary halves of the rows for stability selection.
 //!
-//! Two random pairs and one pair on two sides of the joint space; a pose that was measured several times stays whole. Rows
-//! measured along a path resemble their neighbours, so there the random pairs are made of alternate blocks of rows.
+//! Two random pairs and one pair on two sides of the joint space; all readings of a pose are in one half. Rows measured along a
+//! path resemble their neighbours, so there the random pairs consist of alternate blocks of rows.
 //! Source: complementary pairs of halves, Shah and Samworth 2013; halves on two sides of a variable, Peters et al. 2016.
 
 use nalgebra::{DMatrix, DVector};
@@ -10,16 +10,16 @@ use super::algebra::eigen;
 use crate::measurement::dataset::Dataset;
 use crate::measurement::split;
 
-/// How many halves there are.
+/// Number of halves.
 pub const HALVES: usize = 6;
 
-/// Rows are a path where the usual step between rows is below this share of the usual distance of two rows.
+/// Median step between consecutive rows, as a share of the median distance of any two, below which rows are a path.
 const PATH: f64 = 0.25;
 
-/// Blocks of a path that go to one half or the other.
+/// Number of alternate blocks of a path.
 const PIECES: usize = 24;
 
-/// Indices of the rows of each half, ascending; a half and the next are complements.
+/// Indices of the rows of each half, ascending; consecutive halves are complements.
 pub fn halves(dataset: &Dataset, seed: u64) -> Vec<Vec<usize>> {
     let poses = split::poses(dataset);
     let mut out = Vec::with_capacity(HALVES);
@@ -37,7 +37,7 @@ pub fn halves(dataset: &Dataset, seed: u64) -> Vec<Vec<usize>> {
     out
 }
 
-/// Whether each row lies near the one before it.
+/// Whether rows are a path: each near the previous one.
 pub fn is_path(dataset: &Dataset) -> bool {
     let n = dataset.rows.len();
     if n < 2 * PIECES {
@@ -60,7 +60,7 @@ fn both(poses: &[Vec<usize>], first: &[bool]) -> [Vec<usize>; 2] {
     })
 }
 
-/// Half of the poses, drawn from the poses themselves: another row changes nothing about the others.
+/// A random half of the poses; the draw depends on the joint angles, so further rows do not change it for the others.
 fn random(dataset: &Dataset, poses: &[Vec<usize>], seed: u64) -> Vec<bool> {
     let mut side = vec![false; poses.len()];
     let drawn =
@@ -69,13 +69,13 @@ fn random(dataset: &Dataset, poses: &[Vec<usize>], seed: u64) -> Vec<bool> {
     side
 }
 
-/// Alternate blocks of rows; those of the second pair begin in the middle of those of the first.
+/// Alternate blocks of rows; those of the second pair are offset by half a block.
 fn alternate(poses: &[Vec<usize>], n: usize, pair: usize) -> Vec<bool> {
     let block = |row: usize| ((2 * PIECES * row / n.max(1) + pair) / 2).is_multiple_of(2);
     poses.iter().map(|pose| block(pose[0])).collect()
 }
 
-/// Poses on the two sides of the middle along the direction in which the joints vary most.
+/// Poses on the two sides of the median along the first principal component of the joint angles.
 fn sides_of_joint_space(dataset: &Dataset, poses: &[Vec<usize>]) -> Vec<bool> {
     let all = DMatrix::from_fn(6, poses.len(), |j, p| dataset.rows[poses[p][0]].joints[j]);
     let mean = all.column_mean();

@@ -1,4 +1,4 @@
-//! FoldErrors-out errors to first order: for every fold its rows are taken off the normal matrix, and what is left is solved anew.
+//! Held-out errors to first order: for every fold its rows are taken off the normal matrix, and what is left is solved anew.
 //!
 //! With J the whitened Jacobian, N = JᵀJ + Λ and g = Jᵀr + Λx, a fold with rows t leaves N − JₜᵀJₜ and g − Jₜᵀrₜ. A candidate
 //! with columns C and size precisions S borders that by X = L⁻¹(JᵀC − JₜᵀCₜ), L the factor of the fold's normal matrix, so each

@@ -46,8 +46,8 @@ pub(super) fn beside(written: &Extended, with: Extended) -> Extended {
         .collect();
     for (k, cause) in with.causes.iter().enumerate() {
         let same = written.causes.iter().position(|other| already(std::slice::from_ref(other), cause));
-        let there = same.map(|same| written.places(same)).unwrap_or_default();
-        for (place, there) in with.places(k).into_iter().zip(there) {
+        let there = same.map(|same| written.parameter_indices(same)).unwrap_or_default();
+        for (place, there) in with.parameter_indices(k).into_iter().zip(there) {
             from[place] = Some(there);
         }
     }

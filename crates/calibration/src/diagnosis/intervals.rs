@@ -1,10 +1,10 @@
-//! From which row to which: change points of a shift, found by scanning.
+//! Change points of shifts, by scanning intervals of rows.
 //!
-//! Prefix sums of gradient, information and Q-products over the observations make the evidence of any interval a matter of
-//! p k² operations, so thousands of intervals are tried: a coarse grid of starts and ends, then the best ones refined row by
-//! row. The Q-products are summed once for a fit; a model without some of its parameters takes d directions off again. An interval that begins with the first rows is the same as its complement, and only the later one is told: what
-//! happened, happened at its first row. Source: the likelihood-ratio scan of circular binary segmentation, Olshen et al.
-//! 2004, with nuisance parameters projected off.
+//! With prefix sums of gradient, information and Q-products over the observations, the evidence of any interval takes p k²
+//! operations, so thousands of intervals are tried: a coarse grid of starts and ends, then the best ones refined row by
+//! row. The Q-products are summed once for a fit; a model without some parameters subtracts d directions. An interval from the
+//! first row is equivalent to its complement, which is reported instead: the change happened at its first row. Source:
+//! likelihood-ratio scan of circular binary segmentation, Olshen et al. 2004, with nuisance parameters projected off.
 
 use std::borrow::Cow;
 use std::cmp::Ordering;
@@ -31,7 +31,7 @@ pub struct Interval {
 }
 
 impl Interval {
-    /// The order in which intervals are told: the best first, of equal ones the first.
+    /// Order of the results: best first, ties by position.
     fn before(&self, other: &Self) -> Ordering {
         other.evidence.total_cmp(&self.evidence).then(self.from.cmp(&other.from)).then(self.to.cmp(&other.to))
     }
@@ -40,7 +40,7 @@ impl Interval {
 /// Shortest interval: fewer rows are outliers, not a shift.
 pub const SHORTEST: usize = 4;
 
-/// Intervals among n rows that are told apart, for the price of having looked for the best.
+/// Effective number of distinct intervals among n rows, for the multiple-testing correction.
 pub fn tried(n: f64) -> f64 {
     n.max(2.0) * n.max(3.0).ln()
 }
@@ -48,16 +48,16 @@ pub fn tried(n: f64) -> f64 {
 /// Starts and ends on the coarse grid.
 const GRID: usize = 96;
 
-/// Evidence of an interval on the grid below which moving its ends by less than the grid's spacing cannot make it count.
-const FAINT: f64 = 5.0;
+/// Evidence of a grid interval below which refining its ends cannot make it significant.
+const REFINED_EVIDENCE: f64 = 5.0;
 
-/// Evidence that is no ground to prefer one story of the same rows to the other.
-const SLIGHT: f64 = 6.0;
+/// Difference of evidence below which two descriptions of the same rows are equivalent.
+const TIE_EVIDENCE: f64 = 6.0;
 
 /// Most parameters of a shift.
 const MOST: usize = 6;
 
-/// Scalar product in eight partial sums, which the compiler can keep side by side.
+/// Dot product in eight partial sums, for vectorisation.
 fn dot(x: &[f64], y: &[f64]) -> f64 {
     let mut sums = [0.0; 8];
     let (whole, rest) = (x.chunks_exact(8), x.len() / 8 * 8);
@@ -70,9 +70,9 @@ fn dot(x: &[f64], y: &[f64]) -> f64 {
     sums.iter().sum::<f64>() + tail
 }
 
-/// A kind of shift over all rows, summed up against a whole design.
+/// Prefix sums of one kind of shift against a full design.
 #[derive(Debug, Clone)]
-pub struct Strip {
+pub struct ShiftScan {
     n: usize,
     k: usize,
     /// Columns in units of the sizes.
@@ -88,13 +88,13 @@ pub struct Strip {
     square: Vec<f64>,
 }
 
-/// A strip against one design.
-struct Sums<'a> {
-    strip: &'a Strip,
+/// A scan against one design.
+struct ScanSums<'a> {
+    strip: &'a ShiftScan,
     design: &'a Design,
     /// Prefix sums at every observation, k each.
     gradient: Vec<f64>,
-    /// Prefix sums of the products with directions that are free no more at the cuts, d × (k · cuts).
+    /// Prefix sums of the products with the removed directions at the cuts, d × (k · cuts).
     given_back: Option<DMatrix<f64>>,
     /// Scalar products of the prefix sums at the cuts with each other.
     products: Cow<'a, DMatrix<f64>>,
@@ -129,9 +129,9 @@ fn sums_at(cuts: &[usize], scaled: &DMatrix<f64>, basis: &DMatrix<f64>, per: usi
     out
 }
 
-impl Strip {
-    /// Sums `columns`, given for all rows, whose parameters have the standard deviations `sizes` beforehand; `None` for
-    /// too few rows or too many parameters.
+impl ShiftScan {
+    /// Sums `columns`, given for all rows, with prior standard deviations `sizes`; `None` for too few rows or too many
+    /// parameters.
     pub fn of(whole: &Design, columns: &DMatrix<f64>, sizes: &[f64]) -> Option<Self> {
         let (n, per, k) = (whole.observations, whole.per, columns.ncols());
         if n < 3 * SHORTEST || k > MOST {
@@ -158,10 +158,10 @@ impl Strip {
     }
 
     /// The best intervals, best first: at most `count`, none of which shares most of its rows with a better one. `design` is
-    /// the whole one of the strip, or a part of it.
+    /// the full design of the scan, or a reduction of it.
     pub fn scan(&self, design: &Design, count: usize) -> Vec<Interval> {
         let n = self.n;
-        let sums = Sums::of(self, design);
+        let sums = ScanSums::of(self, design);
         let grid = self.cuts.len() - 1;
         let coarse: Vec<Vec<Interval>> = (0..grid)
             .into_par_iter()
@@ -171,7 +171,7 @@ impl Strip {
                 let mut found = Vec::new();
                 for last in first + 1..=grid {
                     let to = self.cuts[last] - 1;
-                    if to + 1 >= from + SHORTEST && ends_well(to, n) {
+                    if to + 1 >= from + SHORTEST && is_valid_end(to, n) {
                         let evidence = sums.between_cuts(first, last);
                         found.push(Interval { from, to, evidence });
                     }
@@ -182,7 +182,7 @@ impl Strip {
         let mut best: Vec<Interval> = Vec::new();
         let mut last: Option<Interval> = None;
         while best.len() < count {
-            // The next one that shares few rows with those before; few are asked for, so they need not all be sorted.
+            // The next one with little overlap; a full sort is not worth it for a few.
             let next = coarse
                 .iter()
                 .flatten()
@@ -191,7 +191,7 @@ impl Strip {
                 .min_by(|a, b| a.before(b));
             let Some(next) = next.copied() else { break };
             last = Some(next);
-            let next = if next.evidence > FAINT { refined(&sums, next) } else { next };
+            let next = if next.evidence > REFINED_EVIDENCE { refined(&sums, next) } else { next };
             if !best.contains(&next) {
                 best.push(next);
             }
@@ -200,8 +200,8 @@ impl Strip {
     }
 }
 
-impl<'a> Sums<'a> {
-    fn of(strip: &'a Strip, design: &'a Design) -> Self {
+impl<'a> ScanSums<'a> {
+    fn of(strip: &'a ShiftScan, design: &'a Design) -> Self {
         let (n, k, per) = (strip.n, strip.k, design.per);
         let mut gradient = vec![0.0; (n + 1) * k];
         for i in 0..n {
@@ -219,7 +219,7 @@ impl<'a> Sums<'a> {
         Self { strip, design, gradient, given_back, products }
     }
 
-    /// Prefix sums at a cut: k Q-products, then k products with the directions that are free no more.
+    /// Prefix sums at a cut: k Q-products, then k products with the removed directions.
     fn at_cut(&self, cut: usize) -> Vec<f64> {
         let k = self.strip.k;
         let of = |m: &DMatrix<f64>| m.columns(cut * k, k).iter().copied().collect::<Vec<f64>>();
@@ -249,7 +249,7 @@ impl<'a> Sums<'a> {
         })
     }
 
-    /// Evidence of observations from..=to with the scalar products of what is shared with everything free.
+    /// Evidence of observations from..=to, given the scalar products of the Q-products.
     fn evidence_of(&self, from: usize, to: usize, shared: impl Fn(usize, usize) -> f64) -> f64 {
         let k = self.strip.k;
         let square = |a: usize, b: usize| {
@@ -288,7 +288,7 @@ impl<'a> Sums<'a> {
         dot(&y, &y) - det.ln()
     }
 
-    /// Prefix sums at any observation, kept in `known`.
+    /// Prefix sums at any observation, cached in `known`.
     fn at_row<'b>(&self, i: usize, known: &'b mut BTreeMap<usize, Vec<f64>>) -> &'b [f64] {
         if !known.contains_key(&i) {
             let cut = self.strip.cuts.partition_point(|&c| c <= i).saturating_sub(1);
@@ -311,13 +311,13 @@ impl<'a> Sums<'a> {
     }
 }
 
-/// The best intervals of columns that are given for all rows: [`Strip::scan`] of one design.
+/// The best intervals of columns that are given for all rows: [`ShiftScan::scan`] of one design.
 pub fn scan(design: &Design, columns: &DMatrix<f64>, sizes: &[f64], count: usize) -> Vec<Interval> {
-    Strip::of(design, columns, sizes).map_or_else(Vec::new, |strip| strip.scan(design, count))
+    ShiftScan::of(design, columns, sizes).map_or_else(Vec::new, |strip| strip.scan(design, count))
 }
 
-/// A shift ends with the last row, or leaves enough rows after it to be told from one that does.
-fn ends_well(to: usize, n: usize) -> bool {
+/// A shift ends with the last row, or early enough before it to be distinguishable from one that does.
+fn is_valid_end(to: usize, n: usize) -> bool {
     to == n - 1 || to + SHORTEST < n
 }
 
@@ -329,7 +329,7 @@ fn overlap(a: &Interval, b: &Interval) -> f64 {
 }
 
 /// Moves one end at a time within the grid's spacing, until neither helps.
-fn refined(sums: &Sums<'_>, mut best: Interval) -> Interval {
+fn refined(sums: &ScanSums<'_>, mut best: Interval) -> Interval {
     let (n, stride) = (sums.strip.n, sums.strip.stride);
     let (mut work, mut known) = (Vec::new(), BTreeMap::new());
     for _ in 0..6 {
@@ -346,7 +346,7 @@ fn refined(sums: &Sums<'_>, mut best: Interval) -> Interval {
         }
         let low = sums.at_row(best.from, &mut known).to_vec();
         for to in best.to.saturating_sub(2 * stride)..=(best.to + 2 * stride).min(n - 1) {
-            if best.from + SHORTEST <= to + 1 && ends_well(to, n) {
+            if best.from + SHORTEST <= to + 1 && is_valid_end(to, n) {
                 let high = sums.at_row(to + 1, &mut known);
                 let evidence = sums.evidence(best.from, to, &low, high, &mut work);
                 if evidence > best.evidence {
@@ -358,11 +358,11 @@ fn refined(sums: &Sums<'_>, mut best: Interval) -> Interval {
             break;
         }
     }
-    // What happened right at the start and ended is told as what happened at its end, unless the first rows contradict.
+    // A shift that starts with nearly the first rows is reported as its complement, unless the first rows contradict.
     if best.from <= 3 * SHORTEST && best.to + 1 < n {
         let (low, high) = (sums.at_row(best.to + 1, &mut known).to_vec(), sums.at_row(n, &mut known));
         let evidence = sums.evidence(best.to + 1, n - 1, &low, high, &mut work);
-        if evidence > best.evidence - SLIGHT {
+        if evidence > best.evidence - TIE_EVIDENCE {
             return Interval { from: best.to + 1, to: n - 1, evidence };
         }
     }

@@ -1,9 +1,8 @@
-//! Overlapping shifts of one kind, told again as the levels between their change points.
+//! Overlapping shifts of one kind rewritten as piecewise-constant levels.
 //!
-//! Two shifts found one after the other may overlap: one over rows 72 to 535, another that takes it back in 300 to 387. What a
-//! technician can check is what stood where from which row to which, so overlapping shifts are cut at their ends, each
-//! piece gets the sum of what covers it, and a piece that comes to nothing is left out. The same rows are described, with
-//! as many parameters or fewer.
+//! Shifts that were found successively can overlap: one over rows 72 to 535, another that cancels it in 300 to 387. A technician
+//! can check a level between two rows, so overlapping shifts are cut at their ends, each piece gets the sum of the shifts
+//! that cover it, and negligible pieces are dropped. The result has at most as many parameters.
 
 use super::cause::Cause;
 use super::extension::Extended;
@@ -12,12 +11,11 @@ use crate::identification::tolerance::Tolerance;
 use crate::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
 use truegrind_estimation::problem::Problem;
 
-/// A piece whose level is below this share of the largest comes to nothing.
-const NOTHING: f64 = 0.25;
+/// Share of the largest level below which a piece is dropped.
+const NEGLIGIBLE_SHARE: f64 = 0.25;
 
-/// How much worse the levels may fit, in χ² with ln n for each parameter and the ends that were tried: they are the plainer
-/// story.
-const PLAINER: f64 = 4.0;
+/// Penalised χ² by which the levels can be worse and are still preferred, because they are simpler.
+const SIMPLICITY_BONUS: f64 = 4.0;
 
 /// A shift and its rows.
 fn shift(cause: &Cause) -> Option<(&Disturbance, usize, usize)> {
@@ -30,8 +28,8 @@ fn shift(cause: &Cause) -> Option<(&Disturbance, usize, usize)> {
     }
 }
 
-/// The causes with overlapping shifts as levels, and a guess at their values; `None` where none overlap.
-pub fn disjoint(causes: &[Cause]) -> Option<Vec<Cause>> {
+/// The causes with overlapping shifts as levels, with starting values; `None` if none overlap.
+pub fn piecewise_levels(causes: &[Cause]) -> Option<Vec<Cause>> {
     let mut kinds: Vec<&Kind> = Vec::new();
     for (d, ..) in causes.iter().filter_map(shift) {
         if !kinds.contains(&&d.kind) {
@@ -51,16 +49,16 @@ pub fn disjoint(causes: &[Cause]) -> Option<Vec<Cause>> {
         let levels = levels(&group);
         let first = causes.iter().position(|c| shift(c).is_some_and(|(d, ..)| d.kind == *kind));
         let Some(first) = first else { continue };
-        let place = out.iter().position(|c| c == &causes[first]).unwrap_or(out.len());
+        let index = out.iter().position(|c| c == &causes[first]).unwrap_or(out.len());
         out.retain(|c| shift(c).is_none_or(|(d, ..)| d.kind != *kind));
-        let place = place.min(out.len());
-        out.splice(place..place, levels.into_iter().map(Cause::Measurement));
+        let index = index.min(out.len());
+        out.splice(index..index, levels.into_iter().map(Cause::Measurement));
         changed = true;
     }
     changed.then_some(out)
 }
 
-/// The pieces between the ends of a group of shifts of one kind that come to something.
+/// The nonnegligible pieces between the ends of a group of shifts of one kind.
 fn levels(group: &[(&Disturbance, usize, usize)]) -> Vec<Disturbance> {
     let mut cuts: Vec<usize> = group.iter().flat_map(|(_, from, to)| [*from, to + 1]).collect();
     cuts.sort_unstable();
@@ -72,7 +70,7 @@ fn levels(group: &[(&Disturbance, usize, usize)]) -> Vec<Disturbance> {
     let apart = |a: &[f64], b: &[f64]| -> f64 {
         a.iter().zip(b).zip(&sizes).map(|((a, b), s)| ((a - b) / s).powi(2)).sum::<f64>().sqrt()
     };
-    // First row, row after the last, level; before the first and after the last there is nothing.
+    // First row, row after the last, level; the level is 0 before the first and after the last piece.
     let mut pieces: Vec<(usize, usize, Vec<f64>)> = cuts
         .windows(2)
         .map(|cut| {
@@ -83,7 +81,7 @@ fn levels(group: &[(&Disturbance, usize, usize)]) -> Vec<Disturbance> {
             (cut[0], cut[1], level)
         })
         .collect();
-    // Ends that nearly coincide are one event: the few rows between them go to the neighbour that they are more like.
+    // Ends that nearly coincide are one event: a short piece is joined with the more similar neighbour.
     while let Some(k) = pieces.iter().position(|(from, to, _)| to - from < SHORTEST) {
         let (from, to, level) = pieces.remove(k);
         let beside = |at: Option<usize>| at.and_then(|i| pieces.get(i)).map_or(&nothing, |p| &p.2);
@@ -98,7 +96,7 @@ fn levels(group: &[(&Disturbance, usize, usize)]) -> Vec<Disturbance> {
     let largest = pieces.iter().map(|p| apart(&p.2, &nothing)).fold(0.0, f64::max);
     pieces
         .into_iter()
-        .filter(|p| apart(&p.2, &nothing) > NOTHING * largest)
+        .filter(|p| apart(&p.2, &nothing) > NEGLIGIBLE_SHARE * largest)
         .map(|(from, to, values)| Disturbance {
             values,
             ..Disturbance::new(kind.clone(), Profile::Rows { from, to: to - 1 })
@@ -106,8 +104,8 @@ fn levels(group: &[(&Disturbance, usize, usize)]) -> Vec<Disturbance> {
         .collect()
 }
 
-/// Whether `told` describes the rows as well as `before` does, for the number of its parameters.
-pub fn as_good(told: &Extended, before: &Extended) -> bool {
+/// Whether `levels` fits as well as `before`, with a penalty of ln n for each parameter and for the searched ends.
+pub fn is_as_good(levels: &Extended, before: &Extended) -> bool {
     let per = before.problem.rows_per_observation();
     let criterion = |fit: &Extended| {
         let plain = fit.problem.unweighted_residuals(&fit.x);
@@ -126,8 +124,8 @@ pub fn as_good(told: &Extended, before: &Extended) -> bool {
             .sum();
         let n = (plain.len() / per.max(1)) as f64;
         let shifts = fit.causes.iter().filter(|c| shift(c).is_some()).count() as f64;
-        // The ends of a shift were looked for among all rows.
+        // The ends of a shift were searched among all rows.
         rows + fit.parameters.len() as f64 * (plain.len() as f64).ln() + shifts * 2.0 * tried(n).ln()
     };
-    criterion(told) <= criterion(before) + PLAINER
+    criterion(levels) <= criterion(before) + SIMPLICITY_BONUS
 }

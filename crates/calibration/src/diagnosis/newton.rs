@@ -1,4 +1,4 @@
-//! Gauss–Newton from nearby: what a search needs of a fit, and a fold of its refit.
+//! Gauss–Newton steps from a nearby start, for fits within a search and refits of folds.
 //!
 //! **Method.** With N = JᵀWJ + Λ and g = JᵀWr + Λ(x − m), x ← x − t N⁻¹g, t the first of 1, 1/2, 1/4, 1/8 that does not raise
 //! the cost. A step is judged by its cost alone, and no covariance is computed: one pass over the rows with derivatives and one
@@ -6,13 +6,13 @@
 //!
 //! **Shapes.** x, m and g have p entries, N is p × p; priors are the problem's own.
 //!
-//! **Stops.** Where a step promises less than 10⁻⁷ for each scalar row, in units of χ²/2, or where the fall from the step before
-//! to this one, to a twentieth at most, says so of all that would follow. Not at all where no length lowers the cost, or after eight
-//! steps: the caller then goes on with Levenberg and Marquardt.
+//! **Stopping rule.** The predicted decrease of χ²/2 is below 10⁻⁷ for each scalar row, for this step or (from the ratio of the last
+//! two, at least a twentieth) for all further steps together. Fails if no step length lowers the cost, or after eight steps: the
+//! caller then continues with Levenberg–Marquardt.
 //!
 //! **Source and departures.** Nocedal and Wright, *Numerical Optimization*, 2nd ed., §10.3. Other than
-//! [`gauss_newton`](truegrind_estimation::least_squares::gauss_newton) it stops at an absolute promise: scores of candidates are
-//! compared by differences of χ² of about 1, and what is left over is far below.
+//! [`gauss_newton`](truegrind_estimation::least_squares::gauss_newton) it stops at an absolute predicted decrease: scores of
+//! candidates are compared by differences of χ² of about 1, far above it.
 //!
 //! **Checked against** Levenberg–Marquardt on a fit with effects.
 
@@ -22,55 +22,54 @@ use super::algebra::{back_and_forth, factored, solved};
 use truegrind_estimation::objective::Objective;
 use truegrind_estimation::problem::Problem;
 
-/// Promise for each scalar row below which a problem counts as solved.
-const NEAR: f64 = 1e-7;
+/// Predicted decrease for each scalar row below which a problem counts as solved.
+const CONVERGED: f64 = 1e-7;
 
 /// Most steps.
 const STEPS: usize = 8;
 
-/// Promises are not counted on to fall below this share from step to step: with residuals that remain, Gauss and Newton
-/// converge linearly.
-const STEADY: f64 = 0.05;
+/// Smallest assumed ratio of predicted decreases from step to step: with nonzero residuals, Gauss–Newton converges linearly.
+const FASTEST: f64 = 0.05;
 
-/// They are counted on to fall by a twentieth.
-const SLOW: f64 = 0.95;
+/// Largest assumed ratio.
+const SLOWEST: f64 = 0.95;
 
-/// A cost may rise by this share, which is rounding.
+/// Relative increase of the cost that counts as rounding.
 const ROUNDING: f64 = 1e-10;
 
-/// Lengths that are tried, each half of the one before.
+/// Step lengths that are tried, each half of the one before.
 const LENGTHS: usize = 4;
 
-/// A step from x, or the finding that x is where it should be.
+/// A step from x, or of length 0 at the optimum.
 pub(super) struct Step {
     /// L of N = L Lᵀ before the step.
     lower: DMatrix<f64>,
-    /// Fall of the cost that the whole step promised.
-    promise: f64,
-    /// t, or 0 where the promise is less than what costs can be told apart by.
+    /// Decrease of the cost that the full step predicts.
+    predicted: f64,
+    /// t, or 0 where the predicted decrease is below rounding.
     length: f64,
 }
 
 impl Step {
-    /// Moves `x`; `None` where the cost would rise, or where N is not positive definite: `x` then stays.
-    pub(super) fn taken(problem: &dyn Problem, x: &mut Vec<f64>) -> Option<Self> {
+    /// Moves `x`; `None`, with `x` unchanged, where the cost would rise or N is not positive definite.
+    pub(super) fn take(problem: &dyn Problem, x: &mut Vec<f64>) -> Option<Self> {
         let mut objective = Objective::new(problem, x, true);
         let normal = objective.normal_equations(x);
         let mut lower = normal.matrix;
         factored(&mut lower).then_some(())?;
         let step = back_and_forth(&lower, &normal.gradient)?;
-        let promise = 0.5 * step.dot(&normal.gradient);
+        let predicted = 0.5 * step.dot(&normal.gradient);
         let mut length = 1.0;
         for _ in 0..LENGTHS {
-            let there: Vec<f64> = x.iter().zip(step.iter()).map(|(x, s)| x - length * s).collect();
-            // A cost that is no number is no lower one.
-            if objective.cost(&there) <= normal.cost * (1.0 + ROUNDING) {
-                *x = there;
-                return Some(Self { lower, promise, length });
+            let candidate: Vec<f64> = x.iter().zip(step.iter()).map(|(x, s)| x - length * s).collect();
+            // Written so that a NaN cost is rejected.
+            if objective.cost(&candidate) <= normal.cost * (1.0 + ROUNDING) {
+                *x = candidate;
+                return Some(Self { lower, predicted, length });
             }
             length *= 0.5;
         }
-        (promise < NEAR * problem.rows() as f64).then_some(Self { lower, promise, length: 0.0 })
+        (predicted < CONVERGED * problem.rows() as f64).then_some(Self { lower, predicted, length: 0.0 })
     }
 
     /// Variances of the parameters: the diagonal of N⁻¹.
@@ -80,23 +79,23 @@ impl Step {
     }
 }
 
-/// Moves `x` to the optimum; `false` where that did not come about.
+/// Moves `x` to the optimum; `false` if it did not converge.
 pub fn descend(problem: &dyn Problem, x: &mut Vec<f64>) -> bool {
-    descend_to(problem, x, NEAR)
+    descend_to(problem, x, CONVERGED)
 }
 
-/// The same up to a promise of `near` for each scalar row.
-pub(super) fn descend_to(problem: &dyn Problem, x: &mut Vec<f64>, near: f64) -> bool {
-    let enough = near * problem.rows() as f64;
+/// The same to a predicted decrease of `tolerance` for each scalar row.
+pub(super) fn descend_to(problem: &dyn Problem, x: &mut Vec<f64>, tolerance: f64) -> bool {
+    let enough = tolerance * problem.rows() as f64;
     let mut last = f64::MIN_POSITIVE;
     for _ in 0..STEPS {
-        let Some(step) = Step::taken(problem, x) else { return false };
-        // What all further steps would promise, as far as the steps before this one tell.
-        let share = if step.length < 1.0 { SLOW } else { (step.promise / last).clamp(STEADY, SLOW) };
-        if step.promise < enough || share / (1.0 - share) * step.promise < enough {
+        let Some(step) = Step::take(problem, x) else { return false };
+        // Ratio for the geometric series of all further predicted decreases.
+        let share = if step.length < 1.0 { SLOWEST } else { (step.predicted / last).clamp(FASTEST, SLOWEST) };
+        if step.predicted < enough || share / (1.0 - share) * step.predicted < enough {
             return true;
         }
-        last = step.promise;
+        last = step.predicted;
     }
     false
 }

@@ -1,23 +1,23 @@
-//! How to diagnose.
+//! Options of a diagnosis.
 
 use super::selection::{self, BLOCKS};
 use crate::identification::tolerance::Tolerance;
 use crate::identification::verdict::Limits;
 
-/// How to diagnose.
+/// Options of a diagnosis.
 #[derive(Debug, Clone)]
 pub struct Options {
-    /// Priors of links and frames: wide, so that what geometry can explain is never called an effect.
+    /// Priors of links and frames: wide, so that errors that geometry can explain are never called an effect.
     pub tolerance: Tolerance,
-    /// When a cause is accepted.
+    /// Criteria of selection.
     pub selection: selection::Options,
-    /// Contiguous blocks of the second validation.
+    /// Number of contiguous blocks of the second validation.
     pub blocks: usize,
-    /// Whether a smooth correction may follow what no cause explains.
+    /// Whether a smooth correction is fitted to a structured residual.
     pub smooth: bool,
-    /// Whether rounded angles are sharpened by the controller's read-out.
+    /// Whether rounded angles are fused with the controller's read-out.
     pub fuse_readout: bool,
-    /// What the held-out error of the written model (random folds) is held against.
+    /// Limits for the held-out error of the written model (random folds).
     pub limits: Limits,
 }
 

@@ -1,4 +1,4 @@
-//! The view of the residual in which a cause can be seen, before and after it went into the model.
+//! Residual plot that shows a cause: residuals against the revealing variable, without and with the cause in the model.
 
 use nalgebra::Vector3;
 
@@ -9,7 +9,7 @@ use crate::measurement::dataset::{Dataset, Reading, Sensor};
 use crate::measurement::sensor::disturbance::{Kind, Profile};
 use truegrind_arm::effect::Effect;
 
-/// What an axis shows, and its unit.
+/// Label and unit of an axis.
 pub type Label = (String, &'static str);
 
 /// Residuals against the variable that reveals a cause.
@@ -23,11 +23,11 @@ pub struct Picture {
     pub before: Vec<[f64; 2]>,
     /// With it.
     pub after: Vec<[f64; 2]>,
-    /// Rows that the cause is about.
+    /// Rows of a shift.
     pub rows: Option<[usize; 2]>,
 }
 
-/// A row turns a joint visibly when its lever is at least this share of the longest.
+/// Smallest lever arm of a plotted row, as a share of the longest.
 const LEVER: f64 = 0.25;
 
 /// The picture of a cause: `before` is the model without it, `after` the extended one.
@@ -47,20 +47,20 @@ pub fn picture(subject: &Subject<'_>, cause: &Cause, before: &Design, after: &De
         let x = |i: usize| {
             let row = &dataset.rows[i];
             if side {
-                // Spread a little by row, so that points of one side do not hide each other.
+                // Spread by row, so that points of one side do not hide each other.
                 f64::from(row.condition.approach[joint]) + 0.3 * (number(i) / dataset.rows.len() as f64 - 0.5)
             } else {
                 row.joints[driver].to_degrees()
             }
         };
         let label = if side {
-            (format!("side from which joint {} came (−1 below, +1 above)", joint + 1), "")
+            (format!("approach side of joint {} (−1 below, +1 above)", joint + 1), "")
         } else {
             (format!("angle of joint {}", driver + 1), "°")
         };
         return Picture {
             x: label,
-            y: (format!("residual turned to joint {}", joint + 1), "°"),
+            y: (format!("residual about joint {}", joint + 1), "°"),
             before: turned(before, joint, &x),
             after: turned(after, joint, &x),
             rows: None,
@@ -91,7 +91,7 @@ pub fn picture(subject: &Subject<'_>, cause: &Cause, before: &Design, after: &De
     Picture { x: x_label, y: (y_label, "mm"), before: shown(before), after: shown(after), rows: cause.rows() }
 }
 
-/// What a cause of the measurement, or of warmth, is drawn over.
+/// Horizontal axis for a cause of the measurement or a thermal cause.
 fn across<'d>(cause: &Cause, dataset: &'d Dataset) -> (Label, Box<dyn Fn(usize) -> f64 + 'd>) {
     match cause {
         Cause::Measurement(d) if matches!(d.kind, Kind::Scale | Kind::Sag) => (
@@ -120,7 +120,7 @@ fn across<'d>(cause: &Cause, dataset: &'d Dataset) -> (Label, Box<dyn Fn(usize) 
     }
 }
 
-/// Unit vector of a shift of the sensor in the base, where that is the direction to look along.
+/// Unit vector along which the residual of a sensor shift is plotted, in the base.
 fn direction(cause: &Cause) -> Option<Vector3<f64>> {
     match cause {
         Cause::Measurement(d) if matches!(d.kind, Kind::Frame { .. }) => {
@@ -130,7 +130,7 @@ fn direction(cause: &Cause) -> Option<Vector3<f64>> {
     }
 }
 
-/// For each row, the rotation of a joint that would explain most of its residual (°).
+/// For each row, the joint rotation that best explains its residual (°).
 fn turned(design: &Design, joint: usize, x: &dyn Fn(usize) -> f64) -> Vec<[f64; 2]> {
     let theta = &design.slopes.by_joint[joint];
     let rows: Vec<(f64, f64)> = (0..design.observations)

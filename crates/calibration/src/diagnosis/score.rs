@@ -1,14 +1,14 @@
-//! How much a candidate explains, fitted jointly with everything else, and whether that could be chance.
+//! Score test of a candidate with everything else as nuisance parameters: gain, evidence, p-value.
 //!
 //! With gradient g and information S of the projected candidate and its size prior Λ:
 //!
 //! - estimate −(S + Λ)⁻¹ g and gain gᵀ(S + Λ)⁻¹ g, the fall of χ²;
-//! - evidence gain − ln det(I + S Λ⁻¹), twice the log Bayes factor against its absence (Laplace): what a candidate with many
-//!   parameters, or none that this data could see, has to pay;
-//! - the p-value takes the smaller of gᵀS⁺g under the model's own noise and under the scatter that the residuals really
-//!   have, pose by pose (White 1980, heteroskedasticity-consistent; by clusters, Liang and Zeger 1986): noise that depends on the
-//!   pose is no evidence;
-//! - non-centrality λ = cᵀ S c of a stated size c: what the data would show of it.
+//! - evidence gain − ln det(I + S Λ⁻¹), twice the log Bayes factor against its absence (Laplace): it penalises candidates
+//!   with many parameters;
+//! - the p-value uses the smaller of gᵀS⁺g under the model's own noise and under the empirical scatter of the residuals by pose
+//!   (White 1980, heteroskedasticity-consistent; by clusters, Liang and Zeger 1986): noise that depends on the pose is not
+//!   evidence;
+//! - non-centrality λ = cᵀ S c of an effect of size c.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -17,7 +17,7 @@ use super::catalogue::Candidate;
 use super::design::{Design, Projected};
 use truegrind_math::tail::log_chi_square_tail;
 
-/// Non-centrality from which an effect can be counted on to be found.
+/// Non-centrality from which an effect is reliably detected.
 pub const VISIBLE: f64 = 40.0;
 
 /// A scored candidate.
@@ -39,7 +39,7 @@ pub struct Score {
 
 impl Score {
     /// Natural logarithm of the p-value of the candidate alone under the model's own noise, not corrected for trials:
-    /// what [`log_p`] goes on from. `sizes` as scored.
+    /// the first stage of [`log_p`]. `sizes` as in scoring.
     pub fn plain_log_p(&self, sizes: &[f64]) -> f64 {
         if self.gain > SOME {
             let (information, gradient) = in_sizes(&self.information, &self.gradient, sizes);
@@ -56,7 +56,7 @@ pub fn score(design: &Design, candidate: &Candidate) -> Score {
     score_columns(design, &candidate.columns(design), &candidate.cause.sizes(), candidate.tried)
 }
 
-/// Scores columns with the standard deviations that their parameters have beforehand.
+/// Scores columns; `sizes` are the prior standard deviations of their parameters.
 pub fn score_columns(design: &Design, columns: &DMatrix<f64>, sizes: &[f64], tried: f64) -> Score {
     score_projected(&design.project(columns), sizes, tried)
 }
@@ -103,7 +103,7 @@ pub fn score_from(
     }
 }
 
-/// Information and gradient in units of the sizes: well scaled.
+/// Information and gradient in units of the prior standard deviations, for conditioning.
 fn in_sizes(
     information: &DMatrix<f64>,
     gradient: &DVector<f64>,
@@ -114,13 +114,13 @@ fn in_sizes(
     (information, DVector::from_fn(k, |a, _| sizes[a] * gradient[a]))
 }
 
-/// Natural logarithm of a candidate's p-value under whichever noise explains more of it: the model's own, or the scatter of
-/// the residuals. Not corrected for trials.
+/// Natural logarithm of a candidate's p-value, the larger of those under the model's own noise and under the empirical scatter
+/// of the residuals. Not corrected for trials.
 pub fn log_p(design: &Design, candidate: &Candidate, score: &Score) -> f64 {
     log_p_of(design, || candidate.columns(design), &candidate.cause.sizes(), score)
 }
 
-/// The same for columns that are made when they are needed.
+/// The same for columns that are computed on demand.
 pub fn log_p_of(
     design: &Design,
     columns: impl FnOnce() -> DMatrix<f64>,
@@ -128,7 +128,7 @@ pub fn log_p_of(
     score: &Score,
 ) -> f64 {
     let plain = || score.plain_log_p(sizes);
-    // Of many parameters the scatter of a few hundred rows says nothing.
+    // A few hundred rows do not determine the scatter of many parameters.
     if score.gain <= SOME || sizes.len() > MOST_SCATTERED {
         return plain();
     }
@@ -143,18 +143,18 @@ pub fn log_p_of(
     log_chi_square_tail(plain.min(scattered), freedom.max(1))
 }
 
-/// A fall of χ² below this is nobody's evidence, whatever the noise.
+/// Fall of χ² below which the empirical scatter is not computed.
 const SOME: f64 = 8.0;
 
-/// Most parameters whose gradient's covariance is taken from the residuals.
+/// Most parameters for which the gradient's covariance is estimated from the residuals.
 const MOST_SCATTERED: usize = 6;
 
-/// gᵀ S⁺ g over the directions that the data see, and their number.
+/// gᵀ S⁺ g over the directions that the data determine, and their number.
 fn plain_statistic(information: &DMatrix<f64>, gradient: &DVector<f64>) -> (f64, usize) {
     let (mut sum, mut freedom) = (0.0, 0);
     let Some((values, vectors)) = eigen(information) else { return (0.0, 1) };
     for (value, vector) in values.iter().zip(vectors.column_iter()) {
-        // A direction in which the size prior knows more than the data is none of the data's.
+        // Skips directions that the size prior determines better than the data.
         if *value > 0.1 {
             sum += vector.dot(gradient).powi(2) / value;
             freedom += 1;
@@ -163,9 +163,9 @@ fn plain_statistic(information: &DMatrix<f64>, gradient: &DVector<f64>) -> (f64,
     (sum, freedom)
 }
 
-/// The same with the covariance of the gradient taken from the residuals that the candidate leaves: Σ over poses of the outer
-/// products, since readings of one pose are no two witnesses of what the model gets wrong there. Of a design of all rows: the
-/// slopes, and so the numbers of poses, stay those of all where a design is of a part.
+/// The same statistic with the covariance of the gradient estimated from the candidate's residuals: Σ over poses of outer products,
+/// since readings of one pose share its model error (clusters). For designs of all rows only: a design of a subset has the pose
+/// indices of all rows.
 fn scatter_statistic(
     design: &Design,
     columns: &DMatrix<f64>,

@@ -1,72 +1,72 @@
-//! What was found in the rows, and what of it holds: causes are searched, what does not carry over to rows that were held out is
-//! dropped again, and what comes back in halves of the rows is confirmed.
+//! The search for causes and its validation: selects causes, drops those that raise the held-out error, and confirms the others by
+//! stability selection.
 
 use super::candidates::Scored;
 use super::cause::Cause;
 use super::confirmation::{Confirming, Outcome};
 use super::design::{FullDesign, Linear};
 use super::extension::{Extended, Freedom, Subject, fit};
-use super::findings::told_short;
+use super::findings::short_name;
 use super::options::Options;
-use super::remaining::{self, Structure};
-use super::rows::Prepared;
+use super::preparation::Prepared;
+use super::residual_tests::{self, Structure};
 use super::selection::{self, Accepted, Selection};
 use super::validation::{StageError, Validation};
 use crate::identification::network::with_network;
 use crate::measurement::dataset::Dataset;
 use crate::measurement::sensor::disturbance::{Disturbance, Profile};
 
-/// What is diagnosed, and how.
-pub(super) struct Ground<'a> {
-    /// The rows as they were read.
+/// The rows, the fits' subjects and the options of a search.
+pub(super) struct SearchContext<'a> {
+    /// The rows as read.
     pub(super) dataset: &'a Dataset,
-    /// As they are fitted.
+    /// The rows as fitted.
     pub(super) prepared: &'a Prepared,
-    /// All of them.
+    /// All rows.
     pub(super) subject: Subject<'a>,
-    /// Those in which causes are looked for.
+    /// The searched rows: all, or a random subset of very many.
     pub(super) searched: Subject<'a>,
     pub(super) options: &'a Options,
     pub(super) tell: &'a (dyn Fn(&str) + Sync),
 }
 
-impl Ground<'_> {
-    /// Whether causes are looked for in some of the rows alone.
-    pub(super) fn thinned(&self) -> bool {
+impl SearchContext<'_> {
+    /// Whether only a subset of the rows is searched.
+    pub(super) fn is_thinned(&self) -> bool {
         !std::ptr::eq(self.subject.observed, self.searched.observed)
     }
 
-    /// Rows of all the data for each one in which causes are looked for.
+    /// Number of rows for each searched row.
     fn stride(&self) -> usize {
         self.dataset.rows.len().div_ceil(self.searched.observed.dataset.rows.len().max(1))
     }
 }
 
-/// The causes that were found, with the fits and their errors.
+/// The selected causes, with the fits and their errors.
 pub(super) struct Search<'a> {
-    pub(super) ground: &'a Ground<'a>,
+    pub(super) context: &'a SearchContext<'a>,
     registered: Extended,
     pub(super) geometric: Extended,
     /// All causes, fitted to all rows.
     pub(super) extended: Extended,
-    /// The same, fitted to the rows in which they were looked for.
+    /// All causes, fitted to the searched rows.
     pub(super) found: Extended,
     pub(super) accepted: Vec<Accepted>,
-    /// Every candidate beside them.
+    /// All other candidates, scored against the extended model.
     pub(super) left: Vec<Scored>,
     families: f64,
-    /// Gross outliers, by index, with how far they are off.
-    pub(super) wild: Vec<(usize, f64)>,
+    /// Gross outliers: index, and size in standard deviations.
+    pub(super) outliers: Vec<(usize, f64)>,
     pub(super) set_aside: Vec<usize>,
     pub(super) validation: Validation,
-    /// Errors of the registered data sheet, of geometry and of the whole.
+    /// Errors of the registered data sheet, of geometry and of the extended model.
     pub(super) stages: [StageError; 3],
-    /// Over how many of the rows in which causes were looked for readings resemble each other; 0 where they do not.
+    /// Serial correlation range in searched rows; 0 for independent readings.
     pub(super) reach: usize,
     pub(super) notes: Vec<String>,
 }
 
-/// What is confirmed, and what it was judged by.
+/// The confirmations and the linearised fit that they are based on.
 pub(super) struct Confirmed {
     pub(super) linear: Linear,
     pub(super) whole: FullDesign,
@@ -74,22 +74,22 @@ pub(super) struct Confirmed {
 }
 
 impl<'a> Search<'a> {
-    /// Looks for at most so many causes.
-    pub(super) fn of(ground: &'a Ground<'a>, registered: Extended, most: usize) -> Self {
-        let Ground { dataset, subject, searched, options, tell, .. } = ground;
-        tell("looking for causes");
+    /// Searches for at most `most` causes.
+    pub(super) fn run(context: &'a SearchContext<'a>, registered: Extended, most: usize) -> Self {
+        let SearchContext { dataset, subject, searched, options, tell, .. } = context;
+        tell("searching for causes");
         let selection = selection::select(searched, &selection::Options { most, ..options.selection }, tell);
         let Selection { geometric, extended: found, accepted, left, families } = selection;
         let mut notes = Vec::new();
-        let (geometric, extended) = if ground.thinned() {
+        let (geometric, extended) = if context.is_thinned() {
             tell("fitting all rows");
             let rows = &searched.observed.dataset;
             notes.push(format!(
-                "causes were looked for in {} of the {} rows, drawn at random; the fits and their errors are of all rows",
+                "causes were searched in a random {} of the {} rows; the fits and their errors are of all rows",
                 rows.rows.len(),
                 dataset.rows.len()
             ));
-            let causes = to_the_end(&found.causes, rows, dataset);
+            let causes = extend_to_last_row(&found.causes, rows, dataset);
             (
                 fit(subject, &[], Freedom::All, Some(&geometric)),
                 fit(subject, &causes, Freedom::All, Some(&found)),
@@ -97,13 +97,13 @@ impl<'a> Search<'a> {
         } else {
             (geometric, found.clone())
         };
-        let wild = remaining::outliers(&extended);
-        let set_aside: Vec<usize> = wild.iter().map(|(i, _)| *i).collect();
-        tell("holding rows out");
+        let outliers = residual_tests::outliers(&extended);
+        let set_aside: Vec<usize> = outliers.iter().map(|(i, _)| *i).collect();
+        tell("cross-validating");
         let validation = Validation::of(subject, &set_aside, options.selection.seed, options.blocks);
         let stages = [&registered, &geometric, &extended].map(|fit| validation.stage(fit));
         Self {
-            ground,
+            context,
             registered,
             geometric,
             extended,
@@ -111,7 +111,7 @@ impl<'a> Search<'a> {
             accepted,
             left,
             families,
-            wild,
+            outliers,
             set_aside,
             validation,
             stages,
@@ -120,25 +120,25 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Drops what does not carry over to rows that were not seen together with it: it is no knowledge.
-    pub(super) fn drop_what_does_not_carry_over(&mut self) {
+    /// Drops causes while they raise the error on held-out blocks above that of geometry alone.
+    pub(super) fn drop_unvalidated_causes(&mut self) {
         while self.stages[2].blocks.rmse > self.stages[1].blocks.rmse
             && let Some(weakest) = self.weakest()
         {
             self.notes.push(format!(
-                "{} was dropped again: with it the error on held-out blocks was {:.4} mm, geometry alone has {:.4}",
-                told_short(&self.found.causes[weakest]),
+                "{} was dropped: with it the error on held-out blocks was {:.4} mm, with geometry alone {:.4} mm",
+                short_name(&self.found.causes[weakest]),
                 self.stages[2].blocks.rmse,
                 self.stages[1].blocks.rmse
             ));
             self.accepted.remove(weakest);
             let extended = self.without(&[weakest]);
-            self.keep(extended, &[weakest]);
+            self.replace_fit(extended, &[weakest]);
             self.stages[2] = self.validation.stage(&self.extended);
         }
     }
 
-    /// The accepted cause of least merit that is not about rows.
+    /// The accepted cause with the least merit, except shifts.
     fn weakest(&self) -> Option<usize> {
         (0..self.accepted.len())
             .filter(|&k| self.found.causes[k].rows().is_none())
@@ -147,22 +147,22 @@ impl<'a> Search<'a> {
 
     /// The fit to all rows without some of its causes.
     fn without(&self, dropped: &[usize]) -> Extended {
-        without(&self.ground.subject, &self.extended, dropped)
+        without(&self.context.subject, &self.extended, dropped)
     }
 
-    /// Goes on from a fit without some causes.
-    fn keep(&mut self, extended: Extended, dropped: &[usize]) {
-        self.found = if self.ground.thinned() {
-            without(&self.ground.searched, &self.found, dropped)
+    /// Continues with a fit without some causes.
+    fn replace_fit(&mut self, extended: Extended, dropped: &[usize]) {
+        self.found = if self.context.is_thinned() {
+            without(&self.context.searched, &self.found, dropped)
         } else {
             extended.clone()
         };
         self.extended = extended;
     }
 
-    /// Looks which causes come back in halves of the rows, and what stands beside them.
+    /// Confirms the causes by stability selection, and estimates the discrepancy.
     pub(super) fn confirm(&self) -> Confirmed {
-        let Ground { searched, prepared, options, .. } = self.ground;
+        let SearchContext { searched, prepared, options, .. } = self.context;
         let linear = Linear::of(searched, &self.found);
         let whole = linear.whole();
         let confirming = Confirming {
@@ -180,18 +180,17 @@ impl<'a> Search<'a> {
         Confirmed { linear, whole, outcome }
     }
 
-    /// Where readings resemble those before them, holds out stretches of rows, and drops shifts that do not come back.
-    pub(super) fn hold_out_stretches(&mut self, confirmed: &mut Confirmed) {
-        let Ground { subject, options, tell, .. } = self.ground;
+    /// For serially correlated readings: purges the cross-validation, and drops shifts that are not confirmed.
+    pub(super) fn purge_validation(&mut self, confirmed: &mut Confirmed) {
+        let SearchContext { subject, options, tell, .. } = self.context;
         self.reach = confirmed.outcome.discrepancy.reach;
-        let reach = self.reach * self.ground.stride();
+        let reach = self.reach * self.context.stride();
         if reach == 0 {
             return;
         }
-        tell("holding out stretches of rows, as they resemble those before them");
+        tell("cross-validating in blocks, since readings are serially correlated");
         self.notes.push(format!(
-            "readings resemble those up to {reach} rows before them: rows are held out in stretches, with that many rows on either side left out \
-             of the fit"
+            "readings are correlated over {reach} rows: blocks of rows are held out, and as many rows on either side are excluded from the fit"
         ));
         let seed = options.selection.seed;
         self.validation = Validation::in_order(subject, &self.set_aside, seed, options.blocks, reach);
@@ -207,23 +206,24 @@ impl<'a> Search<'a> {
         }
         let lasting = self.without(&passing);
         let stage = self.validation.stage(&lasting);
-        let excursions = confirmed.outcome.discrepancy.correlation > NOISE_ITSELF;
-        if excursions || stage.random.rmse < self.stages[2].random.rmse * PASSING {
+        let excursions = confirmed.outcome.discrepancy.correlation > CORRELATED_NOISE;
+        if excursions || stage.random.rmse < self.stages[2].random.rmse * SHIFT_GAIN {
             self.stages[2] = stage;
-            self.keep(lasting, &passing);
+            self.replace_fit(lasting, &passing);
             let mut place = 0..;
             self.accepted.retain(|_| !place.next().is_some_and(|k| passing.contains(&k)));
             *confirmed = self.confirm();
         }
     }
 
-    /// Fits a smooth correction to what is left, where it carries over; hands back the held-out error without it (mm).
-    pub(super) fn smooth(&mut self, structure: &Structure) -> Option<f64> {
-        let Ground { subject, options, tell, .. } = self.ground;
-        if !options.smooth || !remaining::patterned(structure) {
+    /// Fits a smooth correction to a structured residual, and keeps it if it lowers the held-out error. Returns the held-out error
+    /// without it (mm).
+    pub(super) fn fit_smooth_correction(&mut self, structure: &Structure) -> Option<f64> {
+        let SearchContext { subject, options, tell, .. } = self.context;
+        if !options.smooth || !residual_tests::has_structure(structure) {
             return None;
         }
-        tell("fitting a smooth correction to what is left");
+        tell("fitting a smooth correction to the residual");
         let smooth = smooth_correction(subject, &self.extended);
         let stage = self.validation.stage(&smooth);
         let before = &self.stages[2];
@@ -233,20 +233,20 @@ impl<'a> Search<'a> {
             return Some(without);
         }
         self.notes.push(format!(
-            "a smooth correction would not carry over: held out {:.4} mm against {:.4} without it, on blocks {:.4} against {:.4}",
+            "a smooth correction does not generalise: held-out error {:.4} mm, without it {:.4} mm; on blocks {:.4} mm, without it {:.4} mm",
             stage.random.rmse, before.random.rmse, stage.blocks.rmse, before.blocks.rmse
         ));
         None
     }
 }
 
-/// Shifts that do not come back are fitted noise where readings resemble those before them, unless the error on rows that were
-/// held out with their neighbours is larger without them by this factor.
-const PASSING: f64 = 1.1;
+/// With serially correlated readings, unconfirmed shifts are fitted noise unless the purged held-out error rises by this factor
+/// without them.
+const SHIFT_GAIN: f64 = 1.1;
 
-/// Correlation with the row before, beside smooth courses, from which the noise itself is correlated, and shifts that do not come
-/// back are its excursions whatever the held-out error says: their rows were chosen to hold them.
-const NOISE_ITSELF: f64 = 0.3;
+/// Lag-one correlation, given smooth functions of time, from which the noise itself is correlated and unconfirmed shifts are its
+/// excursions, whatever the held-out error: their rows were selected for it.
+const CORRELATED_NOISE: f64 = 0.3;
 
 /// A fit without some of its causes.
 fn without(subject: &Subject<'_>, fitted: &Extended, dropped: &[usize]) -> Extended {
@@ -255,9 +255,9 @@ fn without(subject: &Subject<'_>, fitted: &Extended, dropped: &[usize]) -> Exten
     fit(subject, &causes, Freedom::All, Some(fitted))
 }
 
-/// The extended model with a smooth correction spread over its poses: a network of bumps on the first three joints.
+/// The extended model with a smooth correction: a radial basis function network on the first three joints.
 fn smooth_correction(subject: &Subject<'_>, extended: &Extended) -> Extended {
-    // Ten poses for each centre, so that the weights are seen.
+    // Ten poses for each centre, so that its weight is identifiable.
     let centres = (subject.observed.dataset.rows.len() / 10).clamp(12, 60);
     let options = truegrind_estimation::network::rbf::Options { centres, ..Default::default() };
     let mut causes = extended.causes.clone();
@@ -266,8 +266,8 @@ fn smooth_correction(subject: &Subject<'_>, extended: &Extended) -> Extended {
     fit(subject, &causes, Freedom::All, Some(extended))
 }
 
-/// Intervals that reach the last of the rows that were searched reach the last row there is.
-fn to_the_end(causes: &[Cause], searched: &Dataset, dataset: &Dataset) -> Vec<Cause> {
+/// Extends intervals that end at the last searched row to the last row.
+fn extend_to_last_row(causes: &[Cause], searched: &Dataset, dataset: &Dataset) -> Vec<Cause> {
     let last = |d: &Dataset| d.rows.last().map_or(0, |r| r.number);
     causes
         .iter()

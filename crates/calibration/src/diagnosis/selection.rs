@@ -90,7 +90,7 @@ pub fn select(subject: &Subject<'_>, options: &Options, tell: &(dyn Fn(&str) + S
     for _ in 0..4 * options.most.max(1) {
         let board =
             known.take().unwrap_or_else(|| CandidateScores::of(&catalogue, subject, Arc::clone(&current)));
-        let left = board.scored(&board.whole.design, true);
+        let left = board.score_all(&board.whole.design, true);
         let taken = (current.causes.len() < options.most)
             .then(|| next(&board, &left, &refused, options, [&random, &blocks]))
             .flatten();
@@ -105,10 +105,10 @@ pub fn select(subject: &Subject<'_>, options: &Options, tell: &(dyn Fn(&str) + S
                     continue;
                 }
                 Review::Settled(accepted) => {
-                    if !told_again && let Some(causes) = levels::disjoint(&current.causes) {
+                    if !told_again && let Some(causes) = levels::piecewise_levels(&current.causes) {
                         told_again = true;
                         let told = warm_fit(subject, &causes, Freedom::All, Some(&current));
-                        if levels::as_good(&told, &current) {
+                        if levels::is_as_good(&told, &current) {
                             current = Arc::new(told);
                             continue;
                         }
@@ -161,7 +161,7 @@ fn as_it_stands(
     current: Arc<Extended>,
 ) -> Selection {
     let board = CandidateScores::of(catalogue, subject, Arc::clone(&current));
-    let left = board.scored(&board.whole.design, true);
+    let left = board.score_all(&board.whole.design, true);
     let accepted = (0..current.causes.len()).map(|index| looked_at(&board, index, true).0).collect();
     drop(board);
     let families = catalogue.families;
@@ -182,12 +182,12 @@ fn asked_again(taken: &Scored, left: &[Scored], doubtful: &mut Vec<(Cause, Vec<C
     let cause = &taken.candidate.cause;
     let near: Vec<Cause> = left
         .iter()
-        .filter(|s| !s.candidate.cause.same_story(cause) && s.score.merit > taken.score.merit - DOUBT)
+        .filter(|s| !s.candidate.cause.is_same_finding(cause) && s.score.merit > taken.score.merit - DOUBT)
         .map(|s| s.candidate.cause.clone())
         .collect();
     let asked = doubtful
         .iter()
-        .filter(|(_, rivals)| rivals.iter().any(|r| r.same_story(cause)))
+        .filter(|(_, rivals)| rivals.iter().any(|r| r.is_same_finding(cause)))
         .map(|(doubted, _)| doubted.clone())
         .collect();
     if !near.is_empty() {
@@ -209,7 +209,7 @@ fn next<'a>(
         .iter()
         .take_while(|s| s.score.merit > 0.0)
         .filter(|s| !already(refused, &s.candidate.cause) && !already(&board.fit.causes, &s.candidate.cause))
-        .filter(|s| board.catalogue.significant(design, s, options.alpha))
+        .filter(|s| board.catalogue.is_significant(design, s, options.alpha))
         .peekable();
     significant.peek()?;
     let held = FoldErrors::of(&board.linear, splits[0]);
@@ -292,11 +292,11 @@ fn review(board: &CandidateScores<'_>, options: &Options, which: &[usize], how: 
             others.remove(index);
             let enough = judged.own.merit + how.ahead;
             let best = scored.iter().take_while(|s| s.score.merit > enough).find(|s| {
-                !already(&others, &s.candidate.cause) && catalogue.significant(&design, s, options.alpha)
+                !already(&others, &s.candidate.cause) && catalogue.is_significant(&design, s, options.alpha)
             });
             let better = best
                 .filter(|best| !already(std::slice::from_ref(&current.causes[index]), &best.candidate.cause));
-            let stands = !current.causes[index].needs_lean() || Cause::lean_is_seen(&others);
+            let stands = !current.causes[index].requires_tilt() || Cause::tilt_is_supported(&others);
             let carries = stands && judged.own.merit > 0.0 && judged.log_p <= options.alpha.ln();
             if better.is_some() || !carries {
                 let reduced = warm_fit(subject, &others, Freedom::All, Some(current));
@@ -339,14 +339,14 @@ fn own_score(subject: &Subject<'_>, design: &Design, scored: &[Scored], cause: &
 fn looked_at(board: &CandidateScores<'_>, index: usize, open: bool) -> (Accepted, Design, Vec<Scored>) {
     let current = &*board.fit;
     let cause = &current.causes[index];
-    let design = board.whole.without(&current.places(index));
-    let scored = board.scored(&design, open);
+    let design = board.whole.without(&current.parameter_indices(index));
+    let scored = board.score_all(&design, open);
     let own = own_score(board.subject, &design, &scored, cause);
     let mut rivals: Vec<Scored> = Vec::new();
     for other in &scored {
         let same =
-            other.candidate.cause.same_story(cause) || already(&current.causes, &other.candidate.cause);
-        let told = rivals.iter().any(|r| r.candidate.cause.same_story(&other.candidate.cause));
+            other.candidate.cause.is_same_finding(cause) || already(&current.causes, &other.candidate.cause);
+        let told = rivals.iter().any(|r| r.candidate.cause.is_same_finding(&other.candidate.cause));
         if !same && !told && other.score.merit > 0.25 * own.score.merit.max(0.0) {
             rivals.push(other.clone());
         }
@@ -356,7 +356,7 @@ fn looked_at(board: &CandidateScores<'_>, index: usize, open: bool) -> (Accepted
     }
     let beside_growth =
         (cause.name() == "sensor-scale").then(|| scale_beside_growth(&design, &own.score.estimate));
-    let log_p = board.catalogue.corrected(&design, &own);
+    let log_p = board.catalogue.corrected_log_p(&design, &own);
     let tried = own.candidate.tried;
     (Accepted { own: own.score, log_p, tried, rivals, beside_growth }, design, scored)
 }

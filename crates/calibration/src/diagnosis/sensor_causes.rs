@@ -1,25 +1,25 @@
-//! Whether the causes of the measurement that were fitted beside an arm make a better arm.
+//! Whether fitting causes of the measurement with the arm improves the arm.
 //!
-//! Such causes are found in readings, and what they explain there is theirs or the links'. With x the arm fitted beside them, C its
-//! covariance and x₀ the arm fitted without, the shape (apart from motions of base and target) is worse beside them than without where the
-//! true arm lies nearer to x₀. With δ = x − x₀ and M as in `benefit`, the probability of that is
+//! Such causes compete with the links for the same part of the readings. With x the arm fitted with them, C its covariance and x₀
+//! the arm fitted without, the arm is worse with them if the true arm is nearer to x₀ in shape (up to motions of base and target).
+//! With δ = x − x₀ and M as in `benefit`, the probability of that is
 //!
 //! Φ(−½ δᵀMδ / √(δᵀM C Mδ)),
 //!
-//! since the projection of the error on δ is normal. It is the rule by which a cut is corrected or left (`truegrind-compensation`,
-//! `probability`), here for the arm itself.
+//! since the projection of the error on δ is normal. The same rule decides whether a cut is corrected (`truegrind-compensation`,
+//! `probability`).
 
 use super::extension::Extended;
 use crate::identification::benefit::{normal_cdf, shape_metric};
 use crate::identification::fit::Fitted;
 use truegrind_arm::condition::Condition;
 
-/// The largest probability of a worse arm with which causes of the measurement stand beside the arm that is written.
-pub(super) const MOST: f64 = 0.02;
+/// Largest probability of a worse arm up to which the written arm is fitted with the causes of the measurement.
+pub(super) const MOST_PROBABILITY: f64 = 0.02;
 
 /// The probability that the arm of `without` is nearer in shape to the true one than that of `with`, which has the same parameters;
-/// `None` where nothing says so.
-pub(super) fn chance_worse(
+/// `None` if it cannot be computed.
+pub(super) fn probability_worse(
     with: &Extended,
     without: &Extended,
     condition: &Condition,

@@ -1,25 +1,25 @@
-//! What the rows cannot show: effects without the columns that would tell of them, and effects that hide inside geometry and
-//! frames, with the smallest size that would show.
+//! Effects that the data cannot detect: missing columns, or confounding with geometry and frames; with the smallest detectable
+//! size.
 
 use nalgebra::DVector;
 
 use super::candidates::Scored;
-use super::catalogue::{Columns, Regressor, STILL_RAD};
+use super::catalogue::{LoggedColumns, Regressor, STILL_RAD};
 use super::cause::Cause;
 use super::design::Design;
 use super::finding::NotTestable;
 use super::findings::pendant;
-use super::rows::Prepared;
+use super::preparation::Prepared;
 use super::score::VISIBLE;
 use super::selection::scale_beside_growth;
 use crate::measurement::dataset::Dataset;
 use truegrind_arm::effect::Effect;
 use truegrind_math::spectral;
 
-/// Peak rotation of a joint that an effect of practical size has (rad).
+/// Peak joint rotation of an effect of practical size (rad).
 const PRACTICAL_RAD: f64 = 0.15 * std::f64::consts::PI / 180.0;
 
-/// What these rows cannot show, with the smallest size that they could.
+/// Effects that these rows cannot detect, with the smallest detectable size.
 pub(super) fn not_testable(
     dataset: &Dataset,
     whole: &Design,
@@ -27,7 +27,7 @@ pub(super) fn not_testable(
     found: &[String],
     prepared: &Prepared,
 ) -> Vec<NotTestable> {
-    let columns = Columns::of(dataset);
+    let columns = LoggedColumns::of(dataset);
     let mut out = Vec::new();
     let missing = |name: &str| !found.iter().any(|f| f == name);
     let mut add = |effect: &str, joints: Option<Vec<usize>>, reason: String, remedy: &str| {
@@ -37,7 +37,7 @@ pub(super) fn not_testable(
         add(
             "backlash",
             None,
-            "no approach columns, and the order of the rows shows nothing of it".to_owned(),
+            "no approach columns, and the order of the rows does not show it".to_owned(),
             "measure each pose from both sides and log approach1 to approach6",
         );
     }
@@ -63,8 +63,9 @@ pub(super) fn not_testable(
             add(
                 "sensor-scale",
                 None,
-                "a scale error of 0.1 % looks like links that are all longer by as much".to_owned(),
-                "measure a length standard, or distances that do not come from the arm",
+                "a scale error of 0.1 % is indistinguishable from links that are all longer by 0.1 %"
+                    .to_owned(),
+                "measure a length standard, or distances that do not depend on the arm",
             );
         }
     }
@@ -86,22 +87,22 @@ pub(super) fn not_testable(
             .collect();
         if !hidden.is_empty() && missing(name) {
             let joints: Vec<usize> = hidden.iter().map(|h| h.0).collect();
-            let sizes: Vec<String> = hidden.iter().map(said).collect();
+            let sizes: Vec<String> = hidden.iter().map(describe).collect();
             add(
                 name,
                 pendant(&joints),
                 format!(
-                    "in these poses it hides inside geometry and frames; the smallest peak that would show: {}",
+                    "in these poses it is confounded with geometry and frames; smallest detectable peak: {}",
                     sizes.join(", ")
                 ),
-                "measure poses that turn these joints far while the others differ: `truegrind plan` proposes them",
+                "measure poses with large rotations of these joints at varied angles of the others: `truegrind plan` proposes them",
             );
         }
     }
     out
 }
 
-/// The smallest peak rotation of a joint by an effect of the arm that would show (rad); NaN where it was not tried.
+/// The smallest detectable peak rotation of a joint by an effect of the arm (rad); NaN where it was not tried.
 fn smallest_that_shows(name: &str, joint: usize, left: &[Scored]) -> f64 {
     let asked = |s: &&Scored| {
         let cause = &s.candidate.cause;
@@ -112,15 +113,15 @@ fn smallest_that_shows(name: &str, joint: usize, left: &[Scored]) -> f64 {
     left.iter().filter(asked).filter_map(smallest_rad).fold(f64::NAN, f64::max)
 }
 
-fn said((joint, smallest): &(usize, f64)) -> String {
+fn describe((joint, smallest): &(usize, f64)) -> String {
     if smallest.is_finite() && smallest.to_degrees() < 90.0 {
         format!("joint {}: {:.2}°", joint + 1, smallest.to_degrees())
     } else {
-        format!("joint {}: nothing at all", joint + 1)
+        format!("joint {}: undetectable", joint + 1)
     }
 }
 
-/// Smallest peak rotation with the non-centrality of [`VISIBLE`] (rad), in the least favourable phase.
+/// Smallest peak rotation with the non-centrality [`VISIBLE`] (rad), in the least favourable phase.
 fn smallest_rad(scored: &Scored) -> Option<f64> {
     let peak = |r: &Regressor| match r {
         Regressor::Arm { rotation, .. } => {

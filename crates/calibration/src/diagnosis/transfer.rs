@@ -1,11 +1,11 @@
-//! Whether what was found is the arm's: the models of one series on another, with only the frames refitted.
+//! Transfer test: the models of one series on another of the same arm, with only the frames refitted.
 //!
-//! An arm's physics moves along to another day and another mounting; what was only fitted stays behind.
+//! Real effects of the arm persist on another day and in another mounting; overfitted ones do not.
 
 use super::cause::Cause;
 use super::extension::{Freedom, Subject, fit};
 use super::finding::Transfer;
-use super::rows::prepare;
+use super::preparation::prepare;
 use crate::identification::calibration::Frames;
 use crate::identification::fit::errors_on;
 use crate::identification::tolerance::Tolerance;
@@ -13,8 +13,8 @@ use crate::measurement::dataset::Dataset;
 use truegrind_arm::model::Model;
 use truegrind_math::statistics::ErrorSummary;
 
-/// Root mean square errors (mm) of data sheet, geometry and extended model on `other`, frames fitted to it, links and effects
-/// as they are. `fuse_readout`: as the models were made.
+/// Root mean square errors (mm) of data sheet, geometry and extended model on `other`, with the frames refitted, links and effects
+/// unchanged. `fuse_readout` as for the models.
 pub fn transfer(
     other: &Dataset,
     frames: &Frames,

@@ -1,8 +1,8 @@
-//! FoldErrors-out errors of a stage: every fold is fitted anew, frames, links and causes, and judged on rows it never saw.
+//! Held-out errors of a stage by refitting frames, links and causes in every fold.
 //!
-//! Few rows and parameters are refitted in full. With many, the rows of a fold are taken off the normal equations of all
-//! rows at their optimum, and one Gauss–Newton step from there is the refit: links move by micrometres between folds, and
-//! what the step leaves is of second order in that. Checked against: full refits.
+//! With few rows and parameters the refit is complete. With many, the rows of a fold are subtracted from the normal equations
+//! of all rows at their optimum, and one Gauss–Newton step is the refit: links move by micrometres between folds, and the
+//! error of the step is of second order in that. Checked against complete refits.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -18,12 +18,12 @@ use crate::measurement::split::{self, Split};
 use truegrind_estimation::problem::{NormalEquations, Problem};
 use truegrind_math::statistics::ErrorSummary;
 
-/// Errors of a stage.
+/// Fitted and held-out errors of a stage.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StageError {
     /// On the rows of the fit.
     pub fitted: ErrorSummary,
-    /// Over five random folds, purged where rows resemble those before them.
+    /// Over five random folds, purged for serially correlated rows.
     pub random: ErrorSummary,
     /// Over contiguous blocks.
     pub blocks: ErrorSummary,
@@ -32,7 +32,7 @@ pub struct StageError {
 /// Scalar rows times squared parameters from which a fold is refitted by one step.
 const MUCH_WORK: f64 = 1e9;
 
-/// How a stage is held out.
+/// The folds of cross-validation.
 #[derive(Debug, Clone)]
 pub struct Validation {
     kept: Vec<usize>,
@@ -47,7 +47,7 @@ impl Validation {
         Self::in_order(subject, set_aside, seed, blocks, 0)
     }
 
-    /// The same where rows that are up to `reach` apart in the file resemble each other: the random folds are purged.
+    /// The same with random folds purged for serial correlation over `reach` rows.
     pub fn in_order(
         subject: &Subject<'_>,
         set_aside: &[usize],
@@ -63,12 +63,12 @@ impl Validation {
         Self { kept, rows, random, blocks }
     }
 
-    /// Rows that are judged.
+    /// Number of validated rows.
     pub fn count(&self) -> usize {
         self.kept.len()
     }
 
-    /// Errors of a fit's kind of model.
+    /// Fitted and held-out errors of the model of a fit.
     pub fn stage(&self, fit: &Extended) -> StageError {
         let fitted = ErrorSummary::of(errors_on(&self.rows, &fit.model, &fit.frames));
         let p = fit.parameters.len() as f64;
@@ -91,14 +91,14 @@ impl Validation {
         [&self.random, &self.blocks].map(|splits| self.held_out(fit, splits))
     }
 
-    /// The same with every fold refitted by one step; `None` where a fold leaves the parameters undetermined.
+    /// The same with every fold refitted by one step; `None` if a fold leaves parameters undetermined.
     pub fn by_steps(&self, fit: &Extended) -> Option<[ErrorSummary; 2]> {
         let p = fit.parameters.len();
         let rows_of = |rows: &[usize]| -> Option<NormalEquations> {
             let observations: Vec<usize> = rows.iter().map(|&k| self.kept[k]).collect();
             Some(fit.problem.subsample(&observations)?.normal_equations(&fit.x))
         };
-        // The random folds share out all rows.
+        // The random folds partition all rows.
         let parts = self
             .random
             .par_iter()
@@ -176,7 +176,7 @@ impl Validation {
     }
 }
 
-/// The fit without its links freed: what the word `nominal` means in a diagnosis.
+/// The fit of frames alone, with the links of the data sheet: the stage `nominal` of a diagnosis.
 pub fn nominal(subject: &Subject<'_>) -> Extended {
     super::extension::fit(subject, &[], Freedom::Frames, None)
 }

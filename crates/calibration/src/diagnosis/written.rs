@@ -28,7 +28,7 @@ pub(super) fn kept(extended: &Extended, certain: &[bool]) -> Vec<Cause> {
 
 /// Whether a cause is of the arm, and yet none that a model of it can carry.
 pub(super) fn is_beyond_an_arm(cause: &Cause) -> bool {
-    matches!(cause, Cause::Measurement(d) if matches!(d.kind, Kind::Empirical(form) if form.is_of_the_arm()))
+    matches!(cause, Cause::Measurement(d) if matches!(d.kind, Kind::Empirical(form) if form.is_in_arm()))
 }
 
 /// The fit with these causes as its arm is written, under the tolerances that its own rows tell (the wide ones of the search would

@@ -85,7 +85,7 @@ impl EmpiricalFault {
     }
 
     /// Whether it is a fault of the arm (which no model file can represent yet) and not of the measurement.
-    pub fn is_of_the_arm(self) -> bool {
+    pub fn is_in_arm(self) -> bool {
         matches!(self, EmpiricalFault::NonlinearStiffness { .. } | EmpiricalFault::TwoJointGear { .. })
     }
 

@@ -19,7 +19,7 @@ use truegrind_calibration::diagnosis::diagnose::{Diagnosed, Options, diagnose};
 use truegrind_calibration::diagnosis::finding::{Confidence, Finding};
 use truegrind_calibration::diagnosis::halves::{HALVES, halves, is_path};
 use truegrind_calibration::diagnosis::marginal::variances;
-use truegrind_calibration::diagnosis::rows::prepare;
+use truegrind_calibration::diagnosis::preparation::prepare;
 use truegrind_calibration::identification::fit::errors_on;
 use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row, Sensor};
 use truegrind_calibration::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
@@ -187,7 +187,7 @@ fn nature_has_no_joint_that_yields_upwards() {
         })
     };
     for of in [&compliance as &dyn Fn(f64) -> Cause, &play, &sag] {
-        assert!(of(1e-5).is_possible() && !of(-1e-5).is_possible());
+        assert!(of(1e-5).has_plausible_sign() && !of(-1e-5).has_plausible_sign());
     }
 }
 

@@ -18,7 +18,7 @@ use truegrind_calibration::diagnosis::cause::Cause;
 use truegrind_calibration::diagnosis::diagnose::{Diagnosed, Options, diagnose};
 use truegrind_calibration::diagnosis::extension::{Extended, Freedom, Subject, fit};
 use truegrind_calibration::diagnosis::finding::Confidence;
-use truegrind_calibration::diagnosis::rows::prepare;
+use truegrind_calibration::diagnosis::preparation::prepare;
 use truegrind_calibration::measurement::dataset::{Dataset, Reading, Sensor};
 use truegrind_calibration::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
 use truegrind_calibration::measurement::sensor::empirical::EmpiricalFault;
@@ -147,13 +147,13 @@ fn the_first_joint_yields_only_where_another_shows_that_the_arm_leans() {
     let tried = |causes: &[Cause]| {
         let board =
             CandidateScores::of(&catalogue, &subject, Arc::new(fit(&subject, causes, Freedom::All, None)));
-        let all = board.scored(&board.whole.design, true);
-        all.iter().any(|s| s.candidate.cause.needs_lean())
+        let all = board.score_all(&board.whole.design, true);
+        all.iter().any(|s| s.candidate.cause.requires_tilt())
     };
     assert!(!tried(&[]), "nothing shows that the arm leans");
     assert!(tried(&[leaning(1)]));
-    assert!(leaning(0).needs_lean() && !leaning(1).needs_lean());
-    assert!(!Cause::lean_is_seen(&[leaning(0)]), "it is no witness of itself");
+    assert!(leaning(0).requires_tilt() && !leaning(1).requires_tilt());
+    assert!(!Cause::tilt_is_supported(&[leaning(0)]), "it is no witness of itself");
 }
 
 fn of_two_joints(joint: usize, other: usize, values: [f64; 4]) -> Cause {
@@ -167,9 +167,9 @@ fn of_two_joints(joint: usize, other: usize, values: [f64; 4]) -> Cause {
 #[test]
 fn an_error_of_two_joints_that_goes_with_the_weight_may_be_a_spring() {
     let arm = arm();
-    assert!(of_two_joints(2, 1, [3e-4, 1e-4, 2e-5, 0.0]).goes_with_weight(&arm));
-    assert!(of_two_joints(1, 2, [3e-4, 1e-4, 2e-5, 0.0]).goes_with_weight(&arm));
-    assert!(!of_two_joints(2, 1, [3e-4, 1e-4, 3e-4, 0.0]).goes_with_weight(&arm));
-    assert!(!of_two_joints(2, 3, [3e-4, 1e-4, 0.0, 0.0]).goes_with_weight(&arm), "axes that cross");
-    assert!(!of_two_joints(4, 1, [3e-4, 1e-4, 0.0, 0.0]).goes_with_weight(&arm), "no neighbours");
+    assert!(of_two_joints(2, 1, [3e-4, 1e-4, 2e-5, 0.0]).follows_gravity_angle(&arm));
+    assert!(of_two_joints(1, 2, [3e-4, 1e-4, 2e-5, 0.0]).follows_gravity_angle(&arm));
+    assert!(!of_two_joints(2, 1, [3e-4, 1e-4, 3e-4, 0.0]).follows_gravity_angle(&arm));
+    assert!(!of_two_joints(2, 3, [3e-4, 1e-4, 0.0, 0.0]).follows_gravity_angle(&arm), "axes that cross");
+    assert!(!of_two_joints(4, 1, [3e-4, 1e-4, 0.0, 0.0]).follows_gravity_angle(&arm), "no neighbours");
 }

@@ -15,9 +15,9 @@ use truegrind_calibration::diagnosis::diagnose::Options;
 use truegrind_calibration::diagnosis::extension::{Extended, Freedom, Subject, fit};
 use truegrind_calibration::diagnosis::held::FoldErrors;
 use truegrind_calibration::diagnosis::intervals::scan;
-use truegrind_calibration::diagnosis::levels::disjoint;
+use truegrind_calibration::diagnosis::levels::piecewise_levels;
 use truegrind_calibration::diagnosis::newton::descend;
-use truegrind_calibration::diagnosis::rows::{mismatches, prepare};
+use truegrind_calibration::diagnosis::preparation::{mismatches, prepare};
 use truegrind_calibration::diagnosis::score::score_columns;
 use truegrind_calibration::diagnosis::validation::Validation;
 use truegrind_calibration::measurement::dataset::Sensor;
@@ -184,7 +184,7 @@ fn a_refit_by_one_step_is_a_refit() {
         for (index, cause) in fitted.causes.iter().enumerate() {
             let candidate = Candidate::of(cause, subject);
             let (columns, sizes) = (candidate.columns(&design), cause.sizes());
-            let without = held.without(&fitted.places(index));
+            let without = held.without(&fitted.parameter_indices(index));
             let (alone, back) = (without.rmse_mm(None, &[]), without.rmse_mm(Some((&columns, &sizes)), &[]));
             assert!(alone > 1.5 * whole, "{cause:?} makes a difference: {alone} against {whole}");
             // Regressors are taken at the nominal arm.
@@ -207,7 +207,7 @@ fn knots_that_no_row_reaches_are_not_searched_for_and_change_nothing() {
         let causes = [Cause::Arm(Effect::GearMap(map))];
         let found = fit(subject, &causes, Freedom::All, Some(fitted));
         assert!(seen.len() < 72, "all {} knots are reached", seen.len());
-        let free = found.places(0).into_iter().map(|k| match found.parameters[k] {
+        let free = found.parameter_indices(0).into_iter().map(|k| match found.parameters[k] {
             Parameter::Effect { parameter, .. } => parameter,
             other => panic!("{other:?}"),
         });
@@ -272,7 +272,7 @@ fn part_of_the_whole(subject: &Subject<'_>, fitted: &Extended) {
     let whole = linear.whole();
     let columns = DMatrix::from_fn(270, 3, |i, k| ((i * (5 + k) + 3 * k) % 17) as f64 - 8.0);
     let on_whole = whole.design.project(&columns);
-    for dropped in [fitted.places(0), fitted.places(1), vec![2, 5, 9]] {
+    for dropped in [fitted.parameter_indices(0), fitted.parameter_indices(1), vec![2, 5, 9]] {
         // The long way: the smaller model's own basis.
         let own = linear.design(&dropped);
         let part = whole.without(&dropped);

@@ -366,7 +366,7 @@ fn compare(hidden: &[Hidden], found: &Diagnosed) -> (usize, usize) {
             if !same {
                 continue;
             }
-            let numbers = truegrind_calibration::diagnosis::words::parameters(&found.extended, index);
+            let numbers = truegrind_calibration::diagnosis::words::found_parameters(&found.extended, index);
             let sigma = |k: usize| numbers[k].sigma;
             let value = |k: usize| numbers[k].value;
             match h {

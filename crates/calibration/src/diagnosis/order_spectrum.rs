@@ -1,9 +1,8 @@
-//! At which orders a reducer speaks: lines of a joint-resolved residual.
+//! Order spectrum of a joint's residual; finds reducer harmonics.
 //!
-//! For every joint, the residual's projection on turning it, resolved at each order per turn: Σ aᵢ e^(i n uᵢ) with
-//! aᵢ = θᵢ·rᵢ, over Σ |θᵢ|². Powers of e^(iu) come by multiplication, so an order costs ten operations a row. What geometry
-//! shares with a line is left out here, which can only make a line look smaller; the few that stand out are then scored like
-//! any other candidate.
+//! For every joint, the projection of the residual on its rotation, by order n per turn: Σ aᵢ e^(i n uᵢ) with aᵢ = θᵢ·rᵢ,
+//! over Σ |θᵢ|². Powers of e^(iu) follow by multiplication, so an order costs ten operations a row. Correlation with geometry
+//! is ignored here, which can only underestimate a peak; the few strongest are then scored like any other candidate.
 
 use nalgebra::DVector;
 use rayon::prelude::*;
@@ -21,24 +20,23 @@ const LOWEST: usize = 3;
 /// Orders up to this are tried: twice the ratio of a strain-wave reducer of 1:160 is 320.
 pub const HIGHEST: usize = 330;
 
-/// A line's χ² from which a fine map is worth a try.
-const STANDS_OUT: f64 = 25.0;
+/// χ² of a peak from which a fine map is tried.
+const MAP_CHI_SQUARE: f64 = 25.0;
 
-/// Lines kept for each joint.
+/// Peaks kept for each joint.
 const KEPT: usize = 2;
 
-/// A joint's angles on the turn, as the orders go by: (cosine, sine) of once and twice the angle, filled up to whole blocks of
-/// rows.
-struct Turn {
+/// (cosine, sine) of a joint's angle and of twice the angle, padded to whole blocks of rows.
+struct JointHarmonics {
     once: [Vec<f64>; 2],
     twice: [Vec<f64>; 2],
 }
 
 /// The turns of all joints that moved; they depend on no fit.
-pub struct Turns([Option<Turn>; 6]);
+pub struct AngleHarmonics([Option<JointHarmonics>; 6]);
 
-impl Turns {
-    /// Of the rows of a data set.
+impl AngleHarmonics {
+    /// Computes them for the rows of a data set.
     pub fn of(subject: &Subject<'_>) -> Self {
         let rows = &subject.observed.dataset.rows;
         let mapped: Vec<_> = rows.iter().map(|r| subject.nominal.joint_map * r.joints).collect();
@@ -54,13 +52,13 @@ impl Turns {
                 };
                 [padded(f64::cos), padded(f64::sin)]
             };
-            (high - low > STILL_RAD).then(|| Turn { once: both(1.0), twice: both(2.0) })
+            (high - low > STILL_RAD).then(|| JointHarmonics { once: both(1.0), twice: both(2.0) })
         }))
     }
 }
 
-/// The strongest lines of a joint: their χ² and orders.
-fn strongest(turn: &Turn, theta: &DVector<f64>, design: &Design) -> Vec<(f64, usize)> {
+/// The strongest orders of a joint, with their χ².
+fn strongest_orders(harmonics: &JointHarmonics, theta: &DVector<f64>, design: &Design) -> Vec<(f64, usize)> {
     let mut weight = 0.0;
     let mut pull = vec![0.0; design.observations.next_multiple_of(ROWS)];
     for (i, p) in pull.iter_mut().enumerate().take(design.observations) {
@@ -69,7 +67,7 @@ fn strongest(turn: &Turn, theta: &DVector<f64>, design: &Design) -> Vec<(f64, us
             weight += theta[s] * theta[s];
         }
     }
-    let sums = vectorised(Orders { turn, pull: &pull });
+    let sums = vectorised(Orders { harmonics, pull: &pull });
     let of = |(order, [sine, cosine]): (usize, [f64; 2])| {
         (2.0 * (sine * sine + cosine * cosine) / weight.max(1e-300), order)
     };
@@ -80,14 +78,14 @@ fn strongest(turn: &Turn, theta: &DVector<f64>, design: &Design) -> Vec<(f64, us
 }
 
 /// Σ aᵢ sin(n uᵢ) and Σ aᵢ cos(n uᵢ) of every order n. Each sum is eight sums, of every eighth row, so that it does not depend on
-/// how many rows a register holds.
+/// the register width.
 struct Orders<'a> {
-    turn: &'a Turn,
+    harmonics: &'a JointHarmonics,
     /// a, a multiple of [`ROWS`] of them.
     pull: &'a [f64],
 }
 
-/// Rows that stay in registers while the orders go by.
+/// Rows of a block, which remain in registers over all orders.
 const ROWS: usize = 2 * WIDTH;
 
 impl AnyWidth for Orders<'_> {
@@ -95,11 +93,14 @@ impl AnyWidth for Orders<'_> {
 
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn run<R: SinCos>(self, like: R) -> Vec<[f64; 2]> {
-        let Self { turn: Turn { once: [cosines, sines], twice: [cosines_twice, sines_twice] }, pull } = self;
+        let Self {
+            harmonics: JointHarmonics { once: [cosines, sines], twice: [cosines_twice, sines_twice] },
+            pull,
+        } = self;
         let mut sums = vec![[[0.0; WIDTH]; 2]; HIGHEST + 1 - LOWEST];
         let registers = ROWS / R::ROWS;
         for first in (0..pull.len()).step_by(ROWS) {
-            // As many as a block of rows needs of the widest kind; what is narrower needs more.
+            // Sized for the narrowest registers; wider ones use fewer.
             let (mut s, mut c, mut sp, mut cp, mut a) =
                 ([like; ROWS], [like; ROWS], [like; ROWS], [like; ROWS], [like; ROWS]);
             for k in 0..registers {
@@ -122,25 +123,26 @@ impl AnyWidth for Orders<'_> {
     }
 }
 
-/// The strongest lines of every joint as candidates, and the joints in which lines within the reach of a fine map stand
-/// out, each with the place in [`FINE`] of the coarsest map that follows them.
+/// The strongest harmonics of every joint as candidates, and the joints with peaks in the range of a fine map, each with the
+/// index in [`FINE`] of the coarsest map that resolves them.
 pub fn candidates(
     subject: &Subject<'_>,
-    turns: &Turns,
+    turns: &AngleHarmonics,
     design: &Design,
 ) -> (Vec<Candidate>, Vec<(usize, usize)>) {
     let dataset = &subject.observed.dataset;
     let strongest: Vec<(f64, usize, usize)> = (0..6)
         .into_par_iter()
         .flat_map_iter(|joint| {
-            let lines =
-                turns.0[joint].as_ref().map(|turn| strongest(turn, &design.slopes.by_joint[joint], design));
+            let lines = turns.0[joint]
+                .as_ref()
+                .map(|harmonics| strongest_orders(harmonics, &design.slopes.by_joint[joint], design));
             lines.into_iter().flatten().map(move |(size, order)| (size, joint, order))
         })
         .collect();
     let mut mapped: Vec<(usize, usize)> = strongest
         .iter()
-        .filter(|(size, ..)| *size > STANDS_OUT)
+        .filter(|(size, ..)| *size > MAP_CHI_SQUARE)
         .filter_map(|(_, joint, order)| Some((*joint, FINE.iter().position(|(_, reach)| order <= reach)?)))
         .collect();
     mapped.sort_unstable();

@@ -1,10 +1,10 @@
-//! What the extended model leaves: gross outliers, noise that grows with range, and structure without a name.
+//! Tests of the extended model's residual: gross outliers, noise that grows with range, unexplained structure.
 //!
-//! - Outliers: Student's t is fitted by its quantiles to the bulk of the residuals' sizes, so a heavy tail is not taken for
-//!   accidents; a row is an outlier where its size, under that tail, would come once in a hundred data sets of this length.
-//! - Range: Spearman's rank correlation of size and distance; where it is sure, σ₀ and slope by least squares on the sizes.
-//! - Structure: rows that are neighbours in joint space, and rows that follow each other, should not resemble one another.
-//!   Correlation of their residuals, with the exact variance under exchangeability (Moran 1950; von Neumann 1941).
+//! - Outliers: Student's t is fitted to quantiles of the residual sizes, so that a heavy tail does not count as outliers; a row
+//!   is an outlier if its size, under that tail, occurs once in a hundred data sets of this length.
+//! - Range: Spearman's rank correlation of size and distance; if significant, σ₀ and slope by least squares on the sizes.
+//! - Structure: correlation of residuals of neighbours in joint space and of consecutive rows, with the exact variance under
+//!   exchangeability (Moran 1950; von Neumann 1941).
 
 use nalgebra::Vector3;
 
@@ -26,33 +26,34 @@ pub struct NoiseModel {
     pub p_value: f64,
 }
 
-/// Structure that is left.
+/// Correlations of residuals.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Structure {
-    /// Correlation of residuals with that of the nearest pose.
+    /// Correlation with the residual of the nearest pose.
     pub neighbours: f64,
     /// Its z-score.
     pub neighbours_z: f64,
-    /// Correlation with the residual of the row before.
+    /// Correlation with the residual of the previous row.
     pub order: f64,
     /// Its z-score.
     pub order_z: f64,
 }
 
-/// Neighbours must resemble each other by this many standard deviations to be called structure.
+/// Smallest z-score of structure.
 const STRUCTURE_Z: f64 = 5.5;
 
-/// And by at least this correlation: a large set makes any trifle significant.
+/// Smallest correlation of structure: in a large data set any trifle is significant.
 const STRUCTURE_R: f64 = 0.15;
 
-/// Whether a correlation of neighbours, with its z-score, is structure.
-pub fn stands_out(correlation: f64, z: f64) -> bool {
+/// Whether a correlation of neighbours is structure.
+pub fn is_structure(correlation: f64, z: f64) -> bool {
     z > STRUCTURE_Z && correlation > STRUCTURE_R
 }
 
-/// Whether something repeatable is left.
-pub fn patterned(structure: &Structure) -> bool {
-    stands_out(structure.neighbours, structure.neighbours_z) || stands_out(structure.order, structure.order_z)
+/// Whether the residual has structure.
+pub fn has_structure(structure: &Structure) -> bool {
+    is_structure(structure.neighbours, structure.neighbours_z)
+        || is_structure(structure.order, structure.order_z)
 }
 
 /// Residual vectors (whitened, position part) of all rows.
@@ -69,7 +70,7 @@ fn vectors(subject: &Subject<'_>, fit: &Extended) -> Vec<Vector3<f64>> {
         .map(|(i, w)| {
             Vector3::from_fn(|k, _| {
                 if k < per.min(3) {
-                    // Residuals are held with Huber's weight in the problem; plain ones are in mm.
+                    // Plain residuals are in mm, without Huber's weights.
                     plain[i * per + k] * w.per_mm
                 } else {
                     0.0
@@ -80,7 +81,7 @@ fn vectors(subject: &Subject<'_>, fit: &Extended) -> Vec<Vector3<f64>> {
         .collect()
 }
 
-/// Rows beyond any tail that the others have, with their size in standard deviations, largest first.
+/// Gross outliers with their sizes in standard deviations, largest first.
 pub fn outliers(fit: &Extended) -> Vec<(usize, f64)> {
     let n = fit.sizes.len();
     if n < 12 {
@@ -91,9 +92,9 @@ pub fn outliers(fit: &Extended) -> Vec<(usize, f64)> {
     // A heavy tail stretches the 95 % quantile against the median.
     let quantile = |p: f64| sorted[((n - 1) as f64 * p) as usize];
     let (middle, high) = (quantile(0.5).max(1e-12), quantile(0.95));
-    // Sizes of whole vectors: the reach of a tail is taken as that of one coordinate with the same stretch.
+    // Sizes of vectors: their tail is approximated by that of one coordinate with the same quantile ratio.
     let stretch = high / middle;
-    // Two quantiles of a few hundred sizes cannot rule out a tail of five degrees of freedom: it is always allowed for.
+    // Two quantiles of a few hundred sizes cannot exclude five degrees of freedom, so the tail is never assumed lighter.
     let limit = middle * reach(heaviness(stretch), n);
     let mut rows: Vec<(usize, f64)> =
         fit.sizes.iter().copied().enumerate().filter(|(_, s)| !(*s <= limit)).collect();
@@ -116,8 +117,8 @@ fn heaviness(stretch: f64) -> f64 {
     5.0
 }
 
-/// Size over median beyond which one of n rows comes once in a hundred data sets, for Student's t with ν degrees of
-/// freedom: its tail falls as the power ν, tied to its 97.5 % quantile.
+/// Size over median that one of n rows exceeds once in a hundred data sets, for Student's t with ν degrees of freedom: its
+/// tail falls as the power ν, matched at the 97.5 % quantile.
 fn reach(nu: f64, n: usize) -> f64 {
     let p = 1e-2 / n as f64;
     let quantile = 1.96 + 2.0 / nu + 5.4 / (nu * nu);
@@ -125,7 +126,7 @@ fn reach(nu: f64, n: usize) -> f64 {
     (3.0 * 0.05 * quantile.powf(nu) / p).powf(1.0 / nu) / median
 }
 
-/// Whether the noise grows with range.
+/// Fits noise that grows with range; `None` if insignificant.
 pub fn noise_model(subject: &Subject<'_>, fit: &Extended, set_aside: &[usize]) -> Option<NoiseModel> {
     let dataset = &subject.observed.dataset;
     let plain = fit.problem.errors_mm(&fit.x);
@@ -187,12 +188,12 @@ pub fn noise_model(subject: &Subject<'_>, fit: &Extended, set_aside: &[usize]) -
     })
 }
 
-/// Correlations of neighbours.
+/// Correlations of neighbouring residuals.
 pub fn structure(subject: &Subject<'_>, fit: &Extended, set_aside: &[usize]) -> Structure {
     let dataset = &subject.observed.dataset;
     let all = vectors(subject, fit);
     let kept: Vec<usize> = (0..all.len()).filter(|i| !set_aside.contains(i)).collect();
-    // Bounded, so that no single row makes a correlation.
+    // Clamped, so that no single row dominates.
     let values: Vec<Vector3<f64>> = kept.iter().map(|&i| all[i].map(|c| c.clamp(-3.0, 3.0))).collect();
     let power = values.iter().map(Vector3::norm_squared).sum::<f64>() / values.len().max(1) as f64;
     let dimensions = if dataset.sensor == Sensor::Cable { 1.0 } else { 3.0 };
@@ -202,7 +203,7 @@ pub fn structure(subject: &Subject<'_>, fit: &Extended, set_aside: &[usize]) -> 
             pairs.iter().map(|&(a, b)| values[a].dot(&values[b])).sum::<f64>() / count / power.max(1e-300);
         (r, r * (count * dimensions).sqrt())
     };
-    // Nearest poses: by joint angles, among rows close in the order of a projection, which is enough for a statistic.
+    // Nearest poses by joint angles; a window of rows is enough for the statistic.
     let mut pairs: Vec<(usize, usize)> = Vec::new();
     let joints: Vec<_> = kept.iter().map(|&i| dataset.rows[i].joints).collect();
     let window = 4000.min(joints.len());
@@ -213,7 +214,7 @@ pub fn structure(subject: &Subject<'_>, fit: &Extended, set_aside: &[usize]) -> 
             .take(window)
             .filter(|(b, _)| *b != a)
             .map(|(b, r)| ((q - r).norm_squared(), b))
-            // Repetitions of one pose share its error in truth: they are the noise floor, not structure.
+            // Repetitions of one pose share its error: they belong to the noise floor, not to structure.
             .filter(|(d, _)| *d > 1e-6)
             .min_by(|x, y| x.0.total_cmp(&y.0));
         if let Some((_, b)) = nearest {
@@ -228,7 +229,7 @@ pub fn structure(subject: &Subject<'_>, fit: &Extended, set_aside: &[usize]) -> 
     Structure { neighbours, neighbours_z, order, order_z }
 }
 
-/// Median size of the rows' errors (mm), for words.
-pub fn typical_mm(fit: &Extended) -> f64 {
+/// Median error of the rows (mm).
+pub fn median_error_mm(fit: &Extended) -> f64 {
     median(&fit.problem.errors_mm(&fit.x).iter().map(|e| e.abs()).collect::<Vec<_>>()).unwrap_or(0.0)
 }

@@ -1,10 +1,9 @@
-//! Readings of one pose are one witness of what the model gets wrong there.
+//! Design effect of repeated poses: readings of one pose share its model error (a random effect of the pose).
 //!
-//! What a model gets wrong at a pose is in every reading of that pose; only the sensor's noise is new in each. With variance b
-//! from pose to pose and w from reading to reading, k readings say of the pose what one of variance b + w/k would: each counts with
-//! 1/(1 + (k − 1) ρ), ρ = b/(b + w). Both variances are those of the residuals, b with the degrees of freedom that the poses have
-//! when all parameters are paid for: with few poses a model that follows each of them leaves nothing between them, and that is no
-//! proof of it. Where the model is right b is nothing, and each reading counts.
+//! With variance b between poses and w within a pose, k readings of a pose are equivalent to one of variance b + w/k: each counts
+//! 1/(1 + (k − 1) ρ), ρ = b/(b + w) the intraclass correlation. Both are estimated from the residuals, b with the degrees of freedom
+//! of the poses less the fitted parameters: a flexible model of few poses leaves no variance between them, which does not prove the
+//! model. For a correct model b = 0, and every reading counts fully.
 //!
 //! Source: Kish 1965 (design effect); Henderson's third method for b and w.
 
@@ -13,58 +12,58 @@ use std::ops::Range;
 use crate::measurement::dataset::Dataset;
 use crate::measurement::split;
 
-/// Repeated readings from which the noise from reading to reading is known.
+/// Fewest repeated readings for an estimate of the variance within poses.
 const KNOWN: usize = 20;
 
-/// Share of the poses' degrees of freedom that is left however many parameters there are.
+/// Smallest assumed share of the poses' degrees of freedom after the parameters are fitted.
 const LEFT: f64 = 0.05;
 
-/// Which rows are of one pose.
+/// The pose of each row.
 #[derive(Debug, Clone)]
-pub(super) struct Repeated {
+pub(super) struct RepeatedPoses {
     pose_of_row: Vec<usize>,
     poses: usize,
 }
 
-/// Variances of whitened residuals.
+/// Variance components of whitened residuals.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Parts {
-    /// From pose to pose.
+pub(super) struct VarianceComponents {
+    /// Between poses.
     pub(super) between: f64,
-    /// From reading to reading.
+    /// Within poses.
     pub(super) within: f64,
 }
 
-impl Parts {
-    /// The whole standard deviation of a reading.
+impl VarianceComponents {
+    /// Total standard deviation of a reading.
     pub(super) fn deviation(&self) -> f64 {
         (self.between + self.within).sqrt()
     }
 
-    /// What one of so many readings of a pose counts.
-    fn counts(&self, readings: f64) -> f64 {
+    /// Effective weight of one of `readings` readings of a pose.
+    fn effective_weight(&self, readings: f64) -> f64 {
         let shared = self.between / (self.between + self.within).max(f64::MIN_POSITIVE);
         1.0 / (1.0 + (readings - 1.0).max(0.0) * shared)
     }
 }
 
-impl Repeated {
-    /// Of a data set; `None` where too few poses were read again.
+impl RepeatedPoses {
+    /// The poses of a data set; `None` for too few repeated readings.
     pub(super) fn of(dataset: &Dataset) -> Option<Self> {
         let pose_of_row = split::pose_of_rows(dataset);
         let poses = pose_of_row.iter().max().map_or(0, |p| p + 1);
         (pose_of_row.len() >= poses + KNOWN).then_some(Self { pose_of_row, poses })
     }
 
-    /// The parts of residuals: `whitened` gives scalar `c` of row i, `share` how much a row counts, and `spent` parameters are
-    /// paid for by the rows.
-    pub(super) fn parts(
+    /// Variance components of residuals: `whitened` gives scalar `c` of row i, `share` is the weight of a row, and `spent` the effective
+    /// number of fitted parameters.
+    pub(super) fn components(
         &self,
         range: &Range<usize>,
         whitened: impl Fn(usize, usize) -> f64,
         share: &[f64],
         spent: f64,
-    ) -> Parts {
+    ) -> VarianceComponents {
         let rows = self.pose_of_row.len();
         let mut weight = vec![0.0; self.poses];
         (0..rows).for_each(|i| weight[self.pose_of_row[i]] += share[i]);
@@ -84,17 +83,17 @@ impl Repeated {
         let all: f64 = weight.iter().sum();
         let free = (self.poses as f64 * scalars - spent).max(LEFT * self.poses as f64 * scalars);
         let within = within / ((rows - self.poses) as f64 * scalars);
-        // Readings of a pose, as the sum of squares between poses sees them.
+        // Effective number of readings per pose in the sum of squares between poses.
         let usual =
             (all - weight.iter().map(|w| w * w).sum::<f64>() / all) / (self.poses as f64 - 1.0).max(1.0);
         let between = ((between / free - within) / usual.max(1.0)).max(0.0);
-        Parts { between, within }
+        VarianceComponents { between, within }
     }
 
-    /// What each row counts.
-    pub(super) fn counts(&self, parts: &Parts) -> Vec<f64> {
+    /// The effective weight of each row.
+    pub(super) fn effective_weights(&self, components: &VarianceComponents) -> Vec<f64> {
         let mut readings = vec![0.0; self.poses];
         self.pose_of_row.iter().for_each(|&pose| readings[pose] += 1.0);
-        self.pose_of_row.iter().map(|&pose| parts.counts(readings[pose])).collect()
+        self.pose_of_row.iter().map(|&pose| components.effective_weight(readings[pose])).collect()
     }
 }

@@ -1,61 +1,61 @@
-//! What the named causes leave, in words: something that depends on the pose or on the order of the rows, or noise.
+//! The unexplained part of the residual: a significant discrepancy over poses or time, or noise.
 
 use super::discrepancy::Discrepancy;
 use super::finding::{Confidence, Finding, Gain};
-use super::remaining::{Structure, stands_out};
+use super::residual_tests::{Structure, is_structure};
 use super::validation::StageError;
 use super::words;
 use crate::measurement::dataset::Dataset;
 
-/// Share of what is left that something else must be worth to be a finding of its own.
-const WORTH: f64 = 0.3;
+/// Smallest share of the residual that makes a discrepancy a finding.
+const LEAST_SHARE: f64 = 0.3;
 
-/// Rows that are named as those in which it shows most.
-const SHOWN: usize = 10;
+/// Number of rows listed, those with the largest discrepancy.
+const MOST_ROWS: usize = 10;
 
-/// What is left is told against the floor where it is this many times as large.
-const ABOVE_FLOOR: f64 = 1.5;
+/// Ratio of residual to noise floor from which the residual is reported.
+const FLOOR_RATIO: f64 = 1.5;
 
-/// What was looked at.
-pub(super) struct Left<'a> {
-    /// The rows in which causes were looked for.
+/// The residual of the extended model and its discrepancy.
+pub(super) struct Unexplained<'a> {
+    /// The searched rows.
     pub(super) dataset: &'a Dataset,
-    /// What no cause describes.
+    /// The model discrepancy.
     pub(super) discrepancy: &'a Discrepancy,
-    /// Correlations of neighbours.
+    /// Correlations of neighbouring residuals.
     pub(super) structure: &'a Structure,
     /// Errors of the extended model.
     pub(super) after: &'a StageError,
-    /// The held-out error before a smooth correction, where there is one (mm).
+    /// The held-out error before a smooth correction, if there is one (mm).
     pub(super) smoothed: Option<f64>,
-    /// What sensor and rounding leave (mm).
+    /// The noise floor (mm).
     pub(super) floor_mm: Option<f64>,
 }
 
-impl Left<'_> {
-    /// Whether something else than noise is left.
-    fn speaks(&self) -> bool {
-        self.discrepancy.speaks() && self.discrepancy.worth_mm() > WORTH * self.after.fitted.rmse
+impl Unexplained<'_> {
+    /// Whether the residual has a significant part that is not noise.
+    fn is_significant(&self) -> bool {
+        self.discrepancy.speaks() && self.discrepancy.worth_mm() > LEAST_SHARE * self.after.fitted.rmse
     }
 
-    /// One sentence; nothing where all is noise as it should be.
+    /// One sentence; `None` for a residual at the noise floor.
     pub(super) fn sentence(&self) -> Option<String> {
         let rmse = self.after.fitted.rmse;
-        if self.speaks() {
+        if self.is_significant() {
             return Some(format!(
-                "{rmse:.3} mm RMS, {:.3} mm of it something else than noise: {}",
+                "{rmse:.3} mm RMS, of which {:.3} mm is not noise: {}",
                 self.discrepancy.worth_mm(),
-                self.likeness()
+                self.description()
             ));
         }
-        let floor = self.floor_mm.filter(|floor| rmse > ABOVE_FLOOR * floor)?;
+        let floor = self.floor_mm.filter(|floor| rmse > FLOOR_RATIO * floor)?;
         Some(format!(
-            "{rmse:.3} mm RMS against a floor of {floor:.3} mm, without a pattern: noise of sensor or arm"
+            "{rmse:.3} mm RMS compared with a noise floor of {floor:.3} mm, without a pattern: noise of sensor or arm"
         ))
     }
 
-    /// What it is like, largest part first.
-    fn likeness(&self) -> String {
+    /// The largest parts of the discrepancy.
+    fn description(&self) -> String {
         let parts: Vec<String> = self
             .discrepancy
             .carried
@@ -63,28 +63,27 @@ impl Left<'_> {
             .take(2)
             .map(|(group, mm)| format!("{mm:.3} mm as if {}", group.words()))
             .collect();
-        let correlated = (self.discrepancy.correlation != 0.0).then(|| {
-            format!("readings resemble the one before them (correlation {:.2})", self.discrepancy.correlation)
-        });
+        let correlated = (self.discrepancy.correlation != 0.0)
+            .then(|| format!("consecutive readings are correlated ({:.2})", self.discrepancy.correlation));
         parts.into_iter().chain(correlated).collect::<Vec<_>>().join("; ")
     }
 
     /// The finding.
     pub(super) fn finding(&self) -> Option<Finding> {
-        self.speaks().then(|| {
+        self.is_significant().then(|| {
             let mut order: Vec<usize> = (0..self.discrepancy.push_mm.len()).collect();
             let push = &self.discrepancy.push_mm;
             order.sort_by(|&a, &b| push[b].total_cmp(&push[a]).then(a.cmp(&b)));
             let mut rows: Vec<usize> =
-                order.iter().take(SHOWN).map(|&i| self.dataset.rows[i].number).collect();
+                order.iter().take(MOST_ROWS).map(|&i| self.dataset.rows[i].number).collect();
             rows.sort_unstable();
             Finding {
                 effect: "unexplained".to_owned(),
                 cause: format!(
-                    "something else is at work that nothing in the catalogue describes: {}{}",
-                    self.likeness(),
+                    "an error remains that no cause in the catalogue explains: {}{}",
+                    self.description(),
                     if self.smoothed.is_some() {
-                        "; a smooth correction follows a part of it, without saying what it is"
+                        "; a smooth correction without a physical cause follows part of it"
                     } else {
                         ""
                     }
@@ -113,13 +112,13 @@ impl Left<'_> {
     fn evidence(&self) -> String {
         let s = self.structure;
         let mut out = format!(
-            "random functions of time and pose beside the causes: twice the log Bayes factor {:.0}",
+            "random functions of time and pose in addition to the causes: twice the log Bayes factor {:.0}",
             self.discrepancy.evidence
         );
         for (r, z, what) in
             [(s.neighbours, s.neighbours_z, "nearest poses"), (s.order, s.order_z, "consecutive rows")]
         {
-            if stands_out(r, z) {
+            if is_structure(r, z) {
                 out.push_str(&format!("; residuals of {what} are correlated by {r:.2} (z = {z:.1})"));
             }
         }

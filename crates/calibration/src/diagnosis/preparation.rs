@@ -1,8 +1,8 @@
-//! Rows before any fit: angles sharpened by the read-out, and rows whose own columns contradict each other.
+//! Prepares the rows before any fit: read-out fusion, contradicting columns, approach sides and motion from the row order.
 //!
-//! A read-out is the controller's own forward map of the angles that it did not round, at its own tool point. Where a row's
-//! read-out lies further from its angles than rounding and the other rows' scatter allow, one of the two was not written
-//! at the same moment, or by the same pose. Such a row keeps its logged angles; the others are sharpened without it.
+//! A read-out is the controller's forward kinematics of the unrounded angles, at its own tool point. If it deviates from the
+//! logged angles by more than rounding and the other rows' scatter allow, the two were not logged at the same time or pose. Such
+//! a row keeps its logged angles; the others are fused without it.
 
 use std::sync::Arc;
 
@@ -19,19 +19,19 @@ use truegrind_math::statistics::median;
 /// Rows whose columns contradict each other.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Mismatch {
-    /// Index of the row and how far read-out and angles are apart (mm).
+    /// Index of the row, and deviation of its read-out from its angles (mm).
     pub rows: Vec<(usize, f64)>,
-    /// What the other rows scatter by (mm, robust).
+    /// Scatter of the other rows (mm, robust).
     pub usual_mm: f64,
 }
 
-/// A mismatch is this many times what the other rows scatter by.
+/// Ratio of deviation to the other rows' scatter from which a row is a mismatch.
 const CUT: f64 = 8.0;
 
-/// More rows than this share are no accident but another tool point or arm.
+/// Share of mismatches above which they indicate another tool point or arm, not single wrong rows.
 const SHARE: f64 = 0.1;
 
-/// Finds rows whose read-out belongs to another pose.
+/// Finds rows whose read-out is of another pose.
 pub fn mismatches(dataset: &Dataset, nominal: &Model) -> Mismatch {
     let posed = nominal.at_condition(&Condition::default());
     let gaps: Vec<Option<(usize, Vector3<f64>)>> = dataset
@@ -66,19 +66,19 @@ pub fn mismatches(dataset: &Dataset, nominal: &Model) -> Mismatch {
 /// Rows ready for a fit.
 #[derive(Debug, Clone)]
 pub struct Prepared {
-    /// The rows with what is known of their angles.
+    /// The rows with the covariances of their angles.
     pub observed: Observations,
-    /// The same without the use of the read-out.
+    /// The rows without read-out fusion.
     pub logged: Observations,
-    /// What sharpening brought, or why it was not done.
+    /// Result of the read-out fusion, or why it was not done.
     pub readout_fusion: Result<ReadoutFusion, NotFused>,
     /// Contradicting rows.
     pub mismatch: Mismatch,
-    /// Whether the sides of approach were taken from the order of the rows.
+    /// Whether approach sides were inferred from the order of the rows.
     pub sides_from_order: bool,
 }
 
-/// Prepares a data set; rounded angles are sharpened by the controller's read-out where that is wanted (`fuse`).
+/// Prepares a data set; with `fuse`, rounded angles are fused with the controller's read-out.
 pub fn prepare(dataset: &Dataset, nominal: &Model, fuse: bool) -> Prepared {
     let mismatch = mismatches(dataset, nominal);
     let mut rows = dataset.clone();
@@ -87,7 +87,7 @@ pub fn prepare(dataset: &Dataset, nominal: &Model, fuse: bool) -> Prepared {
         for i in 1..rows.rows.len() {
             let step = dataset.rows[i].joints - dataset.rows[i - 1].joints;
             Arc::make_mut(&mut rows.rows[i].condition).approach =
-                // A joint that moved up came from below, which is −1.
+                // An increasing joint angle approaches from below (−1).
                 std::array::from_fn(|j| if step[j].abs() < 1e-6 { 0 } else { -step[j].signum() as i8 });
         }
     }
@@ -111,7 +111,7 @@ pub fn prepare(dataset: &Dataset, nominal: &Model, fuse: bool) -> Prepared {
     Prepared { observed, logged, readout_fusion, mismatch, sides_from_order: silent }
 }
 
-/// Notes for each row how the arm came to it; the first row came from nowhere.
+/// Fills in the motion from the previous row; the first row has none.
 fn fill_motion(dataset: &mut Dataset) {
     let path = is_path(dataset);
     let rows: Vec<(Joints, Option<f64>)> =

@@ -1,0 +1,67 @@
+//! Contributions of causes to the readings (mm RMS): total, and unique beyond everything else in the model.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::catalogue::Candidate;
+use super::cause::Cause;
+use super::design::FullDesign;
+use super::extension::{Extended, Subject};
+
+/// Contributions of the causes of a fit.
+pub(super) struct Contributions<'a> {
+    fit: &'a Extended,
+    whole: &'a FullDesign,
+    /// Whitened columns of each cause times its estimate.
+    effects: Vec<DVector<f64>>,
+    /// [`Contributions::unique_rms_mm`] of each cause alone (mm).
+    unique: Vec<f64>,
+}
+
+impl<'a> Contributions<'a> {
+    /// Contributions of the causes of `fit`, linearised as `whole`.
+    pub(super) fn new(subject: &Subject<'_>, fit: &'a Extended, whole: &'a FullDesign) -> Self {
+        let effect = |cause: &Cause| {
+            Candidate::of(cause, subject).columns(&whole.design) * DVector::from_vec(cause.values())
+        };
+        let effects = fit.causes.par_iter().map(effect).collect();
+        let mut out = Self { fit, whole, effects, unique: Vec::new() };
+        out.unique = (0..fit.causes.len()).into_par_iter().map(|k| out.unique_of(&[k])).collect();
+        out
+    }
+
+    /// Total contribution of `causes` together (mm RMS over the observations).
+    pub(super) fn rms_mm(&self, causes: &[usize]) -> f64 {
+        self.in_mm(&self.sum(causes))
+    }
+
+    /// Unique contribution of `causes` together (mm RMS over the observations): the part that links, frames and the other causes
+    /// cannot absorb.
+    pub(super) fn unique_rms_mm(&self, causes: &[usize]) -> f64 {
+        match causes {
+            [] => 0.0,
+            [one] => self.unique[*one],
+            many => self.unique_of(many),
+        }
+    }
+
+    /// The causes are removed together before their effect is projected off the rest: they do not compete with each other.
+    fn unique_of(&self, causes: &[usize]) -> f64 {
+        let indices: Vec<usize> = causes.iter().flat_map(|&k| self.fit.parameter_indices(k)).collect();
+        let without = self.whole.without(&indices);
+        let effect = DMatrix::from_columns(&[self.sum(causes)]);
+        let projected = without.project(&effect);
+        self.in_mm(&without.pure(&effect, &projected).column(0).into_owned())
+    }
+
+    fn sum(&self, causes: &[usize]) -> DVector<f64> {
+        let rows = self.whole.design.slopes.mm.len();
+        causes.iter().fold(DVector::zeros(rows), |sum, &k| sum + &self.effects[k])
+    }
+
+    fn in_mm(&self, effect: &DVector<f64>) -> f64 {
+        let mm = &self.whole.design.slopes.mm;
+        let square: f64 = effect.iter().zip(mm).map(|(v, mm)| (v * mm).powi(2)).sum();
+        (square / self.whole.design.observations.max(1) as f64).sqrt()
+    }
+}

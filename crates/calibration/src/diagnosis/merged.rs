@@ -1,0 +1,245 @@
+//! Merges findings for the report, and ranks them by their contribution (mm RMS).
+//!
+//! Causes of one effect and joint share a finding already. Here three or more shifts are merged ("the set-up changed with
+//! time"), as are shifts that cannot be distinguished from a smooth drift; small contributions are merged without naming a
+//! part.
+
+use super::confirmation::Confirmation;
+use super::confounding::Confounding;
+use super::contribution::Contributions;
+use super::discrepancy::Discrepancy;
+use super::finding::{Confidence, Finding, Gain, Session};
+use super::picture::Picture;
+use super::words;
+
+/// A finding with its causes.
+#[derive(Debug, Clone)]
+pub(super) struct MergedFinding {
+    pub(super) finding: Finding,
+    pub(super) picture: Option<Picture>,
+    /// Indices of its causes in the fit.
+    pub(super) causes: Vec<usize>,
+    /// Those of them that are doubtful, in a finding that also has others.
+    pub(super) doubted: Vec<usize>,
+}
+
+/// Number of shifts from which they are merged.
+const MANY_SHIFTS: usize = 3;
+
+/// Contribution, as a share of the error of geometry alone, below which a finding is a small disturbance.
+const SMALL_SHARE: f64 = 0.02;
+
+/// Number of findings with a cause above which small doubtful ones are merged.
+const MOST_REPORTED: usize = 9;
+
+/// Contribution, as a share of that error, from which a doubtful finding is always reported separately.
+const DOUBTFUL_SHARE: f64 = 0.1;
+
+/// The findings with the causes that refer to them, in the order of `findings`.
+pub(super) fn from_findings(
+    findings: Vec<Finding>,
+    finding_of_cause: &[usize],
+    pictures: Vec<Picture>,
+) -> Vec<MergedFinding> {
+    findings
+        .into_iter()
+        .zip(pictures)
+        .enumerate()
+        .map(|(place, (finding, picture))| MergedFinding {
+            finding,
+            picture: Some(picture),
+            causes: (0..finding_of_cause.len()).filter(|&k| finding_of_cause[k] == place).collect(),
+            doubted: Vec::new(),
+        })
+        .collect()
+}
+
+/// Marks unconfirmed findings, computes contributions, and merges findings.
+pub(super) fn merge_findings(
+    mut findings: Vec<MergedFinding>,
+    confirmations: &[Confirmation],
+    discrepancy: &Discrepancy,
+    confounding: &Confounding<'_>,
+    geometric_mm: f64,
+) -> Vec<MergedFinding> {
+    let contributions = confounding.contributions;
+    for merged in &mut findings {
+        // A finding is confirmed with any of its causes.
+        if !merged.causes.iter().any(|&k| confirmations[k].is_confirmed()) {
+            merged.finding.confidence = Confidence::Ambiguous;
+            let first = merged.causes.first();
+            merged.finding.doubts.extend(first.map(|&k| confirmations[k].doubts()).unwrap_or_default());
+        }
+        merged.finding.worth_mm = Some(contributions.rms_mm(&merged.causes));
+    }
+    for merged in &mut findings {
+        let doubts = confounding.doubts(&merged.causes);
+        if !doubts.is_empty() {
+            merged.finding.confidence = Confidence::Ambiguous;
+            merged.finding.doubts.extend(doubts);
+        }
+    }
+    let smooth = discrepancy.in_time();
+    let is_shift = |s: &MergedFinding| s.finding.rows.is_some();
+    let is_absorbed = |s: &MergedFinding| smooth && s.causes.iter().all(|&k| !confirmations[k].beside);
+    let shifts = findings.iter().filter(|s| is_shift(s)).count();
+    if shifts >= MANY_SHIFTS || findings.iter().any(|s| is_shift(s) && is_absorbed(s)) {
+        merge(&mut findings, is_shift, contributions, |members, worth_mm| {
+            let steps = shifts >= MANY_SHIFTS && !members.iter().all(is_absorbed);
+            setup_change(members, worth_mm, steps, smooth)
+        });
+    }
+    let small = |s: &MergedFinding| s.finding.worth_mm.is_some_and(|w| w < SMALL_SHARE * geometric_mm);
+    let excess = excess(&findings, small, DOUBTFUL_SHARE * geometric_mm);
+    let is_excess = |s: &MergedFinding| s.causes.first().is_some_and(|k| excess.contains(k));
+    if findings.iter().any(|s| small(s) || is_excess(s)) {
+        let excess_only = !excess.is_empty();
+        let told = |members: &[MergedFinding], mm: f64| small_disturbances(members, mm, excess_only);
+        merge(&mut findings, |s| small(s) || is_excess(s), contributions, told);
+        let told = findings.iter_mut().find(|s| s.finding.effect == SMALL_DISTURBANCES);
+        told.into_iter().for_each(|s| s.doubted = excess.clone());
+    }
+    findings
+}
+
+/// Causes of doubtful findings below `doubtful_mm`, smallest first, as many as exceed [`MOST_REPORTED`].
+fn excess(
+    findings: &[MergedFinding],
+    small: impl Fn(&MergedFinding) -> bool,
+    doubtful_mm: f64,
+) -> Vec<usize> {
+    let worth = |s: &MergedFinding| s.finding.worth_mm.unwrap_or(f64::INFINITY);
+    let told: Vec<&MergedFinding> = findings.iter().filter(|s| !small(s)).collect();
+    if told.len() <= MOST_REPORTED {
+        return Vec::new();
+    }
+    let doubted =
+        |s: &&&MergedFinding| s.finding.confidence == Confidence::Ambiguous && worth(s) < doubtful_mm;
+    let mut least: Vec<&&MergedFinding> = told.iter().filter(doubted).collect();
+    least.sort_by(|a, b| worth(a).total_cmp(&worth(b)));
+    // The merged finding takes one line.
+    let beyond = told.len() + 1 - MOST_REPORTED;
+    least.into_iter().take(beyond).flat_map(|s| s.causes.iter().copied()).collect()
+}
+
+/// For each cause, whether it is certain enough for compensation.
+pub(super) fn certain_causes(findings: &[MergedFinding], confirmations: &[Confirmation]) -> Vec<bool> {
+    let mut out: Vec<bool> = confirmations.iter().map(Confirmation::is_confirmed).collect();
+    for merged in findings.iter().filter(|s| s.finding.effect != SMALL_DISTURBANCES) {
+        if merged.finding.confidence == Confidence::Ambiguous {
+            merged.causes.iter().for_each(|&k| out[k] = false);
+        }
+    }
+    findings.iter().flat_map(|s| &s.doubted).for_each(|&k| out[k] = false);
+    out
+}
+
+/// Contract name of the merged small disturbances.
+const SMALL_DISTURBANCES: &str = "small-disturbances";
+
+/// Sorts findings by descending contribution; those without one come last (stable).
+pub(super) fn rank(findings: &mut [MergedFinding]) {
+    let key = |s: &MergedFinding| s.finding.worth_mm.unwrap_or(-1.0);
+    findings.sort_by(|a, b| key(b).total_cmp(&key(a)));
+}
+
+/// Replaces the findings selected by `of` with a merged one, at the index of the first.
+fn merge(
+    findings: &mut Vec<MergedFinding>,
+    of: impl Fn(&MergedFinding) -> bool,
+    contributions: &Contributions<'_>,
+    told: impl FnOnce(&[MergedFinding], f64) -> Finding,
+) {
+    let first = findings.iter().position(&of).unwrap_or(0);
+    let (members, mut others): (Vec<MergedFinding>, Vec<MergedFinding>) = findings.drain(..).partition(of);
+    let causes: Vec<usize> = members.iter().flat_map(|s| s.causes.iter().copied()).collect();
+    let finding = told(&members, contributions.rms_mm(&causes));
+    let size = |s: &MergedFinding| s.finding.worth_mm.unwrap_or(0.0);
+    let largest = members.into_iter().max_by(|a, b| size(a).total_cmp(&size(b)));
+    let picture = largest.and_then(|s| s.picture);
+    others.insert(first.min(others.len()), MergedFinding { finding, picture, causes, doubted: Vec::new() });
+    *findings = others;
+}
+
+fn gain(members: &[MergedFinding]) -> Gain {
+    let gains = members.iter().map(|s| s.finding.gain);
+    gains
+        .reduce(|a, b| Gain {
+            cv_rmse_before_mm: a.cv_rmse_before_mm.max(b.cv_rmse_before_mm),
+            cv_rmse_after_mm: a.cv_rmse_after_mm.min(b.cv_rmse_after_mm),
+        })
+        .unwrap_or(Gain { cv_rmse_before_mm: f64::NAN, cv_rmse_after_mm: f64::NAN })
+}
+
+fn setup_change(members: &[MergedFinding], worth_mm: f64, steps: bool, smooth: bool) -> Finding {
+    let mut sessions: Vec<Session> = members
+        .iter()
+        .filter_map(|s| {
+            Some(Session {
+                rows: s.finding.rows?,
+                effect: s.finding.effect.clone(),
+                cause: s.finding.cause.clone(),
+                worth_mm: s.finding.worth_mm.unwrap_or(0.0),
+            })
+        })
+        .collect();
+    sessions.sort_by_key(|s| s.rows);
+    let confidence =
+        if steps && !smooth && members.iter().any(|s| s.finding.confidence == Confidence::Identified) {
+            Confidence::Identified
+        } else {
+            Confidence::Ambiguous
+        };
+    Finding {
+        effect: "setup-change".to_owned(),
+        cause: if steps {
+            format!("the set-up changed with time: {} shifts, see the table of sessions", sessions.len())
+        } else {
+            "the set-up changed with time; steps and a gradual drift cannot be distinguished".to_owned()
+        },
+        confidence,
+        rows: None,
+        row_list: None,
+        joints: None,
+        parameters: Vec::new(),
+        evidence: members.iter().map(|s| s.finding.evidence.as_str()).collect::<Vec<_>>().join("; "),
+        p_value: members.iter().map(|s| s.finding.p_value).fold(1.0, f64::min),
+        non_centrality: None,
+        gain: gain(members),
+        worth_mm: Some(worth_mm),
+        doubts: Vec::new(),
+        sessions,
+        alternatives: Vec::new(),
+        remedy: words::remedy("setup-change").to_owned(),
+    }
+}
+
+fn small_disturbances(members: &[MergedFinding], worth_mm: f64, excess_only: bool) -> Finding {
+    let doubted = format!(", or less than {:.0} % and is doubtful", 100.0 * DOUBTFUL_SHARE);
+    Finding {
+        effect: SMALL_DISTURBANCES.to_owned(),
+        cause: format!(
+            "{} small disturbance{}, together {worth_mm:.4} mm: too small to justify inspecting a part",
+            members.len(),
+            if members.len() == 1 { "" } else { "s" }
+        ),
+        confidence: Confidence::Ambiguous,
+        rows: None,
+        row_list: None,
+        joints: None,
+        parameters: Vec::new(),
+        evidence: format!(
+            "each contributes less than {:.0} % of the error of geometry alone{}",
+            100.0 * SMALL_SHARE,
+            if excess_only { doubted.as_str() } else { "" }
+        ),
+        p_value: members.iter().map(|s| s.finding.p_value).fold(1.0, f64::min),
+        non_centrality: None,
+        gain: gain(members),
+        worth_mm: Some(worth_mm),
+        doubts: Vec::new(),
+        sessions: Vec::new(),
+        alternatives: Vec::new(),
+        remedy: words::remedy(SMALL_DISTURBANCES).to_owned(),
+    }
+}

@@ -1,0 +1,125 @@
+//! Summarises a search: findings of causes, data quality, and the unexplained residual.
+
+use super::confounding::{Confounding, excess_over_noise_mm};
+use super::contribution::Contributions;
+use super::data_quality::{mismatch_finding, noise_floor, outlier_finding, rounding_finding};
+use super::extension::Extended;
+use super::finding::{Finding, Step};
+use super::findings::FindingBuilder;
+use super::held::FoldErrors;
+use super::merged::{self, MergedFinding};
+use super::picture::Picture;
+use super::residual_tests::Structure;
+use super::search::{Confirmed, Search};
+use super::unexplained::Unexplained;
+use crate::measurement::split;
+
+/// Summary of a search.
+pub(super) struct Summary {
+    /// Findings by descending contribution.
+    pub(super) findings: Vec<MergedFinding>,
+    /// The held-out error as causes were added.
+    pub(super) steps: Vec<Step>,
+    /// The fit to all rows with all parameters of its causes.
+    pub(super) extended: Extended,
+    /// The noise floor (mm) and its source.
+    pub(super) noise_floor: (Option<f64>, String),
+    /// The unexplained residual, in a sentence.
+    pub(super) remaining: Option<String>,
+}
+
+/// Summarises a search. `smoothed` is the held-out error without the smooth correction (mm), if there is one.
+pub(super) fn summarise(
+    search: &Search<'_>,
+    confirmed: &Confirmed,
+    structure: &Structure,
+    smoothed: Option<f64>,
+) -> Summary {
+    let context = search.context;
+    let (subject, searched, prepared) = (&context.subject, &context.searched, context.prepared);
+    let (stages, outcome) = (&search.stages, &confirmed.outcome);
+    let floor = split::noise_floor(context.dataset);
+    let mut steps = vec![
+        Step { added: "data sheet, frames fitted".to_owned(), cv_rmse_mm: stages[0].random.rmse },
+        Step { added: "geometry".to_owned(), cv_rmse_mm: stages[1].random.rmse },
+    ];
+    let extended = search.extended.clone().whole(subject);
+    let (of_causes, finding_of_cause, pictures) = findings(search, confirmed, &extended, &mut steps);
+    let contributions = Contributions::new(searched, &search.found, &confirmed.whole);
+    let confounding = Confounding {
+        causes: &search.found.causes,
+        confirmations: &outcome.confirmations,
+        contributions: &contributions,
+        nominal: subject.nominal,
+        growth_mm: outcome.discrepancy.growth_mm(),
+        field_mm: outcome.discrepancy.field_mm(),
+        excess_over_noise_mm: floor
+            .map_or(0.0, |floor| excess_over_noise_mm(stages[2].fitted.rmse, floor.sigma_mm, floor.freedom)),
+    };
+    let mut findings = merged::merge_findings(
+        merged::from_findings(of_causes, &finding_of_cause, pictures),
+        &outcome.confirmations,
+        &outcome.discrepancy,
+        &confounding,
+        stages[1].fitted.rmse,
+    );
+    if smoothed.is_some() {
+        let added = "smooth correction, without a physical cause".to_owned();
+        steps.push(Step { added, cv_rmse_mm: stages[2].random.rmse });
+    }
+    (context.tell)("analysing the residual");
+    let noise_floor = noise_floor(&floor, subject, &search.extended);
+    let unexplained = Unexplained {
+        dataset: &searched.observed.dataset,
+        discrepancy: &outcome.discrepancy,
+        structure,
+        after: &stages[2],
+        smoothed,
+        floor_mm: noise_floor.0,
+    };
+    let off_mm = off_mm(&search.extended, &search.outliers);
+    let empirical_mm = confounding.largest_empirical_rms_mm();
+    let of_the_record = [
+        rounding_finding(context.dataset, prepared, subject, &search.geometric, stages),
+        mismatch_finding(context.dataset, prepared, &stages[2]),
+        outlier_finding(context.dataset, &search.outliers, (off_mm, empirical_mm), &stages[2]),
+        unexplained.finding(),
+    ];
+    let without_causes = of_the_record.into_iter().flatten();
+    findings.extend(without_causes.map(|finding| MergedFinding {
+        finding,
+        picture: None,
+        causes: Vec::new(),
+        doubted: Vec::new(),
+    }));
+    merged::rank(&mut findings);
+    Summary { findings, steps, extended, noise_floor, remaining: unexplained.sentence() }
+}
+
+/// The largest error of some rows (mm).
+fn off_mm(fit: &Extended, rows: &[(usize, f64)]) -> f64 {
+    let errors = fit.problem.errors_mm(&fit.x);
+    rows.iter().filter_map(|(i, _)| errors.get(*i)).map(|e| e.abs()).fold(0.0, f64::max)
+}
+
+/// The findings of the accepted causes; adds the held-out error after each to `steps`.
+fn findings(
+    search: &Search<'_>,
+    confirmed: &Confirmed,
+    extended: &Extended,
+    steps: &mut Vec<Step>,
+) -> (Vec<Finding>, Vec<usize>, Vec<Picture>) {
+    let context = search.context;
+    let rows = &context.searched.observed.dataset;
+    let folds = split::purged(rows, 5, search.reach, context.options.selection.seed);
+    let aside: &[usize] = if context.is_thinned() { &[] } else { &search.set_aside };
+    let builder = FindingBuilder {
+        subject: &context.searched,
+        found: &search.found,
+        extended,
+        whole: &confirmed.whole,
+        held: &FoldErrors::of(&confirmed.linear, &folds),
+        set_aside: aside,
+    };
+    builder.findings(&search.accepted, steps)
+}
