@@ -29,7 +29,12 @@ pub struct Statement {
 }
 
 /// The whole page.
-pub fn document(found: &Acceptance, dataset: &Dataset, estimated: &Estimated, said: &Statement) -> Document {
+pub fn document(
+    found: &Acceptance,
+    dataset: &Dataset,
+    estimated: &Estimated,
+    statement: &Statement,
+) -> Document {
     let mut page = summary(found, dataset, estimated);
     page.heading(2, "Errors");
     page.figure(
@@ -49,13 +54,13 @@ pub fn document(found: &Acceptance, dataset: &Dataset, estimated: &Estimated, sa
     page.heading(2, "Circumstances");
     page.push(circumstances(found, estimated));
     page.heading(2, "How this was decided");
-    page.push(Block::List(method(found, said)));
+    page.push(Block::List(method(found, statement)));
     page.push(Block::Details {
         summary: format!("Errors of the {} rows", found.rows),
         blocks: vec![row_table(found).excerpt(300).into()],
     });
     page.heading(2, "Where this came from");
-    page.push(provenance(dataset, estimated, said));
+    page.push(provenance(dataset, estimated, statement));
     page
 }
 
@@ -380,8 +385,8 @@ fn circumstances(found: &Acceptance, estimated: &Estimated) -> Table {
     table
 }
 
-fn method(found: &Acceptance, said: &Statement) -> Vec<String> {
-    let frames = if said.frames_stated {
+fn method(found: &Acceptance, statement: &Statement) -> Vec<String> {
+    let frames = if statement.frames_stated {
         "The sensor's frame was stated: nothing was fitted to these rows.".to_owned()
     } else {
         "The sensor's frame and its target were fitted in five folds: each row is judged with a frame that has not seen its pose. \
@@ -453,36 +458,21 @@ fn turns_by_row(turns: &Orientation) -> String {
     .svg()
 }
 
-fn provenance(dataset: &Dataset, estimated: &Estimated, said: &Statement) -> Provenance {
-    let mut page = Provenance { seed: Some(said.seed), ..Provenance::here() };
-    let known = |hash: &str| Some(hash.to_owned()).filter(|hash| !hash.is_empty());
-    page.sources.push(Source {
-        name: dataset.file.clone(),
-        role: "Measurements".to_owned(),
-        sha256: known(&dataset.sha256),
-        rows: Some(dataset.rows.len()),
-    });
-    if let Some((name, hash)) = &said.model {
-        page.sources.push(Source {
-            name: name.clone(),
-            role: "Model".to_owned(),
-            sha256: known(hash),
-            rows: None,
-        });
-    }
-    page.sources.push(Source {
-        name: estimated.provenance.file.clone(),
-        role: "Measurements that the model was fitted to".to_owned(),
-        sha256: known(&estimated.provenance.sha256),
-        rows: Some(estimated.provenance.rows),
-    });
+fn provenance(dataset: &Dataset, estimated: &Estimated, statement: &Statement) -> Provenance {
+    let mut page = Provenance { seed: Some(statement.seed), ..Provenance::here() };
+    let rows = Some(dataset.rows.len());
+    page.sources.push(Source::new(&dataset.file, "Measurements", &dataset.sha256, rows));
+    page.sources.extend(statement.model.iter().map(|(name, hash)| Source::new(name, "Model", hash, None)));
+    let from = &estimated.provenance;
+    let role = "Measurements to which the model was fitted";
+    page.sources.push(Source::new(&from.file, role, &from.sha256, Some(from.rows)));
     page.remarks.push(("Robot".to_owned(), estimated.robot.clone()));
-    page.remarks.extend(said.serials.iter().cloned());
+    page.remarks.extend(statement.serials.iter().cloned());
     page
 }
 
 /// Everything; schema `truegrind.acceptance/1`.
-pub fn json(found: &Acceptance, dataset: &Dataset, estimated: &Estimated, said: &Statement) -> Value {
+pub fn json(found: &Acceptance, dataset: &Dataset, estimated: &Estimated, statement: &Statement) -> Value {
     let known = |uncertainty: Uncertainty| match uncertainty {
         Uncertainty::Stated => "stated",
         Uncertainty::Repeats => "repeated poses",
@@ -510,7 +500,7 @@ pub fn json(found: &Acceptance, dataset: &Dataset, estimated: &Estimated, said: 
     });
     let [time_h, temperature_c, payload_kg] = found.conditions;
     let serials: serde_json::Map<String, Value> =
-        said.serials.iter().map(|(name, text)| (name.clone(), json!(text))).collect();
+        statement.serials.iter().map(|(name, text)| (name.clone(), json!(text))).collect();
     json!({
         "schema": "truegrind.acceptance/1",
         "robot": estimated.robot,
@@ -532,10 +522,10 @@ pub fn json(found: &Acceptance, dataset: &Dataset, estimated: &Estimated, said: 
         "conditions": { "time_h": time_h, "temperature_c": temperature_c, "payload_kg": payload_kg },
         "serials": serials,
         "measurements": { "file": dataset.file, "sha256": dataset.sha256 },
-        "model_file": said.model.as_ref().map(|(name, hash)| json!({ "file": name, "sha256": hash })),
+        "model_file": statement.model.as_ref().map(|(name, hash)| json!({ "file": name, "sha256": hash })),
         "fitted_to": { "file": estimated.provenance.file, "sha256": estimated.provenance.sha256 },
-        "frames_stated": said.frames_stated,
-        "seed": said.seed,
+        "frames_stated": statement.frames_stated,
+        "seed": statement.seed,
         "errors": found.errors_mm.iter().map(|(row, mm)| json!({ "row": row, "error_mm": mm })).collect::<Vec<_>>(),
     })
 }

@@ -10,7 +10,7 @@ use super::kept;
 use super::placement;
 use super::status::Status;
 use super::table::{Cell, Column, Table};
-use truegrind_compensation::deviation::Status as Fate;
+use truegrind_compensation::deviation::Status as MotionStatus;
 use truegrind_compensation::frames::undeclared::undeclared;
 use truegrind_compensation::plan::Plan;
 use truegrind_compensation::plan::reason::OutcomeReason;
@@ -73,8 +73,9 @@ pub struct Row {
 impl Row {
     /// The row of a program that was planned.
     pub fn of(file: String, output: Option<String>, ended: Ended, plan: &Plan, listing: &Listing) -> Row {
-        let count = |fate: Fate| plan.outcomes.iter().filter(|outcome| outcome.status == fate).count();
-        let written = |fate: Fate| matches!(fate, Fate::Changed | Fate::Flagged);
+        let count =
+            |fate: MotionStatus| plan.outcomes.iter().filter(|outcome| outcome.status == fate).count();
+        let written = |fate: MotionStatus| matches!(fate, MotionStatus::Changed | MotionStatus::Flagged);
         let before = plan.outcomes.iter().filter_map(|outcome| outcome.before_mm);
         let after = plan.outcomes.iter().filter(|o| written(o.status)).filter_map(|o| o.after_mm);
         Row {
@@ -83,10 +84,10 @@ impl Row {
             ended,
             motions: [
                 plan.outcomes.len(),
-                count(Fate::Changed),
-                count(Fate::Flagged),
-                count(Fate::Refused),
-                count(Fate::Left),
+                count(MotionStatus::Changed),
+                count(MotionStatus::Flagged),
+                count(MotionStatus::Refused),
+                count(MotionStatus::Left),
             ],
             opaque: listing.opaque.len(),
             before_mm: before.reduce(f64::max),
@@ -155,8 +156,9 @@ fn undeclared_note(listing: &Listing) -> Option<String> {
 
 /// The reason that most motions of a program were refused for, else flagged, else left, with how many.
 fn most_usual(plan: &Plan) -> Option<String> {
-    [(Fate::Refused, "refused"), (Fate::Flagged, "flagged"), (Fate::Left, "left")].into_iter().find_map(
-        |(fate, word)| {
+    [(MotionStatus::Refused, "refused"), (MotionStatus::Flagged, "flagged"), (MotionStatus::Left, "left")]
+        .into_iter()
+        .find_map(|(fate, word)| {
             let reasons = plan
                 .outcomes
                 .iter()
@@ -168,8 +170,7 @@ fn most_usual(plan: &Plan) -> Option<String> {
                 .for_each(|why| *counts.entry(why.kind()).or_default() += 1);
             let (reason, count) = counts.into_iter().max_by_key(|(_, count)| *count)?;
             Some(format!("{count} {word}: {reason}"))
-        },
-    )
+        })
 }
 
 /// The worst first: what failed, what is not rewritten, what is refused, flagged and left most of, what is farthest off.
@@ -248,9 +249,8 @@ pub fn sum(rows: &[Row]) -> String {
 fn read_table(rows: &[Row]) -> Table {
     let rows = worst_first(rows);
     let mut table = table(&rows);
-    let place = |key: &str, table: &Table| table.columns.iter().position(|column| column.key == key);
     // Why, before how many.
-    if let Some(note) = place("note", &table) {
+    if let Some(note) = table.column_index("note") {
         let mut column = table.columns.remove(note);
         column.heading = "Reason".to_owned();
         table.columns.insert(2, column);
@@ -265,7 +265,7 @@ fn read_table(rows: &[Row]) -> Table {
             .filter_map(|row| [Some(&row.file), row.output.as_ref()][at])
             .map(String::as_str)
             .collect();
-        let (Some(column), Some(folder)) = (place(key, &table), shared_folder(&names)) else { continue };
+        let (Some(column), Some(folder)) = (table.column_index(key), shared_folder(&names)) else { continue };
         for row in &mut table.rows {
             if let Cell::Text(name) = &mut row[column] {
                 *name = without(name, folder);
@@ -273,12 +273,7 @@ fn read_table(rows: &[Row]) -> Table {
         }
         table.notes.push(format!("{what} {folder}"));
     }
-    for column in (0..table.columns.len()).rev() {
-        if table.rows.iter().all(|row| row[column] == Cell::Missing) {
-            table.columns.remove(column);
-            table.rows.iter_mut().for_each(|row| drop(row.remove(column)));
-        }
-    }
+    table.remove_empty_columns();
     table.excerpt(ROWS)
 }
 

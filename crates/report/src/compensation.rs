@@ -1,16 +1,16 @@
-//! What became of each motion of a program: the contract `truegrind.compensation/1`, the table, the reasons, the page.
+//! Report on the compensation of a program: JSON `truegrind.compensation/1`, table of motions, reasons, page.
 
 mod first;
 
 use serde_json::{Value, json};
 
 use self::first::key_figures;
-use super::deviation::{fate, fate_word, sections};
+use super::deviation::{fate, sections, status_word};
 use super::document::{Block, Document};
 use super::placement;
 use super::table::{Cell, Column, Table};
 use truegrind_arm::inverse::InverseError;
-use truegrind_compensation::deviation::{PathReport, Status as Fate};
+use truegrind_compensation::deviation::{PathReport, Status as MotionStatus};
 use truegrind_compensation::plan::reason::OutcomeReason;
 use truegrind_compensation::plan::{MotionOutcome, Plan};
 use truegrind_programs::motion::{Listing, Place};
@@ -22,20 +22,20 @@ pub use self::first::{coverage, verdict};
 pub struct ProgramFile {
     /// The file that was read.
     pub file: String,
-    /// The file that was written; `None` where nothing was (dry run).
+    /// The file that was written; `None` in a dry run.
     pub output: Option<String>,
 }
 
-/// Lines that a reason names before it says "and so many more".
-const LINES_NAMED: usize = 6;
+/// Largest number of lines listed for a reason.
+const MAX_LINES: usize = 6;
 
-/// Rows of the table of motions on a page, some eight sheets of paper; a longer table belongs in the CSV file.
+/// Rows of the table of motions on a page (about eight printed pages); the CSV file has all.
 const ROWS_ON_PAGE: usize = 600;
 
-/// Motions that are named as the farthest off.
-const FARTHEST: usize = 8;
+/// Rows of the table of largest deviations.
+const LARGEST: usize = 8;
 
-/// One row per motion. `files` in the order in which the listing counts them.
+/// One row per motion; `files` in the order of the listing.
 pub fn table(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Table {
     let several = files.len() > 1;
     let mut columns = vec![
@@ -74,49 +74,39 @@ pub fn table(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Table {
         table.push(row);
     }
     table.notes.push(
-        "before: how far the tool is off at the end of the motion as programmed. remainder: the predicted remainder, what \
-         rounding and inverse kinematics leave under the same model; a motion that is left or refused keeps its deviation. \
-         1σ is predicted from the covariance of the model: of the shape of the cut, after its best rigid registration, and of \
-         its place. bend: how far the path to this end leaves the intended one \
-         between targets; inserted: targets put in before it."
+        "before: deviation of the tool at the end of the uncorrected motion. remainder: predicted remainder, which rounding and \
+         inverse kinematics leave under the same model; a motion that is left or refused keeps its deviation. 1σ: predicted from \
+         the covariance of the model, for the shape of the cut (after its best rigid registration) and for its place. bend: \
+         deviation from the intended path between the targets. Inserted: number of targets inserted before the end of the motion."
             .to_owned(),
     );
     table
 }
 
-/// [`table`] for a page: not too long, and without columns in which nothing stands.
+/// [`table`] for a page: shortened and without empty columns.
 fn page_table(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Table {
-    let mut table = without_empty_columns(table(plan, listing, files));
+    let mut table = table(plan, listing, files);
+    table.remove_empty_columns();
     table.title.clear();
     table.excerpt(ROWS_ON_PAGE)
 }
 
-fn without_empty_columns(mut table: Table) -> Table {
-    for column in (0..table.columns.len()).rev() {
-        if table.rows.iter().all(|row| row[column] == Cell::Missing) {
-            table.columns.remove(column);
-            table.rows.iter_mut().for_each(|row| drop(row.remove(column)));
-        }
-    }
-    table
-}
-
-/// The motions that are farthest off as programmed, the farthest first; `None` where no deviation is known.
-fn farthest(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Option<Table> {
+/// The motions with the largest uncorrected deviations; `None` if no deviation is known.
+fn largest_deviations(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Option<Table> {
     let mut known: Vec<(f64, &MotionOutcome)> =
         plan.outcomes.iter().filter_map(|outcome| Some((outcome.before_mm?, outcome))).collect();
     known.sort_by(|a, b| b.0.total_cmp(&a.0));
-    known.truncate(FARTHEST);
+    known.truncate(LARGEST);
     let only =
         Plan { outcomes: known.into_iter().map(|(_, outcome)| outcome.clone()).collect(), ..Plan::default() };
-    let mut table = without_empty_columns(table(&only, listing, files));
-    table.title = "Farthest off as programmed".to_owned();
+    let mut table = table(&only, listing, files);
+    table.remove_empty_columns();
+    table.title = "Largest deviations before correction".to_owned();
     table.notes.clear();
     (!table.rows.is_empty()).then_some(table)
 }
 
-/// Reasons why motions were left, refused or flagged, with counts and first lines; the most frequent first within each
-/// status.
+/// Reasons why motions were left, refused or flagged, with counts and first lines; most frequent first within each status.
 pub fn reason_table(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Table {
     let mut table = Table::new(
         "Reasons",
@@ -141,7 +131,7 @@ pub fn reason_table(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Ta
     table
 }
 
-/// The contract `truegrind.compensation/1`. `output` is `null` where nothing was written.
+/// JSON report, schema `truegrind.compensation/1`. `output` is `null` if nothing was written.
 pub fn json(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Value {
     let programs: Vec<Value> = files
         .iter()
@@ -163,7 +153,7 @@ pub fn json(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Value {
                     json!({
                         "line": place.line,
                         "instruction": instruction,
-                        "status": fate_word(outcome.status),
+                        "status": status_word(outcome.status),
                         "reason": outcome.reason.map(|reason| reason.to_string()),
                         "before_mm": outcome.before_mm,
                         "after_mm": outcome.after_mm,
@@ -190,7 +180,7 @@ pub fn json(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Value {
     })
 }
 
-/// What fits a terminal: verdict with coverage, reasons, what could not be read, notes on tools and work objects.
+/// Summary for the terminal: verdict, reasons, unread regions, notes on tools and work objects.
 pub fn summary(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Document {
     let mut page = heading(plan, files);
     page.push(verdict(plan, listing));
@@ -208,7 +198,7 @@ pub fn summary(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Documen
     page
 }
 
-/// The page, with the deviation of the path where reports are given.
+/// The page, including the deviation of the path if reports are given.
 pub fn document(plan: &Plan, listing: &Listing, files: &[ProgramFile], reports: &[PathReport]) -> Document {
     let mut page = heading(plan, files);
     page.push(verdict(plan, listing));
@@ -217,8 +207,8 @@ pub fn document(plan: &Plan, listing: &Listing, files: &[ProgramFile], reports: 
     if !reasons.rows.is_empty() {
         page.push(reasons);
     }
-    if let Some(farthest) = farthest(plan, listing, files) {
-        page.push(farthest);
+    if let Some(largest) = largest_deviations(plan, listing, files) {
+        page.push(largest);
     }
     let placed = placement::sentences(plan, listing);
     if !placed.is_empty() {
@@ -246,10 +236,8 @@ pub fn document(plan: &Plan, listing: &Listing, files: &[ProgramFile], reports: 
     page.heading(2, "Motions");
     page.push(page_table(plan, listing, files));
     if !listing.opaque.is_empty() {
-        page.heading(2, "What could not be read");
-        page.paragraph(
-            "These regions are in the output as they were, byte for byte; motions inside them, if any, too.",
-        );
+        page.heading(2, "Regions that could not be read");
+        page.paragraph("These regions, and any motions in them, are copied to the output byte for byte.");
         page.push(opaque_table(listing, files));
     }
     page
@@ -258,7 +246,7 @@ pub fn document(plan: &Plan, listing: &Listing, files: &[ProgramFile], reports: 
 fn heading(plan: &Plan, files: &[ProgramFile]) -> Document {
     let names: Vec<&str> = files.iter().map(|file| file.file.as_str()).collect();
     let mut page = Document::new(match names.as_slice() {
-        // The name alone: where it lies is in the tables and the JSON.
+        // The file name alone; the path is in the tables and the JSON.
         [name] => format!("Compensation of {}", name.rsplit(['/', '\\']).next().unwrap_or(name)),
         _ => format!("Compensation of {} files", names.len()),
     });
@@ -266,9 +254,10 @@ fn heading(plan: &Plan, files: &[ProgramFile]) -> Document {
     page.subtitle = match outputs.as_slice() {
         [] => "nothing was written".to_owned(),
         outputs => {
-            let same = plan.outcomes.iter().all(|o| matches!(o.status, Fate::Left | Fate::Refused));
-            let as_it_was = if same { ", byte for byte as it was" } else { "" };
-            format!("written to {}{as_it_was}", outputs.join(", "))
+            let same =
+                plan.outcomes.iter().all(|o| matches!(o.status, MotionStatus::Left | MotionStatus::Refused));
+            let unchanged = if same { ", unchanged byte for byte" } else { "" };
+            format!("written to {}{unchanged}", outputs.join(", "))
         }
     };
     page
@@ -277,7 +266,7 @@ fn heading(plan: &Plan, files: &[ProgramFile]) -> Document {
 /// Regions that could not be read.
 pub fn opaque_table(listing: &Listing, files: &[ProgramFile]) -> Table {
     let mut table = Table::new(
-        "Not read, left as it is",
+        "Not read, left unchanged",
         vec![Column::text("file", "File"), Column::count("line", "Line"), Column::text("reason", "Reason")],
     );
     for region in &listing.opaque {
@@ -303,18 +292,18 @@ fn file_name(files: &[ProgramFile], place: Place) -> &str {
 
 /// Motions with the same status and the same kind of reason.
 struct Group<'a> {
-    fate: Fate,
+    fate: MotionStatus,
     reason: String,
-    /// The figure of the reason farthest from what is wanted, with its unit.
+    /// The worst value of the reason, with its unit.
     worst: Option<(f64, &'static str)>,
     outcomes: Vec<&'a MotionOutcome>,
 }
 
 fn grouped(plan: &Plan) -> Vec<Group<'_>> {
     let mut groups: Vec<Group<'_>> = Vec::new();
-    for outcome in plan.outcomes.iter().filter(|outcome| outcome.status != Fate::Changed) {
+    for outcome in plan.outcomes.iter().filter(|outcome| outcome.status != MotionStatus::Changed) {
         let (reason, figure) = match &outcome.reason {
-            Some(why) => kind(why),
+            Some(why) => split_reason(why),
             None => ("nothing to change".to_owned(), None),
         };
         match groups.iter_mut().find(|group| group.fate == outcome.status && group.reason == reason) {
@@ -331,13 +320,15 @@ fn grouped(plan: &Plan) -> Vec<Group<'_>> {
             }
         }
     }
-    let rank = |fate: Fate| [Fate::Refused, Fate::Flagged, Fate::Left].iter().position(|f| *f == fate);
+    let rank = |fate: MotionStatus| {
+        [MotionStatus::Refused, MotionStatus::Flagged, MotionStatus::Left].iter().position(|f| *f == fate)
+    };
     groups.sort_by(|a, b| rank(a.fate).cmp(&rank(b.fate)).then(b.outcomes.len().cmp(&a.outcomes.len())));
     groups
 }
 
-/// A reason without the numbers of one motion, and its number.
-fn kind(why: &OutcomeReason) -> (String, Option<(f64, &'static str)>) {
+/// A reason without the numbers of a single motion, and its value.
+fn split_reason(why: &OutcomeReason) -> (String, Option<(f64, &'static str)>) {
     let plain = |text: &str| (text.to_owned(), None);
     let sized = |text: String, value: f64, unit| (text, Some((value, unit)).filter(|_| value.is_finite()));
     match *why {
@@ -351,47 +342,51 @@ fn kind(why: &OutcomeReason) -> (String, Option<(f64, &'static str)>) {
             plain("target is reachable only in another configuration")
         }
         OutcomeReason::Inverse(InverseError::Abandoned) => {
-            plain("its joints were not sought to the end: too many targets had to be searched for")
+            plain("the search for its joints was abandoned: too many targets needed a search")
         }
-        OutcomeReason::Inverse(InverseError::NotConverged { .. }) => plain("no joints were found"),
+        OutcomeReason::Inverse(InverseError::NotConverged { .. }) => {
+            plain("inverse kinematics did not converge")
+        }
         OutcomeReason::CorrectionTooLarge { mm } => {
-            sized("correction exceeds the bound (--max-correction)".to_owned(), mm, "mm")
+            sized("correction exceeds --max-correction".to_owned(), mm, "mm")
         }
         OutcomeReason::RotationTooLarge { deg } => {
-            sized("correction of the orientation exceeds the bound".to_owned(), deg, "°")
+            sized("correction of the orientation exceeds its limit".to_owned(), deg, "°")
         }
         OutcomeReason::JointJump { joint, deg, on_the_way, .. } => sized(
             format!(
                 "{}the correction would turn joint {} too far near a singularity",
-                if on_the_way { "on the way to it " } else { "" },
+                if on_the_way { "on the path to it, " } else { "" },
                 joint + 1
             ),
             deg,
             "°",
         ),
         OutcomeReason::PathDeviation { mm } => {
-            sized("the path between targets leaves the intended one".to_owned(), mm, "mm")
+            sized("path between the targets deviates from the intended one".to_owned(), mm, "mm")
         }
         OutcomeReason::TooFast { joint, ratio } => sized(
-            format!("at the programmed speed joint {} turns faster than it can", joint + 1),
+            format!("joint {} would exceed its speed limit at the programmed speed", joint + 1),
             ratio,
             "× limit",
         ),
-        OutcomeReason::JointNotMeasured { joint, by_deg } => sized(
-            format!("joint {} is outside the range in which the arm was measured", joint + 1),
-            by_deg,
-            "°",
-        ),
+        OutcomeReason::JointNotMeasured { joint, by_deg } => {
+            sized(format!("joint {} is outside the measured range", joint + 1), by_deg, "°")
+        }
         OutcomeReason::PartOfCut { because, .. } => plain(&format!(
-            "its cut is corrected as a whole or not at all, and another motion stays: {because}"
+            "a cut is corrected as a whole or not at all, and another motion of this cut is not corrected: {because}"
         )),
-        OutcomeReason::Step { mm, .. } => {
-            sized("the step to a motion of the same cut that stays exceeds --tolerance".to_owned(), mm, "mm")
-        }
-        OutcomeReason::Risk { chance } => {
-            sized("the correction may well make the cut worse (--max-risk)".to_owned(), 100.0 * chance, "%")
-        }
-        OutcomeReason::NotCovered { ratio } => sized("no measured pose is near".to_owned(), ratio, "×"),
+        OutcomeReason::Step { mm, .. } => sized(
+            "the step to an uncorrected motion of the same cut would exceed --tolerance".to_owned(),
+            mm,
+            "mm",
+        ),
+        OutcomeReason::Risk { chance } => sized(
+            "the correction makes the cut worse with a probability above --max-risk".to_owned(),
+            100.0 * chance,
+            "%",
+        ),
+        OutcomeReason::NotCovered { ratio } => sized("far from all measured poses".to_owned(), ratio, "×"),
         OutcomeReason::Uncertain { sigma_mm } => {
             sized("the model is uncertain here".to_owned(), sigma_mm, "mm σ")
         }
@@ -402,17 +397,17 @@ fn kind(why: &OutcomeReason) -> (String, Option<(f64, &'static str)>) {
 fn worst_text(value: f64, unit: &str) -> String {
     match unit {
         "°" => format!("{value:.2}°"),
-        "×" => format!("{value:.1} times the usual distance"),
-        "× limit" => format!("{value:.2} times its limit"),
+        "×" => format!("{value:.1} × the usual distance"),
+        "× limit" => format!("{value:.2} × its limit"),
         unit => format!("{value:.3} {unit}"),
     }
 }
 
-/// The first lines, by file where there are several: `a.mod 12, 14; b.mod 3 and 7 more`.
+/// The first lines, grouped by file if there are several: `a.mod 12, 14; b.mod 3 and 7 more`.
 fn lines(places: &[Place], files: &[ProgramFile]) -> String {
     let mut text = String::new();
     let mut last_file = None;
-    for place in places.iter().take(LINES_NAMED) {
+    for place in places.iter().take(MAX_LINES) {
         if files.len() > 1 && last_file != Some(place.file) {
             let gap = if text.is_empty() { "" } else { "; " };
             text.push_str(&format!("{gap}{} {}", file_name(files, *place), place.line));
@@ -422,8 +417,8 @@ fn lines(places: &[Place], files: &[ProgramFile]) -> String {
         }
         last_file = Some(place.file);
     }
-    if places.len() > LINES_NAMED {
-        text.push_str(&format!(" and {} more", places.len() - LINES_NAMED));
+    if places.len() > MAX_LINES {
+        text.push_str(&format!(" and {} more", places.len() - MAX_LINES));
     }
     text
 }

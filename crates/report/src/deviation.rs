@@ -20,7 +20,7 @@ use super::document::{Block, Document, KeyFigure};
 use super::status::Status;
 use super::table::{Cell, Column, Table};
 use truegrind_arm::region::Outside;
-use truegrind_compensation::deviation::{After, Deviation, PathPoint, PathReport, Status as Fate};
+use truegrind_compensation::deviation::{After, Deviation, PathPoint, PathReport, Status as MotionStatus};
 
 pub use kept::{from_kept, kept};
 pub use summary::{block_table, registered_table};
@@ -177,7 +177,7 @@ pub fn flag_table(report: &PathReport) -> Table {
     let kind = |point: &PathPoint| (point.status, point.kind_of_reason());
     for run in report.points.chunk_by(|a, b| kind(a) == kind(b)) {
         let [first, ..] = run else { continue };
-        if first.status == Fate::Changed {
+        if first.status == MotionStatus::Changed {
             continue;
         }
         let reason = first.reason.as_ref().map(|reason| {
@@ -388,23 +388,23 @@ fn outcome(point: &PathPoint) -> [Cell; 3] {
 }
 
 /// What became of a point, with its sign.
-pub(super) fn fate(fate: Fate) -> Cell {
+pub(super) fn fate(fate: MotionStatus) -> Cell {
     let status = match fate {
-        Fate::Changed => Status::Good,
-        Fate::Left => Status::NotEvaluated,
-        Fate::Refused => Status::Bad,
-        Fate::Flagged => Status::Warning,
+        MotionStatus::Changed => Status::Good,
+        MotionStatus::Left => Status::NotEvaluated,
+        MotionStatus::Refused => Status::Bad,
+        MotionStatus::Flagged => Status::Warning,
     };
-    Cell::Judged(status, fate_word(fate).to_owned())
+    Cell::Judged(status, status_word(fate).to_owned())
 }
 
 /// The contract's word.
-pub(super) fn fate_word(fate: Fate) -> &'static str {
+pub(super) fn status_word(fate: MotionStatus) -> &'static str {
     match fate {
-        Fate::Changed => "changed",
-        Fate::Left => "left",
-        Fate::Refused => "refused",
-        Fate::Flagged => "flagged",
+        MotionStatus::Changed => "changed",
+        MotionStatus::Left => "left",
+        MotionStatus::Refused => "refused",
+        MotionStatus::Flagged => "flagged",
     }
 }
 

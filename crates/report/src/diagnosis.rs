@@ -68,12 +68,7 @@ pub fn document(found: &Diagnosed, dataset: &Dataset) -> Document {
         command: None,
         method: Some("diagnose".to_owned()),
         seed: Some(from.seed),
-        sources: vec![Source {
-            name: from.file.clone(),
-            role: "Measurements".to_owned(),
-            sha256: Some(from.sha256.clone()).filter(|hash| !hash.is_empty()),
-            rows: Some(diagnosis.dataset.rows),
-        }],
+        sources: vec![Source::new(&from.file, "Measurements", &from.sha256, Some(diagnosis.dataset.rows))],
         remarks: vec![
             ("Robot".to_owned(), diagnosis.dataset.robot.clone()),
             ("Sensor".to_owned(), diagnosis.dataset.sensor.clone()),

@@ -1,10 +1,10 @@
-//! A document: headings, words, key figures, tables, pictures, verdicts, provenance. One document, every format.
+//! Documents: headings, text, key figures, tables, plots, verdicts and provenance, independent of the format.
 
 use super::number::Precision;
 use super::status::Status;
 use super::table::{Cell, Table};
 
-/// A document, in no format yet.
+/// A document, independent of the format.
 ///
 /// ```
 /// use truegrind_report::document::{Block, Document, Verdict};
@@ -20,57 +20,57 @@ use super::table::{Cell, Table};
 pub struct Document {
     /// Title.
     pub title: String,
-    /// One line under the title; may be empty.
+    /// Subtitle; may be empty.
     pub subtitle: String,
-    /// The content, in reading order.
+    /// The content in reading order.
     pub blocks: Vec<Block>,
 }
 
-/// A piece of a document.
+/// A block of a document.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Block {
-    /// A heading; level 2 is a section, 3 and 4 lie below. Level 1 is the document's title.
+    /// A heading; level 2 is a section. Level 1 is the title of the document.
     Heading(u8, String),
     /// A paragraph.
     Paragraph(String),
-    /// A list of points.
+    /// A bullet list.
     List(Vec<String>),
-    /// A row of numbers that matter.
+    /// A row of key figures.
     KeyFigures(Vec<KeyFigure>),
     /// A table.
     Table(Table),
-    /// A picture.
+    /// A plot.
     Figure(Figure),
-    /// A judgement with its reasons.
+    /// A verdict with its reasons.
     Verdict(Verdict),
-    /// What only some readers want; folded in HTML.
+    /// Details for some readers; collapsed in HTML.
     Details {
-        /// What is inside.
+        /// Heading of the collapsed part.
         summary: String,
         /// The content.
         blocks: Vec<Block>,
     },
-    /// Text with fixed pitch: a command, lines of a program.
+    /// Monospaced text: a command, lines of a program.
     Code(String),
-    /// Where the results came from.
+    /// Provenance of the results.
     Provenance(Provenance),
 }
 
-/// One number that matters, such as the held-out error.
+/// A key figure, such as the held-out error.
 #[derive(Debug, Clone, PartialEq)]
 pub struct KeyFigure {
-    /// What it is.
+    /// Label.
     pub label: String,
-    /// The number.
+    /// Value.
     pub value: Cell,
     /// Digits shown.
     pub precision: Precision,
     /// Unit; may be empty.
     pub unit: String,
-    /// What it is to be compared with, or how it was got; may be empty.
+    /// Explanation or value for comparison; may be empty.
     pub note: String,
-    /// Judgement, where there is one.
+    /// Status, if judged.
     pub status: Option<Status>,
 }
 
@@ -92,19 +92,19 @@ impl KeyFigure {
         }
     }
 
-    /// The same with a note.
+    /// Adds a note.
     pub fn note(mut self, note: impl Into<String>) -> Self {
         self.note = note.into();
         self
     }
 
-    /// The same with a judgement.
+    /// Adds a status.
     pub fn status(mut self, status: Status) -> Self {
         self.status = Some(status);
         self
     }
 
-    /// Value with its unit, `–` without unit where there is no value.
+    /// Value and unit; `–` without unit if the value is missing.
     pub(super) fn shown(&self) -> (String, &str) {
         let shown = self.value.shown(self.precision);
         let unit = if shown == super::number::MISSING { "" } else { self.unit.as_str() };
@@ -112,35 +112,35 @@ impl KeyFigure {
     }
 }
 
-/// A picture.
+/// A plot with its caption.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Figure {
-    /// A whole SVG document, as the plots of [`super::plot`] give it.
+    /// SVG document, as made by the plots of [`super::plot`].
     pub svg: String,
-    /// What it shows, and what to see in it.
+    /// What it shows and how to read it.
     pub caption: String,
 }
 
 impl Figure {
-    /// A picture with its caption.
+    /// A plot with its caption.
     pub fn new(svg: String, caption: impl Into<String>) -> Self {
         Self { svg, caption: caption.into() }
     }
 }
 
-/// A judgement with its reasons.
+/// A verdict with its reasons.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Verdict {
-    /// The judgement.
+    /// Status.
     pub status: Status,
     /// One sentence.
     pub headline: String,
-    /// Why; may be empty.
+    /// Reasons; may be empty.
     pub reasons: Vec<String>,
 }
 
 impl Verdict {
-    /// A judgement with its reasons.
+    /// A verdict with its reasons.
     pub fn new<S: Into<String>>(
         status: Status,
         headline: impl Into<String>,
@@ -150,34 +150,42 @@ impl Verdict {
     }
 }
 
-/// Where results came from: enough to make them again.
+/// Provenance of results, sufficient to reproduce them.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Provenance {
     /// Program and version.
     pub version: String,
-    /// The command, where there was one.
+    /// Command, if any.
     pub command: Option<String>,
-    /// Method by name.
+    /// Name of the method.
     pub method: Option<String>,
-    /// Seed of every random number.
+    /// Seed of all random numbers.
     pub seed: Option<u64>,
-    /// The files that went in.
+    /// Input files.
     pub sources: Vec<Source>,
-    /// Anything else, as name and value.
+    /// Further remarks as name and value.
     pub remarks: Vec<(String, String)>,
 }
 
-/// A file that went in.
+/// An input file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Source {
-    /// Its name.
+    /// File name.
     pub name: String,
-    /// What it was: measurements, robot, program.
+    /// Role: measurements, robot, program.
     pub role: String,
-    /// SHA-256 of its bytes in hexadecimal, where it was taken.
+    /// SHA-256 of its bytes in hexadecimal, if known.
     pub sha256: Option<String>,
-    /// Rows that were used.
+    /// Number of rows used.
     pub rows: Option<usize>,
+}
+
+impl Source {
+    /// An input file; an empty hash counts as unknown.
+    pub fn new(name: impl Into<String>, role: &str, sha256: &str, rows: Option<usize>) -> Self {
+        let sha256 = Some(sha256.to_owned()).filter(|hash| !hash.is_empty());
+        Self { name: name.into(), role: role.to_owned(), sha256, rows }
+    }
 }
 
 impl Provenance {
@@ -186,7 +194,7 @@ impl Provenance {
         Self { version: format!("truegrind {}", env!("CARGO_PKG_VERSION")), ..Self::default() }
     }
 
-    /// Name and value of every entry that is known, in a fixed order.
+    /// Name and value of every known entry, in a fixed order.
     pub(super) fn entries(&self) -> Vec<(String, String)> {
         let mut entries = vec![("Made by".to_owned(), self.version.clone())];
         let known = [

@@ -278,12 +278,11 @@ fn read_table(rows: &[Row]) -> Table {
     let whole = table(rows);
     let mut order: Vec<(Option<usize>, &Vec<Cell>)> = ranks(rows).into_iter().zip(&whole.rows).collect();
     order.sort_by_key(|(rank, _)| *rank);
-    let place = |key: &str| whole.columns.iter().position(|column| column.key == key);
     let robots = one_robot(rows).is_none().then_some("robot");
     let shown: Vec<usize> = READ
         .into_iter()
         .chain(robots)
-        .filter_map(place)
+        .filter_map(|key| whole.column_index(key))
         .filter(|&column| whole.rows.iter().any(|row| row[column] != Cell::Missing))
         .collect();
     let columns = shown.iter().map(|&column| whole.columns[column].clone()).collect();

@@ -323,12 +323,7 @@ fn provenance(found: &Identification, dataset: &Dataset) -> Provenance {
         command: None,
         method: Some(from.method.clone()),
         seed: Some(from.seed),
-        sources: vec![Source {
-            name: from.file.clone(),
-            role: "Measurements".to_owned(),
-            sha256: Some(from.sha256.clone()).filter(|hash| !hash.is_empty()),
-            rows: Some(from.rows),
-        }],
+        sources: vec![Source::new(&from.file, "Measurements", &from.sha256, Some(from.rows))],
         remarks,
     }
 }

@@ -1,5 +1,5 @@
-//! Numbers that are kept in JSON and come back with every bit, whatever reads them: as text, the shortest that reads back as the same
-//! number. JSON's own numbers do not promise that, and know no infinity.
+//! Bit-exact numbers in JSON records, stored as the shortest text that parses to the same number. JSON numbers guarantee neither
+//! exactness nor infinities.
 
 use std::str::FromStr;
 
@@ -8,7 +8,7 @@ use serde_json::{Number, Value};
 
 use super::number::exact;
 
-/// A number.
+/// A number stored as text.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Kept(pub f64);
 
@@ -25,33 +25,33 @@ impl<'de> Deserialize<'de> for Kept {
     }
 }
 
-/// Fields of a structure: `#[serde(with = "kept::optional")]`.
+/// For optional fields: `#[serde(with = "kept::optional")]`.
 pub mod optional {
     use super::{Deserialize, Deserializer, Kept, Serialize, Serializer};
 
-    /// Writes a number that may be absent.
+    /// Serialises an optional number.
     ///
     /// # Errors
-    /// Those of the writer.
+    /// Those of the serialiser.
     pub fn serialize<S: Serializer>(value: &Option<f64>, serializer: S) -> Result<S::Ok, S::Error> {
         value.map(Kept).serialize(serializer)
     }
 
-    /// Reads it back.
+    /// Deserialises an optional number.
     ///
     /// # Errors
-    /// What is no number.
+    /// The text is not a number.
     pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::Error> {
         Ok(Option::<Kept>::deserialize(deserializer)?.map(|kept| kept.0))
     }
 }
 
-/// Stands before a number that was made text; [`TEXT`] before a text that begins with either.
+/// Prefix of a number stored as text. [`TEXT`] is the prefix of a string that starts with either character.
 const NUMBER: char = '#';
 /// See [`NUMBER`].
 const TEXT: char = '\'';
 
-/// A value that is written with each number that is no whole one as text.
+/// A JSON value in which floating-point numbers are stored as text.
 pub struct Packed<'a>(pub &'a Value);
 
 impl Serialize for Packed<'_> {
@@ -71,7 +71,7 @@ impl Serialize for Packed<'_> {
     }
 }
 
-/// The value that was packed.
+/// Reverses [`Packed`].
 pub fn unpacked(value: Value) -> Value {
     match value {
         Value::String(text) => match (text.strip_prefix(NUMBER), text.strip_prefix(TEXT)) {

@@ -1,13 +1,12 @@
-//! What truegrind found, for people and for other programs: tables, pictures and whole documents.
+//! Reports of results for people and for programs: tables, plots and documents.
 //!
-//! Two steps, kept apart. A *view* turns one result (a deviation table, an identification) into a
-//! [`document::Document`] made of [`table::Table`]s, pictures from [`plot`] and verdicts. A *format* turns a table or
-//! a document into text: [`format::terminal`], [`format::markdown`], [`format::csv`], [`format::json`],
-//! [`format::html`]. A view knows no format and a format knows no result, so a new result needs one view, and a new
-//! format one file.
+//! A *view* turns one result (a deviation table, an identification) into a [`document::Document`] of [`table::Table`]s, plots from
+//! [`plot`] and verdicts. A *format* turns a table or a document into text: [`format::terminal`], [`format::markdown`],
+//! [`format::csv`], [`format::json`], [`format::html`]. Views do not depend on formats, nor formats on results, so a new result needs
+//! one view and a new format one file.
 //!
-//! Everything here returns strings, prints nothing, opens nothing, and gives the same bytes for the same input.
-//! What is absent is printed as `–`, never as 0.
+//! All functions are pure: they return strings and give the same bytes for the same input. A missing value is printed as `–`,
+//! never as 0.
 
 pub mod number;
 pub mod kept;

@@ -1,20 +1,20 @@
-//! Numbers as people read them: fixed decimals, significant digits, value ± σ.
+//! Number formatting: fixed decimals, significant digits, value ± σ.
 
-/// What is printed where there is nothing to print.
+/// Printed in place of a missing value.
 pub const MISSING: &str = "–";
 
-/// How many digits of a number are shown. Files for programs (CSV, JSON) always carry all of them.
+/// Number of digits shown. CSV and JSON always contain all digits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Precision {
-    /// So many digits after the point: columns whose points should stand under each other.
+    /// Digits after the decimal point, for columns aligned at the point.
     Decimals(usize),
-    /// So many significant digits, with an exponent where the number is very small or large. With a σ it is σ that
-    /// has so many, and the value ends at the same digit (GUM 7.2.6).
+    /// Significant digits, with an exponent for very small or large numbers. With a σ, σ gets that many digits and the value ends at
+    /// the same digit (GUM 7.2.6).
     Significant(usize),
 }
 
 impl Precision {
-    /// The number as text. NaN is absence, `–`; infinities are `∞` and `-∞`; zero has no sign.
+    /// The number as text. NaN counts as missing (`–`); infinities are `∞` and `-∞`; zero has no sign.
     ///
     /// ```
     /// use truegrind_report::number::Precision::{Decimals, Significant};
@@ -36,7 +36,7 @@ impl Precision {
         }
     }
 
-    /// Value and standard uncertainty as `1.270 ± 0.021`. A σ that is not known or not finite is shown as `–`.
+    /// Value and standard uncertainty as `1.270 ± 0.021`. An unknown or infinite σ is shown as `–`.
     ///
     /// ```
     /// use truegrind_report::number::Precision::{Decimals, Significant};
@@ -50,7 +50,7 @@ impl Precision {
                 let digits = digits.max(1);
                 let exponent = exponent_of(value.abs().max(sigma), digits);
                 let scale = if (-4..7).contains(&exponent) { 0 } else { exponent };
-                // 10^-scale in two steps: 10^308 is the last power that exists.
+                // 10^-scale in two steps, since 10^308 is the largest power of ten.
                 let shift = |x: f64| x * 10f64.powi(-(scale / 2)) * 10f64.powi(-(scale - scale / 2));
                 let decimals = digits as i32 - 1 - exponent_of(shift(sigma), digits);
                 let decimals = usize::try_from(decimals).unwrap_or(0).min(15);
@@ -66,7 +66,7 @@ impl Precision {
     }
 }
 
-/// Factor and unit in which people read a number that is held in `unit`: degrees for radians.
+/// Factor and unit for display: degrees for radians, unchanged otherwise.
 pub fn handy(unit: &str) -> (f64, &str) {
     match unit {
         "rad" => (1f64.to_degrees(), "°"),
@@ -74,7 +74,7 @@ pub fn handy(unit: &str) -> (f64, &str) {
     }
 }
 
-/// The shortest text that reads back as the same number; plain where that is short, with an exponent elsewhere.
+/// The shortest text that parses to the same number, with an exponent if that is shorter.
 pub(super) fn exact(value: f64) -> String {
     let size = value.abs();
     if size != 0.0 && !(1e-5..1e16).contains(&size) && value.is_finite() {
@@ -103,13 +103,13 @@ fn significant(value: f64, digits: usize) -> String {
     fixed(value, usize::try_from(digits as i32 - 1 - exponent).unwrap_or(0))
 }
 
-/// Decimal exponent of a positive number after rounding to so many digits: 9.99 with two digits has exponent 1.
+/// Decimal exponent of a positive number after rounding: 9.99 with two digits has exponent 1.
 fn exponent_of(size: f64, digits: usize) -> i32 {
     let text = format!("{size:.*e}", digits - 1);
     text.split_once('e').and_then(|(_, exponent)| exponent.parse().ok()).unwrap_or(0)
 }
 
-/// Numbers in a sentence, runs as `7 to 16`, and not too many.
+/// A list of numbers for a sentence: runs as `7 to 16`, at most 20 items.
 ///
 /// ```
 /// use truegrind_report::number::listed;

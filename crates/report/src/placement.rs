@@ -1,4 +1,4 @@
-//! What is said of the place of a path, and of the chance that cuts get worse.
+//! Place and shape of paths, and the risk that corrected cuts get worse.
 
 use serde_json::{Value, json};
 
@@ -11,8 +11,8 @@ use truegrind_compensation::risk::placement::{ObjectPlacement, Placement};
 use truegrind_compensation::risk::remedy::Remedy;
 use truegrind_programs::motion::Listing;
 
-/// Cuts that are named one by one.
-const NAMED: usize = 12;
+/// Largest number of listed cuts.
+const MAX_LISTED: usize = 12;
 
 fn word(placement: Placement) -> &'static str {
     match placement {
@@ -21,13 +21,13 @@ fn word(placement: Placement) -> &'static str {
     }
 }
 
-/// One sentence for each work object: what was corrected of it and why, and what would make its place known.
+/// One sentence per work object: what was corrected and why, and which measurement would determine its place.
 pub fn sentences(plan: &Plan, listing: &Listing) -> Vec<String> {
     let what = object_word(listing);
     plan.placements.iter().map(|placement| sentence(placement, what)).collect()
 }
 
-/// What a program of this language calls the frame in which it cuts.
+/// Term of the program language for a work object.
 fn object_word(listing: &Listing) -> &'static str {
     if listing.numbered { "work offset" } else { "work object" }
 }
@@ -35,43 +35,41 @@ fn object_word(listing: &Listing) -> &'static str {
 fn sentence(placement: &ObjectPlacement, what: &str) -> String {
     let ObjectPlacement { work_object, applied, deviation_mm, sigma_mm, remedy, .. } = placement;
     let known = format!(
-        "the path as a whole lies {deviation_mm:.3} mm from where it is meant, which the model knows to ± {sigma_mm:.3} mm (1σ)"
+        "the path as a whole is displaced by {deviation_mm:.3} mm from its intended place (known to ± {sigma_mm:.3} mm, 1σ)"
     );
     if *applied == Placement::Absolute {
         return format!("{what} {work_object}: shape and place are corrected; {known}");
     }
-    let remedy =
-        remedy.as_ref().map(|remedy| format!("{}; ", to_be_measured(remedy, what))).unwrap_or_default();
+    let remedy = remedy.as_ref().map(|remedy| format!("{}; ", remedy_text(remedy, what))).unwrap_or_default();
     format!(
-        "{what} {work_object}: the shape is corrected, the path stays where it is; {known}; {remedy}--placement absolute \
-         corrects the place all the same"
+        "{what} {work_object}: only the shape is corrected, the path stays in place; {known}; {remedy}--placement absolute \
+         corrects the place anyway"
     )
 }
 
-/// What is to be measured so that a place becomes known, what it costs and what it leaves.
-fn to_be_measured(remedy: &Remedy, what: &str) -> String {
+/// The measurement that would determine a place, its duration and the remaining uncertainty.
+fn remedy_text(remedy: &Remedy, what: &str) -> String {
     let what = remedy.measurements.iter().map(|m| m.instruction(what)).collect::<Vec<_>>().join(", and ");
     let (minutes, left) = (remedy.minutes(), remedy.sigma_mm);
     if remedy.suffices {
         format!(
-            "the cheapest measurement that would make the place known: {what} (some {minutes:.0} minutes; it is then known to \
-             ± {left:.3} mm)"
+            "cheapest measurement that would determine the place: {what} (about {minutes:.0} minutes; leaves ± {left:.3} mm)"
         )
     } else {
         format!(
-            "no measurement that was looked at would make the place known well enough to correct it; the best: {what} (some \
-             {minutes:.0} minutes) would leave ± {left:.3} mm"
+            "no considered measurement would determine the place well enough to correct it; the best one, {what} (about \
+             {minutes:.0} minutes), leaves ± {left:.3} mm"
         )
     }
 }
 
-/// The cuts, those first whose correction is most likely to make them worse; `None` where none is known.
+/// The cuts, those first whose correction is most likely to make them worse; `None` without cuts.
 pub fn cut_table(plan: &Plan, listing: &Listing) -> Option<Table> {
     if plan.cuts.is_empty() {
         return None;
     }
     let mut table = Table::new(
-        "Cuts, by the chance that the correction makes them worse",
+        "Cuts by the probability that the correction makes them worse",
         vec![
             Column::text("lines", "Lines"),
             Column::count("motions", "Motions"),
@@ -84,7 +82,7 @@ pub fn cut_table(plan: &Plan, listing: &Listing) -> Option<Table> {
     );
     let mut order: Vec<&CutRisk> = plan.cuts.iter().collect();
     order.sort_by(|a, b| b.probability_of_harm.total_cmp(&a.probability_of_harm));
-    for cut in order.iter().take(NAMED) {
+    for cut in order.iter().take(MAX_LISTED) {
         table.push([
             lines(cut, listing).into(),
             cut.motions.len().into(),
@@ -95,25 +93,25 @@ pub fn cut_table(plan: &Plan, listing: &Listing) -> Option<Table> {
             fate(cut).into(),
         ]);
     }
-    let more = order.len().saturating_sub(NAMED);
+    let more = order.len().saturating_sub(MAX_LISTED);
     if more > 0 {
-        table.notes.push(format!("{more} more cuts with a smaller chance are not listed."));
+        table.notes.push(format!("{more} more cuts with a smaller probability are not listed."));
     }
     table.notes.push(
-        "before: how far the cut is off as it is, RMS (judged by its shape: after its best rigid registration). 1σ: predicted \
-         standard deviation of its correction. worse: probability that the corrected cut is farther off than the cut as it is."
+        "before: RMS deviation of the uncorrected cut (for shape: after its best rigid registration). 1σ: predicted standard \
+         deviation of its correction. worse: probability that the corrected cut deviates more than the uncorrected one."
             .to_owned(),
     );
     Some(table)
 }
 
-/// What became of a cut.
+/// Outcome of a cut.
 fn fate(cut: &CutRisk) -> &'static str {
     match (cut.corrected, cut.left_for_risk) {
         (true, _) => "corrected",
-        (false, true) => "left as it is",
-        // Why is said of its motions.
-        (false, false) => "stays for another reason",
+        (false, true) => "left unchanged",
+        // The reasons are listed with its motions.
+        (false, false) => "left for another reason",
     }
 }
 
@@ -127,13 +125,13 @@ fn lines(cut: &CutRisk, listing: &Listing) -> String {
     }
 }
 
-/// How many cuts stay since their correction may well make them worse, of how many.
-pub fn left(plan: &Plan) -> (usize, usize) {
+/// Number of cuts left unchanged because of `--max-risk`, and number of all cuts.
+pub fn left_at_risk(plan: &Plan) -> (usize, usize) {
     (plan.cuts.iter().filter(|cut| cut.left_for_risk).count(), plan.cuts.len())
 }
 
-/// Predicted 1σ that counts for a motion: of the shape where its cut is judged by that, else of its place.
-pub fn leads_with_shape(plan: &Plan) -> bool {
+/// Whether a work object is corrected in shape only, so that the 1σ of the shape is the relevant one.
+pub fn corrects_shape_only(plan: &Plan) -> bool {
     plan.placements.iter().any(|placement| placement.applied == Placement::Shape)
 }
 
@@ -141,31 +139,31 @@ fn rewritten(plan: &Plan) -> impl Iterator<Item = &MotionOutcome> {
     plan.outcomes.iter().filter(|outcome| matches!(outcome.status, Status::Changed | Status::Flagged))
 }
 
-/// Largest deviation of what is rewritten, as programmed (mm); where the shape alone is corrected, of the shape. `None` where
-/// nothing is rewritten.
+/// Largest uncorrected deviation of the rewritten motions (mm), of the shape if only that is corrected; `None` if nothing is
+/// rewritten.
 pub fn before_mm(plan: &Plan) -> Option<f64> {
     rewritten(plan).filter_map(|outcome| outcome.before_mm).reduce(f64::max)
 }
 
-/// Largest deviation of all motions as programmed (mm).
+/// Largest uncorrected deviation of all motions (mm).
 pub fn largest_mm(plan: &Plan) -> Option<f64> {
     plan.outcomes.iter().filter_map(|outcome| outcome.before_mm).reduce(f64::max)
 }
 
-/// How far off what is rewritten has to be expected (mm): what the solver leaves and the predicted 1σ, the largest of all.
+/// Largest expected deviation of the rewritten motions (mm): remainder of the solver and predicted 1σ.
 pub fn expected_mm(plan: &Plan) -> Option<f64> {
-    let shape = leads_with_shape(plan);
+    let shape = corrects_shape_only(plan);
     let sigma = |outcome: &MotionOutcome| if shape { outcome.shape_sigma_mm } else { outcome.sigma_mm };
     rewritten(plan).filter_map(|outcome| Some(outcome.after_mm?.hypot(sigma(outcome)?))).reduce(f64::max)
 }
 
-/// The chance that what is written gets worse, in words; `None` where nothing is known of it.
-pub fn chance(plan: &Plan) -> Option<String> {
+/// The probability that the corrected cuts get worse, as a sentence; `None` if unknown.
+pub fn risk(plan: &Plan) -> Option<String> {
     let all = percent_of(plan.probability_of_harm?);
     let largest =
         plan.cuts.iter().filter(|cut| cut.corrected).map(|cut| cut.probability_of_harm).fold(0.0, f64::max);
     Some(format!(
-        "the probability that the corrected cuts are farther off than the cuts as they were is {all}, of any one of them {}",
+        "probability that the corrected cuts together deviate more than the uncorrected ones: {all}; for any single cut: {}",
         match percent_of(largest) {
             small if small.starts_with("under") => small,
             other => format!("at most {other}"),
@@ -187,7 +185,7 @@ fn remedy_json(remedy: &Remedy, what: &str) -> Value {
     })
 }
 
-/// What of it the contract holds.
+/// The entries `placements` and `cuts` of the JSON report.
 pub fn json(plan: &Plan, listing: &Listing) -> [Value; 2] {
     let what = object_word(listing);
     let placements = plan.placements.iter().map(|p| {

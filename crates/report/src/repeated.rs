@@ -1,32 +1,32 @@
-//! Figures that were found several times over, in cases or splits: mean ± standard deviation, in tables and as bars.
+//! Statistics over repeated cases or splits: mean ± standard deviation, in tables and as bars.
 
 use super::number::Precision;
 use super::plot::{Axis, BarGroup, Bars};
 use super::table::{Cell, Column};
 use truegrind_math::statistics::{ErrorSummary, mean_and_deviation};
 
-/// A figure of errors.
+/// A statistic of errors.
 type Figure = fn(&ErrorSummary) -> f64;
 
-/// The three figures by which methods are compared: key, heading, figure.
+/// The statistics by which methods are compared: key, heading, statistic.
 const FIGURES: [(&str, &str, Figure); 3] = [
     ("rmse_mm", "RMSE", |e| e.rmse),
     ("mean_absolute_mm", "mean |e|", |e| e.mean_absolute),
     ("max_mm", "max", |e| e.max),
 ];
 
-/// Mean and, of more than one, standard deviation; nothing of none.
+/// Mean and, for two or more values, standard deviation; `None` without values.
 pub fn spread(values: &[f64]) -> Option<(f64, Option<f64>)> {
     let (mean, deviation) = mean_and_deviation(values);
     (!values.is_empty()).then_some((mean, (values.len() > 1).then_some(deviation)))
 }
 
-/// The same for a table.
+/// [`spread`] as a table cell.
 pub fn cell(values: &[f64]) -> Cell {
     spread(values).map_or(Cell::Missing, |(mean, deviation)| Cell::with_sigma(mean, deviation))
 }
 
-/// The same of one figure of errors.
+/// [`spread`] of one statistic as a table cell.
 pub fn over(errors: &[ErrorSummary], figure: Figure) -> Cell {
     cell(&errors.iter().map(figure).collect::<Vec<_>>())
 }
@@ -36,12 +36,12 @@ pub fn columns(decimals: [usize; 3]) -> [Column; 3] {
     std::array::from_fn(|k| Column::number(FIGURES[k].0, FIGURES[k].1, "mm", decimals[k]))
 }
 
-/// What stands in these columns.
+/// The cells of these columns.
 pub fn cells(errors: &[ErrorSummary]) -> [Cell; 3] {
     FIGURES.map(|(_, _, figure)| over(errors, figure))
 }
 
-/// The three figures of every thing side by side; a thing without errors has no bar.
+/// Bar chart of the three statistics for each name; a name without errors has no bar.
 pub fn bars(names: Vec<String>, errors: &[Option<Vec<ErrorSummary>>], labels: Option<Precision>) -> String {
     let groups = FIGURES.map(|(_, heading, figure)| {
         let each: Vec<Option<(f64, Option<f64>)>> =

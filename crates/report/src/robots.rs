@@ -266,10 +266,9 @@ fn push_published(page: &mut Document, robot: &Robot) {
         // Words of any length stand better in a list.
         let mut table = untitled(published_table(robot));
         for key in ["source", "joints_deg", "point"] {
-            table.columns.iter().position(|column| column.key == key).into_iter().for_each(|place| {
-                table.columns.remove(place);
-                table.rows.iter_mut().for_each(|row| drop(row.remove(place)));
-            });
+            if let Some(index) = table.column_index(key) {
+                table.remove_column(index);
+            }
         }
         page.push(table);
         page.push(Block::List(

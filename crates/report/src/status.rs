@@ -1,20 +1,20 @@
-//! How a result is judged. Always shown with a sign and a word, so that nothing hangs on colour.
+//! Status of a result. It is always shown with a sign and a word, so that colour carries no information of its own.
 
-/// A judgement.
+/// Status of a result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Status {
-    /// As it should be.
+    /// No reservation.
     Good,
-    /// Usable, with a reservation that is stated.
+    /// Usable with a stated reservation.
     Warning,
-    /// Not to be used, refused or failed.
+    /// Failed or refused; not to be used.
     Bad,
-    /// Not judged: no limit was stated, or there is nothing to judge by.
+    /// Not judged: no limit was stated, or the data do not suffice.
     NotEvaluated,
 }
 
 impl Status {
-    /// The word: `ok`, `warning`, `failed`, `not evaluated`.
+    /// `ok`, `warning`, `failed` or `not evaluated`.
     pub fn word(self) -> &'static str {
         match self {
             Status::Good => "ok",
@@ -24,7 +24,7 @@ impl Status {
         }
     }
 
-    /// The sign: one character, and for the warning the selector that asks for text instead of an emoji.
+    /// One character; the warning sign is followed by the variation selector for text instead of an emoji.
     pub fn sign(self) -> &'static str {
         match self {
             Status::Good => "✓",
@@ -34,7 +34,7 @@ impl Status {
         }
     }
 
-    /// Name for style sheets.
+    /// CSS class.
     pub(super) fn class(self) -> &'static str {
         match self {
             Status::Good => "good",

@@ -85,12 +85,7 @@ pub fn document(rows: &[MethodRow], robot: &str, dataset: &Dataset) -> Document 
         );
     }
     page.push(Provenance {
-        sources: vec![Source {
-            name: dataset.file.clone(),
-            role: "Measurements".to_owned(),
-            sha256: Some(dataset.sha256.clone()).filter(|hash| !hash.is_empty()),
-            rows: Some(dataset.rows.len()),
-        }],
+        sources: vec![Source::new(&dataset.file, "Measurements", &dataset.sha256, Some(dataset.rows.len()))],
         remarks: vec![
             ("Robot".to_owned(), robot.to_owned()),
             ("Splits".to_owned(), format!("{splits}, seeds 0 to {}", splits.saturating_sub(1))),

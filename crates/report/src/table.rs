@@ -1,9 +1,9 @@
-//! Tables: columns that know their unit and precision, cells that know what is absent.
+//! Tables: columns with unit and precision, cells with missing values.
 
 use super::number::{MISSING, Precision};
 use super::status::Status;
 
-/// A table, in no format yet.
+/// A table, independent of the format.
 ///
 /// ```
 /// use truegrind_report::table::{Cell, Column, Table};
@@ -24,47 +24,46 @@ use super::status::Status;
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
-    /// What the table shows; may be empty.
+    /// Title; may be empty.
     pub title: String,
     /// The columns.
     pub columns: Vec<Column>,
-    /// The rows. Cells that a row has too few are missing; those it has too many are not shown.
+    /// The rows. A short row is filled with missing cells; extra cells are not shown.
     pub rows: Vec<Vec<Cell>>,
-    /// Remarks under the table. Files for programs do not carry them.
+    /// Remarks below the table; not in CSV and Parquet.
     pub notes: Vec<String>,
 }
 
 /// A column.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Column {
-    /// Name in CSV and JSON, with the unit as suffix: `rmse_mm`. A key that an earlier column already has gets a number.
+    /// Name in CSV and JSON, with the unit as suffix: `rmse_mm`. A duplicate key gets a number.
     pub key: String,
-    /// Heading for people.
+    /// Heading.
     pub heading: String,
-    /// Unit, where there is one.
+    /// Unit, if any.
     pub unit: Option<String>,
-    /// What stands in it, whatever a single cell says.
+    /// Type of the column, even if single cells differ.
     pub kind: ColumnKind,
-    /// Digits shown to people.
+    /// Digits shown.
     pub precision: Precision,
 }
 
-/// What stands in a column. A single cell may say something else to people ("diverged 3/10" among errors); in a file with
-/// types, such a cell of a column of numbers is absent.
+/// Type of a column. A single cell may differ ("diverged 3/10" among errors); in a typed file it is then missing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ColumnKind {
-    /// Words.
+    /// Text.
     Text,
-    /// Whole numbers.
+    /// Integers.
     Count,
     /// Numbers.
     Number,
 }
 
-/// Side on which the cells of a column stand.
+/// Alignment of the cells of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Alignment {
-    /// Left, for words.
+    /// Left, for text.
     Left,
     /// Right, for numbers.
     Right,
@@ -74,27 +73,27 @@ pub enum Alignment {
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Cell {
-    /// Words.
+    /// Text.
     Text(String),
-    /// A number in the unit of its column. NaN counts as missing.
+    /// A number in the unit of its column; NaN counts as missing.
     Number(f64),
-    /// A whole number: rows, lines, iterations.
+    /// An integer: rows, lines, iterations.
     Count(u64),
-    /// A number and its standard uncertainty, both in the unit of the column; σ may be NaN where it is not known.
+    /// A number and its standard uncertainty in the unit of the column; an unknown σ is NaN.
     WithSigma {
         /// The value.
         value: f64,
         /// Its 1σ.
         sigma: f64,
     },
-    /// A judgement and what it is about.
+    /// A status with a text.
     Judged(Status, String),
-    /// Nothing. Printed as `–`; empty in CSV, `null` in JSON.
+    /// Missing: printed as `–`, empty in CSV, `null` in JSON.
     Missing,
 }
 
 impl Table {
-    /// A table without rows and notes.
+    /// An empty table.
     pub fn new(title: impl Into<String>, columns: Vec<Column>) -> Self {
         Self { title: title.into(), columns, rows: Vec::new(), notes: Vec::new() }
     }
@@ -104,8 +103,8 @@ impl Table {
         self.rows.push(row.into_iter().collect());
     }
 
-    /// The table with at most `limit` rows, the first and the last ones, dots between them and a note that says how many
-    /// are left out. For pages: a path of 100,000 points belongs in the CSV file.
+    /// The table with at most `limit` of its first and last rows, dots between them, and a note on the omitted rows. For pages: a
+    /// path of 100,000 points belongs in the CSV file.
     pub fn excerpt(&self, limit: usize) -> Table {
         let mut table = self.clone();
         let left_out = self.rows.len().saturating_sub(limit);
@@ -114,7 +113,7 @@ impl Table {
             let dots = vec![Cell::Text("⋮".to_owned()); self.columns.len()];
             table.rows.splice(head..head + left_out, [dots]);
             table.notes.push(format!(
-                "{left_out} of {} rows are left out here, between the first {head} and the last {}.",
+                "{left_out} of {} rows, between the first {head} and the last {}, are omitted here.",
                 self.rows.len(),
                 limit / 3
             ));
@@ -122,17 +121,37 @@ impl Table {
         table
     }
 
-    /// The cell, [`Cell::Missing`] where the row is too short.
+    /// Index of the column with a key.
+    pub(super) fn column_index(&self, key: &str) -> Option<usize> {
+        self.columns.iter().position(|column| column.key == key)
+    }
+
+    /// Removes a column.
+    pub(super) fn remove_column(&mut self, index: usize) {
+        self.columns.remove(index);
+        self.rows.iter_mut().for_each(|row| drop(row.remove(index)));
+    }
+
+    /// Removes the columns without any value.
+    pub(super) fn remove_empty_columns(&mut self) {
+        for index in (0..self.columns.len()).rev() {
+            if self.rows.iter().all(|row| row[index] == Cell::Missing) {
+                self.remove_column(index);
+            }
+        }
+    }
+
+    /// The cell; [`Cell::Missing`] beyond the end of a short row.
     pub(super) fn cell(&self, row: usize, column: usize) -> &Cell {
         self.rows.get(row).and_then(|row| row.get(column)).unwrap_or(&Cell::Missing)
     }
 
-    /// What people read in a cell.
+    /// The cell as shown.
     pub(super) fn shown(&self, row: usize, column: usize) -> String {
         self.cell(row, column).shown(self.columns[column].precision)
     }
 
-    /// The columns of a file for programs: key, and whether the column holds a σ beside its value.
+    /// The columns of a data file; a column with σ becomes two.
     pub(super) fn fields(&self) -> Vec<Field> {
         let mut fields = Vec::new();
         let mut used = std::collections::BTreeSet::new();
@@ -161,17 +180,16 @@ impl Table {
     }
 }
 
-/// A column as programs see it.
+/// A column of a data file.
 pub(super) struct Field {
-    /// Its key, unique in the table.
+    /// Unique key.
     pub(super) key: String,
-    /// Key of the σ that belongs to it, where any cell has one: `sigma` for `value`, `sigma_mm` for `value_mm`,
-    /// `sigma_a_mm` for `a_mm`.
+    /// Key of its σ, if any cell has one: `sigma` for `value`, `sigma_mm` for `value_mm`, `sigma_a_mm` for `a_mm`.
     pub(super) sigma_key: Option<String>,
 }
 
 impl Column {
-    /// A column of words.
+    /// A text column.
     pub fn text(key: impl Into<String>, heading: impl Into<String>) -> Self {
         Self {
             key: key.into(),
@@ -182,12 +200,12 @@ impl Column {
         }
     }
 
-    /// A column of whole numbers.
+    /// A column of integers.
     pub fn count(key: impl Into<String>, heading: impl Into<String>) -> Self {
         Self { kind: ColumnKind::Count, ..Self::text(key, heading) }
     }
 
-    /// A column of numbers with fixed decimals. An empty unit is no unit.
+    /// A column of numbers with fixed decimals; an empty unit means none.
     pub fn number(
         key: impl Into<String>,
         heading: impl Into<String>,
@@ -203,7 +221,7 @@ impl Column {
         }
     }
 
-    /// A column of numbers with so many significant digits; with σ in its cells, that many of σ.
+    /// A column of numbers with significant digits; for cells with σ, those of σ.
     pub fn significant(
         key: impl Into<String>,
         heading: impl Into<String>,
@@ -213,12 +231,12 @@ impl Column {
         Self { precision: Precision::Significant(digits), ..Self::number(key, heading, unit, 0) }
     }
 
-    /// Side on which its cells stand.
+    /// Alignment of its cells.
     pub fn alignment(&self) -> Alignment {
         if self.kind == ColumnKind::Text { Alignment::Left } else { Alignment::Right }
     }
 
-    /// Heading with its unit, `RMSE (mm)`.
+    /// Heading with its unit, `RMSE [mm]`.
     pub fn label(&self) -> String {
         match &self.unit {
             Some(unit) => format!("{} [{unit}]", self.heading),
@@ -228,7 +246,7 @@ impl Column {
 }
 
 impl Cell {
-    /// A number and, where it is known, its σ.
+    /// A number and its σ, if known.
     pub fn with_sigma(value: f64, sigma: Option<f64>) -> Self {
         match sigma {
             Some(sigma) => Cell::WithSigma { value, sigma },

@@ -55,12 +55,7 @@ pub fn document(tracker: &Tracker, fresh: usize, alarms: &[Alarm], model: &str) 
 
 /// The files that were taken in.
 fn sources(tracker: &Tracker) -> Vec<Source> {
-    let of = |consumed: &ConsumedFile| Source {
-        name: consumed.file.clone(),
-        role: "Measurements".to_owned(),
-        sha256: None,
-        rows: Some(consumed.rows),
-    };
+    let of = |consumed: &ConsumedFile| Source::new(&consumed.file, "Measurements", "", Some(consumed.rows));
     tracker.state().consumed.iter().map(of).collect()
 }
 

@@ -1,54 +1,56 @@
-//! The first screen of a page on a compensation: may the program run, how far off is it before and after, what is to be done.
+//! Verdict and key figures of a compensation: may the program run, what are the deviations before and after, what remains to do.
 
-use crate::deviation::fate_word;
+use crate::deviation::status_word;
 use crate::document::{KeyFigure, Verdict};
 use crate::placement;
 use crate::status::Status;
-use truegrind_compensation::deviation::Status as Fate;
+use truegrind_compensation::deviation::Status as MotionStatus;
 use truegrind_compensation::plan::Plan;
 use truegrind_compensation::plan::reason::OutcomeReason;
 use truegrind_programs::motion::Listing;
 
-/// All, in the order in which a reader wants them.
-const FATES: [Fate; 4] = [Fate::Changed, Fate::Flagged, Fate::Refused, Fate::Left];
+/// All statuses in display order.
+const STATUSES: [MotionStatus; 4] =
+    [MotionStatus::Changed, MotionStatus::Flagged, MotionStatus::Refused, MotionStatus::Left];
 
-/// How a rewrite is judged, the same on the terminal, on the page and in the exit code.
+/// Verdict on a compensation, the same on the terminal, on the page and in the exit code.
 pub fn verdict(plan: &Plan, listing: &Listing) -> Verdict {
-    let (refused, flagged) = (count(plan, Fate::Refused), count(plan, Fate::Flagged));
-    let written = count(plan, Fate::Changed) + flagged;
-    let (left, cuts) = placement::left(plan);
+    let (refused, flagged) = (count(plan, MotionStatus::Refused), count(plan, MotionStatus::Flagged));
+    let written = count(plan, MotionStatus::Changed) + flagged;
+    let (left, cuts) = placement::left_at_risk(plan);
     let same =
         !plan.outcomes.is_empty() && plan.outcomes.iter().all(|o| o.reason == Some(OutcomeReason::NoChange));
     let (status, headline) = match (written, refused + flagged) {
         (0, 0) if same => {
-            (Status::NotEvaluated, "Nothing was rewritten: every number is right to its last decimal")
+            (Status::NotEvaluated, "Nothing to correct: every number is already right to its last decimal")
         }
-        (0, 0) if left > 0 => (
-            Status::NotEvaluated,
-            "Nothing was rewritten: the measurement does not tell the arm well enough where the program cuts",
-        ),
-        (0, 0) => (Status::NotEvaluated, "Nothing was rewritten"),
-        (0, _) => (Status::Bad, "Nothing could be rewritten"),
+        (0, 0) if left > 0 => {
+            (Status::NotEvaluated, "Nothing was corrected: the model is too uncertain where the program cuts")
+        }
+        (0, 0) => (Status::NotEvaluated, "Nothing was corrected"),
+        (0, _) => (Status::Bad, "Nothing could be corrected"),
         (_, 0) if left > 0 => (
             Status::Warning,
-            "Rewritten, but for cuts where the measurement does not tell the arm well enough: they stay as they are",
+            "Corrected, except for cuts where the model is too uncertain: these are unchanged",
         ),
-        (_, 0) => (Status::Good, "Everything that can be rewritten is rewritten: the program may run"),
-        _ => (Status::Warning, "Rewritten, but look at what was refused or flagged before the program runs"),
+        (_, 0) => (Status::Good, "All correctable motions are corrected: the program may run"),
+        _ => (
+            Status::Warning,
+            "Corrected, but check the refused and flagged motions before running the program",
+        ),
     };
-    let mut reasons: Vec<String> = sizes(plan).into_iter().collect();
+    let mut reasons: Vec<String> = deviations(plan).into_iter().collect();
     reasons.push(coverage(plan));
     if left > 0 {
         reasons.push(format!(
-            "{left} of {cuts} cuts stay as they are, since the correction makes them worse with a larger probability than \
-             --max-risk takes; more measured poses where they lie tell the arm better (`truegrind plan`)"
+            "{left} of {cuts} cuts are unchanged, since their correction makes them worse with a probability above --max-risk; measuring \
+             more poses near them improves the model (`truegrind plan`)"
         ));
     }
-    reasons.extend(placement::chance(plan));
+    reasons.extend(placement::risk(plan));
     if refused > 0 && written > 0 {
         reasons.push(
-            "a refused motion goes where it always went: between it and its rewritten neighbours the path steps by the \
-             correction"
+            "refused motions are unchanged: the path has a step of the size of the correction between them and their corrected neighbours"
                 .to_owned(),
         );
     }
@@ -56,20 +58,20 @@ pub fn verdict(plan: &Plan, listing: &Listing) -> Verdict {
         count_reason(plan, |why| matches!(why, OutcomeReason::PartOfCut { .. } | OutcomeReason::Step { .. }));
     if steps > 0 {
         reasons.push(format!(
-            "{steps} motions could be corrected but stay, since another motion of their cut stays: half a correction would be \
-             a step in the part"
+            "{steps} correctable motions are unchanged, since another motion of their cut cannot be corrected: correcting a part of a cut \
+             would leave a step in the workpiece"
         ));
     }
     if !listing.opaque.is_empty() {
         reasons.push(format!(
-            "regions that could not be read and stay as they are: {}; a motion in them is not corrected",
+            "{} regions could not be read and are unchanged; motions in them are not corrected",
             listing.opaque.len()
         ));
     }
     let inserted: usize = plan.outcomes.iter().map(|outcome| outcome.inserted).sum();
     if inserted > 0 {
         reasons.push(format!(
-            "{inserted} targets put in, so that straight lines stay straight within the tolerance"
+            "{inserted} targets inserted, to keep the path within the tolerance between targets"
         ));
     }
     Verdict::new(status, headline, reasons)
@@ -79,40 +81,43 @@ fn count_reason(plan: &Plan, is: impl Fn(&OutcomeReason) -> bool) -> usize {
     plan.outcomes.iter().filter(|outcome| outcome.reason.as_ref().is_some_and(&is)).count()
 }
 
-/// How far off it is before and after, in words; `None` where nothing is known of it.
-fn sizes(plan: &Plan) -> Option<String> {
-    let as_it_is = |mm: f64| format!("as it is the program is up to {mm:.3} mm off");
-    let Some(before) = placement::before_mm(plan) else { return placement::largest_mm(plan).map(as_it_is) };
+/// Deviation before and after, as a sentence; `None` if unknown.
+fn deviations(plan: &Plan) -> Option<String> {
+    let uncorrected = |mm: f64| format!("the uncorrected program deviates by up to {mm:.3} mm");
+    let Some(before) = placement::before_mm(plan) else {
+        return placement::largest_mm(plan).map(uncorrected);
+    };
     let after = placement::expected_mm(plan)?;
-    let shape = if placement::leads_with_shape(plan) { ", in shape" } else { "" };
+    let shape = if placement::corrects_shape_only(plan) { " (shape only)" } else { "" };
     Some(format!(
-        "what is rewritten is up to {before:.3} mm off before, and an expected {after:.3} mm (1σ) after{shape}"
+        "largest deviation of the corrected motions{shape}: {before:.3} mm before, {after:.3} mm expected after (1σ)"
     ))
 }
 
 pub(super) fn key_figures(plan: &Plan) -> Vec<KeyFigure> {
     let all = plan.outcomes.len();
-    let shape = if placement::leads_with_shape(plan) { "of the shape" } else { "shape and place" };
+    let shape = if placement::corrects_shape_only(plan) { "of the shape" } else { "shape and place" };
     let mut figures = vec![match placement::before_mm(plan) {
-        Some(mm) => KeyFigure::new("Largest before", mm, 3, "mm").note(format!("{shape}, what is rewritten")),
+        Some(mm) => KeyFigure::new("Largest before", mm, 3, "mm").note(format!("{shape}, corrected motions")),
         None => KeyFigure::new("Largest before", placement::largest_mm(plan), 3, "mm")
-            .note("as it is, all motions"),
+            .note("uncorrected, all motions"),
     }];
     let expected = placement::expected_mm(plan);
     figures.push(KeyFigure::new("Expected after", expected, 3, "mm").note(match expected {
-        Some(_) => format!("{shape}, 1σ of the model: largest of what is rewritten"),
-        None => "nothing is rewritten, or the model has no σ".to_owned(),
+        Some(_) => format!("{shape}, 1σ: largest of the corrected motions"),
+        None => "nothing is corrected, or the model has no σ".to_owned(),
     }));
     if let Some(chance) = plan.probability_of_harm {
         figures.push(
-            KeyFigure::new("Chance to be worse", 100.0 * chance, 1, "%").note("the corrected cuts together"),
+            KeyFigure::new("Probability of worse", 100.0 * chance, 1, "%")
+                .note("all corrected cuts together"),
         );
     }
-    let [changed, flagged, refused, left] = FATES.map(|fate| count(plan, fate));
+    let [changed, flagged, refused, left] = STATUSES.map(|fate| count(plan, fate));
     let rewritten = changed + flagged;
     let share = if all > 0 { format!("{} of {all} motions; ", share(rewritten, all)) } else { String::new() };
     figures.push(
-        KeyFigure::new("Rewritten", rewritten, 0, "")
+        KeyFigure::new("Corrected", rewritten, 0, "")
             .note(format!("{share}{flagged} of them flagged; {refused} refused, {left} left")),
     );
     figures
@@ -122,20 +127,20 @@ pub(super) fn key_figures(plan: &Plan) -> Vec<KeyFigure> {
 pub fn coverage(plan: &Plan) -> String {
     let all = plan.outcomes.len();
     if all == 0 {
-        return "the program holds no motion".to_owned();
+        return "the program contains no motion".to_owned();
     }
-    let parts: Vec<String> = FATES
+    let parts: Vec<String> = STATUSES
         .iter()
         .map(|&fate| {
             let found = count(plan, fate);
-            format!("{found} {} ({})", fate_word(fate), share(found, all))
+            format!("{found} {} ({})", status_word(fate), share(found, all))
         })
         .collect();
     let word = if all == 1 { "motion" } else { "motions" };
     format!("{all} {word}: {}", parts.join(", "))
 }
 
-/// Share in per cent: never 100 % where something is missing, never 0 % where something is there.
+/// Share in per cent; 100 % only if complete, 0 % only if empty.
 fn share(part: usize, all: usize) -> String {
     let percent = 100.0 * part as f64 / all as f64;
     if part < all && percent > 99.9 {
@@ -149,6 +154,6 @@ fn share(part: usize, all: usize) -> String {
     }
 }
 
-fn count(plan: &Plan, fate: Fate) -> usize {
+fn count(plan: &Plan, fate: MotionStatus) -> usize {
     plan.outcomes.iter().filter(|outcome| outcome.status == fate).count()
 }

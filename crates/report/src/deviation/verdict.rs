@@ -4,21 +4,21 @@ use super::side::{AFTER, BEFORE, Side};
 use super::words::{decimals, meaning};
 use crate::document::Verdict;
 use crate::status::Status;
-use truegrind_compensation::deviation::{PathReport, Status as Fate};
+use truegrind_compensation::deviation::{PathReport, Status as MotionStatus};
 
 /// A path that was judged: its largest deviation (mm) as programmed and as rewritten.
 type Judged<'a> = (&'a PathReport, f64, f64);
 
 /// The verdict on one program under all models.
 pub(super) fn verdict(reports: &[&PathReport]) -> Verdict {
-    let count = |fate: Fate| {
+    let count = |fate: MotionStatus| {
         reports.iter().map(|r| r.points.iter().filter(|p| p.status == fate).count()).max().unwrap_or(0)
     };
     let mut reasons = Vec::new();
     let mut status = Status::Good;
     for (fate, text) in [
-        (Fate::Refused, "refused: not rewritten, because that would be wrong or dangerous"),
-        (Fate::Flagged, "flagged: rewritten with a warning"),
+        (MotionStatus::Refused, "refused: not rewritten, because that would be wrong or dangerous"),
+        (MotionStatus::Flagged, "flagged: rewritten with a warning"),
     ] {
         let points = count(fate);
         if points > 0 {
@@ -40,7 +40,7 @@ pub(super) fn verdict(reports: &[&PathReport]) -> Verdict {
             reasons.push(format!("{} makes the path worse: up to {}", report.model, known(Some(*after))));
         }
         // Under a model that corrects no cut there is no correction to be sure of.
-        let corrects = report.cut().any(|p| !matches!(p.status, Fate::Left));
+        let corrects = report.cut().any(|p| !matches!(p.status, MotionStatus::Left));
         if !corrects {
             reasons.push(format!("under {} every cut stays as it is", report.model));
         } else if let (Some(sigma), Some(rms)) = (report.sigma_rms_mm(), before_rms(report))
