@@ -1,4 +1,4 @@
-//! The acceptance of an estimated arm: may it be used at this tolerance, and how was that found out.
+//! Acceptance report of an estimated arm: decision, errors, method.
 
 use serde_json::{Value, json};
 
@@ -15,10 +15,10 @@ use truegrind_calibration::acceptance::{
 use truegrind_calibration::measurement::dataset::{Dataset, Sensor};
 use truegrind_math::statistics::ErrorSummary;
 
-/// What is said beside the measurement.
+/// Further data for the report.
 #[derive(Debug, Clone, Default)]
 pub struct Statement {
-    /// Serial numbers and the like, by name, in the order in which they were stated.
+    /// Serial numbers and other remarks by name.
     pub serials: Vec<(String, String)>,
     /// The model file, and the SHA-256 of its bytes.
     pub model: Option<(String, String)>,
@@ -39,32 +39,29 @@ pub fn document(
     page.heading(2, "Errors");
     page.figure(
         frequency(found, dataset.sensor),
-        "The error of each row under the estimated arm, by a sensor frame that has not seen the row.",
+        "Error of each row under the estimated arm, with a sensor frame fitted without that row.",
     );
-    page.figure(
-        by_row(found, dataset.sensor),
-        "The same by row, in the order of the file, with the tolerance.",
-    );
+    page.figure(by_row(found, dataset.sensor), "Errors by row in file order, with the tolerance.");
     if let Some(turns) = &found.orientation {
         page.figure(
             turns_by_row(turns),
-            "The error of the orientation by row, the angle between the target as it was seen and as the arm says.",
+            "Orientation error by row: angle between measured and predicted target.",
         );
     }
-    page.heading(2, "Circumstances");
-    page.push(circumstances(found, estimated));
-    page.heading(2, "How this was decided");
+    page.heading(2, "Conditions");
+    page.push(conditions(found, estimated));
+    page.heading(2, "Method");
     page.push(Block::List(method(found, statement)));
     page.push(Block::Details {
         summary: format!("Errors of the {} rows", found.rows),
         blocks: vec![row_table(found).excerpt(300).into()],
     });
-    page.heading(2, "Where this came from");
+    page.heading(2, "Provenance");
     page.push(provenance(dataset, estimated, statement));
     page
 }
 
-/// What fits a terminal.
+/// Summary for the terminal.
 pub fn summary(found: &Acceptance, dataset: &Dataset, estimated: &Estimated) -> Document {
     let mut page = Document::new(format!("Acceptance of {}", estimated.robot));
     page.subtitle = format!("{}, {} poses in {} rows", dataset.file, found.poses, found.rows);
@@ -76,7 +73,7 @@ pub fn summary(found: &Acceptance, dataset: &Dataset, estimated: &Estimated) -> 
     page
 }
 
-/// Whether a run ends well.
+/// Whether the arm is accepted.
 pub fn is_accepted(found: &Acceptance) -> bool {
     found.overall() == Decision::Accepted
 }
@@ -86,23 +83,23 @@ fn verdict(found: &Acceptance, sensor: Sensor) -> Verdict {
     let mut reasons = Vec::new();
     match found.uncertainty {
         Uncertainty::Unknown => reasons.push(
-            "the uncertainty of the sensor is not known and left out: state it (--sensor-uncertainty), or repeat some poses"
+            "the sensor uncertainty is unknown and not taken into account: state it (--sensor-uncertainty), or repeat some poses"
                 .to_owned(),
         ),
         Uncertainty::Repeats => reasons.push(
-            "the uncertainty is twice the scatter of repeated poses: what the sensor is off by everywhere is not in it"
+            "the uncertainty is twice the scatter of repeated poses; it does not contain systematic errors of the sensor"
                 .to_owned(),
         ),
         Uncertainty::Stated => {}
     }
     reasons.extend(orientation_reason(found));
     if sensor == Sensor::Cable {
-        reasons.push("a cable sees the error along itself alone: across it nothing is judged".to_owned());
+        reasons.push("a cable measures errors only along itself; errors across it are not judged".to_owned());
     }
     Verdict::new(status, headline, reasons)
 }
 
-/// What was decided. Of position and orientation that one is told which decides, and both where both hold.
+/// The decision, stated for the quantity that decides, or for both if both pass.
 fn headline(found: &Acceptance) -> (Status, String) {
     let overall = found.overall();
     if found.orientation_asked && overall != Decision::Accepted && overall != found.decision {
@@ -115,65 +112,62 @@ fn headline(found: &Acceptance) -> (Status, String) {
                 found.orientation.as_ref().and_then(|turns| Some((turns.model.max, turns.tolerance_rad?)));
             let turn = turn.map_or_else(String::new, |(max, limit)| {
                 let [max, limit] = [max, limit].map(f64::to_degrees);
-                format!("; the largest turn is {max:.4}°, the tolerance {limit:.4}°")
+                format!("; largest orientation error {max:.4}°, tolerance {limit:.4}°")
             });
-            let place = format!("Accepted: the largest error is {max:.3} mm, the tolerance {limit:.3} mm");
+            let place = format!("Accepted: largest error {max:.3} mm, tolerance {limit:.3} mm");
             (Status::Good, place + &turn)
         }
-        Decision::Refused => (
-            Status::Bad,
-            format!("Not accepted: the largest error is {max:.3} mm, the tolerance {limit:.3} mm"),
-        ),
+        Decision::Refused => {
+            (Status::Bad, format!("Not accepted: largest error {max:.3} mm, tolerance {limit:.3} mm"))
+        }
         Decision::Open => (
             Status::Warning,
             format!(
-                "Not decided: the largest error of {max:.3} mm lies within {u:.3} mm, the uncertainty of the sensor, of the \
-                 tolerance of {limit:.3} mm"
+                "Not decided: the largest error {max:.3} mm is within the sensor uncertainty {u:.3} mm of the tolerance {limit:.3} mm"
             ),
         ),
         Decision::NotEvaluated => (
             Status::NotEvaluated,
-            format!("Not evaluated: {} poses, at least {FEWEST_POSES} are asked for", found.poses),
+            format!("Not evaluated: {} poses, at least {FEWEST_POSES} are required", found.poses),
         ),
     }
 }
 
-/// The same of an orientation that decides.
+/// The decision on the orientation.
 fn orientation_headline(found: &Acceptance) -> (Status, String) {
     let Some((turns, limit)) =
         found.orientation.as_ref().and_then(|turns| Some((turns, turns.tolerance_rad?)))
     else {
         let headline =
-            "Not evaluated: a tolerance of the orientation was stated, and the sensor saw no orientation";
+            "Not evaluated: a tolerance of the orientation was stated, but the sensor does not measure it";
         return (Status::NotEvaluated, headline.to_owned());
     };
     let [max, limit, u] = [turns.model.max, limit, turns.uncertainty_rad].map(f64::to_degrees);
     match turns.decision {
         Decision::Refused => {
-            (Status::Bad, format!("Not accepted: the largest turn is {max:.4}°, the tolerance {limit:.4}°"))
+            (Status::Bad, format!("Not accepted: largest orientation error {max:.4}°, tolerance {limit:.4}°"))
         }
         _ => (
             Status::Warning,
             format!(
-                "Not decided: the largest turn of {max:.4}° lies within {u:.4}°, the uncertainty of the sensor, of the tolerance of \
-                 {limit:.4}°"
+                "Not decided: the largest orientation error {max:.4}° is within the sensor uncertainty {u:.4}° of the tolerance {limit:.4}°"
             ),
         ),
     }
 }
 
-/// What qualifies the decision on the orientation.
+/// Reservation on the decision about the orientation.
 fn orientation_reason(found: &Acceptance) -> Option<String> {
     let turns = found.orientation.as_ref()?;
     turns.tolerance_rad?;
     match turns.uncertainty {
         Uncertainty::Stated => None,
         Uncertainty::Repeats => Some(
-            "the uncertainty of the orientation is twice the scatter of repeated poses: what the sensor is off by everywhere is not in it"
+            "the orientation uncertainty is twice the scatter of repeated poses; it does not contain systematic errors of the sensor"
                 .to_owned(),
         ),
         Uncertainty::Unknown => Some(
-            "the uncertainty of the orientation is not known and left out: state it (--sensor-uncertainty-angle), or repeat some poses"
+            "the orientation uncertainty is unknown and not taken into account: state it (--sensor-uncertainty-angle), or repeat some poses"
                 .to_owned(),
         ),
     }
@@ -184,9 +178,9 @@ fn figures(found: &Acceptance) -> Vec<KeyFigure> {
     let uncertainty = Some(found.uncertainty_mm).filter(|_| found.uncertainty != Uncertainty::Unknown);
     vec![
         KeyFigure::new("Largest error", found.model.max, 3, "mm")
-            .note(format!("arm of the data sheet: {:.3} mm", found.nominal.max)),
+            .note(format!("nominal arm: {:.3} mm", found.nominal.max)),
         KeyFigure::new("RMS error", found.model.rmse, 3, "mm")
-            .note(format!("arm of the data sheet: {:.3} mm, {share:.0} % less", found.nominal.rmse)),
+            .note(format!("nominal arm: {:.3} mm ({share:.0} % less now)", found.nominal.rmse)),
         KeyFigure::new("Tolerance", found.tolerance_mm, 3, "mm"),
         KeyFigure::new("Uncertainty of the sensor", uncertainty, 3, "mm").note("expanded, k = 2"),
         KeyFigure::new("Poses", found.poses, 0, "").note("that the model was not fitted to"),
@@ -220,7 +214,7 @@ pub fn table(found: &Acceptance, sensor: Sensor) -> Table {
     table
 }
 
-/// The errors of the orientation, and what was decided by them, or why nothing was.
+/// Orientation errors and the decision on them.
 pub fn orientation_table(found: &Acceptance) -> Table {
     let mut table = Table::new(
         "Orientation",
@@ -237,14 +231,14 @@ pub fn orientation_table(found: &Acceptance) -> Table {
     let Some(turns) = &found.orientation else {
         let mut row = vec![Cell::from("estimated")];
         row.extend((0..5).map(|_| Cell::Missing));
-        row.push("not evaluated: the sensor saw no orientation".into());
+        row.push("not evaluated: the sensor does not measure the orientation".into());
         table.push(row);
         return table;
     };
     let remark = match (turns.tolerance_rad, turns.decision) {
         (None, _) => "not evaluated: no tolerance was stated (--tolerance-angle)".to_owned(),
         (_, Decision::NotEvaluated) => {
-            format!("not evaluated: {} poses, at least {FEWEST_POSES} are asked for", found.poses)
+            format!("not evaluated: {} poses, at least {FEWEST_POSES} are required", found.poses)
         }
         (_, decision) => word(decision).to_owned(),
     };
@@ -290,7 +284,7 @@ pub fn row_table(found: &Acceptance) -> Table {
     table
 }
 
-/// Accuracy and repeatability of poses and paths, or why there are none.
+/// Accuracy and repeatability of poses and paths (ISO 9283), or why they are missing.
 fn iso(found: &Acceptance, dataset: &Dataset) -> Table {
     let mut table = Table::new(
         "ISO 9283",
@@ -303,7 +297,7 @@ fn iso(found: &Acceptance, dataset: &Dataset) -> Table {
     let missing = || match dataset.sensor {
         Sensor::Cable => NO_POSITION.to_owned(),
         _ => format!(
-            "not evaluated: {ISO_CYCLES} cycles at {ISO_POSES} poses are asked for, at most {} of one pose were measured",
+            "not evaluated: {ISO_CYCLES} cycles at {ISO_POSES} poses are required, at most {} were measured at one pose",
             found.most_cycles
         ),
     };
@@ -327,7 +321,7 @@ fn iso(found: &Acceptance, dataset: &Dataset) -> Table {
     table
 }
 
-const NO_POSITION: &str = "not evaluated: a cable sees no position";
+const NO_POSITION: &str = "not evaluated: a cable does not measure positions";
 
 fn no_path() -> String {
     format!(
@@ -336,18 +330,18 @@ fn no_path() -> String {
     )
 }
 
-/// Path accuracy and repeatability of one path, or what is missing for them.
+/// Path accuracy and repeatability of one path, or why they are missing.
 fn iso_of_path(found: &PathFound, table: &mut Table) {
     let PathFound { path, cycles, points, .. } = found;
     let left_out = match found.left_out {
         0 => String::new(),
-        count => format!(", {count} left out that not every cycle has and passes"),
+        count => format!(", {count} points omitted that some cycle lacks"),
     };
     let what = format!("path {path}: {cycles} cycles, {points} sampling points{left_out}");
     let remark = if *points < PATH_POINTS {
-        format!("not evaluated: at least {PATH_POINTS} sampling points are asked for ({what})")
+        format!("not evaluated: at least {PATH_POINTS} sampling points are required ({what})")
     } else if *cycles < PATH_CYCLES {
-        format!("not evaluated: {PATH_CYCLES} cycles are asked for ({what})")
+        format!("not evaluated: {PATH_CYCLES} cycles are required ({what})")
     } else {
         what
     };
@@ -360,7 +354,7 @@ fn iso_of_path(found: &PathFound, table: &mut Table) {
     table.push(["path repeatability RT".into(), found.repeatability_mm.into(), remark.as_str().into()]);
 }
 
-fn circumstances(found: &Acceptance, estimated: &Estimated) -> Table {
+fn conditions(found: &Acceptance, estimated: &Estimated) -> Table {
     let mut table = Table::new(
         "",
         vec![
@@ -381,34 +375,34 @@ fn circumstances(found: &Acceptance, estimated: &Estimated) -> Table {
         let [least, most] = [0, 1].map(|k| Cell::from(range.map(|range| range[k])));
         table.push([name.into(), unit.into(), least, most, model.into()]);
     }
-    table.notes.push("– stands where nothing was logged.".to_owned());
+    table.notes.push("–: not logged.".to_owned());
     table
 }
 
 fn method(found: &Acceptance, statement: &Statement) -> Vec<String> {
     let frames = if statement.frames_stated {
-        "The sensor's frame was stated: nothing was fitted to these rows.".to_owned()
+        "The sensor frame was stated: nothing was fitted to these rows.".to_owned()
     } else {
-        "The sensor's frame and its target were fitted in five folds: each row is judged with a frame that has not seen its pose. \
-         What all readings share (where the robot stands) is not judged so."
+        "Sensor frame and target were fitted in five folds: each row is judged with a frame fitted without its pose. Errors common to \
+         all readings (the position of the robot) are not judged."
             .to_owned()
     };
     let rule = format!(
-        "Accepted where largest error and uncertainty ({:.3} mm) lie within the tolerance together, not accepted where the largest \
-         error exceeds it by more than the uncertainty, else not decided (the rule of ISO 14253-1).",
+        "Decision rule of ISO 14253-1: accepted if the largest error plus the uncertainty ({:.3} mm) is within the tolerance, not \
+         accepted if the largest error exceeds the tolerance by more than the uncertainty, otherwise not decided.",
         found.uncertainty_mm
     );
     let mut method = vec![frames, rule];
     if !found.paths.is_empty() {
         method.push(
-            "Rows that were read on a path count for its accuracy and repeatability alone, at planes normal to the path at each \
-             sampling point. The commanded path is where the model says that the arm stands at the logged joints."
+            "Rows measured on a path count only for path accuracy and repeatability, in planes normal to the path at each sampling \
+             point. The commanded path is the path of the model at the logged joints."
                 .to_owned(),
         );
     }
     if let Some(turns) = found.orientation.as_ref().filter(|turns| turns.tolerance_rad.is_some()) {
         method.push(format!(
-            "The orientation is judged by the same rule, at the same poses, with an uncertainty of {:.4}°; both have to hold.",
+            "The orientation is judged by the same rule at the same poses, with an uncertainty of {:.4}°; both must pass.",
             turns.uncertainty_rad.to_degrees()
         ));
     }
@@ -450,7 +444,7 @@ fn turns_by_row(turns: &Orientation) -> String {
     Graph {
         title: "Errors of the orientation by row".to_owned(),
         x: Axis::new("row of the file", ""),
-        y: Axis::new("turn", "°"),
+        y: Axis::new("orientation error", "°"),
         series: vec![Series::points("estimated arm", points).ink(Ink::Blue)],
         references: turns.tolerance_rad.map(limit).into_iter().collect(),
         ..Graph::default()
@@ -471,7 +465,7 @@ fn provenance(dataset: &Dataset, estimated: &Estimated, statement: &Statement) -
     page
 }
 
-/// Everything; schema `truegrind.acceptance/1`.
+/// JSON report, schema `truegrind.acceptance/1`.
 pub fn json(found: &Acceptance, dataset: &Dataset, estimated: &Estimated, statement: &Statement) -> Value {
     let known = |uncertainty: Uncertainty| match uncertainty {
         Uncertainty::Stated => "stated",

@@ -1,4 +1,4 @@
-//! Many programs in one run: one row per program, the sum, and the programs that could not be done.
+//! Report over many programs: one row per program, totals, and failures.
 
 use std::collections::BTreeMap;
 
@@ -16,17 +16,17 @@ use truegrind_compensation::plan::Plan;
 use truegrind_compensation::plan::reason::OutcomeReason;
 use truegrind_programs::motion::Listing;
 
-/// What became of one program.
+/// Result for a program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Ended {
-    /// Rewritten (or would be, in a dry run).
+    /// Corrected (or would be, in a dry run).
     Changed,
     /// Nothing in it changes.
     Unchanged,
-    /// It carries the mark of this model.
+    /// Already corrected with this model.
     Already,
-    /// It could not be done; the reason says why.
+    /// It could not be processed.
     Failed,
 }
 
@@ -42,14 +42,14 @@ impl Ended {
     }
 }
 
-/// One program of a run. As JSON it is what is kept of it: every number comes back with every bit.
+/// One program of a run. Serialised as its bit-exact record.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Row {
     /// Its files.
     pub file: String,
-    /// Where it went.
+    /// Output file.
     pub output: Option<String>,
-    /// What became of it.
+    /// Result.
     pub ended: Ended,
     /// Motions: all, changed, flagged, refused, left.
     pub motions: [usize; 5],
@@ -58,24 +58,27 @@ pub struct Row {
     /// Largest deviation before (mm).
     #[serde(with = "kept::optional")]
     pub before_mm: Option<f64>,
-    /// Largest predicted remainder of the rewritten motions (mm).
+    /// Largest predicted remainder of the corrected motions (mm).
     #[serde(with = "kept::optional")]
     pub after_mm: Option<f64>,
-    /// How far off the rewritten motions have to be expected: remainder and predicted 1σ, the largest (mm).
+    /// Largest expected deviation of the corrected motions: remainder and predicted 1σ (mm).
     #[serde(with = "kept::optional")]
     pub expected_mm: Option<f64>,
-    /// Why it failed, or what to know about it.
+    /// The error, or a remark.
     pub note: Option<String>,
-    /// Why most of what was refused, else flagged or left, was so, with its share.
+    /// The most frequent reason among refused, else flagged, else left motions, with its count.
     pub reason: Option<String>,
 }
 
 impl Row {
-    /// The row of a program that was planned.
+    /// The row of a planned program.
     pub fn of(file: String, output: Option<String>, ended: Ended, plan: &Plan, listing: &Listing) -> Row {
-        let count =
-            |fate: MotionStatus| plan.outcomes.iter().filter(|outcome| outcome.status == fate).count();
-        let written = |fate: MotionStatus| matches!(fate, MotionStatus::Changed | MotionStatus::Flagged);
+        let count = |motion_status: MotionStatus| {
+            plan.outcomes.iter().filter(|outcome| outcome.status == motion_status).count()
+        };
+        let written = |motion_status: MotionStatus| {
+            matches!(motion_status, MotionStatus::Changed | MotionStatus::Flagged)
+        };
         let before = plan.outcomes.iter().filter_map(|outcome| outcome.before_mm);
         let after = plan.outcomes.iter().filter(|o| written(o.status)).filter_map(|o| o.after_mm);
         Row {
@@ -94,11 +97,11 @@ impl Row {
             after_mm: after.reduce(f64::max),
             expected_mm: placement::expected_mm(plan),
             note: undeclared_note(listing),
-            reason: most_usual(plan),
+            reason: most_frequent_reason(plan),
         }
     }
 
-    /// The row of a program that nothing was worked out for.
+    /// The row of a program without a plan.
     pub fn without(file: String, ended: Ended, note: Option<String>) -> Row {
         Row {
             file,
@@ -114,7 +117,7 @@ impl Row {
         }
     }
 
-    /// Nothing rewritten must not look like done.
+    /// A program without corrections must not look done.
     fn judged(&self) -> Status {
         match self.ended {
             Ended::Changed => Status::Good,
@@ -124,29 +127,28 @@ impl Row {
         }
     }
 
-    /// What to know about it, and the reason of most of what was not done.
-    fn why(&self) -> Option<String> {
+    /// Note and most frequent reason.
+    fn remark(&self) -> Option<String> {
         let both: Vec<&str> = [&self.note, &self.reason].into_iter().flatten().map(String::as_str).collect();
         (!both.is_empty()).then(|| both.join("; "))
     }
 
-    /// Whether nothing of it asks for a look before it runs.
+    /// Whether the program may run without a check.
     fn is_clean(&self) -> bool {
         let [all, _, flagged, refused, _] = self.motions;
         let rewritten = matches!(self.ended, Ended::Changed) || all == 0 && self.ended == Ended::Unchanged;
         rewritten && flagged + refused == 0
     }
 
-    /// Share of its motions that is rewritten (%).
+    /// Share of corrected motions (%).
     pub fn covered_percent(&self) -> Option<f64> {
         let [all, changed, flagged, ..] = self.motions;
         (all > 0).then(|| 100.0 * (changed + flagged) as f64 / all as f64)
     }
 }
 
-/// What is declared nowhere, in a few words.
+/// Note on undeclared names.
 fn undeclared_note(listing: &Listing) -> Option<String> {
-    /// How many names a row has room for.
     const NAMED: usize = 4;
     let all = undeclared(listing);
     let names: Vec<&str> = all.iter().take(NAMED).map(|one| one.name.as_str()).collect();
@@ -154,15 +156,15 @@ fn undeclared_note(listing: &Listing) -> Option<String> {
     (!names.is_empty()).then(|| format!("declared in no file: {}{more}", names.join(", ")))
 }
 
-/// The reason that most motions of a program were refused for, else flagged, else left, with how many.
-fn most_usual(plan: &Plan) -> Option<String> {
+/// The most frequent reason for refused, else flagged, else left motions, with its count.
+fn most_frequent_reason(plan: &Plan) -> Option<String> {
     [(MotionStatus::Refused, "refused"), (MotionStatus::Flagged, "flagged"), (MotionStatus::Left, "left")]
         .into_iter()
-        .find_map(|(fate, word)| {
+        .find_map(|(motion_status, word)| {
             let reasons = plan
                 .outcomes
                 .iter()
-                .filter(|outcome| outcome.status == fate)
+                .filter(|outcome| outcome.status == motion_status)
                 .filter_map(|outcome| outcome.reason);
             let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
             reasons
@@ -173,7 +175,7 @@ fn most_usual(plan: &Plan) -> Option<String> {
         })
 }
 
-/// The worst first: what failed, what is not rewritten, what is refused, flagged and left most of, what is farthest off.
+/// Worst first: failed, not corrected, most refused, flagged and left motions, largest deviation.
 fn worst_first(rows: &[Row]) -> Vec<Row> {
     let mut rows = rows.to_vec();
     let rank = |row: &Row| match row.ended {
@@ -221,21 +223,21 @@ pub fn table(rows: &[Row]) -> Table {
             row.expected_mm.into(),
             row.opaque.into(),
             row.output.clone().into(),
-            row.why().into(),
+            row.remark().into(),
         ]);
         table.push(cells);
     }
     table
 }
 
-/// The sum of all rows in one sentence.
+/// Totals of all rows as a sentence.
 pub fn sum(rows: &[Row]) -> String {
     let with = |ended: Ended| rows.iter().filter(|row| row.ended == ended).count();
     let [all, changed, flagged, refused, left] = totals(rows);
     let share = if all > 0 { 100.0 * (changed + flagged) as f64 / all as f64 } else { 0.0 };
     format!(
         "{} programs: {} changed, {} unchanged, {} already compensated, {} failed; {all} motions: {changed} changed, \
-         {flagged} flagged, {refused} refused, {left} left ({share:.1} % rewritten)",
+         {flagged} flagged, {refused} refused, {left} left ({share:.1} % corrected)",
         rows.len(),
         with(Ended::Changed),
         with(Ended::Unchanged),
@@ -244,12 +246,11 @@ pub fn sum(rows: &[Row]) -> String {
     )
 }
 
-/// The table for people: the worst first, reasons beside the names, no folder that all share, no column in which nothing
-/// stands.
-fn read_table(rows: &[Row]) -> Table {
+/// The table for display: worst first, reasons beside the names, without the common folder and without empty columns.
+fn display_table(rows: &[Row]) -> Table {
     let rows = worst_first(rows);
     let mut table = table(&rows);
-    // Why, before how many.
+    // The reason goes before the counts.
     if let Some(note) = table.column_index("note") {
         let mut column = table.columns.remove(note);
         column.heading = "Reason".to_owned();
@@ -268,7 +269,7 @@ fn read_table(rows: &[Row]) -> Table {
         let (Some(column), Some(folder)) = (table.column_index(key), shared_folder(&names)) else { continue };
         for row in &mut table.rows {
             if let Cell::Text(name) = &mut row[column] {
-                *name = without(name, folder);
+                *name = without_folder(name, folder);
             }
         }
         table.notes.push(format!("{what} {folder}"));
@@ -277,16 +278,16 @@ fn read_table(rows: &[Row]) -> Table {
     table.excerpt(ROWS)
 }
 
-/// Names of files without a folder that all begin with; those of a task stand in one cell.
-fn without(names: &str, folder: &str) -> String {
+/// Removes a common folder from the file names in a cell.
+fn without_folder(names: &str, folder: &str) -> String {
     let short = |name: &'_ str| name.strip_prefix(folder).unwrap_or(name).to_owned();
     names.split(BETWEEN).map(short).collect::<Vec<_>>().join(BETWEEN)
 }
 
-/// What stands between the files of a task.
+/// Separator between the files of a task.
 const BETWEEN: &str = ", ";
 
-/// The folder, with the stroke behind it, that all of several names begin with.
+/// The common folder of several names, with its trailing separator.
 fn shared_folder<'n>(names: &[&'n str]) -> Option<&'n str> {
     let (first, rest) = names.split_first().filter(|(_, rest)| !rest.is_empty())?;
     let folder = first.rfind(['/', '\\']).map(|end| &first[..=end])?;
@@ -298,15 +299,15 @@ fn shared_folder<'n>(names: &[&'n str]) -> Option<&'n str> {
     (folder.len() > 1).then_some(folder)
 }
 
-/// What fits a terminal: the sum, and the table.
+/// Summary for the terminal: verdict and table.
 pub fn summary(rows: &[Row]) -> Document {
     let mut page = Document::new(title(rows));
     page.push(verdict(rows));
-    page.push(read_table(rows));
+    page.push(display_table(rows));
     page
 }
 
-/// Rows of the table in a terminal and on a page; all of them are in the CSV file.
+/// Rows of the table on a terminal or page; the CSV file has all.
 const ROWS: usize = 200;
 
 /// The page.
@@ -316,16 +317,16 @@ pub fn document(rows: &[Row]) -> Document {
     let largest = |value: fn(&Row) -> Option<f64>| rows.iter().filter_map(value).reduce(f64::max);
     let [motions, changed, flagged, ..] = totals(rows);
     page.push(vec![
-        KeyFigure::new("Rewritten", changed + flagged, 0, "")
+        KeyFigure::new("Corrected", changed + flagged, 0, "")
             .note(format!("of {motions} motions, {flagged} of them flagged")),
         KeyFigure::new("Largest before", largest(|row| row.before_mm), 3, "mm")
-            .note("as programmed, all motions"),
+            .note("uncorrected, all motions"),
         KeyFigure::new("Expected after", largest(|row| row.expected_mm), 3, "mm")
-            .note("1σ of the model: largest of what is rewritten"),
-        KeyFigure::new("To look at", rows.iter().filter(|row| !row.is_clean()).count(), 0, "")
-            .note(format!("of {} programs: failed, nothing rewritten, refused or flagged", rows.len())),
+            .note("1σ: largest of the corrected motions"),
+        KeyFigure::new("To check", rows.iter().filter(|row| !row.is_clean()).count(), 0, "")
+            .note(format!("of {} programs: failed, nothing corrected, refused or flagged", rows.len())),
     ]);
-    page.push(read_table(rows));
+    page.push(display_table(rows));
     page
 }
 
@@ -352,22 +353,22 @@ fn verdict(rows: &[Row]) -> Verdict {
         _ => Status::Bad,
     };
     let first = |of: &str| match may_run {
-        0 => "none may run before you have looked at what was refused or flagged".to_owned(),
+        0 => "check the refused and flagged motions before running any of them".to_owned(),
         _ => {
             format!(
-                "{may_run} {of} are rewritten and may run, look at what was refused or flagged before the rest does"
+                "{may_run} {of} are corrected and may run; check the refused and flagged motions of the rest first"
             )
         }
     };
     let headline = match status {
-        Status::NotEvaluated => "Nothing was rewritten".to_owned(),
+        Status::NotEvaluated => "Nothing was corrected".to_owned(),
         Status::Good => {
-            format!("Every program was done; {may_run} of {} are rewritten and may run", rows.len())
+            format!("All programs were processed; {may_run} of {} are corrected and may run", rows.len())
         }
-        Status::Warning => format!("Every program was done; {}", first(&format!("of {}", rows.len()))),
+        Status::Warning => format!("All programs were processed; {}", first(&format!("of {}", rows.len()))),
         Status::Bad => {
             format!(
-                "{} of {} programs could not be done; {}",
+                "{} of {} programs could not be processed; {}",
                 failed.len(),
                 rows.len(),
                 first("of the others")
@@ -378,41 +379,40 @@ fn verdict(rows: &[Row]) -> Verdict {
     let names: Vec<&str> = rows.iter().map(|row| row.file.as_str()).collect();
     let folder = shared_folder(&names).unwrap_or_default();
     let named = |row: &Row, words: &str| {
-        let file = without(&row.file, folder);
-        // Many errors begin with the file's name.
+        let file = without_folder(&row.file, folder);
+        // Many errors already begin with the file name.
         match words.strip_prefix(file.as_str()) {
             Some(rest) if rest.starts_with(':') => words.to_owned(),
             _ => format!("{file}: {words}"),
         }
     };
     reasons.extend(
-        failed.iter().take(FAILED_NAMED).map(|row| named(row, row.note.as_deref().unwrap_or("failed"))),
+        failed.iter().take(MAX_FAILED).map(|row| named(row, row.note.as_deref().unwrap_or("failed"))),
     );
-    // What would be needed is said in full.
+    // Missing declarations are listed with the remedy.
     let missing: Vec<&Row> =
         rows.iter().filter(|row| row.ended == Ended::Unchanged && row.note.is_some()).collect();
-    reasons.extend(missing.iter().take(MISSING_NAMED).filter_map(|row| {
+    reasons.extend(missing.iter().take(MAX_MISSING).filter_map(|row| {
         let note = row.note.as_ref()?;
-        let remedy = "give the file that declares them, or a cell file (--cell) that says where they are";
+        let remedy = "add the file that declares them, or define them in a cell file (--cell)";
         Some(named(row, &format!("{note}; {remedy}")))
     }));
-    if missing.len() > MISSING_NAMED {
+    if missing.len() > MAX_MISSING {
         reasons.push(format!(
-            "and {} more programs of which nothing is rewritten for want of them",
-            missing.len() - MISSING_NAMED
+            "and {} more programs without corrections because of undeclared names",
+            missing.len() - MAX_MISSING
         ));
     }
     Verdict::new(status, headline, reasons)
 }
 
-/// Programs that are named because they failed; the table has all.
-const FAILED_NAMED: usize = 20;
+/// Largest number of listed failures; the table has all.
+const MAX_FAILED: usize = 20;
 
-/// Programs that are named for what is missing.
-const MISSING_NAMED: usize = 5;
+/// Largest number of programs listed for undeclared names.
+const MAX_MISSING: usize = 5;
 
-/// The contract `truegrind.compensation/1` of all programs together, with what failed. `programs` are the entries of
-/// each program's own contract.
+/// JSON report `truegrind.compensation/1` over all programs, with failures. `programs`: the entries of the single reports.
 pub fn json(rows: &[Row], programs: Vec<Value>) -> Value {
     let failed: Vec<Value> = rows
         .iter()

@@ -5,7 +5,7 @@ mod first;
 use serde_json::{Value, json};
 
 use self::first::key_figures;
-use super::deviation::{fate, sections, status_word};
+use super::deviation::{sections, status_cell, status_word};
 use super::document::{Block, Document};
 use super::placement;
 use super::table::{Cell, Column, Table};
@@ -59,7 +59,7 @@ pub fn table(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Table {
         let mut row = vec![
             Cell::Count(u64::from(place.line)),
             instruction.into(),
-            fate(outcome.status),
+            status_cell(outcome.status),
             outcome.before_mm.into(),
             outcome.after_mm.into(),
             outcome.shape_sigma_mm.into(),
@@ -121,7 +121,7 @@ pub fn reason_table(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Ta
     for group in grouped(plan) {
         let places: Vec<Place> = group.outcomes.iter().map(|outcome| motion(outcome, listing).0).collect();
         table.push([
-            fate(group.fate),
+            status_cell(group.status),
             group.outcomes.len().into(),
             group.reason.into(),
             group.worst.map(|(value, unit)| worst_text(value, unit)).into(),
@@ -292,7 +292,7 @@ fn file_name(files: &[ProgramFile], place: Place) -> &str {
 
 /// Motions with the same status and the same kind of reason.
 struct Group<'a> {
-    fate: MotionStatus,
+    status: MotionStatus,
     reason: String,
     /// The worst value of the reason, with its unit.
     worst: Option<(f64, &'static str)>,
@@ -306,7 +306,7 @@ fn grouped(plan: &Plan) -> Vec<Group<'_>> {
             Some(why) => split_reason(why),
             None => ("nothing to change".to_owned(), None),
         };
-        match groups.iter_mut().find(|group| group.fate == outcome.status && group.reason == reason) {
+        match groups.iter_mut().find(|group| group.status == outcome.status && group.reason == reason) {
             Some(group) => {
                 group.outcomes.push(outcome);
                 group.worst = match (group.worst, figure) {
@@ -316,14 +316,14 @@ fn grouped(plan: &Plan) -> Vec<Group<'_>> {
                 };
             }
             None => {
-                groups.push(Group { fate: outcome.status, reason, worst: figure, outcomes: vec![outcome] })
+                groups.push(Group { status: outcome.status, reason, worst: figure, outcomes: vec![outcome] })
             }
         }
     }
-    let rank = |fate: MotionStatus| {
-        [MotionStatus::Refused, MotionStatus::Flagged, MotionStatus::Left].iter().position(|f| *f == fate)
+    let rank = |status: MotionStatus| {
+        [MotionStatus::Refused, MotionStatus::Flagged, MotionStatus::Left].iter().position(|s| *s == status)
     };
-    groups.sort_by(|a, b| rank(a.fate).cmp(&rank(b.fate)).then(b.outcomes.len().cmp(&a.outcomes.len())));
+    groups.sort_by(|a, b| rank(a.status).cmp(&rank(b.status)).then(b.outcomes.len().cmp(&a.outcomes.len())));
     groups
 }
 

@@ -1,8 +1,8 @@
-//! How far each point of a path is off, before and after, and the summary block of ltlm-2024 Table 8.
+//! Deviation of each point of a path before and after correction, and the summary of ltlm-2024 Table 8.
 //!
-//! "After" under the model that made the correction is a *predicted remainder* (rounding, interpolation, inverse
-//! kinematics); it is labelled so everywhere and stands beside the predicted 1σ and the model's held-out error, which say
-//! how far the real arm will be off. Only a simulated actual arm or a measurement is called *achieved*.
+//! "After" under the model that made the correction is a *predicted remainder* (rounding, interpolation, inverse kinematics). It is
+//! labelled so everywhere and shown with the predicted 1σ and the held-out error of the model, which predict the deviation of the
+//! real arm. Only the result on a simulated actual arm or of a measurement is called *achieved*.
 
 mod kept;
 mod side;
@@ -28,13 +28,13 @@ pub use summary::{block_table, registered_table};
 /// Rows of a point table on a page; the whole table belongs in the CSV file.
 const ROWS_ON_PAGE: usize = 150;
 
-/// Programs with an answer of their own on a terminal; of more the table tells.
-const ANSWERED: usize = 5;
+/// Largest number of programs with a verdict on the terminal.
+const MAX_VERDICTS: usize = 5;
 
-/// Models with a key figure of their own.
+/// Largest number of models with a key figure.
 const MODELS_IN_FIGURES: usize = 7;
 
-/// One row per path point of one program under one model, all columns. Positions and vectors in the work object.
+/// One row per path point of one program under one model, with all columns. Positions and vectors in the work object frame.
 pub fn table(report: &PathReport) -> Table {
     let (word, key) = words(report.after);
     let columns = point_columns((word, key), decimals(report.after));
@@ -44,8 +44,7 @@ pub fn table(report: &PathReport) -> Table {
     table
 }
 
-/// The same for several programs and models under each other, for a file: each row names its program and model, what
-/// "after" is, and the model's held-out error.
+/// [`table`] for several programs and models, for a file: each row also has program, model, meaning of "after" and held-out error.
 pub fn whole_table(reports: &[PathReport]) -> Table {
     let mut columns = vec![
         Column::text("program", "Program"),
@@ -119,7 +118,7 @@ fn point_cells(point: &PathPoint) -> Vec<Cell> {
     row
 }
 
-/// What fits a page: position, sizes before and after, 1σ and what became of the point.
+/// Short table for a page: position, deviations before and after, 1σ and status.
 pub fn short_table(report: &PathReport) -> Table {
     let (word, key) = words(report.after);
     let normals = report.points.iter().any(|point| point.normal.is_some());
@@ -161,11 +160,10 @@ pub fn short_table(report: &PathReport) -> Table {
     table
 }
 
-/// Points that were refused, flagged or left, in the order of the path. Neighbours with the same fate and the same kind
-/// of reason share a row, which gives the reason of the first.
+/// Points that were refused, flagged or left, in path order. Neighbours with the same status and kind of reason share a row.
 pub fn flag_table(report: &PathReport) -> Table {
     let mut table = Table::new(
-        "Points to look at",
+        "Points to check",
         vec![
             Column::text("lines", "Lines"),
             Column::text("points", "Points"),
@@ -189,14 +187,14 @@ pub fn flag_table(report: &PathReport) -> Table {
             range(lines).into(),
             range(run.iter().map(|point| point.index)).into(),
             run.len().into(),
-            fate(first.status),
+            status_cell(first.status),
             reason.into(),
         ]);
     }
     table
 }
 
-/// First and last of rising numbers; `None` of none.
+/// Smallest and largest number; `None` without numbers.
 fn range(numbers: impl Iterator<Item = usize>) -> Option<String> {
     let (low, high) = numbers.fold((usize::MAX, 0), |(low, high), n| (low.min(n), high.max(n)));
     match low.cmp(&high) {
@@ -206,11 +204,11 @@ fn range(numbers: impl Iterator<Item = usize>) -> Option<String> {
     }
 }
 
-/// What fits a terminal: the answer for each of a few programs, and the tables of all.
+/// Summary for the terminal: verdicts of the first programs, tables over all.
 pub fn summary(name: &str, reports: &[PathReport]) -> Document {
     let mut page = Document::new(format!("Deviation of {name}"));
     let programs = by_program(reports);
-    for (program, reports) in programs.iter().take(ANSWERED) {
+    for (program, reports) in programs.iter().take(MAX_VERDICTS) {
         let mut verdict = verdict(reports);
         if programs.len() > 1 {
             verdict.headline = format!("{program}: {}", verdict.headline);
@@ -222,7 +220,7 @@ pub fn summary(name: &str, reports: &[PathReport]) -> Document {
     page
 }
 
-/// The page: one section per program. Reports of one program with several models stand together.
+/// The page: one section per program with all its models.
 pub fn document(reports: &[PathReport]) -> Document {
     let programs = by_program(reports);
     let mut page = match programs.as_slice() {
@@ -241,7 +239,7 @@ pub fn document(reports: &[PathReport]) -> Document {
         _ => format!("models {}", models.join(", ")),
     };
     if reports.is_empty() {
-        page.paragraph("No program has a path whose deviation could be told.");
+        page.paragraph("No program has a path whose deviation can be determined.");
     }
     if programs.len() > 1 {
         page.push(block_table(reports));
@@ -255,7 +253,7 @@ pub fn document(reports: &[PathReport]) -> Document {
     page
 }
 
-/// The blocks of one program, headings at `level`: what a page on its compensation takes in too.
+/// The blocks of one program, with headings at `level`; also part of the page on its compensation.
 pub(super) fn sections(reports: &[&PathReport], level: u8) -> Vec<Block> {
     let mut page = Document::default();
     let Some(first) = reports.first() else { return page.blocks };
@@ -267,14 +265,14 @@ pub(super) fn sections(reports: &[&PathReport], level: u8) -> Vec<Block> {
     for figure in pictures::all(reports) {
         page.push(figure);
     }
-    page.heading(level, "Points to look at");
-    let alike = reports.iter().all(|report| same_fates(first, report));
+    page.heading(level, "Points to check");
+    let alike = reports.iter().all(|report| same_outcomes(first, report));
     for report in reports.iter().take(if alike { 1 } else { reports.len() }) {
         let flags = flag_table(report);
         let name = if reports.len() == 1 || alike { String::new() } else { report.model.clone() };
         if flags.rows.is_empty() {
             let of = if name.is_empty() { name } else { format!("{name}: ") };
-            page.paragraph(format!("{of}Every point was rewritten without a flag."));
+            page.paragraph(format!("{of}All points were corrected without a flag."));
         } else {
             page.push(Table { title: name, ..flags.excerpt(60) });
         }
@@ -290,7 +288,7 @@ pub(super) fn sections(reports: &[&PathReport], level: u8) -> Vec<Block> {
     page.blocks
 }
 
-/// Everything; schema `truegrind.deviation/1`.
+/// JSON report, schema `truegrind.deviation/1`.
 pub fn json(reports: &[PathReport]) -> Value {
     let programs: Vec<Value> = by_program(reports)
         .into_iter()
@@ -361,10 +359,10 @@ fn deviation_json(deviation: Deviation) -> Value {
     })
 }
 
-/// Whether two reports say the same of every point.
-fn same_fates(a: &PathReport, b: &PathReport) -> bool {
-    let fates = |r: &PathReport| r.points.iter().map(|p| (p.status, p.reason.clone())).collect::<Vec<_>>();
-    fates(a) == fates(b)
+/// Whether two reports have the same status and reason for every point.
+fn same_outcomes(a: &PathReport, b: &PathReport) -> bool {
+    let outcomes = |r: &PathReport| r.points.iter().map(|p| (p.status, p.reason.clone())).collect::<Vec<_>>();
+    outcomes(a) == outcomes(b)
 }
 
 fn line(point: &PathPoint) -> Cell {
@@ -384,23 +382,23 @@ fn place(point: &PathPoint) -> Vec<Cell> {
 }
 
 fn outcome(point: &PathPoint) -> [Cell; 3] {
-    [point.sigma_mm.into(), fate(point.status), point.reason.clone().into()]
+    [point.sigma_mm.into(), status_cell(point.status), point.reason.clone().into()]
 }
 
-/// What became of a point, with its sign.
-pub(super) fn fate(fate: MotionStatus) -> Cell {
-    let status = match fate {
+/// Cell for the status of a motion.
+pub(super) fn status_cell(status: MotionStatus) -> Cell {
+    let shown = match status {
         MotionStatus::Changed => Status::Good,
         MotionStatus::Left => Status::NotEvaluated,
         MotionStatus::Refused => Status::Bad,
         MotionStatus::Flagged => Status::Warning,
     };
-    Cell::Judged(status, status_word(fate).to_owned())
+    Cell::Judged(shown, status_word(status).to_owned())
 }
 
-/// The contract's word.
-pub(super) fn status_word(fate: MotionStatus) -> &'static str {
-    match fate {
+/// Word for a status in tables and JSON.
+pub(super) fn status_word(status: MotionStatus) -> &'static str {
+    match status {
         MotionStatus::Changed => "changed",
         MotionStatus::Left => "left",
         MotionStatus::Refused => "refused",
@@ -418,8 +416,8 @@ fn key_figures(reports: &[&PathReport]) -> Vec<KeyFigure> {
     };
     let max = |report: &PathReport, side: Side| block(report, side).map(|block| block.all.max);
     if let Some(first) = reports.first() {
-        let note = format!("as programmed{}", mean(first, BEFORE));
-        // What is expected after has no sign along a surface: then what was before is told by its size too.
+        let note = format!("uncorrected{}", mean(first, BEFORE));
+        // The expected deviation has no sign, so the deviation before is then also stated as a size.
         let sizes = || first.cut().filter_map(|p| p.before.map(|d| d.norm_mm())).reduce(f64::max);
         let before = first.expected_mm().and_then(|_| sizes()).or_else(|| max(first, BEFORE));
         figures.push(KeyFigure::new("Largest before", before, 3, "mm").note(note));
@@ -429,9 +427,9 @@ fn key_figures(reports: &[&PathReport]) -> Vec<KeyFigure> {
             After::Achieved => {
                 ("Largest after", max(report, AFTER), format!("achieved{}", mean(report, AFTER)))
             }
-            // What the solver leaves says nothing of the arm: what it has to be expected to do does.
+            // The remainder of the solver does not predict the arm; the expected deviation does.
             After::PredictedRemainder => {
-                ("Expected after", report.expected_mm(), "1σ of the model, largest over the cut".to_owned())
+                ("Expected after", report.expected_mm(), "1σ of the model, maximum over the cut".to_owned())
             }
         };
         let label = if reports.len() > 1 { format!("{label}, {}", report.model) } else { label.to_owned() };
@@ -440,9 +438,10 @@ fn key_figures(reports: &[&PathReport]) -> Vec<KeyFigure> {
     if let [report] = reports {
         if !has(report, AFTER) {
             let shape = report.registered_rms_mm(BEFORE);
-            figures.push(KeyFigure::new("Of it the shape", shape, 3, "mm").note(
-                "RMS after the best rigid registration: what is left where the path is adjusted in place",
-            ));
+            figures.push(
+                KeyFigure::new("Shape only", shape, 3, "mm")
+                    .note("RMS after the best rigid registration, for paths adjusted in place"),
+            );
         }
         if report.after == After::Achieved || !has(report, AFTER) {
             figures.push(
@@ -451,7 +450,7 @@ fn key_figures(reports: &[&PathReport]) -> Vec<KeyFigure> {
         }
         figures.push(
             KeyFigure::new("Held-out error of the model", report.held_out_mm, 3, "mm")
-                .note("RMSE on rows it never saw"),
+                .note("RMSE on rows not used in the fit"),
         );
     }
     figures

@@ -1,5 +1,5 @@
-//! What the model of an arm gets wrong: one sentence of cause for each finding, the picture that shows it, the gain on
-//! held-out rows, what to do, and what could not be told.
+//! Report on a diagnosis: for each finding the cause, the plot that shows it, the gain on held-out rows and the remedy; then what
+//! the data cannot decide.
 
 use super::document::{Block, Document, KeyFigure, Provenance, Source, Verdict};
 use super::number::{Precision, listed};
@@ -17,9 +17,8 @@ pub fn document(found: &Diagnosed, dataset: &Dataset) -> Document {
     let mut page = summary(found);
     page.figure(
         steps(diagnosis),
-        "Held-out error (five random folds, everything refitted in each) from the data sheet to the extended model. The \
-         gain of fitting frames is not shown: every bar has them fitted. Numbers count causes in the order in which \
-         they came in.",
+        "Held-out error (five random folds, everything refitted in each) from the data sheet to the extended model. All bars have \
+         fitted frames, so the gain of fitting them is not shown. Causes are numbered in the order of acceptance.",
     );
     page.push(step_table(diagnosis));
     for (k, finding) in diagnosis.findings.iter().enumerate() {
@@ -40,17 +39,17 @@ pub fn document(found: &Diagnosed, dataset: &Dataset) -> Document {
         }
         page.paragraph(format!("What to do: {}.", finding.remedy));
     }
-    page.heading(2, "What these rows cannot tell");
+    page.heading(2, "What the data cannot decide");
     if diagnosis.not_testable.is_empty() {
-        page.paragraph("Every effect of the catalogue would have shown at a size met in practice.");
+        page.paragraph("Every effect of the catalogue would have been detected at a practical size.");
     } else {
         page.push(not_testable_table(diagnosis));
     }
-    page.heading(2, "What is left");
-    page.paragraph(left(diagnosis));
+    page.heading(2, "Remaining error");
+    page.paragraph(remaining(diagnosis));
     if let Some(noise) = &diagnosis.noise_model {
         page.paragraph(format!(
-            "The noise grows with range: {:.3} mm and {:.3} mm for every metre (p = {:.0e}).",
+            "The noise grows with range: {:.3} mm plus {:.3} mm per metre (p = {:.0e}).",
             noise.sigma_mm, noise.per_metre_mm, noise.p_value
         ));
     }
@@ -61,7 +60,7 @@ pub fn document(found: &Diagnosed, dataset: &Dataset) -> Document {
     if !notes.is_empty() {
         page.push(Block::List(notes));
     }
-    page.heading(2, "Where this came from");
+    page.heading(2, "Provenance");
     let from = &found.estimated.provenance;
     page.push(Provenance {
         version: format!("truegrind {}", from.version),
@@ -77,7 +76,7 @@ pub fn document(found: &Diagnosed, dataset: &Dataset) -> Document {
     page
 }
 
-/// What fits a terminal.
+/// Summary for the terminal.
 pub fn summary(found: &Diagnosed) -> Document {
     let diagnosis = &found.diagnosis;
     let mut page = Document::new(format!("Diagnosis of {}", diagnosis.dataset.robot));
@@ -87,20 +86,20 @@ pub fn summary(found: &Diagnosed) -> Document {
     );
     page.push(super::identification::judged(&found.estimated));
     let fits = &diagnosis.fits;
-    let causes = answer(diagnosis);
+    let causes = causes(diagnosis);
     let sure = diagnosis.findings.iter().filter(|f| f.confidence == Confidence::Identified).count();
     let found_there = match (sure, diagnosis.findings.len() - sure) {
-        (0, 0) => "Nothing but geometry was found".to_owned(),
+        (0, 0) => "No cause beyond geometry was found".to_owned(),
         (0, _) => "No cause beyond geometry is certain".to_owned(),
         (1, _) => "One cause beyond geometry was identified".to_owned(),
         (n, _) => format!("{n} causes beyond geometry were identified"),
     };
-    // A fit of so few rows follows them whatever is wrong: that it found nothing is no good news.
+    // With so few rows an empty result proves nothing.
     let (status, headline) = match diagnosis.poses_needed {
         Some(needed) => (
             Status::NotEvaluated,
             format!(
-                "{} rows are too few to look for causes, at least {needed} different poses are needed; geometry, held by its \
+                "{} rows are too few to look for causes (at least {needed} different poses are needed); fitted geometry with its \
                  priors",
                 diagnosis.dataset.rows
             ),
@@ -108,11 +107,11 @@ pub fn summary(found: &Diagnosed) -> Document {
         None if diagnosis.findings.is_empty() => (Status::Good, found_there),
         None => (Status::Warning, found_there),
     };
-    let mut figures = super::identification::promise(found.benefit.as_ref());
+    let mut figures = super::identification::benefit_figures(found.benefit.as_ref());
     figures.extend([
         KeyFigure::new("Held-out RMSE", fits.extended.cv_rmse_mm, 3, "mm")
             .note(format!("geometry alone: {:.3} mm", fits.geometric.cv_rmse_mm)),
-        KeyFigure::new("On contiguous blocks", fits.extended.cv_blocks_rmse_mm, 3, "mm")
+        KeyFigure::new("Held-out, blocks", fits.extended.cv_blocks_rmse_mm, 3, "mm")
             .note(format!("geometry alone: {:.3} mm", fits.geometric.cv_blocks_rmse_mm)),
         KeyFigure::new("Noise floor", diagnosis.noise_floor_mm, 3, "mm")
             .note(diagnosis.noise_floor_source.clone()),
@@ -125,7 +124,7 @@ pub fn summary(found: &Diagnosed) -> Document {
     page.push(Verdict::new(
         status,
         format!(
-            "{headline}: held-out error {:.3} mm, geometry alone {:.3}, data sheet {:.3}",
+            "{headline}: held-out error {:.3} mm (geometry alone {:.3}, data sheet {:.3})",
             fits.extended.cv_rmse_mm, fits.geometric.cv_rmse_mm, fits.nominal.cv_rmse_mm
         ),
         causes,
@@ -140,8 +139,8 @@ pub fn summary(found: &Diagnosed) -> Document {
     page
 }
 
-/// What was found, ranked by what it is worth: causes that are identified in a sentence each, what is only possible by name.
-fn answer(diagnosis: &Diagnosis) -> Vec<String> {
+/// The findings: identified causes as sentences, possible ones by name.
+fn causes(diagnosis: &Diagnosis) -> Vec<String> {
     let worth = |f: &Finding| f.worth_mm.map_or_else(String::new, |mm| format!(" ({mm:.3} mm)"));
     let is_sure = |f: &&Finding| f.confidence == Confidence::Identified;
     let named = |f: &&Finding| !["unexplained", "small-disturbances"].contains(&f.effect.as_str());
@@ -166,10 +165,10 @@ fn answer(diagnosis: &Diagnosis) -> Vec<String> {
     out
 }
 
-/// The models on other series of the same arm.
+/// Errors of the models on other measurements of the same arm.
 pub fn transfer_table(diagnosis: &Diagnosis) -> Table {
     let mut table = Table::new(
-        "On other series of this arm, only the frames refitted: RMSE",
+        "RMSE on other measurements of this arm, only the frames refitted",
         vec![
             Column::text("file", "file"),
             Column::count("rows", "rows"),
@@ -190,7 +189,7 @@ pub fn transfer_table(diagnosis: &Diagnosis) -> Table {
     table
 }
 
-/// Errors of the three stages.
+/// Errors by stage.
 pub fn stage_table(diagnosis: &Diagnosis) -> Table {
     let mut table = Table::new(
         "Errors by stage",
@@ -206,8 +205,8 @@ pub fn stage_table(diagnosis: &Diagnosis) -> Table {
     let fits = &diagnosis.fits;
     for (name, stage) in [
         ("nominal: frames fitted", &fits.nominal),
-        ("geometric: links too", &fits.geometric),
-        ("extended: findings too", &fits.extended),
+        ("geometric: and links", &fits.geometric),
+        ("extended: and causes", &fits.extended),
     ] {
         table.push([
             Cell::from(name),
@@ -219,14 +218,14 @@ pub fn stage_table(diagnosis: &Diagnosis) -> Table {
         ]);
     }
     table.notes.push(
-        "RMSE, mean and max on the rows of the fit. Held out: five random folds, and contiguous blocks, which show what \
-         drifts or jumps along the rows."
+        "RMSE, mean and max on the rows of the fit. Held out: five random folds, and contiguous blocks, which reveal drifts and \
+         jumps along the rows."
             .to_owned(),
     );
     table
 }
 
-/// One row for each finding.
+/// One row per finding.
 pub fn finding_table(diagnosis: &Diagnosis) -> Table {
     let mut table = Table::new(
         "Findings",
@@ -234,7 +233,7 @@ pub fn finding_table(diagnosis: &Diagnosis) -> Table {
             Column::text("effect", "effect"),
             Column::text("where", "where"),
             Column::text("confidence", "confidence"),
-            Column::number("worth_mm", "worth", "mm", 3),
+            Column::number("worth_mm", "size", "mm", 3),
             Column::significant("p_value", "p", "", 2),
             Column::number("cv_rmse_before_mm", "held out without", "mm", 4),
             Column::number("cv_rmse_after_mm", "held out with", "mm", 4),
@@ -252,21 +251,21 @@ pub fn finding_table(diagnosis: &Diagnosis) -> Table {
         ]);
     }
     table.notes.push(
-        "Worth: by how much it moves the readings, RMS over all rows. Identified: beaten rivals, a place beside what nobody has \
-         named, and found again in halves of the rows."
+        "size: change of the readings, RMS over all rows. identified: better than its alternatives, significant once smooth unmodelled \
+         trends are allowed for, and found again in halves of the rows."
             .to_owned(),
     );
     table
 }
 
-/// What stood where from which row to which, of a set-up that changed with time.
+/// Row ranges of a set-up that changed with time.
 fn sessions(finding: &Finding) -> Table {
     let mut table = Table::new(
         "Sessions",
         vec![
             Column::text("rows", "rows"),
-            Column::text("what", "what a shift of these rows alone would be called"),
-            Column::number("worth_mm", "worth", "mm", 3),
+            Column::text("what", "cause of a shift of these rows alone"),
+            Column::number("worth_mm", "size", "mm", 3),
         ],
     );
     for session in &finding.sessions {
@@ -280,7 +279,7 @@ fn sessions(finding: &Finding) -> Table {
     table
 }
 
-/// A p-value; those that no number can hold are told as bounds.
+/// A p-value; an underflowing one is stated as a bound.
 fn p_value(p: f64) -> Cell {
     if p < 1e-300 { "< 1e-300".into() } else { p.into() }
 }
@@ -319,22 +318,22 @@ fn reasons(finding: &Finding) -> Vec<String> {
     let gain = &finding.gain;
     if gain.cv_rmse_before_mm > gain.cv_rmse_after_mm {
         out.push(format!(
-            "without it the held-out error is {:.4} mm, with it {:.4} mm",
+            "held-out error {:.4} mm without it, {:.4} mm with it",
             gain.cv_rmse_before_mm, gain.cv_rmse_after_mm
         ));
     }
     if let Some(lambda) = finding.non_centrality {
         out.push(format!(
-            "non-centrality {lambda:.0} against everything else that was free; from 40 an effect can be counted on to show"
+            "non-centrality {lambda:.0} with all other parameters free; from 40 on an effect is reliably detected"
         ));
     }
     out.push(match finding.confidence {
-        Confidence::Identified if finding.alternatives.is_empty() => "no other cause comes near".to_owned(),
-        Confidence::Identified => "the alternatives below were fitted in its place and beaten".to_owned(),
+        Confidence::Identified if finding.alternatives.is_empty() => "no alternative comes close".to_owned(),
+        Confidence::Identified => "the alternatives below were fitted in its place and are worse".to_owned(),
         Confidence::Ambiguous if finding.doubts.is_empty() && !finding.alternatives.is_empty() => {
-            "an alternative below explains nearly as much: the name is not sure".to_owned()
+            "an alternative below explains nearly as much, so the cause is not certain".to_owned()
         }
-        Confidence::Ambiguous => "the name is not sure".to_owned(),
+        Confidence::Ambiguous => "the cause is not certain".to_owned(),
     });
     out.extend(finding.doubts.iter().cloned());
     out
@@ -342,14 +341,14 @@ fn reasons(finding: &Finding) -> Vec<String> {
 
 fn parameters(finding: &Finding) -> Table {
     let mut table = Table::new(
-        "Numbers",
+        "Parameters",
         vec![
             Column::text("name", "parameter"),
             Column::significant("value", "value ± 1σ", "", 4),
             Column::text("unit", "unit"),
         ],
     );
-    // A map is a picture, not a table.
+    // The knots of a map are shown as a plot.
     let shown: Vec<&FoundParameter> = finding.parameters.iter().filter(|p| p.name != "knot").collect();
     for parameter in shown {
         let (scale, unit) = super::number::handy(&parameter.unit);
@@ -364,12 +363,12 @@ fn parameters(finding: &Finding) -> Table {
 
 fn rivals(finding: &Finding) -> Table {
     let mut table = Table::new(
-        "What else was fitted in its place",
+        "Alternatives fitted in its place",
         vec![
             Column::text("effect", "effect"),
             Column::text("where", "where"),
             Column::number("cv_rmse_mm", "held out", "mm", 4),
-            Column::number("beaten_by", "beaten by", "2 ln Bayes factor", 1),
+            Column::number("beaten_by", "worse by", "2 ln Bayes factor", 1),
         ],
     );
     for rival in &finding.alternatives {
@@ -388,7 +387,7 @@ fn rivals(finding: &Finding) -> Table {
     table
 }
 
-/// What could not be told.
+/// Effects that the data cannot decide.
 pub fn not_testable_table(diagnosis: &Diagnosis) -> Table {
     let mut table = Table::new(
         "Not testable",
@@ -408,22 +407,22 @@ pub fn not_testable_table(diagnosis: &Diagnosis) -> Table {
     table
 }
 
-fn left(diagnosis: &Diagnosis) -> String {
+fn remaining(diagnosis: &Diagnosis) -> String {
     let rmse = diagnosis.fits.extended.rmse_mm;
     match (&diagnosis.remaining, diagnosis.noise_floor_mm) {
         (Some(text), _) => format!("{}.", sentence(text)),
         (None, Some(floor)) => format!(
-            "Explained: {rmse:.3} mm RMS is left, and the noise floor is {floor:.3} mm ({}).",
+            "Explained: {rmse:.3} mm RMS remains, and the noise floor is {floor:.3} mm ({}).",
             diagnosis.noise_floor_source
         ),
         (None, None) => format!(
-            "{rmse:.3} mm RMS is left, without a pattern; {}, so a floor to hold it against is not known.",
+            "{rmse:.3} mm RMS remains, without a pattern; {}, so the noise floor is unknown.",
             diagnosis.noise_floor_source
         ),
     }
 }
 
-/// Name of a bar: the two first stages, then causes by number.
+/// Name of a bar: the first two stages, then causes by number.
 fn step_name(index: usize) -> String {
     match index {
         0 => "data sheet".to_owned(),
@@ -432,7 +431,7 @@ fn step_name(index: usize) -> String {
     }
 }
 
-/// What each step added.
+/// The steps of the diagnosis.
 pub fn step_table(diagnosis: &Diagnosis) -> Table {
     let mut table = Table::new(
         "Steps",
@@ -459,7 +458,7 @@ fn steps(diagnosis: &Diagnosis) -> String {
     .svg()
 }
 
-/// Points shown in one picture; more would only make the page heavy.
+/// Largest number of points in a plot.
 const POINTS: usize = 3000;
 
 fn thinned(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
@@ -487,7 +486,7 @@ fn drawn(picture: &Picture) -> String {
 
 fn caption(picture: &Picture) -> String {
     format!(
-        "{} against {}: everything else fitted, without this cause and with it.",
+        "{} against {}, without and with this cause, everything else fitted.",
         sentence(&picture.y.0),
         picture.x.0
     )

@@ -1,7 +1,6 @@
-//! Many arms in one run: one row per arm, which causes, how large, and which arm comes first.
+//! Report over many arms: one row per arm with its causes, ranked by possible gain.
 //!
-//! First comes the arm of which most can be gained: its held-out error with the data sheet's links less that of its extended model.
-//! That is what its programs are off by today and need not be.
+//! The gain is the held-out error of the nominal links minus that of the extended model: the error that correction can remove.
 
 use std::collections::BTreeMap;
 
@@ -15,57 +14,57 @@ use super::status::Status;
 use super::table::{Cell, Column, Table};
 use truegrind_calibration::diagnosis::finding::{Confidence, Diagnosis};
 
-/// A cause that was found at an arm.
+/// A cause found for an arm.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Cause {
-    /// Contract name of the effect.
+    /// Machine name of the effect.
     pub effect: String,
     /// Joints or rows.
     pub place: String,
     /// One sentence for a technician.
     pub sentence: String,
-    /// Whether its rivals were fitted and beaten.
+    /// Whether it is better than its alternatives.
     pub identified: bool,
-    /// By how much it moves the readings (mm RMS over all rows); absent where that is no question.
+    /// Change of the readings (mm RMS over all rows), where defined.
     #[serde(with = "kept::optional")]
     pub worth_mm: Option<f64>,
-    /// What to do about it in the workshop.
+    /// Remedy.
     pub remedy: String,
 }
 
-/// One arm. As JSON it is what is kept of it: every number comes back with every bit.
+/// One arm. Serialised as its bit-exact record.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Row {
-    /// Its measurements.
+    /// Measurement file.
     pub file: String,
-    /// Robot by name; absent where the measurements could not be diagnosed.
+    /// Robot name; `None` if the diagnosis failed.
     pub robot: Option<String>,
     /// Rows.
     pub rows: usize,
-    /// Held-out error of the data sheet's links (mm RMSE).
+    /// Held-out error of the nominal links (mm RMSE).
     #[serde(with = "kept::optional")]
     pub nominal_mm: Option<f64>,
-    /// The same with links fitted.
+    /// Held-out error with fitted links (mm RMSE).
     #[serde(with = "kept::optional")]
     pub geometric_mm: Option<f64>,
-    /// The same with causes.
+    /// Held-out error with causes (mm RMSE).
     #[serde(with = "kept::optional")]
     pub extended_mm: Option<f64>,
-    /// What sensor and rounding leave (mm).
+    /// Noise of sensor and rounding (mm).
     #[serde(with = "kept::optional")]
     pub noise_floor_mm: Option<f64>,
     /// Causes, in the order of the diagnosis.
     pub causes: Vec<Cause>,
-    /// The model that was written.
+    /// The written model.
     pub output: Option<String>,
-    /// Why it failed, or what to know about it.
+    /// The error, or a remark.
     pub note: Option<String>,
     /// Whether the arm could not be diagnosed.
     pub failed: bool,
 }
 
 impl Row {
-    /// The row of an arm that was diagnosed; `note`: what to know of its model.
+    /// The row of a diagnosed arm; `note`: remark on its model.
     pub fn of(file: String, output: Option<String>, note: Option<String>, found: &Diagnosis) -> Row {
         let fits = &found.fits;
         let causes = found.findings.iter().map(|finding| Cause {
@@ -108,12 +107,12 @@ impl Row {
         }
     }
 
-    /// What can be gained: held-out error of the data sheet's links less that of the extended model (mm).
+    /// Possible gain: held-out error of the nominal links minus that of the extended model (mm).
     pub fn to_gain_mm(&self) -> Option<f64> {
         Some(self.nominal_mm? - self.extended_mm?)
     }
 
-    /// The cause that moves the readings most; identified ones come before those that are only possible.
+    /// The cause with the largest effect on the readings; identified causes come first.
     fn largest(&self) -> Option<&Cause> {
         let size = |cause: &Cause| (cause.identified, cause.worth_mm.unwrap_or(0.0));
         let larger = |a: &&Cause, b: &&Cause| {
@@ -142,8 +141,7 @@ impl Row {
     }
 }
 
-/// Which arm comes first, second and so on: the place of each row, from 1; of equal ones the earlier first. `None` for those that
-/// could not be diagnosed.
+/// Rank of each row by possible gain, from 1; ties in row order. `None` if the diagnosis failed.
 pub fn ranks(rows: &[Row]) -> Vec<Option<usize>> {
     let mut order: Vec<(usize, f64)> =
         rows.iter().enumerate().filter_map(|(at, row)| Some((at, row.to_gain_mm()?))).collect();
@@ -160,7 +158,7 @@ pub fn table(rows: &[Row]) -> Table {
     let mut table = Table::new(
         "Arms",
         vec![
-            Column::count("rank", "Place"),
+            Column::count("rank", "Rank"),
             Column::text("file", "Measurements"),
             Column::text("status", "Status"),
             Column::text("robot", "Robot"),
@@ -168,7 +166,7 @@ pub fn table(rows: &[Row]) -> Table {
             Column::number("nominal_mm", "Data sheet", "mm", 3),
             Column::number("geometric_mm", "Geometry", "mm", 3),
             Column::number("extended_mm", "With causes", "mm", 3),
-            Column::number("to_gain_mm", "To gain", "mm", 3),
+            Column::number("to_gain_mm", "Gain", "mm", 3),
             Column::number("noise_floor_mm", "Noise floor", "mm", 3),
             Column::text("largest_cause", "Largest cause"),
             Column::text("largest_place", "Where"),
@@ -206,14 +204,14 @@ pub fn table(rows: &[Row]) -> Table {
         ]);
     }
     table.notes.push(
-        "Errors are held out, five random folds. To gain: the data sheet's less that of the model with causes, by which arms are \
-         placed. Its size: by how much a cause moves the readings, RMS over all rows."
+        "Errors are held out (five random folds). Gain: error of the data sheet minus that of the model with causes; arms are ranked by \
+         it. Its size: change of the readings by the cause, RMS over all rows."
             .to_owned(),
     );
     table
 }
 
-/// Which causes were found, at how many arms, and how large.
+/// Causes over all arms, with their number and size.
 pub fn cause_table(rows: &[Row]) -> Table {
     let mut found: BTreeMap<&str, Vec<(&Row, &Cause)>> = BTreeMap::new();
     for row in rows {
@@ -254,11 +252,11 @@ pub fn cause_table(rows: &[Row]) -> Table {
     table
 }
 
-/// Rows of the table in a terminal and on a page; all of them are in the CSV file.
+/// Rows of the table on a terminal or page; the CSV file has all.
 const ROWS: usize = 200;
 
-/// The columns that people read, what decides first; where all arms are one robot, that stands above the table.
-const READ: [&str; 12] = [
+/// The columns for display, most important first; a common robot is named above the table.
+const DISPLAYED: [&str; 12] = [
     "file",
     "rank",
     "status",
@@ -273,31 +271,31 @@ const READ: [&str; 12] = [
     "note",
 ];
 
-/// The table for people: what could not be diagnosed, then the arm of which most can be gained, and no column in which nothing stands.
-fn read_table(rows: &[Row]) -> Table {
+/// The table for display: failures first, then by rank, without empty columns.
+fn display_table(rows: &[Row]) -> Table {
     let whole = table(rows);
     let mut order: Vec<(Option<usize>, &Vec<Cell>)> = ranks(rows).into_iter().zip(&whole.rows).collect();
     order.sort_by_key(|(rank, _)| *rank);
     let robots = one_robot(rows).is_none().then_some("robot");
-    let shown: Vec<usize> = READ
+    let shown: Vec<usize> = DISPLAYED
         .into_iter()
         .chain(robots)
         .filter_map(|key| whole.column_index(key))
         .filter(|&column| whole.rows.iter().any(|row| row[column] != Cell::Missing))
         .collect();
     let columns = shown.iter().map(|&column| whole.columns[column].clone()).collect();
-    let mut read = Table::new(whole.title.clone(), columns);
-    read.rows =
+    let mut table = Table::new(whole.title.clone(), columns);
+    table.rows =
         order.iter().map(|(_, row)| shown.iter().map(|&column| row[column].clone()).collect()).collect();
-    read.notes.push(
-        "Errors are held out, five random folds. To gain: the data sheet's less that of the model with causes, by which arms are \
-         placed. With each cause by how much it moves the readings, RMS over all rows."
+    table.notes.push(
+        "Errors are held out (five random folds). Gain: error of the data sheet minus that of the model with causes; arms are ranked by \
+         it. Causes are listed with their change of the readings, RMS over all rows."
             .to_owned(),
     );
-    read.excerpt(ROWS)
+    table.excerpt(ROWS)
 }
 
-/// The robot that all arms are, of those that could be read.
+/// The common robot of all diagnosed arms, if any.
 fn one_robot(rows: &[Row]) -> Option<&str> {
     let mut robots = rows.iter().filter_map(|row| row.robot.as_deref());
     let first = robots.next()?;
@@ -315,27 +313,27 @@ fn verdict(rows: &[Row]) -> Verdict {
     let first = rows.iter().zip(ranks(rows)).find(|(_, rank)| *rank == Some(1)).map(|(row, _)| row);
     let headline = match first {
         Some(row) => format!(
-            "{} comes first: {:.3} mm to gain; {with_causes} of {} arms have causes beyond geometry",
+            "Largest gain: {} with {:.3} mm; {with_causes} of {} arms have causes beyond geometry",
             row.file,
             row.to_gain_mm().unwrap_or(f64::NAN),
             rows.len()
         ),
         None => "no arm could be diagnosed".to_owned(),
     };
-    /// Arms that are named because they failed; the table has all.
-    const NAMED: usize = 20;
+    /// Largest number of listed failures; the table has all.
+    const MAX_FAILED: usize = 20;
     let why = |row: &&Row| format!("{}: {}", row.file, row.note.as_deref().unwrap_or("failed"));
-    let mut reasons: Vec<String> = failed.iter().take(NAMED).map(why).collect();
-    if failed.len() > NAMED {
-        reasons.push(format!("and {} more arms that could not be diagnosed", failed.len() - NAMED));
+    let mut reasons: Vec<String> = failed.iter().take(MAX_FAILED).map(why).collect();
+    if failed.len() > MAX_FAILED {
+        reasons.push(format!("and {} more arms that could not be diagnosed", failed.len() - MAX_FAILED));
     }
     if let Some(cause) = first.and_then(Row::largest) {
-        reasons.push(format!("what to do there: {}, for {}", cause.remedy, cause.sentence));
+        reasons.push(format!("what to do there: {} ({})", cause.remedy, cause.sentence));
     }
     Verdict::new(status, headline, reasons)
 }
 
-fn begun(rows: &[Row]) -> Document {
+fn heading(rows: &[Row]) -> Document {
     let mut page = Document::new(match rows.len() {
         1 => "Diagnosis of 1 arm".to_owned(),
         count => format!("Diagnosis of {count} arms"),
@@ -345,19 +343,19 @@ fn begun(rows: &[Row]) -> Document {
     page
 }
 
-/// What fits a terminal.
+/// Summary for the terminal.
 pub fn summary(rows: &[Row]) -> Document {
-    let mut page = begun(rows);
-    page.push(read_table(rows));
+    let mut page = heading(rows);
+    page.push(display_table(rows));
     page
 }
 
 /// The page.
 pub fn document(rows: &[Row]) -> Document {
-    let mut page = begun(rows);
+    let mut page = heading(rows);
     let largest = |value: fn(&Row) -> Option<f64>| rows.iter().filter_map(value).reduce(f64::max);
     page.push(vec![
-        KeyFigure::new("Most to gain", largest(Row::to_gain_mm), 3, "mm").note("held out, of one arm"),
+        KeyFigure::new("Largest gain", largest(Row::to_gain_mm), 3, "mm").note("held-out error, single arm"),
         KeyFigure::new("Data sheet", largest(|row| row.nominal_mm), 3, "mm")
             .note("the largest held-out error"),
         KeyFigure::new("With causes", largest(|row| row.extended_mm), 3, "mm")
@@ -365,7 +363,7 @@ pub fn document(rows: &[Row]) -> Document {
         KeyFigure::new("Not diagnosed", rows.iter().filter(|row| row.failed).count(), 0, "")
             .note(format!("of {} arms", rows.len())),
     ]);
-    page.push(read_table(rows));
+    page.push(display_table(rows));
     let causes = cause_table(rows);
     if !causes.rows.is_empty() {
         page.push(causes);
@@ -373,7 +371,7 @@ pub fn document(rows: &[Row]) -> Document {
     page
 }
 
-/// The contract `truegrind.fleet/1`.
+/// JSON report, schema `truegrind.fleet/1`.
 pub fn json(rows: &[Row]) -> Value {
     let arms: Vec<Value> = rows
         .iter()

@@ -1,6 +1,4 @@
-//! What an identification found: verdict, errors by stage, parameters, what the data could tell, outliers.
-//!
-//! Inside truegrind angles are radians; people read degrees here, and the keys of tables and JSON say so.
+//! Report on an identification: verdict, errors by stage, parameters, identifiability, outliers. Angles are shown in degrees.
 
 mod parameter;
 mod row;
@@ -26,48 +24,47 @@ pub use tables::{
     frame_table, held_out_table, observability_table, outlier_table, parameter_table, stage_table,
 };
 
-/// The whole page. `dataset` is the one that was identified from.
+/// The page; `dataset`: the data used for the identification.
 pub fn document(found: &Identification, dataset: &Dataset) -> Document {
     let mut page = summary(found);
     page.push(Block::List(words::remarks(found, dataset)));
     page.figure(
         pictures::frequency(found),
-        "Errors of the held-out rows, which no fit has seen: frames registered alone, and with geometry.",
+        "Errors of the held-out rows, not used in the fit: with registered frames only, and with geometry.",
     );
     page.figure(
         pictures::by_row(found),
-        "The same errors by row, in the order of the file. What runs in steps or drifts along the rows is not \
-         geometry; random splits hide it.",
+        "The same errors by row, in file order. Steps and drifts along the rows are not geometry; random splits hide them.",
     );
 
     page.heading(2, "Parameters of the arm");
     page.figure(
         pictures::parameters(found),
-        "Change from the data sheet with 1σ and 2σ, in units of the manufacturing tolerance that serves as prior, so that \
-         lengths and angles share an axis.",
+        "Change from the data sheet with 1σ and 2σ, in units of the manufacturing tolerance (prior σ), so that lengths and angles \
+         share an axis.",
     );
     page.push(parameter_table(found));
 
-    page.heading(2, "How the arm was measured");
+    page.heading(2, "Sensor and measured point");
     page.push(frame_table(found));
 
-    page.heading(2, "What the data can tell");
+    page.heading(2, "Identifiability");
     match &found.identifiability {
         Some(report) => {
             page.push(words::identifiability(found, report));
             page.figure(
                 pictures::singular_values(report),
-                "Singular values of the Jacobian, each parameter in units of its prior σ and each reading in units of \
-                 its own. Above 1 the data knows more than the prior, below 1 the prior holds; values at the lower end \
-                 belong to combinations that move no reading.",
+                "Singular values of the Jacobian, with parameters in units of their prior σ and readings in units of their own σ. Above 1 \
+                 the data determine a combination, below 1 the prior does; the smallest values belong to combinations that change \
+                 no reading.",
             );
             page.push(observability_table(report));
         }
-        None => page.paragraph("Nothing can be said: the Jacobian is not finite at the estimate."),
+        None => page.paragraph("Not available: the Jacobian is not finite at the estimate."),
     }
 
     page.heading(2, "Rows");
-    page.push(words::sharpening(found));
+    page.push(words::readout_fusion(found));
     page.push(words::outliers(found));
     if !found.outliers.rows.is_empty() {
         page.push(outlier_table(found, dataset));
@@ -82,12 +79,12 @@ pub fn document(found: &Identification, dataset: &Dataset) -> Document {
     page.heading(2, "Convergence");
     page.figure(pictures::convergence(found), words::convergence(found));
 
-    page.heading(2, "Where this came from");
+    page.heading(2, "Provenance");
     page.push(provenance(found, dataset));
     page
 }
 
-/// What fits a terminal: verdict, key figures, the table of stages.
+/// Summary for the terminal: verdict, key figures, errors by stage.
 pub fn summary(found: &Identification) -> Document {
     let estimated = &found.estimated;
     let mut page = Document::new(format!("Identification of {}", estimated.robot));
@@ -104,7 +101,7 @@ pub fn summary(found: &Identification) -> Document {
     page
 }
 
-/// Everything, with the error of each held-out row; schema `truegrind.identification/1`. Angles are degrees.
+/// JSON report with the error of each held-out row, schema `truegrind.identification/1`. Angles in degrees.
 pub fn json(found: &Identification, dataset: &Dataset) -> Value {
     let estimated = &found.estimated;
     let parameters = |of_arm: bool| -> Vec<Value> {
@@ -153,7 +150,7 @@ pub fn json(found: &Identification, dataset: &Dataset) -> Value {
         "parameters": parameters(true),
         "frames": parameters(false),
         "identifiability": identifiability,
-        "sharpening": words::sharpening_json(found),
+        "sharpening": words::readout_fusion_json(found),
         "outliers": {
             "rows": found.outliers.rows.iter().map(|(index, size)| json!({
                 "row": row_number(dataset, *index), "robust_sigmas": size,
@@ -166,7 +163,7 @@ pub fn json(found: &Identification, dataset: &Dataset) -> Value {
     })
 }
 
-/// What the measurements tell, and which combinations they do not.
+/// Rank, singular values and unidentifiable combinations.
 fn identifiability_json(found: &Identification, report: &Identifiability) -> Value {
     let observability: serde_json::Map<String, Value> = report
         .observability
@@ -217,24 +214,21 @@ fn verdict(found: &Identification) -> Verdict {
     judged(&found.estimated)
 }
 
-/// The verdict on an estimated arm as every report says it, whichever way the arm was found.
+/// The verdict on an estimated arm, the same for identification and diagnosis.
 pub fn judged(estimated: &Estimated) -> Verdict {
     let (before, after) = (estimated.registered.held_out.rmse, estimated.geometry.held_out.rmse);
-    let errors =
-        format!("held-out error {after:.3} mm RMSE, where registered frames alone leave {before:.3} mm");
+    let errors = format!("held-out error {after:.3} mm RMSE, {before:.3} mm with registered frames alone");
     let (status, headline) = match estimated.verdict.status {
         Judgement::Pass => {
-            (Status::Good, format!("The model may be used, it meets the stated limits: {errors}"))
+            (Status::Good, format!("The model may be used; it meets the stated limits: {errors}"))
         }
-        Judgement::Fail => (Status::Bad, format!("The fit may not be used as a model: {errors}")),
-        Judgement::Doubtful => (
-            Status::Warning,
-            format!("The model is doubtful, it is not written or used without --allow-doubtful: {errors}"),
-        ),
-        Judgement::NotEvaluated => (
-            Status::NotEvaluated,
-            format!("The model may be used, nothing speaks against it (no limits were stated): {errors}"),
-        ),
+        Judgement::Fail => (Status::Bad, format!("The model must not be used: {errors}")),
+        Judgement::Doubtful => {
+            (Status::Warning, format!("The model is doubtful and needs --allow-doubtful: {errors}"))
+        }
+        Judgement::NotEvaluated => {
+            (Status::NotEvaluated, format!("The model may be used (no limits were stated): {errors}"))
+        }
     };
     let mut reasons = estimated.verdict.reasons.clone();
     if matches!(status, Status::Good | Status::NotEvaluated) {
@@ -246,14 +240,16 @@ pub fn judged(estimated: &Estimated) -> Verdict {
     Verdict::new(status, headline, reasons)
 }
 
-/// How far off programs are before and after, as far as the rows promise.
-pub(super) fn promise(benefit: Option<&Benefit>) -> Vec<KeyFigure> {
+/// Expected deviation of programs before and after correction.
+pub(super) fn benefit_figures(benefit: Option<&Benefit>) -> Vec<KeyFigure> {
     let Some(benefit) = benefit else { return Vec::new() };
     vec![
         KeyFigure::new("Programs before", benefit.nominal_mm, 3, "mm")
-            .note("expected RMS inside the measured region, apart from where base and flange are placed"),
-        KeyFigure::new("Programs after", benefit.estimated_mm, 3, "mm")
-            .note(format!("expected RMS; better with a probability of {}", percent_of(benefit.probability))),
+            .note("expected RMS deviation in the measured region, without placement of base and flange"),
+        KeyFigure::new("Programs after", benefit.estimated_mm, 3, "mm").note(format!(
+            "expected RMS deviation; better with a probability of {}",
+            percent_of(benefit.probability)
+        )),
     ]
 }
 
@@ -264,26 +260,27 @@ fn key_figures(found: &Identification) -> Vec<KeyFigure> {
     let floor = KeyFigure::new("Noise floor", estimated.noise_floor_mm, 3, "mm");
     let used = estimated.provenance.rows;
     let rank = found.identifiability.as_ref();
-    let mut figures = promise(found.benefit.as_ref());
+    let mut figures = benefit_figures(found.benefit.as_ref());
     figures.extend([
         KeyFigure::new("Held-out RMSE", after.rmse, 3, "mm")
-            .note(format!("{}: {:.3} mm", "registered frames alone", before.rmse)),
-        KeyFigure::new("Gain of the model", gain, 0, "%").note("registered frames to geometry, held out"),
+            .note(format!("registered frames alone: {:.3} mm", before.rmse)),
+        KeyFigure::new("Gain of the model", gain, 0, "%")
+            .note("held-out RMSE, from registered frames to geometry"),
         KeyFigure::new("Largest held-out error", after.max, 3, "mm")
             .note(format!("registered: {:.3} mm", before.max)),
         match estimated.noise_floor_mm {
-            Some(_) => floor.note("scatter of repeated poses, else what rounding leaves"),
-            None => floor.note("no pose repeated, nothing known to be rounded"),
+            Some(_) => floor.note("scatter of repeated poses, or else effect of rounding"),
+            None => floor.note("unknown: no repeated pose and no rounding"),
         },
         KeyFigure::new("Rows used", used, 0, "").note(format!(
-            "{} fitted and {} held out to state errors; the model is fitted to all",
+            "{} fitted and {} held out to state errors; the final model is fitted to all",
             used - found.held_out.len().min(used),
             found.held_out.len()
         )),
         KeyFigure::new("Set aside", estimated.provenance.set_aside.len(), 0, "").note("gross outliers"),
         KeyFigure::new("Rank", rank.map(|r| format!("{} of {}", r.rank, r.parameters)), 0, "").note(
             match rank {
-                Some(report) => format!("{} combinations known mostly from priors", report.held_by_priors),
+                Some(report) => format!("{} combinations determined mainly by priors", report.held_by_priors),
                 None => String::new(),
             },
         ),
@@ -298,7 +295,10 @@ fn provenance(found: &Identification, dataset: &Dataset) -> Provenance {
         remark("Robot", found.estimated.robot.clone()),
         remark("Sensor", from.sensor.clone()),
         remark("Split", format!("{} % of the rows held out", (1e4 * from.held_out).round() / 100.0)),
-        remark("Sharpened", if from.sharpened { "yes, by the read-out" } else { "no" }.to_owned()),
+        remark(
+            "Angles refined",
+            if from.sharpened { "yes, by the Cartesian readout" } else { "no" }.to_owned(),
+        ),
     ];
     if let Some(sheet) = &dataset.sheet {
         remarks.push(remark("Sheet", sheet.clone()));

@@ -90,7 +90,7 @@ pub fn cut_table(plan: &Plan, listing: &Listing) -> Option<Table> {
             cut.deviation_mm.into(),
             cut.sigma_mm.into(),
             (100.0 * cut.probability_of_harm).into(),
-            fate(cut).into(),
+            outcome_word(cut).into(),
         ]);
     }
     let more = order.len().saturating_sub(MAX_LISTED);
@@ -106,7 +106,7 @@ pub fn cut_table(plan: &Plan, listing: &Listing) -> Option<Table> {
 }
 
 /// Outcome of a cut.
-fn fate(cut: &CutRisk) -> &'static str {
+fn outcome_word(cut: &CutRisk) -> &'static str {
     match (cut.corrected, cut.left_for_risk) {
         (true, _) => "corrected",
         (false, true) => "left unchanged",

@@ -113,7 +113,7 @@ pub(super) fn key_figures(plan: &Plan) -> Vec<KeyFigure> {
                 .note("all corrected cuts together"),
         );
     }
-    let [changed, flagged, refused, left] = STATUSES.map(|fate| count(plan, fate));
+    let [changed, flagged, refused, left] = STATUSES.map(|status| count(plan, status));
     let rewritten = changed + flagged;
     let share = if all > 0 { format!("{} of {all} motions; ", share(rewritten, all)) } else { String::new() };
     figures.push(
@@ -131,9 +131,9 @@ pub fn coverage(plan: &Plan) -> String {
     }
     let parts: Vec<String> = STATUSES
         .iter()
-        .map(|&fate| {
-            let found = count(plan, fate);
-            format!("{found} {} ({})", status_word(fate), share(found, all))
+        .map(|&status| {
+            let found = count(plan, status);
+            format!("{found} {} ({})", status_word(status), share(found, all))
         })
         .collect();
     let word = if all == 1 { "motion" } else { "motions" };
@@ -154,6 +154,6 @@ fn share(part: usize, all: usize) -> String {
     }
 }
 
-fn count(plan: &Plan, fate: MotionStatus) -> usize {
-    plan.outcomes.iter().filter(|outcome| outcome.status == fate).count()
+fn count(plan: &Plan, motion_status: MotionStatus) -> usize {
+    plan.outcomes.iter().filter(|outcome| outcome.status == motion_status).count()
 }

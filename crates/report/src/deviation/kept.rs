@@ -1,7 +1,7 @@
-//! The report of a path as JSON, from which it comes back with every bit: what a job of many keeps of a program.
+//! Bit-exact JSON record of a path report, for shared runs.
 //!
-//! One text per point, its numbers apart by spaces, since a path may have 100,000 points. Equal poses of work object and tool
-//! follow each other over whole programs and are stated once.
+//! The numbers of each point are one space-separated string, since a path may have 100,000 points. Repeated poses of work object and
+//! tool are stored once.
 
 use nalgebra::{Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde_json::{Value, json};
@@ -13,9 +13,9 @@ use truegrind_programs::motion::MotionKind;
 
 use crate::number::exact;
 
-/// Stands for what is not there.
+/// A missing value.
 const NONE: &str = "-";
-/// Stands for the pose of the point before.
+/// The pose of the previous point.
 const SAME: &str = "=";
 
 const KINDS: [(MotionKind, &str); 6] = [
@@ -27,7 +27,7 @@ const KINDS: [(MotionKind, &str); 6] = [
     (MotionKind::Unknown, "unknown"),
 ];
 
-/// What is kept of a report.
+/// The record of a report.
 pub fn kept(report: &PathReport) -> Value {
     let PathReport { program, model, after, points, held_out_mm } = report;
     let mut last = [String::new(), String::new()];
@@ -41,7 +41,7 @@ pub fn kept(report: &PathReport) -> Value {
     })
 }
 
-/// The report that was kept; `None` where the value is not one.
+/// The report of a record; `None` if the value is not one.
 pub fn from_kept(value: &Value) -> Option<PathReport> {
     let mut last = [None, None];
     let points = value["points"].as_array()?.iter();
@@ -58,7 +58,7 @@ pub fn from_kept(value: &Value) -> Option<PathReport> {
 }
 
 fn of_point(point: &PathPoint, last: &mut [String; 2]) -> Value {
-    // Each field by name: one that comes anew has to be kept too.
+    // Destructured by field, so that a new field cannot be forgotten.
     let PathPoint {
         index,
         line,
@@ -195,7 +195,7 @@ fn pose<'w>(first: &str, rest: &mut impl Iterator<Item = &'w str>, last: Option<
         return last.copied();
     }
     let [x, y, z, w, i, j, k] = from(first, rest)?;
-    // As it was, and not brought to length one again.
+    // Not normalised again, to keep every bit.
     let turn = UnitQuaternion::new_unchecked(Quaternion::new(w, i, j, k));
     Some(Pose::from_parts(Translation3::new(x, y, z), turn))
 }

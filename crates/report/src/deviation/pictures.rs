@@ -1,4 +1,4 @@
-//! Pictures of a path: its deviation along the way, how often each size occurs, and where on the part.
+//! Plots of a path: deviation along the path, histogram, and plan view of the workpiece.
 
 use std::collections::BTreeSet;
 
@@ -11,13 +11,13 @@ use crate::plot::{
 };
 use truegrind_compensation::deviation::{PathPoint, PathReport, Status};
 
-/// More points than a picture can show make a page heavy; of each group the largest is kept.
+/// Largest number of plotted points; of each group of neighbours the largest deviation is kept.
 const POINTS: usize = 2000;
 
-/// Models beyond these would hide each other.
+/// Largest number of models in one plot.
 const MODELS: usize = 5;
 
-/// All pictures of one program.
+/// All plots of one program.
 pub(super) fn all(reports: &[&PathReport]) -> Vec<Figure> {
     let mut out = vec![along(reports)];
     out.push(frequency(reports));
@@ -37,7 +37,7 @@ struct Shown<'a> {
     ink: Option<Ink>,
 }
 
-/// Everything that is drawn: before (of the first report, or of each where they differ), then after.
+/// All curves: before (once if all reports agree), then after.
 fn shown<'a>(reports: &[&'a PathReport]) -> Vec<Shown<'a>> {
     let mut out = Vec::new();
     let Some(first) = reports.first() else { return out };
@@ -77,8 +77,8 @@ fn along(reports: &[&PathReport]) -> Figure {
                 .map(|point| [point.index as f64, side(point).map_or(f64::NAN, |d| d.signed_mm())])
                 .collect();
             let mut series = Series { ink, ..Series::line(name, points) };
-            // The band belongs to the path that will be run: after, or before where nothing was rewritten.
-            // On the way to a cut whose shape alone is corrected the arm's place counts, whose sigma would flatten the cut's.
+            // The band belongs to the path that will be run: after, or before if nothing was corrected. Approaches have the 1σ of
+            // the place, which would dominate the scale if only the shape of the cut is corrected, so they get no band.
             let cuts = report.points.iter().any(|p| p.cutting);
             let sigma = |p: &PathPoint| p.sigma_mm.filter(|_| p.cutting || !cuts);
             if single && (after || !has(report, AFTER)) && kept.iter().any(|p| sigma(p).is_some()) {
@@ -103,26 +103,27 @@ fn along(reports: &[&PathReport]) -> Figure {
         spans: reports.first().map_or(Vec::new(), |report| spans(report)),
         ..Graph::default()
     };
-    let mut caption = String::from("Deviation at each point of the path, approaches and links included.");
+    let mut caption = String::from("Deviation at each point of the path, including approaches and links.");
     if band {
         caption
-            .push_str(" The band is the predicted ±1σ of the model along the cut: where the real arm is expected to run.");
+            .push_str(" The band is the predicted ±1σ of the model along the cut, in which the real arm is expected to run.");
     }
     for (name, same) in alike {
         caption.push_str(&format!(
-            " \u{201c}{name}\u{201d} is not drawn: along the cut it runs as \u{201c}{same}\u{201d}."
+            " \u{201c}{name}\u{201d} is not drawn: along the cut it coincides with \u{201c}{same}\u{201d}."
         ));
     }
     if !graph.spans.is_empty() {
         caption.push_str(" Shaded: points that were refused, flagged or left.");
     }
     if reports.iter().any(|report| report.points.len() > POINTS) {
-        caption.push_str(" Of neighbouring points the one with the largest deviation is drawn.");
+        caption
+            .push_str(" Of each group of neighbouring points the one with the largest deviation is drawn.");
     }
     Figure::new(graph.svg(), caption)
 }
 
-/// Points on the way to a cut, by their place; none of a path without a cut.
+/// Points outside the cuts, by position; empty for a path without a cut.
 fn passing(reports: &[&PathReport]) -> BTreeSet<u64> {
     let points = || reports.iter().flat_map(|report| &report.points);
     let cuts = points().any(|point| point.cutting);
@@ -130,7 +131,7 @@ fn passing(reports: &[&PathReport]) -> BTreeSet<u64> {
 }
 
 fn frequency(reports: &[&PathReport]) -> Figure {
-    // More than two would only hide each other.
+    // More than two histograms would hide each other.
     let one = &reports[..reports.len().min(1)];
     let samples = shown(one)
         .into_iter()
@@ -162,10 +163,7 @@ fn strips(reports: &[&PathReport]) -> Figure {
         colors: if signed { ColorMap::CoolWarm } else { ColorMap::Viridis },
         strips,
     };
-    Figure::new(
-        strip.svg(),
-        "Deviation along the cut, one strip per model on a common scale: strips that look alike are alike.",
-    )
+    Figure::new(strip.svg(), "Deviation along the cut, one strip per model on a common scale.")
 }
 
 fn plan(reports: &[&PathReport]) -> Option<Figure> {
@@ -204,15 +202,15 @@ fn plan(reports: &[&PathReport]) -> Option<Figure> {
     Some(Figure::new(
         view.svg(),
         format!(
-            "The path in the work object, seen along {}, in colours of its deviation; all panels share one scale{}. \
+            "The path in the work object, viewed along {}, coloured by its deviation; all panels share one scale{}. \
              Approaches and links are grey.",
             names[3 - axes[0] - axes[1]],
-            if after.is_empty() { String::new() } else { format!(" (after is {after})") }
+            if after.is_empty() { String::new() } else { format!(" (after: {after})") }
         ),
     ))
 }
 
-/// The two axes of the work object along which the path is longest, in their order.
+/// The two axes of the work object along which the path extends furthest.
 fn widest(report: &PathReport) -> Option<[usize; 2]> {
     let extent = |axis: usize| {
         let ends = report
@@ -229,7 +227,7 @@ fn widest(report: &PathReport) -> Option<[usize; 2]> {
     Some([axes.next()?, axes.next()?])
 }
 
-/// Points for a picture: all, or of each group the one with the largest deviation.
+/// Points to plot: all, or of each group the one with the largest deviation.
 fn thinned(report: &PathReport, side: Side) -> Vec<&PathPoint> {
     let size = |point: &&PathPoint| side(point).map_or(-1.0, |d| d.norm_mm());
     report
@@ -239,7 +237,7 @@ fn thinned(report: &PathReport, side: Side) -> Vec<&PathPoint> {
         .collect()
 }
 
-/// Stretches of points that were not simply rewritten; none where that would be all of them.
+/// Ranges of points that were refused, flagged or left; empty if no point was changed.
 fn spans(report: &PathReport) -> Vec<Span> {
     if report.points.iter().all(|point| point.status != Status::Changed) {
         return Vec::new();

@@ -1,17 +1,17 @@
-//! The two sides of a correction, and the points that they are judged by.
+//! Deviation before and after the correction.
 
 use nalgebra::Point3;
 
 use truegrind_compensation::deviation::{Deviation, PathPoint, PathReport};
 
-/// Which side of the correction.
+/// Selects the deviation before or after the correction.
 pub(super) type Side = fn(&PathPoint) -> Option<Deviation>;
 
 pub(super) const BEFORE: Side = |point| point.before;
 
 pub(super) const AFTER: Side = |point| point.after;
 
-/// Reports by program, in the order in which programs first appear.
+/// Reports grouped by program, in order of first appearance.
 pub(super) fn by_program(reports: &[PathReport]) -> Vec<(&str, Vec<&PathReport>)> {
     let mut out: Vec<(&str, Vec<&PathReport>)> = Vec::new();
     for report in reports {
@@ -23,7 +23,7 @@ pub(super) fn by_program(reports: &[PathReport]) -> Vec<(&str, Vec<&PathReport>)
     out
 }
 
-/// Where the TCP shall be, in the work object.
+/// Intended position of the TCP in the work object frame.
 pub(super) fn intended(point: &PathPoint) -> Point3<f64> {
     point.base_from_object.inverse_transform_point(&Point3::from(point.intended.translation.vector))
 }

@@ -1,19 +1,18 @@
-//! The summary block of ltlm-2024 Table 8, and the shape error after rigid registration.
+//! Summary of ltlm-2024 Table 8, and shape error after rigid registration.
 
 use super::side::{AFTER, BEFORE, Side, by_program, has};
 use super::words::{REMAINDER, meaning};
 use crate::table::{Cell, Column, Table};
 use truegrind_compensation::deviation::{After, Block, PathReport};
 
-/// The block of ltlm-2024 Table 8: before compensation, then one row per model. Where the models disagree about the
-/// path as it was, each has a row of its own before.
+/// Summary of ltlm-2024 Table 8: a row before compensation and one per model after. If the models disagree on the deviation before,
+/// each has its own row.
 pub fn block_table(reports: &[PathReport]) -> Table {
     let all: Vec<&PathReport> = reports.iter().collect();
     block(&all, by_program(reports).len() > 1)
 }
 
-/// RMS deviation as it stands and after the rigid motion that fits the path best, for a base that was not measured in the
-/// work object.
+/// RMS deviation before and after the best rigid registration, for a base that was not measured in the work object.
 pub fn registered_table(reports: &[PathReport]) -> Table {
     let all: Vec<&PathReport> = reports.iter().collect();
     registered(&all, by_program(reports).len() > 1)
@@ -21,7 +20,7 @@ pub fn registered_table(reports: &[PathReport]) -> Table {
 
 /// [`block_table`], with a column for the program where there are several.
 pub(super) fn block(reports: &[&PathReport], programs: bool) -> Table {
-    // The unit stands in the title, so that the figures and what they must be seen beside fit one line.
+    // The unit is in the title, so that the table fits the terminal width.
     let number = |key: &str, heading: &str| Column::number(key, heading, "", 3);
     let mut columns = first_columns(programs);
     columns.extend((1..=5).map(|point| number(&format!("p{point}_mm"), &format!("P{point}"))));
@@ -39,7 +38,7 @@ pub(super) fn block(reports: &[&PathReport], programs: bool) -> Table {
         let mut cells = row.first_cells(programs);
         cells.extend(five_mm.map(Cell::from));
         cells.extend([all.mean, all.mean_absolute, all.standard_deviation, all.max].map(Cell::from));
-        // What a program does on an actual arm before anything is corrected is no model's prediction.
+        // The uncorrected path on an actual arm is no prediction of the model.
         let model = (!row.before || row.report.after != After::Achieved).then_some(row.report);
         cells.extend([model.and_then(|m| m.sigma_rms_mm()).into(), model.and_then(|m| m.held_out_mm).into()]);
         table.push(cells);
@@ -53,18 +52,18 @@ pub(super) fn block(reports: &[&PathReport], programs: bool) -> Table {
     }
     table.notes.push(
         match (with, without) {
-            (_, 0) => "Signed along the outward surface normal: positive stands off the surface, negative digs in.",
-            (0, _) => {
-                "No surface is known: sizes of the deviation, which have no sign, so mean and mean |d| are the same."
+            (_, 0) => {
+                "Signed along the outward surface normal: positive is off the surface, negative is too deep."
             }
-            _ => "Signed along the outward surface normal where the surface is known; sizes elsewhere.",
+            (0, _) => "No surface is given: deviations are unsigned, so mean and mean |d| are equal.",
+            _ => "Signed along the outward surface normal where the surface is known; unsigned elsewhere.",
         }
         .to_owned(),
     );
     table.notes.push(
-        "P1 to P5 lie in the middles of five equal sections of the cut; the other figures are over the whole cut. The \
-         mean is signed, as in ltlm-2024 Table 8, and SD has n − 1; compare by mean |d| and max. 1σ is predicted from \
-         the covariance (RMS over the cut), held-out is the model's RMSE on rows it never saw."
+        "P1 to P5 are the centres of five equal sections of the cut; the other columns are over the whole cut. The mean is signed, \
+         as in ltlm-2024 Table 8; SD uses n − 1. Compare models by mean |d| and max. 1σ: predicted from the covariance (RMS over \
+         the cut). held-out: RMSE of the model on rows not used in the fit."
             .to_owned(),
     );
     if reports.iter().any(|report| report.after == After::PredictedRemainder && has(report, AFTER)) {
@@ -76,9 +75,9 @@ pub(super) fn block(reports: &[&PathReport], programs: bool) -> Table {
 /// [`registered_table`], with a column for the program where there are several.
 pub(super) fn registered(reports: &[&PathReport], programs: bool) -> Table {
     let mut columns = first_columns(programs);
-    columns.push(Column::number("rms_mm", "RMS as it stands", "mm", 4));
+    columns.push(Column::number("rms_mm", "RMS", "mm", 4));
     columns.push(Column::number("registered_rms_mm", "RMS after rigid registration", "mm", 4));
-    let mut table = Table::new("Absolute, and the shape of the path alone", columns);
+    let mut table = Table::new("Absolute deviation, and shape of the path alone", columns);
     let both = |report: &PathReport, side: Side| {
         let squares: Vec<f64> =
             report.points.iter().filter_map(|p| side(p).map(|d| d.vector_mm.norm_squared())).collect();
@@ -91,8 +90,8 @@ pub(super) fn registered(reports: &[&PathReport], programs: bool) -> Table {
         table.push(cells);
     }
     table.notes.push(
-        "Sizes over all points of the path. Registration takes away the rigid motion that fits best: what is left is the \
-         shape of the path, which counts where the base was not measured in the work object."
+        "RMS over all points of the path. Registration removes the best rigid motion; the rest is the shape error of the path, \
+         which matters if the base was not measured in the work object."
             .to_owned(),
     );
     table
@@ -124,7 +123,7 @@ fn first_columns(programs: bool) -> Vec<Column> {
     columns
 }
 
-/// Rows of each program: before compensation, once where all models agree about it, then each model after.
+/// Rows of each program: before compensation, once if all models agree, then each model after.
 fn rows<'a, T: PartialEq>(
     reports: &[&'a PathReport],
     value: impl Fn(&'a PathReport, Side) -> Option<T>,

@@ -1,4 +1,4 @@
-//! Whether a path may be run as it was corrected, in a sentence and with reasons.
+//! Verdict on a corrected path.
 
 use super::side::{AFTER, BEFORE, Side};
 use super::words::{decimals, meaning};
@@ -6,21 +6,25 @@ use crate::document::Verdict;
 use crate::status::Status;
 use truegrind_compensation::deviation::{PathReport, Status as MotionStatus};
 
-/// A path that was judged: its largest deviation (mm) as programmed and as rewritten.
+/// A report with its largest deviation (mm) before and after correction.
 type Judged<'a> = (&'a PathReport, f64, f64);
 
 /// The verdict on one program under all models.
 pub(super) fn verdict(reports: &[&PathReport]) -> Verdict {
-    let count = |fate: MotionStatus| {
-        reports.iter().map(|r| r.points.iter().filter(|p| p.status == fate).count()).max().unwrap_or(0)
+    let count = |motion_status: MotionStatus| {
+        reports
+            .iter()
+            .map(|r| r.points.iter().filter(|p| p.status == motion_status).count())
+            .max()
+            .unwrap_or(0)
     };
     let mut reasons = Vec::new();
     let mut status = Status::Good;
-    for (fate, text) in [
-        (MotionStatus::Refused, "refused: not rewritten, because that would be wrong or dangerous"),
-        (MotionStatus::Flagged, "flagged: rewritten with a warning"),
+    for (motion_status, text) in [
+        (MotionStatus::Refused, "refused: not corrected, because that would be wrong or unsafe"),
+        (MotionStatus::Flagged, "flagged: corrected with a warning"),
     ] {
-        let points = count(fate);
+        let points = count(motion_status);
         if points > 0 {
             status = Status::Warning;
             reasons.push(format!("{points} {} {text}", if points == 1 { "point" } else { "points" }));
@@ -39,10 +43,10 @@ pub(super) fn verdict(reports: &[&PathReport]) -> Verdict {
             };
             reasons.push(format!("{} makes the path worse: up to {}", report.model, known(Some(*after))));
         }
-        // Under a model that corrects no cut there is no correction to be sure of.
+        // A model that corrects no cut has no correction whose certainty could be judged.
         let corrects = report.cut().any(|p| !matches!(p.status, MotionStatus::Left));
         if !corrects {
-            reasons.push(format!("under {} every cut stays as it is", report.model));
+            reasons.push(format!("{} corrects no cut", report.model));
         } else if let (Some(sigma), Some(rms)) = (report.sigma_rms_mm(), before_rms(report))
             && sigma > rms
         {
@@ -61,33 +65,32 @@ pub(super) fn verdict(reports: &[&PathReport]) -> Verdict {
     }
     if judged.is_empty() && !reports.is_empty() {
         reasons.push(
-            "`truegrind compensate` with the same model writes the program that takes out what the model knows of it; what \
-             lies within the predicted 1σ it does not know"
+            "`truegrind compensate` with the same model corrects the program, down to about the predicted 1σ"
                 .to_owned(),
         );
     }
     Verdict::new(status, headline(reports, &judged), reasons)
 }
 
-/// From which deviation to which.
+/// Deviation before and after.
 fn headline(reports: &[&PathReport], judged: &[Judged<'_>]) -> String {
     match judged {
         [] => {
             let worst = reports.iter().filter_map(|report| largest(report, BEFORE)).reduce(f64::max);
-            format!("The path as it is deviates by up to {}; no rewritten path was judged", known(worst))
+            format!("The uncorrected path deviates by up to {}; there is no corrected path", known(worst))
         }
         [(report, ..)] if report.expected_mm().is_some() => {
-            // Sizes both: what is expected has no sign along a surface.
+            // Both unsigned, since the expected deviation has no sign.
             let before = report.cut().filter_map(|p| p.before.map(|d| d.norm_mm())).reduce(f64::max);
             format!(
-                "The largest deviation goes from {} to an expected {} (1σ); held-out error of the model {}",
+                "Largest deviation {} before, {} expected after (1σ); held-out error of the model {}",
                 known(before),
                 known(report.expected_mm()),
                 known(report.held_out_mm),
             )
         }
         [(report, before, after)] => format!(
-            "The largest deviation goes from {before:.3} mm to {after:.*} mm ({}); predicted 1σ {}, held-out error of the \
+            "Largest deviation {before:.3} mm before, {after:.*} mm after ({}); predicted 1σ {}, held-out error of the \
              model {}",
             decimals(report.after),
             meaning(report.after),
@@ -105,7 +108,7 @@ fn headline(reports: &[&PathReport], judged: &[Judged<'_>]) -> String {
             };
             let before = judged.iter().map(|(_, before, _)| *before).fold(0.0, f64::max);
             format!(
-                "The largest deviation goes from {before:.3} mm to {} at best, and to {} at worst ({})",
+                "Largest deviation {before:.3} mm before; after: best {}, worst {} ({})",
                 under(of(|a, b| a.total_cmp(b))),
                 under(of(|a, b| b.total_cmp(a))),
                 meaning(first.after),
@@ -120,10 +123,10 @@ fn largest(report: &PathReport, side: Side) -> Option<f64> {
 }
 
 fn known(mm: Option<f64>) -> String {
-    mm.map_or("not known".to_owned(), |mm| format!("{mm:.3} mm"))
+    mm.map_or("unknown".to_owned(), |mm| format!("{mm:.3} mm"))
 }
 
-/// Root mean square of the sizes of the deviations of the cut as programmed (mm).
+/// RMS of the uncorrected deviations of the cut (mm).
 fn before_rms(report: &PathReport) -> Option<f64> {
     let squares: Vec<f64> =
         report.cut().filter_map(|p| p.before.map(|d| d.vector_mm.norm_squared())).collect();

@@ -1,13 +1,13 @@
-//! What the figures of a deviation are called, and what must be said beside them.
+//! Labels and notes of deviation tables.
 
 use super::side::{AFTER, has};
 use truegrind_compensation::deviation::{After, PathReport};
 
-pub(super) const REMAINDER: &str = "A predicted remainder is what rounding, interpolation and inverse kinematics leave under the \
-    very model that made the correction. It does not say how far the real arm will be off: the predicted 1σ and the \
-    model's held-out error do.";
+pub(super) const REMAINDER: &str = "The predicted remainder is the error of rounding, interpolation and inverse kinematics under the \
+    model that made the correction. It does not predict the deviation of the real arm; the predicted 1σ and the held-out error of \
+    the model do.";
 
-/// Short heading and key of the columns after the correction.
+/// Heading and key of the columns after the correction.
 pub(super) fn words(after: After) -> (&'static str, &'static str) {
     match after {
         After::PredictedRemainder => ("remainder", "predicted_remainder"),
@@ -15,7 +15,7 @@ pub(super) fn words(after: After) -> (&'static str, &'static str) {
     }
 }
 
-/// What the figures after the correction are.
+/// Meaning of the values after the correction.
 pub(super) fn meaning(after: After) -> &'static str {
     match after {
         After::PredictedRemainder => "predicted remainder",
@@ -23,7 +23,7 @@ pub(super) fn meaning(after: After) -> &'static str {
     }
 }
 
-/// A remainder is far smaller than a deviation.
+/// A remainder is far smaller than a deviation, so it has more decimals.
 pub(super) fn decimals(after: After) -> usize {
     match after {
         After::PredictedRemainder => 4,
@@ -31,22 +31,22 @@ pub(super) fn decimals(after: After) -> usize {
     }
 }
 
-/// Model with its held-out error.
+/// Name of the model with its held-out error.
 pub(super) fn named(report: &PathReport) -> String {
     match report.held_out_mm {
         Some(mm) => format!("{} (held-out error {mm:.3} mm RMSE)", report.model),
-        None => format!("{} (held-out error not known)", report.model),
+        None => format!("{} (held-out error unknown)", report.model),
     }
 }
 
 pub(super) fn notes(report: &PathReport) -> Vec<String> {
     let mut notes = vec![
-        "Positions and vectors in the axes of the work object; d is reached minus intended.".to_owned(),
+        "Positions and vectors in the work object frame; d is reached minus intended position.".to_owned(),
         if report.points.iter().any(|point| point.normal.is_some()) {
-            "\"normal\" is signed along the outward surface normal: positive stands off the surface, negative digs in."
+            "\"normal\" is signed along the outward surface normal: positive is off the surface, negative is too deep."
                 .to_owned()
         } else {
-            "No surface is known, so nothing is stated along a normal.".to_owned()
+            "No surface is given, so there are no deviations along a normal.".to_owned()
         },
     ];
     if report.after == After::PredictedRemainder && has(report, AFTER) {

@@ -1,13 +1,13 @@
-//! One identified parameter as people read it.
+//! Display of identified parameters.
 
 use truegrind_arm::estimated::EstimatedParameter;
 
-/// Whether a parameter belongs to the arm and not to how it was measured.
+/// Whether a parameter belongs to the arm rather than to the sensor.
 pub(super) fn is_of_arm(parameter: &EstimatedParameter) -> bool {
     parameter.name.starts_with("link") || parameter.name.starts_with("effect")
 }
 
-/// A parameter with all its numbers times `factor`.
+/// A parameter with all values multiplied by `factor`.
 pub(super) fn in_unit(parameter: &EstimatedParameter, factor: f64, unit: &str) -> EstimatedParameter {
     EstimatedParameter {
         name: parameter.name.clone(),
@@ -20,7 +20,7 @@ pub(super) fn in_unit(parameter: &EstimatedParameter, factor: f64, unit: &str) -
     }
 }
 
-/// A parameter in a unit that people read: degrees for radians, millionths for the small numbers of effects.
+/// A parameter in display units: degrees for radians, ppm for the small parameters of effects.
 pub(super) fn handy(parameter: &EstimatedParameter) -> EstimatedParameter {
     let (factor, unit) = match parameter.unit.as_str() {
         "1" => (1e6, "ppm"),
@@ -31,7 +31,7 @@ pub(super) fn handy(parameter: &EstimatedParameter) -> EstimatedParameter {
     in_unit(parameter, factor, unit)
 }
 
-/// Whether the prior knew more of a parameter than the data did.
+/// Whether the prior determines a parameter more than the data do.
 pub(super) fn held_by_prior(parameter: &EstimatedParameter) -> bool {
     !(parameter.determined >= 0.5)
 }

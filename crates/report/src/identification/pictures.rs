@@ -1,4 +1,4 @@
-//! Pictures of an identification.
+//! Plots of an identification.
 
 use super::parameter::{handy, held_by_prior, is_of_arm};
 use super::row::signed;
@@ -10,14 +10,14 @@ use truegrind_calibration::identification::identify::Identification;
 const BEFORE: &str = "frames registered";
 const AFTER: &str = "geometry";
 
-/// Singular values below this share of the largest are rounding and would only stretch the axis.
+/// Smaller singular values, relative to the largest, are rounding errors and would stretch the axis.
 const SMALLEST_SHARE: f64 = 1e-12;
 
 fn error(found: &Identification) -> Axis {
     Axis::new(if signed(found) { "held-out error, measured minus predicted" } else { "held-out error" }, "mm")
 }
 
-/// Held-out errors before and after, as frequencies.
+/// Histogram of held-out errors before and after.
 pub(super) fn frequency(found: &Identification) -> String {
     let sample = |name: &str, ink, value: fn(&(usize, f64, f64)) -> f64| {
         Sample::new(name, found.held_out.iter().map(value).collect::<Vec<_>>()).ink(ink)
@@ -68,7 +68,7 @@ pub(super) fn parameters(found: &Identification) -> String {
     Intervals { title: "Change from the data sheet".to_owned(), rows: rows.collect() }.svg()
 }
 
-/// Singular values, falling.
+/// Singular values in decreasing order.
 pub(super) fn singular_values(report: &Identifiability) -> String {
     let least = report.singular_values.first().copied().unwrap_or(0.0) * SMALLEST_SHARE;
     let points: Vec<[f64; 2]> = report
@@ -82,13 +82,13 @@ pub(super) fn singular_values(report: &Identifiability) -> String {
         x: Axis::new("number", ""),
         y: Axis::log("singular value", ""),
         series: vec![Series::points("", points).ink(Ink::Blue)],
-        references: vec![Reference::Horizontal(1.0, "as much as the prior knows".to_owned())],
+        references: vec![Reference::Horizontal(1.0, "equal to the prior".to_owned())],
         ..Graph::default()
     }
     .svg()
 }
 
-/// Cost over iterations, one line for each round, iterations counted through.
+/// Cost over iterations, one line per round.
 pub(super) fn convergence(found: &Identification) -> String {
     let rounds = &found.geometry.rounds;
     let mut iteration = 0usize;

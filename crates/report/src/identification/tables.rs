@@ -50,23 +50,22 @@ pub fn stage_table(found: &Identification) -> Table {
     }
     if found.raw.is_none() {
         table.notes.push(
-            "raw: no sensor frame was stated (--sensor-frame, or --outlet and --cable-zero), and an error against a fitted \
-             frame is no raw error."
+            "raw: not available, since no sensor frame was stated (--sensor-frame, or --outlet and --cable-zero)."
                 .to_owned(),
         );
     }
     table.notes.push(
-        "The gain of registering frames (raw to frames registered) says nothing about the arm and is kept apart from the \
-         gain of the model (frames registered to geometry)."
+        "The gain of registering frames (raw to frames registered) is not a property of the arm; the gain of the model is that from \
+         frames registered to geometry."
             .to_owned(),
     );
     table.notes.push(if signed {
-        "mean |e| is what the papers print as \"STD\" or \"SD\" (ltlm-2024 eq. 20, Table 6); SD here is the standard \
-         deviation of the signed errors with n − 1."
+        "mean |e| is called \"STD\" or \"SD\" in the papers (ltlm-2024 eq. 20, Table 6); SD here is the standard deviation of the \
+         signed errors with n − 1."
             .to_owned()
     } else {
-        "Errors are lengths of vectors, so they have no signed mean, and SD is the scatter of the lengths. mean |e| is what \
-         the papers print as \"STD\" (ltlm-2024 eq. 20)."
+        "Errors are lengths of vectors, so they have no signed mean, and SD is the standard deviation of the lengths. mean |e| is \
+         called \"STD\" in the papers (ltlm-2024 eq. 20)."
             .to_owned()
     });
     table
@@ -103,23 +102,23 @@ pub fn parameter_table(found: &Identification) -> Table {
         ]);
     }
     table.notes.push(
-        "Tolerance is the standard deviation of the prior, what an arm leaves the factory with. Determined: the share that \
-         the data brought, 1 − (σ / tolerance)². A parameter below 50 % is known from its prior more than from the data; \
-         where it moved all the same, the data saw a combination, and the priors shared it out among its parts."
+        "Tolerance: standard deviation of the prior, the manufacturing tolerance. Determined: share contributed by the data, \
+         1 − (σ / tolerance)². A parameter below 50 % is known more from its prior than from the data; if it changed anyway, the data \
+         determine a combination of parameters, which the priors distribute over its members."
             .to_owned(),
     );
     if as_printed {
         table.notes.push(
-            "This method has no priors: what the data cannot determine moved freely. These numbers are no geometry.".to_owned(),
+            "This method has no priors: undetermined parameters moved freely. These values are not a geometry.".to_owned(),
         );
     }
     table
 }
 
-/// More than so many tolerances from the data sheet is worth a word.
+/// Deviations above this many tolerances are marked.
 const FAR: f64 = 3.0;
 
-/// What holds a parameter where it is, and whether that is far from the data sheet.
+/// Whether data or prior determine a parameter, and whether it is far from the data sheet.
 fn held(parameter: &EstimatedParameter, as_printed: bool) -> Cell {
     let (status, mut text) = match (held_by_prior(parameter), as_printed) {
         (false, _) => (None, "data".to_owned()),
@@ -136,13 +135,13 @@ fn held(parameter: &EstimatedParameter, as_printed: bool) -> Cell {
     }
 }
 
-/// Sensor frame, outlets, zeros and the touched point.
+/// Sensor frame, outlets, cable zeros and the measured point.
 pub fn frame_table(found: &Identification) -> Table {
     let mut table = Table::new(
-        "Sensor and touched point",
+        "Sensor and measured point",
         vec![
             Column::text("name", "Parameter"),
-            Column::text("meaning", "What it is"),
+            Column::text("meaning", "Meaning"),
             Column::significant("value", "Estimated ± σ", "", 2),
             Column::text("unit", "Unit"),
         ],
@@ -173,11 +172,11 @@ pub fn frame_table(found: &Identification) -> Table {
             let name = format!("zero{number}");
             table.push([name.as_str().into(), meaning(&name).into(), (*zero).into(), "mm".into()]);
         }
-        table.notes.push("Taken from the fit of the frames alone and not moved by this method.".to_owned());
+        table.notes.push("From the fit of the frames alone; this method does not change them.".to_owned());
     }
     table.notes.push(
-        "tool is the point on the flange that the sensor touches (hook, reflector, target). It is not the TCP, and no \
-         program is moved by it."
+        "target is the point on the flange that the sensor measures (hook, reflector, target). It is not the TCP and does not affect \
+         programs."
             .to_owned(),
     );
     table
@@ -185,9 +184,9 @@ pub fn frame_table(found: &Identification) -> Table {
 
 fn meaning(name: &str) -> &'static str {
     match name.split(['.', '1', '2', '3', '4', '5', '6', '7', '8', '9', '0']).next() {
-        Some("target") => "touched point on the flange, not the TCP",
-        Some("sensor") => "sensor frame in the base of the arm",
-        Some("outlet") => "outlet of the cable in the base of the arm",
+        Some("target") => "measured point on the flange, not the TCP",
+        Some("sensor") => "sensor frame in the robot base",
+        Some("outlet") => "cable outlet in the robot base",
         Some("zero") => "reading of the cable at length zero",
         _ => "",
     }
@@ -206,7 +205,7 @@ pub fn held_out_table(found: &Identification) -> Table {
     for (row, before, after) in by_row(found) {
         table.push([row.into(), before.into(), after.into()]);
     }
-    table.notes.push("Rows count as in the spreadsheet.".to_owned());
+    table.notes.push("Row numbers as in the spreadsheet.".to_owned());
     table
 }
 
@@ -256,7 +255,7 @@ pub fn observability_table(report: &Identifiability) -> Table {
         vec![
             Column::text("figure", "Figure"),
             Column::significant("value", "Value", "", 4),
-            Column::text("meaning", "What it is"),
+            Column::text("meaning", "Meaning"),
         ],
     );
     table.push([
@@ -303,7 +302,7 @@ pub fn observability_table(report: &Identifiability) -> Table {
     table
 }
 
-/// A figure that has a meaning only for some sensors or counts.
+/// A value that is defined only for some sensors or counts.
 fn cell(value: f64, meaningful: bool) -> Cell {
     if meaningful { value.into() } else { Cell::Missing }
 }

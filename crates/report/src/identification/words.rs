@@ -1,4 +1,4 @@
-//! Sentences about an identification: what the data cannot separate, what the read-out brought, what was set aside.
+//! Sentences about an identification: unidentifiable combinations, readout fusion, outliers.
 
 use serde_json::{Value, json};
 
@@ -12,33 +12,31 @@ use truegrind_calibration::identification::rounding::NotFused;
 use truegrind_calibration::measurement::dataset::Dataset;
 use truegrind_calibration::measurement::split;
 
-/// What a reader of the errors should have in mind.
+/// Remarks on the errors.
 pub(super) fn remarks(found: &Identification, dataset: &Dataset) -> Vec<String> {
     let mut out = Vec::new();
     let errors = &found.estimated.geometry;
     let (fitted, held) = (errors.fitted.rmse, errors.held_out.rmse);
     if held > 1.5 * fitted && fitted > 0.0 {
         out.push(format!(
-            "Held-out errors are {:.1} times those of the fit: there are few rows for so many parameters, and more poses \
-             would help.",
+            "Held-out errors are {:.1} times those of the fit: there are few rows for the number of parameters; measure more poses.",
             held / fitted
         ));
     }
     if let Some(floor) = found.estimated.noise_floor_mm {
         out.push(match (split::noise_floor(dataset).is_some(), held < 1.5 * floor) {
             (true, true) => format!(
-                "Repeated poses scatter by {floor:.3} mm: a better model cannot show much more in these rows."
+                "Repeated poses scatter by {floor:.3} mm, so a better model could hardly reduce the error on these rows."
             ),
             (true, false) => format!(
-                "Repeated poses scatter by {floor:.3} mm; the rest of the {held:.3} mm is what the model does not explain."
+                "Repeated poses scatter by {floor:.3} mm; the model does not explain the rest of the {held:.3} mm."
             ),
             (false, true) => format!(
-                "The rounding of the angles alone leaves {floor:.3} mm: what is left is mostly rounding, and a better \
-                 model cannot show in these rows. Log angles with more decimals."
+                "Rounding of the angles alone causes {floor:.3} mm, most of the remaining error: log angles with more decimals."
             ),
             (false, false) => format!(
-                "The rounding of the angles alone leaves {floor:.3} mm; the rest of the {held:.3} mm is the sensor, and \
-                 what geometry does not explain."
+                "Rounding of the angles alone causes {floor:.3} mm; the rest of the {held:.3} mm is sensor noise and errors beyond \
+                 geometry."
             ),
         });
     }
@@ -52,16 +50,16 @@ pub(super) fn remarks(found: &Identification, dataset: &Dataset) -> Vec<String> 
     out
 }
 
-/// Judgement of rank, with a sentence for each combination that moves no reading.
+/// Verdict on the rank, with a sentence per combination that changes no reading.
 pub(super) fn identifiability(found: &Identification, report: &Identifiability) -> Block {
     let missing = report.parameters.saturating_sub(report.rank);
     let rank = format!("Rank {} of {}", report.rank, report.parameters);
     if missing == 0 {
         return Verdict::new(
             Status::Good,
-            format!("{rank}: no combination of parameters goes unseen"),
+            format!("{rank}: the data determine all combinations of parameters"),
             [format!(
-                "condition number {}; {} combinations are known better from the priors than from the data",
+                "condition number {}; {} combinations are determined more by the priors than by the data",
                 Precision::Significant(3).format(report.condition),
                 report.held_by_priors
             )],
@@ -69,14 +67,14 @@ pub(super) fn identifiability(found: &Identification, report: &Identifiability) 
         .into();
     }
     let what = if missing == 1 {
-        "one combination of parameters moves no reading and stays where the priors hold it".to_owned()
+        "one combination of parameters changes no reading and is fixed by the priors".to_owned()
     } else {
-        format!("{missing} combinations of parameters move no reading and stay where the priors hold them")
+        format!("{missing} combinations of parameters change no reading and are fixed by the priors")
     };
     Verdict::new(Status::Warning, format!("{rank}: {what}"), combinations(found, report)).into()
 }
 
-/// One sentence for each combination of parameters that moves no reading, in mm and degrees.
+/// One sentence per combination of parameters that changes no reading, in mm and degrees.
 pub(super) fn combinations(found: &Identification, report: &Identifiability) -> Vec<String> {
     report.combinations.iter().map(|terms| combination(found, terms)).collect()
 }
@@ -101,36 +99,34 @@ fn combination(found: &Identification, terms: &[(Parameter, f64)]) -> String {
     terms.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
     let moves: Vec<String> = terms.iter().map(moved).collect();
     match moves.as_slice() {
-        [] => "a combination without a part worth naming goes unseen".to_owned(),
-        [one] => format!("{one} goes unseen"),
-        [first, other] => format!("{first} goes unseen when {other} follows"),
+        [] => "a combination without dominant members is not identifiable".to_owned(),
+        [one] => format!("{one} is not identifiable"),
+        [first, other] => format!("{first} together with {other} is not identifiable"),
         [first, others @ .., last] => {
-            format!("{first} goes unseen when {} and {last} follow", others.join(", "))
+            format!("{first} together with {} and {last} is not identifiable", others.join(", "))
         }
     }
 }
 
-/// What the controller's read-out brought.
-pub(super) fn sharpening(found: &Identification) -> Block {
+/// Result of the readout fusion.
+pub(super) fn readout_fusion(found: &Identification) -> Block {
     match &found.readout_fusion {
         Ok(report) => {
             let point = report.readout_point_mm;
             Verdict::new(
                 Status::Good,
                 format!(
-                    "The controller's read-out sharpened the rounded angles: their σ shrank to {:.0} % of what rounding \
-                     leaves",
+                    "The Cartesian readout of the controller refined the rounded angles: their σ is {:.0} % of the rounding error",
                     100.0 * report.narrowed
                 ),
                 [
                     format!(
-                        "read-out and nominal forward map differ by {:.4} mm RMS with the angles as logged; their \
-                         rounding explains {:.4} mm",
+                        "readout and nominal forward kinematics differ by {:.4} mm RMS with the logged angles; rounding explains {:.4} mm",
                         report.before_mm, report.expected_mm
                     ),
-                    format!("with sharpened angles they differ by {:.4} mm", report.after_mm),
+                    format!("with refined angles they differ by {:.4} mm", report.after_mm),
                     format!(
-                        "the read-out is of the point ({:.3}, {:.3}, {:.3}) mm on the flange",
+                        "the readout refers to the point ({:.3}, {:.3}, {:.3}) mm on the flange",
                         point.x, point.y, point.z
                     ),
                 ],
@@ -138,24 +134,23 @@ pub(super) fn sharpening(found: &Identification) -> Block {
             .into()
         }
         Err(NotFused::Nothing) => Block::Paragraph(
-            "Angles are used as logged: they are not rounded, no read-out was logged with every row, or sharpening was \
-             switched off."
+            "Angles are used as logged: they are not rounded, some rows have no Cartesian readout, or its use was switched off."
                 .to_owned(),
         ),
         Err(NotFused::Mismatch { found_mm, expected_mm }) => Verdict::new(
             Status::Warning,
             format!(
-                "The read-out was not used: it is {found_mm:.3} mm RMS away from the logged angles under the nominal \
-                 arm, where rounding explains {expected_mm:.3} mm"
+                "The Cartesian readout was not used: it differs by {found_mm:.3} mm RMS from the nominal arm at the logged angles, while \
+                 rounding explains {expected_mm:.3} mm"
             ),
-            ["angles and read-out of the same row contradict each other, or the arm is not the one that was stated"],
+            ["angles and readout of the same row contradict each other, or the robot is not the stated one"],
         )
         .into(),
     }
 }
 
-/// The same for programs.
-pub(super) fn sharpening_json(found: &Identification) -> Value {
+/// [`readout_fusion`] as JSON.
+pub(super) fn readout_fusion_json(found: &Identification) -> Value {
     match &found.readout_fusion {
         Ok(report) => json!({
             "used": true,
@@ -172,15 +167,15 @@ pub(super) fn sharpening_json(found: &Identification) -> Value {
     }
 }
 
-/// How many rows were set aside.
+/// Number of rows set aside as outliers.
 pub(super) fn outliers(found: &Identification) -> Block {
     let outliers = &found.outliers;
     match (outliers.rows.len(), outliers.too_many) {
         (0, 0) => Block::Paragraph("No row was set aside as an outlier.".to_owned()),
         (0, many) => Verdict::new(
             Status::Warning,
-            format!("{many} rows lie beyond six robust standard deviations; that many are no accident, and all are used"),
-            ["look for what they share: a stretch of rows, a pose of the arm, a payload"],
+            format!("{many} rows lie beyond six robust standard deviations; these are too many for isolated outliers, so all rows are used"),
+            ["look for what they have in common: a range of rows, a pose of the arm, a payload"],
         )
         .into(),
         (rows, _) => Block::Paragraph(format!(
@@ -190,14 +185,13 @@ pub(super) fn outliers(found: &Identification) -> Block {
     }
 }
 
-/// Caption of the picture of convergence.
+/// Caption of the convergence plot.
 pub(super) fn convergence(found: &Identification) -> String {
     let mut text =
         format!("Cost of the final fit over its iterations; it ended \"{}\".", found.geometry.termination());
     if found.geometry.rounds.len() > 1 {
         text.push_str(
-            " Each round fits with the weights that the round before led to, so costs of different rounds do not share \
-             a scale.",
+            " Each round uses the weights of the round before, so costs of different rounds are not comparable.",
         );
     }
     text
