@@ -27,7 +27,7 @@ pub mod value;
 pub mod symbol;
 pub mod evaluate;
 pub mod modal;
-mod standing;
+mod reaching_motions;
 mod flow;
 pub mod mark;
 mod task;

@@ -181,7 +181,7 @@ impl<'t, 's> GripAnalysis<'t, 's> {
             }
         }
         let mut grips = vec![Grip::Unknown; self.task.listing.motions.len()];
-        if self.task.symbols.interrupting.iter().any(|routine| self.may_grip_in(*routine)) {
+        if self.task.symbols.interrupt_routines.iter().any(|routine| self.may_grip_in(*routine)) {
             return Loads { grips, totals: self.totals };
         }
         let entries = self.entries();
@@ -199,7 +199,7 @@ impl<'t, 's> GripAnalysis<'t, 's> {
         let mut entries: Vec<Option<Grip>> =
             (0..units.len()).map(|unit| begins(unit).then_some(Grip::Empty)).collect();
         // Computed calls and interrupts can occur with any load.
-        let late = symbols.late.iter().flat_map(|late| late.iter().copied());
+        let late = symbols.late_callees.iter().flat_map(|late| late.iter().copied());
         let interrupting = (0..).zip(&symbols.interrupts).filter(|(_, interrupts)| **interrupts);
         for routine in late.chain(interrupting.map(|(routine, _)| routine)) {
             entries[symbols.routines[routine as usize].unit as usize] = Some(Grip::Unknown);
@@ -347,16 +347,16 @@ impl<'t, 's> GripAnalysis<'t, 's> {
     fn may_grip(&self, unit: Unit, node: u32) -> bool {
         let tree = self.tree(unit);
         let name = tree.text(tree.nodes[node as usize].first);
-        let own = self.task.symbols.called(unit.scope, name);
+        let own = self.task.symbols.callees(unit.scope, name);
         own.iter().any(|routine| self.may_grip_in(*routine))
             || own.is_empty()
                 && predefined::calls_by_name(name)
-                && self.task.symbols.late_of(unit).iter().any(|routine| self.may_grip_in(*routine))
+                && self.task.symbols.late_callees_of(unit).iter().any(|routine| self.may_grip_in(*routine))
     }
 
     /// Whether a routine may change the gripped load, directly or in what it calls.
     fn may_grip_in(&self, routine: u32) -> bool {
-        self.task.symbols.routines[routine as usize].reach.grips
+        self.task.symbols.routines[routine as usize].effects.grips
     }
 
     /// Whether statements under a node may change the gripped load.
@@ -405,7 +405,7 @@ impl<'t, 's> GripAnalysis<'t, 's> {
             }
         }
         let state = if self.function_may_grip(unit, node) { Some(Grip::Unknown) } else { state };
-        let routine = match *self.task.symbols.called(unit.scope, name) {
+        let routine = match *self.task.symbols.callees(unit.scope, name) {
             [] if self.may_grip(unit, node) => return Some(Some(Grip::Unknown)),
             [] => return Some(state),
             [routine] => routine,

@@ -23,7 +23,7 @@ use nalgebra::Vector3;
 use self::functions::{Options, call};
 use super::literal;
 use super::number;
-use super::symbol::{Symbol, Symbols, What};
+use super::symbol::{Symbol, SymbolKind, Symbols};
 use super::syntax::{
     Data, RapidTree, Syntax, arguments, expressions, node_kind, parts, text_of, token_kind, tokens_of,
 };
@@ -36,13 +36,13 @@ use crate::tree::Child;
 /// What the statements so far gave to data that the program assigns.
 pub type Known = Map<u32, Value>;
 
-/// How deeply constants may refer to constants.
+/// Longest chain of constants that refer to constants.
 const REFERENCE_DEPTH: u32 = 32;
 
-/// How many numbers and texts data that refers to other data may hold.
+/// Most scalars and strings in data that refers to other data.
 const REFERENCE_SIZE: usize = 1 << 16;
 
-/// How many functions of the program one expression may lead through.
+/// Most functions of the program that one expression may call.
 const FUNCTIONS: u32 = 256;
 
 /// Where an expression stands.
@@ -95,7 +95,7 @@ pub struct Evaluator<'a, 's> {
     elements: RefCell<HashMap<(u32, u32), Vec<Child>>>,
     /// What declarations are worth that refer to others.
     initial: RefCell<HashMap<u32, Value>>,
-    /// How many functions of the program the expression has led through.
+    /// Functions of the program that the current expression has called.
     functions: Cell<u32>,
     /// Whether a function of the program was given what is not known: it may fail where the function never asks for it.
     doubtful: Cell<bool>,
@@ -173,14 +173,14 @@ impl<'a, 's> Evaluator<'a, 's> {
             return unknown(Reason::Undeclared);
         };
         let symbol = &self.symbols.symbols[id as usize];
-        let data = match &symbol.what {
-            What::Data(data) => data,
-            What::Parameter if context.known.contains_key(&id) => {
+        let data = match &symbol.kind {
+            SymbolKind::Data(data) => data,
+            SymbolKind::Parameter if context.known.contains_key(&id) => {
                 let value = self.symbol_value(context, id).target(joints);
                 let source = if value.is_ok() { Source::Computed } else { Source::Unknown };
                 return (value, source);
             }
-            What::Parameter => return unknown(Reason::Parameter),
+            SymbolKind::Parameter => return unknown(Reason::Parameter),
             _ => return unknown(Reason::WrongShape),
         };
         let wanted: &[u8] = if joints { b"jointtarget" } else { b"robtarget" };
@@ -244,7 +244,7 @@ impl<'a, 's> Evaluator<'a, 's> {
     /// The expression of an array element.
     fn element(&self, context: Context<'_>, root: u32, index: u32) -> Result<(u32, Child), Reason> {
         let symbol = &self.symbols.symbols[root as usize];
-        let What::Data(data) = &symbol.what else { return Err(Reason::WrongShape) };
+        let SymbolKind::Data(data) = &symbol.kind else { return Err(Reason::WrongShape) };
         let mut at = data.value.ok_or(Reason::Uninitialised)?;
         let tree = self.tree(symbol.file);
         for position in expressions(self.tree(context.file), index) {
@@ -273,26 +273,30 @@ impl<'a, 's> Evaluator<'a, 's> {
             return value.clone();
         }
         let symbol = &self.symbols.symbols[id as usize];
-        match &symbol.what {
-            What::Data(_) if symbol.ambiguous && symbol.scope != self.symbols.module_scope(context.scope) => {
+        match &symbol.kind {
+            SymbolKind::Data(_)
+                if symbol.ambiguous && symbol.scope != self.symbols.module_scope(context.scope) =>
+            {
                 Value::Unknown(Reason::Ambiguous)
             }
-            What::Data(_) if symbol.assigned && symbol.whole => Value::Unknown(symbol.unknown),
-            What::Data(data) => match data.value {
+            SymbolKind::Data(_) if symbol.assigned && symbol.written_whole => {
+                Value::Unknown(symbol.unknown_reason)
+            }
+            SymbolKind::Data(data) => match data.value {
                 Some(initial) if context.depth < REFERENCE_DEPTH => {
                     let mut value = self.declared(context, id, initial);
-                    for part in &symbol.parts {
-                        self.hide(&mut value, (symbol.scope, &symbol.type_name), part, symbol.unknown);
+                    for part in &symbol.written_parts {
+                        self.hide(&mut value, (symbol.scope, &symbol.type_name), part, symbol.unknown_reason);
                     }
                     value
                 }
                 Some(_) => Value::Unknown(Reason::WrongShape),
-                None if symbol.assigned => Value::Unknown(symbol.unknown),
+                None if symbol.assigned => Value::Unknown(symbol.unknown_reason),
                 None if self.is_zero(symbol, data) => Value::Number(0.0),
                 None => Value::Unknown(Reason::Uninitialised),
             },
-            What::Loop => Value::Unknown(Reason::Assigned),
-            What::Parameter => Value::Unknown(Reason::Parameter),
+            SymbolKind::Loop => Value::Unknown(Reason::Assigned),
+            SymbolKind::Parameter => Value::Unknown(Reason::Parameter),
             _ => Value::Unknown(Reason::WrongShape),
         }
     }
@@ -322,8 +326,8 @@ impl<'a, 's> Evaluator<'a, 's> {
     /// The value of the initial expression of data, whatever becomes of it later.
     pub fn initial_value(&self, context: Context<'_>, id: u32) -> Option<Value> {
         let symbol = &self.symbols.symbols[id as usize];
-        match &symbol.what {
-            What::Data(data) => data.value.map(|value| self.declared(context, id, value)),
+        match &symbol.kind {
+            SymbolKind::Data(data) => data.value.map(|value| self.declared(context, id, value)),
             _ => None,
         }
     }
@@ -446,7 +450,9 @@ impl<'a, 's> Evaluator<'a, 's> {
                 let index = parts(tree, node).nth(1);
                 match index {
                     Some(Child::Node(index))
-                        if !symbol.assigned && matches!(symbol.what, What::Data(_)) && !symbol.ambiguous =>
+                        if !symbol.assigned
+                            && matches!(symbol.kind, SymbolKind::Data(_))
+                            && !symbol.ambiguous =>
                     {
                         match self.element(context, id, index) {
                             Ok((file, element)) => {
@@ -513,8 +519,8 @@ impl<'a, 's> Evaluator<'a, 's> {
         let name = folded(tree.text(tree.nodes[node as usize].first));
         if let Some(id) = self.symbols.find(context.scope, &name) {
             let symbol = &self.symbols.symbols[id as usize];
-            return match symbol.what {
-                What::Routine(routine) if !symbol.ambiguous => {
+            return match symbol.kind {
+                SymbolKind::Routine(routine) if !symbol.ambiguous => {
                     self.own_function(context, tree, node, routine)
                 }
                 _ => Value::Unknown(Reason::RunTimeFunction),
@@ -608,7 +614,7 @@ impl<'a, 's> Evaluator<'a, 's> {
         let (array, number) = (given.next()?.value?, given.next()?.value?);
         let Child::Token(_) = array else { return None };
         let symbol = &self.symbols.symbols[self.symbols.root(tree, context.scope, array)? as usize];
-        let What::Data(data) = &symbol.what else { return None };
+        let SymbolKind::Data(data) = &symbol.kind else { return None };
         if symbol.ambiguous && symbol.scope != self.symbols.module_scope(context.scope) {
             return None;
         }

@@ -47,7 +47,7 @@ pub enum Also {
     Returns,
     /// Calls the procedure that its last required argument names, between any two statements that follow.
     Calls,
-    /// Ends where it touches something, before its target.
+    /// May end before its target, on contact.
     Stops,
     /// Ends the soft servo.
     Stiffens,
@@ -60,7 +60,7 @@ pub enum Also {
 pub struct Instruction {
     /// Its name in the manual's spelling.
     pub name: &'static str,
-    /// How the robot goes.
+    /// Kind of path.
     pub kind: MotionKind,
     /// Required arguments: `T` end, `C` circle point, `J` joint target, `O` output, `S` speed, `Z` zone, `t` tool,
     /// `.` another, `*` any number of others.
@@ -139,7 +139,7 @@ impl Instruction {
         matches!(self.also, Also::Nothing | Also::Triggers) && !self.searches()
     }
 
-    /// How many required arguments there are at least.
+    /// Least number of required arguments.
     pub fn least(&self) -> usize {
         self.pattern.bytes().filter(|&letter| letter != b'*').count()
     }

@@ -22,7 +22,7 @@ type Lexed<'s, O = Bytes<'s>> = IResult<Bytes<'s>, O, ()>;
 const PLACEHOLDERS: [&str; 13] =
     ["TDN", "DDN", "RDN", "PAR", "ALT", "DIM", "SMT", "VAR", "EIT", "CSE", "EXP", "ARG", "ID"];
 
-/// How far the second `%%%` of a header may be from the first.
+/// Greatest distance between the two `%%%` of a header (bytes).
 const HEADER_LIMIT: usize = 1024;
 
 /// Files from here on are split into tokens on all threads (bytes).

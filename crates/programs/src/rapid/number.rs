@@ -104,7 +104,7 @@ fn written_exponent(text: &[u8]) -> Option<i32> {
     (!digits.is_empty()).then_some(sign * value)
 }
 
-/// How many decimals a number token states: those after the point less the exponent.
+/// Number of decimals of a number token: those after the point less the exponent.
 pub fn decimals(text: &[u8]) -> u8 {
     let split = text.iter().position(|byte| matches!(byte, b'e' | b'E')).unwrap_or(text.len());
     let (digits, exponent) = text.split_at(split);

@@ -23,7 +23,7 @@ use crate::rewrite::{Change, FileEdits, NewTarget, Outcome, RewriteOptions, Rewr
 /// Changes that one thread takes at a time.
 const PORTION: usize = 1024;
 
-/// Names of data have at most so many characters.
+/// Greatest length of a data name.
 const NAME_LENGTH: usize = 32;
 
 impl Task<'_> {

@@ -1,28 +1,30 @@
-//! Names: what each stands for, from where it is seen, and whether the program changes it.
+//! Symbol table: names, scopes and routines of all files of a task, the call graph, and the side effects of each routine.
 //!
-//! Look-up goes from the routine to its module to the task (all files given together). LOCAL declarations and those
-//! of routines hide others. What a file assigns, or hands to something that may assign it, is marked: its initial
-//! value then says nothing about its value at a motion, or only about the components that nothing assigns.
+//! Look-up goes from the routine to its module to the task (all files given together). LOCAL declarations and those of
+//! routines hide others. A symbol that the program may write is marked: its initial value then holds at no motion, or only
+//! for the components that are never written.
 
-mod acts;
-pub(super) mod change;
-mod named;
-mod reach;
+mod effects;
+pub(super) mod facts;
+mod late_binding;
+mod purity;
+mod solve;
+mod writes;
 
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
-pub use self::reach::{Change, Ends, How, Reach};
+pub use self::effects::{SideEffects, SwitchExit, Write, WriteKind};
 use super::instruction;
-use super::modal::States;
+use super::modal::SwitchSet;
 use super::syntax::{Data, RapidTree, RoutineHead, Syntax, data, parts, routine_head, text_of, token_kind};
 use super::token::{Token, display, fold, folded, same_name};
 use crate::motion::Reason;
 use crate::tree::Child;
 
-/// What a name stands for.
+/// Kind of a symbol.
 #[derive(Debug, Clone, PartialEq)]
-pub enum What {
+pub enum SymbolKind {
     /// Data.
     Data(Data),
     /// A parameter of a routine.
@@ -46,50 +48,55 @@ pub struct Symbol {
     pub scope: u32,
     /// The token of its name.
     pub name: u32,
-    /// What it stands for.
-    pub what: What,
+    /// Its kind.
+    pub kind: SymbolKind,
     /// Its type in lower case (the aliased type for an alias).
     pub type_name: Vec<u8>,
-    /// Whether anything may change it while the program runs.
+    /// Whether the program may write it.
     pub assigned: bool,
-    /// Whether it is changed otherwise than by assignments to components that `parts` names.
-    pub whole: bool,
-    /// The components that are assigned, each as its path of lower-case names with a point between.
-    pub parts: Vec<Vec<u8>>,
-    /// Why its value is not known where no statement before tells it.
-    pub unknown: Reason,
-    /// Whether it may change between any two statements: in a trap routine or an error handler.
+    /// Whether it is written otherwise than by assignments to the components in `written_parts`.
+    pub written_whole: bool,
+    /// The components that are assigned, each as a path of lower-case names with a point between.
+    pub written_parts: Vec<Vec<u8>>,
+    /// Why its value is unknown where no assignment reaches.
+    pub unknown_reason: Reason,
+    /// Whether it may change between any two statements: written by a trap routine, an error handler or the controller.
     pub volatile: bool,
     /// Whether another module declares the same global name.
     pub ambiguous: bool,
 }
 
 impl Symbol {
-    /// A name that nothing changes.
-    fn new((file, scope): (u32, u32), name: u32, what: What, type_name: Vec<u8>) -> Symbol {
+    /// A symbol that is never written.
+    fn new((file, scope): (u32, u32), name: u32, kind: SymbolKind, type_name: Vec<u8>) -> Symbol {
         Symbol {
             file,
             scope,
             name,
-            what,
+            kind,
             type_name,
             assigned: false,
-            whole: false,
-            parts: Vec::new(),
-            unknown: Reason::Assigned,
+            written_whole: false,
+            written_parts: Vec::new(),
+            unknown_reason: Reason::Assigned,
             volatile: false,
             ambiguous: false,
         }
     }
 
-    /// One that always has another value: a parameter, the variable of a loop.
+    /// One whose value varies: a parameter, the variable of a loop.
     fn varying(self) -> Symbol {
-        Symbol { assigned: true, whole: true, ..self }
+        Symbol { assigned: true, written_whole: true, ..self }
     }
 
     /// Whether it is declared as a constant.
     pub fn is_constant(&self) -> bool {
-        matches!(&self.what, What::Data(data) if data.storage == Token::Const)
+        matches!(&self.kind, SymbolKind::Data(data) if data.storage == Token::Const)
+    }
+
+    /// Whether it is data and no constant.
+    fn is_variable_data(&self) -> bool {
+        matches!(self.kind, SymbolKind::Data(_)) && !self.is_constant()
     }
 }
 
@@ -112,10 +119,10 @@ pub struct RoutineScope {
     pub scope: u32,
     /// The name of its module.
     pub module: String,
-    /// Why what is handed to each parameter may come back changed; `None` where it does not.
-    pub written: Vec<Option<Reason>>,
-    /// What a call of it may change.
-    pub reach: Reach,
+    /// Why the argument of each parameter may be written; `None` where it is not.
+    pub parameter_writes: Vec<Option<Reason>>,
+    /// Side effects of a call.
+    pub effects: SideEffects,
     /// Index into [`Symbols::units`].
     pub unit: u32,
 }
@@ -146,46 +153,46 @@ pub struct Symbols {
     pub units: Vec<Unit>,
     /// Whether a routine has the name of a motion instruction.
     pub hides_instruction: bool,
-    /// What the statements of each unit may change by themselves, in order.
-    pub changed: Vec<Vec<u32>>,
-    /// The units in such an order that what a routine calls stands before it, as far as none calls itself.
+    /// The symbols that the statements of each unit may write, sorted.
+    pub written: Vec<Vec<u32>>,
+    /// Post-order of the call graph: each unit after its callees, except along recursive calls.
     pub callees_first: Vec<u32>,
-    /// How each unit leaves the switches.
-    pub ends: Vec<Ends>,
+    /// Effect of each unit on the switches.
+    pub switch_exits: Vec<SwitchExit>,
     /// The calls and functions of each unit that set a switch or call a routine of the program, in order.
-    pub switches: Vec<Vec<u32>>,
-    /// The routines that each unit may call by a computed name, in order.
-    pub late: Vec<Arc<[u32]>>,
-    /// What they set.
-    pub late_sets: Vec<States>,
+    pub switch_calls: Vec<Vec<u32>>,
+    /// The routines that each unit may call by a computed name, sorted.
+    pub late_callees: Vec<Arc<[u32]>>,
+    /// The switches that they set.
+    pub late_switches: Vec<SwitchSet>,
     /// Whether each routine may run between any two statements: a trap routine, or called while the robot moves.
     pub interrupts: Vec<bool>,
     /// Those that may.
-    pub interrupting: Vec<u32>,
-    /// Whether one of those leads the robot away.
-    led_away: bool,
-    /// What any statement sets.
-    pub everything: States,
-    /// Whether the next cycle may begin in the middle of this one.
-    pub cycles: bool,
-    /// The routines of names that several modules declare for all, in lower case.
+    pub interrupt_routines: Vec<u32>,
+    /// Whether one of those moves the robot without storing the path.
+    interrupts_move_robot: bool,
+    /// The switches that any statement sets.
+    pub all_switches: SwitchSet,
+    /// Whether ExitCycle may restart main in the middle of a cycle.
+    pub restarts_main: bool,
+    /// The routines of each global name that several modules declare, in lower case.
     namesakes: HashMap<Vec<u8>, Vec<u32>>,
-    /// Names of records that are declared more than once, in lower case.
-    pub(super) records_twice: HashSet<Vec<u8>>,
-    /// File, scope and name of the variables of loops, until they are settled.
+    /// Names of record types that are declared more than once, in lower case.
+    pub(super) duplicate_records: HashSet<Vec<u8>>,
+    /// File, scope and name of the loop variables, until they are declared.
     loop_names: Vec<(u32, u32, u32)>,
 }
 
 impl Symbols {
-    /// Gathers the names of files that belong to one task.
-    pub fn gather(trees: &[RapidTree<'_>]) -> Symbols {
+    /// Builds the symbol table of the files of one task and solves its side effects.
+    pub fn collect(trees: &[RapidTree<'_>]) -> Symbols {
         let mut symbols = Symbols { scopes: vec![Scope::default()], ..Symbols::default() };
         for (file, tree) in trees.iter().enumerate() {
-            symbols.file(tree, file as u32);
+            symbols.declare_file(tree, file as u32);
         }
-        symbols.loops(trees);
-        symbols.settle_namesakes(trees);
-        symbols.settle(trees);
+        symbols.declare_loop_variables(trees);
+        symbols.collect_namesakes(trees);
+        symbols.solve_effects(trees);
         symbols
     }
 
@@ -215,18 +222,18 @@ impl Symbols {
 
     /// The routine that a name calls.
     pub fn routine(&self, scope: u32, name: &[u8]) -> Option<u32> {
-        match self.symbols[self.find(scope, name)? as usize].what {
-            What::Routine(routine) => Some(routine),
+        match self.symbols[self.find(scope, name)? as usize].kind {
+            SymbolKind::Routine(routine) => Some(routine),
             _ => None,
         }
     }
 
-    /// The routines that a name may call: several where modules beside this one declare it, of which the controller has one.
-    pub fn called(&self, scope: u32, name: &[u8]) -> &[u32] {
+    /// The routines that a name may call: several where other modules declare it, of which the controller has loaded one.
+    pub fn callees(&self, scope: u32, name: &[u8]) -> &[u32] {
         let Some(symbol) = self.find(scope, name).map(|symbol| &self.symbols[symbol as usize]) else {
             return &[];
         };
-        let What::Routine(routine) = &symbol.what else { return &[] };
+        let SymbolKind::Routine(routine) = &symbol.kind else { return &[] };
         if symbol.ambiguous && symbol.scope != self.module_scope(scope) {
             let name = folded(name);
             return self.namesakes.get(&name).map_or(std::slice::from_ref(routine), Vec::as_slice);
@@ -234,13 +241,13 @@ impl Symbols {
         std::slice::from_ref(routine)
     }
 
-    /// Whether anything may count from where the robot stands (PDispOn without \ExeP).
-    pub(super) fn places(&self) -> bool {
+    /// Whether any statement may depend on the robot's current position (PDispOn without \ExeP).
+    pub(super) fn uses_position(&self) -> bool {
         self.units.iter().any(|unit| unit.routine.is_none())
-            || self.routines.iter().any(|routine| routine.reach.places)
+            || self.routines.iter().any(|routine| routine.effects.uses_position)
     }
 
-    /// Whether a routine is the one with which a program begins.
+    /// Whether a routine is the entry of a program.
     pub fn is_main(&self, trees: &[RapidTree<'_>], routine: u32) -> bool {
         let routine = &self.routines[routine as usize];
         same_name(trees[routine.file as usize].text(routine.head.name), b"main")
@@ -255,30 +262,31 @@ impl Symbols {
         scope
     }
 
-    /// What the statements of a unit may change by themselves, in order.
-    pub fn changed_in(&self, unit: Unit) -> &[u32] {
-        self.place_of(unit).and_then(|at| self.changed.get(at)).map_or(&[], Vec::as_slice)
+    /// The symbols that the statements of a unit may write, sorted.
+    pub fn written_in(&self, unit: Unit) -> &[u32] {
+        self.unit_index(unit).and_then(|at| self.written.get(at)).map_or(&[], Vec::as_slice)
     }
 
     /// The calls among some nodes of a unit that set a switch or call a routine of the program.
-    pub fn switches_in(&self, unit: Unit, nodes: std::ops::Range<u32>) -> &[u32] {
-        let all = self.place_of(unit).and_then(|at| self.switches.get(at)).map_or(&[][..], Vec::as_slice);
+    pub fn switch_calls_in(&self, unit: Unit, nodes: std::ops::Range<u32>) -> &[u32] {
+        let all =
+            self.unit_index(unit).and_then(|at| self.switch_calls.get(at)).map_or(&[][..], Vec::as_slice);
         let first = all.partition_point(|&node| node < nodes.start);
         let end = all.partition_point(|&node| node < nodes.end);
         &all[first..end]
     }
 
     /// The routines that a unit may call by a computed name.
-    pub fn late_of(&self, unit: Unit) -> &[u32] {
-        self.place_of(unit).and_then(|at| self.late.get(at)).map_or(&[], |late| late)
+    pub fn late_callees_of(&self, unit: Unit) -> &[u32] {
+        self.unit_index(unit).and_then(|at| self.late_callees.get(at)).map_or(&[], |late| late)
     }
 
-    /// What the routines set that a unit may call by a computed name.
-    pub fn late_sets_of(&self, unit: Unit) -> States {
-        self.place_of(unit).map_or(States::NONE, |at| self.late_sets[at])
+    /// The switches set by the routines that a unit may call by a computed name.
+    pub fn late_switches_of(&self, unit: Unit) -> SwitchSet {
+        self.unit_index(unit).map_or(SwitchSet::EMPTY, |at| self.late_switches[at])
     }
 
-    fn place_of(&self, unit: Unit) -> Option<usize> {
+    fn unit_index(&self, unit: Unit) -> Option<usize> {
         match unit.routine {
             Some(routine) => Some(self.routines[routine as usize].unit as usize),
             None => self.units.iter().position(|other| (other.file, other.node) == (unit.file, unit.node)),
@@ -290,7 +298,7 @@ impl Symbols {
         self.scopes.iter().flat_map(|scope| scope.names.keys().map(Vec::as_slice))
     }
 
-    /// What is declared in a scope.
+    /// The symbols declared in a scope.
     pub fn declared_in(&self, scope: u32) -> impl Iterator<Item = u32> {
         self.scopes[scope as usize].names.values().copied()
     }
@@ -300,14 +308,13 @@ impl Symbols {
         let mut name = type_name;
         for _ in 0..16 {
             match self.find(scope, name).map(|symbol| &self.symbols[symbol as usize]) {
-                Some(Symbol { what: What::Alias, type_name, .. }) => name = type_name,
+                Some(Symbol { kind: SymbolKind::Alias, type_name, .. }) => name = type_name,
                 _ => break,
             }
         }
         name
     }
 
-    /// The scope of a file's module, for names that stand outside routines.
     fn new_scope(&mut self, parent: u32) -> u32 {
         self.scopes.push(Scope { parent: Some(parent), names: HashMap::new() });
         self.scopes.len() as u32 - 1
@@ -331,7 +338,7 @@ impl Symbols {
         }
     }
 
-    fn file(&mut self, tree: &RapidTree<'_>, file: u32) {
+    fn declare_file(&mut self, tree: &RapidTree<'_>, file: u32) {
         let outside = self.new_scope(0);
         let mut loose = false;
         for node in tree.child_nodes(0) {
@@ -344,7 +351,7 @@ impl Symbols {
                     inside |= !self.item(tree, file, scope, item, &name);
                 }
                 if inside {
-                    self.loose_loops(tree, file, scope, node);
+                    self.collect_loop_variables(tree, file, scope, node);
                     self.units.push(Unit { file, node, scope, routine: None });
                 }
             } else {
@@ -352,7 +359,7 @@ impl Symbols {
             }
         }
         if loose {
-            self.loose_loops(tree, file, outside, 0);
+            self.collect_loop_variables(tree, file, outside, 0);
             self.units.push(Unit { file, node: 0, scope: outside, routine: None });
         }
     }
@@ -361,23 +368,25 @@ impl Symbols {
     fn item(&mut self, tree: &RapidTree<'_>, file: u32, scope: u32, node: u32, module: &str) -> bool {
         let kind = tree.nodes[node as usize].kind;
         match kind {
-            Syntax::Data => self.data(tree, file, scope, node, true),
-            Syntax::Record | Syntax::Alias => self.type_(tree, file, scope, node),
-            Syntax::Proc | Syntax::Func | Syntax::Trap => self.routine_item(tree, file, scope, node, module),
+            Syntax::Data => self.declare_data(tree, file, scope, node, true),
+            Syntax::Record | Syntax::Alias => self.declare_type(tree, file, scope, node),
+            Syntax::Proc | Syntax::Func | Syntax::Trap => {
+                self.declare_routine(tree, file, scope, node, module)
+            }
             Syntax::Attributes | Syntax::Opaque | Syntax::Unwritten => {}
             _ => return false,
         }
         true
     }
 
-    fn data(&mut self, tree: &RapidTree<'_>, file: u32, scope: u32, node: u32, module_level: bool) {
+    fn declare_data(&mut self, tree: &RapidTree<'_>, file: u32, scope: u32, node: u32, module_level: bool) {
         let Some(data) = data(tree, node) else { return };
         let type_name = folded(tree.text(data.type_name));
-        let symbol = Symbol::new((file, scope), data.name, What::Data(data), type_name);
+        let symbol = Symbol::new((file, scope), data.name, SymbolKind::Data(data), type_name);
         self.declare(tree.text(data.name), symbol, module_level && !data.local);
     }
 
-    fn type_(&mut self, tree: &RapidTree<'_>, file: u32, scope: u32, node: u32) {
+    fn declare_type(&mut self, tree: &RapidTree<'_>, file: u32, scope: u32, node: u32) {
         let names = |node: u32| -> Vec<u32> {
             parts(tree, node)
                 .filter_map(|part| match part {
@@ -387,53 +396,61 @@ impl Symbols {
                 .collect()
         };
         let own = names(node);
-        let (name, type_name, what) = if tree.nodes[node as usize].kind == Syntax::Alias {
+        let (name, type_name, kind) = if tree.nodes[node as usize].kind == Syntax::Alias {
             let [type_name, name] = own[..] else { return };
-            (name, folded(tree.text(type_name)), What::Alias)
+            (name, folded(tree.text(type_name)), SymbolKind::Alias)
         } else {
             let [name] = own[..] else { return };
             let components = tree.child_nodes(node).filter_map(|component| match names(component)[..] {
                 [type_name, name] => Some((folded(tree.text(name)), folded(tree.text(type_name)))),
                 _ => None,
             });
-            (name, Vec::new(), What::Record(components.collect()))
+            (name, Vec::new(), SymbolKind::Record(components.collect()))
         };
-        let symbol = Symbol::new((file, scope), name, what, type_name);
+        let symbol = Symbol::new((file, scope), name, kind, type_name);
         self.declare(tree.text(name), symbol, true);
     }
 
-    fn routine_item(&mut self, tree: &RapidTree<'_>, file: u32, scope: u32, node: u32, module: &str) {
+    fn declare_routine(&mut self, tree: &RapidTree<'_>, file: u32, scope: u32, node: u32, module: &str) {
         let Some(head) = routine_head(tree, node) else { return };
         let inner = self.new_scope(scope);
         let index = self.routines.len() as u32;
         let text = tree.text(head.name);
         self.hides_instruction |= instruction::find(text).is_some();
-        let symbol = Symbol::new((file, scope), head.name, What::Routine(index), Vec::new());
+        let symbol = Symbol::new((file, scope), head.name, SymbolKind::Routine(index), Vec::new());
         self.declare(text, symbol, !head.local);
         for parameter in &head.parameters {
             let type_name = folded(tree.text(parameter.type_name));
-            let symbol = Symbol::new((file, inner), parameter.name, What::Parameter, type_name);
+            let symbol = Symbol::new((file, inner), parameter.name, SymbolKind::Parameter, type_name);
             self.declare(tree.text(parameter.name), symbol.varying(), false);
         }
         for inside in node + 1..node + tree.nodes[node as usize].size {
             match tree.nodes[inside as usize].kind {
-                Syntax::Data => self.data(tree, file, inner, inside, false),
+                Syntax::Data => self.declare_data(tree, file, inner, inside, false),
                 Syntax::For => {
                     self.loop_names.extend(loop_name(tree, inside).map(|name| (file, inner, name)))
                 }
                 _ => {}
             }
         }
-        let written = vec![None; head.parameters.len()];
+        let parameter_writes = vec![None; head.parameters.len()];
         let module = module.to_owned();
-        let reach = Reach::default();
+        let effects = SideEffects::default();
         let unit = self.units.len() as u32;
-        self.routines.push(RoutineScope { file, head, scope: inner, module, written, reach, unit });
+        self.routines.push(RoutineScope {
+            file,
+            head,
+            scope: inner,
+            module,
+            parameter_writes,
+            effects,
+            unit,
+        });
         self.units.push(Unit { file, node, scope: inner, routine: Some(index) });
     }
 
     /// The variables of the loops of a fragment, outside routines.
-    fn loose_loops(&mut self, tree: &RapidTree<'_>, file: u32, scope: u32, node: u32) {
+    fn collect_loop_variables(&mut self, tree: &RapidTree<'_>, file: u32, scope: u32, node: u32) {
         let (mut at, end) = (node + 1, node + tree.nodes[node as usize].size);
         while at < end {
             let kind = tree.nodes[at as usize].kind;
@@ -448,28 +465,28 @@ impl Symbols {
         }
     }
 
-    /// Gathers the routines that have their name together with others.
-    fn settle_namesakes(&mut self, trees: &[RapidTree<'_>]) {
+    /// Collects the routines that share a global name.
+    fn collect_namesakes(&mut self, trees: &[RapidTree<'_>]) {
         for symbol in self.symbols.iter().filter(|symbol| symbol.ambiguous) {
-            if let What::Routine(routine) = symbol.what {
+            if let SymbolKind::Routine(routine) = symbol.kind {
                 let name = folded(trees[symbol.file as usize].text(symbol.name));
                 self.namesakes.entry(name).or_default().push(routine);
             }
         }
     }
 
-    /// The variables of loops: names of their routines where nothing else has the name. One that hides other data within its
-    /// loop stands for that data, which the loop is then taken to change; one that hides what never changes stands
-    /// for it in the whole routine.
-    fn loops(&mut self, trees: &[RapidTree<'_>]) {
+    /// Declares loop variables in their routines where the name is free. One that hides other data within its loop is taken for
+    /// that data, which the loop then writes; one that hides a constant hides it in the whole routine.
+    fn declare_loop_variables(&mut self, trees: &[RapidTree<'_>]) {
         for (file, inner, name) in std::mem::take(&mut self.loop_names) {
             let text = trees[file as usize].text(name);
             let hides = self.find(inner, text).is_some_and(|found| {
                 let found = &self.symbols[found as usize];
-                matches!(found.what, What::Data(_) | What::Parameter | What::Loop) && !found.is_constant()
+                matches!(found.kind, SymbolKind::Data(_) | SymbolKind::Parameter | SymbolKind::Loop)
+                    && !found.is_constant()
             });
             if !hides {
-                let symbol = Symbol::new((file, inner), name, What::Loop, b"num".to_vec()).varying();
+                let symbol = Symbol::new((file, inner), name, SymbolKind::Loop, b"num".to_vec()).varying();
                 let id = self.symbols.len() as u32;
                 self.symbols.push(symbol);
                 self.scopes[inner as usize].names.insert(folded(text), id);
@@ -477,7 +494,7 @@ impl Symbols {
         }
     }
 
-    /// The symbol that a name or place begins with.
+    /// The symbol with which a name or place begins.
     pub fn root(&self, tree: &RapidTree<'_>, scope: u32, place: Child) -> Option<u32> {
         let token = match place {
             Child::Token(token) => token,

@@ -86,7 +86,7 @@ pub enum Syntax {
     /// A required argument by position.
     Argument,
     /// A required argument by name.
-    Named,
+    NamePattern,
     /// An optional argument: `\name`, `\name:=value`, `\name?parameter`.
     Option,
     /// `[…]`
@@ -246,7 +246,7 @@ pub fn arguments<'t>(tree: &'t RapidTree<'_>, call: u32) -> impl Iterator<Item =
             Syntax::Argument => {
                 Some(Argument { name: None, optional: false, value: expressions(tree, node).next() })
             }
-            Syntax::Named | Syntax::Option => {
+            Syntax::NamePattern | Syntax::Option => {
                 let mut inner = parts(tree, node).filter(|&part| {
                     !matches!(token_kind(tree, part), Some(Token::Backslash | Token::Assign))
                 });

@@ -10,19 +10,19 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::evaluate::{Context, Evaluator, Source};
-use super::flow::{CallSite, State, Surroundings, Visitor, walk};
+use super::flow::{AbstractState, CallSite, Nesting, Visitor, interpret_unit};
 use super::instruction::{self, Also, Between, INSTRUCTIONS, Instruction, Slot};
 use super::mark;
-use super::modal::{States, Which};
+use super::modal::{Switch, SwitchSet};
 use super::parser::parse;
 use super::predefined;
-use super::standing::Standing;
-use super::symbol::{Ends, Symbols, Unit, What};
+use super::reaching_motions::ReachingMotions;
+use super::symbol::{SwitchExit, SymbolKind, Symbols, Unit};
 use super::syntax::{Argument, RapidTree, Syntax, arguments, expressions, parts, text_of, tokens_of};
 use super::token::{display, folded, same_name};
 use crate::motion::{
     Declaration, Listing, Motion, MotionKind, MotionTarget, OpaqueRegion, Origin, Place, Reason, Role,
-    Routine, Switch,
+    Routine, Switch as SwitchState,
 };
 use crate::tree::Child;
 use literals::Literals;
@@ -50,7 +50,7 @@ impl<'s> Task<'s> {
     /// Reads files, given by name and bytes, as one task. Never fails: what cannot be read is listed.
     pub fn read(files: &[(&str, &'s [u8])]) -> Task<'s> {
         let trees: Vec<_> = files.par_iter().map(|(_, bytes)| parse(bytes)).collect();
-        let symbols = Box::new(Symbols::gather(&trees));
+        let symbols = Box::new(Symbols::collect(&trees));
         let (listing, guarded) = listing(&trees, &symbols);
         let marks = trees.iter().map(mark::Places::of).collect();
         let names = files.iter().map(|(name, _)| (*name).to_owned()).collect();
@@ -117,14 +117,14 @@ struct Lister<'a, 's> {
     listing: Listing,
     guarded: Vec<bool>,
     /// The switches at each motion, "as at the entry" included.
-    modal: Vec<States>,
+    modal: Vec<SwitchSet>,
     /// Whether the program displacement of each motion is known, and stands in its work object.
     displaced: Vec<bool>,
     /// The unit of each motion.
     units: Vec<u32>,
     unit: u32,
     sites: Vec<(u32, CallSite)>,
-    exits: Vec<Option<States>>,
+    exits: Vec<Option<SwitchSet>>,
     depth: u32,
     /// While only the exit of a routine is asked for.
     silent: bool,
@@ -141,8 +141,8 @@ struct Lister<'a, 's> {
     tools: Cached<'s>,
     work_objects: Cached<'s>,
     /// The switches at the calls of each unit by computed names, and of routines that are in none of the files.
-    late: Vec<States>,
-    outside: Vec<States>,
+    late: Vec<SwitchSet>,
+    outside: Vec<SwitchSet>,
     /// The routines named main.
     mains: Vec<u32>,
     /// Whether a target of the motion that is being read may not be replaced: its expression does more than answer.
@@ -167,7 +167,7 @@ struct Literal {
     joints: bool,
 }
 
-/// How deeply exits of routines are followed through calls; beyond, anything that they set may be set.
+/// Greatest call depth to which the exit states of routines are computed; beyond it they may be anything that the routine sets.
 const CALL_DEPTH: u32 = 12;
 
 impl<'a, 's> Lister<'a, 's> {
@@ -195,8 +195,8 @@ impl<'a, 's> Lister<'a, 's> {
             zones: Cached::default(),
             tools: Cached::default(),
             work_objects: Cached::default(),
-            late: vec![States::NONE; symbols.units.len()],
-            outside: vec![States::NONE; symbols.units.len()],
+            late: vec![SwitchSet::EMPTY; symbols.units.len()],
+            outside: vec![SwitchSet::EMPTY; symbols.units.len()],
             mains: Vec::new(),
             acting: false,
             acting_initials: HashMap::new(),
@@ -228,23 +228,23 @@ impl<'a, 's> Lister<'a, 's> {
         // What is called ends before its callers are followed, however long the chain of calls is.
         for &unit in &self.symbols.callees_first {
             let Some(routine) = units[unit as usize].routine else { continue };
-            match self.symbols.ends[unit as usize] {
-                Ends::AsItBegins => self.exits[routine as usize] = Some(States::ENTRY),
-                Ends::Set { called: true } => {
-                    self.exit_of(routine);
+            match self.symbols.switch_exits[unit as usize] {
+                SwitchExit::Unchanged => self.exits[routine as usize] = Some(SwitchSet::ENTRY),
+                SwitchExit::Changed { called: true } => {
+                    self.exit_switches(routine);
                 }
-                Ends::Set { called: false } => {}
+                SwitchExit::Changed { called: false } => {}
             }
         }
         for (index, unit) in units.iter().enumerate() {
             self.unit = index as u32;
             let evaluator = Evaluator::new(self.trees, self.symbols);
-            let exit = walk(&evaluator, *unit, self);
+            let exit = interpret_unit(&evaluator, *unit, self);
             if let Some(routine) = unit.routine {
                 self.exits[routine as usize] = Some(exit);
                 if self.mains.contains(&routine) {
                     // The next cycle begins with the switches as this one leaves them.
-                    self.cycled(exit);
+                    self.record_cycle_restart(exit);
                 }
             }
         }
@@ -295,19 +295,19 @@ impl<'a, 's> Lister<'a, 's> {
         let entries = self.entries();
         let motions = self.listing.motions.iter_mut().zip(&self.modal).zip(&self.units);
         for (((motion, modal), unit), displaced) in motions.zip(&self.displaced) {
-            let states = modal.entered(entries[*unit as usize]);
+            let states = modal.substitute_entry(entries[*unit as usize]);
             motion.modal = states.modal();
             if motion.left.is_none() {
                 // A displacement that the text tells stands in the work object.
-                let unknown = !displaced && states.switch(Which::Displacement) != Switch::Off;
-                let offset = states.switch(Which::ExternalOffset) != Switch::Off;
+                let unknown = !displaced && states.state(Switch::Displacement) != SwitchState::Off;
+                let offset = states.state(Switch::ExternalOffset) != SwitchState::Off;
                 motion.left = left_by_modal(motion, unknown || offset);
             }
         }
     }
 
     /// The switches with which each unit may begin.
-    fn entries(&self) -> Vec<States> {
+    fn entries(&self) -> Vec<SwitchSet> {
         let (units, symbols) = (&self.symbols.units, self.symbols);
         let unit_of = |routine: u32| symbols.routines[routine as usize].unit;
         let mut called = vec![false; units.len()];
@@ -316,19 +316,21 @@ impl<'a, 's> Lister<'a, 's> {
             called[unit_of(site.routine) as usize] |= *unit != unit_of(site.routine);
         }
         // What runs before a routine that none of the files calls: another routine, or nothing.
-        let before = self.exits.iter().flatten().fold(States::NONE, |all, exit| all.or(*exit));
-        let alone = States::START.or(before.entered(States::NONE));
-        let mut entries: Vec<States> = Vec::with_capacity(units.len());
+        let before = self.exits.iter().flatten().fold(SwitchSet::EMPTY, |all, exit| all.join(*exit));
+        let alone = SwitchSet::START.join(before.substitute_entry(SwitchSet::EMPTY));
+        let mut entries: Vec<SwitchSet> = Vec::with_capacity(units.len());
         for (unit, &called) in units.iter().zip(&called) {
             let routine = unit.routine.map(|routine| (routine, &symbols.routines[routine as usize]));
             entries.push(match routine {
-                None => States::START,
+                None => SwitchSet::START,
                 Some((routine, _)) if symbols.interrupts[routine as usize] => {
-                    States::START.or(symbols.everything)
+                    SwitchSet::START.join(symbols.all_switches)
                 }
-                Some((routine, _)) if self.mains.contains(&routine) => States::START,
+                Some((routine, _)) if self.mains.contains(&routine) => SwitchSet::START,
                 // A part of a program may be called from the rest of it.
-                Some((_, scope)) if called && (!self.mains.is_empty() || scope.head.local) => States::NONE,
+                Some((_, scope)) if called && (!self.mains.is_empty() || scope.head.local) => {
+                    SwitchSet::EMPTY
+                }
                 Some(_) => alone,
             });
         }
@@ -342,37 +344,38 @@ impl<'a, 's> Lister<'a, 's> {
         loop {
             let before = entries.clone();
             for (unit, site) in &sites {
-                let arriving = site.modal.entered(entries[*unit as usize]);
+                let arriving = site.modal.substitute_entry(entries[*unit as usize]);
                 let callee = &mut entries[unit_of(site.routine) as usize];
-                *callee = callee.or(arriving);
+                *callee = callee.join(arriving);
             }
-            let mut outside = States::NONE;
+            let mut outside = SwitchSet::EMPTY;
             // Many units share one list of routines.
-            let mut late: BTreeMap<*const u32, (States, &[u32])> = BTreeMap::new();
+            let mut late: BTreeMap<*const u32, (SwitchSet, &[u32])> = BTreeMap::new();
             for (unit, &entry) in entries.iter().enumerate().take(units.len()) {
-                outside = outside.or(self.outside[unit].entered(entry));
-                let called = &symbols.late[unit];
-                let arriving = &mut late.entry(called.as_ptr()).or_insert((States::NONE, called)).0;
-                *arriving = arriving.or(self.late[unit].entered(entry));
+                outside = outside.join(self.outside[unit].substitute_entry(entry));
+                let called = &symbols.late_callees[unit];
+                let arriving = &mut late.entry(called.as_ptr()).or_insert((SwitchSet::EMPTY, called)).0;
+                *arriving = arriving.join(self.late[unit].substitute_entry(entry));
             }
-            for (arriving, called) in late.into_values().filter(|(arriving, _)| *arriving != States::NONE) {
+            for (arriving, called) in late.into_values().filter(|(arriving, _)| *arriving != SwitchSet::EMPTY)
+            {
                 for &routine in called {
                     let callee = &mut entries[unit_of(routine) as usize];
-                    *callee = callee.or(arriving);
+                    *callee = callee.join(arriving);
                 }
             }
             for routine in symbols.routines.iter().filter(|routine| !routine.head.local) {
                 let callee = &mut entries[routine.unit as usize];
-                *callee = callee.or(outside);
+                *callee = callee.join(outside);
             }
             if before != entries {
                 continue;
             }
             // What only calls itself, round about, has no beginning yet.
-            if !entries.contains(&States::NONE) {
+            if !entries.contains(&SwitchSet::EMPTY) {
                 return entries;
             }
-            entries.iter_mut().filter(|entry| **entry == States::NONE).for_each(|entry| *entry = alone);
+            entries.iter_mut().filter(|entry| **entry == SwitchSet::EMPTY).for_each(|entry| *entry = alone);
         }
     }
 
@@ -399,7 +402,7 @@ impl<'a, 's> Lister<'a, 's> {
         Some(index)
     }
 
-    fn motion(&mut self, unit: Unit, node: u32, state: &State, around: Surroundings) -> Motion {
+    fn motion(&mut self, unit: Unit, node: u32, state: &AbstractState, nesting: Nesting) -> Motion {
         let tree = &self.trees[unit.file as usize];
         Motion {
             place: self.place(unit.file, tree.nodes[node as usize].first),
@@ -419,8 +422,8 @@ impl<'a, 's> Lister<'a, 's> {
             axis: None,
             by_radius: false,
             modal: crate::motion::Modal::START,
-            in_loop: around.in_loop,
-            conditional: around.conditional,
+            in_loop: nesting.in_loop,
+            conditional: nesting.conditional,
             previous: state.previous,
             routine: self.routine_of(unit),
             left: None,
@@ -430,7 +433,7 @@ impl<'a, 's> Lister<'a, 's> {
     fn target(
         &mut self,
         unit: Unit,
-        state: &State,
+        state: &AbstractState,
         argument: Child,
         joints: bool,
         role: Role,
@@ -439,7 +442,7 @@ impl<'a, 's> Lister<'a, 's> {
         let context = Context::new(unit.file, unit.scope, &state.known);
         let (value, source) = self.evaluator.target(context, argument, joints);
         self.acting |= self.evaluator.was_doubtful()
-            || self.symbols.acts(tree, unit.scope, argument)
+            || self.symbols.is_impure(tree, unit.scope, argument)
             || matches!(source, Source::Symbol(symbol) | Source::Element(symbol, _) if self.begins_acting(symbol));
         let (first, end) = tokens_of(tree, argument);
         let origin = match source {
@@ -458,7 +461,7 @@ impl<'a, 's> Lister<'a, 's> {
     fn take(
         &mut self,
         motion: &mut Motion,
-        (unit, call, state): (Unit, u32, &State),
+        (unit, call, state): (Unit, u32, &AbstractState),
         argument: Child,
         joints: bool,
         (role, before): (Role, u32),
@@ -481,8 +484,8 @@ impl<'a, 's> Lister<'a, 's> {
         let (trees, symbols) = (self.trees, self.symbols);
         *self.acting_initials.entry(symbol).or_insert_with(|| {
             let found = &symbols.symbols[symbol as usize];
-            let What::Data(data) = &found.what else { return false };
-            let initial = |value| symbols.acts(&trees[found.file as usize], found.scope, value);
+            let SymbolKind::Data(data) = &found.kind else { return false };
+            let initial = |value| symbols.is_impure(&trees[found.file as usize], found.scope, value);
             data.value.is_some_and(initial)
         })
     }
@@ -493,8 +496,8 @@ impl<'a, 's> Lister<'a, 's> {
         }
         let found = &self.symbols.symbols[symbol as usize];
         let tree = &self.trees[found.file as usize];
-        let data = match &found.what {
-            What::Data(data) => Some(data),
+        let data = match &found.kind {
+            SymbolKind::Data(data) => Some(data),
             _ => None,
         };
         self.listing.declarations.push(Declaration {
@@ -515,10 +518,17 @@ impl<'a, 's> Lister<'a, 's> {
     }
 
     /// A motion instruction of the table.
-    fn known(&mut self, unit: Unit, node: u32, state: &State, around: Surroundings, known: usize) -> Motion {
+    fn known(
+        &mut self,
+        unit: Unit,
+        node: u32,
+        state: &AbstractState,
+        nesting: Nesting,
+        known: usize,
+    ) -> Motion {
         let tree = &self.trees[unit.file as usize];
         let instruction: &Instruction = &INSTRUCTIONS[known];
-        let mut motion = self.motion(unit, node, state, around);
+        let mut motion = self.motion(unit, node, state, nesting);
         self.acting = false;
         motion.instruction = self.name_of(known);
         motion.kind = instruction.kind;
@@ -571,7 +581,7 @@ impl<'a, 's> Lister<'a, 's> {
             let duration_s = self.evaluated(unit, state, time).number();
             self.listing.durations_s.insert(self.listing.motions.len() as u32, duration_s);
         }
-        let free = !options.timed && !options.whole && !around.guarded && !self.asks(unit, node);
+        let free = !options.timed && !options.whole && !nesting.guarded && !self.asks(unit, node);
         let splits = instruction.between != Between::Nothing && instruction.also != Also::Triggers;
         motion.insertable = free && splits;
         motion.straightens = free
@@ -631,7 +641,7 @@ impl<'a, 's> Lister<'a, 's> {
     }
 
     /// A call that is no motion instruction of the table but takes a target.
-    fn other(&mut self, unit: Unit, node: u32, state: &State, around: Surroundings) -> Option<Motion> {
+    fn other(&mut self, unit: Unit, node: u32, state: &AbstractState, nesting: Nesting) -> Option<Motion> {
         let tree = &self.trees[unit.file as usize];
         let late = tree.nodes[node as usize].kind == Syntax::LateCall;
         let name = match parts(tree, node).nth(1).filter(|_| late) {
@@ -665,7 +675,7 @@ impl<'a, 's> Lister<'a, 's> {
                 }
             }
         } else if let Some(moves) = predefined::displaces(name).filter(|_| !late) {
-            let mut motion = self.motion(unit, node, state, around);
+            let mut motion = self.motion(unit, node, state, nesting);
             motion.instruction = display(name).into();
             motion.left = Some(moves?);
             return Some(motion);
@@ -680,7 +690,7 @@ impl<'a, 's> Lister<'a, 's> {
         if found.is_empty() {
             return None;
         }
-        let mut motion = self.motion(unit, node, state, around);
+        let mut motion = self.motion(unit, node, state, nesting);
         motion.instruction = display(name).into();
         for (value, joints) in found {
             let mut target = self.target(unit, state, value, joints, Role::To);
@@ -738,7 +748,7 @@ impl<'a, 's> Lister<'a, 's> {
 }
 
 impl Visitor for Lister<'_, '_> {
-    fn call(&mut self, unit: Unit, node: u32, state: &State, place: Surroundings) -> Option<u32> {
+    fn visit_call(&mut self, unit: Unit, node: u32, state: &AbstractState, nesting: Nesting) -> Option<u32> {
         if self.silent {
             return None;
         }
@@ -748,24 +758,24 @@ impl Visitor for Lister<'_, '_> {
         let hidden = self.symbols.hides_instruction && self.symbols.routine(unit.scope, name).is_some();
         let known = if late || hidden { None } else { instruction::find(name) };
         let motion = match known {
-            Some(known) => self.known(unit, node, state, place, known),
-            None => self.other(unit, node, state, place)?,
+            Some(known) => self.known(unit, node, state, nesting, known),
+            None => self.other(unit, node, state, nesting)?,
         };
         self.listing.motions.push(motion);
-        self.guarded.push(place.guarded);
+        self.guarded.push(nesting.guarded);
         self.modal.push(state.modal);
         self.displaced.push(matches!(state.displacement(), Some(Ok(_))));
         self.units.push(self.unit);
         Some(self.listing.motions.len() as u32 - 1)
     }
 
-    fn exit_of(&mut self, routine: u32) -> States {
+    fn exit_switches(&mut self, routine: u32) -> SwitchSet {
         if let Some(exit) = self.exits[routine as usize] {
             return exit;
         }
         let found = &self.symbols.routines[routine as usize];
         // As it begins, or as anything in it or in what it calls may set.
-        let anyhow = States::ENTRY.or(found.reach.sets);
+        let anyhow = SwitchSet::ENTRY.join(found.effects.switches);
         if self.depth >= CALL_DEPTH {
             return anyhow;
         }
@@ -775,34 +785,34 @@ impl Visitor for Lister<'_, '_> {
         let was = std::mem::replace(&mut self.silent, true);
         self.depth += 1;
         let evaluator = Evaluator::new(self.trees, self.symbols);
-        let exit = walk(&evaluator, unit, self);
+        let exit = interpret_unit(&evaluator, unit, self);
         self.depth -= 1;
         self.silent = was;
         self.exits[routine as usize] = Some(exit);
         exit
     }
 
-    fn called(&mut self, site: CallSite) {
+    fn record_call(&mut self, site: CallSite) {
         if !self.silent {
             self.sites.push((self.unit, site));
         }
     }
 
-    fn called_late(&mut self, modal: States) {
+    fn record_late_call(&mut self, modal: SwitchSet) {
         if !self.silent {
             let late = &mut self.late[self.unit as usize];
-            *late = late.or(modal);
+            *late = late.join(modal);
         }
     }
 
-    fn called_outside(&mut self, modal: States) {
+    fn record_external_call(&mut self, modal: SwitchSet) {
         if !self.silent {
             let outside = &mut self.outside[self.unit as usize];
-            *outside = outside.or(modal);
+            *outside = outside.join(modal);
         }
     }
 
-    fn placed_from(&mut self, standing: &Standing) {
+    fn record_position_use(&mut self, standing: &ReachingMotions) {
         if self.silent {
             return;
         }
@@ -819,9 +829,9 @@ impl Visitor for Lister<'_, '_> {
         }
     }
 
-    fn cycled(&mut self, modal: States) {
+    fn record_cycle_restart(&mut self, modal: SwitchSet) {
         for at in 0..self.mains.len() {
-            self.called(CallSite { routine: self.mains[at], modal });
+            self.record_call(CallSite { routine: self.mains[at], modal });
         }
     }
 }
@@ -861,11 +871,11 @@ impl Options {
 }
 
 fn left_by_modal(motion: &Motion, displaced: bool) -> Option<Reason> {
-    if motion.modal.synchronised != Switch::Off {
+    if motion.modal.synchronised != SwitchState::Off {
         Some(Reason::Synchronised)
-    } else if motion.modal.sensor_guided != Switch::Off {
+    } else if motion.modal.sensor_guided != SwitchState::Off {
         Some(Reason::SensorGuided)
-    } else if motion.modal.axis_apart != Switch::Off {
+    } else if motion.modal.axis_apart != SwitchState::Off {
         Some(Reason::AxisApart)
     } else if displaced && motion.kind != MotionKind::AbsoluteJoint {
         Some(Reason::Displacement)

@@ -33,7 +33,7 @@ pub fn held(numbers: &[f64]) -> Result<(), Reason> {
 const NOT_CONNECTED: f64 = 8.9e9;
 
 impl Value {
-    /// How many numbers and texts it holds, counted until they are more than a limit.
+    /// Number of scalars and strings in the value; counting stops above `limit`.
     pub fn size(&self, limit: usize) -> usize {
         match self {
             Value::List(list) => list

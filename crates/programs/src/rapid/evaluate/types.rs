@@ -1,7 +1,7 @@
 //! The types of expressions, and the components of types.
 
 use super::{Evaluator, functions};
-use crate::rapid::symbol::{Symbols, What};
+use crate::rapid::symbol::{SymbolKind, Symbols};
 use crate::rapid::syntax::{RapidTree, Syntax, expressions, parts, text_of, token_kind};
 use crate::rapid::token::{Token, folded, same_name};
 use crate::rapid::value::components;
@@ -26,7 +26,9 @@ impl<'a, 's> Evaluator<'a, 's> {
                 let Some(id) = self.symbols.find(scope, name) else {
                     return functions::result_type(&folded(name)).map(<[u8]>::to_vec);
                 };
-                let What::Routine(routine) = self.symbols.symbols[id as usize].what else { return None };
+                let SymbolKind::Routine(routine) = self.symbols.symbols[id as usize].kind else {
+                    return None;
+                };
                 let routine = &self.symbols.routines[routine as usize];
                 let home = self.tree(routine.file);
                 let first = parts(home, routine.head.node)
@@ -58,11 +60,11 @@ impl<'a, 's> Evaluator<'a, 's> {
     /// The type of data, aliases resolved, and how many dimensions it has.
     fn declared_type(&self, tree: &RapidTree<'s>, scope: u32, name: Child) -> Option<(Vec<u8>, usize)> {
         let symbol = &self.symbols.symbols[self.symbols.root(tree, scope, name)? as usize];
-        let dimensions = match &symbol.what {
-            What::Data(data) => {
+        let dimensions = match &symbol.kind {
+            SymbolKind::Data(data) => {
                 data.dimensions.map_or(0, |node| expressions(self.tree(symbol.file), node).count())
             }
-            What::Parameter | What::Loop => 0,
+            SymbolKind::Parameter | SymbolKind::Loop => 0,
             _ => return None,
         };
         Some((self.symbols.resolved_type(symbol.scope, &symbol.type_name).to_vec(), dimensions))
@@ -80,7 +82,7 @@ impl<'a, 's> Evaluator<'a, 's> {
         Some((index, list[index].1.clone()))
     }
 
-    /// How many components a record type has.
+    /// Number of components of a record type.
     pub fn component_count(&self, scope: u32, type_name: &[u8]) -> Option<usize> {
         let type_name = self.symbols.resolved_type(scope, type_name);
         if let Some(list) = components(type_name) {
@@ -93,8 +95,8 @@ impl<'a, 's> Evaluator<'a, 's> {
     /// be used in another.
     fn record(&self, scope: u32, type_name: &[u8]) -> Option<&'a Vec<(Vec<u8>, Vec<u8>)>> {
         let symbols: &'a Symbols = self.symbols;
-        match &symbols.symbols[symbols.find(scope, type_name)? as usize].what {
-            What::Record(list) if !symbols.records_twice.contains(type_name) => Some(list),
+        match &symbols.symbols[symbols.find(scope, type_name)? as usize].kind {
+            SymbolKind::Record(list) if !symbols.duplicate_records.contains(type_name) => Some(list),
             _ => None,
         }
     }

@@ -1,17 +1,22 @@
 //! What data hold after an assignment: the whole, a component, or an element.
 
-use super::{ELEMENTS, KEPT, State, Walk};
+use super::{AbstractState, Interpreter, MAX_ELEMENTS, MAX_VALUE_SIZE};
 use crate::motion::Reason;
 use crate::rapid::evaluate::{Context, index_of};
-use crate::rapid::symbol::What;
+use crate::rapid::symbol::SymbolKind;
 use crate::rapid::syntax::{Syntax, arguments, expressions, parts, token_kind};
 use crate::rapid::token::{Token, folded, same_name};
 use crate::rapid::value::Value;
 use crate::tree::Child;
 
-impl Walk<'_, '_, '_> {
+impl Interpreter<'_, '_, '_> {
     /// The new value of what Incr, Decr, Add or Clear changes, where the old one is known.
-    pub(super) fn stepped(&self, node: u32, state: &State, name: &[u8]) -> Option<(Child, Value)> {
+    pub(super) fn incremented(
+        &self,
+        node: u32,
+        state: &AbstractState,
+        name: &[u8],
+    ) -> Option<(Child, Value)> {
         let is = |wanted: &[u8]| same_name(name, wanted);
         if !(is(b"Incr") || is(b"Decr") || is(b"Add") || is(b"Clear"))
             || self.evaluator.symbols.routine(self.unit.scope, name).is_some()
@@ -39,22 +44,22 @@ impl Walk<'_, '_, '_> {
     }
 
     /// `place := value;`
-    pub(super) fn assignment(&mut self, node: u32, state: &mut State) {
+    pub(super) fn transfer_assignment(&mut self, node: u32, state: &mut AbstractState) {
         let tree = &self.evaluator.trees[self.unit.file as usize];
         let mut sides = parts(tree, node)
             .filter(|&part| !matches!(token_kind(tree, part), Some(Token::Assign | Token::Semicolon)));
         let (Some(place), Some(expression)) = (sides.next(), sides.next()) else { return };
         for inside in tree.child_nodes(node) {
-            self.forget_changed(inside, state);
+            self.invalidate_changed(inside, state);
         }
         let context = Context::new(self.unit.file, self.unit.scope, &state.known);
         let value = self.evaluator.value(context, expression);
         // TRYNEXT passes an assignment that fails.
         let passed =
             (self.resumes && (self.may_fail(place) || self.may_fail(expression))).then(|| state.clone());
-        self.put(place, value, state);
+        self.store(place, value, state);
         if let Some(passed) = passed {
-            *state = std::mem::replace(state, passed.clone()).joined(passed);
+            *state = std::mem::replace(state, passed.clone()).join(passed);
         }
     }
 
@@ -70,7 +75,7 @@ impl Walk<'_, '_, '_> {
     }
 
     /// Puts a value in a place.
-    pub(super) fn put(&self, place: Child, value: Value, state: &mut State) {
+    pub(super) fn store(&self, place: Child, value: Value, state: &mut AbstractState) {
         let tree = &self.evaluator.trees[self.unit.file as usize];
         let symbols = self.evaluator.symbols;
         let Some(root) = symbols.root(tree, self.unit.scope, place) else { return };
@@ -81,15 +86,15 @@ impl Walk<'_, '_, '_> {
                 let path: Vec<Child> = parts(tree, place).skip(1).collect();
                 let mut old = self.evaluator.symbol_value(context, root);
                 if let (Value::Unknown(reason), Some(Child::Node(_))) = (&old, path.first()) {
-                    old = self.elements(context, root, *reason);
+                    old = self.unknown_elements(context, root, *reason);
                 }
                 let type_name = symbols.symbols[root as usize].type_name.clone();
-                self.replaced(context, old, &type_name, &path, value)
+                self.with_component(context, old, &type_name, &path, value)
             }
         };
-        self.forget(root, state);
+        self.invalidate(root, state);
         // A big array that is filled element by element is not worth keeping.
-        if new.size(KEPT) > KEPT || symbols.symbols[root as usize].volatile {
+        if new.size(MAX_VALUE_SIZE) > MAX_VALUE_SIZE || symbols.symbols[root as usize].volatile {
             state.known.remove(&root);
         } else {
             state.known.insert(root, new);
@@ -97,11 +102,11 @@ impl Walk<'_, '_, '_> {
     }
 
     /// An array of which nothing is known, element by element, so that those that are assigned are.
-    fn elements(&self, context: Context<'_>, root: u32, reason: Reason) -> Value {
+    fn unknown_elements(&self, context: Context<'_>, root: u32, reason: Reason) -> Value {
         let symbol = &self.evaluator.symbols.symbols[root as usize];
         let tree = &self.evaluator.trees[symbol.file as usize];
-        let dimensions = match &symbol.what {
-            What::Data(data) => data.dimensions,
+        let dimensions = match &symbol.kind {
+            SymbolKind::Data(data) => data.dimensions,
             _ => None,
         };
         let Some(dimensions) = dimensions else { return Value::Unknown(reason) };
@@ -112,7 +117,7 @@ impl Walk<'_, '_, '_> {
         for size in sizes.into_iter().rev() {
             let Ok(size) = self.evaluator.value(there, size).number() else { return Value::Unknown(reason) };
             count *= size;
-            if !(1.0..=ELEMENTS).contains(&size) || count > ELEMENTS {
+            if !(1.0..=MAX_ELEMENTS).contains(&size) || count > MAX_ELEMENTS {
                 return Value::Unknown(reason);
             }
             value = Value::List(vec![value; size as usize]);
@@ -121,7 +126,7 @@ impl Walk<'_, '_, '_> {
     }
 
     /// `old` with the component at `path` replaced.
-    fn replaced(
+    fn with_component(
         &self,
         context: Context<'_>,
         old: Value,
@@ -146,19 +151,19 @@ impl Walk<'_, '_, '_> {
                     _ => return Value::Unknown(Reason::WrongShape),
                 };
                 let part = std::mem::replace(&mut list[index], Value::Bool(false));
-                list[index] = self.replaced(context, part, &component_type, rest, value);
+                list[index] = self.with_component(context, part, &component_type, rest, value);
                 Value::List(list)
             }
-            Child::Token(_) => self.replaced(context, old, type_name, rest, value),
+            Child::Token(_) => self.with_component(context, old, type_name, rest, value),
             Child::Node(index) => {
                 let positions: Vec<Child> = expressions(tree, index).collect();
-                self.replaced_at(context, old, type_name, (&positions, rest), value)
+                self.with_element(context, old, type_name, (&positions, rest), value)
             }
         }
     }
 
     /// `old` with the component at `rest` of its element replaced.
-    fn replaced_at(
+    fn with_element(
         &self,
         context: Context<'_>,
         old: Value,
@@ -167,7 +172,7 @@ impl Walk<'_, '_, '_> {
         value: Value,
     ) -> Value {
         let Some((&position, positions)) = positions.split_first() else {
-            return self.replaced(context, old, type_name, rest, value);
+            return self.with_component(context, old, type_name, rest, value);
         };
         let Value::List(mut list) = old else { return Value::Unknown(Reason::Assigned) };
         let Ok(position) = self.evaluator.value(context, position).number() else {
@@ -177,7 +182,7 @@ impl Walk<'_, '_, '_> {
             return Value::Unknown(Reason::IndexOutOfRange);
         };
         let old = std::mem::replace(part, Value::Bool(false));
-        *part = self.replaced_at(context, old, type_name, (positions, rest), value);
+        *part = self.with_element(context, old, type_name, (positions, rest), value);
         Value::List(list)
     }
 }

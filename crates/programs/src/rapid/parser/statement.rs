@@ -9,7 +9,7 @@ use crate::rapid::syntax::Syntax;
 use crate::rapid::token::{Token, same_name};
 use crate::tree::{Node, Opaque, Tree};
 
-/// How deeply blocks may nest.
+/// Greatest nesting depth of blocks.
 const BLOCK_DEPTH: usize = 100;
 
 struct Fail(OpaqueReason);

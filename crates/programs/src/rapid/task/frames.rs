@@ -1,10 +1,10 @@
 //! Speed, zone, tool and work object of a motion: each distinct one once in the listing.
 
-use super::super::flow::State;
+use super::super::flow::AbstractState;
 use super::Lister;
 use crate::motion::{Frame, Place, Reason, Speed, Tool, WorkObject, Zone};
 use crate::rapid::evaluate::{Context, Known};
-use crate::rapid::symbol::{Unit, What};
+use crate::rapid::symbol::{SymbolKind, Unit};
 use crate::rapid::syntax::{text_of, tokens_of};
 use crate::rapid::token::{Token, display};
 use crate::rapid::value::{LARGEST, Value, built_in};
@@ -24,11 +24,11 @@ impl<'s> Lister<'_, 's> {
         })
     }
 
-    pub(super) fn evaluated(&self, unit: Unit, state: &State, value: Child) -> Value {
+    pub(super) fn evaluated(&self, unit: Unit, state: &AbstractState, value: Child) -> Value {
         self.evaluator.value(Context::new(unit.file, unit.scope, &state.known), value)
     }
 
-    pub(super) fn speed(&mut self, unit: Unit, state: &State, value: Child) -> u32 {
+    pub(super) fn speed(&mut self, unit: Unit, state: &AbstractState, value: Child) -> u32 {
         let text = text_of(&self.trees[unit.file as usize], value);
         if let Some(index) = self.speeds.get(unit.scope, text) {
             return index;
@@ -42,7 +42,13 @@ impl<'s> Lister<'_, 's> {
     }
 
     /// The speed of a motion with the velocity of the TCP that its option states in place of it.
-    pub(super) fn overridden(&mut self, speed: u32, unit: Unit, state: &State, velocity: Child) -> u32 {
+    pub(super) fn overridden(
+        &mut self,
+        speed: u32,
+        unit: Unit,
+        state: &AbstractState,
+        velocity: Child,
+    ) -> u32 {
         let mut speed = self.listing.speeds[speed as usize].clone();
         match (&mut speed.value, self.evaluated(unit, state, velocity).number()) {
             (speed @ Ok(_), Ok(velocity)) if !(velocity > 0.0 && velocity <= LARGEST) => {
@@ -55,7 +61,7 @@ impl<'s> Lister<'_, 's> {
         intern(&mut self.listing.speeds, speed)
     }
 
-    pub(super) fn zone(&mut self, unit: Unit, state: &State, value: Child) -> u32 {
+    pub(super) fn zone(&mut self, unit: Unit, state: &AbstractState, value: Child) -> u32 {
         let text = text_of(&self.trees[unit.file as usize], value);
         if let Some(index) = self.zones.get(unit.scope, text) {
             return index;
@@ -74,7 +80,7 @@ impl<'s> Lister<'_, 's> {
         Some(self.place(symbol.file, symbol.name))
     }
 
-    pub(super) fn tool(&mut self, unit: Unit, state: &State, value: Child) -> u32 {
+    pub(super) fn tool(&mut self, unit: Unit, state: &AbstractState, value: Child) -> u32 {
         let text = text_of(&self.trees[unit.file as usize], value);
         if let Some(index) = self.tools.get(unit.scope, text) {
             return index;
@@ -95,7 +101,7 @@ impl<'s> Lister<'_, 's> {
     pub(super) fn declared_tools(&mut self) {
         let known = Known::default();
         for (id, symbol) in (0..).zip(&self.symbols.symbols) {
-            let What::Data(data) = &symbol.what else { continue };
+            let SymbolKind::Data(data) = &symbol.kind else { continue };
             if *symbol.type_name != *b"tooldata" || data.dimensions.is_some() {
                 continue;
             }
@@ -111,7 +117,7 @@ impl<'s> Lister<'_, 's> {
     }
 
     /// The work object of a motion, with the displacement in it that the text tells.
-    pub(super) fn work_object(&mut self, unit: Unit, state: &State, value: Option<Child>) -> u32 {
+    pub(super) fn work_object(&mut self, unit: Unit, state: &AbstractState, value: Option<Child>) -> u32 {
         let displacement =
             state.displacement().and_then(Result::ok).filter(|frame| *frame != Frame::IDENTITY);
         let text: &'s [u8] = match value {

@@ -2,7 +2,7 @@
 
 use super::Lister;
 use crate::motion::{MotionKind, Origin, OtherUse};
-use crate::rapid::symbol::{Unit, What};
+use crate::rapid::symbol::{SymbolKind, Unit};
 use crate::rapid::syntax::{RapidTree, Syntax, arguments, token_kind, tokens_of};
 use crate::rapid::token::{Token, fold, same_name};
 
@@ -20,7 +20,7 @@ impl<'s> Lister<'_, 's> {
         if self.declarations.is_empty() {
             return;
         }
-        // Names seldom begin and end as a target's does: most are turned away by one look.
+        // A hash of the first and last byte rejects most names at once.
         let mut likely = vec![false; 1 << 16];
         let hash = |text: &[u8]| {
             let ends = [text[0], text[text.len() - 1]].map(|byte| usize::from(fold(byte)));
@@ -127,7 +127,7 @@ impl<'s> Lister<'_, 's> {
     /// Uses in the initial values of other declarations at module level.
     pub(super) fn uses_in_declarations(&mut self, likely: &[bool], hash: &dyn Fn(&[u8]) -> usize) {
         for symbol in &self.symbols.symbols {
-            let What::Data(data) = &symbol.what else { continue };
+            let SymbolKind::Data(data) = &symbol.kind else { continue };
             let tree = &self.trees[symbol.file as usize];
             let Some(value) = data.value else { continue };
             let (first, end) = tokens_of(tree, value);

@@ -12,7 +12,7 @@ use crate::tree::{Node, Tree};
 /// The blocks around what is read ahead.
 const AROUND: [Syntax; 4] = [Syntax::File, Syntax::Module, Syntax::Proc, Syntax::Body];
 
-/// How far behind the middle of a file a beginning is looked for (tokens).
+/// Greatest distance from a cut to the statement that begins the next part (tokens).
 const FAR: usize = 1 << 16;
 
 /// Statements of the body of a routine.

@@ -3,7 +3,7 @@
 use super::{Fail, Parsed, Parser, Syntax, Token};
 use crate::motion::OpaqueReason;
 
-/// How deeply brackets and calls may nest.
+/// Greatest nesting depth of brackets and calls.
 const EXPRESSION_DEPTH: u32 = 100;
 
 impl Parser<'_, '_> {
@@ -49,7 +49,7 @@ impl Parser<'_, '_> {
                 }
                 _ if !separated => return Err(Fail(OpaqueReason::MissingSemicolon)),
                 Token::Ident if self.peek_second() == Token::Assign => {
-                    let node = self.open(Syntax::Named);
+                    let node = self.open(Syntax::NamePattern);
                     self.bump();
                     self.bump();
                     self.expression()?;

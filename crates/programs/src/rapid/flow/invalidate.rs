@@ -1,18 +1,18 @@
 //! What is no longer known behind a statement: what it writes, what it calls may change, and what others may write meanwhile.
 
-use super::{CallSite, DISPLACEMENT, State, Walk};
+use super::{AbstractState, CallSite, DISPLACEMENT, Interpreter};
 use crate::motion::Reason;
-use crate::rapid::modal::{States, Which};
+use crate::rapid::modal::{Switch, SwitchSet};
 use crate::rapid::predefined;
-use crate::rapid::symbol::What;
+use crate::rapid::symbol::SymbolKind;
 use crate::rapid::syntax::Syntax;
 use crate::rapid::token::Token;
 use crate::rapid::value::Value;
 
-impl Walk<'_, '_, '_> {
+impl Interpreter<'_, '_, '_> {
     /// Forgets what anything under a node may change: assignments, arguments that come back changed, what called
     /// routines and functions do.
-    pub(super) fn forget_changed(&mut self, node: u32, state: &mut State) {
+    pub(super) fn invalidate_changed(&mut self, node: u32, state: &mut AbstractState) {
         let tree = &self.evaluator.trees[self.unit.file as usize];
         let symbols = self.evaluator.symbols;
         for node in node..node + tree.nodes[node as usize].size {
@@ -20,23 +20,23 @@ impl Walk<'_, '_, '_> {
             if !kind.may_change() {
                 continue;
             }
-            self.forget_written(node, state);
+            self.invalidate_written(node, state);
             let name = tree.text(tree.nodes[node as usize].first);
             match kind {
-                Syntax::LateCall => self.forget_outside(state),
-                Syntax::Call => self.forget_called(name, kind, state),
+                Syntax::LateCall => self.invalidate_nonlocal(state),
+                Syntax::Call => self.invalidate_called(name, kind, state),
                 Syntax::Function => {
-                    for &routine in symbols.called(self.unit.scope, name) {
-                        let sets = symbols.routines[routine as usize].reach.sets;
+                    for &routine in symbols.callees(self.unit.scope, name) {
+                        let sets = symbols.routines[routine as usize].effects.switches;
                         if self.resumes {
                             // It may be called once more after an error in it.
-                            self.may_set(sets, state);
+                            self.join_switches(sets, state);
                         }
-                        self.may_set(self.handled, state);
-                        self.visitor.called(CallSite { routine, modal: state.modal });
-                        self.may_set(sets, state);
+                        self.join_switches(self.handler_switches, state);
+                        self.visitor.record_call(CallSite { routine, modal: state.modal });
+                        self.join_switches(sets, state);
                     }
-                    self.forget_called(name, kind, state);
+                    self.invalidate_called(name, kind, state);
                 }
                 _ => {}
             }
@@ -44,29 +44,30 @@ impl Walk<'_, '_, '_> {
     }
 
     /// Forgets what the expressions of a statement, such as its condition, may change.
-    pub(super) fn forget_asked(&mut self, node: u32, state: &mut State) {
+    pub(super) fn invalidate_condition(&mut self, node: u32, state: &mut AbstractState) {
         let tree = &self.evaluator.trees[self.unit.file as usize];
         for asked in tree.child_nodes(node).filter(|&node| tree.nodes[node as usize].kind.is_expression()) {
-            self.forget_changed(asked, state);
+            self.invalidate_changed(asked, state);
         }
     }
 
     /// Forgets what one statement or function writes by itself.
-    pub(super) fn forget_written(&self, node: u32, state: &mut State) {
+    pub(super) fn invalidate_written(&self, node: u32, state: &mut AbstractState) {
         let tree = &self.evaluator.trees[self.unit.file as usize];
         let symbols = self.evaluator.symbols;
-        symbols.changed_by(tree, self.unit.scope, node, &mut |change| self.forget(change.symbol, state));
+        symbols
+            .for_each_write(tree, self.unit.scope, node, &mut |write| self.invalidate(write.symbol, state));
     }
 
     /// Forgets data, and what may be the same data by another name.
-    pub(super) fn forget(&self, symbol: u32, state: &mut State) {
+    pub(super) fn invalidate(&self, symbol: u32, state: &mut AbstractState) {
         state.known.remove(&symbol);
         if self.aliases.is_empty() {
             return;
         }
         let symbols = &self.evaluator.symbols.symbols;
         if self.aliases.contains(&symbol) {
-            self.forget_outside(state);
+            self.invalidate_nonlocal(state);
         } else if symbols[symbol as usize].scope != self.unit.scope {
             for alias in &self.aliases {
                 state.known.remove(alias);
@@ -75,59 +76,59 @@ impl Walk<'_, '_, '_> {
     }
 
     /// Forgets the data that all tasks share: while this one waits, another may have written it.
-    pub(super) fn forget_shared(&self, state: &mut State) {
+    pub(super) fn invalidate_shared(&self, state: &mut AbstractState) {
         let symbols = &self.evaluator.symbols.symbols;
         state.known.retain(|&id, _| {
-            symbols.get(id as usize).is_none_or(|symbol| match &symbol.what {
-                What::Data(data) => data.storage != Token::Pers || data.local || data.task,
+            symbols.get(id as usize).is_none_or(|symbol| match &symbol.kind {
+                SymbolKind::Data(data) => data.storage != Token::Pers || data.local || data.task,
                 _ => true,
             })
         });
     }
 
     /// Notes that switches may be set here, or not.
-    pub(super) fn may_set(&self, sets: States, state: &mut State) {
-        state.modal = state.modal.or(sets);
-        if !sets.leaves(Which::Displacement) {
+    pub(super) fn join_switches(&self, sets: SwitchSet, state: &mut AbstractState) {
+        state.modal = state.modal.join(sets);
+        if !sets.is_unset(Switch::Displacement) {
             state.known.insert(DISPLACEMENT, Value::Unknown(Reason::Displacement));
         }
     }
 
     /// Forgets what the routine or instruction of this name may change apart from its arguments.
-    pub(super) fn forget_called(&self, name: &[u8], kind: Syntax, state: &mut State) {
+    pub(super) fn invalidate_called(&self, name: &[u8], kind: Syntax, state: &mut AbstractState) {
         let symbols = self.evaluator.symbols;
         if kind == Syntax::Call && symbols.is_motion(self.unit.scope, name) {
             return;
         }
-        let moves = match symbols.called(self.unit.scope, name) {
+        let moves = match symbols.callees(self.unit.scope, name) {
             called @ [_, ..] => {
                 let mut moves = false;
                 for &routine in called {
-                    let reach = &symbols.routines[routine as usize].reach;
-                    for &symbol in &reach.changes {
-                        self.forget(symbol, state);
+                    let effects = &symbols.routines[routine as usize].effects;
+                    for &symbol in &effects.writes {
+                        self.invalidate(symbol, state);
                     }
-                    if reach.anything {
-                        self.forget_outside(state);
+                    if effects.writes_anything {
+                        self.invalidate_nonlocal(state);
                     }
-                    if reach.waits {
-                        self.forget_shared(state);
+                    if effects.waits {
+                        self.invalidate_shared(state);
                     }
-                    moves |= reach.moves;
+                    moves |= effects.moves;
                 }
                 moves
             }
             [] if predefined::effect(name).is_some() => {
                 if kind == Syntax::Call && predefined::calls_by_name(name) {
-                    self.forget_outside(state);
+                    self.invalidate_nonlocal(state);
                 }
                 if predefined::waits(name) {
-                    self.forget_shared(state);
+                    self.invalidate_shared(state);
                 }
                 predefined::displaces(name).is_some()
             }
             [] => {
-                self.forget_outside(state);
+                self.invalidate_nonlocal(state);
                 true
             }
         };
@@ -137,7 +138,7 @@ impl Walk<'_, '_, '_> {
     }
 
     /// A routine that is not known here may change everything that is declared outside this one.
-    pub(super) fn forget_outside(&self, state: &mut State) {
+    pub(super) fn invalidate_nonlocal(&self, state: &mut AbstractState) {
         let symbols = &self.evaluator.symbols.symbols;
         state.known.retain(|&id, _| {
             symbols.get(id as usize).is_none_or(|s| s.scope == self.unit.scope) && !self.aliases.contains(&id)

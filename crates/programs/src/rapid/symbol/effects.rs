@@ -1,0 +1,88 @@
+//! Side effects: the writes of one statement, the side-effect summary of a routine, and a unit's effect on the switches.
+
+use crate::rapid::modal::SwitchSet;
+
+/// A routine that may write more outside data than this counts as writing anything.
+pub(super) const MAX_WRITES: usize = 1024;
+
+/// How a statement writes data.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WriteKind {
+    /// The whole, or a part that the text does not determine.
+    Whole,
+    /// One component: the node of the assigned place.
+    Part(u32),
+    /// Passed to a routine that none of the files declares or that is called by a computed name.
+    HandedOver,
+    /// At any time from here on: the controller keeps a reference and writes it when an event occurs.
+    Later,
+}
+
+/// A write of data.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Write {
+    /// The data.
+    pub symbol: u32,
+    /// How it is written.
+    pub kind: WriteKind,
+}
+
+/// Side-effect summary of a routine: everything that a call may do, callees included. All may-information.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct SideEffects {
+    /// Data declared outside the routine that it may write, sorted.
+    pub writes: Vec<u32>,
+    /// Whether it calls unknown code, which may write all data declared outside routines.
+    pub writes_anything: bool,
+    /// Whether it may move the robot.
+    pub moves: bool,
+    /// Whether it waits, so that another task may write shared data.
+    pub waits: bool,
+    /// Whether it may change the gripped load (GripLoad).
+    pub grips: bool,
+    /// Whether it is impure: it writes outside data, moves, waits, reads a device or a clock, or raises.
+    pub impure: bool,
+    /// Whether it counts a displacement from the robot's current position (PDispOn without \ExeP).
+    pub uses_position: bool,
+    /// The switches that it sets at some time, not at its end alone.
+    pub switches: SwitchSet,
+}
+
+impl SideEffects {
+    /// Joins a callee's summary into this one.
+    pub(super) fn join(&mut self, callee: &SideEffects) {
+        self.writes_anything |= callee.writes_anything;
+        self.moves |= callee.moves;
+        self.waits |= callee.waits;
+        self.grips |= callee.grips;
+        self.impure |= callee.impure;
+        self.uses_position |= callee.uses_position;
+        self.switches = self.switches.join(callee.switches);
+        self.writes.extend_from_slice(&callee.writes);
+        if self.writes.len() > 4 * MAX_WRITES {
+            self.normalise();
+        }
+    }
+
+    /// Sorts the writes and widens too many of them to "anything".
+    pub(super) fn normalise(&mut self) {
+        self.writes.sort_unstable();
+        self.writes.dedup();
+        self.writes_anything |= self.writes.len() > MAX_WRITES;
+        if self.writes_anything {
+            self.writes.clear();
+        }
+    }
+}
+
+/// Effect of a unit on the switches that act in execution order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SwitchExit {
+    /// They are at its end as at its entry.
+    Unchanged,
+    /// Its statements may set some.
+    Changed {
+        /// Whether anything calls it.
+        called: bool,
+    },
+}

@@ -1,0 +1,269 @@
+//! Facts about each unit that need no fixpoint: one pass over every assignment, call and function, callees not included.
+
+use std::collections::BTreeSet;
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use super::effects::Write;
+use super::late_binding::NamePattern;
+use super::writes::literal_data_name;
+use super::{Symbols, Unit};
+use crate::rapid::instruction::{self, Also, INSTRUCTIONS};
+use crate::rapid::modal::{SwitchSet, switches_set_by};
+use crate::rapid::predefined;
+use crate::rapid::syntax::{Argument, RapidTree, Syntax, arguments, parts};
+use crate::rapid::token::{Token, folded, same_name};
+use crate::tree::Child;
+
+/// What the statements of one unit do themselves.
+#[derive(Default)]
+pub(super) struct UnitFacts {
+    pub(super) writes: Vec<Write>,
+    /// The routines that it calls: its edges in the call graph.
+    pub(super) calls: Vec<u32>,
+    /// Whether it calls unknown code.
+    pub(super) calls_unknown: bool,
+    pub(super) moves: bool,
+    pub(super) waits: bool,
+    pub(super) grips: bool,
+    pub(super) impure: bool,
+    pub(super) uses_position: bool,
+    /// Types whose data it writes by a computed name; `None` for any type.
+    pub(super) writes_by_name: Vec<Option<Vec<u8>>>,
+    /// The calls that set a switch or call a routine of the program.
+    pub(super) switch_calls: Vec<u32>,
+    /// The switches that it sets.
+    pub(super) switches: SwitchSet,
+    /// Name patterns of its calls by a computed name.
+    pub(super) late_calls: BTreeSet<NamePattern>,
+    /// Name patterns of the procedures that it lets the controller call while the robot moves.
+    pub(super) interrupts: BTreeSet<NamePattern>,
+    /// Whether it restarts main (ExitCycle).
+    pub(super) restarts_main: bool,
+}
+
+impl UnitFacts {
+    /// These facts and those of the next nodes of the same unit.
+    fn merge(mut self, next: UnitFacts) -> UnitFacts {
+        self.writes.extend(next.writes);
+        self.calls.extend(next.calls);
+        self.switch_calls.extend(next.switch_calls);
+        self.interrupts.extend(next.interrupts);
+        self.late_calls.extend(next.late_calls);
+        self.calls_unknown |= next.calls_unknown;
+        self.moves |= next.moves;
+        self.waits |= next.waits;
+        self.grips |= next.grips;
+        self.impure |= next.impure;
+        self.uses_position |= next.uses_position;
+        self.writes_by_name.extend(next.writes_by_name);
+        self.restarts_main |= next.restarts_main;
+        self.switches = self.switches.join(next.switches);
+        self
+    }
+
+    fn add_switch_call(&mut self, node: u32) {
+        if self.switch_calls.last() != Some(&node) {
+            self.switch_calls.push(node);
+        }
+    }
+}
+
+/// Nodes that one thread processes at a time.
+const PORTION: u32 = 1 << 16;
+
+impl Symbols {
+    /// The facts of every unit.
+    pub(super) fn collect_facts(&self, trees: &[RapidTree<'_>]) -> Vec<UnitFacts> {
+        let facts = |&unit: &Unit| {
+            let nodes = unit.node + 1..unit.node + trees[unit.file as usize].nodes[unit.node as usize].size;
+            // The parts of a long routine in parallel; a fragment skips whole routines, so it stays in one piece.
+            let parts =
+                if unit.routine.is_some() { nodes.len().div_ceil(PORTION as usize).max(1) } else { 1 };
+            if parts == 1 {
+                return self.facts_of(trees, unit, nodes);
+            }
+            let part = |index: usize| {
+                let first = nodes.start + index as u32 * PORTION;
+                self.facts_of(trees, unit, first..(first + PORTION).min(nodes.end))
+            };
+            let mut parts: Vec<UnitFacts> = (0..parts).into_par_iter().map(part).collect();
+            let rest = parts.split_off(1);
+            rest.into_iter().fold(parts.swap_remove(0), UnitFacts::merge)
+        };
+        self.units.iter().map(facts).collect()
+    }
+
+    /// The facts of some nodes of a unit.
+    pub(super) fn facts_of(&self, trees: &[RapidTree<'_>], unit: Unit, nodes: Range<u32>) -> UnitFacts {
+        let tree = &trees[unit.file as usize];
+        let mut facts = UnitFacts::default();
+        let mut node = nodes.start;
+        while node < nodes.end {
+            let kind = tree.nodes[node as usize].kind;
+            if unit.routine.is_none() && (kind.is_routine() || kind == Syntax::Module) {
+                node += tree.nodes[node as usize].size;
+                continue;
+            }
+            if kind == Syntax::Call && self.is_plain_motion(tree, unit.scope, node) {
+                (facts.moves, facts.impure) = (true, true);
+                node += 1;
+                continue;
+            }
+            if kind.may_change() {
+                self.for_each_write(tree, unit.scope, node, &mut |write| facts.writes.push(write));
+            }
+            match kind {
+                Syntax::LateCall => {
+                    let name = parts(tree, node).nth(1);
+                    add_late_call(tree, (node, name), &mut facts);
+                }
+                Syntax::Call | Syntax::Function => self.add_call(tree, unit, (node, kind), &mut facts),
+                // The condition may depend on another task.
+                Syntax::While => facts.waits = true,
+                _ => {}
+            }
+            facts.impure |= self.is_node_impure(tree, unit.scope, node);
+            node += 1;
+        }
+        facts
+    }
+
+    /// A call or function, other than an instruction that only moves the robot.
+    fn add_call(&self, tree: &RapidTree<'_>, unit: Unit, (node, kind): (u32, Syntax), facts: &mut UnitFacts) {
+        let name = tree.text(tree.nodes[node as usize].first);
+        let is_call = kind == Syntax::Call;
+        let callees = self.callees(unit.scope, name);
+        if is_call
+            && callees.is_empty()
+            && let Some(switches) = switches_set_by(tree, node, name)
+        {
+            facts.add_switch_call(node);
+            facts.switches = facts.switches.join(switches);
+        }
+        if is_call && self.is_motion(unit.scope, name) {
+            facts.moves = true;
+            if instruction::find(name).is_some_and(|known| INSTRUCTIONS[known].also == Also::Calls) {
+                let name = arguments(tree, node).filter(|argument| !argument.optional).last();
+                facts.interrupts.insert(NamePattern::of(tree, (name.and_then(|name| name.value), 0, false)));
+            }
+            return;
+        }
+        match callees {
+            [_, ..] => {
+                facts.add_switch_call(node);
+                facts.calls.extend_from_slice(callees);
+            }
+            [] if is_call && predefined::calls_by_name(name) => {
+                let name = arguments(tree, node).find(|argument| !argument.optional);
+                add_late_call(tree, (node, name.and_then(|name| name.value)), facts);
+            }
+            [] if predefined::effect(name).is_none() => (facts.calls_unknown, facts.moves) = (true, true),
+            [] => {
+                facts.moves |= predefined::displaces(name).is_some();
+                facts.restarts_main |= predefined::begins_cycle(name);
+                facts.uses_position |= counts_from_position(tree, node, name);
+                facts.waits |= predefined::waits(name);
+                facts.grips |= predefined::grips(name);
+                // It may write data of any caller.
+                facts.calls_unknown |= self.writes_unknown_data(tree, unit.scope, node, name);
+                if name.eq_ignore_ascii_case(b"SetAllDataVal") {
+                    let type_name = |name| self.resolved_type(unit.scope, &folded(name)).to_vec();
+                    facts.writes_by_name.push(literal_data_name(tree, node).map(type_name));
+                } else if name.eq_ignore_ascii_case(b"SetDataVal") && literal_data_name(tree, node).is_none()
+                {
+                    facts.writes_by_name.push(None);
+                }
+            }
+        }
+    }
+
+    /// Whether a call writes data by a name that the text does not state.
+    pub fn writes_unknown_data(&self, tree: &RapidTree<'_>, scope: u32, call: u32, name: &[u8]) -> bool {
+        let by_name = name.eq_ignore_ascii_case(b"SetAllDataVal")
+            || name.eq_ignore_ascii_case(b"SetDataVal") && literal_data_name(tree, call).is_none();
+        by_name && self.routine(scope, name).is_none()
+    }
+
+    /// Whether the robot may move between two statements of a unit: by an error handler that resumes, or by an interrupt
+    /// routine that does not store the path.
+    pub fn may_move_between_statements(&self, trees: &[RapidTree<'_>], unit: Unit) -> bool {
+        if self.interrupts_move_robot {
+            return true;
+        }
+        let tree = &trees[unit.file as usize];
+        let moves = |node: u32| {
+            let name = tree.text(tree.nodes[node as usize].first);
+            match tree.nodes[node as usize].kind {
+                Syntax::LateCall => true,
+                Syntax::Call if self.is_motion(unit.scope, name) => true,
+                Syntax::Call | Syntax::Function => match self.callees(unit.scope, name) {
+                    callees @ [_, ..] => callees.iter().any(|callee| self.effects_of(*callee).moves),
+                    [] => predefined::displaces(name).is_some() || predefined::effect(name).is_none(),
+                },
+                _ => false,
+            }
+        };
+        let mut clauses = tree.child_nodes(unit.node).filter(|&clause| is_resuming_handler(tree, clause));
+        clauses.any(|clause| (clause..clause + tree.nodes[clause as usize].size).any(moves))
+    }
+
+    /// Whether an interrupt routine moves the robot without storing the path.
+    pub(super) fn find_moving_interrupts(&self, trees: &[RapidTree<'_>]) -> bool {
+        let stores_path = |unit: Unit| {
+            let tree = &trees[unit.file as usize];
+            (unit.node..unit.node + tree.nodes[unit.node as usize].size).any(|node| {
+                let node = tree.nodes[node as usize];
+                node.kind == Syntax::Call && same_name(tree.text(node.first), b"StorePath")
+            })
+        };
+        self.interrupt_routines.iter().any(|&routine| {
+            let routine = &self.routines[routine as usize];
+            routine.effects.moves && !stores_path(self.units[routine.unit as usize])
+        })
+    }
+
+    /// Whether a call by this name is a motion instruction of the table.
+    pub fn is_motion(&self, scope: u32, name: &[u8]) -> bool {
+        instruction::find(name).is_some() && !(self.hides_instruction && self.routine(scope, name).is_some())
+    }
+
+    /// Whether a call is a motion instruction that writes no argument, as nearly every statement of a long program is.
+    pub fn is_plain_motion(&self, tree: &RapidTree<'_>, scope: u32, node: u32) -> bool {
+        let name = tree.text(tree.nodes[node as usize].first);
+        instruction::find(name).is_some_and(|known| INSTRUCTIONS[known].only_moves())
+            && !(self.hides_instruction && self.routine(scope, name).is_some())
+    }
+}
+
+/// A call by a computed name.
+fn add_late_call(tree: &RapidTree<'_>, (node, name): (u32, Option<Child>), facts: &mut UnitFacts) {
+    (facts.calls_unknown, facts.moves) = (true, true);
+    facts.add_switch_call(node);
+    // CallByVar appends a number to the name that it is given.
+    let numbered = tree.nodes[node as usize].kind == Syntax::Call;
+    let given = arguments(tree, node).filter(|argument| !argument.optional).count();
+    let given = if numbered { 0 } else { given };
+    facts.late_calls.insert(NamePattern::of(tree, (name, given, numbered)));
+}
+
+/// Whether a call counts a displacement from the robot's current position: PDispOn without \ExeP.
+pub(crate) fn counts_from_position(tree: &RapidTree<'_>, call: u32, name: &[u8]) -> bool {
+    let executed = |argument: Argument| argument.name.is_some_and(|name| same_name(tree.text(name), b"ExeP"));
+    same_name(name, b"PDispOn") && !arguments(tree, call).any(executed)
+}
+
+/// Whether a clause is an error handler that resumes the statements (RETRY, TRYNEXT, StartMoveRetry).
+pub(crate) fn is_resuming_handler(tree: &RapidTree<'_>, clause: u32) -> bool {
+    let resumes = |node: u32| {
+        let first = tree.nodes[node as usize].first;
+        match tree.nodes[node as usize].kind {
+            Syntax::Leave => matches!(tree.kind(first), Some(Token::Retry | Token::TryNext)),
+            Syntax::Call => predefined::retries(tree.text(first)),
+            _ => false,
+        }
+    };
+    let end = clause + tree.nodes[clause as usize].size;
+    tree.nodes[clause as usize].kind == Syntax::ErrorClause && (clause..end).any(resumes)
+}

@@ -1,0 +1,148 @@
+//! Late binding: which procedures a computed name may call, from the text at its beginning and end and the number of arguments.
+//!
+//! Method: all names sorted twice, forwards and reversed; a pattern scans the shorter of its two matching ranges. Equal
+//! patterns, and units with the same patterns, share one list.
+
+use std::collections::{BTreeSet, HashMap};
+use std::sync::Arc;
+
+use super::Symbols;
+use crate::rapid::syntax::{RapidTree, Syntax, parts};
+use crate::rapid::token::{Token, fold, folded};
+use crate::tree::Child;
+
+/// Most patterns that are checked for one covering another.
+const MAX_COMPARED: usize = 64;
+
+/// What the text determines of a computed name.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(super) struct NamePattern {
+    prefix: Vec<u8>,
+    suffix: Vec<u8>,
+    /// Whether `prefix` is the whole name.
+    whole: bool,
+    /// Number of required arguments given.
+    given: usize,
+}
+
+impl NamePattern {
+    /// The pattern of a string expression; `numbered` where a number is appended to it.
+    pub(super) fn of(
+        tree: &RapidTree<'_>,
+        (name, given, numbered): (Option<Child>, usize, bool),
+    ) -> NamePattern {
+        let text = |part: Child| match part {
+            Child::Token(token) if tree.kind(token) == Some(Token::String) => {
+                let text = tree.text(token);
+                text.get(1..text.len() - 1).map(folded)
+            }
+            _ => None,
+        };
+        let (mut prefix, mut suffix, mut whole) = (None, None, false);
+        match name {
+            Some(Child::Node(node)) if tree.nodes[node as usize].kind == Syntax::Binary => {
+                prefix = parts(tree, node).next().and_then(text);
+                suffix = parts(tree, node).last().and_then(text).filter(|_| !numbered);
+            }
+            Some(part) => {
+                prefix = text(part);
+                whole = prefix.is_some() && !numbered;
+            }
+            None => {}
+        }
+        NamePattern { prefix: prefix.unwrap_or_default(), suffix: suffix.unwrap_or_default(), whole, given }
+    }
+
+    fn matches(&self, name: &[u8]) -> bool {
+        if self.whole {
+            *name == self.prefix[..]
+        } else {
+            name.starts_with(&self.prefix) && name.ends_with(&self.suffix)
+        }
+    }
+
+    /// Whether every name that matches the other matches this.
+    fn covers(&self, other: &NamePattern) -> bool {
+        !self.whole
+            && self.given == other.given
+            && other.prefix.starts_with(&self.prefix)
+            && if other.whole {
+                other.prefix.ends_with(&self.suffix)
+            } else {
+                other.suffix.ends_with(&self.suffix)
+            }
+    }
+}
+
+/// The procedures by name, with and without the module name.
+pub(super) struct ProcedureIndex {
+    forward: Vec<(Vec<u8>, u32)>,
+    backward: Vec<(Vec<u8>, u32)>,
+    /// Required parameters of each routine.
+    required: Vec<usize>,
+    found: HashMap<BTreeSet<NamePattern>, Arc<[u32]>>,
+}
+
+impl ProcedureIndex {
+    pub(super) fn of(symbols: &Symbols, trees: &[RapidTree<'_>]) -> ProcedureIndex {
+        let mut forward = Vec::new();
+        let mut required = Vec::new();
+        for (at, routine) in (0..).zip(&symbols.routines) {
+            required.push(routine.head.parameters.iter().filter(|parameter| !parameter.optional).count());
+            if routine.head.kind == Syntax::Proc {
+                let name = folded(trees[routine.file as usize].text(routine.head.name));
+                let module: Vec<u8> = routine.module.bytes().map(fold).collect();
+                forward.push(([&module[..], b":", &name[..]].concat(), at));
+                forward.push((name, at));
+            }
+        }
+        let turned = |name: &Vec<u8>| name.iter().rev().copied().collect();
+        let mut backward: Vec<(Vec<u8>, u32)> =
+            forward.iter().map(|(name, at)| (turned(name), *at)).collect();
+        forward.sort_unstable();
+        backward.sort_unstable();
+        ProcedureIndex { forward, backward, required, found: HashMap::new() }
+    }
+
+    /// The procedures that match any of the patterns, sorted.
+    pub(super) fn matches(&mut self, patterns: &BTreeSet<NamePattern>) -> Arc<[u32]> {
+        let few = patterns.len() <= MAX_COMPARED;
+        let covered = |one: &NamePattern| {
+            few && patterns
+                .iter()
+                .any(|other| other != one && other.covers(one) && !(one.covers(other) && other > one))
+        };
+        let least: BTreeSet<NamePattern> = patterns.iter().filter(|one| !covered(one)).cloned().collect();
+        if let Some(found) = self.found.get(&least) {
+            return found.clone();
+        }
+        let mut all: Vec<u32> = least.iter().flat_map(|one| self.match_one(one)).collect();
+        all.sort_unstable();
+        all.dedup();
+        let all: Arc<[u32]> = all.into();
+        self.found.insert(least, all.clone());
+        all
+    }
+
+    fn match_one(&self, pattern: &NamePattern) -> Vec<u32> {
+        let forward = prefix_range(&self.forward, &pattern.prefix);
+        let end: Vec<u8> = pattern.suffix.iter().rev().copied().collect();
+        let backward = prefix_range(&self.backward, &end);
+        let takes = |at: &u32| self.required[*at as usize] == pattern.given;
+        if forward.len() <= backward.len() {
+            let fit = forward.iter().filter(|(name, at)| takes(at) && pattern.matches(name));
+            fit.map(|(_, at)| *at).collect()
+        } else {
+            let turned = |name: &Vec<u8>| -> Vec<u8> { name.iter().rev().copied().collect() };
+            let fit = backward.iter().filter(|(name, at)| takes(at) && pattern.matches(&turned(name)));
+            fit.map(|(_, at)| *at).collect()
+        }
+    }
+}
+
+/// The names with a prefix.
+fn prefix_range<'n>(names: &'n [(Vec<u8>, u32)], prefix: &[u8]) -> &'n [(Vec<u8>, u32)] {
+    let first = names.partition_point(|(name, _)| &name[..] < prefix);
+    let long = names[first..].partition_point(|(name, _)| name.starts_with(prefix));
+    &names[first..first + long]
+}
