@@ -24,9 +24,9 @@ struct Piece {
 /// let source = b"G90\nG1 X10\nM30\n";
 /// let mut edits = Edits::new();
 /// edits.replace(7..10, b"X10.02");
-/// let told = unified(source, &edits, "old.nc", "new.nc")?;
+/// let diff = unified(source, &edits, "old.nc", "new.nc")?;
 /// let expected = "--- old.nc\n+++ new.nc\n@@ -1,3 +1,3 @@\n G90\n-G1 X10\n+G1 X10.02\n M30\n";
-/// assert_eq!(String::from_utf8_lossy(&told), expected);
+/// assert_eq!(String::from_utf8_lossy(&diff), expected);
 /// assert!(unified(source, &Edits::new(), "old.nc", "new.nc")?.is_empty());
 /// # Ok::<(), truegrind_programs::edit::EditError>(())
 /// ```

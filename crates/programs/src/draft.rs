@@ -59,8 +59,8 @@ pub fn robot_of(source: &[u8]) -> Option<&str> {
     let mut lines =
         source.split(|&byte| byte == b'\n').take(LINES).filter_map(|line| std::str::from_utf8(line).ok());
     lines.find_map(|line| {
-        let said = line.trim_start_matches(['!', ';', '(', ' ', '\t']).strip_prefix(PATH)?;
-        let (robot, targets) = said.split_once(ROBOT)?.1.rsplit_once(", ")?;
+        let heading = line.trim_start_matches(['!', ';', '(', ' ', '\t']).strip_prefix(PATH)?;
+        let (robot, targets) = heading.split_once(ROBOT)?.1.rsplit_once(", ")?;
         targets.contains(" targets.").then_some(robot)
     })
 }

@@ -513,12 +513,12 @@ pub const UNCORRECTED: &str = "Written for the nominal arm: run truegrind compen
 
 /// Whether a comment is [`UNCORRECTED`], in the comment syntax of any language.
 pub(crate) fn says_uncorrected(comment: &[u8]) -> bool {
-    let said = comment.trim_ascii_start();
-    let said =
-        said.strip_prefix(b"!").or_else(|| said.strip_prefix(b";")).or_else(|| said.strip_prefix(b"("));
-    let said = said.unwrap_or(comment).trim_ascii();
-    let said = said.strip_suffix(b")").unwrap_or(said).trim_ascii_end();
-    said.eq_ignore_ascii_case(UNCORRECTED.as_bytes())
+    let text = comment.trim_ascii_start();
+    let text =
+        text.strip_prefix(b"!").or_else(|| text.strip_prefix(b";")).or_else(|| text.strip_prefix(b"("));
+    let text = text.unwrap_or(comment).trim_ascii();
+    let text = text.strip_suffix(b")").unwrap_or(text).trim_ascii_end();
+    text.eq_ignore_ascii_case(UNCORRECTED.as_bytes())
 }
 
 /// The mark of a compensated file: by which version, with which model.

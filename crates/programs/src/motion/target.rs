@@ -36,9 +36,9 @@ impl Frame {
     /// # Errors
     /// [`Reason::BeyondReach`] for a coordinate beyond [`FARTHEST_MM`], or one that is not finite.
     pub fn within_reach(self) -> Result<Frame, Reason> {
-        let near = self.position_mm.iter().all(|coordinate| coordinate.abs() <= FARTHEST_MM);
-        let turned = self.quaternion.iter().all(|part| part.is_finite());
-        if near && turned { Ok(self) } else { Err(Reason::BeyondReach) }
+        let plausible = self.position_mm.iter().all(|coordinate| coordinate.abs() <= FARTHEST_MM);
+        let finite = self.quaternion.iter().all(|part| part.is_finite());
+        if plausible && finite { Ok(self) } else { Err(Reason::BeyondReach) }
     }
 
     /// The frame of a rigid motion.
@@ -49,7 +49,7 @@ impl Frame {
     /// let frame = Frame { position_mm: [420.0, -10.5, 250.0], quaternion: [0.6, 0.0, 0.8, 0.0] };
     /// let back = Frame::from_pose(&frame.pose());
     /// assert_eq!(back.position_mm, frame.position_mm);
-    /// assert!(back.quaternion.iter().zip(frame.quaternion).all(|(found, told)| (found - told).abs() < 1e-12));
+    /// assert!(back.quaternion.iter().zip(frame.quaternion).all(|(found, expected)| (found - expected).abs() < 1e-12));
     /// ```
     pub fn from_pose(pose: &Pose) -> Frame {
         let (t, q) = (pose.translation.vector, pose.rotation.quaternion());

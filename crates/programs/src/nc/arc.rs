@@ -82,8 +82,8 @@ impl Arc {
             return None;
         }
         let chord = (start[plane.a] - end[plane.a]).hypot(start[plane.b] - end[plane.b]);
-        let turned = if positive { angle(end) - angle(start) } else { angle(start) - angle(end) };
-        let mut sweep_rad = turned.rem_euclid(TAU);
+        let difference = if positive { angle(end) - angle(start) } else { angle(start) - angle(end) };
+        let mut sweep_rad = difference.rem_euclid(TAU);
         // Ends in the same direction, even at different distances.
         if chord < 1e-6 || !(FULL_TURN_RAD..=TAU - FULL_TURN_RAD).contains(&sweep_rad) {
             sweep_rad = TAU;
@@ -168,11 +168,11 @@ impl Arc {
         Arc::from_centre(plane, start, end, [middle[0] + h * normal[0], middle[1] + h * normal[1]], positive)
     }
 
-    /// The arc that goes from where `told` begins to where it ends as this one goes between `meant` (start, middle, end);
-    /// `None` where none does.
+    /// The arc between the `commanded` points (start, middle, end) that corresponds to this one between the `intended`
+    /// points; `None` if there is none.
     ///
-    /// Where the ends are far apart for the radius the three points tell the circle. Where they are not, be the arc short or
-    /// nearly closed, what is rounded of them would turn it: the centre then moves with the points, as a whole.
+    /// Where the chord is long for the radius, the three points determine the circle. In a short or nearly closed arc their
+    /// rounding would rotate it, so the centre is displaced rigidly with the points.
     pub fn displaced(
         &self,
         intended: [[f64; 3]; 3],

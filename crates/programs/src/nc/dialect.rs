@@ -48,7 +48,7 @@ impl Dialect {
             Dialect::Iso => named,
             // LinuxCNC also has numbered parameters, M98 and program numbers.
             Dialect::Fanuc if named == Dialect::LinuxCnc && !only_fanuc(source) => named,
-            said => said,
+            detected => detected,
         }
     }
 

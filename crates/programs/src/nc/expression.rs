@@ -375,15 +375,15 @@ fn function(name: &[u8], x: f64, second: Option<f64>, dialect: Dialect) -> Evalu
     // A Fanuc parameter sets the range of angles; for plain ISO it is unknown too.
     let fanuc = matches!(dialect, Dialect::Fanuc | Dialect::Iso);
     let iso = dialect == Dialect::Iso;
-    let turns = |angle: f64| if fanuc && angle < 0.0 { f64::NAN } else { angle };
+    let in_range = |angle: f64| if fanuc && angle < 0.0 { f64::NAN } else { angle };
     let value = match (name, second) {
         (b"SIN", None) => x.to_radians().sin(),
         (b"COS", None) => x.to_radians().cos(),
         (b"TAN", None) => x.to_radians().tan(),
-        (b"ASIN", None) => turns(x.asin().to_degrees()),
+        (b"ASIN", None) => in_range(x.asin().to_degrees()),
         (b"ACOS", None) => x.acos().to_degrees(),
         (b"ATAN", None) => x.atan().to_degrees(),
-        (b"ATAN" | b"ATAN2", Some(y)) => turns(x.atan2(y).to_degrees()),
+        (b"ATAN" | b"ATAN2", Some(y)) => in_range(x.atan2(y).to_degrees()),
         (b"SQRT", None) => x.sqrt(),
         (b"ABS", None) => x.abs(),
         (b"ROUND", None) => x.round(),

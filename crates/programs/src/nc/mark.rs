@@ -25,8 +25,8 @@ pub fn token(tree: &NcTree<'_>) -> Option<u32> {
 /// The lines that state that the program is not corrected yet.
 pub(super) fn uncorrected(tree: &NcTree<'_>) -> Vec<Range<usize>> {
     let comments = (0..tree.len() as u32).filter(|&token| tree.kind(token) == Some(Token::Comment));
-    let meant = comments.filter(|&token| says_uncorrected(tree.text(token)));
-    meant.map(|token| whole_line(tree.source(), tree.range(token, token + 1))).collect()
+    let marked = comments.filter(|&token| says_uncorrected(tree.text(token)));
+    marked.map(|token| whole_line(tree.source(), tree.range(token, token + 1))).collect()
 }
 
 /// Parses a comment as a mark.
@@ -35,10 +35,10 @@ pub(super) fn uncorrected(tree: &NcTree<'_>) -> Vec<Range<usize>> {
 /// use truegrind_programs::motion::Mark;
 /// use truegrind_programs::nc::{dialect::Dialect, mark};
 ///
-/// let told = Mark { version: "0.1.0".into(), model: "3f9a".into(), partial: true };
-/// let comment = mark::text(&told, Dialect::Fanuc);
+/// let written = Mark { version: "0.1.0".into(), model: "3f9a".into(), partial: true };
+/// let comment = mark::text(&written, Dialect::Fanuc);
 /// assert_eq!(comment, "(truegrind 0.1.0 model 3f9a partial)");
-/// assert_eq!(mark::read(comment.as_bytes()), Some(told));
+/// assert_eq!(mark::read(comment.as_bytes()), Some(written));
 /// assert_eq!(mark::read(b"(ROUGH PASS)"), None);
 /// ```
 pub fn read(comment: &[u8]) -> Option<Mark> {

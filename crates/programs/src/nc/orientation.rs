@@ -67,9 +67,9 @@ impl Angles {
     ///
     /// // Of all equivalent angles, those nearest to the machine's current ones.
     /// for convention in [Angles::Abc, Angles::Wpr, Angles::Rxyz] {
-    ///     let stood = [30.0, -40.0, 200.0];
-    ///     let found = convention.angles(&convention.rotation(stood), [25.0, -35.0, 190.0]);
-    ///     assert!(found.iter().zip(stood).all(|(found, told)| (found - told).abs() < 1e-9), "{found:?}");
+    ///     let current = [30.0, -40.0, 200.0];
+    ///     let found = convention.angles(&convention.rotation(current), [25.0, -35.0, 190.0]);
+    ///     assert!(found.iter().zip(current).all(|(found, expected)| (found - expected).abs() < 1e-9), "{found:?}");
     /// }
     /// ```
     pub fn angles(self, rotation: &UnitQuaternion<f64>, near: [f64; 3]) -> [f64; 3] {
@@ -154,8 +154,8 @@ pub fn vector_and_spin(rotation: &UnitQuaternion<f64>, near_deg: f64) -> ([f64; 
     let vector: [f64; 3] = (-(rotation * Vector3::z())).into();
     let spin = match spun(vector, 0.0) {
         Some(base) => {
-            let turn = base.inverse() * rotation;
-            2.0 * turn.k.atan2(turn.w).to_degrees()
+            let relative = base.inverse() * rotation;
+            2.0 * relative.k.atan2(relative.w).to_degrees()
         }
         None => 0.0,
     };

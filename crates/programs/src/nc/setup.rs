@@ -92,9 +92,9 @@ pub(super) fn statement(comment: &[u8]) -> Result<Option<Statement>, String> {
     }
     if !matches!(&*what, "tool" | "frame") {
         // A misspelt statement must not be ignored like any comment.
-        let meant = ["angles", "tool", "frame"].into_iter().find(|word| what.starts_with(&word[..3]));
+        let misspelt = ["angles", "tool", "frame"].into_iter().find(|word| what.starts_with(&word[..3]));
         let known = "`truegrind angles …`, `truegrind tool …` or `truegrind frame …`";
-        return meant.map_or(Ok(None), |_| Err(known.to_owned()));
+        return misspelt.map_or(Ok(None), |_| Err(known.to_owned()));
     }
     let expected = || {
         let (number, name) = if what == "tool" { ("T1", "tGrind") } else { ("G54", "wPart") };

@@ -300,15 +300,14 @@ impl<'t, 's> Interpreter<'t, 's> {
         };
         self.tools = self.frames_by_name(&tools);
         self.frames = self.frames_by_name(&frames);
-        let told = tools.iter().map(|(_, stated)| (stated.number.clone(), stated.frame));
-        let beforehand: HashSet<String> =
-            self.setup.tools.iter().map(|(name, _)| setup::plain(name)).collect();
-        let kept = told.filter(|(name, _)| {
+        let stated = tools.iter().map(|(_, stated)| (stated.number.clone(), stated.frame));
+        let in_setup: HashSet<String> = self.setup.tools.iter().map(|(name, _)| setup::plain(name)).collect();
+        let used = stated.filter(|(name, _)| {
             let name = setup::plain(name);
-            self.tools.contains_key(&name) && !beforehand.contains(&name)
+            self.tools.contains_key(&name) && !in_setup.contains(&name)
         });
         let declared: Vec<Tool> =
-            self.setup.tools.iter().cloned().chain(kept).map(|one| tool(&one)).collect();
+            self.setup.tools.iter().cloned().chain(used).map(|one| tool(&one)).collect();
         self.listing.declared_tools.extend(declared);
         let labels = tools.into_iter().chain(frames).map(|(_, stated)| (stated.number, stated.name));
         self.listing.labels.extend(labels);

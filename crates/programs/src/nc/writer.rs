@@ -101,7 +101,7 @@ pub fn write(draft: &Draft, dialect: Dialect, angles: Angles) -> Result<Vec<u8>,
         angles,
         options: RewriteOptions::default(),
         number: 0,
-        held: Vec::new(),
+        last: Vec::new(),
         near: [0.0; 3],
         mode: "",
     };
@@ -128,7 +128,7 @@ struct Writer {
     options: RewriteOptions,
     number: u32,
     /// The last value of each address, as text.
-    held: Vec<(&'static str, Vec<u8>)>,
+    last: Vec<(&'static str, Vec<u8>)>,
     near: [f64; 3],
     mode: &'static str,
 }
@@ -227,11 +227,11 @@ impl Writer {
         }
         let texts = self.target_words(target);
         // The three components of a vector are written together, because an omitted one is 0.
-        let vector_moves = texts.iter().any(|(name, text)| is_vector(name) && !self.holds(name, text));
+        let vector_moves = texts.iter().any(|(name, text)| is_vector(name) && !self.is_current(name, text));
         let before = words.len();
         for (name, text) in texts {
-            let holds = if is_vector(name) { !vector_moves } else { self.holds(name, &text) };
-            if holds {
+            let is_current = if is_vector(name) { !vector_moves } else { self.is_current(name, &text) };
+            if is_current {
                 continue;
             }
             if !words.is_empty() {
@@ -239,8 +239,8 @@ impl Writer {
             }
             words.extend_from_slice(name.as_bytes());
             words.extend_from_slice(&text);
-            self.held.retain(|(other, _)| *other != name);
-            self.held.push((name, text));
+            self.last.retain(|(other, _)| *other != name);
+            self.last.push((name, text));
         }
         if words.len() == before {
             // The tool is there already.
@@ -250,11 +250,11 @@ impl Writer {
         if mode == "G1" {
             let mut feed = Vec::new();
             number::write_short(&mut feed, step.speed_mm_s * 60.0, 3);
-            if !self.holds("F", &feed) {
+            if !self.is_current("F", &feed) {
                 words.extend_from_slice(b" F");
                 words.extend_from_slice(&feed);
-                self.held.retain(|(other, _)| *other != "F");
-                self.held.push(("F", feed));
+                self.last.retain(|(other, _)| *other != "F");
+                self.last.push(("F", feed));
             }
         }
         let text = String::from_utf8_lossy(&words).into_owned();
@@ -314,8 +314,8 @@ impl Writer {
         }
     }
 
-    fn holds(&self, name: &str, text: &[u8]) -> bool {
-        self.held.iter().any(|(other, held)| *other == name && held == text)
+    fn is_current(&self, name: &str, text: &[u8]) -> bool {
+        self.last.iter().any(|(other, last)| *other == name && last == text)
     }
 }
 

@@ -36,7 +36,7 @@ fn overlapping_and_outlying_edits_are_errors() {
 }
 
 #[test]
-fn a_hundred_thousand_edits_are_carried_out_in_portions() {
+fn a_hundred_thousand_edits_are_applied_in_portions() {
     let source: Vec<u8> = (0..1_000_000_u32).map(|at| b'a' + (at % 26) as u8).collect();
     let (mut edits, mut expected, mut last) = (Edits::new(), Vec::new(), 0);
     for edit in 0..100_000_usize {
@@ -94,7 +94,7 @@ fn edits_print_as_a_unified_diff() {
     assert!(unified(source, &bad, "a", "b").is_err());
 }
 
-/// What `patch` does: the diff carried out on the source.
+/// Applies the diff to the source, as `patch` does.
 fn patched(source: &[u8], diff: &[u8]) -> Vec<u8> {
     let lines: Vec<&[u8]> = source.split_inclusive(|&byte| byte == b'\n').collect();
     let (mut out, mut at) = (Vec::new(), 0);

@@ -1,4 +1,4 @@
-//! Tests of `program`.
+//! Tests of `programs`.
 
 // A test that cannot go on panics.
 #![allow(clippy::unwrap_used, clippy::print_stderr)]
@@ -11,7 +11,7 @@ mod side_effects;
 mod slow;
 mod numbers;
 mod evaluation;
-mod circumstances;
+mod modal_state;
 mod writing;
 mod edits;
 mod nc;

@@ -1,4 +1,4 @@
-//! NC programs: reading loses nothing, what holds in each block is followed, rewriting writes what is wanted.
+//! NC programs: lossless reading, interpretation of the modal state, rewriting.
 
 use std::path::Path;
 
@@ -14,14 +14,14 @@ use truegrind_programs::rewrite::{Change, Extra, NewTarget, Outcome, RewriteOpti
 use super::samples::{root, told};
 
 mod arcs;
-mod certain;
+mod default_deny;
 mod blocks;
 mod frames;
-mod klartext;
-mod long;
-mod origins;
+mod heidenhain;
+mod line_length;
+mod position_dependencies;
 mod m_words;
-mod stays;
+mod unmodified;
 mod subprograms;
 
 const DIALECTS: [Dialect; 5] =
@@ -68,7 +68,7 @@ fn every_sample_comes_back_and_is_listed_as_expected() {
 }
 
 #[test]
-fn each_sample_is_known_by_its_signs() {
+fn the_dialect_of_each_sample_is_detected() {
     let found: Vec<(String, Dialect)> =
         samples().iter().map(|(name, bytes)| (name.clone(), Dialect::of(bytes))).collect();
     let expected = [
@@ -101,7 +101,7 @@ fn check(source: &[u8], dialect: Dialect) {
         }
         open.push((index + node.size as usize, node.first, node.end));
     }
-    // Listing and a rewrite of everything end, whatever the bytes.
+    // Listing and rewriting terminate on any bytes.
     let setup = Setup { dialect: Some(dialect), angles: Some(Angles::Wpr), ..Setup::default() };
     let task = Task::read(&[("x", source)], &setup);
     let rewritten =
@@ -109,7 +109,7 @@ fn check(source: &[u8], dialect: Dialect) {
     rewritten.files[0].edits.apply(source).unwrap();
 }
 
-/// Every target that is known, moved.
+/// Changes that displace every known target.
 fn moved(listing: &Listing, by: [f64; 3]) -> Vec<Change> {
     (0_u32..)
         .zip(&listing.motions)
@@ -188,8 +188,6 @@ fn gimbal_lock_keeps_the_rotation() {
     }
 }
 
-// ---- what holds in a block ----
-
 const HEAD: &str = "; truegrind angles wpr\n; truegrind tool T0 t [[0,0,100],[1,0,0,0]]\n; truegrind frame G54 w [[500,0,0],[1,0,0,0]]\n; truegrind frame G500 w [[500,0,0],[1,0,0,0]]\n";
 
 fn listing_of(body: &str, dialect: Dialect) -> Listing {
@@ -217,7 +215,7 @@ fn ends(body: &str, dialect: Dialect) -> Vec<Result<[f64; 3], Reason>> {
 }
 
 #[test]
-fn modal_words_increments_units_and_shifts_are_followed() {
+fn modal_words_increments_units_and_shifts_are_interpreted() {
     let all = "G1 X1 Y2 Z3 A0 B0 C0\n";
     let cases: &[(&str, &[[f64; 3]])] = &[
         ("X5\nZ-1", &[[1.0, 2.0, 3.0], [5.0, 2.0, 3.0], [5.0, 2.0, -1.0]]),
@@ -263,7 +261,7 @@ fn a_block_that_begins_with_its_centre_can_become_straight() {
 }
 
 #[test]
-fn heidenhain_presets_and_datum_shifts_are_followed() {
+fn heidenhain_presets_and_datum_shifts_are_interpreted() {
     let go = "L X+1 Y+2 Z+3 A+0 B+0 C+0\n";
     let in_base = |body: &str| -> Vec<Result<[f64; 3], Reason>> {
         let preset = "; truegrind frame PRESET1 w [[600,0,0],[1,0,0,0]]\n";
@@ -292,7 +290,7 @@ fn heidenhain_presets_and_datum_shifts_are_followed() {
         in_base(&format!("CYCL DEF 247 DATUM SETTING ~\n  Q339=+1 ;NUMBER\n{go}{shift}{go}")),
         [[601.0, 2.0, 3.0], [611.0, -3.5, 3.0]].map(Ok)
     );
-    // A preset of which nobody says where it is, a row of a table, a turn.
+    // A preset with an unknown frame, a row of a table, a rotation.
     let left = |body: &str| in_base(&format!("{body}\n{go}"))[0];
     assert_eq!(left("CYCL DEF 247 DATUM SETTING Q339=+4"), Err(Reason::WorkObjectUnknown));
     assert_eq!(left("CYCL DEF 7.0 DATUM SHIFT\nCYCL DEF 7.1 #5"), Err(Reason::Transformed));
@@ -352,18 +350,18 @@ fn orientations_by_angles_and_by_vector() {
 }
 
 #[test]
-fn the_way_goes_past_a_subprogram_of_linuxcnc() {
+fn control_flow_bypasses_a_subprogram_of_linuxcnc() {
     let sub = "o<shift> sub\nG91 G1 X5\n#1=7\no<shift> endsub\n";
     let before = "G1 X1 Y2 Z3 A0 B0 C0\n#1=4\n";
     let found = ends(&format!("{before}{sub}X#1 Y5\n"), Dialect::LinuxCnc);
     assert_eq!(found, [Ok([1.0, 2.0, 3.0]), Err(Reason::UnknownFlow), Ok([4.0, 5.0, 3.0])]);
-    // A call may leave G91 behind, and another value of #1.
+    // A call may leave G91 active, and another value of #1.
     let found = ends(&format!("{before}{sub}o<shift> call\nG1 X2 Y5 Z3\n"), Dialect::LinuxCnc);
     assert_eq!(found[2..], [Err(Reason::Subprogram), Err(Reason::UnknownFlow)]);
 }
 
 #[test]
-fn computed_jumps_and_synchronised_actions_leave_nothing_known() {
+fn computed_jumps_and_synchronised_actions_make_everything_unknown() {
     let go = "G1 X1 Y2 Z3 A0 B0 C0\n";
     // A computed jump may go to any numbered block.
     for jump in ["GOTO#5", "GOTO #5", "GOTO [#5+1]"] {
@@ -384,24 +382,22 @@ fn computed_jumps_and_synchronised_actions_leave_nothing_known() {
 }
 
 #[test]
-fn after_a_jump_only_what_the_whole_file_sets_alike_still_holds() {
+fn at_a_join_only_groups_with_one_value_in_the_file_stay_known() {
     let body = "G90 G1 X1 Y2 Z3 A0 B0 C0\nN10 X2\nG1 X2 Y2 Z2 A0 B0 C0\nIF [#1 GT 5] GOTO 10\nX3\n";
     let found = ends(body, Dialect::LinuxCnc);
     assert_eq!(found[1], Err(Reason::UnknownFlow), "the motion word is forgotten at a jump's aim");
     assert_eq!(found[2], Ok([2.0, 2.0, 2.0]));
     assert_eq!(found[3], Ok([3.0, 2.0, 2.0]));
-    // With both G90 and G91 in the file what the numbers mean is not known.
+    // With both G90 and G91 in the file the meaning of numbers is unknown.
     let found = ends(&format!("{body}G91 X1\n"), Dialect::LinuxCnc);
     assert_eq!(found[2], Err(Reason::UnknownFlow));
-    // Nor what a variable is worth that only a condition sets.
+    // So is the value of a variable that is set conditionally.
     let found = ends("#1=5\n#2=4\nIF [#2 EQ 1] THEN #1=7\nG1 X#1 Y2 Z3 A0 B0 C0\nX#2 Y2 Z3\n", Dialect::Iso);
     assert_eq!(found, [Err(Reason::UnknownFlow), Ok([4.0, 2.0, 3.0])]);
-    // A skipped block makes unsure what it changes, no more.
+    // A skipped block makes uncertain only what it changes.
     let found = ends("G1 X1 Y2 Z3 A0 B0 C0\n/X9\nY5\nX4\n", Dialect::LinuxCnc);
     assert_eq!(found[1..], [Err(Reason::Skippable), Err(Reason::UnknownFlow), Ok([4.0, 5.0, 3.0])]);
 }
-
-// ---- rewriting ----
 
 fn rewrite_as(
     source: &str,
@@ -420,13 +416,13 @@ fn change_of(listing: &Listing, motion: u32, by: [f64; 3]) -> Change {
 }
 
 #[test]
-fn words_keep_their_place_and_missing_ones_are_put_in() {
+fn words_keep_their_place_and_omitted_ones_are_added() {
     let source =
         format!("{HEAD}N10 G1 X1 Y2. Z3.00 A0 B0 C0 F100 ; begin\nN20 X 5.5\nN30 M8\nN40 Y-7 (cool)\n");
     let (text, rewritten) =
         rewrite_as(&source, Dialect::LinuxCnc, |listing| vec![change_of(listing, 1, [0.25, 0.125, 0.0])]);
     assert_eq!(rewritten.outcomes, [Outcome::InPlace]);
-    // X in place with enough decimals, Y put in; the next motion, which stays, says X again and goes on with its own Y.
+    // X in place with enough decimals, Y added; the next, unmodified motion restates X and continues with its own Y.
     let expected = source.replace("X 5.5", "X 5.7500 Y2.1250").replace("Y-7", "X5.5000 Y-7");
     assert_eq!(text, expected);
 }
@@ -454,8 +450,8 @@ fn the_same_values_change_no_byte() {
     }
 }
 
-/// Rewrites every motion that can be, reads the result back: changed motions are where they shall be, all others where
-/// they were.
+/// Rewrites every motion that can be rewritten and reads the result back: changed motions are at their commanded
+/// targets, all others as before.
 fn round_trip(name: &str, bytes: &[u8], setup: &Setup, by: [f64; 3], turn_deg: f64) {
     let task = Task::read(&[(name, bytes)], setup);
     let turn =
@@ -470,7 +466,7 @@ fn round_trip(name: &str, bytes: &[u8], setup: &Setup, by: [f64; 3], turn_deg: f
             }
         }
     }
-    // Every third stays, so that what holds on between must be said again.
+    // Every third is unmodified, so that modal words must be restated between.
     changes.retain(|change| change.motion % 3 != 2);
     let rewritten = task.rewrite(&changes, &RewriteOptions::default()).unwrap();
     let text = rewritten.files[0].edits.apply(bytes).unwrap();
@@ -498,7 +494,7 @@ fn round_trip(name: &str, bytes: &[u8], setup: &Setup, by: [f64; 3], turn_deg: f
                 _ => (old_value.position_mm, old_value.quaternion),
             };
             if new.role == Role::Via {
-                // The point half way of the new circle need not be the wanted one; the circle goes near it.
+                // The midpoint of the new circle need not be the commanded one; the circle passes near it.
                 continue;
             }
             for (axis, (new, wanted)) in new_value.position_mm.iter().zip(&wanted).enumerate() {
@@ -514,7 +510,7 @@ fn round_trip(name: &str, bytes: &[u8], setup: &Setup, by: [f64; 3], turn_deg: f
 }
 
 #[test]
-fn what_is_written_is_read_back_where_it_shall_be() {
+fn written_targets_are_read_back() {
     for (name, bytes) in &samples() {
         round_trip(name, bytes, &Setup::default(), [0.213, -0.117, 0.051], 0.0);
         if name != "linuxcnc.ngc" {
@@ -529,7 +525,7 @@ fn arcs_get_a_centre_that_fits_both_ends() {
         let source = format!("{HEAD}G17 G1 X10 Y0 Z0 A0 B0 C0\n{body}\nG1 X5\n");
         let (text, rewritten) =
             rewrite_as(&source, Dialect::LinuxCnc, |listing| moved(listing, [0.25, 0.5, 0.0]));
-        // A whole circle goes with its start: nothing in its block changes.
+        // A full circle moves with its start: nothing in its block changes.
         let fine = |(at, outcome): (usize, &Outcome)| {
             *outcome == Outcome::InPlace || at == 1 && body.starts_with("G2 I")
         };
@@ -550,7 +546,7 @@ fn arcs_get_a_centre_that_fits_both_ends() {
 }
 
 #[test]
-fn blocks_are_put_in_before_a_motion_and_a_mark_after_the_head() {
+fn blocks_are_inserted_before_a_motion_and_a_mark_after_the_head() {
     let source = "%\nO0001 (TEST)\n(truegrind angles wpr)\n(truegrind tool T0 t [[0,0,100],[1,0,0,0]])\n(truegrind frame G54 w [[500,0,0],[1,0,0,0]])\nG43.4 H1\nN10 G1 X0. Y0. Z0. A180. B0. C0. F600.\nN20 X10. F300.\n%\n";
     let setup = Setup::default();
     let task = Task::read(&[("x", source.as_bytes())], &setup);
@@ -578,7 +574,7 @@ fn blocks_are_put_in_before_a_motion_and_a_mark_after_the_head() {
 }
 
 #[test]
-fn computed_words_become_numbers_and_their_origin_says_so() {
+fn computed_words_become_literals() {
     let source = format!("{HEAD}#1=2\nG1 X[#1*2] Y1 Z#1 A0 B0 C0\n");
     let listing = listing_of("#1=2\nG1 X[#1*2] Y1 Z#1 A0 B0 C0\n", Dialect::LinuxCnc);
     assert_eq!(listing.motions[0].targets[0].origin, Origin::Computed);

@@ -1,5 +1,5 @@
-//! The class: a number that no controller can hold stands in a motion, or would be written into one. Such a motion stays, with
-//! a reason of its own, and nothing that is written has an exponent, is infinite or is no number.
+//! The class: a motion has, or would get, a number that no controller can hold. Such a motion is left with a reason
+//! of its own, and no written number has an exponent or is infinite or NaN.
 
 use truegrind_programs::motion::Reason;
 use truegrind_programs::nc;
@@ -18,7 +18,7 @@ fn rapid(x: &str, speed: &str) -> Option<Reason> {
 }
 
 #[test]
-fn numbers_of_rapid_that_are_too_large_leave_the_motion() {
+fn too_large_numbers_of_rapid_leave_the_motion() {
     let long = "9".repeat(309);
     for x in ["1E39", "-1E300", "1E400", "Exp(9E9)", "1E30*1E30", &long] {
         assert_eq!(rapid(x, "v100"), Some(Reason::NumberRange), "{x}");
@@ -33,7 +33,7 @@ fn numbers_of_rapid_that_are_too_large_leave_the_motion() {
 }
 
 #[test]
-fn feeds_and_words_of_nc_that_are_too_large_or_nothing_leave_the_motion() {
+fn too_large_or_zero_feeds_and_words_of_nc_leave_the_motion() {
     const HEAD: &str = "; truegrind angles wpr\n; truegrind tool T0 t [[0,0,100],[1,0,0,0]]\n; truegrind frame G54 w [[500,0,0],[1,0,0,0]]\nG90 G21 G17 G54\n";
     let long = format!("F{}", "9".repeat(309));
     for (word, reason) in [
@@ -51,7 +51,7 @@ fn feeds_and_words_of_nc_that_are_too_large_or_nothing_leave_the_motion() {
 }
 
 #[test]
-fn nothing_is_written_that_a_control_cannot_hold() {
+fn no_number_beyond_the_range_of_a_control_is_written() {
     let source = format!(
         "MODULE M\nPROC main()\nMoveL [[1,0,400],[0,0,1,0],[0,0,0,0],{EXT}],v100,fine,tool0;\nENDPROC\nENDMODULE\n"
     );

@@ -1,4 +1,4 @@
-//! New values to bytes, and back.
+//! Rewriting: new values are written and read back.
 
 use truegrind_programs::motion::{Mark, MotionKind, Reason, TargetValue};
 use truegrind_programs::rapid::Task;
@@ -38,7 +38,7 @@ fn only_numbers_that_change_are_replaced_with_enough_decimals() {
     assert_eq!(rewritten.outcomes, [Outcome::InPlace]);
     assert_eq!(text, source.replace("500 ,", "500.1250 ,").replace("3E2", "299.0000"));
 
-    // More decimals in the source than asked for are kept; a sign goes with its number; no -0.
+    // More decimals in the source than requested are kept; a sign goes with its number; no -0.
     let source =
         module("", &format!("  MoveL [[500.123456,- 0.5,3],[0,0,1,0],[0,0,0,0],{EXT}],v100,fine,tool0;\n"));
     let (text, _) = rewrite(&source, &[change(0, at(500.123_457_4, -0.000_01, 3.0))]);
@@ -46,7 +46,7 @@ fn only_numbers_that_change_are_replaced_with_enough_decimals() {
 }
 
 #[test]
-fn a_quaternion_is_of_length_one_after_rounding_and_keeps_its_sign() {
+fn a_quaternion_stays_normalised_after_rounding_and_keeps_its_sign() {
     let source =
         module("", &format!("  MoveL [[1,2,3],[-0.5,-0.5,-0.5,-0.5],[0,0,0,0],{EXT}],v100,fine,tool0;\n"));
     let q = [0.501_234_56, 0.498_765_4, 0.500_123_4, 0.499_876_5];
@@ -86,7 +86,7 @@ fn a_shared_declaration_is_split_where_uses_differ() {
             "  MoveL {long},v100,fine,tool0;\n  MoveL {long},v50,fine,tool0;\n  MoveL {long},v50,fine,tool0;\n"
         );
         let source = module(&data, &body);
-        // Two agree, one is left as it is: the declaration stays.
+        // Two agree, one is unmodified: the declaration is unchanged.
         let (text, rewritten) =
             rewrite(&source, &[change(1, at(501.0, 0.0, 300.0)), change(2, at(501.0, 0.0, 300.0))]);
         let name = "pWithANameOfNearlyThirtyTwoCha_2".to_owned();
@@ -119,7 +119,7 @@ fn a_shared_declaration_is_split_where_uses_differ() {
 }
 
 #[test]
-fn a_declaration_that_something_else_reads_is_left_and_the_motion_gets_a_clone() {
+fn a_declaration_with_other_uses_is_unmodified_and_the_motion_gets_a_clone() {
     let data = format!("  CONST robtarget p:=[[500,0,300],[0,0,1,0],[0,0,0,0],{EXT}];\n  VAR num i;\n");
     let source =
         module(&data, "  MoveL p,v100,fine,tool0;\n  MoveL Offs(p,i,0,0),v50,fine,tool0;\n  i:=2;\n");
@@ -159,7 +159,7 @@ fn array_elements_change_in_place_or_in_the_instruction() {
 }
 
 #[test]
-fn a_linear_motion_can_be_told_in_joints() {
+fn a_linear_motion_can_be_rewritten_in_joints() {
     let source = module(
         "",
         "  movel [[500,0,300],[0,0,1,0],[0,0,0,0],[100,9E9,9E9,9E9,9E9,9E9]],v100,z5,tool0\\WObj:=wobj0;\n",
@@ -234,7 +234,7 @@ fn extra_motions_take_over_speed_tool_and_process() {
 }
 
 #[test]
-fn what_cannot_be_done_is_refused_with_its_reason() {
+fn impossible_changes_are_refused_with_their_reason() {
     let extra = || vec![Extra { kind: MotionKind::Linear, target: at(450.0, 0.0, 300.0), external: None }];
     let p = format!("[[500,0,300],[0,0,1,0],[0,0,0,0],{EXT}]");
     let joints = NewTarget::Joint { robot_deg: [0.0; 6] };
@@ -325,8 +325,8 @@ fn each_changed_module_is_marked_behind_its_head() {
     assert!(text.contains(&format!("MODULE B\n{line}PROC a()")), "{text}");
 }
 
-/// Every motion of every sample is moved by its own amount and read back: values within rounding, everything that was
-/// not moved as before, and what could not be changed refused with the reason that the listing gives.
+/// Every motion of every sample is displaced by its own amount and read back: values within rounding, unmodified
+/// motions as before, and refused motions with the reason in the listing.
 #[test]
 fn every_sample_reads_back_what_was_written() {
     for (name, files) in &groups() {

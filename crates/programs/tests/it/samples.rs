@@ -1,5 +1,5 @@
-//! Every sample of `programs/`: it comes back byte for byte, and its motions are listed as
-//! `listings/` says. With `TRUEGRIND_UPDATE_LISTINGS=1` the listings are written anew.
+//! Every sample of `programs/` is printed back byte for byte, and its motions are listed as in `listings/`.
+//! `TRUEGRIND_UPDATE_LISTINGS=1` rewrites the listings.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -16,7 +16,7 @@ pub(crate) fn root() -> PathBuf {
 /// A sample by its name: its files with their bytes.
 pub(crate) type Sample = (String, Vec<(String, Vec<u8>)>);
 
-/// The samples that belong together: a task list names several, every other file stands alone.
+/// Samples that belong together: a task list names several, every other file is alone.
 pub(crate) fn groups() -> Vec<Sample> {
     let folder = root().join("programs");
     let mut files: Vec<PathBuf> =
@@ -171,7 +171,7 @@ fn every_reason_to_leave_a_motion_has_a_sample() {
     for (name, bytes) in &super::nc::samples() {
         look(&super::nc::read(name, bytes).listing);
     }
-    // These belong to rewriting and have tests there.
+    // These belong to rewriting and are tested there.
     let rewriting = [
         Reason::NoInsertion,
         Reason::NoJointForm,
@@ -194,7 +194,7 @@ fn rewriting_with_the_same_values_changes_no_byte() {
             .map(|(motion, listed)| {
                 let targets = listed.targets.iter().map(|target| match target.value {
                     Ok(TargetValue::Cartesian(t)) => {
-                        // As a computation hands it back: normalised, of any sign, with noise.
+                        // As after a computation: normalised, of either sign, with noise.
                         let q = t.pose().rotation.quaternion().coords;
                         NewTarget::Cartesian {
                             position_mm: t.position_mm.map(|x| x + 3e-11),

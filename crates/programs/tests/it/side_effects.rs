@@ -1,5 +1,5 @@
-//! The class: an expression is replaced by its value, or asked twice, and with it goes or comes what it does besides. Nothing
-//! that does more than answer may be taken out of a program or said again.
+//! The class: an expression with side effects is replaced by its value, or evaluated twice. It must neither be
+//! removed from a program nor repeated.
 
 use truegrind_programs::motion::{Listing, MotionKind, Reason};
 use truegrind_programs::rapid::Task;
@@ -10,7 +10,7 @@ const DATA: &str = "CONST robtarget p:=[[400,0,400],[0,0,1,0],[0,0,0,0],[9E9,9E9
     CONST robtarget a{2}:=[[[400,0,400],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],\
     [[400,9,400],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]];\nVAR num n:=0;\nVAR iodev d;\n";
 
-/// Functions that ignore what they are given, and some that act.
+/// Pure functions that ignore their arguments, and functions with side effects.
 const ROUTINES: &str = "FUNC robtarget at(robtarget t,num layer)\nRETURN t;\nENDFUNC\n\
     FUNC robtarget through(robtarget t,num k)\nRETURN at(t,k);\nENDFUNC\n\
     FUNC robtarget divided(robtarget t,num k)\nRETURN at(t,1/k);\nENDFUNC\n\
@@ -41,7 +41,7 @@ fn first(instruction: &str) -> (Option<Reason>, bool, Listing) {
 }
 
 #[test]
-fn a_target_that_does_more_than_answer_stays() {
+fn a_target_with_side_effects_is_unmodified() {
     let acting = [
         "sets(20)",
         "calls(20)",
@@ -74,16 +74,16 @@ fn a_target_that_does_more_than_answer_stays() {
     assert_eq!(reason, Some(Reason::SideEffect));
     let (reason, ..) = first("MoveL divided(p,0),v100,fine,tool0;");
     assert_eq!(reason, Some(Reason::SideEffect));
-    // The circle point goes where a circle becomes straight.
+    // The circle point is removed where a circle becomes straight.
     let (reason, ..) = first("MoveC at(p,sets(1)),Offs(p,1,2,3),v100,fine,tool0;");
     assert_eq!(reason, Some(Reason::SideEffect));
-    // The declaration is written anew where it is computed.
+    // The declaration is rewritten where it is computed.
     let (reason, ..) = first("VAR robtarget q:=at(p,sets(1));\nMoveL q,v100,fine,tool0;");
     assert!(reason.is_some());
 }
 
 #[test]
-fn a_target_that_only_computes_is_replaced() {
+fn a_target_without_side_effects_is_replaced() {
     for target in
         ["at(p,2)", "at(p,n)", "at(p,sum(2))", "through(p,one(3))", "a{one(7)}", "Offs(p,Abs(-1),sum(1),0)"]
     {
@@ -93,7 +93,7 @@ fn a_target_that_only_computes_is_replaced() {
 }
 
 #[test]
-fn an_argument_that_does_more_than_compute_is_asked_once() {
+fn an_argument_with_side_effects_is_evaluated_once() {
     let acting = [
         "v100\\V:=ReadNum(d)",
         "v100\\V:=sets(3)",
@@ -123,7 +123,7 @@ fn an_argument_that_does_more_than_compute_is_asked_once() {
 }
 
 #[test]
-fn what_only_computes_is_listed_in_order_and_writes_nothing() {
+fn pure_routines_are_listed_in_order_and_write_nothing() {
     for name in predefined::all().iter().filter(|one| one.answers).map(|one| one.name) {
         assert!(predefined::only_answers(name.as_bytes()));
         assert!(predefined::only_reads(name.as_bytes()), "{name}");
@@ -134,25 +134,25 @@ fn what_only_computes_is_listed_in_order_and_writes_nothing() {
     }
 }
 
-/// A displacement that is counted from where the robot stands moves with the motion that ends there.
+/// A displacement relative to the robot position pins the motion that ends there.
 #[test]
-fn a_displacement_from_where_the_robot_stands_keeps_that_motion() {
+fn a_displacement_from_the_robot_position_pins_the_motion_before() {
     let reason = |line: &str| first(line).0;
     assert_eq!(reason("MoveL p,v100,fine,tool0;\nPDispOn p,tool0;"), Some(Reason::BeforeDisplacement));
     assert_eq!(reason("MoveL p,v100,fine,tool0;\nPDispOn\\ExeP:=p,p,tool0;\nPDispOff;"), None);
 }
 
-/// The class: on any way to such a displacement the robot may stand at the end of another motion, and each of these must go
-/// on ending where it always did: where ways join, around loops, behind calls and handlers, and at the begin of a cycle.
+/// The class: on any path to such a displacement the robot may be at the end of another motion, and each of these
+/// motions must keep its end point: at joins, around loops, after calls and handlers, and at the start of a cycle.
 #[test]
-fn a_displacement_from_where_the_robot_stands_keeps_the_motions_of_every_way() {
+fn a_displacement_from_the_robot_position_pins_the_motions_of_every_path() {
     let left = |main: &str, routines: &str| -> Vec<bool> {
         let source = format!(
             "MODULE m\nCONST robtarget p:=[[500,0,400],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\nVAR num n;\n\
              PROC main()\n{main}\nENDPROC\n{routines}\nENDMODULE\n"
         );
         let task = Task::read(&[("m.mod", source.as_bytes())]);
-        // Behind a loop that displaces the next cycle is left for that already.
+        // A loop that displaces already leaves the next cycle.
         let stays = [Some(Reason::BeforeDisplacement), Some(Reason::Displacement)];
         let before = |motion: &truegrind_programs::motion::Motion| stays.contains(&motion.left);
         task.listing.motions.iter().map(before).collect()
@@ -164,23 +164,23 @@ fn a_displacement_from_where_the_robot_stands_keeps_the_motions_of_every_way() {
     let one = format!("{GO}{GO}IF n>1 THEN\n{GO}ENDIF\n{HERE}{GO}");
     assert_eq!(left(&one, ""), [false, true, true, false]);
     assert_eq!(left(&format!("{GO}{GO}IF n>1 {GO}{HERE}{GO}"), ""), [false, true, true, false]);
-    // Around a loop, and behind it.
+    // Around a loop, and after it.
     let around = format!("{GO}FOR i FROM 1 TO 3 DO\n{HERE}{GO}{GO}ENDFOR\n");
     assert!(left(&around, "")[0] && left(&around, "")[2]);
     let behind = format!("{GO}{GO}WHILE n>1 DO\n{GO}{GO}ENDWHILE\n{HERE}{GO}");
     assert_eq!(left(&behind, ""), [false, true, false, true, false]);
-    // Behind a call that moves, also where its name is computed, and in one that is called.
+    // After a call that moves, also with a computed name, and within a called routine.
     let goes = format!("PROC go()\n{GO}ENDPROC");
     assert!(left(&format!("{GO}go;\n{HERE}"), &goes)[1]);
     assert!(left(&format!("{GO}%\"go\"%;\n{HERE}"), &goes)[1]);
     let places = format!("PROC here()\n{HERE}ENDPROC");
     assert_eq!(left(&format!("{GO}IF n>1 {GO}here;\n{GO}"), &places), [true, true, false]);
-    // One that is called from elsewhere, an interrupt, and the next cycle.
+    // A routine called from elsewhere, an interrupt, and the next cycle.
     assert_eq!(left(GO, &places), [true]);
     assert_eq!(left(&format!("{HERE}{GO}"), ""), [true]);
     let interrupt = format!("TRAP t\n{HERE}ENDTRAP");
     assert_eq!(left(&format!("CONNECT i WITH t;\n{GO}{GO}"), &interrupt), [true, true]);
-    // What does not move changes nothing.
+    // A routine without motions changes nothing.
     let still = "PROC still()\nn:=n+1;\nENDPROC";
     assert_eq!(left(&format!("{GO}{GO}still;\nn:=2;\n{HERE}{GO}"), still), [false, true, false]);
 }

@@ -1,5 +1,5 @@
-//! The class: a shape of program that takes the square of its length. Each is read at two lengths; four times the text takes
-//! about four times as long, and in no case longer than a bound that its square would pass.
+//! The class: a program shape that takes quadratic time. Each is read at two lengths; four times the text must take
+//! about four times as long, and always less than a bound that quadratic time would exceed.
 
 use std::time::{Duration, Instant};
 
@@ -22,7 +22,7 @@ fn main_of(data: &str, body: &str, more: &str) -> String {
 
 type Shape = (&'static str, fn(usize) -> String);
 
-/// Shapes of NC, by the ending of the name of their file; n stands for about n/4 bytes.
+/// Shapes of NC programs, by file extension; n corresponds to about n/4 bytes.
 const SHAPES_OF_NC: &[Shape] = &[
     ("open.ngc", |n| format!("; x\nG21 G90 G54\n{}", "#<".repeat(n))),
     ("brackets.ngc", |n| format!("G1 X{}", "[".repeat(n))),
@@ -143,22 +143,22 @@ fn read(name: &str, text: &str) -> Duration {
 }
 
 #[test]
-fn no_shape_takes_the_square_of_its_length() {
+fn no_shape_takes_quadratic_time() {
     const SHORT: usize = 1 << 14;
     for (name, shape) in SHAPES_OF_NC.iter().chain(SHAPES_OF_RAPID) {
         let (short, long) = (shape(SHORT), shape(4 * SHORT));
         let best = |text: &str| (0..3).map(|_| read(name, text)).min().unwrap();
         let (short, long) = (best(&short), best(&long));
-        // The square would be sixteen times; what is short says nothing.
+        // Quadratic time would be sixteen times; short times are noise.
         let square = long > Duration::from_millis(150) && long > short * 11;
         assert!(!square, "{name}: {short:?} and {long:?} for four times the text");
     }
 }
 
-/// `cargo test --release -- --ignored below_a_megabyte --nocapture` prints the times of the big ones.
+/// `cargo test --release -- --ignored below_a_megabyte --nocapture` prints the times of the large ones.
 #[test]
 #[ignore = "for figures, in a release build"]
-fn below_a_megabyte_every_shape_ends_in_time() {
+fn below_a_megabyte_every_shape_finishes_in_time() {
     for (name, shape) in SHAPES_OF_NC.iter().chain(SHAPES_OF_RAPID) {
         let mut size = 1 << 18;
         while shape(2 * size).len() < 1_000_000 {

@@ -1,4 +1,4 @@
-//! Reading never fails and loses nothing.
+//! Parsing never fails and loses nothing.
 
 use proptest::prelude::*;
 use truegrind_programs::motion::OpaqueReason;
@@ -93,7 +93,7 @@ fn a_program_of_every_construct_has_no_opaque_region() {
 }
 
 #[test]
-fn what_cannot_be_read_is_opaque_with_its_reason_and_the_rest_is_read() {
+fn unreadable_text_is_opaque_with_a_reason_and_the_rest_is_parsed() {
     let cases: &[(&str, OpaqueReason, (u32, u32), &str)] = &[
         (
             "PROC a()\nMoveL p1 v1;\nMoveL p2,v1;\nENDPROC",
@@ -165,7 +165,8 @@ proptest! {
 
 #[test]
 fn a_large_file_is_split_into_the_same_tokens_on_any_number_of_threads() {
-    // What goes over the end of a line, or looks as if: white space, headers, open strings, comments, other encodings.
+    // Constructs across line ends, or that look like it: white space, headers, open strings, comments, other
+    // encodings.
     let lines: [&[u8]; 9] = [
         b"%%%\n  VERSION:1\n  LANGUAGE:ENGLISH\n%%%\n",
         b"  MoveL [[1.5,-2,3E-2],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,z1,tool0;\r\n",
@@ -197,8 +198,8 @@ fn a_large_file_is_split_into_the_same_tokens_on_any_number_of_threads() {
     }
 }
 
-/// Digits are read eight at a time: a number ends where it did byte by byte, whatever its length, whatever byte follows, and
-/// wherever the text ends.
+/// Digits are read eight at a time: a number must end as in a byte-by-byte reader, whatever its length, the next
+/// byte, and the end of the text.
 #[test]
 fn a_number_ends_at_its_last_digit_whatever_follows() {
     for length in 1..20 {
@@ -219,7 +220,7 @@ fn a_number_ends_at_its_last_digit_whatever_follows() {
     }
 }
 
-/// A name is a reserved word by its letters alone: in any case, and not where one letter more or less, or another, is there.
+/// A name is a reserved word only by exactly its letters, in any case.
 #[test]
 fn reserved_words_are_told_from_names_that_are_nearly_theirs() {
     let words = [

@@ -1,4 +1,4 @@
-//! A fresh module reads back as what it was written from.
+//! A new module reads back as the draft that it was written from.
 
 use truegrind_programs::draft::{Draft, Step};
 use truegrind_programs::motion::{
@@ -66,7 +66,7 @@ fn draft(named_targets: bool) -> Draft {
 }
 
 #[test]
-fn what_is_written_reads_back_equal() {
+fn a_written_module_reads_back_equal() {
     for named in [false, true] {
         let draft = draft(named);
         let text = write(&draft).unwrap();
@@ -101,7 +101,7 @@ fn what_is_written_reads_back_equal() {
 }
 
 #[test]
-fn what_rapid_does_not_allow_is_refused() {
+fn drafts_that_rapid_does_not_allow_are_refused() {
     for name in ["", "1st", "MODULE", "a b", "aName_ThatIsLongerThan_32_Characters"] {
         let draft = Draft { name: name.into(), ..draft(false) };
         assert_eq!(write(&draft), Err(WriteError::Name { name: name.into() }));

@@ -110,15 +110,16 @@ impl<'s> Rewriter<'_, 's> {
             let centre = [rounded(new.centre_mm[0], start[a]), rounded(new.centre_mm[1], start[b])];
             Arc::from_centre(old.plane, start, end, centre, positive)?
         };
-        let apart = |i: usize, j: usize| {
+        let relative_displacement = |i: usize, j: usize| {
             let moved = |axis: usize| {
                 (commanded[i][axis] - intended[i][axis]) - (commanded[j][axis] - intended[j][axis])
             };
             moved(a).hypot(moved(b))
         };
-        let most = MAX_DEVIATION_MM + apart(0, 1).max(apart(1, 2)).max(apart(0, 2));
-        let turns = (as_read.sweep_rad - old.sweep_rad).abs() <= MAX_SWEEP_CHANGE_RAD
+        let allowed = MAX_DEVIATION_MM
+            + relative_displacement(0, 1).max(relative_displacement(1, 2)).max(relative_displacement(0, 2));
+        let sweep_kept = (as_read.sweep_rad - old.sweep_rad).abs() <= MAX_SWEEP_CHANGE_RAD
             && as_read.is_full_circle() == old.is_full_circle();
-        (turns && old.deviation_mm(intended, commanded, &as_read) <= most).then_some(new)
+        (sweep_kept && old.deviation_mm(intended, commanded, &as_read) <= allowed).then_some(new)
     }
 }

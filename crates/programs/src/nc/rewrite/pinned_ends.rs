@@ -16,23 +16,23 @@ impl Task<'_> {
     /// for a tangential path also the start of that motion. Arcs that end there are pinned by the rewrite, because
     /// they may become straight.
     pub(in crate::nc) fn leave_pinned_ends(&mut self) {
-        let mut held = vec![0; self.listing.motions.len()];
+        let mut pinned_axes = vec![0; self.listing.motions.len()];
         for index in (0..self.listing.motions.len()).rev() {
             let motion = &self.listing.motions[index];
             let stays = motion.reason().is_some();
             let dependency = self.start_dependency(index, stays);
-            let axes = self.pinned_start_axes(index, stays, held[index]);
+            let axes = self.pinned_start_axes(index, stays, pinned_axes[index]);
             if axes == 0 {
                 continue;
             }
             let (file, circular) = (motion.place.file, motion.kind == MotionKind::Circular);
             let Some(at) = motion.previous.or((index as u32).checked_sub(1)) else { continue };
-            let turns = self.axes_differ(at, index as u32);
+            let differ = self.axes_differ(at, index as u32);
             let before = &mut self.listing.motions[at as usize];
             if before.place.file != file {
                 continue;
             }
-            held[at as usize] |= if turns { ALL } else { axes };
+            pinned_axes[at as usize] |= if differ { ALL } else { axes };
             if before.kind != MotionKind::Circular && before.reason().is_none() {
                 before.left =
                     Some(if circular { Reason::BeforeUnmodifiedArc } else { Reason::BeforeUnmodifiedPath });
@@ -57,13 +57,13 @@ impl Task<'_> {
         let mut refused = BTreeSet::new();
         // Motions whose start is pinned because a tangential path follows.
         let mut directed = BTreeSet::new();
-        let mut held = vec![0; self.listing.motions.len()];
+        let mut pinned_axes = vec![0; self.listing.motions.len()];
         for index in (1..self.listing.motions.len() as u32).rev() {
             let motion = &self.listing.motions[index as usize];
             let arc_stays = motion.kind == MotionKind::Circular && !wanted.contains_key(&index);
             let stays = motion.reason().is_some() || refused.contains(&index) || arc_stays;
             let dependency = self.start_dependency(index as usize, stays);
-            let axes = self.pinned_start_axes(index as usize, stays, held[index as usize]);
+            let axes = self.pinned_start_axes(index as usize, stays, pinned_axes[index as usize]);
             if axes == 0 && !directed.contains(&index) {
                 continue;
             }
@@ -72,7 +72,7 @@ impl Task<'_> {
                 continue;
             }
             let mixed = axes != 0 && self.axes_differ(before, index);
-            held[before as usize] |= if mixed { ALL } else { axes };
+            pinned_axes[before as usize] |= if mixed { ALL } else { axes };
             let perhaps = self.listing.motions[before as usize].conditional
                 || self.contexts[before as usize].may_omit_words;
             if dependency == StartDependency::Tangent || perhaps {
@@ -106,10 +106,10 @@ impl Task<'_> {
         };
         match [a, b].map(|frame| listing.work_objects[frame as usize].value.as_ref()) {
             [Ok(a), Ok(b)] => {
-                let turn = |frame: &WorkObjectValue| {
+                let rotation = |frame: &WorkObjectValue| {
                     frame.user_frame.pose().rotation * frame.object_frame.pose().rotation
                 };
-                turn(a).angle_to(&turn(b)) > 1e-9
+                rotation(a).angle_to(&rotation(b)) > 1e-9
             }
             _ => true,
         }
@@ -117,7 +117,7 @@ impl Task<'_> {
 
     /// The axes in which a motion must start at the original point: those that its path depends on, and those of
     /// `held`, in which it must end there, that it does not state itself.
-    pub(super) fn pinned_start_axes(&self, index: usize, stays: bool, held: u8) -> u8 {
+    pub(super) fn pinned_start_axes(&self, index: usize, stays: bool, pinned_axes: u8) -> u8 {
         let (motion, context) = (&self.listing.motions[index], &self.contexts[index]);
         let own = match self.start_dependency(index, stays) {
             StartDependency::Independent => 0,
@@ -128,7 +128,11 @@ impl Task<'_> {
         };
         // After a call the position is that of the subprogram; a cycle starts at the tool position.
         let moves = motion.kind != MotionKind::Unknown || motion.reason() == Some(Reason::Cycle);
-        own | if stays && moves && held != 0 { held & !self.axes_with_own_end(index) } else { 0 }
+        own | if stays && moves && pinned_axes != 0 {
+            pinned_axes & !self.axes_with_own_end(index)
+        } else {
+            0
+        }
     }
 
     /// The axes that the words of an arc name; all if fewer than two.

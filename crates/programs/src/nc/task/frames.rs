@@ -28,8 +28,8 @@ impl Interpreter<'_, '_> {
         let name = word.name.to_ascii_uppercase();
         let adds = name[0] == b'A';
         let before = self.state.programmable_frame;
-        let turned = |state: &ModalState| state.is_transform_active(ModalGroup::ProgrammableFrame);
-        let was = turned(&self.state);
+        let unsupported = |state: &ModalState| state.is_transform_active(ModalGroup::ProgrammableFrame);
+        let was = unsupported(&self.state);
         let unknown = self.state.unknown_reason(ModalGroup::ProgrammableFrame.bit()).is_some();
         self.mark_programmable_frame_set();
         if adds && unknown {
@@ -69,12 +69,12 @@ impl Interpreter<'_, '_> {
                     Some(_) if self.state.unknown_reason(ModalGroup::Plane.bit()).is_some() => {
                         angles[0] = f64::NAN
                     }
-                    Some(Ok(turn)) => angles[self.state.plane.normal] = turn,
+                    Some(Ok(angle)) => angles[self.state.plane.normal] = angle,
                     Some(Err(_)) => angles[0] = f64::NAN,
                 }
                 let [x, y, z] = [angles[0], angles[1], angles[2]];
-                let turn = Angles::Wpr.rotation([x, y, z]);
-                x.is_finite().then(|| Pose::from_parts(Vector3::zeros().into(), turn))
+                let rotation = Angles::Wpr.rotation([x, y, z]);
+                x.is_finite().then(|| Pose::from_parts(Vector3::zeros().into(), rotation))
             }
             // Without values SCALE and MIRROR are cancelled; with values they are not rigid motions.
             _ if !stated => Some(Pose::identity()),
@@ -90,7 +90,7 @@ impl Interpreter<'_, '_> {
         }
         let rotation = |pose: &Option<Pose>| pose.map_or(UnitQuaternion::identity(), |pose| pose.rotation);
         let same = rotation(&before).angle_to(&rotation(&self.state.programmable_frame)) < 1e-9;
-        if !same || was || turned(&self.state) {
+        if !same || was || unsupported(&self.state) {
             self.invalidate_pose();
         }
         true
@@ -163,7 +163,7 @@ impl Interpreter<'_, '_> {
             // Under G70 the data of the control stay in its own unit, under G700 they do not.
             let value = self.evaluate_word(word).0.ok().filter(|_| self.counts_in_mm());
             // The lengths that the control holds are unknown: each is NaN until the program sets it.
-            let held = match (self.state.assigned_tools.get(&tool), self.tool_value(&tool)) {
+            let current = match (self.state.assigned_tools.get(&tool), self.tool_value(&tool)) {
                 (_, Ok(frame)) | (Some(Some(frame)), _) => Some(frame),
                 (None, Err(Reason::ToolUnknown)) => {
                     Some(Frame { position_mm: [f64::NAN; 3], ..Frame::IDENTITY })
@@ -171,15 +171,15 @@ impl Interpreter<'_, '_> {
                 _ => None,
             };
             // The active tool keeps its lengths until it is selected again.
-            let open = self.state.unknown_reason(TOOL_GROUPS).is_some() || self.state.tool == tool;
-            let frame = value.zip(held).filter(|_| !open).map(|(value, mut frame)| {
+            let may_be_active = self.state.unknown_reason(TOOL_GROUPS).is_some() || self.state.tool == tool;
+            let frame = value.zip(current).filter(|_| !may_be_active).map(|(value, mut frame)| {
                 frame.position_mm[axis] = value;
                 frame
             });
             self.state.assigned_tools.set(&tool, frame);
             self.pass.effects.assigned.tools |= self.is_conditional();
             self.tool_index.clear();
-            if open {
+            if may_be_active {
                 self.invalidate_position();
             }
         } else if matches!(&*name, b"$TC_DP1" | b"$TC_DP2" | b"$TC_DP6" | b"$TC_DP24" | b"$TC_DP25")
@@ -327,22 +327,22 @@ impl Interpreter<'_, '_> {
         let mut frame = known.unwrap_or(Frame::IDENTITY);
         // Omitted components keep their values. An offset of LinuxCNC, for which an ISO file may be, also has a
         // rotation.
-        let turns = matches!(self.dialect, Dialect::LinuxCnc | Dialect::Iso);
-        let whole = block.axes.iter().all(Option::is_some) && (block.radius.is_some() || !turns);
-        let mut good = whole || known.is_some();
+        let has_rotation = matches!(self.dialect, Dialect::LinuxCnc | Dialect::Iso);
+        let complete = block.axes.iter().all(Option::is_some) && (block.radius.is_some() || !has_rotation);
+        let mut known_value = complete || known.is_some();
         // In G91 LinuxCNC takes the values as absolute, Fanuc and Haas add them; for an ISO file this is unknown.
         let absolute = self.state.absolute || self.dialect == Dialect::LinuxCnc;
-        good &= absolute || self.dialect != Dialect::Iso;
+        known_value &= absolute || self.dialect != Dialect::Iso;
         for (axis, word) in block.axes.iter().enumerate() {
             let Some(index) = word else { continue };
             match self.evaluate_word(&block.words[*index]) {
                 (Ok(value), _) if absolute => frame.position_mm[axis] = value * self.state.unit_mm,
                 (Ok(value), _) => frame.position_mm[axis] += value * self.state.unit_mm,
-                (Err(_), _) => good = false,
+                (Err(_), _) => known_value = false,
             }
         }
         let distance = if self.dialect == Dialect::LinuxCnc { 0 } else { ModalGroup::DistanceMode.bit() };
-        good &= self.state.unknown_reason(distance | ModalGroup::Unit.bit()).is_none();
+        known_value &= self.state.unknown_reason(distance | ModalGroup::Unit.bit()).is_none();
         // Offsets of rotary axes change what A, B and C mean, until each is set to 0.
         let zero = |index: usize| self.number(&block.words[index]) == Some(0.0);
         if !block.abc.iter().flatten().all(|&index| zero(index)) {
@@ -350,17 +350,17 @@ impl Interpreter<'_, '_> {
         } else if absolute && block.abc.iter().all(Option::is_some) {
             self.set_rotary_offset(name, false);
         }
-        good &= !self.state.assigned_offsets.is_rotary(name);
+        known_value &= !self.state.assigned_offsets.is_rotary(name);
         match block.radius.map(|index| self.number(&block.words[index])) {
             // The rotation of the work frame about z (LinuxCNC).
-            Some(Some(turn)) => {
-                let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turn.to_radians());
-                frame.quaternion = [turn.w, turn.i, turn.j, turn.k];
+            Some(Some(angle)) => {
+                let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle.to_radians());
+                frame.quaternion = [rotation.w, rotation.i, rotation.j, rotation.k];
             }
-            Some(None) => good = false,
+            Some(None) => known_value = false,
             None => {}
         }
-        self.assign_offset(name, good.then_some(frame));
+        self.assign_offset(name, known_value.then_some(frame));
     }
 
     /// Notes whether a work offset has offsets of rotary axes, which its frame does not hold.
@@ -378,9 +378,9 @@ impl Interpreter<'_, '_> {
             return;
         }
         self.invalidate_position();
-        let alike = matches!((before, frame), (Some(a), Some(b))
+        let same_rotation = matches!((before, frame), (Some(a), Some(b))
             if a.pose().rotation.angle_to(&b.pose().rotation) < 1e-9);
-        if !alike {
+        if !same_rotation {
             self.invalidate_pose();
         }
     }

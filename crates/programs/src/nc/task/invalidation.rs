@@ -70,12 +70,12 @@ impl Interpreter<'_, '_> {
                     _ => 0,
                 };
                 let settled = self.pass.set_before_branch & bit != 0;
-                let held = match effects.value[group] {
+                let constant_here = match effects.value[group] {
                     // A group that the file never sets has the caller's value in a subprogram.
                     None => !self.scan.is_subprogram,
                     Some(value) => settled || value == start && !self.scan.is_subprogram,
                 };
-                if held && effects.varying & bit == 0 {
+                if constant_here && effects.varying & bit == 0 {
                     constant |= bit;
                 }
             }

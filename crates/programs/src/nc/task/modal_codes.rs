@@ -263,9 +263,9 @@ impl Interpreter<'_, '_> {
     /// rotated.
     pub(super) fn select_work_offset(&mut self, name: String) {
         let before = self.frame_value(&self.state.work_offset.clone());
-        let stale = std::mem::take(&mut self.state.offset_pending);
-        let doubtful = self.state.unknown_reason(ModalGroup::WorkOffset.bit()).is_some();
-        let changes = name != self.state.work_offset || stale || doubtful;
+        let pending = std::mem::take(&mut self.state.offset_pending);
+        let unknown = self.state.unknown_reason(ModalGroup::WorkOffset.bit()).is_some();
+        let changes = name != self.state.work_offset || pending || unknown;
         let after = self.frame_value(&name);
         self.set_group(ModalGroup::WorkOffset, name_key(&name));
         self.state.work_offset = name;
@@ -274,11 +274,11 @@ impl Interpreter<'_, '_> {
             return;
         }
         self.invalidate_position();
-        let alike = match (before, after) {
+        let same_rotation = match (before, after) {
             (Ok(a), Ok(b)) => a.pose().rotation.angle_to(&b.pose().rotation) < 1e-9,
             _ => false,
         };
-        if !alike || stale || doubtful {
+        if !same_rotation || pending || unknown {
             self.invalidate_pose();
         }
     }

@@ -199,7 +199,7 @@ impl Interpreter<'_, '_> {
         let has_centre = block.centre.iter().any(Option::is_some);
         let bends = has_centre && !vector_words || block.radius.is_some();
         // On controls with `,R` and `,C`, R, I and K of a straight block may round or chamfer its corner.
-        let cut = self.dialect.paren_comments() && straight && bends;
+        let corner = self.dialect.paren_comments() && straight && bends;
         let circular = matches!(mode, MotionMode::Circular(_));
         if !(block.has_motion_words() || circular && bends || vector_words && has_centre) {
             self.block_without_axes(block);
@@ -229,7 +229,7 @@ impl Interpreter<'_, '_> {
         motion.tool = Some(self.tool());
         motion.work_object = Some(self.work_object());
         motion.left = self.reason_to_leave(block, mode, machine, &motion);
-        if cut && motion.left.is_none() {
+        if corner && motion.left.is_none() {
             motion.left = Some(Reason::UnsupportedPath);
         }
         motion.timed = !self.state.feed_per_minute && kind != MotionKind::Joint;
@@ -304,13 +304,13 @@ impl Interpreter<'_, '_> {
         }
         let call = self.modal_call(block);
         if call == Some(Reason::Subprogram) || call == Some(Reason::Cycle) && self.cycle_is_program {
-            let held = self.state.modal_call;
+            let call = self.state.modal_call;
             // G66 has been listed itself.
             if !self.dialect.paren_comments() {
                 self.listing.outside.push(self.listing.motions.len() as u32 - 1);
             }
             self.join_unseen_predecessors();
-            self.state.modal_call = held;
+            self.state.modal_call = call;
         } else if (machine || block.unmodelled.is_some())
             && block.abc.iter().chain(&block.rpy).chain(&block.vector).any(Option::is_some)
         {
@@ -511,8 +511,10 @@ impl Interpreter<'_, '_> {
         motion: &Motion,
     ) -> Option<Reason> {
         let state = &self.state;
-        let turns = !matches!(state.orientation_mode, OrientationMode::Unknown(Reason::OrientationUnknown));
-        let needs_tip = matches!(self.dialect, Dialect::Fanuc | Dialect::Siemens | Dialect::Heidenhain);
+        let has_orientation =
+            !matches!(state.orientation_mode, OrientationMode::Unknown(Reason::OrientationUnknown));
+        let requires_tcp_mode =
+            matches!(self.dialect, Dialect::Fanuc | Dialect::Siemens | Dialect::Heidenhain);
         if block.opaque {
             Some(Reason::Unreadable)
         } else if block.skippable {
@@ -543,7 +545,7 @@ impl Interpreter<'_, '_> {
             Some(Reason::Transformed)
         } else if state.radius_compensation {
             Some(Reason::RadiusCompensation)
-        } else if turns && needs_tip && !state.tcp_mode {
+        } else if has_orientation && requires_tcp_mode && !state.tcp_mode {
             Some(Reason::NoTcpMode)
         } else if self.dialect == Dialect::Heidenhain
             && matches!(mode, MotionMode::Circular(_))

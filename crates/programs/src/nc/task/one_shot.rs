@@ -128,18 +128,18 @@ impl Interpreter<'_, '_> {
 
     /// The axes that a block names are unknown from here on.
     pub(super) fn invalidate_named_axes(&mut self, block: &Block<'_>) {
-        let mut lost = 0;
+        let mut unknown = 0;
         for axis in 0..3 {
             if block.axes[axis].is_some() {
                 self.state.position[axis] = Err(Reason::PositionUnknown);
-                lost |= 1 << axis;
+                unknown |= 1 << axis;
             }
             if block.abc[axis].is_some() {
                 self.state.abc[axis] = Err(Reason::OrientationUnknown);
-                lost |= 8 << axis;
+                unknown |= 8 << axis;
             }
         }
         self.state.previous = None;
-        self.events.push(StateEvent::AxesUnknown(lost));
+        self.events.push(StateEvent::AxesUnknown(unknown));
     }
 }

@@ -133,9 +133,9 @@ impl Interpreter<'_, '_> {
         self.set_group_varying(ModalGroup::CoordinateShift);
         let named = block.axes.map(|axis| axis.is_some());
         // Angles are set at the current orientation.
-        let turned = super::named_axes(block) & super::ORIENTATION;
-        if turned != 0 {
-            self.mark_position_used(turned);
+        let rotary = super::named_axes(block) & super::ORIENTATION;
+        if rotary != 0 {
+            self.mark_position_used(rotary);
         }
         if self.in_skippable_block {
             self.mark_position_used(super::named_axes(block));

@@ -11,7 +11,7 @@ use crate::motion::Reason;
 use crate::tree::Node;
 
 /// A value that a control can represent.
-fn held(value: Evaluated) -> Evaluated {
+fn in_range(value: Evaluated) -> Evaluated {
     value.and_then(|value| if value.abs() < LARGEST { Ok(value) } else { Err(Reason::NumberRange) })
 }
 
@@ -226,7 +226,7 @@ impl<'s> Interpreter<'_, 's> {
                 let counted = self.dialect == Dialect::Fanuc
                     && !self.tree.text(number).contains(&b'.')
                     && value != Ok(0.0);
-                let value = held(value);
+                let value = in_range(value);
                 (if counted { Err(Reason::AmbiguousNumber) } else { value }, increment)
             }
             WordValue::Expression { first, end } => {
@@ -250,7 +250,7 @@ impl<'s> Interpreter<'_, 's> {
         };
         let mut evaluator = Evaluator::new(self.tree, self.dialect, range, &variables);
         match evaluator.expression() {
-            Ok(value) if evaluator.at >= range.1 => held(value),
+            Ok(value) if evaluator.at >= range.1 => in_range(value),
             _ => Err(Reason::WrongShape),
         }
     }

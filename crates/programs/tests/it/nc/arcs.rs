@@ -1,4 +1,4 @@
-//! Arcs keep to the way that was meant, or stay with all that hangs on them.
+//! Rewritten arcs stay close to the intended path, or are refused together with the motions that depend on them.
 
 use truegrind_programs::motion::Reason::*;
 use truegrind_programs::motion::{Listing, Reason};
@@ -8,12 +8,12 @@ use truegrind_programs::nc::dialect::Dialect::{self, Fanuc, Heidenhain, LinuxCnc
 use truegrind_programs::nc::setup::Setup;
 use truegrind_programs::rewrite::{Change, Outcome};
 
-use super::certain::{HEAD, begin, check, left};
+use super::default_deny::{HEAD, begin, check, left};
 use super::{change_of, rewrite_as};
 
 const BY: [f64; 3] = [1.7771, -1.1912, -0.8686];
 
-/// All motions moved by much the same, each a little more than the one before.
+/// Changes that displace all motions nearly alike, each slightly more than the one before.
 fn nearly_alike(listing: &Listing, step: [f64; 2]) -> Vec<Change> {
     let all = (0..listing.motions.len() as u32)
         .filter(|&motion| listing.motions[motion as usize].reason().is_none());
@@ -24,7 +24,7 @@ fn nearly_alike(listing: &Listing, step: [f64; 2]) -> Vec<Change> {
     .collect()
 }
 
-/// The lines after the first motion, and what became of all motions that were to change.
+/// The lines after the first motion, and the outcomes of all requested changes.
 fn run(dialect: Dialect, body: &str, step: [f64; 2]) -> (Vec<String>, Vec<Outcome>) {
     let source = format!("{HEAD}{}{body}\n", begin(dialect));
     let (text, rewritten) = rewrite_as(&source, dialect, |listing| nearly_alike(listing, step));
@@ -40,15 +40,15 @@ fn number(line: &str, letter: char) -> f64 {
 }
 
 #[test]
-fn an_arc_whose_start_stays_is_no_circle_of_another_radius() {
+fn an_arc_with_a_pinned_start_does_not_change_its_radius() {
     let refused = [Outcome::Refused(Reason::BeforeUnmodifiedArc), Outcome::Refused(WrongShape)];
-    // The quarter begins where an arc that is left has ended: its end alone would move.
+    // The quarter starts at the end of an unmodified arc: only its end would move.
     let (text, outcomes) =
         run(Heidenhain, "CC X+6 Y+2\nC X+1 Y+2 DR+\nCR X+0 Y+3 R+1 DR+\nL X+0 Y+9", [0.0; 2]);
     assert_eq!(text[..3], ["CC X+6 Y+2", "C X+1 Y+2 DR+", "CR X+0 Y+3 R+1 DR+"]);
     assert_eq!(outcomes[0], Outcome::Refused(WrongShape));
     assert_eq!(outcomes[1], Outcome::InPlace);
-    // The same behind a turn that rises, which no circle closes.
+    // The same after a helical full turn, which no circle closes.
     let (text, outcomes) = run(LinuxCnc, "G3 X1 Y2 Z2 I5 J0\nG3 X0 Y3 I-1 J0\nG1 X0 Y9", [1e-2, 0.0]);
     assert_eq!(text[..2], ["G3 X1 Y2 Z2 I5 J0", "G3 X0 Y3 I-1 J0"]);
     assert_eq!(outcomes[..2], refused);
@@ -69,7 +69,7 @@ fn an_almost_closed_arc_keeps_its_centre() {
         for step in [[0.0, 0.0], [3e-5, -4e-5], [-2e-4, 1e-4]] {
             let (text, outcomes) = run(LinuxCnc, line, step);
             if outcomes[1] != Outcome::InPlace {
-                // What is left of so small a gap may turn the other way: then it stays.
+                // After such a small gap the arc may reverse its direction: then it is refused.
                 assert_eq!(text[0], line);
                 continue;
             }
@@ -79,7 +79,7 @@ fn an_almost_closed_arc_keeps_its_centre() {
             }
         }
     }
-    // Not by staying.
+    // Not because it was refused.
     assert_eq!(
         run(LinuxCnc, "G3 X0.9994 Y2.0004 I3 J4", [3e-5, -4e-5]).1,
         [Outcome::InPlace, Outcome::InPlace]
@@ -91,7 +91,7 @@ fn an_almost_closed_arc_keeps_its_centre() {
 }
 
 #[test]
-fn a_whole_circle_stays_whole_where_its_end_is_rounded() {
+fn a_full_circle_stays_full_when_its_end_is_rounded() {
     for (line, step) in
         [("G3 X1.001 Y2 I50 J0", 0.0), ("G3 X1.001 Y2 I5 J0", 3e-4), ("G2 X1.001 Y2 I5 J0", -3e-4)]
     {
@@ -105,7 +105,7 @@ fn a_whole_circle_stays_whole_where_its_end_is_rounded() {
 }
 
 #[test]
-fn a_short_arc_keeps_its_radius_and_its_way() {
+fn a_short_arc_keeps_its_radius_and_its_path() {
     for (line, chord) in
         [("G3 X1.05 Y2 R10", 0.05), ("G2 X1.02 Y2.01 R50", 0.022), ("G3 X1.3 Y2.1 I-3 J9", 0.316)]
     {
@@ -123,8 +123,8 @@ fn a_short_arc_keeps_its_radius_and_its_way() {
 }
 
 #[test]
-fn what_is_refused_keeps_every_word() {
-    // No change is asked for the arc: what ends at its start stays as well, and what comes before is moved.
+fn a_refused_motion_keeps_every_word() {
+    // The arc has no change: the motion that ends at its start is refused too, and the one before is rewritten.
     for (dialect, body) in
         [(Fanuc, "X20.\nG3 X20.001 Y2. I5. J0.\nG1 X30."), (LinuxCnc, "X20\nG2 X30 Y2 I5 J0\nG1 X40")]
     {
@@ -140,14 +140,14 @@ fn what_is_refused_keeps_every_word() {
 }
 
 #[test]
-fn an_arc_behind_other_motions_that_stay_begins_where_it_always_did() {
+fn an_arc_after_unmodified_motions_keeps_its_start() {
     let before = left(BeforeUnmodifiedPath);
     let unknown = left(PositionUnknown);
     check(
         LinuxCnc,
         &[
             ("X10\nX20\nG55\nZ45\nG2 X25 Y0 I5 J0", &[None, before, unknown, unknown]),
-            // Where a motion between says where the arc begins, the one before it may move.
+            // If a motion between states the start of the arc, the one before it may move.
             ("X10\nX20\nG55\nX20 Y0\nG2 X25 Y0 I5 J0", &[None, None, unknown, unknown]),
             ("X10\nX20\nG55\nG91 X2 Y0\nG90 G2 X25 Y0 I5 J0", &[None, before, unknown, unknown]),
         ],
@@ -156,7 +156,7 @@ fn an_arc_behind_other_motions_that_stay_begins_where_it_always_did() {
         Siemens,
         &[
             ("X10\nX20\nTRANS\nZ45\nG2 X30 Y0 I5 J0", &[None, before, unknown, unknown]),
-            // Y counts from where the motion before the change of frame ended, through all that comes between.
+            // Y is relative to the end of the motion before the change of frame, through everything between.
             (
                 "X10\nX20\nTRANS\nX5 Y=IC(1) Z30\nX7\nX8 Z9\nG3 X9 Y2 I0 J1",
                 &[None, before, unknown, unknown, unknown, unknown],
@@ -170,7 +170,7 @@ fn an_arc_behind_other_motions_that_stay_begins_where_it_always_did() {
 }
 
 #[test]
-fn nothing_is_put_before_a_block_that_starts_the_spindle() {
+fn no_block_is_inserted_before_one_that_starts_the_spindle() {
     let insertable = |dialect: Dialect, words: &str| {
         let source = format!("{HEAD}{}X50 {words}\nG2 X60 Y2 I5 J0 {words}\n", begin(dialect));
         let setup = Setup { dialect: Some(dialect), ..Setup::default() };

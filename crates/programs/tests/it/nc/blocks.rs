@@ -1,4 +1,4 @@
-//! What single blocks say: what acts at their end, what turns axes, what their words are worth.
+//! Single blocks: what takes effect at their end, what rotates axes, how their words are evaluated.
 
 use truegrind_programs::motion::Reason::*;
 use truegrind_programs::nc::Task;
@@ -6,11 +6,11 @@ use truegrind_programs::nc::dialect::Dialect::{Fanuc, Heidenhain, Iso, LinuxCnc,
 use truegrind_programs::nc::parser::parse;
 use truegrind_programs::nc::setup::Setup;
 
-use super::certain::{HEAD, begin, check, left};
+use super::default_deny::{HEAD, begin, check, left};
 use super::ends;
 
 #[test]
-fn the_end_of_a_block_is_where_m129_acts() {
+fn m129_takes_effect_at_the_end_of_its_block() {
     check(Heidenhain, &[("L X+20\nL X+30 M129\nL X+40 Y+0 Z+0", &[None, None, left(NoTcpMode)])]);
     check(Heidenhain, &[("M129\nL X+40 Y+0 Z+0", &[left(NoTcpMode)])]);
 }
@@ -21,14 +21,14 @@ fn a_path_block_may_end_with_m_alone() {
 }
 
 #[test]
-fn a_comment_goes_on_in_the_next_line() {
+fn a_comment_continues_on_the_next_line() {
     let goes_on = "5 ;This is a comment that goes on~\n in the next line~\n X+99 and\n6 L X+20\n";
     for (source, motions) in [
         (goes_on.to_owned(), 2),
-        // A block number begins a block; without a number it is not known what goes on.
+        // A block number begins a block; without a number it is unknown what continues.
         ("5 ;~~~~~~~~\n6 L X+20\n".to_owned(), 2),
         (";~~~~~~~~\nL X+20\n".to_owned(), 2),
-        // In a definition it is the block that goes on.
+        // In a definition the block continues.
         ("5 CYCL DEF 200 ~\n Q200=2 ;CLEARANCE ~\n Q201=-20 ;DEPTH\n6 L X+20\n".to_owned(), 2),
         ("5 ;text~\n\nL X+20\n".to_owned(), 2),
     ] {
@@ -45,13 +45,13 @@ fn a_comment_goes_on_in_the_next_line() {
 }
 
 #[test]
-fn a_motion_word_beside_the_end_of_a_cycle_holds() {
+fn a_motion_code_beside_the_end_of_a_cycle_is_active() {
     check(Iso, &[("G0 G17 G40 G49 G80 G90\nX20 Y0", &[None]), ("G80 G1\nX20 Y0", &[None])]);
     check(Fanuc, &[("G81 Z-5. R2. F100.\nG0 G80\nX5. Y5. Z5.", &[left(Cycle), None])]);
 }
 
 #[test]
-fn what_turns_axes_is_listed() {
+fn motions_of_rotary_axes_are_listed() {
     let l = "L X+10 Y+0 Z+50 A+180 B+0 C+90";
     let tilt = "PLANE SPATIAL SPA+0 SPB+20 SPC+0 TURN MB MAX FMAX";
     check(
@@ -67,7 +67,7 @@ fn what_turns_axes_is_listed() {
 }
 
 #[test]
-fn arcs_lie_in_the_plane_across_the_tool() {
+fn arcs_lie_in_the_plane_perpendicular_to_the_tool() {
     let go = "M128\nL X+10 Y+0 Z+50 A+180 B+0 C+0";
     check(
         Heidenhain,
@@ -89,7 +89,7 @@ fn arcs_lie_in_the_plane_across_the_tool() {
 }
 
 #[test]
-fn a_whole_number_is_rounded_by_the_control() {
+fn the_control_rounds_integer_variables() {
     let body = "DEF INT NK=5, MK=4\nDEF REAL A=3\nTRAORI\nG1 X1 Y2 Z3 A0 B0 C0\n";
     let found = ends(&format!("{body}NK=NK/2\nMK=MK/2\nX=MK\nX=NK\n"), Siemens);
     assert_eq!(found, [Ok([1.0, 2.0, 3.0]), Ok([2.0, 2.0, 3.0]), Err(UnknownVariable)]);
@@ -105,7 +105,7 @@ fn a_star_ends_a_block_of_a_tape_whose_lines_end_with_cr() {
 }
 
 #[test]
-fn a_file_of_another_control_is_read_and_left() {
+fn a_file_of_an_unsupported_control_is_left() {
     let source =
         b"$TEST.MIN%\nO1000\n(ROUGH)\nVC1=10\nG15 H1\nG90 G21\nT1 M6\nG0 X10. Y0. Z50. A180. B0. C90.\nM02\n";
     let task = Task::read(&[("a.min", source)], &Setup::default());
@@ -129,7 +129,7 @@ fn linuxcnc_moves_beside_a_dwell_and_the_end_of_a_shift() {
         assert_eq!(found[1..], [Ok([30.0, 2.0, 3.0]), Ok([30.0, 5.0, 3.0])], "{code}");
     }
     check(LinuxCnc, &[("G4 P1\nX5", &[None]), ("G92.3 X30", &[left(UnknownVariable)])]);
-    // On a Fanuc X is the time; a plain file does not tell what it is where P says the time.
+    // On a Fanuc X is the time; for a plain file this is unknown where P states the time.
     let found = ends(&format!("{}G4 X30.\nY5.\n", begin(Fanuc)), Fanuc);
     assert_eq!(found[1..], [Ok([1.0, 5.0, 3.0])]);
     check(
@@ -144,23 +144,23 @@ fn linuxcnc_moves_beside_a_dwell_and_the_end_of_a_shift() {
 }
 
 #[test]
-fn the_limit_of_the_spindle_shifts_nothing() {
+fn a_spindle_speed_limit_shifts_nothing() {
     check(Fanuc, &[("G92 S2000\nX11.\nG52 X5.\nX10.", &[None, None]), ("G50 S2000\nX11.", &[None])]);
     check(Iso, &[("G92 S2000 M3\nX11", &[None]), ("G50 S2000\nX11", &[None])]);
-    // With an axis it is a place.
+    // With an axis it is a position.
     check(Fanuc, &[("G92 X0. S2000\nG52 X5.\nX10.", &[left(Displacement)])]);
 }
 
 #[test]
-fn after_g80_linuxcnc_wants_a_motion_word() {
+fn after_g80_linuxcnc_requires_a_motion_code() {
     check(LinuxCnc, &[("G80\nX11", &[left(NoMotionCode)]), ("G80\nG1 X11", &[None])]);
     check(Iso, &[("G80\nX11", &[left(NoMotionCode)])]);
     check(Fanuc, &[("G80\nX11.", &[None])]);
 }
 
-/// Which motion word holds behind a cycle differs between controls: that of before it, or the rapid motion with which it ends.
+/// The motion mode after a cycle differs between controls: that before it, or the rapid motion of the cycle.
 #[test]
-fn behind_a_cycle_that_began_under_a_line_a_fanuc_wants_a_motion_word() {
+fn after_a_cycle_under_g1_a_fanuc_requires_a_motion_code() {
     let line = "G1 X5. F100.\nG81 X6. Z-5. R2. F100.\nG80\nX11. Y5. Z5.";
     check(Fanuc, &[(line, &[None, left(Cycle), left(NoMotionCode)])]);
     let rapid = "G0 X5.\nG81 X6. Z-5. R2. F100.\nG80\nX11. Y5. Z5.";

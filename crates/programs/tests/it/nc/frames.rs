@@ -1,20 +1,20 @@
-//! Work offsets, shifts and tools: what each control makes of them.
+//! Work offsets, shifts and tools, as each control treats them.
 
 use truegrind_programs::motion::Reason::*;
 use truegrind_programs::nc::dialect::Dialect::{Fanuc, Heidenhain, Iso, LinuxCnc, Siemens};
 
-use super::certain::{F, G, S, begin, check, left, reasons};
+use super::default_deny::{F, G, S, begin, check, left, reasons};
 use super::{ends, listing_of};
 
 const L: &str = "L X+5 Y+5 Z+5 A+180 B+0 C+0";
 
 #[test]
-fn a_number_beside_a_work_offset_is_not_passed_over() {
+fn a_number_beside_a_work_offset_is_not_ignored() {
     check(
         Fanuc,
         &[
             (&format!("G54 P2\n{F}\nG54\n{F}"), &[left(WorkObjectUnknown), None]),
-            // The number belongs to the call, the dwell.
+            // The number belongs to the call or the dwell.
             (&format!("G54 M98 P1000\n{F}"), &[left(Subprogram), None]),
             (&format!("G54 G4 P500\n{F}"), &[None]),
         ],
@@ -25,7 +25,7 @@ fn a_number_beside_a_work_offset_is_not_passed_over() {
 }
 
 #[test]
-fn offsets_in_incremental_mode_are_values_for_linuxcnc() {
+fn offsets_in_g91_are_absolute_on_linuxcnc() {
     let body = "G90 G54\nG10 L2 P1 X350 Y0 Z250 R0\nG91 G10 L2 P1 X10 Y1 Z2\nG90\nG1 X1 Y2 Z3 A180 B0 C0\n";
     let at = |dialect| {
         let listing = listing_of(body, dialect);
@@ -44,7 +44,7 @@ fn offsets_in_incremental_mode_are_values_for_linuxcnc() {
 }
 
 #[test]
-fn a_shift_within_a_shift_is_not_known() {
+fn a_shift_within_a_shift_is_unknown() {
     let shifted = left(Displacement);
     check(
         Fanuc,
@@ -52,7 +52,7 @@ fn a_shift_within_a_shift_is_not_known() {
             ("G92 X100. Y0. Z50.\nG52 X5.\nG1 X100. Y0. Z50.", &[shifted]),
             ("G52 X5.\nG92 X100.\nX101.\nG52 X0.\nX5. Y5. Z5.", &[None, shifted]),
             ("G52 X5.\nG52 X6.\nX5. Y5. Z5. A180. B0. C0.", &[None]),
-            // Only the axes that are named lose their shift.
+            // Only the named axes lose their shift.
             (&format!("G92 X0. Y0.\nG92.1 X0.\n{F}"), &[shifted]),
             (&format!("G92 X0. Y0.\nG92.1 X0. Y0. Z0.\n{F}"), &[None]),
             (&format!("G92 X0. Y0.\nG92.1\n{F}"), &[shifted]),
@@ -65,7 +65,7 @@ fn a_shift_within_a_shift_is_not_known() {
 }
 
 #[test]
-fn a_preset_may_end_the_shift_within_the_one_before() {
+fn a_preset_may_cancel_the_datum_shift() {
     let preset = "; truegrind frame PRESET2 w [[600,0,0],[1,0,0,0]]\n";
     let shift = "CYCL DEF 7.0 DATUM SHIFT\nCYCL DEF 7.1 X+40";
     let next = "CYCL DEF 247 DATUM SETTING Q339=+2";
@@ -82,7 +82,7 @@ fn a_preset_may_end_the_shift_within_the_one_before() {
 }
 
 #[test]
-fn data_that_the_program_writes_are_not_those_from_outside() {
+fn data_written_by_the_program_override_the_setup() {
     let w = left(WorkObjectAssigned);
     check(
         Heidenhain,
@@ -95,14 +95,15 @@ fn data_that_the_program_writes_are_not_those_from_outside() {
             (&format!("FN 18: SYSREAD Q1 = ID270 NR1 IDX1\n{L}"), &[None]),
         ],
     );
-    // In G70 the control's own data stay in its unit.
+    // In G70 the control's own data keep their unit.
     let t = left(ToolAssigned);
     check(
         Siemens,
         &[
             (&format!("G70\n$TC_DP3[1,1]=2\nG71\nT1 D1\nG54\n{S}"), &[t]),
             (&format!("G71\n$TC_DP3[1,1]=2\nT1 D1\nG54\n{S}"), &[None]),
-            // A tool that is in keeps its lengths until it is called again; of one that nobody has stated each must be said.
+            // The active tool keeps its lengths until it is selected again; each length of an unstated tool must be
+            // set.
             (&format!("T1 D1\n$TC_DP3[1,1]=2\nG54\n{S}"), &[t]),
             (&format!("$TC_DP3[7,1]=2\nT7 D1\nG54\n{S}"), &[left(ToolUnknown)]),
             (&format!("$TC_DP3[7,1]=2\n$TC_DP4[7,1]=0\n$TC_DP5[7,1]=1\nT7 D1\nG54\n{S}"), &[None]),
@@ -112,7 +113,7 @@ fn data_that_the_program_writes_are_not_those_from_outside() {
 }
 
 #[test]
-fn a_tool_is_in_when_it_has_been_changed() {
+fn a_tool_is_active_after_the_tool_change() {
     let tool = |body: &str| {
         let listing = listing_of(&format!("G90 G54\n{body}\nG1 X1 Y2 Z3 A180 B0 C0\n"), LinuxCnc);
         listing.tool(listing.motions.last().unwrap()).unwrap().name.clone()
@@ -124,7 +125,7 @@ fn a_tool_is_in_when_it_has_been_changed() {
 }
 
 #[test]
-fn a_shift_turns_nothing() {
+fn a_shift_rotates_nothing() {
     check(
         Heidenhain,
         &[
@@ -136,19 +137,19 @@ fn a_shift_turns_nothing() {
 }
 
 #[test]
-fn what_ends_where_nothing_is_on_changes_nothing() {
+fn cancelling_an_inactive_transform_changes_nothing() {
     for code in ["G69", "G15", "G13.1", "G50", "G50.1 X0.", "G7.1 C0."] {
         check(Fanuc, &[(&format!("{code}\nG1 X20."), &[None])]);
     }
     check(Siemens, &[("CYCLE800()\nX20\nTOROTOF\nX21\nPAROTOF\nX22", &[None, None, None])]);
     check(Heidenhain, &[("PLANE RESET STAY\nL X+20\nTRANS ROTATION RESET\nL X+21", &[None, None])]);
-    // Where it has been on, the axes are counted anew.
+    // If it was active, the coordinates change.
     check(Fanuc, &[("G68 X0. Y0. R30.\nG69\nG1 X20. Y0. Z50.", &[left(OrientationUnknown)])]);
     assert_eq!(reasons(Fanuc, "/G68 X0. Y0. R30.\nG69\nG1 X20. Y0. Z50."), [left(OrientationUnknown)]);
 }
 
 #[test]
-fn what_adds_to_a_shift_that_is_not_known_is_not_known() {
+fn an_additive_shift_on_an_unknown_one_is_unknown() {
     let go = "G1 X5 Y5 Z5 A=180 B=0 C=0";
     let t = left(Transformed);
     check(
@@ -161,9 +162,9 @@ fn what_adds_to_a_shift_that_is_not_known_is_not_known() {
     );
 }
 
-/// The class: what an offset holds where the program states a part of it. What is not said stays, and is known only where it was.
+/// The class: an offset that the program states in part. Omitted components keep their values, known or not.
 #[test]
-fn an_offset_of_which_the_turn_is_not_said_keeps_the_turn_it_has() {
+fn an_offset_without_a_rotation_word_keeps_its_rotation() {
     let value = |begin: &str, offset: &str, dialect| {
         let source = format!("{begin}G90 G57\nG10 L2 P4 {offset}\nG1 X1 Y2 Z3 A180 B0 C0\n");
         let listing = listing_of(&source, dialect);

@@ -1,9 +1,9 @@
-//! M words: whose values stand beside them, where they jump, what they set.
+//! M words: their values, their jumps, their effects.
 
 use truegrind_programs::motion::Reason::*;
 use truegrind_programs::nc::dialect::Dialect::{Fanuc, Heidenhain, Iso, LinuxCnc};
 
-use super::certain::{F, G, begin, check, left};
+use super::default_deny::{F, G, begin, check, left};
 use super::{ends, listing_of};
 
 #[test]
@@ -14,18 +14,18 @@ fn limits_of_motors_move_nothing() {
     {
         assert_eq!(after(&format!("{setting}\nG1 X30")), [Ok([30.0, 2.0, 3.0])], "{setting}");
     }
-    // What these shift or scale is not known: steps per millimetre, origins.
+    // Their effect on shifts or scales is unknown: steps per millimetre, origins.
     let unknown = &[left(UnknownWord), left(UnknownWord)];
     for word in ["M92 X80", "M206 X5", "M428", "M851 Z-1", "M125 X10 Y10"] {
         check(Iso, &[(&format!("{word}\n{G}"), unknown)]);
     }
-    // A word of the machine beside a motion leaves it one.
+    // A machine function beside a motion leaves it a motion.
     check(Iso, &[("G1 X5 M120\nX6 M8\nM8 X7", &[None, None, None])]);
     check(Fanuc, &[("X5. M205\nM211\nX6.", &[None, None])]);
 }
 
 #[test]
-fn kinematics_that_the_program_switches_are_not_known() {
+fn switched_kinematics_are_unknown() {
     let unknown = &[left(UnknownWord), left(UnknownWord)];
     for word in ["M428", "M429", "M430", "M129", "M68 E3 Q1", "M67 E3 Q0", "M68 E#1 Q1", "M300"] {
         check(LinuxCnc, &[(&format!("{word}\n{G}"), unknown)]);
@@ -51,28 +51,28 @@ fn the_angle_of_the_spindle_is_no_radius() {
 }
 
 #[test]
-fn a_cycle_that_is_called_where_the_tool_stands_is_listed() {
+fn a_cycle_called_at_the_tool_position_is_listed() {
     for call in ["L R0 FMAX M99", "M99", "L M99"] {
         check(
             Heidenhain,
             &[(&format!("{call}\nL X+30\nL X+1 Y+1 Z+1"), &[left(Cycle), left(PositionUnknown), None])],
         );
     }
-    // Cycle 12 puts a program in the place of a cycle.
+    // Cycle 12 replaces the cycle by a program.
     let program = "CYCL DEF 12.0 PGM CALL\nCYCL DEF 12.1 PGM OTHER.H";
     for call in ["M99", "CYCL CALL"] {
-        let found = super::certain::reasons(Heidenhain, &format!("{program}\n{call}\nL X+30"));
+        let found = super::default_deny::reasons(Heidenhain, &format!("{program}\n{call}\nL X+30"));
         assert_eq!(found, [left(Subprogram), left(UnknownFlow)], "{call}");
     }
 }
 
 #[test]
-fn blocks_that_haas_jumps_to_are_reached_from_elsewhere() {
+fn targets_of_haas_jumps_are_joins() {
     let local = "N5 X5.\nN1000 Y20.\nG0 X-40. Y-40.\nM97 P1000\nM30";
-    let found = super::certain::reasons(Fanuc, local);
+    let found = super::default_deny::reasons(Fanuc, local);
     assert_eq!(found[..3], [None, left(UnknownFlow), left(PositionUnknown)]);
     for jump in ["M96 P1000 Q3", "M98 P7 Q1000", "M98 P7 H1000", "M99 P1000", "M46 Q5 P1000", "M97 P#5"] {
-        let found = super::certain::reasons(Fanuc, &format!("X5.\nN1000 Y20.\n{F}\n{jump}"));
+        let found = super::default_deny::reasons(Fanuc, &format!("X5.\nN1000 Y20.\n{F}\n{jump}"));
         assert_eq!(found[1], left(UnknownFlow), "{jump}");
     }
     // A signal may call it at any time.

@@ -1,10 +1,10 @@
-//! A file that is only a subprogram: what holds at its begin is its caller's.
+//! A file that is only a subprogram: its initial state is that of its caller.
 
 use truegrind_programs::motion::Reason::{self, *};
 use truegrind_programs::nc::Task;
 use truegrind_programs::nc::setup::Setup;
 
-use super::certain::HEAD;
+use super::default_deny::HEAD;
 
 fn reasons(name: &str, body: &str) -> Vec<Option<Reason>> {
     let source = format!("{HEAD}{body}\n");
@@ -13,7 +13,7 @@ fn reasons(name: &str, body: &str) -> Vec<Option<Reason>> {
 }
 
 #[test]
-fn what_the_caller_has_set_is_not_known() {
+fn the_state_of_the_caller_is_unknown() {
     let flow = Some(UnknownFlow);
     let go = "G1 X10. Y0. Z50. A180. B0. C90. F500.\nX20. Y0. Z50. A180. B0. C90.";
     assert_eq!(reasons("a.nc", &format!("O1000\nG43.4 H1\n{go}\nM99")), [flow, flow]);
@@ -28,7 +28,7 @@ fn what_the_caller_has_set_is_not_known() {
     ] {
         assert_eq!(reasons(name, &format!("{head}\n{siemens}\n{end}")), [flow], "{name} {head} {end}");
     }
-    // Stating some of it is not stating all: it may be mirrored, turned, scaled.
+    // Stating part of the state is not stating all of it: coordinates may be mirrored, rotated, scaled.
     assert_eq!(
         reasons("a.nc", &format!("O1000\nG90 G21 G17 G40 G54\nT1 M6\nG43.4 H1\n{go}\nM99")),
         [flow, flow]
@@ -36,7 +36,7 @@ fn what_the_caller_has_set_is_not_known() {
 }
 
 #[test]
-fn a_main_program_with_subprograms_of_its_own_begins_as_it_did() {
+fn a_main_program_with_subprograms_starts_in_the_power_on_state() {
     let go = "G43.4 H1\nG1 X10. Y0. Z50. A180. B0. C90. F500.";
     assert_eq!(reasons("a.nc", &format!("O1\nT1 M6\n{go}\nM98 P2\nM30\nO2\nG1 X5.\nM99"))[0], None);
     assert_eq!(reasons("a.nc", &format!("O1\nT1 M6\n{go}\n/M99\nM30"))[0], None);
@@ -46,7 +46,7 @@ fn a_main_program_with_subprograms_of_its_own_begins_as_it_did() {
 }
 
 #[test]
-fn calls_of_programs_that_stand_elsewhere_are_named() {
+fn calls_of_programs_outside_the_file_are_listed() {
     let outside = |name: &str, body: &str| -> Vec<u32> {
         let task = Task::read(&[(name, body.as_bytes())], &Setup::default());
         let motions = &task.listing.motions;

@@ -1,14 +1,15 @@
-//! The class: what stays counts from where a corrected motion ends (an origin that is set there, an increment, a position
-//! that is read), and goes elsewhere than it always did. The motion that ends there stays then, over all ways.
+//! The class: an unmodified word is relative to the end of a corrected motion (an origin set there, an increment, a
+//! position that is read), and would lead elsewhere. The motion that ends there is refused, over all paths of control
+//! flow.
 
 use truegrind_programs::motion::Reason;
 use truegrind_programs::nc::dialect::Dialect::{self, Fanuc, LinuxCnc, Siemens};
 use truegrind_programs::rewrite::Outcome;
 
-use super::certain::{HEAD, begin};
+use super::default_deny::{HEAD, begin};
 use super::{moved, rewrite_as};
 
-/// What becomes of the first motion, where all that can move shall.
+/// The outcome of the first motion, if everything that can be changed is.
 fn first(dialect: Dialect, body: &str) -> Outcome {
     let source = format!("{HEAD}{}{body}\n", begin(dialect));
     let (_, rewritten) = rewrite_as(&source, dialect, |listing| moved(listing, [1.5, -1.25, 0.75]));
@@ -16,7 +17,7 @@ fn first(dialect: Dialect, body: &str) -> Outcome {
 }
 
 #[test]
-fn an_origin_from_which_what_stays_counts_keeps_the_motion_that_ends_there() {
+fn an_origin_used_by_unmodified_words_pins_the_motion_that_ends_there() {
     let refused = Outcome::Refused(Reason::BeforeOrigin);
     for body in [
         "G92 X0. Y0. Z0.\n#103=0\nWHILE [#103 LT 2] DO1\nG1 X20. Y-30. A175.\n#103=#103+1\nEND1",
@@ -37,7 +38,7 @@ fn an_origin_from_which_what_stays_counts_keeps_the_motion_that_ends_there() {
 }
 
 #[test]
-fn increments_and_positions_that_are_read_keep_the_motion_that_ends_there() {
+fn unmodified_increments_and_position_reads_pin_the_motion_that_ends_there() {
     let refused = Outcome::Refused(Reason::BeforeIncrement);
     for body in [
         "#103=0\nWHILE [#103 LT 2] DO1\nG91 G1 X20.\n#103=#103+1\nEND1",
@@ -50,7 +51,7 @@ fn increments_and_positions_that_are_read_keep_the_motion_that_ends_there() {
 }
 
 #[test]
-fn what_is_said_again_or_counts_from_elsewhere_keeps_nothing() {
+fn restated_or_independent_words_pin_nothing() {
     for body in [
         "G92 X0. Y0. Z0.\nG1 X20. Y-30. Z5.",
         "G92 X0. Y0. Z0.\nG92 X0. Y0. Z0.\nG52 X0. Y0. Z0.",
@@ -63,9 +64,9 @@ fn what_is_said_again_or_counts_from_elsewhere_keeps_nothing() {
     }
 }
 
-/// A block that is put in before another is read with what held before that one.
+/// An inserted block is read with the state before the block that it precedes.
 #[test]
-fn nothing_is_put_in_before_a_block_that_changes_what_numbers_mean() {
+fn no_block_is_inserted_before_one_that_changes_word_semantics() {
     for (body, free) in [("G1 X9. Y9. Z9.", true), ("G20 G1 X1. Y1. Z1.", false)] {
         let source = format!("{HEAD}{}{body}\n", begin(Fanuc));
         let setup = truegrind_programs::nc::setup::Setup { dialect: Some(Fanuc), ..Default::default() };
@@ -74,16 +75,16 @@ fn nothing_is_put_in_before_a_block_that_changes_what_numbers_mean() {
     }
 }
 
-/// The class: a block that may be skipped says again what was corrected, so that the tool stands in one of two places. What
-/// is written as an increment from there is right on one way only: then nothing is corrected there.
+/// The class: a block that may be skipped restates corrected words, so that the tool is at one of two positions. An
+/// increment from there is right on one path only: nothing is corrected there.
 #[test]
-fn an_increment_behind_a_block_that_may_be_skipped_keeps_the_motion_before() {
+fn an_increment_after_a_skippable_block_pins_the_motion_before() {
     let refused = Outcome::Refused(Reason::BeforeIncrement);
     for body in ["/Y-10\nX=IC(5) Y-7", "/A=175\nX4 A=IC(5)", "/Z7\nG91 X5 Y1 Z1", "/Y-10\nG91 Z4"] {
         assert_eq!(first(Siemens, body), refused, "{body}");
     }
     assert_eq!(first(Fanuc, "/Y-10.\nG91 X5."), refused);
     assert_eq!(first(LinuxCnc, "/Y-10\nG91 X5"), refused);
-    // A value needs no place to count from.
+    // An absolute value does not depend on the position.
     assert_eq!(first(Siemens, "/Y-10\nX5 Y-7"), Outcome::InPlace);
 }

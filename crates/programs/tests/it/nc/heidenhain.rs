@@ -1,21 +1,21 @@
-//! Heidenhain conversational: what single blocks keep, and what they leave unknown.
+//! Heidenhain conversational: what single blocks preserve, and what they make unknown.
 
 use truegrind_programs::motion::Reason::*;
 use truegrind_programs::nc::dialect::Dialect::Heidenhain;
 use truegrind_programs::nc::parser::parse;
 
-use super::certain::{begin, check, left};
+use super::default_deny::{begin, check, left};
 use super::ends;
 
-/// Where the blocks after the first motion go.
+/// The end points of the blocks after the first motion.
 fn after(body: &str) -> Vec<Result<[f64; 3], truegrind_programs::motion::Reason>> {
     let presets = "; truegrind tool T1 t [[0,0,50],[1,0,0,0]]\n";
     ends(&format!("{presets}{}{body}\n", begin(Heidenhain)), Heidenhain)[1..].to_vec()
 }
 
-/// The same, with the datum shift that holds in the last block (mm).
+/// The same, with the datum shift in the last block (mm).
 fn shifted(body: &str) -> (Option<truegrind_programs::motion::Reason>, Option<[f64; 3]>) {
-    let source = format!("{}{}{body}\n", super::certain::HEAD, begin(Heidenhain));
+    let source = format!("{}{}{body}\n", super::default_deny::HEAD, begin(Heidenhain));
     let setup = truegrind_programs::nc::setup::Setup { dialect: Some(Heidenhain), ..Default::default() };
     let task = truegrind_programs::nc::Task::read(&[("x", source.as_bytes())], &setup);
     let last = task.listing.motions.last().unwrap();
@@ -24,14 +24,14 @@ fn shifted(body: &str) -> (Option<truegrind_programs::motion::Reason>, Option<[f
 }
 
 #[test]
-fn a_shift_told_line_by_line_is_known_once_all_lines_have_come() {
+fn a_datum_shift_over_several_lines_is_known_after_the_last() {
     let l = "L X+10 Y+0 Z+50 A+180 B+0 C+90";
     let cycle = |lines: &[&str]| -> String {
         let line = |(at, line): (usize, &&str)| format!("CYCL DEF 7.{} {line}\n", at + 1);
         format!("CYCL DEF 7.0 DATUM SHIFT\n{}", lines.iter().enumerate().map(line).collect::<String>())
     };
     let shift = Some([-60.0, 0.0, 0.0]);
-    // What a call leaves of a shift before is not known: each axis is, once it has been told.
+    // After a call a shift is unknown, until each axis is stated.
     for before in ["", "CALL LBL 1\n", "TRANS DATUM TABLE TABLINE1\n"] {
         for lines in [&["X-60", "Y+0", "Z+0"][..], &["Y+0", "X-60", "Z+0"], &["X-60 Y+0 Z+0"]] {
             let body = format!("{before}{}{l}\nLBL 1\nCYCL DEF 7.1 Z+5\nLBL 0", cycle(lines));
@@ -41,21 +41,21 @@ fn a_shift_told_line_by_line_is_known_once_all_lines_have_come() {
         let found = shifted(&body);
         assert_eq!(found.0, if before.is_empty() { None } else { left(Transformed) }, "{body}");
     }
-    // A number that cannot be read, a row of the table, an increment to what is not known.
+    // An unreadable number, a row of the table, an increment to an unknown value.
     for line in
         ["CYCL DEF 7.1 XQ5", "CYCL DEF 7.1 #5", "TRANS DATUM TABLE TABLINE1\nCYCL DEF 7.1 IX+5 Y+0 Z+0"]
     {
         assert_eq!(shifted(&format!("{line}\n{l}")).0, left(Transformed), "{line}");
     }
     assert_eq!(shifted(&format!("{}{l}", cycle(&["X+1", "IX+2"]))), (None, Some([3.0, 0.0, 0.0])));
-    // A shift of a rotary axis counts its angles from elsewhere.
+    // A shift of a rotary axis offsets its angles.
     assert_eq!(shifted(&format!("{}{l}", cycle(&["X+1", "C+90"]))).0, left(Transformed));
     assert_eq!(shifted(&format!("{}{l}", cycle(&["X-60", "C+0"]))), (None, shift));
     assert_eq!(shifted(&format!("{}TRANS DATUM RESET\n{l}", cycle(&["C+90"]))), (None, None));
 }
 
 #[test]
-fn the_mark_of_a_skip_stands_before_or_after_the_block_number() {
+fn the_skip_mark_may_precede_or_follow_the_block_number() {
     for block in ["/5 L X+60", "5 /L X+60", "5 / L X+60", "/L X+60"] {
         let source = format!("{block}\n");
         assert_eq!(parse(source.as_bytes(), Heidenhain).print(), source.as_bytes());
@@ -69,7 +69,7 @@ fn the_mark_of_a_skip_stands_before_or_after_the_block_number() {
 }
 
 #[test]
-fn a_surface_normal_alone_turns_the_tool() {
+fn a_surface_normal_alone_aligns_the_tool() {
     let n = "NX+0.1 NY+0 NZ+0.995";
     check(
         Heidenhain,
@@ -79,9 +79,10 @@ fn a_surface_normal_alone_turns_the_tool() {
                 &format!("LN X+11 Y+0 Z+50 {n}\nL X+12 A+180 B+0 C+90\nL X+13"),
                 &[left(AlignedToNormal), None, None],
             ),
-            // With a tool vector it goes where that says.
+            // With a tool vector the motion is known.
             (&format!("LN X+11 Y+0 Z+50 {n} TX+0 TY+0 TZ+1"), &[None]),
-            // The vector holds in its own LN: no other block can say how the tool is turned after it, or may hold one.
+            // The vector holds only in its own LN: no other block can state the orientation after it, or may keep
+            // one.
             (
                 &format!("LN X+11 Y+0 Z+50 {n} TX+0 TY+0 TZ+1\nL X+12\nL X+12 A+180 B+0 C+90"),
                 &[None, left(OrientationUnknown), None],
@@ -111,14 +112,14 @@ fn paraxial_compensation_moves_its_axis_by_the_radius() {
 }
 
 #[test]
-fn what_names_no_tool_keeps_tool_and_place() {
+fn a_call_without_a_tool_keeps_tool_and_position() {
     check(
         Heidenhain,
         &[
             ("TOOL CALL S500\nL X+11\nTOOL CALL Z S500 F200\nL Y+11", &[None, None]),
             ("TOOL CALL 1 Z S500\nL X+11", &[left(PositionUnknown)]),
             ("TOOL CALL S500 DL+1\nL X+1 Y+1 Z+1 A+180 B+0 C+0", &[left(ToolUnknown)]),
-            // Which tool a subprogram leaves behind a speed does not tell.
+            // A speed does not state which tool a subprogram has left.
             (
                 "LBL 1\nTOOL CALL S500\nL X+1 Y+1 Z+1 A+180 B+0 C+0\nTOOL CALL 2 Z\nCALL LBL 1 REP 2",
                 &[left(UnknownFlow), left(Subprogram)],
@@ -128,12 +129,12 @@ fn what_names_no_tool_keeps_tool_and_place() {
 }
 
 #[test]
-fn a_corner_that_is_rounded_or_cut_keeps_its_ends() {
+fn a_rounded_or_chamfered_corner_keeps_its_ends() {
     let path = left(UnsupportedPath);
     for corner in ["RND R2", "RND R2 F100", "CHF 3"] {
         check(Heidenhain, &[(&format!("L X+20\n{corner}\nL Y+30\nL IX+5"), &[None, path, None, None])]);
         assert_eq!(after(&format!("L X+20\n{corner}\nL IY+30"))[2], Ok([20.0, 32.0, 3.0]));
-        // An arc after it begins where the line ends that it rounds.
+        // An arc after it starts at the end of the line that it rounds.
         check(
             Heidenhain,
             &[(
@@ -145,13 +146,13 @@ fn a_corner_that_is_rounded_or_cut_keeps_its_ends() {
 }
 
 #[test]
-fn what_sets_nothing_of_ours_stops_nothing() {
+fn irrelevant_settings_are_ignored() {
     for block in ["L X+11 M120 LA5", "M120 LA5", "QS1 = \"text\"", "QS2 = QS1 || \"T\"", "FUNCTION MODE MILL"]
     {
-        let found = super::certain::reasons(Heidenhain, &format!("{block}\nL X+12"));
+        let found = super::default_deny::reasons(Heidenhain, &format!("{block}\nL X+12"));
         assert!(found.iter().all(Option::is_none), "{block}: {found:?}");
     }
-    // A lathe, or kinematics of which only the name is told.
+    // A lathe, or a kinematic model known only by name.
     for block in ["FUNCTION MODE TURN", "FUNCTION MODE MILL \"HEAD\""] {
         check(Heidenhain, &[(&format!("{block}\nL X+12"), &[left(UnknownWord), left(UnknownWord)])]);
     }

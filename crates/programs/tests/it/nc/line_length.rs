@@ -1,23 +1,23 @@
-//! Lines that become longer than the control takes.
+//! Lines that become longer than the control accepts.
 
 use truegrind_programs::motion::Reason;
 use truegrind_programs::nc::dialect::Dialect::{Fanuc, LinuxCnc, Siemens};
 use truegrind_programs::rewrite::Outcome;
 
-use super::certain::{HEAD, begin};
+use super::default_deny::{HEAD, begin};
 use super::{change_of, rewrite_as};
 
-/// The class: a correction writes more decimals and words, and the line no longer fits the control, which refuses the file or
-/// cuts the line off. Such a motion stays, and so does one whose end only a line that is full could say again.
+/// The class: a correction adds decimals and words until the line no longer fits the control, which refuses the file
+/// or truncates the line. Such a motion is refused, and so is one whose end only a full line could restate.
 #[test]
-fn a_motion_stays_whose_line_would_become_too_long() {
+fn a_motion_whose_line_would_become_too_long_is_refused() {
     for (dialect, most) in [(Siemens, 512), (LinuxCnc, 253), (Fanuc, 2000)] {
         let comment = |text: &str, bytes: usize| format!("{text} ({})", "x".repeat(bytes - text.len() - 4));
         let comment = |text: &str, bytes: usize| match dialect {
             Siemens => comment(text, bytes).replace('(', ";").replace(')', "x"),
             _ => comment(text, bytes),
         };
-        // Eight bytes are left for what grows by seven, or by nine.
+        // Eight bytes are left for growth by seven or nine.
         for (block, fits) in [("X10. Y2. Z3.", true), ("X10. Y20. Z30.5", false)] {
             let full = comment(block, most - if fits { 40 } else { 4 });
             let source = format!("{HEAD}{}{full}\nX50. Y60. Z70.\n", begin(dialect));
@@ -31,7 +31,7 @@ fn a_motion_stays_whose_line_would_become_too_long() {
             assert_eq!(text.contains(&full), stays, "{dialect:?} {text}");
             assert!(dialect == Fanuc || text.lines().all(|line| line.len() < most), "{dialect:?} {text}");
         }
-        // The full line says Y and Z again, which the motion before has moved.
+        // The full line restates Y and Z, which the motion before has changed.
         let full = comment("X10.", most - 4);
         let source = format!("{HEAD}{}X5. Y6. Z7.\n{full}\n", begin(dialect));
         let (text, rewritten) =

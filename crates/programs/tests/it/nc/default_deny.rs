@@ -1,5 +1,5 @@
-//! A motion is changed only where its value and its circumstances are certain: what is not known is listed, what ends one
-//! state does not end another, what is left goes where it always went.
+//! A motion is changed only if its value and modal state are known: unknown words are listed, cancel words end only
+//! their own group, and unmodified motions keep their path.
 
 use truegrind_programs::motion::Reason::{self, *};
 use truegrind_programs::nc::Task;
@@ -11,7 +11,7 @@ use super::{change_of, ends, moved, rewrite_as};
 
 pub(super) const HEAD: &str = "; truegrind angles wpr\n; truegrind tool T0 t [[0,0,100],[1,0,0,0]]\n; truegrind tool T1 t [[0,0,50],[1,0,0,0]]\n; truegrind frame G54 w [[500,0,0],[1,0,0,0]]\n; truegrind frame G55 v [[500,0,0],[0.7071068,0,0,0.7071068]]\n; truegrind frame G500 w [[500,0,0],[1,0,0,0]]\n";
 
-/// What begins a program so that its first motion is certain.
+/// The head of a program, so that its first motion has a known state.
 pub(super) fn begin(dialect: Dialect) -> &'static str {
     match dialect {
         Fanuc => "G90 G21 G17 G54\nG43.4 H1\nG1 X1. Y2. Z3. A180. B0. C0. F600.\n",
@@ -21,13 +21,13 @@ pub(super) fn begin(dialect: Dialect) -> &'static str {
     }
 }
 
-/// The motions after the first one: `None` where they would be changed.
+/// The motions after the first one: `None` if they would be changed.
 pub(super) fn reasons(dialect: Dialect, body: &str) -> Vec<Option<Reason>> {
     let source = format!("{HEAD}{}{body}\n", begin(dialect));
     let setup = Setup { dialect: Some(dialect), ..Setup::default() };
     let task = Task::read(&[("x", source.as_bytes())], &setup);
     let found: Vec<_> = task.listing.motions.iter().map(|motion| motion.reason()).collect();
-    // An arc that stays keeps the first motion where it was.
+    // An unmodified arc pins the end of the first motion.
     assert!(matches!(found[0], None | Some(BeforeUnmodifiedArc | BeforeUnmodifiedPath)), "{body}: {found:?}");
     found[1..].to_vec()
 }
@@ -48,7 +48,7 @@ pub(super) const G: &str = "G1 X5 Y5 Z5 A180 B0 C0";
 pub(super) const S: &str = "G1 X5 Y5 Z5 A=180 B=0 C=0";
 
 #[test]
-fn words_that_are_not_known_are_never_passed_over() {
+fn unknown_words_are_never_ignored() {
     let unknown: &[Option<Reason>] = &[left(UnknownWord), left(UnknownWord)];
     for code in ["G999", "G999 X9.", "G5.4 X9.", "G12.7", "G141 X9.", "G43.7 H1"] {
         check(Fanuc, &[(&format!("{code}\n{F}"), unknown)]);
@@ -63,14 +63,14 @@ fn words_that_are_not_known_are_never_passed_over() {
     {
         check(Heidenhain, &[(&format!("{block}\nL X+5 Y+5 Z+5 A+180 B+0 C+0"), unknown)]);
     }
-    // A computed code may be any; what it set holds on until each is said again.
+    // A computed code may be any; each group stays unknown until it is stated again.
     check(LinuxCnc, &[(&format!("G[#<c>]\n{G}"), &[left(UnknownVariable), left(UnknownVariable)])]);
-    // A value that is worked out is as good as a written one.
+    // A computed value is as good as a literal.
     check(LinuxCnc, &[("#1=0\nG[#1] X5", &[None])]);
 }
 
 #[test]
-fn states_end_with_their_own_word() {
+fn each_group_ends_with_its_own_cancel_word() {
     let t = left(Transformed);
     check(
         Fanuc,
@@ -124,7 +124,7 @@ fn states_end_with_their_own_word() {
 }
 
 #[test]
-fn where_the_tool_stands_is_not_known_after_what_changes_coordinates() {
+fn the_position_is_unknown_after_a_change_of_coordinates() {
     let p = left(PositionUnknown);
     let o = left(OrientationUnknown);
     check(
@@ -135,7 +135,7 @@ fn where_the_tool_stands_is_not_known_after_what_changes_coordinates() {
             ("G1 U-2.\nX5.", &[left(ExternalOnly), p]),
             ("X30. ,A45.\nX5.", &[left(UnsupportedPath), p]),
             (&format!("/M99 P100\nG55\nN100 {F}"), &[left(UnknownFlow)]),
-            // In a program that leaves G91 behind, where a first block of a subprogram leads is not known.
+            // In a program that leaves G91 active, the first block of a subprogram has an unknown end.
             (
                 "M98 P1000\nM30\nO1000\nX5.\nG1 X5. Y5. Z5. A180. B0. C0.\nG91 X1.\nM99",
                 &[left(Subprogram), left(UnknownFlow), left(UnknownFlow), left(UnknownFlow)],
@@ -151,13 +151,13 @@ fn where_the_tool_stands_is_not_known_after_what_changes_coordinates() {
             ("T1 M6\nX5 Y5 Z5", &[o]),
             ("G53 G0 X4 A10\nG1 X5 Y5 Z5", &[left(MachineCoordinates), o]),
             ("X1.2.3\nX5", &[left(Unreadable), p]),
-            // Of what a program says before its ways part only the last counts.
+            // Before the first branch only the last setting counts.
             (&format!("G49\nT1 M6\nG43 H1\n{G}\no100 while [#1 lt 5]\no100 endwhile\n{G}"), &[None, None]),
             (
                 &format!("o100 while [#1 lt 5]\nG91 {G}\no100 endwhile\n{G}"),
                 &[left(UnknownFlow), left(UnknownFlow)],
             ),
-            // R, I and K of a straight block round or cut its corner.
+            // R, I and K of a straight block round or chamfer its corner.
             ("X5 R2\nG0 X6 K1\nX7", &[left(UnsupportedPath), left(UnsupportedPath), None]),
             ("X EXISTS[#<a>]\nX5", &[left(UnknownVariable), None]),
         ],
@@ -180,7 +180,7 @@ fn where_the_tool_stands_is_not_known_after_what_changes_coordinates() {
             ("L X+5 M99\nL Y+5", &[left(Cycle), p]),
             ("M118 X1 Y1\nL Z+5", &[None]),
             ("L X+5 F AUTO\nL X+6 FQ5", &[None, None]),
-            // A jump may pass over what is set after it.
+            // A jump may bypass later settings.
             (
                 "FN 9: IF +Q1 EQU +Q2 GOTO LBL 5\nTOOL CALL 2 Z\nLBL 5\nL X+1 Y+1 Z+1 A+180 B+0 C+0",
                 &[left(UnknownFlow)],
@@ -190,7 +190,7 @@ fn where_the_tool_stands_is_not_known_after_what_changes_coordinates() {
 }
 
 #[test]
-fn tools_and_offsets_that_the_program_sets_are_not_those_from_outside() {
+fn assigned_tools_and_offsets_override_the_setup() {
     let (w, t) = (left(WorkObjectAssigned), left(ToolAssigned));
     check(
         Fanuc,
@@ -213,7 +213,7 @@ fn tools_and_offsets_that_the_program_sets_are_not_those_from_outside() {
             (&format!("G10 L20 P1 X0 Y0 Z0\n{G}"), &[w]),
             (&format!("G10 L2 P[#9] X1 Y1 Z1\n{G}"), &[w]),
             (&format!("G10 L2 P1 X510 Y0 Z0 A10\n{G}"), &[w]),
-            // What turns A, B and C stays until it is taken back, whatever is said of X, Y, Z and R.
+            // Rotary offsets stay until they are taken back, whatever is stated for X, Y, Z and R.
             (&format!("G10 L2 P1 A10\nG10 L2 P1 X510 Y0 Z0 R0\n{G}"), &[w]),
             (&format!("G10 L20 P1 A10\nG10 L2 P1 X510 Y0 Z0 R0\n{G}"), &[w]),
             (&format!("#5224=5\nG10 L2 P1 X510 Y0 Z0 R0\n{G}"), &[w]),
@@ -248,7 +248,7 @@ fn tools_and_offsets_that_the_program_sets_are_not_those_from_outside() {
 }
 
 #[test]
-fn values_are_those_of_the_control() {
+fn values_are_evaluated_as_by_the_control() {
     let after = |body: &str, dialect| ends(&format!("{}{body}\n", begin(dialect)), dialect)[1..].to_vec();
     let at = |x, y, z| Ok([x, y, z]);
     // LinuxCNC reads the whole line before it assigns.
@@ -271,7 +271,7 @@ fn values_are_those_of_the_control() {
 }
 
 #[test]
-fn numbers_and_words_that_do_not_fit_are_never_edited() {
+fn unreadable_numbers_and_words_are_never_edited() {
     for block in ["X1.2.3", "X21,5", "X22 5 7", "X10 X12", "G0 G1 X5", "XY5.", "X +0. 12 34"] {
         for dialect in [Iso, LinuxCnc, Fanuc] {
             let source = format!("{HEAD}{}{block}\nG1 X9. Y9. Z9. A180. B0. C0.\n", begin(dialect));
@@ -301,14 +301,14 @@ fn every_block_that_moves_is_listed() {
     check(Siemens, &[("MYSUB P3\nG1 X5", &[left(Subprogram), left(UnknownFlow)])]);
     check(Siemens, &[("MCALL CYCLE81(50,0,2,-5)\nX5\nMCALL\nX6 Y6 Z6", &[left(Cycle), None])]);
     check(Heidenhain, &[("X+20\nL Y+5\nB+10 C+170 FMAX\nL X+1", &[None, None, None, None])]);
-    // A unit is a unit only where it is one.
+    // A unit only where it is one.
     check(Fanuc, &[(&format!("G70 I5. J30. L6\n{F}"), &[left(Cycle), None])]);
     check(Iso, &[(&format!("G71\n{G}"), &[None])]);
     check(LinuxCnc, &[("G28.1\nX5\nG30.1\nX6", &[None, None])]);
 }
 
 #[test]
-fn the_name_of_a_file_tells_its_control_where_the_text_does_not() {
+fn the_extension_determines_the_dialect_where_the_text_does_not() {
     for (name, text, dialect) in [
         ("a.ngc", "#3=15\nG1 X#3\n", LinuxCnc),
         ("a.nc", "#3=15\nG1 X#3\n", Fanuc),
@@ -321,11 +321,11 @@ fn the_name_of_a_file_tells_its_control_where_the_text_does_not() {
     ] {
         assert_eq!(Dialect::of_named(name, text.as_bytes()), dialect, "{name} {text}");
     }
-    // DIN/ISO of Heidenhain has other meanings: nothing of it is changed.
+    // DIN/ISO of Heidenhain has other meanings: nothing is changed.
     let task =
         Task::read(&[("a.nc", b"%X G71 *\nN1 G54 X+10 Y+5 *\nN2 G01 X+1 Y+2 Z+3 *\n")], &Setup::default());
     assert!(task.listing.motions.iter().all(|motion| motion.left == Some(UnknownWord)));
-    // A text that is no program moves nothing.
+    // A text that is no program has no motions.
     for text in ["Dear reader,\nnothing here moves.\n", "q1_deg,q2_deg,x_mm\n0,1,2\n3.5,4,5\n"] {
         let task = Task::read(&[("a.txt", text.as_bytes())], &Setup::default());
         assert!(task.listing.motions.is_empty(), "{text}: {:?}", task.listing.motions);
@@ -337,7 +337,7 @@ fn the_name_of_a_file_tells_its_control_where_the_text_does_not() {
 }
 
 #[test]
-fn what_is_left_goes_where_it_always_went() {
+fn unmodified_motions_keep_their_end_points() {
     let go = |dialect, body: &str, motion| {
         let source = format!("{HEAD}{}{body}\n", begin(dialect));
         let (text, rewritten) =
@@ -348,14 +348,14 @@ fn what_is_left_goes_where_it_always_went() {
     assert_eq!(text, ["G1 X#100 Y2.0000 Z3.0000", "X5"]);
     let (text, _) = go(LinuxCnc, "/X35\nX5 Y5", 0);
     assert_eq!(text, ["/X35 Y2.0000 Z3.0000", "X5 Y5 Z3.0000"]);
-    // An increment that stays counts from where the tool stands now.
+    // An increment of an unmodified motion is relative to the commanded position.
     let (text, _) = go(Siemens, "G91 X5 RND=2\nX5", 0);
     assert_eq!(text[1..], ["G91 X4.5000 Y0.2500 Z-0.1250 RND=2", "X5"]);
-    // No centre in a C block of Heidenhain, and nothing that moves its start.
+    // No centre in a C block of Heidenhain, and no change of its start.
     let source = format!("{HEAD}{}CC X+20 Y+2\nC X+39 Y+2 DR-\nL X+30\n", begin(Heidenhain));
     let (text, _) = rewrite_as(&source, Heidenhain, |listing| moved(listing, [0.5, 0.0, 0.0]));
     assert_eq!(text, source.replace("L X+30", "L X+30.5000"));
-    // A whole turn that rises, of which start and end move apart, is refused with the motion before it.
+    // A helical full turn whose ends move apart is refused together with the motion before it.
     let source = format!("{HEAD}{}G3 X1 Y2 Z-3 I5 J0\nG1 X5\n", begin(LinuxCnc));
     let (text, rewritten) = rewrite_as(&source, LinuxCnc, |listing| {
         vec![
@@ -369,7 +369,7 @@ fn what_is_left_goes_where_it_always_went() {
         [Outcome::Refused(BeforeUnmodifiedArc), Outcome::Refused(WrongShape)]
     );
     assert_eq!(text, source.replace("G1 X5\n", "G1 X5.5000\n"));
-    // Without TRAORI a tool vector is no word.
+    // Without TRAORI a tool vector is not a word.
     let vector = "TRAORI\nG1 X1 Y2 Z3 A3=0 B3=0.3 C3=0.95 THETA=0 F600\n";
     let source = format!("{HEAD}{vector}TRAFOOF\nG1 X5 Y5 Z5\n");
     let (text, _) = rewrite_as(&source, Siemens, |listing| vec![change_of(listing, 0, [0.5, -0.25, 0.125])]);
@@ -389,21 +389,21 @@ fn what_is_left_goes_where_it_always_went() {
     assert_eq!(Reason::BeforeUnmodifiedArc.text(), "an unmodified arc starts at the end of this motion");
 }
 
-/// The class: a word that holds on, in a block that is left before its words are taken. What it set is not known after it.
+/// The class: a modal word in a block that is left before its words are interpreted. Its value is unknown afterwards.
 #[test]
-fn the_turn_about_the_tool_that_a_left_block_states_holds_on() {
+fn the_spin_of_a_left_block_stays_in_effect() {
     let head = "TRAORI\nG0 X1 Y2 Z3 A3=0 B3=0.3 C3=0.95 THETA=10 F600\n/G1 Y5\n";
     let tail = "G1 X9 Y9 Z9 A3=0.1 B3=0 C3=0.99";
     let last = |between: &str| *reasons(Siemens, &format!("{head}{between}{tail}")).last().unwrap();
-    // Whether G0 or G1 holds is not known there: the block is left.
+    // It is unknown there whether G0 or G1 is active: the block is left.
     assert_eq!(last("THETA=5\n"), Some(OrientationUnknown));
     assert_eq!(last("THETA=5\nG1 THETA=5\n"), None);
     assert_eq!(last(""), None);
 }
 
-/// The class: a work offset or a tool that a called program sets anew, under the name that held before the call.
+/// The class: a work offset or tool that a called program assigns, under the name active before the call.
 #[test]
-fn what_a_called_program_assigns_is_not_known_after_the_call() {
+fn assignments_of_a_called_program_are_unknown_after_the_call() {
     let all = "G1 X1. Y1. Z1. A180. B0. C0. F600.";
     let after = |early: &str, set: &str| {
         let begin = "G90 G21 G17 G40 G94\nT1 M6\nG54\nG43.4 H1";
@@ -420,13 +420,13 @@ fn what_a_called_program_assigns_is_not_known_after_the_call() {
         assert_eq!(after("", set), Some(WorkObjectAssigned), "{set}");
     }
     assert_ne!(after("", "G10 L11 P1 R50."), None, "the length of the tool");
-    // What is set before ways part, and nowhere else, holds wherever they meet.
+    // A value set before the first branch, and nowhere else, holds at every join.
     assert_eq!(after("G10 L2 P1 X500. Y0. Z200.", "G4 X1."), None);
     assert_eq!(after("G10 L2 P1 X500. Y0. Z200.", "G10 L2 P1 X500. Y0. Z200."), Some(WorkObjectAssigned));
 }
 
 #[test]
-fn a_cycle_whose_line_breaks_off_is_no_panic() {
+fn a_truncated_cycle_does_not_panic() {
     for line in [
         "CYCL",
         "CYCL DEF",
@@ -446,12 +446,11 @@ fn a_cycle_whose_line_breaks_off_is_no_panic() {
     }
 }
 
-/// The class: something is set while another thing that it hangs on is in doubt (ways have met, or a label is reached from
-/// elsewhere), and counts as known from then on, with what holds on one of the ways. A length in a unit that is not known, one
-/// axis of a shift, the length of a tool but not which tool, the tool but not which length, the plane but not how centres are
-/// counted.
+/// The class: a group is set while another group that it depends on is unknown (after a join), and is taken as known
+/// although it holds on one path only: a length in an unknown unit, one axis of a shift, the tool length but not the
+/// tool, the tool but not its length, the plane but not the arc centre mode.
 #[test]
-fn what_is_set_in_part_leaves_the_rest_in_doubt() {
+fn a_partial_setting_leaves_the_rest_unknown() {
     let u = left(UnknownFlow);
     let skips = |what: &str| format!("IF [#1 GT 0.] GOTO 10\n{what}\nN10 ");
     check(
@@ -459,10 +458,10 @@ fn what_is_set_in_part_leaves_the_rest_in_doubt() {
         &[
             (&format!("{}G52 X10.\nG21\n{F}\nG52 X0. Y0. Z0.\n{F}", skips("G20")), &[u, None]),
             (&format!("{}G52 X10.\n{F}\nG52 X10. Y0. Z0.\n{F}", skips("G52 Y50.")), &[u, None]),
-            // On the second way an origin is set as well: what G52 makes of it differs from control to control.
+            // The second path also sets an origin: the effect of G52 then differs between controls.
             (&format!("N5 G52 X1. Y2. Z3.\n{F}\nG92 X1.\nGOTO 5"), &[left(Displacement)]),
             (&format!("{}G43.4 H1\n{F}", skips("T1 M6")), &[u]),
-            // What M6 brings in has been made ready elsewhere.
+            // The tool that M6 changes to was prepared elsewhere.
             (&format!("N5 M6\nG43.4 H1\n{F}\nT2\nIF [#1 GT 0.] GOTO 5"), &[left(ToolUnknown)]),
         ],
     );
@@ -491,10 +490,11 @@ fn what_is_set_in_part_leaves_the_rest_in_doubt() {
     );
 }
 
-/// The class: a word whose counting (G90, G91) is in doubt is taken for a place, and what follows it for independent of what
-/// is before. It may be an increment: a path that stays and begins behind it begins where the motion before has led.
+/// The class: a word with unknown distance mode (G90, G91) is taken as absolute, and the motions after it as
+/// independent of those before. It may be an increment: then an unmodified path after it starts where the motion
+/// before has led.
 #[test]
-fn a_word_that_may_be_an_increment_hands_on_where_it_begins() {
+fn a_word_that_may_be_an_increment_depends_on_its_start() {
     let source = format!(
         "{HEAD}{}X5 Y0 Z0\nIF R1>0\nG91\nENDIF\nX3 Y3 Z3\nG90\nCIP X9 Y9 I1=6 J1=7 K1=3\n{S}\n",
         begin(Siemens)
@@ -505,7 +505,7 @@ fn a_word_that_may_be_an_increment_hands_on_where_it_begins() {
 }
 
 #[test]
-fn names_that_move_nothing_are_listed_with_where_they_stand() {
+fn harmless_names_are_listed_with_their_uses() {
     let lines = include_str!("../../../src/nc/siemens.txt").lines().filter(|line| !line.starts_with('#'));
     let listed: Vec<(&str, &str)> = lines.map(|line| line.split_once(' ').unwrap()).collect();
     assert!(listed.windows(2).all(|two| two[0].0 < two[1].0));

@@ -1,4 +1,4 @@
-//! A path that is left goes where it always went: its start and the words that it leaves out.
+//! An unmodified path does not change: neither its start nor the words that it omits.
 
 use proptest::prelude::*;
 use truegrind_programs::motion::Reason::*;
@@ -7,10 +7,10 @@ use truegrind_programs::nc::dialect::Dialect::{self, Fanuc, Heidenhain, LinuxCnc
 use truegrind_programs::nc::setup::Setup;
 use truegrind_programs::rewrite::Outcome;
 
-use super::certain::{HEAD, begin, check, left};
+use super::default_deny::{HEAD, begin, check, left};
 use super::{moved, rewrite_as};
 
-/// The text after a rewrite of everything that can be, without its head.
+/// The text after a rewrite of everything possible, without its head.
 fn rewritten(dialect: Dialect, body: &str) -> String {
     let source = format!("{HEAD}{}{body}\n", begin(dialect));
     let (text, _) = rewrite_as(&source, dialect, |listing| moved(listing, [0.5, -0.25, 0.125]));
@@ -18,14 +18,14 @@ fn rewritten(dialect: Dialect, body: &str) -> String {
 }
 
 #[test]
-fn the_start_of_a_path_that_is_left_stays() {
+fn the_start_of_an_unmodified_path_is_pinned() {
     let path = left(BeforeUnmodifiedPath);
     let other = left(UnsupportedPath);
     check(
         Siemens,
         &[
             ("X10\nX20\nCIP X40 Y0 I1=30 J1=10 K1=50\nG1 X50 Y0 Z50", &[None, path, other, None]),
-            // A path that goes on in the direction of the motion before needs the start of that as well.
+            // A tangential path also needs the start of the motion before.
             ("X10\nX20\nX30\nCT X60 Y10", &[None, path, path, other]),
             ("X10\nX20\nX30 ANG=45", &[None, path, other]),
         ],
@@ -41,21 +41,21 @@ fn the_start_of_a_path_that_is_left_stays() {
     check(LinuxCnc, &[("X10\nX20\nG5.1 X30 Y5 I2 J3", &[None, path, other])]);
 }
 
-/// What a path that stays needs of one axis hangs on every axis of the motions before a turn of the frame.
+/// After a rotation of the frame, a path that needs one axis depends on every axis of the motions before.
 #[test]
-fn a_turned_frame_passes_on_every_axis() {
+fn a_rotated_frame_mixes_the_axes_of_a_dependency() {
     let (path, open) = (left(BeforeUnmodifiedPath), left(PositionUnknown));
     let cip = "CIP X40 Y0 I1=30 J1=10 K1=50";
     let turned = format!("X10 Y5\n$P_PFRAME=CTRANS(X,10)\nX20\nAROT Z90\nY=30 Z5\n{cip}");
     let plain = format!("X10 Y5\nX20 Y10 Z1\nX30 Y12 Z2\n{cip}");
     let listed = [path, open, open, left(UnsupportedPath)];
-    // Without a turn each axis stands for itself: what states all of them ends where it says.
+    // Without a rotation the axes are independent: a motion that states all of them ends where it states.
     check(Siemens, &[(&turned, &listed), (&plain, &[None, None, path, left(UnsupportedPath)])]);
 }
 
-/// The same where the motion comes from a jump: what a path that stays hangs on is followed on every way to it.
+/// The same after a jump: the dependencies of an unmodified path are tracked over every path to it.
 #[test]
-fn a_turned_frame_passes_on_every_axis_of_what_was_before_a_jump() {
+fn a_rotated_frame_mixes_the_axes_across_a_jump() {
     let body = |turn: &str| {
         format!(
             "R2=5\nX10 Y5 Z1\nIF R2<>0 GOTOF M_1\nX11 Y6 Z2\nM_1:\nG1 X20 Z4\n{turn}\nY=R2\n\
@@ -68,7 +68,7 @@ fn a_turned_frame_passes_on_every_axis_of_what_was_before_a_jump() {
 }
 
 #[test]
-fn words_that_such_a_path_leaves_out_hold_what_they_held() {
+fn omitted_words_of_unmodified_paths_keep_their_values() {
     assert_eq!(
         rewritten(Siemens, "X10\nX20\nCIP X40 Y0 I1=30 J1=10 K1=50"),
         "X10.5000\nX20 Y2.0000 Z3.0000\nCIP X40 Y0 I1=30 J1=10 K1=50\n"
@@ -79,10 +79,10 @@ fn words_that_such_a_path_leaves_out_hold_what_they_held() {
     );
 }
 
-/// The class: a block that may be skipped states an axis, and the place before it has moved. What comes next says it again, so
-/// that an origin that is set there, or a motion that leaves the axis out, is where it always was.
+/// The class: a block that may be skipped states an axis that the motion before has changed. The next block restates
+/// it, so that an origin set there, or a motion that omits the axis, is unchanged.
 #[test]
-fn what_a_block_states_that_may_be_skipped_is_said_again() {
+fn words_of_a_skippable_block_are_restated() {
     let text = rewritten(LinuxCnc, "X10\n/X10\nY5\nG5.1 X30 Y15 I2 J3");
     let lines: Vec<&str> = text.lines().collect();
     assert!(lines[0].starts_with("X10.5000") && lines[1].starts_with("/X10"), "{text}");
@@ -90,12 +90,12 @@ fn what_a_block_states_that_may_be_skipped_is_said_again() {
 }
 
 #[test]
-fn a_cycle_runs_where_it_always_ran() {
+fn a_cycle_runs_at_its_original_position() {
     assert_eq!(rewritten(Heidenhain, "L X+4 M99\nL IX+2 M99"), "L X+4 Y+2.0000 Z+3.0000 M99\nL IX+2 M99\n");
 }
 
 #[test]
-fn blocks_that_take_no_other_words_are_written_as_they_were() {
+fn blocks_that_accept_no_added_words_are_unmodified() {
     for block in ["X+20 R+", "LN X+20 NX+0.1 NY+0 NZ+0.995"] {
         let body = format!("L X+4 Y+5\nL X+10\n{block}\nL X+1 R0\n");
         let expected = format!("L X+4.5000 Y+4.7500\nL X+10 Y+5.0000 Z+3.0000\n{block}\nL X+1 R0\n");
@@ -109,14 +109,14 @@ fn blocks_that_take_no_other_words_are_written_as_they_were() {
 }
 
 #[test]
-fn a_shift_that_has_moved_with_the_tool_moves_nothing_that_is_left() {
-    // G92 calls a place X0 that is now 0.5 mm on; G52 says its shift whole.
+fn a_displaced_g92_shift_moves_no_unmodified_motion() {
+    // G92 names a position X0 that is now displaced by 0.5 mm; G52 states its shift in full.
     assert_eq!(rewritten(LinuxCnc, "G92 X0\nX10\nG52 X4\nX3"), "G92 X0\nX10\nG52 X4\nX3.5000\n");
     assert_eq!(rewritten(LinuxCnc, "G92 X0\n/X7"), "G92 X0\n/X6.5000 Y2.0000 Z3.0000\n");
 }
 
 #[test]
-fn a_tool_vector_that_is_left_out_is_said_again() {
+fn an_omitted_tool_vector_is_restated() {
     let source = format!(
         "{HEAD}G90 G71 G17 G54\nTRAORI\nG1 X10 Y0 Z50 A3=0 B3=0 C3=1 THETA=0 F600\nG1 X9 Y1 RND=2\nX10 Y0 Z50\n/X5\nX6 A3=0 B3=0 C3=1\n"
     );
@@ -138,14 +138,14 @@ fn a_tool_vector_that_is_left_out_is_said_again() {
     let again = "A3=0.0000000 B3=0.0000000 C3=1.0000000 THETA=0.000000";
     assert_eq!(line("G1 X9"), format!("G1 X9 Y1 {again} RND=2"));
     assert_eq!(line("/X5"), format!("/X5 {again}"));
-    // After a block that may be skipped both are said.
+    // After a block that may be skipped both are stated.
     assert!(line("X6").contains("THETA="), "{text}");
 }
 
-/// The class: words that are left out are taken from a memory that the control does not have. Where the tool is turned by
-/// a vector, by angles of axes or by A2, B2, C2, the words of the other two hold nothing that is known.
+/// The class: omitted words are taken from values that the control does not store. Where a vector, angles of axes or
+/// A2, B2, C2 state the orientation, the words of the other two have no known values.
 #[test]
-fn angles_from_before_a_tool_vector_are_not_remembered() {
+fn angles_before_a_tool_vector_are_unknown_after_it() {
     for (dialect, turn, block) in [
         (Heidenhain, "LN X+4 Y+5 Z+6 TX+0 TY+0 TZ+1", "L X+7 Y+8 Z+9 B+10"),
         (Siemens, "X4 Y5 Z6 A3=0 B3=0 C3=1", "X7 Y8 Z9 B=10"),
@@ -154,15 +154,15 @@ fn angles_from_before_a_tool_vector_are_not_remembered() {
         let text = rewritten(dialect, &format!("{turn}\n{block}"));
         assert_eq!(text.lines().last(), Some(block), "{text}");
     }
-    // An increment of which the turn is not known stays, and with it the place that it counts from.
+    // An increment with unknown orientation is unmodified, and so is the motion that it is relative to.
     let text = rewritten(Heidenhain, "LN X+4 Y+5 Z+6 TX+0 TY+0 TZ+1\nL IX-10 B+0");
     assert_eq!(text, "LN X+4 Y+5 Z+6 TX+0 TY+0 TZ+1\nL IX-10 B+0\n");
 }
 
-/// The class: a word that may say nothing, because its variable has never been set, is taken to say something. The block may
-/// not move at all: nothing is put into it, and what begins there hangs on the motion before.
+/// The class: a word that the control may ignore, because its variable has never been set, is taken as stated. The
+/// block might not move at all: no word is added to it, and what starts there depends on the motion before.
 #[test]
-fn a_block_that_may_not_move_gets_no_words() {
+fn a_block_that_might_not_move_gets_no_words() {
     let head = "X4. Y5. Z6.\n";
     for block in ["G0 Y#149", "G1 X10. Y#149", "G1 A#149", "/G0 Y#149", "G0 Z-#149"] {
         let text = rewritten(Fanuc, &format!("{head}{block}\nG1 X7. Y8. Z9. A180. B0. C0."));
@@ -170,7 +170,7 @@ fn a_block_that_may_not_move_gets_no_words() {
         assert_eq!(lines[..2], ["X4.5000 Y4.7500 Z6.1250", block], "{text}");
         assert_eq!(lines[2], "G1 X7.5000 Y7.7500 Z9.1250 A180. B0. C0.");
     }
-    // An arc that stays begins where such a block ends, or the one before it.
+    // An unmodified arc starts at the end of such a block, or of the one before it.
     let text = rewritten(Fanuc, &format!("{head}G0 Y#149\nG2 X14. Y5. I5."));
     assert_eq!(text, "X4. Y5. Z6.\nG0 Y#149\nG2 X14. Y5. I5.\n");
     // A variable that is set has a value.
@@ -224,7 +224,7 @@ proptest! {
             let off = (0..3).map(|axis| (b[axis] - at(axis)).abs()).fold(0.0, f64::max);
             prop_assert!(off < 1e-3, "motion {} is off by {}\n{}\n{}", index, off, source, text);
             prop_assert!((0..4).all(|i| (qa[i] - qb[i]).abs() < 1e-6), "motion {}\n{}\n{}", index, source, text);
-            // Where a path that is neither line nor arc begins nothing has moved.
+            // At the start of a path that is neither line nor arc nothing has moved.
             let path = before.listing.motions.get(index + 1);
             if let Some(path) = path
                 && path.left == Some(UnsupportedPath)

@@ -1,4 +1,4 @@
-//! What holds where a motion runs: switches and data that other ways, other routines or the controller may change.
+//! The modal state of motions: switches and data that other paths, other routines or the controller may change.
 
 use truegrind_programs::motion::{Reason, TargetValue};
 use truegrind_programs::rapid::Task;
@@ -38,7 +38,7 @@ fn follows(body: &str) -> Vec<bool> {
     task.listing.motions.iter().map(|motion| motion.previous.is_some()).collect()
 }
 
-/// The heights of the motions of main above 300 mm, or why they are not known.
+/// The heights of the motions of main above 300 mm, or why they are unknown.
 fn heights(body: &str, more: &str) -> Vec<Result<f64, Reason>> {
     let source = module(&format!("{more}\nPROC main()\n{body}\nENDPROC"));
     let task = Task::read(&[("m.mod", source.as_bytes())]);
