@@ -1,9 +1,9 @@
-//! Where tools and work objects come from: the cell file.
+//! The cell file: origins of tools and work objects.
 //!
-//! A frame from *metrology* (CAD, a measuring machine, a tracker) is true as it stands. A frame that was *taught* with
-//! the uncalibrated arm stands where the nominal model put it; the estimated model, given the same joint angles, says
-//! where it truly is ([`crate::frames::taught`]). A taught frame without its teaching points cannot be moved: the difference is
-//! estimated and stated instead.
+//! A frame from *metrology* (CAD, a measuring machine, a tracker) is exact. A frame *taught* with the uncalibrated arm is
+//! where the nominal model put it; the estimated model, given the same joint angles, determines its real pose
+//! ([`crate::frames::taught`]). A taught frame without its teaching points cannot be moved: the difference is estimated and
+//! reported instead.
 //!
 //! ```toml
 //! [[tool]]
@@ -45,31 +45,31 @@ use truegrind_programs::nc::setup;
 use truegrind_surfaces::SurfaceFile;
 use truegrind_surfaces::file::Origin;
 
-/// Which frame of a work object its teaching points make.
+/// Which frame of a work object its teaching points define.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Teaches {
-    /// The user frame, as the controller's three-point method: the object frame and program displacements stay on top of it.
+    /// The user frame, as in the controller's three-point method; object frame and program displacements apply on top of it.
     #[default]
     Uframe,
-    /// The object frame: user and object frame together stand where the points were touched, displacements on top.
+    /// The object frame: user and object frame together are at the touched points, displacements on top.
     Oframe,
 }
 
-/// How a frame was obtained.
+/// Origin of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum FrameOrigin {
-    /// From CAD or measured by other means: true as it stands.
+    /// From CAD or measured by other means: exact.
     Metrology,
     /// Taught with the uncalibrated arm.
     Taught,
 }
 
 impl FrameOrigin {
-    /// As files say it.
+    /// The word used in files.
     fn word(self) -> &'static str {
         match self {
             FrameOrigin::Metrology => "metrology",
@@ -91,35 +91,35 @@ impl From<Origin> for FrameOrigin {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CellFrame {
-    /// Name in the program; letters count the same in either case.
+    /// Name in the program, case-insensitive.
     pub name: String,
-    /// How it was obtained.
+    /// Its origin.
     pub origin: FrameOrigin,
-    /// Controller joint angles (°) of the teaching points. A tool that the robot holds: four or more poses with the TCP
-    /// at one fixed point. A tool that stands: one or more poses in which the tool named in `taught_with` touches its tip,
-    /// or four or more with one and the same tip on the robot. A work object: three poses, first and second on its x axis,
-    /// the third on its y axis, touched by the tool named in `taught_with` (where the robot holds the part, by a tool that
-    /// stands).
+    /// Controller joint angles (°) of the teaching points. A tool that the robot holds: four or more poses with the TCP at
+    /// one fixed point. A stationary tool: one or more poses in which the tool named in `taught_with` touches its tip, or
+    /// four or more with one and the same tip on the robot. A work object: three poses, the first two on its x axis, the
+    /// third on its y axis, touched by the tool named in `taught_with` (where the robot holds the part, by a stationary
+    /// tool).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub teaching_deg: Vec<[f64; 6]>,
-    /// The tool that touched the teaching points. Where a work object names none, it is the one tool of program and cell
-    /// file, apart from tool0; with several it must be named.
+    /// The tool that touched the teaching points. Where a work object names none, the only tool of program and cell file
+    /// other than tool0; with several it must be named.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub taught_with: Option<String>,
-    /// Which frame of a work object the teaching points make; the user frame where left out.
+    /// Which frame of a work object the teaching points define; by default the user frame.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub teaches: Option<Teaches>,
-    /// Where it lies (mm), for NC programs, which name tools and work offsets (`T1`, `G54`) without saying where they are:
-    /// a tool on the flange, a work object in the base. A RAPID program says it itself, and must say the same.
+    /// Position (mm) for NC programs, which name tools and work offsets (`T1`, `G54`) without their values: a tool on the
+    /// flange, a work object in the base. A RAPID program states it itself, and the two must agree.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub position_mm: Option<[f64; 3]>,
-    /// How it is turned, w, x, y, z; not at all where left out.
+    /// Orientation, w, x, y, z; by default none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub quaternion_wxyz: Option<[f64; 4]>,
 }
 
 impl CellFrame {
-    /// One of which nothing but the origin is known.
+    /// A frame of which only the origin is known.
     pub fn of(name: impl Into<String>, origin: FrameOrigin) -> Self {
         Self {
             name: name.into(),
@@ -132,7 +132,7 @@ impl CellFrame {
         }
     }
 
-    /// Where the file says it lies.
+    /// The pose stated in the file.
     pub fn pose(&self) -> Option<Pose> {
         let [w, x, y, z] = self.quaternion_wxyz.unwrap_or([1.0, 0.0, 0.0, 0.0]);
         let turn = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
@@ -140,50 +140,50 @@ impl CellFrame {
     }
 }
 
-/// Why a cell file cannot be used.
+/// Reason why a cell file cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum CellError {
-    /// More teaching points of tools than can be worked through.
+    /// More teaching points of tools than can be processed.
     #[error(
         "tool \"{name}\": {points} teaching points, and the squares of these numbers are {work} for all tools together, \
          expected at most {MOST_TEACHING}: four to ten points tell a TCP, keep those that differ most"
     )]
     TooManyPoints {
-        /// The tool with the most.
+        /// The tool with the most points.
         name: String,
         /// Its points.
         points: usize,
-        /// The sum of the squares.
+        /// Sum of the squares.
         work: usize,
     },
-    /// A convention of angles that is none.
+    /// An unknown angle convention.
     #[error("angles = \"{found}\": expected one of {}", Angles::words())]
     Angles {
-        /// What stands there.
+        /// The word found.
         found: String,
     },
-    /// Not TOML, or a key that is missing, misspelt or of the wrong type.
+    /// Not TOML, or a missing, misspelt or mistyped key.
     #[error("not a cell file: {0}")]
     Syntax(String),
-    /// Keys of a frame that do not go together, or a number that cannot be.
+    /// Inconsistent keys of a frame, or an impossible number.
     #[error("{kind} \"{name}\": {what}")]
     Frame {
         /// `tool` or `wobj`.
         kind: &'static str,
         /// Its name.
         name: String,
-        /// The key and what is wrong.
+        /// The key and its fault.
         what: String,
     },
-    /// One frame under two names that mean the same.
+    /// One frame under two equivalent names.
     #[error("{kind} \"{name}\" is stated twice (as \"{before}\" before): keep one of the two")]
     Twice {
         /// `tool` or `wobj`.
         kind: &'static str,
         /// Its name.
         name: String,
-        /// The name of the first.
+        /// Name of the first.
         before: String,
     },
     /// A letter that no external axis has.
@@ -192,13 +192,13 @@ pub enum CellError {
         /// The letter.
         axis: char,
     },
-    /// An external axis that is stated twice.
+    /// An external axis stated twice.
     #[error("external axis '{axis}' is stated twice: keep one of the two")]
     AxisTwice {
         /// The letter.
         axis: char,
     },
-    /// A surface file says otherwise.
+    /// Contradiction with a surface file.
     #[error(
         "{kind} \"{name}\": the cell file says origin = \"{}\", the surface file origin = \"{}\": correct the one that is wrong",
         cell.word(), surface.word()
@@ -208,21 +208,21 @@ pub enum CellError {
         kind: &'static str,
         /// Its name.
         name: String,
-        /// What the cell file says.
+        /// Origin in the cell file.
         cell: FrameOrigin,
-        /// What the surface file says.
+        /// Origin in the surface file.
         surface: FrameOrigin,
     },
 }
 
-/// Joint angles beyond this are none (°).
+/// Largest plausible joint angle (°).
 const MOST_DEG: f64 = 3600.0;
 
-/// Teaching points of tools, squared and added: 500 of one tool, ten of each of 2,500.
+/// Limit of the sum of squared numbers of teaching points of tools: 500 of one tool, ten of each of 2,500.
 const MOST_TEACHING: usize = 250_000;
 
 impl CellFrame {
-    /// Whether its keys go together and its numbers can be.
+    /// Checks that its keys are consistent and its numbers possible.
     fn check(&self, kind: &'static str) -> Result<(), CellError> {
         let wrong =
             |what: &str| Err(CellError::Frame { kind, name: self.name.clone(), what: what.to_owned() });
@@ -296,21 +296,21 @@ pub struct CellAxis {
 }
 
 impl CellAxis {
-    /// Its place among the external axes of a target.
+    /// Its index among the external axes of a target.
     pub fn index(&self) -> Option<usize> {
         ('a'..='f').position(|letter| letter == self.axis.to_ascii_lowercase())
     }
 }
 
-/// The cell file: what is known of the origin of tools and work objects, and of external axes.
+/// The cell file: origins of tools and work objects, and external axes.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Cell {
     /// The robot of the programs, by its name in the catalogue or in its robot file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub robot: Option<String>,
-    /// What A, B and C of NC programs mean, by its word ([`Angles`]); it goes before what robot file and
-    /// comments of the programs say.
+    /// Convention of A, B and C in NC programs, by its word ([`Angles`]); takes precedence over robot file and comments of
+    /// the programs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub angles: Option<String>,
     /// Tools.
@@ -322,7 +322,7 @@ pub struct Cell {
     /// External axes.
     #[serde(default)]
     pub external: Vec<CellAxis>,
-    /// Entries that say `"?"`, one sentence each: they are to be filled in.
+    /// Entries with the placeholder `"?"`, one sentence each.
     #[serde(skip)]
     pub open: Vec<String>,
 }
@@ -363,7 +363,7 @@ impl Cell {
                 }
             }
         }
-        // A frame is worked out anew for each angle of its points, to tell what their rounding explains.
+        // The frame is recomputed for each angle of its points to determine the effect of rounding.
         let work: usize = cell.tool.iter().map(|tool| tool.teaching_deg.len().saturating_pow(2)).sum();
         if work > MOST_TEACHING {
             let most = cell.tool.iter().max_by_key(|tool| tool.teaching_deg.len());
@@ -381,10 +381,10 @@ impl Cell {
         Ok(cell)
     }
 
-    /// The cell with what a surface file says of the origin of its tool and its work object.
+    /// The cell with the origins that a surface file states for its tool and work object.
     ///
     /// # Errors
-    /// [`CellError::Contradicted`], where the cell file says otherwise.
+    /// [`CellError::Contradicted`], where the cell file states otherwise.
     pub fn with_surface(mut self, surface: &SurfaceFile) -> Result<Self, CellError> {
         let (tool, object) = (&surface.tool, &surface.work_object);
         for (kind, frames, name, origin) in [
@@ -408,34 +408,34 @@ impl Cell {
         Ok(self)
     }
 
-    /// What A, B and C of NC programs mean, where the file says it.
+    /// Convention of A, B and C in NC programs, where the file states it.
     pub fn angles(&self) -> Option<Angles> {
         self.angles.as_deref().and_then(Angles::of)
     }
 
-    /// What an external axis carries, by its place in a target.
+    /// What an external axis carries, by its index in a target.
     pub fn carries(&self, index: usize) -> Option<Carries> {
         self.external.iter().find(|axis| axis.index() == Some(index)).map(|axis| axis.carries)
     }
 }
 
-/// A cell file beside a program, by names: which of its frames mean one of the program.
+/// Lookup of a program's frames in a cell file, by name.
 #[derive(Debug)]
 pub(crate) struct CellLookup<'a> {
     pub(crate) cell: &'a Cell,
     tools: NameIndex<'a>,
     objects: NameIndex<'a>,
-    /// How comments of an NC program call a tool or frame, by its plain name.
+    /// Names that comments of an NC program give to a tool or frame, by its normalised name.
     labels: HashMap<String, Vec<&'a str>>,
 }
 
-/// Frames of a cell file by their names.
+/// Frames of a cell file by name.
 #[derive(Debug)]
 struct NameIndex<'a> {
     frames: &'a [CellFrame],
-    /// By name in lower case.
+    /// By lower-case name.
     lower: HashMap<String, Vec<usize>>,
-    /// By plain name, in which T08 is T8.
+    /// By normalised name, in which T08 is T8.
     plain: HashMap<String, Vec<usize>>,
 }
 
@@ -449,7 +449,7 @@ impl<'a> NameIndex<'a> {
         Self { frames, lower, plain }
     }
 
-    /// Those that mean one of the program: by its name first, then by how a comment calls it.
+    /// The entries for a frame of the program: by its name first, then by the names that comments give it.
     fn meaning(&self, name: &str, in_text: bool, labels: &[&str]) -> Vec<&'a CellFrame> {
         let by = |index: &HashMap<String, Vec<usize>>, key: &str| index.get(key).cloned().unwrap_or_default();
         let mut named = by(&self.lower, &name.to_ascii_lowercase());
@@ -476,7 +476,7 @@ impl<'a> CellLookup<'a> {
         Self { cell, tools: NameIndex::of(&cell.tool), objects: NameIndex::of(&cell.wobj), labels }
     }
 
-    /// How comments call what the program's text does not declare.
+    /// Names given in comments to a frame that the program's text does not declare.
     pub(crate) fn labels_of(&self, name: &str) -> &[&'a str] {
         if self.labels.is_empty() {
             return &[];
@@ -484,33 +484,33 @@ impl<'a> CellLookup<'a> {
         self.labels.get(&setup::plain(name)).map_or(&[], Vec::as_slice)
     }
 
-    /// The frames that mean a tool of the program.
+    /// The entries for a tool of the program.
     pub(crate) fn tools(&self, tool: &Tool) -> Vec<&'a CellFrame> {
         let in_text = tool.place.is_some();
         self.tools.meaning(&tool.name, in_text, if in_text { &[] } else { self.labels_of(&tool.name) })
     }
 
-    /// The frames that mean a work object of the program.
+    /// The entries for a work object of the program.
     pub(crate) fn objects(&self, object: &WorkObject) -> Vec<&'a CellFrame> {
         let in_text = object.place.is_some();
         self.objects.meaning(&object.name, in_text, if in_text { &[] } else { self.labels_of(&object.name) })
     }
 
-    /// What is known of a tool of the program.
+    /// The entry for a tool of the program.
     pub(crate) fn tool(&self, tool: &Tool) -> Option<&'a CellFrame> {
         self.tools(tool).first().copied()
     }
 
-    /// What is known of a work object of the program.
+    /// The entry for a work object of the program.
     pub(crate) fn object(&self, object: &WorkObject) -> Option<&'a CellFrame> {
         self.objects(object).first().copied()
     }
 }
 
-/// So many unused entries are named one by one.
+/// Most unused entries that are listed one by one.
 const MOST_UNUSED: usize = 20;
 
-/// Which entries of a cell file programs use.
+/// The entries of a cell file that programs use.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Used {
     tool: BTreeSet<usize>,
@@ -519,8 +519,8 @@ pub struct Used {
 }
 
 impl Used {
-    /// By one program: what stands for a tool or work object of it, the tools that touched its teaching points (any, where
-    /// that is not said), and the external axes that its targets state.
+    /// Used by one program: the entries for its tools and work objects, the tools that touched their teaching points (any
+    /// tool where that is not stated), and the external axes of its targets.
     pub fn by(listing: &Listing, cell: &Cell) -> Self {
         let stated = CellLookup::of(cell, listing);
         let place =
@@ -550,15 +550,14 @@ impl Used {
         out
     }
 
-    /// By another program too.
+    /// Adds the entries that another program uses.
     pub fn join(&mut self, other: &Self) {
         self.tool.extend(&other.tool);
         self.wobj.extend(&other.wobj);
         self.external.extend(&other.external);
     }
 
-    /// A sentence for each entry that no program uses: a name that is misspelt says nothing, and is not asked for. What the
-    /// surface file put there is its own.
+    /// A sentence for each unused entry: probably a misspelt name. Entries that came from the surface file are excepted.
     pub fn notes(&self, cell: &Cell, surface: Option<&SurfaceFile>) -> Vec<String> {
         let own = |frame: &CellFrame| {
             surface.is_none_or(|s| frame.name != s.tool.name && frame.name != s.work_object.name)
@@ -589,7 +588,7 @@ impl Used {
     }
 }
 
-/// Whether a name of a program is one of the cell file. NC programs declare no names: there T08 is T8.
+/// Whether a name of a program matches one of the cell file. NC programs declare no names: there T08 is T8.
 pub(crate) fn same_name(name: &str, stated: &str, in_text: bool) -> bool {
     name.eq_ignore_ascii_case(stated) || (!in_text && setup::same(name, stated))
 }

@@ -1,4 +1,4 @@
-//! What cell file and robot file say that NC programs do not say themselves.
+//! What cell file and robot file state that NC programs do not: angle convention, tools and work offsets.
 
 use crate::cell::{Cell, CellFrame};
 use truegrind_arm::robots::sheet::Orientation;
@@ -6,7 +6,7 @@ use truegrind_programs::motion::Frame;
 use truegrind_programs::nc::orientation::Angles;
 use truegrind_programs::nc::setup::Setup;
 
-/// How programs are read for a cell; `orientation` is how programs of the robot write one, where its file says so.
+/// How programs are read for a cell; `orientation`: the robot's way to write orientations, where its file states it.
 pub fn cell_setup(cell: &Cell, orientation: Option<Orientation>) -> Setup {
     let frames = |list: &[CellFrame]| -> Vec<(String, Frame)> {
         list.iter().filter_map(|frame| Some((frame.name.clone(), Frame::from_pose(&frame.pose()?)))).collect()
@@ -19,7 +19,7 @@ pub fn cell_setup(cell: &Cell, orientation: Option<Orientation>) -> Setup {
     }
 }
 
-/// The convention of A, B and C that a robot file names; quaternions are no three angles.
+/// The convention of A, B and C named in a robot file; quaternions have none.
 pub fn angle_convention(orientation: Orientation) -> Option<Angles> {
     match orientation {
         Orientation::Quaternion => None,

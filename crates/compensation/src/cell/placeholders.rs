@@ -1,14 +1,14 @@
-//! Entries of a cell file that are still to be filled in: the skeleton of a cell says `"?"` where only a person knows.
+//! Placeholders of a cell file: the template contains `"?"` where only a person knows the value.
 //!
-//! Such a file is read, so that it can be filled in piece by piece, and nothing is corrected with it.
+//! Such a file can be read, so that it can be filled in step by step, but nothing is corrected with it.
 
 use serde::de::DeserializeOwned;
 use toml::{Table, Value};
 
-/// What stands where a person has to say something.
+/// The placeholder.
 pub(crate) const MARK: &str = "?";
 
-/// Reads a cell file, and says what is open in it. Where nothing is, the text itself is read, so that errors have their line.
+/// Reads a cell file and lists its placeholders. Without any, the text itself is read, so that errors state their line.
 pub(crate) fn read<T: DeserializeOwned>(text: &str) -> Result<(T, Vec<String>), toml::de::Error> {
     if !text.contains("\"?\"") && !text.contains("'?'") {
         return Ok((toml::from_str(text)?, Vec::new()));
@@ -29,7 +29,7 @@ pub(crate) fn read<T: DeserializeOwned>(text: &str) -> Result<(T, Vec<String>), 
     Ok((table.try_into()?, open))
 }
 
-/// Takes the open keys out of one entry; what must be there gets a value that is never used.
+/// Removes placeholders from one entry; required keys get a value that is never used.
 fn entries_open(kind: &str, entry: &mut Table, open: &mut Vec<String>) {
     let named = if kind == "external" { "axis" } else { "name" };
     let name = entry.get(named).and_then(Value::as_str).unwrap_or(MARK).to_owned();
@@ -41,7 +41,7 @@ fn entries_open(kind: &str, entry: &mut Table, open: &mut Vec<String>) {
         match key {
             "origin" => drop(entry.insert(key.to_owned(), Value::String("taught".to_owned()))),
             "carries" => drop(entry.insert(key.to_owned(), Value::String("other".to_owned()))),
-            // What says nothing without a key that is open is no error yet.
+            // A key that depends on a placeholder is no error yet.
             "position_mm" => drop(entry.remove("quaternion_wxyz")),
             "teaching_deg" => ["taught_with", "teaches"].iter().for_each(|key| drop(entry.remove(*key))),
             _ => {}
@@ -49,7 +49,7 @@ fn entries_open(kind: &str, entry: &mut Table, open: &mut Vec<String>) {
     }
 }
 
-/// Whether a key was open; it is gone then.
+/// Removes a key whose value is the placeholder; returns whether it did.
 fn takes_away(table: &mut Table, key: &str) -> bool {
     let is_open = table.get(key).and_then(Value::as_str) == Some(MARK);
     if is_open {
@@ -58,7 +58,7 @@ fn takes_away(table: &mut Table, key: &str) -> bool {
     is_open
 }
 
-/// What belongs there.
+/// What to write instead.
 fn expected(key: &str) -> &'static str {
     match key {
         "robot" => "write the robot's name, or remove the line",

@@ -1,4 +1,4 @@
-//! Whether cell, program and model are of one robot: a correction of another arm is none.
+//! Whether cell, program and model belong to the same robot: a correction for another arm is wrong.
 
 use crate::cell::Cell;
 use crate::plan::Plan;
@@ -8,13 +8,13 @@ use truegrind_arm::model::Model;
 use truegrind_arm::robots;
 use truegrind_programs::draft::robot_of;
 
-/// Whether a robot that a file names is the one of a model, under that name or as the same arm of the catalogue.
+/// Whether a robot named in a file is that of a model, by name or as the same arm of the catalogue.
 fn is_same(stated: &str, robot: &str, nominal: &Model) -> bool {
     stated.eq_ignore_ascii_case(robot)
         || robots::load(stated).is_ok_and(|known| robots::check_same_links(nominal, &known.model).is_ok())
 }
 
-/// What is wrong with a cell file that is another robot's.
+/// The fault of a cell file for another robot.
 pub fn cell_robot_mismatch(cell: &Cell, robot: &str, nominal: &Model) -> Option<String> {
     let stated = cell.robot.as_ref().filter(|stated| !is_same(stated, robot, nominal))?;
     Some(format!(
@@ -23,7 +23,7 @@ pub fn cell_robot_mismatch(cell: &Cell, robot: &str, nominal: &Model) -> Option<
     ))
 }
 
-/// What is wrong with a program that says that it was made for another robot; `name` is what its file is called.
+/// The fault of a program whose heading names another robot; `name`: name of its file.
 pub fn program_robot_mismatch(name: &str, source: &[u8], robot: &str, nominal: &Model) -> Option<String> {
     let stated = robot_of(source).filter(|stated| !is_same(stated, robot, nominal))?;
     Some(format!(
@@ -32,11 +32,11 @@ pub fn program_robot_mismatch(name: &str, source: &[u8], robot: &str, nominal: &
     ))
 }
 
-/// Fewer motions than these say nothing of the arm: a single one may be a slip.
+/// A smaller number of motions proves nothing: a single one can be a mistake.
 const FEWEST: usize = 5;
 
-/// How many motions there are where hardly one has joints on the arm that was asked: the program is another arm's. A program
-/// that a few targets of which are out of reach is its own.
+/// Number of unreachable motions, where the arm reaches hardly any: the program belongs to another arm. A program with a few
+/// unreachable targets does not.
 pub fn unreachable_motions(plan: &Plan) -> Option<usize> {
     let untold = |why: &OutcomeReason| {
         matches!(
@@ -52,6 +52,6 @@ pub fn unreachable_motions(plan: &Plan) -> Option<usize> {
     let judged = || plan.outcomes.iter().filter(|outcome| !outcome.reason.as_ref().is_some_and(untold));
     let all = judged().count();
     let without = judged().filter(|outcome| outcome.reason.as_ref().is_some_and(unreached)).count();
-    // One target in fifty may be reached by chance.
+    // One target in fifty can be reachable by chance.
     (all >= FEWEST && 50 * without >= 49 * all).then_some(without)
 }

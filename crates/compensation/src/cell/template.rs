@@ -1,6 +1,7 @@
-//! The cell file that programs ask for, with what they say filled in and the rest marked `"?"`.
+//! Template of the cell file that programs need: filled in as far as they state it, with `"?"` for the rest.
 //!
-//! It loads as it is; nothing is corrected with it before every `"?"` is replaced ([`Cell::open`](crate::cell::Cell::open)).
+//! It loads as written; nothing is corrected with it before every `"?"` is replaced
+//! ([`Cell::open`](crate::cell::Cell::open)).
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -11,14 +12,14 @@ use truegrind_programs::nc::orientation::Angles;
 use truegrind_programs::nc::setup;
 use truegrind_programs::reading::Language;
 
-/// A program whose cell is asked for.
+/// A program that needs a cell file.
 #[derive(Debug, Clone, Copy)]
 pub struct TemplateProgram<'a> {
     /// Its name, for comments.
     pub name: &'a str,
     /// Its language.
     pub language: Language,
-    /// What it does.
+    /// Its motions.
     pub listing: &'a Listing,
 }
 
@@ -27,27 +28,27 @@ pub struct TemplateProgram<'a> {
 pub struct CellTemplate {
     /// The file.
     pub text: String,
-    /// How many values a person has to fill in.
+    /// Number of values to fill in.
     pub open: usize,
 }
 
-/// What programs say of a tool or work object.
+/// What programs state about a tool or work object.
 struct Named {
     name: String,
-    /// How comments call it.
+    /// Name used in comments.
     label: Option<String>,
     language: Language,
-    /// Where it lies, as the program says it, or why that is not known.
+    /// Its pose as programmed, or why that is unknown.
     commanded: Result<Pose, Reason>,
     motions: usize,
-    /// The program and the line that use it first.
+    /// Program and line of the first use.
     first: (String, u32),
 }
 
-/// Kind, and the name as programs may vary it.
+/// Whether it is a tool, and its normalised name.
 type Key = (bool, String);
 
-/// The cell file of these programs. `robot`, where it is known, is written into it.
+/// The cell file of these programs. `robot` is written into it where known.
 pub fn cell_template(programs: &[TemplateProgram<'_>], robot: Option<&str>) -> CellTemplate {
     let mut found: BTreeMap<Key, Named> = BTreeMap::new();
     let mut axes = [false; 6];
@@ -78,7 +79,7 @@ pub fn cell_template(programs: &[TemplateProgram<'_>], robot: Option<&str>) -> C
     CellTemplate { text: out.text, open: out.open }
 }
 
-/// Takes down tool and work object of a motion.
+/// Records tool and work object of a motion.
 fn note(program: &TemplateProgram<'_>, motion: &Motion, found: &mut BTreeMap<Key, Named>) {
     let listing = program.listing;
     let tool = listing.tool(motion).map(|tool| {
@@ -90,7 +91,7 @@ fn note(program: &TemplateProgram<'_>, motion: &Motion, found: &mut BTreeMap<Key
         (false, object.name.as_str(), commanded)
     });
     for (is_tool, name, commanded) in tool.into_iter().chain(object) {
-        // The controller's own, and what a control calls no tool (G49).
+        // The controller's built-in frames, and what an NC control does not count as a tool (G49).
         let own = ["tool0", "wobj0"].iter().any(|own| name.eq_ignore_ascii_case(own));
         if own || is_tool && program.language == Language::Nc && !name.starts_with(['T', 't']) {
             continue;
@@ -132,7 +133,7 @@ struct Writer {
     open: usize,
 }
 
-/// Where the comments of a line begin.
+/// Column of comments.
 const COLUMN: usize = 32;
 
 impl Writer {
@@ -143,7 +144,7 @@ impl Writer {
         };
     }
 
-    /// A key that a person has to fill in.
+    /// A key to fill in.
     fn ask(&mut self, key: &str, comment: &str) {
         self.open += 1;
         self.line(&format!("{key} = \"?\""), comment);
@@ -231,14 +232,14 @@ impl Writer {
     }
 }
 
-/// A number without the zeros that say nothing.
+/// A number without trailing zeros.
 fn short(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
     if text == "-0" { "0".to_owned() } else { text.to_owned() }
 }
 
-/// A basic string of TOML.
+/// A TOML basic string.
 fn quoted(text: &str) -> String {
     toml::Value::String(text.to_owned()).to_string()
 }

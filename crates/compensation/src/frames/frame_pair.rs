@@ -1,4 +1,4 @@
-//! Tool and work object of a motion: as the controller holds them, and as they truly are.
+//! Tool and work object of a motion: as commanded, and as they really are.
 
 use nalgebra::{Point3, Vector3};
 
@@ -10,19 +10,19 @@ use truegrind_arm::model::{Joints, PreparedModel};
 use truegrind_math::se3::{Pose, difference};
 use truegrind_programs::motion::{Tool, ToolValue, WorkObject, WorkObjectValue};
 
-/// Frames between flange and target, for either kind of cell.
+/// The frames between flange and target, for a tool held by the robot and for a stationary tool.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct FramePair {
-    /// The tool on the flange, or in the world for a tool that stands.
+    /// The tool on the flange; in the world for a stationary tool.
     pub(crate) tool: Pose,
     /// The work object in the base, or on the flange where the robot holds the part.
     pub(crate) object: Pose,
-    /// Whether the robot holds the part and the tool stands.
+    /// Whether the robot holds the part and the tool is stationary.
     pub(crate) holds_part: bool,
 }
 
 impl FramePair {
-    /// Where the flange must be for a target in the work object.
+    /// Flange pose that puts the tool at a target in the work object.
     pub(crate) fn flange_for(&self, object_from_tool: &Pose) -> Pose {
         if self.holds_part {
             self.tool * (self.object * object_from_tool).inverse()
@@ -31,7 +31,7 @@ impl FramePair {
         }
     }
 
-    /// The target in the work object at which a flange stands.
+    /// The target in the work object that corresponds to a flange pose.
     pub(crate) fn target_of(&self, base_from_flange: &Pose) -> Pose {
         if self.holds_part {
             self.object.inverse() * base_from_flange.inverse() * self.tool
@@ -45,39 +45,39 @@ impl FramePair {
         if self.holds_part { base_from_flange * self.object } else { self.object }
     }
 
-    /// The tool on the flange, where the robot holds it; the inverse path through the part otherwise.
+    /// The tool on the flange, where the robot holds it; otherwise the inverse path through the part.
     pub(crate) fn flange_from_tool(&self, base_from_flange: &Pose) -> Pose {
         if self.holds_part { base_from_flange.inverse() * self.tool } else { self.tool }
     }
 }
 
-/// A mounting as told and as true, with what was assumed.
+/// A frame pair as commanded and as real, with the assumptions made.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ResolvedFrames {
     /// As the controller holds it.
     pub commanded: FramePair,
-    /// As it is, as far as is known.
+    /// As it really is, as far as is known.
     pub real: FramePair,
     /// How a taught work object moves with the arm's parameters; absent for any other.
     pub carried: Option<RegisteredFrame>,
-    /// What was assumed, one sentence each.
+    /// Assumptions, one sentence each.
     pub notes: Vec<String>,
 }
 
-/// What a mounting is worked out from.
+/// Inputs for resolving a frame pair.
 pub(crate) struct ResolveContext<'a> {
     pub(crate) teaching: &'a Teaching<'a>,
     pub(crate) knowledge: Option<&'a Estimated>,
     /// The inverse of the nominal arm.
     pub(crate) inverse: &'a Inverse<'a>,
-    /// A typical joint vector, at which the effect of an unknown origin is estimated.
+    /// Typical joints, at which the effect of an unknown origin is estimated.
     pub(crate) usual: Joints,
 }
 
-/// Works out a mounting from the program's values and the cell's knowledge.
+/// Resolves a frame pair from the program's values and the cell file.
 ///
 /// # Errors
-/// What the cell file says and the program does not bear out.
+/// A sentence where cell file and program contradict each other.
 pub(crate) fn mount(
     (tool, tool_value): (&Tool, &ToolValue),
     (object, object_value): (&WorkObject, &WorkObjectValue),
@@ -96,7 +96,7 @@ pub(crate) fn mount(
         tool_note(tool, &real_tool, &commanded, with),
         object_note(object, &real, &commanded, &real_object, with),
     ];
-    // A frame on the flange stays with the arm: it has no place of its own in the base.
+    // A frame on the flange moves with the arm: it has no position of its own in the base.
     let taught = real_object.taught.filter(|_| !commanded.holds_part);
     let carried = taught.zip(with.knowledge).and_then(|(t, k)| carried_frame(k, teaching.estimated, &t));
     Ok(ResolvedFrames { commanded, real, carried, notes: notes.into_iter().flatten().collect() })
@@ -106,7 +106,7 @@ fn built_in(name: &str) -> bool {
     name.eq_ignore_ascii_case("tool0") || name.eq_ignore_ascii_case("wobj0")
 }
 
-/// What was assumed of a tool.
+/// Assumption about a tool.
 fn tool_note(
     tool: &Tool,
     real: &RealTool,
@@ -131,7 +131,7 @@ fn tool_note(
     }
 }
 
-/// What was assumed of a work object.
+/// Assumption about a work object.
 fn object_note(
     object: &WorkObject,
     real: &FramePair,
@@ -160,7 +160,7 @@ fn object_note(
     }
 }
 
-/// How the frame of a work object that was taught moves with each parameter of the arm.
+/// How the frame of a taught work object moves with each parameter of the arm.
 fn carried_frame(
     knowledge: &Estimated,
     estimated: &PreparedModel<'_>,
@@ -170,8 +170,8 @@ fn carried_frame(
     carried_through(knowledge, estimated, &pointer.real, joints, points, frame)
 }
 
-/// How a frame through three points, touched with `tip`, moves with each parameter of the arm: the points' velocities, carried
-/// through the construction of the frame by a central difference over ± 1 unit of 1e-4.
+/// How a frame through three points, touched with `tip`, moves with each parameter of the arm: the points' velocities,
+/// carried through the construction of the frame by a central difference over ± 1 unit of 1e-4.
 pub(crate) fn carried_through(
     knowledge: &Estimated,
     estimated: &PreparedModel<'_>,
@@ -197,11 +197,11 @@ pub(crate) fn carried_through(
     Some(RegisteredFrame { origin_mm: frame.translation.vector, twists })
 }
 
-/// Said where no typical pose shows it.
+/// Where no typical pose allows an estimate.
 const NOT_TOLD: &str = "how far it would move had it been taught cannot be told here";
 
-/// How far a taught TCP would move: four orientations about a typical pose, TCP fixed under the nominal model. A tool that
-/// stands is touched once with the middle of the flange.
+/// How far a taught TCP would move: four orientations about a typical pose, TCP fixed under the nominal model. A stationary
+/// tool is touched once with the centre of the flange.
 fn tool_estimate(commanded: &FramePair, with: &ResolveContext<'_>) -> String {
     let Teaching { nominal, estimated, .. } = with.teaching;
     let usual = &with.usual;

@@ -1,4 +1,4 @@
-//! The mountings that a program uses: every pair of tool and work object once, and what external axes carry.
+//! Frame table of a program: every pair of tool and work object once, and the external axes that carry the base.
 
 use std::collections::{HashMap, HashSet};
 
@@ -14,16 +14,16 @@ use truegrind_arm::model::Joints;
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{Listing, Motion, Reason, RobTarget, Switch, WorkObjectValue};
 
-/// Mountings by (tool, work object) as motions use them.
+/// Frame pairs by (tool, work object).
 pub(crate) struct FrameTable {
-    /// The place of each in the list, or why there is none.
+    /// Index of each in the list, or why it has none.
     places: HashMap<(u32, u32), Result<usize, OutcomeReason>>,
     pub(crate) list: Vec<ResolvedFrames>,
     /// The work object of each.
     objects: Vec<u32>,
     /// External axes that carry the base.
     base: [bool; 6],
-    /// What was assumed of external axes, and what the cell file contradicts.
+    /// Assumptions about external axes, and contradictions with the cell file.
     assumed: Vec<String>,
 }
 
@@ -42,7 +42,7 @@ impl FrameTable {
         let mut last = None;
         for motion in &listing.motions {
             let (Some(tool), Some(object)) = (motion.tool, motion.work_object) else { continue };
-            // Nearly always that of the motion before.
+            // Usually the same as in the previous motion.
             if last.replace((tool, object)) == Some((tool, object))
                 || out.places.contains_key(&(tool, object))
             {
@@ -81,8 +81,8 @@ impl FrameTable {
         out
     }
 
-    /// Which external axes carry the base: those of which the cell file says so, and those of targets that lie farther
-    /// away than the arm is long, where the file says nothing.
+    /// Which external axes carry the base: those that the cell file declares so and, where it is silent, those of targets
+    /// farther away than the arm is long.
     fn external_axes(&mut self, listing: &Listing, arms: &Arms<'_>, cell: &Cell) {
         let links = &arms.nominal.arm().model.links;
         let flange = arms.nominal.arm().model.flange.translation.vector.norm();
@@ -127,14 +127,14 @@ impl FrameTable {
         Some(OutcomeReason::MovingBase { axis })
     }
 
-    /// The mounting of a motion, or why its tool or work object tells none.
+    /// Index of a motion's frame pair, or why its tool or work object has no value.
     pub(crate) fn of_motion(&self, motion: &Motion) -> Result<usize, OutcomeReason> {
         let missing = Err(OutcomeReason::Program(Reason::MissingArgument));
         let (Some(tool), Some(object)) = (motion.tool, motion.work_object) else { return missing };
         self.places.get(&(tool, object)).copied().unwrap_or(missing)
     }
 
-    /// The work object of each mounting of the list.
+    /// The work object of each frame pair of the list.
     pub(crate) fn objects(&self) -> Vec<u32> {
         self.objects.clone()
     }
@@ -146,7 +146,7 @@ impl FrameTable {
     }
 }
 
-/// Motions of each pair of tool and work object: the first of them, which are asked for typical joints.
+/// The first few motions of each pair of tool and work object, for typical joints.
 fn typical(listing: &Listing) -> HashMap<(u32, u32), Vec<&Motion>> {
     const ASKED: usize = 50;
     let mut out: HashMap<(u32, u32), Vec<&Motion>> = HashMap::new();
@@ -160,7 +160,7 @@ fn typical(listing: &Listing) -> HashMap<(u32, u32), Vec<&Motion>> {
     out
 }
 
-/// Joints of the first target of these motions that is reached, at which the effect of unknown origins is estimated.
+/// Joints of the first reachable target of these motions, at which the effect of unknown origins is estimated.
 fn usual_joints(motions: &[&Motion], tool: Pose, object: &WorkObjectValue, arms: &Arms<'_>) -> Joints {
     let mounting = FramePair {
         tool,

@@ -1,4 +1,4 @@
-//! The tools of a program whose value is known, by every name that they go by.
+//! Tools of known value, found by every name in use.
 
 use std::collections::HashMap;
 
@@ -14,18 +14,18 @@ pub(crate) struct KnownTool<'a> {
     pub(crate) in_text: bool,
     pub(crate) frame: Pose,
     pub(crate) held: bool,
-    /// How comments call it.
+    /// Names used in comments.
     pub(crate) labels: Vec<&'a str>,
     pub(crate) stated: Option<&'a CellFrame>,
 }
 
-/// The tools whose value is known, by every name that they go by.
+/// Tools of known value, by all their names.
 #[derive(Debug)]
 pub(crate) struct KnownTools<'a> {
     pub(crate) list: Vec<KnownTool<'a>>,
-    /// Places in the list, by names in lower case.
+    /// Indices into the list, by lower-case name.
     lower: HashMap<String, Vec<usize>>,
-    /// The same by plain names, where the program's text does not declare the tool.
+    /// The same by normalised name, for tools that the program's text does not declare.
     plain: HashMap<String, Vec<usize>>,
 }
 
@@ -46,7 +46,7 @@ impl<'a> KnownTools<'a> {
         Self { list, lower, plain }
     }
 
-    /// Those of a name, in the order of the list.
+    /// The tools of a name, in list order.
     pub(crate) fn called(&self, name: &str) -> impl Iterator<Item = &KnownTool<'a>> {
         let lower = self.lower.get(&name.to_ascii_lowercase()).into_iter().flatten();
         let plain = self.plain.get(&setup::plain(name)).into_iter().flatten();
@@ -57,7 +57,7 @@ impl<'a> KnownTools<'a> {
     }
 }
 
-/// So many names are listed in a sentence.
+/// Most names listed in a sentence.
 pub(crate) const MOST_NAMES: usize = 12;
 
 impl KnownTool<'_> {

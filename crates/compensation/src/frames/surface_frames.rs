@@ -1,7 +1,7 @@
-//! Where a surface file says that tool and work object lie, against what a program tells the controller.
+//! Tool and work object of a surface file compared with those of a program.
 //!
-//! A place from metrology is true as it stands: a program whose frame lies elsewhere grinds elsewhere, and one of the two is
-//! wrong. A place that was taught may differ, since the controller's is what was taught.
+//! A frame from metrology is exact: a program whose frame is elsewhere grinds elsewhere, so one of the two is wrong. A taught
+//! frame can differ, since the controller holds what was taught.
 
 use crate::frames::taught::{FrameDistance, WRITTEN_TOLERANCE, list};
 use truegrind_math::se3::Pose;
@@ -10,7 +10,7 @@ use truegrind_programs::nc::setup;
 use truegrind_surfaces::SurfaceFile;
 use truegrind_surfaces::file::Origin;
 
-/// What a surface file says from metrology and this program contradicts, one sentence each.
+/// Contradictions between metrology frames of the surface file and the program, one sentence each.
 pub fn surface_frame_contradictions(listing: &Listing, surface: &SurfaceFile) -> Vec<String> {
     let mut out: Vec<String> = Vec::new();
     let mut add = |fault: Option<String>| out.extend(fault);
@@ -23,7 +23,7 @@ pub fn surface_frame_contradictions(listing: &Listing, surface: &SurfaceFile) ->
     if surface.work_object.origin == Some(Origin::Metrology) {
         let stated = &surface.work_object;
         let means = |object: &&WorkObject| named(listing, &object.name, object.place.is_some(), &stated.name);
-        // A displacement was never part of the place.
+        // A program displacement is not part of the stated frame.
         let undisplaced = |object: &WorkObject| {
             let value = object.value.as_ref().ok()?;
             let whole = value.user_frame.pose() * value.object_frame.pose();
@@ -35,7 +35,7 @@ pub fn surface_frame_contradictions(listing: &Listing, surface: &SurfaceFile) ->
     out
 }
 
-/// Whether a frame of the program goes by a name, as the text or its comments call it.
+/// Whether a frame of the program has the stated name, in the text or in its comments.
 fn named(listing: &Listing, name: &str, in_text: bool, stated: &str) -> bool {
     name.eq_ignore_ascii_case(stated)
         || !in_text
@@ -43,7 +43,7 @@ fn named(listing: &Listing, name: &str, in_text: bool, stated: &str) -> bool {
                 || listing.labels_of(name).any(|label| label.eq_ignore_ascii_case(stated)))
 }
 
-/// The sentence for a place that no frame of the program bears out.
+/// The sentence for a stated frame that no frame of the program matches.
 fn fault(kind: &str, name: &str, stated: &Pose, commanded: &[Pose]) -> Option<String> {
     let apart = |place: &&Pose| FrameDistance::of(stated, place);
     if commanded.iter().any(|place| apart(&place).within(WRITTEN_TOLERANCE)) {

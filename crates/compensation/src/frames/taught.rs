@@ -1,10 +1,10 @@
-//! Frames that were taught with the arm: what the teaching joints say under the nominal and under a better arm.
+//! Taught frames: re-evaluates the teaching joints under the estimated arm.
 //!
-//! The controller worked out a taught frame from joints with the nominal arm N. Under N the teaching joints therefore give
-//! the frame that the program tells, but for rounding; where they do not, another tool touched the points, another frame
-//! was taught, or the joints are another arm's, and the frame must not be moved ([`contradictions`]). Where they do, the
-//! frame moves by what the better arm E makes of the same joints: F* = F_E F_N⁻¹ F. What rounding leaves between F_N and
-//! the told F is kept, so that angles of two decimals do as well as those of ten.
+//! The controller computed a taught frame F from joints with the nominal arm N. Under N the teaching joints therefore
+//! reproduce the programmed frame up to rounding; if they do not, another tool touched the points, another frame was taught,
+//! or the joints belong to another arm, and the frame must not be moved ([`contradictions`]). If they do, the frame moves to
+//! what the estimated arm E makes of the same joints: F* = F_E F_N⁻¹ F. The rounding difference between F_N and F is
+//! preserved, so angles with two decimals serve as well as those with ten.
 
 pub(crate) use crate::frames::teaching_geometry::{FrameDistance, WRITTEN_TOLERANCE, list};
 pub use crate::frames::teaching_geometry::{taught_frame, taught_tcp};
@@ -28,28 +28,28 @@ use truegrind_programs::motion::{Listing, Tool, ToolValue, WorkObject, WorkObjec
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct TouchingTool {
     pub(crate) name: String,
-    /// Whether the robot holds it; otherwise it stands.
+    /// Whether the robot holds it; otherwise it is stationary.
     pub(crate) held: bool,
-    /// Its tip as the controller holds it (mm), on the flange or in the base.
+    /// Its tip as commanded (mm), on the flange or in the base.
     commanded: Vector3<f64>,
-    /// As it is.
+    /// Its real tip.
     pub(crate) real: Vector3<f64>,
 }
 
-/// A tool as it is.
+/// A tool as it really is.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct RealTool {
     pub(crate) pose: Pose,
-    /// By how much its TCP moved (mm), where it was re-evaluated.
+    /// Displacement of its TCP (mm), where it was re-evaluated.
     pub(crate) moved_mm: Option<f64>,
 }
 
-/// A work object as it is.
+/// A work object as it really is.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct RealObject {
-    /// Where targets stand.
+    /// Real pose of the frame of its targets.
     pub(crate) pose: Pose,
-    /// The taught points under the better arm, and their frame; absent where it was not re-evaluated.
+    /// The taught points under the estimated arm, and their frame; absent where it was not re-evaluated.
     pub(crate) taught: Option<TaughtFrame>,
 }
 
@@ -62,19 +62,20 @@ pub(crate) struct TaughtFrame {
     pub(crate) frame: Pose,
 }
 
-/// What teaching points are judged by: the two arms, the cell, and the tools that are known.
+/// Inputs for re-evaluating teaching points: both arms, the cell, and the tools of known value.
 #[derive(Debug)]
 pub(crate) struct Teaching<'a> {
     pub(crate) nominal: &'a PreparedModel<'a>,
     pub(crate) estimated: &'a PreparedModel<'a>,
     pub(crate) stated: CellLookup<'a>,
     pub(crate) listing: &'a Listing,
-    /// [`Teaching::tools`], once they were asked for.
+    /// Cache of [`Teaching::tools`].
     known: OnceCell<KnownTools<'a>>,
 }
 
-/// What the cell file says of tools and work objects and this program does not bear out, what it leaves open, and what the
-/// program's own comments on them misstate, one sentence each; nothing may be corrected before it is put right. `nominal` is the arm that the controller computes with.
+/// Contradictions between cell file and program, unfilled entries of the cell file, and misstatements in the program's own
+/// comments, one sentence each; all must be resolved before anything is corrected. `nominal`: the arm that the controller
+/// computes with.
 pub fn contradictions(listing: &Listing, cell: &Cell, nominal: &Model) -> Vec<String> {
     let commanded = listing.misstated.iter().map(ToString::to_string);
     let unusable: Vec<String> =
@@ -110,11 +111,11 @@ pub fn contradictions(listing: &Listing, cell: &Cell, nominal: &Model) -> Vec<St
     out
 }
 
-/// Two entries of the cell file that mean one frame of the program.
+/// Two entries of the cell file for one frame of the program.
 fn twice(kind: &str, found: &[&CellFrame], name: &str) -> Option<String> {
     let mut found = found.iter().copied();
     let first = found.next()?;
-    // Saying the same again contradicts nothing.
+    // A repeated statement is no contradiction.
     let second = found.find(|other| **other != CellFrame::of(&other.name, first.origin))?;
     Some(format!(
         "cell file: {kind} \"{}\" and {kind} \"{}\" are both {name} of the program: keep one of the two",
@@ -136,10 +137,10 @@ impl<'a> Teaching<'a> {
         Self { nominal, estimated, stated: CellLookup::of(cell, listing), listing, known: OnceCell::new() }
     }
 
-    /// A tool as it is.
+    /// Resolves a tool.
     ///
     /// # Errors
-    /// What the cell file says of it and cannot be.
+    /// A sentence where the cell file contradicts the program or itself.
     pub(crate) fn tool(&self, tool: &Tool, value: &ToolValue) -> Result<RealTool, String> {
         let commanded = value.frame.pose();
         let stands = RealTool { pose: commanded, moved_mm: None };
@@ -150,7 +151,7 @@ impl<'a> Teaching<'a> {
         self.told_tool(stated, &commanded, value.robhold)
     }
 
-    /// A tool of the cell file that the controller holds as `commanded`.
+    /// Resolves a tool of the cell file that the controller holds as `commanded`.
     fn told_tool(&self, stated: &CellFrame, commanded: &Pose, held: bool) -> Result<RealTool, String> {
         if stated.origin == FrameOrigin::Metrology || stated.teaching_deg.is_empty() {
             return Ok(RealTool { pose: *commanded, moved_mm: None });
@@ -223,16 +224,16 @@ impl<'a> Teaching<'a> {
         Ok(RealTool { pose, moved_mm: Some(shift.norm()) })
     }
 
-    /// A work object as it is.
+    /// Resolves a work object.
     ///
     /// # Errors
-    /// What the cell file says of it and cannot be.
+    /// A sentence where the cell file contradicts the program or itself.
     pub(crate) fn object(&self, object: &WorkObject, value: &WorkObjectValue) -> Result<RealObject, String> {
         let user = value.user_frame.pose();
         let within = value.object_frame.pose();
         let as_told = RealObject { pose: user * within, taught: None };
         let Some(stated) = self.stated.object(object) else { return Ok(as_told) };
-        // A displacement was not taught: it is on top of what was.
+        // A displacement is not taught: it applies on top of the taught frame.
         let displaced = object.displacement.map_or_else(Pose::identity, |frame| frame.pose());
         let undisplaced = user * within * displaced.inverse();
         if object.place.is_some() {
@@ -285,8 +286,8 @@ impl<'a> Teaching<'a> {
         Ok(RealObject { pose, taught: Some(TaughtFrame { pointer, joints, points, frame }) })
     }
 
-    /// The sentence for teaching points that make another frame than the one that is told, with the cause that explains
-    /// it, where one does.
+    /// The sentence for teaching points that define another frame than the programmed one, with a cause where one explains
+    /// it.
     fn other_frame(
         &self,
         stated: &CellFrame,
@@ -334,7 +335,7 @@ impl<'a> Teaching<'a> {
         )
     }
 
-    /// The tool that touched the teaching points of `stated`; `held`: the robot must have held it.
+    /// The tool that touched the teaching points of `stated`; `held`: whether the robot must hold it.
     fn pointer(&self, kind: &str, stated: &CellFrame, held: bool) -> Result<TouchingTool, String> {
         let here = format!("cell file: {kind} \"{}\"", stated.name);
         let known = self.tools();
@@ -403,8 +404,7 @@ impl<'a> Teaching<'a> {
         })
     }
 
-    /// Every tool whose value is known, in the order of names: those of the program, those that the cell file places,
-    /// and tool0.
+    /// Every tool of known value, by name: those of the program, those that the cell file places, and tool0.
     fn tools(&self) -> &KnownTools<'a> {
         self.known.get_or_init(|| KnownTools::of(self.known()))
     }
@@ -417,7 +417,7 @@ impl<'a> Teaching<'a> {
             let Ok(value) = &tool.value else { continue };
             let (in_text, held, frame) = (tool.place.is_some(), value.robhold, value.frame.pose());
             let place = frame.translation.vector.iter().chain(frame.rotation.coords.iter());
-            // Adding 0 makes −0 and 0 one.
+            // Adding 0 maps −0 to 0.
             let bits: Vec<u64> = place.map(|v| (v + 0.0).to_bits()).collect();
             if seen.insert((tool.name.as_str(), in_text, held, bits)) {
                 let labels = self.stated.labels_of(&tool.name).to_vec();
@@ -451,7 +451,7 @@ impl<'a> Teaching<'a> {
     }
 }
 
-/// Whether the cell file places a frame where the program does, if it places it at all.
+/// Whether the cell file agrees with the program about the position of a frame, if it states one.
 fn agrees(kind: &str, stated: &CellFrame, commanded: &Pose) -> Result<(), String> {
     let Some(placed) = stated.pose() else { return Ok(()) };
     let apart = FrameDistance::of(&placed, commanded);

@@ -1,18 +1,19 @@
-//! What teaching joints say under one arm: a tool's tip, a frame through three points, and how far rounding leaves them open.
+//! Geometry of teaching joints under one arm: the tip of a tool, the frame through three points, and the effect of rounding.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Point3, Vector3};
 
 use truegrind_arm::model::{Joints, PreparedModel};
 use truegrind_math::se3::{Pose, rotation_from_matrix};
 
-/// What programs round away when they write a frame, and constructions of the same frame may differ by (mm, rad).
+/// Rounding of written frames, and differences between constructions of the same frame (mm, rad).
 pub(crate) const WRITTEN_TOLERANCE: FrameDistance =
     FrameDistance { mm: 0.1, rad: 0.02 * std::f64::consts::PI / 180.0 };
-/// However coarsely the teaching joints are written, a told frame that is farther away is not theirs (mm, rad).
+/// A programmed frame farther away than this does not belong to the teaching joints, however coarsely they are rounded (mm,
+/// rad).
 const MOST: FrameDistance = FrameDistance { mm: 5.0, rad: std::f64::consts::PI / 180.0 };
-/// Controllers show joint angles with two decimals at least (°): coarser ones are not taken for rounded.
+/// Controllers show joint angles with at least two decimals (°): coarser ones are not taken as rounded.
 const COARSEST_DEG: f64 = 0.01;
-/// Poses whose orientations tell the TCP less than this are too much alike (smallest singular value).
+/// Poses are too much alike if their orientations determine the TCP less well than this (smallest singular value).
 const ALIKE: f64 = 1e-3;
 
 /// Distance of two frames.
@@ -35,17 +36,17 @@ impl FrameDistance {
     }
 }
 
-/// The point that stays where it is over several poses, on the flange and in the base.
+/// The fixed point of several poses, on the flange and in the base.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct FixedPoint {
     pub(crate) on_flange: Vector3<f64>,
     pub(crate) in_base: Vector3<f64>,
-    /// Standard deviations of the two that the scatter of the poses tells (mm).
+    /// Standard deviations of the two from the scatter of the poses (mm).
     pub(crate) sigma_mm: [f64; 2],
 }
 
-/// By linear least squares (the n-point method). `None` for poses that do not fix it: too few, orientations too much
-/// alike, or no finite numbers.
+/// The fixed point by linear least squares (the n-point method). `None` where the poses do not determine it: too few,
+/// orientations too much alike, or non-finite numbers.
 pub(crate) fn fixed_point(arm: &PreparedModel<'_>, teaching: &[Joints]) -> Option<FixedPoint> {
     // R_i t + p_i = c for all i: unknown t and c.
     let n = teaching.len();
@@ -63,8 +64,8 @@ pub(crate) fn fixed_point(arm: &PreparedModel<'_>, teaching: &[Joints]) -> Optio
     if !a.iter().chain(b.iter()).all(|v| v.is_finite()) {
         return None;
     }
-    // A = Q R: x = R⁻¹ Qᵀ b, and (Aᵀ A)⁻¹ = R⁻¹ R⁻ᵀ. Not by the singular value decomposition, whose singular vectors come out
-    // wrong by 1e-5 where singular values coincide, as they do here.
+    // A = Q R: x = R⁻¹ Qᵀ b, and (Aᵀ A)⁻¹ = R⁻¹ R⁻ᵀ. Not by the singular value decomposition, whose
+    // singular vectors are wrong by 1e-5 where singular values coincide, as they do here.
     let qr = a.clone().qr();
     let r = qr.r();
     if !(r.singular_values().min() >= ALIKE) {
@@ -82,8 +83,8 @@ pub(crate) fn fixed_point(arm: &PreparedModel<'_>, teaching: &[Joints]) -> Optio
     })
 }
 
-/// The TCP that stays at one point over all poses (mm, on the flange), by linear least squares (the n-point method).
-/// `None` for poses that do not fix it: fewer than three, or orientations too much alike.
+/// The TCP from poses that all touch one point (mm, on the flange), by linear least squares (the n-point method). `None`
+/// where the poses do not determine it: fewer than three, or orientations too much alike.
 ///
 /// ```
 /// use nalgebra::Vector3;
@@ -118,8 +119,8 @@ pub fn taught_tcp(arm: &PreparedModel<'_>, teaching: &[Joints]) -> Option<Vector
     fixed_point(arm, teaching).map(|found| found.on_flange)
 }
 
-/// The frame through three taught points: the first two on x, the third on y (the origin is its foot on x).
-/// `None` where the points are in line.
+/// The frame through three taught points: the first two on x, the third on y (the origin is its foot on x). `None` where the
+/// points are collinear.
 ///
 /// ```
 /// use nalgebra::Point3;
@@ -147,7 +148,7 @@ pub(crate) fn radians(deg: &[[f64; 6]]) -> Vec<Joints> {
     deg.iter().map(|q| Joints::from_fn(|i, _| q[i].to_radians())).collect()
 }
 
-/// Half of the last decimal that any of these angles states (rad).
+/// Half of the last decimal of these angles (rad).
 pub(crate) fn half_step_rad(deg: &[[f64; 6]]) -> f64 {
     let decimals = |angle: &f64| {
         let text = angle.to_string();
@@ -157,8 +158,8 @@ pub(crate) fn half_step_rad(deg: &[[f64; 6]]) -> f64 {
     0.5 * 10f64.powi(-(most as i32)).min(COARSEST_DEG).to_radians()
 }
 
-/// By how much a frame can move that is worked out from rounded joints: each of them off by half its last decimal, all
-/// of them to the worst side.
+/// Largest displacement of a frame computed from rounded joints: each of them off by half its last decimal, all in the worst
+/// direction.
 pub(crate) fn rounded(
     joints: &[Joints],
     half_rad: f64,
@@ -180,7 +181,7 @@ pub(crate) fn rounded(
     all
 }
 
-/// What is explained: what is written, what rounding makes of the joints, and `scatter_mm`.
+/// Difference that is explained by written decimals, rounded joints and `scatter_mm`.
 pub(crate) fn explained(rounded: FrameDistance, scatter_mm: f64) -> FrameDistance {
     FrameDistance {
         mm: (WRITTEN_TOLERANCE.mm + rounded.mm + scatter_mm).min(MOST.mm),
@@ -192,7 +193,7 @@ pub(crate) fn list(position: &Vector3<f64>) -> String {
     format!("[{:.3}, {:.3}, {:.3}]", position.x, position.y, position.z)
 }
 
-/// Teaching points: touched by a tool that the robot holds, or on a part that it holds to a tool that stands.
+/// Taught points: touched with a tool that the robot holds, or on a held part with a stationary tool.
 pub(crate) fn touched(
     arm: &PreparedModel<'_>,
     joints: &[Joints; 3],

@@ -1,4 +1,4 @@
-//! Tools and work objects that motions use and no file declares: their names, and what to give so that they are known.
+//! Tools and work objects that motions use and no file declares, with the remedy.
 
 use std::collections::BTreeMap;
 
@@ -14,11 +14,11 @@ pub struct Undeclared {
     pub name: String,
     /// Motions that use it.
     pub motions: usize,
-    /// The line of the first of them, from 1.
+    /// Line of the first of them, 1-based.
     pub line: u32,
 }
 
-/// The tools and work objects of a listing that are declared in none of its files, in the order of their first use.
+/// The undeclared tools and work objects of a listing, in order of first use.
 pub fn undeclared(listing: &Listing) -> Vec<Undeclared> {
     let mut found: BTreeMap<(bool, &str), Undeclared> = BTreeMap::new();
     for motion in &listing.motions {
@@ -33,7 +33,7 @@ pub fn undeclared(listing: &Listing) -> Vec<Undeclared> {
     found
 }
 
-/// What a motion uses that is declared nowhere, and whether it is a tool.
+/// Undeclared frames of a motion, and whether each is a tool.
 fn names<'a>(listing: &'a Listing, motion: &Motion) -> impl Iterator<Item = (bool, &'a str)> {
     let nowhere = |reason: Option<&Reason>| {
         matches!(reason, Some(Reason::Undeclared | Reason::ToolUnknown | Reason::WorkObjectUnknown))
@@ -44,7 +44,7 @@ fn names<'a>(listing: &'a Listing, motion: &Motion) -> impl Iterator<Item = (boo
     tool.into_iter().chain(object.map(|object| (false, object.name.as_str())))
 }
 
-/// One sentence for each, with what to give.
+/// One sentence for each, with the remedy.
 pub(crate) fn notes(listing: &Listing, language: Language) -> Vec<String> {
     let sentence = |one: &Undeclared| {
         let (what, key) = match (one.tool, language) {
@@ -84,5 +84,5 @@ pub(crate) fn notes(listing: &Listing, language: Language) -> Vec<String> {
     out
 }
 
-/// How many are named.
+/// Most frames that are listed.
 const NAMED: usize = 12;
