@@ -9,7 +9,7 @@ MODULE Bounds
     MoveL [[390,70,320],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0; ! expect bound: exceeds the bound (--max-correction) | turn: ° exceeds the bound | singular: too close to a singularity | unsure: the model is uncertain here | elsewhere: no measured pose is near | narrow: outside the range in which the arm was measured
     MoveAbsJ [[0,0,0,0,30,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0; ! expect bound: joint target | joints: nothing
     MoveJ [[328.0385,-30,320],[0,0,1,0],[-1,0,-1,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0; ! expect loose: nothing
-    MoveC [[380,-60,320],[0,0,1,0],[-1,0,-1,0],[9E9,9E9,9E9,9E9,9E9,9E9]],[[431.9615,-30,320],[0,0,1,0],[-1,0,-1,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100\T:=3,fine,tool0; ! expect loose: the circle stays
+    MoveC [[380,-60,320],[0,0,1,0],[-1,0,-1,0],[9E9,9E9,9E9,9E9,9E9,9E9]],[[431.9615,-30,320],[0,0,1,0],[-1,0,-1,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100\T:=3,fine,tool0; ! expect loose: the circle was kept
     MoveJ [[374,0,630.432000],[0.709224916,0,0.704982282,0],[0,0,0,1],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;
     MoveJ [[374,0,630.216000],[0.708166645,0,0.706045326,0],[0,0,0,1],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0; ! expect branch: another configuration
     MoveJ [[374,0,629.784000],[0.706045326,0,0.708166645,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0; ! expect branch: another configuration

@@ -10,14 +10,14 @@ MODULE Refusals
     MoveJ [[374,0,630],[0.707106781,0,0.707106781,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0; ! expect: another configuration
     MoveJ [[-350,20,400],[0,0,1,0],[1,0,1,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0; ! expect: joint 1
     MoveJ [[200,-100,400],[0,0,1,0],[-1,0,-1,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0; ! expect: nothing
-    MoveL [[200,100,400],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v2000,fine,tool0; ! expect: joint 1 turns
+    MoveL [[200,100,400],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v2000,fine,tool0; ! expect: joint 1 exceeds its speed limit
     MoveJ [[250,-230,320],[0,0,1,0],[-1,0,-1,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0; ! expect: nothing
     MoveL [[420,-230,320],[0,0,1,0],[-1,0,-1,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,z200,tool0; ! expect: nothing
     MoveL [[420,230,320],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0; ! expect: rounded corner
-    IF near() MoveL [[420,-230,320],[0,0,1,0],[-1,0,-1,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0; ! expect: the path to it leaves
+    IF near() MoveL [[420,-230,320],[0,0,1,0],[-1,0,-1,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0; ! expect: the path to it deviates
     MoveJ [[328.0385,-30,320],[0,0,1,0],[-1,0,-1,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0; ! expect: nothing
-    MoveC [[380,-60,320],[0,0,1,0],[-1,0,-1,0],[9E9,9E9,9E9,9E9,9E9,9E9]],[[431.9615,-30,320],[0,0,1,0],[-1,0,-1,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100\T:=3,fine,tool0; ! expect: the path to it leaves
-    MoveC [[380,-60,320],[0,0,1,0],[-1,0,-1,0],[9E9,9E9,9E9,9E9,9E9,9E9]],[[431.9615,-30,320],[0,0,1,0],[-1,0,-1,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0; ! expect: whole circle
+    MoveC [[380,-60,320],[0,0,1,0],[-1,0,-1,0],[9E9,9E9,9E9,9E9,9E9,9E9]],[[431.9615,-30,320],[0,0,1,0],[-1,0,-1,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100\T:=3,fine,tool0; ! expect: the path to it deviates
+    MoveC [[380,-60,320],[0,0,1,0],[-1,0,-1,0],[9E9,9E9,9E9,9E9,9E9,9E9]],[[431.9615,-30,320],[0,0,1,0],[-1,0,-1,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0; ! expect: full circle
     MoveC [[440,-30,320],[0,0,1,0],[-1,0,-1,0],[9E9,9E9,9E9,9E9,9E9,9E9]],[[450,-30,320],[0,0,1,0],[-1,0,-1,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0; ! expect: make no circle
   ENDPROC
   FUNC bool near()

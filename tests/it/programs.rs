@@ -350,7 +350,7 @@ fn the_nominal_arm_lists_every_motion_and_changes_no_byte() {
     assert_eq!(lines, [4, 6, 7, 8]);
     assert!(found.iter().all(|(_, status, _)| status == "left"), "{found:?}");
     let says = [
-        "its numbers are right to the last decimal",
+        "its numbers are already right to the last written decimal",
         "known only at run time",
         "the tool frame is unknown",
         "joint target",
@@ -539,7 +539,7 @@ fn lines_whose_path_nobody_checked_are_named() {
     let (code, text, err) = truegrind(at, &["compensate", "a.mod", "--model", "model.toml", "--dry-run"]);
     assert_eq!(code, 0, "{err}");
     let words: String = text.split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(words.contains("3 of the lines and arcs start where the text alone does not tell"), "{text}");
+    assert!(words.contains("3 of the lines and arcs have an unknown or uncorrected start"), "{text}");
     assert!(words.contains("the path between is not checked (lines 4, 6, 8)"), "{text}");
 }
 
@@ -563,7 +563,7 @@ fn a_motion_that_is_right_already_is_left_for_that_reason() {
     assert_eq!(motions.len(), 3);
     for motion in &motions {
         assert_eq!(motion["status"], "left", "{motion}");
-        assert_eq!(motion["reason"], "its numbers are right to the last decimal that is written", "{motion}");
+        assert_eq!(motion["reason"], "its numbers are already right to the last written decimal", "{motion}");
     }
 }
 

@@ -146,8 +146,9 @@ impl CellFrame {
 pub enum CellError {
     /// More teaching points of tools than can be processed.
     #[error(
-        "tool \"{name}\": {points} teaching points, and the squares of these numbers are {work} for all tools together, \
-         expected at most {MOST_TEACHING}: four to ten points tell a TCP, keep those that differ most"
+        "tool \"{name}\": {points} teaching points, and the squares of these numbers are {work} for all \
+         tools together, expected at most {MOST_TEACHING}: four to ten points determine a TCP; keep those \
+         that differ most"
     )]
     TooManyPoints {
         /// The tool with the most points.
@@ -200,7 +201,8 @@ pub enum CellError {
     },
     /// Contradiction with a surface file.
     #[error(
-        "{kind} \"{name}\": the cell file says origin = \"{}\", the surface file origin = \"{}\": correct the one that is wrong",
+        "{kind} \"{name}\": the cell file states origin = \"{}\", the surface file origin = \"{}\": correct \
+         the one that is wrong",
         cell.word(), surface.word()
     )]
     Contradicted {
@@ -236,10 +238,10 @@ impl CellFrame {
         }
         if let Some(q) = self.quaternion_wxyz {
             if !((q.iter().map(|q| q * q).sum::<f64>() - 1.0).abs() < 1e-3) {
-                return wrong("quaternion_wxyz has not length 1");
+                return wrong("quaternion_wxyz does not have length 1");
             }
             if self.position_mm.is_none() {
-                return wrong("quaternion_wxyz says nothing without position_mm: state both");
+                return wrong("quaternion_wxyz has no effect without position_mm: state both");
             }
         }
         let found = self.teaching_deg.len();
@@ -248,14 +250,14 @@ impl CellFrame {
         }
         if self.origin == FrameOrigin::Metrology && found > 0 {
             return wrong(
-                "teaching_deg contradicts origin = \"metrology\": write origin = \"taught\", or remove the points where the \
-                 frame's numbers are true as they stand",
+                "teaching_deg contradicts origin = \"metrology\": write origin = \"taught\", or remove the \
+                 points if the frame's numbers are exact",
             );
         }
         if found == 0 && (self.taught_with.is_some() || self.teaches.is_some()) {
             let key = if self.taught_with.is_some() { "taught_with" } else { "teaches" };
             return wrong(&format!(
-                "{key} says nothing without teaching_deg: give the teaching points, or remove it"
+                "{key} has no effect without teaching_deg: give the teaching points, or remove it"
             ));
         }
         if kind == "tool" && self.teaches.is_some() {
@@ -566,7 +568,7 @@ impl Used {
             let unused = list.iter().enumerate().filter(|(place, frame)| !used.contains(place) && own(frame));
             let say = |(_, frame): (usize, &CellFrame)| {
                 format!(
-                    "cell file: {kind} \"{}\" is used by no program: is its name as the program writes it?",
+                    "cell file: {kind} \"{}\" is not used by any program: is its name spelt as in the program?",
                     frame.name
                 )
             };
@@ -574,7 +576,7 @@ impl Used {
             let more = out.len().saturating_sub(MOST_UNUSED);
             out.truncate(MOST_UNUSED);
             if more > 0 {
-                out.push(format!("cell file: {more} more [[{kind}]] are used by no program"));
+                out.push(format!("cell file: {more} more [[{kind}]] are not used by any program"));
             }
             out
         };
@@ -582,7 +584,7 @@ impl Used {
         out.extend(frames("wobj", &cell.wobj, &self.wobj));
         let unused = cell.external.iter().enumerate().filter(|(place, _)| !self.external.contains(place));
         out.extend(unused.map(|(_, axis)| {
-            format!("cell file: external axis '{}' is stated in no target of any program", axis.axis)
+            format!("cell file: external axis '{}' does not occur in any target of any program", axis.axis)
         }));
         out
     }

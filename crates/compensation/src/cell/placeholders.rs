@@ -62,15 +62,15 @@ fn takes_away(table: &mut Table, key: &str) -> bool {
 fn expected(key: &str) -> &'static str {
     match key {
         "robot" => "write the robot's name, or remove the line",
-        "angles" => "write abc, wpr, rxyz or rotation-vector: what A, B and C of the programs mean",
+        "angles" => "write abc, wpr, rxyz or rotation-vector: the convention of A, B and C in the programs",
         "origin" => {
-            "write \"metrology\" (its numbers are true: CAD, a measuring machine, a tracker) or \"taught\" (with the arm, before it \
-             was calibrated)"
+            "write \"metrology\" (its numbers are exact: CAD, a measuring machine, a tracker) or \"taught\" \
+             (with the arm, before it was calibrated)"
         }
         "position_mm" => {
-            "write where it lies, [x, y, z] in mm: a tool on the flange, a work object in the robot's base"
+            "write its position, [x, y, z] in mm: a tool on the flange, a work object in the robot's base"
         }
-        "quaternion_wxyz" => "write how it is turned, [w, x, y, z], or remove the line where it is not",
+        "quaternion_wxyz" => "write its orientation, [w, x, y, z], or remove the line if it has none",
         "teaching_deg" => "write the joint angles (°) of the teaching points, or remove the line",
         "taught_with" => "write the name of the tool that touched the teaching points, or remove the line",
         _ => "write \"base\" (the axis carries the robot) or \"other\"",

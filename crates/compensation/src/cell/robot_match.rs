@@ -18,8 +18,8 @@ fn is_same(stated: &str, robot: &str, nominal: &Model) -> bool {
 pub fn cell_robot_mismatch(cell: &Cell, robot: &str, nominal: &Model) -> Option<String> {
     let stated = cell.robot.as_ref().filter(|stated| !is_same(stated, robot, nominal))?;
     Some(format!(
-        "cell file: robot = \"{stated}\", but the model is one of {robot}: give the model of the robot that runs the programs, or \
-         correct the cell file"
+        "cell file: robot = \"{stated}\", but the model is of {robot}: give the model of the robot that runs \
+         the programs, or correct the cell file"
     ))
 }
 
@@ -27,8 +27,8 @@ pub fn cell_robot_mismatch(cell: &Cell, robot: &str, nominal: &Model) -> Option<
 pub fn program_robot_mismatch(name: &str, source: &[u8], robot: &str, nominal: &Model) -> Option<String> {
     let stated = robot_of(source).filter(|stated| !is_same(stated, robot, nominal))?;
     Some(format!(
-        "{name}: its heading says that it was made for {stated}, but the model is one of {robot}: give the model of the robot \
-         that runs it, or take that line out where it is wrong"
+        "{name}: its heading states that it was made for {stated}, but the model is of {robot}: give the \
+         model of the robot that runs it, or remove that line if it is wrong"
     ))
 }
 

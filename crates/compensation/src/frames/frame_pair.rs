@@ -119,13 +119,13 @@ fn tool_note(
         Some(_) => Some(match real.moved_mm {
             Some(shift) => format!("tool {name} was taught: re-evaluated, its TCP moves by {shift:.3} mm"),
             None => format!(
-                "tool {name} was taught, but its teaching points are not given: taken as it stands; {}",
+                "tool {name} was taught, but its teaching points are not given: taken as exact; {}",
                 tool_estimate(commanded, with)
             ),
         }),
         None if built_in(name) => None,
         None => Some(format!(
-            "tool {name}: origin not stated, taken as metrology (true as it stands); {}",
+            "tool {name}: origin not stated, taken as metrology (exact); {}",
             tool_estimate(commanded, with)
         )),
     }
@@ -149,12 +149,12 @@ fn object_note(
             Some(format!("{what} {name} was taught: re-evaluated, it moves by {shift:.3} mm and {turn:.4}°"))
         }
         Some(_) => Some(format!(
-            "{what} {name} was taught, but its teaching points are not given: taken as it stands; {}",
+            "{what} {name} was taught, but its teaching points are not given: taken as exact; {}",
             object_estimate(commanded, with)
         )),
         None if built_in(name) => None,
         None => Some(format!(
-            "{what} {name}: origin not stated, taken as metrology (true as it stands in the robot's base); {}",
+            "{what} {name}: origin not stated, taken as metrology (exact in the robot's base); {}",
             object_estimate(commanded, with)
         )),
     }
@@ -198,7 +198,7 @@ pub(crate) fn carried_through(
 }
 
 /// Where no typical pose allows an estimate.
-const NOT_TOLD: &str = "how far it would move had it been taught cannot be told here";
+const NOT_TOLD: &str = "how far it would move had it been taught cannot be estimated here";
 
 /// How far a taught TCP would move: four orientations about a typical pose, TCP fixed under the nominal model. A stationary
 /// tool is touched once with the centre of the flange.

@@ -112,11 +112,14 @@ impl FrameTable {
             }
             self.assumed.push(if self.base[axis] {
                 format!(
-                    "external axis {letter}: targets lie farther away than the arm is long, so it is taken to carry the \
-                     robot's base (cell file, [[external]])"
+                    "external axis {letter}: targets are farther away than the arm is long, so it is assumed \
+                     to carry the robot's base (cell file, [[external]])"
                 )
             } else {
-                format!("external axis {letter} moves: taken not to carry the robot's base (cell file, [[external]])")
+                format!(
+                    "external axis {letter} moves: assumed not to carry the robot's base (cell file, \
+                         [[external]])"
+                )
             });
         }
     }

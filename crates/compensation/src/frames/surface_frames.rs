@@ -52,8 +52,9 @@ fn fault(kind: &str, name: &str, stated: &Pose, commanded: &[Pose]) -> Option<St
     let nearest = commanded.iter().min_by(|a, b| apart(a).mm.total_cmp(&apart(b).mm))?;
     let FrameDistance { mm, rad } = FrameDistance::of(stated, nearest);
     Some(format!(
-        "surface file: {kind} \"{name}\" lies at {} with origin = \"metrology\", {mm:.2} mm and {:.3}° away from where the program \
-         tells it, {}: correct the one that is wrong, or write origin = \"taught\" where the controller's was taught",
+        "surface file: {kind} \"{name}\" is at {} with origin = \"metrology\", {mm:.2} mm and {:.3}° away \
+         from the programmed one, {}: correct the one that is wrong, or write origin = \"taught\" if the \
+         controller's was taught",
         list(&stated.translation.vector),
         rad.to_degrees(),
         list(&nearest.translation.vector)

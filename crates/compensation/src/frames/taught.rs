@@ -163,8 +163,9 @@ impl<'a> Teaching<'a> {
         let (nominal, estimated, bound) = match (&stated.taught_with, held) {
             (Some(pointer), true) => {
                 return Err(format!(
-                    "cell file: tool \"{name}\": taught_with = \"{pointer}\", but the robot holds {name}: its own poses about \
-                     one point tell its TCP; remove taught_with (it is for work objects, and for tools that stand)"
+                    "cell file: tool \"{name}\": taught_with = \"{pointer}\", but the robot holds {name}: \
+                     its own poses about one point determine its TCP; remove taught_with (it is for work \
+                     objects and stationary tools)"
                 ));
             }
             (Some(_), false) => {
@@ -186,15 +187,15 @@ impl<'a> Teaching<'a> {
                 let pick = |found: FixedPoint| if held { found.on_flange } else { found.in_base };
                 let alike = || {
                     format!(
-                        "cell file: tool \"{name}\": its {} teaching points are too much alike to tell the TCP: give four or \
-                         more with the tool turned by 30° and more between them",
+                        "cell file: tool \"{name}\": its {} teaching points are too much alike to determine \
+                         the TCP: give four or more with the tool turned by 30° and more between them",
                         joints.len()
                     )
                 };
                 if joints.len() < 4 {
                     return Err(format!(
-                        "cell file: tool \"{name}\": {} teaching points, expected at least 4 (a tool that stands needs fewer \
-                         with taught_with)",
+                        "cell file: tool \"{name}\": {} teaching points, expected at least 4 (a stationary \
+                         tool needs fewer with taught_with)",
                         joints.len()
                     ));
                 }
@@ -209,10 +210,11 @@ impl<'a> Teaching<'a> {
         let apart = (nominal - told_tip).norm();
         if !(apart <= bound.mm) {
             return Err(format!(
-                "cell file: tool \"{name}\": with the arm of the data sheet its teaching points put the TCP at {}, {apart:.2} mm \
-                 and 0° away from what the program tells, {} (up to {:.2} mm is explained by rounding and by the scatter of the \
-                 points): these are the joint angles of another tool or another arm, or the TCP was changed since; teach it \
-                 anew, or write origin = \"metrology\" without teaching_deg where its numbers are true",
+                "cell file: tool \"{name}\": with the nominal arm its teaching points put the TCP at {}, \
+                 {apart:.2} mm and 0° away from the programmed one, {} (up to {:.2} mm is explained by \
+                 rounding and by the scatter of the points): these are the joint angles of another tool or \
+                 another arm, or the TCP was changed since; teach it again, or write origin = \"metrology\" \
+                 without teaching_deg if its numbers are exact",
                 list(&nominal),
                 list(&told_tip),
                 bound.mm
@@ -258,7 +260,8 @@ impl<'a> Teaching<'a> {
         let pointer = self.pointer("wobj", stated, !part)?;
         let in_line = || {
             format!(
-                "cell file: wobj \"{}\": its three teaching points are in line: the third must lie beside the x axis",
+                "cell file: wobj \"{}\": its three teaching points are collinear: the third must be off the \
+                 x axis",
                 stated.name
             )
         };
@@ -311,19 +314,20 @@ impl<'a> Teaching<'a> {
         let cause = if FrameDistance::of(nominal, other).within(bound) {
             let place =
                 if instead == "oframe" { "with its object frame" } else { "without its object frame" };
-            format!("they make the frame {place}: write teaches = \"{instead}\"")
+            format!("they define the frame {place}: write teaches = \"{instead}\"")
         } else if let Some(tool) = known.iter().find(fits) {
             format!("they fit tool {}: write taught_with = \"{}\"", tool.name, tool.name)
         } else {
-            "another tool touched them, they are the joint angles of another arm, or the frame was changed since: correct \
-             taught_with or teaching_deg, or write origin = \"metrology\" without them where the frame's numbers are true"
+            "another tool touched them, they are the joint angles of another arm, or the frame was changed \
+             since: correct taught_with or teaching_deg, or write origin = \"metrology\" without them if the \
+             frame's numbers are exact"
                 .to_owned()
         };
         let apart = FrameDistance::of(nominal, commanded);
         format!(
-            "cell file: wobj \"{}\": with the arm of the data sheet and tool {} its teaching points make a frame at {}, {:.2} mm \
-             and {:.3}° away from the {frame} that the program tells, at {} (up to {:.2} mm and {:.3}° is explained by rounding): \
-             {cause}",
+            "cell file: wobj \"{}\": with the nominal arm and tool {} its teaching points define a frame at \
+             {}, {:.2} mm and {:.3}° away from the programmed {frame}, at {} (up to {:.2} mm and {:.3}° is \
+             explained by rounding): {cause}",
             stated.name,
             pointer.name,
             list(&nominal.translation.vector),
@@ -339,7 +343,7 @@ impl<'a> Teaching<'a> {
     fn pointer(&self, kind: &str, stated: &CellFrame, held: bool) -> Result<TouchingTool, String> {
         let here = format!("cell file: {kind} \"{}\"", stated.name);
         let known = self.tools();
-        let holds = if held { "that the robot holds" } else { "that stands" };
+        let holds = if held { "that the robot holds" } else { "that is stationary" };
         let found = match &stated.taught_with {
             Some(name) => {
                 let mut same = known.called(name);
@@ -359,7 +363,8 @@ impl<'a> Teaching<'a> {
                 }
                 if found.held != held {
                     return Err(format!(
-                        "{here}: taught_with = \"{name}\": its points are touched by a tool {holds}, and {name} is none"
+                        "{here}: taught_with = \"{name}\": its points must be touched by a tool {holds}, but \
+                         {name} is not one"
                     ));
                 }
                 found
@@ -460,8 +465,9 @@ fn agrees(kind: &str, stated: &CellFrame, commanded: &Pose) -> Result<(), String
     }
     let what = if kind == "tool" { "frame" } else { "user frame" };
     Err(format!(
-        "cell file: {kind} \"{}\": position_mm and quaternion_wxyz are {:.2} mm and {:.3}° away from the {what} that the program \
-         declares, at {}: a RAPID program says where it is; remove them, or correct the one that is wrong",
+        "cell file: {kind} \"{}\": position_mm and quaternion_wxyz are {:.2} mm and {:.3}° away from the \
+         {what} that the program declares, at {}: a RAPID program states it itself; remove them, or correct \
+         the one that is wrong",
         stated.name,
         apart.mm,
         apart.rad.to_degrees(),

@@ -63,8 +63,8 @@ pub(crate) fn notes(listing: &Listing, language: Language) -> Vec<String> {
                     .to_owned()
             }
             Language::Nc => format!(
-                "say where it is in a cell file (--cell): [[{key}]] name = \"{}\", origin = \"metrology\", position_mm = [x, y, z], \
-                 quaternion_wxyz = [w, x, y, z]",
+                "state its pose in a cell file (--cell): [[{key}]] name = \"{}\", origin = \"metrology\", \
+                 position_mm = [x, y, z], quaternion_wxyz = [w, x, y, z]",
                 one.name
             ),
         };

@@ -17,12 +17,13 @@ pub(crate) fn play_note(arms: &Arms<'_>, solved: &SolvedTargets) -> Option<Strin
     let unknown = match solved.in_play() {
         (0, _) => String::new(),
         (count, most) => format!(
-            "; at {count} targets the side of a joint cannot be told from the text (nothing moved it yet, or the motion \
-             before is not known): the middle of its play is taken, and half of it is in their σ (up to {most:.3} mm)"
+            "; at {count} targets the backlash side of a joint is unknown (it has not moved yet, or the \
+             previous motion is unknown): mid-play is assumed, and half the backlash is included in their σ \
+             (up to {most:.3} mm)"
         ),
     };
     Some(format!(
-        "backlash ({}): the side from which each joint comes follows from the program's own motion{unknown}",
+        "backlash ({}): the side from which each joint arrives follows from the program's own motion{unknown}",
         plays.join(", ")
     ))
 }
@@ -37,7 +38,7 @@ pub(crate) fn doubt_note(arms: &Arms<'_>) -> Option<String> {
         })
         .collect();
     (!named.is_empty())
-        .then(|| format!("in doubt, so not corrected for, but counted in every σ: {}", named.join(", ")))
+        .then(|| format!("doubtful, therefore not corrected, but included in every σ: {}", named.join(", ")))
 }
 
 /// What was not checked or was assumed, with line numbers.
@@ -45,15 +46,15 @@ pub(crate) fn open_notes(listing: &Listing, solved: &SolvedTargets, unchecked: &
     let mut out = Vec::new();
     if let Some(lines) = lines_of(listing, unchecked) {
         out.push(format!(
-            "{} of the lines and arcs start where the text alone does not tell, or where the program was not corrected: their \
-             ends are right, the path between is not checked ({lines})",
+            "{} of the lines and arcs have an unknown or uncorrected start: their ends are correct, the path \
+             between is not checked ({lines})",
             unchecked.len()
         ));
     }
     if let Some(lines) = lines_of(listing, &listing.outside) {
         out.push(format!(
-            "{} of the blocks call programs that do not stand in their file: these are taken to leave work offset, shifts, tool, \
-             units and tool centre point control as they are ({lines})",
+            "{} of the blocks call programs that are not in their file: these are assumed to leave work \
+             offset, shifts, tool, units and tool centre point control unchanged ({lines})",
             listing.outside.len()
         ));
     }
@@ -66,8 +67,9 @@ pub(crate) fn open_notes(listing: &Listing, solved: &SolvedTargets, unchecked: &
     let wrist: Vec<u32> = (0..listing.motions.len() as u32).filter(curve).collect();
     if let Some(lines) = lines_of(listing, &wrist) {
         out.push(format!(
-            "on {} of the lines and arcs the controller turns the wrist joint by joint (SingArea \\Wrist): their paths are \
-             checked as if the tool turned evenly, and no targets are put in ({lines})",
+            "on {} of the lines and arcs the controller turns the wrist joint by joint (SingArea \\Wrist): \
+             their paths are checked as if the orientation were interpolated evenly, and no targets are \
+             inserted ({lines})",
             wrist.len()
         ));
     }
@@ -75,13 +77,14 @@ pub(crate) fn open_notes(listing: &Listing, solved: &SolvedTargets, unchecked: &
         let count = solved.guessed.len();
         out.push(if listing.numbered {
             format!(
-                "where the arm stands before {count} of the motions the text does not tell, and no NC word states the \
-                 configuration: the most usual one is taken, unchecked ({lines})"
+                "before {count} of the motions the position of the arm is unknown, and no NC word states the \
+                 configuration: the most usual one is assumed, unchecked ({lines})"
             )
         } else {
             format!(
-                "{count} of the motions go, unchecked, to the configuration next to where the arm stands (ConfL \\Off, ConfJ \\Off), \
-                 which the text does not tell there: the one that keeps to the stated quarters best is taken ({lines})"
+                "{count} of the motions go, unchecked, to the configuration next to where the arm stands \
+                 (ConfL \\Off, ConfJ \\Off), which is unknown there: the one that matches the stated quarter \
+                 turns best is assumed ({lines})"
             )
         });
     }
@@ -123,25 +126,25 @@ pub(crate) fn load_notes(listing: &Listing, arms: &Arms<'_>, options: &Options) 
         let (low, high) = stated.iter().fold((first, first), |(a, b), kg| (a.min(*kg), b.max(*kg)));
         let range = if low == high { format!("{low} kg") } else { format!("{low} to {high} kg") };
         out.push(format!(
-            "payload: {range}, as the program's tools and loads say (--payload states another)"
+            "payload: {range}, as stated by the program's tools and loads (--payload overrides it)"
         ));
     }
     if load_dependent && silent > 0 {
         out.push(format!(
-            "payload: at {silent} motions the tool states no mass, and that of the measurement is taken ({base}); \
-             --payload states it"
+            "payload: at {silent} motions the tool states no mass, so that of the measurement is assumed \
+             ({base}); --payload overrides it"
         ));
     }
     if loads.unknown() > 0 {
         out.push(format!(
-            "payload: at {} motions what GripLoad sets is not known from the text; the tool alone is counted",
+            "payload: at {} motions the load set by GripLoad is unknown; only the tool is counted",
             loads.unknown()
         ));
     }
     if lumped {
         out.push(format!(
-            "compliance was found without the masses of the arm: it holds for the load of the measurement ({base}) and does \
-             not follow that of the program"
+            "compliance was identified without the masses of the arm: it applies to the payload of the \
+             measurement ({base}) and does not follow that of the program"
         ));
     }
     out

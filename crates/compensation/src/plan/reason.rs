@@ -10,7 +10,7 @@ use truegrind_programs::motion::Reason;
 /// ```
 /// use truegrind_compensation::plan::reason::Why;
 ///
-/// assert_eq!(OutcomeReason::OutsideLimits { joint: 4 }.to_string(), "joint 5 would leave its range");
+/// assert_eq!(OutcomeReason::OutsideLimits { joint: 4 }.to_string(), "joint 5 would exceed its limits");
 /// let far = OutcomeReason::CorrectionTooLarge { mm: 3.25 };
 /// assert_eq!(far.to_string(), "correction of 3.250 mm exceeds the bound (--max-correction)");
 /// // In a summary, motions are counted by the reason without its figures.
@@ -176,18 +176,18 @@ impl OutcomeReason {
         match self {
             OutcomeReason::StartOfUnchangedArc { line } => write!(
                 f,
-                "the circular motion of line {line} stays as it is and starts here: from a corrected start it would be another \
-                 circle"
+                "the circular motion of line {line} remains unmodified and starts here: from a corrected start it would be a \
+                 different circle"
             ),
             OutcomeReason::StartOfSingularPath { line } => write!(
                 f,
-                "the motion of line {line} stays as it is and starts here: from a corrected start it would come too close to a \
-                 singularity"
+                "the motion of line {line} remains unmodified and starts here: from a corrected start it would pass too close to \
+                 a singularity"
             ),
             OutcomeReason::StartOfLimitedPath { line, joint } => write!(
                 f,
-                "the motion of line {line} stays as it is and starts here: from a corrected start joint {} would leave its \
-                 range on the way",
+                "the motion of line {line} remains unmodified and starts here: from a corrected start joint {} would exceed its \
+                 limits on the way",
                 joint + 1
             ),
             _ => Ok(()),
@@ -206,43 +206,43 @@ impl OutcomeReason {
             OutcomeReason::Inverse(
                 InverseError::OtherConfiguration { .. } | InverseError::OtherBranch { .. },
             ) => "not reachable in its configuration",
-            OutcomeReason::Inverse(InverseError::Abandoned) => "too many targets had to be searched for",
-            OutcomeReason::Inverse(_) => "no joints were found",
-            OutcomeReason::OutsideLimits { .. } => "a joint would leave its range",
-            OutcomeReason::PathOutsideLimits { .. } => "a joint would leave its range on the way to it",
+            OutcomeReason::Inverse(InverseError::Abandoned) => "the search budget of the program was used up",
+            OutcomeReason::Inverse(_) => "no joint solution was found",
+            OutcomeReason::OutsideLimits { .. } => "a joint would exceed its limits",
+            OutcomeReason::PathOutsideLimits { .. } => "a joint would exceed its limits on the way",
             OutcomeReason::CorrectionTooLarge { .. } => "correction exceeds the bound (--max-correction)",
             OutcomeReason::RotationTooLarge { .. } => "correction of the orientation exceeds the bound",
             OutcomeReason::NearSingularity => "too close to a singularity",
             OutcomeReason::OtherBranch => "the corrected target lies in another configuration",
-            OutcomeReason::PathDeviation { .. } => "the path between targets leaves the intended one",
-            OutcomeReason::CornerDeviation { .. } => "the rounded corner leaves the intended one",
+            OutcomeReason::PathDeviation { .. } => "the path between targets deviates from the intended one",
+            OutcomeReason::CornerDeviation { .. } => "the rounded corner deviates from the intended one",
             OutcomeReason::AmbiguousCentre { .. } => {
-                "told by its radius, the centre of a half circle is left open"
+                "the radius of a half circle leaves its centre ambiguous"
             }
-            OutcomeReason::CircleKept => "the circle stays a circle",
-            OutcomeReason::TooFast { .. } => "a joint turns faster than it can",
-            OutcomeReason::NoCircle => "no circle through its points keeps to the way that was meant",
-            OutcomeReason::StartOfUnchangedArc { .. } => "a circular motion that stays starts where it ends",
+            OutcomeReason::CircleKept => "the circle was kept",
+            OutcomeReason::TooFast { .. } => "a joint exceeds its speed limit",
+            OutcomeReason::NoCircle => "no circle through its points follows the intended path",
+            OutcomeReason::StartOfUnchangedArc { .. } => "an unmodified circular motion starts where it ends",
             OutcomeReason::StartOfSingularPath { .. } => {
-                "a motion that stays and passes a singularity starts where it ends"
+                "an unmodified motion near a singularity starts where it ends"
             }
             OutcomeReason::StartOfLimitedPath { .. } => {
-                "a joint would leave its range on a motion that stays and starts here"
+                "a joint would exceed its limits on an unmodified motion that starts here"
             }
-            OutcomeReason::FullCircle => "a whole circle",
+            OutcomeReason::FullCircle => "a full circle",
             OutcomeReason::JointNotMeasured { .. } => {
                 "a joint is outside the range in which the arm was measured"
             }
             OutcomeReason::JointJump { .. } => "near a singularity the correction turns a joint too far",
-            OutcomeReason::SingularPath => "the way to it passes too close to a singularity",
-            OutcomeReason::AmbiguousBranch => "which configuration the controller takes is open",
+            OutcomeReason::SingularPath => "the path to it passes too close to a singularity",
+            OutcomeReason::AmbiguousBranch => "the controller's choice of configuration is ambiguous",
             OutcomeReason::UnknownStart => {
-                "corrected for the stated configuration, which is not checked, from a start that is not known"
+                "corrected for the stated configuration, which is not checked, from an unknown start"
             }
             OutcomeReason::PartOfCut { because, .. } => because,
             OutcomeReason::Step { .. } => "the step to its neighbour is too large",
-            OutcomeReason::Risk { .. } => "the correction may well make the cut worse (--max-risk)",
-            OutcomeReason::NotCovered { .. } => "no measured pose is near",
+            OutcomeReason::Risk { .. } => "the correction is too likely to make the cut worse (--max-risk)",
+            OutcomeReason::NotCovered { .. } => "no measured pose is nearby",
             OutcomeReason::Uncertain { .. } => "the model is uncertain here",
         }
     }
@@ -250,37 +250,35 @@ impl OutcomeReason {
     /// The whole sentence, where it contains no figures and says more than [`Self::kind`].
     fn sentence(&self) -> Option<&'static str> {
         Some(match self {
-            OutcomeReason::NoChange => "its numbers are right to the last decimal that is written",
+            OutcomeReason::NoChange => "its numbers are already right to the last written decimal",
             OutcomeReason::JointTarget => {
                 "joint target: states joints, not a pose (--joint-targets rewrites it too)"
             }
             OutcomeReason::CellContradiction => {
-                "what the cell file says of its tool or work object and what the program says do not agree"
+                "cell file and program disagree about its tool or work object"
             }
-            OutcomeReason::SingularPath => {
-                "on the corrected way to it the arm comes too close to a singularity"
-            }
+            OutcomeReason::SingularPath => "the corrected path to it passes too close to a singularity",
             OutcomeReason::AmbiguousBranch => {
-                "the controller may take another configuration, since none is stated and another lies as near: state it, or \
-                 come nearer before"
+                "no configuration is stated and another one is equally near, so the controller might select it: state the \
+                 configuration, or add a target closer to this one"
             }
             OutcomeReason::UnknownStart => {
-                "its configuration is not checked (ConfL \\Off, ConfJ \\Off): the controller takes the one next to where the \
-                 arm stands, and where it comes from the text does not tell. It is corrected for the stated one, or the one \
-                 that leads on from there: check that, or begin with a joint target"
+                "its configuration is not checked (ConfL \\Off, ConfJ \\Off): the controller selects the one next to where the arm \
+                 stands, and the program does not determine its start. It is corrected for the stated configuration, or the \
+                 one that continues from there: check it, or begin with a joint target"
             }
             OutcomeReason::PathDeviation { mm } if !mm.is_finite() => "the arm cannot follow the path to it",
             OutcomeReason::CornerDeviation { mm } if !mm.is_finite() => {
                 "the arm cannot follow the rounded corner before it: round it less (zone, path tolerance)"
             }
             OutcomeReason::CircleKept => {
-                "the circle stays: its start is not known or not corrected, the instruction may not be split, or no \
-                 straight pieces keep to it"
+                "the circle was kept: its start is unknown or not corrected, the instruction cannot be split, or no straight \
+                 segments follow it"
             }
             OutcomeReason::NoCircle => {
-                "its three points make no circle, or none that keeps to the way that was meant"
+                "its three points make no circle, or none that follows the intended path"
             }
-            OutcomeReason::FullCircle => "a whole circle: the path between its ends is not checked",
+            OutcomeReason::FullCircle => "a full circle: the path between its ends is not checked",
             _ => return None,
         })
     }
@@ -295,13 +293,15 @@ impl fmt::Display for OutcomeReason {
             OutcomeReason::Program(reason) => reason.fmt(f),
             OutcomeReason::MovingBase { axis } => write!(
                 f,
-                "external axis {} carries the robot's base: where that stands is not followed",
+                "external axis {} carries the robot's base, whose position is not modelled",
                 char::from(b'a' + *axis as u8)
             ),
             OutcomeReason::Inverse(error) => error.fmt(f),
-            OutcomeReason::OutsideLimits { joint } => write!(f, "joint {} would leave its range", joint + 1),
+            OutcomeReason::OutsideLimits { joint } => {
+                write!(f, "joint {} would exceed its limits", joint + 1)
+            }
             OutcomeReason::PathOutsideLimits { joint } => {
-                write!(f, "on the corrected way to it joint {} would leave its range", joint + 1)
+                write!(f, "joint {} would exceed its limits on the corrected path to it", joint + 1)
             }
             OutcomeReason::CorrectionTooLarge { mm } => {
                 write!(f, "correction of {mm:.3} mm exceeds the bound (--max-correction)")
@@ -309,28 +309,28 @@ impl fmt::Display for OutcomeReason {
             OutcomeReason::RotationTooLarge { deg } => write!(f, "correction of {deg:.3}° exceeds the bound"),
             OutcomeReason::JointJump { joint, deg, most_deg, on_the_way } => write!(
                 f,
-                "{}the correction would turn joint {} by {deg:.1}°, more than {most_deg:.1}°, which is enough away from \
+                "{}the correction would turn joint {} by {deg:.1}°, but at most {most_deg:.1}° is needed away from \
                  singularities: keep farther from the singular configuration",
                 if *on_the_way { "on the way to it " } else { "" },
                 joint + 1
             ),
             OutcomeReason::PathDeviation { mm } => {
-                write!(f, "the path to it leaves the intended one by {mm:.3} mm")
+                write!(f, "the path to it deviates from the intended one by {mm:.3} mm")
             }
             OutcomeReason::CornerDeviation { mm } => {
                 write!(
                     f,
-                    "the rounded corner before it leaves the intended one by {mm:.3} mm: round it less (zone, path tolerance)"
+                    "the rounded corner before it deviates from the intended one by {mm:.3} mm: round it less (zone, path tolerance)"
                 )
             }
             OutcomeReason::AmbiguousCentre { mm } => write!(
                 f,
-                "an arc of about half a turn that states its radius: the decimals that are written leave its centre open by \
+                "an arc of about half a turn programmed by its radius: the written decimals leave its centre ambiguous by \
                  {mm:.3} mm; state the centre instead (I, J, K; CC)"
             ),
             OutcomeReason::TooFast { joint, ratio } => write!(
                 f,
-                "at the programmed speed joint {} turns {ratio:.2} times as fast as it can",
+                "at the programmed speed joint {} exceeds its speed limit by a factor of {ratio:.2}",
                 joint + 1
             ),
             OutcomeReason::StartOfUnchangedArc { .. }
@@ -343,21 +343,21 @@ impl fmt::Display for OutcomeReason {
             ),
             OutcomeReason::PartOfCut { line, because } => write!(
                 f,
-                "the cut is corrected as a whole or not at all, and line {line} stays as it is: {because} (--partial \
-                 corrects the rest)"
+                "a cut is corrected as a whole or not at all, and line {line} remains unmodified: {because} (--partial corrects \
+                 the rest)"
             ),
             OutcomeReason::Step { line, mm } => write!(
                 f,
-                "line {line} of the same cut stays as it is: the step of {mm:.3} mm between the two exceeds --tolerance"
+                "line {line} of the same cut remains unmodified: the step of {mm:.3} mm between the two exceeds --tolerance"
             ),
             OutcomeReason::Risk { chance } => write!(
                 f,
-                "with a probability of {:.0} % the correction makes this cut worse than it is, more than --max-risk takes: the \
-                 measurement does not tell the arm well enough here",
+                "the correction makes this cut worse with a probability of {:.0} %, more than --max-risk allows: the \
+                 measurement does not determine the arm well enough here",
                 100.0 * chance
             ),
             OutcomeReason::NotCovered { ratio } => {
-                write!(f, "no measured pose is near: {ratio:.1} times the distance of measured poses")
+                write!(f, "no measured pose is nearby: {ratio:.1} times the distance between measured poses")
             }
             OutcomeReason::Uncertain { sigma_mm } => {
                 write!(f, "the model is uncertain here: predicted standard deviation {sigma_mm:.3} mm")

@@ -89,17 +89,22 @@ impl Measurement {
             Measurement::Touch => format!(
                 "touch three points of the {object} with this arm and give their joints (cell file, origin = \"taught\")"
             ),
-            Measurement::Frame => "measure where the sensor stands in the robot's base and state it (--sensor-frame, or --outlet and \
-                                   --cable-zero, with --frame-sigma)"
-                .to_owned(),
+            Measurement::Frame => {
+                "measure the pose of the sensor in the robot's base and state it (--sensor-frame, or \
+                         --outlet and --cable-zero, with --frame-sigma)"
+                    .to_owned()
+            }
             Measurement::Beside { poses } => format!(
                 "measure {poses} poses with the target beside the axis of joint 6, at many angles of that joint"
             ),
             Measurement::Plate { poses } => format!(
-                "measure {poses} poses with three targets whose places on the flange a coordinate measuring machine has told"
+                "measure {poses} poses with three targets whose positions on the flange were measured on a \
+                 coordinate measuring machine"
             ),
             Measurement::Station { poses } => {
-                format!("measure {poses} poses with the sensor, or the outlet of its cable, at a second place")
+                format!(
+                    "measure {poses} poses with the sensor, or the outlet of its cable, at a second station"
+                )
             }
             Measurement::More { poses } => format!("measure {poses} more poses as before"),
         }

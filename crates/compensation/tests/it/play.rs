@@ -250,7 +250,7 @@ fn the_judge_sees_what_the_simulation_sees_and_a_start_without_sides_is_said() {
     assert!(worst(&report, true) < 1e-3, "{}", worst(&report, true));
     assert!(worst(&report, false) > 0.1);
     let note = planned.notes.iter().find(|note| note.contains("backlash")).expect("a note on backlash");
-    assert!(note.contains("joint 1: 0.0200°") && note.contains("cannot be told"), "{note}");
+    assert!(note.contains("joint 1: 0.0200°") && note.contains("is unknown (it has not moved yet"), "{note}");
     // Half the play of each joint is in σ at the start and no longer when all joints have moved.
     let sigma = |k: usize| planned.outcomes[k].sigma_mm.unwrap();
     assert!(sigma(0) > 0.09, "σ at the start {}", sigma(0));
