@@ -1,12 +1,12 @@
-//! The statements of a routine in the order in which they run: what assigned data holds, how the switches stand, and
-//! which motion went before.
+//! Abstract interpreter of one routine: the values of data, the switches and the reaching motions before each statement.
 //!
-//! One pass per routine. Straight-line assignments are followed exactly; where ways join, only what they agree on
-//! stays known; what a loop assigns is unknown at its beginning; a label or an error handler can be reachable from
-//! anywhere in the routine. What a called routine or function may change is forgotten, and what a trap routine, an
-//! error handler or the controller itself may change at any time is never known. A parameter by reference may be another
-//! name of data outside or of another parameter: where one changes, the others are forgotten. What is not known from the statements before has, as far as nothing
-//! assigns its components, its initial value.
+//! Method: a forward may-analysis over the structured statements, one pass per routine. [`AbstractState`] holds constants
+//! (constant propagation, [`Known`]), a [`SwitchSet`] and the [`ReachingMotions`]; each statement kind has a transfer
+//! function; branches meet in [`AbstractState::join`]. Loops need no fixpoint: whatever a loop writes is unknown at its head.
+//! Labels and error handlers start in a state that joins every point of the routine. Calls apply the callee's side-effect
+//! summary ([`super::symbol::SideEffects`]) and its exit switches. Volatile data, which an interrupt routine, an error handler
+//! or the controller may write, is never known. A parameter by reference may alias outside data or another parameter: a write
+//! to one invalidates the others. Data without a known assignment has its initial value where nothing writes it.
 
 mod assign;
 mod invalidate;
@@ -24,30 +24,30 @@ use super::value::Value;
 use crate::motion::{Frame, Reason};
 use crate::tree::Child;
 
-/// The key in [`Known`] under which the program displacement stands: no name of the program has it. Where it is absent
-/// the displacement is as at the entry of the routine.
+/// The key of the program displacement in [`Known`]; no symbol has it. Where it is absent, the displacement is as at the entry
+/// of the routine.
 pub(super) const DISPLACEMENT: u32 = u32::MAX;
 
-/// Data that holds more numbers and texts is not followed.
+/// Larger values (scalars and strings) are not tracked.
 const MAX_VALUE_SIZE: usize = 4096;
 
-/// Longer arrays are not followed element by element.
+/// Longer arrays are not tracked element by element.
 const MAX_ELEMENTS: f64 = 64.0;
 
-/// What holds before a statement.
+/// Abstract state before a statement.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct AbstractState {
     pub(super) known: Known,
     pub(super) modal: SwitchSet,
     pub(super) previous: Option<u32>,
-    /// Where the robot may stand, where anything tracks_motions from there.
+    /// The motions that may be the last executed; tracked only where the program depends on them.
     reaching: ReachingMotions,
-    /// Whether any way leads here.
+    /// Whether control flow can reach the statement.
     reachable: bool,
 }
 
 impl AbstractState {
-    /// The program displacement: `None` as at the entry of the routine, an error where it is not known.
+    /// The program displacement: `None` as at the entry of the routine, an error where it is unknown.
     pub(super) fn displacement(&self) -> Option<Result<Frame, Reason>> {
         self.known.get(&DISPLACEMENT).map(|value| value.frame())
     }
@@ -62,7 +62,7 @@ impl AbstractState {
         let mut known = self
             .known
             .joined(&other.known, &|a: Option<&Value>, b: Option<&Value>| Some(join_values(a?, b?)));
-        // What one way alone tells is, where the ways join, as if no way told it.
+        // Known on one branch only: unknown at the join.
         if self.known.contains_key(&DISPLACEMENT) != other.known.contains_key(&DISPLACEMENT) {
             known.insert(DISPLACEMENT, Value::Unknown(Reason::Displacement));
         }
@@ -76,7 +76,7 @@ impl AbstractState {
     }
 }
 
-/// What two values agree on.
+/// Join of two values: equal components stay known.
 fn join_values(a: &Value, b: &Value) -> Value {
     match (a, b) {
         _ if a == b => a.clone(),
@@ -87,41 +87,41 @@ fn join_values(a: &Value, b: &Value) -> Value {
     }
 }
 
-/// A call of a routine of the program, with the switches as they stand there.
+/// A call of a routine of the program, with the switches at the call.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct CallSite {
     pub(super) routine: u32,
     pub(super) modal: SwitchSet,
 }
 
-/// What the walk hands to its owner at each statement that may move the robot.
+/// Receives what the interpreter finds.
 pub(super) trait Visitor {
-    /// A call; answers the index of the motion, where it is one.
+    /// A call; returns the index of the motion if it is one.
     fn visit_call(&mut self, unit: Unit, node: u32, state: &AbstractState, nesting: Nesting) -> Option<u32>;
-    /// The states of switches with which a routine ends, "as at the entry" included.
+    /// The switches at the end of a routine, "as at the entry" included.
     fn exit_switches(&mut self, routine: u32) -> SwitchSet;
     /// A call of a routine of the program.
     fn record_call(&mut self, site: CallSite);
-    /// A call by a computed name, with the switches as they stand there.
+    /// A call by a computed name, with the switches at the call.
     fn record_late_call(&mut self, modal: SwitchSet);
-    /// A call of a routine that is in none of the files, which may call those that are.
+    /// A call of a routine that no file declares; it may call those that are declared.
     fn record_external_call(&mut self, modal: SwitchSet);
-    /// A displacement is counted from where the robot stands.
+    /// A displacement is counted from the robot's current position.
     fn record_position_use(&mut self, reaching: &ReachingMotions);
-    /// The next cycle begins at main with the switches as they stand here.
+    /// The next cycle enters main with these switches.
     fn record_cycle_restart(&mut self, modal: SwitchSet);
 }
 
-/// In what a statement stands.
+/// Control structures around a statement.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Nesting {
     pub(super) in_loop: bool,
     pub(super) conditional: bool,
-    /// Whether a compact IF guards the statement alone.
+    /// Whether a compact IF guards this statement alone.
     pub(super) guarded: bool,
 }
 
-/// Walks one unit; hands back the states of the switches at its end.
+/// Interprets one unit; returns the switches at its end.
 pub(super) fn interpret_unit(
     evaluator: &Evaluator<'_, '_>,
     unit: Unit,
@@ -152,7 +152,7 @@ pub(super) fn interpret_unit(
     if let Some(routine) = unit.routine
         && tree.child_nodes(unit.node).any(|clause| is_exception_clause(tree.nodes[clause as usize].kind))
     {
-        // An error leaves what is called anywhere.
+        // An error may leave a callee at any point.
         interpreter.any = interpreter.any.join(symbols.routines[routine as usize].effects.switches);
     }
     let reaching = if tracks_motions { ReachingMotions::routine_entry() } else { ReachingMotions::default() };
@@ -163,7 +163,7 @@ pub(super) fn interpret_unit(
         reaching,
         reachable: true,
     };
-    // Where ExitCycle begins main anew, its variables may be as they were.
+    // ExitCycle restarts main without reinitialising its variables.
     if unit
         .routine
         .is_some_and(|routine| !(symbols.restarts_main && symbols.is_main(evaluator.trees, routine)))
@@ -186,7 +186,7 @@ pub(super) fn interpret_unit(
     if end.reachable { interpreter.exits.join(end.modal) } else { interpreter.exits }
 }
 
-/// The parameters of a unit that may be other names of data outside it, or of each other.
+/// The parameters of a unit that may alias outside data or each other.
 fn aliases(evaluator: &Evaluator<'_, '_>, unit: Unit) -> Vec<u32> {
     let Some(routine) = unit.routine else { return Vec::new() };
     let tree = &evaluator.trees[unit.file as usize];
@@ -200,22 +200,22 @@ struct Interpreter<'w, 'a, 's> {
     unit: Unit,
     visitor: &'w mut dyn Visitor,
     exits: SwitchSet,
-    /// What any statement of the unit may set.
+    /// The switches that any statement of the unit may set: those at a point reachable from anywhere.
     any: SwitchSet,
-    /// What an error handler may set before it goes back to the statements, and what trap routines leave set.
+    /// The switches that an error handler may set before it resumes, and those that trap routines leave set.
     handler_switches: SwitchSet,
-    /// Whether an error handler goes back to the statements, so that what they call may end anywhere.
+    /// Whether an error handler resumes the statements, so that a callee may have ended anywhere.
     resumes: bool,
-    /// Whether an error handler that goes back to the statements, or a trap routine, moves the robot.
+    /// Whether the robot may move between two statements (error handler or interrupt).
     moved_between: bool,
-    /// Whether anything in the program tracks_motions from where the robot stands.
+    /// Whether anything in the program depends on the robot's current position.
     tracks_motions: bool,
-    /// The parameters that may be other names of data outside, or of each other.
+    /// The parameters that may alias outside data or each other.
     aliases: Vec<u32>,
 }
 
 impl Interpreter<'_, '_, '_> {
-    /// The children of a node that are statements or hold statements.
+    /// Transfers a state through the statements under a node.
     fn transfer_block(&mut self, node: u32, mut state: AbstractState, nesting: Nesting) -> AbstractState {
         let tree = &self.evaluator.trees[self.unit.file as usize];
         let (mut child, end) = (node + 1, node + tree.nodes[node as usize].size);
@@ -247,7 +247,7 @@ impl Interpreter<'_, '_, '_> {
             Syntax::If => self.transfer_branches(node, state, conditional, Token::Else),
             Syntax::Test => self.transfer_branches(node, state, conditional, Token::Default),
             Syntax::CompactIf => {
-                // The condition is asked before the ways part.
+                // The condition is evaluated on both branches.
                 self.invalidate_condition(node, &mut state);
                 let before = state.clone();
                 let guarded = Nesting { guarded: true, ..conditional };
@@ -263,7 +263,7 @@ impl Interpreter<'_, '_, '_> {
                 if end.reachable && kind == Syntax::UndoClause && self.evaluator.symbols.restarts_main {
                     self.visitor.record_cycle_restart(end.modal);
                 }
-                // The handler is no continuation of the statements before it.
+                // Control does not fall through into the handler.
                 state
             }
             Syntax::Label => state.join(self.state_at_any_point()),
@@ -273,18 +273,18 @@ impl Interpreter<'_, '_, '_> {
                 AbstractState { reachable: false, ..state }
             }
             Syntax::Raise if self.resumes => {
-                // The handler of the routine goes on behind it.
+                // The handler may resume after it.
                 self.join_switches(self.handler_switches, &mut state);
                 AbstractState { previous: None, reaching: self.any_motion(), ..state }
             }
-            // Where a caller catches the error, it tracks_motions with all that is set here.
+            // A caller that catches the error joins all switches set here.
             Syntax::Goto | Syntax::Raise => AbstractState { reachable: false, ..state },
             Syntax::Leave => {
                 self.exits = self.exits.join(state.modal);
                 AbstractState { reachable: false, ..state }
             }
             Syntax::Opaque | Syntax::Unwritten => {
-                // What could not be read may do anything to what the routine assigns.
+                // Unparsed text may write anything.
                 AbstractState {
                     previous: None,
                     reaching: self.any_motion(),
@@ -292,7 +292,7 @@ impl Interpreter<'_, '_, '_> {
                     ..state
                 }
             }
-            // Conditions and bounds: the functions in them.
+            // Conditions and bounds: their function calls.
             _ => {
                 self.invalidate_changed(node, &mut state);
                 state
@@ -300,7 +300,7 @@ impl Interpreter<'_, '_, '_> {
         }
     }
 
-    /// A loop: what holds in it and behind it holds on every way round.
+    /// A loop: everything that it writes is unknown at its head and behind it, which holds for every number of iterations.
     fn transfer_loop(
         &mut self,
         node: u32,
@@ -316,7 +316,7 @@ impl Interpreter<'_, '_, '_> {
         let invalidate = |interpreter: &mut Self, state: &mut AbstractState| {
             interpreter.invalidate_changed(node, state);
             if kind == Syntax::While {
-                // It may wait for another task.
+                // The condition may wait for another task.
                 interpreter.invalidate_shared(state);
             }
             if displaces {
@@ -347,7 +347,7 @@ impl Interpreter<'_, '_, '_> {
                 self.invalidate_changed(branch, &mut state);
                 continue;
             }
-            // A condition is asked before the branches that follow, whether they are gone or not.
+            // A condition is evaluated before all following branches.
             self.invalidate_condition(branch, &mut state);
             let first = parts(tree, branch).next();
             complete |= first.and_then(|first| token_kind(tree, first)) == Some(otherwise);
@@ -358,14 +358,14 @@ impl Interpreter<'_, '_, '_> {
             });
         }
         match joined {
-            // TRYNEXT passes all branches where a condition fails.
+            // TRYNEXT skips all branches where a condition raises an error.
             Some(joined) if complete && !self.resumes => joined,
             Some(joined) => joined.join(state),
             None => state,
         }
     }
 
-    /// What holds at a place that can be reachable from anywhere in the routine.
+    /// State at a point that can be reached from anywhere in the routine.
     fn state_at_any_point(&self) -> AbstractState {
         let mut known = Known::new();
         if !self.any.is_entry(Switch::Displacement) {
@@ -374,23 +374,23 @@ impl Interpreter<'_, '_, '_> {
         AbstractState { known, modal: self.any, previous: None, reaching: self.any_motion(), reachable: true }
     }
 
-    /// The robot may stand at the end of any motion.
+    /// Any motion may be the last executed.
     fn any_motion(&self) -> ReachingMotions {
         if self.tracks_motions { ReachingMotions::any() } else { ReachingMotions::default() }
     }
 
-    /// Where the robot stands after a motion.
+    /// Updates the reaching motions after a motion.
     fn after_motion(&self, motion: Option<u32>, before: &mut ReachingMotions) {
         if !self.tracks_motions {
             return;
         }
-        // A handler goes on behind a motion that has failed, or from any_motion.
+        // A handler may resume after a failed motion, or from anywhere.
         let also = if self.resumes { std::mem::take(before) } else { ReachingMotions::default() };
         *before = ReachingMotions::after(motion).join(also);
         before.any |= self.moved_between;
     }
 
-    /// Whether statements under a node may set or end a program displacement.
+    /// Whether statements under a node may change the program displacement.
     fn may_displace(&mut self, node: u32) -> bool {
         !self.switches_set_under(node).is_unset(Switch::Displacement)
     }
@@ -416,7 +416,7 @@ impl Interpreter<'_, '_, '_> {
         let frame = if same_name(name, b"PDispSet") {
             first.and_then(|frame| self.evaluator.value(context, frame).frame().ok())
         } else if same_name(name, b"PDispOn") {
-            // From the programmed point to the executed one; without \ExeP from where the robot stands.
+            // From the programmed to the executed point; without \ExeP from the current position.
             let executed = option(b"ExeP").and_then(|argument| argument.value).and_then(target);
             let programmed = first.and_then(target);
             executed.zip(programmed).map(|(executed, programmed)| match option(b"Rot") {
@@ -428,13 +428,13 @@ impl Interpreter<'_, '_, '_> {
                 }
             })
         } else {
-            // PDispAdd tracks_motions from what a search found.
+            // PDispAdd depends on a search result.
             None
         };
         frame.map_or(Value::Unknown(Reason::Displacement), |frame| Value::from_frame(&frame))
     }
 
-    /// What the error handlers of the unit set before they go back to the statements, and what trap routines leave set.
+    /// The switches that the unit's error handlers set before they resume, and those that trap routines leave set.
     fn handler_switches(&mut self) -> SwitchSet {
         let tree = &self.evaluator.trees[self.unit.file as usize];
         let clauses = tree.child_nodes(self.unit.node);
@@ -444,7 +444,7 @@ impl Interpreter<'_, '_, '_> {
             .into_iter()
             .fold(SwitchSet::EMPTY, |all, clause| all.join(self.switches_set_under(clause)));
         let symbols = self.evaluator.symbols;
-        // One trap routine waits for the other.
+        // Trap routines do not interrupt each other.
         if self.unit.routine.is_some_and(|routine| symbols.interrupts[routine as usize]) {
             return handler_switches;
         }
@@ -454,7 +454,7 @@ impl Interpreter<'_, '_, '_> {
         symbols.interrupt_routines.iter().fold(handler_switches, left)
     }
 
-    /// Everything that statements under a node may set.
+    /// The switches that statements under a node may set.
     fn switches_set_under(&mut self, node: u32) -> SwitchSet {
         let tree = &self.evaluator.trees[self.unit.file as usize];
         let end = node + tree.nodes[node as usize].size;
@@ -478,7 +478,7 @@ impl Interpreter<'_, '_, '_> {
                 }
             }
         }
-        // "As at the entry" of a called routine is what holds here anyway.
+        // A callee's "as at the entry" adds nothing.
         out.substitute_entry(SwitchSet::EMPTY)
     }
 
@@ -503,7 +503,7 @@ impl Interpreter<'_, '_, '_> {
                 state.modal = state.modal.set(Switch::Soft, false);
             }
             if motion.is_some() {
-                // A search stops where its signal comes, and a handler may go on from any_motion.
+                // A search stops where its signal comes, and a handler may resume from anywhere.
                 state.previous = motion.filter(|_| !known.ends_early() && !self.moved_between);
                 self.after_motion(motion, &mut state.reaching);
             }
@@ -558,7 +558,7 @@ impl Interpreter<'_, '_, '_> {
         state
     }
 
-    /// A call of what sets switches (ConfL, PDispOn): these hold from here on.
+    /// An instruction that sets switches (ConfL, PDispOn).
     fn transfer_switch_instruction(
         &mut self,
         node: u32,
@@ -572,7 +572,7 @@ impl Interpreter<'_, '_, '_> {
         if counts_from_position(tree, node, name) {
             self.visitor.record_position_use(&state.reaching);
         }
-        // One that also moves.
+        // Some also move.
         state.previous = motion.or(state.previous);
         if motion.is_some() {
             self.after_motion(motion, &mut state.reaching);
@@ -587,14 +587,14 @@ impl Interpreter<'_, '_, '_> {
         }
     }
 
-    /// A call of a routine whose name is worked out while the program runs.
+    /// A call by a name computed at run time.
     fn transfer_late_call(&mut self, state: &mut AbstractState) {
         let symbols = self.evaluator.symbols;
         if self.tracks_motions {
             self.visitor.record_position_use(&state.reaching);
         }
         if self.resumes {
-            // It may be called once more after an error in it.
+            // RETRY may call it again after an error in it.
             self.join_switches(symbols.late_switches_of(self.unit), state);
         }
         self.visitor.record_late_call(state.modal);
@@ -607,14 +607,14 @@ impl Interpreter<'_, '_, '_> {
         state.reaching = self.any_motion();
     }
 
-    /// A call of a routine of the program: of one of these, where modules declare several of the name.
+    /// A call of a routine of the program; of any of `called` where several modules declare the name.
     fn transfer_routine_call(&mut self, called: &[u32], name: &[u8], state: &mut AbstractState) {
         let symbols = self.evaluator.symbols;
         let sets =
             |all: SwitchSet, routine: &u32| all.join(symbols.routines[*routine as usize].effects.switches);
         let sets = called.iter().fold(SwitchSet::EMPTY, sets);
         if self.resumes {
-            // It may have been left anywhere by an error, and be called once more.
+            // An error may have left it anywhere, and RETRY may call it again.
             self.join_switches(sets, state);
         }
         if called.iter().any(|routine| symbols.routines[*routine as usize].effects.uses_position) {
@@ -650,7 +650,7 @@ impl Interpreter<'_, '_, '_> {
     }
 }
 
-/// Whether a clause of a routine is gone into from any of its statements.
+/// Whether a clause can be entered from any statement of its routine.
 fn is_exception_clause(clause: Syntax) -> bool {
     matches!(clause, Syntax::ErrorClause | Syntax::UndoClause)
 }

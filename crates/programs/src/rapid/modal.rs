@@ -1,25 +1,23 @@
-//! Switches that act in execution order: configuration monitoring, displacement, offsets and the like.
+//! Modal switches: instructions that act in execution order (configuration monitoring, displacement, offsets).
 //!
-//! Method: for each switch the set of states it may have. Within a routine the set is followed statement by statement,
-//! with "as at the entry of the routine" as one of its members, so that each routine is walked once; calls insert the
-//! set with switch the called routine ends. What the entries really are is then propagated along the calls from main
-//! (switch starts with the controller's defaults) until nothing changes. Sets only grow where ways join, so a switch
-//! is never called off when it may be on.
+//! Method: [`SwitchSet`] is the lattice element, for each switch the set of its possible states; [`SwitchSet::join`] is the
+//! union, so a switch is never called off when it may be on. Within a routine "as at the entry" is one of the states, so each
+//! routine is interpreted once and its exit is a function of its entry ([`SwitchSet::substitute_entry`]). The entry states are
+//! then propagated along the call graph from main, which starts with the controller's defaults, to a fixpoint.
 //!
-//! A routine also begins in the state at a call by a computed name that may mean it, and at a call of a routine that
-//! is in none of the files, switch may call it in turn; main begins in the state in switch it or ExitCycle ends a cycle (the
-//! next cycle resets no switch); a trap routine begins in any state, and whatever it leaves set may hold at every statement. Where an error
-//! handler goes back to the statements, a called routine may have ended anywhere.
+//! A routine is also entered by calls with a computed name that matches it, and by routines that no file declares; main also in
+//! the state in which it or ExitCycle ends a cycle (the next cycle resets no switch); a trap routine in any state, and the
+//! switches that it leaves set may hold at every statement. Where an error handler resumes, a callee may have ended anywhere.
 //!
-//! Departure: a routine that is in none of the files is taken to leave the switches as they are, and so are event
-//! routines, switch only the system parameters name.
+//! Departure: routines that no file declares are taken to leave the switches unchanged, and so are event routines, which
+//! only the system parameters name.
 
 use super::syntax::{RapidTree, arguments};
 use super::token::same_name;
 use crate::motion::{Modal, Switch as SwitchState};
 use crate::tree::Child;
 
-/// The sets of states of all switches: three bits each, off, on, as at the entry.
+/// The possible states of all switches: three bits each, for off, on, and as at the entry of the routine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct SwitchSet(u32);
 
@@ -66,7 +64,7 @@ const fn all(bits: u32) -> u32 {
 impl SwitchSet {
     /// As at the entry of the routine.
     pub const ENTRY: SwitchSet = SwitchSet(all(ENTRY));
-    /// Nothing: no way leads here.
+    /// No state: unreachable, or no effect.
     pub const EMPTY: SwitchSet = SwitchSet(0);
     /// After a start from main: configurations monitored, everything else off.
     pub const START: SwitchSet = SwitchSet(all(OFF) & !(0o77) | ON | ON << 3);
@@ -74,24 +72,24 @@ impl SwitchSet {
     /// On or off.
     pub const ANY: SwitchSet = SwitchSet(all(OFF | ON));
 
-    /// Either.
+    /// Join: the union of the states.
     pub fn join(self, other: SwitchSet) -> SwitchSet {
         SwitchSet(self.0 | other.0)
     }
 
-    /// One switch set.
+    /// One switch assigned.
     pub fn set(self, switch: Switch, on: bool) -> SwitchSet {
         let shift = 3 * switch as u32;
         SwitchSet(self.0 & !(7 << shift) | if on { ON } else { OFF } << shift)
     }
 
-    /// With what `other` says of a switch in place of what was said of it.
+    /// Strong update: the switches that `other` sets take its states.
     pub fn overwrite(self, other: SwitchSet) -> SwitchSet {
-        let said = (0..COUNT).map(|index| 7 << (3 * index)).filter(|bits| other.0 & bits != 0);
-        SwitchSet(said.fold(self.0, |all, bits| all & !bits) | other.0)
+        let assigned = (0..COUNT).map(|index| 7 << (3 * index)).filter(|bits| other.0 & bits != 0);
+        SwitchSet(assigned.fold(self.0, |all, bits| all & !bits) | other.0)
     }
 
-    /// With "as at the entry" replaced by what the entry is.
+    /// Replaces "as at the entry" by the states at the entry.
     pub fn substitute_entry(self, entry: SwitchSet) -> SwitchSet {
         let mut out = 0;
         for shift in (0..COUNT).map(|index| 3 * index) {
@@ -114,7 +112,7 @@ impl SwitchSet {
         self.0 >> (3 * switch as u32) & 7 == OFF
     }
 
-    /// Whether nothing is said about a switch.
+    /// Whether a switch has no state: it is not set.
     pub(super) fn is_unset(self, switch: Switch) -> bool {
         self.0 >> (3 * switch as u32) & 7 == 0
     }
@@ -127,7 +125,7 @@ impl SwitchSet {
         }
     }
 
-    /// As the listing tells it.
+    /// The modal state as the listing states it.
     pub fn modal(self) -> Modal {
         let both = |a: SwitchState, b: SwitchState| match (a, b) {
             (SwitchState::Off, SwitchState::Off) => SwitchState::Off,
@@ -148,7 +146,7 @@ impl SwitchSet {
     }
 }
 
-/// What an instruction sets; nothing is said of the other switches.
+/// Transfer function of an instruction: the switches that it sets; the others are empty.
 pub fn switches_set_by(tree: &RapidTree<'_>, call: u32, name: &[u8]) -> Option<SwitchSet> {
     if !matches!(name.first().map(|byte| byte | 32), Some(b'c' | b'p' | b'e' | b's' | b'i')) {
         return None;

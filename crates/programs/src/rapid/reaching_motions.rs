@@ -1,40 +1,40 @@
-//! Where the robot may stand when a way leads to a statement: at the ends of which motions.
+//! Reaching motions: which motions may be the last executed before a statement, as reaching definitions are for data.
 //!
-//! A displacement that counts from there (PDispOn without \ExeP) needs these ends where they always were, on every way.
+//! A displacement counted from the robot's current position (PDispOn without \ExeP) requires that none of these endpoints moves.
 
-/// Motions at one of whose ends the robot stands.
+/// A set of motions, one of which was executed last.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct ReachingMotions {
-    /// Their indices, in order.
+    /// Their indices, sorted.
     motions: Vec<u32>,
-    /// Or at that of any motion of the program.
+    /// Or any motion of the program.
     pub(super) any: bool,
-    /// Or at that of any motion of a loop that is gone through.
+    /// Or any motion of an enclosing loop.
     any_in_loop: bool,
-    /// Or where it stood at the begin of the routine.
+    /// Or the last motion before the routine was called.
     pub(super) entry: bool,
 }
 
-/// More motions than these count as any.
+/// A larger set is widened to any motion.
 const MAX_MOTIONS: usize = 256;
 
 impl ReachingMotions {
-    /// At the end of this motion.
+    /// This motion.
     pub(super) fn after(motion: Option<u32>) -> Self {
         Self { motions: motion.into_iter().collect(), ..Self::default() }
     }
 
-    /// Where it stood at the begin of the routine.
+    /// The last motion before the routine was called.
     pub(super) fn routine_entry() -> Self {
         Self { entry: true, ..Self::default() }
     }
 
-    /// At the end of any motion.
+    /// Any motion.
     pub(super) fn any() -> Self {
         Self { any: true, ..Self::default() }
     }
 
-    /// Where either stands.
+    /// Join: the union.
     pub(super) fn join(mut self, other: Self) -> Self {
         if self.motions != other.motions {
             self.motions.extend(other.motions);
@@ -50,17 +50,17 @@ impl ReachingMotions {
         self
     }
 
-    /// The same at the begin of a loop, which may have been gone through before.
+    /// At the head of a loop, after any number of iterations.
     pub(super) fn in_loop(&self) -> Self {
         Self { any_in_loop: true, ..self.clone() }
     }
 
-    /// The same behind a loop that stands where the robot did as in `outside`.
+    /// Behind a loop that was entered with `outside`.
     pub(super) fn after_loop(self, outside: &Self) -> Self {
         Self { any_in_loop: outside.any_in_loop, ..self }
     }
 
-    /// The motions, or nothing where it may be any.
+    /// The motions; `None` where any may have been the last.
     pub(super) fn motions(&self) -> Option<&[u32]> {
         (!self.any && !self.any_in_loop).then_some(&self.motions)
     }

@@ -1,4 +1,4 @@
-//! What data hold after an assignment: the whole, a component, or an element.
+//! Transfer function of assignments: to a whole, a component or an element.
 
 use super::{AbstractState, Interpreter, MAX_ELEMENTS, MAX_VALUE_SIZE};
 use crate::motion::Reason;
@@ -10,7 +10,7 @@ use crate::rapid::value::Value;
 use crate::tree::Child;
 
 impl Interpreter<'_, '_, '_> {
-    /// The new value of what Incr, Decr, Add or Clear changes, where the old one is known.
+    /// Place and new value of Incr, Decr, Add and Clear, where the old value is known.
     pub(super) fn incremented(
         &self,
         node: u32,
@@ -54,16 +54,16 @@ impl Interpreter<'_, '_, '_> {
         }
         let context = Context::new(self.unit.file, self.unit.scope, &state.known);
         let value = self.evaluator.value(context, expression);
-        // TRYNEXT passes an assignment that fails.
-        let passed =
+        // TRYNEXT skips an assignment that raises an error.
+        let skipped =
             (self.resumes && (self.may_fail(place) || self.may_fail(expression))).then(|| state.clone());
         self.store(place, value, state);
-        if let Some(passed) = passed {
-            *state = std::mem::replace(state, passed.clone()).join(passed);
+        if let Some(skipped) = skipped {
+            *state = std::mem::replace(state, skipped.clone()).join(skipped);
         }
     }
 
-    /// Whether an argument of a function of the program, which need not use it, may raise an error.
+    /// Whether an expression calls a function of the program, which may raise an error.
     fn may_fail(&self, part: Child) -> bool {
         let tree = &self.evaluator.trees[self.unit.file as usize];
         let Child::Node(node) = part else { return false };
@@ -74,7 +74,7 @@ impl Interpreter<'_, '_, '_> {
         })
     }
 
-    /// Puts a value in a place.
+    /// Stores a value in a place.
     pub(super) fn store(&self, place: Child, value: Value, state: &mut AbstractState) {
         let tree = &self.evaluator.trees[self.unit.file as usize];
         let symbols = self.evaluator.symbols;
@@ -93,7 +93,7 @@ impl Interpreter<'_, '_, '_> {
             }
         };
         self.invalidate(root, state);
-        // A big array that is filled element by element is not worth keeping.
+        // A large array that is filled element by element is not tracked.
         if new.size(MAX_VALUE_SIZE) > MAX_VALUE_SIZE || symbols.symbols[root as usize].volatile {
             state.known.remove(&root);
         } else {
@@ -101,7 +101,7 @@ impl Interpreter<'_, '_, '_> {
         }
     }
 
-    /// An array of which nothing is known, element by element, so that those that are assigned are.
+    /// An unknown array, element by element, so that assigned elements become known.
     fn unknown_elements(&self, context: Context<'_>, root: u32, reason: Reason) -> Value {
         let symbol = &self.evaluator.symbols.symbols[root as usize];
         let tree = &self.evaluator.trees[symbol.file as usize];
@@ -162,7 +162,7 @@ impl Interpreter<'_, '_, '_> {
         }
     }
 
-    /// `old` with the component at `rest` of its element replaced.
+    /// `old` with the component `rest` of the element at `positions` replaced.
     fn with_element(
         &self,
         context: Context<'_>,

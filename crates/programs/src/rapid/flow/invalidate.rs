@@ -1,4 +1,4 @@
-//! What is no longer known behind a statement: what it writes, what it calls may change, and what others may write meanwhile.
+//! Invalidation of known values: data that a statement writes, that callees may write, and that other tasks may write meanwhile.
 
 use super::{AbstractState, CallSite, DISPLACEMENT, Interpreter};
 use crate::motion::Reason;
@@ -10,8 +10,7 @@ use crate::rapid::token::Token;
 use crate::rapid::value::Value;
 
 impl Interpreter<'_, '_, '_> {
-    /// Forgets what anything under a node may change: assignments, arguments that come back changed, what called
-    /// routines and functions do.
+    /// Invalidates everything that statements under a node may write: assignments, output arguments, side effects of callees.
     pub(super) fn invalidate_changed(&mut self, node: u32, state: &mut AbstractState) {
         let tree = &self.evaluator.trees[self.unit.file as usize];
         let symbols = self.evaluator.symbols;
@@ -29,7 +28,7 @@ impl Interpreter<'_, '_, '_> {
                     for &routine in symbols.callees(self.unit.scope, name) {
                         let sets = symbols.routines[routine as usize].effects.switches;
                         if self.resumes {
-                            // It may be called once more after an error in it.
+                            // RETRY may call it again after an error in it.
                             self.join_switches(sets, state);
                         }
                         self.join_switches(self.handler_switches, state);
@@ -43,7 +42,7 @@ impl Interpreter<'_, '_, '_> {
         }
     }
 
-    /// Forgets what the expressions of a statement, such as its condition, may change.
+    /// Invalidates what the expressions of a statement, such as its condition, may write.
     pub(super) fn invalidate_condition(&mut self, node: u32, state: &mut AbstractState) {
         let tree = &self.evaluator.trees[self.unit.file as usize];
         for asked in tree.child_nodes(node).filter(|&node| tree.nodes[node as usize].kind.is_expression()) {
@@ -51,7 +50,7 @@ impl Interpreter<'_, '_, '_> {
         }
     }
 
-    /// Forgets what one statement or function writes by itself.
+    /// Invalidates what one statement or function writes, callees not counted.
     pub(super) fn invalidate_written(&self, node: u32, state: &mut AbstractState) {
         let tree = &self.evaluator.trees[self.unit.file as usize];
         let symbols = self.evaluator.symbols;
@@ -59,7 +58,7 @@ impl Interpreter<'_, '_, '_> {
             .for_each_write(tree, self.unit.scope, node, &mut |write| self.invalidate(write.symbol, state));
     }
 
-    /// Forgets data, and what may be the same data by another name.
+    /// Invalidates data and its possible aliases.
     pub(super) fn invalidate(&self, symbol: u32, state: &mut AbstractState) {
         state.known.remove(&symbol);
         if self.aliases.is_empty() {
@@ -75,7 +74,7 @@ impl Interpreter<'_, '_, '_> {
         }
     }
 
-    /// Forgets the data that all tasks share: while this one waits, another may have written it.
+    /// Invalidates the data that tasks share: another task may write it while this one waits.
     pub(super) fn invalidate_shared(&self, state: &mut AbstractState) {
         let symbols = &self.evaluator.symbols.symbols;
         state.known.retain(|&id, _| {
@@ -86,7 +85,7 @@ impl Interpreter<'_, '_, '_> {
         });
     }
 
-    /// Notes that switches may be set here, or not.
+    /// Joins switches that may be set here.
     pub(super) fn join_switches(&self, sets: SwitchSet, state: &mut AbstractState) {
         state.modal = state.modal.join(sets);
         if !sets.is_unset(Switch::Displacement) {
@@ -94,7 +93,7 @@ impl Interpreter<'_, '_, '_> {
         }
     }
 
-    /// Forgets what the routine or instruction of this name may change apart from its arguments.
+    /// Invalidates what a routine or instruction may write apart from its arguments.
     pub(super) fn invalidate_called(&self, name: &[u8], kind: Syntax, state: &mut AbstractState) {
         let symbols = self.evaluator.symbols;
         if kind == Syntax::Call && symbols.is_motion(self.unit.scope, name) {
@@ -137,7 +136,7 @@ impl Interpreter<'_, '_, '_> {
         }
     }
 
-    /// A routine that is not known here may change everything that is declared outside this one.
+    /// Invalidates everything declared outside the unit, which unknown code may write.
     pub(super) fn invalidate_nonlocal(&self, state: &mut AbstractState) {
         let symbols = &self.evaluator.symbols.symbols;
         state.known.retain(|&id, _| {

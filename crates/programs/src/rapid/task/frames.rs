@@ -1,7 +1,7 @@
 //! Speed, zone, tool and work object of a motion: each distinct one once in the listing.
 
 use super::super::flow::AbstractState;
-use super::Lister;
+use super::ListingBuilder;
 use crate::motion::{Frame, Place, Reason, Speed, Tool, WorkObject, Zone};
 use crate::rapid::evaluate::{Context, Known};
 use crate::rapid::symbol::{SymbolKind, Unit};
@@ -10,7 +10,7 @@ use crate::rapid::token::{Token, display};
 use crate::rapid::value::{LARGEST, Value, built_in};
 use crate::tree::Child;
 
-impl<'s> Lister<'_, 's> {
+impl<'s> ListingBuilder<'_, 's> {
     /// Whether a name or expression may have another value at another motion.
     pub(super) fn varies(&self, unit: Unit, value: Child) -> bool {
         let tree = &self.trees[unit.file as usize];

@@ -1,12 +1,12 @@
 //! Who uses a declared target: motions, and everything else that an edit of the declaration would reach.
 
-use super::Lister;
+use super::ListingBuilder;
 use crate::motion::{MotionKind, Origin, OtherUse};
 use crate::rapid::symbol::{SymbolKind, Unit};
 use crate::rapid::syntax::{RapidTree, Syntax, arguments, token_kind, tokens_of};
 use crate::rapid::token::{Token, fold, same_name};
 
-impl<'s> Lister<'_, 's> {
+impl<'s> ListingBuilder<'_, 's> {
     /// Finds every use of the declared targets in the listing that is no motion's own target argument.
     pub(super) fn other_uses(&mut self) {
         for (index, motion) in self.listing.motions.iter().enumerate() {

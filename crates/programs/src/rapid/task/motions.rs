@@ -1,0 +1,418 @@
+//! Motions of the listing: targets, options and frames of one instruction, and the reason where it must not be changed.
+
+use std::sync::Arc;
+
+use super::{ListingBuilder, Literal, literals};
+use crate::motion::{Declaration, Motion, MotionKind, MotionTarget, Origin, Reason, Role, Routine};
+use crate::rapid::evaluate::{Context, Source};
+use crate::rapid::flow::{AbstractState, Nesting};
+use crate::rapid::instruction::{Also, Between, INSTRUCTIONS, Instruction, Slot};
+use crate::rapid::predefined;
+use crate::rapid::symbol::{SymbolKind, Unit};
+use crate::rapid::syntax::{Argument, RapidTree, Syntax, arguments, expressions, parts, text_of, tokens_of};
+use crate::rapid::token::{display, folded, same_name};
+use crate::tree::Child;
+
+impl ListingBuilder<'_, '_> {
+    fn name_of(&mut self, known: usize) -> Arc<str> {
+        self.names[known].get_or_insert_with(|| INSTRUCTIONS[known].name.into()).clone()
+    }
+
+    fn routine_of(&mut self, unit: Unit) -> Option<u32> {
+        let routine = unit.routine?;
+        if let Some(&index) = self.routines.get(&routine) {
+            return Some(index);
+        }
+        let scope = &self.symbols.routines[routine as usize];
+        let tree = &self.trees[scope.file as usize];
+        self.listing.routines.push(Routine {
+            name: display(tree.text(scope.head.name)),
+            module: scope.module.clone(),
+            place: self.place(scope.file, scope.head.name),
+        });
+        let index = self.listing.routines.len() as u32 - 1;
+        self.routines.insert(routine, index);
+        Some(index)
+    }
+
+    fn motion(&mut self, unit: Unit, node: u32, state: &AbstractState, nesting: Nesting) -> Motion {
+        let tree = &self.trees[unit.file as usize];
+        Motion {
+            place: self.place(unit.file, tree.nodes[node as usize].first),
+            statement: tree.node_span(node),
+            instruction: "".into(),
+            kind: MotionKind::Unknown,
+            targets: Vec::new(),
+            speed: None,
+            zone: None,
+            tool: None,
+            work_object: None,
+            timed: false,
+            insertable: false,
+            straightens: false,
+            rapid: false,
+            configures: true,
+            axis: None,
+            by_radius: false,
+            modal: crate::motion::Modal::START,
+            in_loop: nesting.in_loop,
+            conditional: nesting.conditional,
+            previous: state.previous,
+            routine: self.routine_of(unit),
+            left: None,
+        }
+    }
+
+    fn target(
+        &mut self,
+        unit: Unit,
+        state: &AbstractState,
+        argument: Child,
+        joints: bool,
+        role: Role,
+    ) -> MotionTarget {
+        let tree = &self.trees[unit.file as usize];
+        let context = Context::new(unit.file, unit.scope, &state.known);
+        let (value, source) = self.evaluator.target(context, argument, joints);
+        self.impure |= self.evaluator.was_doubtful()
+            || self.symbols.is_impure(tree, unit.scope, argument)
+            || matches!(source, Source::Symbol(symbol) | Source::Element(symbol, _) if self.has_impure_initial(symbol));
+        let (first, end) = tokens_of(tree, argument);
+        let origin = match source {
+            Source::Inline => Origin::Inline,
+            Source::Computed => Origin::Computed,
+            Source::Unknown => Origin::Unknown,
+            Source::Symbol(symbol) => Origin::Declared(self.declaration(symbol)),
+            Source::Element(symbol, literal) => {
+                Origin::Element { declaration: self.declaration(symbol), literal }
+            }
+        };
+        MotionTarget { role, value, origin, argument: tree.span(first, end) }
+    }
+
+    /// Adds a target to the motion as number `before`; one written as numbers is inserted later.
+    fn add_target(
+        &mut self,
+        motion: &mut Motion,
+        (unit, call, state): (Unit, u32, &AbstractState),
+        argument: Child,
+        joints: bool,
+        (role, before): (Role, u32),
+    ) {
+        match literals::plain(&self.trees[unit.file as usize], argument) {
+            Some(node) => {
+                let motion = self.listing.motions.len() as u32;
+                let file = unit.file;
+                self.literals.push(Literal { motion, target: before, role, file, call, node, joints });
+            }
+            None => {
+                motion.targets.reserve_exact(1);
+                motion.targets.push(self.target(unit, state, argument, joints, role));
+            }
+        }
+    }
+
+    /// Whether the initial value of data is impure.
+    fn has_impure_initial(&mut self, symbol: u32) -> bool {
+        let (trees, symbols) = (self.trees, self.symbols);
+        *self.impure_initials.entry(symbol).or_insert_with(|| {
+            let found = &symbols.symbols[symbol as usize];
+            let SymbolKind::Data(data) = &found.kind else { return false };
+            let initial = |value| symbols.is_impure(&trees[found.file as usize], found.scope, value);
+            data.value.is_some_and(initial)
+        })
+    }
+
+    fn declaration(&mut self, symbol: u32) -> u32 {
+        if let Some(&index) = self.declarations.get(&symbol) {
+            return index;
+        }
+        let found = &self.symbols.symbols[symbol as usize];
+        let tree = &self.trees[found.file as usize];
+        let data = match &found.kind {
+            SymbolKind::Data(data) => Some(data),
+            _ => None,
+        };
+        self.listing.declarations.push(Declaration {
+            name: display(tree.text(found.name)),
+            place: self.place(found.file, found.name),
+            statement: data.map(|data| tree.node_span(data.node)).unwrap_or_default(),
+            literal: data.and_then(|data| data.value).map(|value| {
+                let (first, end) = tokens_of(tree, value);
+                tree.span(first, end)
+            }),
+            array: data.is_some_and(|data| data.dimensions.is_some()),
+            uses: Vec::new(),
+            other_uses: Vec::new(),
+        });
+        let index = self.listing.declarations.len() as u32 - 1;
+        self.declarations.insert(symbol, index);
+        index
+    }
+
+    /// A motion instruction of the table.
+    pub(super) fn table_motion(
+        &mut self,
+        unit: Unit,
+        node: u32,
+        state: &AbstractState,
+        nesting: Nesting,
+        known: usize,
+    ) -> Motion {
+        let tree = &self.trees[unit.file as usize];
+        let instruction: &Instruction = &INSTRUCTIONS[known];
+        let mut motion = self.motion(unit, node, state, nesting);
+        self.impure = false;
+        motion.instruction = self.name_of(known);
+        motion.kind = instruction.kind;
+        let count = arguments(tree, node).filter(|argument| !argument.optional).count();
+        let (mut index, mut work_object, mut has_tool) = (0, None, false);
+        let (mut velocity, mut time) = (None, None);
+        let (mut targets, mut to, mut via) = (0, false, instruction.kind != MotionKind::Circular);
+        let mut options = Options::default();
+        for argument in arguments(tree, node) {
+            if argument.optional {
+                options.note(tree, argument);
+                match argument.name.map(|name| tree.text(name)) {
+                    Some(name) if same_name(name, b"WObj") => work_object = argument.value,
+                    Some(name) if same_name(name, b"V") => velocity = argument.value,
+                    Some(name) if same_name(name, b"T") => time = argument.value,
+                    _ => {}
+                }
+                continue;
+            }
+            let slot = match argument.name.map(|name| tree.text(name)) {
+                None => instruction.slot(index, count),
+                Some(name) => named_slot(name),
+            };
+            index += 1;
+            let Some(value) = argument.value else { continue };
+            match slot {
+                Some(Slot::To) => {
+                    let joints = instruction.takes_joints();
+                    self.add_target(&mut motion, (unit, node, state), value, joints, (Role::To, targets));
+                    (targets, to) = (targets + 1, true);
+                }
+                Some(Slot::Via) => {
+                    self.add_target(&mut motion, (unit, node, state), value, false, (Role::Via, targets));
+                    (targets, via) = (targets + 1, true);
+                }
+                Some(Slot::Speed) => motion.speed = Some(self.speed(unit, state, value)),
+                Some(Slot::Zone) => motion.zone = Some(self.zone(unit, state, value)),
+                Some(Slot::Tool) => {
+                    has_tool = true;
+                    motion.tool = Some(self.tool(unit, state, value));
+                }
+                _ => {}
+            }
+        }
+        motion.timed = options.timed;
+        if let (Some(speed), Some(velocity)) = (motion.speed, velocity) {
+            motion.speed = Some(self.overridden(speed, unit, state, velocity));
+        }
+        if let Some(time) = time {
+            let duration_s = self.evaluated(unit, state, time).number();
+            self.listing.durations_s.insert(self.listing.motions.len() as u32, duration_s);
+        }
+        let free =
+            !options.timed && !options.whole && !nesting.guarded && !self.has_impure_argument(unit, node);
+        let splits = instruction.between != Between::Nothing && instruction.also != Also::Triggers;
+        motion.insertable = free && splits;
+        motion.straightens = free
+            && instruction.kind == MotionKind::Circular
+            // A trigger at a distance along the movement would fire on its last piece.
+            && instruction
+                .line_form()
+                .is_some_and(|line| line.between != Between::Nothing && line.also != Also::Triggers);
+        if has_tool {
+            motion.work_object = Some(self.work_object(unit, state, work_object));
+        }
+        let complete = to && via && count >= instruction.least();
+        motion.left = self.refusal(&motion, instruction, &options, complete);
+        // Replacing an impure expression would drop its effect. An unknown target is refused for that reason instead.
+        let known = motion.targets.iter().all(|target| target.value.is_ok());
+        motion.left = motion.left.or((self.impure && known).then_some(Reason::SideEffect));
+        motion
+    }
+
+    /// Why a motion instruction must not be changed: by its own kind, its frames or its speed. `complete`: it has all arguments.
+    fn refusal(
+        &self,
+        motion: &Motion,
+        instruction: &Instruction,
+        options: &Options,
+        complete: bool,
+    ) -> Option<Reason> {
+        let own = if instruction.kind == MotionKind::External {
+            Some(Reason::ExternalOnly)
+        } else if !complete {
+            Some(Reason::MissingArgument)
+        } else if instruction.sensor_guided || options.corrected {
+            Some(Reason::SensorGuided)
+        } else if options.synchronised {
+            Some(Reason::Synchronised)
+        } else if instruction.kind == MotionKind::AbsoluteJoint {
+            None
+        } else {
+            self.listing.left_by_frames(motion)
+        };
+        let speed = self.listing.speed(motion).map(|speed| &speed.value);
+        own.or((speed == Some(&Err(Reason::NumberRange))).then_some(Reason::NumberRange))
+    }
+
+    /// Whether an argument calls a function of the program or an impure one: each inserted target would evaluate it again.
+    fn has_impure_argument(&self, unit: Unit, node: u32) -> bool {
+        let tree = &self.trees[unit.file as usize];
+        let nodes = node..node + tree.nodes[node as usize].size;
+        let mut functions = nodes.filter(|&node| tree.nodes[node as usize].kind == Syntax::Function);
+        functions.any(|function| {
+            let name = tree.text(tree.nodes[function as usize].first);
+            self.symbols.routine(unit.scope, name).is_some() || !predefined::only_answers(name)
+        })
+    }
+
+    /// A call that takes a target but is no motion instruction of the table.
+    pub(super) fn other_motion(
+        &mut self,
+        unit: Unit,
+        node: u32,
+        state: &AbstractState,
+        nesting: Nesting,
+    ) -> Option<Motion> {
+        let tree = &self.trees[unit.file as usize];
+        let late = tree.nodes[node as usize].kind == Syntax::LateCall;
+        let name = match parts(tree, node).nth(1).filter(|_| late) {
+            Some(expression) => text_of(tree, expression),
+            None => tree.text(tree.nodes[node as usize].first),
+        };
+        let routine = if late { None } else { self.symbols.routine(unit.scope, name) };
+        let mut found: Vec<(Child, bool)> = Vec::new();
+        if let Some(routine) = routine {
+            let routine = &self.symbols.routines[routine as usize];
+            let home = &self.trees[routine.file as usize];
+            let mut required = routine.head.parameters.iter().filter(|parameter| !parameter.optional);
+            for argument in arguments(tree, node) {
+                let parameter = match argument.name {
+                    None => required.next(),
+                    Some(option) => routine
+                        .head
+                        .parameters
+                        .iter()
+                        .find(|parameter| same_name(home.text(parameter.name), tree.text(option))),
+                };
+                let (Some(parameter), Some(value)) = (parameter, argument.value) else { continue };
+                if parameter.by_reference || parameter.array {
+                    continue;
+                }
+                let type_name = folded(home.text(parameter.type_name));
+                match self.symbols.resolved_type(routine.scope, &type_name) {
+                    b"robtarget" => found.push((value, false)),
+                    b"jointtarget" => found.push((value, true)),
+                    _ => {}
+                }
+            }
+        } else if let Some(moves) = predefined::displaces(name).filter(|_| !late) {
+            let mut motion = self.motion(unit, node, state, nesting);
+            motion.instruction = display(name).into();
+            motion.left = Some(moves?);
+            return Some(motion);
+        } else if predefined::effect(name).is_none() || late {
+            for argument in arguments(tree, node) {
+                let Some(value) = argument.value else { continue };
+                if let Some(joints) = self.looks_like_target(unit, value) {
+                    found.push((value, joints));
+                }
+            }
+        }
+        if found.is_empty() {
+            return None;
+        }
+        let mut motion = self.motion(unit, node, state, nesting);
+        motion.instruction = display(name).into();
+        for (value, joints) in found {
+            let mut target = self.target(unit, state, value, joints, Role::To);
+            // Never rewritten here: no declaration counts it as a use by a motion.
+            if let Origin::Declared(_) | Origin::Element { .. } = target.origin {
+                target.origin = Origin::Computed;
+            }
+            motion.targets.push(target);
+        }
+        motion.left = Some(match (late, routine) {
+            (true, _) => Reason::LateBinding,
+            (false, Some(_)) => Reason::OwnRoutine,
+            (false, None) => Reason::UnknownInstruction,
+        });
+        Some(motion)
+    }
+
+    /// Whether an argument is a target by its type: `Some(true)` for a jointtarget.
+    fn looks_like_target(&self, unit: Unit, value: Child) -> Option<bool> {
+        let tree = &self.trees[unit.file as usize];
+        if let Child::Node(node) = value {
+            let mut inside = expressions(tree, node);
+            match tree.nodes[node as usize].kind {
+                Syntax::Paren => return self.looks_like_target(unit, inside.next()?),
+                Syntax::Aggregate => {
+                    let parts: Vec<Child> = inside.collect();
+                    let fits = |types: &[(&[u8], usize)]| {
+                        parts.len() == types.len()
+                            && parts.iter().zip(types).all(|(&part, of)| self.fits(unit, part, *of))
+                    };
+                    let joints = fits(&[(b"robjoint", 6), (b"extjoint", 6)]);
+                    let pose = fits(&[(b"pos", 3), (b"orient", 4), (b"confdata", 4), (b"extjoint", 6)]);
+                    return (joints || pose).then_some(joints);
+                }
+                _ => {}
+            }
+        }
+        match &*self.evaluator.type_of((unit.file, unit.scope), value)? {
+            b"robtarget" => Some(false),
+            b"jointtarget" => Some(true),
+            _ => None,
+        }
+    }
+
+    /// Whether a value may be of a type with this number of components.
+    fn fits(&self, unit: Unit, value: Child, (type_name, count): (&[u8], usize)) -> bool {
+        let tree = &self.trees[unit.file as usize];
+        match value {
+            Child::Node(node) if tree.nodes[node as usize].kind == Syntax::Aggregate => {
+                expressions(tree, node).count() == count
+            }
+            _ => self.evaluator.type_of((unit.file, unit.scope), value).is_some_and(|t| t == type_name),
+        }
+    }
+}
+
+/// The slot of a named argument.
+fn named_slot(name: &[u8]) -> Option<Slot> {
+    const NAMES: [(&[u8], Slot); 6] = [
+        (b"ToPoint", Slot::To),
+        (b"ToJointPos", Slot::To),
+        (b"CirPoint", Slot::Via),
+        (b"Speed", Slot::Speed),
+        (b"Zone", Slot::Zone),
+        (b"Tool", Slot::Tool),
+    ];
+    NAMES.iter().find(|(known, _)| same_name(name, known)).map(|&(_, slot)| slot)
+}
+
+/// The optional arguments that decide whether a motion may be changed.
+#[derive(Default)]
+struct Options {
+    corrected: bool,
+    synchronised: bool,
+    timed: bool,
+    /// Whether the instruction cannot be split: a process starts or ends with it, or the following statements run during it.
+    whole: bool,
+}
+
+impl Options {
+    fn note(&mut self, tree: &RapidTree<'_>, argument: Argument) {
+        let Some(name) = argument.name.map(|name| tree.text(name)) else { return };
+        self.corrected |= same_name(name, b"Corr") || same_name(name, b"Track");
+        self.synchronised |= same_name(name, b"ID");
+        self.timed |= same_name(name, b"T") || same_name(name, b"Time");
+        self.whole |= [&b"On"[..], b"Off", b"Conc"].iter().any(|whole| same_name(name, whole));
+    }
+}
