@@ -80,7 +80,7 @@ fn a_doubtful_model_needs_a_flag_to_be_written_and_to_be_used() {
     fs::write(at.join("data.csv"), scaled(0.005)).unwrap();
     let program = "MODULE m\nPROC main()\nMoveJ [[400,0,400],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;\nENDPROC\nENDMODULE\n";
     fs::write(at.join("in.mod"), program).unwrap();
-    let word = "The model is doubtful, it is not written or used without --allow-doubtful";
+    let word = "The model is doubtful and needs --allow-doubtful";
     for verb in ["identify", "diagnose"] {
         let begin = [verb, "data.csv", "--robot", "abb-irb-120", "-o", "m.toml"];
         let (code, _, err) =
@@ -553,7 +553,7 @@ fn plan_writes_a_program_and_the_log_to_fill_in() {
     );
     assert!(out.contains("nothing to correct"), "{out} {err}");
     for (arguments, word) in [
-        (vec!["--sensor", "cable"], "--outlet is missing"),
+        (vec!["--sensor", "cable"], "--outlet X,Y,Z is missing"),
         (vec!["--sensor", "cable", "--outlet", "750,200,40", "--box", "0,0,0,1,1"], "--box"),
         (vec!["--sensor", "cable", "--outlet", "750,200,40", "--range", "9,1"], "--range"),
         (vec!["--sensor", "position", "--outlet", "750,200,40"], "--sensor-frame"),
@@ -609,7 +609,7 @@ fn the_demo_goes_the_whole_way_and_the_causes_it_finds_straighten_the_path() {
     }
     // The shape of the path: what is left of it after rigid registration.
     let shape = |row: &str| -> f64 {
-        let table = out.split_once("Absolute, and the shape").unwrap().1;
+        let table = out.split_once("Absolute deviation, and shape").unwrap().1;
         let line = table.lines().find(|line| line.starts_with(row)).unwrap_or_else(|| panic!("{row}: {out}"));
         line.split_whitespace().last().unwrap().parse().unwrap()
     };

@@ -270,10 +270,10 @@ fn modules_of_a_folder_are_one_task_when_asked() {
         truegrind(at, &[&arguments, more].concat())
     };
     let contract = || json(&fs::read_to_string(at.join("all.json")).unwrap());
-    // Each by itself: the tool is not there, and the way out is named. Nothing was rewritten, which is not done.
+    // Each by itself: the tool is not there, and the way out is named. Nothing was corrected, which is not done.
     let (code, text, err) = run(&["-o", "alone"]);
     assert_eq!(code, 1, "{text}\n{err}");
-    assert!(text.contains("Nothing was rewritten") && !text.contains("[ok]"), "{text}");
+    assert!(text.contains("Nothing was corrected") && !text.contains("[ok]"), "{text}");
     assert!(text.contains("declared in no file: tWheel"), "{text}");
     assert!(err.contains("5 motions") && err.contains("--together"), "{err}");
     assert_eq!(fs::read_to_string(at.join("alone/PROGMOD/Work.mod")).unwrap(), work);
@@ -468,7 +468,7 @@ fn links_and_pipes_stay_what_they_are() {
     std::os::unix::fs::symlink("a.mod", at.join("input.mod")).unwrap();
     let (code, _, err) = compensate("input.mod");
     assert_eq!(code, 2);
-    assert!(err.contains("an input is never overwritten"), "{err}");
+    assert!(err.contains("inputs are never overwritten"), "{err}");
     // A pipe: written into, not replaced.
     let pipe = at.join("pipe");
     assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
@@ -582,7 +582,7 @@ fn nothing_rewritten_is_never_ok_and_names_what_is_missing() {
     let nc = ["--model", "model.toml", "--robot", "abb-irb-120"];
     let (code, text, _) = truegrind(at, &[&["compensate", "one.nc", "-o", "out.nc"], &nc[..]].concat());
     assert_eq!(code, 1, "{text}");
-    assert!(text.contains("[not evaluated] Nothing was rewritten") && !text.contains("[ok]"), "{text}");
+    assert!(text.contains("[not evaluated] Nothing was corrected") && !text.contains("[ok]"), "{text}");
     let words: String = text.split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(
         words.contains("tool T7 is declared in none of the files, and 2 motions use it (first: line 6)"),
@@ -601,7 +601,7 @@ fn nothing_rewritten_is_never_ok_and_names_what_is_missing() {
     assert!(!text.contains("[ok]") && !text.contains("✓ unchanged"), "{text}");
     let words: String = text.split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(
-        words.contains("Nothing was rewritten") && words.contains("declared in no file: T7, G54"),
+        words.contains("Nothing was corrected") && words.contains("declared in no file: T7, G54"),
         "{text}"
     );
     // With what was asked for they are rewritten.
@@ -632,7 +632,7 @@ fn a_cut_corrected_in_part_says_so_in_its_mark() {
     let (whole, text) = run(&[]);
     assert_eq!(whole, far);
     assert!(
-        text.contains("Nothing could be rewritten") && text.contains("as a whole or not at all"),
+        text.contains("Nothing could be corrected") && text.contains("as a whole or not at all"),
         "{text}"
     );
     let (partial, text) = run(&["--partial", "--tolerance", "5"]);

@@ -1,7 +1,7 @@
-//! Formats: each turns a table, and where it makes sense a whole document, into text or bytes.
+//! Output formats for tables and documents.
 //!
-//! For people: [`terminal`], [`markdown`], [`html`], with the digits each column asks for. For programs: [`csv`],
-//! [`json`] and `parquet`, with every digit. Words that came from files pass [`visible`] in all of them but Parquet.
+//! For people: [`terminal`], [`markdown`] and [`html`], with the digits of each column. For programs: [`csv`], [`json`] and `parquet`,
+//! with all digits. Text from files passes [`visible`] in all formats except Parquet.
 
 pub mod visible;
 pub mod terminal;

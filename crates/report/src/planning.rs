@@ -1,4 +1,4 @@
-//! A measurement plan: the rows to measure, what they will tell, which effects they can decide.
+//! Report on a measurement plan: rows to measure, predicted uncertainties, detectable effects.
 
 use serde_json::{Value, json};
 
@@ -15,8 +15,8 @@ use truegrind_planning::poses::{MeasurementSetup, Plan};
 /// Rows on a page; all are in the CSV file.
 const ROWS_ON_PAGE: usize = 60;
 
-/// One row per reading to take. As CSV it is the log to fill in: joint angles, sides of approach and time under the names
-/// that `identify` reads, and what the nominal arm would give beside it.
+/// One row per reading. As CSV it is the log to fill in: joint angles, approach directions and time under the column names that
+/// `identify` reads, and the expected reading of the nominal arm.
 pub fn table(plan: &Plan, setup: &MeasurementSetup<'_>) -> Table {
     let mut columns =
         vec![Column::count("row", "Row"), Column::count("pose", "Pose"), Column::text("purpose", "Purpose")];
@@ -51,7 +51,11 @@ pub fn table(plan: &Plan, setup: &MeasurementSetup<'_>) -> Table {
         if cables {
             cells.push((pose.anchor).into());
         }
-        cells.push(if row.cable_unclear { "unhook the cable on the way".into() } else { Cell::Missing });
+        cells.push(if row.cable_unclear {
+            "unhook the cable before this pose".into()
+        } else {
+            Cell::Missing
+        });
         table.push(cells);
     }
     table
@@ -61,10 +65,10 @@ fn plan_reading(plan: &Plan, setup: &MeasurementSetup<'_>) -> Option<Reading> {
     plan.rows.first().and_then(|row| reading(plan, setup, row))
 }
 
-/// Every effect with the smallest size that the plan decides.
+/// Every effect with its smallest detectable size.
 pub fn effect_table(plan: &Plan) -> Table {
     let mut table = Table::new(
-        "What the rows can decide",
+        "Detectable effects",
         vec![
             Column::text("effect", "Effect"),
             Column::text("which", "Which"),
@@ -73,7 +77,7 @@ pub fn effect_table(plan: &Plan) -> Table {
             Column::significant("shows", "Shows as", "", 2),
             Column::text("shows_unit", "Unit"),
             Column::significant("usual", "Usual size", "", 2),
-            Column::text("decided", "Decided"),
+            Column::text("decided", "Detectable"),
         ],
     );
     for found in &plan.detectability {
@@ -89,10 +93,9 @@ pub fn effect_table(plan: &Plan) -> Table {
         ]);
     }
     table.notes.push(
-        "Smallest size: the one whose non-centrality beside geometry and frames reaches the stated bound in its worst phase \
-         or direction. Shows as: what that does at the most, in a joint or at the sensor. Usual size: small for what is \
-         met in practice, in the same unit. Shifts are taken to happen in the middle of the run; a shift near its end \
-         needs to be larger."
+        "Smallest size: size at which the non-centrality, with geometry and frames free, reaches --decisive in the worst phase or \
+         direction. Shows as: its largest effect in a joint or at the sensor. Usual size: a small practical value in the same \
+         unit. Shifts are assumed in the middle of the run; a shift near its end must be larger."
             .to_owned(),
     );
     table
@@ -104,14 +107,14 @@ fn judged(found: &Detectability) -> Cell {
     } else if found.is_decided() {
         Cell::Judged(Status::Good, "yes".to_owned())
     } else {
-        Cell::Judged(Status::Warning, "only when larger than usual".to_owned())
+        Cell::Judged(Status::Warning, "only if larger than usual".to_owned())
     }
 }
 
 /// Predicted standard deviation of every parameter.
 pub fn sigma_table(plan: &Plan) -> Table {
     let mut table = Table::new(
-        "What the rows will tell of every parameter",
+        "Predicted uncertainty of every parameter",
         vec![
             Column::text("parameter", "Parameter"),
             Column::significant("sigma", "Predicted 1σ", "", 2),
@@ -124,7 +127,7 @@ pub fn sigma_table(plan: &Plan) -> Table {
         table.push([parameter.to_string().into(), value.into(), unit.into()]);
     }
     table.notes.push(
-        "Tolerances of the arm and its frames are counted in. What no reading can see keeps its tolerance."
+        "Including the prior tolerances of arm and frames. Unidentifiable parameters keep their tolerance."
             .to_owned(),
     );
     table
@@ -138,14 +141,14 @@ fn verdict(plan: &Plan) -> Verdict {
     let minutes = plan.rows.last().map_or(0.0, |row| 60.0 * row.time_h);
     let mut reasons = vec![
         format!(
-            "what to do: run the program slowly first, then take one reading at each of the {} rows, in their order (about \
+            "what to do: run the program slowly first, then take one reading at each of the {} rows in order (about \
              {minutes:.0} min)",
             plan.rows.len()
         ),
         "poses stay within joint limits and clear of singularities".to_owned(),
     ];
     reasons.push(format!(
-        "{} rows at {} poses: {} from the other side, {} repeated, {} for warm-up",
+        "{} rows at {} poses: {} with opposite approach direction, {} repeated, {} for warm-up",
         plan.rows.len(),
         plan.poses.len(),
         rows_of(plan, Purpose::OtherSide),
@@ -154,8 +157,7 @@ fn verdict(plan: &Plan) -> Verdict {
     ));
     let quality = &plan.quality;
     reasons.push(format!(
-        "after one visit to each pose the model says what is read elsewhere to {:.3} mm (1σ); after as many random poses: \
-         {:.3} mm",
+        "predicted 1σ of a reading at any other pose: {:.3} mm after one visit to each pose, {:.3} mm after as many random poses",
         quality.reading_sigma_mm, quality.random_reading_sigma_mm
     ));
     let undecided: Vec<&Detectability> = plan.detectability.iter().filter(|d| !d.is_decided()).collect();
@@ -164,27 +166,27 @@ fn verdict(plan: &Plan) -> Verdict {
             undecided.iter().take(6).map(|d| format!("{} ({})", d.effect, d.which)).collect();
         let more = undecided.len().saturating_sub(names.len());
         let tail = if more > 0 { format!(" and {more} more") } else { String::new() };
-        reasons.push(format!("not decided at the usual size: {}{tail}", names.join(", ")));
+        reasons.push(format!("not detectable at the usual size: {}{tail}", names.join(", ")));
     }
     reasons.push(format!(
-        "checked: {}; the way to the first pose and anything else in the cell are not",
+        "checked: {}; not checked: the move to the first pose and anything else in the cell",
         checked(plan)
     ));
     let rough = plan.rows.iter().filter(|row| row.cable_unclear).count();
     if rough > 0 {
         reasons.insert(
             1,
-            format!("{rough} times the cable has to be unhooked on the way: the table of rows says where"),
+            format!("the cable must be unhooked between poses {rough} times; the table of rows shows where"),
         );
     }
     let (status, headline) = match rough {
-        0 => (Status::Good, "The program may run: links and target keep out of what was stated"),
-        _ => (Status::Warning, "The program may run, if the cable is unhooked where it would be in the way"),
+        0 => (Status::Good, "The program may run: links and target stay clear of the stated obstacles"),
+        _ => (Status::Warning, "The program may run if the cable is unhooked between some poses"),
     };
     Verdict::new(status, headline, reasons)
 }
 
-/// What fits a terminal.
+/// Summary for the terminal.
 pub fn summary(plan: &Plan, robot: &str) -> Document {
     let mut page = Document::new(format!("What to measure on {robot}"));
     page.push(verdict(plan));
@@ -198,19 +200,19 @@ pub fn document(plan: &Plan, setup: &MeasurementSetup<'_>, robot: &str) -> Docum
     page.push(verdict(plan));
     page.push(vec![
         KeyFigure::new("Rows", plan.rows.len(), 0, "").note(format!("at {} poses", plan.poses.len())),
-        KeyFigure::new("Left unknown after it", plan.quality.reading_sigma_mm, 3, "mm")
-            .note("predicted 1σ of a reading anywhere else"),
-        KeyFigure::new("After random poses", plan.quality.random_reading_sigma_mm, 3, "mm")
-            .note(format!("as many, {} of them", plan.poses.len())),
+        KeyFigure::new("Remaining uncertainty", plan.quality.reading_sigma_mm, 3, "mm")
+            .note("predicted 1σ of a reading at any other pose"),
+        KeyFigure::new("With random poses", plan.quality.random_reading_sigma_mm, 3, "mm")
+            .note(format!("for comparison, {} poses", plan.poses.len())),
         KeyFigure::new(
-            "Effects decided",
+            "Detectable effects",
             plan.detectability.iter().filter(|d| d.is_decided()).count(),
             0,
             "",
         )
-        .note(format!("of {}, at sizes met in practice", plan.detectability.len())),
+        .note(format!("of {}, at usual sizes", plan.detectability.len())),
     ]);
-    page.paragraph("No program can know what else stands in the cell: state it as boxes (--keep-out).");
+    page.paragraph("Obstacles in the cell are unknown to the planner: state them as boxes (--keep-out).");
     page.push(effect_table(plan));
     page.heading(2, "Rows");
     page.push(table(plan, setup).excerpt(ROWS_ON_PAGE));
@@ -218,7 +220,7 @@ pub fn document(plan: &Plan, setup: &MeasurementSetup<'_>, robot: &str) -> Docum
     page
 }
 
-/// Everything; schema `truegrind.plan/1`.
+/// JSON report, schema `truegrind.plan/1`.
 pub fn json(plan: &Plan, setup: &MeasurementSetup<'_>, robot: &str) -> Value {
     let rows: Vec<Value> = plan
         .rows

@@ -1,13 +1,12 @@
-//! Pictures as SVG text: graphs, histograms, bars, parameter intervals, paths in plan view, heat strips.
+//! Plots as SVG: graphs, histograms, bars, parameter intervals, paths in plan view, heat strips.
 //!
-//! Each plot is a struct with public fields and one method, `svg`, which always gives a whole SVG document: without
-//! data it gives empty axes, and what is not finite is left out (a gap in a line). Text stays text, so that pages can
-//! be searched. Black follows the text colour of the page around the picture, so that the same picture serves a light
-//! and a dark page. Series differ in colour (Okabe and Ito, told apart by colour-blind eyes), in dash and in marker.
-//! Legends stand above the data, never on it.
+//! Each plot is a struct with public fields and a method `svg`, which always returns a complete SVG document: without data it has
+//! empty axes, and non-finite values are gaps. Text remains text, so that pages can be searched. Black follows the text colour of
+//! the page, for light and dark mode. Series differ in colour (Okabe and Ito, suitable for colour-blind readers), dash and marker.
+//! Legends are above the data.
 //!
-//! The drawing is done by plotters on a backend of our own: its SVG backend knows neither
-//! fractions of a pixel nor dashes, and its width of a text is a count of bytes. No font is needed on the machine.
+//! Plots are drawn by plotters on a custom backend, since its SVG backend supports neither fractions of a pixel nor dashes and
+//! measures text by its number of bytes. No fonts are needed.
 //!
 //! ```
 //! use truegrind_report::plot::{Axis, Graph, Series};
@@ -37,7 +36,7 @@ mod color_bar;
 mod plan;
 mod strip;
 
-pub use alike::told_apart;
+pub use alike::distinguishable;
 pub use axis::Axis;
 pub use bars::{BarGroup, Bars};
 pub use graph::{Graph, Mark, Reference, Series, Span};

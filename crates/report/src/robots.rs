@@ -1,4 +1,4 @@
-//! The catalogue of arms and the page of one arm: link table, ranges, masses, published poses, sources.
+//! Catalogue of robots, and the page of one robot: links, joint ranges, masses, published poses, sources.
 
 use serde_json::{Value, json};
 
@@ -44,7 +44,7 @@ pub fn catalogue_table(robots: &[Robot]) -> Table {
     table
 }
 
-/// The links: which four numbers are free, and their nominal values in mm and degrees.
+/// The links with their nominal parameters in mm and degrees.
 pub fn link_table(robot: &Robot) -> Table {
     let hayati = robot.sheet.link.iter().any(|link| link.model == LinkModel::Hayati);
     let mut columns = vec![
@@ -75,21 +75,19 @@ pub fn link_table(robot: &Robot) -> Table {
         ]);
     }
     table.notes.push(
-        "T = Rz(θ) Tz(d) Tx(a) Rx(α) from each frame to the next (ltlm-2024 eq. 2); θ is the joint's angle plus the \
-         offset."
+        "T = Rz(θ) Tz(d) Tx(a) Rx(α) from each frame to the next (ltlm-2024 eq. 2); θ is the joint angle plus the offset."
             .to_owned(),
     );
     if hayati {
         table.notes.push(
-            "Hayati links end in Ry(β): the next axis is nominally parallel, d is a constant of theirs and not \
-             identified."
+            "Hayati links end in Ry(β): their next axis is nominally parallel, and d is constant and not identified."
                 .to_owned(),
         );
     }
     table
 }
 
-/// Ranges and speeds of the joints in the controller's angles.
+/// Ranges and speeds of the joints in controller angles.
 pub fn joint_table(robot: &Robot) -> Table {
     let joints = &robot.sheet.joints;
     let mut table = Table::new(
@@ -109,19 +107,17 @@ pub fn joint_table(robot: &Robot) -> Table {
         Angles::Logged => {
             table
                 .notes
-                .push("Angles as the controller shows and logs them, without the offsets θ.".to_owned());
+                .push("Angles as displayed and logged by the controller, without the offsets θ.".to_owned());
         }
-        Angles::Dh => {
-            table.notes.push("Logged angles are DH angles: the offsets θ are in them already.".to_owned())
-        }
+        Angles::Dh => table.notes.push("Logged angles are DH angles, including the offsets θ.".to_owned()),
     }
     for (joint, sum) in couplings(joints.map) {
-        table.notes.push(format!("The rotation of joint {joint} is {sum} of the controller's angles."));
+        table.notes.push(format!("The rotation of joint {joint} is {sum} in controller angles."));
     }
     table
 }
 
-/// Masses and centres of mass; `None` where none are published.
+/// Masses and centres of mass; `None` if none are published.
 pub fn mass_table(robot: &Robot) -> Option<Table> {
     let masses = robot.sheet.masses.as_ref()?;
     let mut columns = vec![Column::count("link", "Link"), Column::number("mass_kg", "Mass", "kg", 2)];
@@ -137,7 +133,7 @@ pub fn mass_table(robot: &Robot) -> Option<Table> {
     Some(table)
 }
 
-/// Poses that were published, and how far the links miss them.
+/// Published poses, and the error of the links at them.
 pub fn published_table(robot: &Robot) -> Table {
     let mut table = Table::new(
         "Published poses",
@@ -146,9 +142,9 @@ pub fn published_table(robot: &Robot) -> Table {
             Column::text("joints_deg", "Joints [°]"),
             Column::text("point", "Point"),
             Column::text("published_mm", "Published [mm]"),
-            Column::number("miss_mm", "Miss", "mm", 3),
+            Column::number("miss_mm", "Error", "mm", 3),
             Column::number("tolerance_mm", "Tolerance", "mm", 3),
-            Column::number("turn_deg", "Turned by", "°", 4),
+            Column::number("turn_deg", "Rotation error", "°", 4),
             Column::text("source", "Source"),
         ],
     );
@@ -174,11 +170,11 @@ pub fn published_table(robot: &Robot) -> Table {
             pose.source.as_str().into(),
         ]);
     }
-    table.notes.push("The tolerance is what the rounding of the published numbers allows.".to_owned());
+    table.notes.push("Tolerance: rounding of the published numbers.".to_owned());
     table
 }
 
-/// Which number comes from where.
+/// Sources of the numbers.
 pub fn source_table(robot: &Robot) -> Table {
     let sources = &robot.sheet.sources;
     let mut table =
@@ -194,7 +190,7 @@ pub fn source_table(robot: &Robot) -> Table {
     table
 }
 
-/// The page of one arm.
+/// The page of one robot.
 pub fn document(robot: &Robot) -> Document {
     let sheet = &robot.sheet;
     let mut page = Document::new(sheet.name.clone());
@@ -206,7 +202,7 @@ pub fn document(robot: &Robot) -> Document {
     if !robot.warnings.is_empty() {
         page.push(Verdict::new(
             Status::Warning,
-            "The sheet can be used, with reservations",
+            "The robot file can be used with reservations",
             robot.warnings.iter().cloned(),
         ));
     }
@@ -219,36 +215,35 @@ pub fn document(robot: &Robot) -> Document {
     page.push(vec![
         payload,
         figure("Reach", sheet.reach_mm, 0, "mm"),
-        figure("Repeatability RP", sheet.repeatability_mm, 3, "mm").note("not the accuracy"),
+        figure("Repeatability RP", sheet.repeatability_mm, 3, "mm").note("not the absolute accuracy"),
         KeyFigure::new("Programs", sheet.dialect.map(dialect), 0, "")
             .note(sheet.orientation().map_or("", orientation)),
     ]);
     if sheet.compensates {
         page.paragraph(
-            "The controller already computes with identified parameters, so a program for it is rewritten only when \
-             that is asked for.",
+            "The controller already compensates with identified parameters, so programs for this robot are not corrected.",
         );
     }
     page.heading(2, "Links");
     page.push(untitled(link_table(robot)));
     if let Some(flange) = &sheet.flange {
         page.paragraph(format!(
-            "The flange lies in the last link frame at ({}) mm, turned by the quaternion ({}), w first.",
-            list(&flange.position_mm.map(without_dust)),
-            list(&flange.quaternion_wxyz.map(without_dust))
+            "Flange in the last link frame: position ({}) mm, quaternion ({}), w first.",
+            list(&flange.position_mm.map(snap_to_zero)),
+            list(&flange.quaternion_wxyz.map(snap_to_zero))
         ));
     }
     page.heading(2, "Joints");
     page.push(untitled(joint_table(robot)));
     page.heading(2, "Mounting and masses");
     page.paragraph(format!(
-        "Gravity points along ({}) in the base; the mounting face is at ({}) mm.",
+        "Direction of gravity in the base frame: ({}); mounting face at ({}) mm.",
         list(&sheet.mounting.gravity),
         list(&sheet.mounting.plate_mm)
     ));
     match mass_table(robot) {
         Some(table) => page.push(untitled(table)),
-        None => page.paragraph("No masses are stated, so gravity bends this arm only through its payload."),
+        None => page.paragraph("No masses are stated, so only the payload counts for gravity loads."),
     }
     page.heading(2, "Published poses");
     push_published(&mut page, robot);
@@ -257,13 +252,13 @@ pub fn document(robot: &Robot) -> Document {
     page
 }
 
-/// What checks the links: a table, and the words of each pose in a list.
+/// The published poses: a table, and their descriptions as a list.
 fn push_published(page: &mut Document, robot: &Robot) {
     let sheet = &robot.sheet;
     if sheet.published.is_empty() {
-        page.paragraph("None is stated, so nothing checks the links.");
+        page.paragraph("None are stated, so the links are not verified.");
     } else {
-        // Words of any length stand better in a list.
+        // Long texts are easier to read in a list.
         let mut table = untitled(published_table(robot));
         for key in ["source", "joints_deg", "point"] {
             if let Some(index) = table.column_index(key) {
@@ -281,16 +276,16 @@ fn push_published(page: &mut Document, robot: &Robot) {
     }
 }
 
-/// What was understood of a robot file, in a few lines: to be compared with the manual before anything is measured.
+/// Interpretation of a robot file, to be compared with the manual before a measurement.
 pub fn understood(found: &ImportedRobot) -> Document {
     let mut page = Document::new(found.robot.sheet.name.clone());
-    page.subtitle = format!("{}, as it is understood", found.kind.text());
+    page.subtitle = format!("interpretation of the {}", found.kind.text());
     page.push(Block::List(found.summary.clone()));
-    page.paragraph("Compare zero pose and axes with the manual: a wrong zero is the usual mistake.");
+    page.paragraph("Compare zero pose and axes with the manual: wrong zeros are the most common mistake.");
     page
 }
 
-/// The same with a picture of the zero pose, and the page of the arm.
+/// [`understood`] with a plot of the zero pose and the page of the robot.
 pub fn checked(found: &ImportedRobot) -> Document {
     let mut page = understood(found);
     page.push(Block::Figure(zero_pose(&found.robot)));
@@ -299,13 +294,13 @@ pub fn checked(found: &ImportedRobot) -> Document {
     page
 }
 
-/// The lines between the joints with all of them at 0°, from the side and from the front.
+/// The arm with all joints at 0° as lines between the joints, in side and front view.
 fn zero_pose(robot: &Robot) -> Figure {
     let ready = robot.model.at_condition(&Condition::default());
     let frames = ready.frames(&Joints::zeros());
     let flange = ready.forward(&Joints::zeros());
     let tip = flange.translation.vector;
-    // A short piece along the flange's z shows where it looks.
+    // A short line along the z axis of the flange shows its direction.
     let ahead = tip + flange.rotation * nalgebra::Vector3::z() * 60.0;
     let mut stops: Vec<[f64; 3]> = frames.origin.to_vec();
     stops.extend([tip, ahead].map(<[f64; 3]>::from));
@@ -324,11 +319,11 @@ fn zero_pose(robot: &Robot) -> Figure {
     };
     Figure::new(
         view.svg(),
-        "The lines between the joints' frames with all joints at 0°, and 60 mm along the flange's z: the picture of the manual?",
+        "Lines between the joint frames with all joints at 0°, and 60 mm along the z axis of the flange. Compare with the manual.",
     )
 }
 
-/// The data sheet with what its published poses say of it; schema `truegrind.robot/1`.
+/// JSON of a robot with the errors at its published poses, schema `truegrind.robot/1`.
 pub fn json(robot: &Robot) -> Value {
     let misses: Vec<Value> = robot
         .sheet
@@ -347,12 +342,12 @@ pub fn json(robot: &Robot) -> Value {
     })
 }
 
-/// The catalogue for programs; schema `truegrind.robots/1`.
+/// JSON of the catalogue, schema `truegrind.robots/1`.
 pub fn catalogue_json(robots: &[Robot]) -> Value {
     json!({ "schema": "truegrind.robots/1", "robots": super::format::json::Rows(&catalogue_table(robots)) })
 }
 
-/// A table right under a heading that says the same.
+/// A table without its title, for use below a heading.
 fn untitled(table: Table) -> Table {
     Table { title: String::new(), ..table }
 }
@@ -361,13 +356,13 @@ fn words(text: &str) -> Cell {
     if text.is_empty() { Cell::Missing } else { text.into() }
 }
 
-/// What arithmetic leaves of a zero is shown as one: a billionth of a millimetre is nobody's measure.
-fn without_dust(value: f64) -> f64 {
+/// Shows rounding residue as zero.
+fn snap_to_zero(value: f64) -> f64 {
     if value.abs() < 1e-9 { 0.0 } else { value }
 }
 
 fn list(values: &[f64]) -> String {
-    // Rust would print −0.
+    // Avoids −0.
     let shown: Vec<String> = values.iter().map(|value| format!("{}", value + 0.0)).collect();
     if shown.is_empty() { MISSING.to_owned() } else { shown.join(", ") }
 }

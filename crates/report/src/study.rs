@@ -1,4 +1,4 @@
-//! Methods side by side over several splits: does the method matter, and by how much?
+//! Comparison of solvers over several splits.
 
 use serde_json::{Value, json};
 
@@ -12,13 +12,13 @@ use truegrind_calibration::identification::study::MethodRow;
 use truegrind_calibration::measurement::dataset::Dataset;
 use truegrind_math::statistics::{ErrorSummary, mean_and_deviation};
 
-/// Methods whose held-out RMSE agrees to this share on every split reached the same optimum.
+/// Methods whose held-out RMSE agrees within this ratio on every split reached the same optimum.
 const SAME_OPTIMUM: f64 = 1e-3;
 
 /// Name of the first row.
 const REGISTERED: &str = "frames registered";
 
-/// One row per method, the first for registered frames alone. Figures are mean ± standard deviation over the splits.
+/// One row per method, the first for registered frames alone; mean ± standard deviation over the splits.
 pub fn table(rows: &[MethodRow]) -> Table {
     let splits = rows.first().map_or(0, |row| row.held_out.len());
     let mut table = Table::new(
@@ -50,10 +50,9 @@ pub fn document(rows: &[MethodRow], robot: &str, dataset: &Dataset) -> Document 
             rows.iter().find(|row| row.solver.is_none()).map(|row| row.over_splits(|s| s.rmse).0);
         let headline = match registered {
             Some(registered) => format!(
-                "{best} leaves the least on held-out rows: {rmse:.3} mm RMSE, where registered frames alone leave \
-                 {registered:.3} mm"
+                "{best} has the smallest held-out error: {rmse:.3} mm RMSE ({registered:.3} mm with registered frames alone)"
             ),
-            None => format!("{best} leaves the least on held-out rows: {rmse:.3} mm RMSE"),
+            None => format!("{best} has the smallest held-out error: {rmse:.3} mm RMSE"),
         };
         let stuck: Vec<String> = rows
             .iter()
@@ -74,14 +73,14 @@ pub fn document(rows: &[MethodRow], robot: &str, dataset: &Dataset) -> Document 
     page.heading(2, "Errors by method");
     page.figure(
         bars(rows),
-        "Held-out errors, mean over the splits; whiskers are one standard deviation. A whisker tells how much the \
-         choice of rows matters, not how sure the difference of two methods is: they share their rows.",
+        "Held-out errors, mean over the splits; whiskers are one standard deviation. They show the influence of the split, not the \
+         uncertainty of the difference between two methods, which share their rows.",
     );
     if splits > 1 {
         page.figure(
             by_split(rows),
-            "Held-out RMSE of each split. All methods see the same rows, so lines may be compared split by split; lines \
-             on top of each other reached the same optimum.",
+            "Held-out RMSE of each split. All methods use the same rows, so lines can be compared split by split; coinciding lines \
+             reached the same optimum.",
         );
     }
     page.push(Provenance {
@@ -95,7 +94,7 @@ pub fn document(rows: &[MethodRow], robot: &str, dataset: &Dataset) -> Document 
     page
 }
 
-/// Everything, with the figures of each split; schema `truegrind.study/1`.
+/// JSON report with the figures of each split, schema `truegrind.study/1`.
 pub fn json(rows: &[MethodRow], robot: &str, dataset: &Dataset) -> Value {
     let methods: Vec<Value> = rows
         .iter()
@@ -135,13 +134,13 @@ fn passes(row: &MethodRow) -> Option<f64> {
     (!row.jacobian_passes.is_empty()).then(|| mean_and_deviation(&row.jacobian_passes).0)
 }
 
-/// Splits on which a test of convergence held, and all.
+/// Number of converged splits, and of all splits.
 fn converged(row: &MethodRow) -> Option<(usize, usize)> {
     row.solver?;
     Some((row.terminations.iter().filter(|t| t.is_converged()).count(), row.terminations.len()))
 }
 
-/// Name, mean and standard deviation of the smallest mean held-out RMSE among the methods; the first of equals.
+/// Name, mean and standard deviation of the method with the smallest mean held-out RMSE; the first among equals.
 fn best(rows: &[MethodRow]) -> Option<(&'static str, f64, Option<f64>)> {
     rows.iter()
         .filter(|row| row.solver.is_some() && !row.held_out.is_empty())
@@ -149,7 +148,7 @@ fn best(rows: &[MethodRow]) -> Option<(&'static str, f64, Option<f64>)> {
             let (mean, deviation) = row.over_splits(|s| s.rmse);
             (name(row), mean, (row.held_out.len() > 1).then_some(deviation))
         })
-        // A later method must be better by more than the optimum is defined.
+        // A later method must be better by more than the tolerance of the optimum.
         .reduce(|a, b| if b.1 < a.1 * (1.0 - SAME_OPTIMUM) { b } else { a })
 }
 
@@ -164,19 +163,19 @@ fn notes(rows: &[MethodRow]) -> Vec<String> {
         })
         .collect();
     notes.extend([
-        "mean |e| is what the papers print as \"STD\" (ltlm-2024 eq. 20). ± is the standard deviation over the splits."
+        "mean |e| is called \"STD\" in the papers (ltlm-2024 eq. 20). ±: standard deviation over the splits."
             .to_owned(),
-        "A Jacobian pass takes all rows once, with derivatives; all rounds of a fit count. LTLM takes two in each \
-         iteration: compare methods by passes, not by iterations."
+        "A Jacobian pass evaluates all rows once with derivatives; all rounds of a fit count. LTLM needs two per iteration, so compare \
+         methods by passes rather than iterations."
             .to_owned(),
     ]);
     let literal: Vec<&str> =
         rows.iter().filter(|row| row.solver.is_some_and(|s| s.as_printed)).map(name).collect();
     if !literal.is_empty() {
         notes.push(format!(
-            "{} as the paper prints: fixed μ = 5, no scaling, no priors. What the data cannot see moves freely, so \
-             parameters of such a fit are a comparison and no model. μ has no unit in the paper; here it acts on mm and \
-             radians, where it is negligible for hundreds of rows.",
+            "{} as printed in the paper: fixed μ = 5, no scaling, no priors. Undetermined parameters move freely, so such a fit serves \
+             for comparison and is not a model. μ has no unit in the paper; here it acts on mm and radians, where it is negligible \
+             for hundreds of rows.",
             literal.join(" and ")
         ));
     }
@@ -184,7 +183,7 @@ fn notes(rows: &[MethodRow]) -> Vec<String> {
     notes
 }
 
-/// A sentence for each group of methods that cannot be told apart by their errors.
+/// A sentence per group of methods with the same errors.
 fn same_optimum(rows: &[MethodRow]) -> Vec<String> {
     let methods: Vec<&MethodRow> =
         rows.iter().filter(|row| row.solver.is_some() && !row.held_out.is_empty()).collect();
@@ -217,8 +216,7 @@ fn same_optimum(rows: &[MethodRow]) -> Vec<String> {
         }
         if group.len() > 1 {
             notes.push(format!(
-                "{} reach the same optimum on every split (held-out RMSE within {} mm), so they differ only in work: \
-                 the optimum belongs to the problem, not to the method.",
+                "{} reach the same optimum on every split (held-out RMSE within {} mm), so they differ only in computing effort.",
                 group.join(" and "),
                 Precision::Significant(2).format(widest)
             ));

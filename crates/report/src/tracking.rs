@@ -1,4 +1,4 @@
-//! A track: what was taken in, what moved, and how sure the arm is known now.
+//! Report on a track: processed poses, detected changes, current parameters.
 
 use serde_json::{Value, json};
 
@@ -11,7 +11,7 @@ use truegrind_calibration::tracking::state::ConsumedFile;
 use truegrind_calibration::tracking::{Alarm, Tracker};
 use truegrind_math::statistics::median;
 
-/// What the terminal shows.
+/// Summary for the terminal.
 pub fn summary(tracker: &Tracker, fresh: usize, alarms: &[Alarm], model: &str) -> Document {
     let mut page = Document::new("Track");
     page.subtitle = format!("{}, {} readings", tracker.robot(), tracker.state().sensor);
@@ -19,7 +19,7 @@ pub fn summary(tracker: &Tracker, fresh: usize, alarms: &[Alarm], model: &str) -
     page
 }
 
-/// Whether a file is what CSV makes of [`table`]: a result, and no measurement.
+/// Whether a file is the CSV of [`table`] rather than a measurement.
 pub fn is_table(csv: &[u8]) -> bool {
     csv.starts_with(b"parameter,unit,")
 }
@@ -29,10 +29,10 @@ pub fn document(tracker: &Tracker, fresh: usize, alarms: &[Alarm], model: &str) 
     let mut page = summary(tracker, fresh, alarms, model);
     let earlier = tracker.state().alarms.len() - alarms.len().min(tracker.state().alarms.len());
     if earlier > 0 {
-        page.heading(2, "Changes noticed before");
+        page.heading(2, "Earlier changes");
         page.push(Block::List(tracker.state().alarms[..earlier].iter().map(ToString::to_string).collect()));
     }
-    page.heading(2, "How surprising the poses are");
+    page.heading(2, "Innovations");
     let history = &tracker.state().history;
     let points: Vec<[f64; 2]> = history.iter().enumerate().map(|(i, s)| [i as f64 + 1.0, s.nis]).collect();
     page.figure(
@@ -45,15 +45,15 @@ pub fn document(tracker: &Tracker, fresh: usize, alarms: &[Alarm], model: &str) 
             ..Graph::default()
         }
         .svg(),
-        "How surprising each pose was: near the line on average while arm, sensor and noise are what they are taken for.",
+        "Normalised innovation squared of each pose. Its mean is near the line as long as arm, sensor and noise match the model.",
     );
-    page.heading(2, "Where the arm stands");
+    page.heading(2, "Current parameters");
     page.push(table(tracker));
     page.push(Provenance { sources: sources(tracker), ..Provenance::here() });
     page
 }
 
-/// The files that were taken in.
+/// The processed files.
 fn sources(tracker: &Tracker) -> Vec<Source> {
     let of = |consumed: &ConsumedFile| Source::new(&consumed.file, "Measurements", "", Some(consumed.rows));
     tracker.state().consumed.iter().map(of).collect()
@@ -70,17 +70,20 @@ fn rows_per_pose(tracker: &Tracker) -> f64 {
 fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], model: &str) {
     let state = tracker.state();
     let (status, headline) = match alarms.len() {
-        0 => (Status::Good, format!("{fresh} new poses taken in, no change noticed: programs stay right")),
-        1 => (Status::Warning, format!("{fresh} new poses taken in, one change noticed")),
-        n => (Status::Warning, format!("{fresh} new poses taken in, {n} changes noticed")),
+        0 => (
+            Status::Good,
+            format!("{fresh} new poses processed, no change detected: the programs remain valid"),
+        ),
+        1 => (Status::Warning, format!("{fresh} new poses processed, one change detected")),
+        n => (Status::Warning, format!("{fresh} new poses processed, {n} changes detected")),
     };
     let mut reasons: Vec<String> = alarms.iter().map(ToString::to_string).collect();
     let (status, headline) = if tracker.mostly_set_aside() {
         reasons.insert(
             0,
             format!(
-                "{} of {} poses were set aside since they fit neither the arm nor a change that was found: the model follows the \
-                 rest alone; look at the sensor and its target, or begin a new track",
+                "{} of {} poses were set aside, since they fit neither the arm nor a detected change: the model follows the others \
+                 only; check the sensor and its target, or start a new track",
                 state.accidents, state.poses
             ),
         );
@@ -90,31 +93,31 @@ fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], 
     };
     if status == Status::Warning {
         reasons.push(
-            "what to do: where the arm itself moved, correct the programs anew with the model that was written; where sensor or \
-             target did, mount them firmly"
+            "what to do: if the arm changed, correct the original programs with the new model; if sensor or target moved, mount them \
+             firmly"
                 .to_owned(),
         );
     }
     page.push(Verdict::new(status, headline, reasons));
     let nis: Vec<f64> = state.history.iter().map(|s| s.nis).filter(|n| n.is_finite()).collect();
-    // One pose after a new mounting is worth a million: a mean would speak of nothing else.
+    // A single pose after remounting may have a NIS of a million, which would dominate the mean.
     let usual = (!nis.is_empty()).then(|| median(&nis));
     let degrees = rows_per_pose(tracker);
     let expected = degrees * (1.0 - 2.0 / (9.0 * degrees)).powi(3);
     page.push(vec![
-        KeyFigure::new("Poses in all", state.poses, 0, "").note(format!("{} set aside", state.accidents)),
-        KeyFigure::new("Surprise of the latest poses", usual, 2, "").note(format!(
-            "median of the normalised innovations squared; {expected:.1} where arm, sensor and noise are what they are taken for"
+        KeyFigure::new("Poses", state.poses, 0, "").note(format!("{} set aside", state.accidents)),
+        KeyFigure::new("NIS of the latest poses", usual, 2, "").note(format!(
+            "median of the normalised innovation squared; {expected:.1} expected if arm, sensor and noise match the model"
         )),
-        KeyFigure::new("Changes in all", state.alarms.len(), 0, "").note(format!("{} in these poses", alarms.len())),
+        KeyFigure::new("Changes", state.alarms.len(), 0, "").note(format!("{} in the new poses", alarms.len())),
     ]);
     page.paragraph(format!("Model written: {model}"));
 }
 
-/// Parameters as they stand now.
+/// Current parameters.
 pub fn table(tracker: &Tracker) -> Table {
     let mut table = Table::new(
-        "Parameters, as deviations from the model that tracking began with",
+        "Parameters, as deviations from the initial model",
         vec![
             Column::text("parameter", "Parameter"),
             Column::text("unit", "Unit"),
@@ -133,7 +136,7 @@ pub fn table(tracker: &Tracker) -> Table {
     table
 }
 
-/// Everything; schema `truegrind.track-report/1`.
+/// JSON report, schema `truegrind.track-report/1`.
 pub fn json(tracker: &Tracker, fresh: usize, alarms: &[Alarm]) -> Value {
     let state = tracker.state();
     let sigmas = tracker.sigmas();

@@ -121,7 +121,7 @@ fn the_orientation_is_told_and_judged_where_that_is_asked_for() {
         accept("later.csv", &["--tolerance-angle", "2", "--sensor-uncertainty-angle", "0.01"]);
     let said = on_one_line(&out);
     assert!(
-        code == 0 && said.contains("; the largest turn is") && said.contains("the tolerance 2.0000°"),
+        code == 0 && said.contains("; largest orientation error") && said.contains("the tolerance 2.0000°"),
         "{out}"
     );
     let half = format!("{}", 0.5 * largest);
@@ -137,7 +137,10 @@ fn the_orientation_is_told_and_judged_where_that_is_asked_for() {
         .collect();
     fs::write(at.join("places.csv"), places).unwrap();
     let (code, out, err) = accept("places.csv", &["--html", "page.html"]);
-    assert!(code == 0 && page().contains("not evaluated: the sensor saw no orientation"), "{out}{err}");
+    assert!(
+        code == 0 && page().contains("not evaluated: the sensor does not measure the orientation"),
+        "{out}{err}"
+    );
     let (code, out, _) = accept("places.csv", &["--tolerance-angle", "1"]);
     let headline = "[not evaluated] Not evaluated: a tolerance of the orientation was stated, and the sensor saw no orientation";
     assert!(code == 1 && on_one_line(&out).contains(headline), "{out}");

@@ -300,6 +300,6 @@ fn track_takes_a_folder_of_small_files_and_none_twice() {
     (4..6).for_each(day);
     let (code, out, err) = track(&["--date", "2026-05-05", "--csv", "days/parameters.csv", "--sigma", "0.1"]);
     assert!(code == 0 && out.contains("30 new poses"), "{out}{err}");
-    assert!(err.contains("goes on with the settings that it began with"), "{err}");
+    assert!(err.contains("keeps the settings with which it was started"), "{err}");
     assert!(track(&["--csv", "days/parameters.csv"]).2.contains("no new measurements"));
 }

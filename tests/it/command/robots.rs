@@ -22,7 +22,7 @@ fn what_is_understood_of_a_file_is_told_and_goes_to_a_robot_file() {
         assert!(out.contains(words), "{words}: {out}");
     }
     let page = fs::read_to_string(at.join("page.html")).unwrap();
-    assert!(page.contains("<svg") && page.contains("the picture of the manual?"));
+    assert!(page.contains("<svg") && page.contains("Compare with the manual."));
     // The file and the robot file that was written of it are one robot to every verb.
     let (_, ours, _) = truegrind(at, &["robots", "arm.toml"]);
     let (_, theirs, _) = truegrind(at, &["robots", "arm.urdf"]);
@@ -46,7 +46,7 @@ fn what_is_understood_of_a_file_is_told_and_goes_to_a_robot_file() {
     );
     assert_eq!(code, 0, "{err}");
     let (code, _, err) = truegrind(at, &["robots", "--check", "arm.urdf", "-o", "arm.csv"]);
-    assert!(code == 2 && err.contains("ends in .toml"), "{err}");
+    assert!(code == 2 && err.contains("expected the extension .toml"), "{err}");
     let (code, _, err) = truegrind(at, &["identify", "none.csv", "--robot", "arm.step"]);
     assert!(code == 2 && err.contains("arm.step"), "{err}");
 }
@@ -70,7 +70,7 @@ fn what_is_exported_says_its_own_error() {
     assert!(out.contains("# effects beyond rigid links are left out: joint-compliance"), "{out}");
     let (code, out, err) = export("whole.toml", &["mdh-csv", "-o", "-", "--data", "poses.csv"]);
     assert!(
-        code == 1 && out.contains("which the model was fitted to, so that this is no held-out error"),
+        code == 1 && out.contains("to which the model was fitted, so this is not a held-out error"),
         "{out}{err}"
     );
     // Each format by rows that the fit has not seen, read back as its user reads it: the links of this arm are the model.
@@ -84,11 +84,11 @@ fn what_is_exported_says_its_own_error() {
     };
     for form in ["urdf", "dh-csv", "mdh-csv", "ur-yaml"] {
         let (code, out, err) = export("links.toml", &[form, "-o", "-", "--data", "later.csv"]);
-        assert!(code == 0 && out.contains("which the model was not fitted to"), "{form}: {out}{err}");
-        let (links, whole) = (number(&out, "sensor's frame fitted: "), number(&out, "whole model "));
+        assert!(code == 0 && out.contains("to which the model was not fitted"), "{form}: {out}{err}");
+        let (links, whole) = (number(&out, "sensor frame fitted: "), number(&out, "whole model "));
         assert!((links - whole).abs() < 2e-4 && links > 0.01, "{form}: {links} {whole}");
         let (_, out, _) = export("whole.toml", &[form, "-o", "-", "--data", "later.csv"]);
-        let (links, whole) = (number(&out, "sensor's frame fitted: "), number(&out, "whole model "));
+        let (links, whole) = (number(&out, "sensor frame fitted: "), number(&out, "whole model "));
         assert!(links > whole, "{form}: {links} {whole}");
     }
     // And back in again.

@@ -7,7 +7,7 @@ use super::words::meaning;
 use crate::document::Figure;
 use crate::plot::{
     Axis, ColorMap, Graph, HeatStrip, Histogram, Ink, PlanPath, PlanView, Sample, Series, Span, Strip,
-    told_apart,
+    distinguishable,
 };
 use truegrind_compensation::deviation::{PathPoint, PathReport, Status};
 
@@ -94,7 +94,7 @@ fn along(reports: &[&PathReport]) -> Figure {
         })
         .collect();
     let passing = passing(reports);
-    let (series, alike) = told_apart(series, |x| !passing.contains(&x.to_bits()));
+    let (series, alike) = distinguishable(series, |x| !passing.contains(&x.to_bits()));
     let graph = Graph {
         title: "Deviation along the path".to_owned(),
         x: Axis::new("path point", ""),

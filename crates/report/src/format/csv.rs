@@ -1,11 +1,11 @@
-//! CSV after RFC 4180: comma, CRLF, quotes where needed, one header row of column keys.
+//! CSV according to RFC 4180: comma, CRLF, quotes where needed, one header row of column keys.
 //!
-//! Every digit of a number, so that a reader gets the same bits back. A column whose cells carry a σ becomes two. An
-//! absent cell is empty. Titles and notes are left out: RFC 4180 has no comments.
+//! Numbers are bit-exact. A column with σ becomes two. A missing cell is empty. Titles and notes are omitted, since RFC 4180 has no
+//! comments.
 //!
-//! Words may come from files of others. Characters that act without showing are spelled out ([`visible`]), and a word that a
-//! spreadsheet would take for a formula (one that begins with `=`, `+`, `-`, `@`, a tab or a carriage return and is no number)
-//! gets an apostrophe before it, the spreadsheets' own sign for text.
+//! Text may come from foreign files. Invisible control characters are escaped ([`visible`]), and text that a spreadsheet would
+//! interpret as a formula (starting with `=`, `+`, `-`, `@`, tab or carriage return, and not a number) is prefixed with an
+//! apostrophe.
 
 use super::visible;
 use crate::number::exact;
@@ -20,7 +20,7 @@ use crate::table::{Cell, Table};
 /// let mut table = Table::new("", vec![Column::text("name", "name"), Column::number("rmse_mm", "RMSE", "mm", 2)]);
 /// table.push(["p10, p20".into(), 0.125.into()]);
 /// table.push(["p30".into(), Cell::Missing]);
-/// // Every digit for programs, and nothing where nothing is known.
+/// // All digits, and an empty cell for a missing value.
 /// assert_eq!(csv::table(&table), "name,rmse_mm\r\n\"p10, p20\",0.125\r\np30,\r\n");
 /// ```
 pub fn table(table: &Table) -> String {
@@ -64,7 +64,7 @@ fn words(text: &str) -> String {
         && text.chars().nth(1).is_some()
         && text.parse::<f64>().is_err();
     let mark = if formula { "'" } else { "" };
-    // Ends of lines stay: quotes hold them.
+    // Line breaks are kept inside quotes.
     let shown: Vec<_> = text.split('\r').map(visible::text).collect();
     mark.to_owned() + &shown.join("\r")
 }
@@ -74,7 +74,7 @@ fn number(value: f64) -> String {
 }
 
 fn line<S: AsRef<str>>(cells: &[S]) -> String {
-    // A lone empty cell would be an empty line, which readers skip.
+    // A single empty cell would be an empty line, which readers skip.
     if let [cell] = cells
         && cell.as_ref().is_empty()
     {

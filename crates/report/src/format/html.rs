@@ -1,5 +1,4 @@
-//! HTML: one page that needs nothing beside itself. It loads nothing and runs no script, and a content security policy
-//! inside the page holds it to that.
+//! HTML: a self-contained page that loads nothing and runs no script; a content security policy enforces this.
 
 use std::collections::BTreeSet;
 
@@ -8,22 +7,22 @@ use crate::document::{Block, Document, Figure, KeyFigure, Verdict};
 use crate::status::Status;
 use crate::table::{Alignment, Cell, Table};
 
-/// Style sheet of a page: light and dark after the reader's setting, and paper.
+/// Style sheet for light mode, dark mode and print.
 const STYLE: &str = include_str!("page.css");
 
-/// Sections from which a page gets a table of contents.
+/// Fewest sections for a table of contents.
 const SECTIONS_FOR_CONTENTS: usize = 4;
 
-/// A cell longer than this is a sentence.
+/// Longer cells count as sentences (characters).
 const SENTENCE: usize = 40;
 
-/// A column whose cells are no longer than this keeps them on one line.
+/// Columns with cells up to this length are not wrapped (characters).
 const SHORT: usize = 16;
 
-/// Rows from which a table scrolls inside the page.
+/// Tables with more rows scroll inside the page.
 const ROWS_TO_SCROLL: usize = 24;
 
-/// The document as a whole page.
+/// The document as an HTML page.
 pub fn document(document: &Document) -> String {
     let mut page = Page::default();
     page.blocks(&document.blocks);
@@ -44,7 +43,7 @@ pub fn document(document: &Document) -> String {
     )
 }
 
-/// The table alone, as an HTML fragment.
+/// The table as an HTML fragment.
 pub fn table(table: &Table) -> String {
     let mut html = String::from(if table.rows.len() > ROWS_TO_SCROLL {
         "<div class=\"table long\" tabindex=\"0\">\n<table>\n"
@@ -65,14 +64,14 @@ pub fn table(table: &Table) -> String {
         ));
     }
     html.push_str("</tr></thead>\n<tbody>\n");
-    // Sentences need room: a browser would give it to the columns beside them.
+    // Without a class, browsers give sentences too little width.
     let sentences: Vec<bool> = (0..table.columns.len())
         .map(|column| {
             let words = table.columns[column].alignment() == Alignment::Left;
             words && (0..table.rows.len()).any(|row| table.shown(row, column).chars().count() > SENTENCE)
         })
         .collect();
-    // A short word or a status is not broken, which would double the height of every row.
+    // Wrapping a short word or status would double the height of every row.
     let short: Vec<bool> = (0..table.columns.len())
         .map(|column| (0..table.rows.len()).all(|row| table.shown(row, column).chars().count() <= SHORT))
         .collect();
@@ -101,13 +100,12 @@ pub fn table(table: &Table) -> String {
     html
 }
 
-/// Text with what HTML reads as markup made harmless, in content and in quoted attributes; control characters, which are
-/// errors in HTML and forbidden in XML, and others that act without showing are spelled out.
+/// Escapes text for content and quoted attributes; control and other invisible characters are spelled out ([`visible`]).
 ///
 /// ```
 /// use truegrind_report::format::html;
 ///
-/// // A name from a program is text on a page, whatever it says.
+/// // Names from programs are shown as text.
 /// assert_eq!(html::escape("<b>\"p10\" & p20"), "&lt;b&gt;&quot;p10&quot; &amp; p20");
 /// ```
 pub fn escape(text: &str) -> String {
@@ -142,7 +140,7 @@ fn judged(status: Status, text: &str) -> String {
     )
 }
 
-/// What has been written, and what a table of contents needs to know of it.
+/// The page under construction, with data for the table of contents.
 #[derive(Default)]
 struct Page {
     body: String,
@@ -195,7 +193,7 @@ impl Page {
         }
     }
 
-    /// A name made of the heading's letters and digits, unlike every earlier one.
+    /// A unique anchor made of the letters and digits of the heading.
     fn anchor(&mut self, text: &str) -> String {
         let mut name = String::new();
         for character in text.chars() {
@@ -264,7 +262,7 @@ impl Page {
 
     fn figure(&mut self, figure: &Figure) {
         self.figures += 1;
-        // Inside HTML an SVG element needs no namespace.
+        // SVG embedded in HTML needs no namespace.
         let svg = figure.svg.replacen(" xmlns=\"http://www.w3.org/2000/svg\"", "", 1);
         self.push(&format!(
             "<figure>\n{}\n<figcaption><b>Figure {}.</b> {}</figcaption>\n</figure>\n",

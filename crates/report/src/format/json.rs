@@ -1,5 +1,4 @@
-//! JSON: keys in the order in which they are stated, numbers with every digit, what is not finite as `null`. A reader gets
-//! back every character; those that act without showing stand as `\u…`.
+//! JSON: keys in declaration order, numbers with all digits, non-finite numbers as `null`. Invisible characters are escaped as `\u…`.
 
 use serde::Serialize;
 use serde::ser::{SerializeMap, SerializeSeq, Serializer};
@@ -7,21 +6,20 @@ use serde::ser::{SerializeMap, SerializeSeq, Serializer};
 use super::visible;
 use crate::table::{Cell, Field, Table};
 
-/// Any result as indented JSON with a newline at the end. Fields come in the order in which the type states them, and
-/// numbers that are not finite become `null`, since JSON has no word for them.
+/// A result as indented JSON with a final newline. Non-finite numbers become `null`.
 ///
 /// # Errors
 /// A map whose keys are not strings, or a `Serialize` of the type's own that fails.
 pub fn text<T: Serialize + ?Sized>(value: &T) -> Result<String, serde_json::Error> {
     let mut text = serde_json::to_string_pretty(value)?;
     text.push('\n');
-    if !text.contains(visible::acts) {
+    if !text.contains(visible::is_invisible) {
         return Ok(text);
     }
-    // JSON wants only the first 32 escaped. The others stand in strings alone, where their numbers mean the same.
+    // JSON requires escapes only below 32. The others can occur only inside strings, where escapes are allowed.
     let mut escaped = String::with_capacity(text.len() + 64);
     for character in text.chars() {
-        if visible::acts(character) {
+        if visible::is_invisible(character) {
             let units = character
                 .encode_utf16(&mut [0; 2])
                 .iter()

@@ -1,6 +1,6 @@
-//! Markdown as GitHub and GitLab read it (CommonMark with tables).
+//! Markdown for GitHub and GitLab (CommonMark with tables).
 //!
-//! Pictures appear by their captions: Markdown has no place for SVG inside the file.
+//! Plots are replaced by their captions, since Markdown cannot embed SVG.
 
 use super::{html, visible};
 use crate::document::{Block, Document};
@@ -17,7 +17,7 @@ use crate::table::{Alignment, Table};
 /// table.push(["c".into(), Cell::Missing]);
 /// let text = markdown::table(&table);
 /// assert!(text.contains("RMSE [mm]") && text.contains("1.50") && text.contains('–'), "{text}");
-/// // A bar in a name ends no column.
+/// // A bar in a name is escaped.
 /// assert!(text.contains(r"a\|b"), "{text}");
 /// ```
 pub fn table(table: &Table) -> String {
@@ -141,7 +141,7 @@ fn push_blocks(text: &mut String, blocks: &[Block]) {
     }
 }
 
-/// Text that Markdown shows as it is, on one line, with what acts without showing spelled out. Underscores inside words (`path_01.mod`) need no escape.
+/// Escapes text for one line of Markdown. Underscores inside words (`path_01.mod`) need no escape.
 fn escape(text: &str) -> String {
     let characters: Vec<char> = visible::text(text).chars().collect();
     let mut escaped = String::with_capacity(text.len());
@@ -151,7 +151,7 @@ fn escape(text: &str) -> String {
         };
         match character {
             '\\' | '`' | '*' | '<' | '|' | '~' => escaped.push('\\'),
-            // Alone, brackets are text; only a link's or image's `](`, `][` or `]:` makes them more.
+            // Brackets are special only in `](`, `][` and `]:`.
             ']' if matches!(characters.get(index + 1), Some('(' | '[' | ':')) => escaped.push('\\'),
             '_' if !(word(index.checked_sub(1)) && word(Some(index + 1))) => escaped.push('\\'),
             '#' | '-' | '+' | '>'

@@ -1,10 +1,9 @@
-//! Apache Parquet: the table as typed columns, for data frames and data bases.
+//! Apache Parquet: typed columns for data frames and databases.
 //!
-//! Words are UTF-8 strings, counts 64-bit integers, everything else doubles, with every bit; the type is the column's, whatever
-//! its cells say. A column whose cells carry a σ becomes two. An absent cell is null, and so is one that does not fit the
-//! type of its column. One row group, uncompressed, no statistics: what every reader understands.
+//! Text columns are UTF-8 strings, counts 64-bit integers, all others doubles. A column with σ becomes two. A missing cell is null, and
+//! so is a cell that does not match the type of its column. One row group, uncompressed, without statistics, for compatibility.
 //!
-//! Checked against: a reader of the tests' own that follows the specification of the format.
+//! Verified by an independent reader in the tests.
 
 use std::sync::Arc;
 
@@ -29,7 +28,7 @@ struct Leaf {
 /// The table as a Parquet file.
 ///
 /// # Errors
-/// What the writer says; nothing that a table can hold is known to bring that about.
+/// Those of the Parquet writer; no table is known to cause one.
 pub fn table(table: &Table) -> Result<Vec<u8>, ParquetError> {
     let leaves = leaves(table);
     let fields = leaves.iter().map(|leaf| field(leaf).map(Arc::new)).collect::<Result<_, _>>()?;
@@ -97,7 +96,7 @@ fn write(column: &mut ColumnWriter<'_>, table: &Table, leaf: &Leaf) -> Result<()
     Ok(())
 }
 
-/// The values that are there, and for every row whether there is one.
+/// The present values, and their definition levels.
 fn present<T>(cells: impl Iterator<Item = Option<T>>) -> (Vec<T>, Vec<i16>) {
     let (mut values, mut levels) = (Vec::new(), Vec::new());
     for cell in cells {
@@ -123,7 +122,7 @@ fn text(cell: &Cell) -> Option<String> {
 fn count(cell: &Cell) -> Option<i64> {
     match cell {
         Cell::Count(count) => i64::try_from(*count).ok(),
-        // Beyond 2⁵³ a double no longer says which whole number is meant.
+        // Doubles above 2⁵³ are not exact integers.
         Cell::Number(value) if value.fract() == 0.0 && value.abs() < 9e15 => Some(*value as i64),
         _ => None,
     }

@@ -1,23 +1,22 @@
-//! Plain text for a terminal: aligned columns within a given width, no colour codes.
+//! Plain text for a terminal: columns aligned within a given width, no colour codes.
 //!
-//! One character counts as one cell, which holds for everything truegrind itself writes. What would act on a terminal
-//! is spelled out ([`visible`]).
+//! Every character is assumed to be one cell wide, which holds for all text of truegrind itself. Control characters are escaped
+//! ([`visible`]).
 
 use super::visible;
 use crate::document::{Block, Document};
 use crate::status::Status;
 use crate::table::{Alignment, ColumnKind, Table};
 
-/// Columns of words are made as narrow as this before a table is cut into blocks.
+/// Text columns are narrowed to this width before a table is split into blocks.
 const NARROWEST_TEXT: usize = 12;
-/// A cell longer than this is a sentence, and is not read in a column narrower than that.
+/// Longer cells count as sentences, which need a wider column.
 const SENTENCE: usize = 40;
 const NARROWEST_SENTENCE: usize = 24;
 const GAP: usize = 2;
 
-/// The table as lines of at most `width` characters. Where it is wider, folders that all paths of a column share are left
-/// out, then cells of words go on in further lines; where that does not suffice, the table continues below with the first
-/// columns repeated, as many as tell the rows apart. Nothing is cut off.
+/// The table as lines of at most `width` characters. A wider table first omits common folders of paths, then wraps text cells, and
+/// finally continues in blocks below, which repeat as many leading columns as identify the rows. Nothing is truncated.
 pub fn table(table: &Table, width: usize) -> String {
     let mut text = String::new();
     if !table.title.is_empty() {
@@ -32,16 +31,17 @@ pub fn table(table: &Table, width: usize) -> String {
     };
     let mut widths = widest(&lines);
     if total(widths.iter().copied()) > width {
-        columns.clone().for_each(|column| leave_out_folders(&mut lines[1..], column));
+        columns.clone().for_each(|column| omit_common_folder(&mut lines[1..], column));
         widths = widest(&lines);
     }
     shrink(table, &mut widths, width);
-    for (number, block) in blocks(&widths, telling(table, &lines[1..]), width).iter().enumerate() {
+    for (number, block) in blocks(&widths, identifying_columns(table, &lines[1..]), width).iter().enumerate()
+    {
         if !text.is_empty() && number > 0 {
             text.push('\n');
         }
         for (index, line) in lines.iter().enumerate() {
-            let cells: Vec<Vec<String>> = block.iter().map(|&c| pieces(&line[c], widths[c])).collect();
+            let cells: Vec<Vec<String>> = block.iter().map(|&c| wrap_cell(&line[c], widths[c])).collect();
             for row in 0..cells.iter().map(Vec::len).max().unwrap_or(1) {
                 let cell = |(place, &c): (usize, &usize)| {
                     let piece = cells[place].get(row).map_or("", String::as_str);
@@ -60,8 +60,7 @@ pub fn table(table: &Table, width: usize) -> String {
     text
 }
 
-/// The document as lines of at most `width` characters. Pictures and folded parts are left out, and so are headings
-/// that have nothing else below them.
+/// The document as lines of at most `width` characters, without plots, collapsed details, and headings of these alone.
 pub fn document(document: &Document, width: usize) -> String {
     let mut text = wrapped(&document.title, width, "");
     text.push_str(&format!("{}\n", "═".repeat(length(&visible::text(&document.title)).min(width))));
@@ -77,7 +76,7 @@ pub fn document(document: &Document, width: usize) -> String {
     text
 }
 
-/// Whether a block leaves anything on a terminal, knowing those after it.
+/// Whether a block is shown on a terminal, given the following blocks.
 fn shows(block: &Block, after: &[Block]) -> bool {
     match block {
         Block::Figure(_) | Block::Details { .. } => false,
@@ -89,7 +88,7 @@ fn shows(block: &Block, after: &[Block]) -> bool {
     }
 }
 
-/// A judgement for a terminal, `[warning]`.
+/// A status for a terminal, `[warning]`.
 pub fn badge(status: Status) -> String {
     format!("[{}]", status.word())
 }
@@ -144,7 +143,7 @@ fn push_block(text: &mut String, block: &Block, width: usize) {
     }
 }
 
-/// Takes characters from the widest column of words until the table fits or no such column can give any.
+/// Narrows the widest text columns until the table fits or all are at their minimum.
 fn shrink(table: &Table, widths: &mut [usize], width: usize) {
     let whole = widths.to_vec();
     let words = |c: usize| table.columns[c].alignment() == Alignment::Left;
@@ -156,7 +155,7 @@ fn shrink(table: &Table, widths: &mut [usize], width: usize) {
             .max_by_key(|&c| (widths[c], std::cmp::Reverse(c)));
         match widest {
             Some(column) => widths[column] -= 1,
-            // It goes on below in any case: then nothing is gained by breaking more than the widest.
+            // The table is split anyway, so only the widest columns are narrowed.
             None => {
                 let most = (width.saturating_sub(GAP) / 2).max(NARROWEST_TEXT);
                 (0..widths.len())
@@ -168,9 +167,9 @@ fn shrink(table: &Table, widths: &mut [usize], width: usize) {
     }
 }
 
-/// Leaves out the folders that all paths of a column begin with.
-fn leave_out_folders(rows: &mut [Vec<String>], column: usize) {
-    // A folder of a few letters is shorter than what says that it was left out.
+/// Omits the common folder of all paths of a column.
+fn omit_common_folder(rows: &mut [Vec<String>], column: usize) {
+    // Shorter folders are not worth omitting.
     const WORTH: usize = 4;
     let absent = |cell: &str| cell == "–" || cell == "⋮";
     let paths: Vec<&str> = rows.iter().map(|row| row[column].as_str()).filter(|cell| !absent(cell)).collect();
@@ -182,7 +181,7 @@ fn leave_out_folders(rows: &mut [Vec<String>], column: usize) {
     else {
         return;
     };
-    // Words with a stroke between them are no path.
+    // Text with slashes is not a path.
     if folders < WORTH || paths.iter().any(|path| path.contains(": ")) {
         return;
     }
@@ -191,8 +190,8 @@ fn leave_out_folders(rows: &mut [Vec<String>], column: usize) {
     }
 }
 
-/// How many columns of words at the left tell the rows apart; one where all of them do not.
-fn telling(table: &Table, rows: &[Vec<String>]) -> usize {
+/// Number of leading text columns that identify the rows; 1 if they do not.
+fn identifying_columns(table: &Table, rows: &[Vec<String>]) -> usize {
     let words = table.columns.iter().take_while(|column| column.kind == ColumnKind::Text).count();
     let tells = |count: &usize| {
         let mut seen = std::collections::HashSet::new();
@@ -201,8 +200,8 @@ fn telling(table: &Table, rows: &[Vec<String>]) -> usize {
     (1..=words).find(tells).unwrap_or(1)
 }
 
-/// Columns of each block; the first columns lead every block, as far as there is room for another beside them. A block has at
-/// least one column beside the first, even where that is too wide.
+/// Columns of each block. The leading columns are repeated in every block as far as there is room for another column; a block has at
+/// least one further column, even if that is too wide.
 fn blocks(widths: &[usize], leading: usize, width: usize) -> Vec<Vec<usize>> {
     if widths.is_empty() {
         return Vec::new();
@@ -240,9 +239,9 @@ fn push_line(text: &mut String, cells: impl Iterator<Item = String>) {
     text.push('\n');
 }
 
-/// A cell in lines of at most `width` characters, broken between words; a longer word behind a stroke, a hyphen or the like,
-/// else anywhere.
-fn pieces(cell: &str, width: usize) -> Vec<String> {
+/// Wraps a cell to lines of at most `width` characters: between words, in a long word after a slash, hyphen or similar, or else
+/// anywhere.
+fn wrap_cell(cell: &str, width: usize) -> Vec<String> {
     if length(cell) <= width {
         return vec![cell.to_owned()];
     }
@@ -284,7 +283,7 @@ fn fit(cell: &str, width: usize, alignment: Alignment) -> String {
     }
 }
 
-/// A line and a note beside it, which goes on below itself where the terminal ends.
+/// A line with a note beside it, wrapped in its own column.
 fn beside(text: &mut String, line: &str, note: &str, width: usize) {
     let indent = length(line) + GAP;
     let room = width.saturating_sub(indent).max(NARROWEST_SENTENCE);
@@ -297,8 +296,8 @@ fn beside(text: &mut String, line: &str, note: &str, width: usize) {
     }
 }
 
-/// Words in lines of at most `width` characters, each with a newline; later lines start with `indent`. A single longer
-/// word, such as a file name, is not cut.
+/// Wraps text to lines of at most `width` characters; further lines start with `indent`. A longer word, such as a file name, is not
+/// broken.
 fn wrapped(text: &str, width: usize, indent: &str) -> String {
     let text = &*visible::text(text);
     let mut lines = String::new();
@@ -323,7 +322,7 @@ fn wrapped(text: &str, width: usize, indent: &str) -> String {
     lines
 }
 
-/// Characters that take a cell; the selector after the warning sign takes none.
+/// Number of character cells; the variation selector after the warning sign has no width.
 fn length(text: &str) -> usize {
     text.chars().filter(|c| *c != '\u{fe0e}').count()
 }

@@ -1,13 +1,16 @@
-//! Curves that run as another: drawn over it they would hide it.
+//! Detection of coinciding curves, of which only one is drawn.
 
 use super::graph::Series;
 
-/// Share of the height of a picture that a line is wide.
+/// Width of a line as a share of the height of the plot.
 const LINE: f64 = 0.005;
 
-/// The curves that can be told apart, and of the others the name with that of the one that they run as: nowhere apart by more than a
-/// line's width, where `counts` says of an x that it counts. What has a band is drawn whatever it runs as.
-pub fn told_apart(series: Vec<Series>, counts: impl Fn(f64) -> bool) -> (Vec<Series>, Vec<(String, String)>) {
+/// The distinguishable curves, and for each other one its name with that of the curve it coincides with: within a line width at every
+/// x for which `counts` is true. Curves with a band are always drawn.
+pub fn distinguishable(
+    series: Vec<Series>,
+    counts: impl Fn(f64) -> bool,
+) -> (Vec<Series>, Vec<(String, String)>) {
     let heights = || series.iter().flat_map(|s| &s.points).map(|p| p[1]).filter(|y| y.is_finite());
     let (low, high) =
         heights().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), y| (low.min(y), high.max(y)));

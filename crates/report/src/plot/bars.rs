@@ -1,4 +1,4 @@
-//! Bars: one figure per thing and group, with whiskers where a spread is known.
+//! Bar charts with optional whiskers.
 
 use super::axis::Axis;
 use super::canvas::{DrawingError, PIXEL};
@@ -13,28 +13,28 @@ use plotters::style::text_anchor::{HPos, VPos};
 /// A bar chart.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bars {
-    /// Title inside the picture; may be empty.
+    /// Title; may be empty.
     pub title: String,
-    /// What the bars measure. On a logarithmic axis they start at its lower end.
+    /// Value axis. On a logarithmic axis bars start at its lower end.
     pub y: Axis,
-    /// The things along the horizontal axis, such as methods.
+    /// Categories along the horizontal axis, such as methods.
     pub names: Vec<String>,
-    /// What is shown of each, side by side.
+    /// Groups of bars, side by side in each category.
     pub groups: Vec<BarGroup>,
-    /// Digits of the number over each bar; none where absent.
+    /// Precision of the number above each bar; `None` for no numbers.
     pub labels: Option<Precision>,
 }
 
-/// One figure of every thing.
+/// One bar per category.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BarGroup {
     /// Name in the legend; may be empty.
     pub name: String,
-    /// One value per thing, in the order of the names. What is absent is marked `–`.
+    /// One value per category; a missing one is marked `–`.
     pub values: Vec<Option<f64>>,
-    /// Standard deviations, drawn as whiskers; may be shorter than the values.
+    /// Standard deviations, drawn as whiskers; may be shorter than `values`.
     pub deviations: Vec<Option<f64>>,
-    /// Colour; by the order of the groups where absent.
+    /// Colour; by default in the order of the groups.
     pub ink: Option<Ink>,
 }
 
@@ -46,7 +46,7 @@ impl BarGroup {
 }
 
 impl Bars {
-    /// The picture, 900 × 380 pixels.
+    /// The SVG, 900 × 380 pixels.
     pub fn svg(&self) -> String {
         let name = if self.title.is_empty() { self.y.text() } else { self.title.clone() };
         picture((900, 380), &name, |pen| self.draw(pen))
@@ -74,7 +74,7 @@ impl Bars {
         let inside = frame.draw(pen)?;
         if !self.groups.iter().any(|group| (0..group.values.len()).any(|index| group.value(index).is_some()))
         {
-            return inside.say_empty(pen);
+            return inside.draw_empty(pen);
         }
         let slot = f64::from(inside.x.end - inside.x.start) / self.names.len().max(1) as f64;
         let breadth = (slot * 0.78 / self.groups.len().max(1) as f64).min(f64::from(90 * PIXEL));
@@ -86,7 +86,7 @@ impl Bars {
                 self.draw_bar(pen, &inside, (index, place), middle, breadth)?;
             }
         }
-        // The line at zero lies over the feet of the bars.
+        // The zero line is drawn over the bars.
         pen.line(
             vec![(inside.x.start, inside.base()), (inside.x.end, inside.base())],
             Paint::text(0.5),
@@ -99,13 +99,13 @@ impl Bars {
         self.groups[group].ink.unwrap_or(Ink::nth(group + usize::from(self.groups.len() == 1)))
     }
 
-    /// All that the vertical axis has to hold.
+    /// Values that the vertical axis must cover.
     fn extent(&self) -> impl Iterator<Item = f64> {
         let values = self.groups.iter().flat_map(|group| {
             (0..group.values.len()).flat_map(|index| {
                 let value = group.value(index);
                 let spread = group.deviation(index).unwrap_or(0.0);
-                // A number over a bar needs room.
+                // Space for the number above a bar.
                 let room = match (self.labels, value) {
                     (Some(_), Some(value)) if self.y.log => Some((value + spread) * 1.5),
                     (Some(_), Some(value)) => Some((value + spread.copysign(value)) * 1.06),
@@ -117,7 +117,7 @@ impl Bars {
         values.flatten()
     }
 
-    /// The bar of a group at a place, about `middle`, with its whisker and its number; `breadth` is the room that it has.
+    /// Draws the bar of a group and category at `middle`, with whisker and number, within `breadth`.
     fn draw_bar(
         &self,
         pen: Pen<'_>,
@@ -155,7 +155,7 @@ impl Bars {
         if let Some(precision) = self.labels {
             let label = precision.format(value);
             let size = LABEL * 0.9;
-            // Numbers wider than their bars would run into each other.
+            // Numbers wider than their bars would overlap.
             if letters::width(&label, size) <= breadth * 1.05 {
                 let (at, side) = if value < 0.0 {
                     (top.max(base) + 2 * PIXEL, VPos::Top)
@@ -170,7 +170,7 @@ impl Bars {
     }
 }
 
-/// A spread, from its lower to its upper end, each with a cap.
+/// Draws a whisker with caps.
 fn draw_whisker(pen: Pen<'_>, middle: i32, ends: [i32; 2], cap: i32) -> Result<(), DrawingError> {
     for path in [
         vec![(middle, ends[0]), (middle, ends[1])],
@@ -192,7 +192,7 @@ impl BarGroup {
     }
 }
 
-/// Names that fit side by side over 800 pixels, cut with `…` where they do not.
+/// Names shortened with `…` to fit side by side in 800 pixels.
 fn shortened(names: &[String]) -> Vec<String> {
     let room = 800.0 * f64::from(PIXEL) / names.len().max(1) as f64 * 0.95;
     names

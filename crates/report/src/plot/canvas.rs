@@ -1,6 +1,6 @@
 //! The plotters backend that writes SVG.
 //!
-//! Backend coordinates are integers, so the canvas counts in tenths of a pixel and writes them with one decimal.
+//! Backend coordinates are integers, so the canvas uses tenths of a pixel and writes one decimal.
 
 use std::cell::{Cell, RefCell};
 use std::convert::Infallible;
@@ -18,16 +18,16 @@ use plotters_backend::{
 use super::letters;
 use crate::format::html::escape;
 
-/// Units of the canvas in a pixel of the picture.
+/// Canvas units per pixel.
 pub(super) const PIXEL: i32 = 10;
 
-/// What may go wrong while drawing. The canvas itself cannot fail.
+/// Error of drawing; the canvas itself cannot fail.
 pub(super) type DrawingError = DrawingAreaErrorKind<Infallible>;
 
-/// A drawing area of the canvas in its own units.
+/// A drawing area in canvas units.
 pub(super) type Area = DrawingArea<Canvas, plotters::coord::Shift>;
 
-/// The SVG text under way and what plotters' styles cannot say. Cloning shares it.
+/// The SVG text under construction, and styles that plotters does not support. Clones share it.
 #[derive(Clone)]
 pub(super) struct Sheet(Rc<Shared>);
 
@@ -37,13 +37,12 @@ struct Shared {
 }
 
 impl Sheet {
-    /// From now on paths are drawn with this SVG dash pattern, in pixels; empty for solid.
+    /// Sets the SVG dash pattern of the following paths, in pixels; empty for solid.
     pub(super) fn dash(&self, pattern: &'static str) {
         self.0.dash.set(pattern);
     }
 
-    /// Opens a group that shows only what lies inside the rectangle, in units of the canvas. An inner `svg` element cuts
-    /// without the page-wide names that `clipPath` needs.
+    /// Opens a clipped group (canvas units). A nested `svg` element clips without the page-wide ids that `clipPath` needs.
     pub(super) fn open_window(&self, x: std::ops::Range<i32>, y: std::ops::Range<i32>) {
         let (left, top) = (px(x.start), px(y.start));
         let (width, height) = (px(x.end - x.start), px(y.end - y.start));
@@ -57,8 +56,8 @@ impl Sheet {
         self.push("</svg>\n");
     }
 
-    /// Lines of one colour and width as a single element, which for thousands of them is far shorter than one each.
-    /// With round ends lines that continue each other show no seam; without, they end exactly.
+    /// Lines of one colour and width as a single element, which is much shorter than one element each. Round ends hide seams between
+    /// consecutive lines; otherwise lines end exactly.
     pub(super) fn strokes(
         &self,
         lines: &[Vec<BackendCoord>],
@@ -94,7 +93,7 @@ impl Sheet {
         self.push(&(tag + "/>\n"));
     }
 
-    /// Opens a group that tells this when pointed at.
+    /// Opens a group with a tooltip.
     pub(super) fn open_group(&self, title: &str) {
         self.push(&format!("<g><title>{}</title>\n", escape(title)));
     }
@@ -109,7 +108,7 @@ impl Sheet {
     }
 }
 
-/// Draws on a sheet of so many pixels and gives the SVG document. `name` is what a screen reader says.
+/// Draws on a sheet (size in pixels) and returns the SVG document. `name`: label for screen readers.
 pub(super) fn draw(
     (width, height): (u32, u32),
     name: &str,
@@ -129,7 +128,7 @@ pub(super) fn draw(
     drop(area);
     if let Err(error) = drawn {
         sheet.push(&format!(
-            "<text x=\"10\" y=\"20\">this picture could not be drawn: {}</text>\n",
+            "<text x=\"10\" y=\"20\">this plot could not be drawn: {}</text>\n",
             escape(&error.to_string())
         ));
     }
@@ -231,7 +230,7 @@ impl DrawingBackend for Canvas {
             HPos::Center => "middle",
             HPos::Right => "end",
         };
-        // Baseline below the point by so much of the size: capitals are 0.72 high, descenders 0.21 deep.
+        // Offset of the baseline in units of the font size: capitals are 0.72 high, descenders 0.21 deep.
         let drop = match style.anchor().v_pos {
             VPos::Top => "0.76em",
             VPos::Center => "0.36em",
@@ -270,7 +269,7 @@ impl DrawingBackend for Canvas {
 }
 
 impl Canvas {
-    /// Ends a tag with its paint.
+    /// Writes a tag with its fill or stroke.
     fn shape<S: BackendStyle>(&self, tag: &str, style: &S, fill: bool) {
         let color = style.color();
         if color.alpha == 0.0 {
@@ -299,7 +298,7 @@ impl Canvas {
     }
 }
 
-/// Black is the colour of the text around the picture.
+/// SVG colour; black is the text colour of the page.
 fn paint(color: BackendColor) -> String {
     match color.rgb {
         (0, 0, 0) => "currentColor".to_owned(),

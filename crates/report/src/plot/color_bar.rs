@@ -1,4 +1,4 @@
-//! The bar that says which colour is which value.
+//! Colour scale and its bar.
 
 use plotters::style::text_anchor::{HPos, VPos};
 
@@ -12,7 +12,7 @@ use super::scale::{Ends, Scale};
 const STEPS: i32 = 64;
 const BREADTH: i32 = 14 * PIXEL;
 
-/// Colours of a range of values.
+/// Colours for a range of values.
 pub(super) struct Colors {
     map: ColorMap,
     pub(super) scale: Scale,
@@ -20,7 +20,7 @@ pub(super) struct Colors {
 }
 
 impl Colors {
-    /// Colours for values along an axis. A signed map is laid out evenly around 0.
+    /// Colours for the values of an axis. A signed map is symmetric about 0.
     pub(super) fn of(axis: &Axis, map: ColorMap, values: impl Iterator<Item = f64>) -> Self {
         let mut axis = axis.clone();
         let mut ends = Ends::Tight;
@@ -33,14 +33,14 @@ impl Colors {
             };
             axis.range = Some([-size, size]).filter(|_| size > 0.0);
         } else if !axis.log {
-            // Sizes count from 0, so that pictures of good and bad paths can be compared.
+            // Sizes start at 0, so that plots of good and bad paths can be compared.
             ends = if values.iter().all(|value| *value >= 0.0) { Ends::Nought } else { Ends::Tight };
         }
         let text = axis.text();
         Self { map, scale: Scale::of(&axis, values.into_iter(), ends, 5), text }
     }
 
-    /// Fraction of a value on the bar, `None` where it is not finite.
+    /// Fraction of a value on the bar; `None` if it is not finite.
     pub(super) fn fraction(&self, value: f64) -> Option<f64> {
         self.scale.fraction(value).map(|fraction| fraction.clamp(0.0, 1.0))
     }
@@ -53,7 +53,7 @@ impl Colors {
         self.map.at(fraction)
     }
 
-    /// Room that the bar takes at the right of a picture.
+    /// Width of the bar with its labels.
     pub(super) fn room(&self) -> i32 {
         let widest = self.scale.ticks.iter().map(|tick| letters::width(&tick.1, LABEL)).fold(0.0, f64::max);
         BREADTH + widest as i32 + LABEL as i32 + 24 * PIXEL
@@ -65,7 +65,7 @@ impl Colors {
         for step in 0..STEPS {
             let low = at(f64::from(step) / f64::from(STEPS));
             let paint = self.paint((f64::from(step) + 0.5) / f64::from(STEPS));
-            // Each step reaches to the top and the next lies over it: edges that meet would show seams.
+            // Each step extends to the top and is covered by the next, since touching edges would show seams.
             pen.rectangle([(left, top), (left + BREADTH, low)], paint)?;
         }
         pen.outline([(left, top), (left + BREADTH, bottom)], Paint::text(0.5), THIN)?;

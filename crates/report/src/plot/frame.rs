@@ -1,4 +1,4 @@
-//! What surrounds the data of most plots: title, legend, grid, axes with ticks and labels.
+//! Frame of a plot: title, legend, grid, axes with ticks and labels.
 
 use std::ops::Range;
 
@@ -13,17 +13,16 @@ use super::pen::{BOLD, LABEL, Marker, Paint, Pen, THIN, TITLE, stroke, text};
 use super::scale::Scale;
 
 const TICK: i32 = 4 * PIXEL;
-/// Empty edge around a picture.
+/// Margin around a plot.
 pub(super) const EDGE: i32 = 10 * PIXEL;
-/// Room below the text under the horizontal axis, which would else stand on the edge: a font with deeper descenders than
-/// expected would be cut.
+/// Space below the label of the horizontal axis, for fonts with deep descenders.
 const FOOT: i32 = 6 * PIXEL;
 const LEGEND_LINE: i32 = 20 * PIXEL;
 const GLYPH: i32 = 30 * PIXEL;
 const GLYPH_GAP: i32 = 6 * PIXEL;
 const ENTRY_GAP: i32 = 20 * PIXEL;
 
-/// A frame to be drawn.
+/// Description of a frame.
 pub(super) struct Frame<'a> {
     pub(super) title: &'a str,
     pub(super) x: Scale,
@@ -33,7 +32,7 @@ pub(super) struct Frame<'a> {
     pub(super) legend: Vec<Entry>,
     pub(super) x_grid: bool,
     pub(super) y_grid: bool,
-    /// Room right of the axes, in canvas units.
+    /// Space right of the axes (canvas units).
     pub(super) right: i32,
 }
 
@@ -45,7 +44,7 @@ pub(super) struct Entry {
     pub(super) glyph: Glyph,
 }
 
-/// How an entry is drawn.
+/// Symbol of an entry.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Glyph {
     Line { dash: &'static str, width: u32, marker: Option<Marker> },
@@ -54,8 +53,7 @@ pub(super) enum Glyph {
 }
 
 impl Frame<'_> {
-    /// Draws the frame on an area of the sheet and hands back what maps numbers to places inside it. Those places count
-    /// from the corner of the whole sheet.
+    /// Draws the frame and returns its inside, which maps values to positions on the sheet.
     pub(super) fn draw(&self, pen: Pen<'_>) -> Result<Inside, DrawingError> {
         let area = pen.area;
         let mut top = EDGE;
@@ -148,27 +146,27 @@ impl Entry {
 
 /// The inside of a drawn frame.
 pub(super) struct Inside {
-    /// From the left to the right end, in canvas units of the whole sheet.
+    /// Left and right end, in canvas units of the sheet.
     pub(super) x: Range<i32>,
-    /// From the top to the bottom end.
+    /// Top and bottom end.
     pub(super) y: Range<i32>,
     x_scale: Scale,
     y_scale: Scale,
 }
 
 impl Inside {
-    /// Place of a point; `None` where it has none: not finite, or not positive on a logarithmic axis.
+    /// Position of a point; `None` if it is not finite, or not positive on a logarithmic axis.
     pub(super) fn place(&self, x: f64, y: f64) -> Option<(i32, i32)> {
         Some((self.across(x)?, self.down(y)?))
     }
 
-    /// Place of an x on the whole sheet.
+    /// Horizontal position of a value.
     pub(super) fn across(&self, x: f64) -> Option<i32> {
         let fraction = self.x_scale.fraction(x)?;
         Some(self.x.start + (fraction * f64::from(self.x.end - self.x.start)).clamp(-1e6, 1e6).round() as i32)
     }
 
-    /// Place of a y on the whole sheet.
+    /// Vertical position of a value.
     pub(super) fn down(&self, y: f64) -> Option<i32> {
         let fraction = self.y_scale.fraction(y)?;
         Some(self.y.end - (fraction * f64::from(self.y.end - self.y.start)).clamp(-1e6, 1e6).round() as i32)
@@ -181,24 +179,24 @@ impl Inside {
         if low < high { Some([self.place(low, low)?, self.place(high, high)?]) } else { None }
     }
 
-    /// Place of zero on the vertical axis, or of the end that is nearest to it.
+    /// Position of zero on the vertical axis, or of the end nearest to zero.
     pub(super) fn base(&self) -> i32 {
         self.down(0.0).unwrap_or(self.y.end).clamp(self.y.start, self.y.end)
     }
 
-    /// Whether a place lies inside, the edge included.
+    /// Whether a position is inside, including the edge.
     pub(super) fn holds(&self, (x, y): (i32, i32)) -> bool {
         (self.x.start..=self.x.end).contains(&x) && (self.y.start..=self.y.end).contains(&y)
     }
 
-    /// Says in the middle that there is nothing to show.
-    pub(super) fn say_empty(&self, pen: Pen<'_>) -> Result<(), DrawingError> {
+    /// Draws "no data" in the middle.
+    pub(super) fn draw_empty(&self, pen: Pen<'_>) -> Result<(), DrawingError> {
         let middle = (self.x.start / 2 + self.x.end / 2, self.y.start / 2 + self.y.end / 2);
         pen.text("no data", middle, TITLE, HPos::Center, VPos::Center)
     }
 
-    /// Draws what may reach beyond the inside; what does is cut off, except for the breadth of a marker.
-    pub(super) fn cut(
+    /// Draws clipped to the inside, plus the size of a marker.
+    pub(super) fn clip(
         &self,
         pen: Pen<'_>,
         drawing: impl FnOnce() -> Result<(), DrawingError>,
@@ -214,7 +212,7 @@ impl Inside {
     }
 }
 
-/// Draws a whole picture in pixels with a pen on all of it.
+/// Draws a plot (size in pixels).
 pub(super) fn picture(
     size: (u32, u32),
     name: &str,

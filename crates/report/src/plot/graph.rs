@@ -1,4 +1,4 @@
-//! Graphs: lines, points, bands and error bars over two axes, linear or logarithmic.
+//! Graphs: lines, points, bands and error bars over linear or logarithmic axes.
 
 use std::collections::BTreeSet;
 
@@ -12,29 +12,29 @@ use super::scale::{Ends, Scale};
 /// Size in pixels.
 const SIZE: (u32, u32) = (900, 420);
 
-/// Distance between the markers of a line, in pixels, so that lines with many points stay lines.
+/// Distance between the markers of a line (pixels).
 const MARKER_DISTANCE: i32 = 70;
 
-/// Up to this many points each point of a line has its marker.
+/// Up to this many points, every point of a line has a marker.
 const POINTS_WITH_MARKER: usize = 12;
 
-/// Above this many points a line is not dashed: in a noisy line nobody sees dashes.
+/// Lines with more points are not dashed, since dashes are invisible in noisy lines.
 const POINTS_WITH_DASH: usize = 400;
 
 /// A graph.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Graph {
-    /// Title inside the picture; may be empty.
+    /// Title; may be empty.
     pub title: String,
     /// Horizontal axis.
     pub x: Axis,
     /// Vertical axis.
     pub y: Axis,
-    /// What is shown, the first one drawn first.
+    /// Series in drawing order.
     pub series: Vec<Series>,
-    /// Lines across the graph, such as a noise floor.
+    /// Reference lines, such as a noise floor.
     pub references: Vec<Reference>,
-    /// Shaded stretches of the horizontal axis, such as rows to measure again.
+    /// Shaded ranges of the horizontal axis, such as rows to measure again.
     pub spans: Vec<Span>,
 }
 
@@ -43,17 +43,17 @@ pub struct Graph {
 pub struct Series {
     /// Name in the legend; empty for none.
     pub name: String,
-    /// The points, x and y. Those not finite leave a gap.
+    /// Points (x, y); non-finite ones are gaps.
     pub points: Vec<[f64; 2]>,
-    /// Lower and upper bound at each point: a band around a line, error bars on points. Empty for none.
+    /// Lower and upper bound at each point: a band for lines, error bars for points; empty for none.
     pub bounds: Vec<[f64; 2]>,
     /// Lines or points.
     pub mark: Mark,
-    /// Colour; by the order of the series where absent.
+    /// Colour; by default in the order of the series.
     pub ink: Option<Ink>,
 }
 
-/// How a series is drawn.
+/// Style of a series.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mark {
     /// A line through the points in their order.
@@ -62,18 +62,18 @@ pub enum Mark {
     Points,
 }
 
-/// A line across the graph.
+/// A reference line.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Reference {
     /// At a y, with its name in the legend.
     Horizontal(f64, String),
     /// At an x, with its name in the legend.
     Vertical(f64, String),
-    /// Through the origin with slope 1, such as "equal" between predicted and measured.
+    /// Through the origin with slope 1, such as predicted equals measured.
     Diagonal(String),
 }
 
-/// A shaded stretch of the horizontal axis.
+/// A shaded range of the horizontal axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Span {
     /// Its ends.
@@ -101,20 +101,20 @@ impl Series {
         )
     }
 
-    /// The same in a stated colour.
+    /// Sets the colour.
     pub fn ink(mut self, ink: Ink) -> Self {
         self.ink = Some(ink);
         self
     }
 
-    /// The same with a band or error bars of so much to both sides of each point.
+    /// Adds a symmetric band or error bars.
     pub fn plus_minus(mut self, sizes: &[f64]) -> Self {
         self.bounds = self.points.iter().zip(sizes).map(|([_, y], size)| [y - size, y + size]).collect();
         self
     }
 }
 
-/// A series with its place in the order of series.
+/// A series with its style.
 struct Drawn<'a> {
     series: &'a Series,
     ink: Ink,
@@ -123,7 +123,7 @@ struct Drawn<'a> {
 }
 
 impl Graph {
-    /// The picture, 900 × 420 pixels.
+    /// The SVG, 900 × 420 pixels.
     pub fn svg(&self) -> String {
         let name = if self.title.is_empty() { self.y.text() } else { self.title.clone() };
         picture(SIZE, &name, |pen| self.draw(pen))
@@ -149,9 +149,9 @@ impl Graph {
         let inside = self.frame(&drawn).draw(pen)?;
         let places = |series: &Series| series.points.iter().any(|[x, y]| inside.place(*x, *y).is_some());
         if !self.series.iter().any(places) {
-            return inside.say_empty(pen);
+            return inside.draw_empty(pen);
         }
-        inside.cut(pen, || {
+        inside.clip(pen, || {
             for span in &self.spans {
                 draw_span(&inside, pen, span)?;
             }
@@ -195,7 +195,7 @@ impl Graph {
             }
         }
         legend.retain(|entry| !entry.name.is_empty());
-        // A line runs from edge to edge; points keep off it.
+        // Lines extend to the edges; points keep a distance.
         let loose = self.series.iter().any(|series| series.mark == Mark::Points);
         let ends = if loose { Ends::Loose } else { Ends::Tight };
         let x = points().map(|[x, _]| *x).chain(places);
@@ -222,7 +222,7 @@ fn draw_span(inside: &Inside, pen: Pen<'_>, span: &Span) -> Result<(), DrawingEr
     let [from, to] = span.range.map(|x| inside.across(x));
     match (from, to) {
         (Some(from), Some(to)) => {
-            // A single row is still seen.
+            // A single row remains visible.
             let to = to.max(from + 3 * PIXEL);
             pen.rectangle([(from, inside.y.start), (to, inside.y.end)], Paint(SPAN_INK.rgb(), SPAN_ALPHA))
         }
@@ -258,7 +258,7 @@ impl Drawn<'_> {
             (Mark::Points, Some(marker)) => {
                 let places: Vec<_> = places.flatten().collect();
                 let alpha = if places.len() > 300 { 0.55 } else { 0.85 };
-                // Points that fall on each other within half a pixel are one.
+                // Points within half a pixel of each other are drawn once.
                 let mut seen = BTreeSet::new();
                 for place in places {
                     if seen.insert((place.0 / (PIXEL / 2), place.1 / (PIXEL / 2))) && inside.holds(place) {
@@ -289,7 +289,7 @@ impl Drawn<'_> {
             }
         }
         match run[..] {
-            // A lone point between gaps would leave no trace as a line.
+            // A single point between gaps would be invisible as a line.
             [place] if self.marker.is_none() => pen.marker(Marker::Circle, place, paint),
             _ => pen.line(thinned(run), paint, BOLD, self.dash),
         }
@@ -321,7 +321,7 @@ impl Drawn<'_> {
     }
 }
 
-/// Stretches without gaps.
+/// Runs without gaps.
 fn runs<T>(places: impl Iterator<Item = Option<T>>) -> Vec<Vec<T>> {
     let mut runs = Vec::new();
     let mut run = Vec::new();
@@ -338,8 +338,8 @@ fn runs<T>(places: impl Iterator<Item = Option<T>>) -> Vec<Vec<T>> {
     runs
 }
 
-/// The same line with at most four points in each column of half a pixel: the first, the lowest, the highest and the
-/// last. Nobody sees the difference, and 100,000 targets make a picture of some hundred kilobytes.
+/// Reduces a line to at most four points per column of half a pixel (first, lowest, highest, last), which looks the same: 100,000
+/// targets then need some hundred kilobytes.
 pub(super) fn thinned(run: Vec<(i32, i32)>) -> Vec<(i32, i32)> {
     if run.len() < 2_000 {
         return run;

@@ -1,4 +1,4 @@
-//! Histograms of one or several samples over common bins.
+//! Histograms of one or more samples over common bins.
 
 use super::axis::Axis;
 use super::canvas::DrawingError;
@@ -7,19 +7,19 @@ use super::ink::Ink;
 use super::pen::{BOLD, Paint, Pen, dash};
 use super::scale::{Ends, Scale, linear_ticks};
 
-/// More bins than this show noise rather than form.
+/// More bins would show noise.
 const MOST_BINS: usize = 60;
 
 /// A histogram.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Histogram {
-    /// Title inside the picture; may be empty.
+    /// Title; may be empty.
     pub title: String,
-    /// What was counted. A logarithmic axis is not supported and drawn linear.
+    /// Value axis; always drawn linear.
     pub x: Axis,
-    /// The samples, drawn over each other.
+    /// Samples, drawn over each other.
     pub samples: Vec<Sample>,
-    /// About how many bins; chosen from the data where absent.
+    /// Approximate number of bins; by default from the data.
     pub bins: Option<usize>,
 }
 
@@ -28,9 +28,9 @@ pub struct Histogram {
 pub struct Sample {
     /// Name in the legend.
     pub name: String,
-    /// Its values; those not finite are not counted.
+    /// Values; non-finite ones are ignored.
     pub values: Vec<f64>,
-    /// Colour; by the order of the samples where absent.
+    /// Colour; by default in the order of the samples.
     pub ink: Option<Ink>,
 }
 
@@ -40,7 +40,7 @@ impl Sample {
         Self { name: name.into(), values: values.into(), ink: None }
     }
 
-    /// The same in a stated colour.
+    /// Sets the colour.
     pub fn ink(mut self, ink: Ink) -> Self {
         self.ink = Some(ink);
         self
@@ -50,16 +50,15 @@ impl Sample {
 /// Counts of every sample in common bins.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bins {
-    /// Ends of the bins, one more than there are bins; empty where there is nothing to count. A bin holds its lower
-    /// end; the last one holds its upper end too.
+    /// Edges of the bins, one more than bins; empty without data. A bin includes its lower edge, the last also its upper edge.
     pub edges: Vec<f64>,
-    /// For each sample, its counts.
+    /// Counts of each sample.
     pub counts: Vec<Vec<usize>>,
 }
 
 impl Histogram {
-    /// Counts in bins of a round width. Without a wish for their number the width follows Freedman and Diaconis, twice
-    /// the interquartile range over the cube root of the count, for the sample where it is smallest.
+    /// Counts in bins of a round width. By default the width is that of Freedman and Diaconis (twice the interquartile range over the
+    /// cube root of the count), the smallest over the samples.
     pub fn bins(&self) -> Bins {
         let samples: Vec<Vec<f64>> = self.samples.iter().map(|sample| sorted(&sample.values)).collect();
         let ends = samples.iter().filter_map(|sample| Some((*sample.first()?, *sample.last()?)));
@@ -76,7 +75,7 @@ impl Histogram {
         Bins { edges, counts }
     }
 
-    /// The picture, 900 × 340 pixels.
+    /// The SVG, 900 × 340 pixels.
     pub fn svg(&self) -> String {
         let name = if self.title.is_empty() {
             format!("histogram of {}", self.x.text())
@@ -111,9 +110,9 @@ impl Histogram {
         };
         let inside = frame.draw(pen)?;
         if bins.edges.is_empty() {
-            return inside.say_empty(pen);
+            return inside.draw_empty(pen);
         }
-        inside.cut(pen, || {
+        inside.clip(pen, || {
             for (index, counts) in bins.counts.iter().enumerate() {
                 let mut outline = Vec::new();
                 // From the first bin that holds anything to the last.

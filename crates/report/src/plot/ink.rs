@@ -1,14 +1,13 @@
-//! Colours: of series, and of values.
+//! Colours of series and colour maps.
 
 use plotters::style::RGBColor;
 
-/// Colour of a series, after Okabe and Ito, "Color Universal Design" (2008). Their yellow is left out: on white it is
-/// hardly seen.
+/// Colour of a series (Okabe and Ito, "Color Universal Design", 2008), without their yellow, which is hard to see on white.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ink {
-    /// Blue. By habit: after compensation.
+    /// Blue; by convention after compensation.
     Blue,
-    /// Vermilion. By habit: before compensation.
+    /// Vermilion; by convention before compensation.
     Vermilion,
     /// Bluish green.
     Green,
@@ -18,12 +17,12 @@ pub enum Ink {
     Orange,
     /// Sky blue.
     Sky,
-    /// The colour of the text around: black on a light page, white on a dark one.
+    /// Text colour of the page.
     Text,
 }
 
 impl Ink {
-    /// The order in which series get their colours.
+    /// Order of the colours of series.
     pub const CYCLE: [Ink; 7] =
         [Ink::Vermilion, Ink::Blue, Ink::Green, Ink::Purple, Ink::Orange, Ink::Sky, Ink::Text];
 
@@ -45,14 +44,13 @@ impl Ink {
     }
 }
 
-/// Colours of values.
+/// Colour map for values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum ColorMap {
-    /// Viridis (Smith and van der Walt, 2015), for sizes: equal steps look equal, in grey and to colour-blind eyes too.
+    /// Viridis (Smith and van der Walt, 2015), for sizes: perceptually uniform, also in grey and for colour-blind readers.
     #[default]
     Viridis,
-    /// Blue over grey to red (Moreland, "Diverging color maps for scientific visualization", 2009), for signed values;
-    /// its middle is 0.
+    /// Blue over grey to red (Moreland, "Diverging color maps for scientific visualization", 2009), for signed values centred at 0.
     CoolWarm,
 }
 
@@ -85,11 +83,11 @@ impl ColorMap {
         }
     }
 
-    /// Colour at a fraction of the range, red, green and blue; fractions beyond 0 to 1 get the colour of that end.
+    /// RGB colour at a fraction of the range, clamped to 0..1.
     pub fn at(self, fraction: f64) -> [u8; 3] {
         let table = self.table();
         let place = fraction.clamp(0.0, 1.0) * (table.len() - 1) as f64;
-        // NaN becomes 0 here; callers leave such values out.
+        // NaN becomes 0; callers exclude it.
         let below = (place as usize).min(table.len() - 2);
         let part = place - below as f64;
         std::array::from_fn(|channel| {

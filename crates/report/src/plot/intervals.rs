@@ -105,7 +105,7 @@ impl Intervals {
             pen.line(vec![(zero, inside.y.start), (zero, inside.y.end)], Paint::text(0.6), THIN, "")?;
         }
         if self.rows.is_empty() {
-            return inside.say_empty(pen);
+            return inside.draw_empty(pen);
         }
         for (index, (row, text)) in self.rows.iter().zip(&texts).enumerate() {
             let Some(y) = inside.down((self.rows.len() - 1 - index) as f64) else { continue };

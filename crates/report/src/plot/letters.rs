@@ -1,6 +1,6 @@
-//! Width of a text without a font: advance widths of Helvetica, which Arial, Liberation Sans and Nimbus Sans share.
+//! Text widths without a font: advance widths of Helvetica, shared by Arial, Liberation Sans and Nimbus Sans.
 
-/// Family asked of the viewer, so that what is measured here is what is drawn.
+/// Font family in the SVG, matching these widths.
 pub(super) const FAMILY: &str = "Helvetica, Arial, Liberation Sans, sans-serif";
 
 /// Advance widths of ASCII 32 to 126 in thousandths of the size (Adobe Font Metrics of Helvetica).
@@ -12,8 +12,7 @@ const WIDTHS: [u16; 95] = [
     278, 556, 500, 722, 500, 500, 500, 334, 260, 334, 584,
 ];
 
-/// Width of a line of text of the given size, in the unit of the size. Generous by a twentieth, since the viewer may
-/// have a wider font.
+/// Width of a line of text, in the unit of the font size; 5 % larger, since the viewer may use a wider font.
 pub(super) fn width(text: &str, size: f64) -> f64 {
     let thousandths: f64 = text.chars().map(advance).sum();
     thousandths * size * 1.05e-3
@@ -22,7 +21,7 @@ pub(super) fn width(text: &str, size: f64) -> f64 {
 fn advance(character: char) -> f64 {
     match character {
         ' '..='~' => f64::from(WIDTHS[character as usize - 32]),
-        // Superscripts, the degree sign and primes are narrow; ±, ×, → and Greek about as wide as a digit.
+        // Superscripts, degree sign and primes are narrow; ±, × and Greek letters about as wide as a digit.
         '⁰'..='₎' | '°' | '²' | '³' | '¹' | '′' => 350.0,
         'σ' | '±' | '×' | '–' | 'µ' | 'μ' => 580.0,
         _ => 700.0,

@@ -1,4 +1,4 @@
-//! Lines, areas, markers and words on an area of the canvas. All lengths are in canvas units.
+//! Lines, areas, markers and text on an area of the canvas. Lengths in canvas units.
 
 use plotters::element::{Circle, PathElement, Polygon, Rectangle};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -8,13 +8,13 @@ use plotters::style::{
 
 use super::canvas::{Area, DrawingError, PIXEL, Sheet};
 
-/// Size of labels.
+/// Font size of labels.
 pub(super) const LABEL: f64 = 13.0 * PIXEL as f64;
-/// Size of titles.
+/// Font size of titles.
 pub(super) const TITLE: f64 = 14.5 * PIXEL as f64;
-/// Width of lines that carry data.
+/// Width of data lines.
 pub(super) const BOLD: u32 = 18;
-/// Width of lines that accompany them.
+/// Width of auxiliary lines.
 pub(super) const THIN: u32 = 10;
 /// Half the size of a marker.
 pub(super) const MARKER: i32 = 4 * PIXEL;
@@ -29,18 +29,18 @@ pub(super) struct Pen<'a> {
     pub(super) sheet: &'a Sheet,
 }
 
-/// A colour and how much of it.
+/// A colour with its opacity.
 #[derive(Clone, Copy)]
 pub(super) struct Paint(pub(super) RGBColor, pub(super) f64);
 
 impl Paint {
-    /// The colour of the text around the picture.
+    /// Text colour of the page.
     pub(super) fn text(alpha: f64) -> Self {
         Paint(BLACK, alpha)
     }
 }
 
-/// Form of a marker.
+/// Shape of a marker.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Marker {
     Circle,
@@ -60,7 +60,7 @@ impl Marker {
     }
 }
 
-/// Dash pattern of the nth series in pixels, as SVG writes it; the first is solid.
+/// SVG dash pattern of the nth series in pixels; the first is solid.
 pub(super) fn dash(index: usize) -> &'static str {
     const DASHES: [&str; 6] = ["", "8 4", "3 3", "10 4 3 4", "15 5", "6 3 2 3 2 3"];
     DASHES[index % DASHES.len()]
@@ -117,10 +117,8 @@ impl Pen<'_> {
     pub(super) fn bold(&self, words: &str, at: Point, size: f64, horizontal: HPos, vertical: VPos) -> Drawn {
         self.area.draw_text(words, &text(size, FontStyle::Bold, horizontal, vertical), at)
     }
-}
 
-impl Pen<'_> {
-    /// Words that read from bottom to top, their top at the left of the point and their middle at its height.
+    /// Text from bottom to top, centred vertically at the point and to its right.
     pub(super) fn upright(&self, words: &str, at: Point, size: f64) -> Drawn {
         let style =
             text(size, FontStyle::Normal, HPos::Center, VPos::Top).transform(FontTransform::Rotate270);
@@ -128,14 +126,14 @@ impl Pen<'_> {
     }
 }
 
-/// Style of words.
+/// Text style.
 pub(super) fn text(size: f64, style: FontStyle, horizontal: HPos, vertical: VPos) -> TextStyle<'static> {
-    // The family is stated once, at the root of the picture.
+    // The font family is set at the root of the SVG.
     let font = FontDesc::new(FontFamily::SansSerif, size, style);
     TextStyle { font, color: BLACK.mix(0.85).to_backend_color(), pos: Pos::new(horizontal, vertical) }
 }
 
-/// Style of lines.
+/// Line style.
 pub(super) fn stroke(Paint(color, alpha): Paint, width: u32) -> ShapeStyle {
     ShapeStyle { color: color.mix(alpha), filled: false, stroke_width: width }
 }

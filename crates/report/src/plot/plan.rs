@@ -1,4 +1,4 @@
-//! Paths seen from above, coloured by a value such as their deviation; several beside each other with one colour bar.
+//! Plan views of paths, coloured by a value such as their deviation, in panels with one colour bar.
 
 use plotters::style::text_anchor::{HPos, VPos};
 
@@ -10,47 +10,47 @@ use super::ink::ColorMap;
 use super::pen::{Marker, Paint, Pen, TITLE};
 use super::scale::{Ends, Scale};
 
-/// Colours told apart along a path. All pieces of one colour are a single element.
+/// Number of colours along a path; all pieces of one colour are a single element.
 const SHADES: usize = 96;
 
-/// Points closer than this to the one before are merged with it, in canvas units; the largest value stays.
+/// Points closer than this to the previous one are merged, keeping the largest value (canvas units).
 const NEAR: i32 = 2 * PIXEL;
 
 /// Paths in plan view.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PlanView {
-    /// Title inside the picture; may be empty.
+    /// Title; may be empty.
     pub title: String,
-    /// Horizontal coordinate. Both coordinates have the same scale, so that shapes are true.
+    /// Horizontal coordinate; both coordinates have the same scale.
     pub x: Axis,
     /// Vertical coordinate.
     pub y: Axis,
-    /// What the colours mean; all paths share it.
+    /// Meaning of the colours, common to all paths.
     pub value: Axis,
-    /// The colours.
+    /// Colour map.
     pub colors: ColorMap,
-    /// The paths, each in a panel of its own.
+    /// Paths, each in its own panel.
     pub paths: Vec<PlanPath>,
 }
 
 /// One path.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlanPath {
-    /// Name over its panel.
+    /// Title of its panel.
     pub name: String,
-    /// Its points, x and y.
+    /// Points (x, y).
     pub points: Vec<[f64; 2]>,
-    /// The value at each point. Where it is not finite the path is grey.
+    /// Value at each point; grey if not finite.
     pub values: Vec<f64>,
 }
 
 impl PlanView {
-    /// The picture, 900 pixels wide, up to three panels in a row.
+    /// The SVG, 900 pixels wide, up to three panels in a row.
     pub fn svg(&self) -> String {
         let name = if self.title.is_empty() { self.value.text() } else { self.title.clone() };
         let columns = self.paths.len().clamp(1, 3);
         let rows = self.paths.len().div_ceil(columns).max(1);
-        // Panels as high as the shape of the paths asks for.
+        // The height of the panels follows the aspect ratio of the paths.
         let span = |axis: usize| {
             let ends = self.paths.iter().flat_map(|path| &path.points).map(|point| point[axis]);
             let ends = ends
@@ -60,7 +60,7 @@ impl PlanView {
         };
         let aspect = span(1) / span(0);
         let width = 800.0 / columns as f64 - 75.0;
-        // Nothing to show has no shape; NaN is replaced too.
+        // Also replaces NaN, without points.
         let inside = if aspect > 0.0 { (width * aspect * 1.1).clamp(140.0, 560.0) } else { 200.0 };
         let height = inside as u32 + 96;
         picture((900, 30 + height * rows as u32), &name, |pen| self.draw(pen, columns, rows))
@@ -84,10 +84,10 @@ impl PlanView {
             let frame = self.frame(self.paths.get(index), (across, down));
             let inside = frame.draw(Pen { area: &panel, sheet: pen.sheet })?;
             if let Some(path) = self.paths.get(index) {
-                inside.cut(pen, || path.draw(&inside, &colors, pen))?;
+                inside.clip(pen, || path.draw(&inside, &colors, pen))?;
             }
             if self.paths.get(index).is_none_or(|path| path.points.is_empty()) {
-                inside.say_empty(pen)?;
+                inside.draw_empty(pen)?;
             }
             if index == 0 {
                 bar.0 = inside.y.start;
@@ -97,13 +97,13 @@ impl PlanView {
         colors.draw(pen, right + 6 * PIXEL, bar.0, bar.1)
     }
 
-    /// A frame whose axes have the same scale, around all paths so that panels can be compared.
+    /// A frame with equal scales around all paths, so that panels can be compared.
     fn frame<'a>(&'a self, path: Option<&'a PlanPath>, (across, down): (i32, i32)) -> Frame<'a> {
         let points = || self.paths.iter().flat_map(|path| &path.points);
         let ticks = if across > 500 * PIXEL { 8 } else { 4 };
         let x = Scale::of(&linear(&self.x), points().map(|point| point[0]), Ends::Around, ticks);
         let y = Scale::of(&linear(&self.y), points().map(|point| point[1]), Ends::Around, ticks);
-        // About what the frame leaves inside; exact to the width of a tick label.
+        // Approximate inside of the frame; exact to the width of a tick label.
         let room = [across - 80 * PIXEL, down - 96 * PIXEL].map(|room| f64::from(room.max(PIXEL)));
         let per_unit = ((x.high - x.low) / room[0]).max((y.high - y.low) / room[1]);
         let widened = |scale: &Scale, room: f64| {
@@ -142,7 +142,7 @@ impl PlanPath {
             rim.push(run.iter().map(|(place, _)| *place).collect());
             let mut last = None;
             for pair in run.windows(2) {
-                // A value belongs to a point; the piece between two points shows their mean.
+                // The piece between two points shows their mean value.
                 let value = pair[0].1 / 2.0 + pair[1].1 / 2.0;
                 let shade =
                     colors.fraction(value).map(|fraction| (fraction * SHADES as f64).round() as usize);
@@ -157,7 +157,7 @@ impl PlanPath {
                 last = Some(shade);
             }
         }
-        // A faint rim sets pale colours off from a pale page, and dark ones from a dark one.
+        // A faint outline separates pale colours from a light page and dark ones from a dark page.
         pen.sheet.strokes(&rim, [0; 3], 0.35, 5 * PIXEL, true);
         pen.sheet.strokes(&unknown, [0; 3], 0.3, 34, true);
         for (shade, lines) in shades.iter().enumerate() {
@@ -166,7 +166,7 @@ impl PlanPath {
         Ok(())
     }
 
-    /// Stretches of the path without gaps, as places and values; of near points one is kept, with the largest value.
+    /// Runs of the path without gaps, as positions and values; near points are merged, keeping the largest value.
     fn runs(&self, inside: &Inside) -> Vec<Vec<((i32, i32), f64)>> {
         let mut runs: Vec<Vec<((i32, i32), f64)>> = vec![Vec::new()];
         for (index, [x, y]) in self.points.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Scales: the ends of an axis, its ticks and their labels.
+//! Scales: range of an axis, ticks and labels.
 
 use std::ops::Range;
 
@@ -6,36 +6,36 @@ use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, Value
 
 use super::axis::Axis;
 
-/// Canvas coordinates beyond this are cut off long before anyone sees them.
+/// Limit of canvas coordinates, far outside any plot.
 const FAR: f64 = 1e6;
 
-/// Numbers smaller than this are drawn as zero: the powers of ten that would scale them do not exist.
+/// Smaller numbers are drawn as zero, since the powers of ten to scale them do not exist.
 const SMALLEST: f64 = 1e-290;
 
-/// One axis of a frame, ready to be drawn.
+/// One axis of a frame.
 #[derive(Debug, Clone)]
 pub(super) struct Scale {
     pub(super) low: f64,
     pub(super) high: f64,
     log: bool,
-    /// Places with their labels, from low to high.
+    /// Ticks with their labels, ascending.
     pub(super) ticks: Vec<(f64, String)>,
-    /// Places between them that get a faint line.
+    /// Minor ticks.
     minor: Vec<f64>,
 }
 
-/// How the ends of a scale follow from the data.
+/// How the range of a scale follows from the data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Ends {
     /// Exactly the data.
     Tight,
-    /// The data and a little more.
+    /// The data with a margin.
     Loose,
-    /// The data, a little more, and zero.
+    /// The data with a margin, and zero.
     Zero,
-    /// From zero to the largest value exactly.
+    /// From zero to exactly the largest value.
     Nought,
-    /// The data and a little more on both sides, even where that crosses zero.
+    /// The data with a margin on both sides, even across zero.
     Around,
 }
 
@@ -55,16 +55,16 @@ impl Scale {
             low = (low * 10f64.powf(-margin)).max(f64::MIN_POSITIVE);
             high = (high * 10f64.powf(margin)).min(f64::MAX);
         } else {
-            // Halved, so that the span of the largest numbers is finite.
+            // Halved to avoid overflow.
             let span = 2.0 * (high / 2.0 - low / 2.0);
             let size = low.abs().max(high.abs());
             if span <= size * 1e-12 || size < SMALLEST {
-                // A constant: room on both sides, so that its line lies in the middle.
+                // A constant: margins on both sides, so that its line is in the middle.
                 let room = if size < SMALLEST { 1.0 } else { size * 0.1 };
                 [low, high] = [low - room, high + room];
             } else {
                 let margin = if matches!(ends, Ends::Tight | Ends::Nought) { 0.0 } else { 0.05 * span };
-                // What is never negative starts at zero rather than just below.
+                // Non-negative data start at zero rather than just below.
                 let floor = if low >= 0.0 && ends != Ends::Around { 0.0 } else { f64::MIN };
                 let ceiling = if high <= 0.0 && ends != Ends::Around { 0.0 } else { f64::MAX };
                 [low, high] = [(low - margin).max(floor), (high + margin).min(ceiling)];
@@ -85,13 +85,13 @@ impl Scale {
         Self::between(low, high, axis.log, ticks)
     }
 
-    /// Scale with stated ends.
+    /// Scale with a given range.
     pub(super) fn between(low: f64, high: f64, log: bool, ticks: usize) -> Self {
         if log {
             let places = log_ticks(low, high, ticks);
             let decade = (high / low).log10() / ticks.max(1) as f64;
             let minor = if decade < 1.0 { minor_ticks(low, high, &places) } else { Vec::new() };
-            // One manner for all labels of an axis.
+            // Same style for all labels of an axis.
             let plain = places.iter().all(|&place| (1e-3..1e5).contains(&place));
             let label = |place: f64| if plain { format!("{place}") } else { power(place) };
             Self { low, high, log, ticks: places.iter().map(|&place| (place, label(place))).collect(), minor }
@@ -102,13 +102,13 @@ impl Scale {
         }
     }
 
-    /// Scale for things that have names: they stand at 0, 1, 2, …
+    /// Scale for categories at 0, 1, 2, …
     pub(super) fn named(names: &[String]) -> Self {
         let ticks = names.iter().enumerate().map(|(place, name)| (place as f64, name.clone())).collect();
         Self { low: -0.5, high: names.len().max(1) as f64 - 0.5, log: false, ticks, minor: Vec::new() }
     }
 
-    /// Place of a value between the ends, 0 to 1; `None` where it has none.
+    /// Position of a value in the range, 0 to 1; `None` if not finite.
     pub(super) fn fraction(&self, value: f64) -> Option<f64> {
         let fraction = if self.log {
             (value / self.low).ln() / (self.high / self.low).ln()
@@ -143,12 +143,12 @@ impl Ranged for Scale {
 
 impl ValueFormatter<f64> for Scale {
     fn format_ext(&self, value: &f64) -> String {
-        // The values asked for are the key points themselves.
+        // Only called for the key points.
         self.ticks.iter().find(|tick| tick.0 == *value).map(|tick| tick.1.clone()).unwrap_or_default()
     }
 }
 
-/// Round numbers between two ends, at steps of 1, 2 or 5 times a power of ten, at most about `wanted` of them.
+/// Round numbers in a range, with steps of 1, 2 or 5 times a power of ten, about `wanted` at most.
 ///
 /// ```
 /// use truegrind_report::plot::linear_ticks;
@@ -160,7 +160,7 @@ pub fn linear_ticks(low: f64, high: f64, wanted: usize) -> Vec<f64> {
         return if low.is_finite() { vec![low] } else { Vec::new() };
     }
     let (factor, exponent) = step(span / wanted.max(1) as f64);
-    // A tick is a whole number times a power of ten, divided or multiplied exactly, so that 0.3 is 0.3.
+    // Ticks are exact: an integer times or divided by a power of ten, so that 0.3 is 0.3.
     let place = |count: f64| {
         if exponent < 0 {
             count * factor / 10f64.powi(-exponent)
@@ -174,15 +174,15 @@ pub fn linear_ticks(low: f64, high: f64, wanted: usize) -> Vec<f64> {
         return vec![low, high];
     }
     if last < first {
-        // A step so wide that it passes over the whole range.
+        // The step is wider than the range.
         return linear_ticks(low, high, wanted + 1);
     }
     let count = (last - first) as usize;
     (0..=count).map(|i| place(first + i as f64) + 0.0).collect()
 }
 
-/// Powers of ten between two positive ends, every second or further one where there are too many; with twos and fives
-/// where there are few, and round linear numbers where the ends are closer than that.
+/// Powers of ten in a positive range, thinned if there are too many; with twos and fives if there are few, and round linear numbers
+/// in a narrow range.
 ///
 /// ```
 /// use truegrind_report::plot::log_ticks;
@@ -210,12 +210,12 @@ pub fn log_ticks(low: f64, high: f64, wanted: usize) -> Vec<f64> {
     if places.len() >= 3 { places } else { linear_ticks(low, high, wanted) }
 }
 
-/// 10^power; negative powers by division, which is exact where it can be.
+/// 10^power; negative powers by division, which is more accurate.
 fn ten(power: i32) -> f64 {
     if power < 0 && power > -308 { 1.0 / 10f64.powi(-power) } else { 10f64.powi(power) }
 }
 
-/// Twos to nines of each decade that are no ticks.
+/// Multiples of two to nine in each decade, without the ticks.
 fn minor_ticks(low: f64, high: f64, ticks: &[f64]) -> Vec<f64> {
     let (first, last) = (low.log10().floor() as i32, high.log10().ceil() as i32);
     (first..last)
@@ -237,7 +237,7 @@ fn step(size: f64) -> (f64, i32) {
     (1.0, exponent + 1)
 }
 
-/// Labels with the digits that tell the ticks apart; with exponents where numbers are very small or large.
+/// Labels with enough digits to distinguish the ticks; with exponents for very small or large numbers.
 fn linear_labels(places: &[f64]) -> Vec<String> {
     let size = places.iter().fold(0.0f64, |size, place| size.max(place.abs()));
     let width = match places {

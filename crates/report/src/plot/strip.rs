@@ -1,4 +1,4 @@
-//! Heat strips: a value along a path or over rows, one strip per method, so that many are compared at a glance.
+//! Heat strips: a value along a path or over rows, one strip per method.
 
 use super::axis::Axis;
 use super::canvas::{DrawingError, PIXEL};
@@ -12,24 +12,24 @@ use super::scale::{Ends, Scale};
 /// Height of a strip in pixels.
 const STRIP: u32 = 30;
 
-/// Cells across at most; of several values in a cell the one farthest from zero is shown.
+/// Largest number of cells; a cell with several values shows the one farthest from zero.
 const CELLS: usize = 400;
 
-/// Colours told apart.
+/// Number of colours.
 const SHADES: usize = 64;
 
-/// Strips under each other.
+/// Heat strips, one below the other.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct HeatStrip {
-    /// Title inside the picture; may be empty.
+    /// Title; may be empty.
     pub title: String,
-    /// What runs along the strips; the values stand at 0, 1, 2, … unless a range says between which ends.
+    /// Axis along the strips; values are at 0, 1, 2, … unless a range is given.
     pub x: Axis,
-    /// What the colours mean; all strips share it.
+    /// Meaning of the colours, common to all strips.
     pub value: Axis,
-    /// The colours.
+    /// Colour map.
     pub colors: ColorMap,
-    /// The strips, from top to bottom.
+    /// Strips from top to bottom.
     pub strips: Vec<Strip>,
 }
 
@@ -38,15 +38,15 @@ pub struct HeatStrip {
 pub struct Strip {
     /// Its name.
     pub name: String,
-    /// Its values, evenly spaced. What is not finite stays empty.
+    /// Evenly spaced values; non-finite ones remain empty.
     pub values: Vec<f64>,
 }
 
 impl HeatStrip {
-    /// The picture, 900 pixels wide and as high as its strips need.
+    /// The SVG, 900 pixels wide.
     pub fn svg(&self) -> String {
         let name = if self.title.is_empty() { self.value.text() } else { self.title.clone() };
-        // The text beside the colour bar stands upright and needs its length.
+        // The vertical label of the colour bar needs its length.
         let text = letters::width(&self.value.text(), LABEL) as u32 / PIXEL as u32;
         let height = (100 + STRIP * self.strips.len().max(3) as u32).max(text + 40);
         picture((900, height), &name, |pen| self.draw(pen))
@@ -85,7 +85,7 @@ impl HeatStrip {
             for run in colored.chunk_by(|a, b| a == b) {
                 let to = from + run.len();
                 if let Some(shade) = run[0] {
-                    // Half a pixel under the next cell: edges that meet would show seams.
+                    // Extends half a pixel under the next cell, since touching edges would show seams.
                     let beyond = if colored.get(to).is_some_and(Option::is_some) { PIXEL / 2 } else { 0 };
                     shades[shade].push(vec![(cell(from), middle), (cell(to) + beyond, middle)]);
                 }
@@ -100,13 +100,13 @@ impl HeatStrip {
             pen.outline(rim, Paint::text(0.3), THIN)?;
         }
         if cells == 0 {
-            inside.say_empty(pen)?;
+            inside.draw_empty(pen)?;
         }
         colors.draw(pen, inside.x.end + 2 * EDGE, inside.y.start, inside.y.end)
     }
 }
 
-/// Shade of a cell, `None` where none of its values is finite.
+/// Shade of a cell; `None` if none of its values is finite.
 fn shade(strip: &Strip, colors: &Colors, cell: usize, cells: usize, longest: usize) -> Option<usize> {
     let (from, to) = (cell * longest / cells, (cell + 1) * longest / cells);
     let values = strip.values.get(from..to.min(strip.values.len()))?;

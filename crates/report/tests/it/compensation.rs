@@ -194,7 +194,7 @@ fn coverage_counts_and_never_rounds_to_all_or_nothing() {
         "100000 motions: 99999 changed (> 99.9 %), 0 flagged (0 %), 1 refused (< 0.1 %), 0 left (0 %)"
     );
     plan.outcomes.clear();
-    assert_eq!(view::coverage(&plan), "the program holds no motion");
+    assert_eq!(view::coverage(&plan), "the program contains no motion");
 }
 
 #[test]
@@ -202,7 +202,7 @@ fn verdict_and_page_tell_what_to_look_at() {
     let (mut plan, listing, files) = example();
     let text = terminal::document(&view::summary(&plan, &listing, &files), 200);
     assert!(text.contains("[warning] Rewritten, but look at what was refused or flagged"), "{text}");
-    assert!(text.contains("the path steps by the correction"), "{text}");
+    assert!(text.contains("the path has a step of the size of the correction"), "{text}");
     assert!(text.contains("2 targets put in"), "{text}");
     assert!(text.contains("- tool disc: origin not stated"), "{text}");
     assert!(text.contains("written to out/grind.mod"), "{text}");

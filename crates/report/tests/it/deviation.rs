@@ -132,7 +132,7 @@ fn the_table_stands_in_the_work_object_with_every_column() {
     assert!(lines[3].contains(",,,,,,,,,,,refused,target is out of reach"), "{}", lines[3]);
     assert!(table.rows[2][6..17].iter().all(|cell| *cell == Cell::Missing));
     assert!(table.title.contains("held-out error 0.460 mm RMSE"), "{}", table.title);
-    assert!(table.notes.join(" ").contains("does not say how far the real arm will be off"));
+    assert!(table.notes.join(" ").contains("does not predict the deviation of the real arm"));
 }
 
 #[test]
@@ -216,7 +216,7 @@ fn models_that_agree_about_the_path_before_share_its_row() {
 fn without_a_surface_nothing_is_signed() {
     let table = view::table(&three(false));
     assert!(table.rows.iter().all(|row| row[10] == Cell::Missing && row[15] == Cell::Missing));
-    assert!(table.notes.join(" ").contains("No surface is known"));
+    assert!(table.notes.join(" ").contains("No surface is given"));
     let block = view::block_table(&[three(false)]);
     assert!(block.notes[0].contains("have no sign"), "{}", block.notes[0]);
     assert!(view::short_table(&three(false)).columns.iter().all(|column| !column.key.contains("normal")));

@@ -336,7 +336,8 @@ fn file_names_stay_readable_in_markdown() {
 /// characters of ASCII and Latin-1, what turns the direction of reading round, what has no width, other ends of lines.
 #[test]
 fn what_acts_without_showing_is_spelled_out_in_every_format() {
-    let hidden = (0..=0x10_ffff).filter_map(char::from_u32).filter(|c| visible::acts(*c)).collect::<String>();
+    let hidden =
+        (0..=0x10_ffff).filter_map(char::from_u32).filter(|c| visible::is_invisible(*c)).collect::<String>();
     for c in [
         '\0', '\x07', '\x1b', '\x7f', '\u{80}', '\u{9b}', '\u{9f}', '\u{200b}', '\u{2028}', '\u{202e}',
         '\u{2066}', '\u{2069}', '\u{feff}',
@@ -367,7 +368,7 @@ fn what_acts_without_showing_is_spelled_out_in_every_format() {
         ("json", json::table(&table)),
         ("csv", csv::table(&table).replace('\r', "")),
     ] {
-        let found: Vec<char> = text.chars().filter(|c| visible::acts(*c)).collect();
+        let found: Vec<char> = text.chars().filter(|c| visible::is_invisible(*c)).collect();
         assert!(found.is_empty(), "{format}: {found:?}");
         if format != "json" {
             assert!(text.contains("x1b") && text.contains("u{202e}"), "{format}");
@@ -410,7 +411,8 @@ fn a_table_that_continues_below_repeats_what_tells_its_rows_apart() {
 fn the_note_of_a_key_figure_stays_within_the_terminal() {
     let mut document = Document::new("Page");
     document.push(vec![
-        KeyFigure::new("Programs before", 0.66, 3, "mm").note("expected RMS inside the measured region"),
+        KeyFigure::new("Programs before", 0.66, 3, "mm")
+            .note("expected RMS deviation in the measured region"),
         KeyFigure::new("After", 0.05, 3, "mm"),
     ]);
     let text = terminal::document(&document, 48);

@@ -78,7 +78,7 @@ geometry           held out     24      0.500          0.400    0.450     1.000 
     assert_eq!(&text[..expected.len()], expected);
     let notes = view::stage_table(&found).notes.join(" ");
     assert!(notes.contains("no sensor frame was stated"), "{notes}");
-    assert!(notes.contains("kept apart from the gain of the model"), "{notes}");
+    assert!(notes.contains("the gain of the model is that from frames registered to geometry"), "{notes}");
     assert!(notes.contains("\"STD\""), "{notes}");
     // A stated frame gives the raw row; lengths of vectors have no signed mean.
     found.raw = Some(ErrorSummary::of([3.0, -4.0]));
@@ -124,12 +124,12 @@ effect1.1            0      2.50 ± 0.10     2.5000  µrad/(N m)        100     
 fn frames_stand_apart_and_are_said_not_to_be_the_tcp() {
     let table = view::frame_table(&by_hand());
     assert_eq!(table.rows.len(), 3);
-    assert_eq!(text_of(&table.rows[0][1]), "touched point on the flange, not the TCP");
-    assert_eq!(text_of(&table.rows[1][1]), "sensor frame in the base of the arm");
+    assert_eq!(text_of(&table.rows[0][1]), "measured point on the flange, not the TCP");
+    assert_eq!(text_of(&table.rows[1][1]), "sensor frame in the robot base");
     let Cell::WithSigma { value, sigma } = table.rows[1][2] else { panic!("{:?}", table.rows[1]) };
     assert!((value - 10.0).abs() < 1e-12 && (sigma - 0.1).abs() < 1e-12);
     assert_eq!(text_of(&table.rows[1][3]), "°");
-    assert_eq!(text_of(&table.rows[2][1]), "outlet of the cable in the base of the arm");
+    assert_eq!(text_of(&table.rows[2][1]), "cable outlet in the robot base");
     assert!(table.notes.join(" ").contains("It is not the TCP"));
 }
 
@@ -194,13 +194,9 @@ fn a_verdict_is_one_sentence_with_its_reasons() {
     let head = |found: &Identification| terminal::document(&view::summary(found), 300);
     found.estimated.verdict.reasons = vec!["because".to_owned()];
     for (status, badge, sentence) in [
-        (Judgement::Pass, "[ok]", "The model may be used, it meets the stated limits"),
-        (Judgement::Fail, "[failed]", "The fit may not be used as a model"),
-        (
-            Judgement::NotEvaluated,
-            "[not evaluated]",
-            "The model may be used, nothing speaks against it (no limits were stated)",
-        ),
+        (Judgement::Pass, "[ok]", "The model may be used; it meets the stated limits"),
+        (Judgement::Fail, "[failed]", "The model must not be used"),
+        (Judgement::NotEvaluated, "[not evaluated]", "The model may be used (no limits were stated)"),
     ] {
         found.estimated.verdict.status = status;
         let text = head(&found);
@@ -301,11 +297,11 @@ fn the_page_is_whole() {
     let text = leave("identification.html", &page);
     for heading in [
         "Parameters of the arm",
-        "How the arm was measured",
+        "Sensor and measured point",
         "What the data can tell",
         "Rows",
         "Convergence",
-        "Where this came from",
+        "Provenance",
     ] {
         assert!(text.contains(&format!(">{heading}</h2>")), "no {heading}");
     }

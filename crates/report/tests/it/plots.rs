@@ -2,7 +2,7 @@ use proptest::prelude::*;
 use truegrind_report::number::Precision;
 use truegrind_report::plot::{
     Axis, BarGroup, Bars, ColorMap, Graph, HeatStrip, Histogram, Interval, Intervals, PlanPath, PlanView,
-    Reference, Sample, Series, Span, Strip, linear_ticks, log_ticks, told_apart,
+    Reference, Sample, Series, Span, Strip, distinguishable, linear_ticks, log_ticks,
 };
 
 /// Every tag is closed in order, every attribute quoted, no `<` or bare `&` in text. HTML's void elements may stay open.
@@ -384,11 +384,11 @@ fn a_curve_that_runs_as_another_is_named_and_not_drawn_over_it() {
     let all = || vec![line("before", 0.0, 0.1), line("kept", 0.5, 0.1001), line("after", 0.0, 0.01)];
     let names = |series: &[Series]| series.iter().map(|s| s.name.clone()).collect::<Vec<_>>();
     // Point 0 is on the way to the cut.
-    let (drawn, alike) = told_apart(all(), |x| x > 0.0);
+    let (drawn, alike) = distinguishable(all(), |x| x > 0.0);
     assert_eq!(names(&drawn), ["before", "after"]);
     assert_eq!(alike, [("kept".to_owned(), "before".to_owned())]);
-    assert_eq!(told_apart(all(), |_| true).0.len(), 3);
+    assert_eq!(distinguishable(all(), |_| true).0.len(), 3);
     let mut banded = all();
     banded[1] = banded[1].clone().plus_minus(&[0.1; 20]);
-    assert_eq!(told_apart(banded, |x| x > 0.0).0.len(), 3, "its band is to be seen");
+    assert_eq!(distinguishable(banded, |x| x > 0.0).0.len(), 3, "its band is to be seen");
 }

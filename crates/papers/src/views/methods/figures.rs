@@ -4,7 +4,7 @@ use crate::experiment::Treatment;
 use crate::protocol::{MethodResult, Study};
 use crate::views::study::{held_out, seconds};
 use truegrind_report::number::Precision;
-use truegrind_report::plot::{Axis, BarGroup, Bars, Graph, Ink, Reference, Series, told_apart};
+use truegrind_report::plot::{Axis, BarGroup, Bars, Graph, Ink, Reference, Series, distinguishable};
 use truegrind_report::repeated;
 
 /// A method that diverged has no bar: it would be the only one to be seen.
@@ -42,7 +42,7 @@ fn rows_of(study: &Study, treatment: Treatment) -> Vec<(String, String)> {
     let lines =
         results.filter_map(|r| Some(Series::line(&r.method.id, numbered(&r.outcomes.first()?.errors_mm))));
     let start = Series::line("BC", numbered(registered)).ink(Ink::Text);
-    let (mut drawn, alike) = told_apart(std::iter::once(start).chain(lines).collect(), |_| true);
+    let (mut drawn, alike) = distinguishable(std::iter::once(start).chain(lines).collect(), |_| true);
     let start = drawn.remove(0);
     let pictures = drawn.chunks(PANEL).map(|panel| {
         let each = panel.iter().cloned().zip([Ink::Vermilion, Ink::Blue, Ink::Green, Ink::Purple]);
