@@ -1,10 +1,10 @@
 //! truegrind learns how one real robot arm differs from its data sheet, names the causes, and rewrites RAPID and NC
 //! programs so that the real arm follows the intended path.
 //!
-//! Lengths are millimetres and angles radians; degrees and other units live at the edges of files. A frame is named by what
-//! it takes to what: `base_from_flange * flange_from_tool` cancels. Three models of one arm are kept apart: *nominal* (the
-//! data sheet, what the controller computes with), *estimated* (nominal and everything identified) and *actual* (the real
-//! arm, known only in a simulation).
+//! Lengths are millimetres and angles radians; degrees and other units occur only in files. Transforms are named by target and source
+//! frame, so that `base_from_flange * flange_from_tool` composes. Three models of an arm are distinguished: *nominal* (the data sheet,
+//! used by the controller), *estimated* (nominal plus everything identified) and *actual* (the real arm, known only in a
+//! simulation).
 //!
 //! # From measurements to a corrected program
 //!
@@ -15,15 +15,15 @@
 //! };
 //!
 //! # let (csv, module): (&[u8], &[u8]) = (include_bytes!("../tests/data/irb120-rounded.csv"), include_bytes!("../programs/told.mod"));
-//! // What was measured, on which arm.
+//! // The robot and its measurements.
 //! let robot = robots::load("abb-irb-120")?;
 //! let rows = read_measurements("poses.csv", csv, &ImportOptions::default())?;
-//! // The arm that gives these readings, with the causes of what geometry does not explain.
+//! // The estimated arm, including the causes of errors beyond geometry.
 //! let frames = starting_frames(&rows, &robot.model, &Tolerance::default(), true)?;
 //! let options = DiagnoseOptions::default();
 //! let found = diagnose(&rows, "abb-irb-120", &robot.model, &frames, &options, &|_| {})?;
 //! println!("held-out RMSE [mm]: {:.3}", found.diagnosis.fits.extended.cv_rmse_mm);
-//! // A program that this arm runs as it was meant.
+//! // The program, corrected for this arm.
 //! let program = Program::read(&[("blade.mod", module)], &NcSetup::default());
 //! let done = compensate(&program, &found.estimated, &Cell::default(), &CompensateOptions::default(), None)?;
 //! for (motion, outcome) in program.listing().motions.iter().zip(&done.plan.outcomes) {
@@ -34,11 +34,11 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Whether a model may be used is in [`Estimated::verdict`]; why a motion stayed as it is, in its [`MotionOutcome`]. What the
-//! names below do not reach is in the crates, which stand here by their names: [`arm`], [`programs`], [`surfaces`],
+//! [`Estimated::verdict`] states whether a model may be used, [`MotionOutcome`] why a motion is unchanged. Everything else is in the
+//! crates, re-exported as [`arm`], [`programs`], [`surfaces`],
 //! [`estimation`], [`calibration`], [`compensation`], [`planning`], [`report`], [`papers`], [`math`].
 
-// Many inputs over several machines.
+// Runs over many inputs on several machines.
 pub mod units;
 
 // The arm.
@@ -69,7 +69,7 @@ pub use truegrind_arm::robots::{self, NominalMismatch, Robot, RobotError};
 pub use truegrind_math::se3::Pose;
 pub use truegrind_math::statistics::ErrorSummary;
 
-// What was measured.
+// Measurements.
 pub use truegrind_calibration::measurement::convention::{AngleConvention, UnknownConvention};
 pub use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row, Sensor};
 pub use truegrind_calibration::measurement::import::{
@@ -81,7 +81,7 @@ pub use truegrind_calibration::measurement::simulation::recipe::Recipe;
 pub use truegrind_calibration::measurement::simulation::{RecipeError, SimulatedRow, Simulation};
 pub use truegrind_calibration::measurement::split::{self, NoiseFloor, Split};
 
-// What it tells of the arm.
+// Identification, diagnosis and tracking.
 pub use truegrind_calibration::diagnosis::cause::Cause;
 pub use truegrind_calibration::diagnosis::diagnose::{Diagnosed, Options as DiagnoseOptions, diagnose};
 pub use truegrind_calibration::diagnosis::finding::{
@@ -101,7 +101,7 @@ pub use truegrind_calibration::tracking::{
     Alarm, Options as TrackOptions, State as TrackState, StateError as TrackStateError, TrackError, Tracker,
 };
 
-// Solvers, for any problem.
+// Solvers.
 pub use truegrind_estimation::estimate::{Estimate, Evaluations, Iteration, Termination};
 pub use truegrind_estimation::problem::{NormalEquations, Prior, Problem};
 
@@ -120,7 +120,7 @@ pub use truegrind_programs::rapid::writer::write as write_rapid;
 pub use truegrind_programs::reading::{Language, Program};
 pub use truegrind_programs::rewrite::{Change, FileEdits, NewTarget, Outcome, RewriteOptions, Rewritten};
 
-// Surfaces, and paths over them.
+// Surfaces, tool paths and measurement plans.
 pub use truegrind_planning::poses::{
     MeasurementSetup, Options as PosesOptions, Plan as PosesPlan, PlanError, plan as plan_poses,
 };
@@ -128,7 +128,7 @@ pub use truegrind_planning::taught_cell::taught_cell;
 pub use truegrind_planning::toolpath::{Toolpath, ToolpathError, toolpath};
 pub use truegrind_surfaces::{Contact, Domain, Mesh, Surface, SurfaceFile};
 
-// What is corrected, and by how much.
+// Compensation.
 pub use truegrind_compensation::cell::{Cell, CellError, CellFrame, FrameOrigin, Teaches};
 pub use truegrind_compensation::compensate::{CompensateError, Compensated, compensate};
 pub use truegrind_compensation::cut::Cuts;
@@ -138,12 +138,12 @@ pub use truegrind_compensation::plan::reason::OutcomeReason;
 pub use truegrind_compensation::plan::{MotionOutcome, Plan as CompensatePlan};
 pub use truegrind_compensation::verify::{ActingArm, VerificationTask, verify};
 
-// How it is told.
+// Reports.
 pub use truegrind_report::document::{Block, Document, Figure};
 pub use truegrind_report::format;
 pub use truegrind_report::table::{Column, Table};
 
-// The crates, by their names.
+// The crates.
 pub use truegrind_arm as arm;
 pub use truegrind_calibration as calibration;
 pub use truegrind_compensation as compensation;

@@ -1,4 +1,4 @@
-//! The command line of truegrind. All work is in the library; here arguments, files and the exit code.
+//! The command line of truegrind: arguments, files and exit codes. All computation is in the library.
 
 mod cli;
 

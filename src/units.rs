@@ -1,9 +1,8 @@
-//! Many inputs over several machines: which unit belongs to which share, by what a unit is known, and what is kept of one that
-//! is done.
+//! Runs over many inputs on several machines: shares, keys and records of units.
 //!
-//! A *unit* is what one run handles by itself: the files of one task, or the measurements of one arm. It is idempotent: its key
-//! covers all that decides what comes of it, its outputs get their names when they are whole, and its record comes after them.
-//! Whatever starts the jobs (Slurm, Kubernetes, HTCondor, GNU parallel, Dask, Ray) has nothing to do but try again.
+//! A *unit* is processed independently: the files of one task, or the measurements of one arm. Units are idempotent: the key covers
+//! everything that determines the result, outputs are renamed into place when complete, and the record is written after them. A
+//! scheduler (Slurm, Kubernetes, HTCondor, GNU parallel, Dask, Ray) only has to retry.
 
 pub mod done;
 pub mod key;

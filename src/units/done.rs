@@ -1,21 +1,21 @@
-//! What is kept of a unit that is done: `done/KEY.json`, schema `truegrind.done/1`.
+//! Record of a finished unit: `done/KEY.json`, schema `truegrind.done/1`.
 //!
-//! It is written after all outputs of the unit are in their places, and says what is in them; so whoever finds it, and finds the
-//! outputs as it says, has nothing to do. A record that a crash of the machine tore does not read, and counts for nothing.
+//! It is written after all outputs of the unit and contains their hashes: if the record exists and the outputs match, the unit need not
+//! be processed again. A record torn by a machine crash does not parse and is ignored.
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-/// Name and version of the form.
+/// Schema name and version.
 pub const SCHEMA: &str = "truegrind.done/1";
 
-/// A file that was written.
+/// An output file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Output {
-    /// Where.
+    /// Path.
     pub file: String,
-    /// Whether that is below the folder of what is done, which may have moved since; else it is as it was named.
+    /// Whether the path is relative to the folder of the run, which may have moved since.
     pub below: bool,
     /// SHA-256 of its bytes.
     pub sha256: String,
@@ -25,40 +25,39 @@ pub struct Output {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Ended {
-    /// It was done, whatever came of it.
+    /// Processed, whatever the result.
     Done,
-    /// It could not be done. A job that resumes tries it again.
+    /// Failed; a resumed job tries it again.
     Failed,
-    /// Whoever did it died, several times. A job that resumes lets it be.
+    /// Crashed its process several times; a resumed job skips it.
     Killed,
 }
 
-/// The record of a unit, with what the reports of the run need of it as JSON.
+/// The record of a unit with its report data as JSON.
 pub type Done = Recorded<Value>;
 
-/// The record of a unit; `R`: what the reports of the run need of it. A reader that needs less of it takes a type that passes over the
-/// rest, and builds nothing for that.
+/// The record of a unit; `R`: its report data. A reader that needs only a part uses a type that skips the rest.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Recorded<R> {
     /// [`SCHEMA`].
     pub schema: String,
-    /// Its key; see [`super::key::of_unit`].
+    /// Key; see [`super::key::of_unit`].
     pub key: String,
-    /// Its name, for people.
+    /// Name for display.
     pub unit: String,
-    /// How it ended.
+    /// How the unit ended.
     pub ended: Ended,
-    /// What was written.
+    /// Output files.
     pub outputs: Vec<Output>,
-    /// What the reports of the run need of it, every bit.
+    /// Report data, bit-exact.
     pub record: R,
 }
 
 impl<R> Recorded<R> {
-    /// As a file; `record`: JSON, in place of that of `self`, which a job of many need not build first.
+    /// The text of the file. `record`: its report data as JSON text, which saves building a JSON value.
     ///
     /// # Errors
-    /// None that a record could bring about; what the writer says.
+    /// Those of the serialiser; no record is known to cause one.
     pub fn to_text(&self, record: &str) -> Result<String, serde_json::Error> {
         let Self { schema, key, unit, ended, outputs, record: _ } = self;
         let [schema, key, unit] = [schema, key, unit].map(serde_json::to_string);
@@ -67,7 +66,7 @@ impl<R> Recorded<R> {
         Ok(format!("{{{head},\"ended\":{ended},\"outputs\":{outputs},\"record\":{record}}}\n"))
     }
 
-    /// The same unit with something else of it; `None` where there is nothing.
+    /// Converts the report data.
     pub fn and_then<T>(self, of: impl FnOnce(R) -> Option<T>) -> Option<Recorded<T>> {
         let Self { schema, key, unit, ended, outputs, record } = self;
         Some(Recorded { schema, key, unit, ended, outputs, record: of(record)? })
@@ -75,7 +74,7 @@ impl<R> Recorded<R> {
 }
 
 impl<R: DeserializeOwned> Recorded<R> {
-    /// From the bytes of a file; `None` where it is not the whole record of the unit with this key.
+    /// Parses a file; `None` if it is not the complete record of the unit with this key.
     pub fn from_bytes(bytes: &[u8], key: &str) -> Option<Self> {
         let done: Self = serde_json::from_slice(bytes).ok()?;
         (done.schema == SCHEMA && done.key == key).then_some(done)

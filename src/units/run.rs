@@ -1,22 +1,22 @@
-//! The list of all units of a run, in the order of the one run that would do them all: `run.json`, schema `truegrind.run/1`.
+//! List of all units of a run, in the order of an unshared run: `run.json`, schema `truegrind.run/1`.
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-/// Name and version of the form.
+/// Schema name and version.
 pub const SCHEMA: &str = "truegrind.run/1";
 
-/// One unit: the files that were named, before any of them names further ones.
+/// One unit: its named files; a task list is not expanded.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Unit {
-    /// The folder that was given, where it was one: outputs keep their place below it.
+    /// The folder in which they were found, if any: outputs keep their relative path.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub under: Option<String>,
-    /// Its files, as they were given or found.
+    /// Paths of its files, as given or found.
     pub paths: Vec<String>,
 }
 
-/// A run: what its jobs have in common.
+/// Data common to all jobs of a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Run {
     /// [`SCHEMA`].
@@ -25,12 +25,12 @@ pub struct Run {
     pub version: String,
     /// The verb.
     pub verb: String,
-    /// Its key; see [`super::key::of_run`].
+    /// Key; see [`super::key::of_run`].
     pub run: String,
-    /// How many shares the job that wrote this was told of.
+    /// Number of shares, if the run is sharded.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shares: Option<u32>,
-    /// What the reports need beside the units.
+    /// Further data for the reports.
     #[serde(default)]
     pub context: Value,
     /// All units.
@@ -38,10 +38,10 @@ pub struct Run {
 }
 
 impl Run {
-    /// As a file, one unit a line.
+    /// The text of the file, one unit per line.
     ///
     /// # Errors
-    /// None that a run could bring about; what the writer says.
+    /// Those of the serialiser; no run is known to cause one.
     pub fn to_text(&self) -> Result<String, serde_json::Error> {
         let mut head = serde_json::to_value(Run { units: Vec::new(), ..self.clone() })?;
         if let Value::Object(all) = &mut head {
@@ -52,10 +52,10 @@ impl Run {
         Ok(format!("{},\"units\":[\n{}\n]}}\n", head.strip_suffix('}').unwrap_or(&head), units.join(",\n")))
     }
 
-    /// From the bytes of a file.
+    /// Parses a file.
     ///
     /// # Errors
-    /// What is wrong with it, in words.
+    /// Invalid JSON or another schema.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, String> {
         let run: Self = serde_json::from_slice(bytes).map_err(|error| error.to_string())?;
         if run.schema != SCHEMA {

@@ -1,4 +1,4 @@
-//! Which share of a run does which unit.
+//! Assignment of units to the shares of a run.
 
 use std::str::FromStr;
 
@@ -6,9 +6,8 @@ use super::key::Fields;
 
 /// Share `number` of `of`, counted from 1.
 ///
-/// A unit's share follows from its name alone, by a hash of it and not by its place among the others: a file that is added or taken
-/// away while the jobs of a run are starting moves no other unit from one share to another, and every machine comes to
-/// the same answer without asking the others. The price is that shares are equal only on average.
+/// The share of a unit depends on a hash of its name alone, not on its position: adding or removing a file while jobs are starting moves
+/// no other unit to another share, and all machines agree without communication. Shares are therefore equal only on average.
 ///
 /// ```
 /// use truegrind::units::share::Share;
@@ -24,20 +23,19 @@ use super::key::Fields;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Share {
-    /// Which one, from 1.
+    /// Number, from 1.
     pub number: u32,
-    /// Of how many.
+    /// Number of shares.
     pub of: u32,
 }
 
 impl Share {
-    /// Whether the unit with this name is in the share. Names are those below the folder that was given, with `/` between
-    /// folders on every machine.
+    /// Whether the share contains the unit. `name`: path relative to the given folder, with `/` as separator on all platforms.
     pub fn has(&self, name: &str) -> bool {
         self.of > 0 && Self::of_name(name, self.of) == self.number
     }
 
-    /// The number of the share, of so many, that does the unit with this name.
+    /// Number of the share (of `of`) that contains the unit.
     pub fn of_name(name: &str, of: u32) -> u32 {
         let hash = Fields::new("truegrind.share/1").text(name).digest();
         let (first, _) = hash.split_at(8);

@@ -1,11 +1,11 @@
-//! The body of an arm and its motion over a time axis.
+//! Body of an arm and its motion over the time axis.
 //!
 //! **Method.** Every link is an entity inside the one before it, with the pose of its frame in the frame before as a
 //! column over time; its body is drawn once, in its own frame. In frame i the joint axis i and its origin do not move
 //! (T = Rz(θ) Tz(d) Tx(a) Rx(α) Ry(β): the inverse's translation does not contain θ), so a link is the cylinder along d
-//! and the capsule along a, and a disc around the joint axis. Girths follow from the length of the whole arm; data sheets
-//! have no shapes. Where a robot file names meshes, they are drawn instead, each in the frame that it moves with. Joint effects
-//! and growth turn and move the frames, not the bodies.
+//! and the capsule along a, and a disc around the joint axis. Radii are proportional to the
+//! length of the arm, since data sheets contain no shapes. Meshes named by a robot file are drawn instead, each in its link frame.
+//! Joint effects and thermal growth move the frames, not the bodies.
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use rerun::components::{Color, FillMode, RotationQuat, Translation3D};
@@ -18,15 +18,15 @@ use truegrind_arm::model::{Joints, Model, PreparedModel};
 use truegrind_math::se3::Pose;
 use truegrind_surfaces::Tessellation;
 
-/// Radius of each link over the length of the arm.
+/// Radius of each link, relative to the length of the arm.
 const GIRTH: [f64; 6] = [0.056, 0.046, 0.042, 0.034, 0.028, 0.022];
-/// Height and radius of the foot over the length of the arm.
+/// Height and radius of the foot, relative to the length of the arm.
 const FOOT: [f64; 2] = [0.05, 0.095];
-/// Thickness of the flange's disc over the length of the arm.
+/// Thickness of the flange, relative to the length of the arm.
 const FLANGE: f64 = 0.014;
-/// Radius of the tool's body over the length of the arm.
+/// Radius of the tool, relative to the length of the arm.
 const TOOL: f64 = 0.020;
-/// A link shorter than this part of the arm has no body of its own.
+/// Links shorter than this share of the arm have no body.
 const SHORT: f64 = 0.02;
 
 /// Colours of an arm.
@@ -38,35 +38,35 @@ pub(super) struct Paint {
 }
 
 impl Paint {
-    /// The arm in its own, neutral colours.
+    /// Neutral colours.
     pub(super) const SOLID: Paint =
         Paint { link: [205, 209, 215, 255], joint: [112, 120, 133, 255], tool: [150, 158, 170, 255] };
 
-    /// An arm of one colour.
+    /// A single colour.
     pub(super) fn of([r, g, b, _]: Rgba) -> Paint {
         let darker = |c: u8| (u16::from(c) * 7 / 10) as u8;
         let joint = [darker(r), darker(g), darker(b), 255];
         Paint { link: [r, g, b, 255], joint, tool: joint }
     }
 
-    /// A see-through arm of one colour.
+    /// A single transparent colour.
     pub(super) fn ghost([r, g, b, _]: Rgba) -> Paint {
         Paint { link: [r, g, b, 64], joint: [r, g, b, 90], tool: [r, g, b, 110] }
     }
 }
 
-/// A mesh that shows a part of an arm.
+/// A mesh of a link.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LinkMesh {
-    /// The frame that it moves with: 0 is the base, i the end of link i.
+    /// Its frame: 0 is the base, i the end of link i.
     pub frame: usize,
-    /// Where it lies in that frame.
+    /// Pose in that frame.
     pub pose: Pose,
-    /// Its triangles (mm), in its own axes.
+    /// Triangles (mm) in its own frame.
     pub triangles: Tessellation,
 }
 
-/// What all pictures of one arm have in common.
+/// Settings common to all drawings of an arm.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Figure<'a> {
     pub(super) model: &'a Model,
@@ -74,18 +74,18 @@ pub(super) struct Figure<'a> {
     pub(super) meshes: &'a [LinkMesh],
 }
 
-/// Where an arm stands at one time.
+/// State of an arm at one time.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Stand {
-    /// Time on the axis.
+    /// Time.
     pub(super) time: i64,
-    /// Controller joints.
+    /// Controller angles.
     pub(super) joints: Joints,
     /// The tool on the flange.
     pub(super) flange_from_tool: Pose,
 }
 
-/// Draws an arm below the entity `root`, standing where `stands` say, in the order of time.
+/// Draws an arm below the entity `root` at `stands`, in order of time.
 pub(super) fn draw(
     store: &mut Store,
     root: &str,
@@ -105,7 +105,7 @@ pub(super) struct Posed<'a> {
     pub(super) flange: Pose,
 }
 
-/// The same with frames that are known.
+/// Draws an arm with given frames.
 pub(super) fn draw_posed(
     store: &mut Store,
     root: &str,
@@ -139,7 +139,7 @@ pub(super) fn draw_posed(
         };
         cylinders(store, &format!("{path}/plate"), &[disc], paint.joint)?;
     }
-    // The tool: logged where it changes.
+    // The tool is logged when it changes.
     path = format!("{path}/tool");
     let mut last = None;
     let mut changes: Vec<Stand> = Vec::new();
@@ -154,7 +154,7 @@ pub(super) fn draw_posed(
     tool(store, &path, &first.flange_from_tool, length, paint)
 }
 
-/// Draws the meshes that move with a frame; whether there are any.
+/// Draws the meshes of a frame; returns whether there are any.
 fn shown(
     store: &mut Store,
     path: &str,
@@ -176,7 +176,7 @@ fn shown(
     Ok(!of_frame.is_empty())
 }
 
-/// All frames of the arm in its base: 0 is the base itself, i the end of link i.
+/// All frames in the base frame: 0 is the base, i the end of link i.
 pub(super) fn frames(arm: &PreparedModel<'_>, joints: &Joints) -> [Pose; 7] {
     let chain = arm.frames(joints);
     std::array::from_fn(|i| {
@@ -197,7 +197,7 @@ pub(super) fn length_mm(model: &Model) -> f64 {
     model.links.iter().map(|l| l.a_mm.abs() + l.d_mm.abs()).sum::<f64>().max(1.0)
 }
 
-/// Points that an arm at `joints` takes up with its bodies, for placing the eye.
+/// Points occupied by the arm at `joints`, to place the camera.
 pub(super) fn extent(arm: &PreparedModel<'_>, joints: &Joints, length: f64) -> Vec<Point3<f64>> {
     let girth = FOOT[1] * length;
     let around = |f: &Pose| {
@@ -207,7 +207,7 @@ pub(super) fn extent(arm: &PreparedModel<'_>, joints: &Joints, length: f64) -> V
     frames(arm, joints).iter().flat_map(around).flatten().collect()
 }
 
-/// A pose that changes.
+/// A time-dependent pose.
 pub(super) fn motion(
     store: &mut Store,
     path: &str,
@@ -222,7 +222,7 @@ pub(super) fn motion(
     store.over(path, (axis, times), columns)
 }
 
-/// A pose that does not change.
+/// A constant pose.
 pub(super) fn still(store: &mut Store, path: &str, pose: &Pose) -> Result<(), VisualError> {
     let placed = Transform3D::new()
         .with_translation(translation(&pose.translation.vector))
@@ -238,7 +238,7 @@ fn quaternion(q: &UnitQuaternion<f64>) -> RotationQuat {
     RotationQuat(rerun::Quaternion::from_xyzw(q.coords.map(|c| c as f32).into()))
 }
 
-/// A round bar between two points.
+/// A cylinder between two points.
 #[derive(Debug, Clone, Copy)]
 struct Cylinder {
     from: Vector3<f64>,
@@ -264,7 +264,7 @@ fn foot(store: &mut Store, root: &str, length: f64, paint: &Paint) -> Result<(),
     cylinders(store, &format!("{root}/foot"), &[plate], paint.joint)
 }
 
-/// The body of a link in its own frame; `own_from_previous` is the frame before it, seen from there.
+/// Body of a link in its own frame.
 fn body(
     store: &mut Store,
     path: &str,
@@ -283,7 +283,7 @@ fn body(
         .map(|(from, to)| Cylinder { from, to, radius })
         .filter(|bar| bar.length() > SHORT * length)
         .collect();
-    // The last link ends flat, at the flange.
+    // The last link ends flat at the flange.
     if link == 5 {
         cylinders(store, &format!("{path}/body"), &bars, paint.link)?;
     } else if !bars.is_empty() {
@@ -297,8 +297,7 @@ fn body(
         .with_fill_mode(FillMode::Solid);
         store.fixed(format!("{path}/body"), &capsules)?;
     }
-    // The disc of joint i lies around axis i, which passes through the origin of the frame before; the last joint's is
-    // the flange's plate.
+    // The disc of joint i is around axis i, through the origin of the previous frame; that of the last joint is the flange.
     if link < 5 {
         let half = axis * (1.15 * radius);
         let disc = Cylinder { from: start - half, to: start + half, radius: 1.12 * radius };
@@ -307,7 +306,7 @@ fn body(
     Ok(())
 }
 
-/// A spindle from the flange to the TCP, in the frame of the tool, and a ball at the TCP.
+/// A spindle from the flange to the TCP, in the tool frame, and a ball at the TCP.
 fn tool(
     store: &mut Store,
     path: &str,

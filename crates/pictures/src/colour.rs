@@ -1,8 +1,8 @@
-//! Colours of pictures: one map for sizes, a few hues for things.
+//! Colours: a map for sizes and a palette for objects.
 //!
-//! Sizes of deviations use viridis (S. van der Walt and N. Smith 2015, public domain): perceptually uniform and told
-//! apart by people who see red and green alike. Its darkest fifth is left out, so that the smallest deviations stay
-//! visible on the dark background of the viewer. Things use the palette of M. Okabe and K. Ito, 2008.
+//! Deviations use viridis (S. van der Walt and N. Smith 2015, public domain), perceptually uniform and suitable for colour-blind
+//! users, without its darkest fifth, which would be invisible on the dark background of the viewer. Objects use the palette of
+//! M. Okabe and K. Ito, 2008.
 
 /// Red, green, blue, opacity.
 pub type Rgba = [u8; 4];
@@ -27,17 +27,17 @@ const VIRIDIS: [[u8; 3]; 16] = [
     [0xfd, 0xe7, 0x25],
 ];
 
-/// Where the used part of viridis begins.
+/// Start of the used part of viridis.
 const FIRST: f64 = 0.2;
 
-/// How many colours a [`Scale`] tells apart.
+/// Number of colours of a [`Scale`].
 pub const STEPS: usize = 32;
 
-/// The program as it was: vermilion.
+/// The uncorrected program: vermilion.
 pub const BEFORE: Rgba = [0xd5, 0x5e, 0x00, 255];
-/// The arm as the data sheet has it, drawn see-through.
+/// The nominal arm, transparent.
 pub const GHOST: Rgba = [222, 228, 236, 255];
-/// The rewritten program under each model, in turn: sky blue, bluish green, orange, blue.
+/// The corrected program under each model: sky blue, bluish green, orange, blue.
 pub const AFTER: [Rgba; 4] =
     [[0x56, 0xb4, 0xe9, 255], [0x00, 0x9e, 0x73, 255], [0xe6, 0x9f, 0x00, 255], [0x00, 0x72, 0xb2, 255]];
 /// The six joints.
@@ -51,11 +51,11 @@ pub const JOINTS: [Rgba; 6] = [
 ];
 /// Points with a warning: yellow.
 pub const FLAGGED: Rgba = [0xf0, 0xe4, 0x42, 255];
-/// Points that were not rewritten: reddish purple.
+/// Points that were not corrected: reddish purple.
 pub const REFUSED: Rgba = [0xcc, 0x79, 0xa7, 255];
-/// What was intended.
+/// The intended path.
 pub const INTENDED: Rgba = [245, 245, 245, 255];
-/// Moves that do not cut.
+/// Moves without cutting.
 pub const TRAVEL: Rgba = [120, 128, 140, 255];
 /// Predicted standard deviation.
 pub const SIGMA: Rgba = [150, 156, 166, 255];
@@ -64,12 +64,12 @@ pub const TOOL: Rgba = [176, 186, 200, 255];
 /// The workpiece.
 pub const WORKPIECE: Rgba = [92, 100, 114, 255];
 
-/// The colour of the rewritten program under model `index`.
+/// Colour of the corrected program under model `index`.
 pub fn after(index: usize) -> Rgba {
     AFTER[index % AFTER.len()]
 }
 
-/// The map at `share` 0…1; outside it stays at its ends, and what is no number is grey.
+/// The map at `share`, clamped to 0…1; NaN is grey.
 pub fn map(share: f64) -> Rgba {
     if share.is_nan() {
         return TRAVEL;
@@ -84,15 +84,15 @@ pub fn map(share: f64) -> Rgba {
     [blend(0), blend(1), blend(2), 255]
 }
 
-/// Which colour means which deviation: zero to a round figure, in [`STEPS`] steps.
+/// Colour scale for deviations, from zero to a round number in [`STEPS`] steps.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scale {
-    /// The deviation at the upper end (mm).
+    /// Upper end (mm).
     pub top_mm: f64,
 }
 
 impl Scale {
-    /// The scale whose upper end is the next of 1, 2, 5 × 10ⁿ above all `sizes_mm`; of nothing, 1 mm.
+    /// Scale whose upper end is the next of 1, 2, 5 × 10ⁿ above all `sizes_mm`; 1 mm without sizes.
     pub fn over(sizes_mm: impl IntoIterator<Item = f64>) -> Self {
         let largest = sizes_mm.into_iter().filter(|s| s.is_finite()).fold(0.0, f64::max);
         Self { top_mm: if largest > 0.0 { round_up(largest) } else { 1.0 } }
@@ -108,21 +108,21 @@ impl Scale {
         map(step as f64 / (STEPS - 1) as f64)
     }
 
-    /// The colour of a deviation (mm); grey where it is no number.
+    /// Colour of a deviation (mm); NaN is grey.
     pub fn of(&self, size_mm: f64) -> Rgba {
         if size_mm.is_nan() { TRAVEL } else { self.colour(self.step(size_mm)) }
     }
 }
 
-/// The smallest of 1, 2, 2.5, 5 × 10ⁿ that is not below `value` > 0.
+/// The smallest of 1, 2, 2.5, 5 × 10ⁿ that is at least `value` > 0.
 pub(super) fn round_up(value: f64) -> f64 {
     let decade = 10f64.powf(value.log10().floor());
     let steps = [1.0, 2.0, 2.5, 5.0, 10.0];
-    // A hair of slack, so that 0.5 is not rounded to 1 for the last bit of a logarithm.
+    // Tolerance for rounding of the logarithm, so that 0.5 is not rounded up to 1.
     steps.iter().map(|s| s * decade).find(|s| *s >= value * (1.0 - 1e-9)).unwrap_or(10.0 * decade)
 }
 
-/// The largest of 1, 2, 5 × 10ⁿ that is not above `value`, and never below 1.
+/// The largest of 1, 2, 5 × 10ⁿ that is at most `value`, and at least 1.
 pub(super) fn round_down(value: f64) -> f64 {
     if !(value > 1.0) || !value.is_finite() {
         return 1.0;

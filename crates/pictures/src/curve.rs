@@ -6,9 +6,9 @@ use rerun::{Scalars, SeriesLines, SeriesPoints};
 use super::colour::Rgba;
 use super::recording::{Store, VisualError};
 
-/// From the lowest to the highest value, with room above for a legend of `names` lines; `None` of nothing.
+/// Range of the values, with space above for a legend of `names` lines; `None` without values.
 pub(super) fn range(values: impl IntoIterator<Item = f64>, names: usize) -> Option<[f64; 2]> {
-    /// Part of a plot's height that a line of the legend takes.
+    /// Height of a line of the legend, relative to the plot.
     const LINE: f64 = 0.09;
     let mut ends: Option<[f64; 2]> = None;
     for value in values.into_iter().filter(|v| v.is_finite()) {
@@ -21,7 +21,7 @@ pub(super) fn range(values: impl IntoIterator<Item = f64>, names: usize) -> Opti
     Some([low - 0.06 * span, high + span * room / (1.0 - room)])
 }
 
-/// How a curve is drawn.
+/// Style of a curve.
 #[derive(Clone, Copy)]
 pub(super) struct Pen<'a> {
     pub(super) name: &'a str,
@@ -29,7 +29,7 @@ pub(super) struct Pen<'a> {
     pub(super) width: f32,
 }
 
-/// A curve with its name and colour; nothing where it has no values.
+/// Draws a curve with name and colour, if it has values.
 pub(super) fn curve(
     store: &mut Store,
     path: &str,
@@ -62,7 +62,7 @@ fn values(
     store.over(path, (axis, &times), columns)
 }
 
-/// Points with their name, colour and shape; nothing where there are none.
+/// Draws points with name, colour and shape, if there are any.
 pub(super) fn points(
     store: &mut Store,
     path: &str,

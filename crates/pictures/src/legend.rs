@@ -1,4 +1,4 @@
-//! The bar that says which colour means how much.
+//! Colour bar.
 
 use rerun::components::{Color, Radius};
 use rerun::{LineStrips2D, Points2D};
@@ -7,7 +7,7 @@ use super::colour::{INTENDED, STEPS, Scale};
 use super::page::{Pane, View};
 use super::recording::{Store, VisualError};
 
-/// A bar of all colours over 0 to 100, with its figures (mm) below.
+/// A bar of all colours, with values (mm) below.
 pub(super) fn draw(store: &mut Store, scale: &Scale) -> Result<(), VisualError> {
     let edge = |step: usize| 100.0 * step as f32 / STEPS as f32;
     let bar = LineStrips2D::new((0..STEPS).map(|s| [[edge(s), 0.0], [edge(s + 1), 0.0]]))

@@ -1,23 +1,20 @@
-//! Pictures in three dimensions and over time, for the Rerun viewer.
+//! 3D recordings over time for the Rerun viewer.
 //!
-//! The only module that names `rerun`. It turns results into a [`Recording`], whose content is the
-//! bytes of an `.rrd` file, or goes to a viewer that is running. Nothing of Rerun shows in what this module takes and
-//! returns.
+//! The only crate that uses `rerun`, which does not appear in its API. It turns results into a [`Recording`], which is written as an
+//! `.rrd` file or sent to a running viewer.
 //!
-//! - [`path`]: an arm that runs a program, before and after it was rewritten;
-//! - [`measured`]: a measurement file, and the residuals of whatever was fitted to it.
+//! - [`path`]: an arm that runs a program, before and after correction;
+//! - [`measured`]: measurements, with the residuals of fitted models.
 //!
-//! **Units.** Lengths are mm, in space too: Rerun knows no unit, and programs and parts are drawn in mm. Angles are
-//! degrees. Every view says so in its name. The frame is the base of the arm, z up.
+//! **Units.** Lengths are mm, angles degrees; view names state them, since Rerun has no units. The frame is the robot base, z up.
 //!
-//! **Time.** There is one time axis, counted in points of the path ([`path::AXIS`]) or rows of the file
-//! ([`measured::AXIS`]); clock time is not recorded.
+//! **Time.** One time axis counts points of the path ([`path::AXIS`]) or rows of the file ([`measured::AXIS`]); clock time is not
+//! recorded.
 //!
-//! **Same input, same bytes.** Rerun's own recording stream numbers everything by the clock. [`recording`] numbers it
-//! by a counter instead and names the recording by its content, so the file of the same result is the same file.
+//! **Reproducibility.** The recording stream of Rerun derives its ids from the clock. [`recording`] uses a counter instead and names the
+//! recording by its content, so that the same result gives the same bytes.
 //!
-//! In reading order: [`colour`], [`recording`], `page` (the layout with which a recording opens), `legend`, `curve`,
-//! `markdown`, `arm` and `shape` (what pages are made of), [`path`], [`measured`].
+//! Modules: [`colour`], [`recording`], `page` (initial layout), `legend`, `curve`, `markdown`, `arm`, `shape`, [`path`], [`measured`].
 
 pub mod colour;
 pub mod recording;

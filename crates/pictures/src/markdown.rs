@@ -1,11 +1,11 @@
-//! Figures and foreign text in Markdown.
+//! Numbers and foreign text in Markdown.
 
-/// A figure in mm, or a dash where there is none.
+/// A value in mm, or a dash if missing.
 pub(super) fn number(value: Option<f64>) -> String {
     value.filter(|v| v.is_finite()).map_or_else(|| "–".to_owned(), |v| format!("{v:.3}"))
 }
 
-/// Text from outside as one line of Markdown.
+/// Foreign text as one escaped line of Markdown.
 pub(super) fn line(text: &str) -> String {
     let mut out = String::new();
     for c in text.chars() {
@@ -17,12 +17,12 @@ pub(super) fn line(text: &str) -> String {
     out
 }
 
-/// The same, in a table.
+/// Foreign text in a cell of a Markdown table.
 pub(super) fn cell(text: &str) -> String {
     line(text).replace('|', "\\|")
 }
 
-/// A value with its standard deviation, to two digits of that.
+/// A value with its standard deviation, with two digits of that.
 pub(super) fn with_sigma(value: f64, sigma: f64) -> String {
     if !(sigma > 0.0) || !sigma.is_finite() {
         return format!("{value:.4}");

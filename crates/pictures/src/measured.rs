@@ -1,16 +1,16 @@
-//! The picture of a measurement file: where the arm stood, what the sensor read, and what a fit leaves of it.
+//! Recording of measurements: poses of the arm, readings of the sensor, residuals of fits.
 //!
-//! | entity | what |
+//! | entity | content |
 //! |---|---|
 //! | `arm/at_row` | the arm at the logged joints, row by row |
-//! | `arm/nominal`, `arm/exaggerated` | the arm of the data sheet as a ghost, the real one with its differences exaggerated |
-//! | `touched` | the point that the sensor touches, at all rows, coloured by the size of the residual |
-//! | `read` | where a tracker saw it, at the row of the time axis |
-//! | `sensor/…` | outlets of cables and the cable of the row, or the tracker's frame and its ray |
-//! | `keep_out` | boxes that nothing shall enter |
+//! | `arm/nominal`, `arm/exaggerated` | the nominal arm, transparent; the real arm with exaggerated differences |
+//! | `touched` | the measured point at all rows, coloured by the size of the residual |
+//! | `read` | the position read by a tracker at the current row |
+//! | `sensor/…` | cable outlets and the current cable, or the tracker frame and its beam |
+//! | `keep_out` | forbidden boxes |
 //! | `set_aside` | rows that were set aside as outliers |
-//! | `residual/…` | residuals over the rows, before and after, and of rows that were held out |
-//! | `joints/…` | logged joint angles over the rows |
+//! | `residual/…` | residuals by row, before and after, and of held-out rows |
+//! | `joints/…` | logged joint angles by row |
 //! | `summary`, `legend` | errors, verdict, parameters with their standard deviations; the colours |
 
 mod scene;
@@ -42,16 +42,16 @@ pub use self::scene::{MeasuredScene, Residuals};
 /// The time axis: [`Row::number`].
 pub const AXIS: &str = "row";
 
-/// Rows that go by in a second when the file is played.
+/// Playback speed (rows per second).
 const ROWS_PER_SECOND: f64 = 4.0;
 
-/// Length of the axes of a tracker's frame over the length of the arm.
+/// Length of the axes of the tracker frame, relative to the length of the arm.
 const SENSOR_AXES: f64 = 0.12;
 
-/// The colour scale ends at this quantile of the residuals, so that one outlier does not make all others dark.
+/// The colour scale ends at this quantile of the residuals, so that outliers do not dominate it.
 const TOP_QUANTILE: f64 = 0.98;
 
-/// Draws a measurement file with what was identified from it.
+/// Recording of an identification.
 ///
 /// # Errors
 /// [`VisualError::Empty`] without rows.
@@ -93,7 +93,7 @@ pub fn dataset_recording(
     })
 }
 
-/// Draws a measurement file with what a diagnosis found: the residuals that data sheet, geometry and findings leave.
+/// Recording of a diagnosis, with the residuals of data sheet, geometry and extended model.
 ///
 /// # Errors
 /// [`VisualError::Empty`] without rows.
@@ -133,7 +133,7 @@ fn numbered(dataset: &Dataset, errors: Vec<f64>) -> Vec<(usize, f64)> {
     dataset.rows.iter().map(|r| r.number).zip(errors).collect()
 }
 
-/// Draws a measurement file.
+/// Recording of measurements.
 ///
 /// # Errors
 /// [`VisualError::Empty`] without rows.
@@ -176,7 +176,7 @@ pub fn measured_recording(scene: &MeasuredScene<'_>) -> Result<Recording, Visual
     Recording::new("truegrind measurements", &scene.dataset.file, store, page)
 }
 
-/// A quantile of the sizes of residuals; 0 of none.
+/// A quantile of the absolute residuals; 0 without residuals.
 fn quantile(residuals: Option<&Residuals>, share: f64) -> f64 {
     let mut sizes: Vec<f64> =
         residuals.iter().flat_map(|r| &r.rows).map(|(_, e)| e.abs()).filter(|e| e.is_finite()).collect();
@@ -185,7 +185,7 @@ fn quantile(residuals: Option<&Residuals>, share: f64) -> f64 {
     sizes.get((last as f64 * share).ceil() as usize).copied().unwrap_or(0.0)
 }
 
-/// All touched points, by the size of what the last stage leaves; rows that were set aside are marked.
+/// All measured points, coloured by the residual of the last stage; rows set aside are marked.
 fn cloud(
     store: &mut Store,
     scene: &MeasuredScene<'_>,
@@ -215,7 +215,7 @@ fn cloud(
     store.fixed("set_aside", &marks)
 }
 
-/// Boxes that nothing shall enter, as edges.
+/// Edges of the forbidden boxes.
 fn keep_out(store: &mut Store, scene: &MeasuredScene<'_>) -> Result<(), VisualError> {
     if scene.keep_out_mm.is_empty() {
         return Ok(());
@@ -232,7 +232,7 @@ fn keep_out(store: &mut Store, scene: &MeasuredScene<'_>) -> Result<(), VisualEr
     store.fixed("keep_out", &boxes)
 }
 
-/// Where the sensor stands, and what it reads at each row.
+/// The sensor and its reading at each row.
 fn sensor(store: &mut Store, scene: &MeasuredScene<'_>, touched: &[Point3<f64>]) -> Result<(), VisualError> {
     let Some(frames) = scene.frames else { return Ok(()) };
     let times: Vec<i64> = scene.dataset.rows.iter().map(|r| r.number as i64).collect();
@@ -265,7 +265,7 @@ fn sensor(store: &mut Store, scene: &MeasuredScene<'_>, touched: &[Point3<f64>])
         return store.fixed("sensor/cable", &style);
     }
     if scene.planned && frames.base_from_sensor == Pose::identity() {
-        // Where the tracker will stand is not stated.
+        // The position of the tracker is unknown.
         return Ok(());
     }
     let length = SENSOR_AXES * arm::length_mm(scene.arm);
@@ -344,7 +344,7 @@ fn layout(
         let at_sensor = Point3::from(frames.base_from_sensor.translation.vector);
         match scene.dataset.rows[0].reading {
             Reading::Cable(_) => seen.extend(frames.outlets_mm.iter().map(|o| Point3::from(*o))),
-            // A tracker stands metres away; it is in the picture, but the picture is not for it.
+            // A tracker is metres away, so the view is not fitted to it.
             Reading::Position(_) | Reading::Pose(_) if at_sensor.coords.norm() < 2000.0 => {
                 seen.push(at_sensor)
             }

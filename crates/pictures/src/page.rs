@@ -1,7 +1,7 @@
-//! The page with which a recording opens: views side by side, where the eye stands, the time panel.
+//! Initial layout of a recording: views, camera, time panel.
 //!
-//! Written straight into the blueprint store, since the builder of the SDK has no words for the eye, the legend of a plot
-//! or the range of an axis. Views and containers are numbered in the order in which they are written.
+//! Written directly into the blueprint store, since the builder of the SDK supports neither camera nor plot legends nor axis ranges.
+//! Views and containers are numbered in order.
 
 use nalgebra::{Point3, Vector3};
 use rerun::blueprint::components::{
@@ -23,23 +23,23 @@ use super::recording::{Store, VisualError};
 /// The time axis of blueprint stores.
 const BLUEPRINT: (&str, i64) = ("blueprint", 0);
 
-/// Behind everything in space: dark, but not so dark that the low end of the colour map is lost.
+/// Background: dark, but light enough for the low end of the colour map.
 const BACKGROUND: Rgba = [24, 27, 33, 255];
 const GRID: Rgba = [70, 76, 88, 120];
 
-/// A part of the page.
+/// A part of the layout.
 pub(super) enum Pane {
     /// One view.
     View(View),
-    /// Side by side, with the share of each.
+    /// Side by side, with shares.
     Row(Vec<(f32, Pane)>),
-    /// Above each other, with the share of each.
+    /// Stacked vertically, with shares.
     Column(Vec<(f32, Pane)>),
-    /// Behind each other; the first is in front.
+    /// Tabs; the first is active.
     Tabs(Vec<Pane>),
 }
 
-/// A view: its class, its name, which entities it shows, and what else is set.
+/// A view: class, name, entities and settings.
 pub(super) struct View {
     class: &'static str,
     name: String,
@@ -58,7 +58,7 @@ impl View {
         self
     }
 
-    /// Space, seen by `eye`. `shows` are Rerun's expressions, such as `+ /arm/**`.
+    /// A 3D view with camera `eye`. `shows`: entity expressions of Rerun, such as `+ /arm/**`.
     pub(super) fn space(name: impl Into<String>, shows: &[&str], eye: &Eye) -> Self {
         let point = |p: &Point3<f64>| Position3D::new(p.x as f32, p.y as f32, p.z as f32);
         Self::new("3D", name, shows)
@@ -76,7 +76,7 @@ impl View {
             .with("LineGrid3D", &LineGrid3D::new().with_color(Color::from(GRID)))
     }
 
-    /// A flat drawing over `x` and `y`, y downwards.
+    /// A 2D view over `x` and `y`, y downwards.
     pub(super) fn flat(name: impl Into<String>, shows: &[&str], x: [f64; 2], y: [f64; 2]) -> Self {
         let bounds =
             rerun::blueprint::components::VisualBounds2D(Range2D { x_range: x.into(), y_range: y.into() });
@@ -86,7 +86,7 @@ impl View {
         )
     }
 
-    /// Curves over the time axis; `range` of the values, where it is known, with room for the legend above them.
+    /// Curves over the time axis; `range` of the values, if known, including space for the legend.
     pub(super) fn curves(name: impl Into<String>, shows: &[&str], range: Option<[f64; 2]>) -> Self {
         let view = Self::new("TimeSeries", name, shows)
             .with("PlotLegend", &PlotLegend::new().with_corner(Corner2D::RightTop));
@@ -98,7 +98,7 @@ impl View {
         }
     }
 
-    /// A text.
+    /// A text view.
     pub(super) fn text(name: impl Into<String>, shows: &[&str]) -> Self {
         Self::new("TextDocument", name, shows).with(
             "TextDocumentFormat",
@@ -107,7 +107,7 @@ impl View {
     }
 }
 
-/// Where the eye stands and what it looks at.
+/// Camera position and target.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Eye {
     position_mm: Point3<f64>,
@@ -115,15 +115,15 @@ pub(super) struct Eye {
 }
 
 impl Eye {
-    /// The eye that sees all of `points` from `direction` (from them to the eye), in a view that is at least `wide` times as wide
-    /// as high; Rerun's eye sees some 55° from top to bottom. `closeness` 1 has them fill it from border to border.
+    /// The camera that sees all of `points` from `direction` (from the points to the camera), in a view with aspect ratio of at least
+    /// `wide`; the vertical field of view of Rerun is about 55°. With `closeness` 1 they fill the view.
     pub(super) fn on(points: &[Point3<f64>], direction: Vector3<f64>, wide: f64, closeness: f64) -> Self {
         let (low, high) = bounds(points);
         let middle = nalgebra::center(&low, &high);
         let back = direction.normalize();
         let side = Vector3::z().cross(&back).try_normalize(1e-6).unwrap_or_else(Vector3::x);
         let up = back.cross(&side);
-        // What is seen of the box that is as deep as it is: its middle over both borders.
+        // Apparent size of the box at its depth.
         let half = |axis: &Vector3<f64>| {
             let places = points.iter().map(|p| (p - middle).dot(axis));
             let (low, high) = places.fold((0.0f64, 0.0f64), |(low, high), v| (low.min(v), high.max(v)));
@@ -141,14 +141,13 @@ impl Eye {
     }
 }
 
-/// The smallest box along the axes around `points`; a point at the origin where there are none.
+/// Axis-aligned bounding box of `points`; the origin without points.
 pub(super) fn bounds(points: &[Point3<f64>]) -> (Point3<f64>, Point3<f64>) {
     let Some(first) = points.first() else { return (Point3::origin(), Point3::origin()) };
     points.iter().fold((*first, *first), |(low, high), p| (low.inf(p), high.sup(p)))
 }
 
-/// The page as a blueprint store. The time panel stands at the start of `axis`, at rest; `per_second` points or rows
-/// go by when it is played.
+/// The layout as a blueprint store, with the time panel paused at the start of `axis`; playback speed `per_second`.
 pub(super) fn page(root: Pane, axis: &str, per_second: f64) -> Result<Store, VisualError> {
     let mut writer = Writer { store: Store::default(), written: 0 };
     let root = match root {

@@ -1,26 +1,23 @@
-//! The picture of a path: the arm that runs the program, the part, and how far the tool is off.
+//! Recording of a path: the arm running the program, the workpiece, and the deviation of the tool.
 //!
-//! What is in it, by entity:
-//!
-//! | entity | what |
+//! | entity | content |
 //! |---|---|
-//! | `arm/nominal` | the arm as the data sheet has it, at the joints of the program as it was: a ghost |
-//! | `arm/exaggerated` | the real one at the same joints, its differences from that times a factor of their own |
-//! | `arm/after` | the real arm with the joints of the rewritten program |
-//! | `arm/before` | the same with the joints of the program as it was |
-//! | `workpiece` | the part, where its triangles are known |
-//! | `path/intended`, `path/travel` | where the tool shall cut, and how it moves between cuts |
-//! | `path/before`, `path/after/…` | where it goes, at true scale, coloured by the size of the deviation |
-//! | `exaggerated/…` | the same with deviations times the scale factor, before and after in colours of their own |
-//! | `tool_axes` | the direction in which the tool points, at some of the points |
-//! | `marks/flagged`, `marks/refused` | points with a warning, and points that were not rewritten |
-//! | `deviation/normal/…`, `deviation/size/…`, `deviation/angle/…` | curves over the path |
-//! | `joints/…` | what the joints of the rewritten program differ by |
-//! | `summary`, `legend` | the figures in words, and the colours |
+//! | `arm/nominal` | the nominal arm at the joints of the uncorrected program, transparent |
+//! | `arm/exaggerated` | the real arm at the same joints, with exaggerated differences |
+//! | `arm/after` | the real arm at the joints of the corrected program |
+//! | `arm/before` | the real arm at the joints of the uncorrected program |
+//! | `workpiece` | the workpiece, if its triangles are known |
+//! | `path/intended`, `path/travel` | intended path of the tool, and moves between cuts |
+//! | `path/before`, `path/after/…` | path of the tool to scale, coloured by the deviation |
+//! | `exaggerated/…` | the paths with exaggerated deviations |
+//! | `tool_axes` | direction of the tool at some points |
+//! | `marks/flagged`, `marks/refused` | flagged and refused points |
+//! | `deviation/normal/…`, `deviation/size/…`, `deviation/angle/…` | deviation along the path |
+//! | `joints/…` | change of the joints by the correction |
+//! | `summary`, `legend` | key figures, and colours |
 //!
-//! Drawn to scale, deviations of a millimetre vanish on a part of a hand's width. They are therefore drawn times a
-//! factor as well, the same for all, which every name and label states. The differences of the arm itself have a factor of their
-//! own, by which they show beside its length (`shape`).
+//! Deviations of a millimetre are invisible to scale, so they are also drawn exaggerated by a common factor, stated in names and
+//! labels. The differences of the arm itself have a separate factor (`shape`).
 
 mod scene;
 mod curves;
@@ -39,10 +36,10 @@ use truegrind_compensation::deviation::After;
 
 pub use self::scene::{AXIS, PathScene, Workpiece};
 
-/// Points that go by in a second when the path is played.
+/// Playback speed (points per second).
 const POINTS_PER_SECOND: f64 = 15.0;
 
-/// Draws a path.
+/// Recording of a path.
 ///
 /// # Errors
 /// [`VisualError::Empty`] without a single point.
@@ -78,7 +75,7 @@ fn layout(scene: &PathScene<'_>, plan: &Plan<'_>) -> Result<Store, VisualError> 
         part.extend(work.triangles.vertices_mm.iter().map(|v| work.base_from_object * v));
     }
     let (low, high) = bounds(&part);
-    // Seen from beyond the part, from above, a little from the side.
+    // View from beyond the workpiece, from above, slightly from the side.
     let middle = nalgebra::center(&low, &high);
     let out = Vector3::new(middle.x, middle.y, 0.0).try_normalize(1e-6).unwrap_or_else(Vector3::x);
     let side = Vector3::z().cross(&out);
@@ -119,7 +116,7 @@ fn layout(scene: &PathScene<'_>, plan: &Plan<'_>) -> Result<Store, VisualError> 
     };
     let mut tabs =
         vec![Pane::View(drawn), sized("Size before [mm]", &["+ /path/before/**", "+ /path/largest/before"])];
-    // What the solver leaves under its own model is nothing, and says nothing of the arm.
+    // The remainder under the correcting model is almost zero and does not predict the arm.
     if scene.reports.iter().any(|report| report.after == After::Achieved) {
         tabs.push(sized("Size after [mm]", &["+ /path/after/**", "+ /path/largest/after/**"]));
     }

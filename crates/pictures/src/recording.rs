@@ -1,8 +1,8 @@
-//! A recording: what an `.rrd` file holds, with numbers from a counter instead of a clock.
+//! Recordings: the content of an `.rrd` file, with ids from a counter instead of a clock.
 //!
-//! Rerun's stream stamps chunks, rows and stores with the time of day and random names. Chunks are therefore made here
-//! one by one: chunk k has the identifier (k, 0), its rows (k, 1), (k, 2), …; the store is named by the SHA-256 of
-//! its own content. The same result gives the same bytes, and two different results never merge in a viewer.
+//! The stream of Rerun uses clock time and random ids for chunks, rows and stores. Here chunk k has the id (k, 0) and its rows (k, 1),
+//! (k, 2), …; the store is named by the SHA-256 of its content. The same result gives the same bytes, and different results do not
+//! merge in a viewer.
 
 use std::path::Path;
 use std::time::Duration;
@@ -22,40 +22,40 @@ use rerun::{
 use sha2::{Digest, Sha256};
 use thiserror::Error;
 
-/// Where a Rerun viewer listens if nothing else is said.
+/// Default address of a Rerun viewer.
 pub const VIEWER: &str = rerun::DEFAULT_CONNECT_URL;
 
-/// How long a viewer may take to accept a recording.
+/// Timeout for a viewer to accept a recording.
 const PATIENCE: Duration = Duration::from_secs(10);
 
-/// Why there is no picture.
+/// Error of making or showing a recording.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum VisualError {
-    /// There is nothing to be drawn.
+    /// There is nothing to draw.
     #[error("there is nothing to draw: {0}")]
     Empty(&'static str),
-    /// Rerun refused the content.
+    /// Rerun rejected the content.
     #[error("the recording cannot be encoded: {0}")]
     Encoding(String),
-    /// The address of a viewer cannot be read.
+    /// Invalid address of a viewer.
     #[error("{url} is no address of a Rerun viewer ({problem}); expected one such as {VIEWER}")]
     Address {
-        /// What was given.
+        /// The address.
         url: String,
-        /// What is wrong with it.
+        /// The problem.
         problem: String,
     },
-    /// No viewer answers.
+    /// No viewer responds.
     #[error(
-        "no Rerun viewer takes the recording at {url} ({problem}); start one with `rerun`, or write an .rrd file"
+        "no Rerun viewer accepts the recording at {url} ({problem}); start one with `rerun`, or write an .rrd file"
     )]
     Viewer {
-        /// Where it was looked for.
+        /// The address.
         url: String,
-        /// What happened.
+        /// The problem.
         problem: String,
     },
-    /// The viewer's program cannot be started.
+    /// The viewer cannot be started.
     #[error(
         "the Rerun viewer cannot be started ({0}); install it with `pip install rerun-sdk` or \
          `cargo install rerun-cli`, so that `rerun` is on the path, or write an .rrd file"
@@ -63,7 +63,7 @@ pub enum VisualError {
     Start(String),
 }
 
-/// A finished picture. See the module page.
+/// A finished recording; see the module documentation.
 #[derive(Debug, Clone)]
 pub struct Recording {
     messages: Vec<LogMsg>,
@@ -78,7 +78,7 @@ impl Recording {
         encoded(&self.messages)
     }
 
-    /// Sends the recording to a viewer that is running at `url`, such as [`VIEWER`].
+    /// Sends the recording to the viewer at `url`, such as [`VIEWER`].
     ///
     /// # Errors
     /// [`VisualError::Address`] and [`VisualError::Viewer`].
@@ -91,7 +91,7 @@ impl Recording {
             .map_err(|e| VisualError::Viewer { url: url.to_owned(), problem: e.to_string() })
     }
 
-    /// Starts a viewer, or takes the one that runs at [`VIEWER`], and sends the recording to it.
+    /// Sends the recording to the viewer at [`VIEWER`], which is started if needed.
     ///
     /// # Errors
     /// [`VisualError::Start`] and [`VisualError::Viewer`].
@@ -102,7 +102,7 @@ impl Recording {
         self.connect(VIEWER)
     }
 
-    /// Opens an `.rrd` file in a viewer of its own.
+    /// Opens an `.rrd` file in a new viewer.
     ///
     /// # Errors
     /// [`VisualError::Start`].
@@ -116,7 +116,7 @@ impl Recording {
         rerun::spawn(&options).map(drop).map_err(|e| VisualError::Start(first_line(&e.to_string())))
     }
 
-    /// Puts content and page together. `application` keeps the layouts of different kinds of pages apart.
+    /// Combines content and layout. `application` separates the layouts of different kinds of recordings.
     pub(super) fn new(
         application: &'static str,
         name: &str,
@@ -133,13 +133,12 @@ impl Recording {
     }
 }
 
-/// Rerun's longer messages carry advice of their own.
+/// First line of an error; the longer messages of Rerun contain advice.
 fn first_line(message: &str) -> String {
     message.lines().next().unwrap_or_default().trim().to_owned()
 }
 
-/// Without the index that Rerun writes behind the messages: its order is that of a hash, and another in every run. A viewer
-/// makes its own.
+/// Removes the index that Rerun appends, whose order is that of a hash map and differs from run to run; viewers build their own.
 fn encoded(messages: &[LogMsg]) -> Result<Vec<u8>, VisualError> {
     let mut encoder = Encoder::local().map_err(encoding)?;
     encoder.do_not_emit_footer();
@@ -154,7 +153,7 @@ fn encoding(error: impl std::fmt::Display) -> VisualError {
     VisualError::Encoding(error.to_string())
 }
 
-/// Entities and what is known of them, in the order in which they were told.
+/// Logged entities, in order.
 #[derive(Debug, Default)]
 pub(super) struct Store {
     chunks: Vec<Chunk>,
@@ -181,7 +180,7 @@ impl Store {
         Ok(())
     }
 
-    /// Something that does not change.
+    /// Logs static data.
     pub(super) fn fixed(
         &mut self,
         path: impl Into<EntityPath>,
@@ -190,7 +189,7 @@ impl Store {
         self.row(path, TimePoint::default(), what.as_serialized_batches())
     }
 
-    /// Something that holds from one time on.
+    /// Logs data valid from a time on.
     pub(super) fn at(
         &mut self,
         path: impl Into<EntityPath>,
@@ -201,7 +200,7 @@ impl Store {
         self.row(path, TimePoint::default().with(axis, time), batches)
     }
 
-    /// Something that changes: one row of `columns` for each of `times`.
+    /// Logs time-dependent data: one row of `columns` for each of `times`.
     pub(super) fn over(
         &mut self,
         path: impl Into<EntityPath>,
@@ -220,7 +219,7 @@ impl Store {
         Ok(())
     }
 
-    /// The store as messages, the first of which names it.
+    /// The store as messages; the first one names it.
     fn messages(self, kind: StoreKind, application: &'static str) -> Result<Vec<LogMsg>, VisualError> {
         let name = |id: &str| StoreId::new(kind, application, id.to_owned());
         let said = |store: &StoreId| {
