@@ -1,4 +1,4 @@
-//! What every arm can do, whichever of the three it is: forward and inverse map.
+//! Forward and inverse kinematics, common to `Robot`, `Model` and `Arm`.
 
 use numpy::ndarray::ArrayView2;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
@@ -10,7 +10,7 @@ use crate::errors::{Kind, Refusal};
 use crate::model::PyModel;
 use crate::robot::{PyArm, PyRobot};
 
-/// An arm, with the arm whose closed form begins the search for joints and the condition that holds unless another is stated.
+/// An arm, the nominal arm whose closed-form inverse starts the search for joints, and the default condition.
 pub(crate) struct Acting<'a> {
     pub(crate) arm: &'a Model,
     pub(crate) nominal: &'a Model,
@@ -20,7 +20,7 @@ pub(crate) struct Acting<'a> {
 /// The arm of a `Robot`, `Model` or `Arm`.
 ///
 /// # Errors
-/// Where it is none of them.
+/// Any other type.
 pub(crate) fn acting<'a>(arm: &'a Bound<'_, PyAny>) -> PyResult<Acting<'a>> {
     if let Ok(robot) = arm.cast::<PyRobot>() {
         return Ok(robot.get().acting());
@@ -35,7 +35,7 @@ pub(crate) fn acting<'a>(arm: &'a Bound<'_, PyAny>) -> PyResult<Acting<'a>> {
     Err(Refusal::argument("arm", found, "a Robot, a Model or an Arm").into())
 }
 
-/// What a call says of the circumstances; what it does not say is the arm's own.
+/// Condition of a call; unstated values are those of the arm.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Stated {
     pub(crate) payload_kg: Option<f64>,
@@ -44,14 +44,14 @@ pub(crate) struct Stated {
     pub(crate) time_h: Option<f64>,
 }
 
-/// No robot carries more.
+/// Payloads above this are typing errors (kg).
 const LARGEST_PAYLOAD_KG: f64 = 3000.0;
 
 impl Stated {
-    /// The condition of a call. The centre of a payload is stated on the flange and kept in the last frame.
+    /// The condition of a call. The centre of mass is stated in the flange frame and stored in the last link frame.
     ///
     /// # Errors
-    /// A mass that nothing has.
+    /// A mass out of range.
     pub(crate) fn on(&self, arm: &Model, own: &Condition) -> Result<Condition, Refusal> {
         if let Some(kg) = self.payload_kg
             && !(0.0..=LARGEST_PAYLOAD_KG).contains(&kg)
@@ -144,7 +144,7 @@ pub(crate) fn inverse<'py>(
     arrays::named(py, Tuple::Solutions, (q_deg, reached, if one { None } else { Some(why) }))
 }
 
-/// Targets one after the other: each begins at the joints of the last that was reached.
+/// Solves targets in order, each starting at the joints of the last reached one.
 fn path(inverse: &Inverse<'_>, targets: &[Pose]) -> Vec<Result<Joints, InverseError>> {
     let found = inverse.solve_path(targets, &Joints::zeros());
     found.into_iter().map(|found| found.map(|found| found.joints)).collect()

@@ -1,4 +1,4 @@
-//! NumPy arrays in and out: joint angles by rows, positions and rotations, without a copy of the whole in between.
+//! Conversion of NumPy arrays: joint angles by rows, positions and rotations, without intermediate copies.
 
 use numpy::ndarray::{ArrayView2, ArrayViewD, Axis, Ix2};
 use numpy::{AllowTypeChange, PyArray2, PyArray3, PyArrayLikeDyn, PyArrayMethods};
@@ -10,13 +10,13 @@ use truegrind::{Condition, JointColumns, Joints, Model, Pose, PoseColumns};
 
 use crate::errors::Refusal;
 
-/// An array of numbers, or what NumPy makes one of.
+/// An array of numbers, or anything NumPy converts to one.
 pub(crate) type Numbers<'py> = PyArrayLikeDyn<'py, f64, AllowTypeChange>;
 
-/// Rows that one pass takes: joints, kernel and poses stay in the nearest caches.
+/// Rows per pass, so that joints, kernel and poses stay in cache.
 const BLOCK: usize = 512;
 
-/// From here on several threads take part.
+/// Number of rows from which several threads are used.
 const MANY: usize = 16 * BLOCK;
 
 /// The rows of an array of shape (N, `width`), or the one row of an array of shape (`width`,).
@@ -51,7 +51,7 @@ pub(crate) fn joints(q_deg: ArrayView2<'_, f64>, row: usize) -> Joints {
     Joints::from_fn(|j, _| q_deg[(row, j)].to_radians())
 }
 
-/// A place or several, as many as rows were given: shape (N, 3), or (3,) for one.
+/// One or more points: shape (N, 3), or (3,) for one.
 pub(crate) fn shaped<'py>(
     py: Python<'py>,
     array: Bound<'py, PyAny>,
@@ -137,7 +137,7 @@ fn all_rows(
 /// Positions (mm) and rotation matrices as poses.
 ///
 /// # Errors
-/// Where a matrix is no rotation, or the numbers of rows differ.
+/// A matrix is not a rotation, or the numbers of rows differ.
 pub(crate) fn poses(
     position_mm: ArrayView2<'_, f64>,
     rotation: ArrayViewD<'_, f64>,
@@ -156,7 +156,7 @@ pub(crate) fn poses(
         .map(|row| {
             let matrix = nalgebra::Matrix3::from_fn(|i, j| flat[[row, i, j]]);
             let off = (matrix * matrix.transpose() - nalgebra::Matrix3::identity()).amax();
-            // Not `>`: what is no number is no rotation either.
+            // Not `>`, so that NaN is refused too.
             if !(off <= 1e-6 && matrix.determinant() > 0.0) {
                 let found = format!("row {row}, {off:.1e} away from a rotation");
                 return Err(Refusal::argument("rotation", found, "right-handed rotation matrices"));
@@ -167,10 +167,10 @@ pub(crate) fn poses(
         .collect()
 }
 
-/// The named tuples of the package, looked up once.
+/// The named tuples of the package, cached.
 static TUPLES: PyOnceLock<[Py<PyAny>; 2]> = PyOnceLock::new();
 
-/// Which of them.
+/// Selects a named tuple.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Tuple {
     Poses,

@@ -1,4 +1,4 @@
-//! Measured rows, from files, arrays and data frames.
+//! Measurements from files, arrays and data frames.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -15,7 +15,7 @@ use crate::arrays::Numbers;
 use crate::errors::{Kind, Refusal};
 use crate::files;
 
-/// Measured poses: joint angles as logged, and what one sensor read.
+/// Measured poses: logged joint angles and the readings of one sensor.
 #[pyclass(name = "Dataset", module = "truegrind", frozen)]
 pub(crate) struct PyDataset {
     pub(crate) rows: Arc<Dataset>,
@@ -24,9 +24,9 @@ pub(crate) struct PyDataset {
 
 /// A column of a table.
 enum Column<'py> {
-    /// Numbers; what is no number is an empty cell where `gaps` are allowed.
+    /// Numbers; NaN is an empty cell if `gaps` are allowed.
     Numbers(Numbers<'py>, bool),
-    /// Texts, or nothing.
+    /// Texts or empty cells.
     Texts(Vec<Option<String>>),
 }
 
@@ -124,7 +124,7 @@ fn add<'py>(
 
 #[pymethods]
 impl PyDataset {
-    /// Reads a text table (comma, semicolon or tab) from a path, or from bytes.
+    /// Reads a text table (separated by comma, semicolon or tab) from a path or from bytes.
     #[staticmethod]
     #[pyo3(signature = (source, *, name = None, allow_odd_units = false))]
     fn from_csv(source: &Bound<'_, PyAny>, name: Option<String>, allow_odd_units: bool) -> PyResult<Self> {
@@ -132,7 +132,7 @@ impl PyDataset {
         read(source.py(), &name, &bytes, None, allow_odd_units)
     }
 
-    /// Reads a workbook from a path, or from bytes; without ``sheet`` the first sheet that has the columns.
+    /// Reads a workbook from a path or from bytes; by default the first sheet with the needed columns.
     #[staticmethod]
     #[pyo3(signature = (source, *, sheet = None, name = None, allow_odd_units = false))]
     fn from_xlsx(
@@ -145,10 +145,10 @@ impl PyDataset {
         read(source.py(), &name, &bytes, sheet, allow_odd_units)
     }
 
-    /// Rows from arrays: logged controller angles (°) of shape (N, 6), and one sensor: ``length_mm`` (N,) of a cable,
-    /// ``position_mm`` (N, 3) of a tracker, or with ``quaternion_wxyz`` (N, 4) a pose. What else is known of a row: the
-    /// controller's read-out ``readout_mm`` (N, 3), ``time_h``, ``temperature_c`` and ``payload_kg`` (N,), sides of approach
-    /// (N, 6) in −1, 0, 1, the number of the cable outlet ``anchor`` (N,), ``session`` labels. NaN means not known there.
+    /// Rows from arrays: logged controller angles (°) of shape (N, 6), and the readings of one sensor: ``length_mm`` (N,) of a
+    /// cable, ``position_mm`` (N, 3) of a tracker, or with ``quaternion_wxyz`` (N, 4) a pose. Optional: Cartesian readout of the
+    /// controller ``readout_mm`` (N, 3), ``time_h``, ``temperature_c`` and ``payload_kg`` (N,), approach directions (N, 6) in
+    /// −1, 0, 1, number of the cable outlet ``anchor`` (N,), ``session`` labels. NaN means unknown.
     #[staticmethod]
     #[pyo3(signature = (
         q_deg, *, length_mm = None, position_mm = None, quaternion_wxyz = None, readout_mm = None, time_h = None,
@@ -203,9 +203,9 @@ impl PyDataset {
         of_columns(py, name, columns, allow_odd_units)
     }
 
-    /// Rows from a data frame: anything with the interchange protocol ``__dataframe__`` (pandas, polars, pyarrow, …), or with
-    /// columns by name that NumPy reads. Columns are named as in files: q1 to q6 (°), L or measured_x, measured_y, measured_z
-    /// (mm), and so on; nulls are empty cells.
+    /// Rows from a data frame: anything with the interchange protocol ``__dataframe__`` (pandas, polars, pyarrow, …), or with named
+    /// columns that NumPy can convert. Columns are named as in files: q1 to q6 (°), L or measured_x, measured_y, measured_z (mm)
+    /// and so on; nulls are empty cells.
     #[staticmethod]
     #[pyo3(signature = (frame, *, name = "dataframe", allow_odd_units = false))]
     fn from_dataframe(frame: &Bound<'_, PyAny>, name: &str, allow_odd_units: bool) -> PyResult<Self> {
@@ -222,7 +222,7 @@ impl PyDataset {
         of_columns(py, name, columns, allow_odd_units)
     }
 
-    /// Name of the file, as reports print it.
+    /// File name as printed in reports.
     #[getter]
     fn file(&self) -> &str {
         &self.rows.file
@@ -234,7 +234,7 @@ impl PyDataset {
         truegrind::calibration::identification::identify::sensor_name(self.rows.sensor)
     }
 
-    /// What a reader should know: columns skipped, blank rows dropped.
+    /// Remarks: skipped columns, dropped blank rows.
     #[getter]
     fn notes(&self) -> Vec<String> {
         self.rows.notes.clone()
@@ -263,7 +263,7 @@ impl PyDataset {
             .then(|| PyArray1::from_iter(py, self.rows.rows.iter().map(|row| length(&row.reading))))
     }
 
-    /// Positions in the sensor's frame (mm), shape (N, 3); ``None`` for a cable.
+    /// Positions in the sensor frame (mm), shape (N, 3); ``None`` for a cable.
     #[getter]
     fn position_mm<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
         let place = |reading: &Reading| match reading {
@@ -300,8 +300,8 @@ fn read(
 }
 
 impl PyDataset {
-    /// The rows with the controller's angles of a robot, where their units fit it. `angles` is `"logged"`, `"dh"` or what the
-    /// robot file says.
+    /// The rows with controller angles, with units checked against the robot. `angles`: `"logged"`, `"dh"`, or by default that of the
+    /// robot file.
     pub(crate) fn of(&self, robot: &Robot, angles: Option<&str>) -> Result<Dataset, Refusal> {
         let convention = match angles {
             None => robot.sheet.joints.angles.into(),

@@ -1,5 +1,4 @@
-//! Errors of the library as exceptions: one small tree, with file, row, column, what was found and what was expected as
-//! attributes where they are known.
+//! Errors of the library as exceptions, with the attributes file, row, column, found and expected where known.
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -11,7 +10,7 @@ use truegrind::{
     RobotError, SolverError, TrackError, TrackStateError,
 };
 
-/// Which class of the tree.
+/// Exception class.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
     Argument,
@@ -47,7 +46,7 @@ impl Kind {
     }
 }
 
-/// Why something was refused, before Python hears of it.
+/// An error before it becomes a Python exception.
 #[derive(Debug)]
 pub(crate) struct Refusal {
     kind: Kind,
@@ -60,7 +59,7 @@ pub(crate) struct Refusal {
     expected: Option<String>,
 }
 
-/// How the command line names what is a keyword here.
+/// Command line options and the corresponding keywords.
 const KEYWORDS: [(&str, &str); 12] = [
     ("--allow-odd-units takes the file at its word", "allow_odd_units=True takes the rows at their word"),
     ("--allow-odd-units", "allow_odd_units=True"),
@@ -87,7 +86,7 @@ impl Refusal {
         Self { kind, message, file: None, sheet: None, row: None, column: None, found: None, expected: None }
     }
 
-    /// An argument that cannot be: what it is called, what was found, what was expected.
+    /// An invalid argument: its name, the found and the expected value.
     pub(crate) fn argument(name: &str, found: impl ToString, expected: &str) -> Self {
         let found = found.to_string();
         let told = Self::new(Kind::Argument, format!("{name}: found {found}; expected {expected}"));
@@ -223,7 +222,7 @@ impl From<IdentifyError> for Refusal {
     }
 }
 
-/// Errors that are told as they are.
+/// Errors whose message is used unchanged.
 macro_rules! told {
     ($($error:ty => $kind:ident),+ $(,)?) => {
         $(impl From<$error> for Refusal {

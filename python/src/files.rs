@@ -1,4 +1,4 @@
-//! Files, as Python reports them: what cannot be opened is an `OSError` with its name.
+//! File access; a file that cannot be opened is an `OSError` with its name.
 
 use std::fs::{self, OpenOptions};
 use std::io::{self, Write};
@@ -21,12 +21,12 @@ pub(crate) fn read_text(path: &Path, kind: Kind) -> PyResult<String> {
     })
 }
 
-/// What a file is called in messages and reports: the last part of its path.
+/// File name in messages and reports: the last part of its path.
 pub(crate) fn name(path: &Path) -> String {
     path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }
 
-/// Writes a file whole or not at all: beside its place, then by its name.
+/// Writes a file atomically: to a temporary file, then renamed.
 pub(crate) fn write(path: &Path, bytes: &[u8]) -> PyResult<()> {
     let beside = part_of(path);
     let written = || -> io::Result<()> {
@@ -48,7 +48,7 @@ fn part_of(path: &Path) -> PathBuf {
 fn failed(error: &io::Error, path: &Path) -> PyErr {
     let path = path.display().to_string();
     match error.raw_os_error() {
-        // Python takes the class from the number: FileNotFoundError, PermissionError and so on.
+        // Python selects the subclass by errno: FileNotFoundError, PermissionError and so on.
         Some(number) => {
             let text = error.to_string();
             let text = text.split(" (os error").next().unwrap_or_default().to_owned();

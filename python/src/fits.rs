@@ -1,4 +1,4 @@
-//! What measurements tell of an arm: identify and diagnose.
+//! Fits: identify and diagnose.
 
 use std::sync::Arc;
 
@@ -20,7 +20,7 @@ use crate::model::{PyModel, parameter};
 use crate::robot::robot;
 use crate::running::run;
 
-/// What an identification found.
+/// Result of an identification.
 #[pyclass(name = "Identification", module = "truegrind", frozen)]
 pub(crate) struct PyIdentification {
     found: Arc<Identification>,
@@ -41,43 +41,43 @@ impl PyIdentification {
         crate::model::word(self.found.estimated.verdict.status)
     }
 
-    /// Why, one sentence each.
+    /// Reasons for the verdict, one sentence each.
     #[getter]
     fn reasons(&self) -> Vec<String> {
         self.found.estimated.verdict.reasons.clone()
     }
 
-    /// RMS error on rows that the fit did not see (mm).
+    /// RMS error on held-out rows (mm).
     #[getter]
     fn held_out_rmse_mm(&self) -> f64 {
         self.found.estimated.geometry.held_out.rmse
     }
 
-    /// Largest error on rows that the fit did not see (mm).
+    /// Largest error on held-out rows (mm).
     #[getter]
     fn held_out_max_mm(&self) -> f64 {
         self.found.estimated.geometry.held_out.max
     }
 
-    /// RMS error on these rows with the data sheet's arm and a fitted sensor frame (mm).
+    /// RMS error on held-out rows of the nominal arm with a fitted sensor frame (mm).
     #[getter]
     fn held_out_rmse_before_mm(&self) -> f64 {
         self.found.estimated.registered.held_out.rmse
     }
 
-    /// What the sensor and the rounding leave (mm); ``None`` where it cannot be told.
+    /// Noise of sensor and rounding (mm); ``None`` if unknown.
     #[getter]
     fn noise_floor_mm(&self) -> Option<f64> {
         self.found.estimated.noise_floor_mm
     }
 
-    /// Everything that was free, of the measurement too: dictionaries with name, unit, nominal, value, sigma, determined.
+    /// All fitted parameters, including those of the sensor: dictionaries with name, unit, nominal, value, sigma, determined.
     #[getter]
     fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
         self.found.parameters.iter().map(|found| parameter(py, found)).collect()
     }
 
-    /// Errors of the rows that were held out (mm): row numbers, before and after, each of shape (n,).
+    /// Errors of the held-out rows (mm): row numbers, before and after, each of shape (n,).
     #[getter]
     fn held_out<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let rows = &self.found.held_out;
@@ -88,12 +88,12 @@ impl PyIdentification {
         Ok(out)
     }
 
-    /// Everything as JSON text, schema ``truegrind.identification/1``: the bytes that ``truegrind identify --json`` writes.
+    /// The full result as JSON text, schema ``truegrind.identification/1``: the bytes that ``truegrind identify --json`` writes.
     fn to_json(&self) -> PyResult<String> {
         crate::json(&identification::json(&self.found, &self.rows))
     }
 
-    /// The page, as HTML.
+    /// The report as HTML.
     fn to_html(&self) -> String {
         format::html::document(&identification::document(&self.found, &self.rows))
     }
@@ -114,9 +114,9 @@ impl PyIdentification {
     }
 }
 
-/// Fits an arm to measured poses. ``robot`` is a Robot, a name of ``truegrind.robots()`` or a robot file. ``held_out`` is the
-/// share of rows that the error is stated on; tolerances (mm, °) are the priors of links; ``angles`` is ``"logged"`` or ``"dh"``
-/// where the robot file does not say it. ``progress`` is called with each step. The result is the same for any number of threads.
+/// Fits an arm to measured poses. ``robot``: a Robot, a name from ``truegrind.robots()`` or a robot file. ``held_out``: share of rows
+/// held out to estimate the error. Tolerances (mm, °): prior σ of the links. ``angles``: ``"logged"`` or ``"dh"``, by default that of
+/// the robot file. ``progress`` is called with each step. The result does not depend on the number of threads.
 #[pyfunction]
 #[pyo3(
     name = "identify",
@@ -155,7 +155,7 @@ pub(crate) fn identify_(
             *place = positive(name, value)? * scale;
         }
     }
-    // As the command line has it: tolerances that are stated are taken as they are.
+    // As in the command line, stated tolerances are not estimated from the data.
     tolerance.zero_rad = tolerance.angle_rad;
     tolerance.learn_widths = tolerance_length_mm.is_none() && tolerance_angle_deg.is_none();
     for (name, limit) in [("limit_rmse_mm", limit_rmse_mm), ("limit_max_mm", limit_max_mm)] {
@@ -194,7 +194,7 @@ pub(crate) fn positive(name: &str, value: f64) -> Result<f64, Refusal> {
     Err(Refusal::argument(name, value, "a number above 0"))
 }
 
-/// What a diagnosis found.
+/// Result of a diagnosis.
 #[pyclass(name = "Diagnosis", module = "truegrind", frozen)]
 pub(crate) struct PyDiagnosis {
     found: Arc<Diagnosed>,
@@ -203,7 +203,7 @@ pub(crate) struct PyDiagnosis {
 
 #[pymethods]
 impl PyDiagnosis {
-    /// The arm with the causes that are certain, for programs.
+    /// The arm with the certain causes, for compensation.
     #[getter]
     fn model(&self) -> PyResult<PyModel> {
         Ok(PyModel::found(&self.found.estimated)?)
@@ -215,44 +215,44 @@ impl PyDiagnosis {
         crate::model::word(self.found.estimated.verdict.status)
     }
 
-    /// Why, one sentence each.
+    /// Reasons for the verdict, one sentence each.
     #[getter]
     fn reasons(&self) -> Vec<String> {
         self.found.estimated.verdict.reasons.clone()
     }
 
-    /// The causes, most weighty first: dictionaries as in the JSON.
+    /// The causes, largest first: dictionaries as in the JSON.
     #[getter]
     fn findings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let whole = py.import("json")?.call_method1("loads", (self.to_json()?,))?;
         whole.get_item("findings")
     }
 
-    /// RMS error on rows held out in turn, with geometry alone (mm).
+    /// Cross-validated RMS error with geometry alone (mm).
     #[getter]
     fn geometry_rmse_mm(&self) -> f64 {
         self.found.diagnosis.fits.geometric.cv_rmse_mm
     }
 
-    /// The same with all causes (mm).
+    /// Cross-validated RMS error with all causes (mm).
     #[getter]
     fn held_out_rmse_mm(&self) -> f64 {
         self.found.diagnosis.fits.extended.cv_rmse_mm
     }
 
-    /// What is left of structure that no cause explains, in a sentence; ``None`` where nothing is.
+    /// The unexplained structure as a sentence; ``None`` if there is none.
     #[getter]
     fn remaining(&self) -> Option<String> {
         self.found.diagnosis.remaining.clone()
     }
 
-    /// What a reader should know.
+    /// Remarks.
     #[getter]
     fn notes(&self) -> Vec<String> {
         self.found.diagnosis.notes.iter().chain(&self.rows.notes).cloned().collect()
     }
 
-    /// Everything as JSON text, schema ``truegrind.diagnosis/1``: the bytes that ``truegrind diagnose --json`` writes.
+    /// The full result as JSON text, schema ``truegrind.diagnosis/1``: the bytes that ``truegrind diagnose --json`` writes.
     fn to_json(&self) -> PyResult<String> {
         let counted = self.found.diagnosis.clone().with_rows_from_0(&self.rows);
         let value = serde_json::to_value(counted)
@@ -260,7 +260,7 @@ impl PyDiagnosis {
         crate::json(&value)
     }
 
-    /// The page, as HTML.
+    /// The report as HTML.
     fn to_html(&self) -> String {
         format::html::document(&diagnosis::document(&self.found, &self.rows))
     }
@@ -281,9 +281,9 @@ impl PyDiagnosis {
     }
 }
 
-/// Names the causes of what geometry does not explain. ``alpha`` is the chance of any false finding, ``most`` the most causes
-/// that are accepted, ``blocks`` the contiguous blocks that are held out in turn; ``also`` are further datasets of the same arm,
-/// on which the models are judged with only the frames refitted.
+/// Finds the causes of errors that geometry does not explain. ``alpha``: probability of any false finding. ``most``: largest number of
+/// causes. ``blocks``: number of contiguous blocks held out in turn. ``also``: further datasets of the same arm, on which the models are
+/// tested with only the frames refitted.
 #[pyfunction]
 #[pyo3(
     name = "diagnose",

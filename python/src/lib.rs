@@ -1,5 +1,4 @@
-//! truegrind as a Python module: arrays in, arrays out, results as objects. What is computed is the library's; here arguments are
-//! read, files are opened and exceptions are raised, as the command line does for its own users.
+//! truegrind as a Python module. It converts arguments, opens files and raises exceptions; all computation is in the library.
 
 mod arm;
 mod arrays;
@@ -23,13 +22,13 @@ pub(crate) fn json(value: &serde_json::Value) -> PyResult<String> {
     Ok(format::json::text(value).map_err(|error| Refusal::new(Kind::Defect, error))?)
 }
 
-/// A page in a frame of its own, so that it and the notebook keep their styles.
+/// A page in an iframe, so that its style and that of the notebook stay separate.
 pub(crate) fn framed(page: &str) -> String {
     let page = page.replace('&', "&amp;").replace('"', "&quot;");
     format!("<iframe srcdoc=\"{page}\" style=\"width:100%;height:36em;border:0\"></iframe>")
 }
 
-/// What the package is made of.
+/// The extension module.
 #[pymodule(gil_used = false)]
 mod _truegrind {
     #[pymodule_export]

@@ -1,4 +1,4 @@
-//! An estimated arm, and its file.
+//! Estimated arms and model files.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -16,13 +16,13 @@ use crate::errors::{Kind, Refusal};
 use crate::files;
 use crate::robot::PyArm;
 
-/// An estimated arm: the nominal one, everything that was identified, and how well it is known.
+/// An estimated arm: the nominal arm, everything identified, and its covariance.
 #[pyclass(name = "Model", module = "truegrind", frozen)]
 pub(crate) struct PyModel {
     pub(crate) arm: Arc<Estimated>,
     /// Name for reports.
     pub(crate) name: String,
-    /// Short hash of the file's bytes, which programs are marked with.
+    /// Short hash of the model file, written into corrected programs.
     pub(crate) hash: String,
 }
 
@@ -31,7 +31,7 @@ fn hash(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().take(6).map(|b| format!("{b:02x}")).collect()
 }
 
-/// A judgement as files write it.
+/// Verdict as written in files.
 pub(crate) fn word(status: Judgement) -> &'static str {
     match status {
         Judgement::Pass => "pass",
@@ -42,13 +42,13 @@ pub(crate) fn word(status: Judgement) -> &'static str {
 }
 
 impl PyModel {
-    /// A model that was just found.
+    /// A newly fitted model.
     pub(crate) fn found(arm: &Estimated) -> Result<Self, Refusal> {
         let text = arm.to_toml()?;
         Ok(Self { arm: Arc::new(arm.clone()), name: "model.toml".to_owned(), hash: hash(text.as_bytes()) })
     }
 
-    /// A model from the text of its file.
+    /// Parses a model file.
     fn read(text: &str, name: &str) -> Result<Self, Refusal> {
         let told = |error: &dyn std::fmt::Display| {
             let message = error.to_string();
@@ -70,7 +70,7 @@ impl PyModel {
         Acting { arm: &self.arm.model, nominal: &self.arm.nominal, condition: self.arm.condition }
     }
 
-    /// Programs are corrected with a doubtful model only where that is asked for.
+    /// Refuses a doubtful model unless allowed.
     pub(crate) fn allowed(&self, allow_doubtful: bool) -> Result<(), Refusal> {
         let verdict = &self.arm.verdict;
         let why = || verdict.reasons.join("; ");
@@ -93,7 +93,7 @@ impl PyModel {
     }
 }
 
-/// A model, or the file of one.
+/// A model or the path of a model file.
 pub(crate) fn named<'a>(model: &'a Bound<'_, PyAny>, kept: &'a mut Option<PyModel>) -> PyResult<&'a PyModel> {
     if let Ok(model) = model.cast::<PyModel>() {
         return Ok(model.get());
@@ -113,32 +113,32 @@ impl PyModel {
     /// Model(path)
     /// --
     ///
-    /// The model of a file.
+    /// Reads a model file.
     #[new]
     fn new(path: PathBuf) -> PyResult<Self> {
         load(&path)
     }
 
-    /// The model of a file.
+    /// Reads a model file.
     #[staticmethod]
     #[pyo3(name = "load")]
     fn load_(path: PathBuf) -> PyResult<Self> {
         load(&path)
     }
 
-    /// The model of a file's text; ``file`` is its name in messages and reports.
+    /// Parses the text of a model file; ``file``: its name in messages and reports.
     #[staticmethod]
     #[pyo3(signature = (text, file = "model.toml"))]
     fn from_toml(text: &str, file: &str) -> PyResult<Self> {
         Ok(Self::read(text, file)?)
     }
 
-    /// The text of the model's file.
+    /// The text of the model file.
     fn to_toml(&self) -> PyResult<String> {
         Ok(self.arm.to_toml().map_err(Refusal::from)?)
     }
 
-    /// Writes the model's file; a doubtful model only where that is asked for, one of a failed fit never.
+    /// Writes the model file; a doubtful model only if allowed, a failed one never.
     #[pyo3(signature = (path, *, allow_doubtful = false))]
     fn save(&self, path: PathBuf, allow_doubtful: bool) -> PyResult<()> {
         self.allowed(allow_doubtful)?;
@@ -157,38 +157,38 @@ impl PyModel {
         word(self.arm.verdict.status)
     }
 
-    /// Why, one sentence each.
+    /// Reasons for the verdict, one sentence each.
     #[getter]
     fn reasons(&self) -> Vec<String> {
         self.arm.verdict.reasons.clone()
     }
 
-    /// First twelve hex digits of the SHA-256 of the file that ``save`` writes or ``load`` read: corrected programs carry them.
+    /// First twelve hex digits of the SHA-256 of the model file; written into corrected programs.
     #[getter]
     fn hash(&self) -> &str {
         &self.hash
     }
 
-    /// RMS error on rows that the fit did not see (mm).
+    /// RMS error on held-out rows (mm).
     #[getter]
     fn held_out_rmse_mm(&self) -> f64 {
         self.arm.geometry.held_out.rmse
     }
 
-    /// The same with the data sheet's arm and a fitted sensor frame (mm).
+    /// RMS error on held-out rows of the nominal arm with a fitted sensor frame (mm).
     #[getter]
     fn held_out_rmse_before_mm(&self) -> f64 {
         self.arm.registered.held_out.rmse
     }
 
-    /// The arm that the controller computes with.
+    /// The nominal arm, used by the controller.
     #[getter]
     fn nominal(&self) -> PyArm {
         let name = format!("nominal {}", self.arm.robot);
         PyArm { name, model: self.arm.nominal.clone(), nominal: self.arm.nominal.clone() }
     }
 
-    /// What was identified: dictionaries with name, unit, nominal, value, sigma, determined.
+    /// Identified parameters: dictionaries with name, unit, nominal, value, sigma, determined.
     #[getter]
     fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
         self.arm.parameters.iter().map(|found| parameter(py, found)).collect()
@@ -209,8 +209,8 @@ impl PyModel {
     }
 
     /// Poses of the flange in the base for controller angles (°) of shape (N, 6) or (6,): ``Poses(position_mm, rotation)``.
-    /// Mass (kg) and its centre on the flange (mm), temperature (°C) and hours since it was switched on replace those that the
-    /// model was measured under.
+    /// Payload mass (kg) and its centre on the flange (mm), temperature (°C) and hours since power-on replace those of the
+    /// measurement.
     #[pyo3(signature = (q_deg, *, payload_kg = None, payload_centre_mm = None, temperature_c = None, time_h = None))]
     fn forward<'py>(
         &self,
@@ -225,7 +225,7 @@ impl PyModel {
         forward(py, &self.acting(), &q_deg, &stated)
     }
 
-    /// Controller angles (°) with which this arm reaches poses of its flange: ``Solutions(q_deg, reached, why)``.
+    /// Controller angles (°) at which this arm reaches poses of its flange: ``Solutions(q_deg, reached, why)``.
     #[pyo3(signature = (position_mm, rotation, near_deg = None))]
     fn inverse<'py>(
         &self,
@@ -258,7 +258,7 @@ impl PyModel {
         shaped(py, PyArray1::from_vec(py, sigmas).into_any(), one)
     }
 
-    /// Whether controller angles (°) of shape (N, 6) or (6,) lie where the arm was measured.
+    /// Whether controller angles (°) of shape (N, 6) or (6,) are in the measured region.
     fn measured_at<'py>(&self, py: Python<'py>, q_deg: Numbers<'py>) -> PyResult<Bound<'py, PyAny>> {
         let (q_deg, one) = rows("q_deg", q_deg.as_array(), 6)?;
         let inside: Vec<bool> = py.detach(|| {

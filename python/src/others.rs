@@ -1,4 +1,4 @@
-//! Measurements of a stated arm, which poses to measure, and an arm over its life.
+//! Simulation, measurement plans and tracking.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -27,7 +27,7 @@ use crate::programs::text;
 use crate::robot::{PyArm, from_name, robot};
 use crate::running::run;
 
-/// Measurements of an arm that is known in every detail.
+/// Simulated measurements.
 #[pyclass(name = "Simulation", module = "truegrind", frozen)]
 pub(crate) struct PySimulation {
     made: Simulation,
@@ -43,7 +43,7 @@ impl PySimulation {
         PyDataset { rows: self.rows.clone(), odd_units: false }
     }
 
-    /// The measurement file, with header.
+    /// The measurement file (CSV).
     #[getter]
     fn csv(&self) -> &str {
         &self.made.csv
@@ -64,8 +64,8 @@ impl PySimulation {
     }
 }
 
-/// Measurements of a stated "actual" arm, effects, noise and rounding included. ``recipe`` is a recipe file (TOML), or its text;
-/// ``seed`` replaces that of poses and noise.
+/// Simulates measurements of a given "actual" arm, with effects, noise and rounding. ``recipe``: a recipe file (TOML) or its text.
+/// ``seed``: seed of poses and noise, instead of that of the recipe.
 #[pyfunction]
 #[pyo3(signature = (recipe, *, seed = None, name = "simulated.csv"))]
 pub(crate) fn simulate(
@@ -89,7 +89,7 @@ pub(crate) fn simulate(
     })
 }
 
-/// Which poses to measure.
+/// A measurement plan.
 #[pyclass(name = "Plan", module = "truegrind", frozen)]
 pub(crate) struct PyPlan {
     plan: PosesPlan,
@@ -108,14 +108,14 @@ impl PyPlan {
 
 #[pymethods]
 impl PyPlan {
-    /// The poses in the order of measuring, one list for each column of the table.
+    /// The rows in measuring order, one list per column of the table.
     #[getter]
     fn poses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let csv = format::csv::table(&planning::table(&self.plan, &self.setup()));
         py.import("truegrind._results")?.call_method1("table", (csv,))
     }
 
-    /// The program that moves there (RAPID).
+    /// The RAPID program that moves to the poses.
     fn program(&self) -> PyResult<String> {
         let drive = ProgramSettings {
             robot: self.robot.sheet.name.clone(),
@@ -128,12 +128,12 @@ impl PyPlan {
         Ok(String::from_utf8_lossy(&bytes).into_owned())
     }
 
-    /// Everything as JSON text, schema ``truegrind.plan/1``: the bytes that ``truegrind plan --json`` writes.
+    /// The full result as JSON text, schema ``truegrind.plan/1``: the bytes that ``truegrind plan --json`` writes.
     fn to_json(&self) -> PyResult<String> {
         crate::json(&planning::json(&self.plan, &self.setup(), &self.robot.sheet.name))
     }
 
-    /// The page, as HTML.
+    /// The report as HTML.
     fn to_html(&self) -> String {
         format::html::document(&planning::document(&self.plan, &self.setup(), &self.robot.sheet.name))
     }
@@ -151,7 +151,7 @@ impl PyPlan {
     }
 }
 
-/// Where the sensor stands: x, y, z (mm), or x, y, z, qw, qx, qy, qz.
+/// Pose of the sensor: x, y, z (mm), or x, y, z, qw, qx, qy, qz.
 fn place(name: &str, numbers: &[f64]) -> Result<Pose, Refusal> {
     let expected = "x, y, z (mm), or x, y, z, qw, qx, qy, qz of a unit quaternion";
     let wrong = || Refusal::argument(name, format!("{numbers:?}"), expected);
@@ -168,8 +168,8 @@ fn place(name: &str, numbers: &[f64]) -> Result<Pose, Refusal> {
     }
 }
 
-/// Which poses to measure, as a program that moves there. ``sensor`` is ``"cable"``, ``"position"`` or ``"pose"``; a cable needs
-/// its ``outlets_mm`` in the base, a tracker may stand anywhere. ``touched_point`` is the hook or reflector on the flange.
+/// Chooses the poses to measure and makes a program that moves to them. ``sensor``: ``"cable"``, ``"position"`` or ``"pose"``. A cable
+/// needs its ``outlets_mm`` in the base; a tracker may stand anywhere. ``touched_point``: the hook or reflector on the flange.
 #[pyfunction]
 #[pyo3(
     name = "plan",
@@ -267,7 +267,7 @@ pub(crate) fn plan_(
     })
 }
 
-/// A model that is kept accurate as measurements come in.
+/// Result of tracking.
 #[pyclass(name = "Track", module = "truegrind", frozen)]
 pub(crate) struct PyTrack {
     tracker: Tracker,
@@ -277,37 +277,37 @@ pub(crate) struct PyTrack {
 
 #[pymethods]
 impl PyTrack {
-    /// The model as it stands now.
+    /// The current model.
     #[getter]
     fn model(&self) -> PyResult<PyModel> {
         Ok(PyModel::found(&self.tracker.model())?)
     }
 
-    /// Poses that were taken in, all together.
+    /// Number of processed poses.
     #[getter]
     fn poses(&self) -> usize {
         self.tracker.state().poses
     }
 
-    /// Alarms that these measurements raised: dictionaries as in the JSON.
+    /// Alarms raised by these measurements: dictionaries as in the JSON.
     #[getter]
     fn alarms<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let whole = py.import("json")?.call_method1("loads", (self.to_json()?,))?;
         whole.get_item("alarms")
     }
 
-    /// The state, from which ``track(..., state=...)`` goes on.
+    /// The state, for ``track(..., state=...)``.
     #[getter]
     fn state(&self) -> PyResult<String> {
         Ok(self.tracker.state().to_toml().map_err(Refusal::from)?)
     }
 
-    /// Everything as JSON text, schema ``truegrind.track/1``.
+    /// The full result as JSON text, schema ``truegrind.track/1``.
     fn to_json(&self) -> PyResult<String> {
         crate::json(&tracking::json(&self.tracker, self.fresh, &self.alarms))
     }
 
-    /// The page, as HTML.
+    /// The report as HTML.
     fn to_html(&self) -> String {
         format::html::document(&tracking::document(&self.tracker, self.fresh, &self.alarms, "the model"))
     }
@@ -327,8 +327,8 @@ impl PyTrack {
     }
 }
 
-/// Keeps a model accurate as measurements come in: takes in the rows of one dataset, or of several in their order. ``state`` is
-/// what an earlier track ended with; ``first_poses`` place the sensor before tracking begins.
+/// Updates a model with new measurements: one dataset, or several in order. ``state``: state of an earlier track. ``first_poses``: number
+/// of poses that locate the sensor before tracking begins.
 #[pyfunction]
 #[pyo3(
     name = "track",

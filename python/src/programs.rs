@@ -1,4 +1,4 @@
-//! Programs: corrected for an arm, and how far they are off on it.
+//! Compensation and deviation of programs.
 
 use std::path::{Path, PathBuf};
 
@@ -30,13 +30,13 @@ use crate::model::{PyModel, named};
 use crate::robot::PyArm;
 use crate::running::run;
 
-/// The files of one program, each by the name that reports print.
+/// The files of one program, with their names in reports.
 pub(crate) struct Sources {
     pub(crate) files: Vec<(String, Vec<u8>)>,
 }
 
 impl Sources {
-    /// The program as it is read; names without their folders, as on the controller.
+    /// The parsed program; file names without folders, as on the controller.
     fn task<'s>(&'s self, setup: &NcSetup) -> Program<'s> {
         let plain: Vec<(&str, &[u8])> =
             self.files.iter().map(|(name, bytes)| (last(name), bytes.as_slice())).collect();
@@ -78,7 +78,7 @@ pub(crate) fn sources(given: &Bound<'_, PyAny>) -> PyResult<Sources> {
     Ok(Sources { files: out })
 }
 
-/// A file; a task list stands for the modules beside it that it names.
+/// Reads a file; a task list is replaced by the modules that it names.
 fn read(given: &Bound<'_, PyAny>, out: &mut Vec<(String, Vec<u8>)>) -> PyResult<()> {
     let path: PathBuf = given.extract().map_err(|_| {
         Refusal::argument("program", given, "a path, a list of paths, or a dictionary of names and texts")
@@ -93,7 +93,7 @@ fn read(given: &Bound<'_, PyAny>, out: &mut Vec<(String, Vec<u8>)>) -> PyResult<
         let plain = module.replace('\\', "/");
         if plain.split('/').any(|part| part == "..") || Path::new(&plain).is_absolute() {
             let message = format!(
-                "{}: {module}: stands outside the folder of that list: give its path",
+                "{}: {module}: lies outside the folder of that task list: give its path",
                 path.display()
             );
             return Err(Refusal::new(Kind::Program, message).into());
@@ -104,7 +104,7 @@ fn read(given: &Bound<'_, PyAny>, out: &mut Vec<(String, Vec<u8>)>) -> PyResult<
     Ok(())
 }
 
-/// A text, or the file of one: what has a line end or `text:` in it is no path.
+/// A text or a path: a string with a line break or `text:` is a text.
 pub(crate) fn text(given: &Bound<'_, PyAny>, kind: Kind) -> PyResult<(String, Option<PathBuf>)> {
     if let Ok(text) = given.cast::<PyString>() {
         let text = text.to_str()?;
@@ -116,7 +116,7 @@ pub(crate) fn text(given: &Bound<'_, PyAny>, kind: Kind) -> PyResult<(String, Op
     Ok((files::read_text(&path, kind)?, Some(path)))
 }
 
-/// What is known of the cell.
+/// The cell.
 struct Place {
     cell: Cell,
     surface: Option<SurfaceFile>,
@@ -163,15 +163,15 @@ fn read_surface(path: &Path) -> PyResult<SurfaceFile> {
     Ok(read.map_err(|error| Refusal::new(Kind::Program, error).of_file(&name))?)
 }
 
-/// What the robot file says of NC programs; a robot that is not of the catalogue says nothing.
+/// Control settings of the robot file for NC programs; none for an unknown robot.
 fn nc_setup(cell: &Cell, robot: &str) -> NcSetup {
     setup(cell, robots::load(robot).ok().and_then(|robot| robot.sheet.orientation()))
 }
 
-/// Which files carry the mark of this model already.
+/// For each file, whether it carries the mark of this model.
 ///
 /// # Errors
-/// Where one carries the mark of another.
+/// A file carries the mark of another model.
 fn marked(listing: &Listing, sources: &Sources, hash: &str, again: bool) -> Result<Vec<bool>, Refusal> {
     let mut out = vec![false; sources.files.len()];
     for ((mark, (name, _)), marked) in listing.marks.iter().zip(&sources.files).zip(&mut out) {
@@ -190,7 +190,7 @@ fn marked(listing: &Listing, sources: &Sources, hash: &str, again: bool) -> Resu
     Ok(out)
 }
 
-/// A program, corrected.
+/// A corrected program.
 #[pyclass(name = "Compensation", module = "truegrind", frozen)]
 pub(crate) struct PyCompensation {
     sources: Sources,
@@ -226,7 +226,7 @@ impl PyCompensation {
         self.sources.files.iter().zip(&self.corrected).any(|((_, old), new)| old != new)
     }
 
-    /// Writes the corrected files into a folder, or the one file to a path. No original is overwritten.
+    /// Writes the corrected files to a folder, or a single file to a path. Originals are never overwritten.
     fn save(&self, path: PathBuf) -> PyResult<()> {
         let places: Vec<PathBuf> = match self.sources.files.as_slice() {
             [_] if !path.is_dir() => vec![path],
@@ -248,7 +248,7 @@ impl PyCompensation {
         places.iter().zip(&self.corrected).try_for_each(|(place, bytes)| files::write(place, bytes))
     }
 
-    /// What became of each motion: dictionaries as in the JSON.
+    /// Status of each motion: dictionaries as in the JSON.
     #[getter]
     fn motions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let whole = py.import("json")?.call_method1("loads", (self.to_json()?,))?;
@@ -261,7 +261,7 @@ impl PyCompensation {
         Ok(out.into_any())
     }
 
-    /// Numbers of motions by what became of them: changed, flagged, refused, left.
+    /// Number of motions by status: changed, flagged, refused, left.
     #[getter]
     fn counts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let out = PyDict::new(py);
@@ -276,18 +276,18 @@ impl PyCompensation {
         Ok(out)
     }
 
-    /// What was assumed of tools and work objects, and entries of the cell file that the program does not use.
+    /// Notes on tools and work objects, and on unused entries of the cell file.
     #[getter]
     fn notes(&self) -> Vec<String> {
         self.plan.notes.iter().chain(&self.unused).cloned().collect()
     }
 
-    /// Everything as JSON text, schema ``truegrind.compensation/1``: the bytes that ``truegrind compensate --dry-run --json`` writes.
+    /// The full result as JSON text, schema ``truegrind.compensation/1``: the bytes that ``truegrind compensate --dry-run --json`` writes.
     fn to_json(&self) -> PyResult<String> {
         crate::json(&view::json(&self.plan, &self.listing, &self.files()))
     }
 
-    /// The page, as HTML.
+    /// The report as HTML.
     fn to_html(&self) -> String {
         let reports = std::slice::from_ref(&self.report);
         format::html::document(&view::document(&self.plan, &self.listing, &self.files(), reports))
@@ -302,11 +302,11 @@ impl PyCompensation {
     }
 }
 
-/// Rewrites a program so that the estimated arm follows it. ``program`` is a path, a list of paths (modules of one task) or a
-/// dictionary of names and texts; ``cell`` a cell file or its text; ``surface`` the surface file that is ground. ``placement`` says
-/// whether the place of the path over each work object is corrected ("absolute"), its shape alone ("shape"), or the place only where
-/// the model knows it better than it is off ("auto"). A cut that the correction makes worse with a larger probability than
-/// ``max_risk`` stays as it is. Nothing is written: ``Compensation.save`` does.
+/// Corrects a program so that the real arm follows the intended path. ``program``: a path, a list of paths (modules of one task) or a
+/// dictionary of names and texts. ``cell``: a cell file or its text. ``surface``: a surface file. ``placement``: correct shape and place
+/// of the path in each work object ("absolute"), its shape alone ("shape"), or the place only where the model knows it better than it
+/// is off ("auto"). A cut is left unchanged if its correction makes it worse with a probability above ``max_risk``. Nothing is written;
+/// use ``Compensation.save``.
 #[pyfunction]
 #[pyo3(
     name = "compensate",
@@ -395,7 +395,7 @@ fn corrected(
     let setup = nc_setup(&cell, &arm.robot);
     let mut program = sources.task(&setup);
     let loads = own_loads.then(|| Loads::of(&program));
-    // Listed, a program needs its trees no more: they are larger than the file.
+    // The syntax trees are larger than the file and not needed once the motions are listed.
     program.forget_trees();
     let program = program;
     let listing = program.listing();
@@ -443,7 +443,7 @@ fn corrected(
     Ok(PyCompensation { sources, corrected, plan, listing, report, unused })
 }
 
-/// Nothing is corrected or judged with a cell or a program of another robot.
+/// Refuses a cell or a program of another robot.
 fn agreed(sources: &Sources, cell: &Cell, arm: &Estimated) -> Result<(), Refusal> {
     let (robot, nominal) = (&arm.robot, &arm.nominal);
     if let Some(fault) = cell_robot_mismatch(cell, robot, nominal) {
@@ -455,7 +455,7 @@ fn agreed(sources: &Sources, cell: &Cell, arm: &Estimated) -> Result<(), Refusal
     fault.map_or(Ok(()), |(name, fault)| Err(Refusal::new(Kind::Program, fault).of_file(name)))
 }
 
-/// How far a program is off on an arm.
+/// Deviation of a program on an arm.
 #[pyclass(name = "Deviation", module = "truegrind", frozen)]
 pub(crate) struct PyDeviation {
     reports: Vec<PathReport>,
@@ -463,7 +463,7 @@ pub(crate) struct PyDeviation {
 
 #[pymethods]
 impl PyDeviation {
-    /// The points of the path, one list for each column of the table (mm, °); ``None`` where a value is absent.
+    /// The points of the path, one list per column of the table (mm, °); ``None`` for missing values.
     #[getter]
     fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         py.import("truegrind._results")?.call_method1("table", (self.to_csv(),))
@@ -474,12 +474,12 @@ impl PyDeviation {
         format::csv::table(&deviations::whole_table(&self.reports))
     }
 
-    /// Everything as JSON text, schema ``truegrind.deviation/1``: the bytes that ``truegrind deviation --json`` writes.
+    /// The full result as JSON text, schema ``truegrind.deviation/1``: the bytes that ``truegrind deviation --json`` writes.
     fn to_json(&self) -> PyResult<String> {
         crate::json(&deviations::json(&self.reports))
     }
 
-    /// The page, as HTML.
+    /// The report as HTML.
     fn to_html(&self) -> String {
         format::html::document(&deviations::document(&self.reports))
     }
@@ -495,8 +495,8 @@ impl PyDeviation {
     }
 }
 
-/// How far a program is off under a model; nothing is rewritten. With ``intended``, the original program states what was meant,
-/// and ``program`` is what came of it. With ``actual`` (an ``Arm`` of a simulation) the programs are run on that arm.
+/// Deviation of a program under a model; nothing is rewritten. With ``intended``, the original program defines the intended path, and
+/// ``program`` is its corrected version. With ``actual`` (an ``Arm`` of a simulation) the programs are run on that arm.
 #[pyfunction]
 #[pyo3(
     name = "deviation",
@@ -531,7 +531,7 @@ pub(crate) fn deviation_(
     run(py, threads, progress, || task.judged(&place, payload_kg.is_none()))
 }
 
-/// A program that is run on an arm.
+/// A program run on an arm.
 struct Run<'a> {
     estimated: &'a PyModel,
     actual: Option<&'a PyArm>,

@@ -1,4 +1,4 @@
-//! Robots of the catalogue and of one's own, and arms that are known only as arms.
+//! Robots of the catalogue and from files, and arms without a data sheet.
 
 use std::path::PathBuf;
 
@@ -14,7 +14,7 @@ use crate::arrays::Numbers;
 use crate::errors::{Kind, Refusal};
 use crate::files;
 
-/// A robot arm as its data sheet has it: what its own controller computes with.
+/// A robot with its nominal arm from the data sheet.
 #[pyclass(name = "Robot", module = "truegrind", frozen)]
 pub(crate) struct PyRobot {
     pub(crate) robot: Robot,
@@ -27,10 +27,10 @@ impl PyRobot {
     }
 }
 
-/// A robot by name of the catalogue, by file, or as it is.
+/// A robot from a catalogue name, a file, or a `Robot`.
 ///
 /// # Errors
-/// `RobotError`, or `OSError` where a file cannot be opened.
+/// `RobotError`, or `OSError` if a file cannot be opened.
 pub(crate) fn robot(named: &Bound<'_, PyAny>) -> PyResult<Robot> {
     if let Ok(robot) = named.cast::<PyRobot>() {
         return Ok(robot.get().robot.clone());
@@ -41,7 +41,7 @@ pub(crate) fn robot(named: &Bound<'_, PyAny>) -> PyResult<Robot> {
     Ok(from_name(&path, &ImportOptions::default())?.0)
 }
 
-/// A robot by name of the catalogue, or by file, and what was understood of the file.
+/// A robot from a catalogue name or a file, with the interpretation of the file.
 pub(crate) fn from_name(path: &std::path::Path, choice: &ImportOptions) -> PyResult<(Robot, Vec<String>)> {
     let text = path.display().to_string();
     if FileKind::of(&text).is_some() || text.contains('/') || path.is_file() {
@@ -61,9 +61,9 @@ impl PyRobot {
     /// Robot(name)
     /// --
     ///
-    /// A robot by a name of ``truegrind.robots()``, or from a robot file: TOML, URDF, a table of link parameters (CSV), the
-    /// calibration of a Universal Robots arm (.conf, .yaml). Of a URDF ``base`` and ``tip`` are the links that stand and bear the
-    /// tool, where it does not say so; ``ground_joint_3``: the log counts joint 3 against the ground, as FANUC controllers do.
+    /// A robot by name (``truegrind.robots()``) or from a robot file: TOML, URDF, a table of link parameters (CSV), or the
+    /// calibration of a Universal Robots arm (.conf, .yaml). ``base`` and ``tip``: base and flange link of a URDF.
+    /// ``ground_joint_3``: the log states joint 3 relative to the ground, as FANUC controllers do.
     #[new]
     #[pyo3(signature = (name, *, base = None, tip = None, ground_joint_3 = false))]
     fn new(name: PathBuf, base: Option<String>, tip: Option<String>, ground_joint_3: bool) -> PyResult<Self> {
@@ -71,7 +71,7 @@ impl PyRobot {
         Ok(Self { robot, understood })
     }
 
-    /// The robot of a robot file's text; ``file`` is its name in messages.
+    /// Parses the text of a robot file; ``file``: its name in messages.
     #[staticmethod]
     #[pyo3(signature = (text, file = "robot.toml"))]
     fn from_toml(text: &str, file: &str) -> PyResult<Self> {
@@ -109,7 +109,7 @@ impl PyRobot {
         degrees(py, &self.robot.model.limits.max_rad)
     }
 
-    /// What was understood of the robot file, to be compared with the manual: zero pose, axes, flange; empty for the catalogue.
+    /// Interpretation of the robot file, to compare with the manual: zero pose, axes, flange; empty for the catalogue.
     #[getter]
     fn understood(&self) -> Vec<String> {
         self.understood.clone()
@@ -120,7 +120,7 @@ impl PyRobot {
         Ok(robots::to_toml(&self.robot).map_err(|error| Refusal::new(Kind::Robot, error))?)
     }
 
-    /// What is allowed in its data sheet and will hurt, one sentence each.
+    /// Reservations about its data sheet, one sentence each.
     #[getter]
     fn warnings(&self) -> Vec<String> {
         self.robot.warnings.clone()
@@ -148,7 +148,7 @@ impl PyRobot {
         crate::json(&view::json(&self.robot))
     }
 
-    /// The page of the robot, as HTML.
+    /// The report as HTML.
     fn to_html(&self) -> String {
         format::html::document(&view::document(&self.robot))
     }
@@ -182,15 +182,15 @@ impl PyArm {
 
 #[pymethods]
 impl PyArm {
-    /// What the arm is called.
+    /// Name of the arm.
     #[getter]
     fn name(&self) -> &str {
         &self.name
     }
 
     /// Poses of the flange in the base for controller angles (°) of shape (N, 6) or (6,): ``Poses(position_mm, rotation)``.
-    /// Mass (kg) and its centre on the flange (mm), temperature (°C) and hours since it was switched on count where the arm
-    /// yields to them.
+    /// Payload mass (kg) and its centre on the flange (mm), temperature (°C) and hours since power-on matter only for arms with
+    /// such effects.
     #[pyo3(signature = (q_deg, *, payload_kg = None, payload_centre_mm = None, temperature_c = None, time_h = None))]
     fn forward<'py>(
         &self,
@@ -228,7 +228,7 @@ impl PyArm {
     }
 }
 
-/// Names of the robots that ship.
+/// Names of the robots in the catalogue.
 #[pyfunction]
 #[pyo3(name = "robots")]
 pub(crate) fn catalogue() -> Vec<String> {
@@ -254,7 +254,7 @@ pub(crate) fn forward_of<'py>(
     forward(py, &acting(arm)?, &q_deg, &stated)
 }
 
-/// Controller angles (°) with which an arm reaches poses of its flange, as its method ``inverse``.
+/// Controller angles (°) at which an arm reaches poses of its flange, as its method ``inverse``.
 #[pyfunction]
 #[pyo3(name = "inverse", signature = (arm, position_mm, rotation, near_deg = None))]
 pub(crate) fn inverse_of<'py>(

@@ -1,4 +1,4 @@
-//! Long work beside the interpreter: without its lock, with Ctrl-C and with a word on where it stands.
+//! Long computations without the GIL, with Ctrl-C and progress.
 
 use std::any::Any;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
@@ -10,10 +10,10 @@ use truegrind::math::work::{Watch, run_watched};
 
 use crate::errors::{Kind, Refusal};
 
-/// How often the interpreter is asked whether Ctrl-C was pressed.
+/// Interval of the checks for Ctrl-C.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// More threads than any machine has processors only cost memory.
+/// More threads would only cost memory.
 const MOST_THREADS: usize = 1024;
 
 enum Event {
@@ -21,7 +21,7 @@ enum Event {
     Done,
 }
 
-/// Runs `work` on threads of its own. `progress` is called with each step; what it raises, and Ctrl-C, ends the work at its next
+/// Runs `work` on its own threads. `progress` is called with each step; an exception it raises, or Ctrl-C, ends the work at the next
 /// checkpoint and is raised here.
 pub(crate) fn run<T: Send>(
     py: Python<'_>,
@@ -84,7 +84,7 @@ fn next(receive: &Mutex<Receiver<Event>>) -> Result<Event, RecvTimeoutError> {
     receive.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(LOOK)
 }
 
-/// A panic is a defect of truegrind, and no fault of what it was given.
+/// Turns a panic into an exception that asks for a report.
 fn defect(payload: &(dyn Any + Send)) -> Refusal {
     let text = payload.downcast_ref::<&str>().map(|text| (*text).to_owned());
     let text = text.or_else(|| payload.downcast_ref::<String>().cloned());

@@ -150,7 +150,7 @@ def test_the_error_that_is_stated_is_that_of_the_file(run, tmp_path):
     data.write_text(rows.csv, encoding="utf-8")
     found = tg.diagnose(tg.Dataset.from_csv(DATA / "irb120-tracker.csv"), "abb-irb-120", threads=1)
     text = exported(run, tmp_path, found.model, "urdf", "--data", data)
-    stated = re.search(r"which the model was not fitted to\), only the sensor's frame fitted: ([0-9.]+) mm RMS", text)
+    stated = re.search(r"to which the model was not fitted\), only the sensor frame fitted: ([0-9.]+) mm RMS", text)
     assert stated, text
     place, rotation = Urdf(text).forward(np.radians(rows.dataset.q_deg))
     measured = rows.dataset.position_mm

@@ -61,7 +61,7 @@ def test_what_cannot_be_done_says_why(plant):
     command = _jobs.compensating(["in/broken.pgf"], "arm.toml", "out", None, {})
     (units,) = _jobs.chunks(_jobs.listed(command), 7)
     _jobs.do(command, units)
-    with pytest.raises(tg.TruegrindError, match=r"none of 1 programs could be done(.|\n)*nowhere\.mod"):
+    with pytest.raises(tg.TruegrindError, match=r"none of 1 programs could be processed(.|\n)*nowhere\.mod"):
         _jobs.gathered(command, {})
 
 

@@ -490,10 +490,10 @@ fn stated_frames_that_make_no_sense_are_refused() {
         (vec!["--sensor-frame", "1,2,3"], "cable lengths"),
         (vec!["--outlet", "1,2,3"], "--cable-zero"),
         (vec!["--outlet", "1,2", "--cable-zero", "3"], "2 numbers"),
-        (vec!["--outlet", "1,2,x", "--cable-zero", "3"], "`x` is no number"),
-        (vec!["--outlet", "1,2,NaN", "--cable-zero", "3"], "no number"),
-        (vec!["--outlet", "1,2,3", "--outlet", "1,2,3", "--cable-zero", "3"], "stated 2 times"),
-        (vec!["--touched-point", "1,2,3"], "says nothing"),
+        (vec!["--outlet", "1,2,x", "--cable-zero", "3"], "`x` is not a number"),
+        (vec!["--outlet", "1,2,NaN", "--cable-zero", "3"], "not a number"),
+        (vec!["--outlet", "1,2,3", "--outlet", "1,2,3", "--cable-zero", "3"], "given 2 times"),
+        (vec!["--touched-point", "1,2,3"], "--touched-point needs --sensor-frame"),
         (vec!["--outlet", "1,2,3", "--cable-zero", "3", "--touched-point", "0,0,0,1,1,0,0"], "length 1.414"),
     ] {
         let all = [&["identify", "data.csv", "--robot", "abb-irb-120"], stated.as_slice()].concat();

@@ -31,10 +31,10 @@ fn a_model_is_accepted_by_poses_of_its_own() {
     };
     let page = ["1", "--serial", "arm=120-503211", "--html", "page.html", "--json", "page.json"];
     let (code, out, err) = accept("later.csv", &page);
-    assert!(code == 0 && out.contains("[ok] Accepted: the largest error is 0."), "{out}{err}");
+    assert!(code == 0 && out.contains("[ok] Accepted: largest error 0."), "{out}{err}");
     let html = fs::read_to_string(at.join("page.html")).unwrap();
     assert!(html.contains("120-503211") && html.contains("<svg"));
-    assert!(html.contains("30 cycles at 5 poses are asked for, at most 1 of one pose were measured"));
+    assert!(html.contains("30 cycles at 5 poses are required, at most 1 were measured at one pose"));
     let json: serde_json::Value = serde_json::from_slice(&fs::read(at.join("page.json")).unwrap()).unwrap();
     assert_eq!(json["schema"], "truegrind.acceptance/1");
     assert!(json["iso_9283"].is_null());
@@ -127,7 +127,7 @@ fn the_orientation_is_told_and_judged_where_that_is_asked_for() {
     let half = format!("{}", 0.5 * largest);
     let tight = ["--tolerance-angle", &half, "--sensor-uncertainty-angle", "0.0001", "--json", "page.json"];
     let (code, out, _) = accept("later.csv", &tight);
-    assert!(code == 1 && on_one_line(&out).contains("[failed] Not accepted: the largest turn is"), "{out}");
+    assert!(code == 1 && on_one_line(&out).contains("[failed] Not accepted: largest orientation error"), "{out}");
     assert_eq!(json()["decision"], "not accepted");
     // Positions alone.
     let places: String = fs::read_to_string(at.join("later.csv"))
@@ -142,7 +142,7 @@ fn the_orientation_is_told_and_judged_where_that_is_asked_for() {
         "{out}{err}"
     );
     let (code, out, _) = accept("places.csv", &["--tolerance-angle", "1"]);
-    let headline = "[not evaluated] Not evaluated: a tolerance of the orientation was stated, and the sensor saw no orientation";
+    let headline = "[not evaluated] Not evaluated: a tolerance of the orientation was stated, but the sensor does not measure it";
     assert!(code == 1 && on_one_line(&out).contains(headline), "{out}");
 }
 
@@ -195,7 +195,7 @@ fn a_measured_path_is_evaluated() {
     table(4, 10);
     let (code, out, _, found) = accept();
     assert!(
-        code == 0 && out.contains("not evaluated: 10 cycles are asked for (path edge: 4 cycles"),
+        code == 0 && out.contains("not evaluated: 10 cycles are required (path edge: 4 cycles"),
         "{out}"
     );
     assert!(out.contains("largest deviation of the path") && found["iso_9283_paths"][0]["at_mm"].is_null());

@@ -30,7 +30,7 @@ fn a_panic_ends_one_unit_and_not_the_others() {
                 let text = format!("{error:#}");
                 assert!(
                     unit == 42
-                        && text.contains("defect of truegrind")
+                        && text.contains("internal error of truegrind")
                         && text.contains("unit 42 is at fault"),
                     "{text}"
                 );

@@ -132,7 +132,7 @@ fn brief_records_make_every_report_but_one() {
     }
     let (code, _, err) = truegrind(at, &["gather", "real", "--json", "all.json"]);
     // What could not be done has no entries, and is complete.
-    assert!(code == 2 && err.contains("7 of 8 are not done") && !at.join("all.json").exists(), "{err}");
+    assert!(code == 2 && err.contains("7 of 8 units are missing") && !at.join("all.json").exists(), "{err}");
     let (code, _, err) = truegrind(at, &with(&COMPENSATE, &["--resume", "--json", "some.json"]));
     assert!(code < 2, "{err}");
     gathered_like(one.path(), &expected, at, "real", &[]);
@@ -327,7 +327,7 @@ fn a_run_that_was_killed_goes_on_with_the_rest() {
     assert!((10..68).contains(&before.len()), "{}", before.len());
     // What is not there is said by name.
     let (code, _, err) = truegrind(at, &["gather", "real"]);
-    assert!(code == 2 && err.contains(&format!("{} of 68 are not done", 68 - before.len())), "{err}");
+    assert!(code == 2 && err.contains(&format!("{} of 68 units are missing", 68 - before.len())), "{err}");
     let (code, _, err) = truegrind(at, &job);
     assert!(code < 2, "{err}");
     let after = records(at, "real");
@@ -351,7 +351,7 @@ fn what_is_missing_is_listed_by_share_and_name() {
     assert!(code == 0 && !at.join("real/straight.mod").exists(), "{err}");
     let (code, _, err) = truegrind(at, &["gather", "real"]);
     assert!(
-        code == 2 && err.contains("8 of 8 are not done") && err.contains("in/line 1/circles.mod"),
+        code == 2 && err.contains("8 of 8 units are missing") && err.contains("in/line 1/circles.mod"),
         "{err}"
     );
     let (code, _, err) = truegrind(at, &with(&COMPENSATE, &["--shard", "1/2", "--resume"]));
@@ -424,7 +424,7 @@ fn whatever_changes_what_comes_out_reuses_nothing_stale() {
     // An output changes: it alone is done again.
     fs::write(at.join("real/latin.mod"), "edited").unwrap();
     let (code, _, err) = truegrind(at, &["gather", "real"]);
-    assert!(code == 2 && err.contains("not as it was written: real/latin.mod"), "{err}");
+    assert!(code == 2 && err.contains("outputs changed after they were written: real/latin.mod"), "{err}");
     job(&[]);
     assert!(fs::read(at.join("real/latin.mod")).unwrap().starts_with(b"! Schl\xe4uche"));
     let (code, _, err) = truegrind(at, &["gather", "real"]);
@@ -484,7 +484,7 @@ fn a_unit_that_always_kills_its_worker_is_listed_and_takes_no_other_along() {
         .map(|line| line.split(',').next().unwrap())
         .collect();
     assert_eq!(failed, BTreeSet::from(["in/broken.pgf", "in/copy002big.mod"]), "{table}");
-    assert!(table.contains("whoever did it died, 3 times"), "{table}");
+    assert!(table.contains("processing it crashed 3 times"), "{table}");
     // It is not tried again, unless that is asked for.
     let (code, _, err) = truegrind(at, &job);
     assert!(code == 1, "{err}");

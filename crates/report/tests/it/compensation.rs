@@ -201,17 +201,17 @@ fn coverage_counts_and_never_rounds_to_all_or_nothing() {
 fn verdict_and_page_tell_what_to_look_at() {
     let (mut plan, listing, files) = example();
     let text = terminal::document(&view::summary(&plan, &listing, &files), 200);
-    assert!(text.contains("[warning] Rewritten, but look at what was refused or flagged"), "{text}");
+    assert!(text.contains("[warning] Corrected, but check the refused and flagged motions"), "{text}");
     assert!(text.contains("the path has a step of the size of the correction"), "{text}");
-    assert!(text.contains("2 targets put in"), "{text}");
+    assert!(text.contains("2 targets inserted"), "{text}");
     assert!(text.contains("- tool disc: origin not stated"), "{text}");
     assert!(text.contains("written to out/grind.mod"), "{text}");
     let page = leave("compensation.html", &view::document(&plan, &listing, &files, &[]));
-    assert!(page.contains(">Motions</h2>") && page.contains(">What could not be read</h2>"));
+    assert!(page.contains(">Motions</h2>") && page.contains(">Regions that could not be read</h2>"));
     for (status, sentence) in [
-        (Status::Changed, "[ok] Everything that can be rewritten is rewritten"),
-        (Status::Left, "[not evaluated] Nothing was rewritten"),
-        (Status::Refused, "[failed] Nothing could be rewritten"),
+        (Status::Changed, "[ok] All correctable motions are corrected"),
+        (Status::Left, "[not evaluated] Nothing was corrected"),
+        (Status::Refused, "[failed] Nothing could be corrected"),
     ] {
         plan.outcomes.iter_mut().for_each(|outcome| outcome.status = status);
         let text = terminal::document(&view::summary(&plan, &listing, &files), 200);

@@ -218,7 +218,7 @@ fn without_a_surface_nothing_is_signed() {
     assert!(table.rows.iter().all(|row| row[10] == Cell::Missing && row[15] == Cell::Missing));
     assert!(table.notes.join(" ").contains("No surface is given"));
     let block = view::block_table(&[three(false)]);
-    assert!(block.notes[0].contains("have no sign"), "{}", block.notes[0]);
+    assert!(block.notes[0].contains("deviations are unsigned"), "{}", block.notes[0]);
     assert!(view::short_table(&three(false)).columns.iter().all(|column| !column.key.contains("normal")));
 }
 
@@ -314,7 +314,7 @@ fn pages_of_one_model_of_several_and_of_nothing() {
     let one = view::document(&[raster("model.toml", After::PredictedRemainder, 2e-4)]);
     let text = leave("deviation-one.html", &one);
     assert_eq!(text.matches("<figure>").count(), 3);
-    assert!(text.contains("16 points flagged: rewritten with a warning"), "one count per point");
+    assert!(text.contains("16 points flagged: corrected with a warning"), "one count per point");
     assert!(!text.contains("NaN"));
     let several = view::document(&[
         raster("lm", After::Achieved, 0.12),
@@ -323,7 +323,7 @@ fn pages_of_one_model_of_several_and_of_nothing() {
     ]);
     let text = leave("deviation-several.html", &several);
     // The best and the worst by name: a range without names says nothing.
-    assert!(text.contains("mm under ltlm at best") && text.contains("mm under lm-as-printed at worst"));
+    assert!(text.contains("mm under ltlm, worst") && text.contains("mm under lm-as-printed ("));
     assert_eq!(text.matches("<figure>").count(), 4);
     assert_eq!(
         several,
@@ -335,7 +335,7 @@ fn pages_of_one_model_of_several_and_of_nothing() {
     );
     // A program of which no point is known, and no program at all.
     let empty = markdown::document(&view::document(&[report("m", Vec::new())]));
-    assert!(empty.contains("not known"), "{empty}");
+    assert!(empty.contains("unknown"), "{empty}");
     assert!(markdown::document(&view::document(&[])).contains("No program has a path"));
 }
 
@@ -344,10 +344,10 @@ fn a_correction_smaller_than_its_sigma_is_called_so() {
     let mut unsure = raster("m", After::PredictedRemainder, 1e-4);
     unsure.points.iter_mut().for_each(|point| (point.status, point.reason) = (Status::Changed, None));
     let page = |report: &PathReport| terminal::document(&view::document(std::slice::from_ref(report)), 200);
-    assert!(page(&unsure).contains("[ok] The largest deviation goes from"));
+    assert!(page(&unsure).contains("[ok] Largest deviation"));
     unsure.points.iter_mut().for_each(|point| point.sigma_mm = Some(4.0));
     let text = page(&unsure);
-    assert!(text.contains("[warning] The largest deviation goes from"), "{text}");
+    assert!(text.contains("[warning] Largest deviation"), "{text}");
     assert!(text.contains("predicted 1σ of 4.000 mm exceeds the deviation that it corrects"), "{text}");
 }
 
@@ -358,7 +358,7 @@ fn a_correction_that_makes_it_worse_is_called_so() {
     worse.points[0].after = Some(deviation([0.0, 0.0, 3.0], true));
     let text = terminal::document(&view::document(&[worse]), 200);
     assert!(
-        text.contains("[failed] The largest deviation goes from 1.200 mm to 3.000 mm (achieved)"),
+        text.contains("[failed] Largest deviation 1.200 mm before, 3.000 mm after (achieved)"),
         "{text}"
     );
 }

@@ -46,7 +46,7 @@ fn the_arm_with_most_to_gain_comes_first() {
     // What is certain comes before what is larger and not.
     assert!(lines[3].contains("joint-compliance,joint 2,0.5,"), "{text}");
     let page = markdown::document(&document(&rows));
-    assert!(page.contains("worn.csv comes first: 1.800 mm to gain; 2 of 4 arms"), "{page}");
+    assert!(page.contains("Largest gain: worn.csv with 1.800 mm; 2 of 4 arms"), "{page}");
     assert!(page.find("lost.csv").unwrap() < page.find("quiet.csv").unwrap(), "{page}");
     let causes = csv::table(&cause_table(&rows));
     assert!(causes.contains("backlash,2,1,0.9,\"worn.csv, joint 2\""), "{causes}");

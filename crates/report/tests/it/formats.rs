@@ -276,7 +276,7 @@ fn an_excerpt_says_what_it_leaves_out() {
     let shown: Vec<&Cell> = excerpt.rows.iter().map(|row| &row[0]).collect();
     let count = |i| Cell::Count(i);
     assert_eq!(shown, [&count(0), &count(1), &count(2), &count(3), &"⋮".into(), &count(98), &count(99)]);
-    assert_eq!(excerpt.notes, ["94 of 100 rows are left out here, between the first 4 and the last 2."]);
+    assert_eq!(excerpt.notes, ["94 of 100 rows, between the first 4 and the last 2, are omitted here."]);
     assert_eq!(table.excerpt(100), table);
 }
 
@@ -412,7 +412,7 @@ fn the_note_of_a_key_figure_stays_within_the_terminal() {
     let mut document = Document::new("Page");
     document.push(vec![
         KeyFigure::new("Programs before", 0.66, 3, "mm")
-            .note("expected RMS deviation in the measured region"),
+            .note("expected RMS inside the measured region"),
         KeyFigure::new("After", 0.05, 3, "mm"),
     ]);
     let text = terminal::document(&document, 48);

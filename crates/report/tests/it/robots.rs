@@ -132,6 +132,6 @@ fn a_users_sheet_without_sources_shows_dashes_and_warns() {
     let sources = view::source_table(&robot);
     assert!(sources.rows.iter().all(|row| row[1] == Cell::Missing));
     let page = terminal::document(&view::document(&robot), 100);
-    assert!(page.contains("[warning] The sheet can be used, with reservations"), "{page}");
+    assert!(page.contains("[warning] The robot file can be used with reservations"), "{page}");
     assert!(page.contains("No masses are stated"), "{page}");
 }
