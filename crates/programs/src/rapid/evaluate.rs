@@ -1,24 +1,22 @@
-//! What an expression is worth, as far as the text tells it.
+//! Constant evaluation of expressions.
 //!
-//! Method: constants are folded in double precision; data that nothing in the given files changes has its initial
-//! value; data that is assigned has what the flow of straight-line statements gave it ([`Known`]), else its initial
-//! value without the components that anything assigns. Target functions
-//! follow the RAPID reference: `Offs` adds in the object frame and keeps the orientation; `RelTool` moves along the
-//! axes of the target's tool frame and then turns about its x, the new y and the new z. A function of the program that does
-//! nothing but return an expression is worth that expression. Everything else is [`Value::Unknown`] with its reason.
+//! Method: constants are folded in double precision. Data that no file writes has its initial value; data that is written has
+//! the value that constant propagation found ([`Known`]), else its initial value without the components that are written
+//! anywhere. Target functions follow the RAPID reference: `Offs` adds in the object frame and keeps the orientation; `RelTool`
+//! moves along the axes of the target's tool frame and then rotates about its x, the new y and the new z. A function of the
+//! program whose only statement is RETURN is evaluated inline. Everything else is [`Value::Unknown`] with its reason.
 //!
-//! Stops: what a declaration is worth is worked out once; chains of declarations and of functions have a greatest
-//! length, values that refer to each other a greatest size.
+//! Termination: the value of a declaration is computed once; chains of declarations and of functions have a greatest length,
+//! values that refer to each other a greatest size.
 //!
 //! Departure: a controller computes `num` in single precision.
 
 mod functions;
+mod operators;
 mod types;
 
 use std::cell::{Cell, RefCell};
 use std::collections::HashMap;
-
-use nalgebra::Vector3;
 
 use self::functions::{Options, call};
 use super::literal;
@@ -33,7 +31,7 @@ use crate::motion::{Reason, Span, TargetValue};
 use crate::shared::Map;
 use crate::tree::Child;
 
-/// What the statements so far gave to data that the program assigns.
+/// Known values of written data, by symbol (constant propagation).
 pub type Known = Map<u32, Value>;
 
 /// Longest chain of constants that refer to constants.
@@ -45,14 +43,14 @@ const REFERENCE_SIZE: usize = 1 << 16;
 /// Most functions of the program that one expression may call.
 const FUNCTIONS: u32 = 256;
 
-/// Where an expression stands.
+/// Where an expression is evaluated.
 #[derive(Debug, Clone, Copy)]
 pub struct Context<'k> {
     /// The file.
     pub file: u32,
     /// The scope.
     pub scope: u32,
-    /// What is known of assigned data.
+    /// Known values of written data.
     pub known: &'k Known,
     depth: u32,
 }
@@ -64,7 +62,7 @@ impl<'k> Context<'k> {
     }
 }
 
-/// Where a target's numbers come from, before declarations have their place in the listing.
+/// Where a target's numbers are written, before declarations are indexed in the listing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Source {
     /// The literal in the instruction.
@@ -79,7 +77,7 @@ pub enum Source {
     Unknown,
 }
 
-/// The place of an element by its index, from 1: the controller counts in single precision.
+/// Zero-based index of an array element; the controller rounds the index in single precision.
 pub(super) fn index_of(position: f64) -> Option<usize> {
     let index = f64::from(position as f32).round();
     (index >= 1.0).then(|| index as usize - 1)
@@ -90,16 +88,16 @@ pub(super) fn index_of(position: f64) -> Option<usize> {
 pub struct Evaluator<'a, 's> {
     /// The files.
     pub trees: &'a [RapidTree<'s>],
-    /// Their names.
+    /// Their symbol table.
     pub symbols: &'a Symbols,
     elements: RefCell<HashMap<(u32, u32), Vec<Child>>>,
-    /// What declarations are worth that refer to others.
+    /// Values of declarations that refer to others.
     initial: RefCell<HashMap<u32, Value>>,
     /// Functions of the program that the current expression has called.
     functions: Cell<u32>,
-    /// Whether a function of the program was given what is not known: it may fail where the function never asks for it.
-    doubtful: Cell<bool>,
-    /// What is known where a declaration stands.
+    /// Whether a function of the program got an unknown argument, whose evaluation may raise an error even if it is not used.
+    may_raise: Cell<bool>,
+    /// Nothing is known at a declaration.
     nothing: Known,
 }
 
@@ -112,7 +110,7 @@ impl<'a, 's> Evaluator<'a, 's> {
             elements: RefCell::default(),
             initial: RefCell::default(),
             functions: Cell::new(0),
-            doubtful: Cell::new(false),
+            may_raise: Cell::new(false),
             nothing: Known::new(),
         }
     }
@@ -121,13 +119,13 @@ impl<'a, 's> Evaluator<'a, 's> {
         &self.trees[file as usize]
     }
 
-    /// Whether the target that was asked for last is worth what it is only as long as nothing fails: a function of the program
-    /// was given what is not known, and did not look at it.
-    pub fn was_doubtful(&self) -> bool {
-        self.doubtful.get()
+    /// Whether the value of the last target holds only if no error is raised: a function of the program got an unknown
+    /// argument that it does not use.
+    pub fn may_raise(&self) -> bool {
+        self.may_raise.get()
     }
 
-    /// A target argument: its value and where its numbers stand.
+    /// Value of a target argument, and where its numbers are written.
     pub fn target(
         &self,
         context: Context<'_>,
@@ -135,7 +133,7 @@ impl<'a, 's> Evaluator<'a, 's> {
         joints: bool,
     ) -> (Result<TargetValue, Reason>, Source) {
         let tree = self.tree(context.file);
-        self.doubtful.set(false);
+        self.may_raise.set(false);
         match argument {
             Child::Node(node) if tree.nodes[node as usize].kind == Syntax::Aggregate => {
                 if let Some(value) = literal_target(tree.node_text(node), joints) {
@@ -205,7 +203,7 @@ impl<'a, 's> Evaluator<'a, 's> {
         (value, source)
     }
 
-    /// `name{i, …}` of an array that nothing assigns.
+    /// `name{i, …}` of an array that is never written.
     fn element_target(
         &self,
         context: Context<'_>,
@@ -232,7 +230,7 @@ impl<'a, 's> Evaluator<'a, 's> {
         let (first, end) = tokens_of(self.tree(file), element);
         let value = match literal_target(text, joints) {
             Some(value) => value,
-            None => self.value(self.at(context, symbol.scope, file), element).target(joints),
+            None => self.value(self.declaration_context(context, symbol.scope, file), element).target(joints),
         };
         let source = match value {
             Ok(_) => Source::Element(root, self.tree(file).span(first, end)),
@@ -262,12 +260,12 @@ impl<'a, 's> Evaluator<'a, 's> {
         Ok((symbol.file, at))
     }
 
-    /// The same context at a declaration elsewhere: nothing assigned is known there.
-    fn at(&self, context: Context<'_>, scope: u32, file: u32) -> Context<'_> {
+    /// The context of a declaration, where no assignment is known.
+    fn declaration_context(&self, context: Context<'_>, scope: u32, file: u32) -> Context<'_> {
         Context { file, scope, known: &self.nothing, depth: context.depth + 1 }
     }
 
-    /// What data or a parameter is worth.
+    /// Value of data or a parameter.
     pub fn symbol_value(&self, context: Context<'_>, id: u32) -> Value {
         if let Some(value) = context.known.get(&id) {
             return value.clone();
@@ -284,15 +282,20 @@ impl<'a, 's> Evaluator<'a, 's> {
             }
             SymbolKind::Data(data) => match data.value {
                 Some(initial) if context.depth < REFERENCE_DEPTH => {
-                    let mut value = self.declared(context, id, initial);
+                    let mut value = self.declared_value(context, id, initial);
                     for part in &symbol.written_parts {
-                        self.hide(&mut value, (symbol.scope, &symbol.type_name), part, symbol.unknown_reason);
+                        self.make_unknown(
+                            &mut value,
+                            (symbol.scope, &symbol.type_name),
+                            part,
+                            symbol.unknown_reason,
+                        );
                     }
                     value
                 }
                 Some(_) => Value::Unknown(Reason::WrongShape),
                 None if symbol.assigned => Value::Unknown(symbol.unknown_reason),
-                None if self.is_zero(symbol, data) => Value::Number(0.0),
+                None if self.starts_at_zero(symbol, data) => Value::Number(0.0),
                 None => Value::Unknown(Reason::Uninitialised),
             },
             SymbolKind::Loop => Value::Unknown(Reason::Assigned),
@@ -301,21 +304,21 @@ impl<'a, 's> Evaluator<'a, 's> {
         }
     }
 
-    /// Whether data begin as zero, and nothing outside the files given can change them: a number of a routine.
-    fn is_zero(&self, symbol: &Symbol, data: &Data) -> bool {
+    /// Whether uninitialised data is 0: a number declared in a routine, which no other file can write.
+    fn starts_at_zero(&self, symbol: &Symbol, data: &Data) -> bool {
         let of_routine = self.symbols.module_scope(symbol.scope) != symbol.scope;
         let number = matches!(&*symbol.type_name, b"num" | b"dnum") && data.dimensions.is_none();
         of_routine && number && data.storage == Token::Var
     }
 
-    /// Makes the component at a path of names unknown.
-    fn hide(&self, value: &mut Value, (scope, type_name): (u32, &[u8]), path: &[u8], reason: Reason) {
+    /// Makes the component at a path unknown.
+    fn make_unknown(&self, value: &mut Value, (scope, type_name): (u32, &[u8]), path: &[u8], reason: Reason) {
         let mut names = path.splitn(2, |&byte| byte == b'.');
         let (Some(name), rest) = (names.next(), names.next()) else { return };
         let found = self.component(scope, type_name, name);
         match (found, &mut *value) {
             (Some((index, type_name)), Value::List(list)) if index < list.len() => match rest {
-                Some(rest) => self.hide(&mut list[index], (scope, &type_name), rest, reason),
+                Some(rest) => self.make_unknown(&mut list[index], (scope, &type_name), rest, reason),
                 None => list[index] = Value::Unknown(reason),
             },
             (_, Value::Unknown(_)) => {}
@@ -323,20 +326,20 @@ impl<'a, 's> Evaluator<'a, 's> {
         }
     }
 
-    /// The value of the initial expression of data, whatever becomes of it later.
+    /// The value of the initial expression of data, whatever is assigned later.
     pub fn initial_value(&self, context: Context<'_>, id: u32) -> Option<Value> {
         let symbol = &self.symbols.symbols[id as usize];
         match &symbol.kind {
-            SymbolKind::Data(data) => data.value.map(|value| self.declared(context, id, value)),
+            SymbolKind::Data(data) => data.value.map(|value| self.declared_value(context, id, value)),
             _ => None,
         }
     }
 
-    /// The value of the initial expression of data; worked out once where it refers to other data.
-    fn declared(&self, context: Context<'_>, id: u32, initial: Child) -> Value {
+    /// The value of the initial expression of data, cached where it refers to other data.
+    fn declared_value(&self, context: Context<'_>, id: u32, initial: Child) -> Value {
         let symbol = &self.symbols.symbols[id as usize];
         let tree = self.tree(symbol.file);
-        let there = self.at(context, symbol.scope, symbol.file);
+        let there = self.declaration_context(context, symbol.scope, symbol.file);
         let (first, end) = tokens_of(tree, initial);
         if !tree.kinds()[first as usize..end as usize].contains(&Token::Ident) {
             return self.value(there, initial);
@@ -375,7 +378,7 @@ impl<'a, 's> Evaluator<'a, 's> {
         for part in expressions(tree, node) {
             let value = self.value(context, part);
             let (first, end) = tokens_of(tree, part);
-            // Numbers that stand here are no more than the text is long.
+            // Literal numbers are bounded by the length of the text.
             if tree.kinds()[first as usize..end as usize].contains(&Token::Ident) {
                 size += value.size(REFERENCE_SIZE);
             }
@@ -425,7 +428,7 @@ impl<'a, 's> Evaluator<'a, 's> {
     fn binary(&self, context: Context<'_>, tree: &RapidTree<'s>, node: u32) -> Value {
         let mut left: Option<Value> = None;
         let mut operator = None;
-        // Operands and operators alternate (`*` could be either by itself).
+        // Operands and operators alternate (`*` alone is ambiguous).
         for (index, part) in parts(tree, node).enumerate() {
             if index % 2 == 1 {
                 operator = token_kind(tree, part);
@@ -433,7 +436,7 @@ impl<'a, 's> Evaluator<'a, 's> {
             }
             let right = self.value(context, part);
             left = Some(match (left, operator) {
-                (Some(left), Some(operator)) => combined(&left, operator, &right),
+                (Some(left), Some(operator)) => operators::binary(&left, operator, &right),
                 _ => right,
             });
         }
@@ -446,7 +449,7 @@ impl<'a, 's> Evaluator<'a, 's> {
             Some(id) => {
                 let symbol = &self.symbols.symbols[id as usize];
                 let type_name = symbol.type_name.clone();
-                // An element of an array that nothing assigns, without building the array.
+                // An element of an array that is never written, without building the array.
                 let index = parts(tree, node).nth(1);
                 match index {
                     Some(Child::Node(index))
@@ -456,7 +459,7 @@ impl<'a, 's> Evaluator<'a, 's> {
                     {
                         match self.element(context, id, index) {
                             Ok((file, element)) => {
-                                let at = self.at(context, symbol.scope, file);
+                                let at = self.declaration_context(context, symbol.scope, file);
                                 (self.value(at, element), type_name, parts(tree, node).skip(2))
                             }
                             Err(reason) => return Value::Unknown(reason),
@@ -521,7 +524,7 @@ impl<'a, 's> Evaluator<'a, 's> {
             let symbol = &self.symbols.symbols[id as usize];
             return match symbol.kind {
                 SymbolKind::Routine(routine) if !symbol.ambiguous => {
-                    self.own_function(context, tree, node, routine)
+                    self.inline_function(context, tree, node, routine)
                 }
                 _ => Value::Unknown(Reason::RunTimeFunction),
             };
@@ -535,7 +538,7 @@ impl<'a, 's> Evaluator<'a, 's> {
             match (argument.name, argument.value) {
                 (None, None) => {}
                 (None, Some(value)) => {
-                    // reg1 to reg5: variables of the USER module that every controller has.
+                    // reg1 to reg5: variables of the USER module of every controller.
                     let own =
                         matches!(text_of(tree, value), [b'r' | b'R', b'e' | b'E', b'g' | b'G', b'1'..=b'5']);
                     required.push(match self.value(context, value) {
@@ -570,8 +573,8 @@ impl<'a, 's> Evaluator<'a, 's> {
         }
     }
 
-    /// A function of the program: what it returns, where that is all that it does.
-    fn own_function(&self, context: Context<'_>, tree: &RapidTree<'s>, node: u32, routine: u32) -> Value {
+    /// Inline evaluation of a function of the program whose only statement is RETURN.
+    fn inline_function(&self, context: Context<'_>, tree: &RapidTree<'s>, node: u32, routine: u32) -> Value {
         let unknown = Value::Unknown(Reason::RunTimeFunction);
         self.functions.set(if context.depth == 0 { 0 } else { self.functions.get() + 1 });
         if context.depth >= REFERENCE_DEPTH || self.functions.get() >= FUNCTIONS {
@@ -579,7 +582,7 @@ impl<'a, 's> Evaluator<'a, 's> {
         }
         let found = &self.symbols.routines[routine as usize];
         let home = self.tree(found.file);
-        let Some(returned) = only_returns(home, found.head.node) else { return unknown };
+        let Some(returned) = single_return(home, found.head.node) else { return unknown };
         let parameters = &found.head.parameters;
         if parameters.iter().any(|parameter| parameter.by_reference || parameter.array) {
             return unknown;
@@ -597,12 +600,12 @@ impl<'a, 's> Evaluator<'a, 's> {
             let (Some(parameter), Some(value)) = (parameter, argument.value) else { return unknown };
             let Some(id) = self.symbols.find(found.scope, home.text(parameter.name)) else { return unknown };
             let given = self.value(Context { depth: context.depth + 1, ..context }, value);
-            self.doubtful.set(self.doubtful.get() || !given.is_known() && !is_plain_place(tree, value));
+            self.may_raise.set(self.may_raise.get() || !given.is_known() && !is_plain_place(tree, value));
             known.insert(id, given);
         }
         let depth = context.depth + 1;
         match self.value(Context { file: found.file, scope: found.scope, known: &known, depth }, returned) {
-            // Not a parameter of the routine in which the call stands.
+            // A parameter of the function, not of the calling routine.
             Value::Unknown(Reason::Parameter) => unknown,
             value => value,
         }
@@ -621,12 +624,13 @@ impl<'a, 's> Evaluator<'a, 's> {
         let number = self.value(context, number).number().ok()?.round();
         let at = if number >= 1.0 { number as usize - 1 } else { return None };
         let size = expressions(self.tree(symbol.file), data.dimensions?).nth(at)?;
-        let size = self.value(self.at(context, symbol.scope, symbol.file), size).number().ok()?;
+        let size =
+            self.value(self.declaration_context(context, symbol.scope, symbol.file), size).number().ok()?;
         Some(Value::Number(size))
     }
 }
 
-/// Whether an expression is a name or a component of one: it is read and cannot fail.
+/// Whether an expression is a name or a component of one, whose evaluation cannot fail.
 fn is_plain_place(tree: &RapidTree<'_>, expression: Child) -> bool {
     match expression {
         Child::Token(_) => true,
@@ -637,8 +641,8 @@ fn is_plain_place(tree: &RapidTree<'_>, expression: Child) -> bool {
     }
 }
 
-/// The expression that a function returns, where that is its only statement and it declares nothing.
-fn only_returns(tree: &RapidTree<'_>, function: u32) -> Option<Child> {
+/// The returned expression of a function whose only statement is RETURN and which declares nothing.
+fn single_return(tree: &RapidTree<'_>, function: u32) -> Option<Child> {
     let mut inside =
         tree.child_nodes(function).filter(|&node| tree.nodes[node as usize].kind != Syntax::Parameters);
     let (mut only, None) = (inside.next()?, inside.next()) else { return None };
@@ -650,7 +654,7 @@ fn only_returns(tree: &RapidTree<'_>, function: u32) -> Option<Child> {
     (tree.nodes[only as usize].kind == Syntax::Return).then(|| expressions(tree, only).next()).flatten()
 }
 
-/// The target that a literal of plain numbers is; `None` where it is no such literal.
+/// The target of a literal of plain numbers; `None` for anything else.
 fn literal_target(text: &[u8], joints: bool) -> Option<Result<TargetValue, Reason>> {
     if joints {
         let found = literal::numbers(text, literal::JOINTTARGET)?;
@@ -686,64 +690,4 @@ fn unquoted(text: &[u8]) -> Vec<u8> {
         }
     }
     out
-}
-
-fn combined(left: &Value, operator: Token, right: &Value) -> Value {
-    match (left, right) {
-        (Value::Unknown(reason), _) | (_, Value::Unknown(reason)) => Value::Unknown(*reason),
-        (&Value::Number(a), &Value::Number(b)) => match operator {
-            Token::Plus => Value::Number(a + b),
-            Token::Minus => Value::Number(a - b),
-            Token::Star => Value::Number(a * b),
-            Token::Slash if b != 0.0 => Value::Number(a / b),
-            Token::Div if b.round() != 0.0 => Value::Number((a.round() / b.round()).trunc()),
-            Token::Mod if b.round() != 0.0 => Value::Number(a.round().rem_euclid(b.round().abs())),
-            Token::Equal => Value::Bool(a == b),
-            Token::NotEqual => Value::Bool(a != b),
-            Token::Less => Value::Bool(a < b),
-            Token::LessEqual => Value::Bool(a <= b),
-            Token::Greater => Value::Bool(a > b),
-            Token::GreaterEqual => Value::Bool(a >= b),
-            _ => Value::Unknown(Reason::WrongShape),
-        },
-        (&Value::Bool(a), &Value::Bool(b)) => match operator {
-            Token::And => Value::Bool(a && b),
-            Token::Or => Value::Bool(a || b),
-            Token::Xor | Token::NotEqual => Value::Bool(a != b),
-            Token::Equal => Value::Bool(a == b),
-            _ => Value::Unknown(Reason::WrongShape),
-        },
-        (Value::Text(a), Value::Text(b)) if operator == Token::Plus => Value::Text([&**a, &**b].concat()),
-        (Value::List(_), Value::List(_)) => match (left.numbers::<3>(), right.numbers::<3>(), operator) {
-            (Ok(a), Ok(b), Token::Plus) => Value::from_numbers(&[a[0] + b[0], a[1] + b[1], a[2] + b[2]]),
-            (Ok(a), Ok(b), Token::Minus) => Value::from_numbers(&[a[0] - b[0], a[1] - b[1], a[2] - b[2]]),
-            (Ok(a), Ok(b), Token::Star) => {
-                let cross = Vector3::from(a).cross(&Vector3::from(b));
-                Value::from_numbers(&[cross.x, cross.y, cross.z])
-            }
-            _ => match (left.numbers::<4>(), right.numbers::<4>(), operator) {
-                (Ok(a), Ok(b), Token::Star) => {
-                    let turn = |q: [f64; 4]| nalgebra::Quaternion::new(q[0], q[1], q[2], q[3]);
-                    let product = turn(a) * turn(b);
-                    Value::from_numbers(&[product.w, product.i, product.j, product.k])
-                }
-                (Err(reason), _, _) | (_, Err(reason), _) if reason != Reason::WrongShape => {
-                    Value::Unknown(reason)
-                }
-                _ => Value::Unknown(Reason::WrongShape),
-            },
-        },
-        (Value::List(_), &Value::Number(factor)) | (&Value::Number(factor), Value::List(_)) => {
-            let list = if matches!(left, Value::List(_)) { left } else { right };
-            match (list.numbers::<3>(), operator) {
-                (Ok(vector), Token::Star) => Value::from_numbers(&vector.map(|value| value * factor)),
-                (Ok(vector), Token::Slash) if matches!(left, Value::List(_)) && factor != 0.0 => {
-                    Value::from_numbers(&vector.map(|value| value / factor))
-                }
-                (Err(reason), _) => Value::Unknown(reason),
-                _ => Value::Unknown(Reason::WrongShape),
-            }
-        }
-        _ => Value::Unknown(Reason::WrongShape),
-    }
 }

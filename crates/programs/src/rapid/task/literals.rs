@@ -1,5 +1,5 @@
-//! Targets that stand in motion instructions as numbers. No statement changes their values, so they are read on other
-//! threads while the statements are followed.
+//! Targets written as numbers in motion instructions. No statement changes their values, so they are read on other threads
+//! during the interpretation.
 
 use rayon::prelude::*;
 
@@ -11,17 +11,17 @@ use super::super::token::Token;
 use crate::motion::{MotionTarget, Origin, Role};
 use crate::tree::Child;
 
-/// Nodes that one thread looks at at a time.
+/// Nodes that one thread processes at a time.
 const PORTION: u32 = 1 << 14;
 
-/// The values, by file and by the portion in which the call stands, in the order of nodes.
+/// The targets, by file and portion of the call, in the order of nodes.
 pub(super) struct Literals(Vec<Vec<Vec<Read>>>);
 
 #[derive(Debug)]
 struct Read {
     node: u32,
     joints: bool,
-    /// One target, as the list of a motion will hold it: a million of them are not copied.
+    /// One target, as the list that a motion takes over: a million of them are not copied.
     target: Vec<MotionTarget>,
 }
 
@@ -35,7 +35,7 @@ impl Literals {
         Literals(files.collect())
     }
 
-    /// The one target that the literal at `node` in the call at `call` is; `None` where it was not read, or handed out before.
+    /// The target of the literal at `node` in the call at `call`; `None` where it was not read or has been taken.
     pub(super) fn take(
         &mut self,
         file: u32,
@@ -72,10 +72,10 @@ fn read(trees: &[RapidTree<'_>], symbols: &Symbols, file: u32, portion: u32) -> 
     out
 }
 
-/// An aggregate of numbers as a target to which a motion goes.
+/// An aggregate of numbers as a motion's target.
 pub(super) fn target(evaluator: &Evaluator<'_, '_>, file: u32, node: u32, joints: bool) -> MotionTarget {
     let nothing = Known::new();
-    // No name stands in it: any scope will do.
+    // It contains no name: any scope serves.
     let (value, source) = evaluator.target(Context::new(file, 0, &nothing), Child::Node(node), joints);
     let origin = match source {
         Source::Inline => Origin::Inline,
@@ -86,7 +86,7 @@ pub(super) fn target(evaluator: &Evaluator<'_, '_>, file: u32, node: u32, joints
     MotionTarget { role: Role::To, value, origin, argument }
 }
 
-/// The node of an argument that is an aggregate of nothing but numbers.
+/// The node of an argument that is an aggregate of numbers alone.
 pub(super) fn plain(tree: &RapidTree<'_>, argument: Child) -> Option<u32> {
     let Child::Node(node) = argument else { return None };
     let found = tree.nodes[node as usize];

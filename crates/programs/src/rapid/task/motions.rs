@@ -74,7 +74,7 @@ impl ListingBuilder<'_, '_> {
         let tree = &self.trees[unit.file as usize];
         let context = Context::new(unit.file, unit.scope, &state.known);
         let (value, source) = self.evaluator.target(context, argument, joints);
-        self.impure |= self.evaluator.was_doubtful()
+        self.impure |= self.evaluator.may_raise()
             || self.symbols.is_impure(tree, unit.scope, argument)
             || matches!(source, Source::Symbol(symbol) | Source::Element(symbol, _) if self.has_impure_initial(symbol));
         let (first, end) = tokens_of(tree, argument);

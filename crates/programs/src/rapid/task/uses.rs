@@ -1,4 +1,4 @@
-//! Who uses a declared target: motions, and everything else that an edit of the declaration would reach.
+//! Uses of declared targets: by motions, and all other uses that an edit of the declaration would affect.
 
 use super::ListingBuilder;
 use crate::motion::{MotionKind, Origin, OtherUse};
@@ -7,7 +7,7 @@ use crate::rapid::syntax::{RapidTree, Syntax, arguments, token_kind, tokens_of};
 use crate::rapid::token::{Token, fold, same_name};
 
 impl<'s> ListingBuilder<'_, 's> {
-    /// Finds every use of the declared targets in the listing that is no motion's own target argument.
+    /// Finds every use of the listed declarations that is not a motion's target argument.
     pub(super) fn other_uses(&mut self) {
         for (index, motion) in self.listing.motions.iter().enumerate() {
             for (target_index, target) in motion.targets.iter().enumerate() {
@@ -30,7 +30,7 @@ impl<'s> ListingBuilder<'_, 's> {
             let symbol = &self.symbols.symbols[symbol as usize];
             likely[hash(self.trees[symbol.file as usize].text(symbol.name))] = true;
         }
-        // Own uses by the first byte of the argument; whatever else lies within a motion's argument is a base.
+        // A use at the first byte of a target argument is the motion's own; any other within it is part of an expression.
         for (unit_index, unit) in self.symbols.units.iter().enumerate() {
             let tree = &self.trees[unit.file as usize];
             // Motions are listed unit by unit.
@@ -43,7 +43,7 @@ impl<'s> ListingBuilder<'_, 's> {
         self.uses_by_name();
     }
 
-    /// GetDataVal with a name that the text does not tell may read any of them.
+    /// GetDataVal with a computed name may read any of them.
     fn uses_by_name(&mut self) {
         for (file, tree) in (0..).zip(self.trees) {
             let reads = |node: &u32| {
@@ -55,7 +55,7 @@ impl<'s> ListingBuilder<'_, 's> {
                 name.and_then(|name| name.value).and_then(|name| token_kind(tree, name))
                     != Some(Token::String)
             };
-            // One in a file says it for all.
+            // One per file suffices.
             if let Some(node) = (0..tree.nodes.len() as u32).filter(reads).find(computed) {
                 let place = self.place(file, tree.nodes[node as usize].first);
                 for declaration in &mut self.listing.declarations {
@@ -76,7 +76,7 @@ impl<'s> ListingBuilder<'_, 's> {
         let node = tree.nodes[unit.node as usize];
         let mut next = 0;
         for token in node.first..node.end {
-            // A text may be the name with which GetDataVal reads it.
+            // A string may be the name that GetDataVal reads.
             let name = match (tree.kind(token), tree.text(token)) {
                 (Some(Token::Ident), name) => name,
                 (Some(Token::String), [_, name @ .., _]) if !name.is_empty() => name,
