@@ -1,7 +1,7 @@
-//! Which numbers an arm may have that comes from a file: finite, and such as an arm has.
+//! Bounds of the numbers of an arm that comes from a file.
 //!
-//! The bounds are wide; what they keep out is no arm at all: NaN and infinity, units mistaken by a thousand, a joint map that
-//! turns nothing. What comes after may then rely on finite numbers.
+//! The bounds are wide; they exclude NaN and infinity, units mistaken by a thousand, and a singular joint map. All code after
+//! loading relies on them.
 
 use std::ops::RangeInclusive;
 
@@ -10,31 +10,31 @@ use nalgebra::Matrix6;
 use crate::body::Body;
 use truegrind_math::spectral;
 
-/// A number that no arm has.
+/// A value outside its bounds.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{key}: found {found}, expected {expected}")]
 pub struct InvalidValue {
     /// Key, as a path; links, bodies and lists count from 1.
     pub key: String,
-    /// What is there.
+    /// The value found.
     pub found: String,
-    /// What it should be.
+    /// What was expected.
     pub expected: &'static str,
 }
 
 impl InvalidValue {
-    /// A fault that is no number out of its range.
+    /// A fault other than a number out of range.
     pub fn new(key: impl Into<String>, found: impl Into<String>, expected: &'static str) -> Self {
         Self { key: key.into(), found: found.into(), expected }
     }
 
-    /// The same fault within a larger part of the file.
+    /// The same fault with the key of the enclosing part in front.
     pub fn within(self, part: &str) -> Self {
         Self { key: format!("{part}.{}", self.key), ..self }
     }
 }
 
-/// A range of numbers, and what it is in words.
+/// A range of numbers, with its description.
 #[derive(Debug, Clone)]
 pub struct Bound {
     range: RangeInclusive<f64>,
@@ -42,7 +42,7 @@ pub struct Bound {
 }
 
 impl Bound {
-    /// A range and its words.
+    /// A range and its description.
     pub const fn new(least: f64, most: f64, expected: &'static str) -> Self {
         Self { range: least..=most, expected }
     }
@@ -76,7 +76,7 @@ impl Bound {
     }
 }
 
-/// A number as a message shows it: three hundred digits say less than an exponent.
+/// A number for messages; very large and small ones with an exponent.
 pub fn display_number(value: f64) -> String {
     let size = value.abs();
     if size != 0.0 && !(1e-6..1e16).contains(&size) { format!("{value:e}") } else { value.to_string() }
@@ -102,7 +102,7 @@ const COUPLING: Bound = Bound::new(-10.0, 10.0, "turns of a link for a turn of a
 /// Six joint ranges (°).
 ///
 /// # Errors
-/// A number that is no angle, or a range that is empty.
+/// A number out of range, or an empty range.
 pub fn joint_ranges(min_deg: &[f64; 6], max_deg: &[f64; 6]) -> Result<(), InvalidValue> {
     JOINT_DEG.check_all("min_deg", min_deg)?;
     JOINT_DEG.check_all("max_deg", max_deg)?;
@@ -116,10 +116,10 @@ pub fn joint_ranges(min_deg: &[f64; 6], max_deg: &[f64; 6]) -> Result<(), Invali
     }
 }
 
-/// A joint map: signs and couplings, which leave the volume of the joint space as it is.
+/// A joint map: signs and couplings, which preserve the volume of the joint space.
 ///
 /// # Errors
-/// Numbers that are no turns, or a map that is far from a matrix of determinant ±1 with a good inverse.
+/// Numbers out of range, or a map whose determinant is not near ±1 or whose condition is above 100.
 pub fn joint_map(rows: &[[f64; 6]; 6]) -> Result<(), InvalidValue> {
     const VOLUME: RangeInclusive<f64> = 0.5..=2.0;
     const CONDITION: f64 = 100.0;

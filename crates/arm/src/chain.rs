@@ -93,7 +93,7 @@ pub fn chain<R: Real>(links: &[LinkTable; 6], sin: &[R; 6], cos: &[R; 6]) -> Cha
 pub fn scaled_chain<R: Real>(links: &[LinkTable; 6], sin: &[R; 6], cos: &[R; 6], scale: R) -> Chain<R> {
     let mut end = FrameColumns::identity(scale);
     let base = end;
-    // One after the other and no loop: what nobody asks for is then never written to memory.
+    // Unrolled: unused frames are then never written to memory.
     let (lateral_1, end_1) = (end.advance(&links[0], sin[0], cos[0], scale), end);
     let (lateral_2, end_2) = (end.advance(&links[1], sin[1], cos[1], scale), end);
     let (lateral_3, end_3) = (end.advance(&links[2], sin[2], cos[2], scale), end);
@@ -138,7 +138,7 @@ impl<R: Real> FrameColumns<R> {
         Self { axes: [[one, zero, zero], [zero, one, zero], [zero, zero, one]], origin: [zero; 3] }
     }
 
-    /// Goes on over one link; hands back the x axis after the joint's rotation.
+    /// Advances over one link; returns the x axis after the joint's rotation.
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn advance(&mut self, link: &LinkTable, sin: R, cos: R, scale: R) -> [R; 3] {
         let [x, y, z] = self.axes;

@@ -1,8 +1,8 @@
-//! What, beside the joint angles, decides where the arm stands.
+//! Conditions beside the joint angles that determine the pose of the arm.
 
 use serde::{Deserialize, Serialize};
 
-/// The circumstances of one pose. A circumstance that is not known is `None`, and effects that need it stand still.
+/// The condition of one pose. An unknown value is `None`, and effects that depend on it are zero.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Condition {
@@ -14,6 +14,6 @@ pub struct Condition {
     pub payload_kg: Option<f64>,
     /// Centre of the payload in the last frame of the arm (mm).
     pub payload_centre_mm: [f64; 3],
-    /// The side from which each joint came to rest: −1 from below, +1 from above, 0 not known.
+    /// Approach direction of each joint: −1 from below, +1 from above, 0 unknown.
     pub approach: [i8; 6],
 }

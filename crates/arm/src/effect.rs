@@ -1,8 +1,8 @@
-//! Physical effects beyond rigid links, one file each: what they do to the joints and links of an arm.
+//! Physical effects beyond rigid links, one file each: offsets of joint angles, growth of links.
 //!
 //! Every joint effect is linear in its parameters: it adds Σ pₖ φₖ(u, condition) to the mapped joint angles u, so one
-//! set of regressors φ serves simulation, identification and compensation. Whether an effect is there is not decided
-//! here.
+//! set of regressors φ serves simulation, identification and compensation. Model selection is not
+//! part of this module.
 
 pub mod compliance;
 pub mod lumped_compliance;
@@ -60,7 +60,7 @@ pub enum Effect {
     Backlash(Backlash),
     /// Links that grow with time or temperature.
     ThermalDrift(Thermal),
-    /// What a network learned of errors without a physical name.
+    /// A learned smooth correction without a physical cause.
     SmoothCorrection(SmoothCorrection),
 }
 
@@ -105,7 +105,7 @@ impl Effect {
         each!(self, e => e.parameters())
     }
 
-    /// Whether all its parameters are 0: it moves nothing, and stands there for what it may be.
+    /// Whether all its parameters are 0: it changes nothing and is listed for the covariance alone.
     pub fn is_zero(&self) -> bool {
         self.parameters().iter().all(|parameter| parameter.value == 0.0)
     }
@@ -115,12 +115,12 @@ impl Effect {
         each!(self, e => e.set(index, value))
     }
 
-    /// What each parameter adds to the joint rotations, per unit, at mapped joint angles `u` (rad).
+    /// Derivatives of the joint rotations with respect to each parameter, at mapped joint angles `u` (rad).
     pub fn regressors(&self, statics: &Statics, u: &Joints, condition: &Condition) -> Vec<Joints> {
         each!(self, e => e.regressors(statics, u, condition))
     }
 
-    /// What the effect adds to the joint rotations (rad).
+    /// Offset that the effect adds to the joint rotations (rad).
     pub fn offset(&self, statics: &Statics, u: &Joints, condition: &Condition) -> Joints {
         each!(self, e => e.offset(statics, u, condition))
     }
@@ -148,8 +148,8 @@ impl Effect {
         }
     }
 
-    /// Adds the slope times a step of u, for one row or several in lanes, where that is cheap: the slope of compliance,
-    /// some 1e-3, is left out. For Newton's method, which forgives it.
+    /// Adds the Jacobian times a step of u, for one row or several in lanes. The Jacobian of compliance, some 1e-3, is neglected,
+    /// which Newton's method tolerates.
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub fn add_jacobian_product<R: SinCos>(&self, u: &[R; 6], step: &[R; 6], out: &mut [R; 6]) {
         match self {
@@ -183,7 +183,7 @@ impl Effect {
         }
     }
 
-    /// Derivatives of [`Effect::growth`] with respect to the parameters; empty for an effect that lets nothing grow.
+    /// Derivatives of [`Effect::growth`] with respect to the parameters; empty for an effect without growth.
     pub fn growth_regressors(&self, condition: &Condition) -> Vec<f64> {
         match self {
             Effect::ThermalDrift(thermal) => thermal.growth_regressors(condition),

@@ -1,11 +1,11 @@
-//! Joints for a pose: closed form on the nominal arm for seeds, Newton on the estimated arm for the answer.
+//! Inverse kinematics: closed form on the nominal arm for seeds, Newton's method on the estimated arm for the answer.
 //!
-//! Method: the nominal geometry tells the family: spherical wrist, three parallel axes (UR), or neither. A closed form
-//! gives up to eight branches as seeds; Newton's method carries each to the estimated arm, whose perturbed links have
-//! no closed form and whose effects depend on the joints. Without a closed form the seeds are spread over the joint
-//! ranges. Along a path no closed form is needed: each target starts from its neighbour, eight in lanes.
+//! Method: the nominal geometry determines the family: spherical wrist, three parallel axes (UR), or neither. A closed form
+//! gives up to eight branches as seeds; Newton's method takes each to the estimated arm, whose perturbed links have no closed
+//! form and whose effects depend on the joints. Without a closed form the seeds are spread over the joint ranges. Along a path
+//! each target starts from its neighbour, eight in lanes, without a closed form.
 //! Shapes: one target, a pose of the flange in the base (mm); solutions in controller angles (rad).
-//! Stops: at 1e-9 mm and 1e-12 rad, see [`newton`]; how it ended otherwise is an [`InverseError`].
+//! Termination: at 1e-9 mm and 1e-12 rad, see [`newton`]; otherwise an [`InverseError`].
 //! Checked against: `forward(inverse(pose)) = pose` for every arm of the catalogue, nominal and perturbed.
 
 pub mod solution;
@@ -43,7 +43,7 @@ pub use self::structure::Branch;
 /// A joint angle may lie beyond its limit by rounding (rad).
 const LIMIT_SLACK_RAD: f64 = 1e-9;
 
-/// A solution farther from its seed than this is found by way of all branches (rad).
+/// A solution farther from its seed than this is rejected in favour of a search over all branches (rad).
 const MAX_SEED_DISTANCE_RAD: f64 = 0.9 * PI;
 /// The same for an arm whose branches cannot be told apart (rad).
 const MAX_SEED_DISTANCE_NO_BRANCHES_RAD: f64 = 0.5;
@@ -56,8 +56,8 @@ pub struct Inverse<'a> {
     flange_inverse: FrameColumns<f64>,
     structure: Structure,
     kernel: Kernel,
-    /// How far a point of the estimated arm and the same one of the nominal arm may be from each other, all joints turned
-    /// alike, at the most (mm).
+    /// Upper bound of the distance between a point of the estimated arm and the same point of the nominal arm at equal joint
+    /// angles (mm).
     model_distance_mm: f64,
 }
 
@@ -114,8 +114,8 @@ impl<'a> Inverse<'a> {
         self.structure.has_branches().then_some(SingularityDistances { wrist, elbow, shoulder })
     }
 
-    /// The distances of [`Inverse::singularity_distances`] with the signs that tell the branches apart: shoulder, elbow,
-    /// wrist; negative for behind, elbow back and axis 5 negative. All 1 for an arm without a closed form.
+    /// The distances of [`Inverse::singularity_distances`] with the signs of the branch: shoulder, elbow, wrist; negative for
+    /// behind, elbow back and axis 5 negative. All 1 for an arm without a closed form.
     pub fn branch_margins(&self, joints: &Joints) -> [f64; 3] {
         self.margins(joints)
     }
@@ -132,17 +132,17 @@ impl<'a> Inverse<'a> {
     }
 
     /// Smallest singular value of the 6 × 6 Jacobian of the flange, translations divided by [`Inverse::length_mm`],
-    /// with respect to the rotations of the joints (couplings and slopes of effects not counted). Not a number where the
-    /// joints are not.
+    /// with respect to the rotations of the joints (couplings and slopes of effects not counted). NaN where a joint is
+    /// NaN.
     pub fn smallest_singular_value(&self, joints: &Joints) -> f64 {
         let jacobian = newton::scaled_jacobian(&self.arm, joints, self.kernel.length_mm);
         spectral::singular_values(&jacobian).map_or(f64::NAN, |values| values.min())
     }
 
-    /// The solution on the branch of `seed`, each joint on the turn nearest to it. The fast way along a path.
+    /// The solution on the branch of `seed`, each joint on the turn nearest to it. The fast function along a path.
     ///
-    /// A branch is left only across its border: where the seed or the solution stands within 2 % of a singularity,
-    /// either side counts as the seed's.
+    /// The branch can change only at a singularity: where the margin of seed or solution is below 2 %, either side counts as
+    /// the seed's branch.
     ///
     /// ```
     /// use truegrind_arm::condition::Condition;
@@ -157,7 +157,7 @@ impl<'a> Inverse<'a> {
     /// let found = inverse.solve_near(&arm.forward(&meant, &still), &Joints::new(0.2, 0.1, 0.0, 0.4, 0.7, -0.3))?;
     /// assert!((found.joints - meant).norm() < 1e-9);
     ///
-    /// // Two metres away there is nothing to be found, and it is said by how much.
+    /// // A target two metres away is unreachable; the error states by how much.
     /// let far = nalgebra::Translation3::new(2000.0, 0.0, 0.0) * arm.forward(&meant, &still);
     /// let refused = inverse.solve_near(&far, &meant);
     /// assert!(matches!(refused, Err(InverseError::Unreachable { beyond_mm }) if beyond_mm > 1000.0));
@@ -178,7 +178,7 @@ impl<'a> Inverse<'a> {
         }
     }
 
-    /// [`Inverse::solve_near`] where no search of all branches is needed for the answer.
+    /// [`Inverse::solve_near`] without a search over all branches; `None` where one would be needed.
     fn solve_without_search(&self, target: &Pose, seed: &Joints) -> Option<Result<Solution, InverseError>> {
         if self.goal(target).is_err() || !seed.iter().all(|q| q.is_finite()) {
             return Some(Err(InverseError::NotFinite));
@@ -189,12 +189,12 @@ impl<'a> Inverse<'a> {
 
     /// The solution in a requested configuration.
     ///
-    /// An axis may lie outside its requested quarter by up to 5°, since the estimated arm stands a little beside the
-    /// nominal one for which the program was written; so may a branch be left across its border. A solution on the very
-    /// branch goes before all others: near a singularity the arm has two solutions close together, and cfx tells which is
-    /// meant. Among several the one nearest to `near` is taken, without `near` the one that best keeps to the quarters.
-    /// Joints 2, 3 and 5 stand on the turn nearest to `near`; without it, or with less than a turn of room, on that nearest
-    /// to the middle of their range.
+    /// An axis may lie outside its requested quarter by up to 5°, since the estimated arm differs a little from the nominal one
+    /// for which the program was written; for the same reason a branch may be left where its margin is small. A solution on
+    /// the exact branch has precedence: near a singularity the arm has two solutions close together, and cfx selects one.
+    /// Among several the one nearest to `near` is taken; without `near` the one with the least overshoot of the quarters.
+    /// Joints 2, 3 and 5 take the turn nearest to `near`; without it, or with a range of less than a turn, the turn nearest to
+    /// the middle of their range.
     ///
     /// ```
     /// use truegrind_arm::condition::Condition;
@@ -253,7 +253,7 @@ impl<'a> Inverse<'a> {
         self.structure.margins_of(&self.arm.frames(joints))
     }
 
-    /// The solution of the kernel, if it counts.
+    /// The kernel's solution, if it is accepted.
     fn accepted(&self, solved: &Solved<f64>, seed: &Joints) -> Option<Solution> {
         let joints = self.controller_angles(&solved.mapped);
         self.is_accepted(solved, &joints, seed).then_some(solved.solution(&joints))
@@ -268,7 +268,7 @@ impl<'a> Inverse<'a> {
         }
     }
 
-    /// Whether a solution of the kernel counts: arrived, not far from the seed, on its branch.
+    /// Whether a solution of the kernel is accepted: converged, near the seed, on its branch.
     #[inline(always)]
     fn is_accepted(&self, solved: &Solved<f64>, joints: &Joints, seed: &Joints) -> bool {
         let farthest = if self.structure.has_branches() {
@@ -318,9 +318,9 @@ impl<'a> Inverse<'a> {
     }
 }
 
-/// See [`Inverse::model_distance_mm`]. Effects turn joints and do no more, but for the growth of the links. A link that is longer
-/// moves what follows by as much; one that is turned moves it, and turns the last frame under a target, by no more than the
-/// angle times the length of the whole arm.
+/// See [`Inverse::model_distance_mm`]. Effects rotate joints, except for the growth of links. A longer link moves everything behind
+/// it by the same length; a rotated one by at most the angle times the length of the arm, and once more through the rotation
+/// of the last frame under a target.
 fn model_distance_mm(estimated: &Model, condition: &Condition, nominal: &Model, extent_mm: f64) -> f64 {
     let links = estimated.links_at(condition);
     let of = |(a, b): (&Link, &Link)| {
@@ -330,7 +330,7 @@ fn model_distance_mm(estimated: &Model, condition: &Condition, nominal: &Model, 
     links.iter().zip(&nominal.links).map(of).sum()
 }
 
-/// Whether margins belong to one branch; a border near which either stands does not count.
+/// Whether two sets of margins belong to one branch; margins below the tolerance belong to both sides.
 #[inline(always)]
 fn same_branch(a: &[f64; 3], b: &[f64; 3]) -> bool {
     (0..3).all(|k| {

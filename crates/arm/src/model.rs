@@ -50,7 +50,7 @@ impl Model {
         self.at_condition(condition).forward(q)
     }
 
-    /// The model with everything worked out that does not depend on the joints.
+    /// The model with everything precomputed that does not depend on the joints.
     ///
     /// ```
     /// use truegrind_arm::condition::Condition;
@@ -79,8 +79,8 @@ impl Model {
         }
     }
 
-    /// Statics of the arm: its links as they are, without joint effects (their share in the torque is of second
-    /// order), massless where masses are unknown (only the payload then counts).
+    /// Statics of the rigid arm: joint effects change the torque in second order only. Massless where the masses are unknown;
+    /// then only the payload counts.
     pub fn statics(&self) -> Statics {
         Statics::new(&self.links, self.bodies, self.gravity)
     }
@@ -104,7 +104,7 @@ impl Model {
 pub struct PreparedModel<'a> {
     /// The arm.
     pub model: &'a Model,
-    /// The circumstances.
+    /// The condition.
     pub condition: Condition,
     /// Link tables under the condition.
     pub tables: [LinkTable; 6],
@@ -219,7 +219,7 @@ impl PreparedModel<'_> {
         slope * self.model.joint_map
     }
 
-    /// What each parameter of effect `index` adds to the joint rotations, per unit.
+    /// Derivatives of the joint rotations with respect to the parameters of effect `index`.
     pub fn effect_regressors(&self, index: usize, q: &Joints) -> Vec<Joints> {
         let mapped = self.model.joint_map * q;
         match (&self.statics, self.model.effects.get(index)) {

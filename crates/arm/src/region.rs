@@ -1,4 +1,4 @@
-//! Where an arm was measured: joint ranges and a thinned cloud of poses, to tell a program that leaves it.
+//! Measured region of an arm: joint ranges and a thinned cloud of poses, to detect programs that leave it.
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -15,7 +15,7 @@ pub struct Region {
     pub max_deg: [f64; 6],
     /// Measured joint vectors (°), thinned so that they are far from each other.
     pub samples_deg: Vec<[f64; 6]>,
-    /// How far a measured pose may lie from its nearest neighbour among the samples [°, Euclidean in joint space].
+    /// Typical distance of a measured pose to its nearest neighbour among the samples [°, Euclidean in joint space].
     pub spacing_deg: f64,
     /// Largest predicted standard deviation of the flange's position over the measured poses (mm).
     pub sigma_mm: f64,
@@ -55,11 +55,10 @@ fn distance(a: &[f64; 6], b: &[f64; 6]) -> f64 {
     square(a, b).sqrt()
 }
 
-/// Poses that one thread takes at a time.
+/// Poses that one thread processes at a time.
 const PORTION: usize = 8192;
 
-/// Takes one more sample into account: each pose's distance to the nearest of them, and the pose that is farthest, the last of
-/// several.
+/// Updates each pose's distance to the nearest sample with one more; returns the farthest pose, the last of several.
 fn farthest(nearest: &mut [f64], poses: &[[f64; 6]], sample: &[f64; 6]) -> Option<(usize, f64)> {
     let last = |a: &(usize, f64), b: &(usize, f64)| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0));
     let portions = nearest.par_chunks_mut(PORTION).zip(poses.par_chunks(PORTION)).enumerate();
@@ -131,8 +130,8 @@ impl Region {
         self.outside_along(q, &mut NearestSample::default())
     }
 
-    /// The same along a path: what was found at the pose before is looked at first, and left in `last` for the next one.
-    /// The answer does not depend on it.
+    /// The same along a path: the nearest sample of the previous pose is tried first and updated in `last`. The result does not
+    /// depend on it.
     pub fn outside_along(&self, q: &Joints, last: &mut NearestSample) -> Option<Outside> {
         let degrees: [f64; 6] = std::array::from_fn(|i| q[i].to_degrees());
         let beyond = |i: usize| (self.min_deg[i] - degrees[i]).max(degrees[i] - self.max_deg[i]);
@@ -147,13 +146,12 @@ impl Region {
             if here <= allowed * allowed {
                 return None;
             }
-            // The others have come nearer by no more than the pose has moved.
+            // Triangle inequality: the others have come nearer by at most the distance that the pose has moved.
             if here.sqrt() <= last.others - distance(&last.at, &degrees) {
                 return coverage(here);
             }
         }
-        // The first sample that is near enough settles it. One whose first joints alone are farther away than the second
-        // nearest so far is passed over.
+        // The first sample near enough suffices. One whose first three joints alone are farther than the second nearest is skipped.
         let (mut nearest, mut second) = (f64::INFINITY, f64::INFINITY);
         for (index, sample) in self.samples_deg.iter().enumerate() {
             let part: f64 = sample[..3].iter().zip(&degrees).map(|(a, b)| (a - b) * (a - b)).sum();
@@ -176,7 +174,7 @@ impl Region {
     }
 }
 
-/// The sample that was nearest to the pose looked at last.
+/// The nearest sample of the previous pose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NearestSample {
     index: usize,

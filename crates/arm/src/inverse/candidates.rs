@@ -1,4 +1,4 @@
-//! The careful road: all branches, all turns, seeds spread over the joint ranges.
+//! Global inverse search: all branches, all turns, and seeds spread over the joint ranges.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -12,23 +12,23 @@ use crate::joints::{Joints, Limits};
 use truegrind_math::se3::Pose;
 use truegrind_math::spectral;
 
-/// Solutions nearer than this are one (rad).
+/// Solutions nearer than this are the same (rad).
 const SAME_RAD: f64 = 1e-6;
-/// Singular values below this belong to directions in which another solution may be near.
+/// Another solution may be near along singular directions below this value.
 const NEARLY_SINGULAR: f64 = 0.15;
-/// Spread seeds for an arm without a closed form.
+/// Halton seeds for an arm without a closed form.
 const HALTON_SEEDS: usize = 64;
-/// Spread seeds where a closed form leads to nothing although the target seems to be in reach.
+/// Halton seeds where a closed form finds nothing although the target seems reachable.
 const RESCUE_SEEDS: usize = 24;
-/// A solution with a smaller margin to a singularity may have a neighbour across it.
+/// A solution with a smaller margin to a singularity may have a second solution across it.
 const NEAR_FOLD: f64 = 0.1;
-/// Targets beside one whose wanted solution is not found.
+/// Perturbed targets tried where the requested solution is not found.
 const PERTURBED_TARGETS: usize = 60;
-/// How far beside, in turn (rad, and shares of the characteristic length).
+/// Sizes of the perturbation, in turn (rad, and fractions of the characteristic length).
 const PERTURBATION: [f64; 3] = [0.01, 0.04, 0.15];
 
 impl Inverse<'_> {
-    /// [`Inverse::solve_near`] where the kernel's answer does not count.
+    /// [`Inverse::solve_near`] where the kernel's solution is not accepted.
     pub(super) fn search_near(
         &self,
         goal: &Goal,
@@ -64,7 +64,7 @@ impl Inverse<'_> {
         }
     }
 
-    /// [`Inverse::solve_configured`] by way of all branches.
+    /// [`Inverse::solve_configured`] by a search over all branches.
     pub(super) fn search_configured(
         &self,
         goal: &Goal,
@@ -73,7 +73,7 @@ impl Inverse<'_> {
     ) -> Result<Solution, InverseError> {
         let wanted = Joints::from_fn(|axis, _| match QUARTER_AXES.iter().position(|&a| a == axis) {
             Some(k) => (f64::from(configuration.quarters()[k]) + 0.5) * FRAC_PI_2,
-            // A joint with less than a turn of room has one turn within it at most, wherever the arm comes from.
+            // A joint whose range is less than a turn has at most one turn within it.
             None => {
                 near.filter(|_| self.room(axis) > TAU).map_or_else(|| self.middle(axis), |near| near[axis])
             }
@@ -112,7 +112,7 @@ impl Inverse<'_> {
                 continue;
             }
             let distance = near.map_or(0.0, |near| (joints - near).amax());
-            // A joint more or less is no reason to take another branch than the one that is stated.
+            // The stated branch has precedence over a shorter distance.
             let strays = f64::from(u8::from(!configuration.matches_branch_exactly(&margins)));
             let rank = [strays, distance, overshoot.max(0.0)];
             if best.as_ref().is_none_or(|(r, _)| rank < *r) {
@@ -133,8 +133,8 @@ impl Inverse<'_> {
         }
     }
 
-    /// One solution within the limits for each branch, each joint on the turn nearest to `near`: those between which a
-    /// controller chooses that goes to the nearest one. Empty where there is none.
+    /// One solution within the limits for each branch, each joint on the turn nearest to `near`: the candidates of a controller
+    /// that moves to the nearest one. Empty where there is none.
     pub fn solve_all_branches(&self, target: &Pose, near: &Joints) -> Vec<Joints> {
         let Ok(goal) = self.goal(target) else { return Vec::new() };
         let found = self.branches(&goal, Some(near), &self.margins(near), 0).unwrap_or_default();
@@ -187,7 +187,7 @@ impl Inverse<'_> {
             }
         }
         if self.structure.has_branches() {
-            // Near a fold two branches meet, and Newton may have taken both seeds to one of them, or to none.
+            // Two branches meet at a fold, where Newton may take both seeds to one of them, or to none.
             if search.found.len() < seeds.len() && beyond_mm < 0.05 * self.kernel.length_mm {
                 let roots = search.found.iter().chain(&search.stuck).map(|o| o.joints).collect::<Vec<_>>();
                 roots.iter().for_each(|root| search.explore(root));
@@ -230,8 +230,8 @@ impl Inverse<'_> {
         })
     }
 
-    /// Solutions with more that lie near a fold, until one of them `fits`. There the closed form of the target itself leads
-    /// to few places, but those of targets a little beside it stand all about the fold: they are the seeds.
+    /// Adds solutions near a fold until one `fits`. There the closed form of the target gives few seeds; those of slightly
+    /// perturbed targets lie all around the fold.
     fn beside(
         &self,
         goal: &Goal,
@@ -262,8 +262,8 @@ impl Inverse<'_> {
         search.found
     }
 
-    /// The outcome with each joint on the turn nearest to `wanted`; effects that know the turn are solved again. A joint
-    /// whose turn no configuration states stays within its range where another turn does.
+    /// The outcome with each joint on the turn nearest to `wanted`, solved again since effects may depend on the turn. A joint
+    /// without a stated quarter keeps within its range where some turn does.
     fn turned(&self, goal: &Goal, outcome: Outcome, wanted: &Joints) -> Outcome {
         let mut joints = on_nearest_turn(&outcome.joints, wanted);
         for axis in (0..6).filter(|axis| !QUARTER_AXES.contains(axis)) {
@@ -313,7 +313,7 @@ fn halton(axis: usize, k: usize) -> f64 {
     fraction
 }
 
-/// Solutions gathered from seed after seed.
+/// Solutions collected from many seeds.
 struct Search<'s, 'a> {
     inverse: &'s Inverse<'a>,
     goal: &'s Goal,
@@ -337,8 +337,7 @@ impl Search<'_, '_> {
         }
     }
 
-    /// Seeds on both sides of `root` along every direction in which the arm is nearly singular there: that is where
-    /// the partner of a solution lies near a fold.
+    /// Tries seeds on both sides of `root` along every nearly singular direction, where the second solution near a fold lies.
     fn explore(&mut self, root: &Joints) {
         let arm = &self.inverse.arm;
         let jacobian =
@@ -366,14 +365,14 @@ fn range(limits: &Limits, axis: usize) -> (f64, f64) {
     if (high - low).is_finite() { (low, high) } else { (-PI, PI) }
 }
 
-/// More combinations of turns than a robot has; an arm with wider limits gets the nearest turn of each joint alone.
+/// More combinations of turns than any robot has; beyond, a joint keeps its nearest turn alone.
 const MAX_COMBINATIONS: usize = 4096;
 
 /// Every combination of full turns that lies within the limits.
 fn full_turns_within(joints: &Joints, limits: &Limits) -> Vec<Joints> {
     let mut out = vec![*joints];
     for axis in 0..6 {
-        // A joint may lie outside by as much as effects move it from turn to turn; Newton and the limits decide.
+        // Effects may move a joint from turn to turn by this much; Newton and the limits decide.
         let slack = 0.02;
         let (min, max) = range(limits, axis);
         let low = ((min - slack - joints[axis]) / TAU).ceil();

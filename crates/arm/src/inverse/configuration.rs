@@ -1,6 +1,6 @@
-//! Arm configuration as RAPID's `confdata` states it, and how solutions are matched to a requested one.
+//! Arm configuration in the convention of RAPID's `confdata`, and matching of solutions to a requested one.
 //!
-//! cf1, cf4, cf6 count quarter turns: floor(angle / 90°) of axes 1, 4 and 6. cfx tells the eight branches apart
+//! cf1, cf4, cf6 count quarter turns: floor(angle / 90°) of axes 1, 4 and 6. cfx identifies the eight branches
 //! (six-axis arms under RobotWare):
 //!
 //! | cfx | wrist centre to axis 1 | wrist centre to lower arm | axis 5 |
@@ -12,14 +12,14 @@
 //!
 //! In front and behind are seen from the arm as axis 1 has turned it: the wrist centre lies on the x side of the plane
 //! through axes 1 and 2, and on the side of the line through axes 2 and 3 to which a growing angle of axis 2 leans. The
-//! borders are the three singularities. Arms such as IRB 1400, 2400, 4400 and 6400 use cf1, cf4 and cf6 alone and ignore
+//! branches meet at the three singularities. Arms such as IRB 1400, 2400, 4400 and 6400 use cf1, cf4 and cf6 alone and ignore
 //! cfx: a reader must not insist on it.
 //!
 //! Source: ABB, Technical reference manual RAPID Instructions, Functions and Data types (3HAC16581-1), confdata. The
 //! table stands in the same order in the documentation of py-opw-kinematics (AXIS_CONFIGURATION.md) and in the toolbox
 //! ARTE (compute_configuration.m), which also takes the signs of x in frame 1 and of the side of the lower arm in frame 2.
 //! Departure: the manual leaves open to which quarter exactly −90° belongs; here, by the floor, to −1. Targets are
-//! matched with a tolerance, so that nothing hangs on it.
+//! matched with a tolerance, so that nothing depends on it.
 
 use std::f64::consts::FRAC_PI_2;
 use std::fmt;
@@ -53,11 +53,11 @@ impl fmt::Display for Configuration {
 /// Axes (0-based) whose quarter turns a configuration states.
 pub(super) const QUARTER_AXES: [usize; 3] = [0, 3, 5];
 
-/// How far a solution may lie outside a requested quarter (rad): an estimated arm stands some tenths of a degree
-/// beside the nominal one, more near the wrist singularity, while other branches are a quarter turn away and more.
+/// Tolerance of a requested quarter (rad): the estimated arm differs from the nominal one by some tenths of a degree, by more
+/// near the wrist singularity, while other branches differ by a quarter turn and more.
 const QUARTER_TOLERANCE_RAD: f64 = 0.09;
 
-/// How near to its border a branch may be taken for its neighbour (see [`Structure::margins`]).
+/// Below this margin both sides count as the branch (see [`Structure::margins`]).
 pub(super) const BRANCH_TOLERANCE: f64 = 0.02;
 
 /// Configuration of an arm at controller angles (rad); cfx is 0 for an arm without a closed form. For the nominal arm,
@@ -102,17 +102,17 @@ impl Configuration {
         out
     }
 
-    /// Whether joints and their margins are of this configuration, borders counted to both sides.
+    /// Whether joints and their margins have this configuration, within the tolerances.
     pub(super) fn matches(&self, joints: &Joints, margins: &[f64; 3]) -> bool {
         self.overshoot_rad(joints) <= QUARTER_TOLERANCE_RAD && self.matches_branch(margins)
     }
 
-    /// Whether margins are of the stated branch to the sign, as a controller that uses cfx reads it.
+    /// Whether margins have exactly the stated branch, as a controller that uses cfx reads it.
     pub(super) fn matches_branch_exactly(&self, margins: &[f64; 3]) -> bool {
         Branch::of(margins).index() == self.cfx
     }
 
-    /// Whether margins of a solution belong to the stated branch, borders counted to both sides.
+    /// Whether margins belong to the stated branch, within the tolerance.
     fn matches_branch(&self, margins: &[f64; 3]) -> bool {
         (0..3).all(|k| {
             let wanted_negative = (self.cfx >> (2 - k)) & 1 == 1;

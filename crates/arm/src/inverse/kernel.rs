@@ -1,16 +1,14 @@
-//! Newton's method for one target or for several in lanes: the fast road, with no branch and no allocation.
+//! Newton's method for one target or several in lanes: no branch, no allocation.
 //!
-//! Method: the twist that is missing is taken at the wrist point, which joints 4 to 6 hardly move. The Jacobian is
-//! then [A B; C D] with A (3 × 3, translation by joints 1 to 3) far from singular wherever shoulder and elbow are, and
-//! A⁻¹ and the inverse of the Schur complement S = D − C A⁻¹ B follow from cross products: no pivoting. The slope σ of
-//! the effects enters as Δu = (I − σ) Δθ, exact to σ²; that of compliance (some 1e-3) is left out and costs at most
-//! one step more.
+//! Method: the missing twist is taken at the wrist point, which joints 4 to 6 hardly move. The Jacobian is then [A B; C D] with
+//! A (3 × 3, translation by joints 1 to 3) far from singular wherever shoulder and elbow are, and A⁻¹ and the inverse of the
+//! Schur complement S = D − C A⁻¹ B follow from cross products without pivoting. The Jacobian σ of the effects enters as
+//! Δu = (I − σ) Δθ, exact to σ²; that of compliance (some 1e-3) is neglected and costs at most one step more.
 //! Shapes: `R` is one row or several; unknowns are the mapped joint angles u (rad).
-//! Stops: a row stands still once it is within [`TOLERANCE_MM`] and
-//! [`TOLERANCE_RAD`], so it gets the same bits whatever its neighbours do; a row whose step is longer than
-//! [`MAX_STEP_RAD`] or which needs more than [`MAX_STEPS`] is given up and left to [`super::newton`]. Where only the
-//! joints are requested ([`Outputs::Joints`]), a step shorter than [`FINAL_STEP_RAD`] is the last: by Newton's square law
-//! what it leaves lies below the tolerances, which holds where the slope of the effects is exact, so only without them.
+//! Termination: a row is frozen once it is within [`TOLERANCE_MM`] and [`TOLERANCE_RAD`], so it gets the same bits whatever its
+//! neighbours do; a row with a step longer than [`MAX_STEP_RAD`] or more than [`MAX_STEPS`] steps is left to [`super::newton`].
+//! For [`Outputs::Joints`], a step shorter than [`FINAL_STEP_RAD`] is the last: by quadratic convergence its remainder lies below
+//! the tolerances. That requires an exact Jacobian of the effects, so it applies only without effects.
 //! Checked against: [`super::newton`], the forward map.
 
 use super::newton::{TOLERANCE_MM, TOLERANCE_RAD};
@@ -34,12 +32,12 @@ const FINAL_STEP_RAD: f64 = 5e-7;
 pub(super) enum Outputs {
     /// Joints, residuals and the distance to singularity at the end.
     Full,
-    /// Joints alone: `singularity` says by more than 0 that the Jacobian at the end has an inverse, and residuals are
-    /// those before the last step.
+    /// Joints alone: `singularity` above 0 states that the Jacobian at the end is invertible, and residuals are those before the
+    /// last step.
     Joints,
 }
 
-/// What the kernel needs to know of an arm.
+/// Geometry of an arm for the kernel.
 #[derive(Debug, Clone)]
 pub(super) struct Kernel {
     /// The wrist point in the last frame (mm).
@@ -50,7 +48,7 @@ pub(super) struct Kernel {
     pub(super) length_mm: f64,
 }
 
-/// Where a row ended.
+/// Result of a row.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Solved<R> {
     /// Mapped joint angles (rad).
@@ -173,7 +171,7 @@ impl<R: SinCos> Factored<R> {
         for k in 0..3 {
             let mut unit = [zero; 3];
             unit[k] = one;
-            // A unit of scaled translation, and a turn about the point, which carries the wrist point along.
+            // A unit of scaled translation, and a rotation about the point, which moves the wrist point too.
             let shift = self.solve(&unit, &[zero; 3]);
             let turn = self.solve(&cross(&unit, lever), &unit);
             for j in 0..6 {
@@ -186,7 +184,7 @@ impl<R: SinCos> Factored<R> {
 }
 
 impl Kernel {
-    /// Runs from mapped angles `start` to where the last frame is at `goal`.
+    /// Solves for the mapped angles at which the last frame is at `goal`, from `start`.
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn solve<R: SinCos>(
         &self,
@@ -223,7 +221,7 @@ impl Kernel {
             }
             let residual_mm = dot(&missing, &missing).sqrt();
             let residual_rad = dot(&turn, &turn).sqrt();
-            // The sine of the missing angle says nothing beyond a quarter turn.
+            // The sine of the missing angle is ambiguous beyond a quarter turn.
             let sensible = (trace - one).positive();
             let converged = residual_mm.within(TOLERANCE_MM) * residual_rad.within(TOLERANCE_RAD) * sensible;
             if step == 0 {
@@ -242,7 +240,7 @@ impl Kernel {
                     delta[j] -= carried[j];
                     alive = alive * delta[j].within(MAX_STEP_RAD);
                 }
-                // Rows that stand still must not take up a NaN: 0 · NaN is NaN, so a lost row stays lost, and only it.
+                // Frozen rows must not take up a NaN: 0 · NaN is NaN, so a lost row stays lost, and only it.
                 for j in 0..6 {
                     mapped[j] += alive * delta[j];
                 }

@@ -5,7 +5,7 @@
 //! q ← q + J⁻¹ e. Where a full step does not make |e| smaller, as happens near singularities, the step is
 //! (JᵀJ + λI)⁻¹ Jᵀ e with λ tenfold until it does (Levenberg), and λ falls back to 0 afterwards.
 //! Shapes: six joints, six equations.
-//! Stops: below [`TOLERANCE_MM`] and [`TOLERANCE_RAD`]; after 80 evaluations; where λ no longer helps.
+//! Termination: below [`TOLERANCE_MM`] and [`TOLERANCE_RAD`]; after 80 evaluations; where λ no longer helps.
 //! Checked against: the forward map on thousands of poses of perturbed arms.
 
 use nalgebra::{Matrix3, Matrix6, Rotation3, Vector3, Vector6};
@@ -28,7 +28,7 @@ pub const TOLERANCE_RAD: f64 = 5e-13;
 const MAX_STEP_RAD: f64 = 0.6;
 const MAX_EVALUATIONS: usize = 80;
 
-/// A target as the kernel wants it: pose of the last DH frame, and the flange.
+/// A target: pose of the last DH frame, and the flange.
 #[derive(Debug, Clone)]
 pub(super) struct Goal {
     pub(super) last: Pose,
@@ -50,7 +50,7 @@ impl Goal {
     }
 }
 
-/// Where the iteration ended.
+/// Result of the iteration.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Outcome {
     pub(super) joints: Joints,
@@ -106,7 +106,7 @@ fn state(arm: &PreparedModel<'_>, goal: &Goal, joints: Joints, length_mm: f64) -
     }
 }
 
-/// Rotation vector of a matrix; from the antisymmetric part while that is exact enough.
+/// Rotation vector of a matrix; from the antisymmetric part while that is accurate.
 fn rotation_vector(m: &Matrix3<f64>) -> Vector3<f64> {
     let half = Vector3::new(m[(2, 1)] - m[(1, 2)], m[(0, 2)] - m[(2, 0)], m[(1, 0)] - m[(0, 1)]) * 0.5;
     let sine = half.norm();
@@ -117,7 +117,7 @@ fn rotation_vector(m: &Matrix3<f64>) -> Vector3<f64> {
     Rotation3::from_matrix_unchecked(*m).scaled_axis()
 }
 
-/// Runs from `start`. NaN ends it at once, not converged; so does an budget that is used up.
+/// Iterates from `start`. NaN ends it at once without convergence, and so does an exhausted budget.
 pub(super) fn solve(arm: &PreparedModel<'_>, goal: &Goal, start: &Joints, length_mm: f64) -> Outcome {
     if budget::refuses() {
         let far = f64::INFINITY;

@@ -1,4 +1,4 @@
-//! Many targets: along a path, each started from its neighbour, or each with a seed of its own; eight in lanes.
+//! Inverse kinematics of many targets, eight in lanes: along a path, each started from its neighbour, or each with its own seed.
 
 use rayon::prelude::*;
 
@@ -11,32 +11,31 @@ use crate::joints::{self, Joints};
 use truegrind_math::lanes::{AnyWidth, SinCos, WIDTH, vectorised};
 use truegrind_math::se3::Pose;
 
-/// Neighbours on a path that stand farther apart are solved one after the other, not in lanes (rad).
+/// Neighbours on a path that are farther apart are solved sequentially, not in lanes (rad).
 const MAX_STRIDE_RAD: f64 = 0.35;
-/// Strides up to here are continued into the next eight seeds (rad).
+/// Strides up to this size are extrapolated to the next eight seeds (rad).
 const STEADY_STRIDE_RAD: f64 = 0.05;
-/// Targets that one thread takes at a time; the results do not depend on it.
+/// Targets that one thread processes at a time; the results do not depend on it.
 const PORTION: usize = 1024;
 
-/// Joints that reach a target, and what comes with them at no cost.
+/// Joints that reach a target, with their configuration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PathJoints {
     /// Controller angles (rad).
     pub joints: Joints,
     /// Their configuration.
     pub configuration: Configuration,
-    /// The signs of [`Branch`] at these joints, as numbers that vanish on the borders.
+    /// The signed margins of the [`Branch`] at these joints.
     margins: [f64; 3],
 }
 
 impl PathJoints {
-    /// Whether the joints are of the configuration that was requested, borders counted to both sides as in
-    /// [`Inverse::solve_configured`].
+    /// Whether the joints have the requested configuration, within the tolerances of [`Inverse::solve_configured`].
     pub fn matches(&self, wanted: &Configuration) -> bool {
         wanted.matches(&self.joints, &self.margins)
     }
 
-    /// The same with the branch to the sign: no other solution of the target is of that configuration.
+    /// The same with the exact branch: no other solution of the target has that configuration.
     pub fn matches_exactly(&self, wanted: &Configuration) -> bool {
         self.matches(wanted) && wanted.matches_branch_exactly(&self.margins)
     }
@@ -49,7 +48,7 @@ impl PathJoints {
 
 impl Inverse<'_> {
     /// Joints along a path from `start`: every target on the branch of the one before it, each joint on the turn
-    /// nearest to it. A target that fails leaves the path where it was: the next one starts from the last success.
+    /// nearest to it. After a failed target the next one starts from the last success.
     ///
     /// One thread; the same input gives the same bits.
     pub fn solve_path(&self, targets: &[Pose], start: &Joints) -> Vec<Result<Solution, InverseError>> {
@@ -68,7 +67,7 @@ impl Inverse<'_> {
         })
     }
 
-    /// The first of [`Inverse::solve_path_joints`], up to a target for which all branches would have to be searched.
+    /// The leading results of [`Inverse::solve_path_joints`], up to the first target that would need a search over all branches.
     pub fn solve_path_prefix(&self, targets: &[Pose], start: &Joints) -> Vec<PathJoints> {
         let reached = self.along(targets, start, Outputs::Joints, true, |solution, margins| {
             self.path_joints(&solution.joints, &margins)
@@ -76,7 +75,7 @@ impl Inverse<'_> {
         reached.into_iter().map_while(Result::ok).collect()
     }
 
-    /// `easily`: up to a target that is not reached without a search, which ends the list.
+    /// `easily`: the first target that would need a search ends the list.
     fn along<T>(
         &self,
         targets: &[Pose],
@@ -101,7 +100,7 @@ impl Inverse<'_> {
             for (k, target) in block.iter().enumerate() {
                 let row = lane(&solved, k);
                 let joints = self.controller_angles(&row.mapped);
-                // The road in lanes is open while strides are short and the branch is kept.
+                // Lanes are valid while strides are short and the branch is kept.
                 if self.is_accepted(&row, &joints, &seeds[k])
                     && joints::max_joint_difference(&joints, &last) < MAX_STRIDE_RAD
                     && same_branch(&margins, &row.margins[1])
@@ -193,9 +192,8 @@ impl Inverse<'_> {
         out
     }
 
-    /// [`Inverse::solve_seeded`] where solution and seed differ alike along the list, as on the path of an estimated arm
-    /// that is seeded with the nominal one's joints: each eight begin by as much beside their seeds as the last one before
-    /// them ended. One thread.
+    /// [`Inverse::solve_seeded`] where solution and seed differ by nearly the same offset along the list, as on the path of an
+    /// estimated arm seeded with the nominal one's joints: each eight start with the last offset found. One thread.
     pub fn solve_offset_seeded(
         &self,
         targets: &[Pose],
@@ -221,7 +219,7 @@ impl Inverse<'_> {
         out
     }
 
-    /// The kernel's solution where it counts, the careful one elsewhere.
+    /// The kernel's solution where it is accepted, else the searched one.
     fn judged(&self, row: &Solved<f64>, target: &Pose, seed: &Joints) -> Result<Solution, InverseError> {
         let joints = self.controller_angles(&row.mapped);
         match self.is_accepted(row, &joints, seed) {
@@ -244,7 +242,7 @@ impl Inverse<'_> {
         self.kernel.solve(&self.arm, &self.structure, &goal, &start, Outputs::Full)
     }
 
-    /// The kernel on up to eight targets; the last one fills the lanes. `lanes` is room for them.
+    /// The kernel on up to eight targets; the last one fills the lanes. `lanes` is a buffer.
     fn solve_lanes(
         &self,
         targets: &[Pose],
@@ -268,10 +266,10 @@ impl Inverse<'_> {
         vectorised(Block { inverse: self, targets: lanes, outputs, solved });
     }
 
-    /// Place of the last frame for a pose of the flange, given by quaternion (x, y, z, w) and translation.
+    /// The last frame for a pose of the flange, given by quaternion (x, y, z, w) and translation.
     ///
-    /// The quaternion need not have length 1 to the last bit: an interpolated one seldom has, and axes that are longer
-    /// than 1 by 1e-11 ask for a place that no joints reach.
+    /// The quaternion is normalised: an interpolated one seldom has exactly length 1, and axes longer than 1 by 1e-11 would give an
+    /// unreachable frame.
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn last_frame_goal<R: SinCos>(&self, quaternion: &[R; 4], translation: &[R; 3]) -> FrameColumns<R> {
         let [x, y, z, w] = *quaternion;
@@ -286,7 +284,7 @@ impl Inverse<'_> {
     }
 }
 
-/// The stride to be continued: none after a long one.
+/// The stride to extrapolate: none after a long one.
 #[inline(always)]
 fn stride_between(from: &Joints, to: &Joints) -> Joints {
     if joints::max_joint_difference(from, to) >= STEADY_STRIDE_RAD { Joints::zeros() } else { to - from }

@@ -1,6 +1,6 @@
-//! What a closed form hands to Newton's method.
+//! Seed of Newton's method, from a closed form.
 
-/// Where Newton's method starts.
+/// Start of Newton's method.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Seed {
     /// DH joint rotations (rad).

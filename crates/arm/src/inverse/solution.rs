@@ -1,4 +1,4 @@
-//! What the inverse map hands back: a solution, or why there is none.
+//! Results of the inverse: a solution, or the reason why there is none.
 
 use super::configuration::Configuration;
 use crate::joints::Joints;
@@ -8,15 +8,15 @@ use crate::joints::Joints;
 pub struct Solution {
     /// Controller angles (rad).
     pub joints: Joints,
-    /// What the flange still misses the target by (mm).
+    /// Position residual of the flange (mm).
     pub residual_mm: f64,
-    /// What the flange still misses the target by (rad).
+    /// Orientation residual of the flange (rad).
     pub residual_rad: f64,
     /// Newton steps taken.
     pub iterations: usize,
     /// Distance to singularity: 1/‖J⁻¹‖ (Frobenius), J as in
-    /// [`Inverse::smallest_singular_value`](super::Inverse::smallest_singular_value), which it does not exceed, to
-    /// which it is equal close to a singularity, and of which it is √6 times smaller at the worst. 0 at a singularity.
+    /// [`Inverse::smallest_singular_value`](super::Inverse::smallest_singular_value), of which it is a
+    /// lower bound: equal close to a singularity, and smaller by at most √6. 0 at a singularity.
     pub singularity: f64,
 }
 
@@ -30,12 +30,12 @@ pub enum Singularity {
     Elbow,
     /// The wrist centre on axis 1: joint 1.
     Shoulder,
-    /// Not one of the named ones.
+    /// None of the named ones.
     Other,
 }
 
 impl Singularity {
-    /// The joint (0-based) whose motion leaves the singularity or which turns fast near it.
+    /// The joint (0-based) whose motion leaves the singularity or which moves fast near it.
     pub fn joint(&self) -> Option<usize> {
         match self {
             Singularity::Wrist => Some(4),
@@ -64,7 +64,7 @@ pub struct SingularityDistances {
     pub wrist: f64,
     /// |sin| of the angle between lower arm and forearm.
     pub elbow: f64,
-    /// Distance of the wrist centre from the plane of axis 1, in parts of the arm's extent.
+    /// Distance of the wrist centre from the plane of axis 1, as a fraction of the arm's extent.
     pub shoulder: f64,
 }
 
@@ -92,7 +92,7 @@ pub enum InverseError {
         /// How far the target's wrist centre lies outside the nominal arm's reach, on the nearest branch (mm).
         beyond_mm: f64,
     },
-    /// The target needs an angle that a joint does not have.
+    /// The target requires an angle outside a joint's range.
     #[error(
         "joint {} would have to stand at {:.3}°, its range is {:.3}° to {:.3}°",
         joint + 1, angle_rad.to_degrees(), min_rad.to_degrees(), max_rad.to_degrees()
@@ -107,7 +107,7 @@ pub enum InverseError {
         /// Upper limit (rad).
         max_rad: f64,
     },
-    /// The arm is so close to a singularity that no joints were found.
+    /// No joints were found because the arm is too close to a singularity.
     #[error("no joints found this close to the {singularity}: distance {distance:.2e}")]
     NearSingularity {
         /// Which one.
@@ -131,7 +131,7 @@ pub enum InverseError {
         /// The nearest that reaches the target.
         nearest: Configuration,
     },
-    /// Newton's method did not arrive.
+    /// Newton's method did not converge.
     #[error("no solution found: {residual_mm:.3e} mm and {residual_rad:.3e} rad remain")]
     NotConverged {
         /// Remaining distance (mm).
@@ -139,7 +139,7 @@ pub enum InverseError {
         /// Remaining angle (rad).
         residual_rad: f64,
     },
-    /// The search was given up: see [`budget`](super::budget).
+    /// The search budget is used up: see [`budget`](super::budget).
     #[error(
         "its joints were not sought to the end: too many targets of this program are out of reach or beside a singularity, and \
          the work on those is bounded; correct them first, or divide the program"

@@ -1,4 +1,4 @@
-//! Which closed form an arm has, and the three signs that tell its branches apart.
+//! Kinematic family of an arm, its closed form, and the three signed margins that identify a branch.
 
 use nalgebra::{Point3, Vector3};
 
@@ -21,7 +21,7 @@ pub(super) enum Family {
     Other,
 }
 
-/// One of the eight ways in which an arm with a closed form reaches a pose.
+/// One of the eight solutions for a pose of an arm with a closed form.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Branch {
     /// The wrist centre lies behind axis 1, seen in the direction in which the shoulder faces.
@@ -51,8 +51,8 @@ impl Structure {
         Self { axes, family, scales }
     }
 
-    /// All branches for a pose of the last frame; `free` gives the rotations that a singular pose leaves open. Empty
-    /// without a closed form.
+    /// Seeds on all branches for a pose of the last frame; `free` gives the rotations that a singular pose leaves undetermined.
+    /// Empty without a closed form.
     pub(super) fn seeds(&self, target: &Pose, free: &[f64; 6]) -> Vec<Seed> {
         match &self.family {
             Family::Spherical(centre) => spherical::solve(&self.axes, centre, target, free),
@@ -66,13 +66,12 @@ impl Structure {
         self.axes.extent_mm
     }
 
-    /// Whether no arm whose points are within `model_distance_mm` of this one's, all joints turned alike, reaches a pose of the last
-    /// frame that the closed form has beyond reach by `beyond_mm`.
+    /// Whether a pose of the last frame that the closed form puts out of reach by `beyond_mm` is out of reach of every arm
+    /// whose points are within `model_distance_mm` of this one's at equal joint angles.
     ///
-    /// For a spherical wrist: the wrist centre is told by the pose, and the places that it reaches are a ring about axis 1.
-    /// Seen in a plane through that axis, a shift of the wrist centre moves its place by no more than as much, but for an
-    /// arm with an offset to the side, of which the plane turns: more the nearer to the axis. Any arm: what lies farther
-    /// from the base than all links in line are long.
+    /// For a spherical wrist the pose determines the wrist centre, whose workspace is a ring about axis 1. In a plane through
+    /// that axis a shift of the wrist centre moves it by at most as much, except for an arm with a lateral offset, whose plane
+    /// rotates: more so the nearer to the axis. For any arm: a pose farther from the base than all links in line.
     pub(super) fn is_surely_unreachable(&self, last: &Pose, beyond_mm: f64, model_distance_mm: f64) -> bool {
         if !(beyond_mm > 0.0 && beyond_mm.is_finite()) {
             return false;
@@ -85,7 +84,7 @@ impl Structure {
         let there = (last * axes.home_inverse * Point3::from(centre)).coords - axes.point[0];
         let from_axis = there.cross(&axes.direction[0]).norm();
         let to_side = axes.direction[1].dot(&(centre - axes.point[0])).abs();
-        // What the closed form itself takes for meeting and for parallel.
+        // The tolerances of the closed form for meeting and parallel axes.
         let loose = axes.meeting(3, 4).map_or(f64::INFINITY, |(_, gap)| gap)
             + axes.distance(5, &centre)
             + axes.extent_mm * axes.direction[1].cross(&axes.direction[2]).norm();
@@ -97,7 +96,7 @@ impl Structure {
         beyond_mm > shift * nearest / (nearest.powi(2) - to_side.powi(2)).sqrt()
     }
 
-    /// The point that joints 4 to 6 move least, in the last frame (mm): where the twist is taken.
+    /// The point that joints 4 to 6 move least, in the last frame (mm); the kernel takes the twist there.
     pub(super) fn wrist_in_last(&self) -> [f64; 3] {
         match self.family {
             Family::Spherical(point) | Family::Parallel(point) => {
@@ -107,9 +106,9 @@ impl Structure {
         }
     }
 
-    /// Signed distances from the borders between branches: how far the wrist point lies in front of axis 1 (as part of the
-    /// arm's extent), the sine of the elbow, the sine of the wrist. Behind, elbow back and axis 5 negative count as
-    /// negative. All 1 for an arm without a closed form, which has no branches.
+    /// Signed distances from the singularities between branches: distance of the wrist point in front of axis 1 (as a fraction of
+    /// the arm's extent), sine of the elbow, sine of the wrist. Behind, elbow back and axis 5 negative are negative. All 1 for
+    /// an arm without a closed form, which has no branches.
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn margins<R: Real>(&self, frames: &Chain<R>, wrist: &[R; 3]) -> [R; 3] {
         let (z, o) = (&frames.z, &frames.origin);
@@ -126,7 +125,7 @@ impl Structure {
         [shoulder, elbow, wrist]
     }
 
-    /// The margins of a model of this structure whose joints have been put into frames.
+    /// The margins for the joint frames of a model of this structure.
     pub(super) fn margins_of(&self, frames: &Chain<f64>) -> [f64; 3] {
         let [x, y, z] = self.wrist_in_last();
         let wrist = std::array::from_fn(|k| {
@@ -147,7 +146,7 @@ impl Branch {
     }
 }
 
-/// What makes the margins signed parts of one: with the controller's senses of joints 2 and 5.
+/// Factors that normalise the margins and give them the signs of the controller's joints 2 and 5.
 fn scales(axes: &Axes, family: Family) -> [f64; 3] {
     let end = match family {
         Family::Spherical(centre) => centre,

@@ -1,4 +1,4 @@
-//! The comment line that says that a file was compensated.
+//! The mark: the comment line that records that a file was compensated.
 //!
 //! `! truegrind 0.1.0 model 3f9a…`, and `partial` behind it where cuts may be corrected in part, on a line of its own after the head of each MODULE in which something changed: a
 //! controller keeps the modules of a file apart.
@@ -11,7 +11,7 @@ use crate::edit::Edits;
 use crate::motion::{Mark, says_uncorrected};
 use crate::tree::whole_line;
 
-/// Where the marks of one file stand and go: all that is asked of its tree once its motions are listed.
+/// Present and future places of the marks of one file: all that is needed of its tree after listing.
 #[derive(Debug, Clone)]
 pub(super) struct Places {
     modules: Vec<Module>,
@@ -27,12 +27,12 @@ struct Module {
     old: Option<Range<usize>>,
     /// Where a mark goes, and whether a line begins there.
     place: (usize, bool),
-    /// The lines that say that the program is still to be corrected.
+    /// The lines that state that the program is not yet corrected.
     uncorrected: Vec<Range<usize>>,
 }
 
 impl Places {
-    /// Those of a file.
+    /// The marks of a file.
     pub(super) fn of(tree: &RapidTree<'_>) -> Self {
         let whole = 0..tree.len() as u32;
         let modules = modules(tree);
@@ -56,7 +56,7 @@ impl Places {
         Self { modules, old }
     }
 
-    /// The marks of the modules in which something changed, `comment` being what they say.
+    /// Edits that put `comment` into every changed module.
     pub(super) fn edits(&self, source: &[u8], edits: &Edits, comment: &[u8]) -> Edits {
         let mut changed = vec![self.modules.len() == 1; self.modules.len()];
         if self.modules.len() > 1 {
@@ -94,7 +94,7 @@ pub fn find(tree: &RapidTree<'_>) -> Option<Mark> {
 
 /// The token of the mark among some tokens.
 fn token_in(tree: &RapidTree<'_>, tokens: Range<u32>) -> Option<u32> {
-    // Long stretches hold no comment: that is told without looking at each token by itself.
+    // Long stretches without a comment are skipped at once.
     const STRETCH: usize = 128;
     let is_comment = |kind: &Token| *kind == Token::Comment;
     let holds_comment = |kinds: &[Token]| kinds.iter().fold(false, |any, kind| any | is_comment(kind));
@@ -111,8 +111,8 @@ fn token_in(tree: &RapidTree<'_>, tokens: Range<u32>) -> Option<u32> {
     })
 }
 
-/// The lines among some tokens that say that the program is still to be corrected: the comment with the blanks before it
-/// and its line end, where it has the line to itself.
+/// The lines among some tokens that state that the program is not yet corrected: the comment with the blanks before it, and
+/// its line end where it is alone on the line.
 fn uncorrected(tree: &RapidTree<'_>, tokens: Range<u32>) -> Vec<Range<usize>> {
     let first = tokens.start as usize;
     let kinds = (first..).zip(&tree.kinds()[first..tokens.end as usize]);
@@ -123,7 +123,7 @@ fn uncorrected(tree: &RapidTree<'_>, tokens: Range<u32>) -> Vec<Range<usize>> {
 
 /// Reads a comment as a mark.
 pub fn read(comment: &[u8]) -> Option<Mark> {
-    // Nearly no comment is one.
+    // Hardly any comment is a mark.
     let begins = comment.iter().position(|byte| *byte != b'!' && !byte.is_ascii_whitespace())?;
     if !comment[begins..].starts_with(b"truegrind") {
         return None;

@@ -1,4 +1,4 @@
-//! Values to text: fresh literals, and new numbers in the place of old ones.
+//! Printing values: new literals, and new numbers in place of old ones.
 //!
 //! A number is replaced only where it changes by at least half a unit of the last decimal that would be written (and
 //! by more than numerical noise), so that writing back what was read changes no byte. A quaternion is compared with
@@ -18,7 +18,7 @@ const QUATERNION_NOISE: f64 = 1e-10;
 /// The same for joints (degrees).
 const JOINT_NOISE_DEG: f64 = 1e-9;
 
-/// A target with what shall be new; `None` keeps the old configuration.
+/// The new value of a target; `None` keeps the old configuration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Fresh {
     Cartesian { position_mm: [f64; 3], quaternion: [f64; 4], conf: Option<[i32; 4]> },
@@ -79,7 +79,7 @@ pub(super) fn changes(old: &TargetValue, fresh: &Fresh, options: &RewriteOptions
     }
 }
 
-/// Replaces the numbers of the literal `text`, whose first byte is byte `at` of its file. Answers whether anything
+/// Replaces the numbers of the literal `text`, whose first byte is byte `at` of its file. Returns whether anything
 /// changed; `None` where the text is no plain literal of that kind. `old`: what was read from it, where it is plain.
 pub(super) fn replace_numbers(
     text: &[u8],
@@ -146,7 +146,7 @@ pub(super) fn replace_numbers(
     Some(edits.len() > before)
 }
 
-/// A whole target of old and new.
+/// The old target with the new value.
 pub(super) fn merged(old: &TargetValue, fresh: &Fresh) -> TargetValue {
     let external = match old {
         TargetValue::Cartesian(target) => target.external,
@@ -169,7 +169,7 @@ pub(super) fn merged(old: &TargetValue, fresh: &Fresh) -> TargetValue {
     }
 }
 
-/// A fresh literal.
+/// A new literal.
 pub(super) fn literal(out: &mut Vec<u8>, value: &TargetValue, options: &RewriteOptions) {
     let list = |out: &mut Vec<u8>, values: &[f64], decimals: u8| {
         out.push(b'[');

@@ -1,6 +1,6 @@
-//! New values to edits of RAPID text.
+//! Rewriting: new target values as edits of the RAPID text.
 //!
-//! Where a target's numbers stand decides how it changes: a literal in the instruction in place; a declaration in
+//! The origin of a target's numbers decides how it changes: a literal in the instruction in place; a declaration in
 //! place where every use agrees on the new value and nothing else reads it, else a clone beside it under a new name;
 //! an array element in place or as a literal in the instruction; a computed target as a literal in the instruction.
 
@@ -20,7 +20,7 @@ use crate::edit::{EditError, Edits};
 use crate::motion::{Motion, MotionKind, Origin, Reason, Role, Span, TargetValue};
 use crate::rewrite::{Change, FileEdits, NewTarget, Outcome, RewriteOptions, Rewritten};
 
-/// Changes that one thread takes at a time.
+/// Changes that one thread processes at a time.
 const PORTION: usize = 1024;
 
 /// Greatest length of a data name.
@@ -58,7 +58,7 @@ impl Task<'_> {
         })
     }
 
-    /// Why a change cannot be made.
+    /// Why a change is refused.
     fn refusal(&self, motion: &Motion, change: &Change) -> Option<Reason> {
         if let Some(reason) = motion.reason() {
             return Some(reason);
@@ -108,23 +108,23 @@ fn instruction_of(motion: &Motion) -> Option<&'static Instruction> {
     instruction::find(motion.instruction.as_bytes()).map(|index| &INSTRUCTIONS[index])
 }
 
-/// One wish for a declared target: which change, which motion and target, which value.
+/// Update of one target: index of the change, motion, target, and the new value.
 #[derive(Clone, Copy)]
-struct Wish {
+struct TargetUpdate {
     change: usize,
     motion: u32,
     target: u32,
     fresh: Fresh,
 }
 
-/// Wishes by declaration and first byte of the literal.
-type WishesOf = BTreeMap<(u32, u32), Vec<Wish>>;
+/// Updates by declaration and first byte of the literal.
+type UpdatesByDeclaration = BTreeMap<(u32, u32), Vec<TargetUpdate>>;
 
-/// Who uses which declared target.
+/// Uses of the declared targets.
 struct Users {
-    /// The motions of each declaration, array elements apart by the first byte of their literal.
+    /// Motions that use each declaration; array elements are distinguished by the first byte of their literal.
     own: HashMap<(u32, u32), Vec<(u32, u32)>>,
-    /// Declarations that something reads which will not be written out as a literal.
+    /// Declarations with a reader that will not be replaced by a literal.
     read_elsewhere: HashSet<u32>,
 }
 
@@ -175,12 +175,13 @@ impl<'r, 's> Rewriter<'r, 's> {
 
     fn all(&mut self, changes: &[Change]) -> Vec<Outcome> {
         let task = self.task;
-        let (mut outcomes, wishes, computed) = self.in_place(changes);
-        let replaced: HashSet<(u32, u32)> = computed.iter().map(|wish| (wish.motion, wish.target)).collect();
-        if !wishes.is_empty() {
+        let (mut outcomes, updates, computed) = self.in_place(changes);
+        let replaced: HashSet<(u32, u32)> =
+            computed.iter().map(|update| (update.motion, update.target)).collect();
+        if !updates.is_empty() {
             let users = Users::of(task, &replaced);
-            for ((declaration, literal), wishes) in wishes {
-                self.declared((declaration, literal), &wishes, &users, &mut outcomes);
+            for ((declaration, literal), updates) in updates {
+                self.declared((declaration, literal), &updates, &users, &mut outcomes);
             }
         }
         self.computed(&computed, &mut outcomes);
@@ -195,9 +196,9 @@ impl<'r, 's> Rewriter<'r, 's> {
         outcomes
     }
 
-    /// What stands in the instructions themselves, in portions on all threads: an edit of one instruction depends on
-    /// no other. Wishes for declared and computed targets are collected, in the order of the changes.
-    fn in_place(&mut self, changes: &[Change]) -> (Vec<Outcome>, WishesOf, Vec<Wish>) {
+    /// Edits within the instructions, in parallel, since none depends on another. Updates of declared and computed targets are
+    /// collected in the order of the changes.
+    fn in_place(&mut self, changes: &[Change]) -> (Vec<Outcome>, UpdatesByDeclaration, Vec<TargetUpdate>) {
         let (task, options) = (self.task, self.options);
         let portions: Vec<_> = changes
             .par_chunks(PORTION)
@@ -208,41 +209,41 @@ impl<'r, 's> Rewriter<'r, 's> {
                     // About eight numbers of a target change, each by a few digits.
                     *edits = Edits::with_capacity(8 * changes.len(), 64 * changes.len());
                 }
-                let (mut wishes, mut computed) = (WishesOf::new(), Vec::new());
+                let (mut updates, mut computed) = (UpdatesByDeclaration::new(), Vec::new());
                 let outcomes: Vec<Outcome> = (portion * PORTION..)
                     .zip(changes)
                     .map(|(index, change)| match task.listing.motions.get(change.motion as usize) {
                         None => Outcome::Refused(Reason::MissingArgument),
                         Some(motion) => match task.refusal(motion, change) {
                             Some(reason) => Outcome::Refused(reason),
-                            None => part.one(index, motion, change, &mut wishes, &mut computed),
+                            None => part.one(index, motion, change, &mut updates, &mut computed),
                         },
                     })
                     .collect();
-                (part.edits, outcomes, wishes, computed)
+                (part.edits, outcomes, updates, computed)
             })
             .collect();
-        let (mut outcomes, mut wishes, mut computed) =
-            (Vec::with_capacity(changes.len()), WishesOf::new(), Vec::new());
-        for (edits, mut some, wished, mut left) in portions {
+        let (mut outcomes, mut updates, mut computed) =
+            (Vec::with_capacity(changes.len()), UpdatesByDeclaration::new(), Vec::new());
+        for (edits, mut some, updated, mut left) in portions {
             self.edits.iter_mut().zip(edits).for_each(|(all, some)| all.append(some));
             outcomes.append(&mut some);
-            for (place, mut more) in wished {
-                wishes.entry(place).or_default().append(&mut more);
+            for (place, mut more) in updated {
+                updates.entry(place).or_default().append(&mut more);
             }
             computed.append(&mut left);
         }
-        (outcomes, wishes, computed)
+        (outcomes, updates, computed)
     }
 
-    /// The targets of one motion: what stands in the instruction at once, the rest for later.
+    /// The targets of one motion: literals in the instruction at once, the others collected.
     fn one(
         &mut self,
         index: usize,
         motion: &Motion,
         change: &Change,
-        wishes: &mut WishesOf,
-        computed: &mut Vec<Wish>,
+        updates: &mut UpdatesByDeclaration,
+        computed: &mut Vec<TargetUpdate>,
     ) -> Outcome {
         let mut outcome = Outcome::Unchanged;
         if change.straightens() {
@@ -253,7 +254,7 @@ impl<'r, 's> Rewriter<'r, 's> {
             let Some(fresh) = fresh(new) else { continue };
             let Ok(old) = target.value else { continue };
             let (motion_index, position) = (change.motion, position as u32);
-            let wish = Wish { change: index, motion: motion_index, target: position, fresh };
+            let update = TargetUpdate { change: index, motion: motion_index, target: position, fresh };
             if matches!((&fresh, &old), (Fresh::Joint { .. }, TargetValue::Cartesian(_))) {
                 self.take_joint_form(motion, target.argument, &old, &fresh);
                 outcome = worse(outcome, Outcome::Inlined);
@@ -266,19 +267,19 @@ impl<'r, 's> Rewriter<'r, 's> {
                     }
                 }
                 Origin::Declared(declaration) => {
-                    wishes.entry((declaration, 0)).or_default().push(wish);
+                    updates.entry((declaration, 0)).or_default().push(update);
                 }
                 Origin::Element { declaration, literal } => {
-                    wishes.entry((declaration, literal.start)).or_default().push(wish);
+                    updates.entry((declaration, literal.start)).or_default().push(update);
                 }
-                Origin::Computed => computed.push(wish),
+                Origin::Computed => computed.push(update),
                 Origin::Unknown => {}
             }
         }
         outcome
     }
 
-    /// Numbers of a literal in place, or the whole literal where it is not made of plain numbers. `plain`: it is.
+    /// Replaces the numbers of a literal, or the whole literal where it does not consist of plain numbers. `plain`: it does.
     fn literal(&mut self, file: u32, span: Span, (old, plain): (&TargetValue, bool), fresh: &Fresh) -> bool {
         let text = &self.task.sources[file as usize][span.range()];
         let edits = &mut self.edits[file as usize];
@@ -300,8 +301,8 @@ impl<'r, 's> Rewriter<'r, 's> {
         edits.replace_with(span.range(), |out| print::literal(out, &value, self.options));
     }
 
-    /// The instruction becomes the one on a line, and its circle point goes with the comma behind it; a comment between
-    /// them stays.
+    /// Changes the instruction to the linear one and deletes the circle point with the comma behind it; a comment between them
+    /// is kept.
     fn straighten(&mut self, motion: &Motion) {
         let Some(line) = instruction_of(motion).and_then(Instruction::line_form) else { return };
         let start = motion.statement.start as usize;
@@ -313,7 +314,7 @@ impl<'r, 's> Rewriter<'r, 's> {
         }
     }
 
-    /// The instruction becomes the one that takes joints.
+    /// Changes the instruction to the one that takes joints.
     fn take_joint_form(&mut self, motion: &Motion, span: Span, old: &TargetValue, fresh: &Fresh) {
         let Some(name) = instruction_of(motion).and_then(|instruction| instruction.joint_form) else {
             return;
@@ -330,41 +331,44 @@ impl<'r, 's> Rewriter<'r, 's> {
 
     // ---- declarations ----
 
-    /// The wishes for one declared target or array element.
+    /// Updates of one declared target or array element.
     fn declared(
         &mut self,
         (index, start): (u32, u32),
-        wishes: &[Wish],
+        updates: &[TargetUpdate],
         users: &Users,
         outcomes: &mut [Outcome],
     ) {
         let task = self.task;
         let declaration = &task.listing.declarations[index as usize];
-        let target = |wish: &Wish| &task.listing.motions[wish.motion as usize].targets[wish.target as usize];
-        let Some(first) = wishes.first() else { return };
+        let target = |update: &TargetUpdate| {
+            &task.listing.motions[update.motion as usize].targets[update.target as usize]
+        };
+        let Some(first) = updates.first() else { return };
         let Ok(old) = target(first).value else { return };
         let literal = match target(first).origin {
             Origin::Element { literal, .. } => literal,
             _ => declaration.literal.unwrap_or_default(),
         };
-        // Wishes that come to the same text.
-        let mut groups: Vec<(Vec<u8>, Vec<&Wish>)> = Vec::new();
+        // Updates with the same text.
+        let mut groups: Vec<(Vec<u8>, Vec<&TargetUpdate>)> = Vec::new();
         let mut group_of: HashMap<Vec<u8>, usize> = HashMap::new();
         let source = task.sources[declaration.place.file as usize];
         let original = source[literal.range()].to_vec();
-        for wish in wishes {
-            let text = self.written(&original, &old, &wish.fresh);
+        for update in updates {
+            let text = self.written(&original, &old, &update.fresh);
             let group = *group_of.entry(text.clone()).or_insert_with(|| {
                 groups.push((text, Vec::new()));
                 groups.len() - 1
             });
-            groups[group].1.push(wish);
+            groups[group].1.push(update);
         }
-        // Whoever else needs the old value.
-        let wished: HashSet<(u32, u32)> = wishes.iter().map(|wish| (wish.motion, wish.target)).collect();
+        // Other uses that need the old value.
+        let updated: HashSet<(u32, u32)> =
+            updates.iter().map(|update| (update.motion, update.target)).collect();
         let own = users.own.get(&(index, start)).map_or(&[][..], Vec::as_slice);
         let others_hold = users.read_elsewhere.contains(&index)
-            || own.iter().any(|user| !wished.contains(user))
+            || own.iter().any(|user| !updated.contains(user))
             || groups.iter().any(|(text, _)| *text == original);
         let mut free = !others_hold;
         for (text, group) in groups {
@@ -377,23 +381,23 @@ impl<'r, 's> Rewriter<'r, 's> {
                 self.moved_bases.insert(index);
                 Outcome::InPlace
             } else if declaration.array {
-                for wish in &group {
-                    let motion = &task.listing.motions[wish.motion as usize];
-                    self.inline(motion, target(wish).argument, &old, &wish.fresh);
+                for update in &group {
+                    let motion = &task.listing.motions[update.motion as usize];
+                    self.inline(motion, target(update).argument, &old, &update.fresh);
                 }
                 Outcome::Inlined
             } else {
                 let name = self.clone_of(index, &text);
-                for wish in &group {
-                    let motion = &task.listing.motions[wish.motion as usize];
+                for update in &group {
+                    let motion = &task.listing.motions[update.motion as usize];
                     let edits = &mut self.edits[motion.place.file as usize];
-                    edits.replace(target(wish).argument.range(), name.as_bytes());
+                    edits.replace(target(update).argument.range(), name.as_bytes());
                 }
                 Outcome::Split(name)
             };
-            for wish in group {
-                let was = std::mem::replace(&mut outcomes[wish.change], Outcome::Unchanged);
-                outcomes[wish.change] = worse(was, outcome.clone());
+            for update in group {
+                let was = std::mem::replace(&mut outcomes[update.change], Outcome::Unchanged);
+                outcomes[update.change] = worse(was, outcome.clone());
             }
         }
     }
@@ -412,7 +416,7 @@ impl<'r, 's> Rewriter<'r, 's> {
         }
     }
 
-    /// Declares a constant with this value beside a declaration; answers its name.
+    /// Declares a constant with this value beside a declaration; returns its name.
     fn clone_of(&mut self, index: u32, literal: &[u8]) -> String {
         let declaration = &self.task.listing.declarations[index as usize];
         let file = declaration.place.file as usize;
@@ -421,7 +425,7 @@ impl<'r, 's> Rewriter<'r, 's> {
         let statement = &source[declaration.statement.range()];
         let local = statement.len() >= 5 && same_name(&statement[..5], b"LOCAL");
         let joints = super::literal::numbers(literal, super::literal::ROBTARGET).is_none();
-        // After the declaration, and after a comment that stands behind it on its line.
+        // After the declaration and a comment on the same line.
         let end = declaration.statement.end as usize;
         let line = source[end..].iter().position(|&byte| byte == b'\n').map_or(source.len(), |at| end + at);
         let rest = source[end..line].trim_ascii();
@@ -442,7 +446,7 @@ impl<'r, 's> Rewriter<'r, 's> {
         name
     }
 
-    /// `p10` to `p10_2`, `p10_3`, …: of at most 32 characters, and like no other name of the task.
+    /// `p10` to `p10_2`, `p10_3`, …: at most 32 characters, unused in the task.
     fn new_name(&mut self, like: &str) -> String {
         let task = self.task;
         let names = self.names.get_or_insert_with(|| {
@@ -475,32 +479,32 @@ impl<'r, 's> Rewriter<'r, 's> {
 
     // ---- computed targets ----
 
-    fn computed(&mut self, wishes: &[Wish], outcomes: &mut [Outcome]) {
+    fn computed(&mut self, updates: &[TargetUpdate], outcomes: &mut [Outcome]) {
         let task = self.task;
-        // A target computed from a declaration that has moved must be written out even where it itself stays.
+        // A target computed from a changed declaration must be written out even where its own value is unchanged.
         let mut forced: HashSet<(u32, u32)> = HashSet::new();
         for (index, declaration) in task.listing.declarations.iter().enumerate() {
             if self.moved_bases.contains(&(index as u32)) {
                 forced.extend(declaration.other_uses.iter().filter_map(|other| other.motion));
             }
         }
-        for wish in wishes {
-            let motion = &task.listing.motions[wish.motion as usize];
-            let target = &motion.targets[wish.target as usize];
+        for update in updates {
+            let motion = &task.listing.motions[update.motion as usize];
+            let target = &motion.targets[update.target as usize];
             let Ok(old) = target.value else { continue };
-            if !print::changes(&old, &wish.fresh, self.options)
-                && !forced.contains(&(wish.motion, wish.target))
+            if !print::changes(&old, &update.fresh, self.options)
+                && !forced.contains(&(update.motion, update.target))
             {
                 continue;
             }
-            self.inline(motion, target.argument, &old, &wish.fresh);
-            let was = std::mem::replace(&mut outcomes[wish.change], Outcome::Unchanged);
-            outcomes[wish.change] = worse(was, Outcome::Inlined);
+            self.inline(motion, target.argument, &old, &update.fresh);
+            let was = std::mem::replace(&mut outcomes[update.change], Outcome::Unchanged);
+            outcomes[update.change] = worse(was, Outcome::Inlined);
         }
     }
 }
 
-/// The instruction that a change leaves.
+/// The instruction after a change.
 fn written_as(instruction: &'static Instruction, change: &Change) -> Option<&'static Instruction> {
     if change.straightens() { instruction.line_form() } else { Some(instruction) }
 }
@@ -509,7 +513,7 @@ fn written_as(instruction: &'static Instruction, change: &Change) -> Option<&'st
 fn circle_point(source: &[u8], motion: &Motion) -> Option<[std::ops::Range<usize>; 2]> {
     let via = motion.targets.iter().find(|target| target.role == Role::Via)?;
     let mut argument = via.argument.range();
-    // `CirPoint := p20` goes with its name.
+    // `CirPoint := p20` is deleted with its name.
     if let Some(before) = source[..argument.start].trim_ascii_end().strip_suffix(b":=") {
         let name = before.trim_ascii_end();
         let long =
@@ -540,7 +544,7 @@ fn fresh(new: &NewTarget) -> Option<Fresh> {
     }
 }
 
-/// The outcome that says more.
+/// The more significant outcome.
 fn worse(a: Outcome, b: Outcome) -> Outcome {
     let rank = |outcome: &Outcome| match outcome {
         Outcome::Unchanged => 0,

@@ -1,4 +1,4 @@
-//! Motions that are put in before another: they take its speed, tool, work object and process.
+//! Motions inserted before another: they take its speed, tool, work object and process.
 
 use super::{Rewriter, circle_point, fresh, indent, instruction_of, written_as};
 use crate::edit::Edits;
@@ -13,7 +13,7 @@ use crate::rewrite::{Change, Extra};
 use crate::tree::Child;
 
 impl Rewriter<'_, '_> {
-    /// Puts in what a change asks for.
+    /// Inserts the motions of a change.
     pub(super) fn extras(&mut self, change: &Change) {
         let motion = &self.task.listing.motions[change.motion as usize];
         let Some(instruction) = instruction_of(motion) else { return };
@@ -119,7 +119,7 @@ struct Parts {
     speed_options: Vec<Span>,
     /// `\WObj`, `\TLoad`.
     tool_options: Vec<Span>,
-    /// `\Inpos`, `\Z`: belong to the stop at the end.
+    /// `\Inpos`, `\Z`, which belong to the stop at the end.
     stop_options: Vec<Span>,
 }
 

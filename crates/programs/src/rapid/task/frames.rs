@@ -11,7 +11,7 @@ use crate::rapid::value::{LARGEST, Value, built_in};
 use crate::tree::Child;
 
 impl<'s> ListingBuilder<'_, 's> {
-    /// Whether a name or expression may have another value at another motion.
+    /// Whether a name or expression may have different values at different motions.
     pub(super) fn varies(&self, unit: Unit, value: Child) -> bool {
         let tree = &self.trees[unit.file as usize];
         let (first, end) = tokens_of(tree, value);
@@ -41,7 +41,7 @@ impl<'s> ListingBuilder<'_, 's> {
         index
     }
 
-    /// The speed of a motion with the velocity of the TCP that its option states in place of it.
+    /// The speed of a motion with the TCP velocity of its option `\V`.
     pub(super) fn overridden(
         &mut self,
         speed: u32,
@@ -116,7 +116,7 @@ impl<'s> ListingBuilder<'_, 's> {
         }
     }
 
-    /// The work object of a motion, with the displacement in it that the text tells.
+    /// The work object of a motion, a known displacement included.
     pub(super) fn work_object(&mut self, unit: Unit, state: &AbstractState, value: Option<Child>) -> u32 {
         let displacement =
             state.displacement().and_then(Result::ok).filter(|frame| *frame != Frame::IDENTITY);
@@ -124,7 +124,7 @@ impl<'s> ListingBuilder<'_, 's> {
             Some(value) => text_of(&self.trees[unit.file as usize], value),
             None => b"wobj0",
         };
-        // Without an argument it is wobj0 in every scope, whatever a scope calls by that name.
+        // Without an argument it is wobj0, even where a scope declares that name.
         let scope = if value.is_some() { unit.scope } else { u32::MAX };
         if displacement.is_none()
             && let Some(index) = self.work_objects.get(scope, text)
