@@ -1,4 +1,4 @@
-//! How an arm stands in a TOML file: lengths in mm, angles in degrees.
+//! An arm in a TOML file: lengths in mm, angles in degrees.
 
 use nalgebra::{Matrix6, Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
@@ -152,7 +152,7 @@ impl ArmFile {
         })
     }
 
-    /// Refuses numbers that no arm has; whatever passes is finite.
+    /// Refuses numbers out of bounds; all accepted numbers are finite.
     fn check(&self) -> Result<(), InvalidValue> {
         bounds::joint_map(&self.joint_map)?;
         bounds::joint_ranges(&self.min_deg, &self.max_deg)?;

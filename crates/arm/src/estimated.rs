@@ -1,7 +1,6 @@
-//! An estimated arm: the nominal arm, everything identified, how well it is known, and where it came from.
+//! An estimated arm: the nominal arm, all identified parameters with their covariance, and their provenance.
 //!
-//! The TOML file of an estimated arm is complete: it holds the nominal arm too, so a program can be rewritten from it
-//! alone.
+//! The TOML file of an estimated arm is complete: it contains the nominal arm too, so it suffices to correct programs.
 
 mod checks;
 mod error;
@@ -31,9 +30,9 @@ pub enum Judgement {
     Pass,
     /// The fit may not be used.
     Fail,
-    /// The data do not promise that programs gain: used only where that is asked for.
+    /// The data do not show that a correction helps: used only on explicit request.
     Doubtful,
-    /// Nothing speaks against the fit, and no limits were stated to judge it by.
+    /// No objection to the fit, and no stated limits to judge it by.
     NotEvaluated,
 }
 
@@ -64,7 +63,7 @@ pub struct EstimatedParameter {
     /// Standard deviation of the prior; absent without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub prior_sigma: Option<f64>,
-    /// Share of the knowledge that the data brought: 1 − (sigma / prior sigma)²; 0 means the prior alone holds it.
+    /// Share of the information that came from the data: 1 − (sigma / prior sigma)²; 0 where the prior alone determines it.
     pub determined: f64,
 }
 
@@ -88,13 +87,13 @@ pub struct Provenance {
     pub seed: u64,
     /// Share of rows that was held out to state the error.
     pub held_out: f64,
-    /// Whether rounded angles were sharpened by the controller's read-out.
+    /// Whether rounded angles were refined by read-out fusion.
     pub sharpened: bool,
     /// Version of truegrind.
     pub version: String,
 }
 
-/// Errors of one stage, on the rows it was fitted to and on rows it never saw (mm).
+/// Errors of one stage on fitted and on held-out rows (mm).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StageErrors {
@@ -109,11 +108,11 @@ pub struct StageErrors {
 pub struct Estimated {
     /// Catalogue name of the nominal arm.
     pub robot: String,
-    /// What the controller computes with.
+    /// The nominal arm, with which the controller computes.
     pub nominal: Model,
-    /// The arm as estimated. Effects that were found and are in doubt stand in it at size 0, for the covariance.
+    /// The estimated arm. Doubtful effects are included with parameters 0, for the covariance.
     pub model: Model,
-    /// Everything that was identified, of the arm first.
+    /// All identified parameters, those of the arm first.
     pub parameters: Vec<EstimatedParameter>,
     /// Parameters of the arm in the order of the covariance.
     pub order: Vec<Parameter>,
@@ -121,21 +120,21 @@ pub struct Estimated {
     pub covariance: DMatrix<f64>,
     /// Where the data came from.
     pub provenance: Provenance,
-    /// Errors with frames registered alone.
+    /// Errors of the nominal arm with registered frames.
     pub registered: StageErrors,
-    /// Errors with geometry.
+    /// Errors of the calibrated arm.
     pub geometry: StageErrors,
-    /// What the sensor and the rounding leave (mm); absent where it cannot be told.
+    /// Noise floor from sensor and rounding (mm); absent where it is unknown.
     pub noise_floor_mm: Option<f64>,
     /// The judgement.
     pub verdict: Verdict,
     /// Where the arm was measured.
     pub region: Region,
-    /// The condition that the estimate holds for.
+    /// The condition for which the estimate is valid.
     pub condition: Condition,
 }
 
-/// A frame that was taught with the arm, so that it moves with the arm's parameters.
+/// A frame registered with the arm, so that it depends on the arm's parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RegisteredFrame {
     /// Its origin in the base (mm).
@@ -144,22 +143,21 @@ pub struct RegisteredFrame {
     pub twists: Vec<Vector6<f64>>,
 }
 
-/// A point that rides on the flange, whose predicted σ is asked for.
+/// A point on the flange whose predicted σ is computed.
 #[derive(Debug, Clone, Copy)]
 pub struct FlangePoint<'a> {
     /// Controller angles (rad).
     pub joints: Joints,
     /// The point on the flange: its translation counts.
     pub flange_from_tool: Pose,
-    /// The frame that the arm itself placed, against which the point is judged.
+    /// The registered frame relative to which σ is computed.
     pub carried: Option<&'a RegisteredFrame>,
 }
 
 /// Eight points' numbers side by side.
 type Eight = [f64; WIDTH];
 
-/// Velocities of points that ride on the last frame, for the parameters of links (zero for all others); hands back the
-/// points in the base (mm).
+/// Velocities of points on the last frame for the link parameters (zero for all others); returns the points in the base (mm).
 struct LinkVelocities<'a> {
     arm: &'a PreparedModel<'a>,
     angles: &'a [Eight; 6],
@@ -262,7 +260,7 @@ impl AnyWidth for Quadratic<'_> {
     }
 }
 
-/// √v of a variance that rounding may have taken below 0; not a number of what is none.
+/// √v of a variance that rounding may have made negative; NaN for NaN.
 fn root(variance: f64) -> f64 {
     if variance > 0.0 || variance.is_nan() { variance.sqrt() } else { 0.0 }
 }
@@ -283,7 +281,7 @@ impl Estimated {
     /// Predicted standard deviation of the position of a point on the flange (mm): √trace(J Σ Jᵀ), the double sum of
     /// Σᵢⱼ vᵢ·vⱼ over the velocities that the arm's parameters give the point.
     ///
-    /// With `carried`, relative to a frame that the arm itself placed: what moves point and frame alike does not count.
+    /// With `carried`, relative to a registered frame: common motion of point and frame cancels.
     pub fn position_sigma_mm(
         &self,
         arm: &PreparedModel<'_>,

@@ -1,8 +1,7 @@
 //! Data sheets of robot arms: the catalogue that ships, and any other arm from a TOML file.
 //!
-//! One file per maker in the folder beside this one, each number with its source. The nominal model of an arm is what
-//! its own controller computes with; nothing here is measured. How a file is built up: [`sheet`]; what is checked
-//! before a model comes out of it: [`validation`].
+//! One file per maker in the folder beside this one, each number with its source. The nominal model is the one
+//! with which the controller computes; nothing here is measured. Schema of a file: [`sheet`]; its checks: [`validation`].
 //!
 //! ```
 //! let robot = truegrind_arm::robots::load("abb-irb-120")?;
@@ -35,20 +34,19 @@ const FILES: [(&str, &str); 7] = [
     ("yaskawa.toml", include_str!("robots/yaskawa.toml")),
 ];
 
-/// An arm as its data sheet has it.
+/// An arm according to its data sheet.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Robot {
-    /// What the file says, sources included.
+    /// The data sheet, sources included.
     pub sheet: DataSheet,
     /// The nominal model.
     pub model: Model,
-    /// What is allowed but will hurt, one sentence each. In the catalogue only `hsr-jr680` has one: no range of its
-    /// joints is published.
+    /// Warnings, one sentence each. In the catalogue only `hsr-jr680` has one: the ranges of its joints are not published.
     pub warnings: Vec<String>,
 }
 
 impl Robot {
-    /// Checks a data sheet and makes the model. `file` is named in errors.
+    /// Checks a data sheet and builds the model. `file` is named in errors.
     pub fn new(sheet: DataSheet, file: &str) -> Result<Self, RobotError> {
         let warnings = validation::check(&sheet).map_err(|fault| fault.of(file, &sheet.name))?;
         let links = <&[_; 6]>::try_from(sheet.link.as_slice())
@@ -69,7 +67,7 @@ pub fn catalogue() -> Vec<String> {
     names
 }
 
-/// What file `index` of the catalogue says; each is read once, by whoever asks first.
+/// File `index` of the catalogue, parsed once.
 fn shipped(index: usize) -> Result<&'static RobotFile, RobotError> {
     static READ: [OnceLock<RobotFile>; FILES.len()] = [const { OnceLock::new() }; FILES.len()];
     if let Some(content) = READ[index].get() {
@@ -80,7 +78,7 @@ fn shipped(index: usize) -> Result<&'static RobotFile, RobotError> {
     Ok(READ[index].get_or_init(|| content))
 }
 
-/// An arm of the catalogue. Capitals do not matter.
+/// An arm of the catalogue; the name is case-insensitive.
 ///
 /// ```
 /// use truegrind_arm::robots;
@@ -100,8 +98,7 @@ pub fn load(name: &str) -> Result<Robot, RobotError> {
     Err(RobotError::Unknown { name: name.to_owned(), known: catalogue().join(", ") })
 }
 
-/// Refuses a nominal arm that goes by a name of the catalogue and is not that arm. A name that the catalogue has not is
-/// nobody's business.
+/// Refuses a nominal arm with a name of the catalogue that is not that arm. Other names are accepted.
 ///
 /// ```
 /// use truegrind_arm::robots::{self, NominalMismatch};
@@ -111,7 +108,7 @@ pub fn load(name: &str) -> Result<Robot, RobotError> {
 /// arm.links[3].d_mm += 1.0;
 /// let Err(NominalMismatch::Name { place, .. }) = robots::check_catalogue_name("abb-irb-120", &arm) else { panic!("another arm") };
 /// assert!(place.contains("link 4 d_mm"));
-/// // An arm of one's own has a name of its own.
+/// // A user's own arm has another name.
 /// assert_eq!(robots::check_catalogue_name("workshop-6", &arm), Ok(()));
 /// # Ok::<(), robots::RobotError>(())
 /// ```
@@ -126,7 +123,7 @@ pub fn check_catalogue_name(name: &str, nominal: &Model) -> Result<(), NominalMi
     for (index, (file, _)) in FILES.iter().enumerate() {
         let Ok(content) = shipped(index) else { continue };
         for sheet in &content.robot {
-            // The maker's own designation is as good as the catalogue's name.
+            // The maker's designation counts as the catalogue's name.
             if wanted.is_empty() || (plain(&sheet.name) != wanted && plain(&sheet.model) != wanted) {
                 continue;
             }
@@ -140,7 +137,7 @@ pub fn check_catalogue_name(name: &str, nominal: &Model) -> Result<(), NominalMi
     different.map_or(Ok(()), |place| Err(NominalMismatch::Name { name: name.to_owned(), place }))
 }
 
-/// Refuses a nominal arm whose links are not those of another of the same name.
+/// Refuses a nominal arm whose links differ from those of another arm with the same name.
 ///
 /// # Errors
 /// [`NominalMismatch::Arms`], which says where the two differ first.
@@ -172,7 +169,7 @@ pub fn parse(text: &str, file: &str) -> Result<Robot, RobotError> {
 /// The text of a file that [`parse`] reads.
 ///
 /// # Errors
-/// What the writer says of a number that TOML does not hold.
+/// The TOML writer's message for a number that cannot be written.
 pub fn to_toml(robot: &Robot) -> Result<String, String> {
     toml::to_string(&RobotFile { robot: vec![robot.sheet.clone()] }).map_err(|error| error.to_string())
 }

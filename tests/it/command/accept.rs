@@ -127,7 +127,10 @@ fn the_orientation_is_told_and_judged_where_that_is_asked_for() {
     let half = format!("{}", 0.5 * largest);
     let tight = ["--tolerance-angle", &half, "--sensor-uncertainty-angle", "0.0001", "--json", "page.json"];
     let (code, out, _) = accept("later.csv", &tight);
-    assert!(code == 1 && on_one_line(&out).contains("[failed] Not accepted: largest orientation error"), "{out}");
+    assert!(
+        code == 1 && on_one_line(&out).contains("[failed] Not accepted: largest orientation error"),
+        "{out}"
+    );
     assert_eq!(json()["decision"], "not accepted");
     // Positions alone.
     let places: String = fs::read_to_string(at.join("later.csv"))
@@ -194,10 +197,7 @@ fn a_measured_path_is_evaluated() {
     assert!((0.005..0.2).contains(&repeatability), "{repeatability}");
     table(4, 10);
     let (code, out, _, found) = accept();
-    assert!(
-        code == 0 && out.contains("not evaluated: 10 cycles are required (path edge: 4 cycles"),
-        "{out}"
-    );
+    assert!(code == 0 && out.contains("not evaluated: 10 cycles are required (path edge: 4 cycles"), "{out}");
     assert!(out.contains("largest deviation of the path") && found["iso_9283_paths"][0]["at_mm"].is_null());
     // What is wrong is told by its place.
     for (from, to, expected) in [

@@ -1,7 +1,5 @@
-//! What must hold before the numbers of a model file are used.
-//!
-//! A model decides where the real tool goes, so nothing in its file is taken on trust: a number that is not finite would
-//! come out as a σ of 0, and a covariance that is none as a σ of any size.
+//! Checks of a model file before its numbers are used: a number that is not finite would give a σ of 0, and an invalid covariance
+//! a σ of any size.
 
 use nalgebra::DMatrix;
 
@@ -24,14 +22,14 @@ const SPACING_DEG: Bound = Bound::new(0.0, 1e4, "a distance in degrees, 0 or mor
 const TIME_H: Bound = Bound::new(-1e6, 1e6, "a time in hours");
 const TEMPERATURE_C: Bound = Bound::new(-273.15, 2000.0, "a temperature in °C");
 
-/// How far the links of an estimated arm may be from the nominal ones: far more than any arm is off (mm).
+/// Largest difference between estimated and nominal links: far more than any arm deviates (mm).
 const FARTHEST_MM: Bound = Bound::new(-200.0, 200.0, "a link within 200 mm of the nominal arm's");
 /// The same for angles (°).
 const FARTHEST_DEG: Bound = Bound::new(-45.0, 45.0, "a link within 45° of the nominal arm's");
 /// Most samples of a region and parameters of a model.
 const MOST: usize = 100_000;
 
-/// Checks a model as it was read; its two arms have passed their own checks.
+/// Checks a model after reading; its two arms have passed their own checks.
 pub(super) fn check(model: &Estimated) -> Result<(), InvalidValue> {
     if model.robot.trim().is_empty() {
         return Err(InvalidValue::new("robot", "nothing", "the name of the arm"));
@@ -53,7 +51,7 @@ pub(super) fn check(model: &Estimated) -> Result<(), InvalidValue> {
     covariance(&model.order, &model.covariance)
 }
 
-/// The estimated arm is the nominal one, a little off: the same joint map, link by link.
+/// The estimated arm must have the joint map of the nominal one, and links near its links.
 fn arms(nominal: &Model, estimated: &Model) -> Result<(), InvalidValue> {
     if (nominal.joint_map - estimated.joint_map).amax() > 1e-9 {
         return Err(InvalidValue::new(
@@ -146,7 +144,7 @@ fn number(parameter: &EstimatedParameter) -> Result<(), InvalidValue> {
     SHARE.check(|| "determined".to_owned(), parameter.determined)
 }
 
-/// Every parameter of the covariance is one that the arm has, and the list of parameters follows the same order.
+/// Every parameter of the covariance must belong to the arm, and the list of parameters must have the same order.
 fn order(model: &Estimated) -> Result<(), InvalidValue> {
     let arm = &model.model;
     for (i, parameter) in model.order.iter().enumerate() {
@@ -174,7 +172,7 @@ fn order(model: &Estimated) -> Result<(), InvalidValue> {
             ));
         }
     }
-    // A model may leave its list of parameters away: nothing is computed from it.
+    // The list of parameters may be omitted: nothing is computed from it.
     if model.parameters.is_empty() {
         return Ok(());
     }
@@ -196,8 +194,8 @@ fn order(model: &Estimated) -> Result<(), InvalidValue> {
     ))
 }
 
-/// A covariance has a Cholesky factor. It is looked for in correlations, so that units do not matter; a pivot may lie
-/// below 0 by what rounding does to parameters that are all but the same.
+/// A covariance must have a Cholesky factor. It is computed on correlations, so that units do not matter; rounding may make
+/// a pivot of nearly equal parameters slightly negative.
 fn covariance(order: &[Parameter], matrix: &DMatrix<f64>) -> Result<(), InvalidValue> {
     const SLACK: f64 = 1e-6;
     let n = order.len();
@@ -217,7 +215,7 @@ fn covariance(order: &[Parameter], matrix: &DMatrix<f64>) -> Result<(), InvalidV
         for i in k..n {
             let known: f64 = (0..k).map(|m| factor[(i, m)] * factor[(k, m)]).sum();
             let scale = sigma[i] * sigma[k];
-            // Of what never varies nothing depends.
+            // A variance of 0 requires covariances of 0.
             if scale == 0.0 && matrix[(i, k)] != 0.0 {
                 return refuse(i, bounds::display_number(matrix[(i, k)]), "0 beside a variance of 0");
             }

@@ -1,8 +1,8 @@
-//! Why there is no robot, or not the one that was meant.
+//! Errors of robot files, and mismatches of nominal arms.
 
 use thiserror::Error;
 
-/// Why there is no robot.
+/// Why a robot cannot be loaded.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum RobotError {
@@ -11,7 +11,7 @@ pub enum RobotError {
         "unknown robot \"{name}\", expected one of {known}; or give the path of a robot file of your own (TOML file, URDF, table of link parameters, UR calibration)"
     )]
     Unknown {
-        /// What was asked for.
+        /// The requested name.
         name: String,
         /// The catalogue.
         known: String,
@@ -40,7 +40,7 @@ pub enum RobotError {
         /// How many.
         found: usize,
     },
-    /// Something in another's description of an arm that cannot be used.
+    /// A foreign description of an arm that cannot be used.
     #[error("{file}: {key}: found {found}, expected {expected}; {remedy}")]
     Foreign {
         /// File.
@@ -54,7 +54,7 @@ pub enum RobotError {
         /// What to do.
         remedy: &'static str,
     },
-    /// A value that cannot be right.
+    /// An invalid value.
     #[error("{file}: robot \"{robot}\": {key}: found {found}, expected {expected}; {remedy}")]
     Invalid {
         /// File.
@@ -72,11 +72,11 @@ pub enum RobotError {
     },
 }
 
-/// Why a nominal arm is not the one that its name says.
+/// Why a nominal arm is not the one of its name.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum NominalMismatch {
-    /// It goes by a name of the catalogue and has other links.
+    /// It has a name of the catalogue and other links.
     #[error(
         "its nominal arm goes by the name {name} and is not the one of the catalogue: {place}; correct the name, or give an arm \
          of your own a name of its own"

@@ -1,5 +1,4 @@
-//! An arm in the formats of others. They hold links and ranges of joints; what an estimated arm has beyond that stays behind, and
-//! whoever writes one has to say so ([`lost_in_export`]).
+//! Export of an arm to other formats. They contain links and joint ranges; [`lost_in_export`] lists everything else.
 
 use std::fmt::Write;
 
@@ -10,7 +9,7 @@ use crate::joints::Joints;
 use crate::model::Model;
 use truegrind_math::se3::Pose;
 
-/// A format that is written.
+/// An export format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
     /// Unified Robot Description Format: links without shapes.
@@ -23,10 +22,10 @@ pub enum Format {
     UrYaml,
 }
 
-/// The joints of such a file.
+/// The joints of a UR kinematics file.
 const UR: [&str; 6] = ["shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2", "wrist_3"];
 
-/// What of an arm the format does not hold, one sentence each.
+/// Parts of an arm that the format cannot represent, one sentence each.
 pub fn lost_in_export(model: &Model, format: Format) -> Vec<String> {
     let mut out = Vec::new();
     let acting = model.effects.iter().filter(|effect| !effect.is_zero());
@@ -53,8 +52,8 @@ pub fn lost_in_export(model: &Model, format: Format) -> Vec<String> {
     out
 }
 
-/// The flange in the last frame that a format holds: a table ends before it; Craig's, and the file of UR drivers, before length and
-/// twist of the last link.
+/// The flange in the last frame of a format: a table ends before the flange; Craig's, and the file of UR drivers, also before
+/// length and twist of the last link.
 pub fn flange_in_last_frame(model: &Model, format: Format) -> Pose {
     let last = &model.links[5];
     match format {
@@ -67,8 +66,8 @@ pub fn flange_in_last_frame(model: &Model, format: Format) -> Pose {
     }
 }
 
-/// The angles of the joints of a file for the angles that the controller counts: what a format does not hold of signs and
-/// couplings has to be worked out by whoever moves the exported arm.
+/// Matrix from controller angles to the joint angles of a file: signs and couplings that the format cannot represent and that
+/// users of the exported arm must apply.
 pub fn joint_matrix(model: &Model, format: Format) -> Matrix6<f64> {
     match format {
         Format::Standard | Format::Modified => Matrix6::identity(),
@@ -77,12 +76,12 @@ pub fn joint_matrix(model: &Model, format: Format) -> Matrix6<f64> {
     }
 }
 
-/// By which sign a joint of a URDF turns its link: so that a joint that turns nothing but its link counts as the controller does.
+/// Sign of each joint axis of a URDF, so that an uncoupled joint counts as in the controller.
 fn signs(model: &Model) -> Vector6<f64> {
     model.joint_map.diagonal().map(|turn| if turn < 0.0 { -1.0 } else { 1.0 })
 }
 
-/// Which joints of a file are not those of the controller, and what they are; `None` where all are.
+/// Note on the joints of a file that differ from the controller's; `None` where none does.
 fn angle_note(model: &Model, format: Format) -> Option<String> {
     let angles = joint_matrix(model, format);
     let sum = |i: usize| {
@@ -116,7 +115,7 @@ fn angle_note(model: &Model, format: Format) -> Option<String> {
     })
 }
 
-/// The links of an arm in a format; `name` is the robot's, `notes` stand in it as comments.
+/// The links of an arm in a format; `name` is the robot's, `notes` become comments.
 pub fn write(model: &Model, name: &str, format: Format, notes: &[String]) -> String {
     match format {
         Format::Urdf => urdf(model, name, notes),
@@ -126,12 +125,12 @@ pub fn write(model: &Model, name: &str, format: Format, notes: &[String]) -> Str
     }
 }
 
-/// The frame of each joint in the one before, turning about its z; the flange in the last, all joints at zero.
+/// The frame of each joint, which rotates about its z, in the one before; last the flange; all joints at zero.
 fn joint_frames(model: &Model) -> [Pose; 7] {
     let mut out = [Pose::identity(); 7];
     let mut rest = Pose::identity();
     for (place, link) in out.iter_mut().zip(&model.links) {
-        // The offset theta turns the frame before the joint; what comes after it belongs to the next.
+        // The offset theta rotates the frame before the joint; the rest of the link belongs to the next frame.
         let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), link.theta_rad);
         let turned = Pose::from_parts(Default::default(), turn);
         *place = rest * turned;
@@ -199,7 +198,7 @@ fn urdf(model: &Model, name: &str, notes: &[String]) -> String {
     out
 }
 
-/// Ranges and speeds of the joints of a URDF. Where one is a sum of the controller's, each of those may be anywhere in its own range.
+/// Ranges and speeds of the joints of a URDF. The range of a sum is the sum of the ranges of the controller's joints.
 struct Ranges {
     low_rad: [f64; 6],
     high_rad: [f64; 6],
@@ -213,7 +212,7 @@ impl Ranges {
         let sum = |i: usize, of: &dyn Fn(usize, f64) -> f64| {
             let row = angles.row(i);
             let parts = row.iter().enumerate().filter(|(_, turn)| **turn != 0.0);
-            // A sum of one stays what it is, to the bit.
+            // A sum of one term keeps its bits.
             parts.map(|(j, turn)| turn.abs() * of(j, *turn)).reduce(|a, b| a + b).unwrap_or(0.0)
         };
         let end = |j: usize, lower: bool| match lower {

@@ -1,9 +1,8 @@
-//! Arms that somebody else foreign: URDF files, tables of Denavit–Hartenberg parameters, the calibration files of Universal
-//! Robots.
+//! Import of foreign descriptions of arms: URDF files, Denavit–Hartenberg tables, calibration files of Universal Robots.
 //!
-//! Whatever the form, six axes are read as lines in space at zero (`axes`), and our links are fitted through them. So a table
-//! whose parallel axes put a link hundreds of metres away gives links of the arm's own size, and nothing depends on where somebody
-//! else put his frames. The outcome is compared with the file's own product of transforms before it is handed out.
+//! Every format is read as six axes in space at zero joint angles (`axes`), and links are fitted through them. So a table whose
+//! nearly parallel axes put a link hundreds of metres away gives links of the arm's own size, independent of the file's frames.
+//! The result is compared with the file's own product of transforms before it is returned.
 
 mod axes;
 mod chain;
@@ -24,15 +23,14 @@ pub use common::ImportOptions;
 use common::{foreign_error, zero_if_tiny};
 use truegrind_math::se3::{Pose, difference};
 
-/// An arm, and what was understood of its file.
+/// An imported arm.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ImportedRobot {
     /// The arm.
     pub robot: Robot,
-    /// Which kind of file it is.
+    /// The kind of file.
     pub kind: Kind,
-    /// What a reader should compare with the manual, one sentence each: joints, zero pose, axes, flange, and what was taken from
-    /// the file beside.
+    /// Summary for comparison with the manual, one sentence each: joints, zero pose, axes, flange, and notes on the file.
     pub summary: Vec<String>,
     /// Meshes that the file names for drawing; none where it names none.
     pub visuals: Vec<Visual>,
@@ -41,9 +39,9 @@ pub struct ImportedRobot {
 /// A mesh that a file names for drawing a link. Nothing is computed from it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Visual {
-    /// The frame that it moves with: 0 is the base, i the end of link i.
+    /// The frame to which it is fixed: 0 is the base, i the end of link i.
     pub frame: usize,
-    /// Where it lies in that frame.
+    /// Its pose in that frame.
     pub pose: Pose,
     /// Its file, as it is named there.
     pub file: String,
@@ -55,7 +53,7 @@ pub struct Visual {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Kind {
-    /// Our own.
+    /// Robot file of truegrind.
     Toml,
     /// Unified Robot Description Format.
     Urdf,
@@ -68,7 +66,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// What a file is, by its ending.
+    /// The kind of a file, by its extension.
     pub fn of(name: &str) -> Option<Self> {
         let ending = name.rsplit_once('.')?.1.to_ascii_lowercase();
         match ending.as_str() {
@@ -93,7 +91,7 @@ impl Kind {
     }
 }
 
-/// An arm from a file of any kind that is known; `file` is its name, by whose ending the kind is told, and which messages name.
+/// Imports an arm from a file of any known kind; `file` is its name, whose extension determines the kind, and which messages name.
 ///
 /// ```
 /// use truegrind_arm::robots::foreign::{ImportOptions, import};
@@ -140,7 +138,7 @@ pub fn import(text: &str, file: &str, choice: &ImportOptions) -> Result<Imported
     Ok(ImportedRobot { robot, kind, summary, visuals })
 }
 
-/// Our arm through the axes of a foreign one, compared with it.
+/// Builds the robot from a foreign description and compares the two.
 fn robot(
     foreign: ForeignArm,
     file: &str,
@@ -164,7 +162,7 @@ fn robot(
         map *= couplings;
     }
     if ground_joint_3 {
-        // The link's own angle is that against the ground less what joint 2 turns it by.
+        // The link's own angle is the angle against the ground minus the rotation by joint 2.
         map[(2, 1)] -= fitted.parallel_2_3(file)?;
         notes.push(
             "joint 3 is counted against the ground: link 3 turns by J3 and by what J2 takes back".to_owned(),
@@ -229,15 +227,15 @@ fn masses(foreign: &ForeignArm, fitted: &axes::FittedLinks) -> Option<Masses> {
     })
 }
 
-/// What an arm is called whose file does not say it: after the file, and so that no file is meant by it.
+/// Name of an arm without one: the file name without path separators or points.
 fn name_of(file: &str) -> String {
     file.rsplit(['/', '\\']).next().unwrap_or(file).replace('.', "-")
 }
 
-/// Our arm may differ from the file's own product of transforms by this (mm, and rad on a metre).
+/// Tolerance between the robot and the file's own product of transforms (mm, and rad on a metre).
 const SAME_MM: f64 = 1e-6;
 
-/// Refuses what came out otherwise than the file has it. The joints of the file are those of the links, before any coupling.
+/// Refuses a robot that differs from its file. The joints of the file are those of the links, before any coupling.
 fn check_against_file(
     robot: &Robot,
     foreign: &ForeignArm,
@@ -245,7 +243,7 @@ fn check_against_file(
     map: &Matrix6<f64>,
     file: &str,
 ) -> Result<(), RobotError> {
-    // By which our links turn for those of the file; what the controller's joints make of it is in the map alone.
+    // Link rotations for the file's joints; the controller's couplings are in the map alone.
     let mut plain = Matrix6::identity();
     plain[(0, 0)] = fitted.first_turn;
     let from_links = map.try_inverse().unwrap_or(plain) * plain;
@@ -277,7 +275,7 @@ fn apart(a: &Pose, b: &Pose) -> (f64, f64) {
     (off.fixed_rows::<3>(0).norm(), off.fixed_rows::<3>(3).norm())
 }
 
-/// What was understood: to be compared with the manual.
+/// Summary of the arm, for comparison with the manual.
 fn summarise(robot: &Robot, notes: &[String]) -> Vec<String> {
     let still = Condition::default();
     let ready = robot.model.at_condition(&still);
@@ -324,7 +322,7 @@ fn summarise(robot: &Robot, notes: &[String]) -> Vec<String> {
     out
 }
 
-/// A direction as people say it.
+/// A direction in words.
 fn direction(v: &Vector3<f64>) -> String {
     for (axis, name) in [(Vector3::x(), "x"), (Vector3::y(), "y"), (Vector3::z(), "z")] {
         let along = v.dot(&axis);

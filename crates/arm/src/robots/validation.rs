@@ -1,8 +1,7 @@
-//! What must hold before a data sheet becomes a model.
+//! Checks of a data sheet before it becomes a model.
 //!
-//! The frequent faults are caught by name: radians for degrees, metres for millimetres, a table of another arm (the
-//! file's own published poses are then missed), plain DH on parallel axes (allowed, with a warning: d cannot be
-//! determined there, rls-2025).
+//! Frequent faults have their own messages: radians for degrees, metres for millimetres, a table of another arm (detected by the
+//! file's own published poses), plain DH on parallel axes (allowed, with a warning: d cannot be identified there, rls-2025).
 
 use nalgebra::{Matrix6, Vector6};
 
@@ -17,7 +16,7 @@ use crate::model::Model;
 /// Below this sine of the twist two axes count as parallel: 0.5°.
 const PARALLEL: f64 = 0.0087;
 
-/// A value that cannot be right, before file and robot are known.
+/// An invalid value, before file and robot are known.
 #[derive(Debug)]
 pub(super) struct Fault {
     key: String,
@@ -61,7 +60,7 @@ pub(super) fn link_count(found: usize) -> Fault {
     )
 }
 
-/// Checks all but the published poses; gives the warnings.
+/// Checks all but the published poses; returns the warnings.
 pub(super) fn check(sheet: &DataSheet) -> Result<Vec<String>, Fault> {
     if sheet.name.trim().is_empty() {
         return Err(Fault::new("name", "nothing", "a name", "give the arm a name"));
@@ -79,7 +78,7 @@ pub(super) fn check(sheet: &DataSheet) -> Result<Vec<String>, Fault> {
     Ok(warnings(sheet))
 }
 
-/// Every number is finite and such as an arm has.
+/// Every number must be finite and within its bounds.
 fn bounded(sheet: &DataSheet) -> Result<(), InvalidValue> {
     for (i, link) in sheet.link.iter().enumerate() {
         let key = |name: &str| format!("link {} {name}", i + 1);
@@ -115,7 +114,7 @@ fn bounded(sheet: &DataSheet) -> Result<(), InvalidValue> {
     Ok(())
 }
 
-/// What a data sheet need not say; where it does, above 0.
+/// Optional performance figures must be above 0.
 fn performance(sheet: &DataSheet) -> Result<(), InvalidValue> {
     for (key, bound, value) in [
         ("payload_kg", LOAD_KG, sheet.payload_kg),
@@ -343,10 +342,10 @@ fn warnings(sheet: &DataSheet) -> Vec<String> {
     out
 }
 
-/// Links may differ by this from those of the catalogue, after degrees and back (mm and rad).
+/// Tolerance of equal links, after conversion to degrees and back (mm and rad).
 const SAME: f64 = 1e-6;
 
-/// Where a nominal arm differs from another of the same name: the first number that does.
+/// The first difference between a nominal arm and another of the same name.
 pub(super) fn difference(found: &Model, known: &Model) -> Option<String> {
     for (i, (a, b)) in found.links.iter().zip(&known.links).enumerate() {
         if a.model != b.model {
@@ -376,11 +375,11 @@ pub(super) fn difference(found: &Model, known: &Model) -> Option<String> {
 pub fn deviation(pose: &Published, model: &Model) -> (f64, Option<f64>) {
     let q = Vector6::from(pose.joints_deg.map(f64::to_radians));
     let condition = Default::default();
-    let posed = model.at_condition(&condition);
-    let flange = posed.forward(&q);
+    let prepared = model.at_condition(&condition);
+    let flange = prepared.forward(&q);
     let point = match pose.point {
         Point::Flange => flange.translation.vector,
-        Point::WristCentre => posed.frames(&q).origin[5].into(),
+        Point::WristCentre => prepared.frames(&q).origin[5].into(),
     };
     let distance = match (pose.position_mm, pose.radius_mm) {
         (Some(position), _) => (point - nalgebra::Vector3::from(position)).norm(),
@@ -391,7 +390,7 @@ pub fn deviation(pose: &Published, model: &Model) -> (f64, Option<f64>) {
     (distance, turn)
 }
 
-/// The sheet's own published poses must come out.
+/// The model must reproduce the published poses of its sheet.
 pub(super) fn check_published(sheet: &DataSheet, model: &Model) -> Result<(), Fault> {
     for pose in &sheet.published {
         let key = || format!("published \"{}\"", pose.what);

@@ -357,8 +357,5 @@ fn a_correction_that_makes_it_worse_is_called_so() {
     worse.after = After::Achieved;
     worse.points[0].after = Some(deviation([0.0, 0.0, 3.0], true));
     let text = terminal::document(&view::document(&[worse]), 200);
-    assert!(
-        text.contains("[failed] Largest deviation 1.200 mm before, 3.000 mm after (achieved)"),
-        "{text}"
-    );
+    assert!(text.contains("[failed] Largest deviation 1.200 mm before, 3.000 mm after (achieved)"), "{text}");
 }

@@ -411,8 +411,7 @@ fn a_table_that_continues_below_repeats_what_tells_its_rows_apart() {
 fn the_note_of_a_key_figure_stays_within_the_terminal() {
     let mut document = Document::new("Page");
     document.push(vec![
-        KeyFigure::new("Programs before", 0.66, 3, "mm")
-            .note("expected RMS inside the measured region"),
+        KeyFigure::new("Programs before", 0.66, 3, "mm").note("expected RMS inside the measured region"),
         KeyFigure::new("After", 0.05, 3, "mm"),
     ]);
     let text = terminal::document(&document, 48);

@@ -165,7 +165,10 @@ fn combinations_are_sentences_in_mm_and_degrees() {
     assert_eq!(told["determined_condition"], 1e6);
     assert_eq!(told["observability"]["o3"], 0.3);
     let text = terminal::document(&view::document(&found, identification().1), 120);
-    assert!(text.contains("[warning] Rank 29 of 31: 2 combinations of parameters change no reading"), "{text}");
+    assert!(
+        text.contains("[warning] Rank 29 of 31: 2 combinations of parameters change no reading"),
+        "{text}"
+    );
     assert!(text.contains("O1") && text.contains('∞'));
 }
 
@@ -182,7 +185,11 @@ fn what_makes_up_for_an_unseen_link_is_named() {
     // A longer first link lifts everything, the outlet of the cable too; a longer last link takes the hook along; a turn of
     // the first joint turns the outlet about the base.
     let with = |name: &str| sentences.iter().find(|s| s.starts_with(name)).copied().unwrap_or_default();
-    assert_eq!(with("link1.d"), "link1.d +1.0 mm is not identifiable when outlet.z +1.0 mm follows", "{sentences:?}");
+    assert_eq!(
+        with("link1.d"),
+        "link1.d +1.0 mm is not identifiable when outlet.z +1.0 mm follows",
+        "{sentences:?}"
+    );
     assert!(with("link6.d").contains("target.z −1.0 mm"), "{sentences:?}");
     assert!(with("link1.theta").contains("outlet.y"), "{sentences:?}");
     assert!(json["identifiability"]["observability"]["o1"].as_f64().unwrap() > 0.0);
@@ -244,7 +251,10 @@ fn a_contradicting_read_out_is_a_warning() {
     let mut found = by_hand();
     found.readout_fusion = Err(NotFused::Mismatch { found_mm: 4.2, expected_mm: 0.6 });
     let text = terminal::document(&view::document(&found, identification().1), 200);
-    assert!(text.contains("[warning] The Cartesian readout was not used: it differs by 4.200 mm RMS"), "{text}");
+    assert!(
+        text.contains("[warning] The Cartesian readout was not used: it differs by 4.200 mm RMS"),
+        "{text}"
+    );
     assert_eq!(view::json(&found, identification().1)["sharpening"]["found_mm"], 4.2);
     found.readout_fusion = Err(NotFused::Nothing);
     let text = terminal::document(&view::document(&found, identification().1), 200);

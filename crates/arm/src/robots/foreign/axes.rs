@@ -1,10 +1,10 @@
-//! Our links through six axes in space.
+//! Fit of DH and Hayati links through six axes in space.
 //!
-//! Method: the common normals of Denavit and Hartenberg (1955) between axes that are not parallel. Between parallel ones, where
-//! common normals are everywhere or far away, Hayati and Mirmirani's form (1985): the next frame lies where the next axis meets
-//! the plane through this frame across this axis, and two twists turn this axis into the next. That holds exactly for axes that are
-//! nearly parallel too, so nothing is rounded to a parallel.
-//! Departures: of the two directions of a normal the one is taken that turns the joint by less.
+//! Method: the common normals of Denavit and Hartenberg (1955) between axes that are not parallel. Between parallel ones, whose
+//! common normal is undetermined or far away, Hayati and Mirmirani's form (1985): the next frame lies where the next axis meets
+//! the plane through this frame across this axis, and two twists rotate this axis into the next. That is exact for nearly parallel
+//! axes too, so nothing is rounded to a parallel.
+//! Departures: of the two directions of a normal, the one with the smaller joint offset is taken.
 //! Checked against: the file's own product of transforms.
 
 use nalgebra::{Point3, UnitQuaternion, UnitVector3, Vector3};
@@ -16,29 +16,29 @@ use crate::robots::error::RobotError;
 use crate::robots::sheet::LinkSheet;
 use truegrind_math::se3::Pose;
 
-/// Below this sine of the angle between them two axes are taken by Hayati's form: 0.5°, as the check of data sheets has it.
+/// Below this sine of their angle two axes are linked by Hayati's form: 0.5°, as in the check of data sheets.
 const PARALLEL: f64 = 0.0087;
 
 /// Axes that are closer than this meet (mm). Every joint may be moved by so much, and all of them together stay a hundred times
 /// below the nanometre within which an arm agrees with its file; a product of transforms is off by less.
 const MEET_MM: f64 = 1e-11;
 
-/// A first axis that leans by less is upright (rad): ten picometres at the end of a metre.
+/// A first axis inclined by less is upright (rad): ten picometres at a distance of a metre.
 const SAME_RAD: f64 = 1e-14;
 
 /// What a place (mm) and an angle (°) have to be for the digits of [`FittedLinks::note`] to show them.
 const SHOWN: [f64; 2] = [5e-4, 5e-5];
 
-/// Links, and where they were fitted.
+/// Fitted links and their frames.
 #[derive(Debug, Clone)]
 pub(super) struct FittedLinks {
     /// The links.
     pub(super) links: [LinkSheet; 6],
     /// The flange in the last link frame.
     pub(super) flange: Pose,
-    /// Our base in the file's: its z is axis 1. The same wherever that allows it.
+    /// The robot's base in the file's: its z is axis 1. The same as the file's where possible.
     pub(super) base: Pose,
-    /// −1 where joint 1 of the file turns against our z.
+    /// −1 where joint 1 of the file rotates against that z.
     pub(super) first_turn: f64,
     /// Frames of the links in the file's base with all joints at zero; the base first.
     pub(super) frames: [Pose; 7],
@@ -46,7 +46,7 @@ pub(super) struct FittedLinks {
     directions: [UnitVector3<f64>; 6],
 }
 
-/// Lays our links through the axes of a foreign arm.
+/// Fits links through the axes of a foreign arm.
 pub(super) fn fit_links(foreign: &ForeignArm, file: &str) -> Result<FittedLinks, RobotError> {
     let frames = foreign.frames();
     let lines: [(Point3<f64>, UnitVector3<f64>); 6] = std::array::from_fn(|i| {
@@ -85,7 +85,7 @@ pub(super) fn fit_links(foreign: &ForeignArm, file: &str) -> Result<FittedLinks,
     })
 }
 
-/// The pose of a link with its joint at zero, from the degrees that the sheet holds.
+/// The pose of a link with its joint at zero, from the degrees of the sheet.
 fn turned(link: &LinkSheet) -> Pose {
     Link {
         model: link.model,
@@ -98,10 +98,10 @@ fn turned(link: &LinkSheet) -> Pose {
     .pose(0.0)
 }
 
-/// Our base for a first axis, and whether it turns against the axis: the file's own base where that lies on the axis, else the
-/// place on the axis nearest to it.
+/// The base for a first axis, and −1 where its z is against the axis: the file's own base where it lies on the axis, else the
+/// nearest point of the axis.
 fn base((point, direction): &(Point3<f64>, UnitVector3<f64>)) -> (Pose, f64) {
-    // Upright whichever way round the file counts joint 1.
+    // Upright in either sense of joint 1.
     let turn = if direction.z < -1.0 + 1e-9 { -1.0 } else { 1.0 };
     let z = direction.into_inner() * turn;
     let upright = (z - Vector3::z()).norm() < SAME_RAD;
@@ -110,7 +110,7 @@ fn base((point, direction): &(Point3<f64>, UnitVector3<f64>)) -> (Pose, f64) {
     if upright {
         return (Pose::from_parts(foot.coords.into(), UnitQuaternion::identity()), turn);
     }
-    // By sine and cosine: from the cosine alone a turn of less than 1e-8 is none.
+    // By sine and cosine: the cosine alone loses rotations below 1e-8.
     let across = Vector3::z().cross(&z);
     let (sine, cosine) = (across.norm(), z.z);
     let axis = if sine > 0.0 { across / sine } else { Vector3::x() };
@@ -118,7 +118,7 @@ fn base((point, direction): &(Point3<f64>, UnitVector3<f64>)) -> (Pose, f64) {
     (Pose::from_parts(foot.coords.into(), rotation), turn)
 }
 
-/// A direction of a normal by its angle, turned the other way round where that turns the joint by less.
+/// Angle and sign of a normal, reversed where that makes the joint offset smaller.
 fn shorter(angle: f64) -> (f64, f64) {
     use std::f64::consts::{FRAC_PI_2, PI};
     if angle > FRAC_PI_2 + 1e-9 {
@@ -140,7 +140,7 @@ fn between(
     let sine = direction.x.hypot(direction.y);
     let about_z = |angle: f64| UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle);
     if sine < PARALLEL {
-        // Where the next axis meets the plane through this frame.
+        // Intersection of the next axis with the plane through this frame.
         let meets = point - direction.into_inner() * (point.z / direction.z);
         let length = meets.x.hypot(meets.y);
         if length < 1e-6 {
@@ -180,7 +180,7 @@ fn between(
     })
 }
 
-/// The last link and the flange behind it: what the link can hold of the flange is in the link.
+/// The last link and the flange behind it; the link takes as much of the flange as it can represent.
 fn last(flange: &Pose) -> (LinkSheet, Pose) {
     let place = flange.translation.vector;
     let z = flange.rotation * Vector3::z();
@@ -205,7 +205,7 @@ fn last(flange: &Pose) -> (LinkSheet, Pose) {
 }
 
 impl FittedLinks {
-    /// Where our base lies, where that is not the file's.
+    /// Note on the base where it is not the file's.
     pub(super) fn note(&self) -> Option<String> {
         let mut parts = Vec::new();
         if self.first_turn < 0.0 {
@@ -226,10 +226,10 @@ impl FittedLinks {
         (!parts.is_empty()).then(|| parts.join("; "))
     }
 
-    /// +1 or −1 where axes 2 and 3 are parallel or against each other.
+    /// +1 or −1 where axes 2 and 3 are parallel or antiparallel.
     ///
     /// # Errors
-    /// Where they are neither, since then nothing is counted against the ground.
+    /// Where they are neither, since then no joint is counted against the ground.
     pub(super) fn parallel_2_3(&self, file: &str) -> Result<f64, RobotError> {
         let along = self.directions[1].dot(&self.directions[2]);
         if along.abs() < 1.0 - 1e-4 {

@@ -1,4 +1,4 @@
-//! Six joints and the fixed transforms between them, as a file has them.
+//! A foreign arm: six joints and the fixed transforms between them, as the file describes them.
 
 use nalgebra::{Matrix6, UnitQuaternion, UnitVector3, Vector3};
 
@@ -7,7 +7,7 @@ use crate::joints::Joints;
 use crate::robots::sheet::Dialect;
 use truegrind_math::se3::Pose;
 
-/// One joint: where its frame lies in the frame before, and about which axis of its own it turns.
+/// One joint: its frame in the one before, and its axis.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Step {
     /// Fixed transform that comes before the turn.
@@ -16,7 +16,7 @@ pub(super) struct Step {
     pub(super) axis: UnitVector3<f64>,
 }
 
-/// An arm as a file describes it.
+/// A foreign arm.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct ForeignArm {
     /// The joints from base to flange.
@@ -27,19 +27,19 @@ pub(super) struct ForeignArm {
     pub(super) limits_deg: Option<[[f64; 2]; 6]>,
     /// Highest speeds (°/s), where all are stated.
     pub(super) speed_deg_s: Option<[f64; 6]>,
-    /// Turns of the links for turns of the controller's joints, where that is more than one for one.
+    /// Link rotations per rotation of the controller's joints, where that is not the identity.
     pub(super) joint_map: Option<Matrix6<f64>>,
     /// Mass of each link, its centre in the base with all joints at zero (mm).
     pub(super) masses: Option<[Body; 6]>,
-    /// Maker, designation, language of programs, where told.
+    /// Maker, designation, program language, where stated.
     pub(super) maker: String,
     pub(super) designation: String,
     pub(super) dialect: Option<Dialect>,
-    /// Where the numbers come from.
+    /// Source of the numbers.
     pub(super) source: String,
     /// Meshes that the file names for drawing.
     pub(super) visuals: Vec<Mesh>,
-    /// What a reader should know.
+    /// Notes for the user.
     pub(super) notes: Vec<String>,
 }
 
@@ -48,7 +48,7 @@ pub(super) struct ForeignArm {
 pub(super) struct Mesh {
     /// How many of the six joints move it.
     pub(super) joints: usize,
-    /// Where it lies in the file's base with all joints at zero.
+    /// Its pose in the file's base with all joints at zero.
     pub(super) place: Pose,
     /// Its file, as it is named.
     pub(super) file: String,
@@ -69,7 +69,7 @@ impl ForeignArm {
         out
     }
 
-    /// The flange in the base for turns of the links (rad): the product as the file has it.
+    /// The flange in the base for link rotations (rad): the file's own product of transforms.
     pub(super) fn forward(&self, joints: &Joints) -> Pose {
         let turned = |step: &Step, angle: f64| {
             step.before

@@ -1,20 +1,20 @@
-//! What the readers of others' descriptions share.
+//! Shared parts of the importers.
 
 use crate::robots::error::RobotError;
 use crate::robots::sheet::Dialect;
 
-/// What a file leaves open.
+/// Choices that a file leaves open.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct ImportOptions {
-    /// The link that stands: the root of the tree where left out.
+    /// The base link; the root of the tree if omitted.
     pub base: Option<String>,
-    /// The link that is the flange: `tool0` or `flange` where left out and there is one.
+    /// The flange link; `tool0` or `flange` if omitted and present.
     pub tip: Option<String>,
-    /// The log's third angle is that of the forearm against the ground, whatever joint 2 does, as FANUC controllers count it.
+    /// Joint 3 is counted against the ground, independent of joint 2, as FANUC controllers do.
     pub ground_joint_3: bool,
 }
 
-/// Something that cannot be used, in a file of somebody else.
+/// The error of an unusable part of a foreign file.
 pub(super) fn foreign_error(
     file: &str,
     key: impl Into<String>,
@@ -31,12 +31,12 @@ pub(super) fn foreign_error(
     }
 }
 
-/// What stands where a zero was meant.
+/// Rounds numerical noise to zero.
 pub(super) fn zero_if_tiny(value: f64) -> f64 {
     if value.abs() < 1e-12 { 0.0 } else { value }
 }
 
-/// The language of a maker's programs, where a name tells the maker.
+/// Program language and maker, by a maker's name in the text.
 pub(super) fn maker_of(text: &str) -> (Option<Dialect>, &'static str) {
     let text = text.to_lowercase();
     for (word, maker, dialect) in [

@@ -1,8 +1,8 @@
 //! URDF: the joints between two links of a tree.
 //!
-//! Which part of the tree is the arm is not guessed: a tree with one chain of exactly six joints that move is read by itself, with
-//! the flange in `tool0` or `flange` where there is one; whatever else asks for base and tip. Lengths are metres and angles
-//! radians; what stands beyond a fixed joint belongs to the link before, masses too.
+//! The arm within the tree is not guessed: a tree with exactly one chain of six moving joints is unambiguous, with the flange in
+//! `tool0` or `flange` if present; any other requires base and tip. Lengths are metres and angles radians; links behind a fixed
+//! joint belong to the link before it, with their masses.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -16,10 +16,10 @@ use crate::body::Body;
 use crate::robots::error::RobotError;
 use truegrind_math::se3::Pose;
 
-/// Far more than any description of robots has.
+/// Far more than any robot description contains.
 const MAX_NODES: u32 = 1_000_000;
 
-/// Names by which the flange goes; the first that is there is taken.
+/// Names of the flange link, in order of precedence.
 const FLANGES: [&str; 4] = ["tool0", "flange", "ee_link", "tool_link"];
 
 #[derive(Debug, Clone, PartialEq)]
@@ -53,7 +53,7 @@ impl Joint<'_> {
 struct Tree<'a> {
     file: &'a str,
     joints: Vec<Joint<'a>>,
-    /// The joint that leads to each link.
+    /// The joint whose child is each link.
     to: BTreeMap<&'a str, usize>,
     masses: BTreeMap<&'a str, Body>,
     links: Vec<&'a str>,
@@ -90,7 +90,7 @@ pub(super) fn read(text: &str, file: &str, choice: &ImportOptions) -> Result<For
             "give a URDF: SDF and MJCF are other formats",
         ));
     }
-    // What is only defined and never used says nothing of the robot.
+    // Definitions without use do not matter.
     let defines = |node: &Node<'_, '_>| matches!(node.tag_name().name(), "property" | "arg" | "macro");
     let is_macro =
         |node: &Node<'_, '_>| node.tag_name().namespace().is_some_and(|name| name.contains("xacro"));
@@ -117,10 +117,10 @@ fn macros(file: &str) -> RobotError {
     )
 }
 
-/// More than these no file forgets to declare.
+/// Most undeclared prefixes that are repaired.
 const MAX_PREFIXES: usize = 16;
 
-/// The text with its prefixes declared: many tools leave that out, and nothing of what they mark is read.
+/// The text with its namespace prefixes declared: many tools omit that, and the marked elements are not read.
 fn with_prefixes(text: &str) -> Cow<'_, str> {
     let mut text = Cow::Borrowed(text);
     for _ in 0..MAX_PREFIXES {
@@ -167,7 +167,7 @@ fn child<'a, 'i>(node: &Node<'a, 'i>, name: &str) -> Option<Node<'a, 'i>> {
     node.children().find(|child| child.has_tag_name(name))
 }
 
-/// The transform of an `<origin>`; none is no transform.
+/// The transform of an `<origin>`; the identity if there is none.
 fn origin(node: &Node<'_, '_>, file: &str) -> Result<Pose, RobotError> {
     let place = child(node, "origin");
     let xyz = numbers(place, "xyz", [0.0; 3], file)?;
@@ -243,7 +243,7 @@ fn body(node: &Node<'_, '_>, file: &str) -> Result<Option<Body>, RobotError> {
     Ok((mass_kg > 0.0).then(|| Body { mass_kg, centre_mm: centre.into() }))
 }
 
-/// The meshes of one link that show it: those of `<visual>`, or, where none of them is STL and those of `<collision>` are, these.
+/// The meshes for drawing a link: those of `<visual>`, or those of `<collision>` where only these are STL.
 fn shown_by(link: &Node<'_, '_>, file: &str) -> Result<Vec<LinkMesh>, RobotError> {
     let of = |tag: &str| -> Result<Vec<LinkMesh>, RobotError> {
         let parts = link.children().filter(|inner| inner.has_tag_name(tag));
@@ -258,7 +258,7 @@ fn shown_by(link: &Node<'_, '_>, file: &str) -> Result<Vec<LinkMesh>, RobotError
     Ok(if collision.iter().any(is_stl) { collision } else { visual })
 }
 
-/// The mesh of a `<visual>` or `<collision>`; boxes, cylinders and balls are left to us.
+/// The mesh of a `<visual>` or `<collision>`; boxes, cylinders and spheres are not read.
 fn drawn(visual: &Node<'_, '_>, file: &str) -> Result<Option<LinkMesh>, RobotError> {
     let mesh = child(visual, "geometry").and_then(|geometry| child(&geometry, "mesh"));
     let Some(name) = mesh.and_then(|mesh| mesh.attribute("filename")) else { return Ok(None) };
@@ -288,7 +288,7 @@ impl<'a> Tree<'a> {
                     tree.visuals.extend(shown_by(&node, file)?.into_iter().map(|drawn| (name, drawn)));
                     tree.meshes += node.descendants().filter(|inner| inner.has_tag_name("mesh")).count();
                 }
-                // A transmission has joints of its own, which are none.
+                // The joints of a transmission are no joints of the tree.
                 "joint" => {
                     let joint = joint(&node, file)?;
                     if let Some(first) = tree.to.insert(joint.child, tree.joints.len()) {
@@ -312,7 +312,7 @@ impl<'a> Tree<'a> {
         Ok(tree)
     }
 
-    /// The link where the arm begins.
+    /// The base link of the arm.
     fn base(&self, choice: &ImportOptions) -> Result<&'a str, RobotError> {
         if let Some(base) = &choice.base {
             return self.named(base, "base");
@@ -355,7 +355,7 @@ impl<'a> Tree<'a> {
         })
     }
 
-    /// The joints from a base to a tip; `None` where the one does not stand above the other.
+    /// The joints from a base to a tip; `None` where the tip is not below the base.
     fn path(&self, base: &str, tip: &str) -> Option<Vec<usize>> {
         let mut out = Vec::new();
         let mut at = tip;
@@ -363,7 +363,7 @@ impl<'a> Tree<'a> {
             let joint = *self.to.get(at)?;
             out.push(joint);
             at = self.joints[joint].parent;
-            // A circle leads nowhere.
+            // A cycle has no root.
             if out.len() > self.joints.len() {
                 return None;
             }
@@ -408,7 +408,7 @@ impl<'a> Tree<'a> {
         }
     }
 
-    /// The joints to the flange, where a link bears the name of one; what moves behind it is a gripper.
+    /// The joints to the flange, where a link has the name of one; joints behind it belong to a gripper.
     fn to_flange(&self, base: &'a str) -> Result<Option<Vec<usize>>, RobotError> {
         let named = |link: &str, name: &str| {
             link.strip_suffix(name).is_some_and(|rest| rest.is_empty() || rest.ends_with(['_', '-', '/']))
@@ -441,7 +441,7 @@ impl<'a> Tree<'a> {
         Ok(None)
     }
 
-    /// The last joint of every chain that has six and is not on the way to a seventh, and the longest chain there is.
+    /// The last joint of every chain of exactly six joints that no longer chain contains, and the longest chain.
     fn ends(&self, base: &str) -> (Vec<usize>, Vec<usize>) {
         let parents: Vec<&str> = self.joints.iter().map(|joint| joint.parent).collect();
         let leaves = self.to.keys().filter(|link| !parents.contains(link));
@@ -531,7 +531,7 @@ impl<'a> Tree<'a> {
         Ok(path)
     }
 
-    /// The child of a joint and all that hangs on it.
+    /// The child of a joint and all its descendants.
     fn links_behind(&self, joint: usize) -> Vec<&'a str> {
         let mut out = vec![self.joints[joint].child];
         let mut at = 0;
@@ -619,12 +619,12 @@ impl<'a> Tree<'a> {
         })
     }
 
-    /// The meshes of the arm's links and of what is fixed to them.
+    /// The meshes of the arm's links and of links fixed to them.
     fn shown(&self, base: &str, moving: &[usize]) -> Vec<Mesh> {
         let shown = |(link, drawn): &(&str, LinkMesh)| {
             let path = self.path(base, link)?;
             let own = self.moving(&path);
-            // What hangs on a finger does not belong to the arm.
+            // Links behind a gripper joint do not belong to the arm.
             if !moving.starts_with(&own) {
                 return None;
             }
@@ -639,13 +639,13 @@ impl<'a> Tree<'a> {
         self.visuals.iter().filter_map(shown).collect()
     }
 
-    /// What turns with each joint and no further: its link and whatever is fixed to it. `None` where one has no mass.
+    /// Mass of each joint's link and the links fixed to it. `None` where one has no mass.
     fn masses(&self, base: &str, moving: &[usize]) -> Option<[Body; 6]> {
         let mut out = [Body { mass_kg: 0.0, centre_mm: [0.0; 3] }; 6];
         for (link, body) in &self.masses {
             let Some(path) = self.path(base, link) else { continue };
             let own = self.moving(&path);
-            // What hangs on a finger does not belong to the arm.
+            // Links behind a gripper joint do not belong to the arm.
             let Some(place) = moving.iter().position(|joint| own.last() == Some(joint)) else { continue };
             let frame = path.iter().fold(Pose::identity(), |pose, joint| pose * self.joints[*joint].before);
             let centre = frame * Point3::from(body.centre_mm);
