@@ -81,9 +81,9 @@ pub struct VerificationTask<'a> {
 }
 
 /// Runs a program on an arm.
-pub fn verify(task: &VerificationTask<'_>, conditions: &ActingArm<'_>) -> PathReport {
-    let mut arms = Arms::simulated(conditions.nominal, conditions.model, &conditions.condition);
-    arms.knowledge = conditions.knowledge;
+pub fn verify(task: &VerificationTask<'_>, acting_arm: &ActingArm<'_>) -> PathReport {
+    let mut arms = Arms::simulated(acting_arm.nominal, acting_arm.model, &acting_arm.condition);
+    arms.knowledge = acting_arm.knowledge;
     let before = run(task.original, task.loads[0], &mut arms, task.cell);
     let after = task.rewritten.map(|listing| (listing, run(listing, task.loads[1], &mut arms, task.cell)));
     let partners = after.as_ref().map(|(_, runs)| align(&before, runs));
@@ -120,14 +120,14 @@ pub fn verify(task: &VerificationTask<'_>, conditions: &ActingArm<'_>) -> PathRe
                 joints_after: second.map(|s| s.joints),
                 before: Some(deviation(&first.reached)),
                 after: second.map(|s| deviation(&s.reached)),
-                sigma_mm: conditions.knowledge.map(|k| {
+                sigma_mm: acting_arm.knowledge.map(|k| {
                     let (tool, carried) = (&first.flange_from_tool, first.carried.as_ref());
                     let known =
                         k.position_sigma_mm(arms.conditions.arm(condition_index), &joints, tool, carried);
                     known.hypot(arms.conditions.play_uncertainty_mm(condition_index, &joints, tool))
                 }),
                 shape_sigma_mm: None,
-                outside: conditions.knowledge.and_then(|k| k.region.outside(&joints)),
+                outside: acting_arm.knowledge.and_then(|k| k.region.outside(&joints)),
                 status: if second.is_some() { Status::Changed } else { Status::Left },
                 reason: None,
             }
@@ -138,7 +138,7 @@ pub fn verify(task: &VerificationTask<'_>, conditions: &ActingArm<'_>) -> PathRe
         model: task.name.to_owned(),
         after: task.after,
         points,
-        held_out_mm: conditions.knowledge.map(|k| k.geometry.held_out.rmse),
+        held_out_mm: acting_arm.knowledge.map(|k| k.geometry.held_out.rmse),
     }
 }
 

@@ -1,25 +1,25 @@
-//! How much work a path may take: counted, so that the same file ends the same way on every machine.
+//! Work budget of one path: counted, so that the same file ends the same way on every machine.
 //!
-//! A look at a surface costs what its equation has in terms, or what a vertical ray may meet of a mesh. A file of a few
-//! lines could otherwise ask for hours: a chord error of a nanometre, a wave of a thousand periods, triangles all over each
-//! other.
+//! An evaluation of the surface costs as much as its equation has terms, or as many triangles as a vertical ray can meet in a
+//! mesh. Without a budget, a file of a few lines could require hours: a chord error of a nanometre, a wave of a thousand
+//! periods, triangles stacked on each other.
 
 use std::cell::Cell;
 
 use crate::error::SurfaceError;
 use crate::surface::Surface;
 
-/// Terms of equations that are evaluated for one path: some seconds.
+/// Terms of equations evaluated for one path: some seconds.
 const MOST_TERMS: f64 = 2e8;
-/// Steps that are looked at while equal ones are sought; then each step is as long as the bounds allow.
+/// Candidate steps tested while equal steps are searched for; after that each step is as long as the bounds allow.
 const MOST_TRIALS: usize = 20_000_000;
 
-/// What is left for one path.
+/// The remaining budget of one path.
 #[derive(Debug)]
 pub(crate) struct Budget {
     terms: Cell<f64>,
     trials: Cell<usize>,
-    /// Of one look.
+    /// Cost of one evaluation.
     cost: f64,
 }
 
@@ -28,16 +28,16 @@ impl Budget {
         Self { terms: Cell::new(MOST_TERMS), trials: Cell::new(MOST_TRIALS), cost: surface.look_cost() }
     }
 
-    /// Takes `looks` at the surface.
+    /// Charges `looks` evaluations of the surface.
     ///
     /// # Errors
-    /// [`SurfaceError::TooMuchWork`] where they are no longer there.
+    /// [`SurfaceError::TooMuchWork`] where the budget is exhausted.
     pub(crate) fn look(&self, looks: usize) -> Result<(), SurfaceError> {
         self.terms.set(self.terms.get() - self.cost * looks as f64);
         if self.terms.get() >= 0.0 { Ok(()) } else { Err(SurfaceError::TooMuchWork { terms: MOST_TERMS }) }
     }
 
-    /// Takes one step that is looked at; `false` where there is none left.
+    /// Charges one candidate step; `false` where none is left.
     pub(crate) fn try_step(&self) -> bool {
         let left = self.trials.get();
         self.trials.set(left.saturating_sub(1));

@@ -21,13 +21,13 @@ pub struct Foot {
     /// Distance of the given point from the tangent plane of the foot, positive on the outward side: the signed
     /// deviation along the normal.
     pub normal_mm: f64,
-    /// What remains of the distance beside the normal: zero but for a point beyond the border of the surface (and, on a
-    /// mesh, for one above an edge).
+    /// Remaining distance, tangential to the surface: zero unless the point is beyond the border of the surface (or, on a
+    /// mesh, above an edge).
     pub beside_mm: f64,
 }
 
 impl Foot {
-    /// Measures `point` against the tangent plane of its foot.
+    /// Measures `point` relative to the tangent plane of its foot.
     pub(crate) fn over(contact: Contact, point: &Point3<f64>) -> Option<Self> {
         let away = point - contact.position_mm;
         let normal_mm = contact.normal.dot(&away);
@@ -36,7 +36,7 @@ impl Foot {
     }
 }
 
-/// A unit vector, unless the vector is so short or so far from finite that it has no direction.
+/// A unit vector, unless the vector is too short or not finite.
 pub(crate) fn direction(vector: Vector3<f64>) -> Option<Unit<Vector3<f64>>> {
     Unit::try_new(vector, f64::MIN_POSITIVE).filter(|unit| unit.iter().all(|c| c.is_finite()))
 }

@@ -1,21 +1,18 @@
 //! Surfaces given by equations: explicit z(x, y), parametric (x, y, z)(u, v) and implicit F(x, y, z) = 0.
 //!
-//! **Method.** Derivatives are symbolic ([`expression`](super::expression)). Explicit and parametric surfaces share
-//! one second-order jet: normal S_u × S_v, normal curvature −II/I, and Newton's method for the nearest point. The
-//! implicit one has normal ∇F/|∇F|, normal curvature tᵀ∇²F t/|∇F|, and Newton's method on the Lagrangian of the
-//! nearest point.
+//! **Method.** Derivatives are symbolic ([`expression`](super::expression)). Explicit and parametric surfaces share one
+//! second-order jet: normal S_u × S_v, normal curvature −II/I, and Newton's method for the nearest point. The implicit
+//! surface has normal ∇F/|∇F|, normal curvature tᵀ∇²F t/|∇F|, and Newton's method on the Lagrangian of the nearest point.
 //!
 //! **Shapes.** Plan coordinates are (x, y), (u, v) and (x, y); positions in mm.
 //!
-//! **Stops.** Newton's method ends at a step below 1e-12 of the scale, after 60 steps at most; a ray through an
-//! implicit surface is looked at in [`Implicit::SLICES`] slices from above.
+//! **Stops.** Newton's method ends at a step below 1e-12 of the scale, after at most 60 steps; a ray through an implicit
+//! surface is sampled in [`Implicit::SLICES`] slices from above.
 //!
-//! **Source and departures.** The differential geometry is in any textbook (do Carmo, *Differential Geometry of
-//! Curves and Surfaces*, 2-4 and 3-3; for implicit surfaces R. Goldman, *Curvature formulas for implicit curves and
-//! surfaces*, 2005).
+//! **Source and departures.** Textbook differential geometry (do Carmo, *Differential Geometry of Curves and Surfaces*, 2-4
+//! and 3-3; for implicit surfaces R. Goldman, *Curvature formulas for implicit curves and surfaces*, 2005).
 //!
-//! **Checked against.** Numerical differences, the same surface written explicitly and implicitly, spheres and
-//! cylinders.
+//! **Checked against.** Numerical differences, the same surface written explicitly and implicitly, spheres and cylinders.
 
 mod implicit;
 mod jet;
@@ -160,7 +157,7 @@ impl Parametric {
         }
     }
 
-    /// The point and its tangents alone, which is all that a contact takes.
+    /// The point and its tangents only, as a contact needs them.
     fn flat(&self, plan: [f64; 2]) -> Jet {
         let values = self.coordinates.each_ref().map(|c| c.value(&plan));
         let first = self.coordinates.each_ref().map(|c| c.gradient(&plan));
@@ -173,7 +170,7 @@ impl Parametric {
     }
 }
 
-/// Contacts on a lattice over the whole domain, or the place where there is none.
+/// Contacts on a lattice over the whole domain, or the place without one.
 fn looked_over(
     domain: &Domain,
     names: [&str; 2],

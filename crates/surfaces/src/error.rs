@@ -1,12 +1,12 @@
-//! What can be wrong with a surface, its file, or a path over it.
+//! Errors of a surface, its file, or a path over it.
 
 use super::expression::ExpressionError;
 
-/// Why there is no surface or no path.
+/// Reason why there is no surface or no path.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SurfaceError {
-    /// The text is not TOML, or holds a key that means nothing or a value of another kind.
+    /// Not TOML, an unknown key, or a value of the wrong type.
     #[error("{file}, line {line}, column {column}: {message}")]
     Toml {
         /// Name of the file.
@@ -18,7 +18,7 @@ pub enum SurfaceError {
         /// What was found and what was expected.
         message: String,
     },
-    /// A value does not say what it should.
+    /// An invalid value.
     #[error("{file}, key `{key}`: found {found}, expected {expected}; {remedy}")]
     Value {
         /// Name of the file.
@@ -32,7 +32,7 @@ pub enum SurfaceError {
         /// What to do.
         remedy: String,
     },
-    /// Something else is wrong with what a file states.
+    /// Another fault in what a file states.
     #[error("{file}, key `{key}`: {source}")]
     Stated {
         /// Name of the file.
@@ -45,7 +45,7 @@ pub enum SurfaceError {
     /// An equation cannot be read.
     #[error(transparent)]
     Expression(#[from] ExpressionError),
-    /// An equation has no finite value or no normal somewhere in its domain.
+    /// An equation without a finite value or a normal somewhere in its domain.
     #[error(
         "`{text}` is {found} at {place}, expected a finite value and a normal everywhere in the domain; shrink the \
          domain or correct the equation"
@@ -53,7 +53,7 @@ pub enum SurfaceError {
     NotFinite {
         /// The equation.
         text: String,
-        /// What it gives.
+        /// Its value there.
         found: String,
         /// Where, such as `x = 1, y = 2`.
         place: String,
@@ -76,7 +76,7 @@ pub enum SurfaceError {
         /// The equation.
         text: String,
     },
-    /// The bytes of a mesh are not an STL file, or its triangles make no surface.
+    /// Bytes that are not an STL file, or triangles that form no surface.
     #[error("the mesh {problem}; {remedy}")]
     Mesh {
         /// What is wrong.
@@ -84,14 +84,14 @@ pub enum SurfaceError {
         /// What to do.
         remedy: String,
     },
-    /// An option of the path has a value with which no path can be made.
+    /// An option for which no path can be made.
     #[error("{option} is {found}, expected {expected}")]
     Option {
         /// Name of the option.
         option: &'static str,
         /// Its value.
         found: f64,
-        /// What would do.
+        /// Acceptable values.
         expected: &'static str,
     },
     /// The tool does not fit into a hollow of the surface.
@@ -111,7 +111,7 @@ pub enum SurfaceError {
         /// Where.
         z: f64,
     },
-    /// The fixed direction of the tool's x axis is along the tool's z axis somewhere.
+    /// The fixed direction of the tool's x axis is parallel to the tool's z axis somewhere.
     #[error(
         "the fixed direction of the tool's x axis is along the tool itself near ({x:.3}, {y:.3}, {z:.3}) mm; choose \
          another tool_x_direction, or tool_x = \"feed\""
@@ -124,7 +124,7 @@ pub enum SurfaceError {
         /// Where.
         z: f64,
     },
-    /// A path of too many points.
+    /// A path with too many points.
     #[error(
         "the path would have more than {limit} points; take a larger step-over, step or chord error, or a smaller domain"
     )]
@@ -132,13 +132,13 @@ pub enum SurfaceError {
         /// The largest number of points.
         limit: usize,
     },
-    /// A path that takes too long to find.
+    /// A path that takes too long to compute.
     #[error(
         "the path would take more than {terms:e} terms of the equation, or as much of a mesh, to find; take a larger chord \
          error, step or step-over, a simpler equation, fewer waves or fewer triangles above each other"
     )]
     TooMuchWork {
-        /// Most terms that are evaluated.
+        /// Largest number of evaluated terms.
         terms: f64,
     },
     /// No curve of the pattern meets the surface.

@@ -54,9 +54,9 @@ pub struct ExpressionError {
     pub text: String,
     /// Where reading stopped, in characters from 1.
     pub column: usize,
-    /// What stands there.
+    /// What was found there.
     pub found: String,
-    /// What could stand there, or what to write instead.
+    /// What could be there, or what to write instead.
     pub expected: String,
 }
 
@@ -64,20 +64,20 @@ pub struct ExpressionError {
 #[derive(Debug, Clone)]
 pub struct Expression {
     text: String,
-    /// Which of the named variables occur, in the alphabetical order in which exmex wants their values.
+    /// Which of the named variables occur, in alphabetical order, as exmex requires their values.
     used: Vec<usize>,
     terms: Terms,
-    /// Boxed, for it keeps much on the spot: some 20 kB.
+    /// Boxed, since it occupies some 20 kB inline.
     value: Box<FlatEx<f64>>,
     first: Vec<FlatEx<f64>>,
     /// Upper triangle by rows over the used variables.
     second: Vec<FlatEx<f64>>,
 }
 
-/// Stack for the longest text (bytes): only what is used takes memory.
+/// Stack size for the longest text (bytes): only the used part takes memory.
 const STACK: usize = 512 << 20;
 
-/// Runs `work` on a thread with much room; `None` where there is no such thread.
+/// Runs `work` on a thread with a large stack; `None` where no such thread can be started.
 fn on_ample_stack<T: Send>(work: impl FnOnce() -> T + Send) -> Option<T> {
     std::thread::scope(|scope| {
         let thread = std::thread::Builder::new().stack_size(STACK).spawn_scoped(scope, work);
@@ -104,7 +104,7 @@ impl Expression {
         let mut reader = Reader::new(text, variables);
         let whole = reader.whole()?;
         let terms = whole.terms();
-        // Not a number counts as too many.
+        // NaN counts as too many.
         if !(terms.second <= MOST_TERMS) {
             return Err(ExpressionError {
                 text: text.to_owned(),
@@ -164,8 +164,8 @@ impl Expression {
         &self.text
     }
 
-    /// Terms of the value and of all first derivatives together, as the rules of differentiation write them; each counts
-    /// for more where the expression has functions, which take as long as several sums and products.
+    /// Terms of the value, and of all first derivatives together, as the rules of differentiation write them; each counts for
+    /// more where the expression has functions, which take as long as several sums and products.
     pub(crate) fn terms(&self) -> [f64; 2] {
         let weight = match &self.text {
             text if text.contains("tan") => 4.0,
@@ -216,8 +216,7 @@ enum Part {
     Text(String, Terms),
 }
 
-/// How many operands and functions an expression and its derivatives have, written out as the rules of differentiation
-/// have it.
+/// Number of operands and functions of an expression and its derivatives, as the rules of differentiation write them.
 #[derive(Debug, Clone, Copy)]
 struct Terms {
     value: f64,
@@ -232,7 +231,7 @@ impl Terms {
     /// Of two parts under an operator.
     fn combined(self, sign: char, other: Terms) -> Terms {
         let (a, b) = (self, other);
-        // A part that does not vary, and a derivative that vanishes, are left away.
+        // Constant parts and vanishing derivatives are omitted.
         let times = |x: f64, y: f64| if x == 0.0 || y == 0.0 { 0.0 } else { x + y };
         let value = a.value + b.value;
         match sign {
@@ -267,7 +266,7 @@ impl Terms {
         }
     }
 
-    /// Of a function of it, itself of `outer` terms: f′(a) a′, and f″(a) a′² + f′(a) a″.
+    /// Of an outer function with `outer` terms: f′(a) a′, and f″(a) a′² + f′(a) a″.
     fn within(self, outer: f64) -> Terms {
         if self.first == 0.0 {
             return Terms { value: outer, ..Terms::CONSTANT };
@@ -307,7 +306,7 @@ struct Reader<'a> {
     text: &'a str,
     variables: &'a [&'a str],
     characters: Vec<char>,
-    /// The token under consideration, where it starts and where the next one is looked for.
+    /// The current token, its start, and where the next one is read.
     token: Token,
     start: usize,
     next: usize,

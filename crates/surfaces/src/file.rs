@@ -74,20 +74,20 @@ use truegrind_math::se3::Pose;
 pub const ZONES: [&str; 15] = [
     "fine", "z0", "z1", "z5", "z10", "z15", "z20", "z30", "z40", "z50", "z60", "z80", "z100", "z150", "z200",
 ];
-/// A frame that is nearer to its parent than this, but not at it, is taken to be stated in metres.
+/// A frame closer to its parent than this, but not coincident with it, is assumed to be stated in metres.
 const NEAREST_MM: f64 = 2.0;
-/// And none is farther away (mm).
+/// Largest distance of a frame from its parent (mm).
 const FARTHEST_MM: f64 = 1e6;
-/// No speed [mm/s], mass (kg), radius (mm) or unit (mm) is more.
+/// Largest speed [mm/s], mass (kg), radius (mm) or unit (mm).
 const MOST: f64 = 1e6;
 
-/// How a tool or work-object frame was obtained.
+/// Origin of a tool or work-object frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Origin {
-    /// Drawn or measured, independent of the robot.
+    /// From CAD or a measurement, independent of the robot.
     Metrology,
-    /// Taught with the robot, and therefore wrong by the robot's own error.
+    /// Taught with the robot, and therefore affected by the robot's own error.
     Taught,
 }
 
@@ -102,41 +102,41 @@ pub struct Tool {
     pub mass_kg: f64,
     /// Centre of gravity in the flange frame in mm.
     pub cog_mm: Vector3<f64>,
-    /// Radius of the tool where it touches in mm; needed for a scallop height.
+    /// Contact radius of the tool (mm); needed for a scallop height.
     pub radius_mm: Option<f64>,
-    /// How the TCP was obtained, if stated.
+    /// Origin of the TCP, if stated.
     pub origin: Option<Origin>,
 }
 
-/// Where the surface is.
+/// Position of the surface.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WorkObject {
     /// Name of the wobjdata.
     pub name: String,
     /// The surface's frame in the robot's base.
     pub base_from_work_object: Pose,
-    /// How the frame was obtained, if stated.
+    /// Origin of the frame, if stated.
     pub origin: Option<Origin>,
 }
 
-/// What a surface file states, checked and ready to use.
+/// Contents of a surface file, validated.
 #[derive(Debug, Clone)]
 pub struct SurfaceFile {
-    /// Name of the job; also fit for the name of a module.
+    /// Name of the job; also valid as a module name.
     pub name: String,
     /// The surface.
     pub surface: Surface,
-    /// Its place.
+    /// Its work object.
     pub work_object: WorkObject,
     /// The tool.
     pub tool: Tool,
-    /// How the path runs.
+    /// Path options.
     pub path: PathOptions,
-    /// Feed speed of the TCP on a cut in mm/s.
+    /// Feed speed of the TCP during a cut in mm/s.
     pub speed_mm_s: f64,
     /// Speed of the TCP on approach, retract and link in mm/s.
     pub travel_speed_mm_s: f64,
-    /// Zone between cuts: `fine`, `z0`, `z1`, …, as the controller names it.
+    /// Zone between cuts: `fine`, `z0`, `z1`, …, by the controller's names.
     pub zone: String,
 }
 

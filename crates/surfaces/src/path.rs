@@ -35,14 +35,14 @@ use truegrind_math::se3::Pose;
 
 pub use options::{Along, PathOptions, Pattern, Spacing, ToolX, Traverse};
 
-/// What the tool does on the way to a point.
+/// Kind of motion to a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum PointKind {
-    /// Comes down along the normal, not yet in contact: the point above the first cut of a pass.
+    /// Descends along the normal, not yet in contact: the point above the first cut of a pass.
     Approach,
     /// In contact with the surface.
     Cut,
-    /// Leaves along the normal: the point above the last cut of a pass.
+    /// Lifts off along the normal: the point above the last cut of a pass.
     Retract,
     /// Moves above the surface from one pass to the next.
     Link,
@@ -51,7 +51,7 @@ pub enum PointKind {
 /// One point of a path, in the surface's frame (the work object).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PathPoint {
-    /// Where the TCP shall be. On a cut this is the contact point; lead and tilt turn the tool about it.
+    /// Position of the TCP. On a cut this is the contact point; lead and tilt rotate the tool about it.
     pub position_mm: Point3<f64>,
     /// Outward unit normal of the surface at the contact point (of an approach, retract or link: at the point below).
     pub normal: Unit<Vector3<f64>>,
@@ -60,9 +60,9 @@ pub struct PathPoint {
     /// Orientation of the tool. The columns of its rotation matrix are the tool's axes: z points into the surface, the
     /// frame is right-handed.
     pub orientation: UnitQuaternion<f64>,
-    /// What the tool does on the way to this point.
+    /// Kind of motion to this point.
     pub kind: PointKind,
-    /// Which pass the point belongs to, counted from 0 in the order of cutting; a link belongs to the pass it leads to.
+    /// Pass of the point, counted from 0 in the order of cutting; a link belongs to the pass it leads to.
     pub pass: usize,
 }
 
@@ -82,7 +82,7 @@ impl PathPoint {
 struct Cut {
     contact: Contact,
     feed: Unit<Vector3<f64>>,
-    /// Direction that lead, tilt and a tool x along the feed refer to: the feed, but turning evenly through a corner.
+    /// Reference direction of lead, tilt and a tool x along the feed: the feed, interpolated evenly through a corner.
     heading: Unit<Vector3<f64>>,
 }
 
@@ -111,7 +111,7 @@ pub fn over(surface: &Surface, options: &PathOptions) -> Result<Vec<PathPoint>, 
     options.check()?;
     let budget = Budget::of(surface);
     let curves = pattern::curves(surface, options, &budget)?;
-    // The chords of a few looks are no longer than the curve: what is refused here would surely be too long.
+    // The chords of a few samples are no longer than the curve: what is refused here is certainly too long.
     let mut least = 0.0;
     for curve in &curves {
         least += total_mm(trace(surface, curve, curve.first_look() / 4, &budget)?);
@@ -136,10 +136,10 @@ pub fn over(surface: &Surface, options: &PathOptions) -> Result<Vec<PathPoint>, 
     joined(surface, options, &passes, &budget)
 }
 
-/// The parts of a curve that lie on the surface, looked at in `looks` intervals.
+/// The parts of a curve that lie on the surface, sampled in `looks` intervals.
 ///
 /// # Errors
-/// A budget that does not hold as many looks.
+/// A budget with fewer evaluations left.
 fn trace(
     surface: &Surface,
     curve: &pattern::Curve,
@@ -156,7 +156,7 @@ fn total_mm(runs: Vec<Trace>) -> f64 {
     runs.iter().map(Trace::length_mm).sum()
 }
 
-/// The cuts along one curve; one list for each part of it that lies on the surface.
+/// The cuts along one curve; one list for each part of it on the surface.
 fn cuts(
     surface: &Surface,
     curve: &pattern::Curve,
@@ -191,7 +191,8 @@ fn cuts(
         if runs.iter().map(|(_, shares)| shares.len()).sum::<usize>() > room {
             return Err(SurfaceError::TooLong { limit: PathOptions::LARGEST });
         }
-        // Steps of fewer than four looks are judged too coarsely: the chord error needs more, within reason.
+        // Steps over fewer than four samples are judged too coarsely: the chord error needs more, within
+        // reason.
         if closest < 4 && looks < FINEST.min((64 * curve.first_look()).saturating_mul(finer)) {
             looks *= 2;
             continue;
@@ -207,10 +208,10 @@ fn cuts(
     }
 }
 
-/// Looks at the surface that one point of a path takes.
+/// Evaluations of the surface for one point of a path.
 const LOOKS_PER_CUT: usize = 5;
 
-/// The contact at a share of a curve with the direction of the curve there.
+/// The contact at a share of a curve, with the direction of the curve there.
 fn cut(
     contact: &impl Fn(f64) -> Option<Contact>,
     run: &Trace,
@@ -227,7 +228,7 @@ fn cut(
         let difference = if room_behind >= reach_mm && room_ahead >= reach_mm {
             point(reach_mm)? - point(-reach_mm)?
         } else {
-            // At an end, the second-order difference to one side.
+            // At an end, the one-sided second-order difference.
             let side = if room_ahead >= room_behind { 1.0 } else { -1.0 };
             let near = point(side * reach_mm)? - here.position_mm;
             let far = point(side * 2.0 * reach_mm)? - here.position_mm;
@@ -291,7 +292,8 @@ fn joined(
         points.append(&mut framed);
         points.push(retract);
     }
-    // The same rotation has two quaternions; neighbours take the nearer one, and the first the one with w ≥ 0.
+    // A rotation has two quaternions: each point takes the one nearer to the previous, the first the one
+    // with w ≥ 0.
     let mut before = UnitQuaternion::identity();
     for point in &mut points {
         if point.orientation.coords.dot(&before.coords) < 0.0 {
@@ -302,8 +304,7 @@ fn joined(
     Ok(points)
 }
 
-/// Part of the way from one orientation to another; a half turn, for which there is no shortest way, is made at its
-/// end.
+/// Interpolates two orientations; a half turn, which has no shortest rotation, is made at its end.
 fn turned(from: &UnitQuaternion<f64>, to: &UnitQuaternion<f64>, share: f64) -> UnitQuaternion<f64> {
     from.try_slerp(to, share, 1e-9).unwrap_or(*to)
 }

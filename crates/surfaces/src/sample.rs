@@ -3,7 +3,7 @@
 use crate::error::SurfaceError;
 use crate::file::SurfaceFile;
 
-/// A surface file that ships, as its bytes.
+/// A sample surface file, as its bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Sample {
     /// Name of the file in the folder `surfaces`.
@@ -26,14 +26,14 @@ pub const PLATE: Sample =
 /// The triangles of [`PLATE`].
 pub const PLATE_STL: &[u8] = include_bytes!("../../../surfaces/plate.stl");
 
-/// All surface files that ship.
+/// All sample surface files.
 pub const ALL: [Sample; 4] = [BLADE, DOME, SADDLE, PLATE];
 
 impl Sample {
-    /// Reads the sample; its mesh ships too.
+    /// Reads the sample and, where needed, its mesh.
     ///
     /// # Errors
-    /// None in what ships: a test reads every one.
+    /// None for the samples: a test reads every one.
     pub fn read(&self) -> Result<SurfaceFile, SurfaceError> {
         SurfaceFile::read(self.file, self.bytes, |name| match name {
             "plate.stl" => Ok(PLATE_STL.to_vec()),

@@ -25,7 +25,7 @@ use nalgebra::Point3;
 
 use super::budget::Budget;
 
-/// In how many places a curve is looked at, at most.
+/// Largest number of samples of a curve.
 pub const FINEST: usize = 1 << 20;
 
 /// Distance of two passes on the surface in mm at which a ball of radius `tool_radius_mm` leaves a cusp of height
@@ -81,20 +81,20 @@ pub struct Steps {
     pub chord_mm: f64,
 }
 
-/// A curve looked at so closely that its chords can be judged.
+/// A curve sampled so densely that its chords can be judged.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Trace {
     /// Shares 0…1, ascending.
     pub(crate) shares: Vec<f64>,
-    /// The points there.
+    /// Points at these shares.
     pub(crate) points: Vec<Point3<f64>>,
-    /// Length of the curve up to there in mm.
+    /// Arc length of the curve up to these shares in mm.
     pub(crate) lengths: Vec<f64>,
 }
 
 impl Trace {
-    /// Looks at `curve` in `count` + 1 equally spaced shares of `from`…`to`; every run of neighbours at which it
-    /// has a point becomes a trace.
+    /// Samples `curve` in `count` + 1 equally spaced shares of `from`…`to`; every run of consecutive samples on the surface
+    /// becomes a trace.
     pub(crate) fn runs(
         curve: impl Fn(f64) -> Option<Point3<f64>>,
         from: f64,
@@ -126,7 +126,7 @@ impl Trace {
         self.lengths.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max)
     }
 
-    /// The share at which the curve has a given length.
+    /// The share at which the curve reaches a given length.
     pub(crate) fn share_at(&self, length_mm: f64) -> f64 {
         interpolated(&self.lengths, &self.shares, length_mm)
     }
@@ -136,10 +136,10 @@ impl Trace {
         interpolated(&self.shares, &self.lengths, share)
     }
 
-    /// Shares that divide the curve so that both bounds hold: equally long steps where that takes at most a third
-    /// more of them, else each step as long as the bounds allow. The second number says over how few looked-at
-    /// intervals a step extends: below four the curve should be looked at more closely. Where more than `room` steps are
-    /// needed, as many as were found to be too many.
+    /// Shares that divide the curve so that both bounds hold: equally long steps where that takes at most a third more of
+    /// them, else each step as long as the bounds allow. The second number is the smallest number of sampled intervals in a
+    /// step: below four the curve should be sampled more densely. Where more than `room` steps are needed, as many as were
+    /// found to be too many.
     pub(crate) fn divided(&self, steps: &Steps, room: usize, budget: &Budget) -> (Vec<f64>, usize) {
         let mut breaks = vec![0];
         while breaks[breaks.len() - 1] + 1 < self.points.len() && breaks.len() <= room + 1 {
@@ -196,8 +196,8 @@ impl Trace {
             (b - a).norm() <= steps.max_step_mm
                 && self.points[from + 1..to].iter().all(|p| beside_chord_mm(p, &a, &b) <= steps.chord_mm)
         };
-        // Doubling, then halving: whatever is returned has itself been found to hold, so a curve that bends back
-        // cannot deceive.
+        // Doubling, then bisection: whatever is returned was itself found to hold, so a curve that bends
+        // back does no harm.
         let last = self.points.len() - 1;
         let (mut reached, mut stride) = (from + 1, 1);
         while reached < last && holds((reached + stride).min(last)) {
@@ -228,7 +228,7 @@ impl Trace {
     }
 }
 
-/// Distance of a point from the straight piece between two others in mm.
+/// Distance of a point from the chord between two others in mm.
 pub fn beside_chord_mm(point: &Point3<f64>, from: &Point3<f64>, to: &Point3<f64>) -> f64 {
     let (chord, away) = (to - from, point - from);
     let squared = chord.norm_squared();

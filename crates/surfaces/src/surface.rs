@@ -1,4 +1,4 @@
-//! A workpiece's surface, whatever it is given by.
+//! A workpiece's surface, from an equation or a mesh.
 
 use nalgebra::{Point3, Vector3};
 
@@ -44,7 +44,7 @@ impl Surface {
         }
     }
 
-    /// What a call of [`Surface::contact`] costs, in terms of an equation.
+    /// Cost of a call of [`Surface::contact`], in terms of an equation.
     pub(crate) fn look_cost(&self) -> f64 {
         match self {
             Surface::Explicit(surface) => surface.look_cost(),
@@ -54,10 +54,10 @@ impl Surface {
         }
     }
 
-    /// The nearest point of the surface to `point` (in the surface's frame), and how far it is along the normal there.
+    /// The nearest point of the surface to `point` (in the surface's frame), and its distance along the normal there.
     ///
-    /// Explicit and parametric surfaces end at the border of their domain, a mesh at its own; an implicit one is
-    /// followed beyond. `None` for a point that is not finite or one for which no nearest point is found.
+    /// Explicit and parametric surfaces end at the border of their domain, a mesh at its own; an implicit one is followed
+    /// beyond. `None` for a point that is not finite or for which no nearest point is found.
     pub fn foot(&self, point: &Point3<f64>) -> Option<Foot> {
         if !point.iter().all(|c| c.is_finite()) {
             return None;
@@ -70,13 +70,13 @@ impl Surface {
         }
     }
 
-    /// Deviation of `point` along the surface normal in mm, positive on the outward side (material left standing).
+    /// Deviation of `point` along the surface normal in mm, positive on the outward side (excess material).
     pub fn deviation_mm(&self, point: &Point3<f64>) -> Option<f64> {
         self.foot(point).map(|foot| foot.normal_mm)
     }
 
-    /// Normal curvature in 1/mm at a contact in the tangential part of `direction`: positive where the surface
-    /// falls away from its outward side (1/r on a ball of radius r seen from outside), negative in a hollow.
+    /// Normal curvature in 1/mm at a contact in the tangential part of `direction`: positive where the surface curves away
+    /// from its outward side (1/r on a ball of radius r seen from outside), negative in a hollow.
     pub fn curvature_per_mm(&self, at: &Contact, direction: &Vector3<f64>) -> f64 {
         match self {
             Surface::Explicit(surface) => surface.curvature_per_mm(at, direction),
@@ -104,7 +104,7 @@ impl Surface {
         }
         let row = cells + 1;
         for corner in (0..cells).flat_map(|i| (0..cells).map(move |k| i * row + k)) {
-            // Two triangles a–b–c and a–c–d around the cell, turned so that they face outward.
+            // Two triangles a–b–c and a–c–d of the cell, oriented outward.
             let [a, b, c, d] = [corner, corner + 1, corner + row + 1, corner + row].map(|i| at[i]);
             for triangle in [[a, b, c], [a, c, d]] {
                 let [Some(i), Some(j), Some(k)] = triangle else { continue };

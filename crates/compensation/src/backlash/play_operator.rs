@@ -7,7 +7,7 @@
 //! Stops: steps are halved until the largest deviation changes by less than a quarter of [`CHORD_MM`], at most [`DOUBLINGS`]
 //! times; a step in which a link leaves its flank or engages again is halved separately, since the path has a corner there.
 //! Source: M. A. Krasnosel'skii, A. V. Pokrovskii, Systems with Hysteresis, 1989, the play.
-//! Checked against: an independent simulation of a controller in small steps (crates/compensation/tests/it/play.rs).
+//! Checked against: an independent simulation of a controller in small steps (crates/compensation/tests/it/backlash.rs).
 
 use crate::backlash::sides::JointSides;
 use crate::condition::arm_conditions::ArmConditions;

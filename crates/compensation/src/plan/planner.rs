@@ -302,7 +302,7 @@ impl<'a> Planner<'a> {
             let middle = if straight(index) && path.is_some() { middles.next() } else { None };
             let middle = middle.unwrap_or(f64::INFINITY);
             let mut worked =
-                with_budget(budget, || self.plan_motion(index, path.as_ref(), middle, last.as_ref()));
+                with_budget(budget, || plan_motion(index, self, path.as_ref(), middle, last.as_ref()));
             if budget.exhausted && worked.change.is_some() {
                 worked.flag(OutcomeReason::Inverse(InverseError::Abandoned));
             }
@@ -384,20 +384,10 @@ impl<'a> Planner<'a> {
             self.solved.of(previous).iter().filter_map(|t| t.as_ref().ok()).collect();
         deviation(&SegmentPlan::of(before, Some(&path), &good, middle, self.arms, self.options))
     }
-
-    /// Plans one motion. `middle_mm`: deviation of its commanded line at the midpoint. `last`: segment plan of the previously
-    /// planned motion.
-    fn plan_motion(
-        &self,
-        index: usize,
-        path: Option<&Segment<'a>>,
-        middle_mm: f64,
-        last: Option<&(u32, SegmentPlan)>,
-    ) -> PlannedMotion {
-        plan_motion(index, self, path, middle_mm, last)
-    }
 }
 
+/// Plans one motion. `middle_mm`: deviation of its commanded line at the midpoint. `last`: segment plan of the previously
+/// planned motion.
 fn plan_motion<'a>(
     index: usize,
     job: &Planner<'a>,

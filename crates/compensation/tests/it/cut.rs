@@ -1,6 +1,6 @@
 //! A cut is corrected as a whole or not at all: a step of the whole correction in the middle of the part is worse than no
-//! correction. The class: any motion that stays (out of bounds, not known from the text, refused by the writer) beside
-//! motions of the same cut that were moved.
+//! correction. The class of fault: a motion that remains unmodified (out of bounds, not known from the text, refused by the
+//! writer) beside corrected motions of the same cut.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -78,7 +78,7 @@ fn a_target_that_cannot_be_reached_keeps_its_cut_and_no_other() {
         assert!(text.contains(&target(x.parse().unwrap(), 0.0)), "{x}: {text}");
     }
     assert!(!text.contains(&line(410.0, "z1")));
-    // Where a motion stays it goes where it always went, and the report says so.
+    // An unmodified motion keeps its deviation, and the report says so.
     assert_eq!(done.plan.outcomes[1].after_mm, done.plan.outcomes[1].before_mm);
 }
 
@@ -89,7 +89,7 @@ fn a_target_known_only_at_run_time_keeps_its_cut() {
     let (partly, _) = done(&module(&body), Cuts::Whole, 0.05);
     assert_eq!(statuses(&partly), [Refused, Left, Refused]);
     assert!(matches!(partly.plan.outcomes[0].reason, Some(OutcomeReason::PartOfCut { line: 6, .. })));
-    // All of a cut for one reason: nothing is refused that could have been corrected.
+    // A whole cut for one reason: nothing is refused that could have been corrected.
     let (all_left, _) = done(&module(&late.repeat(2)), Cuts::Whole, 0.05);
     assert_eq!(statuses(&all_left), [Left, Left]);
 }
@@ -122,7 +122,7 @@ fn another_tool_or_work_object_begins_another_cut() {
 
 #[test]
 fn what_the_writer_refuses_keeps_its_cut_too() {
-    // Force control has no form with joint targets, which only the writer finds.
+    // Force control has no form with joint targets, which only the writer detects.
     let pressed = format!("FCPressL {},v20,5,z1,tool0;\n", target(390.0, 0.0));
     let body = [line(380.0, "z1"), pressed, line(400.0, "fine"), line(405.0, "z1")].concat();
     let source = module(&body);
@@ -162,7 +162,7 @@ fn in_part_a_step_between_neighbours_stays_below_the_tolerance() {
     let body: String =
         (0..9).map(|k| line(if k == 4 { 900.0 } else { 380.0 + f64::from(k) }, "z1")).collect();
     let source = module(&body);
-    // The correction is some tenths of a millimetre: nothing of the cut may be moved alone.
+    // The correction is some tenths of a millimetre: no part of the cut may be moved alone.
     let (tight, bytes) = done(&source, Cuts::Partial, 0.01);
     assert!(statuses(&tight).iter().all(|status| *status == Refused));
     assert!(matches!(tight.plan.outcomes[3].reason, Some(OutcomeReason::Step { line: 8, mm }) if mm > 0.01));
@@ -178,8 +178,8 @@ fn in_part_a_step_between_neighbours_stays_below_the_tolerance() {
     );
 }
 
-/// Random programs of cuts, with targets that cannot be corrected strewn in: of two motions that run into each other
-/// never one is moved and the other not.
+/// Random programs of cuts with interspersed targets that cannot be corrected: of two consecutive motions of a cut never only
+/// one is moved.
 #[test]
 fn no_random_program_has_a_cut_half_corrected() {
     let (mut moved, mut kept) = (0, 0);

@@ -1,19 +1,19 @@
-//! Rewriting programs: the estimated arm follows what was meant, and nothing dangerous is ever written.
+//! Rewriting programs: the estimated arm follows the intended path, and nothing dangerous is ever written.
 
 // A test that cannot go on panics.
 #![allow(clippy::unwrap_used, clippy::print_stderr)]
 
-mod change;
+mod frame_change;
 mod cut;
-mod in_doubt;
-mod path;
+mod doubtful_effects;
+mod segment;
 mod payload;
 mod placement;
-mod play;
-mod range;
+mod backlash;
+mod joint_limits;
 mod reasons;
 mod remedy;
-mod singular;
+mod singularity;
 mod taught;
 
 use nalgebra::{DMatrix, Vector3};
@@ -238,7 +238,7 @@ fn a_long_line_gets_targets_only_where_the_tolerance_would_be_broken() {
     let text = edits.files[0].edits.apply(source).unwrap();
     let again = Task::read(&[("p.mod", text.as_slice())]);
     assert_eq!(again.listing.motions.len(), 2 + tight.outcomes[1].inserted);
-    // The judge finds the partners of the original targets among the targets put in.
+    // The verification matches original targets with those among inserted ones.
     let report = run_on(&actual, source, &text, &Cell::default());
     assert_eq!(report.points.len(), 2);
     assert!(worst(&report, true) < 1e-3, "{}", worst(&report, true));
@@ -268,7 +268,7 @@ fn a_taught_work_object_carries_its_frame_to_the_estimated_arm() {
         wobj: vec![frame("wobjBlade", FrameOrigin::Taught, teaching_deg)],
         ..Cell::default()
     };
-    // The arm is known but for its base: a rigid shift that no sensor in the base can see.
+    // The arm is known except for its base: a rigid displacement that no sensor in the base can see.
     let mut known_model = actual.clone();
     known_model.links[0].d_mm += 0.7;
     known_model.links[0].theta_rad += 0.002;
@@ -276,7 +276,7 @@ fn a_taught_work_object_carries_its_frame_to_the_estimated_arm() {
     let (_, program) = rewritten(&source, &known, &cell, &Options::default());
     let report = run_on(&actual, &source, &program, &cell);
     assert!(worst(&report, true) < 1e-3, "taught: the base does not matter: {}", worst(&report, true));
-    // With a work object from metrology the unknown base stays in the result, and the report says so.
+    // With a work object from metrology the unknown base remains in the result, and the report says so.
     let (planned, program) = rewritten(&source, &known, &Cell::default(), &Options::default());
     let report = run_on(&actual, &source, &program, &Cell::default());
     assert!(worst(&report, true) > 0.5);

@@ -1,4 +1,4 @@
-//! What programs say that the arm carries.
+//! Payloads that programs state.
 
 use truegrind_compensation::condition::payload::{Grip, Load, Loads};
 use truegrind_programs::rapid::Task;
@@ -34,12 +34,12 @@ fn a_grip_is_followed_through_statements_branches_loops_and_calls() {
         masses("PROC main()\n m;\n GripLoad part;\n m;\n GripLoad load0;\n m;\nENDPROC\n"),
         [tool, both, tool]
     );
-    // Both branches take it: known after; one does: not known, and the tool alone is counted.
+    // Both branches grip it: known afterwards; one does: unknown, and only the tool is counted.
     let body = "PROC main()\n IF a THEN\n GripLoad part;\n ELSE\n GripLoad part;\n ENDIF\n m;\nENDPROC\n";
     assert_eq!(masses(body), [both]);
     let (_, loads) = grips("PROC main()\n IF a THEN\n GripLoad part;\n ENDIF\n m;\nENDPROC\n");
     assert_eq!((loads.grips.as_slice(), loads.unknown()), (&[Grip::Unknown][..], 1));
-    // At the beginning of a loop the part may be held from the last turn.
+    // At the start of a loop the part may be held from the previous iteration.
     let (_, loads) =
         grips("PROC main()\n FOR i FROM 1 TO 2 DO\n m;\n GripLoad part;\n m;\n ENDFOR\n m;\nENDPROC\n");
     assert!(matches!(loads.grips[..], [Grip::Unknown, Grip::Holds(_), Grip::Unknown]), "{:?}", loads.grips);
@@ -47,7 +47,7 @@ fn a_grip_is_followed_through_statements_branches_loops_and_calls() {
     let body = "PROC main()\n m;\n take;\n m;\n place;\n m;\nENDPROC\nPROC take()\n GripLoad part;\nENDPROC\n\
                 PROC place()\n m;\n GripLoad load0;\nENDPROC\n";
     assert_eq!(masses(body), [tool, both, tool, both]);
-    // A load that the program weighs is not in the text.
+    // A load that the program measures is not in the text.
     let (_, loads) = grips("PROC main()\n GripLoad weighed;\n m;\nENDPROC\n");
     assert_eq!(loads.unknown(), 1);
 }
@@ -94,16 +94,16 @@ fn a_grip_changes_in_functions_by_names_in_traps_and_from_cycle_to_cycle() {
     }
     let trap = "TRAP tr\n GripLoad part;\nENDTRAP\n";
     assert_eq!(unknown(&format!("PROC main()\n m;\nENDPROC\n{trap}")), 1);
-    // What main holds at its end it holds when it begins again.
+    // The load at the end of main is held at its next start.
     assert_eq!(unknown("PROC main()\n m;\n GripLoad part;\n m;\nENDPROC\n"), 1);
-    // load0 is nothing, whatever the tool weighs.
+    // load0 means no load, whatever the tool weighs.
     let (_, loads) = grips("PROC main()\n GripLoad load0;\n m;\nENDPROC\n");
     assert_eq!(loads.grips, [Grip::Empty]);
     let load0 = "PROC main()\n MoveL TARGET,v100,fine,t\\TLoad:=load0;\nENDPROC\n";
     assert_eq!(masses(load0), [Some(2.0)]);
 }
 
-/// The class: a call by which a routine begins with something else in the gripper than by the calls that name it.
+/// The class of fault: a call by which a routine begins with another gripped load than by the calls that name it.
 #[test]
 fn what_a_computed_name_or_an_interrupt_begins_with_is_not_known() {
     let body = "PROC main()\n %\"go\"%;\n GripLoad part;\n go;\nENDPROC\nPROC go()\n m;\nENDPROC\n";

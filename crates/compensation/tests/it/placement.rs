@@ -1,4 +1,5 @@
-//! Shape and place of a path apart, and the chance that a cut gets worse: against arms drawn from the model's covariance.
+//! Shape and position of a path, and the probability that a correction does harm: compared with arms drawn from the model's
+//! covariance.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rand::{RngExt, SeedableRng};
@@ -17,7 +18,7 @@ use truegrind_compensation::risk::placement::Placement;
 
 use super::{blade, estimated, nominal, perturbed, rewritten, run_on, worst};
 
-/// A model that is right, of which the data did not see where joint 1 has its zero.
+/// A correct model whose data did not determine the zero of joint 1.
 fn placed_somewhere(seed: u64, joints: &[Joints]) -> Estimated {
     let mut known = estimated(perturbed(seed, 1.0), joints);
     let turn = Parameter::Link { joint: 0, coordinate: LinkCoordinate::Theta };
@@ -65,7 +66,7 @@ fn a_place_that_is_not_known_stays_and_the_shape_is_corrected() {
         let places: Vec<Vector3<f64>> = points.iter().map(|p| p.intended.translation.vector).collect();
         let projector = rigid(&places);
         let (before, after) = (deviations(&points, false), deviations(&points, true));
-        // What is left is where the path as a whole lay, and nothing of its shape.
+        // What remains is the position of the path as a whole, and nothing of its shape.
         let shape = |d: &DVector<f64>| (d - &projector * d).amax();
         assert!(shape(&before) > 0.02, "{}", shape(&before));
         assert!(shape(&after) < 2e-3, "{}", shape(&after));
@@ -93,7 +94,7 @@ fn a_place_that_is_known_is_corrected_and_can_be_asked_for() {
     }
 }
 
-/// Arms about the estimated one as its covariance has them, of covariance F Fᵀ.
+/// Arms drawn about the estimated one with covariance F Fᵀ.
 struct Drawn {
     known: Estimated,
     factor: DMatrix<f64>,
@@ -128,7 +129,7 @@ impl Drawn {
     }
 }
 
-/// Where an arm has the tool at the motions of a cut.
+/// Position of an arm's tool at the motions of a cut.
 fn reached(model: &Model, plan: &Plan, cut: &CutRisk) -> (Vec<Vector3<f64>>, DVector<f64>) {
     let arm = model.at_condition(&truegrind_arm::condition::Condition::default());
     assert_eq!(plan.points.len(), plan.outcomes.len(), "every motion has a pose");
@@ -203,7 +204,7 @@ fn the_chance_that_a_cut_gets_worse_is_the_share_of_drawn_arms_on_which_it_does(
     }
 }
 
-/// The class: a correction that is as likely to follow the noise of the measurement as the arm.
+/// The class of fault: a correction that is as likely to follow the noise of the measurement as the arm.
 #[test]
 fn a_cut_that_would_too_likely_get_worse_is_left_whole_with_that_reason() {
     let (source, joints) = blade();
@@ -226,7 +227,7 @@ fn a_cut_that_would_too_likely_get_worse_is_left_whole_with_that_reason() {
             assert!(after.contains(line), "{line}");
         }
     }
-    // A larger chance may be taken.
+    // A higher risk can be accepted.
     let largest = left.iter().map(|cut| cut.probability_of_harm).fold(0.0, f64::max);
     let options = Options { max_risk: largest + 0.01, ..with(Placement::Shape) };
     let (taken, _) = rewritten(&source, &drawn.known, &Cell::default(), &options);

@@ -1,4 +1,4 @@
-//! Every reason why a motion is left, refused or flagged shows in a program.
+//! Every reason why a motion is left, refused or flagged occurs in a program.
 
 use std::collections::BTreeSet;
 
@@ -16,19 +16,19 @@ use truegrind_programs::rapid::Task;
 
 use super::{estimated, nominal, perturbed};
 
-/// Every variant by name: a new one does not compile until it stands here.
+/// Every variant by name: a new one does not compile until it is listed here.
 fn name(why: &OutcomeReason) -> &'static str {
     match why {
         OutcomeReason::Program(_) => "program",
         OutcomeReason::MovingBase { .. } => "moving base",
-        // Only with a cell file (tests/it/compensation/taught.rs).
+        // Only with a cell file (taught.rs).
         OutcomeReason::CellContradiction => "contradicted",
         // Only where a program is rewritten (tests/it/programs.rs).
         OutcomeReason::NoChange => "same",
         OutcomeReason::JointTarget => "joint target",
         OutcomeReason::Inverse(_) => "inverse",
         OutcomeReason::OutsideLimits { .. } => "outside limits",
-        // tests/it/range.rs.
+        // tests/it/joint_limits.rs.
         OutcomeReason::PathOutsideLimits { .. } => "way outside limits",
         OutcomeReason::StartOfLimitedPath { .. } => "before limited way",
         OutcomeReason::CorrectionTooLarge { .. } => "too far",
@@ -38,18 +38,18 @@ fn name(why: &OutcomeReason) -> &'static str {
         OutcomeReason::SingularPath => "singular way",
         OutcomeReason::OtherBranch => "other branch",
         OutcomeReason::AmbiguousBranch => "open branch",
-        // Only where the start is unknown (tests/it/singular.rs).
+        // Only where the start is unknown (tests/it/singularity.rs).
         OutcomeReason::UnknownStart => "open start",
         OutcomeReason::PathDeviation { .. } => "bend",
         OutcomeReason::CornerDeviation { .. } => "corner",
-        // tests/it/path.rs.
+        // tests/it/segment.rs.
         OutcomeReason::AmbiguousCentre { .. } => "open centre",
         OutcomeReason::CircleKept => "circle kept",
         OutcomeReason::TooFast { .. } => "too fast",
         OutcomeReason::NoCircle => "no circle",
-        // tests/it/path.rs.
+        // tests/it/segment.rs.
         OutcomeReason::StartOfUnchangedArc { .. } => "before circle",
-        // tests/it/singular.rs.
+        // tests/it/singularity.rs.
         OutcomeReason::StartOfSingularPath { .. } => "before singular way",
         OutcomeReason::FullCircle => "whole circle",
         OutcomeReason::JointNotMeasured { .. } => "joint not measured",
@@ -95,7 +95,7 @@ fn known() -> Estimated {
     known
 }
 
-/// Each motion by itself, so that its own reason shows and not that of its cut.
+/// Each motion on its own, so that its own reason shows and not that of its cut.
 fn planned(source: &[u8], known: &Estimated, cell: &Cell, options: &Options) -> Plan {
     planned_in_cuts(source, known, cell, &Options { cuts: Cuts::Single, ..options.clone() })
 }
@@ -290,14 +290,14 @@ fn an_axis_that_carries_the_base_refuses_its_motions() {
         planned(&source, &known(), cell, &Options::default()).outcomes.iter().map(|o| o.reason).collect()
     };
     let base = Some(OutcomeReason::MovingBase { axis: 0 });
-    // Farther away than the arm is long: the axis must carry the base, there and where it stands at 0.
+    // Farther away than the arm is long: the axis must carry the base, also where it is at 0.
     let found = reasons(&Cell::default());
     assert_eq!(found, [base, base, base, None]);
     let stated = |text: &str| Cell::from_toml(&format!("[[external]]\naxis = \"{text}")).unwrap();
     assert_eq!(reasons(&stated("a\"\ncarries = \"base\"\n")), [base, base, base, None]);
     let both = stated("b\"\ncarries = \"base\"\n");
     assert_eq!(reasons(&both)[3], Some(OutcomeReason::MovingBase { axis: 1 }));
-    // Stated not to: then the far target is out of reach, and says so.
+    // Stated not to carry it: then the far target is out of reach.
     let other = reasons(&stated("a\"\ncarries = \"other\"\n"));
     assert_eq!(other[0], None);
     assert!(matches!(other[1], Some(OutcomeReason::Inverse(_))), "{other:?}");

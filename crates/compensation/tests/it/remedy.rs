@@ -1,7 +1,8 @@
-//! The cheapest measurement that makes a place known, foreseen and then really made: rows are simulated, the arm is identified,
-//! the program is planned, and what was foreseen of the place's sigma is held against a fit with the rows that were proposed.
+//! The cheapest measurement that makes a position known, predicted and then actually made: rows are simulated, the arm is
+//! identified, the program is planned, and the predicted sigma of the position is compared with a fit including the proposed
+//! rows.
 //!
-//! The class of fault: a remedy that is named by rule, whether it helps or not.
+//! The class of fault: a remedy that is proposed by rule, whether it helps or not.
 
 use std::fmt::Write as _;
 use std::ops::AddAssign;
@@ -33,8 +34,8 @@ use truegrind_programs::rapid::Task;
 
 use super::{estimated, nominal};
 
-/// What was foreseen and what came lie within this factor of each other: where sensor and target will stand is assumed, and the
-/// widths of the tolerances are learned again.
+/// Prediction and result agree within this factor: sensor and target positions are assumed, and the widths of the tolerances
+/// are estimated again.
 const NEAR: f64 = 2.0;
 
 const ON_AXIS: &str = "0.0, 0.0, 61.3";
@@ -56,7 +57,7 @@ fn rows(seed: u64, count: usize, target: &str) -> (Dataset, Model) {
     (read, simulation.actual)
 }
 
-/// The arm that the rows give; with the true frame of the sensor where it is stated.
+/// The arm identified from the rows; with the true frame of the sensor where it is stated.
 fn identified(rows: &Dataset, stated: bool) -> Identification {
     let mut options = identify::Options::default();
     let mut frames = starts(rows, &nominal()).unwrap().remove(0);
@@ -77,7 +78,7 @@ fn rapid(frame: &Pose) -> String {
 
 const TOOL: [f64; 3] = [20.0, -10.0, 150.0];
 
-/// A raster over a part, with joints. `held`: by the robot, and the tool stands.
+/// A raster over a part, with joints. `held`: by the robot, with a stationary tool.
 struct Scene {
     object: Pose,
     tool: Pose,
@@ -145,7 +146,7 @@ impl Scene {
         placement.clone()
     }
 
-    /// An arm under which the place is not taken, of rows from `seed` on.
+    /// An arm under which the position is not corrected, from rows of seeds from `seed` on.
     fn not_placed(&self, seed: u64, mut arm: impl FnMut(&Dataset) -> Estimated) -> Estimated {
         let arms = (seed..seed + 12).map(|seed| arm(&rows(seed, 150, BESIDE).0));
         let mut shape =
@@ -167,7 +168,7 @@ fn near(foreseen: f64, came: f64) -> bool {
 #[test]
 fn where_touching_three_points_is_enough_it_is_named_and_brings_what_was_said() {
     let mut scene = Scene::of(false);
-    // The work object as the controller worked it out from three points that were touched on it.
+    // The work object as the controller computed it from three touched points.
     let sheet = nominal();
     let arm = sheet.at_condition(&Condition::default());
     let touched = [0, 3, 12].map(|k| scene.targets[k].1);
@@ -189,7 +190,8 @@ fn where_touching_three_points_is_enough_it_is_named_and_brings_what_was_said() 
     );
     let then = scene.planned(&known, &Cell::from_toml(&cell).unwrap(), 0.1);
     assert!(then.taught);
-    // What a hand adds by touching is foreseen too, and not known to the model: 0.05 mm at each point.
+    // The uncertainty of touching by hand is predicted too, and unknown to the model: 0.05 mm at each
+    // point.
     let foreseen = remedy.sigma_mm;
     assert!(foreseen > 0.02 && near(foreseen, then.sigma_mm.hypot(0.05)), "{foreseen} {then:?}");
     let before = scene.planned(&known, &Cell::default(), 0.1).sigma_mm;
@@ -198,7 +200,8 @@ fn where_touching_three_points_is_enough_it_is_named_and_brings_what_was_said() 
 
 #[test]
 fn where_the_sensors_frame_is_what_is_missing_it_is_named_and_brings_what_was_said() {
-    // The robot holds the part: nothing can be touched, and where the tool stands hangs on the base.
+    // The robot holds the part: nothing can be touched, and the position of the stationary tool depends on
+    // the base.
     let scene = Scene::of(true);
     let mut stated = None;
     let known = scene.not_placed(30, |rows| {
@@ -212,8 +215,8 @@ fn where_the_sensors_frame_is_what_is_missing_it_is_named_and_brings_what_was_sa
     assert!(near(remedy.sigma_mm, then.sigma_mm), "{remedy:?} {then:?}");
 }
 
-/// The covariance of the arm's parameters once rows have come, by the calibration's own derivatives: as a fit of them has it that
-/// starts from what was known.
+/// The covariance of the arm's parameters after rows, by the calibration's own derivatives, for a fit that starts from the
+/// previous knowledge.
 fn fitted(known: &Estimated, rows: &Dataset) -> DMatrix<f64> {
     let frames = starts(rows, &nominal()).unwrap().remove(0);
     let own = frame_parameters(rows);
@@ -244,7 +247,8 @@ fn where_the_axis_of_joint_6_is_not_known_a_target_beside_it_is_named_and_brings
     let (measured, actual) = rows(6, 150, ON_AXIS);
     let joints: Vec<Joints> = measured.rows.iter().map(|row| row.joints).collect();
     let mut known = estimated(actual, &joints);
-    // A tilt of axis 6 that a target on that axis does not see: its place on link 5 makes up for it there.
+    // A tilt of axis 6 that a target on that axis does not see: its position on link 5 compensates for it
+    // there.
     let place = |coordinate| {
         let parameter = Parameter::Link { joint: 4, coordinate };
         known.order.iter().position(|p| *p == parameter).unwrap()
@@ -267,7 +271,7 @@ fn where_the_axis_of_joint_6_is_not_known_a_target_beside_it_is_named_and_brings
     known.covariance += &unseen * unseen.transpose();
     known.provenance.sensor = "position".to_owned();
     known.geometry.held_out.rmse = 0.03 * 3.0_f64.sqrt();
-    // The place is told to be off by less than is known of it.
+    // The position's deviation is less than its uncertainty.
     known.nominal = known.model.clone();
     let before = scene.planned(&known, &Cell::default(), 0.1);
     let remedy = scene.remedy(&known);
@@ -281,7 +285,7 @@ fn where_the_axis_of_joint_6_is_not_known_a_target_beside_it_is_named_and_brings
 
 #[test]
 fn where_nothing_is_enough_that_is_said_and_what_the_best_would_leave() {
-    // The arm of the data sheet itself: its place is off by nothing, and nothing knows that better.
+    // The nominal arm itself: its position has no deviation, and nothing determines that better.
     let scene = Scene::of(true);
     let joints: Vec<Joints> = scene.targets.iter().map(|t| t.1).collect();
     let mut known = estimated(nominal(), &joints);
@@ -289,7 +293,7 @@ fn where_nothing_is_enough_that_is_said_and_what_the_best_would_leave() {
     let placement = scene.planned(&known, &Cell::default(), 0.1);
     let remedy = scene.remedy(&known);
     assert!(!remedy.suffices && remedy.sigma_mm <= placement.sigma_mm, "{remedy:?} {placement:?}");
-    // Nor is anything proposed where no chance at all is taken.
+    // Nor is anything proposed where no risk at all is accepted.
     let (rows, _) = rows(3, 150, BESIDE);
     let known = identified(&rows, false).estimated;
     let remedy = scene.planned(&known, &Cell::default(), 0.0).remedy.unwrap();

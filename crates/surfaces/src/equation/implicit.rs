@@ -8,8 +8,8 @@ use crate::equation::survey::{AROUND, LATTICE};
 use crate::error::SurfaceError;
 use crate::expression::Expression;
 
-/// The zero set of F(x, y, z), seen from above. Outside is the side on which the top of the z range lies, whatever
-/// the sign of F there.
+/// The zero set of F(x, y, z), seen from above. Outside is the side of the upper end of the z range, whatever the sign of F
+/// there.
 #[derive(Debug, Clone)]
 pub struct Implicit {
     f: Expression,
@@ -21,7 +21,7 @@ pub struct Implicit {
 }
 
 impl Implicit {
-    /// In how many slices the z range is searched for the first zero from above.
+    /// Number of slices in which the z range is searched for the first zero from above.
     pub const SLICES: usize = 64;
 
     /// Reads `f` as an expression in x, y, z in mm; the surface is looked for over `domain` between the two heights
@@ -67,13 +67,13 @@ impl Implicit {
         self.domain
     }
 
-    /// All slices, and some steps of Newton's method.
+    /// All slices, and some Newton steps.
     pub(crate) fn look_cost(&self) -> f64 {
         let [value, first] = self.f.terms();
         AROUND + Self::SLICES as f64 * value + 8.0 * (value + first)
     }
 
-    /// The first zero from above, found slice by slice, then by bisection and Newton's method together.
+    /// The first zero from above: by slices, then by safeguarded Newton steps with bisection.
     pub(crate) fn contact(&self, plan: [f64; 2]) -> Option<Contact> {
         let [x, y] = plan;
         let value = |z: f64| self.outward * self.f.value(&[x, y, z]);
@@ -95,7 +95,7 @@ impl Implicit {
             }
             let slope = self.outward * self.f.gradient(&[x, y, z]).z;
             let newton = z - here / slope;
-            // Newton's step where it stays between the two sides, else the middle.
+            // The Newton step where it stays in the bracket, else the midpoint.
             let next = if newton < outside && newton > inside { newton } else { 0.5 * (outside + inside) };
             let step = (next - z).abs();
             z = next;
@@ -106,8 +106,8 @@ impl Implicit {
         self.at(Point3::new(x, y, z))
     }
 
-    /// The nearest point: along the gradient to the surface and sideways until the rest is normal to it, then
-    /// Newton's method on the Lagrangian |q − p|²/2 + λF(q). The equation is followed beyond the domain.
+    /// The nearest point: along the gradient to the surface and sideways until the remainder is normal to it, then Newton's
+    /// method on the Lagrangian |q − p|²/2 + λF(q). The equation is followed beyond the domain.
     pub(crate) fn foot(&self, point: &Point3<f64>) -> Option<Foot> {
         let squared = |c: &Contact| (c.position_mm - point).norm_squared();
         let nearest = self.lattice.iter().min_by(|a, b| squared(a).total_cmp(&squared(b)))?;
@@ -160,7 +160,7 @@ impl Implicit {
             if sideways.norm() <= 1e-3 * away.norm().min(1.0) {
                 break;
             }
-            // Half a step where a whole one leads farther away, as on a strongly bent surface.
+            // Half a step where a full step increases the distance, as on a strongly curved surface.
             let distance = away.norm();
             let shares = [1.0, 0.5, 0.25, 0.1, 0.02].into_iter();
             let next = shares

@@ -1,4 +1,4 @@
-//! A parametrised surface near one of its points, up to second order, and what follows from that alone.
+//! A parametrised surface near one of its points, up to second order.
 
 use nalgebra::{Matrix2, Point3, Vector2, Vector3};
 
@@ -23,7 +23,7 @@ impl Jet {
     pub(super) fn contact(&self, plan: [f64; 2]) -> Option<Contact> {
         let [su, sv] = self.first;
         let across = su.cross(&sv);
-        // Where the two tangents are parallel to rounding, at a pole, their product has no direction.
+        // Where the two tangents are parallel up to rounding, at a pole, their product has no direction.
         let regular = across.norm() > 1e-10 * su.norm() * sv.norm();
         let normal = direction(across * self.outward).filter(|_| regular)?;
         let finite = self.point.iter().all(|c| c.is_finite());
@@ -73,7 +73,7 @@ pub(super) fn foot(
         if !(matrix.determinant() > 1e-6 * metric.determinant() && matrix.trace() > 0.0) {
             matrix = metric;
         }
-        // A coordinate that stands at its bound and wants beyond is held there.
+        // A coordinate at its bound with a step beyond it is fixed there.
         for i in 0..2 {
             if (plan[i] <= low[i] && gradient[i] > 0.0) || (plan[i] >= high[i] && gradient[i] < 0.0) {
                 gradient[i] = 0.0;

@@ -1,8 +1,8 @@
-//! How closely a surface is looked over, and what a look costs.
+//! Lattice for surveying a surface, and the fixed cost of an evaluation.
 
-/// How many intervals each side of the domain has where a surface is looked over: for values that are not finite,
-/// and for the starting points of Newton's method.
+/// Intervals along each side of the domain where a surface is surveyed: for non-finite values, and for starting points of
+/// Newton's method.
 pub(super) const LATTICE: usize = 40;
 
-/// What a look costs beside the terms of the equation.
+/// Fixed cost of an evaluation in addition to the terms of the equation.
 pub(super) const AROUND: f64 = 20.0;

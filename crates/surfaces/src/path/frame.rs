@@ -1,8 +1,8 @@
-//! The tool's frame at a point of a path: its z axis into the surface, turned by lead and tilt, its x axis by rule.
+//! Tool frame at a point of a path: z axis into the surface, rotated by lead and tilt; x axis by a rule.
 //!
-//! With outward normal n, feed f and l = n × f (to the left of the feed, seen with n up), the spindle's direction,
-//! away from the surface, is n turned by the lead angle about l towards f, then by the tilt angle about f towards
-//! l. The tool's z axis is its opposite, so that z · n = −cos(lead) cos(tilt).
+//! With outward normal n, feed f and l = n × f (to the left of the feed, seen with n up), the spindle direction, away from
+//! the surface, is n rotated by the lead angle about l towards f, then by the tilt angle about f towards l. The tool's z axis
+//! is its opposite, so that z · n = −cos(lead) cos(tilt).
 
 use nalgebra::{Matrix3, Point3, Rotation3, Unit, UnitQuaternion, Vector3};
 
@@ -10,7 +10,7 @@ use crate::error::SurfaceError;
 use crate::path::options::{PathOptions, ToolX};
 use truegrind_math::se3::rotation_from_matrix;
 
-/// Sine of the angle to the tool's axis below which a direction cannot say where the tool's x axis points.
+/// Sine of the angle to the tool's axis below which a direction does not determine the tool's x axis.
 const PARALLEL: f64 = 1e-3;
 
 /// The orientation of the tool where the surface has the outward normal `normal` and the tool is fed along `feed`.
@@ -29,7 +29,7 @@ pub fn orientation(
     let z = -(turn * normal.into_inner());
     let wanted = match options.tool_x {
         ToolX::Fixed(direction) => direction.normalize(),
-        // The feed turned with the tool is normal to z already.
+        // The feed rotated with the tool is already normal to z.
         ToolX::Feed => turn * feed.into_inner(),
     };
     let across = wanted - z * z.dot(&wanted);

@@ -1,4 +1,4 @@
-//! The way from one pass to the next: up along the normal, over, and down along the normal.
+//! Links from one pass to the next: up along the normal, across, and down along the normal.
 
 use nalgebra::{Point3, Unit, Vector3};
 
@@ -7,12 +7,12 @@ use crate::contact::Contact;
 use crate::error::SurfaceError;
 use crate::surface::Surface;
 
-/// How often a link is halved, at most.
+/// Largest number of bisections of a link.
 const HALVINGS: usize = 6;
-/// In how many places between its ends a piece of a link is looked at.
+/// Samples inside a piece of a link.
 const LOOKS: usize = 16;
 
-/// A point of a link, with how far along the link it lies (0…1).
+/// A point of a link, with its share of the link (0…1).
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Stop {
     pub(crate) share: f64,
@@ -25,12 +25,12 @@ pub(crate) fn lifted(contact: &Contact, height_mm: f64) -> Point3<f64> {
     contact.position_mm + contact.normal.into_inner() * height_mm
 }
 
-/// The points between the two lifted ends of a link that keep its straight pieces at least half the height above
-/// the surface. None are needed over a flat surface; over a dome, the link follows it. Where there is no surface
-/// below, nothing is in the way.
+/// The points between the two lifted ends of a link that keep its straight pieces at least half the height above the surface.
+/// None are needed over a flat surface; over a dome, the link follows it. Where there is no surface below, nothing obstructs
+/// the link.
 ///
 /// # Errors
-/// A budget that does not hold as many looks.
+/// A budget with fewer evaluations left.
 pub(crate) fn over(
     surface: &Surface,
     from: &Contact,

@@ -1,4 +1,4 @@
-//! What a path is made from besides the surface.
+//! Options of a path over a surface.
 
 use nalgebra::Vector3;
 use serde::Deserialize;
@@ -12,14 +12,13 @@ use crate::error::SurfaceError;
 pub enum Pattern {
     /// Straight passes over the whole domain, side by side.
     Raster,
-    /// One curve from the middle outwards, over the ellipse inscribed in the domain, closed by a full turn along
-    /// its rim.
+    /// One curve from the centre outwards, over the ellipse inscribed in the domain, closed by a full turn along its rim.
     Spiral,
     /// Closed passes parallel to the border of the domain, from the border inwards.
     Contour,
 }
 
-/// Along which plan coordinate the passes of a raster run.
+/// Plan coordinate along which the passes of a raster run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
@@ -31,30 +30,30 @@ pub enum Along {
     Second,
 }
 
-/// Whether every second pass of a raster runs backwards.
+/// Whether every second pass of a raster is reversed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Traverse {
-    /// To and fro.
+    /// Back and forth.
     #[default]
     Zigzag,
     /// Always in the same direction, which keeps lead angle and cutting direction.
     OneWay,
 }
 
-/// Where the tool's x axis points, about the tool's own z axis.
+/// Direction of the tool's x axis, about the tool's own z axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum ToolX {
-    /// As near as possible to one direction in the surface's frame. The right choice for a tool that turns about
-    /// its z axis: the wrist stays calm.
+    /// As near as possible to one direction in the surface's frame. The right choice for a rotating tool: the wrist moves
+    /// little.
     Fixed(Vector3<f64>),
     /// Along the feed.
     Feed,
 }
 
-/// How far apart neighbouring passes are.
+/// Distance of neighbouring passes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Spacing {
@@ -67,19 +66,19 @@ pub enum Spacing {
     Scallop {
         /// The height.
         scallop_mm: f64,
-        /// Radius of the tool where it touches.
+        /// Contact radius of the tool.
         tool_radius_mm: f64,
     },
 }
 
-/// Everything that a path is made from besides the surface.
+/// Options of a path over a surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PathOptions {
     /// The family of curves.
     pub pattern: Pattern,
     /// Direction of a raster's passes.
     pub along: Along,
-    /// Whether a raster runs to and fro.
+    /// Whether a raster runs back and forth.
     pub traverse: Traverse,
     /// Distance of neighbouring passes.
     pub spacing: Spacing,
@@ -121,10 +120,10 @@ impl PathOptions {
     /// Largest number of points of a path.
     pub const LARGEST: usize = 200_000;
 
-    /// Refuses options with which no path can be made.
+    /// Refuses options for which no path can be made.
     ///
     /// # Errors
-    /// The option, its value and what would do.
+    /// The option, its value and acceptable values.
     pub fn check(&self) -> Result<(), SurfaceError> {
         let refuse = |option, found, expected| Err(SurfaceError::Option { option, found, expected });
         let positive = |value: f64| (f64::MIN_POSITIVE..=1e6).contains(&value);

@@ -1,9 +1,8 @@
 //! The families of curves: where in the plan each pass runs.
 //!
-//! A family is a function of two shares 0…1, one across its curves and one along them, to a place in the domain.
-//! How the curves are spread across is decided on the surface itself: on a lattice of curves the distance of
-//! neighbours is measured, divided by the distance allowed there, and summed; the passes are put at equal parts of
-//! that sum, as few as keep every part within 1.
+//! A family maps two shares 0…1, one across its curves and one along them, to a place in the domain. The spacing across is
+//! determined on the surface itself: on a lattice of curves the distance of neighbours is measured, divided by the distance
+//! allowed there, and summed; the passes are placed at equal parts of that sum, as few as keep every part within 1.
 
 use nalgebra::{Point3, Vector3};
 
@@ -14,7 +13,7 @@ use crate::path::options::{Along, PathOptions, Pattern, Spacing, Traverse};
 use crate::sampling::{self, interpolated};
 use crate::surface::Surface;
 
-/// How many curves, and how many places on each, the lattice has.
+/// Number of curves of the lattice, and of places on each.
 const ACROSS: usize = 120;
 const ALONG: usize = 36;
 
@@ -22,7 +21,7 @@ const ALONG: usize = 36;
 #[derive(Debug, Clone)]
 pub(crate) struct Curve {
     family: Family,
-    /// Where across the family: one place, or for a spiral the places after each full turn.
+    /// Position across the family: one place, or for a spiral the places after each full turn.
     across: Vec<f64>,
     backwards: bool,
 }
@@ -32,10 +31,10 @@ pub(crate) struct Curve {
 enum Family {
     /// Straight lines along the first or second coordinate.
     Lines(Along),
-    /// Ellipses about the middle.
+    /// Ellipses about the centre.
     Ellipses,
-    /// Rectangles inset from the border by an equal distance on the surface; the numbers are how much narrower the
-    /// innermost one, of no width, is in each coordinate, as a share of the half range.
+    /// Rectangles inset from the border by an equal distance on the surface; the numbers are the insets of the innermost one,
+    /// of no width, in each coordinate, as a share of the half range.
     Rectangles([f64; 2]),
 }
 
@@ -89,7 +88,7 @@ impl Curve {
         }
     }
 
-    /// Shares at which the curve has a corner, between its ends.
+    /// Shares of the curve's corners, between its ends.
     pub(crate) fn corners(&self) -> &'static [f64] {
         match self.family {
             Family::Rectangles(_) => &[0.125, 0.375, 0.625, 0.875],
@@ -97,7 +96,7 @@ impl Curve {
         }
     }
 
-    /// In how many places the curve should be looked at to begin with: enough for every turn.
+    /// Initial number of samples of the curve: enough for every turn.
     pub(crate) fn first_look(&self) -> usize {
         64 * (self.across.len().max(2) - 1)
     }
@@ -106,8 +105,8 @@ impl Curve {
 /// The curves of a pattern over a surface, in the order of cutting.
 ///
 /// # Errors
-/// A hollow into which the tool does not fit, more than [`PathOptions::LARGEST`] passes, more looks than the budget has, or a pattern that nowhere
-/// meets the surface.
+/// A hollow into which the tool does not fit, more than [`PathOptions::LARGEST`] passes, an exhausted budget, or a pattern
+/// that nowhere meets the surface.
 pub(crate) fn curves(
     surface: &Surface,
     options: &PathOptions,
@@ -129,7 +128,7 @@ pub(crate) fn curves(
     }
     let places: Vec<f64> = (0..=ACROSS).map(|k| k as f64 / ACROSS as f64).collect();
     let across = |sum: f64| interpolated(&sums, &places, sum);
-    // A hair more than the sum, so that rounding cannot ask for one pass too few or too many.
+    // Slightly more than the sum, so that rounding cannot require one pass too few or too many.
     let parts = |sum: f64| (sum - 1e-9).ceil().max(1.0);
     let one = |across: f64, backwards: bool| Curve { family, across: vec![across], backwards };
     Ok(match options.pattern {
@@ -153,8 +152,7 @@ pub(crate) fn curves(
     })
 }
 
-/// How much narrower the innermost rectangle is in each coordinate: all of the shorter side, and the same distance
-/// of the longer one.
+/// Insets of the innermost rectangle in each coordinate: all of the shorter side, and the same distance of the longer one.
 fn insets(surface: &Surface) -> [f64; 2] {
     let domain = surface.domain();
     let length = |along: fn(f64) -> [f64; 2]| {
@@ -166,7 +164,7 @@ fn insets(surface: &Surface) -> [f64; 2] {
     if shorter > 0.0 { [shorter / first, shorter / second] } else { [1.0, 1.0] }
 }
 
-/// For each curve of the lattice, how many allowed steps lie between the first curve and it, where they are most.
+/// For each curve of the lattice, the number of allowed steps between the first curve and it, where they are most.
 fn steps_across(surface: &Surface, family: Family, spacing: &Spacing) -> Result<Vec<f64>, SurfaceError> {
     let domain = surface.domain();
     let curve = |k: usize| -> Vec<Option<Contact>> {

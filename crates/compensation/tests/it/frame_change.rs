@@ -10,7 +10,7 @@ use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{Listing, Motion};
 use truegrind_programs::rapid::Task;
 
-use super::path::{EXT, known, module_with, rewrite};
+use super::segment::{EXT, known, module_with, rewrite};
 use super::{nominal, perturbed};
 
 /// A line with `tool0` from where the flange stands at the first target, then one with a tool of its own in another object.
@@ -34,8 +34,8 @@ fn told(motion: &Motion) -> Pose {
     motion.to().unwrap().value.unwrap().cartesian().unwrap().pose()
 }
 
-/// How far the tip of the real arm comes from the straight line that was meant, on the motions of `text` that lead to the
-/// end of the second motion of `source` (mm).
+/// Largest distance of the real arm's tip from the intended straight line, over the motions of `text` that lead to the end of
+/// the second motion of `source` (mm).
 fn off_line(source: &str, text: &str, known: &Estimated, put_in: usize) -> f64 {
     let before = Task::read(&[("p.mod", source.as_bytes())]).listing;
     let after = Task::read(&[("p.mod", text.as_bytes())]).listing;
@@ -47,7 +47,8 @@ fn off_line(source: &str, text: &str, known: &Estimated, put_in: usize) -> f64 {
         .solve_near(&told(&after.motions[0]), &Joints::new(-0.5, 0.4, 0.2, 0.0, 0.9, -0.5))
         .unwrap()
         .joints;
-    // Meant: from where the tip of the second tool is when the flange stands at the first target, to the second target.
+    // Intended: from the tip of the second tool when the flange is at the first target, to the second
+    // target.
     let begin = (told(&before.motions[0]) * tool).translation.vector;
     let end = (object * told(&before.motions[1])).translation.vector;
     let along = (end - begin).normalize();
@@ -86,7 +87,7 @@ fn a_line_that_begins_under_another_tool_is_checked_and_straightened() {
         .unwrap_or_else(|| panic!("it is not checked: {outcome:?}\n{:?}", planned.notes));
     let found = off_line(&source, &text, &known, 0);
     assert!(found > 0.05 && (found - stated).abs() < 4e-3, "{found} mm, stated {stated}");
-    // Nothing tells where the first line begins, and that alone is not checked.
+    // The start of the first line is unknown, and only that line is not checked.
     assert!(planned.notes.iter().any(|note| note.contains("is not checked (line 5)")), "{:?}", planned.notes);
 
     let tight = Options { tolerance_mm: found / 3.0, ..Options::default() };

@@ -1,16 +1,16 @@
-//! Joint ranges on the way. The class of the fault: a bound that is kept at targets and broken between them. A line or an arc
-//! turns some joints beyond where they stand at its ends; where the told way just keeps to a range, the corrected one, or one
-//! that stays but starts at a corrected end, may leave it, and the controller stops there.
+//! Joint limits along segments. The class of fault: a limit that is kept at targets and exceeded between them. Along a line
+//! or an arc some joints move beyond their values at its ends; where the original segment just keeps a limit, the corrected
+//! one, or an unmodified one from a corrected start, can exceed it, and the controller stops there.
 
-use super::singular::{confdata, corrected, ends, forward, known, marched, module, sheet, target};
+use super::singularity::{confdata, corrected, ends, forward, known, marched, module, sheet, target};
 use super::*;
 
 const STEPS: usize = 200;
 
-/// How far the told way stays within the narrowed range (rad).
+/// Distance of the original segment from the narrowed limit (rad).
 const ROOM: f64 = 1e-4;
 
-/// The joint that goes farthest beyond both ends of a way, to which side, and how far it comes.
+/// The joint that moves farthest beyond both ends of a segment, in which direction, and how far.
 fn beyond(way: &[Joints]) -> (usize, f64, f64, f64) {
     let (first, last) = (way[0], way[way.len() - 1]);
     let mut most = (0, 1.0, 0.0, 0.0);
@@ -32,7 +32,7 @@ struct Scene {
     joint: usize,
 }
 
-/// A line of which one joint turns on its way, on an arm whose range ends just beyond that.
+/// A line along which one joint reverses, on an arm whose limit is just beyond that.
 fn scene(round: u64, random: &mut ChaCha8Rng) -> Option<Scene> {
     let robot = "abb-irb-120";
     let free = sheet(robot);
@@ -59,7 +59,7 @@ fn scene(round: u64, random: &mut ChaCha8Rng) -> Option<Scene> {
     Some(Scene { source, arm, joint })
 }
 
-/// Whether the controller goes along the line of a program: all joints keep to the arm's ranges on it.
+/// Whether the controller can execute the line of a program: all joints keep the arm's limits.
 fn goes(program: &[u8], arm: &Model, near: &Joints) -> bool {
     let told = ends(program);
     let begin = marched(arm, &forward(arm, near), &told[0].1, near, 20).unwrap()[20];

@@ -1,6 +1,6 @@
-//! Backlash and payload: the rewritten program is run by a simulation that knows nothing of sides. It follows the
-//! controller's joints in small steps, and each link is dragged along by the flank against which it lies (the play
-//! operator): θ stays where it is until q − b/2 or q + b/2 takes it along.
+//! Backlash and payload: the rewritten program is run by a simulation without any notion of sides. It follows the
+//! controller's joints in small steps, and each link is moved by the flank against which it lies (the play operator): θ rests
+//! until q − b/2 or q + b/2 reaches it.
 
 use nalgebra::{Point3, Vector3};
 use truegrind_arm::condition::Condition;
@@ -23,12 +23,12 @@ use truegrind_programs::rewrite::RewriteOptions;
 
 use super::{estimated, nominal, perturbed, run_on, worst};
 
-/// To how much the distance from the line is told (mm).
+/// Accuracy of the distance from the line (mm).
 const CHORD_MM: f64 = 0.003;
 
 const PLAY_DEG: [f64; 6] = [0.02, 0.015, 0.02, 0.0, 0.03, 0.0];
 
-/// The arm with play and compliance.
+/// The arm with backlash and compliance.
 fn worn(seed: u64) -> Model {
     let mut arm = perturbed(seed, 0.5);
     let plays = PLAY_DEG.iter().enumerate().filter(|(_, play)| **play != 0.0);
@@ -46,8 +46,8 @@ fn without_play(arm: &Model) -> Model {
     arm
 }
 
-/// Lines to and fro in y, each 20 mm farther out; joint 1 turns at every end, joints 2, 3 and 5 half way on each line.
-/// The gripper takes a kilogram after the third line.
+/// Lines back and forth in y, each 20 mm farther out; joint 1 reverses at every end, joints 2, 3 and 5 half way along each
+/// line. The gripper takes a kilogram after the third line.
 fn source() -> String {
     let mut text = String::from(
         "MODULE M\n PERS tooldata tGrip := [TRUE,[[0,0,60],[1,0,0,0]],[1.5,[10,0,40],[1,0,0,0],0,0,0]];\n \
@@ -70,7 +70,7 @@ fn source() -> String {
     text + " ENDPROC\nENDMODULE\n"
 }
 
-/// What the arm carries: tool and part, worked out by hand on the flange, which is the last frame of this arm.
+/// The payload: tool and part, computed by hand on the flange, which is the last frame of this arm.
 fn carried(y_lines: usize) -> Condition {
     let (payload_kg, payload_centre_mm) = if y_lines < 3 {
         (1.5, [10.0, 0.0, 40.0])
@@ -80,7 +80,7 @@ fn carried(y_lines: usize) -> Condition {
     Condition { payload_kg: Some(payload_kg), payload_centre_mm, ..Condition::default() }
 }
 
-/// One place on the way, with where the tool is there.
+/// One sample of the path, with the position of the tool there.
 struct Passed {
     motion: usize,
     /// Whether it is the end of the motion.
@@ -157,7 +157,8 @@ fn intended(text: &str) -> Vec<Vector3<f64>> {
     task.listing.motions.iter().map(|m| value(m).cartesian().unwrap().pose().translation.vector).collect()
 }
 
-/// The largest deviation at the ends of lines beyond the first two, at which the flanks have settled. No targets were put in.
+/// The largest deviation at the ends of lines after the first two, from where the flanks are determined. No targets were
+/// inserted.
 fn worst_end(program: &[u8], text: &str, arm: &Model) -> f64 {
     let task = Task::read(&[("p.mod", program)]);
     let meant = intended(text);
@@ -178,7 +179,7 @@ fn sides_and_loads_of_the_program_leave_nothing_and_the_middle_does() {
         assert!(planned.outcomes.iter().all(|o| o.status == Status::Changed || o.status == Status::Flagged));
         let right = worst_end(&program, &text, &arm);
         assert!(right < 1e-3, "with sides and loads {right} mm are left");
-        // Without sides: the middle of the play.
+        // Without sides: mid-play.
         let (_, middle) = rewrite(&text, &without_play(&arm), &full);
         let middle = worst_end(&middle, &text, &arm);
         assert!(middle > 0.05, "in the middle of the play only {middle} mm are left");
@@ -212,15 +213,15 @@ fn the_path_between_targets_takes_up_the_play_where_joints_turn() {
                 .fold(f64::INFINITY, f64::min)
         };
         let passed = run(&changed.listing, &arm, part_from);
-        // Where the gripper takes the part the arm sags at once, before any target can put it right, and the joints that
-        // lift it again have their play to take up.
+        // Where the gripper takes the part the arm sags at once, before any target can correct it, and the
+        // joints that lift it again must take up their backlash.
         let taken = |p: &Passed| p.motion == part_from || (p.tip.coords - meant[5]).norm() < 1.0;
         passed.iter().filter(|p| p.motion > begin && !taken(p)).map(|p| distance(&p.tip)).fold(0.0, f64::max)
     };
     let (planned, program) = rewrite(&text, &arm, &options(5.0, Some(loads.clone())));
     assert!(planned.outcomes.iter().all(|o| o.inserted == 0));
     let loose = off_path(&program, &planned);
-    // A link does not jump from flank to flank, it waits, and so it is stated.
+    // A link does not jump from flank to flank, it rests, and the stated deviation accounts for that.
     let stated = |planned: &Plan| {
         let without_part = planned.outcomes.iter().enumerate().filter(|(k, _)| *k > 3 && *k != 6);
         without_part.filter_map(|(_, o)| o.path_deviation_mm).fold(0.0, f64::max)
@@ -233,7 +234,7 @@ fn the_path_between_targets_takes_up_the_play_where_joints_turn() {
     let left = off_path(&program, &planned);
     assert!(left < tolerance + CHORD_MM, "targets where joints turn leave {left} mm of {loose}");
     assert!((stated(&planned) - left).abs() < CHORD_MM, "stated {}, found {left}", stated(&planned));
-    // Where the part is taken more than the tolerance is left for a moment, and that is said.
+    // Where the part is taken, the deviation exceeds the tolerance for a moment, and the outcome states it.
     for (k, outcome) in planned.outcomes.iter().enumerate() {
         let bent = matches!(outcome.reason, Some(OutcomeReason::PathDeviation { mm }) if mm > tolerance);
         assert_eq!(bent, k == 6, "{outcome:?}");
@@ -245,28 +246,29 @@ fn the_judge_sees_what_the_simulation_sees_and_a_start_without_sides_is_said() {
     let text = source();
     let arm = worn(7);
     let (planned, program) = rewrite(&text, &arm, &options(5.0, None));
-    // The same arm judges: under its own sides nothing is left, but for the start, where no side is known.
+    // Verified on the same arm: with its own sides nothing remains, except at the start, where no side is
+    // known.
     let report = run_on(&arm, text.as_bytes(), &program, &Cell::default());
     assert!(worst(&report, true) < 1e-3, "{}", worst(&report, true));
     assert!(worst(&report, false) > 0.1);
     let note = planned.notes.iter().find(|note| note.contains("backlash")).expect("a note on backlash");
     assert!(note.contains("joint 1: 0.0200°") && note.contains("is unknown (it has not moved yet"), "{note}");
-    // Half the play of each joint is in σ at the start and no longer when all joints have moved.
+    // Half the backlash of each joint is in σ at the start and no longer once all joints have moved.
     let sigma = |k: usize| planned.outcomes[k].sigma_mm.unwrap();
     assert!(sigma(0) > 0.09, "σ at the start {}", sigma(0));
     let settled = planned.outcomes[3..].iter().filter_map(|o| o.sigma_mm).fold(0.0, f64::max);
     assert!(settled < 0.2 * sigma(0), "σ later {settled}");
 }
 
-/// The class: what is followed along a line must be followed as well where the line begins under another tool or work
-/// object than that in which it ends. The path is the same, and so are the sides at its end.
+/// The class of fault: a line must be followed as accurately where it begins under another tool or work object than where it
+/// ends. The path is the same, and so are the sides at its end.
 #[test]
 fn joints_turn_on_lines_that_begin_in_another_object_too() {
     let unit = "[[0,0,0],[1,0,0,0]]";
     let object = format!(" PERS wobjdata wSame := [FALSE,TRUE,\"\",{unit},{unit}];\n PROC main()");
     let mut text = String::new();
     for (k, line) in source().replace(" PROC main()", &object).lines().enumerate() {
-        // Lines that follow each other name one object and the other.
+        // Consecutive lines alternate between the two objects.
         let other = k % 2 == 0 && line.contains("Move");
         text += &if other { line.replace("tGrip;", "tGrip\\WObj:=wSame;") } else { line.to_owned() };
         text.push('\n');
@@ -279,8 +281,8 @@ fn joints_turn_on_lines_that_begin_in_another_object_too() {
     assert!(left < 1e-3, "where the object changes {left} mm are left");
 }
 
-/// The class: a side that is called known before the play is taken up. A link stays where it is until its motor has moved by
-/// the whole play, so a short motion from an unknown start tells no side, and says so in its σ.
+/// The class of fault: a side that counts as known before the backlash is taken up. A link rests until its motor has moved by
+/// the whole backlash, so a short motion from an unknown start determines no side, and its σ says so.
 #[test]
 fn less_than_the_play_tells_no_side() {
     let arm = worn(3);
@@ -298,8 +300,8 @@ fn less_than_the_play_tells_no_side() {
     assert!(sigma(3) < 0.2 * sigma(0), "{}", sigma(3));
 }
 
-/// The class: a side that is told from joints that were guessed. Where no configuration is checked and nothing tells where the arm
-/// comes from, a joint may stand a whole turn elsewhere, and comes to where the next motion tells it from the other side.
+/// The class of fault: a side derived from guessed joints. Where no configuration is checked and the start is unknown, a
+/// joint can be a whole turn off and arrive from the other side.
 #[test]
 fn guessed_joints_tell_no_side() {
     let arm = worn(3);
@@ -311,7 +313,7 @@ fn guessed_joints_tell_no_side() {
     let unchecked =
         checked.replace("  MoveJ", "  ConfJ\\Off;\n  MoveJ").replacen("  MoveL", "  ConfJ\\On;\n  MoveL", 1);
     assert!(unchecked.contains("ConfJ\\Off") && unchecked.contains("ConfJ\\On"));
-    // The first line is as long from where it really begins, and nobody knows from where.
+    // The first line is just as long from its real start, which is unknown.
     assert!(
         sigma(&checked, 1) < 0.7 * sigma(&unchecked, 1),
         "{} {}",
@@ -322,8 +324,8 @@ fn guessed_joints_tell_no_side() {
     assert!(sigma(&unchecked, 3) < 0.2 * sigma(&unchecked, 0), "{}", sigma(&unchecked, 3));
 }
 
-/// The class: motors and links are not told apart. Where a target that is corrected lies behind the one before by less than
-/// the play, the motor comes back by more than all of it, and to and fro in such steps every end is right.
+/// The class of fault: motors and links are not distinguished. Where a corrected target lies behind the previous one by less
+/// than the backlash, the motor reverses by more than all of it, and after such steps back and forth every end is right.
 #[test]
 fn steps_smaller_than_the_play_are_right_too() {
     let mut text = String::new();
@@ -348,7 +350,7 @@ fn steps_smaller_than_the_play_are_right_too() {
     }
 }
 
-/// The same arm with joints that do not yield.
+/// The same arm without compliance.
 fn stiff(arm: &Model) -> Model {
     let mut arm = arm.clone();
     arm.effects.retain(|effect| matches!(effect, Effect::Backlash(_)));

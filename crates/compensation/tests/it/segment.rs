@@ -1,5 +1,5 @@
-//! The path between the points: circles kept and replaced, rounded corners, joint speeds, the configuration of what is
-//! put in. The real arm is followed densely here by code of this file's own.
+//! The path between targets: circles kept and replaced, rounded corners, joint speeds, the configuration of inserted targets.
+//! The real arm is followed densely here by independent code.
 
 use std::f64::consts::{PI, TAU};
 
@@ -48,7 +48,7 @@ fn down(x: f64, y: f64, z: f64) -> String {
 
 pub(super) fn known(actual: &Model) -> Estimated {
     let mut known = estimated(actual.clone(), &[Joints::zeros()]);
-    // Everywhere is measured: these tests are about the path.
+    // Everything is measured: these tests are about the path.
     (known.region.min_deg, known.region.max_deg) = ([-400.0; 6], [400.0; 6]);
     known.region.spacing_deg = 1e6;
     known
@@ -62,14 +62,14 @@ pub(super) fn rewrite(source: &str, known: &Estimated, options: &Options) -> (Pl
     (planned, String::from_utf8(text).unwrap())
 }
 
-/// Tool poses of the ends of all motions, told; tool0 in wobj0, so that they are those of the flange.
+/// Commanded tool poses at the ends of all motions; tool0 in wobj0, so they are flange poses.
 fn told(listing: &Listing) -> Vec<Pose> {
     let pose =
         |m: &truegrind_programs::motion::Motion| m.to().unwrap().value.unwrap().cartesian().unwrap().pose();
     listing.motions.iter().map(pose).collect()
 }
 
-/// Where the real arm takes the tool when the controller goes along told poses.
+/// Poses that the real arm reaches when the controller follows commanded poses.
 fn gone(path: impl Iterator<Item = Pose>, start: &Joints, actual: &Model) -> Vec<Pose> {
     let sheet = nominal();
     let inverse = Inverse::new(&sheet, &Condition::default(), &sheet);
@@ -121,7 +121,7 @@ fn a_circle_is_kept_and_its_path_checked() {
     let outcome = &planned.outcomes[1];
     assert_eq!((outcome.status, outcome.inserted), (Status::Changed, 0), "{outcome:?}");
     assert!(text.contains("MoveC") && text.contains("! over"));
-    // What is stated is what an arm does that goes along the told circle.
+    // The stated deviation is that of an arm that follows the commanded circle.
     let task = Task::read(&[("p.mod", text.as_bytes())]);
     let ends = told(&task.listing);
     let via = task.listing.motions[1].targets[0].value.unwrap().cartesian().unwrap().pose();
@@ -175,7 +175,8 @@ fn a_circle_in_straight_pieces_is_followed_within_the_tolerance_and_smoothly() {
                 .fold(0.0, f64::max);
             assert!(most <= tolerance_mm, "{most} of {tolerance_mm}");
             assert!(most > 0.4 * tolerance_mm, "no more pieces than needed: {most} of {tolerance_mm}");
-            // Equal pieces, the speed of the instruction, and a zone that does not stop; the last keeps its own.
+            // Equal pieces, the speed of the instruction, and a zone that does not stop; the last keeps its
+            // own.
             let long = |pair: &[Pose]| (pair[0].translation.vector - pair[1].translation.vector).norm();
             let lengths: Vec<f64> = pieces.windows(2).map(long).collect();
             let mean = lengths.iter().sum::<f64>() / lengths.len() as f64;
@@ -187,7 +188,7 @@ fn a_circle_in_straight_pieces_is_followed_within_the_tolerance_and_smoothly() {
                 assert!(!zone.fine && 2.0 * zone.tcp_mm <= mean, "{zone:?} in pieces of {mean}");
             }
             assert_eq!(task.listing.zone(&task.listing.motions[count - 2]).unwrap().text, "z5");
-            // Each target that was put in states the configuration in which it is reached.
+            // Each inserted target states the configuration in which it is reached.
             let nothing = estimated(nominal(), &[Joints::zeros()]);
             let again = plan(&task.listing, &nothing, &Cell::default(), &Options::default());
             assert!(again.outcomes.iter().all(|o| o.status != Status::Refused), "{:?}", again.outcomes);
@@ -225,7 +226,7 @@ fn a_circle_that_may_not_be_split_stays_and_is_flagged() {
     assert_eq!(planned.outcomes[1].reason, Some(OutcomeReason::CircleKept));
     assert_eq!(planned.outcomes[1].status, Status::Flagged);
     assert!(text.contains("MoveC"));
-    // Nor one whose start nobody knows.
+    // Nor one with an unknown start.
     let alone = module(&format!("  MoveC {},{},v50,z5,tool0;\n", on_circle(-90.0), on_circle(-20.0)));
     let (planned, _) = rewrite(&alone, &known(&actual), &options);
     assert_eq!(planned.outcomes[0].reason, Some(OutcomeReason::CircleKept));
@@ -283,8 +284,8 @@ fn a_circle_whose_start_stays_is_no_other_circle() {
     assert!(strayed > 3, "{strayed}");
 }
 
-/// A circular motion that stays hangs on its start as well: where that is corrected, a circle that is small against the
-/// correction, closes, or has points that the text does not tell becomes another one.
+/// An unmodified circular motion depends on its start as well: where that is corrected, a circle that is small against the
+/// correction, closes, or has points unknown to the program becomes a different one.
 #[test]
 fn a_circle_that_stays_starts_where_it_did() {
     let pose = |x: f64, y: f64| {

@@ -1,4 +1,4 @@
-//! What stands in an arm at size 0: it corrects nothing, and counts in σ.
+//! Doubtful effects are in an arm with size 0: they correct nothing, and count in σ.
 
 use nalgebra::{DMatrix, DVector};
 use truegrind_arm::effect::Effect;
