@@ -143,13 +143,13 @@ pub(crate) fn steps(
     let mut open: Vec<u32> = (0..count as u32).filter(|index| stays[*index as usize]).collect();
     let mut out = Vec::new();
     while let Some(index) = open.pop() {
-        for beside in std::mem::take(&mut neighbours[index as usize]) {
-            let mm = shift_mm(beside);
-            if !stays[beside as usize] && !(mm <= tolerance_mm) {
+        for lateral_offset in std::mem::take(&mut neighbours[index as usize]) {
+            let mm = shift_mm(lateral_offset);
+            if !stays[lateral_offset as usize] && !(mm <= tolerance_mm) {
                 let line = listing.motions[index as usize].place.line;
-                out.push((beside, OutcomeReason::Step { line, mm }));
-                stays[beside as usize] = true;
-                open.push(beside);
+                out.push((lateral_offset, OutcomeReason::Step { line, mm }));
+                stays[lateral_offset as usize] = true;
+                open.push(lateral_offset);
             }
         }
     }

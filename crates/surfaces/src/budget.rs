@@ -25,20 +25,20 @@ pub(crate) struct Budget {
 
 impl Budget {
     pub(crate) fn of(surface: &Surface) -> Self {
-        Self { terms: Cell::new(MOST_TERMS), trials: Cell::new(MOST_TRIALS), cost: surface.look_cost() }
+        Self { terms: Cell::new(MOST_TERMS), trials: Cell::new(MOST_TRIALS), cost: surface.evaluation_cost() }
     }
 
-    /// Charges `looks` evaluations of the surface.
+    /// Charges `evaluations` evaluations of the surface.
     ///
     /// # Errors
     /// [`SurfaceError::TooMuchWork`] where the budget is exhausted.
-    pub(crate) fn look(&self, looks: usize) -> Result<(), SurfaceError> {
-        self.terms.set(self.terms.get() - self.cost * looks as f64);
+    pub(crate) fn charge(&self, evaluations: usize) -> Result<(), SurfaceError> {
+        self.terms.set(self.terms.get() - self.cost * evaluations as f64);
         if self.terms.get() >= 0.0 { Ok(()) } else { Err(SurfaceError::TooMuchWork { terms: MOST_TERMS }) }
     }
 
     /// Charges one candidate step; `false` where none is left.
-    pub(crate) fn try_step(&self) -> bool {
+    pub(crate) fn charge_step(&self) -> bool {
         let left = self.trials.get();
         self.trials.set(left.saturating_sub(1));
         left > 0

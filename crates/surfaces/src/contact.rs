@@ -23,7 +23,7 @@ pub struct Foot {
     pub normal_mm: f64,
     /// Remaining distance, tangential to the surface: zero unless the point is beyond the border of the surface (or, on a
     /// mesh, above an edge).
-    pub beside_mm: f64,
+    pub tangential_mm: f64,
 }
 
 impl Foot {
@@ -31,8 +31,12 @@ impl Foot {
     pub(crate) fn over(contact: Contact, point: &Point3<f64>) -> Option<Self> {
         let away = point - contact.position_mm;
         let normal_mm = contact.normal.dot(&away);
-        let beside_mm = (away - contact.normal.into_inner() * normal_mm).norm();
-        (normal_mm.is_finite() && beside_mm.is_finite()).then_some(Self { contact, normal_mm, beside_mm })
+        let tangential_mm = (away - contact.normal.into_inner() * normal_mm).norm();
+        (normal_mm.is_finite() && tangential_mm.is_finite()).then_some(Self {
+            contact,
+            normal_mm,
+            tangential_mm,
+        })
     }
 }
 

@@ -25,7 +25,7 @@ use crate::contact::{Contact, Foot};
 use crate::domain::Domain;
 use crate::error::SurfaceError;
 use jet::Jet;
-use survey::{AROUND, LATTICE};
+use survey::{FIXED_COST, LATTICE};
 
 pub use implicit::Implicit;
 
@@ -62,7 +62,7 @@ impl Explicit {
     pub fn new(z: &str, domain: Domain) -> Result<Self, SurfaceError> {
         domain.check(["x", "y"])?;
         let mut surface = Self { z: Expression::parse(z, &["x", "y"])?, domain, lattice: Vec::new() };
-        surface.lattice = looked_over(&domain, ["x", "y"], z, |plan| surface.jet(plan))?;
+        surface.lattice = contacts_on_lattice(&domain, ["x", "y"], z, |plan| surface.jet(plan))?;
         Ok(surface)
     }
 
@@ -75,8 +75,8 @@ impl Explicit {
         self.with(plan, z, slope, [Vector3::zeros(); 3]).contact(plan)
     }
 
-    pub(crate) fn look_cost(&self) -> f64 {
-        AROUND + self.z.terms().iter().sum::<f64>()
+    pub(crate) fn evaluation_cost(&self) -> f64 {
+        FIXED_COST + self.z.terms().iter().sum::<f64>()
     }
 
     pub(crate) fn foot(&self, point: &Point3<f64>) -> Option<Foot> {
@@ -125,7 +125,7 @@ impl Parametric {
         let read = [parse(x)?, parse(y)?, parse(z)?];
         let mut surface = Self { coordinates: read, domain, flipped, lattice: Vec::new() };
         let text = format!("({x}, {y}, {z})");
-        surface.lattice = looked_over(&domain, ["u", "v"], &text, |plan| surface.jet(plan))?;
+        surface.lattice = contacts_on_lattice(&domain, ["u", "v"], &text, |plan| surface.jet(plan))?;
         Ok(surface)
     }
 
@@ -137,8 +137,8 @@ impl Parametric {
         self.flat(plan).contact(plan)
     }
 
-    pub(crate) fn look_cost(&self) -> f64 {
-        AROUND + self.coordinates.iter().flat_map(Expression::terms).sum::<f64>()
+    pub(crate) fn evaluation_cost(&self) -> f64 {
+        FIXED_COST + self.coordinates.iter().flat_map(Expression::terms).sum::<f64>()
     }
 
     pub(crate) fn foot(&self, point: &Point3<f64>) -> Option<Foot> {
@@ -171,7 +171,7 @@ impl Parametric {
 }
 
 /// Contacts on a lattice over the whole domain, or the place without one.
-fn looked_over(
+fn contacts_on_lattice(
     domain: &Domain,
     names: [&str; 2],
     text: &str,

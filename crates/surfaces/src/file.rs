@@ -141,8 +141,8 @@ pub struct SurfaceFile {
 }
 
 impl SurfaceFile {
-    /// Reads the bytes of a surface file. `file` is the name that errors state; a mesh is asked for by the name
-    /// that the file gives it.
+    /// Reads the bytes of a surface file. `file`: the name stated in errors; a mesh is requested by the name that the file
+    /// gives it.
     ///
     /// ```
     /// use truegrind_surfaces::{Origin, SurfaceFile, sample};
@@ -299,7 +299,7 @@ struct StatedPath {
     zone: Option<String>,
 }
 
-/// Turns what is stated into what is meant, and what is wrong into an error that names the file.
+/// Converts the stated values, and faults into errors that name the file.
 struct Reporter<'a> {
     file: &'a str,
 }
@@ -590,7 +590,7 @@ impl Reporter<'_> {
         }
     }
 
-    /// Along which coordinate of the surface the passes run.
+    /// The coordinate of the surface along which the passes run.
     fn along(&self, stated: &StatedPath, surface: &StatedSurface) -> Result<Along, SurfaceError> {
         let names = if surface.kind == Kind::Parametric { ["u", "v"] } else { ["x", "y"] };
         Ok(match stated.along.as_deref() {
@@ -605,7 +605,7 @@ impl Reporter<'_> {
         })
     }
 
-    /// How far passes lie apart.
+    /// Distance of neighbouring passes.
     fn spacing(&self, stated: &StatedPath, tool: &Tool) -> Result<Spacing, SurfaceError> {
         Ok(match (stated.step_over_mm, stated.scallop_mm, tool.radius_mm) {
             (Some(step), None, Some(radius)) if step > 2.0 * radius => {
@@ -632,7 +632,7 @@ impl Reporter<'_> {
         })
     }
 
-    /// How the tool is turned about its axis.
+    /// Orientation of the tool about its axis.
     fn tool_x(&self, stated: &StatedPath) -> Result<ToolX, SurfaceError> {
         Ok(match (stated.tool_x, stated.tool_x_direction) {
             (Some(StatedToolX::Feed), Some(_)) => {

@@ -1,19 +1,18 @@
 //! Surfaces given by triangles.
 //!
-//! **Method.** The bytes of an STL file become a `parry3d` triangle mesh, which casts rays, finds nearest points
-//! through a tree of boxes, and tells inside from outside with angle-weighted pseudo-normals. Normals shown to the
-//! tool are blended between the corners of a triangle, so that they turn smoothly over a finely faceted surface,
-//! except across a crease.
+//! **Method.** The bytes of an STL file become a `parry3d` triangle mesh, which casts rays, finds nearest points through a
+//! tree of boxes, and distinguishes inside from outside by angle-weighted pseudo-normals. Normals for the tool are blended
+//! between the corners of a triangle, so that they vary smoothly over a finely faceted surface, except across a crease.
 //!
-//! **Shapes.** Vertices in mm in the file's frame, which is the surface's frame. Plan coordinates are (x, y), seen
-//! from above.
+//! **Shapes.** Vertices in mm in the file's frame, which is the surface's frame. Plan coordinates are (x, y), seen from
+//! above.
 //!
 //! **Stops.** Nothing iterates.
 //!
 //! **Source and departures.** J. A. Bærentzen and H. Aanæs, *Signed distance computation using the angle weighted
-//! pseudonormal*, 2005, as parry has it. STL knows no unit and no joined vertices: the unit is stated, equal
-//! corners are joined, and triangles without area are dropped. A binary file whose header begins with `solid` is
-//! recognised by its length.
+//! pseudonormal*, 2005, as implemented in parry. STL has no units and no shared vertices: the unit is stated, equal corners
+//! are merged, and triangles without area are dropped. A binary file whose header begins with `solid` is recognised by its
+//! length.
 //!
 //! **Checked against.** A faceted sphere, whose distance to the true one is bounded by its facets.
 
@@ -31,9 +30,9 @@ use crate::tessellation::Tessellation;
 
 /// Triangles that meet at a smaller angle than this share a smooth normal.
 const CREASE_RAD: f64 = std::f64::consts::FRAC_PI_6;
-/// A mesh smaller than this is taken to be in metres or inches.
+/// A smaller mesh is assumed to be in metres or inches.
 const SMALLEST_MM: f64 = 2.0;
-/// No workpiece is larger: a kilometre.
+/// Largest workpiece: a kilometre.
 const LARGEST_MM: f64 = 1e6;
 
 /// A surface of triangles, wound counter-clockwise seen from outside.
@@ -44,13 +43,13 @@ pub struct Mesh {
     facet_normals: Vec<Unit<Vector3<f64>>>,
     /// Smooth normal at each corner of each facet.
     corner_normals: Vec<[Unit<Vector3<f64>>; 3]>,
-    /// For each facet and each of its edges 0–1, 1–2, 2–0: whether no other facet lies beyond it.
+    /// For each facet and each of its edges 0–1, 1–2, 2–0: whether no other facet adjoins it.
     open_edges: Vec<[bool; 3]>,
     /// For each vertex: whether it lies on the border.
     open_vertices: Vec<bool>,
-    /// A length over which neighbouring facets are told apart: twice the mean edge.
+    /// Length over which normals of neighbouring facets differ: twice the mean edge.
     scale_mm: f64,
-    /// How many boxes around triangles a vertical ray meets on average.
+    /// Mean number of triangle boxes that a vertical ray meets.
     stacked: f64,
 }
 
@@ -63,12 +62,12 @@ impl std::fmt::Debug for Mesh {
     }
 }
 
-/// How the numbers of a mesh file are to be understood.
+/// Interpretation of the numbers of a mesh file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeshOptions {
     /// Length of one unit of the file in mm: 1 for mm, 25.4 for inches, 1000 for metres.
     pub unit_mm: f64,
-    /// Whether the triangles are wound the wrong way round.
+    /// Whether the triangles are wound clockwise.
     pub flipped: bool,
     /// Part of the mesh to be used, in plan; all of it if `None`.
     pub domain: Option<Domain>,
@@ -107,7 +106,7 @@ impl Mesh {
                 remedy: "export it again as binary STL".to_owned(),
             }
         })?;
-        // Adding 0 makes −0 and 0 the same bits, so that corners which are equal are joined below.
+        // Adding 0 maps −0 to 0, so that equal corners are merged below.
         let vertices: Vec<Point3<f64>> = read
             .vertices
             .iter()
@@ -117,8 +116,8 @@ impl Mesh {
         Self::new(vertices, facets, options)
     }
 
-    /// The triangles of an STL file alone, for drawing: each with its own corners, millimetres by `unit_mm` along each axis.
-    /// They need not close, nor be seen from above.
+    /// The triangles of an STL file alone, for drawing: each with its own corners, in mm by `unit_mm` along each axis. They
+    /// need not form a closed surface, nor be seen from above.
     ///
     /// # Errors
     /// Bytes that are not STL, and vertices that are not finite.
@@ -134,7 +133,7 @@ impl Mesh {
             Point3::from(std::array::from_fn::<f64, 3, _>(|k| f64::from(v[k]) * unit_mm[k]))
         };
         let mut out = Tessellation { vertices_mm: Vec::new(), normals: Vec::new(), triangles: Vec::new() };
-        // A mirrored axis turns every triangle round.
+        // A mirrored axis reverses the winding of every triangle.
         let turned = unit_mm.iter().product::<f64>() < 0.0;
         for face in &read.faces {
             let mut corners = face.vertices.map(corner);
@@ -195,7 +194,7 @@ impl Mesh {
                 "check unit_mm, and that every vertex belongs to the part",
             ));
         }
-        // The very border is missed by a vertical ray after rounding, so the domain ends just inside it.
+        // After rounding, a vertical ray misses the exact border, so the domain ends just inside it.
         let inside = |from: f64, to: f64| [from + 1e-9 * (to - from), to - 1e-9 * (to - from)];
         let whole = Domain { first: inside(low.x, high.x), second: inside(low.y, high.y) };
         let domain = options.domain.unwrap_or(whole);
@@ -241,7 +240,7 @@ impl Mesh {
         self.triangles.num_triangles()
     }
 
-    /// Where a ray from `origin` in `direction` first meets the mesh, on whichever side of a triangle.
+    /// First intersection of a ray with the mesh, on either side of a triangle.
     pub fn ray(&self, origin: &Point3<f64>, direction: &Unit<Vector3<f64>>) -> Option<Contact> {
         let ray = Ray::new(
             DVec3::new(origin.x, origin.y, origin.z),
@@ -261,8 +260,8 @@ impl Mesh {
         if projection.is_inside { -away.norm() } else { away.norm() }
     }
 
-    /// A walk down the tree of boxes, and all that a vertical ray meets there.
-    pub(crate) fn look_cost(&self) -> f64 {
+    /// A walk down the tree of boxes, and all triangles that a vertical ray meets there.
+    pub(crate) fn evaluation_cost(&self) -> f64 {
         50.0 + 20.0 * (self.stacked + (self.triangle_count() as f64).log2())
     }
 
@@ -270,7 +269,7 @@ impl Mesh {
         self.domain
     }
 
-    /// What a vertical ray from above meets, unless that is the back of a triangle.
+    /// The first intersection of a vertical ray from above, unless that is the back of a triangle.
     pub(crate) fn contact(&self, plan: [f64; 2]) -> Option<Contact> {
         self.seen_from_above(plan)
             .filter(|(facet, _)| self.facet_normals[*facet].z > 0.0)
@@ -292,16 +291,17 @@ impl Mesh {
             TrianglePointLocation::OnFace(..) | TrianglePointLocation::OnSolid => false,
         };
         if beyond {
-            // Beyond the border the distance is no deviation; the part along the border facet's normal is.
+            // Beyond the border the distance is no deviation; its component along the border facet's normal
+            // is.
             let normal = self.facet_normals[facet];
             return Foot::over(Contact { normal, ..contact }, point).map(|foot| Foot { contact, ..foot });
         }
         let away = (point - at).norm();
         let normal_mm = if projection.is_inside { -away } else { away };
-        away.is_finite().then_some(Foot { contact, normal_mm, beside_mm: 0.0 })
+        away.is_finite().then_some(Foot { contact, normal_mm, tangential_mm: 0.0 })
     }
 
-    /// Turn of the smooth normal over a length of two mean edges: a mesh has no curvature of its own.
+    /// Rotation of the smooth normal over a length of two mean edges: a mesh has no curvature of its own.
     pub(crate) fn curvature_per_mm(&self, at: &Contact, direction: &Vector3<f64>) -> f64 {
         let tangent = direction - at.normal.into_inner() * at.normal.dot(direction);
         let Some(tangent) = Unit::try_new(tangent, 1e-10 * direction.norm()) else { return 0.0 };
@@ -351,7 +351,7 @@ impl Mesh {
     }
 }
 
-/// The bytes in a form that the reader cannot mistake: a binary file must not begin with `solid`, a text file must
+/// The bytes in a form that the reader cannot misinterpret: a binary file must not begin with `solid`, a text file must begin
 /// with `solid `.
 fn recognised(bytes: &[u8]) -> Result<Vec<u8>, SurfaceError> {
     let count = bytes.get(80..84).map(|n| u64::from(u32::from_le_bytes([n[0], n[1], n[2], n[3]])));
@@ -381,7 +381,7 @@ fn recognised(bytes: &[u8]) -> Result<Vec<u8>, SurfaceError> {
     }
 }
 
-/// Vertices without duplicates, and facets with an area over them.
+/// Vertices without duplicates, and their facets of non-zero area.
 fn joined(vertices: &[Point3<f64>], facets: &[[u32; 3]], flipped: bool) -> (Vec<Point3<f64>>, Vec<[u32; 3]>) {
     let mut places: BTreeMap<[u64; 3], u32> = BTreeMap::new();
     let mut kept = Vec::new();
@@ -412,7 +412,7 @@ fn bounds(vertices: &[Point3<f64>]) -> (Vector3<f64>, Vector3<f64>) {
     vertices.iter().fold(start, |(low, high), v| (low.inf(&v.coords), high.sup(&v.coords)))
 }
 
-/// Mean number of triangles whose box stands over a place of the whole domain.
+/// Mean number of triangles whose box covers a place of the whole domain.
 fn stacked(vertices: &[Point3<f64>], facets: &[[u32; 3]], whole: &Domain) -> f64 {
     let side = |[from, to]: [f64; 2]| (to - from).max(f64::MIN_POSITIVE);
     let boxes = facets.iter().map(|facet| {
@@ -433,8 +433,7 @@ fn facet_normal(vertices: &[Point3<f64>], facet: &[u32; 3]) -> Unit<Vector3<f64>
     Unit::new_normalize((b - a).cross(&(c - a)))
 }
 
-/// At each corner, the normals of the facets around it that meet this facet without a crease, weighted by their
-/// angle there.
+/// At each corner, the normals of the facets around it that meet this facet without a crease, weighted by their angle there.
 fn corner_normals(
     vertices: &[Point3<f64>],
     facets: &[[u32; 3]],

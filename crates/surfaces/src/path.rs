@@ -114,7 +114,7 @@ pub fn over(surface: &Surface, options: &PathOptions) -> Result<Vec<PathPoint>, 
     // The chords of a few samples are no longer than the curve: what is refused here is certainly too long.
     let mut least = 0.0;
     for curve in &curves {
-        least += total_mm(trace(surface, curve, curve.first_look() / 4, &budget)?);
+        least += total_mm(trace(surface, curve, curve.initial_samples() / 4, &budget)?);
     }
     if least / options.max_step_mm > PathOptions::LARGEST as f64 {
         return Err(SurfaceError::TooLong { limit: PathOptions::LARGEST });
@@ -136,20 +136,20 @@ pub fn over(surface: &Surface, options: &PathOptions) -> Result<Vec<PathPoint>, 
     joined(surface, options, &passes, &budget)
 }
 
-/// The parts of a curve that lie on the surface, sampled in `looks` intervals.
+/// The parts of a curve that lie on the surface, sampled in `intervals` intervals.
 ///
 /// # Errors
 /// A budget with fewer evaluations left.
 fn trace(
     surface: &Surface,
     curve: &pattern::Curve,
-    looks: usize,
+    intervals: usize,
     budget: &Budget,
 ) -> Result<Vec<Trace>, SurfaceError> {
-    budget.look(looks + 1)?;
+    budget.charge(intervals + 1)?;
     let domain = surface.domain();
     let point = |share: f64| surface.contact(domain.at(curve.place(share))).map(|c| c.position_mm);
-    Ok(Trace::runs(point, 0.0, 1.0, looks))
+    Ok(Trace::runs(point, 0.0, 1.0, intervals))
 }
 
 fn total_mm(runs: Vec<Trace>) -> f64 {
@@ -167,13 +167,13 @@ fn cuts(
     let domain = surface.domain();
     let steps = Steps { max_step_mm: options.max_step_mm, chord_mm: options.chord_mm };
     let contact = |share: f64| surface.contact(domain.at(curve.place(share)));
-    let coarse = trace(surface, curve, curve.first_look(), budget)?;
+    let coarse = trace(surface, curve, curve.initial_samples(), budget)?;
     let gap_mm = coarse.iter().map(Trace::coarsest_mm).fold(0.0, f64::max);
     let finer = (8.0 * gap_mm / options.max_step_mm).ceil().max(1.0) as usize;
-    let mut looks = curve.first_look().saturating_mul(finer).min(FINEST);
+    let mut intervals = curve.initial_samples().saturating_mul(finer).min(FINEST);
     loop {
         let mut closest = usize::MAX;
-        let runs: Vec<(Trace, Vec<f64>)> = trace(surface, curve, looks, budget)?
+        let runs: Vec<(Trace, Vec<f64>)> = trace(surface, curve, intervals, budget)?
             .into_iter()
             .map(|run| {
                 let (from, to) = (run.shares[0], run.shares[run.shares.len() - 1]);
@@ -193,11 +193,11 @@ fn cuts(
         }
         // Steps over fewer than four samples are judged too coarsely: the chord error needs more, within
         // reason.
-        if closest < 4 && looks < FINEST.min((64 * curve.first_look()).saturating_mul(finer)) {
-            looks *= 2;
+        if closest < 4 && intervals < FINEST.min((64 * curve.initial_samples()).saturating_mul(finer)) {
+            intervals *= 2;
             continue;
         }
-        budget.look(LOOKS_PER_CUT * runs.iter().map(|(_, shares)| shares.len()).sum::<usize>())?;
+        budget.charge(EVALUATIONS_PER_CUT * runs.iter().map(|(_, shares)| shares.len()).sum::<usize>())?;
         return Ok(runs
             .iter()
             .map(|(run, shares)| {
@@ -209,7 +209,7 @@ fn cuts(
 }
 
 /// Evaluations of the surface for one point of a path.
-const LOOKS_PER_CUT: usize = 5;
+const EVALUATIONS_PER_CUT: usize = 5;
 
 /// The contact at a share of a curve, with the direction of the curve there.
 fn cut(

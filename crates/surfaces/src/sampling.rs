@@ -154,7 +154,7 @@ impl Trace {
             let mut shares = vec![share(0)];
             while shares.len() <= count {
                 let (from, to) = (shares[shares.len() - 1], share(shares.len()));
-                if !(budget.try_step() && self.holds(from, to, steps)) {
+                if !(budget.charge_step() && self.holds(from, to, steps)) {
                     break;
                 }
                 shares.push(to);

@@ -45,12 +45,12 @@ impl Surface {
     }
 
     /// Cost of a call of [`Surface::contact`], in terms of an equation.
-    pub(crate) fn look_cost(&self) -> f64 {
+    pub(crate) fn evaluation_cost(&self) -> f64 {
         match self {
-            Surface::Explicit(surface) => surface.look_cost(),
-            Surface::Parametric(surface) => surface.look_cost(),
-            Surface::Implicit(surface) => surface.look_cost(),
-            Surface::Mesh(surface) => surface.look_cost(),
+            Surface::Explicit(surface) => surface.evaluation_cost(),
+            Surface::Parametric(surface) => surface.evaluation_cost(),
+            Surface::Implicit(surface) => surface.evaluation_cost(),
+            Surface::Mesh(surface) => surface.evaluation_cost(),
         }
     }
 

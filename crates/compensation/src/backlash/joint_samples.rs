@@ -1,7 +1,7 @@
 //! Joint samples along the segments of a program.
 
 use crate::backlash::motion_end::{MotionEnd, ReachedEnd, SampledJoints};
-use crate::backlash::reversals::agrees;
+use crate::backlash::reversals::samples_agree;
 use crate::frames::frame_pair::FramePair;
 use crate::search_budget;
 use crate::segment::curve::Curve;
@@ -35,30 +35,30 @@ pub(crate) fn sampled(
     before: &[Option<u32>],
     nominal: &Inverse<'_>,
     half: &[f64; 6],
-    mounting: &dyn Fn(usize) -> FramePair,
+    frames_of: &dyn Fn(usize) -> FramePair,
 ) -> (Vec<Option<SampledJoints>>, Vec<f64>) {
     let start = |m: usize| before[m].and_then(|from| stops.get(from as usize));
     let mut samples = Samples::default();
     for (m, stop) in stops.iter().enumerate() {
-        samples.of(start(m), stop, 1, mounting);
+        samples.of(start(m), stop, 1, frames_of);
     }
     let mut paths = samples.passed(nominal);
-    let settled = |m: &usize, samples: &Option<SampledJoints>| match (start(*m), &stops[*m], samples) {
+    let unchanged_for = |m: &usize, samples: &Option<SampledJoints>| match (start(*m), &stops[*m], samples) {
         (Some(MotionEnd::At(from)), MotionEnd::At(to), Some(samples)) => {
-            agrees(&from.joints, samples, &to.joints, half)
+            samples_agree(&from.joints, samples, &to.joints, half)
         }
         _ => true,
     };
-    let mut rough: Vec<usize> = (0..stops.len()).filter(|m| !settled(m, &paths[*m])).collect();
+    let mut rough: Vec<usize> = (0..stops.len()).filter(|m| !unchanged_for(m, &paths[*m])).collect();
     for refinement in 1..=REFINEMENTS {
         let mut finer = Samples::default();
         for &m in &rough {
-            finer.of(start(m), &stops[m], 4_usize.pow(refinement), mounting);
+            finer.of(start(m), &stops[m], 4_usize.pow(refinement), frames_of);
         }
         for (&m, samples) in rough.iter().zip(finer.passed(nominal)) {
             paths[m] = samples;
         }
-        rough.retain(|m| !settled(m, &paths[*m]));
+        rough.retain(|m| !unchanged_for(m, &paths[*m]));
     }
     (paths, samples.passes)
 }
@@ -70,7 +70,7 @@ pub(crate) fn by_wrist(
     before: &[Option<u32>],
     nominal: &Inverse<'_>,
     half: &[f64; 6],
-    mounting: &dyn Fn(usize) -> FramePair,
+    frames_of: &dyn Fn(usize) -> FramePair,
 ) -> Vec<Option<Option<SampledJoints>>> {
     let of = |(stop, before): (&MotionEnd<'_>, &Option<u32>)| {
         let (Some(MotionEnd::At(from)), MotionEnd::At(to)) =
@@ -79,7 +79,7 @@ pub(crate) fn by_wrist(
             return None;
         };
         let wrist = to.motion.modal.wrist_interpolation != Switch::Off;
-        let (curve, within) = Some((from, to)).filter(|_| wrist).and_then(|_| path(from, to, mounting))?;
+        let (curve, within) = Some((from, to)).filter(|_| wrist).and_then(|_| path(from, to, frames_of))?;
         let ends = [&from.joints, &to.joints];
         let mut count = pieces_of(&curve);
         loop {
@@ -91,8 +91,9 @@ pub(crate) fn by_wrist(
                 count,
                 MOST_STEP_RAD,
             );
-            let settled = |samples: &SampledJoints| agrees(&from.joints, samples, &to.joints, half);
-            if count >= MOST_REFINED || samples.as_ref().is_some_and(settled) {
+            let unchanged_for =
+                |samples: &SampledJoints| samples_agree(&from.joints, samples, &to.joints, half);
+            if count >= MOST_REFINED || samples.as_ref().is_some_and(unchanged_for) {
                 return Some(samples);
             }
             count = (4 * count).min(MOST_REFINED);
@@ -105,16 +106,16 @@ pub(crate) fn by_wrist(
 fn path(
     from: &ReachedEnd<'_>,
     to: &ReachedEnd<'_>,
-    mounting: &dyn Fn(usize) -> FramePair,
+    frames_of: &dyn Fn(usize) -> FramePair,
 ) -> Option<(Curve, FramePair)> {
     if !to.path_kinds().0 {
         return None;
     }
     // The path belongs to the tool and work object of the motion, even where it starts under others.
-    let within = mounting(to.frames_index);
+    let within = frames_of(to.frames_index);
     let mut begin = from.commanded;
     if from.frames_index != to.frames_index {
-        begin = within.target_of(&mounting(from.frames_index).flange_for(&from.commanded));
+        begin = within.target_of(&frames_of(from.frames_index).flange_for(&from.commanded));
     }
     let curve = match (to.motion.kind, to.via) {
         (MotionKind::Circular, Some(via)) => Curve::round(begin, &via, to.commanded, to.motion),
@@ -135,7 +136,7 @@ struct Samples {
     shares: Vec<f64>,
     flanges: Vec<Pose>,
     /// Joints at the start and at the end of each motion.
-    ends_rad: Vec<[Joints; 2]>,
+    end_joints_rad: Vec<[Joints; 2]>,
     /// Share of each motion at which its circle point is passed.
     passes: Vec<f64>,
 }
@@ -152,11 +153,11 @@ impl Samples {
         from: Option<&MotionEnd<'_>>,
         stop: &MotionEnd<'_>,
         density: usize,
-        mounting: &dyn Fn(usize) -> FramePair,
+        frames_of: &dyn Fn(usize) -> FramePair,
     ) {
         let mut passes = 0.5;
         if let (Some(MotionEnd::At(from)), MotionEnd::At(to)) = (from, stop)
-            && let Some((curve, within)) = path(from, to, mounting)
+            && let Some((curve, within)) = path(from, to, frames_of)
         {
             passes = to.via.map_or(passes, |via| curve.passes(&via));
             let pieces = (density * pieces_of(&curve)).min(MOST_REFINED);
@@ -170,7 +171,7 @@ impl Samples {
             Some(MotionEnd::At(reached)) => reached.joints,
             _ => Joints::zeros(),
         };
-        self.ends_rad.push([joints(from), joints(Some(stop))]);
+        self.end_joints_rad.push([joints(from), joints(Some(stop))]);
         self.ends.push(self.shares.len());
         self.passes.push(passes);
     }
@@ -180,7 +181,7 @@ impl Samples {
     /// close.
     fn passed(&self, nominal: &Inverse<'_>) -> Vec<Option<SampledJoints>> {
         let of = |motion: usize| {
-            let [start, end] = &self.ends_rad[motion];
+            let [start, end] = &self.end_joints_rad[motion];
             let flanges = &self.flanges[self.range(motion)];
             if flanges.is_empty() {
                 return Some(Vec::new());

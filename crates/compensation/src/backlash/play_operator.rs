@@ -146,9 +146,9 @@ impl<'a> PlayOperator<'a> {
         for _ in 0..DOUBLINGS {
             steps *= 2;
             let finer = along(steps);
-            let settled = (finer - most).abs() < 0.25 * CHORD_MM;
+            let unchanged_for = (finer - most).abs() < 0.25 * CHORD_MM;
             most = finer;
-            if settled || !most.is_finite() {
+            if unchanged_for || !most.is_finite() {
                 break;
             }
         }

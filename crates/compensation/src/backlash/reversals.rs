@@ -23,7 +23,12 @@ pub(crate) fn turning_point(samples: &[(f64, f64)], k: usize) -> Option<(f64, f6
 
 /// Whether every other sample of a path implies the same reversals as all samples, for joints with backlash, and none hidden
 /// near its end.
-pub(crate) fn agrees(start: &Joints, samples: &[(f64, Joints)], end: &Joints, half: &[f64; 6]) -> bool {
+pub(crate) fn samples_agree(
+    start: &Joints,
+    samples: &[(f64, Joints)],
+    end: &Joints,
+    half: &[f64; 6],
+) -> bool {
     if samples.len() < 3 {
         return true;
     }
@@ -36,7 +41,7 @@ pub(crate) fn agrees(start: &Joints, samples: &[(f64, Joints)], end: &Joints, ha
         // Largest travel of a reversal hidden between the last two samples.
         let hidden = 0.5 * (fine - coarse).abs() * (1.0 - all[all.len() - 2].0);
         let certain = (fine - coarse).abs() < 0.5 * fine.abs() || hidden < 0.1 * DEAD_BAND_RAD;
-        let [all, other] = [turns(&all), turns(&other)];
+        let [all, other] = [reversals_of(&all), reversals_of(&other)];
         let alike = |((one, at), (other, near)): (&(i8, f64), &(i8, f64))| {
             one == other && (at - near).abs() < 0.5 * DEAD_BAND_RAD
         };
@@ -52,7 +57,7 @@ fn last_slope(samples: &[(f64, f64)]) -> f64 {
 }
 
 /// Successive directions of a joint, and the reversal points.
-fn turns(samples: &[(f64, f64)]) -> Vec<(i8, f64)> {
+fn reversals_of(samples: &[(f64, f64)]) -> Vec<(i8, f64)> {
     let mut out: Vec<(i8, f64)> = Vec::new();
     let mut farthest = samples[0].1;
     for k in 1..samples.len() {

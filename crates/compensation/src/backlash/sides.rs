@@ -19,19 +19,19 @@ use crate::backlash::play_track::{PlayTrack, agreed, arrive, passing};
 use crate::frames::frame_pair::FramePair;
 use truegrind_arm::inverse::Inverse;
 
-/// The sides along all motions. `before[m]`: the motion that ended where motion m starts. `doubted[m]`: the joints whose side
+/// The sides along all motions. `before[m]`: the motion that ended where motion m starts. `unknown_sides[m]`: the joints whose side
 /// counts as unknown at the end of motion m; none where it is empty.
 pub(crate) fn backlash_sides(
     stops: &[MotionEnd<'_>],
     before: &[Option<u32>],
     nominal: &Inverse<'_>,
     play_rad: &[f64; 6],
-    mounting: &dyn Fn(usize) -> FramePair,
-    doubted: &[[bool; 6]],
+    frames_of: &dyn Fn(usize) -> FramePair,
+    unknown_sides: &[[bool; 6]],
 ) -> Vec<BacklashSides> {
     let half = play_rad.map(|play| 0.5 * play.abs());
-    let (paths, passes) = sampled(stops, before, nominal, &half, mounting);
-    let by_wrist = by_wrist(stops, before, nominal, &half, mounting);
+    let (paths, passes) = sampled(stops, before, nominal, &half, frames_of);
+    let by_wrist = by_wrist(stops, before, nominal, &half, frames_of);
     let mut tracks: Vec<Option<[PlayTrack; 6]>> = Vec::with_capacity(stops.len());
     let mut out = Vec::with_capacity(stops.len());
     for (m, stop) in stops.iter().enumerate() {
@@ -66,7 +66,9 @@ pub(crate) fn backlash_sides(
                 course.via = agreed(along.iter().map(|samples| passing(here, reached, samples, passes[m])));
                 (course.turns, here) = arrive(here, reached, &along);
                 course.end = here.map(|t| t.side);
-                for joint in (0..6).filter(|&joint| doubted.get(m).is_some_and(|doubted| doubted[joint])) {
+                for joint in (0..6)
+                    .filter(|&joint| unknown_sides.get(m).is_some_and(|unknown_sides| unknown_sides[joint]))
+                {
                     course.forget(joint);
                     here[joint].forget(reached.links.map(|links| links[joint]), reached.joints[joint]);
                 }

@@ -16,25 +16,25 @@ pub(crate) fn read<T: DeserializeOwned>(text: &str) -> Result<(T, Vec<String>), 
     let mut table: Table = text.parse()?;
     let mut open = Vec::new();
     for key in ["robot", "angles"] {
-        if takes_away(&mut table, key) {
+        if remove_placeholder(&mut table, key) {
             open.push(format!("{key} = \"?\": {}", expected(key)));
         }
     }
     for kind in ["tool", "wobj", "external"] {
         let Some(Value::Array(entries)) = table.get_mut(kind) else { continue };
         for entry in entries.iter_mut().filter_map(Value::as_table_mut) {
-            entries_open(kind, entry, &mut open);
+            remove_placeholders(kind, entry, &mut open);
         }
     }
     Ok((table.try_into()?, open))
 }
 
 /// Removes placeholders from one entry; required keys get a value that is never used.
-fn entries_open(kind: &str, entry: &mut Table, open: &mut Vec<String>) {
+fn remove_placeholders(kind: &str, entry: &mut Table, open: &mut Vec<String>) {
     let named = if kind == "external" { "axis" } else { "name" };
     let name = entry.get(named).and_then(Value::as_str).unwrap_or(MARK).to_owned();
     for key in ["origin", "position_mm", "quaternion_wxyz", "teaching_deg", "taught_with", "carries"] {
-        if !takes_away(entry, key) {
+        if !remove_placeholder(entry, key) {
             continue;
         }
         open.push(format!("{kind} \"{name}\": {key} = \"?\": {}", expected(key)));
@@ -50,7 +50,7 @@ fn entries_open(kind: &str, entry: &mut Table, open: &mut Vec<String>) {
 }
 
 /// Removes a key whose value is the placeholder; returns whether it did.
-fn takes_away(table: &mut Table, key: &str) -> bool {
+fn remove_placeholder(table: &mut Table, key: &str) -> bool {
     let is_open = table.get(key).and_then(Value::as_str) == Some(MARK);
     if is_open {
         table.remove(key);

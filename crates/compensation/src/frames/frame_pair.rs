@@ -71,14 +71,14 @@ pub(crate) struct ResolveContext<'a> {
     /// The inverse of the nominal arm.
     pub(crate) inverse: &'a Inverse<'a>,
     /// Typical joints, at which the effect of an unknown origin is estimated.
-    pub(crate) usual: Joints,
+    pub(crate) typical_at: Joints,
 }
 
 /// Resolves a frame pair from the program's values and the cell file.
 ///
 /// # Errors
 /// A sentence where cell file and program contradict each other.
-pub(crate) fn mount(
+pub(crate) fn resolve_frames(
     (tool, tool_value): (&Tool, &ToolValue),
     (object, object_value): (&WorkObject, &WorkObjectValue),
     with: &ResolveContext<'_>,
@@ -198,26 +198,26 @@ pub(crate) fn carried_through(
 }
 
 /// Where no typical pose allows an estimate.
-const NOT_TOLD: &str = "how far it would move had it been taught cannot be estimated here";
+const NO_ESTIMATE: &str = "how far it would move had it been taught cannot be estimated here";
 
 /// How far a taught TCP would move: four orientations about a typical pose, TCP fixed under the nominal model. A stationary
 /// tool is touched once with the centre of the flange.
 fn tool_estimate(commanded: &FramePair, with: &ResolveContext<'_>) -> String {
     let Teaching { nominal, estimated, .. } = with.teaching;
-    let usual = &with.usual;
+    let typical_at = &with.typical_at;
     if commanded.holds_part {
-        let flange = |arm: &PreparedModel<'_>| arm.forward(usual).translation.vector;
+        let flange = |arm: &PreparedModel<'_>| arm.forward(typical_at).translation.vector;
         let shift = (flange(estimated) - flange(nominal)).norm();
         return format!("had it been taught with this arm, its TCP would move by about {shift:.2} mm");
     }
     let turns = [[0.0, 0.0, 0.0], [0.5, 0.3, 0.0], [-0.5, 0.3, 0.6], [0.0, -0.5, -0.6]];
     let inverse = with.inverse;
-    let at = nominal.forward(usual) * commanded.tool;
+    let at = nominal.forward(typical_at) * commanded.tool;
     let teaching: Vec<Joints> = turns
         .iter()
         .filter_map(|w| {
             let turned = at * Pose::new(Vector3::zeros(), Vector3::from(*w));
-            inverse.solve_near(&(turned * commanded.tool.inverse()), usual).ok().map(|s| s.joints)
+            inverse.solve_near(&(turned * commanded.tool.inverse()), typical_at).ok().map(|s| s.joints)
         })
         .collect();
     match taught_tcp(estimated, &teaching) {
@@ -225,21 +225,21 @@ fn tool_estimate(commanded: &FramePair, with: &ResolveContext<'_>) -> String {
             let shift = (tcp - commanded.tool.translation.vector).norm();
             format!("had it been taught with this arm, its TCP would move by about {shift:.2} mm")
         }
-        None => NOT_TOLD.to_owned(),
+        None => NO_ESTIMATE.to_owned(),
     }
 }
 
 /// How far a taught work object would move: its origin and 100 mm along x and y, touched near a typical pose.
 fn object_estimate(commanded: &FramePair, with: &ResolveContext<'_>) -> String {
     let Teaching { nominal, estimated, .. } = with.teaching;
-    let usual = &with.usual;
+    let typical_at = &with.typical_at;
     let inverse = with.inverse;
-    let orientation = commanded.target_of(&nominal.forward(usual)).rotation;
+    let orientation = commanded.target_of(&nominal.forward(typical_at)).rotation;
     let touched: Vec<Point3<f64>> = [[0.0, 0.0], [100.0, 0.0], [0.0, 100.0]]
         .iter()
         .filter_map(|[x, y]| {
             let target = Pose::from_parts(Vector3::new(*x, *y, 0.0).into(), orientation);
-            let joints = inverse.solve_near(&commanded.flange_for(&target), usual).ok()?.joints;
+            let joints = inverse.solve_near(&commanded.flange_for(&target), typical_at).ok()?.joints;
             let tip = Point3::from(commanded.tool.translation.vector);
             let flange = estimated.forward(&joints);
             Some(if commanded.holds_part { flange.inverse() * tip } else { flange * tip })
@@ -251,6 +251,6 @@ fn object_estimate(commanded: &FramePair, with: &ResolveContext<'_>) -> String {
             let turn = pose.rotation.angle_to(&commanded.object.rotation).to_degrees();
             format!("had it been taught with this arm, it would move by about {shift:.2} mm and {turn:.3}°")
         }
-        None => NOT_TOLD.to_owned(),
+        None => NO_ESTIMATE.to_owned(),
     }
 }

@@ -5,7 +5,7 @@ use std::collections::{HashMap, HashSet};
 use crate::arms::Arms;
 use crate::cell::{Carries, Cell};
 use crate::configuration::configured;
-use crate::frames::frame_pair::{FramePair, ResolveContext, ResolvedFrames, mount};
+use crate::frames::frame_pair::{FramePair, ResolveContext, ResolvedFrames, resolve_frames};
 use crate::frames::taught::Teaching;
 use crate::plan::reason::OutcomeReason;
 use crate::search_budget;
@@ -37,7 +37,7 @@ impl FrameTable {
             assumed: Vec::new(),
         };
         let teaching = Teaching::of(arms.nominal.arm(), arms.estimated.arm(), cell, listing);
-        let typical = typical(listing);
+        let first_motions = first_motions(listing);
         let mut budget = SearchBudget::of(search_budget::FRAMES);
         let mut last = None;
         for motion in &listing.motions {
@@ -54,14 +54,14 @@ impl FrameTable {
                 out.places.insert((tool, object), Err(OutcomeReason::Program(reason)));
                 continue;
             };
-            let here = typical.get(&(tool, object)).map_or(&[][..], Vec::as_slice);
+            let here = first_motions.get(&(tool, object)).map_or(&[][..], Vec::as_slice);
             let found = with_budget(&mut budget, || {
-                let usual = usual_joints(here, tv.frame.pose(), ov, arms);
+                let typical_at = typical_joints(here, tv.frame.pose(), ov, arms);
                 let (teaching, inverse) = (&teaching, &arms.nominal);
-                mount(
+                resolve_frames(
                     (t, tv),
                     (o, ov),
-                    &ResolveContext { teaching, knowledge: arms.knowledge, inverse, usual },
+                    &ResolveContext { teaching, knowledge: arms.knowledge, inverse, typical_at },
                 )
             });
             let found = match found {
@@ -150,7 +150,7 @@ impl FrameTable {
 }
 
 /// The first few motions of each pair of tool and work object, for typical joints.
-fn typical(listing: &Listing) -> HashMap<(u32, u32), Vec<&Motion>> {
+fn first_motions(listing: &Listing) -> HashMap<(u32, u32), Vec<&Motion>> {
     const ASKED: usize = 50;
     let mut out: HashMap<(u32, u32), Vec<&Motion>> = HashMap::new();
     for motion in &listing.motions {
@@ -164,7 +164,7 @@ fn typical(listing: &Listing) -> HashMap<(u32, u32), Vec<&Motion>> {
 }
 
 /// Joints of the first reachable target of these motions, at which the effect of unknown origins is estimated.
-fn usual_joints(motions: &[&Motion], tool: Pose, object: &WorkObjectValue, arms: &Arms<'_>) -> Joints {
+fn typical_joints(motions: &[&Motion], tool: Pose, object: &WorkObjectValue, arms: &Arms<'_>) -> Joints {
     let mounting = FramePair {
         tool,
         object: object.user_frame.pose() * object.object_frame.pose(),

@@ -97,8 +97,8 @@ pub fn contradictions(listing: &Listing, cell: &Cell, nominal: &Model) -> Vec<St
         }
         let (Ok(value), Ok(place)) = (&tool.value, &object.value) else { continue };
         let found = [
-            twice("tool", &teaching.stated.tools(tool), &tool.name),
-            twice("wobj", &teaching.stated.objects(object), &object.name),
+            duplicate_entries("tool", &teaching.stated.tools(tool), &tool.name),
+            duplicate_entries("wobj", &teaching.stated.objects(object), &object.name),
             teaching.tool(tool, value).err(),
             teaching.object(object, place).err(),
         ];
@@ -112,7 +112,7 @@ pub fn contradictions(listing: &Listing, cell: &Cell, nominal: &Model) -> Vec<St
 }
 
 /// Two entries of the cell file for one frame of the program.
-fn twice(kind: &str, found: &[&CellFrame], name: &str) -> Option<String> {
+fn duplicate_entries(kind: &str, found: &[&CellFrame], name: &str) -> Option<String> {
     let mut found = found.iter().copied();
     let first = found.next()?;
     // A repeated statement is no contradiction.
@@ -148,11 +148,11 @@ impl<'a> Teaching<'a> {
         if tool.place.is_some() {
             agrees("tool", stated, &commanded)?;
         }
-        self.told_tool(stated, &commanded, value.robhold)
+        self.commanded_tool(stated, &commanded, value.robhold)
     }
 
     /// Resolves a tool of the cell file that the controller holds as `commanded`.
-    fn told_tool(&self, stated: &CellFrame, commanded: &Pose, held: bool) -> Result<RealTool, String> {
+    fn commanded_tool(&self, stated: &CellFrame, commanded: &Pose, held: bool) -> Result<RealTool, String> {
         if stated.origin == FrameOrigin::Metrology || stated.teaching_deg.is_empty() {
             return Ok(RealTool { pose: *commanded, moved_mm: None });
         }
@@ -398,7 +398,7 @@ impl<'a> Teaching<'a> {
             }
         };
         let real = match found.stated {
-            Some(stated) => self.told_tool(stated, &found.frame, found.held)?.pose,
+            Some(stated) => self.commanded_tool(stated, &found.frame, found.held)?.pose,
             None => found.frame,
         };
         Ok(TouchingTool {

@@ -20,7 +20,7 @@ use crate::feasibility::unchanged::{blocking_reason, unchanged_motions};
 use crate::frames::frame_pair::FramePair;
 use crate::frames::frame_table::FrameTable;
 use crate::options::{Options, is_rewritable};
-use crate::plan::notes::{doubt_note, load_notes, open_notes, play_note};
+use crate::plan::notes::{backlash_note, doubtful_effects_note, load_notes, unchecked_notes};
 use crate::plan::reason::OutcomeReason;
 use crate::plan::{MotionOutcome, Plan};
 use crate::risk::assessment::{Assessment, AssessmentSample, EstimateContext, assess_program};
@@ -59,7 +59,7 @@ pub(crate) struct SolvedProgram<'a> {
     assessment: Assessment,
     solved: SolvedTargets,
     /// The unmodified motions that `solved` was computed with.
-    solved_without: BTreeMap<u32, OutcomeReason>,
+    solved_unchanged: BTreeMap<u32, OutcomeReason>,
 }
 
 impl<'a> SolvedProgram<'a> {
@@ -73,20 +73,34 @@ impl<'a> SolvedProgram<'a> {
         let mut frame_table = FrameTable::of(listing, &arms, cell);
         let program = OriginalProgram::of(listing, &arms, &frame_table);
         let assessment = assess(listing, &program, &mut arms, &mut frame_table, options);
-        let solved_without = assessment.risky();
-        let solved =
-            solve_targets(listing, &program, &mut arms, &frame_table, &assessment, options, &solved_without);
+        let solved_unchanged = assessment.risky();
+        let solved = solve_targets(
+            listing,
+            &program,
+            &mut arms,
+            &frame_table,
+            &assessment,
+            options,
+            &solved_unchanged,
+        );
         let program = arms.conditions.has_play().then_some(program);
-        Self { listing, options, arms, frame_table, program, assessment, solved, solved_without }
+        Self { listing, options, arms, frame_table, program, assessment, solved, solved_unchanged }
     }
 
     /// The plan in which the motions that the writer refused (`refused`, by index) remain unmodified, and with them their
     /// cuts.
     pub(crate) fn plan(&mut self, refused: &BTreeMap<u32, OutcomeReason>) -> Plan {
-        let stays = self.settled(refused);
+        let unchanged = self.unchanged_for(refused);
         let Self { listing, options, arms, frame_table, assessment, solved, .. } = self;
-        let mut plan =
-            planned(&Planner { listing, solved, stays: &stays, frame_table, assessment, arms, options });
+        let mut plan = planned(&Planner {
+            listing,
+            solved,
+            unchanged: &unchanged,
+            frame_table,
+            assessment,
+            arms,
+            options,
+        });
         plan.placements.clone_from(&assessment.placements);
         plan.cuts.clone_from(&assessment.cuts);
         let rewritten = |motion: &u32| {
@@ -104,36 +118,37 @@ impl<'a> SolvedProgram<'a> {
 
     /// The motions that remain unmodified. With backlash, an unmodified motion changes the sides from which joints arrive at
     /// later targets: all targets are then solved again.
-    fn settled(&mut self, refused: &BTreeMap<u32, OutcomeReason>) -> BTreeMap<u32, OutcomeReason> {
-        let Self { listing, options, arms, frame_table, program, assessment, solved, solved_without } = self;
+    fn unchanged_for(&mut self, refused: &BTreeMap<u32, OutcomeReason>) -> BTreeMap<u32, OutcomeReason> {
+        let Self { listing, options, arms, frame_table, program, assessment, solved, solved_unchanged } =
+            self;
         let mut refused = refused.clone();
         for (motion, why) in assessment.risky() {
             refused.entry(motion).or_insert(why);
         }
-        for _ in 0..MOST_SETTLING {
+        for _ in 0..MOST_UNCHANGED_ROUNDS {
             if let Some(program) = program
-                && refused != *solved_without
+                && refused != *solved_unchanged
             {
                 *solved = solve_targets(listing, program, arms, frame_table, assessment, options, &refused);
-                solved_without.clone_from(&refused);
+                solved_unchanged.clone_from(&refused);
             } else {
                 solved.allow_again();
             }
-            let stays = unchanged_motions(listing, solved, frame_table, arms, options, &refused);
+            let unchanged = unchanged_motions(listing, solved, frame_table, arms, options, &refused);
             if !arms.conditions.has_play() {
-                return stays;
+                return unchanged;
             }
             let more: Vec<(u32, OutcomeReason)> = (0..listing.motions.len() as u32)
                 .filter(|motion| !refused.contains_key(motion))
                 .filter(|motion| !solved.of(*motion as usize).is_empty())
                 .filter(|motion| solved.of(*motion as usize).iter().all(Result::is_ok))
-                .filter_map(|motion| match blocking_reason(motion, listing, solved, options, &stays) {
+                .filter_map(|motion| match blocking_reason(motion, listing, solved, options, &unchanged) {
                     Some((Status::Refused, why)) => Some((motion, why)),
                     _ => None,
                 })
                 .collect();
             if more.is_empty() {
-                return stays;
+                return unchanged;
             }
             refused.extend(more);
         }
@@ -175,7 +190,7 @@ fn assess(
 }
 
 /// Largest number of rounds in which unmodified motions change the backlash sides of later ones.
-const MOST_SETTLING: usize = 64;
+const MOST_UNCHANGED_ROUNDS: usize = 64;
 
 fn planned(job: &Planner<'_>) -> Plan {
     let Planner { listing, solved, frame_table, arms, options, .. } = *job;
@@ -184,18 +199,19 @@ fn planned(job: &Planner<'_>) -> Plan {
     // Filled in place: concatenating per-portion lists would hold everything twice.
     let mut outcomes: Vec<MotionOutcome> = (0..count as u32).map(MotionOutcome::left).collect();
     let mut changes: Vec<Option<Change>> = (0..count).map(|_| None).collect();
-    let mut places: Vec<Places<'_>> = outcomes.chunks_mut(PORTION).zip(changes.chunks_mut(PORTION)).collect();
+    let mut slots: Vec<OutputSlots<'_>> =
+        outcomes.chunks_mut(PORTION).zip(changes.chunks_mut(PORTION)).collect();
     let portions: Vec<PortionResult> =
-        search_budget::shared_out_into(whole, &mut places, |portion, places, budget| {
+        search_budget::shared_out_into(whole, &mut slots, |portion, slots, budget| {
             let first = portion * PORTION;
-            job.portion(first..(first + PORTION).min(count), places, budget)
+            job.portion(first..(first + PORTION).min(count), slots, budget)
         });
     let mut notes = frame_table.notes();
-    notes.extend(play_note(arms, solved));
-    notes.extend(doubt_note(arms));
+    notes.extend(backlash_note(arms, solved));
+    notes.extend(doubtful_effects_note(arms));
     notes.extend(load_notes(listing, arms, options));
     let unchecked: Vec<u32> = portions.iter().flat_map(|portion| portion.unchecked.iter().copied()).collect();
-    notes.extend(open_notes(listing, solved, &unchecked));
+    notes.extend(unchecked_notes(listing, solved, &unchecked));
     let changes = changes.into_iter().flatten().collect();
     let mut plan = Plan { notes, changes, outcomes, ..Plan::default() };
     plan.points.reserve_exact(portions.iter().map(|p| p.points.len()).sum());
@@ -214,7 +230,7 @@ struct Planner<'a> {
     listing: &'a Listing,
     solved: &'a SolvedTargets,
     /// Motions that remain unmodified although their targets could be corrected.
-    stays: &'a BTreeMap<u32, OutcomeReason>,
+    unchanged: &'a BTreeMap<u32, OutcomeReason>,
     frame_table: &'a FrameTable,
     assessment: &'a Assessment,
     arms: &'a Arms<'a>,
@@ -222,7 +238,7 @@ struct Planner<'a> {
 }
 
 /// Output slots of consecutive motions.
-type Places<'p> = (&'p mut [MotionOutcome], &'p mut [Option<Change>]);
+type OutputSlots<'p> = (&'p mut [MotionOutcome], &'p mut [Option<Change>]);
 
 /// Remaining results of a portion.
 struct PortionResult {
@@ -275,7 +291,7 @@ impl<'a> Planner<'a> {
     fn portion(
         &self,
         motions: std::ops::Range<usize>,
-        (outcomes, changes): &mut Places<'_>,
+        (outcomes, changes): &mut OutputSlots<'_>,
         budget: &mut SearchBudget,
     ) -> PortionResult {
         reserve_memory();
@@ -297,8 +313,8 @@ impl<'a> Planner<'a> {
             unchecked: Vec::new(),
             points: Vec::with_capacity(if self.options.points { count } else { 0 }),
         };
-        let places = outcomes.iter_mut().zip(changes.iter_mut());
-        for ((index, path), (outcome, change)) in motions.zip(&paths).zip(places) {
+        let slots = outcomes.iter_mut().zip(changes.iter_mut());
+        for ((index, path), (outcome, change)) in motions.zip(&paths).zip(slots) {
             let middle = if straight(index) && path.is_some() { middles.next() } else { None };
             let middle = middle.unwrap_or(f64::INFINITY);
             let mut worked =
@@ -332,7 +348,7 @@ impl<'a> Planner<'a> {
         };
         if !is_rewritable(before, self.options)
             || !targets.iter().all(changes)
-            || self.stays.contains_key(&(previous as u32))
+            || self.unchanged.contains_key(&(previous as u32))
         {
             return None;
         }
@@ -380,9 +396,9 @@ impl<'a> Planner<'a> {
         }
         let path = self.path(previous)?;
         let middle = midpoint_deviations(&[&path], self.arms, self.options.emit)[0];
-        let good: Vec<&SolvedTarget> =
+        let solved_targets: Vec<&SolvedTarget> =
             self.solved.of(previous).iter().filter_map(|t| t.as_ref().ok()).collect();
-        deviation(&SegmentPlan::of(before, Some(&path), &good, middle, self.arms, self.options))
+        deviation(&SegmentPlan::of(before, Some(&path), &solved_targets, middle, self.arms, self.options))
     }
 }
 
@@ -425,18 +441,18 @@ fn plan_motion<'a>(
         }
         _ => None,
     };
-    if let Some((status, why)) = blocking_reason(index as u32, listing, solved, options, job.stays) {
+    if let Some((status, why)) = blocking_reason(index as u32, listing, solved, options, job.unchanged) {
         return finish(outcome, status, Some(why), None, point);
     }
-    let good: Vec<&SolvedTarget> = targets.iter().filter_map(|t| t.as_ref().ok()).collect();
+    let solved_targets: Vec<&SolvedTarget> = targets.iter().filter_map(|t| t.as_ref().ok()).collect();
     // The segment from the previous motion.
-    let segment_plan = SegmentPlan::of(motion, path, &good, middle_mm, arms, options);
+    let segment_plan = SegmentPlan::of(motion, path, &solved_targets, middle_mm, arms, options);
     (outcome.path_deviation_mm, outcome.inserted) =
         (segment_plan.path_deviation_mm, segment_plan.before.len());
     // All other flags hold only for the guessed configuration, so this one takes precedence.
     let guessed = options.flag_unknown_starts
         && motion.configures
-        && good.iter().any(|s| s.guess != BranchGuess::Known);
+        && solved_targets.iter().any(|s| s.guess != BranchGuess::Known);
     let mut flag = if guessed { Some(OutcomeReason::UnknownStart) } else { segment_plan.flag };
     if let Some(corner) = job.corner(motion, path, &segment_plan, last) {
         outcome.path_deviation_mm =
@@ -447,13 +463,13 @@ fn plan_motion<'a>(
     }
     let flag =
         flag.or_else(|| path.and_then(|path| too_fast(index, motion, listing, path, &segment_plan, arms)));
-    let flag = flag.or_else(|| good.iter().find_map(|s| doubtful(s, arms)));
+    let flag = flag.or_else(|| solved_targets.iter().find_map(|s| uncertainty_flag(s, arms)));
     let new = |(target, solved): (&MotionTarget, &&SolvedTarget)| match target.role {
         Role::Via if segment_plan.straight => NewTarget::Drop,
         _ => new_target(target, solved, motion, options),
     };
-    let new_targets: Vec<NewTarget> = motion.targets.iter().zip(&good).map(new).collect();
-    outcome.after_mm = good.last().map(|s| s.deviation_mm[1]);
+    let new_targets: Vec<NewTarget> = motion.targets.iter().zip(&solved_targets).map(new).collect();
+    outcome.after_mm = solved_targets.last().map(|s| s.deviation_mm[1]);
     let change = Change { motion: index as u32, targets: new_targets, before: segment_plan.before.clone() };
     let status = if flag.is_some() { Status::Flagged } else { Status::Changed };
     PlannedMotion { segment_plan: Some(segment_plan), ..finish(outcome, status, flag, Some(change), point) }
@@ -478,7 +494,7 @@ fn too_fast(
     (ratio > 1.0).then_some(OutcomeReason::TooFast { joint, ratio })
 }
 
-fn doubtful(solved: &SolvedTarget, arms: &Arms<'_>) -> Option<OutcomeReason> {
+fn uncertainty_flag(solved: &SolvedTarget, arms: &Arms<'_>) -> Option<OutcomeReason> {
     match solved.outside {
         Some(Outside::Joint { joint, by_deg }) => {
             return Some(OutcomeReason::JointNotMeasured { joint, by_deg });

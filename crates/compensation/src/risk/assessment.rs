@@ -51,18 +51,18 @@ impl Assessment {
 
     /// The reference frame of the shape of a motion's cut: it moves with the arm's parameters as the cut does.
     pub(crate) fn registered(&self, motion: u32) -> Option<&RegisteredFrame> {
-        self.registered[self.place(motion)?].as_ref()
+        self.registered[self.cut_index(motion)?].as_ref()
     }
 
     /// Sigma of the shape of a motion's cut (RMS, mm), for parts that the robot holds.
     pub(crate) fn sigma_of_cut_mm(&self, motion: u32) -> Option<f64> {
-        let place = self.place(motion)?;
-        (self.registered[place].is_none()).then_some(self.cuts[place].shape_sigma_mm)
+        let cut_index = self.cut_index(motion)?;
+        (self.registered[cut_index].is_none()).then_some(self.cuts[cut_index].shape_sigma_mm)
     }
 
     /// Whether only the shape of a motion's cut is corrected.
     pub(crate) fn shape_alone(&self, motion: u32) -> bool {
-        self.place(motion).is_some_and(|place| self.cuts[place].assessed == Placement::Shape)
+        self.cut_index(motion).is_some_and(|cut_index| self.cuts[cut_index].assessed == Placement::Shape)
     }
 
     /// Probability that correcting these cuts does harm, taken together; absent without any.
@@ -72,13 +72,13 @@ impl Assessment {
         cuts: impl IntoIterator<Item = &'c CutRisk>,
     ) -> Option<f64> {
         let mut total = ProgramTotal::of(knowledge);
-        let places = cuts.into_iter().filter_map(|cut| self.place(*cut.motions.first()?));
-        places.filter_map(|place| self.shares.get(place)).for_each(|share| total.add(share));
+        let places = cuts.into_iter().filter_map(|cut| self.cut_index(*cut.motions.first()?));
+        places.filter_map(|cut_index| self.shares.get(cut_index)).for_each(|share| total.add(share));
         total.probability_of_harm(knowledge)
     }
 
-    fn place(&self, motion: u32) -> Option<usize> {
-        self.cut_of.get(motion as usize).copied().flatten().map(|place| place as usize)
+    fn cut_index(&self, motion: u32) -> Option<usize> {
+        self.cut_of.get(motion as usize).copied().flatten().map(|cut_index| cut_index as usize)
     }
 }
 
@@ -149,7 +149,7 @@ pub(crate) fn assess_program(
     list: &mut [ResolvedFrames],
     objects: &[u32],
     with: &EstimateContext<'_, '_>,
-    wanted: PlacementChoice,
+    choice: PlacementChoice,
 ) -> Assessment {
     let EstimateContext { conditions, knowledge } = *with;
     let mut out = Assessment { cut_of: vec![None; listing.motions.len()], ..Assessment::default() };
@@ -157,12 +157,13 @@ pub(crate) fn assess_program(
     for (object, motions) in &chosen.objects {
         let targets: Vec<AssessedTarget> = motions.iter().filter_map(|m| at.get(m).copied()).collect();
         let name = &listing.work_objects[*object as usize].name;
-        let found = assess_placement(name, &targets, list, conditions, knowledge, wanted);
+        let found = assess_placement(name, &targets, list, conditions, knowledge, choice);
         let Some((mut placement, displaced)) = found else { continue };
-        if placement.applied == Placement::Shape && wanted.remedies {
-            let max_risk = wanted.max_risk;
-            let place = UnknownPlacement { targets: &targets, list: &*list, conditions, knowledge, max_risk };
-            placement.remedy = remedy_search::remedy(&place);
+        if placement.applied == Placement::Shape && choice.remedies {
+            let max_risk = choice.max_risk;
+            let cut_index =
+                UnknownPlacement { targets: &targets, list: &*list, conditions, knowledge, max_risk };
+            placement.remedy = remedy_search::remedy(&cut_index);
         }
         taken.insert(*object, placement.applied);
         out.placements.push(placement);
@@ -194,9 +195,9 @@ pub(crate) fn assess_program(
         let Some((judged, judgement)) = judged else { continue };
         let probability_of_harm =
             probability_of_harm(judgement.square, &judgement.toward, knowledge, judged.points);
-        let left_for_risk = !(probability_of_harm <= wanted.max_risk);
-        let place = out.cuts.len() as u32;
-        motions.iter().for_each(|m| out.cut_of[*m as usize] = Some(place));
+        let left_for_risk = !(probability_of_harm <= choice.max_risk);
+        let cut_index = out.cuts.len() as u32;
+        motions.iter().for_each(|m| out.cut_of[*m as usize] = Some(cut_index));
         out.cuts.push(CutRisk {
             motions: motions.clone(),
             assessed: judged.placement,

@@ -129,7 +129,7 @@ pub(crate) fn assess_placement(
     list: &[ResolvedFrames],
     conditions: &ArmConditions<'_>,
     knowledge: &Estimated,
-    wanted: PlacementChoice,
+    choice: PlacementChoice,
 ) -> Option<(ObjectPlacement, Option<Pose>)> {
     let taught = targets.iter().any(|target| list[target.frames_index].carried.is_some());
     let off: Vec<TargetDeviation> = targets
@@ -146,8 +146,8 @@ pub(crate) fn assess_placement(
     let toward = twists.tr_mul(&registration.weighed(&twist));
     let probability =
         probability_of_harm(deviation_mm * deviation_mm * off.len() as f64, &toward, knowledge, off.len());
-    let applied = match wanted.placement {
-        Placement::Auto if sigma_mm <= deviation_mm && probability <= wanted.max_risk => Placement::Absolute,
+    let applied = match choice.placement {
+        Placement::Auto if sigma_mm <= deviation_mm && probability <= choice.max_risk => Placement::Absolute,
         Placement::Auto => Placement::Shape,
         other => other,
     };

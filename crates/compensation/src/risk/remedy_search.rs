@@ -76,19 +76,19 @@ pub(crate) fn remedy(place: &UnknownPlacement<'_, '_>) -> Option<Remedy> {
 /// The candidates.
 fn candidates(touch: bool, rows: bool) -> Vec<Vec<Measurement>> {
     use Measurement::{Beside, Frame, More, Plate, Station, Touch};
-    let (beside, plate) = (Beside { poses: POSES }, Plate { poses: POSES });
+    let (lateral_offset, plate) = (Beside { poses: POSES }, Plate { poses: POSES });
     let (station, more) = (Station { poses: POSES }, More { poses: MORE_POSES });
     let mut out = Vec::new();
     if touch {
         out.push(vec![Touch]);
     }
     if rows {
-        let alone = [Frame, beside, plate, station, more];
+        let alone = [Frame, lateral_offset, plate, station, more];
         out.extend(alone.map(|measurement| vec![measurement]));
-        out.extend([beside, plate, station].map(|measurement| vec![Frame, measurement]));
+        out.extend([lateral_offset, plate, station].map(|measurement| vec![Frame, measurement]));
     }
     if touch && rows {
-        out.extend([beside, plate].map(|measurement| vec![Touch, measurement]));
+        out.extend([lateral_offset, plate].map(|measurement| vec![Touch, measurement]));
     }
     out
 }

@@ -16,7 +16,7 @@ use nalgebra::Vector3;
 
 use crate::arms::Arms;
 use crate::backlash::play_operator::PlayOperator;
-use crate::segment::curve::{Curve, beside, between};
+use crate::segment::curve::{Curve, between, lateral_offset};
 use crate::segment::line::{STEPS, SegmentEnd, largest_from};
 use truegrind_arm::model::Joints;
 use truegrind_math::se3::Pose;
@@ -78,7 +78,7 @@ impl Corner {
         }
         let off: Vector3<f64> = point - at(t);
         // Before and after the corner the path continues along its tangents.
-        if t <= 0.0 || t >= 1.0 { beside(&off, &along(t)) } else { off.norm() }
+        if t <= 0.0 || t >= 1.0 { lateral_offset(&off, &along(t)) } else { off.norm() }
     }
 }
 

@@ -108,7 +108,7 @@ impl Arc {
         let (sin, cos) = (self.sweep * s).sin_cos();
         let along =
             (self.y * cos - self.x * sin) * (self.radius * self.sweep) + self.axis.into_inner() * self.rise;
-        beside(&off, &along)
+        lateral_offset(&off, &along)
     }
 
     fn turn(&self, s: f64) -> UnitQuaternion<f64> {
@@ -117,7 +117,7 @@ impl Arc {
 }
 
 /// The component of an offset normal to a direction; the whole offset where there is no direction.
-pub(crate) fn beside(off: &Vector3<f64>, along: &Vector3<f64>) -> f64 {
+pub(crate) fn lateral_offset(off: &Vector3<f64>, along: &Vector3<f64>) -> f64 {
     match along.try_normalize(1e-6) {
         Some(direction) => (off - direction * direction.dot(off)).norm(),
         None => off.norm(),
@@ -216,7 +216,7 @@ impl Curve {
             None => {
                 let along = self.to.translation.vector - self.from.translation.vector;
                 let on = self.from.translation.vector + along * near;
-                beside(&(pose.translation.vector - on), &along)
+                lateral_offset(&(pose.translation.vector - on), &along)
             }
         }
     }

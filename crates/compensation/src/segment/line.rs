@@ -10,7 +10,7 @@ use crate::feasibility::singularity::jumps_joint;
 use crate::frames::frame_pair::ResolvedFrames;
 use crate::options::{Emit, Options};
 use crate::segment::condition_schedule::{CHORD_MM, ConditionSchedule};
-use crate::segment::curve::{beside, between};
+use crate::segment::curve::{between, lateral_offset};
 use truegrind_arm::model::Joints;
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::MotionKind;
@@ -165,7 +165,7 @@ fn line_offset(from: &SegmentEnd<'_>, to: &SegmentEnd<'_>, s: f64, flange: &Pose
     let reached = to.frames_index.real.target_of(flange);
     let intended = from.intended.translation.vector.lerp(&to.intended.translation.vector, s);
     let off = reached.translation.vector - intended;
-    beside(&off, &(to.intended.translation.vector - from.intended.translation.vector))
+    lateral_offset(&off, &(to.intended.translation.vector - from.intended.translation.vector))
 }
 
 /// [`offset_at`] the midpoints of many lines, in lanes.
@@ -270,13 +270,13 @@ pub(crate) fn largest_from(ends: [f64; 2], pieces: usize, off: &dyn Fn(f64) -> f
     for k in 0..pieces {
         let after = at(k + 1);
         let (begin, end) = (k as f64 / pieces as f64, (k + 1) as f64 / pieces as f64);
-        most = most.max(after).max(between_samples((begin, before), (end, after), off, HALVINGS));
+        most = most.max(after).max(largest_between_samples((begin, before), (end, after), off, HALVINGS));
         before = after;
     }
     most
 }
 
-fn between_samples(a: (f64, f64), b: (f64, f64), off: &dyn Fn(f64) -> f64, halvings: u32) -> f64 {
+fn largest_between_samples(a: (f64, f64), b: (f64, f64), off: &dyn Fn(f64) -> f64, halvings: u32) -> f64 {
     let s = 0.5 * (a.0 + b.0);
     let middle = off(s);
     // A path that the arm cannot follow shows at the first sample.
@@ -284,8 +284,8 @@ fn between_samples(a: (f64, f64), b: (f64, f64), off: &dyn Fn(f64) -> f64, halvi
         return middle;
     }
     let halves = [
-        between_samples(a, (s, middle), off, halvings - 1),
-        between_samples((s, middle), b, off, halvings - 1),
+        largest_between_samples(a, (s, middle), off, halvings - 1),
+        largest_between_samples((s, middle), b, off, halvings - 1),
     ];
     halves[0].max(halves[1]).max(middle)
 }

@@ -167,13 +167,13 @@ fn originals(
         solve_run(&target_refs[run.clone()], &mut near, arms, frame_table, &mut budget, &mut out[run]);
         motion = end;
     }
-    guess_unsure(listing, target_refs, first, arms, frame_table, &mut out);
+    guess_if_possibly_unmonitored(listing, target_refs, first, arms, frame_table, &mut out);
     out
 }
 
 /// Where the configuration may or may not be checked, depending on the execution path, the branch counts as guessed as if
 /// unchecked: from an unknown start, or from one that is guessed itself.
-fn guess_unsure(
+fn guess_if_possibly_unmonitored(
     listing: &Listing,
     target_refs: &[TargetRef<'_>],
     first: &[usize],

@@ -95,22 +95,22 @@ impl TargetSolver<'_> {
             self.fill(&mut targets, arms, &condition_indices, &condition_indices, None);
             return self.solved(targets, Vec::new());
         }
-        let mut doubted: Vec<[bool; 6]> = vec![[false; 6]; count];
-        let as_is = self.sides(arms, None, &doubted);
+        let mut unknown_sides: Vec<[bool; 6]> = vec![[false; 6]; count];
+        let as_is = self.sides(arms, None, &unknown_sides);
         let before = self.condition_indices(arms, &as_is, &load);
         let mut sides = as_is;
         let mut condition_indices = before.clone();
         let mut targets = self.unsolved();
         self.fill(&mut targets, arms, &before, &condition_indices, None);
         for round in 1..=MOST_ROUNDS {
-            let next = self.sides(arms, Some(&targets), &doubted);
+            let next = self.sides(arms, Some(&targets), &unknown_sides);
             if round > ROUNDS {
                 // A side that still alternates counts as unknown.
-                for (doubted, (next, last)) in doubted.iter_mut().zip(next.iter().zip(&sides)) {
-                    (0..6).for_each(|j| doubted[j] |= next.end[j] != last.end[j]);
+                for (unknown_sides, (next, last)) in unknown_sides.iter_mut().zip(next.iter().zip(&sides)) {
+                    (0..6).for_each(|j| unknown_sides[j] |= next.end[j] != last.end[j]);
                 }
             }
-            sides = if round > ROUNDS { self.sides(arms, Some(&targets), &doubted) } else { next };
+            sides = if round > ROUNDS { self.sides(arms, Some(&targets), &unknown_sides) } else { next };
             let new = self.condition_indices(arms, &sides, &load);
             if new == condition_indices {
                 break;
@@ -229,7 +229,7 @@ impl TargetSolver<'_> {
         &self,
         arms: &Arms<'_>,
         solved: Option<&[Result<SolvedTarget, OutcomeReason>]>,
-        doubted: &[[bool; 6]],
+        unknown_sides: &[[bool; 6]],
     ) -> Vec<BacklashSides> {
         let motions = &self.listing.motions;
         let stop = |m: usize| {
@@ -290,7 +290,7 @@ impl TargetSolver<'_> {
         let follows = |m: usize| motions[m].previous.filter(|from| guessed(m) || !guessed(*from as usize));
         let before: Vec<Option<u32>> = (0..motions.len()).map(follows).collect();
         let commanded = |frames_index: usize| self.frame_table.list[frames_index].commanded;
-        backlash_sides(&stops, &before, &arms.nominal, &arms.conditions.play_rad, &commanded, doubted)
+        backlash_sides(&stops, &before, &arms.nominal, &arms.conditions.play_rad, &commanded, unknown_sides)
     }
 
     /// Condition of each target.

@@ -4,7 +4,7 @@ use nalgebra::{Matrix4, Point3, Vector3, Vector4};
 
 use crate::contact::{Contact, Foot, direction};
 use crate::domain::Domain;
-use crate::equation::survey::{AROUND, LATTICE};
+use crate::equation::survey::{FIXED_COST, LATTICE};
 use crate::error::SurfaceError;
 use crate::expression::Expression;
 
@@ -68,9 +68,9 @@ impl Implicit {
     }
 
     /// All slices, and some Newton steps.
-    pub(crate) fn look_cost(&self) -> f64 {
+    pub(crate) fn evaluation_cost(&self) -> f64 {
         let [value, first] = self.f.terms();
-        AROUND + Self::SLICES as f64 * value + 8.0 * (value + first)
+        FIXED_COST + Self::SLICES as f64 * value + 8.0 * (value + first)
     }
 
     /// The first zero from above: by slices, then by safeguarded Newton steps with bisection.

@@ -5,4 +5,4 @@
 pub(super) const LATTICE: usize = 40;
 
 /// Fixed cost of an evaluation in addition to the terms of the equation.
-pub(super) const AROUND: f64 = 20.0;
+pub(super) const FIXED_COST: f64 = 20.0;

@@ -10,7 +10,7 @@ use crate::surface::Surface;
 /// Largest number of bisections of a link.
 const HALVINGS: usize = 6;
 /// Samples inside a piece of a link.
-const LOOKS: usize = 16;
+const SAMPLES: usize = 16;
 
 /// A point of a link, with its share of the link (0…1).
 #[derive(Debug, Clone, Copy)]
@@ -47,11 +47,11 @@ pub(crate) fn over(
     let mut stops = vec![start, end];
     for _ in 0..HALVINGS {
         let mut closer = vec![start];
-        budget.look(LOOKS * (stops.len() - 1))?;
+        budget.charge(SAMPLES * (stops.len() - 1))?;
         for pair in stops.windows(2) {
             let (a, b) = (pair[0], pair[1]);
-            let clear = (1..LOOKS).all(|i| {
-                let part = i as f64 / LOOKS as f64;
+            let clear = (1..SAMPLES).all(|i| {
+                let part = i as f64 / SAMPLES as f64;
                 let at = a.position_mm + (b.position_mm - a.position_mm) * part;
                 below(a.share * (1.0 - part) + b.share * part)
                     .is_none_or(|c| c.normal.dot(&(at - c.position_mm)) >= 0.5 * height_mm)

@@ -97,7 +97,7 @@ impl Curve {
     }
 
     /// Initial number of samples of the curve: enough for every turn.
-    pub(crate) fn first_look(&self) -> usize {
+    pub(crate) fn initial_samples(&self) -> usize {
         64 * (self.across.len().max(2) - 1)
     }
 }
@@ -112,7 +112,7 @@ pub(crate) fn curves(
     options: &PathOptions,
     budget: &Budget,
 ) -> Result<Vec<Curve>, SurfaceError> {
-    budget.look((ACROSS + 1) * (ALONG + 3))?;
+    budget.charge((ACROSS + 1) * (ALONG + 3))?;
     let family = match options.pattern {
         Pattern::Raster => Family::Lines(options.along),
         Pattern::Spiral => Family::Ellipses,

@@ -83,7 +83,7 @@ fn the_same_surface_in_three_forms_agrees() {
         for surface in &forms {
             let foot = surface.foot(&point).unwrap();
             assert!((foot.normal_mm - height).abs() < 1e-9, "{surface:?}: {} not {height}", foot.normal_mm);
-            assert!(foot.beside_mm < 1e-7, "{}", foot.beside_mm);
+            assert!(foot.tangential_mm < 1e-7, "{}", foot.tangential_mm);
             assert!((foot.contact.position_mm - a.position_mm).norm() < 1e-7);
             assert_eq!(surface.deviation_mm(&point), Some(foot.normal_mm));
         }
@@ -120,10 +120,10 @@ fn beyond_the_border_the_part_along_the_normal_is_the_deviation() {
     let plane = explicit("0", square(10.0));
     let foot = plane.foot(&Point3::new(13.0, 4.0, 0.25)).unwrap();
     assert_eq!(foot.contact.plan, [10.0, 4.0]);
-    assert!((foot.normal_mm - 0.25).abs() < 1e-12 && (foot.beside_mm - 3.0).abs() < 1e-12);
+    assert!((foot.normal_mm - 0.25).abs() < 1e-12 && (foot.tangential_mm - 3.0).abs() < 1e-12);
     let corner = plane.foot(&Point3::new(-13.0, 14.0, -1.0)).unwrap();
     assert_eq!(corner.contact.plan, [-10.0, 10.0]);
-    assert!((corner.beside_mm - 5.0).abs() < 1e-12 && (corner.normal_mm + 1.0).abs() < 1e-12);
+    assert!((corner.tangential_mm - 5.0).abs() < 1e-12 && (corner.normal_mm + 1.0).abs() < 1e-12);
     assert_eq!(plane.foot(&Point3::new(f64::NAN, 0.0, 0.0)), None);
 }
 

@@ -151,12 +151,12 @@ fn beyond_an_open_border_the_part_along_the_normal_is_the_deviation() {
         [[0.0, 0.0, 5.0], [40.0, 30.0, 5.0], [0.0, 30.0, 5.0]],
     ];
     let surface = Surface::Mesh(mesh_of(&binary(&sheet, b"sheet")));
-    for (point, normal_mm, beside_mm) in
+    for (point, normal_mm, tangential_mm) in
         [([43.0, 10.0, 5.5], 0.5, 3.0), ([-3.0, -4.0, 4.0], -1.0, 5.0), ([10.0, 7.5, 6.0], 1.0, 0.0)]
     {
         let foot = surface.foot(&Point3::from(point)).unwrap();
         assert!(
-            (foot.normal_mm - normal_mm).abs() < 1e-12 && (foot.beside_mm - beside_mm).abs() < 1e-12,
+            (foot.normal_mm - normal_mm).abs() < 1e-12 && (foot.tangential_mm - tangential_mm).abs() < 1e-12,
             "{foot:?}"
         );
     }
