@@ -2,9 +2,9 @@
 //! pose.
 //!
 //! Let P be the target in the work object; t and w tool and work object as programmed, t* and w* the real ones; N and E the
-//! nominal and the estimated forward map. The original program reaches E(N⁻¹(w P t⁻¹)); the intended pose in the base is w*
-//! P; the joints that reach it are q = E⁻¹(w* P t*⁻¹); the controller moves there when commanded P′ = w⁻¹ N(q) t, or q
-//! itself.
+//! nominal and the estimated forward map. The original program reaches E(N⁻¹(w P t⁻¹)). The intended pose in the base is
+//! w* P, and the joints that reach it are q = E⁻¹(w* P t*⁻¹). The controller moves there when commanded P′ = w⁻¹ N(q) t, or
+//! q itself.
 //!
 //! Between two corrected ends the commanded line is straight for the *nominal* arm; the estimated arm deviates slightly from
 //! it. The deviation is sampled, and where it exceeds the tolerance, targets are inserted by bisection.
