@@ -1,17 +1,15 @@
-//! Whether an accepted cause is confirmed, without which it is not called identified: it must win beside what no cause describes, come back in halves of the
-//! rows, and be of the same size there.
+//! Confirmation of accepted causes by model discrepancy and stability selection. Only a confirmed cause is called identified.
 //!
-//! 1. *Beside the discrepancy.* The functions of [`discrepancy`](super::discrepancy) get their most probable variances beside the
-//!    accepted causes. A cause that then no longer carries itself is taken out, the variances are found anew without it, and so
-//!    on, until all that are left carry themselves.
-//! 2. *In halves.* In each half of [`halves`](super::halves) causes are selected again from nothing, by evidence and to first order.
-//!    A cause has come back if it is selected there with the same joints. One that is too weak for half of the rows has come
-//!    back if it raises the evidence there beside the others and no rival was selected in its place. Rows of a shift must share
-//!    [`OVERLAP`] of theirs with those that are found again.
-//! 3. *Of one size.* Its size in a half must not differ from that in all rows by more than both chance and [`CHANGED`] allow.
+//! 1. *Discrepancy.* The random functions of [`discrepancy`](super::discrepancy) get their most probable variances given the
+//!    accepted causes. The least significant cause that is no longer significant is removed and the variances are estimated again,
+//!    until all remaining causes are significant.
+//! 2. *Stability selection.* In each half of [`halves`](super::halves) causes are selected again from scratch, by evidence and to
+//!    first order. A cause is recovered if it is selected there with the same joints, or if it raises the evidence there (it can be
+//!    too weak for selection) and no rival was selected in its place. The recovered interval of a shift must overlap by [`OVERLAP`].
+//! 3. *Invariance.* Its size in a half must not differ from that in all rows by more than chance and [`CHANGED`] allow.
 //!
-//! Source: Meinshausen and Bühlmann 2010 and Shah and Samworth 2013 (selection in halves); Peters, Bühlmann and Meinshausen 2016
-//! (a cause has the same size wherever it acts).
+//! Source: Meinshausen and Bühlmann 2010 and Shah and Samworth 2013 (stability selection); Peters, Bühlmann and Meinshausen 2016
+//! (invariance of causes).
 
 use std::sync::Arc;
 
@@ -34,137 +32,134 @@ use crate::measurement::sensor::disturbance::{Disturbance, Profile};
 use truegrind_arm::effect::Effect;
 use truegrind_math::work::checkpoint;
 
-/// How a cause came out.
+/// Confirmation of one cause.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Confirmation {
-    /// Whether it carries itself beside what no cause describes.
-    pub beside: bool,
+    /// Whether it is significant with the discrepancy in the model.
+    pub significant: bool,
     /// Natural logarithm of its p-value there, corrected for trials.
     pub log_p: f64,
-    /// By how much its merit exceeds that of its best rival there.
-    pub ahead: f64,
-    /// Halves in which it came back.
-    pub came_back: usize,
-    /// Halves that could tell.
-    pub asked: usize,
-    /// Halves in which it had another size.
+    /// Its merit less that of its best rival there.
+    pub margin: f64,
+    /// Number of halves in which it was recovered.
+    pub recovered: usize,
+    /// Number of halves that could detect it.
+    pub testable: usize,
+    /// Number of halves in which its size differed.
     pub changed: usize,
-    /// Whether nature has such a size, and nothing else that was found says the same of the same rows.
+    /// Whether its size is physically plausible, and no other finding explains the same rows.
     pub plausible: bool,
 }
 
-/// Halves in which a cause may fail to come back.
-const MISSED: usize = 1;
+/// Number of halves in which a cause can fail and still be confirmed.
+const ALLOWED_FAILURES: usize = 1;
 
-/// Squared correlation of a joint's side with its last step from which they are the same.
-const ALIKE: f64 = 0.9;
+/// Squared correlation of a joint's approach side with its last step from which the two are confounded.
+const CONFOUNDED: f64 = 0.9;
 
-/// Twice the log Bayes factor by which a cause must be ahead of its rivals beside what no cause describes.
-const AHEAD: f64 = 6.0;
+/// Twice the log Bayes factor against its best rival that a cause needs with the discrepancy in the model.
+const MARGIN: f64 = 6.0;
 
 impl Confirmation {
-    /// Whether it may be called identified, as far as this goes.
+    /// Whether it passes all criteria for an identified cause.
     pub(super) fn is_confirmed(&self) -> bool {
-        self.beside && self.plausible && self.ahead >= AHEAD && self.recurs() && self.changed <= MISSED
+        self.is_significant()
+            && self.margin >= MARGIN
+            && self.is_stable()
+            && self.changed <= ALLOWED_FAILURES
     }
 
-    /// Whether it carries itself and has a size that nature has, sure or not.
-    pub(super) fn is_there(&self) -> bool {
-        self.beside && self.plausible
+    /// Whether it is significant and plausible, confirmed or not.
+    pub(super) fn is_significant(&self) -> bool {
+        self.significant && self.plausible
     }
 
-    /// Whether it comes back in the halves that could tell; where none could, nobody has seen it come back.
-    fn recurs(&self) -> bool {
-        self.came_back > 0 && self.came_back + MISSED >= self.asked
+    /// Whether it was recovered in the halves that could detect it; not if there are none.
+    fn is_stable(&self) -> bool {
+        self.recovered > 0 && self.recovered + ALLOWED_FAILURES >= self.testable
     }
 
-    /// Why it may not be called identified.
+    /// Why it is not confirmed.
     pub(super) fn doubts(&self) -> Vec<String> {
         let mut out = Vec::new();
         if !self.plausible {
-            out.push(
-                "nature has no such size, or something else that was found says the same of these rows"
-                    .to_owned(),
-            );
+            out.push("physically implausible size, or another finding explains the same rows".to_owned());
         }
-        if !self.beside {
+        if !self.significant {
             out.push(
-                "it does not carry itself beside smooth functions of time and pose that nobody has named"
-                    .to_owned(),
+                "not significant once smooth unmodelled trends in time and pose are allowed for".to_owned(),
             );
-        } else if self.ahead < AHEAD {
+        } else if self.margin < MARGIN {
             out.push(format!(
-                "beside what nobody has named a rival comes near: twice the log Bayes factor {:.1}",
-                self.ahead
+                "with smooth unmodelled trends allowed for, a rival is nearly as probable: twice the log Bayes factor {:.1}",
+                self.margin
             ));
         }
-        if self.asked == 0 {
-            out.push(
-                "it is too weak to be seen in half of the rows, so it could not be found again".to_owned(),
-            );
-        } else if !self.recurs() {
+        if self.testable == 0 {
+            out.push("too weak to be detected in half of the rows, so repeating the search cannot confirm it".to_owned());
+        } else if !self.is_stable() {
             out.push(format!(
-                "searched again, it came back in {} of {} halves of the rows that could tell",
-                self.came_back, self.asked
+                "the search finds it in only {} of {} halves of the rows in which it is detectable",
+                self.recovered, self.testable
             ));
         }
-        if self.changed > MISSED {
-            out.push(format!("it had another size in {} of {} halves of the rows", self.changed, self.asked));
+        if self.changed > ALLOWED_FAILURES {
+            out.push(format!("its size differs in {} of {} halves of the rows", self.changed, self.testable));
         }
         out
     }
 }
 
-/// Rows that two shifts share, of all that either has, from which they are the same.
+/// Overlap of two shifts (shared rows over all rows of either) from which they are the same.
 const OVERLAP: f64 = 0.8;
 
-/// A size that differs by less than this share is the same.
+/// Relative change below which a size counts as the same.
 const CHANGED: f64 = 0.5;
 
-/// Fall of χ² in all rows, beside geometry alone, below which a candidate is selected in no half.
-const SOME: f64 = 15.0;
+/// Fall of χ² in all rows, relative to geometry alone, that a candidate needs to take part in stability selection.
+const LEAST_GAIN: f64 = 15.0;
 
-/// Non-centrality in a half from which the half can tell of a cause.
-const TELLING: f64 = 15.0;
+/// Non-centrality from which a half can detect a cause.
+const DETECTABLE: f64 = 15.0;
 
-/// What confirming all accepted causes came to.
+/// Confirmations of all accepted causes.
 pub(super) struct Outcome {
     /// One for each cause.
     pub confirmations: Vec<Confirmation>,
-    /// What no cause describes, beside those that are confirmed.
+    /// The discrepancy given the significant causes.
     pub discrepancy: Discrepancy,
 }
 
-/// The final fit, linearised, with its causes and every candidate: what is to be confirmed.
-pub(super) struct Confirming<'a> {
+/// The final fit, linearised, with its causes and all candidates.
+pub(super) struct ConfirmationContext<'a> {
     /// The rows.
     pub subject: &'a Subject<'a>,
     /// The fit.
     pub found: &'a Extended,
-    /// The fit linearised.
+    /// The linearised fit.
     pub linear: &'a Linear,
-    /// The causes of the fit, as accepted.
+    /// The accepted causes.
     pub accepted: &'a [Accepted],
-    /// Every candidate.
+    /// All candidates.
     pub pool: &'a [Scored],
-    /// As the search had them.
+    /// Options of the search.
     pub options: &'a Options,
-    /// Kinds of candidates.
+    /// Number of candidate families.
     pub families: f64,
-    /// Whether the sides from which joints came were taken from the order of the rows.
+    /// Whether approach sides were inferred from the order of the rows.
     pub sides_from_order: bool,
-    /// The design of the fit: what candidates are made of.
+    /// The design of the fit, for the columns of candidates.
     pub raw: &'a Design,
 }
 
-/// A candidate with its columns for all rows, whitened as in the fit.
+/// A candidate with its columns over all rows, whitened as in the fit.
 struct WithColumns {
     candidate: Arc<Candidate>,
     columns: DMatrix<f64>,
 }
 
-impl Confirming<'_> {
-    /// Confirms each cause or not.
+impl ConfirmationContext<'_> {
+    /// Tests all causes.
     pub(super) fn outcome(&self) -> Outcome {
         let numbers: Vec<usize> = self.subject.observed.dataset.rows.iter().map(|r| r.number).collect();
         let functions = Functions::of(self.subject, self.linear);
@@ -177,19 +172,19 @@ impl Confirming<'_> {
                 WithColumns { columns: candidate.columns(self.raw), candidate: Arc::new(candidate) }
             })
             .collect();
-        let (mut confirmations, out, discrepancy) = self.beside(&functions, &own, &numbers);
+        let (mut confirmations, removed, discrepancy) = self.eliminate(&functions, &own, &numbers);
         if !own.is_empty() {
             let pool = self.pool(&discrepancy, &numbers);
             let halves = halves(&self.subject.observed.dataset, self.options.seed);
-            let told: Vec<Vec<Option<(bool, bool)>>> = halves
+            let tested: Vec<Vec<Option<(bool, bool)>>> = halves
                 .par_iter()
-                .map(|half| Half::of(self, half, &discrepancy, &numbers).told(&own, &pool, &out))
+                .map(|half| Half::of(self, half, &discrepancy, &numbers).test(&own, &pool, &removed))
                 .collect();
-            for in_half in told {
-                for (confirmation, told) in confirmations.iter_mut().zip(in_half) {
-                    if let Some((came_back, changed)) = told {
-                        confirmation.asked += 1;
-                        confirmation.came_back += usize::from(came_back);
+            for in_half in tested {
+                for (confirmation, tested) in confirmations.iter_mut().zip(in_half) {
+                    if let Some((recovered, changed)) = tested {
+                        confirmation.testable += 1;
+                        confirmation.recovered += usize::from(recovered);
                         confirmation.changed += usize::from(changed);
                     }
                 }
@@ -198,7 +193,7 @@ impl Confirming<'_> {
         Outcome { confirmations, discrepancy }
     }
 
-    /// Candidates that explain anything of what geometry leaves; the others are selected in no half.
+    /// Candidates for stability selection: those with enough gain relative to geometry alone.
     fn pool(&self, discrepancy: &Discrepancy, numbers: &[usize]) -> Vec<WithColumns> {
         let all: Vec<WithColumns> = self
             .pool
@@ -220,43 +215,43 @@ impl Confirming<'_> {
             .zip(projected)
             .filter(|(t, p)| {
                 let candidate = &t.candidate;
-                score_projected(p, &candidate.cause.sizes(), candidate.tried).gain > SOME
+                score_projected(p, &candidate.cause.sizes(), candidate.tried).gain > LEAST_GAIN
             })
             .map(|(t, _)| t)
             .collect()
     }
 
-    /// Sides that were taken from the order of the rows say nothing that a reading before rest, or one that is late, does not say
-    /// too: where that was found, or where the joint went by steps of one size, so that side and step are the same.
-    fn told_otherwise(&self, cause: &Cause) -> bool {
+    /// Whether backlash is confounded with unsettled or late readings: approach sides were inferred from the row order, and either such
+    /// a cause was found, or the joint's steps have one size, so that side and step are proportional.
+    fn is_confounded_with_lag(&self, cause: &Cause) -> bool {
         let Cause::Arm(Effect::Backlash(backlash)) = cause else { return false };
         let lags = self.found.causes.iter().any(|c| ["unsettled", "latency"].contains(&c.name()));
-        self.sides_from_order && (lags || self.steps_alike(backlash.joint))
+        self.sides_from_order && (lags || self.has_uniform_steps(backlash.joint))
     }
 
-    /// Whether the steps of a joint, where it moved, are nearly of one size.
-    fn steps_alike(&self, joint: usize) -> bool {
+    /// Whether the nonzero steps of a joint are nearly of one size.
+    fn has_uniform_steps(&self, joint: usize) -> bool {
         let rows = self.subject.observed.dataset.rows.iter();
         let steps = rows.filter_map(|row| Some(row.motion()?.step[joint].abs()));
         let (mut count, mut sum, mut square) = (0.0, 0.0, 0.0);
         for step in steps.filter(|step| *step > 1e-6) {
             (count, sum, square) = (count + 1.0, sum + step, square + step * step);
         }
-        sum * sum > ALIKE * count * square
+        sum * sum > CONFOUNDED * count * square
     }
 
     fn parameter_indices(&self, causes: &[usize]) -> Vec<usize> {
         causes.iter().flat_map(|&k| self.found.parameter_indices(k)).collect()
     }
 
-    /// Takes out causes that do not carry themselves beside the functions, one after the other.
-    fn beside(
+    /// Removes causes that are not significant with the discrepancy, one after the other (backward elimination).
+    fn eliminate(
         &self,
         functions: &Functions,
         own: &[WithColumns],
         numbers: &[usize],
     ) -> (Vec<Confirmation>, Vec<usize>, Discrepancy) {
-        let mut out: Vec<usize> = Vec::new();
+        let mut removed: Vec<usize> = Vec::new();
         let mut discrepancy = Discrepancy::of(functions, self.linear, &[], numbers, None);
         let mut confirmations = loop {
             let (rho, noise) = (discrepancy.correlation, discrepancy.noise);
@@ -266,8 +261,8 @@ impl Confirming<'_> {
                 .into_par_iter()
                 .map(|k| {
                     checkpoint();
-                    let mut dropped = out.clone();
-                    if !out.contains(&k) {
+                    let mut dropped = removed.clone();
+                    if !removed.contains(&k) {
                         dropped.push(k);
                     }
                     let design = whole.without(&self.parameter_indices(&dropped));
@@ -275,10 +270,10 @@ impl Confirming<'_> {
                 })
                 .collect();
             let worst = (0..own.len())
-                .filter(|k| !out.contains(k) && !judged[*k].beside)
+                .filter(|k| !removed.contains(k) && !judged[*k].significant)
                 .max_by(|&a, &b| judged[a].log_p.total_cmp(&judged[b].log_p).then(b.cmp(&a)));
             let Some(worst) = worst else { break judged };
-            out.push(worst);
+            removed.push(worst);
             discrepancy = Discrepancy::of(
                 functions,
                 self.linear,
@@ -287,10 +282,10 @@ impl Confirming<'_> {
                 Some(&discrepancy),
             );
         };
-        for k in &out {
-            confirmations[*k].beside = false;
+        for k in &removed {
+            confirmations[*k].significant = false;
         }
-        (confirmations, out, discrepancy)
+        (confirmations, removed, discrepancy)
     }
 
     fn judged(
@@ -315,20 +310,20 @@ impl Confirming<'_> {
             })
             .fold(0.0, f64::max);
         Confirmation {
-            beside: score.merit > 0.0 && log_p <= self.options.alpha.ln(),
+            significant: score.merit > 0.0 && log_p <= self.options.alpha.ln(),
             log_p,
-            ahead: score.merit - best,
-            came_back: 0,
-            asked: 0,
+            margin: score.merit - best,
+            recovered: 0,
+            testable: 0,
             changed: 0,
-            plausible: own.candidate.cause.has_plausible_sign() && !self.told_otherwise(&own.candidate.cause),
+            plausible: own.candidate.cause.has_plausible_sign() && !self.is_confounded_with_lag(&own.candidate.cause),
         }
     }
 }
 
 /// The rows of one half.
 struct Half<'a> {
-    confirming: &'a Confirming<'a>,
+    confirming: &'a ConfirmationContext<'a>,
     rows: &'a [usize],
     numbers: Vec<usize>,
     rho: f64,
@@ -338,7 +333,7 @@ struct Half<'a> {
 
 impl<'a> Half<'a> {
     fn of(
-        confirming: &'a Confirming<'a>,
+        confirming: &'a ConfirmationContext<'a>,
         rows: &'a [usize],
         discrepancy: &Discrepancy,
         numbers: &[usize],
@@ -357,8 +352,13 @@ impl<'a> Half<'a> {
         prewhiten(&picked(of_all, self.rows, per), self.rho, &self.numbers, per) / self.noise
     }
 
-    /// For each cause whether it came back and whether it had another size; `None` where this half cannot tell.
-    fn told(&self, own: &[WithColumns], pool: &[WithColumns], out: &[usize]) -> Vec<Option<(bool, bool)>> {
+    /// For each cause, whether it is recovered and whether its size differs; `None` if undetectable in this half.
+    fn test(
+        &self,
+        own: &[WithColumns],
+        pool: &[WithColumns],
+        removed: &[usize],
+    ) -> Vec<Option<(bool, bool)>> {
         let all: Vec<usize> = (0..own.len()).collect();
         let selected = self.selected(own, pool, &self.confirming.parameter_indices(&all));
         let whole = self.linear.whole();
@@ -368,22 +368,22 @@ impl<'a> Half<'a> {
             .zip(&projected)
             .enumerate()
             .map(|(k, (tried, projected))| {
-                let dropped: Vec<usize> = out.iter().copied().filter(|o| *o != k).chain([k]).collect();
+                let dropped: Vec<usize> = removed.iter().copied().filter(|o| *o != k).chain([k]).collect();
                 let design = whole.without(&self.confirming.parameter_indices(&dropped));
                 let accepted = &self.confirming.accepted[k];
                 let sizes = tried.candidate.cause.sizes();
                 let score = score_from(design.gradient_and_information(projected), &sizes, accepted.tried);
                 let before = &accepted.own.estimate;
                 let lambda = |v: &DVector<f64>| (v.transpose() * &score.information * v)[0].max(0.0);
-                if lambda(before) < TELLING {
+                if lambda(before) < DETECTABLE {
                     return None;
                 }
                 let apart = lambda(&(&score.estimate - before));
                 let chance = 16.0 + 3.0 * before.len() as f64;
                 let changed = apart > chance && apart > CHANGED * CHANGED * lambda(before);
                 let cause = &tried.candidate.cause;
-                let came_back = if cause.rows().is_some() {
-                    self.found_again(tried, &design, &score)
+                let recovered = if cause.rows().is_some() {
+                    self.recovers_shift(tried, &design, &score)
                 } else {
                     let same = selected.iter().any(|s| s.is_same_finding(cause));
                     let displaced = accepted.rivals.iter().any(|r| {
@@ -393,19 +393,19 @@ impl<'a> Half<'a> {
                     });
                     same || (score.evidence > 0.0 && !displaced)
                 };
-                Some((came_back, changed))
+                Some((recovered, changed))
             })
             .collect()
     }
 
-    /// Whether a shift is found again where it was.
-    fn found_again(&self, tried: &WithColumns, design: &Design, score: &Score) -> bool {
+    /// Whether a shift is recovered in the same rows.
+    fn recovers_shift(&self, tried: &WithColumns, design: &Design, score: &Score) -> bool {
         let Some([from, to]) = tried.candidate.cause.rows() else { return false };
         let Cause::Measurement(disturbance) = &tried.candidate.cause else { return false };
         if !(score.evidence > 0.0) {
             return false;
         }
-        // The kind in all rows, not only in its own.
+        // The same kind of shift over all rows.
         let always = Cause::Measurement(Disturbance::new(disturbance.kind.clone(), Profile::Constant));
         let everywhere = Candidate::of(&always, self.confirming.subject).columns(self.confirming.raw);
         let everywhere = self.columns(&everywhere);
@@ -418,7 +418,7 @@ impl<'a> Half<'a> {
             let mine = (0..self.numbers.len()).filter(|&i| inside(i)).count();
             let shared = (best.from..=best.to).filter(|&i| inside(i)).count();
             let both = mine + (best.to + 1 - best.from) - shared;
-            // What happened in rows a to b is the same story as what happened in all others.
+            // A shift in rows a to b is equivalent to one in all other rows.
             let n = self.numbers.len();
             let (others, rest) = (n - mine, best.to + 1 - best.from - shared);
             let complement = rest as f64 / (others + (best.to + 1 - best.from) - rest).max(1) as f64;
@@ -426,7 +426,7 @@ impl<'a> Half<'a> {
         })
     }
 
-    /// Causes selected from nothing, best first, each step to first order.
+    /// Forward selection from scratch, each step to first order; best first.
     fn selected(&self, own: &[WithColumns], pool: &[WithColumns], places: &[usize]) -> Vec<Cause> {
         let design = self.linear.design(places);
         let all: Vec<&WithColumns> = pool.iter().chain(own.iter().filter(|o| fresh(o, pool))).collect();
@@ -454,7 +454,7 @@ impl<'a> Half<'a> {
                 .max_by(|a, b| a.1.merit.total_cmp(&b.1.merit).then(b.0.cmp(&a.0)));
             let Some((j, _)) = best else { break };
             chosen.push(j);
-            // Everything is projected off what was chosen.
+            // Projects the selected cause off all candidates.
             let mut pure = design.pure(&columns[j], &projected[j]);
             pure -= extra.transpose() * product(&extra, &columns[j]);
             let mut normal = projected[j].information.clone();
@@ -478,7 +478,8 @@ impl<'a> Half<'a> {
     }
 }
 
-/// Whether a cause is not among the pool's.
+/// Whether a cause is not in the pool.
+
 fn fresh(own: &WithColumns, pool: &[WithColumns]) -> bool {
     let cause = &own.candidate.cause;
     cause.rows().is_some() || !pool.iter().any(|p| already(std::slice::from_ref(cause), &p.candidate.cause))

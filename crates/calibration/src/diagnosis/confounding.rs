@@ -108,7 +108,7 @@ impl Confounding<'_> {
 
     /// A shift in some rows next to a larger empirical fault: rows in which the expansion of that is worst look shifted.
     fn by_empirical_fault(&self, own: f64) -> Option<String> {
-        let rough = |k: &usize| self.causes[*k].is_empirical() && self.confirmations[*k].is_there();
+        let rough = |k: &usize| self.causes[*k].is_empirical() && self.confirmations[*k].is_significant();
         let larger =
             (0..self.causes.len()).filter(rough).find(|&k| own < self.contributions.unique_rms_mm(&[k]))?;
         Some(format!(
@@ -119,7 +119,7 @@ impl Confounding<'_> {
 
     /// The largest contribution of an empirical fault (mm RMS).
     pub(super) fn largest_empirical_rms_mm(&self) -> f64 {
-        let rough = |k: &usize| self.causes[*k].is_empirical() && self.confirmations[*k].is_there();
+        let rough = |k: &usize| self.causes[*k].is_empirical() && self.confirmations[*k].is_significant();
         (0..self.causes.len()).filter(rough).map(|k| self.contributions.rms_mm(&[k])).fold(0.0, f64::max)
     }
 
@@ -127,7 +127,7 @@ impl Confounding<'_> {
     fn sensor_fault_rms_mm(&self) -> f64 {
         let of_sensor = |k: &usize| {
             let cause = &self.causes[*k];
-            cause.is_empirical() && !cause.is_in_arm() && self.confirmations[*k].is_there()
+            cause.is_empirical() && !cause.is_in_arm() && self.confirmations[*k].is_significant()
         };
         (0..self.causes.len()).filter(of_sensor).map(|k| self.contributions.rms_mm(&[k])).fold(0.0, f64::max)
     }
@@ -140,7 +140,7 @@ impl Confounding<'_> {
     fn empirical_rms_mm(&self, causes: &[usize], smooth: bool) -> f64 {
         let parts: Vec<Option<(Part, usize)>> = causes.iter().map(|&k| self.causes[k].part()).collect();
         // An empirical fault need not be identified to leave residues.
-        let there = |k: &usize| !causes.contains(k) && self.confirmations[*k].is_there();
+        let there = |k: &usize| !causes.contains(k) && self.confirmations[*k].is_significant();
         let rough = (0..self.causes.len()).filter(there).filter(|&k| self.causes[k].is_empirical());
         let rough = rough.filter(|&k| {
             let part = self.causes[k].part().filter(|_| self.causes[k].is_in_arm());

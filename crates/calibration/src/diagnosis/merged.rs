@@ -81,7 +81,7 @@ pub(super) fn merge_findings(
     }
     let smooth = discrepancy.in_time();
     let is_shift = |s: &MergedFinding| s.finding.rows.is_some();
-    let is_absorbed = |s: &MergedFinding| smooth && s.causes.iter().all(|&k| !confirmations[k].beside);
+    let is_absorbed = |s: &MergedFinding| smooth && s.causes.iter().all(|&k| !confirmations[k].significant);
     let shifts = findings.iter().filter(|s| is_shift(s)).count();
     if shifts >= MANY_SHIFTS || findings.iter().any(|s| is_shift(s) && is_absorbed(s)) {
         merge(&mut findings, is_shift, contributions, |members, worth_mm| {

@@ -3,7 +3,7 @@
 
 use super::candidates::Scored;
 use super::cause::Cause;
-use super::confirmation::{Confirming, Outcome};
+use super::confirmation::{ConfirmationContext, Outcome};
 use super::design::{FullDesign, Linear};
 use super::extension::{Extended, Freedom, Subject, fit};
 use super::findings::short_name;
@@ -165,7 +165,7 @@ impl<'a> Search<'a> {
         let SearchContext { searched, prepared, options, .. } = self.context;
         let linear = Linear::of(searched, &self.found);
         let whole = linear.whole();
-        let confirming = Confirming {
+        let confirming = ConfirmationContext {
             subject: searched,
             found: &self.found,
             linear: &linear,
