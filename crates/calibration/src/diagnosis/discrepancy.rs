@@ -1,10 +1,10 @@
-//! What no cause of the catalogue describes, as random functions beside the causes.
+//! Model discrepancy: random functions of time and pose for errors that no cause in the catalogue describes.
 //!
-//! Two families of functions, each a group with a variance of its own: *courses in time* of everything that a measurement
-//! hangs on (the sensor's frame, the touched point, the zero, the scale, common growth of the links, unlogged load), Brownian
-//! by their spectrum, and *fields over poses*, smooth functions of the joint angles. The variances are those under
-//! which the rows are most probable ([`marginal`]); what is left may be correlated from row to row. A cause that
-//! is to be named must win beside all of that, and what it carries is reported as "something else".
+//! Two families of functions, in groups with a variance component each: *functions of time* for every quantity that a
+//! measurement depends on (the sensor's frame, the target, the zero, the scale, common growth of the links, unlogged load), with
+//! a Brownian spectrum, and *fields over poses*, smooth functions of the joint angles. The variances maximise the marginal
+//! likelihood ([`marginal`]); the remaining noise can be serially correlated. An identified cause must remain significant with
+//! these functions in the model; their own contribution is reported as unexplained.
 //!
 //! Source: Kennedy and O'Hagan 2001, Brynjarsdóttir and O'Hagan 2014 on the discrepancy of a model; the features of a field
 //! are those of Rahimi and Recht 2007, with frequencies of a fixed seed.
@@ -23,112 +23,112 @@ use crate::identification::calibration::flange_torques;
 use crate::measurement::dataset::{Dataset, Sensor};
 use truegrind_arm::model::Model;
 
-/// What a group of functions moves, and by what it changes.
+/// The quantity that a group of functions changes, and the variable that it depends on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Group {
-    /// The sensor's frame or the outlet, in the course of the rows.
+    /// The sensor's frame or the outlet, over time.
     FrameInTime,
-    /// The touched point, in the course of the rows.
+    /// The target, over time.
     TargetInTime,
-    /// A cable's zero, in the course of the rows.
+    /// A cable's zero, over time.
     ZeroInTime,
-    /// The sensor's scale, in the course of the rows.
+    /// The sensor's scale, over time.
     ScaleInTime,
-    /// A common growth of all lengths of the arm, in the course of the rows.
+    /// A common growth of all lengths of the arm, over time.
     GrowthInTime,
-    /// A load at the flange, in the course of the rows.
+    /// A load at the flange, over time.
     LoadInTime,
-    /// The reading, over the joint angles, changing within half a turn.
+    /// The reading, over the joint angles, with a correlation length of half a turn.
     CoarseField,
-    /// The reading, over the joint angles, changing within some ten degrees.
+    /// The reading, over the joint angles, with a correlation length of some ten degrees.
     FineField,
 }
 
 impl Group {
-    /// Whether it follows the rows, not the poses.
+    /// Whether it is a function of time, not of the pose.
     pub fn in_time(self) -> bool {
         !matches!(self, Group::CoarseField | Group::FineField)
     }
 
-    /// What it is like, in words that follow "as if".
+    /// Description that follows "as if".
     pub fn words(self) -> &'static str {
         match self {
-            Group::FrameInTime => "the sensor or its outlet wandered while the rows were taken",
-            Group::TargetInTime => "the measured point wandered on the flange while the rows were taken",
-            Group::ZeroInTime => "the cable's zero wandered while the rows were taken",
-            Group::ScaleInTime => "the sensor's scale wandered while the rows were taken",
-            Group::GrowthInTime => "the whole arm grew and shrank while the rows were taken",
-            Group::LoadInTime => "the load at the flange changed while the rows were taken",
+            Group::FrameInTime => "the sensor or its outlet drifted during the measurement",
+            Group::TargetInTime => "the target drifted on the flange during the measurement",
+            Group::ZeroInTime => "the cable's zero drifted during the measurement",
+            Group::ScaleInTime => "the sensor's scale drifted during the measurement",
+            Group::GrowthInTime => "the whole arm expanded or contracted during the measurement",
+            Group::LoadInTime => "the load at the flange changed during the measurement",
             Group::CoarseField => "the error depends smoothly on the pose",
             Group::FineField => "the error depends on the pose and changes within some ten degrees",
         }
     }
 }
 
-/// Cosines of a course in time.
+/// Number of cosines of a function of time.
 const COSINES: usize = 12;
 
 /// Features of a field for each coordinate that it moves.
 const FEATURES: usize = 32;
 
-/// Angle (rad) within which a field changes: coarse, fine.
-const REACH_RAD: [f64; 2] = [1.2, 0.45];
+/// Correlation length of a field (rad): coarse, fine.
+const LENGTH_RAD: [f64; 2] = [1.2, 0.45];
 
-/// Joints over which a field is laid: the last one turns the target about itself.
+/// Number of joints that a field depends on: the last one rotates the target about itself.
 const JOINTS: usize = 5;
 
-/// Variance of a group's push on a whitened reading below which it carries nothing.
-const NOTHING: f64 = 1e-4;
+/// Variance of a group's effect on a whitened reading below which it is negligible.
+const NEGLIGIBLE: f64 = 1e-4;
 
 /// Groups of functions, with the columns of their coefficients for every scalar row.
 #[derive(Debug, Clone)]
 pub struct Functions {
-    /// Columns, n × m, each group scaled so that coefficients of variance 1 push a whitened reading by 1 on average.
+    /// Columns, n × m, each group scaled so that coefficients of variance 1 change a whitened reading by 1 RMS.
     pub columns: DMatrix<f64>,
-    /// Which columns belong to which group.
+    /// The columns of each group.
     pub groups: Vec<(Group, std::ops::Range<usize>)>,
 }
 
 impl Functions {
-    /// All functions that the rows of a data set can carry.
+    /// All functions for a data set.
     pub fn of(subject: &Subject<'_>, linear: &Linear) -> Self {
         let dataset = &subject.observed.dataset;
         let slopes = &linear.slopes;
         let (n, per) = (linear.observations, linear.per);
         let mut out = Self { columns: DMatrix::zeros(n * per, 0), groups: Vec::new() };
-        let courses = cosines(n);
+        let time = cosines(n);
         let frame: Vec<DVector<f64>> = columns_of(&slopes.by_frame);
         let single = |slope: &DVector<f64>| vec![slope.clone()];
-        out.push(Group::FrameInTime, &frame, &courses, per);
-        out.push(Group::TargetInTime, &columns_of(&slopes.by_target), &courses, per);
+        out.push(Group::FrameInTime, &frame, &time, per);
+        out.push(Group::TargetInTime, &columns_of(&slopes.by_target), &time, per);
         if dataset.sensor == Sensor::Cable {
-            out.push(Group::ZeroInTime, &single(&slopes.by_zero), &courses, per);
+            out.push(Group::ZeroInTime, &single(&slopes.by_zero), &time, per);
         }
-        out.push(Group::ScaleInTime, &single(&slopes.by_scale), &courses, per);
-        out.push(Group::GrowthInTime, &single(&slopes.by_growth), &courses, per);
-        out.push(Group::LoadInTime, &loads(dataset, subject.nominal, slopes, per), &courses, per);
+        out.push(Group::ScaleInTime, &single(&slopes.by_scale), &time, per);
+        out.push(Group::GrowthInTime, &single(&slopes.by_growth), &time, per);
+        out.push(Group::LoadInTime, &loads(dataset, subject.nominal, slopes, per), &time, per);
         let reading =
             if dataset.sensor == Sensor::Cable { single(&slopes.by_zero) } else { frame[..3].to_vec() };
-        for (group, reach) in [Group::CoarseField, Group::FineField].into_iter().zip(REACH_RAD) {
-            out.push(group, &reading, &features(dataset, reach), per);
+        for (group, length) in [Group::CoarseField, Group::FineField].into_iter().zip(LENGTH_RAD) {
+            out.push(group, &reading, &features(dataset, length), per);
         }
         out
     }
 
-    /// Adds slopes × courses.
-    fn push(&mut self, group: Group, slopes: &[DVector<f64>], courses: &DMatrix<f64>, per: usize) {
+    /// Adds the products of `slopes` and `basis`.
+    fn push(&mut self, group: Group, slopes: &[DVector<f64>], basis: &DMatrix<f64>, per: usize) {
         let (rows, first) = (self.columns.nrows(), self.columns.ncols());
-        let count = slopes.len() * courses.ncols();
+        let count = slopes.len() * basis.ncols();
         let mut added = DMatrix::zeros(rows, count);
-        let mut places = added.column_iter_mut();
+        let mut columns = added.column_iter_mut();
         for slope in slopes {
-            // A shift along one axis and a turn about another are made comparable by what they do to a reading.
-            let usual = (slope.norm_squared() / rows as f64).sqrt();
-            for course in courses.column_iter() {
-                let Some(mut place) = places.next() else { continue };
-                if usual > 0.0 {
-                    place.iter_mut().enumerate().for_each(|(s, v)| *v = slope[s] * course[s / per] / usual);
+            // Scaled by their effect on a reading, so that shifts and rotations are comparable.
+            let rms = (slope.norm_squared() / rows as f64).sqrt();
+            for function in basis.column_iter() {
+                let Some(mut column) = columns.next() else { continue };
+                if rms > 0.0 {
+                    column.iter_mut().enumerate().for_each(|(s, v)| *v = slope[s] * function[s / per] / rms);
                 }
             }
         }
@@ -148,7 +148,7 @@ fn columns_of(matrix: &DMatrix<f64>) -> Vec<DVector<f64>> {
     matrix.column_iter().map(|c| c.into_owned()).collect()
 }
 
-/// cos(π k u) / k over the rows, u from 0 to 1: the series of a Brownian course.
+/// cos(π k u) / k over the rows, u from 0 to 1: the Karhunen–Loève series of Brownian motion.
 fn cosines(n: usize) -> DMatrix<f64> {
     DMatrix::from_fn(n, COSINES, |i, k| {
         let u = (i as f64 + 0.5) / n as f64;
@@ -156,28 +156,28 @@ fn cosines(n: usize) -> DMatrix<f64> {
     })
 }
 
-/// Random features of a smooth function of the joint angles.
-fn features(dataset: &Dataset, reach_rad: f64) -> DMatrix<f64> {
-    let mut rng = ChaCha8Rng::seed_from_u64(reach_rad.to_bits());
+/// Random Fourier features of a smooth function of the joint angles.
+fn features(dataset: &Dataset, length_rad: f64) -> DMatrix<f64> {
+    let mut rng = ChaCha8Rng::seed_from_u64(length_rad.to_bits());
     let n = dataset.rows.len();
     let mut out = DMatrix::zeros(n, FEATURES);
     for mut column in out.column_iter_mut() {
         let frequency: Vec<f64> = (0..JOINTS)
             .map(|_| {
                 let normal: f64 = StandardNormal.sample(&mut rng);
-                normal / reach_rad
+                normal / length_rad
             })
             .collect();
         let phase = rng.random_range(0.0..std::f64::consts::TAU);
-        for (place, row) in column.iter_mut().zip(dataset.rows.iter()) {
+        for (entry, row) in column.iter_mut().zip(dataset.rows.iter()) {
             let angle: f64 = frequency.iter().zip(row.joints.iter()).map(|(f, q)| f * q).sum();
-            *place = (angle + phase).cos();
+            *entry = (angle + phase).cos();
         }
     }
     out
 }
 
-/// Slopes by a mass at the flange under which joints 2 and 3 yield.
+/// Slopes by a mass at the flange that deflects joints 2 and 3.
 fn loads(dataset: &Dataset, nominal: &Model, slopes: &Slopes, per: usize) -> Vec<DVector<f64>> {
     let torques = flange_torques(dataset, nominal);
     [1, 2]
@@ -188,32 +188,32 @@ fn loads(dataset: &Dataset, nominal: &Model, slopes: &Slopes, per: usize) -> Vec
         .to_vec()
 }
 
-/// The functions with their variances, found beside a fit.
+/// The functions with their estimated variances, given a fit.
 #[derive(Debug, Clone)]
 pub struct Discrepancy {
     /// Standard deviation of the coefficients of each group of the functions.
     sizes: Vec<f64>,
-    /// The functions that carry anything, each column in units of its standard deviation.
+    /// The nonnegligible functions, each column in units of its standard deviation.
     pub columns: DMatrix<f64>,
-    /// Of each column, whether it follows the rows, not the poses.
+    /// For each column, whether it is a function of time.
     in_time: Vec<bool>,
-    /// What each group that carries anything is worth in the readings (mm RMS), largest first.
-    pub carried: Vec<(Group, f64)>,
-    /// How far all of it moves the reading of each observation (mm).
-    pub push_mm: Vec<f64>,
-    /// Twice the log Bayes factor for there being anything of it.
+    /// Contribution of each nonnegligible group to the readings (mm RMS), largest first.
+    pub contributions: Vec<(Group, f64)>,
+    /// Size of the total effect on each observation (mm).
+    pub effect_mm: Vec<f64>,
+    /// Twice the log Bayes factor for a discrepancy.
     pub evidence: f64,
-    /// Standard deviation of what is left, in units of what the fit took for the noise.
+    /// Standard deviation of the remaining noise, in units of the fit's noise.
     pub noise: f64,
-    /// Correlation of what is left from one row to the next; 0 where it is none.
+    /// Lag-one correlation of the remaining noise; 0 if insignificant.
     pub correlation: f64,
-    /// Over how many rows what is left resembles itself; 0 where it does not.
-    pub reach: usize,
+    /// Range of the serial correlation in rows; 0 without one.
+    pub correlation_range: usize,
 }
 
 impl Discrepancy {
-    /// Variances beside everything that is free in `linear` but the parameters at `dropped`.
-    /// `before` is what was found with more free, to start from.
+    /// Estimates the variances with everything in `linear` free except the parameters at `dropped`. `before` is the result of a larger
+    /// model as a start.
     pub fn of(
         functions: &Functions,
         linear: &Linear,
@@ -222,26 +222,35 @@ impl Discrepancy {
         before: Option<&Self>,
     ) -> Self {
         let rho = before.map_or(0.0, |b| b.correlation);
-        let mut out = Self::with(functions, linear, dropped, numbers, rho, before);
+        let mut out = Self::estimate(functions, linear, dropped, numbers, rho, before);
         if let Some(before) = before.filter(|b| b.correlation != 0.0) {
-            out.reach = before.reach;
+            out.correlation_range = before.correlation_range;
         }
         if rho == 0.0 && out.correlation != 0.0 {
-            let (rho, reach) = (out.correlation, out.reach);
-            out = Self { reach, ..Self::with(functions, linear, dropped, numbers, rho, Some(&out)) };
+            let (rho, correlation_range) = (out.correlation, out.correlation_range);
+            let whitened = Self::estimate(functions, linear, dropped, numbers, rho, Some(&out));
+            out = Self { correlation_range, ..whitened };
         }
-        if out.speaks() { out } else { out.silent() }
+        if out.is_significant() { out } else { out.without_functions() }
     }
 
-    /// Nothing but the noise, and its correlation.
-    fn silent(self) -> Self {
+    /// The noise and its correlation alone.
+    fn without_functions(self) -> Self {
         let columns = DMatrix::zeros(self.columns.nrows(), 0);
-        let push_mm = vec![0.0; self.push_mm.len()];
-        Self { columns, in_time: Vec::new(), carried: Vec::new(), push_mm, evidence: 0.0, noise: 1.0, ..self }
+        let effect_mm = vec![0.0; self.effect_mm.len()];
+        Self {
+            columns,
+            in_time: Vec::new(),
+            contributions: Vec::new(),
+            effect_mm,
+            evidence: 0.0,
+            noise: 1.0,
+            ..self
+        }
     }
 
-    /// The same where neighbouring rows are correlated by `rho`.
-    fn with(
+    /// The estimate for a lag-one correlation of `rho`.
+    fn estimate(
         functions: &Functions,
         linear: &Linear,
         dropped: &[usize],
@@ -264,24 +273,24 @@ impl Discrepancy {
         );
         let pure = design.pure(&columns, &projected);
         let left = &design.residual + &pure * &coefficients;
-        let mut carried = Vec::new();
+        let mut contributions = Vec::new();
         let (mut kept, mut in_time) = (Vec::new(), Vec::new());
-        let mut push_mm = vec![0.0; linear.slopes.mm.len()];
+        let mut effect_mm = vec![0.0; linear.slopes.mm.len()];
         for ((group, range), size) in functions.groups.iter().zip(&sizes) {
-            if size * size <= NOTHING * noise * noise {
+            if size * size <= NEGLIGIBLE * noise * noise {
                 continue;
             }
-            // What links and frames would take over is not its own.
+            // Excludes the part that links and frames can absorb.
             let own = if rho == 0.0 { &pure } else { &functions.columns };
             let part = own.columns(range.start, range.len()) * coefficients.rows(range.start, range.len());
             let lengths: Vec<f64> = linear.slopes.mm.iter().zip(part.iter()).map(|(mm, v)| mm * v).collect();
             let square: f64 = lengths.iter().map(|l| l * l).sum();
-            carried.push((*group, (square / linear.observations.max(1) as f64).sqrt()));
-            push_mm.iter_mut().zip(&lengths).for_each(|(sum, l)| *sum += l);
+            contributions.push((*group, (square / linear.observations.max(1) as f64).sqrt()));
+            effect_mm.iter_mut().zip(&lengths).for_each(|(sum, l)| *sum += l);
             kept.extend(range.clone().map(|k| (k, *size)));
             in_time.extend(range.clone().map(|_| group.in_time()));
         }
-        carried.sort_by(|a, b| b.1.total_cmp(&a.1));
+        contributions.sort_by(|a, b| b.1.total_cmp(&a.1));
         let scaled: Vec<DVector<f64>> =
             kept.iter().map(|&(k, size)| functions.columns.column(k) * size).collect();
         let columns =
@@ -291,50 +300,60 @@ impl Discrepancy {
         } else {
             rho
         };
-        let reach = if rho == 0.0 && correlation != 0.0 {
+        let correlation_range = if rho == 0.0 && correlation != 0.0 {
             correlation_range(&left, linear.per, &linear.slopes.poses)
         } else {
             0
         };
-        let push_mm =
-            push_mm.chunks(linear.per).map(|row| row.iter().map(|l| l * l).sum::<f64>().sqrt()).collect();
-        Self { sizes, columns, in_time, carried, push_mm, evidence, noise, correlation, reach }
+        let effect_mm =
+            effect_mm.chunks(linear.per).map(|row| row.iter().map(|l| l * l).sum::<f64>().sqrt()).collect();
+        Self {
+            sizes,
+            columns,
+            in_time,
+            contributions,
+            effect_mm,
+            evidence,
+            noise,
+            correlation,
+            correlation_range,
+        }
     }
 
-    /// What depends on the pose alone is worth so much (mm RMS).
+    /// Contribution of the fields over poses (mm RMS).
     pub fn field_mm(&self) -> f64 {
-        let fields = self.carried.iter().filter(|(group, _)| !group.in_time());
+        let fields = self.contributions.iter().filter(|(group, _)| !group.in_time());
         fields.map(|(_, mm)| mm * mm).sum::<f64>().sqrt()
     }
 
-    /// Growth of the arm in the course of the rows is worth so much (mm RMS).
+    /// Contribution of growth of the arm over time (mm RMS).
     pub fn growth_mm(&self) -> f64 {
-        let growth = self.carried.iter().find(|(group, _)| *group == Group::GrowthInTime);
+        let growth = self.contributions.iter().find(|(group, _)| *group == Group::GrowthInTime);
         growth.map_or(0.0, |(_, mm)| *mm)
     }
 
-    /// The columns that follow the rows.
+    /// The columns that are functions of time.
     pub fn in_time_columns(&self) -> DMatrix<f64> {
-        let places: Vec<usize> = (0..self.in_time.len()).filter(|&k| self.in_time[k]).collect();
-        self.columns.select_columns(&places)
+        let indices: Vec<usize> = (0..self.in_time.len()).filter(|&k| self.in_time[k]).collect();
+        self.columns.select_columns(&indices)
     }
 
-    /// Whether something follows the rows, not the poses.
+    /// Whether it depends on time, by a function or by serial correlation.
     pub fn in_time(&self) -> bool {
-        self.correlation != 0.0 || self.carried.iter().any(|(group, _)| group.in_time())
+        self.correlation != 0.0 || self.contributions.iter().any(|(group, _)| group.in_time())
     }
 
-    /// What all of it together is worth in the readings (mm RMS).
-    pub fn worth_mm(&self) -> f64 {
-        let square: f64 = self.push_mm.iter().map(|l| l * l).sum();
-        (square / self.push_mm.len().max(1) as f64).sqrt()
+    /// Total contribution to the readings (mm RMS).
+    pub fn rms_mm(&self) -> f64 {
+        let square: f64 = self.effect_mm.iter().map(|l| l * l).sum();
+        (square / self.effect_mm.len().max(1) as f64).sqrt()
     }
 
-    /// Whether there is anything of it that a reader should hear of.
-    pub fn speaks(&self) -> bool {
-        (self.evidence > SPEAKS && !self.carried.is_empty()) || self.correlation != 0.0
+    /// Whether there is significant discrepancy.
+    pub fn is_significant(&self) -> bool {
+        (self.evidence > SIGNIFICANT && !self.contributions.is_empty()) || self.correlation != 0.0
     }
 }
 
-/// Twice a log Bayes factor from which something else is there: a thousand to one.
-const SPEAKS: f64 = 14.0;
+/// Twice the log Bayes factor from which a discrepancy is significant: a thousand to one.
+const SIGNIFICANT: f64 = 14.0;

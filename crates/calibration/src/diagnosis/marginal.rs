@@ -1,9 +1,9 @@
-//! Variances of groups of random functions under which the rows are most probable.
+//! Variance components of random functions by maximum marginal likelihood (evidence).
 //!
-//! With S the information and c the gradient of m coefficients beside everything else that is free, coefficients a ~ N(0, D),
-//! D diagonal with one variance for each group, and noise of variance s²: a = −(S/s² + D⁻¹)⁻¹ c/s², and twice the log of the
-//! rows' probability is −[ν ln s² + ln det(I + D S/s²) + (R − cᵀ(S + s²D⁻¹)⁻¹c)/s²], R the squares that everything else leaves
-//! with ν degrees of freedom. Each variance is renewed by vᵍ ← |aᵍ|²/γᵍ, γᵍ = Σ(1 − Vₖₖ/vᵍ) its well-determined coefficients.
+//! With S the information and c the gradient of m coefficients, everything else projected off, coefficients a ~ N(0, D), D diagonal
+//! with one variance for each group, and noise of variance s²: a = −(S/s² + D⁻¹)⁻¹ c/s², and twice the log marginal likelihood is
+//! −[ν ln s² + ln det(I + D S/s²) + (R − cᵀ(S + s²D⁻¹)⁻¹c)/s²], R the residual sum of squares of everything else with ν degrees of
+//! freedom. Fixed-point update: vᵍ ← |aᵍ|²/γᵍ, γᵍ = Σ(1 − Vₖₖ/vᵍ) the number of well-determined coefficients.
 //! Source: MacKay 1992, Bayesian interpolation.
 
 use std::ops::Range;
@@ -12,19 +12,19 @@ use nalgebra::{DMatrix, DVector};
 
 use super::algebra::{back_and_forth, factored, solved};
 
-/// Rounds of renewal: variances that go to nothing do so slowly, and are cut off by [`GONE`].
+/// Most iterations: variances approach 0 slowly and are truncated by [`NEGLIGIBLE`].
 const ROUNDS: usize = 30;
 
-/// A group whose standard deviation falls below this share of the noise is gone.
-const GONE: f64 = 0.02;
+/// Standard deviation of a group, relative to the noise, below which it is set to 0.
+const NEGLIGIBLE: f64 = 0.02;
 
-/// Variances settle where none moves by more than this share.
-const SETTLED: f64 = 0.02;
+/// Relative change of all standard deviations at convergence.
+const CONVERGED: f64 = 0.02;
 
-/// What was found.
+/// Estimated variance components.
 #[derive(Debug, Clone)]
 pub struct Variances {
-    /// Standard deviation of each group's coefficients; 0 where it carries nothing.
+    /// Standard deviation of each group's coefficients; 0 if negligible.
     pub sizes: Vec<f64>,
     /// Standard deviation of the noise, in units of the whitened rows.
     pub noise: f64,
@@ -34,7 +34,8 @@ pub struct Variances {
     pub coefficients: DVector<f64>,
 }
 
-/// See the module page. `square` is R and `freedom` ν; `start` are sizes to start from.
+/// Estimates the variance components; see the module documentation. `square` is R and `freedom` ν; `start` has starting values of the
+/// standard deviations.
 pub fn variances(
     information: &DMatrix<f64>,
     gradient: &DVector<f64>,
@@ -46,9 +47,9 @@ pub fn variances(
     let nu = freedom.max(1.0);
     let mut noise2 = (square / nu).max(1e-12);
     let usual = 0.3 * noise2.sqrt();
-    // A group that was gone before may come back when less is free beside it.
+    // A group that was 0 before can reappear when fewer other parameters are free.
     let mut sizes: Vec<f64> =
-        (0..groups.len()).map(|g| start.map_or(usual, |s| s[g].max(2.0 * GONE * noise2.sqrt()))).collect();
+        (0..groups.len()).map(|g| start.map_or(usual, |s| s[g].max(2.0 * NEGLIGIBLE * noise2.sqrt()))).collect();
     let mut coefficients = DVector::zeros(m);
     for _ in 0..ROUNDS {
         let Some(state) = State::of(information, gradient, groups, &sizes, noise2) else { break };
@@ -64,12 +65,12 @@ pub fn variances(
             let norm = state.unit.rows(range.start, range.len()).norm_squared() * sizes[g] * sizes[g];
             let next = if gamma > 1e-6 { (norm / gamma).sqrt() } else { 0.0 };
             moved = moved.max((next / sizes[g] - 1.0).abs());
-            sizes[g] = if next < GONE * noise2.sqrt() { 0.0 } else { next };
+            sizes[g] = if next < NEGLIGIBLE * noise2.sqrt() { 0.0 } else { next };
         }
         let left =
             square + 2.0 * gradient.dot(&coefficients) + (information * &coefficients).dot(&coefficients);
         noise2 = (left / (nu - spent).max(0.05 * nu)).max(1e-12);
-        if moved < SETTLED {
+        if moved < CONVERGED {
             break;
         }
     }
@@ -85,7 +86,8 @@ pub fn variances(
     Variances { sizes, noise: noise2.sqrt(), evidence, coefficients }
 }
 
-/// Coefficients in units of their standard deviations, and what goes with them.
+/// Coefficients in units of their prior standard deviations, with their posterior variances.
+
 struct State {
     unit: DVector<f64>,
     /// Posterior variance over prior variance.

@@ -94,10 +94,10 @@ pub(super) fn merge_findings(
     let is_excess = |s: &MergedFinding| s.causes.first().is_some_and(|k| excess.contains(k));
     if findings.iter().any(|s| small(s) || is_excess(s)) {
         let excess_only = !excess.is_empty();
-        let told = |members: &[MergedFinding], mm: f64| small_disturbances(members, mm, excess_only);
-        merge(&mut findings, |s| small(s) || is_excess(s), contributions, told);
-        let told = findings.iter_mut().find(|s| s.finding.effect == SMALL_DISTURBANCES);
-        told.into_iter().for_each(|s| s.doubted = excess.clone());
+        let build = |members: &[MergedFinding], mm: f64| small_disturbances(members, mm, excess_only);
+        merge(&mut findings, |s| small(s) || is_excess(s), contributions, build);
+        let small_finding = findings.iter_mut().find(|s| s.finding.effect == SMALL_DISTURBANCES);
+        small_finding.into_iter().for_each(|s| s.doubted = excess.clone());
     }
     findings
 }
@@ -109,16 +109,16 @@ fn excess(
     doubtful_mm: f64,
 ) -> Vec<usize> {
     let worth = |s: &MergedFinding| s.finding.worth_mm.unwrap_or(f64::INFINITY);
-    let told: Vec<&MergedFinding> = findings.iter().filter(|s| !small(s)).collect();
-    if told.len() <= MOST_REPORTED {
+    let reported: Vec<&MergedFinding> = findings.iter().filter(|s| !small(s)).collect();
+    if reported.len() <= MOST_REPORTED {
         return Vec::new();
     }
     let doubted =
         |s: &&&MergedFinding| s.finding.confidence == Confidence::Ambiguous && worth(s) < doubtful_mm;
-    let mut least: Vec<&&MergedFinding> = told.iter().filter(doubted).collect();
+    let mut least: Vec<&&MergedFinding> = reported.iter().filter(doubted).collect();
     least.sort_by(|a, b| worth(a).total_cmp(&worth(b)));
     // The merged finding takes one line.
-    let beyond = told.len() + 1 - MOST_REPORTED;
+    let beyond = reported.len() + 1 - MOST_REPORTED;
     least.into_iter().take(beyond).flat_map(|s| s.causes.iter().copied()).collect()
 }
 
@@ -148,12 +148,12 @@ fn merge(
     findings: &mut Vec<MergedFinding>,
     of: impl Fn(&MergedFinding) -> bool,
     contributions: &Contributions<'_>,
-    told: impl FnOnce(&[MergedFinding], f64) -> Finding,
+    build: impl FnOnce(&[MergedFinding], f64) -> Finding,
 ) {
     let first = findings.iter().position(&of).unwrap_or(0);
     let (members, mut others): (Vec<MergedFinding>, Vec<MergedFinding>) = findings.drain(..).partition(of);
     let causes: Vec<usize> = members.iter().flat_map(|s| s.causes.iter().copied()).collect();
-    let finding = told(&members, contributions.rms_mm(&causes));
+    let finding = build(&members, contributions.rms_mm(&causes));
     let size = |s: &MergedFinding| s.finding.worth_mm.unwrap_or(0.0);
     let largest = members.into_iter().max_by(|a, b| size(a).total_cmp(&size(b)));
     let picture = largest.and_then(|s| s.picture);

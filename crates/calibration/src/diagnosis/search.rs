@@ -62,7 +62,7 @@ pub(super) struct Search<'a> {
     /// Errors of the registered data sheet, of geometry and of the extended model.
     pub(super) stages: [StageError; 3],
     /// Serial correlation range in searched rows; 0 for independent readings.
-    pub(super) reach: usize,
+    pub(super) correlation_range: usize,
     pub(super) notes: Vec<String>,
 }
 
@@ -115,7 +115,7 @@ impl<'a> Search<'a> {
             set_aside,
             validation,
             stages,
-            reach: 0,
+            correlation_range: 0,
             notes,
         }
     }
@@ -183,8 +183,8 @@ impl<'a> Search<'a> {
     /// For serially correlated readings: purges the cross-validation, and drops shifts that are not confirmed.
     pub(super) fn purge_validation(&mut self, confirmed: &mut Confirmed) {
         let SearchContext { subject, options, tell, .. } = self.context;
-        self.reach = confirmed.outcome.discrepancy.reach;
-        let reach = self.reach * self.context.stride();
+        self.correlation_range = confirmed.outcome.discrepancy.correlation_range;
+        let reach = self.correlation_range * self.context.stride();
         if reach == 0 {
             return;
         }

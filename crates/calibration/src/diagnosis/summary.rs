@@ -111,7 +111,7 @@ fn findings(
 ) -> (Vec<Finding>, Vec<usize>, Vec<Picture>) {
     let context = search.context;
     let rows = &context.searched.observed.dataset;
-    let folds = split::purged(rows, 5, search.reach, context.options.selection.seed);
+    let folds = split::purged(rows, 5, search.correlation_range, context.options.selection.seed);
     let aside: &[usize] = if context.is_thinned() { &[] } else { &search.set_aside };
     let builder = FindingBuilder {
         subject: &context.searched,

@@ -35,7 +35,7 @@ pub(super) struct Unexplained<'a> {
 impl Unexplained<'_> {
     /// Whether the residual has a significant part that is not noise.
     fn is_significant(&self) -> bool {
-        self.discrepancy.speaks() && self.discrepancy.worth_mm() > LEAST_SHARE * self.after.fitted.rmse
+        self.discrepancy.is_significant() && self.discrepancy.rms_mm() > LEAST_SHARE * self.after.fitted.rmse
     }
 
     /// One sentence; `None` for a residual at the noise floor.
@@ -44,7 +44,7 @@ impl Unexplained<'_> {
         if self.is_significant() {
             return Some(format!(
                 "{rmse:.3} mm RMS, of which {:.3} mm is not noise: {}",
-                self.discrepancy.worth_mm(),
+                self.discrepancy.rms_mm(),
                 self.description()
             ));
         }
@@ -58,7 +58,7 @@ impl Unexplained<'_> {
     fn description(&self) -> String {
         let parts: Vec<String> = self
             .discrepancy
-            .carried
+            .contributions
             .iter()
             .take(2)
             .map(|(group, mm)| format!("{mm:.3} mm as if {}", group.words()))
@@ -71,9 +71,9 @@ impl Unexplained<'_> {
     /// The finding.
     pub(super) fn finding(&self) -> Option<Finding> {
         self.is_significant().then(|| {
-            let mut order: Vec<usize> = (0..self.discrepancy.push_mm.len()).collect();
-            let push = &self.discrepancy.push_mm;
-            order.sort_by(|&a, &b| push[b].total_cmp(&push[a]).then(a.cmp(&b)));
+            let mut order: Vec<usize> = (0..self.discrepancy.effect_mm.len()).collect();
+            let effect = &self.discrepancy.effect_mm;
+            order.sort_by(|&a, &b| effect[b].total_cmp(&effect[a]).then(a.cmp(&b)));
             let mut rows: Vec<usize> =
                 order.iter().take(MOST_ROWS).map(|&i| self.dataset.rows[i].number).collect();
             rows.sort_unstable();
@@ -100,7 +100,7 @@ impl Unexplained<'_> {
                     cv_rmse_before_mm: self.smoothed.unwrap_or(self.after.random.rmse),
                     cv_rmse_after_mm: self.after.random.rmse,
                 },
-                worth_mm: Some(self.discrepancy.worth_mm()),
+                worth_mm: Some(self.discrepancy.rms_mm()),
                 doubts: Vec::new(),
                 sessions: Vec::new(),
                 alternatives: Vec::new(),
