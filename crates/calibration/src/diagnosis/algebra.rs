@@ -147,7 +147,6 @@ pub(super) fn lower_factor(normal: DMatrix<f64>) -> DMatrix<f64> {
 
 /// Eigenvalues and eigenvectors of a symmetric matrix; `None` for non-finite entries. Single-threaded: faer is built without
 /// threads.
-
 pub(super) fn eigen(a: &DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f64>)> {
     let n = a.nrows();
     let found = shown(a).self_adjoint_eigen(faer::Side::Lower).ok()?;

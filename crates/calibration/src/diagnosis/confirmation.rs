@@ -26,7 +26,7 @@ use super::extension::{Extended, Subject};
 use super::halves::halves;
 use super::intervals::ShiftScan;
 use super::score::{Score, log_p_of, score_columns, score_from, score_projected};
-use super::selection::{Accepted, Options, already};
+use super::selection::{Accepted, Options, contains_cause};
 use super::serial_correlation::prewhiten;
 use crate::measurement::sensor::disturbance::{Disturbance, Profile};
 use truegrind_arm::effect::Effect;
@@ -63,10 +63,7 @@ const MARGIN: f64 = 6.0;
 impl Confirmation {
     /// Whether it passes all criteria for an identified cause.
     pub(super) fn is_confirmed(&self) -> bool {
-        self.is_significant()
-            && self.margin >= MARGIN
-            && self.is_stable()
-            && self.changed <= ALLOWED_FAILURES
+        self.is_significant() && self.margin >= MARGIN && self.is_stable() && self.changed <= ALLOWED_FAILURES
     }
 
     /// Whether it is significant and plausible, confirmed or not.
@@ -96,7 +93,10 @@ impl Confirmation {
             ));
         }
         if self.testable == 0 {
-            out.push("too weak to be detected in half of the rows, so repeating the search cannot confirm it".to_owned());
+            out.push(
+                "too weak to be detected in half of the rows, so repeating the search cannot confirm it"
+                    .to_owned(),
+            );
         } else if !self.is_stable() {
             out.push(format!(
                 "the search finds it in only {} of {} halves of the rows in which it is detectable",
@@ -206,7 +206,7 @@ impl ConfirmationContext<'_> {
             .collect();
         let (rho, noise) = (discrepancy.correlation, discrepancy.noise);
         let every: Vec<usize> = (0..self.found.causes.len()).collect();
-        let linear = self.linear.beside(&discrepancy.columns).filtered(rho, numbers, noise);
+        let linear = self.linear.with_random_effects(&discrepancy.columns).prewhitened(rho, numbers, noise);
         let design = linear.design(&self.parameter_indices(&every));
         let columns: Vec<DMatrix<f64>> =
             all.par_iter().map(|t| prewhiten(&t.columns, rho, numbers, linear.per) / noise).collect();
@@ -255,7 +255,11 @@ impl ConfirmationContext<'_> {
         let mut discrepancy = Discrepancy::of(functions, self.linear, &[], numbers, None);
         let mut confirmations = loop {
             let (rho, noise) = (discrepancy.correlation, discrepancy.noise);
-            let whole = self.linear.beside(&discrepancy.columns).filtered(rho, numbers, noise).whole();
+            let whole = self
+                .linear
+                .with_random_effects(&discrepancy.columns)
+                .prewhitened(rho, numbers, noise)
+                .whole();
             let whiten = |columns: &DMatrix<f64>| prewhiten(columns, rho, numbers, self.linear.per) / noise;
             let judged: Vec<Confirmation> = (0..own.len())
                 .into_par_iter()
@@ -316,7 +320,8 @@ impl ConfirmationContext<'_> {
             recovered: 0,
             testable: 0,
             changed: 0,
-            plausible: own.candidate.cause.has_plausible_sign() && !self.is_confounded_with_lag(&own.candidate.cause),
+            plausible: own.candidate.cause.has_plausible_sign()
+                && !self.is_confounded_with_lag(&own.candidate.cause),
         }
     }
 }
@@ -342,7 +347,7 @@ impl<'a> Half<'a> {
         let (rho, noise) = (discrepancy.correlation, discrepancy.noise);
         let part = confirming.linear.part(rows);
         let columns = picked(&discrepancy.columns, rows, confirming.linear.per);
-        let linear = part.beside(&columns).filtered(rho, &numbers, noise);
+        let linear = part.with_random_effects(&columns).prewhitened(rho, &numbers, noise);
         Self { confirming, rows, numbers, rho, noise, linear }
     }
 
@@ -479,10 +484,10 @@ impl<'a> Half<'a> {
 }
 
 /// Whether a cause is not in the pool.
-
 fn fresh(own: &WithColumns, pool: &[WithColumns]) -> bool {
     let cause = &own.candidate.cause;
-    cause.rows().is_some() || !pool.iter().any(|p| already(std::slice::from_ref(cause), &p.candidate.cause))
+    cause.rows().is_some()
+        || !pool.iter().any(|p| contains_cause(std::slice::from_ref(cause), &p.candidate.cause))
 }
 
 fn ranges(columns: &[DMatrix<f64>]) -> Vec<std::ops::Range<usize>> {

@@ -1,10 +1,10 @@
-//! A fit, linearised and whitened: what a candidate adds beyond everything that is already free.
+//! A fit linearised and whitened: the effect of a candidate with everything else as nuisance parameters projected off.
 //!
 //! With J the whitened Jacobian of the n scalar rows by the p free parameters and Λ their prior precisions,
 //! JᵀJ + Λ = L Lᵀ and Q = J L⁻ᵀ. A candidate with columns C (n × k) has, with everything else refitted to first order, the
-//! gradient g = Cᵀr and the information S = CᵀC − (QᵀC)ᵀ(QᵀC), with r the residual at the optimum. The model without some
-//! of the parameters follows from the same J: their columns go, their share J x goes back into r, and the rest is solved
-//! anew, r ← r − Q L⁻¹(Jᵀr + Λx).
+//! gradient g = Cᵀr and the information S = CᵀC − (QᵀC)ᵀ(QᵀC), with r the residual at the optimum. A model without some
+//! parameters follows from the same J: their columns are removed, their J x is added back to r, and the rest is solved again,
+//! r ← r − Q L⁻¹(Jᵀr + Λx).
 //!
 //! Source: the score test with nuisance parameters, Rao 1948; the projection is that of Frisch and Waugh.
 
@@ -25,14 +25,14 @@ use truegrind_estimation::problem::Problem;
 use truegrind_math::axpy::add_scaled;
 use truegrind_math::work::checkpoint;
 
-/// Slopes of the whitened residual by what candidates are made of, n each.
+/// Derivatives of the whitened residual from which the columns of candidates are built, n each.
 #[derive(Debug, Clone)]
 pub struct Slopes {
     /// By the rotation of each joint.
     pub by_joint: Vec<DVector<f64>>,
     /// By a common relative growth of all lengths.
     pub by_growth: DVector<f64>,
-    /// By the touched point on the flange, n × 3.
+    /// By the target on the flange, n × 3.
     pub by_target: DMatrix<f64>,
     /// By the sensor's frame or the outlet, n × 6 or n × 3.
     pub by_frame: DMatrix<f64>,
@@ -42,13 +42,13 @@ pub struct Slopes {
     pub by_scale: DVector<f64>,
     /// By a cable's squared weight over tension; zeros for other sensors.
     pub by_sag: DVector<f64>,
-    /// What a whitened residual is worth in mm; 0 for orientations.
+    /// Length of a whitened residual of 1 (mm); 0 for orientations.
     pub mm: Vec<f64>,
-    /// Number of the pose of each observation: readings of one pose share what the model gets wrong there.
+    /// Pose index of each observation: readings of one pose share its model error.
     pub poses: Vec<usize>,
 }
 
-/// See the module page. Scalar rows are ordered observation by observation.
+/// A linearised model with everything free projected off; see the module documentation. Scalar rows are ordered by observation.
 #[derive(Debug, Clone)]
 pub struct Design {
     /// Observations.
@@ -59,33 +59,33 @@ pub struct Design {
     pub residual: DVector<f64>,
     /// Q transposed, p × n.
     pub basis: Arc<DMatrix<f64>>,
-    /// What was taken out of the basis again.
+    /// Directions removed from the basis.
     pub reduction: Option<Reduction>,
-    /// What candidates are made of.
+    /// Derivatives for the columns of candidates.
     pub slopes: Arc<Slopes>,
 }
 
-/// Directions of a basis that are free no more.
+/// Directions of a basis that are no longer free.
 #[derive(Debug, Clone)]
 pub struct Reduction {
     /// U, orthonormal, p × d.
     directions: DMatrix<f64>,
-    /// (Q U)ᵀ, d × n, once somebody asked for it.
+    /// (Q U)ᵀ, d × n, computed on demand.
     removed: OnceLock<DMatrix<f64>>,
-    /// How far the residual moved along each.
+    /// Change of the residual along each.
     moved: DVector<f64>,
 }
 
-/// A fit linearised, from which the design of any smaller model follows without a refit.
+/// A linearised fit, from which the design of any smaller model follows without a refit.
 #[derive(Debug, Clone)]
 pub struct Linear {
     pub(super) observations: usize,
     pub(super) per: usize,
-    /// How many witnesses a row is, on average.
-    pub(super) witnesses: f64,
+    /// Mean effective weight of a row.
+    pub(super) effective_share: f64,
     /// Jᵀ, p × n.
     pub(super) rows: DMatrix<f64>,
-    /// JᵀJ + Λ, once somebody asked for it.
+    /// JᵀJ + Λ, computed on demand.
     normal: OnceLock<DMatrix<f64>>,
     /// r, n.
     pub(super) residual: DVector<f64>,
@@ -96,18 +96,18 @@ pub struct Linear {
     pub(super) slopes: Arc<Slopes>,
 }
 
-/// A whole design with what it takes to go on from it to smaller ones.
+/// A design with all parameters free, and the factors for reducing it.
 #[derive(Debug, Clone)]
 pub struct FullDesign {
-    /// Everything free.
+    /// All parameters free.
     pub design: Design,
     /// L.
     lower: DMatrix<f64>,
-    /// The estimate after one more step.
+    /// The estimate after one Gauss–Newton step.
     x: DVector<f64>,
 }
 
-/// What a candidate's columns come to against a design.
+/// The columns of a candidate projected on a design.
 #[derive(Debug, Clone)]
 pub struct Projected {
     /// Gradient, k.
@@ -116,7 +116,7 @@ pub struct Projected {
     pub information: DMatrix<f64>,
     /// QᵀC, p × k.
     pub shared: DMatrix<f64>,
-    /// The part of that along directions that are free no more, d × k.
+    /// The part of that along removed directions, d × k.
     pub given_back: Option<DMatrix<f64>>,
 }
 
@@ -132,7 +132,7 @@ impl Linear {
         for (k, precision) in precision.iter().enumerate() {
             gradient[k] += precision * fit.x[k];
         }
-        // Slopes by what candidates are made of, at the estimate.
+        // Derivatives for the columns of candidates, at the estimate.
         let anchors = dataset.anchors();
         let mut probes: Vec<Parameter> = Vec::new();
         for coordinate in [LinkCoordinate::Theta, LinkCoordinate::A, LinkCoordinate::D] {
@@ -192,7 +192,7 @@ impl Linear {
         Self {
             observations,
             per,
-            witnesses: fit.witnesses,
+            effective_share: fit.effective_share,
             rows: transposed,
             normal: OnceLock::new(),
             residual,
@@ -203,7 +203,7 @@ impl Linear {
         }
     }
 
-    /// The rows of some observations alone. What candidates are made of stays that of all rows.
+    /// Restricts to some observations; the derivatives for candidates remain those of all rows.
     pub(super) fn part(&self, observations: &[usize]) -> Self {
         let scalars: Vec<usize> =
             observations.iter().flat_map(|&i| i * self.per..(i + 1) * self.per).collect();
@@ -211,8 +211,8 @@ impl Linear {
         self.with_rows(self.rows.select_columns(&scalars), residual)
     }
 
-    /// The same with random functions free too: `columns`, n × m, whose coefficients have variance 1.
-    pub(super) fn beside(&self, columns: &DMatrix<f64>) -> Self {
+    /// Adds random effects: `columns`, n × m, with coefficients of variance 1.
+    pub(super) fn with_random_effects(&self, columns: &DMatrix<f64>) -> Self {
         let (p, m) = (self.rows.nrows(), columns.ncols());
         let mut rows = DMatrix::zeros(p + m, self.rows.ncols());
         rows.rows_mut(0, p).copy_from(&self.rows);
@@ -221,9 +221,9 @@ impl Linear {
         self.with(rows, self.residual.clone(), extended(&self.x, 0.0), extended(&self.precision, 1.0))
     }
 
-    /// The same where neighbouring rows are correlated by `rho` and the noise is `noise` times what it was taken for;
-    /// `numbers` are the data rows of the observations.
-    pub(super) fn filtered(&self, rho: f64, numbers: &[usize], noise: f64) -> Self {
+    /// Prewhitens for a lag-one correlation `rho` and noise that is `noise` times the assumed one; `numbers` are the row numbers of the
+    /// observations.
+    pub(super) fn prewhitened(&self, rho: f64, numbers: &[usize], noise: f64) -> Self {
         if rho == 0.0 && noise == 1.0 {
             return self.clone();
         }
@@ -248,7 +248,7 @@ impl Linear {
         Self {
             observations: rows.ncols() / self.per.max(1),
             per: self.per,
-            witnesses: self.witnesses,
+            effective_share: self.effective_share,
             rows,
             normal: OnceLock::new(),
             residual,
@@ -270,7 +270,7 @@ impl Linear {
         })
     }
 
-    /// How many parameters the rows determine, those at `dropped` left out: each counts by the share that its prior does not.
+    /// Effective number of parameters without those at `dropped`: each counts by the share that its prior does not determine.
     pub(super) fn spent(&self, dropped: &[usize]) -> f64 {
         let kept: Vec<usize> = (0..self.x.len()).filter(|k| !dropped.contains(k)).collect();
         let p = kept.len();
@@ -292,7 +292,7 @@ impl Linear {
         residual
     }
 
-    /// The design of the whole fit, from which those of smaller models follow at little cost.
+    /// The design with all parameters free, from which those of smaller models follow at little cost.
     pub fn whole(&self) -> FullDesign {
         let lower = lower_factor(self.normal().clone());
         let basis = solved(&lower, self.rows.clone());
@@ -314,8 +314,8 @@ impl Linear {
         FullDesign { design, lower, x: x - step }
     }
 
-    /// The design of the model without the parameters at `dropped`, with a basis of its own: what [`FullDesign::without`] is
-    /// compared with.
+    /// The design of the model without the parameters at `dropped`, factored from scratch; the reference for
+    /// [`FullDesign::without`].
     pub fn design(&self, dropped: &[usize]) -> Design {
         let kept: Vec<usize> = (0..self.x.len()).filter(|k| !dropped.contains(k)).collect();
         let p = kept.len();
@@ -343,7 +343,7 @@ impl Linear {
 }
 
 impl FullDesign {
-    /// The first `count` parameters after one more step, and their covariance.
+    /// The first `count` parameters after one Gauss–Newton step, and their covariance.
     pub(super) fn estimate(&self, count: usize) -> (Vec<f64>, DMatrix<f64>) {
         let p = self.x.len();
         let mut picked = DMatrix::zeros(p, count);
@@ -351,7 +351,7 @@ impl FullDesign {
         (self.x.rows(0, count).iter().copied().collect(), gram(&solved(&self.lower, picked)))
     }
 
-    /// The design of the model without the parameters at `dropped`, by taking directions out of the whole basis.
+    /// The design of the model without the parameters at `dropped`, by removing directions from the full basis.
     ///
     /// With Z = L⁻¹E for the dropped columns E of the identity and ZᵀZ = M Mᵀ, U = Z M⁻ᵀ is orthonormal, the smaller
     /// model's projection is Q(I − UUᵀ)Qᵀ, and its residual r − QU M⁻¹x with x the dropped parameters.
@@ -377,12 +377,12 @@ impl FullDesign {
 }
 
 impl Design {
-    /// The design of a whole fit.
+    /// The design of a fit with all parameters free.
     pub fn of(subject: &Subject<'_>, fit: &Extended) -> Self {
         Linear::of(subject, fit).whole().design
     }
 
-    /// Columns against everything that is already free.
+    /// Projects everything free off `columns`.
     pub fn project(&self, columns: &DMatrix<f64>) -> Projected {
         let (shared, square) = self.sparse_product(columns).unwrap_or_else(|| {
             let shared = product(&self.basis, columns);
@@ -391,7 +391,7 @@ impl Design {
         self.projected(columns, shared, square)
     }
 
-    /// The same for the columns of many candidates, with one pass over the basis for those that are dense.
+    /// The same for many candidates, with one pass over the basis for the dense ones.
     pub fn project_all(&self, all: &[DMatrix<f64>]) -> Vec<Projected> {
         let sparse: Vec<_> = all
             .par_iter()
@@ -428,8 +428,7 @@ impl Design {
             .collect()
     }
 
-    /// QᵀC and CᵀC of columns of which each reaches few rows, like a knot of an error map: what it does not reach costs
-    /// nothing.
+    /// QᵀC and CᵀC of sparse columns, such as knots of an error map, in time proportional to the nonzero entries.
     fn sparse_product(&self, columns: &DMatrix<f64>) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
         let reached = sparse(columns)?;
         let mut shared = DMatrix::zeros(self.basis.nrows(), columns.ncols());
@@ -458,13 +457,13 @@ impl Design {
         Projected { gradient, information, shared, given_back }
     }
 
-    /// The same from the projection on the whole design of which this is a part.
+    /// The same from the projection on the full design of which this is a reduction.
     pub fn project_on(&self, whole: &Projected) -> Projected {
         let (gradient, information, given_back) = self.reduced(whole);
         Projected { gradient, information, shared: whole.shared.clone(), given_back }
     }
 
-    /// Gradient (k) and information (k × k) of that alone, which is all that a score takes: the rest is large to copy.
+    /// Gradient (k) and information (k × k) of that, all that a score needs, without copying the rest.
     pub fn gradient_and_information(&self, whole: &Projected) -> (DVector<f64>, DMatrix<f64>) {
         let (gradient, information, _) = self.reduced(whole);
         (gradient, information)
@@ -481,7 +480,7 @@ impl Design {
         (gradient, information, Some(back))
     }
 
-    /// What is left of columns when everything free has been fitted to them, n × k.
+    /// The columns with everything free projected off, n × k.
     pub fn pure(&self, columns: &DMatrix<f64>, projected: &Projected) -> DMatrix<f64> {
         let mut shared = projected.shared.clone();
         if let (Some(reduction), Some(back)) = (&self.reduction, &projected.given_back) {
@@ -492,7 +491,7 @@ impl Design {
         }
         let mut out = columns.clone();
         for (mut column, shared) in out.column_iter_mut().zip(shared.column_iter()) {
-            // Row by row: a product of matrices would pack the whole basis for a few columns.
+            // Row by row: a matrix product would pack the whole basis for a few columns.
             for (place, q) in column.iter_mut().zip(self.basis.column_iter()) {
                 *place -= q.dot(&shared);
             }
@@ -500,19 +499,19 @@ impl Design {
         out
     }
 
-    /// Of a design that is a part of a whole one, the basis along the directions that are free no more, d × n.
+    /// Of a reduced design, the basis along the removed directions, d × n.
     pub(super) fn removed(&self) -> Option<&DMatrix<f64>> {
         let reduction = self.reduction.as_ref()?;
         Some(reduction.removed.get_or_init(|| product_of_transposed(&reduction.directions, &self.basis)))
     }
 
-    /// Scalar rows.
+    /// Number of scalar rows.
     pub fn rows(&self) -> usize {
         self.residual.len()
     }
 }
 
-/// Columns from which a product of matrices is worth packing the basis.
+/// Number of columns from which a matrix product is worth packing the basis.
 const MANY: usize = 8;
 
 /// Whitened residuals of a problem at `x` and its Jacobian transposed, p × n; what is no number counts as 0.
@@ -523,10 +522,10 @@ fn linearised(problem: &CalibrationProblem, x: &[f64]) -> (DVector<f64>, DMatrix
     (residual, rows)
 }
 
-/// Columns count as sparse where at most one entry in so many is not 0.
+/// Columns count as sparse if at most one in this many entries is nonzero.
 const SPARSE: usize = 4;
 
-/// The rows that each column reaches, where they are few.
+/// The nonzero rows of each column, if the columns are sparse.
 fn sparse(columns: &DMatrix<f64>) -> Option<Vec<Vec<usize>>> {
     let most = columns.len() / SPARSE;
     if columns.ncols() < 2 * SPARSE || columns.iter().filter(|c| **c != 0.0).count() > most {
@@ -538,7 +537,7 @@ fn sparse(columns: &DMatrix<f64>) -> Option<Vec<Vec<usize>>> {
     Some(columns.column_iter().map(reached).collect())
 }
 
-/// Slopes by the sensor's scale and by a cable's sag.
+/// Derivatives by the sensor's scale and by a cable's sag.
 fn readings(
     subject: &Subject<'_>,
     fit: &Extended,
@@ -552,7 +551,7 @@ fn readings(
     let touched = nalgebra::Point3::from(fit.frames.flange_from_target.translation.vector);
     for (i, row) in dataset.rows.iter().enumerate() {
         let w = weights[i].per_mm;
-        // Where the model sees the point, not where the reading has it: noise is no evidence of a scale.
+        // At the modelled point, not the measured one: noise is not evidence of a scale error.
         let at = (fit.model.forward(&row.joints, &row.condition) * touched).coords;
         match row.reading {
             Reading::Cable(_) => {

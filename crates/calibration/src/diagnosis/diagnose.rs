@@ -11,12 +11,12 @@ use super::picture::Picture;
 use super::preparation::{Prepared, prepare};
 use super::residual_tests;
 use super::search::{Confirmed, Search, SearchContext};
-use super::selection::already;
+use super::selection::contains_cause;
 use super::sensor_causes::{self, probability_worse};
 use super::summary::{self, Summary};
 use super::testability::not_testable;
 use super::validation::{StageError, nominal};
-use super::written::{kept, wandered, written};
+use super::written::{certain_causes, fit_written, time_discrepancy};
 use crate::identification::benefit::{Benefit, benefit};
 use crate::identification::calibration::Frames;
 use crate::identification::fit::{Fitted, Observations, frame_parameters};
@@ -60,7 +60,7 @@ pub struct Diagnosed {
 /// Median error with only the frames fitted above which the rows are not of this arm (mm).
 const WRONG_ARM_MM: f64 = 25.0;
 
-/// Diagnoses `dataset` of the arm `nominal` (by name `robot`), frames starting at `frames`. `tell` hears of each step.
+/// Diagnoses `dataset` of the arm `nominal` (by name `robot`), frames starting at `frames`. `progress` is called at every step.
 ///
 /// # Errors
 /// If the rows cannot be of this arm.
@@ -70,7 +70,7 @@ pub fn diagnose(
     nominal_arm: &Model,
     frames: &Frames,
     options: &Options,
-    tell: &(dyn Fn(&str) + Sync),
+    progress: &(dyn Fn(&str) + Sync),
 ) -> Result<Diagnosed, DiagnoseError> {
     let prepared = prepare(dataset, nominal_arm, options.fuse_readout);
     let subject =
@@ -87,11 +87,11 @@ pub fn diagnose(
     let needed = poses_needed_at_least(dataset, nominal_arm);
     let thin_rows = thin_rows(&prepared.observed);
     let searched = Subject { observed: thin_rows.as_ref().unwrap_or(&prepared.observed), ..subject };
-    let context = SearchContext { dataset, prepared: &prepared, subject, searched, options, tell };
+    let context = SearchContext { dataset, prepared: &prepared, subject, searched, options, progress };
     let most = if needed.is_some() { 0 } else { options.selection.most };
     let mut search = Search::run(&context, registered, most);
     search.drop_unvalidated_causes();
-    tell("stability selection in halves of the rows");
+    progress("stability selection in halves of the rows");
     let mut confirmed = search.confirm();
     search.purge_validation(&mut confirmed);
     let structure = residual_tests::structure(&subject, &search.extended, &search.set_aside);
@@ -102,7 +102,6 @@ pub fn diagnose(
         notes.push(format!(
             "{} rows at {} distinct poses are too few to separate effects from geometry: at least {needed} poses are needed, some hundred are \
              usual; these results depend on the priors",
-
             dataset.rows.len(),
             count_distinct_poses(dataset, usize::MAX)
         ));
@@ -112,7 +111,7 @@ pub fn diagnose(
     for (index, merged) in summary.findings.iter().enumerate() {
         merged.causes.iter().for_each(|&k| finding_of_cause[k] = index);
     }
-    let certain = merged::certain_causes(&summary.findings, &confirmed.outcome.confirmations);
+    let certain = merged::certain_flags(&summary.findings, &confirmed.outcome.confirmations);
     let extended = summary.extended.clone();
     let (mut diagnosis, pictures) = build_diagnosis(&search, &confirmed, summary, robot, notes);
     diagnosis.poses_needed = needed;
@@ -156,7 +155,8 @@ fn certain_model(
 ) -> (Extended, StageError) {
     let subject = &search.context.subject;
     let of = |certain: &[bool]| {
-        let fit = written(subject, &search.extended, &kept(&search.extended, certain), discrepancy);
+        let fit =
+            fit_written(subject, &search.extended, &certain_causes(&search.extended, certain), discrepancy);
         let errors = search.validation.stage(&fit);
         (fit, errors)
     };
@@ -184,13 +184,13 @@ fn without_measurement_causes(
 ) -> ((Extended, StageError), Option<f64>) {
     let of_the_arm: Vec<Cause> =
         certain_model.0.causes.iter().filter(|cause| matches!(cause, Cause::Arm(_))).cloned().collect();
-    if of_the_arm.len() == certain_model.0.causes.len() && wandered(discrepancy).is_none() {
+    if of_the_arm.len() == certain_model.0.causes.len() && time_discrepancy(discrepancy).is_none() {
         return (certain_model, None);
     }
     let SearchContext { dataset, subject, .. } = search.context;
-    let without = written(subject, &search.extended, &of_the_arm, None);
+    let without = fit_written(subject, &search.extended, &of_the_arm, None);
     let samples = Region::of(subject.observed.dataset.rows.iter().map(|row| &row.joints), 0.0).samples_deg;
-    let beside = in_doubt::beside(&without, certain_model.0.clone());
+    let beside = in_doubt::with_zero_causes(&without, certain_model.0.clone());
     match probability_worse(&certain_model.0, &beside, &mean_condition(dataset), &samples) {
         Some(chance) if chance > sensor_causes::MOST_PROBABILITY => {
             let errors = search.validation.stage(&without);
@@ -206,11 +206,14 @@ fn with_uncertain_causes(
     fit: &Extended,
     discrepancy: Option<&Discrepancy>,
 ) -> Option<Extended> {
-    let all = in_doubt::all(&search.extended.causes, &search.accepted);
-    let missing = |cause: &Cause| !already(&fit.causes, cause);
-    all.iter()
-        .any(missing)
-        .then(|| in_doubt::beside(fit, written(&search.context.subject, &search.extended, &all, discrepancy)))
+    let all = in_doubt::representable_causes(&search.extended.causes, &search.accepted);
+    let missing = |cause: &Cause| !contains_cause(&fit.causes, cause);
+    all.iter().any(missing).then(|| {
+        in_doubt::with_zero_causes(
+            fit,
+            fit_written(&search.context.subject, &search.extended, &all, discrepancy),
+        )
+    })
 }
 
 /// Builds the diagnosis, and the pictures of its findings.

@@ -258,11 +258,11 @@ impl Discrepancy {
         rho: f64,
         before: Option<&Self>,
     ) -> Self {
-        let filtered = linear.filtered(rho, numbers, 1.0);
+        let filtered = linear.prewhitened(rho, numbers, 1.0);
         let columns = prewhiten(&functions.columns, rho, numbers, linear.per);
         let design = filtered.design(dropped);
         let projected = design.project(&columns);
-        let freedom = design.rows() as f64 * linear.witnesses - filtered.spent(dropped);
+        let freedom = design.rows() as f64 * linear.effective_share - filtered.spent(dropped);
         let square = design.residual.norm_squared();
         let Variances { sizes, noise, evidence, coefficients } = marginal::variances(
             &projected.information,

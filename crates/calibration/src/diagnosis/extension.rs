@@ -1,12 +1,12 @@
 //! The model extended by causes: a robust fit of frames, links and causes together.
 //!
 //! Method: iteratively reweighted least squares with Huber's weight min(1, k/s), s the size of a row's whitened residual
-//! and k = 2. A bounded influence, not a redescending one: a block of rows that was shifted still pulls, so that its cause can
-//! be found, while single wild rows pull no more than a bad normal one. Scale by the median, refined at the end so that
+//! and k = 2. The influence is bounded, not redescending: a shifted block of rows still has influence, so that its cause can
+//! be found, while single outliers have no more influence than a bad normal row. Scale by the median, refined at the end so that
 //! the weighted sum of squares has its degrees of freedom. Source: Huber, Robust Statistics, 1981, chapter 7.
 //!
-//! Near another fit the steps are Gauss and Newton's (see `newton`) as long as they descend. A search leaves it at that; any
-//! other fit ends with Levenberg and Marquardt.
+//! From a nearby fit the steps are Gauss–Newton (see `newton`) as long as they descend. Fits within a search stop there; all
+//! others end with Levenberg–Marquardt.
 
 use std::ops::Range;
 
@@ -27,7 +27,7 @@ use truegrind_estimation::least_squares::lm;
 use truegrind_estimation::problem::{Prior, Problem, prior_cost};
 use truegrind_math::statistics::median;
 
-/// What is diagnosed: the rows, the data sheet, and where the frames start.
+/// The data of a fit: rows, nominal arm, starting frames, priors.
 #[derive(Debug, Clone, Copy)]
 pub struct Subject<'a> {
     /// The rows.
@@ -40,7 +40,7 @@ pub struct Subject<'a> {
     pub tolerance: &'a Tolerance,
 }
 
-/// Which parameters a fit frees.
+/// The free parameters of a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Freedom {
     /// Frames alone.
@@ -58,7 +58,7 @@ pub struct Extended {
     pub parameters: Vec<Parameter>,
     /// Their priors.
     pub priors: Vec<Prior>,
-    /// The problem, with robust weights.
+    /// The calibration problem, with robust weights.
     pub problem: CalibrationProblem,
     /// The estimate, in deviations from the start.
     pub x: Vec<f64>,
@@ -72,35 +72,35 @@ pub struct Extended {
     pub sizes: Vec<f64>,
     /// Weights of the rows, Huber's not included.
     pub weights: Vec<Weight>,
-    /// How many witnesses a row is of what the model gets wrong, on average: fewer than one where poses were read again.
-    pub witnesses: f64,
+    /// Mean effective weight of a row for the model error: below 1 for repeated poses (design effect).
+    pub effective_share: f64,
     /// Standard deviation of a reading (mm), and of an orientation (rad).
     pub sigma: (f64, f64),
-    /// What the solver said, with the covariance of the parameters; without it in the middle of a search.
+    /// The solver's result, with the covariance of the parameters except within a search.
     pub estimate: Estimate,
 }
 
-/// Bend of Huber's weight, in standard deviations.
-const BEND: f64 = 2.0;
+/// Huber's k, in standard deviations.
+const HUBER_K: f64 = 2.0;
 
-/// No sensor reads better than this (mm, rad). Fewer rows than parameters fit without any error: what is then held is held
-/// by the priors, which must not be lost beside weights without bound.
-const FINEST: (f64, f64) = (1e-3, 1e-6);
+/// Smallest standard deviation of a reading (mm, rad). With fewer rows than parameters the residual is 0; unbounded weights would then
+/// overwhelm the priors.
+const LEAST_SIGMA: (f64, f64) = (1e-3, 1e-6);
 
-/// What a search leaves unsolved of a fit, in χ²/2 for each scalar row: what is linear about the fit takes it up, and merits are
+/// Convergence tolerance of fits within a search, in χ²/2 for each scalar row: the linearisation absorbs the rest, and merits are
 /// compared in units of χ².
 const SEARCHED: f64 = 1e-5;
 
-/// Scalar rows times squared parameters from which a last word need not be so long.
+/// Scalar rows times squared parameters from which the final refinement is looser.
 const MUCH_WORK: f64 = 1e8;
 
-/// What is then left of the cost.
+/// Relative cost tolerance of that looser refinement.
 const FINE_ENOUGH: f64 = 1e-8;
 
-/// At most this many rounds of solver and weights.
+/// Most rounds of solver and weights.
 const ROUNDS: usize = 8;
 
-/// Which knots of a map a row of the data set reaches; all for another effect.
+/// For an error map, the knots that some row reaches; all parameters of another effect.
 fn reached(subject: &Subject<'_>, effect: &Effect) -> Vec<bool> {
     let Effect::GearMap(map) = effect else { return vec![true; effect.parameters().len()] };
     let mut out = vec![false; map.knots_rad.len()];
@@ -111,8 +111,8 @@ fn reached(subject: &Subject<'_>, effect: &Effect) -> Vec<bool> {
     out
 }
 
-/// The start of a fit: nominal arm and frames with the causes at size 0, what is free, and the sizes that the causes have. With
-/// `seen` a knot that no row reaches is not free: it is where its prior holds it, and changes nothing about the others.
+/// The start of a fit: nominal arm and frames with the causes at size 0, and the free parameters with the current values of causes.
+/// With `seen`, knots that no row reaches are not free: they would remain at their prior without affecting the others.
 fn start(
     subject: &Subject<'_>,
     causes: &[Cause],
@@ -158,14 +158,14 @@ fn start(
     (model, frames, links)
 }
 
-/// Where a parameter starts: at the size that its cause has, or where links and frames were in another fit.
+/// Starting value of a parameter: the value of its cause, or that of the link or frame in a nearby fit.
 fn starting((parameter, size): &(Parameter, Option<f64>), near: Option<&Extended>) -> f64 {
     size.unwrap_or_else(|| {
         near.and_then(|e| e.parameters.iter().position(|q| q == parameter).map(|k| e.x[k])).unwrap_or(0.0)
     })
 }
 
-/// Scalars of one observation: lengths, angles.
+/// Numbers of lengths and angles in one observation.
 fn components(sensor: Sensor) -> (usize, usize) {
     match sensor {
         Sensor::Cable => (1, 0),
@@ -174,7 +174,7 @@ fn components(sensor: Sensor) -> (usize, usize) {
     }
 }
 
-/// Median of √(χ²ₖ/k), which turns a median of sizes into a standard deviation.
+/// Median of √(χ²ₖ/k), to convert a median size to a standard deviation.
 fn median_size(k: usize) -> f64 {
     match k {
         1 => 0.6745,
@@ -183,14 +183,13 @@ fn median_size(k: usize) -> f64 {
     }
 }
 
-/// Fits the nominal arm extended by `causes` robustly, from the sizes that the causes have. `near` gives starting values of
-/// links and frames, and of the noise.
+/// Robust fit of the nominal arm extended by `causes`, starting at their values. `near` provides starting values of links, frames
+/// and noise.
 pub fn fit(subject: &Subject<'_>, causes: &[Cause], freedom: Freedom, near: Option<&Extended>) -> Extended {
     warm_fit(subject, causes, freedom, near).refine()
 }
 
-/// The same for a search: where `near` is near enough for Gauss and Newton, as close to the optimum as they stop, and without a
-/// covariance.
+/// The same within a search: only to the tolerance of Gauss–Newton from `near`, without a covariance.
 pub(super) fn warm_fit(
     subject: &Subject<'_>,
     causes: &[Cause],
@@ -220,33 +219,33 @@ pub(super) fn warm_fit(
         round += 1;
         let base = rounding::weights(dataset, &model, &frames, &observed.angles, sigma.0, sigma.1);
         let problem = plain_task.reweighted(&with_robust_weights(&base, &robust_weight));
-        let gone = Gone::one(&problem, &mut x, nearby, near.is_some());
-        nearby = matches!(gone, Gone::Step(_));
+        let steps = Round::run(&problem, &mut x, nearby, near.is_some());
+        nearby = matches!(steps, Round::Step(_));
         (model, frames) = problem.apply(&x);
         let plain = problem.unweighted_residuals(&x);
         let whitened = Whitened { base: &base, plain: &plain, per, repeated: repeated.as_ref() };
         let of_lengths = whitened.spread(0..lengths);
         let of_angles = if angles > 0 { whitened.spread(lengths..per) } else { 1.0 };
         let sizes = whitened.sizes([lengths, angles], [of_lengths, of_angles]);
-        let next: Vec<f64> = sizes.iter().map(|s| (BEND / s).min(1.0)).collect();
+        let next: Vec<f64> = sizes.iter().map(|s| (HUBER_K / s).min(1.0)).collect();
         let moved = next.iter().zip(&robust_weight).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         let settled = (of_lengths - 1.0).abs() < 1e-2 && (of_angles - 1.0).abs() < 1e-2 && moved < 5e-2;
         if (settled && round > 1) || round >= ROUNDS {
-            let spent = gone.spent(&priors);
-            let (by_length, length_witnesses) = whitened.deviations(0..lengths, &robust_weight, spent);
-            let (by_angle, angle_witnesses) = whitened.deviations(lengths..per, &robust_weight, spent);
+            let spent = steps.spent(&priors);
+            let (by_length, length_share) = whitened.deviations(0..lengths, &robust_weight, spent);
+            let (by_angle, angle_share) = whitened.deviations(lengths..per, &robust_weight, spent);
             let share = |count: usize| count as f64 / per as f64;
-            let witnesses = share(lengths) * length_witnesses + share(angles) * angle_witnesses;
+            let effective_share = share(lengths) * length_share + share(angles) * angle_share;
             let weights: Vec<Weight> = base
                 .iter()
                 .zip(by_length.iter().zip(&by_angle))
                 .map(|(w, (length, angle))| Weight {
-                    per_mm: (w.per_mm / length).min(FINEST.0.recip()),
-                    per_rad: (w.per_rad / angle).min(FINEST.1.recip()),
+                    per_mm: (w.per_mm / length).min(LEAST_SIGMA.0.recip()),
+                    per_rad: (w.per_rad / angle).min(LEAST_SIGMA.1.recip()),
                 })
                 .collect();
             let problem = plain_task.reweighted(&with_robust_weights(&weights, &robust_weight));
-            let estimate = descended(&problem, &priors, x, nearby);
+            let estimate = final_descent(&problem, &priors, x, nearby);
             let (model, frames) = problem.apply(&estimate.x);
             return Extended {
                 causes: filled(causes, &model, &frames),
@@ -258,32 +257,35 @@ pub(super) fn warm_fit(
                 robust_weight,
                 sizes,
                 weights,
-                witnesses,
+                effective_share,
                 sigma,
                 estimate,
                 problem,
             };
         }
         robust_weight = next;
-        sigma = (narrowed(sigma.0, of_lengths, &base, true), narrowed(sigma.1, of_angles, &base, false));
+        sigma = (
+            updated_sigma(sigma.0, of_lengths, &base, true),
+            updated_sigma(sigma.1, of_angles, &base, false),
+        );
     }
 }
 
-/// How a round of a fit went on.
-enum Gone {
-    /// By a step of Gauss and Newton.
+/// The solver steps of one round.
+enum Round {
+    /// One Gauss–Newton step.
     Step(Step),
-    /// By a few of Levenberg and Marquardt, with the covariance there.
+    /// A few Levenberg–Marquardt steps, with the covariance.
     Solved(Option<DMatrix<f64>>),
 }
 
-impl Gone {
-    /// Goes on by one step where the optimum is nearby and that is taken, else by a few.
-    fn one(problem: &CalibrationProblem, x: &mut Vec<f64>, nearby: bool, near: bool) -> Self {
+impl Round {
+    /// Takes one Gauss–Newton step if the optimum is nearby and it descends, else a few Levenberg–Marquardt steps.
+    fn run(problem: &CalibrationProblem, x: &mut Vec<f64>, nearby: bool, near: bool) -> Self {
         if nearby && let Some(step) = Step::take(problem, x) {
             return Self::Step(step);
         }
-        // Weights still change: what is beyond a few steps would be thrown away.
+        // The weights still change, so convergence beyond a few steps would be wasted.
         let steps = if near { 1 } else { 3 };
         let rough = lm::Options { max_iterations: steps, cost_tolerance: 1e-4, ..lm::Options::default() };
         let estimate = lm::solve(problem, x, &rough);
@@ -291,7 +293,7 @@ impl Gone {
         Self::Solved(estimate.covariance)
     }
 
-    /// Degrees of freedom that are used up: each parameter counts by the share that its prior does not determine.
+    /// Effective number of parameters: each counts by the share that its prior does not determine.
     fn spent(&self, priors: &[Prior]) -> f64 {
         let variances = match self {
             Self::Step(step) => step.variances(),
@@ -302,18 +304,18 @@ impl Gone {
     }
 }
 
-/// Residuals over what the sensor and the angles promise.
+/// Residuals divided by the expected standard deviation of sensor and angles.
 struct Whitened<'a> {
     base: &'a [Weight],
     plain: &'a [f64],
     /// Residuals of a row.
     per: usize,
-    /// Which rows are of one pose, where poses were read again.
+    /// The pose of each row, if there are enough repeated readings.
     repeated: Option<&'a RepeatedPoses>,
 }
 
 impl Whitened<'_> {
-    /// A residual of a row; nothing where it is no number.
+    /// A residual of a row; 0 if not finite.
     fn scalar(&self, i: usize, c: usize) -> f64 {
         let w = &self.base[i];
         let value = self.plain[i * self.per + c] * if c < 3 { w.per_mm } else { w.per_rad };
@@ -340,7 +342,7 @@ impl Whitened<'_> {
         (median(&all).unwrap_or(1.0) / median_size(range.len())).clamp(1e-6, 1e6)
     }
 
-    /// How large each row is, lengths and angles over their spreads.
+    /// The size of each row, lengths and angles relative to their spreads.
     fn sizes(&self, [lengths, angles]: [usize; 2], [of_lengths, of_angles]: [f64; 2]) -> Vec<f64> {
         let size = |i: usize| {
             let a = self.size(i, 0..lengths) / of_lengths;
@@ -353,8 +355,8 @@ impl Whitened<'_> {
         (0..self.base.len()).map(size).collect()
     }
 
-    /// What each row deviates by, over what sensor and angles promise, when `spent` parameters are paid for, and how many witnesses
-    /// a row is: readings of one pose are fewer than they are many.
+    /// Standard deviation of each row relative to the expected one, corrected for `spent` effective parameters, and the mean effective
+    /// weight of a row (below 1 for repeated poses).
     fn deviations(&self, range: Range<usize>, robust_weight: &[f64], spent: f64) -> (Vec<f64>, f64) {
         let n = self.base.len();
         if range.is_empty() {
@@ -367,11 +369,11 @@ impl Whitened<'_> {
         let parts = repeated.components(&range, |i, c| self.scalar(i, c), robust_weight, share * spent);
         let whole = parts.deviation().max(1e-6);
         let counts = repeated.effective_weights(&parts);
-        let witnesses = counts.iter().sum::<f64>() / n as f64;
-        (counts.into_iter().map(|counts| whole / counts.sqrt()).collect(), witnesses)
+        let effective_share = counts.iter().sum::<f64>() / n as f64;
+        (counts.into_iter().map(|counts| whole / counts.sqrt()).collect(), effective_share)
     }
 
-    /// The scale under which the weighted squares have their degrees of freedom.
+    /// The scale for which the weighted sum of squares equals its degrees of freedom.
     fn dispersion(&self, range: Range<usize>, robust_weight: &[f64], freedom_share: f64) -> f64 {
         let of_row = |i: usize| {
             let row = self.squares(i, &range);
@@ -383,8 +385,8 @@ impl Whitened<'_> {
     }
 }
 
-/// The end of a fit under weights that stay.
-fn descended(problem: &CalibrationProblem, priors: &[Prior], mut x: Vec<f64>, nearby: bool) -> Estimate {
+/// Final descent with fixed weights.
+fn final_descent(problem: &CalibrationProblem, priors: &[Prior], mut x: Vec<f64>, nearby: bool) -> Estimate {
     if nearby && newton::descend_to(problem, &mut x, SEARCHED) {
         return Estimate {
             covariance: None,
@@ -396,19 +398,19 @@ fn descended(problem: &CalibrationProblem, priors: &[Prior], mut x: Vec<f64>, ne
         };
     }
     if nearby {
-        // A promise is held against the cost, half the rows: the same as above.
+        // Relative to the cost, about half the number of rows: the same tolerance as above.
         let loose = lm::Options { cost_tolerance: 2.0 * SEARCHED, ..lm::Options::default() };
         return Estimate { covariance: None, ..lm::solve(problem, &x, &loose) };
     }
     lm::solve(problem, &x, &lm::Options::default())
 }
 
-/// The sensor's σ after the spread of whole residuals turned out `spread` times what σ and the angles' share promised.
-fn narrowed(sigma: f64, spread: f64, base: &[Weight], lengths: bool) -> f64 {
+/// Updates the sensor's σ if the spread of the residuals is `spread` times the value expected from σ and the angles.
+fn updated_sigma(sigma: f64, spread: f64, base: &[Weight], lengths: bool) -> f64 {
     let of = |w: &Weight| if lengths { w.per_mm } else { w.per_rad };
     let total = median(&base.iter().map(|w| 1.0 / of(w).powi(2)).collect::<Vec<_>>()).unwrap_or(1.0);
     let share = (total - sigma * sigma).max(0.0);
-    let smallest = if lengths { FINEST.0 } else { FINEST.1 };
+    let smallest = if lengths { LEAST_SIGMA.0 } else { LEAST_SIGMA.1 };
     (total * spread * spread - share).max(0.01 * sigma * sigma).sqrt().max(smallest)
 }
 
@@ -420,7 +422,7 @@ fn with_robust_weights(weights: &[Weight], robust_weight: &[f64]) -> Vec<Weight>
         .collect()
 }
 
-/// The causes with the values that the fit gave them.
+/// The causes with their fitted values.
 pub(super) fn filled(causes: &[Cause], model: &Model, frames: &Frames) -> Vec<Cause> {
     let first = model.effects.len() - causes.iter().filter(|c| matches!(c, Cause::Arm(_))).count();
     let (mut effect, mut disturbance) = (first, 0);
@@ -440,7 +442,7 @@ pub(super) fn filled(causes: &[Cause], model: &Model, frames: &Frames) -> Vec<Ca
 }
 
 impl Extended {
-    /// The fit with the solver's last word on it: at the optimum, with a covariance.
+    /// Refines the fit to the optimum, with a covariance.
     pub(super) fn refine(self) -> Self {
         if self.estimate.covariance.is_some() {
             return self;
@@ -455,7 +457,7 @@ impl Extended {
         Self { causes, x: estimate.x.clone(), model, frames, estimate, ..self }
     }
 
-    /// The same fit with all parameters of its causes, those that no row reaches with what their priors say of them.
+    /// The same fit with all parameters of its causes; those that no row reaches have their prior mean and variance.
     pub(super) fn whole(self, subject: &Subject<'_>) -> Self {
         let (model, frames, free) = start(subject, &self.causes, Freedom::All, false);
         let parameters: Vec<Parameter> = free.into_iter().map(|p| p.0).collect();
@@ -480,7 +482,7 @@ impl Extended {
         Self { parameters, priors, problem, x, estimate, ..self }
     }
 
-    /// Places in x of the parameters of cause `index`.
+    /// Indices in x of the parameters of cause `index`.
     pub fn parameter_indices(&self, index: usize) -> Vec<usize> {
         let arm = matches!(self.causes[index], Cause::Arm(_));
         let before = self.causes[..index].iter().filter(|c| matches!(c, Cause::Arm(_)) == arm).count();

@@ -146,7 +146,7 @@ impl FindingBuilder<'_> {
         let mut clear = alternatives.iter().all(beaten);
         // A finding that raises the held-out error is not confirmed, however well it fits the other rows.
         let unconfirmed = before_mm < BETTER * after_mm;
-        if unconfirmed || own.beside_growth.is_some_and(|lambda| lambda < VISIBLE) {
+        if unconfirmed || own.information_beside_growth.is_some_and(|lambda| lambda < VISIBLE) {
             clear = false;
             alternatives.insert(
                 0,

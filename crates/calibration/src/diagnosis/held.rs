@@ -1,11 +1,11 @@
-//! Held-out errors to first order: for every fold its rows are taken off the normal matrix, and what is left is solved anew.
+//! Held-out errors to first order: the rows of each fold are subtracted from the normal matrix, and the rest is solved again.
 //!
 //! With J the whitened Jacobian, N = JᵀJ + Λ and g = Jᵀr + Λx, a fold with rows t leaves N − JₜᵀJₜ and g − Jₜᵀrₜ. A candidate
 //! with columns C and size precisions S borders that by X = L⁻¹(JᵀC − JₜᵀCₜ), L the factor of the fold's normal matrix, so each
-//! candidate costs some products, not another factor. The model without some parameters is the part of N that is left, with
-//! J x of those given back to r.
+//! candidate costs a few products, not another factorisation. A model without some parameters uses the remaining part of N, with
+//! the J x of the dropped ones added back to r.
 //!
-//! Shapes: p parameters, n scalar rows, m of them in a fold, k columns of a candidate. Checked against: fits of every fold.
+//! Shapes: p parameters, n scalar rows, m of them in a fold, k columns of a candidate. Checked against refits of every fold.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -19,9 +19,9 @@ use truegrind_math::work::checkpoint;
 /// One fold.
 #[derive(Debug, Clone)]
 struct Fold {
-    /// Scalar rows that are held out, whole observations: those that are judged, then further ones at the same poses.
+    /// Held-out scalar rows, by whole observations: the test rows, then the purged rows.
     out: Vec<usize>,
-    /// How many are judged.
+    /// Number of test rows among them.
     judged: usize,
     /// Jₜᵀ, p × m.
     rows: DMatrix<f64>,
@@ -29,7 +29,7 @@ struct Fold {
     square: DMatrix<f64>,
 }
 
-/// The folds of a split, against one fit.
+/// Cross-validation of one linearised fit.
 #[derive(Debug, Clone)]
 pub struct FoldErrors<'a> {
     linear: &'a Linear,
@@ -39,7 +39,7 @@ pub struct FoldErrors<'a> {
 /// A fold's normal matrix, factored, and L⁻¹ of its gradient.
 type Factored = Option<(DMatrix<f64>, DVector<f64>)>;
 
-/// The model without some of its parameters, every fold of it solved.
+/// Cross-validation of the model without some of its parameters.
 #[derive(Debug, Clone)]
 pub struct Reduced<'a> {
     held: &'a FoldErrors<'a>,
@@ -48,11 +48,11 @@ pub struct Reduced<'a> {
     solved: Vec<Factored>,
 }
 
-/// Columns of a candidate with the standard deviations of its parameters.
+/// Columns of an added candidate with the prior standard deviations of its parameters.
 pub type Added<'a> = Option<(&'a DMatrix<f64>, &'a [f64])>;
 
 impl<'a> FoldErrors<'a> {
-    /// For the fit `linear`; `splits` in observations.
+    /// Prepares the folds `splits` (in observations) of the fit `linear`.
     pub fn of(linear: &'a Linear, splits: &[Split]) -> Self {
         let per = linear.per;
         let folds = splits
@@ -70,7 +70,7 @@ impl<'a> FoldErrors<'a> {
         Self { linear, folds }
     }
 
-    /// Without the parameters at `dropped`.
+    /// The model without the parameters at `dropped`.
     pub fn without(&'a self, dropped: &[usize]) -> Reduced<'a> {
         let linear = self.linear;
         let kept: Vec<usize> = (0..linear.x.len()).filter(|k| !dropped.contains(k)).collect();
@@ -111,15 +111,15 @@ impl<'a> FoldErrors<'a> {
     }
 }
 
-/// Rows that neither train nor test: further readings at the poses of the test.
+/// Purged rows, which neither train nor test.
 pub(super) fn neither(split: &Split, rows: usize) -> Vec<usize> {
     let mut met = vec![false; rows];
     split.train.iter().chain(&split.test).for_each(|&i| met[i] = true);
     (0..rows).filter(|&i| !met[i]).collect()
 }
 
-fn picked(all: &DVector<f64>, places: &[usize]) -> DVector<f64> {
-    DVector::from_iterator(places.len(), places.iter().map(|&s| all[s]))
+fn picked(all: &DVector<f64>, indices: &[usize]) -> DVector<f64> {
+    DVector::from_iterator(indices.len(), indices.iter().map(|&s| all[s]))
 }
 
 impl Reduced<'_> {
@@ -134,7 +134,7 @@ impl Reduced<'_> {
         ErrorSummary::of(self.errors_mm(added, set_aside)).rmse
     }
 
-    /// Sizes of the held-out position errors (mm), fold by fold, observations at `set_aside` left out.
+    /// Sizes of the held-out position errors (mm), fold by fold, without observations in `set_aside`.
     pub fn errors_mm(&self, added: Added<'_>, set_aside: &[usize]) -> Vec<f64> {
         let (per, mm) = (self.held.linear.per, &self.held.linear.slopes.mm);
         let mut errors = Vec::new();
@@ -150,7 +150,7 @@ impl Reduced<'_> {
         errors
     }
 
-    /// Whitened held-out residuals fold by fold, everything refitted in every fold to first order.
+    /// Whitened held-out residuals, fold by fold, with everything refitted in every fold to first order.
     fn residuals(&self, added: Added<'_>) -> Vec<DVector<f64>> {
         let linear = self.held.linear;
         let whole = added.map(|(columns, _)| {
@@ -192,7 +192,7 @@ impl Reduced<'_> {
             .collect()
     }
 
-    /// X of a candidate in a fold, and the sizes that it gets there.
+    /// X of a candidate in a fold, and its estimate there.
     fn bordered(
         &self,
         fold: &Fold,

@@ -48,8 +48,9 @@ pub fn variances(
     let mut noise2 = (square / nu).max(1e-12);
     let usual = 0.3 * noise2.sqrt();
     // A group that was 0 before can reappear when fewer other parameters are free.
-    let mut sizes: Vec<f64> =
-        (0..groups.len()).map(|g| start.map_or(usual, |s| s[g].max(2.0 * NEGLIGIBLE * noise2.sqrt()))).collect();
+    let mut sizes: Vec<f64> = (0..groups.len())
+        .map(|g| start.map_or(usual, |s| s[g].max(2.0 * NEGLIGIBLE * noise2.sqrt())))
+        .collect();
     let mut coefficients = DVector::zeros(m);
     for _ in 0..ROUNDS {
         let Some(state) = State::of(information, gradient, groups, &sizes, noise2) else { break };
@@ -87,7 +88,6 @@ pub fn variances(
 }
 
 /// Coefficients in units of their prior standard deviations, with their posterior variances.
-
 struct State {
     unit: DVector<f64>,
     /// Posterior variance over prior variance.

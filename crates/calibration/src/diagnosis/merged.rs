@@ -123,7 +123,7 @@ fn excess(
 }
 
 /// For each cause, whether it is certain enough for compensation.
-pub(super) fn certain_causes(findings: &[MergedFinding], confirmations: &[Confirmation]) -> Vec<bool> {
+pub(super) fn certain_flags(findings: &[MergedFinding], confirmations: &[Confirmation]) -> Vec<bool> {
     let mut out: Vec<bool> = confirmations.iter().map(Confirmation::is_confirmed).collect();
     for merged in findings.iter().filter(|s| s.finding.effect != SMALL_DISTURBANCES) {
         if merged.finding.confidence == Confidence::Ambiguous {

@@ -27,7 +27,7 @@ pub(super) struct SearchContext<'a> {
     /// The searched rows: all, or a random subset of very many.
     pub(super) searched: Subject<'a>,
     pub(super) options: &'a Options,
-    pub(super) tell: &'a (dyn Fn(&str) + Sync),
+    pub(super) progress: &'a (dyn Fn(&str) + Sync),
 }
 
 impl SearchContext<'_> {
@@ -76,13 +76,14 @@ pub(super) struct Confirmed {
 impl<'a> Search<'a> {
     /// Searches for at most `most` causes.
     pub(super) fn run(context: &'a SearchContext<'a>, registered: Extended, most: usize) -> Self {
-        let SearchContext { dataset, subject, searched, options, tell, .. } = context;
-        tell("searching for causes");
-        let selection = selection::select(searched, &selection::Options { most, ..options.selection }, tell);
+        let SearchContext { dataset, subject, searched, options, progress, .. } = context;
+        progress("searching for causes");
+        let selection =
+            selection::select(searched, &selection::Options { most, ..options.selection }, progress);
         let Selection { geometric, extended: found, accepted, left, families } = selection;
         let mut notes = Vec::new();
         let (geometric, extended) = if context.is_thinned() {
-            tell("fitting all rows");
+            progress("fitting all rows");
             let rows = &searched.observed.dataset;
             notes.push(format!(
                 "causes were searched in a random {} of the {} rows; the fits and their errors are of all rows",
@@ -99,7 +100,7 @@ impl<'a> Search<'a> {
         };
         let outliers = residual_tests::outliers(&extended);
         let set_aside: Vec<usize> = outliers.iter().map(|(i, _)| *i).collect();
-        tell("cross-validating");
+        progress("cross-validating");
         let validation = Validation::of(subject, &set_aside, options.selection.seed, options.blocks);
         let stages = [&registered, &geometric, &extended].map(|fit| validation.stage(fit));
         Self {
@@ -182,13 +183,13 @@ impl<'a> Search<'a> {
 
     /// For serially correlated readings: purges the cross-validation, and drops shifts that are not confirmed.
     pub(super) fn purge_validation(&mut self, confirmed: &mut Confirmed) {
-        let SearchContext { subject, options, tell, .. } = self.context;
+        let SearchContext { subject, options, progress, .. } = self.context;
         self.correlation_range = confirmed.outcome.discrepancy.correlation_range;
         let reach = self.correlation_range * self.context.stride();
         if reach == 0 {
             return;
         }
-        tell("cross-validating in blocks, since readings are serially correlated");
+        progress("cross-validating in blocks, since readings are serially correlated");
         self.notes.push(format!(
             "readings are correlated over {reach} rows: blocks of rows are held out, and as many rows on either side are excluded from the fit"
         ));
@@ -219,11 +220,11 @@ impl<'a> Search<'a> {
     /// Fits a smooth correction to a structured residual, and keeps it if it lowers the held-out error. Returns the held-out error
     /// without it (mm).
     pub(super) fn fit_smooth_correction(&mut self, structure: &Structure) -> Option<f64> {
-        let SearchContext { subject, options, tell, .. } = self.context;
+        let SearchContext { subject, options, progress, .. } = self.context;
         if !options.smooth || !residual_tests::has_structure(structure) {
             return None;
         }
-        tell("fitting a smooth correction to the residual");
+        progress("fitting a smooth correction to the residual");
         let smooth = smooth_correction(subject, &self.extended);
         let stage = self.validation.stage(&smooth);
         let before = &self.stages[2];

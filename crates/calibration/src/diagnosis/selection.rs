@@ -1,4 +1,4 @@
-//! Which causes go into the model: forward by evidence and held-out error, backward, exchanged, until nothing helps.
+//! Stepwise selection of causes: forward by evidence and held-out error, backward elimination, exchanges, until nothing changes.
 
 use std::cell::OnceCell;
 use std::sync::Arc;
@@ -18,12 +18,12 @@ use super::score::{Score, score};
 use crate::measurement::split::{self, Split};
 use truegrind_arm::effect::Effect;
 
-/// When a cause is accepted.
+/// Criteria of selection.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
-    /// Chance of any false finding on data with nothing hidden.
+    /// Probability of any false finding on data without causes (family-wise error rate).
     pub alpha: f64,
-    /// Most causes that are accepted.
+    /// Most accepted causes.
     pub most: usize,
     /// Seed of the random folds.
     pub seed: u64,
@@ -35,22 +35,22 @@ impl Default for Options {
     }
 }
 
-/// An accepted cause, judged against the model without it.
+/// An accepted cause, scored against the model without it.
 #[derive(Debug, Clone)]
 pub struct Accepted {
     /// Its score there.
     pub own: Score,
-    /// Corrected p-value, its natural logarithm.
+    /// Natural logarithm of its corrected p-value.
     pub log_p: f64,
-    /// Variants of it that were tried.
+    /// Number of variants of it that were tried.
     pub tried: f64,
-    /// Other stories, best first, with their scores there.
+    /// Rivals (other findings), best first, with their scores there.
     pub rivals: Vec<Scored>,
-    /// Non-centrality that is left when all lengths may grow together without a prior; for a sensor's scale.
-    pub beside_growth: Option<f64>,
+    /// For a sensor's scale, the non-centrality if a common growth of all lengths is free without a prior.
+    pub information_beside_growth: Option<f64>,
 }
 
-/// What the selection came to.
+/// Result of the selection.
 #[derive(Debug, Clone)]
 pub struct Selection {
     /// Geometry alone.
@@ -59,20 +59,20 @@ pub struct Selection {
     pub extended: Extended,
     /// One for each cause.
     pub accepted: Vec<Accepted>,
-    /// Every candidate against the extended model, best first: what is left to find, and what could not be seen.
+    /// All candidates scored against the extended model, best first.
     pub left: Vec<Scored>,
-    /// Kinds of candidates that were tried.
+    /// Number of candidate families.
     pub families: f64,
 }
 
-/// A finding may raise the error on held-out blocks by this share at most, where it is not about rows.
+/// Largest factor by which a cause other than a shift can raise the error on held-out blocks.
 const BLOCK_SLACK: f64 = 1.005;
 
 /// Contiguous blocks of the second validation.
 pub const BLOCKS: usize = 10;
 
-/// Selects causes. `tell` hears of every step.
-pub fn select(subject: &Subject<'_>, options: &Options, tell: &(dyn Fn(&str) + Sync)) -> Selection {
+/// Selects causes. `progress` is called at every step.
+pub fn select(subject: &Subject<'_>, options: &Options, progress: &(dyn Fn(&str) + Sync)) -> Selection {
     let dataset = &subject.observed.dataset;
     let catalogue = Catalogue::of(subject);
     let registered = fit(subject, &[], Freedom::Frames, None);
@@ -80,36 +80,35 @@ pub fn select(subject: &Subject<'_>, options: &Options, tell: &(dyn Fn(&str) + S
     let random = split::folds(dataset, 5, options.seed);
     let blocks = split::blocks(dataset, BLOCKS);
     let mut current = Arc::new(geometric.clone());
-    // The board of the current fit, where one was made already.
+    // Scores of the current fit, if already computed.
     let mut known: Option<CandidateScores<'_>> = None;
-    let mut refused: Vec<Cause> = Vec::new();
-    // Causes that were not far ahead of others when they came in, with those: they are looked at again when one of them
-    // comes in too.
-    let mut doubtful: Vec<(Cause, Vec<Cause>)> = Vec::new();
-    let (mut told_again, mut ahead, mut turned_out) = (false, EXCHANGE, Vec::new());
+    let mut banned: Vec<Cause> = Vec::new();
+    // Causes that were accepted with close rivals, and these rivals: reviewed when one of the rivals is accepted too.
+    let mut close_calls: Vec<(Cause, Vec<Cause>)> = Vec::new();
+    let (mut levels_tried, mut margin, mut removed_once) = (false, EXCHANGE_MARGIN, Vec::new());
     for _ in 0..4 * options.most.max(1) {
-        let board =
+        let scores =
             known.take().unwrap_or_else(|| CandidateScores::of(&catalogue, subject, Arc::clone(&current)));
-        let left = board.score_all(&board.whole.design, true);
-        let taken = (current.causes.len() < options.most)
-            .then(|| next(&board, &left, &refused, options, [&random, &blocks]))
+        let left = scores.score_all(&scores.whole.design, true);
+        let best = (current.causes.len() < options.most)
+            .then(|| next_candidate(&scores, &left, &banned, options, [&random, &blocks]))
             .flatten();
-        let Some(taken) = taken else {
+        let Some(best) = best else {
             let all: Vec<usize> = (0..current.causes.len()).collect();
-            match review(&board, options, &all, &How { quick: false, ahead }) {
+            match review(&scores, options, &all, &ReviewOptions { listed_only: false, margin }) {
                 Review::Changed(settled) => {
-                    // A cause that was turned out twice does not come back, and it gets harder to turn one out.
-                    note_gone(&current, &settled, &mut turned_out, &mut refused);
-                    ahead *= HARDER;
+                    // A cause removed twice is banned; the margin of an exchange grows, so the loop ends.
+                    ban_repeated_removals(&current, &settled, &mut removed_once, &mut banned);
+                    margin *= MARGIN_GROWTH;
                     current = Arc::new(*settled);
                     continue;
                 }
                 Review::Settled(accepted) => {
-                    if !told_again && let Some(causes) = levels::piecewise_levels(&current.causes) {
-                        told_again = true;
-                        let told = warm_fit(subject, &causes, Freedom::All, Some(&current));
-                        if levels::is_as_good(&told, &current) {
-                            current = Arc::new(told);
+                    if !levels_tried && let Some(causes) = levels::piecewise_levels(&current.causes) {
+                        levels_tried = true;
+                        let levelled = warm_fit(subject, &causes, Freedom::All, Some(&current));
+                        if levels::is_as_good(&levelled, &current) {
+                            current = Arc::new(levelled);
                             continue;
                         }
                     }
@@ -123,96 +122,116 @@ pub fn select(subject: &Subject<'_>, options: &Options, tell: &(dyn Fn(&str) + S
                 }
             }
         };
-        let cause = taken.candidate.cause.clone();
-        tell(&format!("{}. {}", current.causes.len() + 1, cause.name()));
-        let asked = asked_again(taken, &left, &mut doubtful);
+        let cause = best.candidate.cause.clone();
+        progress(&format!("{}. {}", current.causes.len() + 1, cause.name()));
+        let to_review = causes_to_review(best, &left, &mut close_calls);
         let mut causes = current.causes.clone();
         causes.push(cause.clone());
         let count = current.causes.len();
         current = Arc::new(warm_fit(subject, &causes, Freedom::All, Some(&current)));
         for _ in 0..options.most {
-            let unsure: Vec<usize> =
-                (0..current.causes.len()).filter(|&k| already(&asked, &current.causes[k])).collect();
+            let unsure: Vec<usize> = (0..current.causes.len())
+                .filter(|&k| contains_cause(&to_review, &current.causes[k]))
+                .collect();
             if unsure.is_empty() {
                 break;
             }
-            let board = CandidateScores::of(&catalogue, subject, Arc::clone(&current));
-            match review(&board, options, &unsure, &How { quick: true, ahead: EXCHANGE }) {
+            let scores = CandidateScores::of(&catalogue, subject, Arc::clone(&current));
+            match review(
+                &scores,
+                options,
+                &unsure,
+                &ReviewOptions { listed_only: true, margin: EXCHANGE_MARGIN },
+            ) {
                 Review::Changed(settled) => current = Arc::new(*settled),
                 Review::Settled(_) => {
-                    known = Some(board);
+                    known = Some(scores);
                     break;
                 }
             }
         }
-        if current.causes.len() <= count && !already(&current.causes, &cause) {
-            // The newcomer did not survive beside the others: not to be tried again.
-            refused.push(cause);
+        if current.causes.len() <= count && !contains_cause(&current.causes, &cause) {
+            // The new cause did not survive the review: it is banned.
+            banned.push(cause);
         }
     }
-    as_it_stands(&catalogue, subject, geometric, current)
+    final_selection(&catalogue, subject, geometric, current)
 }
 
-/// Causes that take turns without end: the last state is judged as it stands.
-fn as_it_stands(
+/// The final result if the iteration limit is reached: the current state without further changes.
+fn final_selection(
     catalogue: &Catalogue,
     subject: &Subject<'_>,
     geometric: Extended,
     current: Arc<Extended>,
 ) -> Selection {
-    let board = CandidateScores::of(catalogue, subject, Arc::clone(&current));
-    let left = board.score_all(&board.whole.design, true);
-    let accepted = (0..current.causes.len()).map(|index| looked_at(&board, index, true).0).collect();
-    drop(board);
+    let scores = CandidateScores::of(catalogue, subject, Arc::clone(&current));
+    let left = scores.score_all(&scores.whole.design, true);
+    let accepted = (0..current.causes.len()).map(|index| judge(&scores, index, true).0).collect();
+    drop(scores);
     let families = catalogue.families;
     Selection { geometric, extended: Arc::unwrap_or_clone(current).refine(), accepted, left, families }
 }
 
-/// Notes the causes that a review turned out, in `refused` those that were turned out before.
-fn note_gone(current: &Extended, settled: &Extended, turned_out: &mut Vec<Cause>, refused: &mut Vec<Cause>) {
-    for gone in current.causes.iter().filter(|c| !already(&settled.causes, c)) {
-        let list = if already(turned_out, gone) { &mut *refused } else { &mut *turned_out };
+/// Adds the causes that a review removed to `removed_once`, or to `banned` if they were removed before.
+fn ban_repeated_removals(
+    current: &Extended,
+    settled: &Extended,
+    removed_once: &mut Vec<Cause>,
+    banned: &mut Vec<Cause>,
+) {
+    for gone in current.causes.iter().filter(|c| !contains_cause(&settled.causes, c)) {
+        let list = if contains_cause(removed_once, gone) { &mut *banned } else { &mut *removed_once };
         list.push(gone.clone());
     }
 }
 
-/// Accepted causes that were not far ahead of the one that comes in; where that is not far ahead of others either it is noted with
-/// them.
-fn asked_again(taken: &Scored, left: &[Scored], doubtful: &mut Vec<(Cause, Vec<Cause>)>) -> Vec<Cause> {
-    let cause = &taken.candidate.cause;
+/// Accepted causes for which the new cause was a close rival. If the new cause has close rivals itself, it is added to
+/// `close_calls` with them.
+fn causes_to_review(
+    best: &Scored,
+    left: &[Scored],
+    close_calls: &mut Vec<(Cause, Vec<Cause>)>,
+) -> Vec<Cause> {
+    let cause = &best.candidate.cause;
     let near: Vec<Cause> = left
         .iter()
-        .filter(|s| !s.candidate.cause.is_same_finding(cause) && s.score.merit > taken.score.merit - DOUBT)
+        .filter(|s| {
+            !s.candidate.cause.is_same_finding(cause) && s.score.merit > best.score.merit - DOUBT_MARGIN
+        })
         .map(|s| s.candidate.cause.clone())
         .collect();
-    let asked = doubtful
+    let asked = close_calls
         .iter()
         .filter(|(_, rivals)| rivals.iter().any(|r| r.is_same_finding(cause)))
         .map(|(doubted, _)| doubted.clone())
         .collect();
     if !near.is_empty() {
-        doubtful.push((cause.clone(), near));
+        close_calls.push((cause.clone(), near));
     }
     asked
 }
 
-/// The best candidate that is significant and lowers the error on random folds, and hardly raises that on blocks.
-fn next<'a>(
-    board: &CandidateScores<'_>,
+/// The best candidate that is significant, lowers the error on random folds, and hardly raises that on blocks.
+fn next_candidate<'a>(
+    scores: &CandidateScores<'_>,
     left: &'a [Scored],
-    refused: &[Cause],
+    banned: &[Cause],
     options: &Options,
     splits: [&[Split]; 2],
 ) -> Option<&'a Scored> {
-    let design = &board.whole.design;
+    let design = &scores.whole.design;
     let mut significant = left
         .iter()
         .take_while(|s| s.score.merit > 0.0)
-        .filter(|s| !already(refused, &s.candidate.cause) && !already(&board.fit.causes, &s.candidate.cause))
-        .filter(|s| board.catalogue.is_significant(design, s, options.alpha))
+        .filter(|s| {
+            !contains_cause(banned, &s.candidate.cause)
+                && !contains_cause(&scores.fit.causes, &s.candidate.cause)
+        })
+        .filter(|s| scores.catalogue.is_significant(design, s, options.alpha))
         .peekable();
     significant.peek()?;
-    let held = FoldErrors::of(&board.linear, splits[0]);
+    let held = FoldErrors::of(&scores.linear, splits[0]);
     let random = held.without(&[]);
     let before = random.squares(None);
     let (in_blocks, blocks) = (OnceCell::new(), OnceCell::new());
@@ -223,7 +242,7 @@ fn next<'a>(
         let local = scored.candidate.cause.rows().is_some();
         let on_blocks = || {
             let (blocks, before) = blocks.get_or_init(|| {
-                let blocks = in_blocks.get_or_init(|| FoldErrors::of(&board.linear, splits[1])).without(&[]);
+                let blocks = in_blocks.get_or_init(|| FoldErrors::of(&scores.linear, splits[1])).without(&[]);
                 let before = blocks.squares(None);
                 (blocks, before)
             });
@@ -233,11 +252,11 @@ fn next<'a>(
     })
 }
 
-/// A cause is in doubt beside rivals that have less merit by no more than this.
-const DOUBT: f64 = 30.0;
+/// Difference of merit up to which a rival is close.
+const DOUBT_MARGIN: f64 = 30.0;
 
-/// Whether a cause with the same parameters is in the model.
-pub(super) fn already(causes: &[Cause], candidate: &Cause) -> bool {
+/// Whether `causes` contains one with the same parameters (of any value).
+pub(super) fn contains_cause(causes: &[Cause], candidate: &Cause) -> bool {
     causes.iter().any(|c| match (c, candidate) {
         (Cause::Arm(a), Cause::Arm(b)) => {
             let still = |e: &Effect| {
@@ -252,50 +271,51 @@ pub(super) fn already(causes: &[Cause], candidate: &Cause) -> bool {
     })
 }
 
-/// A cause must be better than another by this much merit to take its place.
-const EXCHANGE: f64 = 2.0;
+/// Merit by which a cause must exceed another to replace it.
+const EXCHANGE_MARGIN: f64 = 2.0;
 
-/// By how much that grows with every change of a whole review.
-const HARDER: f64 = 1.5;
+/// Growth factor of that margin with every change by a full review.
+const MARGIN_GROWTH: f64 = 1.5;
 
-/// How accepted causes are looked at again.
-struct How {
-    /// Causes whose rows or order are listed are compared with their like only.
-    quick: bool,
-    /// Merit by which another cause must be better.
-    ahead: f64,
+/// Options of a review of accepted causes.
+struct ReviewOptions {
+    /// Whether listed causes are compared with listed candidates only.
+    listed_only: bool,
+    /// Merit by which another cause must exceed an accepted one.
+    margin: f64,
 }
 
-/// Causes that are looked at beside each other, before one of them may change the model.
-const BESIDE: usize = 4;
+/// Number of causes that are scored in parallel before the model can change.
+const PARALLEL_REVIEWS: usize = 4;
 
-/// What looking again at accepted causes came to.
+/// Result of a review.
 enum Review {
-    /// One was dropped or exchanged.
+    /// A cause was dropped or exchanged.
     Changed(Box<Extended>),
-    /// All stand.
+    /// All causes remain.
     Settled(Vec<Accepted>),
 }
 
-/// Looks at causes against the model without them: drops one that no longer carries itself, or exchanges one that another
-/// explains better.
-fn review(board: &CandidateScores<'_>, options: &Options, which: &[usize], how: &How) -> Review {
-    let (subject, catalogue, current) = (board.subject, board.catalogue, &*board.fit);
+/// Scores causes against the model without them: drops one that is no longer significant, or exchanges one for a better rival.
+fn review(scores: &CandidateScores<'_>, options: &Options, which: &[usize], how: &ReviewOptions) -> Review {
+    let (subject, catalogue, current) = (scores.subject, scores.catalogue, &*scores.fit);
     let mut accepted = Vec::new();
-    for some in which.chunks(BESIDE) {
+    for some in which.chunks(PARALLEL_REVIEWS) {
         let looked: Vec<_> = some
             .par_iter()
-            .map(|&index| looked_at(board, index, !how.quick || is_open(&current.causes[index])))
+            .map(|&index| judge(scores, index, !how.listed_only || is_searched(&current.causes[index])))
             .collect();
         for (&index, (judged, design, scored)) in some.iter().zip(looked) {
             let mut others = current.causes.clone();
             others.remove(index);
-            let enough = judged.own.merit + how.ahead;
+            let enough = judged.own.merit + how.margin;
             let best = scored.iter().take_while(|s| s.score.merit > enough).find(|s| {
-                !already(&others, &s.candidate.cause) && catalogue.is_significant(&design, s, options.alpha)
+                !contains_cause(&others, &s.candidate.cause)
+                    && catalogue.is_significant(&design, s, options.alpha)
             });
-            let better = best
-                .filter(|best| !already(std::slice::from_ref(&current.causes[index]), &best.candidate.cause));
+            let better = best.filter(|best| {
+                !contains_cause(std::slice::from_ref(&current.causes[index]), &best.candidate.cause)
+            });
             let stands = !current.causes[index].requires_tilt() || Cause::tilt_is_supported(&others);
             let carries = stands && judged.own.merit > 0.0 && judged.log_p <= options.alpha.ln();
             if better.is_some() || !carries {
@@ -311,14 +331,16 @@ fn review(board: &CandidateScores<'_>, options: &Options, which: &[usize], how: 
     Review::Settled(accepted)
 }
 
-/// Whether a cause's rows or order were looked for.
-fn is_open(cause: &Cause) -> bool {
+/// Whether a cause's rows or order were searched, not listed.
+fn is_searched(cause: &Cause) -> bool {
     cause.rows().is_some() || cause.name() == "gear-transmission"
 }
 
-/// The score of a cause itself, from the list where it is there, computed otherwise (its own rows or order).
+/// The score of a cause itself: from the list if it is there, else computed (for searched rows or orders).
 fn own_score(subject: &Subject<'_>, design: &Design, scored: &[Scored], cause: &Cause) -> Scored {
-    if let Some(found) = scored.iter().find(|s| already(std::slice::from_ref(cause), &s.candidate.cause)) {
+    if let Some(found) =
+        scored.iter().find(|s| contains_cause(std::slice::from_ref(cause), &s.candidate.cause))
+    {
         return found.clone();
     }
     let candidate = Candidate::of(cause, subject);
@@ -335,17 +357,17 @@ fn own_score(subject: &Subject<'_>, design: &Design, scored: &[Scored], cause: &
     Scored { candidate, score }
 }
 
-/// A cause against the model without it: the judgement, the design there, and every candidate's score in it.
-fn looked_at(board: &CandidateScores<'_>, index: usize, open: bool) -> (Accepted, Design, Vec<Scored>) {
-    let current = &*board.fit;
+/// Scores a cause against the model without it. Returns the result, the design of that model, and the scores of all candidates in it.
+fn judge(scores: &CandidateScores<'_>, index: usize, open: bool) -> (Accepted, Design, Vec<Scored>) {
+    let current = &*scores.fit;
     let cause = &current.causes[index];
-    let design = board.whole.without(&current.parameter_indices(index));
-    let scored = board.score_all(&design, open);
-    let own = own_score(board.subject, &design, &scored, cause);
+    let design = scores.whole.without(&current.parameter_indices(index));
+    let scored = scores.score_all(&design, open);
+    let own = own_score(scores.subject, &design, &scored, cause);
     let mut rivals: Vec<Scored> = Vec::new();
     for other in &scored {
-        let same =
-            other.candidate.cause.is_same_finding(cause) || already(&current.causes, &other.candidate.cause);
+        let same = other.candidate.cause.is_same_finding(cause)
+            || contains_cause(&current.causes, &other.candidate.cause);
         let told = rivals.iter().any(|r| r.candidate.cause.is_same_finding(&other.candidate.cause));
         if !same && !told && other.score.merit > 0.25 * own.score.merit.max(0.0) {
             rivals.push(other.clone());
@@ -354,15 +376,15 @@ fn looked_at(board: &CandidateScores<'_>, index: usize, open: bool) -> (Accepted
             break;
         }
     }
-    let beside_growth =
-        (cause.name() == "sensor-scale").then(|| scale_beside_growth(&design, &own.score.estimate));
-    let log_p = board.catalogue.corrected_log_p(&design, &own);
+    let information_beside_growth = (cause.name() == "sensor-scale")
+        .then(|| scale_information_beside_growth(&design, &own.score.estimate));
+    let log_p = scores.catalogue.corrected_log_p(&design, &own);
     let tried = own.candidate.tried;
-    (Accepted { own: own.score, log_p, tried, rivals, beside_growth }, design, scored)
+    (Accepted { own: own.score, log_p, tried, rivals, information_beside_growth }, design, scored)
 }
 
-/// Non-centrality of a sensor's scale of that size when all lengths of the arm may grow together freely.
-pub fn scale_beside_growth(design: &Design, estimate: &DVector<f64>) -> f64 {
+/// Non-centrality of a sensor scale error of that size if a common growth of all lengths of the arm is free without a prior.
+pub fn scale_information_beside_growth(design: &Design, estimate: &DVector<f64>) -> f64 {
     let columns = DMatrix::from_columns(&[design.slopes.by_scale.clone(), design.slopes.by_growth.clone()]);
     let s = design.project(&columns).information;
     let own = s[(0, 0)] - s[(0, 1)].powi(2) / s[(1, 1)].max(1e-300);

@@ -67,7 +67,7 @@ pub(super) fn summarise(
         let added = "smooth correction, without a physical cause".to_owned();
         steps.push(Step { added, cv_rmse_mm: stages[2].random.rmse });
     }
-    (context.tell)("analysing the residual");
+    (context.progress)("analysing the residual");
     let noise_floor = noise_floor(&floor, subject, &search.extended);
     let unexplained = Unexplained {
         dataset: &searched.observed.dataset,

@@ -11,7 +11,7 @@ use super::finding::NotTestable;
 use super::findings::pendant;
 use super::preparation::Prepared;
 use super::score::VISIBLE;
-use super::selection::scale_beside_growth;
+use super::selection::scale_information_beside_growth;
 use crate::measurement::dataset::Dataset;
 use truegrind_arm::effect::Effect;
 use truegrind_math::spectral;
@@ -58,7 +58,7 @@ pub(super) fn not_testable(
         );
     }
     if missing("sensor-scale") {
-        let one = scale_beside_growth(whole, &DVector::from_element(1, 1e-3));
+        let one = scale_information_beside_growth(whole, &DVector::from_element(1, 1e-3));
         if one < VISIBLE {
             add(
                 "sensor-scale",

@@ -54,7 +54,6 @@ impl AngleConvention {
     /// `None` when the arm's joint map cannot be inverted.
     pub fn apply(self, mut data: Dataset, model: &Model) -> Option<Dataset> {
         // Iterating mutably would copy shared rows.
-
         if self == AngleConvention::Dh {
             for row in &mut data.rows {
                 row.joints = self.controller_angles(model, &row.joints)?;

@@ -425,7 +425,6 @@ fn squared_lengths(
 
 /// The best fit of several starts. A later one must be better by more than rounding, so that the first and simplest start
 /// decides directions that the data do not determine.
-
 fn best_start<S: Clone>(
     starts: Vec<S>,
     size: usize,

@@ -54,7 +54,6 @@ pub fn columns(sensor: Sensor) -> Vec<Column> {
 }
 
 /// The meaning of each group of columns, with the first and last name of the group.
-
 pub fn meanings(columns: &[Column]) -> Vec<(String, &'static str)> {
     let mut out: Vec<(String, &'static str)> = Vec::new();
     for together in columns.chunk_by(|a, b| a.meaning == b.meaning) {

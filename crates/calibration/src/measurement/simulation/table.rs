@@ -18,7 +18,6 @@ pub(super) struct Logged {
 }
 
 /// Format of a number: rounded to an optional step, with the decimals that the step needs; never a negative zero.
-
 struct Format {
     step: Option<f64>,
     decimals: usize,
