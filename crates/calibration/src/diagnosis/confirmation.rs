@@ -281,7 +281,7 @@ impl ConfirmationContext<'_> {
             discrepancy = Discrepancy::of(
                 functions,
                 self.linear,
-                &self.parameter_indices(&out),
+                &self.parameter_indices(&removed),
                 numbers,
                 Some(&discrepancy),
             );

@@ -60,33 +60,21 @@ pub(super) fn rounding_finding(
             )
         }
     };
+    let cause = format!(
+        "the log rounds joint angles to {:.3}°, which alone moves the target by {:.3} mm RMS",
+        step.to_degrees(),
+        share.sqrt()
+    );
     Some(Finding {
-        effect: "angle-rounding".to_owned(),
-        cause: format!(
-            "the log rounds joint angles to {:.3}°, which alone moves the target by {:.3} mm RMS",
-            step.to_degrees(),
-            share.sqrt()
-        ),
-        confidence: Confidence::Identified,
-        rows: None,
-        row_list: None,
-        joints: None,
-        parameters: vec![FoundParameter {
-            name: "step".to_owned(),
-            value: step.to_degrees(),
-            sigma: None,
-            unit: "°".to_owned(),
-        }],
-        evidence,
-        p_value: 0.0,
-        non_centrality: None,
-        gain,
+        parameters: vec![read_parameter("step", step.to_degrees(), "°")],
         worth_mm: Some(share.sqrt()),
-        doubts: Vec::new(),
-        sessions: Vec::new(),
-        alternatives: Vec::new(),
-        remedy: words::remedy("angle-rounding").to_owned(),
+        ..words::finding("angle-rounding", cause, Confidence::Identified, evidence, gain)
     })
+}
+
+/// A parameter that is read from the data, not estimated.
+fn read_parameter(name: &str, value: f64, unit: &str) -> FoundParameter {
+    FoundParameter { name: name.to_owned(), value, sigma: None, unit: unit.to_owned() }
 }
 
 pub(super) fn mismatch_finding(
@@ -99,35 +87,24 @@ pub(super) fn mismatch_finding(
     if rows.is_empty() {
         return None;
     }
+    let cause = format!(
+        "in {} rows the controller's x, y, z are of another pose than its angles, up to {largest:.2} mm apart",
+        rows.len()
+    );
+    let evidence = format!(
+        "read-out compared with the nominal forward kinematics of the angles: the other rows scatter by {:.4} mm",
+        prepared.mismatch.usual_mm
+    );
     Some(Finding {
-        effect: "readout-mismatch".to_owned(),
-        cause: format!(
-            "in {} rows the controller's x, y, z are of another pose than its angles, up to {largest:.2} mm apart",
-            rows.len()
-        ),
-        confidence: Confidence::Identified,
-        rows: None,
         row_list: Some(rows.iter().map(|(i, _)| dataset.rows[*i].number).collect()),
-        joints: None,
-        parameters: vec![FoundParameter {
-            name: "largest mismatch".to_owned(),
-            value: largest,
-            sigma: None,
-            unit: "mm".to_owned(),
-        }],
-        evidence: format!(
-            "read-out compared with the nominal forward kinematics of the angles: the other rows scatter by {:.4} mm",
-            prepared.mismatch.usual_mm
-        ),
-        p_value: 0.0,
-        non_centrality: None,
-        gain: Gain { cv_rmse_before_mm: after.random.rmse, cv_rmse_after_mm: after.random.rmse },
-        worth_mm: None,
-        doubts: Vec::new(),
-        sessions: Vec::new(),
-        alternatives: Vec::new(),
-        remedy: words::remedy("readout-mismatch").to_owned(),
+        parameters: vec![read_parameter("largest mismatch", largest, "mm")],
+        ..words::finding("readout-mismatch", cause, Confidence::Identified, evidence, no_gain(after))
     })
+}
+
+/// The held-out error of the final model, for findings without a parameter in it.
+fn no_gain(after: &StageError) -> Gain {
+    Gain { cv_rmse_before_mm: after.random.rmse, cv_rmse_after_mm: after.random.rmse }
 }
 
 /// Ratio of the largest outlier to the RMS of an empirical fault above which the outlier is not a residue of that fault.
@@ -137,11 +114,11 @@ const REMAINDER: f64 = 6.0;
 /// like outliers too.
 pub(super) fn outlier_finding(
     dataset: &Dataset,
-    wild: &[(usize, f64)],
+    outliers: &[(usize, f64)],
     (off_mm, empirical_mm): (f64, f64),
     after: &StageError,
 ) -> Option<Finding> {
-    if wild.is_empty() {
+    if outliers.is_empty() {
         return None;
     }
     let remainder = off_mm < REMAINDER * empirical_mm;
@@ -153,30 +130,21 @@ pub(super) fn outlier_finding(
     } else {
         Vec::new()
     };
-    let mut list: Vec<usize> = wild.iter().map(|(i, _)| dataset.rows[*i].number).collect();
+    let mut list: Vec<usize> = outliers.iter().map(|(i, _)| dataset.rows[*i].number).collect();
     list.sort_unstable();
+    let cause = format!(
+        "{} single readings deviate far more than all others, up to {:.0} times their scatter",
+        list.len(),
+        outliers[0].1
+    );
+    let confidence = if remainder { Confidence::Ambiguous } else { Confidence::Identified };
+    let evidence =
+        "residuals so large that the tail of the others yields one in a hundred data sets".to_owned();
     Some(Finding {
-        effect: "outliers".to_owned(),
-        cause: format!(
-            "{} single readings deviate far more than all others, up to {:.0} times their scatter",
-            list.len(),
-            wild[0].1
-        ),
-        confidence: if remainder { Confidence::Ambiguous } else { Confidence::Identified },
-        rows: None,
         row_list: Some(list),
-        joints: None,
-        parameters: Vec::new(),
-        evidence: "residuals so large that the tail of the others yields one in a hundred data sets"
-            .to_owned(),
         p_value: 1e-2,
-        non_centrality: None,
-        gain: Gain { cv_rmse_before_mm: after.random.rmse, cv_rmse_after_mm: after.random.rmse },
-        worth_mm: None,
         doubts,
-        sessions: Vec::new(),
-        alternatives: Vec::new(),
-        remedy: words::remedy("outliers").to_owned(),
+        ..words::finding("outliers", cause, confidence, evidence, no_gain(after))
     })
 }
 

@@ -282,11 +282,7 @@ const SEARCHED: usize = 9_000;
 /// A random subset of the rows of a very long data set, drawn by their angles; `None` if all rows are searched.
 fn thin_rows(observed: &Observations) -> Option<Observations> {
     let dataset = &observed.dataset;
-    let per = match dataset.sensor {
-        Sensor::Cable => 1,
-        Sensor::Position => 3,
-        Sensor::Pose => 6,
-    };
+    let per = dataset.sensor.scalars();
     let most = SEARCHED / per;
     (dataset.rows.len() > most).then(|| {
         // Not every k-th row: one row less would change the choice of all later ones.
@@ -300,11 +296,7 @@ fn thin_rows(observed: &Observations) -> Option<Observations> {
 
 /// The number of poses needed, if there are too few.
 fn poses_needed_at_least(dataset: &Dataset, nominal: &Model) -> Option<usize> {
-    let per = match dataset.sensor {
-        Sensor::Cable => 1,
-        Sensor::Position => 3,
-        Sensor::Pose => 6,
-    };
+    let per = dataset.sensor.scalars();
     let parameters = arm_parameters(nominal).len() + frame_parameters(dataset).len();
     let needed = (3 * parameters).div_ceil(2 * per) + 10;
     (count_distinct_poses(dataset, needed) < needed).then_some(needed)

@@ -190,56 +190,39 @@ fn setup_change(members: &[MergedFinding], worth_mm: f64, steps: bool, smooth: b
         } else {
             Confidence::Ambiguous
         };
+    let cause = if steps {
+        format!("the set-up changed with time: {} shifts, see the table of sessions", sessions.len())
+    } else {
+        "the set-up changed with time; steps and a gradual drift cannot be distinguished".to_owned()
+    };
+    let evidence = members.iter().map(|s| s.finding.evidence.as_str()).collect::<Vec<_>>().join("; ");
     Finding {
-        effect: "setup-change".to_owned(),
-        cause: if steps {
-            format!("the set-up changed with time: {} shifts, see the table of sessions", sessions.len())
-        } else {
-            "the set-up changed with time; steps and a gradual drift cannot be distinguished".to_owned()
-        },
-        confidence,
-        rows: None,
-        row_list: None,
-        joints: None,
-        parameters: Vec::new(),
-        evidence: members.iter().map(|s| s.finding.evidence.as_str()).collect::<Vec<_>>().join("; "),
-        p_value: members.iter().map(|s| s.finding.p_value).fold(1.0, f64::min),
-        non_centrality: None,
-        gain: gain(members),
+        p_value: least_p_value(members),
         worth_mm: Some(worth_mm),
-        doubts: Vec::new(),
         sessions,
-        alternatives: Vec::new(),
-        remedy: words::remedy("setup-change").to_owned(),
+        ..words::finding("setup-change", cause, confidence, evidence, gain(members))
     }
+}
+
+fn least_p_value(members: &[MergedFinding]) -> f64 {
+    members.iter().map(|s| s.finding.p_value).fold(1.0, f64::min)
 }
 
 fn small_disturbances(members: &[MergedFinding], worth_mm: f64, excess_only: bool) -> Finding {
     let doubted = format!(", or less than {:.0} % and is doubtful", 100.0 * DOUBTFUL_SHARE);
+    let cause = format!(
+        "{} small disturbance{}, together {worth_mm:.4} mm: too small to justify inspecting a part",
+        members.len(),
+        if members.len() == 1 { "" } else { "s" }
+    );
+    let evidence = format!(
+        "each contributes less than {:.0} % of the error of geometry alone{}",
+        100.0 * SMALL_SHARE,
+        if excess_only { doubted.as_str() } else { "" }
+    );
     Finding {
-        effect: SMALL_DISTURBANCES.to_owned(),
-        cause: format!(
-            "{} small disturbance{}, together {worth_mm:.4} mm: too small to justify inspecting a part",
-            members.len(),
-            if members.len() == 1 { "" } else { "s" }
-        ),
-        confidence: Confidence::Ambiguous,
-        rows: None,
-        row_list: None,
-        joints: None,
-        parameters: Vec::new(),
-        evidence: format!(
-            "each contributes less than {:.0} % of the error of geometry alone{}",
-            100.0 * SMALL_SHARE,
-            if excess_only { doubted.as_str() } else { "" }
-        ),
-        p_value: members.iter().map(|s| s.finding.p_value).fold(1.0, f64::min),
-        non_centrality: None,
-        gain: gain(members),
+        p_value: least_p_value(members),
         worth_mm: Some(worth_mm),
-        doubts: Vec::new(),
-        sessions: Vec::new(),
-        alternatives: Vec::new(),
-        remedy: words::remedy(SMALL_DISTURBANCES).to_owned(),
+        ..words::finding(SMALL_DISTURBANCES, cause, Confidence::Ambiguous, evidence, gain(members))
     }
 }

@@ -58,11 +58,7 @@ pub fn has_structure(structure: &Structure) -> bool {
 
 /// Residual vectors (whitened, position part) of all rows.
 fn vectors(subject: &Subject<'_>, fit: &Extended) -> Vec<Vector3<f64>> {
-    let per = match subject.observed.dataset.sensor {
-        Sensor::Cable => 1,
-        Sensor::Position => 3,
-        Sensor::Pose => 6,
-    };
+    let per = subject.observed.dataset.sensor.scalars();
     let plain = fit.problem.unweighted_residuals(&fit.x);
     fit.weights
         .iter()

@@ -77,34 +77,24 @@ impl Unexplained<'_> {
             let mut rows: Vec<usize> =
                 order.iter().take(MOST_ROWS).map(|&i| self.dataset.rows[i].number).collect();
             rows.sort_unstable();
+            let follows = if self.smoothed.is_some() {
+                "; a smooth correction without a physical cause follows part of it"
+            } else {
+                ""
+            };
+            let cause = format!(
+                "an error remains that no cause in the catalogue explains: {}{follows}",
+                self.description()
+            );
+            let gain = Gain {
+                cv_rmse_before_mm: self.smoothed.unwrap_or(self.after.random.rmse),
+                cv_rmse_after_mm: self.after.random.rmse,
+            };
             Finding {
-                effect: "unexplained".to_owned(),
-                cause: format!(
-                    "an error remains that no cause in the catalogue explains: {}{}",
-                    self.description(),
-                    if self.smoothed.is_some() {
-                        "; a smooth correction without a physical cause follows part of it"
-                    } else {
-                        ""
-                    }
-                ),
-                confidence: Confidence::Ambiguous,
-                rows: None,
                 row_list: Some(rows),
-                joints: None,
-                parameters: Vec::new(),
-                evidence: self.evidence(),
                 p_value: (-0.5 * self.discrepancy.evidence.max(0.0)).exp().min(1.0),
-                non_centrality: None,
-                gain: Gain {
-                    cv_rmse_before_mm: self.smoothed.unwrap_or(self.after.random.rmse),
-                    cv_rmse_after_mm: self.after.random.rmse,
-                },
                 worth_mm: Some(self.discrepancy.rms_mm()),
-                doubts: Vec::new(),
-                sessions: Vec::new(),
-                alternatives: Vec::new(),
-                remedy: words::remedy("unexplained").to_owned(),
+                ..words::finding("unexplained", cause, Confidence::Ambiguous, self.evidence(), gain)
             }
         })
     }

@@ -2,7 +2,7 @@
 
 use super::cause::Cause;
 use super::extension::Extended;
-use super::finding::FoundParameter;
+use super::finding::{Confidence, Finding, FoundParameter, Gain};
 use crate::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
 use crate::measurement::sensor::empirical::EmpiricalFault;
 use truegrind_arm::effect::Effect;
@@ -63,6 +63,34 @@ fn value_of(parameters: &[FoundParameter], k: usize) -> f64 {
 
 fn norm(parameters: &[FoundParameter]) -> f64 {
     parameters.iter().take(3).map(|p| p.value * p.value).sum::<f64>().sqrt()
+}
+
+/// A finding of `effect` with its usual remedy and without rows, joints, parameters or rivals.
+pub(super) fn finding(
+    effect: &str,
+    cause: String,
+    confidence: Confidence,
+    evidence: String,
+    gain: Gain,
+) -> Finding {
+    Finding {
+        effect: effect.to_owned(),
+        cause,
+        confidence,
+        rows: None,
+        row_list: None,
+        joints: None,
+        parameters: Vec::new(),
+        evidence,
+        p_value: 0.0,
+        non_centrality: None,
+        gain,
+        worth_mm: None,
+        doubts: Vec::new(),
+        sessions: Vec::new(),
+        alternatives: Vec::new(),
+        remedy: remedy(effect).to_owned(),
+    }
 }
 
 /// One sentence that states the part and the size of a cause.

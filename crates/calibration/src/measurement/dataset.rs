@@ -20,6 +20,17 @@ pub enum Sensor {
     Pose,
 }
 
+impl Sensor {
+    /// Number of scalars in a reading.
+    pub fn scalars(self) -> usize {
+        match self {
+            Sensor::Cable => 1,
+            Sensor::Position => 3,
+            Sensor::Pose => 6,
+        }
+    }
+}
+
 /// A measurement file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dataset {
