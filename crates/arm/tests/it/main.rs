@@ -1,4 +1,4 @@
-//! Tests of `kinematics`, and of the mathematics below it.
+//! Tests of the arm: kinematics, effects, files, and the mathematics below them.
 
 // A test that cannot go on panics.
 #![allow(clippy::unwrap_used, clippy::print_stderr)]

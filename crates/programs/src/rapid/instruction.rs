@@ -1,4 +1,4 @@
-//! The motion instructions of RAPID and what their arguments are.
+//! The motion instructions of RAPID and the meaning of their arguments.
 //!
 //! Source: RAPID instructions reference (RobotWare 6) and, for process packages, their application manuals; argument
 //! orders of arc, force control, paint, spot and dispense instructions are confirmed by public programs.
@@ -6,7 +6,7 @@
 use super::token::fold;
 use crate::motion::MotionKind;
 
-/// What a required argument is.
+/// Meaning of a required argument.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Slot {
     /// The end point.
@@ -25,7 +25,7 @@ pub enum Slot {
     Other,
 }
 
-/// What may be put between the start of a motion and its end so that the process goes on.
+/// The instruction for motions inserted before a motion without interrupting its process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Between {
     /// A plain MoveL or MoveJ.
@@ -38,7 +38,7 @@ pub enum Between {
     Nothing,
 }
 
-/// What a motion instruction does besides moving.
+/// Effect of a motion instruction besides moving.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Also {
     /// Nothing.
@@ -51,7 +51,7 @@ pub enum Also {
     Stops,
     /// Ends the soft servo.
     Stiffens,
-    /// Does things at distances from its start or end, or at either: what is put before it would shift them.
+    /// Triggers events at distances from its start or end: an inserted motion would shift them.
     Triggers,
 }
 
@@ -65,13 +65,13 @@ pub struct Instruction {
     /// Required arguments: `T` end, `C` circle point, `J` joint target, `O` output, `S` speed, `Z` zone, `t` tool,
     /// `.` another, `*` any number of others.
     pattern: &'static str,
-    /// What may be put between.
+    /// The instruction for inserted motions.
     pub between: Between,
-    /// The instruction that does the same with a joint target.
+    /// The equivalent instruction with a joint target.
     pub joint_form: Option<&'static str>,
     /// Whether a sensor moves the path.
     pub sensor_guided: bool,
-    /// What it does besides.
+    /// Its effect besides moving.
     pub also: Also,
 }
 
@@ -81,7 +81,7 @@ impl Instruction {
         self.pattern.contains('J')
     }
 
-    /// What the required argument at `index` of `count` is; `None` where the count does not fit.
+    /// Meaning of the required argument at `index` of `count`; `None` where the count does not match.
     pub fn slot(&self, index: usize, count: usize) -> Option<Slot> {
         let pattern = self.pattern.as_bytes();
         let letter = match self.pattern.find('*') {
@@ -110,8 +110,8 @@ impl Instruction {
         })
     }
 
-    /// For a motion on a circle, the one that does the same on a line: the last C of its name is an L, the circle point
-    /// goes, the other arguments stay.
+    /// The linear instruction of a circular one: the last C of its name becomes L, the circle point is dropped, the other
+    /// arguments are kept.
     pub fn line_form(&self) -> Option<&'static Instruction> {
         let rest = self.pattern.strip_prefix('C')?;
         let at = self.name.rfind('C')?;
@@ -129,12 +129,12 @@ impl Instruction {
         self.pattern.contains('O')
     }
 
-    /// Whether it ends elsewhere than at its target: where a signal comes, or where it touches something.
+    /// Whether it may end before its target: on a signal or on contact.
     pub fn ends_early(&self) -> bool {
         self.also == Also::Stops || self.searches()
     }
 
-    /// Whether it does nothing but move: nearly every statement of a long program is such a one.
+    /// Whether it only moves, as nearly every statement of a long program does.
     pub fn only_moves(&self) -> bool {
         matches!(self.also, Also::Nothing | Also::Triggers) && !self.searches()
     }
@@ -290,7 +290,7 @@ pub const INSTRUCTIONS: &[Instruction] = &[
 
 /// The instruction of this name in any case, by its index in [`INSTRUCTIONS`].
 pub fn find(name: &[u8]) -> Option<usize> {
-    // Every name begins with one of these letters; nearly all others are turned away here.
+    // Every name begins with one of these letters, which rejects nearly all others.
     if !matches!(
         name.first().map(|&byte| fold(byte)),
         Some(b'm' | b't' | b's' | b'a' | b'f' | b'p' | b'n' | b'd' | b'l' | b'c' | b'e')

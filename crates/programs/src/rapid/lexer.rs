@@ -1,4 +1,4 @@
-//! Bytes to tokens, on `nom` (RAPID kernel reference, chapter 2).
+//! Lexer: bytes to tokens, with `nom` (RAPID kernel reference, chapter 2).
 //!
 //! Every byte ends up in exactly one token, whatever the file holds. The lexer works on bytes and never transcodes:
 //! controllers write Latin-1, people write UTF-8 and GBK into comments, and none of these can hide a `"`, `!`, `;` or
@@ -18,20 +18,20 @@ use crate::tree::Tree;
 type Bytes<'s> = &'s [u8];
 type Lexed<'s, O = Bytes<'s>> = IResult<Bytes<'s>, O, ()>;
 
-/// The placeholders that the editor leaves for what is not written yet; programs that hold them are legal.
+/// The placeholders of the editor; programs with them are legal.
 const PLACEHOLDERS: [&str; 13] =
     ["TDN", "DDN", "RDN", "PAR", "ALT", "DIM", "SMT", "VAR", "EIT", "CSE", "EXP", "ARG", "ID"];
 
 /// Greatest distance between the two `%%%` of a header (bytes).
 const HEADER_LIMIT: usize = 1024;
 
-/// Files from here on are split into tokens on all threads (bytes).
+/// Larger files are lexed on all threads (bytes).
 const LARGE: usize = 1 << 20;
 
 /// Splits a file into tokens.
 ///
-/// A large file is cut where a line begins with something other than white space: no token but white space and the
-/// header goes over the end of a line, so the parts are the same as of the whole.
+/// A large file is cut where a line begins with something other than white space: only white space and the
+/// header extend over the end of a line, so the tokens are the same as of the whole.
 pub fn lex(source: &[u8]) -> Tree<'_, Token, Syntax> {
     if source.len() >= u32::MAX as usize || is_binary(source) {
         let mut tree = Tree::new(source, 1);
@@ -41,7 +41,7 @@ pub fn lex(source: &[u8]) -> Tree<'_, Token, Syntax> {
     lex_text(source)
 }
 
-/// Splits what is known to be text of a program into tokens.
+/// Splits the text of a program into tokens.
 pub(super) fn lex_text(source: &[u8]) -> Tree<'_, Token, Syntax> {
     let mut tree = Tree::new(source, source.len() / 2);
     let cuts = cuts(source);
@@ -116,7 +116,7 @@ fn tokens(source: &[u8], range: std::ops::Range<usize>, tree: &mut Tree<'_, Toke
     }
 }
 
-/// White space; notes the beginnings of lines.
+/// White space; records the beginnings of lines.
 #[inline]
 fn space<'s>(input: Bytes<'s>, at: usize, tree: &mut Tree<'_, Token, Syntax>) -> Bytes<'s> {
     let mut index = 0;
@@ -215,8 +215,8 @@ pub fn number(input: Bytes<'_>) -> Lexed<'_> {
     take(end).parse(input)
 }
 
-/// Where the digits from `at` end. Eight bytes at a time: the lengths of numbers cannot be foreseen, and each loop over single
-/// digits would end with a branch that was guessed wrongly.
+/// Where the digits from `at` end. Eight bytes at a time: the lengths of numbers are unpredictable, and a loop over single digits
+/// would end with a mispredicted branch.
 #[inline]
 fn digits(input: Bytes<'_>, mut at: usize) -> usize {
     while let Some(eight) = input.get(at..).and_then(<[u8]>::first_chunk::<8>) {

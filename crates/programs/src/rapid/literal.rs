@@ -1,8 +1,8 @@
-//! Literal aggregates of plain numbers, read straight from bytes on `nom`: the fast way to the value of a robtarget or
-//! jointtarget and to the place of each of its numbers.
+//! Literal aggregates of plain numbers, parsed directly from bytes with `nom`: the fast path to the value of a robtarget or
+//! jointtarget and to the byte range of each number.
 //!
-//! Signs, white space and comments may stand anywhere between; anything else (a name, arithmetic) makes the answer
-//! `None`, and the evaluator takes the general way.
+//! Signs, white space and comments may stand anywhere between; anything else (a name, arithmetic) gives `None`,
+//! and the evaluator is used.
 
 use nom::IResult;
 
@@ -14,7 +14,7 @@ pub const ROBTARGET: &[usize] = &[3, 4, 4, 6];
 /// The groups of a jointtarget: robax, extax.
 pub const JOINTTARGET: &[usize] = &[6, 6];
 
-/// The numbers of a literal: their values, and where each stands relative to the literal's first byte, sign included.
+/// The numbers of a literal: their values, and their byte ranges relative to the literal's first byte, sign included.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Numbers {
     /// Values in order.
@@ -32,8 +32,8 @@ pub fn numbers(text: &[u8], shape: &[usize]) -> Option<Numbers> {
     Some(found)
 }
 
-/// Where the first numbers of a literal stand whose values are known: [`numbers`] without reading them again. `shape` are
-/// the groups that they fill.
+/// The byte ranges of numbers whose values are known: [`numbers`] without parsing them again. `shape`: the groups that they
+/// fill.
 pub fn places(text: &[u8], shape: &[usize], values: &[f64]) -> Option<Numbers> {
     let passed = |number| {
         let rest = unsigned(number).0;
@@ -114,7 +114,7 @@ fn signed(input: &[u8]) -> Rest<'_, f64> {
     Ok((rest, if negative { -value } else { value }))
 }
 
-/// What stands behind a sign, and whether that is a minus.
+/// The text behind a sign, and whether the sign is a minus.
 #[inline]
 fn unsigned(input: &[u8]) -> (&[u8], bool) {
     match input {

@@ -1,9 +1,8 @@
-//! Tokens to tree: the grammar of RAPID (kernel reference, chapter 10), tolerant.
+//! Parser: tokens to a tree by the grammar of RAPID (kernel reference, chapter 10), with error recovery.
 //!
-//! Blocks stand on an explicit stack, so that nesting costs no machine stack; expressions recurse to a stated depth.
-//! What cannot be read becomes one `Opaque` node that ends at the next `;`, block keyword or, where only a `;` is
-//! missing, line; reading then goes on. Chains of one operator are one flat node. Of a large file the statements of later
-//! parts are read ahead, on other threads.
+//! Blocks are on an explicit stack, so that nesting uses no machine stack; expressions recurse to a stated depth. Unreadable
+//! text becomes one `Opaque` node that ends at the next `;`, block keyword or, where only a `;` is missing, line; parsing then
+//! continues. Chains of one operator are one flat node. The later parts of a large file are parsed ahead on other threads.
 
 mod statement;
 
@@ -16,22 +15,22 @@ use super::syntax::Syntax;
 use super::token::Token;
 use crate::tree::Tree;
 
-/// A part of a file that is worth a thread of its own (tokens).
+/// Size of the parts of a file that are parsed in parallel (tokens).
 const PART: usize = 1 << 18;
 
-/// Reads one file. Never fails; see [`Tree::opaque`] for what could not be read.
+/// Parses one file. Never fails; [`Tree::opaque`] lists the unreadable parts.
 pub fn parse(source: &[u8]) -> Tree<'_, Token, Syntax> {
     let tree = lex(source);
     let parts = (tree.len() / PART).min(rayon::current_num_threads());
     nodes_of(tree, parts)
 }
 
-/// The same with a stated number of parts that are read side by side: the tree does not depend on it.
+/// The same with a stated number of parallel parts; the tree does not depend on it.
 pub fn parse_in_parts(source: &[u8], parts: usize) -> Tree<'_, Token, Syntax> {
     nodes_of(lex(source), parts)
 }
 
-/// Reads one statement of a file that was read.
+/// Parses one statement of a file.
 pub(super) fn parse_statement(statement: &[u8]) -> Tree<'_, Token, Syntax> {
     nodes_of(lex_text(statement), 0)
 }

@@ -1,7 +1,6 @@
-//! The predefined instructions and functions that are no motions, and what they do; `predefined.txt` lists them with the source.
+//! Side effects of the predefined instructions and functions other than motions; `predefined.txt` lists them with the source.
 //!
-//! Whatever is not there and is declared in none of the given files may change what it is given and everything that it
-//! sees.
+//! Anything else that no file declares may write its arguments and all visible data.
 
 use std::sync::LazyLock;
 
@@ -13,17 +12,17 @@ use crate::motion::Reason;
 pub struct Predefined {
     /// In lower case.
     pub name: &'static str,
-    /// What it does with its arguments.
+    /// Its effect on its arguments.
     pub effect: Effect,
-    /// Whether it computes and does no more.
+    /// Whether it is pure: it only computes.
     pub answers: bool,
     /// Whether it waits, for another task, an operator or a device.
     pub waits: bool,
-    /// Whether the robot stands somewhere else after it, and why it is left where it is a motion of its own.
+    /// Whether it moves the robot, and the reason to refuse it where it is a motion itself.
     pub displaces: Option<Option<Reason>>,
 }
 
-/// What a predefined instruction or function does with its arguments.
+/// Effect of a predefined instruction or function on its arguments.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Effect {
     /// Reads them.
@@ -39,7 +38,7 @@ pub struct Written {
     pub required: Vec<usize>,
     /// The optional ones, in lower case.
     pub optional: Vec<&'static str>,
-    /// Whether it keeps them and writes at any time after: sensors, cyclic conditions.
+    /// Whether it keeps a reference and writes at any later time: sensors, cyclic conditions.
     pub later: bool,
 }
 
@@ -94,7 +93,7 @@ fn listed(name: &[u8]) -> Option<&'static Predefined> {
     LISTED.get(found)
 }
 
-/// What the predefined instruction or function of this name, in any case, does; `None` where there is none.
+/// Effect of the predefined instruction or function of this name, in any case; `None` where there is none.
 pub fn effect(name: &[u8]) -> Option<&'static Effect> {
     listed(name).map(|found| &found.effect)
 }
@@ -104,8 +103,8 @@ pub fn only_reads(name: &[u8]) -> bool {
     effect(name) == Some(&Effect::Reads)
 }
 
-/// Whether it is a function that computes and does no more: asked once, twice or never, nothing else is changed.
-pub fn only_answers(name: &[u8]) -> bool {
+/// Whether it is a pure function: it may be evaluated any number of times.
+pub fn is_pure(name: &[u8]) -> bool {
     listed(name).is_some_and(|found| found.answers)
 }
 
@@ -114,30 +113,28 @@ pub fn calls_by_name(name: &[u8]) -> bool {
     name.eq_ignore_ascii_case(b"CallByVar")
 }
 
-/// Whether it goes back to the statements from an error handler, as RETRY does.
+/// Whether it resumes from an error handler, as RETRY does.
 pub fn retries(name: &[u8]) -> bool {
     name.eq_ignore_ascii_case(b"StartMoveRetry")
 }
 
-/// Whether it waits: for something that another task may bring about, with data that tasks share, for an operator, who may
-/// change them, or for a device.
+/// Whether it waits for another task, an operator or a device: shared data may change meanwhile.
 pub fn waits(name: &[u8]) -> bool {
     listed(name).is_some_and(|found| found.waits)
 }
 
-/// Whether it tells what the gripper holds.
+/// Whether it states the gripped load.
 pub fn grips(name: &[u8]) -> bool {
     name.eq_ignore_ascii_case(b"GripLoad")
 }
 
-/// Whether it begins the next cycle at main with everything set as it is.
+/// Whether it restarts main without resetting anything (ExitCycle).
 pub fn begins_cycle(name: &[u8]) -> bool {
     name.eq_ignore_ascii_case(b"ExitCycle")
 }
 
-/// Whether the robot stands somewhere else after it, as far as the text tells; `Some(Some(reason))` where it is a
-/// motion of its own, left for that reason: it moves the robot without a target in the text, lets something else move it, or drops
-/// or changes the path that is under way.
+/// Whether it may change the position of the robot; `Some(Some(reason))` where it is a motion itself, refused for that reason: it
+/// moves the robot without a target in the text, lets something else move it, or drops or changes the current path.
 pub fn displaces(name: &[u8]) -> Option<Option<Reason>> {
     listed(name)?.displaces
 }

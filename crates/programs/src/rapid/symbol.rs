@@ -127,7 +127,7 @@ pub struct RoutineScope {
     pub unit: u32,
 }
 
-/// Statements that run together: a routine, or the statements of a fragment outside routines.
+/// Unit of analysis: a routine, or the statements of a fragment outside routines.
 #[derive(Debug, Clone, Copy)]
 pub struct Unit {
     /// Its file.
@@ -140,16 +140,16 @@ pub struct Unit {
     pub routine: Option<u32>,
 }
 
-/// All names of a task.
+/// The symbol table of a task.
 #[derive(Debug, Default)]
 pub struct Symbols {
-    /// The names.
+    /// The symbols.
     pub symbols: Vec<Symbol>,
     /// The scopes; 0 is the task.
     pub scopes: Vec<Scope>,
     /// The routines.
     pub routines: Vec<RoutineScope>,
-    /// Everything that runs, in the order of files and lines.
+    /// All units, in the order of files and lines.
     pub units: Vec<Unit>,
     /// Whether a routine has the name of a motion instruction.
     pub hides_instruction: bool,
@@ -196,7 +196,7 @@ impl Symbols {
         symbols
     }
 
-    /// The symbol that a name stands for in a scope.
+    /// Resolves a name in a scope.
     pub fn find(&self, scope: u32, name: &[u8]) -> Option<u32> {
         let mut buffer = [0_u8; 64];
         let long;

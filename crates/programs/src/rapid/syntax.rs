@@ -1,6 +1,6 @@
 //! The kinds of RAPID node, and typed views of them.
 //!
-//! A view is a node index with a name; it reads the tree when asked and holds nothing. An expression of one token has
+//! A view is a typed node index; it stores no content. An expression of one token has
 //! no node: [`Child`] says which it is.
 
 use super::token::Token;
@@ -81,7 +81,7 @@ pub enum Syntax {
     Connect,
     /// A placeholder where a statement or declaration should be.
     Unwritten,
-    /// What could not be read.
+    /// Unreadable text.
     Opaque,
     /// A required argument by position.
     Argument,
@@ -139,7 +139,7 @@ impl Syntax {
         )
     }
 
-    /// Whether it may change data by itself.
+    /// Whether it may write data itself.
     pub(super) fn may_change(self) -> bool {
         matches!(
             self,

@@ -2,7 +2,7 @@
 
 macro_rules! tokens {
     (plain { $($plain:ident,)* } keywords { $($keyword:ident = $text:literal,)* }) => {
-        /// A kind of token. White space, comments and headers come first, so that one comparison tells them.
+        /// A kind of token. White space, comments and headers come first, so that one comparison identifies them.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
         #[repr(u8)]
         #[allow(missing_docs)]

@@ -1,11 +1,11 @@
-//! Values of RAPID expressions as far as the text tells them, and the shapes of the predefined types.
+//! Abstract values of RAPID expressions, and the components of the predefined types.
 
 use crate::motion::{
     FARTHEST_MM, Frame, JointTarget, Reason, RobTarget, SpeedValue, TargetValue, ToolValue, WorkObjectValue,
     ZoneValue,
 };
 
-/// A value, whole or in part.
+/// A value, known completely or in part.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Value {
@@ -17,14 +17,14 @@ pub enum Value {
     Text(Vec<u8>),
     /// Records and arrays: components in order.
     List(Vec<Value>),
-    /// Not known from the text.
+    /// Unknown, with the reason.
     Unknown(Reason),
 }
 
 /// The largest number of a controller: num is of single precision.
 pub const LARGEST: f64 = f32::MAX as f64;
 
-/// Whether a controller can hold these numbers.
+/// Whether a controller can represent these numbers.
 pub fn held(numbers: &[f64]) -> Result<(), Reason> {
     if numbers.iter().all(|number| number.abs() <= LARGEST) { Ok(()) } else { Err(Reason::NumberRange) }
 }
@@ -77,7 +77,7 @@ impl Value {
         }
     }
 
-    /// So many numbers.
+    /// A list of N numbers.
     pub fn numbers<const N: usize>(&self) -> Result<[f64; N], Reason> {
         let mut out = [0.0; N];
         for (out, value) in out.iter_mut().zip(self.list(N)?) {
@@ -177,7 +177,7 @@ pub fn usable(quaternion: &[f64; 4]) -> Result<(), Reason> {
     if (square - 1.0).abs() <= 0.1 { Ok(()) } else { Err(Reason::BadQuaternion) }
 }
 
-/// Whether numbers (mm, °, kg) are such as an arm can hold.
+/// Whether numbers (mm, °, kg) are plausible for an arm.
 pub fn within_reach(numbers: &[f64]) -> Result<(), Reason> {
     if numbers.iter().all(|number| number.abs() <= FARTHEST_MM) { Ok(()) } else { Err(Reason::BeyondReach) }
 }

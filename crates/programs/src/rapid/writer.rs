@@ -1,7 +1,7 @@
-//! A fresh module from a draft.
+//! Writer: a new module from a draft.
 //!
 //! Written as a programmer would: tool and work object as PERS, targets as CONST p10, p20, … or in the instructions,
-//! speeds and zones of the controller where they exist and CONST of their own where not, one PROC main.
+//! predefined speeds and zones where they exist, else CONST, one PROC main.
 
 use std::collections::BTreeMap;
 
@@ -27,14 +27,14 @@ pub enum WriteError {
         /// The name.
         name: String,
     },
-    /// A step that does not hold what its kind needs.
+    /// A step without the data of its kind.
     #[error("step {step}: a {kind:?} motion does not take this target: expected {expected}")]
     Step {
         /// The index of the step.
         step: usize,
         /// Its kind.
         kind: MotionKind,
-        /// What it needs.
+        /// What it requires.
         expected: &'static str,
     },
     /// A number that is not finite.
@@ -87,7 +87,7 @@ pub enum WriteError {
 ///     monitor_configuration: true,
 ///     steps: vec![step],
 /// };
-/// // What is written reads back as what was meant.
+/// // The module reads back with the same target.
 /// let module = writer::write(&draft)?;
 /// let listing = Task::read(&[("blade.mod", &module[..])]).listing;
 /// assert_eq!(listing.motions[0].targets[0].value, Ok(TargetValue::Cartesian(to)));

@@ -39,7 +39,7 @@ impl Symbols {
             Syntax::Call => self.callees(scope, tree.text(found.first)).is_empty(),
             Syntax::Function => {
                 let name = tree.text(found.first);
-                self.callees(scope, name).is_empty() && !predefined::only_answers(name)
+                self.callees(scope, name).is_empty() && !predefined::is_pure(name)
             }
             _ => false,
         }

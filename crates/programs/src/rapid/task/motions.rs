@@ -267,7 +267,7 @@ impl ListingBuilder<'_, '_> {
         let mut functions = nodes.filter(|&node| tree.nodes[node as usize].kind == Syntax::Function);
         functions.any(|function| {
             let name = tree.text(tree.nodes[function as usize].first);
-            self.symbols.routine(unit.scope, name).is_some() || !predefined::only_answers(name)
+            self.symbols.routine(unit.scope, name).is_some() || !predefined::is_pure(name)
         })
     }
 
