@@ -1,8 +1,10 @@
-//! The statements of a file: blocks on a stack, broken ones passed over to where the next begins.
+//! Statements: open blocks on a stack; after a broken statement the parser skips to the beginning of the next.
 
 pub(super) mod ahead;
+mod control_flow;
 mod declaration;
 mod expression;
+mod keywords;
 
 use crate::motion::OpaqueReason;
 use crate::rapid::syntax::Syntax;
@@ -422,124 +424,6 @@ impl<'t, 's> Parser<'t, 's> {
         Ok(())
     }
 
-    /// The nearest open block of a kind in the current routine.
-    fn nearest(&self, wanted: Syntax) -> Option<usize> {
-        let blocks = self.blocks.iter().enumerate().rev();
-        blocks
-            .take_while(|(_, block)| block.kind.is_statement_block())
-            .find(|(_, block)| block.kind == wanted)
-            .map(|(index, _)| index)
-    }
-
-    fn condition(&mut self) -> Parsed {
-        self.open_block(Syntax::If);
-        let (block, header) = (self.blocks.len() - 1, (self.nodes.len(), self.at));
-        self.bump();
-        match self.expression() {
-            Ok(()) if self.eat(Token::Then) => self.open_block(Syntax::Branch),
-            Ok(()) => {
-                // No THEN: the compact form guards one statement.
-                let node = self.blocks[block].node;
-                self.nodes[node].kind = Syntax::CompactIf;
-                self.blocks[block].kind = Syntax::CompactIf;
-                if self.peek().ends_block() || self.peek() == Token::End {
-                    self.close_block();
-                    return Err(Fail(OpaqueReason::Unexpected));
-                }
-            }
-            failed => {
-                self.header_done(header, failed);
-                self.open_block(Syntax::Branch);
-            }
-        }
-        Ok(())
-    }
-
-    fn branch(&mut self) -> Parsed {
-        let Some(index) = self.nearest(Syntax::If) else {
-            return Err(Fail(OpaqueReason::StrayEnd));
-        };
-        self.close_above(index);
-        self.open_block(Syntax::Branch);
-        let header = (self.nodes.len(), self.at);
-        if self.eat(Token::ElseIf) {
-            let result = self.expression().and_then(|()| self.expect(Token::Then, OpaqueReason::Unexpected));
-            self.header_done(header, result);
-        } else {
-            self.bump();
-        }
-        Ok(())
-    }
-
-    fn for_loop(&mut self) -> Parsed {
-        self.open_block(Syntax::For);
-        let header = (self.nodes.len(), self.at);
-        self.bump();
-        let result = self.for_header();
-        self.header_done(header, result);
-        self.open_block(Syntax::Body);
-        Ok(())
-    }
-
-    fn for_header(&mut self) -> Parsed {
-        self.name()?;
-        self.expect(Token::From, OpaqueReason::Unexpected)?;
-        self.expression()?;
-        self.expect(Token::To, OpaqueReason::Unexpected)?;
-        self.expression()?;
-        if self.eat(Token::Step) {
-            self.expression()?;
-        }
-        self.expect(Token::Do, OpaqueReason::Unexpected)
-    }
-
-    fn while_loop(&mut self) -> Parsed {
-        self.open_block(Syntax::While);
-        let header = (self.nodes.len(), self.at);
-        self.bump();
-        let result = self.expression().and_then(|()| self.expect(Token::Do, OpaqueReason::Unexpected));
-        self.header_done(header, result);
-        self.open_block(Syntax::Body);
-        Ok(())
-    }
-
-    fn test(&mut self) -> Parsed {
-        self.open_block(Syntax::Test);
-        let header = (self.nodes.len(), self.at);
-        self.bump();
-        let result = self.expression();
-        self.header_done(header, result);
-        if self.peek() == Token::Placeholder {
-            self.bump();
-        }
-        Ok(())
-    }
-
-    fn case(&mut self) -> Parsed {
-        let Some(index) = self.nearest(Syntax::Test) else {
-            return Err(Fail(OpaqueReason::StrayEnd));
-        };
-        self.close_above(index);
-        self.open_block(Syntax::Case);
-        let header = (self.nodes.len(), self.at);
-        let result = if self.eat(Token::Case) { self.case_header() } else { self.default_header() };
-        self.header_done(header, result);
-        Ok(())
-    }
-
-    fn case_header(&mut self) -> Parsed {
-        self.expression()?;
-        while self.eat(Token::Comma) {
-            self.expression()?;
-        }
-        self.expect(Token::Colon, OpaqueReason::Unexpected)
-    }
-
-    fn default_header(&mut self) -> Parsed {
-        self.bump();
-        self.expect(Token::Colon, OpaqueReason::Unexpected)
-    }
-
     // ---- simple statements ----
 
     fn statement(&mut self) -> Parsed {
@@ -623,67 +507,5 @@ impl<'t, 's> Parser<'t, 's> {
         self.expect(Token::Assign, OpaqueReason::Unexpected)?;
         self.expression()?;
         Ok(Syntax::Assignment)
-    }
-}
-
-impl Token {
-    /// Keywords that close or continue a block.
-    fn ends_block(self) -> bool {
-        matches!(
-            self,
-            Token::EndModule
-                | Token::EndProc
-                | Token::EndFunc
-                | Token::EndTrap
-                | Token::EndRecord
-                | Token::EndIf
-                | Token::EndFor
-                | Token::EndWhile
-                | Token::EndTest
-                | Token::Else
-                | Token::ElseIf
-                | Token::Case
-                | Token::Default
-                | Token::Error
-                | Token::Undo
-                | Token::Backward
-        )
-    }
-
-    /// Keywords with which something new certainly begins, where reading can start again.
-    fn begins_statement(self) -> bool {
-        self.ends_block()
-            || self.begins_with_keyword()
-            || matches!(
-                self,
-                Token::Module
-                    | Token::Proc
-                    | Token::Func
-                    | Token::Trap
-                    | Token::Local
-                    | Token::Const
-                    | Token::Pers
-                    | Token::Var
-                    | Token::Record
-                    | Token::Alias
-            )
-    }
-
-    /// Whether a statement begins with it that its keyword tells.
-    fn begins_with_keyword(self) -> bool {
-        matches!(
-            self,
-            Token::If
-                | Token::For
-                | Token::While
-                | Token::Test
-                | Token::Goto
-                | Token::Return
-                | Token::Raise
-                | Token::Exit
-                | Token::Retry
-                | Token::TryNext
-                | Token::Connect
-        )
     }
 }
