@@ -125,7 +125,7 @@ mod arm {
     use truegrind::calibration::identification::fit::{Start, fit, frame_parameters};
     use truegrind::calibration::identification::identify::{Options, identify, prepare_observations};
     use truegrind::calibration::identification::solver::SOLVERS;
-    use truegrind::calibration::identification::start::starts;
+    use truegrind::calibration::identification::start::candidate_frames;
     use truegrind::calibration::identification::tolerance::Tolerance;
     use truegrind::calibration::measurement::dataset::Dataset;
     use truegrind::calibration::measurement::{import, split};
@@ -142,7 +142,7 @@ mod arm {
         let (dataset, simulation, _) = simulated::measure(&experiment, nominal).expect("ships");
         let dataset = dataset.subset(&(0..rows).collect::<Vec<_>>());
         let model = simulation.nominal;
-        let frames = starts(&dataset, &model).expect("placed").remove(0);
+        let frames = candidate_frames(&dataset, &model).expect("placed").remove(0);
         let (observed, _) = prepare_observations(&dataset, &model, false);
         let start = Start { model: &model, frames: &frames };
         let sensing = frame_parameters(&dataset);
@@ -165,7 +165,7 @@ mod arm {
         };
         let dataset = import::read("rows.csv", csv.as_bytes(), &import::Options::default()).expect("read");
         let model = nominal(robot).expect("in the catalogue");
-        let frames = starts(&dataset, &model).expect("placed").remove(0);
+        let frames = candidate_frames(&dataset, &model).expect("placed").remove(0);
         let options = Options {
             tolerance: Tolerance::default(),
             solver: &SOLVERS[0],

@@ -25,7 +25,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use truegrind::arm::inverse::Inverse;
-use truegrind::calibration::identification::start::starts;
+use truegrind::calibration::identification::start::candidate_frames;
 use truegrind::calibration::measurement::import;
 use truegrind::compensation::risk::placement::Placement;
 use truegrind::compensation::verify::{ActingArm, VerificationTask, verify};
@@ -116,7 +116,7 @@ impl Case {
 fn model_of(case: &Case, simulation: &Simulation) -> Option<Estimated> {
     let rows = import::read("case.csv", simulation.csv.as_bytes(), &import::Options::default()).unwrap();
     let nominal = &simulation.nominal;
-    let frames = starts(&rows, nominal).ok()?;
+    let frames = candidate_frames(&rows, nominal).ok()?;
     if case.causes {
         let frames = frames.first()?;
         let found = diagnose(&rows, case.robot, nominal, frames, &DiagnoseOptions::default(), &|_| {});

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::cause::{Cause, MAP_KNOTS};
 use super::design::Design;
 use super::extension::Subject;
-use crate::identification::calibration::{Frames, rotations, shifts};
+use crate::identification::calibration::{Frames, joint_rotations, sensor_shifts};
 use crate::measurement::dataset::{Dataset, Reading, Sensor};
 use crate::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
 use crate::measurement::sensor::empirical::EmpiricalFault;
@@ -140,11 +140,11 @@ impl Candidate {
             Kind::Target => (0..3).map(|k| push(Coordinate::Target(k))).collect(),
             Kind::Scale => vec![push(Coordinate::Scale)],
             Kind::Sag => vec![push(Coordinate::Sag)],
-            Kind::Empirical(form) if !form.rotates_joints() => shifts(*form, dataset, nominal, frames)
+            Kind::Empirical(form) if !form.rotates_joints() => sensor_shifts(*form, dataset, nominal, frames)
                 .into_iter()
                 .map(|v| Regressor::Shift(std::array::from_fn(|k| v.iter().map(|v| v[k]).collect())))
                 .collect(),
-            kind => rotations(kind, dataset, nominal)
+            kind => joint_rotations(kind, dataset, nominal)
                 .into_iter()
                 .map(|rotation| Regressor::Arm {
                     rotation: rotation

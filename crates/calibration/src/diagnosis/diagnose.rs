@@ -21,7 +21,7 @@ use crate::identification::benefit::{Benefit, benefit};
 use crate::identification::calibration::Frames;
 use crate::identification::fit::{Fitted, Observations, frame_parameters};
 use crate::identification::identify::{
-    arm_covariance, arm_of, mean_condition, parameter_table, sensor_name, with_sigma_in_region,
+    arm_covariance, arm_parameters_of, mean_condition, parameter_table, sensor_name, with_sigma_in_region,
 };
 use crate::identification::start::count_distinct_poses;
 use crate::identification::tolerance::Tolerance;
@@ -323,7 +323,7 @@ fn estimated(
 ) -> (Estimated, Option<Benefit>) {
     let SearchContext { dataset, prepared, subject, options, .. } = context;
     let nominal_arm = subject.nominal;
-    let order = arm_of(handed);
+    let order = arm_parameters_of(handed);
     let estimated = Estimated {
         robot: robot.to_owned(),
         nominal: nominal_arm.clone(),

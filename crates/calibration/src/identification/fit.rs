@@ -1,18 +1,16 @@
-//! The fit: frames, outliers, weights, geometry, held-out error, and the verdict.
+//! Weighted fit with an estimated noise variance, and outlier detection.
 //!
-//! Stages, each stated on the rows it was fitted to and on rows it never saw:
+//! Stages, each with its error on the fitted rows and on held-out rows:
 //!
-//! 1. *raw*: the nominal arm with a sensor frame that the user stated; absent where none was stated, since a fitted
-//!    frame is no raw error;
-//! 2. *registered*: the nominal arm, with base or outlet, cable zero and touched point fitted;
+//! 1. *raw*: the nominal arm with a stated sensor frame; absent otherwise, since the error with a fitted frame is not raw;
+//! 2. *registered*: the nominal arm, with base or outlet, cable zero and target fitted;
 //! 3. *geometry*: the links too.
 //!
 //! The gain of a model is the step from registered to geometry, never from raw.
 //!
-//! Outliers are found on all rows before the split, by a robust fit of geometry (Cauchy weights, then rows beyond ten
-//! robust standard deviations), because a large residual may be physics that geometry explains. The sensor's standard
-//! deviation is estimated along with the fit: the value under which the whitened residuals have their degrees of
-//! freedom.
+//! Outliers are detected on all rows before the split, by a robust fit of geometry (Cauchy weights, then rows beyond ten robust
+//! standard deviations), because geometry can explain a large residual. The sensor's variance is the one at which the
+//! whitened residuals have their degrees of freedom as sum of squares.
 
 use crate::identification::calibration::{CalibrationProblem, Frames, Weight};
 use crate::identification::identifiability::{Identifiability, identifiability};
@@ -28,7 +26,7 @@ use truegrind_estimation::problem::{Prior, Problem};
 use truegrind_math::statistics::{ErrorSummary, median};
 use truegrind_math::work::checkpoint;
 
-/// Parameters of the measurement: frame, outlet, zero, touched point.
+/// Parameters of the measurement: frame, outlet, zero, target.
 pub fn frame_parameters(dataset: &Dataset) -> Vec<Parameter> {
     let target = if dataset.sensor == Sensor::Pose { 6 } else { 3 };
     let mut out: Vec<Parameter> = (0..target).map(Parameter::Target).collect();
@@ -44,10 +42,10 @@ pub fn frame_parameters(dataset: &Dataset) -> Vec<Parameter> {
     out
 }
 
-/// Rows with what is known of their angles.
+/// Rows with the covariance of their joint angles.
 #[derive(Debug, Clone)]
 pub struct Observations {
-    /// The rows, their angles sharpened where that was possible.
+    /// The rows, with the read-out fused into the angles where possible.
     pub dataset: Dataset,
     /// Covariance of each row's angles.
     pub angles: AngleCovariance,
@@ -59,57 +57,57 @@ impl Observations {
         Self { dataset: self.dataset.subset(indices), angles: self.angles.subset(indices) }
     }
 
-    /// Some of very many rows, one from each of equal stretches; `None` where there are not so many.
+    /// A stratified subsample of more than [`MANY_ROWS`] rows, one from each of equal intervals; `None` for fewer rows.
     ///
-    /// Weights, the sensor's standard deviation and what is an outlier are as well told by them, at a fraction of the cost.
+    /// It determines weights, the sensor's standard deviation and outlier bounds as well, at a fraction of the cost.
     pub(crate) fn subsample(&self) -> Option<Self> {
         let rows = self.dataset.rows.len();
         if rows <= MANY_ROWS {
             return None;
         }
-        let place = |stretch: usize| {
-            let [begin, end] = [stretch, stretch + 1].map(|k| k * rows / FEW_ROWS);
-            // Without order, so that no rhythm of the measurement is met (the finaliser of splitmix64).
-            let mut bits = (stretch as u64).wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let draw = |interval: usize| {
+            let [begin, end] = [interval, interval + 1].map(|k| k * rows / FEW_ROWS);
+            // A hash (the finaliser of splitmix64), so that no period of the measurement is matched.
+            let mut bits = (interval as u64).wrapping_add(0x9e37_79b9_7f4a_7c15);
             bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
             bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
             begin + ((bits ^ (bits >> 31)) % (end - begin) as u64) as usize
         };
-        Some(self.subset(&(0..FEW_ROWS).map(place).collect::<Vec<_>>()))
+        Some(self.subset(&(0..FEW_ROWS).map(draw).collect::<Vec<_>>()))
     }
 }
 
-/// Rows from which some stand for all where only weights are to be told.
+/// Rows above which weights are estimated from a subsample.
 const MANY_ROWS: usize = 50_000;
-/// How many stand for them.
+/// Rows of the subsample.
 const FEW_ROWS: usize = 20_000;
 
-/// A fitted stage.
+/// Result of a fit.
 #[derive(Debug, Clone)]
 pub struct Fitted {
-    /// What was free.
+    /// Free parameters.
     pub parameters: Vec<Parameter>,
-    /// Its priors.
+    /// Their priors.
     pub priors: Vec<Prior>,
-    /// What the solver found, in deviations from the start.
+    /// Estimate as deviations from the start.
     pub estimate: Estimate,
     /// The arm.
     pub model: Model,
     /// The frames.
     pub frames: Frames,
-    /// Standard deviation of a reading that the fit leaves (mm), angles' rounding not included.
+    /// Estimated standard deviation of a reading (mm), without the rounding of angles.
     pub sigma_mm: f64,
     /// The same for an orientation (rad).
     pub sigma_rad: f64,
-    /// The problem at its last weights, for whoever wants to look closer.
+    /// The problem with its final weights.
     pub problem: CalibrationProblem,
-    /// Work of all rounds together.
+    /// Total work of all rounds.
     pub evaluations: Evaluations,
-    /// The story of every round. Weights change between rounds, so their costs do not share a scale.
+    /// Trace of every round. Weights change between rounds, so costs of different rounds are not comparable.
     pub rounds: Vec<Vec<Iteration>>,
 }
 
-/// What a stage starts from.
+/// Starting values of a fit.
 #[derive(Debug, Clone, Copy)]
 pub struct Start<'a> {
     /// The arm.
@@ -118,13 +116,12 @@ pub struct Start<'a> {
     pub frames: &'a Frames,
 }
 
-/// Smallest standard deviation of a reading that is believed (mm): below it weights would only amplify rounding.
+/// Lower bound of the noise estimate (mm): below it, weights would only amplify rounding.
 const SMALLEST_SIGMA_MM: f64 = 1e-4;
 const SMALLEST_SIGMA_RAD: f64 = 1e-6;
 
-/// Fits `parameters` to `observed`, estimating the sensor's standard deviation along.
-///
-/// Three rounds of solver and variance, and of the tolerances of links where they are to be learned.
+/// Fits `parameters` to `observed` and estimates the sensor's standard deviation, alternating in three rounds; likewise the
+/// prior widths of the links where [`Tolerance::learn_widths`] is set.
 pub fn fit(
     observed: &Observations,
     start: Start<'_>,
@@ -141,9 +138,9 @@ pub fn fit(
     let mut evaluations = Evaluations::default();
     let (mut last, mut rounds): (Option<(CalibrationProblem, Estimate)>, _) =
         (None, Vec::with_capacity(ROUNDS));
-    // Of very many rows some settle the weights, and all of them are fitted once.
+    // Weights from a subsample of very many rows; all rows are fitted once.
     let few = observed.subsample();
-    let mut steps = Steps::of(few.as_ref().unwrap_or(observed), parameters);
+    let mut steps = StepBudget::of(few.as_ref().unwrap_or(observed), parameters);
     for round in 1..=ROUNDS {
         checkpoint();
         let observed = few.as_ref().filter(|_| round < ROUNDS).unwrap_or(observed);
@@ -171,12 +168,12 @@ pub fn fit(
         x.clone_from(&estimate.x);
         (model, frames) = problem.apply(&x);
         let shares = match &few {
-            // Where they were told from is near enough: the arm moved by a share of its tolerance.
+            // The arm moves by a fraction of its tolerance, so the shares at the start are accurate enough.
             Some(_) => before,
             None => rounding::angle_shares(&observed.dataset, &model, &frames, &observed.angles),
         };
-        let spent = spent_freedom(&problem, &estimate);
-        (sigma_mm, sigma_rad) = spreads(&problem, &x, &shares, spent);
+        let determined = effective_parameters(&problem, &estimate);
+        (sigma_mm, sigma_rad) = noise_sigmas(&problem, &x, &shares, determined);
         rounds.push(estimate.trace.clone());
         if tolerance.learn_widths && round < ROUNDS {
             let learned = learn_tolerance(tolerance, parameters, &priors, &estimate);
@@ -199,22 +196,21 @@ pub fn fit(
     }
 }
 
-/// Solver and variance are alternated this often; the variance has settled to per cent after two.
+/// Rounds of solver and variance; the variance converges to per cent after two.
 const ROUNDS: usize = 3;
 
-/// The trial steps that are left to the rounds of a fit: a search that crawls along a valley without a floor must not do so in
-/// every round. Fits that find their optimum take some ten steps a round.
-struct Steps {
+/// Budget of trial steps over all rounds of a fit, for searches along a flat valley. A normal fit takes some ten steps a round.
+struct StepBudget {
     left: usize,
 }
 
-/// Rows times the square of the parameters, summed over all steps: about a second.
+/// Rows times parameters squared, summed over all steps: about a second.
 const WORK: usize = 5_000_000_000;
 
-/// No fit has fewer steps.
+/// Smallest budget.
 const FEWEST_STEPS: usize = 100;
 
-impl Steps {
+impl StepBudget {
     fn of(observed: &Observations, parameters: &[Parameter]) -> Self {
         let step = observed.dataset.rows.len() * parameters.len() * parameters.len();
         Self { left: (WORK / step.max(1)).max(FEWEST_STEPS) }
@@ -227,8 +223,8 @@ impl Steps {
     }
 }
 
-/// Degrees of freedom that the fit used up: Σ (1 − σ²/prior²), each parameter's share that the data determined.
-fn spent_freedom(problem: &CalibrationProblem, estimate: &Estimate) -> f64 {
+/// Effective number of parameters that the data determine: Σ (1 − σ²/prior²).
+fn effective_parameters(problem: &CalibrationProblem, estimate: &Estimate) -> f64 {
     let Some(covariance) = &estimate.covariance else { return 0.0 };
     let shares = problem
         .priors()
@@ -238,14 +234,19 @@ fn spent_freedom(problem: &CalibrationProblem, estimate: &Estimate) -> f64 {
     shares.sum()
 }
 
-/// The standard deviations σ with Σ r²/(σ² + share) = rows − spent, for lengths and for orientations.
-fn spreads(problem: &CalibrationProblem, x: &[f64], shares: &[(f64, f64)], spent: f64) -> (f64, f64) {
+/// The standard deviations σ with Σ r²/(σ² + share) = rows − determined, for lengths and for orientations.
+fn noise_sigmas(
+    problem: &CalibrationProblem,
+    x: &[f64],
+    shares: &[(f64, f64)],
+    determined: f64,
+) -> (f64, f64) {
     let per = problem.rows_per_observation();
     let plain = problem.unweighted_residuals(x);
     let rows = plain.len() as f64;
-    let freedom_share = ((rows - spent) / rows).max(0.1);
+    let freedom_share = ((rows - determined) / rows).max(0.1);
     let solve = |components: std::ops::Range<usize>, share: fn(&(f64, f64)) -> f64, smallest: f64| {
-        // Squared residual and share; not kept, as there may be a million rows.
+        // Squared residual and share; recomputed rather than stored, as there can be a million rows.
         let squares = || {
             plain.chunks_exact(per).zip(shares).flat_map(|(r, s)| {
                 let share = share(s);
@@ -271,22 +272,22 @@ fn spreads(problem: &CalibrationProblem, x: &[f64], shares: &[(f64, f64)], spent
     (mm, rad)
 }
 
-/// Rows set aside as gross outliers, by their index, with the robust standard deviations they are off.
+/// Rows rejected as gross outliers.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Outliers {
-    /// Index into the data set and size in robust standard deviations, largest first.
+    /// Index into the data set and residual in robust standard deviations, largest first.
     pub rows: Vec<(usize, f64)>,
-    /// Rows beyond the cut, when there were too many to be called outliers and none was set aside.
+    /// Rows beyond the cut, if there were too many to be outliers and none was rejected.
     pub too_many: usize,
 }
 
 /// A row is an outlier beyond this many robust standard deviations of a geometry fit.
 const OUTLIER_CUT: f64 = 10.0;
 
-/// No more than this share of the rows is ever set aside: more is structure, not accident.
+/// Largest share of rejected rows: more is a systematic effect.
 const OUTLIER_SHARE: f64 = 0.1;
 
-/// Finds gross outliers by a robust fit of geometry.
+/// Detects gross outliers by a robust fit of geometry.
 pub fn outliers(
     observed: &Observations,
     start: Start<'_>,
@@ -309,7 +310,7 @@ pub fn outliers(
     // 1.4826 turns the median of |normal| into σ; the norm of three coordinates has median 1.538 σ.
     let consistency = if dataset.sensor == Sensor::Cable { 1.4826 } else { 1.0 / 1.538 };
     let mut before: Option<CalibrationProblem> = None;
-    let mut steps = Steps::of(observed, &parameters);
+    let mut steps = StepBudget::of(observed, &parameters);
     for _ in 0..ROBUST_ROUNDS {
         let base = rounding::weights(dataset, &model, &frames, &observed.angles, sigma, 1e-3);
         let weights: Vec<Weight> = base
@@ -348,7 +349,7 @@ pub fn outliers(
     }
     drop(before);
     if few.is_some() {
-        // Found on some, applied to all.
+        // Fitted to the subsample, applied to all rows.
         let base = rounding::weights(&all.dataset, &model, &frames, &all.angles, sigma, 1e-3);
         let errors = errors_on(all, &model, &frames);
         let sizes: Vec<f64> = errors.iter().zip(&base).map(|(e, w)| e.abs() * w.per_mm).collect();
@@ -368,7 +369,7 @@ const ROBUST_ROUNDS: usize = 12;
 /// Tuning constant of the Cauchy weight: 95 % efficiency on normal errors.
 const CAUCHY: f64 = 2.385;
 
-/// Errors of a fit on rows of its own problem's data set or on others.
+/// Position errors of a model and frames on any rows (mm), as [`CalibrationProblem::errors_mm`].
 pub fn errors_on(observed: &Observations, model: &Model, frames: &Frames) -> Vec<f64> {
     let weights = vec![Weight { per_mm: 1.0, per_rad: 1.0 }; observed.dataset.rows.len()];
     CalibrationProblem::new(&observed.dataset, model, frames, &[], &[], &weights).errors_mm(&[])
@@ -388,7 +389,7 @@ impl Fitted {
         }
     }
 
-    /// What the data could tell of the parameters.
+    /// Identifiability of the parameters.
     pub fn identifiability(&self) -> Option<Identifiability> {
         let scale: Vec<f64> = self.priors.iter().map(|p| p.sigma).collect();
         identifiability(&self.problem, &self.estimate.x, &scale)
@@ -399,7 +400,7 @@ impl Fitted {
         self.estimate.termination
     }
 
-    /// The story of the last round.
+    /// Trace of the last round.
     pub fn trace(&self) -> &[Iteration] {
         &self.estimate.trace
     }

@@ -1,8 +1,7 @@
-//! What the data can tell: rank, condition, observability indices, and which parameters it cannot separate.
+//! Identifiability: rank, condition, observability indices, and the null space of unidentifiable combinations.
 //!
-//! Method: the whitened Jacobian with its columns in units of the prior's standard deviation, reduced to its
-//! triangular factor, then singular values. A singular value of 1 means that the data knows as much about that
-//! combination as the prior does.
+//! Method: singular values of the triangular factor of the whitened Jacobian, its columns in units of the prior's standard
+//! deviation. At a singular value of 1 the data contain as much information on that combination as the prior.
 //! Observability indices as in Joubair and Bonev 2013 (doi 10.1016/j.mechmachtheory.2013.07.005), for L parameters and
 //! m poses: O1 = (σ₁…σ_L)^(1/L) / √m, O2 = σ_L/σ₁, O3 = σ_L, O4 = σ_L²/σ₁, O5 = 1 / Σ 1/σᵢ.
 
@@ -14,7 +13,7 @@ use truegrind_estimation::least_squares::rank;
 use truegrind_estimation::least_squares::triangular::triangular_factor;
 use truegrind_estimation::problem::Problem;
 
-/// The report.
+/// Identifiability report.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Identifiability {
     /// Number of parameters.
@@ -25,13 +24,13 @@ pub struct Identifiability {
     pub condition: f64,
     /// The same over the combinations that the data determine, the first `rank` singular values.
     pub determined_condition: f64,
-    /// Singular values, falling.
+    /// Singular values, in descending order.
     pub singular_values: Vec<f64>,
-    /// O1 to O5 over the combinations that the data determine: over all parameters with full rank.
+    /// O1 to O5 over the determined combinations (all parameters at full rank).
     pub observability: [f64; 5],
-    /// Combinations of parameters that the data cannot separate, in units of the priors: each moves no reading.
+    /// Null vectors in units of the priors: combinations of parameters that change no reading.
     pub combinations: Vec<Vec<(Parameter, f64)>>,
-    /// Directions with a singular value below 1: the prior knows more than the data.
+    /// Number of singular values below 1, where the prior is more informative than the data.
     pub held_by_priors: usize,
 }
 
@@ -75,8 +74,8 @@ pub fn identifiability(problem: &CalibrationProblem, x: &[f64], scale: &[f64]) -
     })
 }
 
-/// The parts of a null vector that are worth naming: large in units of the priors, or large in mm or radians. A frame's
-/// prior is so wide that the millimetre by which it makes up for a link is a small share of it.
+/// The entries of a null vector that are large in units of the priors, or in mm or radians: a frame's prior is so wide that the
+/// millimetre by which it compensates a link is a small share of it.
 fn combination(vector: &[f64], parameters: &[Parameter], scale: &[f64]) -> Vec<(Parameter, f64)> {
     let peak = vector.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
     let amount = |k: usize| (vector[k] * scale[k]).abs();
@@ -94,7 +93,7 @@ fn combination(vector: &[f64], parameters: &[Parameter], scale: &[f64]) -> Vec<(
         .collect()
 }
 
-/// Shares of a null vector below this are rounding.
+/// Shares of a null vector below this are rounding errors.
 const FAINTEST_SHARE: f64 = 1e-5;
 
 /// Singular values below this share of the largest count as zero.

@@ -1,4 +1,4 @@
-//! The whole identification of one data set: fuse_readout, set outliers aside, split, fit, judge.
+//! Identification of one data set: read-out fusion, outlier rejection, split, fit, verdict.
 
 use thiserror::Error;
 
@@ -29,24 +29,24 @@ use truegrind_estimation::problem::Problem;
 use truegrind_math::statistics::{ErrorSummary, largest, median};
 use truegrind_math::work::{checkpoint, report_step};
 
-/// How to identify.
+/// Settings of an identification.
 #[derive(Debug, Clone)]
 pub struct Options {
     /// Priors.
     pub tolerance: Tolerance,
     /// Method.
     pub solver: &'static Solver,
-    /// Share of rows held out to state errors.
+    /// Share of held-out rows.
     pub held_out: f64,
     /// Seed of the split.
     pub seed: u64,
-    /// Whether rounded angles may be sharpened by the read-out.
+    /// Whether to fuse the controller's Cartesian read-out into rounded angles.
     pub fuse_readout: bool,
     /// Largest held-out RMSE with which the fit passes (mm).
     pub limit_rmse_mm: Option<f64>,
     /// Largest held-out error with which the fit passes (mm).
     pub limit_max_mm: Option<f64>,
-    /// Frames that were measured by other means; then raw errors exist.
+    /// Frames measured by other means; raw errors exist only with them.
     pub stated_frames: Option<Frames>,
 }
 
@@ -66,13 +66,13 @@ impl Default for Options {
     }
 }
 
-/// Why nothing could be fitted.
+/// Why identification is impossible.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum IdentifyError {
     /// Fewer scalar readings than parameters.
     #[error(
-        "{file}: {rows} rows at {poses} different poses of the arm give {scalars} readings that count after {held_out} are \
+        "{file}: {rows} rows at {poses} different poses of the arm leave {scalars} independent readings after {held_out} are \
          held out, for {parameters} parameters: measure at least {needed} poses (some hundred are usual)"
     )]
     TooFewRows {
@@ -80,7 +80,7 @@ pub enum IdentifyError {
         file: String,
         /// Rows there are.
         rows: usize,
-        /// Different poses among them: a reading taken again tells nothing new of the arm.
+        /// Distinct poses among them: a repeated reading adds no information on the arm.
         poses: usize,
         /// Scalar readings left for the fit.
         scalars: usize,
@@ -91,11 +91,11 @@ pub enum IdentifyError {
         /// Rows needed.
         needed: usize,
     },
-    /// Frames alone leave an error that no arm has.
+    /// The error with fitted frames exceeds any arm's tolerance.
     #[error(
-        "{file}: with the frames fitted, robot {robot} still misses the readings by {rmse_mm:.1} mm RMS; no arm is that far \
-         from its data sheet: check that --robot is the arm that was measured, that no two columns changed places, that \
-         lengths are mm and angles are degrees, and try --angles dh"
+        "{file}: with fitted frames, robot {robot} still differs from the readings by {rmse_mm:.1} mm RMS, more than any arm \
+         differs from its data sheet: check that --robot is the measured arm, that no two columns are swapped, that lengths \
+         are in mm and angles in degrees, and try --angles dh"
     )]
     WrongArm {
         /// File.
@@ -107,41 +107,41 @@ pub enum IdentifyError {
     },
 }
 
-/// Everything that identification found.
+/// Result of an identification.
 #[derive(Debug, Clone)]
 pub struct Identification {
-    /// The estimated arm, fitted to all rows that were not set aside.
+    /// The estimated arm, fitted to all rows except outliers.
     pub estimated: Estimated,
-    /// What it promises programs; absent for methods that make no model.
+    /// Its expected benefit; absent for methods as printed, which give no model.
     pub benefit: Option<Benefit>,
-    /// The fit behind it.
+    /// The fit of geometry to all rows.
     pub geometry: Fitted,
-    /// The fit of the frames alone, on all rows.
+    /// The fit of the frames alone to all rows.
     pub registered: Fitted,
-    /// The fit of geometry on the rows that were not held out, which the held-out errors belong to.
+    /// The fit of geometry to the training rows, which the held-out errors belong to.
     pub training: Fitted,
-    /// Errors with the user's stated frames; absent without.
+    /// Errors with stated frames; absent without.
     pub raw: Option<ErrorSummary>,
-    /// What the data could tell.
+    /// Identifiability of the parameters.
     pub identifiability: Option<Identifiability>,
-    /// What the read-out brought, or why it was not used.
+    /// Result of the read-out fusion, or why there was none.
     pub readout_fusion: Result<ReadoutFusion, NotFused>,
-    /// Rows set aside.
+    /// Rejected rows.
     pub outliers: Outliers,
-    /// Rows that were held out, as the file counts them, with the error before (registered) and after (geometry) (mm).
+    /// Held-out rows by their number in the file, with the error before (registered) and after (geometry) (mm).
     pub held_out: Vec<(usize, f64, f64)>,
-    /// Names and values ± σ of everything that was free, of the measurement too.
+    /// Names and values ± σ of all free parameters, those of the measurement included.
     pub parameters: Vec<EstimatedParameter>,
 }
 
-/// More than this with frames fitted is no tolerance but a mistake (mm).
+/// RMS error with fitted frames above which the arm or the file is wrong (mm).
 const WRONG_ARM_MM: f64 = 25.0;
 
-/// Identifies `nominal` (catalogue name `robot`) from `dataset`, starting from `frames`; `split` divides the rows
-/// that were not set aside, given their number.
+/// Identifies `nominal` (catalogue name `robot`) from `dataset`, starting from `frames`; `split` divides the rows that are not
+/// outliers.
 ///
 /// # Errors
-/// [`IdentifyError`] when the data cannot carry a fit at all. A poor fit is no error: its verdict says so.
+/// [`IdentifyError`] if no fit is possible. A poor fit is no error: see its verdict.
 pub fn identify(
     dataset: &Dataset,
     robot: &str,
@@ -153,13 +153,13 @@ pub fn identify(
     report_step("looking for outliers");
     let start = Start { model: nominal, frames };
     let (observed, readout_fusion) = prepare_observations(dataset, nominal, options.fuse_readout);
-    enough(&observed.dataset, nominal, options.held_out)?;
-    // Every method sees the same rows.
+    check_row_count(&observed.dataset, nominal, options.held_out)?;
+    // The same outliers for every method.
     let outliers = outliers(&observed, start, &options.tolerance, options.solver_for_frames());
     let prepared = options.solver.prepare_model(nominal, dataset);
     let nominal = &prepared;
     let observed = without(observed, &outliers);
-    // Before the fits, whose columns take room of their own.
+    // Before the fits, to limit peak memory.
     let repeats = split::noise_floor(&observed.dataset);
     let region = Region::of(observed.dataset.rows.iter().map(|row| &row.joints), 0.0);
     let (fitted_rows, held_rows) = {
@@ -169,14 +169,14 @@ pub fn identify(
     let sensing = frame_parameters(&observed.dataset);
     let everything = options.solver.parameters(nominal, &sensing);
     let stages = Stages { nominal, frames, sensing: &sensing, everything: &everything, options };
-    let trained = trained(&stages, &fitted_rows, &held_rows);
+    let trained = fit_training_rows(&stages, &fitted_rows, &held_rows);
     let wrong =
         |rmse_mm| IdentifyError::WrongArm { file: dataset.file.clone(), robot: robot.to_owned(), rmse_mm };
     let trained = trained.map_err(wrong)?;
     let variance_inflation =
         (!options.solver.as_printed).then(|| variance_inflation(&trained.training, &held_rows));
     drop((fitted_rows, held_rows));
-    // The model itself: all rows.
+    // The final model, from all rows.
     report_step("fitting all rows");
     let registered = stages.registered(&observed);
     let geometry = stages.geometry(&observed, &registered);
@@ -188,10 +188,10 @@ pub fn identify(
         robot: robot.to_owned(),
         nominal: nominal.clone(),
         model: geometry.model.clone(),
-        order: arm_of(&geometry),
+        order: arm_parameters_of(&geometry),
         covariance: arm_covariance(&geometry),
         provenance: Provenance { sharpened, ..provenance(dataset, &observed, &outliers, options) },
-        parameters: of_the_arm(&parameters),
+        parameters: select_arm_parameters(&parameters),
         registered: trained.registered,
         geometry: trained.geometry,
         noise_floor_mm: noise_floor(repeats, &observed, &geometry),
@@ -199,12 +199,12 @@ pub fn identify(
         region,
         condition: mean_condition(dataset),
     };
-    report_step("judging what the model promises programs");
+    report_step("estimating the benefit for programs");
     let mut estimated = with_sigma_in_region(estimated, &geometry);
     let benefit = variance_inflation.and_then(|variance_inflation| {
         benefit(&geometry, &observed.dataset, &estimated, &options.tolerance, variance_inflation)
     });
-    let case = Case {
+    let case = VerdictInputs {
         trained: &trained,
         geometry: &geometry,
         parameters: &parameters,
@@ -228,21 +228,23 @@ pub fn identify(
     })
 }
 
-/// The fit without the rows that are held out.
+/// The fit to the training rows.
 struct Trained {
     training: Fitted,
     /// Errors with frames alone.
     registered: StageErrors,
     /// Errors with geometry.
     geometry: StageErrors,
-    /// Rows that were held out, as the file counts them, with their errors before and after (mm).
+    /// Held-out rows by their number in the file, with their errors before and after (mm).
     held_out: Vec<(usize, f64, f64)>,
 }
 
-/// Fits some rows and judges by others; the error with frames alone (mm) where that is no tolerance but a mistake. Literal forms move
-/// frames first, then links without priors.
-fn trained(stages: &Stages<'_>, rows: &Observations, held: &Observations) -> Result<Trained, f64> {
-    report_step("fitting without the rows that are held out");
+/// Fits the training rows and evaluates the held-out ones.
+///
+/// # Errors
+/// The RMS error with frames alone (mm), if above [`WRONG_ARM_MM`].
+fn fit_training_rows(stages: &Stages<'_>, rows: &Observations, held: &Observations) -> Result<Trained, f64> {
+    report_step("fitting the training rows");
     let registered = stages.registered(rows);
     let rmse_mm = summary_on(rows, &registered.model, &registered.frames).rmse;
     if !(rmse_mm < WRONG_ARM_MM) {
@@ -265,7 +267,7 @@ fn trained(stages: &Stages<'_>, rows: &Observations, held: &Observations) -> Res
     Ok(Trained { training, registered, geometry, held_out })
 }
 
-/// Where a model is from, as far as the file and the options tell.
+/// Provenance of a model: file, rows, method.
 fn provenance(
     dataset: &Dataset,
     observed: &Observations,
@@ -286,7 +288,7 @@ fn provenance(
     }
 }
 
-/// The rows but for those that are outliers.
+/// The rows without the outliers.
 fn without(observed: Observations, outliers: &Outliers) -> Observations {
     if outliers.rows.is_empty() {
         return observed;
@@ -298,19 +300,19 @@ fn without(observed: Observations, outliers: &Outliers) -> Observations {
     observed.subset(&kept)
 }
 
-/// The stages of a fit, for whichever rows.
+/// The stages of an identification, for any rows.
 struct Stages<'a> {
     nominal: &'a Model,
     frames: &'a Frames,
     /// Parameters of the measurement.
     sensing: &'a [Parameter],
-    /// These and the arm's.
+    /// Parameters of the measurement and the arm.
     everything: &'a [Parameter],
     options: &'a Options,
 }
 
 impl Stages<'_> {
-    /// The nominal arm, with the frames fitted. Its rows are forgotten.
+    /// Fits the frames with the nominal arm. The rows of the problem are dropped.
     fn registered(&self, rows: &Observations) -> Fitted {
         let Options { tolerance, seed, .. } = self.options;
         let start = Start { model: self.nominal, frames: self.frames };
@@ -319,11 +321,11 @@ impl Stages<'_> {
         fitted
     }
 
-    /// The links too. Literal forms move frames first, then links without priors.
+    /// Fits the links too. Methods as printed fit frames first, then links without priors.
     fn geometry(&self, rows: &Observations, registered: &Fitted) -> Fitted {
         let Options { solver, tolerance, seed, .. } = self.options;
         if solver.as_printed {
-            return literal(rows, self.nominal, &registered.frames, solver, *seed);
+            return fit_as_printed(rows, self.nominal, &registered.frames, solver, *seed);
         }
         let frames = if solver.needs_registered_frames() { &registered.frames } else { self.frames };
         let start = Start { model: self.nominal, frames };
@@ -331,20 +333,20 @@ impl Stages<'_> {
     }
 }
 
-/// The parameters of links and joints among those of a fit.
-fn of_the_arm(parameters: &[EstimatedParameter]) -> Vec<EstimatedParameter> {
+/// The arm's parameters among those of a fit.
+fn select_arm_parameters(parameters: &[EstimatedParameter]) -> Vec<EstimatedParameter> {
     let arm = |p: &&EstimatedParameter| p.name.starts_with("link") || p.name.starts_with("effect");
     parameters.iter().filter(arm).cloned().collect()
 }
 
 impl Options {
-    /// Frames are always registered soundly, so that methods differ in geometry alone.
+    /// Frames are always registered with the default solver, so that methods differ in geometry alone.
     fn solver_for_frames(&self) -> &'static Solver {
         &SOLVERS[0]
     }
 }
 
-/// Contract name of a sensor.
+/// Machine name of a sensor.
 pub fn sensor_name(sensor: Sensor) -> &'static str {
     match sensor {
         Sensor::Cable => "cable",
@@ -353,14 +355,14 @@ pub fn sensor_name(sensor: Sensor) -> &'static str {
     }
 }
 
-/// Sharpens what can be sharpened.
+/// Fuses the read-out into the angles where possible, if `fuse`.
 pub fn prepare_observations(
     dataset: &Dataset,
     nominal: &Model,
-    wanted: bool,
+    fuse: bool,
 ) -> (Observations, Result<ReadoutFusion, NotFused>) {
     let mut rows = dataset.clone();
-    match if wanted { fuse_readout(&mut rows, nominal) } else { Err(NotFused::Nothing) } {
+    match if fuse { fuse_readout(&mut rows, nominal) } else { Err(NotFused::Nothing) } {
         Ok((report, angles)) => {
             (Observations { dataset: rows, angles: AngleCovariance::each(angles) }, Ok(report))
         }
@@ -371,7 +373,7 @@ pub fn prepare_observations(
     }
 }
 
-fn enough(dataset: &Dataset, nominal: &Model, held_out: f64) -> Result<(), IdentifyError> {
+fn check_row_count(dataset: &Dataset, nominal: &Model, held_out: f64) -> Result<(), IdentifyError> {
     let parameters = arm_parameters(nominal).len() + frame_parameters(dataset).len();
     let per = match dataset.sensor {
         Sensor::Cable => 1,
@@ -399,10 +401,16 @@ fn enough(dataset: &Dataset, nominal: &Model, held_out: f64) -> Result<(), Ident
 
 /// The papers' protocol: frames from the frame-only fit, then 24 link parameters without priors or weights
 /// (ltlm-2024, with the outlet that it takes as known).
-fn literal(rows: &Observations, nominal: &Model, frames: &Frames, solver: &Solver, seed: u64) -> Fitted {
+fn fit_as_printed(
+    rows: &Observations,
+    nominal: &Model,
+    frames: &Frames,
+    solver: &Solver,
+    seed: u64,
+) -> Fitted {
     let parameters = link_parameters(nominal);
     let weights = vec![Weight { per_mm: 1.0, per_rad: 1.0 }; rows.dataset.rows.len()];
-    // Priors for what cannot do without: first covariances of filters, boxes of swarms. The others ignore them.
+    // Priors for methods that need them: initial covariances of filters, boxes of swarms. The others ignore them.
     let priors = Tolerance::default().priors(&parameters, nominal);
     let problem = CalibrationProblem::new(&rows.dataset, nominal, frames, &parameters, &priors, &weights);
     let estimate = solver.solve(&problem, &vec![0.0; parameters.len()], seed);
@@ -480,11 +488,11 @@ pub(crate) fn parameter_table(fitted: &Fitted, nominal: &Model) -> Vec<Estimated
         .collect()
 }
 
-pub(crate) fn arm_of(fitted: &Fitted) -> Vec<Parameter> {
+pub(crate) fn arm_parameters_of(fitted: &Fitted) -> Vec<Parameter> {
     fitted.parameters.iter().copied().filter(Parameter::is_of_arm).collect()
 }
 
-/// The block of the arm's parameters: marginal over the frames.
+/// Covariance block of the arm's parameters: marginal over the frames.
 pub(crate) fn arm_covariance(fitted: &Fitted) -> nalgebra::DMatrix<f64> {
     let places: Vec<usize> =
         fitted.parameters.iter().enumerate().filter(|(_, p)| p.is_of_arm()).map(|(k, _)| k).collect();
@@ -497,8 +505,7 @@ pub(crate) fn arm_covariance(fitted: &Fitted) -> nalgebra::DMatrix<f64> {
     }
 }
 
-/// What repeated poses scatter by (mm), or else what the rounding of angles alone leaves in a row; `None` where
-/// neither is known.
+/// Scatter of repeated poses (mm), otherwise the RMS effect of rounded angles; `None` if neither is known.
 fn noise_floor(repeats: Option<NoiseFloor>, observed: &Observations, fitted: &Fitted) -> Option<f64> {
     if let Some(floor) = repeats {
         return Some(floor.sigma_mm);
@@ -522,7 +529,7 @@ pub(crate) fn mean_condition(dataset: &Dataset) -> Condition {
     }
 }
 
-/// The largest standard deviation that the arm's parameters leave at the poses of its region.
+/// Sets the region's largest position standard deviation due to the arm's parameters.
 pub(crate) fn with_sigma_in_region(mut estimated: Estimated, fitted: &Fitted) -> Estimated {
     let condition = estimated.condition;
     let posed = estimated.model.at_condition(&condition);
@@ -542,7 +549,7 @@ pub(crate) fn with_sigma_in_region(mut estimated: Estimated, fitted: &Fitted) ->
     estimated
 }
 
-struct Case<'a> {
+struct VerdictInputs<'a> {
     trained: &'a Trained,
     geometry: &'a Fitted,
     parameters: &'a [EstimatedParameter],
@@ -551,7 +558,7 @@ struct Case<'a> {
     sensor: Sensor,
 }
 
-fn judge(case: &Case<'_>, options: &Options) -> Verdict {
+fn judge(case: &VerdictInputs<'_>, options: &Options) -> Verdict {
     let mut verdict = VerdictBuilder::default();
     for (fitted, rows) in [(&case.trained.training, "the rows of the split"), (case.geometry, "all rows")] {
         let filtered =
@@ -559,21 +566,23 @@ fn judge(case: &Case<'_>, options: &Options) -> Verdict {
         if fitted.termination().is_converged() {
             verdict.note(format!("on {rows} the fit converged"));
         } else if filtered {
-            verdict.note(format!("on {rows} the filter took in every reading; it claims no minimum"));
+            verdict.note(format!(
+                "on {rows} the filter processed every reading; it does not test for a minimum"
+            ));
         } else {
             verdict.fail(format!("on {rows} the fit did not converge: {}", fitted.termination()));
         }
     }
     if options.solver.as_printed {
         verdict.fail(format!(
-            "{} has no priors: what the data cannot see moved freely, so its parameters are a comparison and no model",
+            "{} has no priors: undetermined parameters moved freely, so the result is a comparison and not a model",
             options.solver.name
         ));
     }
     verdict.check_links(case.parameters, &options.tolerance, 0.0);
     if case.outliers.too_many > 0 {
         verdict.note(format!(
-            "{} rows lie beyond ten robust standard deviations, too many to be accidents: none was set aside",
+            "{} rows lie beyond ten robust standard deviations, too many to be outliers: none was rejected",
             case.outliers.too_many
         ));
     }

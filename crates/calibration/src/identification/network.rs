@@ -1,4 +1,4 @@
-//! The network as part of an arm: a smooth correction whose centres are spread over the measured poses.
+//! Radial basis function network as an effect of the arm, its centres spread over the measured poses.
 
 use crate::measurement::dataset::Dataset;
 use truegrind_arm::effect::Effect;
@@ -7,8 +7,8 @@ use truegrind_arm::model::Model;
 use truegrind_arm::parameter::Parameter;
 use truegrind_estimation::network::rbf::{Layout, Options};
 
-/// The arm with a correction that does nothing yet, its centres spread over the poses of `dataset`. Without poses the
-/// arm as it is. The layout is always the sound one: a model must end where its measurements end.
+/// The arm with a zero correction, its centres spread over the poses of `dataset`. Without poses the arm is returned
+/// unchanged. The layout is always the robust one: a model must not extrapolate beyond its measurements.
 pub fn with_network(model: &Model, dataset: &Dataset, options: &Options) -> Model {
     let wrists: Vec<[f64; 3]> = dataset
         .rows

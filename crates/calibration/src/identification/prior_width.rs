@@ -1,19 +1,21 @@
-//! How wide the tolerances of one arm are, as its own rows tell.
+//! Empirical Bayes estimate of the prior widths of link parameters: hierarchical prior, marginal likelihood, posterior mean
+//! square.
 //!
-//! The catalogue's tolerance holds what the data do not see, and says how uncertain that is: a wrong width is a wrong sigma.
-//! What the data do see of this arm tells how well it was made. So the widths τ of lengths, of twists and of joint zeros follow from
-//! the rows, weighed by what is known of arms: one is made three times better or worse than another, and all of them together deviate
-//! by the catalogue's τ₀, which is the root mean square over arms: ln τ ~ N(ln τ₀ − s², s²), so that E τ² = τ₀².
+//! The prior width of a parameter that the data do not determine is its standard deviation, so a wrong width is a wrong sigma.
+//! The parameters that the data determine show how accurately this arm was made. The widths τ of lengths, twists and joint
+//! zeros are therefore estimated from the rows, with a hyperprior over arms: ln τ ~ N(ln τ₀ − s², s²), so that E τ² = τ₀²,
+//! where τ₀ is the catalogue's tolerance (the root mean square over arms) and s corresponds to a factor of three between arms.
 //!
-//! With A the information of the rows and b = A x̂ + T⁻¹ x̂ at the estimate x̂ with priors T, a width makes x = (A + T'⁻¹)⁻¹ b, and
+//! With A the information of the rows and b = A x̂ + T⁻¹ x̂ at the estimate x̂ with priors T, widths T' give
+//! x = (A + T'⁻¹)⁻¹ b and the log marginal likelihood
 //! ln p(rows | τ) = −½ ln |A + T'⁻¹| − ½ ln |T'| + ½ bᵀ x.
-//! Its derivative with respect to ln τ of a group of parameters is Σ x²/τ² − γ, γ = Σ (1 − C/τ²) the number of them that are determined
-//! (MacKay 1992, Bayesian interpolation).
+//! Its derivative with respect to ln τ of a group is Σ x²/τ² − γ, with γ = Σ (1 − C/τ²) the effective number of determined
+//! parameters (MacKay 1992, Bayesian interpolation).
 //!
-//! The rows tell a width by some four to eight numbers, so it stays uncertain by a third, and what they do not see deviates by
-//! E (τ² | rows), not by the most probable τ, which is a tenth to a third less. So the width that is handed on is the root of that mean
-//! square. The three integrals are a product of Gauss–Hermite rules about the mode of p(τ | rows) times each τ, halfway between the
-//! mode of what is normalised and that of what is sought.
+//! A width is estimated from some four to eight parameters and remains uncertain by a third. The variance of an undetermined
+//! parameter is E(τ² | rows), a tenth to a third above the posterior mode in τ, so the root of this mean square is returned. The
+//! integral over the three log widths is a product of Gauss–Hermite rules about the mode of p(τ | rows) times each τ, halfway
+//! between the modes of the normalising integral and the one for τ².
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, SymmetricEigen, Vector3};
 
@@ -22,12 +24,13 @@ use truegrind_arm::parameter::{LinkCoordinate, Parameter};
 use truegrind_estimation::estimate::Estimate;
 use truegrind_estimation::problem::Prior;
 
-/// s, the standard deviation of ln τ over arms: they are made three times better or worse than each other.
+/// s, the standard deviation of ln τ over arms: a factor of three.
 const SPREAD: f64 = 1.1;
-/// A width is kept within this factor of the catalogue's.
-const MOST: f64 = 30.0;
-const ROUNDS: usize = 40;
-const SETTLED: f64 = 0.01;
+/// Bound of a width relative to the catalogue's.
+const MAX_RATIO: f64 = 30.0;
+const MAX_ITERATIONS: usize = 40;
+/// Largest step of ln τ at convergence.
+const STEP_TOLERANCE: f64 = 0.01;
 
 /// Nodes and weights of the Gauss–Hermite rule of five points for a standard normal variable.
 const NODES: [(f64, f64); 5] = {
@@ -37,7 +40,7 @@ const NODES: [(f64, f64); 5] = {
     [(-OUTER.0, OUTER.1), (-INNER.0, INNER.1), (0.0, 8.0 / 15.0), INNER, OUTER]
 };
 
-/// Groups of link parameters that are made alike.
+/// Groups of link parameters with a common width: lengths, twists, joint zeros.
 const GROUPS: usize = 3;
 
 fn group(parameter: &Parameter) -> Option<usize> {
@@ -53,123 +56,123 @@ fn widths(tolerance: &mut Tolerance) -> [&mut f64; GROUPS] {
     [&mut tolerance.length_mm, &mut tolerance.angle_rad, &mut tolerance.zero_rad]
 }
 
-/// The tolerances of the arm that `estimate` was fitted to with `priors`; those of the `catalogue` where the estimate says
-/// nothing of its covariance, or no link was free.
+/// Estimates the tolerances from `estimate`, which was fitted with `priors`. Returns `catalogue` if the estimate has no
+/// covariance or no link was free.
 pub fn learn_tolerance(
     catalogue: &Tolerance,
     parameters: &[Parameter],
     priors: &[Prior],
     estimate: &Estimate,
 ) -> Tolerance {
-    told(catalogue, parameters, priors, estimate).unwrap_or(*catalogue)
+    estimated_tolerance(catalogue, parameters, priors, estimate).unwrap_or(*catalogue)
 }
 
-fn told(
+fn estimated_tolerance(
     catalogue: &Tolerance,
     parameters: &[Parameter],
     priors: &[Prior],
     estimate: &Estimate,
 ) -> Option<Tolerance> {
     let mut out = *catalogue;
-    let links = Links::of(widths(&mut out).map(|width| *width), parameters, priors, estimate)?;
+    let links = LinkPosterior::of(widths(&mut out).map(|width| *width), parameters, priors, estimate)?;
     let log = links.root_mean_square()?;
     for (width, log) in widths(&mut out).into_iter().zip(&log) {
-        *width *= log.clamp(-MOST.ln(), MOST.ln()).exp();
+        *width *= log.clamp(-MAX_RATIO.ln(), MAX_RATIO.ln()).exp();
     }
     let fine = |w: f64| w.is_finite() && w > 0.0;
     (fine(out.length_mm) && fine(out.angle_rad) && fine(out.zero_rad)).then_some(out)
 }
 
-/// What rows say of the links, whatever the rest of the fit is. Widths are logarithms of multiples of the catalogue's.
-struct Links {
-    /// A + T⁻¹, in units of the priors T, so that millimetres and radians are of one size.
+/// Marginal posterior of the links. Widths are parametrised by the log of their ratio to the catalogue's.
+struct LinkPosterior {
+    /// A + T⁻¹, in units of the priors T, so that millimetres and radians are commensurable.
     precision: DMatrix<f64>,
     /// b in these units.
     right: DVector<f64>,
-    /// Of each parameter its group, and the catalogue's width in units of its prior.
-    made: Vec<(usize, f64)>,
+    /// Group of each parameter, and the catalogue's width in units of its prior.
+    widths: Vec<(usize, f64)>,
 }
 
-impl Links {
+impl LinkPosterior {
     fn of(
         catalogue: [f64; GROUPS],
         parameters: &[Parameter],
         priors: &[Prior],
         estimate: &Estimate,
     ) -> Option<Self> {
-        let places: Vec<(usize, usize)> =
+        let indices: Vec<(usize, usize)> =
             parameters.iter().enumerate().filter_map(|(k, p)| Some((k, group(p)?))).collect();
         let covariance = estimate.covariance.as_ref()?;
-        let unit = |i: usize| priors[places[i].0].sigma;
-        let n = places.len();
+        let unit = |i: usize| priors[indices[i].0].sigma;
+        let n = indices.len();
         if n == 0 {
             return None;
         }
         let scaled =
-            DMatrix::from_fn(n, n, |i, j| covariance[(places[i].0, places[j].0)] / (unit(i) * unit(j)));
+            DMatrix::from_fn(n, n, |i, j| covariance[(indices[i].0, indices[j].0)] / (unit(i) * unit(j)));
         let precision = Cholesky::new(scaled)?.inverse();
-        let right = &precision * DVector::from_fn(n, |i, _| estimate.x[places[i].0] / unit(i));
-        let made = (0..n).map(|i| (places[i].1, catalogue[places[i].1] / unit(i))).collect();
-        Some(Self { precision, right, made })
+        let right = &precision * DVector::from_fn(n, |i, _| estimate.x[indices[i].0] / unit(i));
+        let widths = (0..n).map(|i| (indices[i].1, catalogue[indices[i].1] / unit(i))).collect();
+        Some(Self { precision, right, widths })
     }
 
     /// 1/τ² of each parameter.
     fn weights(&self, log: &Vector3<f64>) -> Vec<f64> {
-        self.made.iter().map(|(g, width)| (width * log[*g].exp()).powi(-2)).collect()
+        self.widths.iter().map(|(g, width)| (width * log[*g].exp()).powi(-2)).collect()
     }
 
-    /// The factor of A + T'⁻¹.
+    /// Cholesky factor of A + T'⁻¹.
     fn factor(&self, weights: &[f64]) -> Option<Cholesky<f64, Dyn>> {
         let mut matrix = self.precision.clone();
         weights.iter().enumerate().for_each(|(k, weight)| matrix[(k, k)] += weight - 1.0);
         Cholesky::new(matrix)
     }
 
-    /// ln p(τ | rows), but for a constant.
+    /// ln p(τ | rows), up to a constant.
     fn log_probability(&self, log: &Vector3<f64>) -> Option<f64> {
         let weights = self.weights(log);
         let factor = self.factor(&weights)?;
         let lower = factor.l_dirty();
         let determinant: f64 = lower.diagonal().iter().map(|v| 2.0 * v.ln()).sum();
-        let mut met = self.right.clone();
-        if !lower.solve_lower_triangular_mut(&mut met) {
+        let mut whitened = self.right.clone();
+        if !lower.solve_lower_triangular_mut(&mut whitened) {
             return None;
         }
-        let widths: f64 = weights.iter().map(|w| w.ln()).sum();
-        let off = log.add_scalar(SPREAD * SPREAD) / SPREAD;
-        Some(0.5 * (widths - determinant + met.norm_squared() - off.norm_squared()))
+        let log_prior: f64 = weights.iter().map(|w| w.ln()).sum();
+        let deviation = log.add_scalar(SPREAD * SPREAD) / SPREAD;
+        Some(0.5 * (log_prior - determinant + whitened.norm_squared() - deviation.norm_squared()))
     }
 
     /// The mode of p(τ | rows) times each τ, and the negative second derivative of its logarithm there.
     fn mode(&self) -> Option<(Vector3<f64>, Matrix3<f64>)> {
-        let held = (SPREAD * SPREAD).recip();
+        let hyperprior = (SPREAD * SPREAD).recip();
         let (mut log, mut curvature) = (Vector3::<f64>::zeros(), Matrix3::<f64>::zeros());
-        for _ in 0..ROUNDS {
+        for _ in 0..MAX_ITERATIONS {
             let weights = self.weights(&log);
             let factor = self.factor(&weights)?;
-            let (found, inverse) = (factor.solve(&self.right), factor.inverse());
+            let (mean, covariance) = (factor.solve(&self.right), factor.inverse());
             let (mut squares, mut determined) = (Vector3::<f64>::zeros(), Vector3::<f64>::zeros());
-            curvature = Matrix3::from_diagonal_element(held);
-            for (i, &(g, _)) in self.made.iter().enumerate() {
-                squares[g] += found[i] * found[i] * weights[i];
-                determined[g] += 1.0 - inverse[(i, i)] * weights[i];
-                curvature[(g, g)] += 2.0 * (found[i] * found[i] + inverse[(i, i)]) * weights[i];
-                for (j, &(h, _)) in self.made.iter().enumerate() {
-                    let both = inverse[(i, j)] * weights[i] * weights[j];
-                    curvature[(g, h)] -= both * (4.0 * found[i] * found[j] + 2.0 * inverse[(i, j)]);
+            curvature = Matrix3::from_diagonal_element(hyperprior);
+            for (i, &(g, _)) in self.widths.iter().enumerate() {
+                squares[g] += mean[i] * mean[i] * weights[i];
+                determined[g] += 1.0 - covariance[(i, i)] * weights[i];
+                curvature[(g, g)] += 2.0 * (mean[i] * mean[i] + covariance[(i, i)]) * weights[i];
+                for (j, &(h, _)) in self.widths.iter().enumerate() {
+                    let both = covariance[(i, j)] * weights[i] * weights[j];
+                    curvature[(g, h)] -= both * (4.0 * mean[i] * mean[j] + 2.0 * covariance[(i, j)]);
                 }
             }
             let mut moved = 0.0_f64;
             for g in 0..GROUPS {
-                // −ln τ over s² from the catalogue's spread, where its −s² and the τ beside the probability cancel.
-                let slope: f64 = squares[g] - determined[g] - log[g] * held;
-                // Newton's step, with the curvature that Σ x²/τ² and the catalogue have.
-                let step = (slope / (2.0 * squares[g] + held)).clamp(-1.0, 1.0);
-                let next = (log[g] + step).clamp(-MOST.ln(), MOST.ln());
+                // −ln τ / s² from the hyperprior; its mean −s² cancels against the extra factor τ.
+                let slope: f64 = squares[g] - determined[g] - log[g] * hyperprior;
+                // Newton step with the curvature of Σ x²/τ² and the hyperprior.
+                let step = (slope / (2.0 * squares[g] + hyperprior)).clamp(-1.0, 1.0);
+                let next = (log[g] + step).clamp(-MAX_RATIO.ln(), MAX_RATIO.ln());
                 moved = moved.max((next - log[g]).abs());
                 log[g] = next;
             }
-            if moved < SETTLED {
+            if moved < STEP_TOLERANCE {
                 break;
             }
         }
@@ -179,16 +182,16 @@ impl Links {
     /// ½ ln E (τ² | rows) of each group.
     fn root_mean_square(&self) -> Option<Vector3<f64>> {
         let (mode, curvature) = self.mode()?;
-        // The rows make no width less certain than it is without them.
+        // The posterior is at least as narrow as the hyperprior.
         let axes = SymmetricEigen::new(curvature);
         let reach = axes.eigenvalues.map(|value| value.max((SPREAD * SPREAD).recip()).sqrt().recip());
-        let away = axes.eigenvectors * Matrix3::from_diagonal(&reach);
+        let scaling = axes.eigenvectors * Matrix3::from_diagonal(&reach);
         let mut points = Vec::with_capacity(NODES.len().pow(3));
         for (x, of_x) in NODES {
             for (y, of_y) in NODES {
                 for (z, of_z) in NODES {
                     let normal = Vector3::new(x, y, z);
-                    let at = mode + away * normal;
+                    let at = mode + scaling * normal;
                     let log = self.log_probability(&at)? + 0.5 * normal.norm_squared();
                     points.push((at, log + (of_x * of_y * of_z).ln()));
                 }

@@ -1,21 +1,21 @@
-//! Registering a sensor: its frame, the outlet of its cable and the touched point are fitted, the arm stays nominal.
+//! Sensor registration: fits the sensor's frame, cable outlet and target with the nominal arm.
 //!
-//! A cable that was read from one side leaves two places for its outlet. Each is fitted, and the one whose readings are
-//! met best is taken.
+//! Cable readings from one side are consistent with two outlets. Both are fitted, and the one with the smaller residual is
+//! returned.
 
 use super::calibration::Frames;
 use super::fit::{Fitted, Observations, Start, fit, frame_parameters, summary_on};
 use super::identify::prepare_observations;
 use super::solver::SOLVERS;
-use super::start::{StartError, starts};
+use super::start::{StartError, candidate_frames};
 use super::tolerance::Tolerance;
 use crate::measurement::dataset::Dataset;
 use truegrind_arm::model::Model;
 
-/// A sensor in its place.
+/// A registered sensor.
 #[derive(Debug, Clone)]
 pub struct Registered {
-    /// Frames from closed forms, where a fit of the arm starts.
+    /// Closed-form frames, the initial guess for a fit of the arm.
     pub start: Frames,
     /// The fit of the frames alone.
     pub fitted: Fitted,
@@ -32,7 +32,7 @@ pub fn register(
 ) -> Result<Registered, StartError> {
     let sensing = frame_parameters(&observed.dataset);
     let (mut best, mut least_mm) = (None, f64::INFINITY);
-    for frames in starts(&observed.dataset, nominal)? {
+    for frames in candidate_frames(&observed.dataset, nominal)? {
         let start = Start { model: nominal, frames: &frames };
         let fitted = fit(observed, start, &sensing, tolerance, &SOLVERS[0], 0);
         let rmse_mm = summary_on(observed, &fitted.model, &fitted.frames).rmse;
@@ -44,8 +44,8 @@ pub fn register(
     best.ok_or_else(|| StartError::of(&observed.dataset, "sensor", 4))
 }
 
-/// The frames where a fit of the arm to `dataset` starts; `fuse_readout` as [`prepare_observations`] has it. Nothing is fitted where
-/// closed forms leave no choice.
+/// Initial frames for a fit of the arm to `dataset`; `fuse_readout` as in [`prepare_observations`]. Nothing is fitted if the
+/// closed form is unique.
 ///
 /// # Errors
 /// [`StartError`] when the rows do not determine the frames.
@@ -55,7 +55,7 @@ pub fn starting_frames(
     tolerance: &Tolerance,
     fuse_readout: bool,
 ) -> Result<Frames, StartError> {
-    let mut candidates = starts(dataset, nominal)?;
+    let mut candidates = candidate_frames(dataset, nominal)?;
     if candidates.len() == 1 {
         return Ok(candidates.remove(0));
     }

@@ -1,11 +1,10 @@
-//! Rounded logs are information: how far the rounding of angles reaches into the reading, and how the controller's own
-//! Cartesian read-out sharpens them.
+//! Rounding of logged angles: its variance in the readings, and fusion with the controller's Cartesian read-out
+//! (errors-in-variables).
 //!
-//! A logged angle of step h is uniform within ±h/2: variance h²/12. The read-out is the controller's forward map of
-//! the angles that it did not round, at its own tool point t: x = F(q) t, rounded too. Both together give for each
-//! row the angles that minimise ‖(q − q̄)/σ_q‖² + ‖(F(q) t − x)/σ_x‖², by a few Gauss–Newton steps, and their
-//! covariance P = (I/σ_q² + JᵀJ/σ_x²)⁻¹ (errors in variables). A row's reading then carries the variance u J P Jᵀ uᵀ
-//! beside the sensor's.
+//! A logged angle with step h is uniform within ±h/2, variance h²/12. The read-out is the controller's forward map of the
+//! unrounded angles at its tool point t, x = F(q) t, rounded too. Each row's angles minimise
+//! ‖(q − q̄)/σ_q‖² + ‖(F(q) t − x)/σ_x‖² by a few Gauss–Newton steps, with covariance P = (I/σ_q² + JᵀJ/σ_x²)⁻¹. The row's
+//! reading then has the variance u J P Jᵀ uᵀ in addition to the sensor's.
 
 use nalgebra::{Matrix3, Matrix3x6, Matrix6, Vector3};
 
@@ -17,12 +16,12 @@ use truegrind_arm::jacobian::joint_jacobian;
 use truegrind_arm::model::Model;
 use truegrind_math::work::checkpoint;
 
-/// Covariance of the joint angles of each row (rad²): one for all rows until some have their own.
+/// Covariance of the joint angles of each row (rad²): common, or individual.
 #[derive(Debug, Clone)]
 pub struct AngleCovariance {
     rows: usize,
     common: Matrix6<f64>,
-    /// One for each row; empty where all are alike.
+    /// One for each row; empty where all are equal.
     own: Vec<Matrix6<f64>>,
 }
 
@@ -32,7 +31,7 @@ impl AngleCovariance {
         Self { rows: own.len(), common: Matrix6::zeros(), own }
     }
 
-    /// Of row `i`.
+    /// Covariance of row `i`.
     pub fn of(&self, i: usize) -> &Matrix6<f64> {
         self.own.get(i).unwrap_or(&self.common)
     }
@@ -52,8 +51,8 @@ impl AngleCovariance {
         Self { rows: indices.len(), common: self.common, own }
     }
 
-    /// Whether no row's angles are in doubt.
-    fn silent(&self) -> bool {
+    /// Whether all angles are exact.
+    fn is_zero(&self) -> bool {
         match self.own.as_slice() {
             [] => self.common.trace() == 0.0,
             own => own.iter().all(|p| p.trace() == 0.0),
@@ -61,45 +60,45 @@ impl AngleCovariance {
     }
 }
 
-/// Angles as they are logged: h²/12 on the diagonal, 0 where no rounding shows.
+/// Covariance of the logged angles: h²/12 on the diagonal, 0 without visible rounding.
 pub fn logged_covariance(dataset: &Dataset) -> AngleCovariance {
     let variance = dataset.angle_step_rad.map_or(0.0, |h| h * h / 12.0);
     AngleCovariance { rows: dataset.rows.len(), common: Matrix6::identity() * variance, own: Vec::new() }
 }
 
-/// What sharpening did.
+/// Result of a read-out fusion.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReadoutFusion {
-    /// The point whose position the controller read out, on the flange (mm).
+    /// The controller's tool point on the flange (mm).
     pub readout_point_mm: Vector3<f64>,
     /// RMS difference of read-out and nominal forward map before (mm).
     pub before_mm: f64,
-    /// The same with sharpened angles (mm).
+    /// The same with fused angles (mm).
     pub after_mm: f64,
-    /// What rounding alone would leave before (mm).
+    /// Expected RMS difference from rounding alone, before (mm).
     pub expected_mm: f64,
-    /// Factor by which the angles' standard deviation shrank, on average over rows and joints.
+    /// Ratio of the angles' standard deviation after and before, mean over rows and joints.
     pub narrowed: f64,
 }
 
 /// Why the read-out was not used.
 #[derive(Debug, Clone, PartialEq)]
 pub enum NotFused {
-    /// No row has a read-out, or angles are not rounded.
+    /// A row has no read-out, or angles are not rounded.
     Nothing,
-    /// The read-out does not belong to these angles under the nominal model.
+    /// The read-out contradicts the angles under the nominal model.
     Mismatch {
         /// RMS difference (mm).
         found_mm: f64,
-        /// What rounding alone would leave (mm).
+        /// Expected from rounding alone (mm).
         expected_mm: f64,
     },
 }
 
-/// Sharpens the angles of all rows in place and gives their covariance. See the module page.
+/// Fuses the read-out into the angles of all rows in place, and returns their covariance. See the module page.
 ///
 /// # Errors
-/// Leaves the rows as they are when there is nothing to use or the read-out contradicts the angles.
+/// [`NotFused`]; the rows are then unchanged.
 pub fn fuse_readout(
     dataset: &mut Dataset,
     nominal: &Model,
@@ -112,7 +111,7 @@ pub fn fuse_readout(
         return Err(NotFused::Nothing);
     }
     let angle_variance = step * step / 12.0;
-    // A read-out without a step is taken as single precision would leave it.
+    // Without a visible step, single precision is assumed.
     let readout_variance = dataset.readout_step_mm.map_or(1e-3_f64.powi(2), |h| h * h / 12.0);
     let posed = nominal.at_condition(&Condition::default());
     let readout = |i: usize| dataset.rows[i].readout_mm().unwrap_or_default();
@@ -171,8 +170,8 @@ pub fn fuse_readout(
 
 /// Weights of all rows from the sensor's standard deviations and the covariance of the angles.
 ///
-/// `sigma_mm` is the sensor's (with whatever the model does not explain), `sigma_rad` that of an orientation.
-/// For positions and poses the share of the angles is averaged over the three axes.
+/// `sigma_mm` is the sensor's standard deviation, unmodelled effects included, `sigma_rad` that of an orientation. For
+/// positions and poses the variance due to the angles is averaged over the three axes.
 pub fn weights(
     dataset: &Dataset,
     model: &Model,
@@ -181,7 +180,7 @@ pub fn weights(
     sigma_mm: f64,
     sigma_rad: f64,
 ) -> Vec<Weight> {
-    if angles.silent() {
+    if angles.is_zero() {
         return vec![Weight { per_mm: 1.0 / sigma_mm, per_rad: 1.0 / sigma_rad }; dataset.rows.len()];
     }
     weights_of(&angle_shares(dataset, model, frames, angles), sigma_mm, sigma_rad)
@@ -198,19 +197,19 @@ pub(crate) fn weights_of(shares: &[(f64, f64)], sigma_mm: f64, sigma_rad: f64) -
         .collect()
 }
 
-/// Variance that the angles bring into each row's length (mm²) and orientation (rad²).
+/// Variance of each row's length (mm²) and orientation (rad²) due to the angles.
 pub fn angle_shares(
     dataset: &Dataset,
     model: &Model,
     frames: &Frames,
     angles: &AngleCovariance,
 ) -> Vec<(f64, f64)> {
-    if angles.silent() {
+    if angles.is_zero() {
         return vec![(0.0, 0.0); dataset.rows.len()];
     }
     let still = Condition::default();
     let posed = model.at_condition(&still);
-    // Each row by itself, so the result does not depend on the number of threads.
+    // Rows are independent, so the result does not depend on the number of threads.
     (0..dataset.rows.len())
         .into_par_iter()
         .with_min_len(1024)

@@ -1,8 +1,7 @@
-//! The methods that identification can use, by name: one line for each, as its paper prints it and as a numerical
-//! analyst would set it up.
+//! Registry of solvers by name, each as printed in its paper and in a robust form.
 //!
-//! Every method minimises the cost of a [`Problem`] or filters its rows. What a method costs is counted in rows
-//! evaluated, with and without derivatives ([`Estimate::evaluations`]).
+//! Every solver minimises the cost of a [`Problem`] or filters its rows. Its work is counted in evaluated rows, with and
+//! without derivatives ([`Estimate::evaluations`]).
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -20,66 +19,66 @@ use truegrind_estimation::network::rbf;
 use truegrind_estimation::problem::Problem;
 use truegrind_estimation::swarm::{bas, de, pso, qibas, sca};
 
-/// What a method is.
+/// Family of a solver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Family {
-    /// All rows at once, with derivatives; has tests of convergence.
+    /// Batch least squares with derivatives and convergence tests.
     LeastSquares,
-    /// One observation at a time; ends when all were taken in.
+    /// One observation at a time; ends after the last one.
     Filter,
-    /// The cost alone; ends when its budget is spent.
+    /// Derivative-free search; ends when its budget is spent.
     Swarm,
-    /// A smooth function with many weights.
+    /// Network of many weights.
     Network,
 }
 
-/// What a network is fitted together with.
+/// Parameters fitted together with a network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Scope {
-    /// Links and frames: what they cannot explain is left to the network.
+    /// Links and frames; the network explains the rest.
     WithLinks,
-    /// Nothing: links stay nominal, frames as registered.
+    /// None: links are nominal, frames registered.
     Alone,
 }
 
-/// A method of identification.
+/// A solver of identification problems.
 #[derive(Debug, Clone, Copy)]
 pub struct Solver {
     /// Name on the command line and in reports.
     pub name: &'static str,
     /// One line for a list.
     pub about: &'static str,
-    /// Whether the method is a paper's literal form: without priors, so that what the data cannot see moves freely.
-    /// Such a fit is a comparison, never a model.
+    /// Whether the method runs as printed in its paper, without priors, so that undetermined parameters move freely. Such a fit
+    /// is for comparison, never a model.
     pub as_printed: bool,
-    /// What kind of method it is.
+    /// Family of the method.
     pub family: Family,
-    /// Whether the arm gets a network, and with what.
+    /// Scope of the network; `None` without a network.
     pub network: Option<Scope>,
     run: fn(&dyn Problem, &[f64], u64) -> Estimate,
-    configure: fn(&toml::Table) -> Result<Configured, String>,
+    configure: fn(&toml::Table) -> Result<ConfiguredSolver, String>,
 }
 
-/// Why there is no such method, or not with such settings.
+/// An unknown solver, or invalid settings.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum SolverError {
     /// No method has that name.
     #[error("unknown method \"{name}\"; the methods are {}", known.join(", "))]
     Unknown {
-        /// What was asked for.
+        /// The requested name.
         name: String,
-        /// The names that there are.
+        /// The known names.
         known: Vec<&'static str>,
     },
-    /// A setting that the method has not, or of the wrong type.
+    /// An unknown setting, or one of the wrong type.
     #[error("settings of {method}: {fault}")]
     Settings {
         /// The method.
         method: &'static str,
-        /// What is wrong, with the settings that there are.
+        /// The fault, with the known settings.
         fault: String,
     },
 }
@@ -87,11 +86,11 @@ pub enum SolverError {
 /// A method's call: problem, start, seed.
 pub type Run = Box<dyn Fn(&dyn Problem, &[f64], u64) -> Estimate + Send + Sync>;
 
-/// A method with settings of its own.
-pub struct Configured {
+/// A solver with changed settings.
+pub struct ConfiguredSolver {
     /// The call.
     pub run: Run,
-    /// All settings, those that were not changed too.
+    /// All settings, unchanged ones included.
     pub settings: toml::Table,
 }
 
@@ -101,8 +100,8 @@ impl Solver {
         (self.run)(problem, start, seed)
     }
 
-    /// The same with no more than so many trial steps where the method counts them (`max-iterations`); it never takes more than
-    /// it would by itself.
+    /// As [`Solver::solve`], with at most `most_iterations` trial steps if the method has the setting `max-iterations`; never
+    /// more than its default.
     pub fn solve_within(
         &self,
         problem: &dyn Problem,
@@ -126,12 +125,12 @@ impl Solver {
     /// The method with `changes` to its settings (the fields of its `Options`, in kebab-case).
     ///
     /// # Errors
-    /// [`SolverError::Settings`] says what the settings are, where a name or a type is wrong.
-    pub fn configured(&self, changes: &toml::Table) -> Result<Configured, SolverError> {
+    /// [`SolverError::Settings`] lists the settings, if a name or a type is wrong.
+    pub fn configured(&self, changes: &toml::Table) -> Result<ConfiguredSolver, SolverError> {
         (self.configure)(changes).map_err(|fault| SolverError::Settings { method: self.name, fault })
     }
 
-    /// The arm that the method fits: with a network that does nothing yet, where the method has one.
+    /// The arm that the method fits: `nominal`, with a zero network if the method has one.
     pub fn prepare_model(&self, nominal: &Model, dataset: &Dataset) -> Model {
         match self.network {
             Some(_) => with_network(nominal, dataset, &network_options()),
@@ -139,13 +138,12 @@ impl Solver {
         }
     }
 
-    /// Whether frames must be registered before the method begins: it explores the whole of its priors, or leaves
-    /// frames alone.
+    /// Whether frames must be registered first: the method explores its whole prior, or does not fit frames.
     pub fn needs_registered_frames(&self) -> bool {
         matches!(self.family, Family::Filter | Family::Swarm) || self.network == Some(Scope::Alone)
     }
 
-    /// What the method moves: everything of the arm and of the measurement, or a network that stands alone.
+    /// Free parameters of the method: all of the arm and the measurement, or a network alone.
     pub fn parameters(&self, prepared: &Model, sensing: &[Parameter]) -> Vec<Parameter> {
         match self.network {
             Some(Scope::Alone) => network_parameters(prepared),
@@ -153,8 +151,8 @@ impl Solver {
         }
     }
 
-    /// Priors for the method: where frames are registered beforehand they lie within what links of ordinary tolerance
-    /// can shift them by (1 mm and 0.3° at some 0.7 m).
+    /// Priors for the method: registered frames are off by no more than links of ordinary tolerance shift them (1 mm and
+    /// 0.3° at some 0.7 m).
     pub fn tolerance(&self, tolerance: &Tolerance) -> Tolerance {
         if self.needs_registered_frames() {
             Tolerance { target_mm: 10.0, target_rad: 0.02, frame_mm: 10.0, frame_rad: 0.02, ..*tolerance }
@@ -164,13 +162,13 @@ impl Solver {
     }
 }
 
-/// How the network of a method is laid out.
+/// Layout of a method's network.
 pub fn network_options() -> rbf::Options {
     rbf::Options { weight_sigma: SMOOTH_SIGMA_RAD, ..rbf::Options::default() }
 }
 
-/// `base` with the fields of `changes` in place of its own, tables inside tables too.
-fn changed<T: Serialize + DeserializeOwned>(
+/// Overrides the fields of `base` by those of `changes`, nested tables included.
+fn override_options<T: Serialize + DeserializeOwned>(
     base: &T,
     changes: &toml::Table,
 ) -> Result<(T, toml::Table), String> {
@@ -191,7 +189,7 @@ fn merge(into: &mut toml::Table, changes: &toml::Table) {
     }
 }
 
-/// A line of the list: its module gives `Options` and `solve`.
+/// An entry of the registry; its module provides `Options` and `solve`.
 macro_rules! method {
     ($name:literal, $about:literal, $family:ident, $as_printed:literal, $network:expr, $module:ident, $options:expr) => {
         Solver {
@@ -207,17 +205,17 @@ macro_rules! method {
             },
             configure: |changes| {
                 let base: $module::Options = $options;
-                let (options, settings) = changed(&base, changes)?;
+                let (options, settings) = override_options(&base, changes)?;
                 let run: Run = Box::new(move |problem, start, seed| {
                     let mut options = Clone::clone(&options);
                     options.seed = seed;
                     $module::solve(problem, start, &options)
                 });
-                Ok(Configured { run, settings })
+                Ok(ConfiguredSolver { run, settings })
             },
         }
     };
-    ($name:literal, $about:literal, $family:ident, sound $module:ident) => {
+    ($name:literal, $about:literal, $family:ident, robust $module:ident) => {
         method!($name, $about, $family, false, None, $module, $module::Options::default())
     };
     ($name:literal, $about:literal, $family:ident, printed $module:ident) => {
@@ -225,10 +223,10 @@ macro_rules! method {
     };
 }
 
-/// The methods that are compared by default, the default one first.
+/// The solvers compared by default, the default one first.
 pub const SOLVERS: &[Solver] = &[
-    method!("lm", "Levenberg–Marquardt, scaled, gain-ratio damping, with priors", LeastSquares, sound lm),
-    method!("ltlm", "logistic-tent chaotic LM on the same scaled steps, with priors", LeastSquares, sound ltlm),
+    method!("lm", "Levenberg–Marquardt, scaled, gain-ratio damping, with priors", LeastSquares, robust lm),
+    method!("ltlm", "logistic-tent chaotic LM on the same scaled steps, with priors", LeastSquares, robust ltlm),
     method!("lm-as-printed", "LM of ltlm-2024 eq. 10: fixed mu = 5, unscaled, no priors", LeastSquares, printed lm),
     method!(
         "ltlm-as-printed",
@@ -238,15 +236,15 @@ pub const SOLVERS: &[Solver] = &[
     ),
 ];
 
-/// All others.
+/// All other solvers.
 pub const FURTHER_SOLVERS: &[Solver] = &[
-    method!("sslm", "LM with a step size found by line search", LeastSquares, sound sslm),
-    method!("vslm", "variable step-size LM that grows back to whole steps", LeastSquares, sound vslm),
-    method!("least-squares", "Gauss–Newton with halved steps, with priors", LeastSquares, sound gauss_newton),
-    method!("ekf", "extended Kalman filter, one sweep, each row counted once", Filter, sound ekf),
-    method!("ukf", "scaled unscented Kalman filter with Q and R", Filter, sound ukf),
-    method!("ukf-vslm", "scaled UKF, then step-size LM until it converges", LeastSquares, sound ukf_vslm),
-    method!("pf", "particle filter, tempered, with a kernel that moves its particles", Filter, sound pf),
+    method!("sslm", "LM with a step size found by line search", LeastSquares, robust sslm),
+    method!("vslm", "variable step-size LM that grows back to whole steps", LeastSquares, robust vslm),
+    method!("least-squares", "Gauss–Newton with halved steps, with priors", LeastSquares, robust gauss_newton),
+    method!("ekf", "extended Kalman filter, one sweep, each row counted once", Filter, robust ekf),
+    method!("ukf", "scaled unscented Kalman filter with Q and R", Filter, robust ukf),
+    method!("ukf-vslm", "scaled UKF, then step-size LM until it converges", LeastSquares, robust ukf_vslm),
+    method!("pf", "particle filter, tempered, with a kernel that moves its particles", Filter, robust pf),
     method!(
         "rls",
         "recursive least squares in square-root form, linearised three times",
@@ -256,11 +254,11 @@ pub const FURTHER_SOLVERS: &[Solver] = &[
         rls,
         rls::Options { linearisations: 3, ..rls::Options::default() }
     ),
-    method!("pso", "particle swarm with constriction", Swarm, sound pso),
-    method!("de", "differential evolution, current-to-best", Swarm, sound de),
-    method!("sca", "sine cosine algorithm that keeps what is better", Swarm, sound sca),
-    method!("bas", "beetle antennae search that keeps what is better", Swarm, sound bas),
-    method!("qibas", "beetle antennae search with quadratic interpolation", Swarm, sound qibas),
+    method!("pso", "particle swarm with constriction", Swarm, robust pso),
+    method!("de", "differential evolution, current-to-best", Swarm, robust de),
+    method!("sca", "sine cosine algorithm that keeps what is better", Swarm, robust sca),
+    method!("bas", "beetle antennae search that keeps what is better", Swarm, robust bas),
+    method!("qibas", "beetle antennae search with quadratic interpolation", Swarm, robust qibas),
     Solver {
         name: "rbf",
         about: "LM on links and a radial basis function network together, with priors",
@@ -269,11 +267,11 @@ pub const FURTHER_SOLVERS: &[Solver] = &[
         network: Some(Scope::WithLinks),
         run: |problem, start, seed| lm::solve(problem, start, &lm::Options { seed, ..Default::default() }),
         configure: |changes| {
-            let (options, settings) = changed(&lm::Options::default(), changes)?;
+            let (options, settings) = override_options(&lm::Options::default(), changes)?;
             let run: Run = Box::new(move |problem, start, seed| {
                 lm::solve(problem, start, &lm::Options { seed, ..options })
             });
-            Ok(Configured { run, settings })
+            Ok(ConfiguredSolver { run, settings })
         },
     },
     method!(
@@ -318,7 +316,7 @@ pub const FURTHER_SOLVERS: &[Solver] = &[
     method!("qibas-as-printed", "the same with quadratic interpolation", Swarm, printed qibas),
 ];
 
-/// Every method there is, the default one first.
+/// All solvers, the default one first.
 pub fn all() -> impl Iterator<Item = &'static Solver> {
     SOLVERS.iter().chain(FURTHER_SOLVERS)
 }
@@ -339,7 +337,7 @@ pub fn all() -> impl Iterator<Item = &'static Solver> {
 /// ```
 ///
 /// # Errors
-/// [`SolverError::Unknown`] lists the names that exist.
+/// [`SolverError::Unknown`] lists the known names.
 pub fn by_name(name: &str) -> Result<&'static Solver, SolverError> {
     all()
         .find(|s| s.name == name)

@@ -1,4 +1,4 @@
-//! Where a fit starts: sensor frame, outlet and touched point from closed forms under the nominal arm.
+//! Initial guess: sensor frame, cable outlet and target in closed form, with the nominal arm.
 
 use std::collections::HashSet;
 
@@ -12,18 +12,18 @@ use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Model;
 use truegrind_math::se3::Pose;
 
-/// The rows do not place the sensor.
+/// The rows do not determine the sensor's frame.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[error(
-    "{file}: the {rows} rows, at {poses} different poses of the arm, do not tell where the {what} is: measure at least \
-     {needed} poses that are not all in one line and turn the wrist between them"
+    "{file}: the {rows} rows, at {poses} different poses of the arm, do not determine the {what}: measure at least {needed} \
+     poses that are not collinear, with different wrist orientations"
 )]
 pub struct StartError {
     /// File.
     pub file: String,
     /// Rows.
     pub rows: usize,
-    /// Different poses among them.
+    /// Distinct poses among them.
     pub poses: usize,
     /// Outlet or frame.
     pub what: &'static str,
@@ -38,11 +38,11 @@ impl StartError {
     }
 }
 
-/// Starting frames for a data set, best first: cable lengths seen from one side may leave a second outlet.
+/// Candidate frames, best first: cable lengths from one side can fit two outlets.
 ///
 /// # Errors
-/// [`StartError`] when the rows do not determine them.
-pub fn starts(dataset: &Dataset, nominal: &Model) -> Result<Vec<Frames>, StartError> {
+/// [`StartError`] if the rows do not determine them.
+pub fn candidate_frames(dataset: &Dataset, nominal: &Model) -> Result<Vec<Frames>, StartError> {
     let none = |what, needed| StartError::of(dataset, what, needed);
     let (what, needed) = match dataset.sensor {
         Sensor::Cable => ("cable outlet", 4),
@@ -102,7 +102,7 @@ pub fn starts(dataset: &Dataset, nominal: &Model) -> Result<Vec<Frames>, StartEr
     }
 }
 
-/// How many rows differ in their joint angles or their cable; counted up to `enough`.
+/// Number of rows that differ in joint angles or cable, counted up to `enough`.
 pub fn count_distinct_poses(dataset: &Dataset, enough: usize) -> usize {
     let mut met = HashSet::new();
     for row in &dataset.rows {

@@ -1,4 +1,4 @@
-//! All solvers side by side over several seeded splits of one data set: the table that says whether a method matters.
+//! Compares all solvers over several seeded splits of one data set.
 
 use rayon::prelude::*;
 
@@ -15,13 +15,13 @@ use truegrind_math::statistics::{ErrorSummary, mean_and_deviation};
 /// One method over all splits.
 #[derive(Debug, Clone)]
 pub struct MethodRow {
-    /// The method; `None` for the nominal arm with registered frames, which all are compared to.
+    /// The method; `None` for the nominal arm with registered frames, the baseline.
     pub solver: Option<&'static Solver>,
     /// Held-out errors, one for each split.
     pub held_out: Vec<ErrorSummary>,
-    /// How each fit ended.
+    /// Termination of each fit.
     pub terminations: Vec<Termination>,
-    /// Passes over the rows that brought Jacobians, over all rounds of each fit.
+    /// Jacobian passes over the rows, over all rounds of each fit.
     pub jacobian_passes: Vec<f64>,
 }
 
@@ -45,9 +45,9 @@ pub fn study(
     options: &Options,
     splits: u64,
 ) -> Result<Vec<MethodRow>, IdentifyError> {
-    let tasks: Vec<(usize, u64)> =
+    let runs: Vec<(usize, u64)> =
         (0..SOLVERS.len()).flat_map(|s| (0..splits).map(move |seed| (s, seed))).collect();
-    let found = tasks
+    let found = runs
         .par_iter()
         .map(|&(s, seed)| {
             let options = Options { solver: &SOLVERS[s], seed, ..options.clone() };

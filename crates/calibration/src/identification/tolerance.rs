@@ -1,7 +1,6 @@
-//! What is known of an arm before it is measured: manufacturing tolerances as priors.
+//! Priors: manufacturing tolerances of the arm, and wide priors for the sensor's frames.
 //!
-//! They hold a combination of parameters that the data cannot see at its nominal value, and give way where the data
-//! speaks. A frame of the sensor is not manufactured: its priors are wide.
+//! The tolerances keep combinations of parameters that the data do not determine at their nominal values.
 
 use crate::identification::calibration::Frames;
 use crate::measurement::sensor::disturbance::{Disturbance, Kind};
@@ -19,7 +18,7 @@ pub struct Tolerance {
     pub angle_rad: f64,
     /// Joint zeros (rad).
     pub zero_rad: f64,
-    /// The touched point on the flange about its starting value (mm): a hook or reflector stands off.
+    /// The target on the flange about its starting value (mm): a hook or reflector has a stand-off.
     pub target_mm: f64,
     /// Orientation of a full-pose target about its starting value (rad).
     pub target_rad: f64,
@@ -27,13 +26,13 @@ pub struct Tolerance {
     pub frame_mm: f64,
     /// Orientation of the sensor frame about its starting value (rad); wide.
     pub frame_rad: f64,
-    /// Whether the rows tell how wide the tolerances of links are, weighed by the ones stated here (`prior_width`).
+    /// Whether to estimate the prior widths of links from the rows, with the ones stated here as hyperprior (`prior_width`).
     pub learn_widths: bool,
 }
 
 impl Default for Tolerance {
-    /// 1 mm and 0.3° on the arm, which is what industrial arms leave the factory with (Nubiola and Bonev 2013 find up to
-    /// 0.9 mm and 0.5° on an IRB 1600); 50 mm for the touched point.
+    /// 1 mm and 0.3° for the arm, typical of industrial arms (Nubiola and Bonev 2013 find up to 0.9 mm and 0.5° on an
+    /// IRB 1600); 50 mm for the target.
     fn default() -> Self {
         Self {
             length_mm: 1.0,
@@ -69,7 +68,7 @@ impl Tolerance {
         Prior { mean: 0.0, sigma }
     }
 
-    /// Standard deviation of a parameter of a disturbance, in its unit: sizes met in practice, wide.
+    /// Standard deviation of a parameter of a disturbance, in its unit: a wide prior from sizes met in practice.
     pub fn of_disturbance(disturbance: &Disturbance, parameter: usize) -> f64 {
         match &disturbance.kind {
             Kind::Zero | Kind::Target => 5.0,
@@ -103,9 +102,9 @@ impl Tolerance {
     }
 }
 
-/// Sizes that effects have on real arms, as wide priors.
+/// Wide priors from sizes of effects on real arms.
 pub fn effect_sigma(effect: &Effect, parameter: usize) -> f64 {
-    // The gears of a wrist are smaller and yield ten times as much.
+    // The smaller gears of a wrist are ten times as compliant.
     let soft = |joint: usize| if joint < 3 { 1.0 } else { 10.0 };
     match effect {
         Effect::JointCompliance(compliance) => 1e-4 * soft(compliance.joint),
@@ -124,5 +123,5 @@ pub fn effect_sigma(effect: &Effect, parameter: usize) -> f64 {
     }
 }
 
-/// A smooth correction moves the wrist by tenths of a millimetre at half a metre.
+/// Prior of a smooth correction: tenths of a millimetre at half a metre.
 pub const SMOOTH_SIGMA_RAD: f64 = 6e-4;

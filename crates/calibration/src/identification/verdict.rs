@@ -1,9 +1,9 @@
-//! The verdict on an estimated arm, the same for a fit of geometry and for one with causes beside it.
+//! The verdict on an estimated arm, shared by identification and diagnosis.
 //!
-//! A fit *fails* where it is no model: it did not converge, a link came out where no arm has it, rows that were held out got
-//! worse, a stated limit is missed. It is *doubtful* where nothing of that holds, but its data do not promise that programs
-//! will be better for it: a scale of the sensor explains what the links were bent to follow, or rows are too few for their
-//! noise. A doubtful model is written only where that is asked for, and says so wherever it is used.
+//! A fit *fails* if it did not converge, a link parameter is physically implausible, the held-out error increased, or a stated
+//! limit is exceeded. It is *doubtful* if none of this holds but its expected benefit is uncertain: a scale error of the sensor
+//! explains the readings as well as the links, or there are too few rows for their noise. A doubtful model is written only on
+//! request, and every use of it says so.
 
 use crate::identification::benefit::{Benefit, ScaleError};
 use crate::identification::tolerance::Tolerance;
@@ -11,20 +11,20 @@ use crate::measurement::dataset::Sensor;
 use truegrind_arm::estimated::{EstimatedParameter, Judgement, Verdict};
 use truegrind_math::statistics::ErrorSummary;
 
-/// Least probability of a benefit with which a model is not doubtful.
+/// Smallest probability of a benefit at which a model is not doubtful.
 pub const MIN_PROBABILITY: f64 = 0.96;
 
-/// Probability from which a scale of the sensor counts as found.
+/// Probability from which a scale error of the sensor counts as detected.
 const FOUND: f64 = 0.95;
 
-/// A scale that is found makes a model doubtful where it accounts for this share of the error (RMS) that the estimated arm
-/// is then left with, against the data sheet's.
+/// A detected scale error makes a model doubtful if the estimated arm's RMS error, given that scale error, exceeds this share of
+/// the nominal arm's.
 const SPOILT: f64 = 0.5;
 
 /// A parameter farther than this many tolerances from nominal makes the fit fail.
-const STRANGE_DEVIATION: f64 = 6.0;
+const IMPLAUSIBLE_DEVIATION: f64 = 6.0;
 
-/// What speaks for and against a model, one sentence each.
+/// Collects the reasons for and against a model, one sentence each.
 #[derive(Debug, Clone, Default)]
 pub struct VerdictBuilder {
     failures: Vec<String>,
@@ -33,7 +33,7 @@ pub struct VerdictBuilder {
     limits_stated: bool,
 }
 
-/// Limits of the held-out error beyond which a fit fails (mm); none where nothing is stated.
+/// Limits of the held-out error beyond which a fit fails (mm); `None` where not stated.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Limits {
     /// Of the RMSE.
@@ -43,30 +43,31 @@ pub struct Limits {
 }
 
 impl VerdictBuilder {
-    /// A reason why this is no model.
+    /// Adds a reason for failure.
     pub fn fail(&mut self, reason: impl Into<String>) {
         self.failures.push(reason.into());
     }
 
-    /// A reason why it may not serve programs.
+    /// Adds a reason for doubt.
     pub fn doubt(&mut self, reason: impl Into<String>) {
         self.doubts.push(reason.into());
     }
 
-    /// Something to know.
+    /// Adds a note.
     pub fn note(&mut self, reason: impl Into<String>) {
         self.others.push(reason.into());
     }
 
-    /// Fails where a link lies where no arm has it. `sure` standard deviations of the estimate are taken off first: with
-    /// wide priors a parameter that the data hardly see wanders.
-    pub fn check_links(&mut self, parameters: &[EstimatedParameter], tolerance: &Tolerance, sure: f64) {
+    /// Fails for a link parameter too far from nominal. `margin` standard deviations of the estimate are subtracted first: with
+    /// wide priors, weakly determined parameters scatter.
+    pub fn check_links(&mut self, parameters: &[EstimatedParameter], tolerance: &Tolerance, margin: f64) {
         for p in parameters.iter().filter(|p| p.name.starts_with("link")) {
             let one = if p.unit == "mm" { tolerance.length_mm } else { tolerance.angle_rad };
             let off = (p.value - p.nominal).abs();
-            if !((off - sure * p.sigma) / one < STRANGE_DEVIATION) {
+            if !((off - margin * p.sigma) / one < IMPLAUSIBLE_DEVIATION) {
                 self.fail(format!(
-                    "{} came out {:.0} tolerances from nominal: wrong units, wrong robot, or an effect that geometry cannot hold",
+                    "{} is estimated {:.0} tolerances from nominal: wrong units, wrong robot, or an effect that link geometry \
+                     cannot represent",
                     p.name,
                     off / one
                 ));
@@ -74,16 +75,17 @@ impl VerdictBuilder {
         }
     }
 
-    /// Fails where rows that were held out are worse off (RMSE in mm).
+    /// Fails if the held-out error increased (RMSE in mm).
     pub fn check_held_out(&mut self, registered_mm: f64, model_mm: f64) {
         if model_mm > registered_mm {
             self.fail(format!(
-                "geometry is worse than registered frames on held-out rows: {model_mm:.3} against {registered_mm:.3} mm RMSE"
+                "on held-out rows the estimated geometry is worse than registered frames alone: {model_mm:.3} against \
+                 {registered_mm:.3} mm RMSE"
             ));
         }
     }
 
-    /// Fails where a stated limit of the held-out error is missed, and says where none is stated.
+    /// Fails if the held-out error exceeds a stated limit; notes if none is stated.
     pub fn check_limits(&mut self, limits: &Limits, held_out: &ErrorSummary) {
         for (name, limit, found) in
             [("RMSE", limits.rmse_mm, held_out.rmse), ("maximum", limits.max_mm, held_out.max)]
@@ -101,38 +103,38 @@ impl VerdictBuilder {
         }
     }
 
-    /// Doubts where the model does not promise to help, and says why.
+    /// Adds doubts if the benefit is uncertain, with the reason.
     pub fn check_benefit(&mut self, benefit: Option<&Benefit>, sensor: Sensor) {
         let Some(found) = benefit else {
-            self.doubt("what the model would bring programs cannot be told: its equations have no solution");
+            self.doubt("the benefit for programs cannot be computed: the normal equations are singular");
             return;
         };
-        let promise = promise(found);
+        let sentence = benefit_sentence(found);
         if found.probability >= MIN_PROBABILITY {
-            self.note(promise);
+            self.note(sentence);
             match &found.scale {
                 Some(scale) if spoils(scale) => self.doubt(scale_sentence(scale, sensor)),
                 _ => {}
             }
             return;
         }
-        self.doubt(promise);
+        self.doubt(sentence);
         if found.probability_without_scale < MIN_PROBABILITY {
-            self.doubt(few(found));
+            self.doubt(too_few_rows(found));
             return;
         }
         match &found.scale {
             Some(scale) if scale.probability > 0.5 => self.doubt(scale_sentence(scale, sensor)),
             Some(scale) => self.doubt(format!(
-                "a scale error of the sensor of {} cannot be told from longer links by these rows: {}",
+                "these rows cannot distinguish a sensor scale error of {} from longer links: {}",
                 percent(scale),
                 remedy(sensor)
             )),
-            None => self.doubt(few(found)),
+            None => self.doubt(too_few_rows(found)),
         }
     }
 
-    /// The verdict: what speaks against the model first.
+    /// The verdict, with the reasons against the model first.
     pub fn build(mut self) -> Verdict {
         let status = match (self.failures.is_empty(), self.doubts.is_empty(), self.limits_stated) {
             (false, ..) => Judgement::Fail,
@@ -147,7 +149,7 @@ impl VerdictBuilder {
     }
 }
 
-/// Whether a scale was found, and spoils the model.
+/// Whether a scale error is detected and makes the model doubtful.
 fn spoils(scale: &ScaleError) -> bool {
     scale.probability > FOUND
         && scale.value.abs() > 3.0 * scale.sigma
@@ -155,7 +157,7 @@ fn spoils(scale: &ScaleError) -> bool {
         && scale.estimated_mm > SPOILT * scale.nominal_mm
 }
 
-/// A probability as people read it: no 0 % and no 100 %, which nothing measured can be.
+/// A probability in per cent, never rounded to 0 % or 100 %.
 ///
 /// ```
 /// use truegrind_calibration::identification::verdict::percent_of;
@@ -172,13 +174,13 @@ pub fn percent_of(probability: f64) -> String {
     }
 }
 
-/// What a model promises.
-fn promise(found: &Benefit) -> String {
+/// The expected benefit in words.
+fn benefit_sentence(found: &Benefit) -> String {
     let probability = percent_of(found.probability);
     format!(
-        "inside the measured region, apart from where base and flange are placed, the data sheet's arm is expected to be \
-         {:.3} mm RMS off and the estimated one {:.3} mm: it helps programs with a probability of {probability} (at least {:.0} % \
-         is asked for)",
+        "inside the measured region, apart from the placement of base and flange, the expected RMS error is {:.3} mm for the \
+         nominal arm and {:.3} mm for the estimated one: it improves programs with a probability of {probability} (at least \
+         {:.0} % is required)",
         found.nominal_mm,
         found.estimated_mm,
         100.0 * MIN_PROBABILITY
@@ -191,14 +193,11 @@ fn percent(scale: &ScaleError) -> String {
 
 fn scale_sentence(scale: &ScaleError, sensor: Sensor) -> String {
     let share = 100.0 * (1.0 - scale.geometry_share.clamp(0.0, 1.0).sqrt());
-    let bent = if share >= 0.5 {
-        format!(", and {share:.0} % of what the links were bent by")
-    } else {
-        String::new()
-    };
+    let absorbed =
+        if share >= 0.5 { format!(", and {share:.0} % of the links' correction") } else { String::new() };
     let (long, error) = if scale.value < 0.0 { ("short", -scale.value) } else { ("long", scale.value) };
     format!(
-        "a sensor that reads {:.3} ± {:.3} % too {long} explains the rows better than the links alone (probability {}){bent}: {}",
+        "a sensor that reads {:.3} ± {:.3} % too {long} explains the rows better than the links alone (probability {}){absorbed}: {}",
         100.0 * error,
         100.0 * scale.sigma,
         percent_of(scale.probability),
@@ -218,10 +217,10 @@ fn remedy(sensor: Sensor) -> &'static str {
     }
 }
 
-fn few(found: &Benefit) -> String {
+fn too_few_rows(found: &Benefit) -> String {
     format!(
-        "{} readings determine {:.1} of {} parameters, and with the noise that they show the correction is as likely to follow \
-         the noise as the arm: measure more poses, or with less noise; `diagnose` tells whether something moved while measuring",
+        "{} readings determine {:.1} of {} parameters; at their noise level the correction can follow the noise rather than the \
+         arm: measure more poses, or with less noise; `diagnose` tests whether something moved during the measurement",
         found.readings, found.determined, found.parameters
     )
 }

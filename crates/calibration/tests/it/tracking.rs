@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 use truegrind_arm::estimated::Estimated;
 use truegrind_calibration::identification::identify::{self, identify};
 use truegrind_calibration::identification::solver::SOLVERS;
-use truegrind_calibration::identification::start::starts;
+use truegrind_calibration::identification::start::candidate_frames;
 use truegrind_calibration::identification::tolerance::Tolerance;
 use truegrind_calibration::measurement::dataset::{Dataset, Reading};
 use truegrind_calibration::measurement::simulation::recipe::{LinkDeviation, Recipe};
@@ -57,7 +57,7 @@ fn model() -> &'static Estimated {
     MODEL.get_or_init(|| {
         let dataset = measured(1, None);
         let robot = nominal("abb-irb-120").unwrap();
-        let frames = starts(&dataset, &robot).unwrap().remove(0);
+        let frames = candidate_frames(&dataset, &robot).unwrap().remove(0);
         let division = |d: &Dataset| split::random(d, 0.2, 0);
         identify(&dataset, "abb-irb-120", &robot, &frames, &division, &settings()).unwrap().estimated
     })
@@ -257,7 +257,7 @@ fn a_model_that_leaves_effects_unexplained_raises_no_alarm_on_the_arm_that_it_wa
         let rows = |range: std::ops::Range<usize>| dataset.subset(&range.collect::<Vec<_>>());
         let (first, second) = (rows(0..half), rows(half..dataset.rows.len()));
         let robot = nominal("abb-irb-120").unwrap();
-        let frames = starts(&first, &robot).unwrap().remove(0);
+        let frames = candidate_frames(&first, &robot).unwrap().remove(0);
         let division = |d: &Dataset| split::random(d, 0.2, 0);
         let found = identify(&first, "abb-irb-120", &robot, &frames, &division, &settings()).unwrap();
         let mut tracker = Tracker::begin(&found.estimated, "hash", &second, &Options::default()).unwrap();

@@ -16,7 +16,7 @@ use truegrind_arm::parameter::{LinkCoordinate, Parameter};
 use truegrind_calibration::identification::calibration::{CalibrationProblem, Weight};
 use truegrind_calibration::identification::fit::frame_parameters;
 use truegrind_calibration::identification::identify::{self, Identification, identify};
-use truegrind_calibration::identification::start::starts;
+use truegrind_calibration::identification::start::candidate_frames;
 use truegrind_calibration::identification::tolerance::Tolerance;
 use truegrind_calibration::measurement::dataset::Dataset;
 use truegrind_calibration::measurement::simulation::recipe::Recipe;

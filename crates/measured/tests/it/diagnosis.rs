@@ -2,13 +2,13 @@
 
 use truegrind_arm::robots;
 use truegrind_calibration::diagnosis::diagnose::{Diagnosed, Options, diagnose};
-use truegrind_calibration::identification::start::starts;
+use truegrind_calibration::identification::start::candidate_frames;
 use truegrind_measured::data_set;
 
 fn diagnosed(file: &str, robot: &str, options: &Options) -> Diagnosed {
     let dataset = data_set(file, None);
     let nominal = robots::load(robot).unwrap().model;
-    let frames = starts(&dataset, &nominal).unwrap().remove(0);
+    let frames = candidate_frames(&dataset, &nominal).unwrap().remove(0);
     diagnose(&dataset, robot, &nominal, &frames, options, &|_| {}).unwrap()
 }
 

@@ -2,7 +2,7 @@
 
 use truegrind_calibration::identification::identify::{Options, identify};
 use truegrind_calibration::identification::solver::by_name;
-use truegrind_calibration::identification::start::starts;
+use truegrind_calibration::identification::start::candidate_frames;
 use truegrind_calibration::identification::tolerance::Tolerance;
 use truegrind_calibration::measurement::dataset::Dataset;
 use truegrind_calibration::measurement::split;
@@ -15,7 +15,7 @@ use truegrind_measured::data_set;
 fn robocali_meets_the_reference() {
     let dataset = data_set("RobotCali.xlsx", None);
     let robot = truegrind_arm::robots::load("abb-irb-120").unwrap();
-    let frames = starts(&dataset, &robot.model).unwrap().remove(0);
+    let frames = candidate_frames(&dataset, &robot.model).unwrap().remove(0);
     for (fuse_readout, limit) in [(false, 0.46), (true, 0.36)] {
         let (mut registered, mut geometry) = (0.0, 0.0);
         for seed in 0..3 {

@@ -8,7 +8,7 @@ use truegrind_calibration::identification::calibration::{Frames, Weight};
 use truegrind_calibration::identification::fit::{Observations, Start, errors_on, fit, frame_parameters};
 use truegrind_calibration::identification::identify::prepare_observations;
 use truegrind_calibration::identification::solver::SOLVERS;
-use truegrind_calibration::identification::start::starts;
+use truegrind_calibration::identification::start::candidate_frames;
 use truegrind_calibration::identification::tolerance::Tolerance;
 use truegrind_calibration::measurement::import;
 use truegrind_calibration::measurement::simulation::recipe::{LinkDeviation, Recipe};
@@ -78,7 +78,7 @@ pub(super) fn arm(
     let sigma_mm = (noise.sigma_mm + 2.0 * noise.per_metre_mm).max(1e-3);
     let sigma_rad = noise.sigma_deg.to_radians().max(1e-6);
     let first = &groups[0].identify;
-    let candidates = starts(&first.dataset, &nominal)?;
+    let candidates = candidate_frames(&first.dataset, &nominal)?;
     let frames = candidates.into_iter().next().unwrap_or_else(|| Frames::at_origin(1));
     let parameters: Vec<Parameter> =
         link_parameters(&nominal).into_iter().chain(frame_parameters(&first.dataset)).collect();

@@ -15,7 +15,7 @@ use truegrind_pictures::measured::{AXIS, Residuals};
 use truegrind_pictures::{MeasuredScene, VisualError, diagnosis_recording, measured_recording};
 
 use super::read::Read;
-use truegrind_calibration::identification::start::starts;
+use truegrind_calibration::identification::start::candidate_frames;
 
 const OUTLET: [f64; 3] = [900.0, -200.0, 30.0];
 const HOOK: [f64; 3] = [10.0, 0.0, 40.0];
@@ -172,7 +172,7 @@ fn a_diagnosis_says_in_its_picture_what_it_found() {
     let bytes = include_bytes!("../../../../tests/data/irb120-cable.csv");
     let dataset = import::read("irb120-cable.csv", bytes, &import::Options::default()).unwrap();
     let options = diagnose::Options::default();
-    let start = starts(&dataset, &arm()).unwrap().remove(0);
+    let start = candidate_frames(&dataset, &arm()).unwrap().remove(0);
     let found = diagnose::diagnose(&dataset, "abb-irb-120", &arm(), &start, &options, &|_| {}).unwrap();
     assert!(!found.diagnosis.findings.is_empty());
     let text = Read::of(&diagnosis_recording(&dataset, &found, &[]).unwrap().rrd().unwrap()).summary();

@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 use truegrind_arm::robots;
 use truegrind_calibration::identification::identify::{Identification, Options, identify};
 use truegrind_calibration::identification::solver::SOLVERS;
-use truegrind_calibration::identification::start::starts;
+use truegrind_calibration::identification::start::candidate_frames;
 use truegrind_calibration::identification::tolerance::Tolerance;
 use truegrind_calibration::measurement::dataset::Dataset;
 use truegrind_calibration::measurement::import;
@@ -32,7 +32,7 @@ pub(super) fn identification() -> (&'static Identification, &'static Dataset) {
     let (found, dataset) = FOUND.get_or_init(|| {
         let robot = robots::load("abb-irb-120").unwrap();
         let dataset = dataset();
-        let frames = starts(&dataset, &robot.model).unwrap().remove(0);
+        let frames = candidate_frames(&dataset, &robot.model).unwrap().remove(0);
         let options = Options {
             tolerance: Tolerance::default(),
             solver: &SOLVERS[0],

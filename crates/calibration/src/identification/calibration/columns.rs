@@ -1,12 +1,12 @@
-//! Measured rows by columns, and what each effect and disturbance adds to them.
+//! Structure of arrays: readings, joint angles, and regressors of effects and disturbances, one column each.
 
 use std::ops::Range;
 use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::forms::{self, rotations};
 use super::frames::{Frames, Weight};
+use super::regressors::{self, joint_rotations};
 use crate::measurement::dataset::{Dataset, Reading, Sensor};
 use crate::measurement::sensor::disturbance::Kind;
 use truegrind_arm::condition::Condition;
@@ -15,29 +15,29 @@ use truegrind_arm::parameter::Parameter;
 use truegrind_math::lanes::WIDTH;
 use truegrind_math::work::checkpoint;
 
-/// Rows from which their columns are made on all threads; fewer are not worth the call.
+/// Rows from which columns are built in parallel.
 const MANY_ROWS: usize = 8192;
 
-/// Rows from which only the angles are kept: their sines and cosines cost each pass some ten nanoseconds a row, and a hundred
-/// bytes a row if they are kept.
+/// Rows from which sines and cosines are recomputed in each pass (some ten nanoseconds a row) instead of stored (a hundred
+/// bytes a row).
 const MANY_ANGLES: usize = 50_000;
 
 /// The joint angles of the rows (rad, of the mapped arm).
 #[derive(Debug, Clone)]
 pub(super) enum Angles {
     /// Their sines and cosines.
-    Worked { sin: [Vec<f64>; 6], cos: [Vec<f64>; 6] },
+    SinCos { sin: [Vec<f64>; 6], cos: [Vec<f64>; 6] },
     /// The angles themselves, of very many rows.
-    Plain([Vec<f64>; 6]),
+    Raw([Vec<f64>; 6]),
 }
 
 impl Default for Angles {
     fn default() -> Self {
-        Self::Plain(Default::default())
+        Self::Raw(Default::default())
     }
 }
 
-/// Weights of the rows, padded to whole lanes with rows of weight 0. Apart from the columns, which fits to the same rows share.
+/// Weights of the rows, padded to whole lanes with weight 0. Kept apart from [`Columns`], which fits to the same rows share.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Weights {
     pub(super) per_mm: Vec<f64>,
@@ -46,7 +46,7 @@ pub(super) struct Weights {
 }
 
 impl Weights {
-    /// One for each of so many rows.
+    /// One for each row.
     pub(super) fn of(weights: &[Weight], rows: usize, sensor: Sensor) -> Self {
         assert_eq!(weights.len(), rows, "one weight for each row");
         let padded = |of: fn(&Weight) -> f64| {
@@ -59,7 +59,7 @@ impl Weights {
         Self { per_mm: padded(|w| w.per_mm), per_rad }
     }
 
-    /// Those of the rows at `rows`.
+    /// The weights of the given rows.
     pub(super) fn subset(&self, rows: &[usize]) -> Self {
         let picked = |all: &[f64]| -> Vec<f64> {
             if all.is_empty() {
@@ -73,21 +73,21 @@ impl Weights {
     }
 }
 
-/// Measured rows by columns, padded to whole lanes by the last row.
+/// Measured rows as columns, padded to whole lanes with the last row.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Columns {
     pub(super) angles: Arc<Angles>,
     /// Cable: length. Position: x, y, z. Pose: x, y, z and the nine entries of the rotation, column-major.
     pub(super) reading: Vec<Vec<f64>>,
-    /// The outlet of each row's cable; empty where there is but one.
+    /// The outlet of each row's cable; empty where there is only one.
     pub(super) anchor: Vec<u32>,
-    /// Joint rotations that the starting model's effects add; empty without effects.
+    /// Joint rotations by the starting model's effects; absent without effects.
     pub(super) extra: Option<[Vec<f64>; 6]>,
     /// Relative growth of the starting model's links; empty without.
     pub(super) growth: Vec<f64>,
     /// For each free effect parameter: rotations and growth per unit.
     pub(super) effects: Vec<EffectColumns>,
-    /// Where in `effects` each parameter of x is; out of range for those that are no effect's.
+    /// Index into `effects` of each parameter of x; out of range for parameters of no effect.
     pub(super) effect_at: Vec<usize>,
     /// How far each disturbance goes in each row.
     pub(super) profiles: Vec<Vec<f64>>,
@@ -96,7 +96,7 @@ pub(super) struct Columns {
 }
 
 impl Columns {
-    /// The columns of the parameter at place `k` of x, where it is an effect's or a load's.
+    /// The columns of parameter `k` of x, if it belongs to an effect or a load.
     #[inline(always)]
     pub(super) fn effect_of(&self, k: usize) -> Option<&EffectColumns> {
         self.effect_at.get(k).and_then(|&e| self.effects.get(e))
@@ -105,14 +105,14 @@ impl Columns {
 
 #[derive(Debug, Clone, Default)]
 pub(super) struct EffectColumns {
-    /// Position of the parameter in x.
-    pub(super) place: usize,
+    /// Index of the parameter in x.
+    pub(super) index: usize,
     pub(super) rotation: [Option<Vec<f64>>; 6],
     pub(super) growth: Option<Vec<f64>>,
 }
 
 impl Columns {
-    /// The rows at `rows`, padded as all are.
+    /// The given rows, padded likewise.
     pub(super) fn subset(&self, rows: &[usize]) -> Self {
         let n = rows.len();
         let padded = n.div_ceil(WIDTH) * WIDTH;
@@ -125,11 +125,11 @@ impl Columns {
         }
         Self {
             angles: Arc::new(match &*self.angles {
-                Angles::Worked { sin, cos } => Angles::Worked {
+                Angles::SinCos { sin, cos } => Angles::SinCos {
                     sin: std::array::from_fn(|j| picked(&sin[j])),
                     cos: std::array::from_fn(|j| picked(&cos[j])),
                 },
-                Angles::Plain(angles) => Angles::Plain(std::array::from_fn(|j| picked(&angles[j]))),
+                Angles::Raw(angles) => Angles::Raw(std::array::from_fn(|j| picked(&angles[j]))),
             }),
             reading: self.reading.iter().map(|column| picked(column)).collect(),
             anchor: if self.anchor.is_empty() {
@@ -143,7 +143,7 @@ impl Columns {
                 .effects
                 .iter()
                 .map(|effect| EffectColumns {
-                    place: effect.place,
+                    index: effect.index,
                     rotation: std::array::from_fn(|j| effect.rotation[j].as_deref().map(&picked)),
                     growth: effect.growth.as_deref().map(&picked),
                 })
@@ -158,7 +158,7 @@ impl Columns {
         }
     }
 
-    /// Of the rows of a data set; `angles`: theirs, where they are known.
+    /// Columns of a data set; `angles` are reused where given.
     pub(super) fn of(
         dataset: &Dataset,
         start: &Model,
@@ -194,19 +194,19 @@ impl Columns {
                 })
             })
             .collect();
-        let worked = || {
+        let angle_columns = || {
             if n < MANY_ANGLES {
-                Angles::Worked {
+                Angles::SinCos {
                     sin: std::array::from_fn(|j| column(&|i| mapped(i, j).sin())),
                     cos: std::array::from_fn(|j| column(&|i| mapped(i, j).cos())),
                 }
             } else {
-                Angles::Plain(std::array::from_fn(|j| column(&|i| mapped(i, j))))
+                Angles::Raw(std::array::from_fn(|j| column(&|i| mapped(i, j))))
             }
         };
         let several = dataset.sensor == Sensor::Cable && frames.outlets_mm.len() > 1;
         let mut out = Self {
-            angles: angles.cloned().unwrap_or_else(|| Arc::new(worked())),
+            angles: angles.cloned().unwrap_or_else(|| Arc::new(angle_columns())),
             reading,
             anchor: if several { (0..padded).map(|i| row(i).anchor as u32).collect() } else { Vec::new() },
             ..Self::default()
@@ -218,14 +218,14 @@ impl Columns {
         out.profiles =
             frames.disturbances.iter().map(|d| column(&|i| d.profile.at(row(i)))).collect::<Vec<_>>();
         if turned {
-            out.add_turns(dataset, start, frames, parameters, padded);
+            out.add_joint_disturbances(dataset, start, frames, parameters, padded);
         }
         out.shifts = frames
             .disturbances
             .iter()
             .map(|d| match d.kind {
                 Kind::Empirical(form) if !form.rotates_joints() => {
-                    forms::shifts(form, dataset, start, frames)
+                    regressors::sensor_shifts(form, dataset, start, frames)
                         .iter()
                         .map(|v| std::array::from_fn(|k| column(&|i| v[i.min(n.saturating_sub(1))][k])))
                         .collect()
@@ -235,13 +235,13 @@ impl Columns {
             .collect();
         out.effect_at = vec![usize::MAX; parameters.len()];
         for (e, effect) in out.effects.iter().enumerate() {
-            out.effect_at[effect.place] = e;
+            out.effect_at[effect.index] = e;
         }
         out
     }
 
-    /// Disturbances that turn the joints like an effect, in the rows of their profile.
-    fn add_turns(
+    /// Adds the regressors of disturbances that rotate joints, times their profile.
+    fn add_joint_disturbances(
         &mut self,
         dataset: &Dataset,
         start: &Model,
@@ -251,7 +251,8 @@ impl Columns {
     ) {
         let last = dataset.rows.len().saturating_sub(1);
         for (index, disturbance) in frames.disturbances.iter().enumerate() {
-            for (parameter, rotation) in rotations(&disturbance.kind, dataset, start).into_iter().enumerate()
+            for (parameter, rotation) in
+                joint_rotations(&disturbance.kind, dataset, start).into_iter().enumerate()
             {
                 let profile = &self.profiles[index];
                 let rotation: [Option<Vec<f64>>; 6] =
@@ -264,9 +265,9 @@ impl Columns {
                         }
                     }
                 }
-                let here = Parameter::Disturbance { index, parameter };
-                if let Some(place) = parameters.iter().position(|p| *p == here) {
-                    self.effects.push(EffectColumns { place, rotation, growth: None });
+                let wanted = Parameter::Disturbance { index, parameter };
+                if let Some(x_index) = parameters.iter().position(|p| *p == wanted) {
+                    self.effects.push(EffectColumns { index: x_index, rotation, growth: None });
                 }
             }
         }
@@ -277,32 +278,32 @@ impl Columns {
         let free: Vec<FreeEffect> = parameters
             .iter()
             .enumerate()
-            .filter_map(|(place, p)| match *p {
-                Parameter::Effect { index, parameter } => Some(FreeEffect { place, index, parameter }),
+            .filter_map(|(x_index, p)| match *p {
+                Parameter::Effect { index, parameter } => Some(FreeEffect { x_index, index, parameter }),
                 _ => None,
             })
             .collect();
-        let parts: Vec<OfEffects> = (0..n.div_ceil(PART_ROWS))
+        let parts: Vec<EffectRows> = (0..n.div_ceil(CHUNK_ROWS))
             .into_par_iter()
             .map(|part| {
                 checkpoint();
-                let first = part * PART_ROWS;
-                OfEffects::of(dataset, first..n.min(first + PART_ROWS), start, &free)
+                let first = part * CHUNK_ROWS;
+                EffectRows::of(dataset, first..n.min(first + CHUNK_ROWS), start, &free)
             })
             .collect();
-        // Padding repeats the last row, with weight 0; what an effect adds per unit is nothing there.
-        let joined = |of: &dyn Fn(&OfEffects) -> &[f64]| {
+        // Padding repeats the last row, with weight 0 and zero regressors.
+        let joined = |of: &dyn Fn(&EffectRows) -> &[f64]| {
             let mut out = Vec::with_capacity(padded);
             parts.iter().for_each(|part| out.extend_from_slice(of(part)));
             out.resize(padded, out.last().copied().unwrap_or(0.0));
             out
         };
-        let spread = |of: &dyn Fn(&OfEffects) -> Option<&[f64]>| {
+        let spread = |of: &dyn Fn(&EffectRows) -> Option<&[f64]>| {
             parts.iter().any(|part| of(part).is_some()).then(|| {
                 let mut out = vec![0.0; padded];
-                for (place, part) in out.chunks_mut(PART_ROWS).zip(&parts) {
+                for (chunk, part) in out.chunks_mut(CHUNK_ROWS).zip(&parts) {
                     if let Some(some) = of(part) {
-                        place[..some.len()].copy_from_slice(some);
+                        chunk[..some.len()].copy_from_slice(some);
                     }
                 }
                 out
@@ -314,7 +315,7 @@ impl Columns {
             .iter()
             .enumerate()
             .map(|(k, free)| EffectColumns {
-                place: free.place,
+                index: free.x_index,
                 rotation: std::array::from_fn(|j| spread(&|part| part.effects[k].rotation[j].as_deref())),
                 growth: spread(&|part| part.effects[k].growth.as_deref()),
             })
@@ -322,27 +323,27 @@ impl Columns {
     }
 }
 
-/// Rows of which one thread works out the effects.
-const PART_ROWS: usize = 128;
+/// Rows per parallel chunk.
+const CHUNK_ROWS: usize = 128;
 
 /// A free parameter of an effect.
 struct FreeEffect {
-    /// Position in x.
-    place: usize,
+    /// Index in x.
+    x_index: usize,
     /// Effect of the starting model.
     index: usize,
     /// Which of its parameters.
     parameter: usize,
 }
 
-/// What the effects of the starting model do in some rows.
-struct OfEffects {
+/// Joint rotations, growth and regressors of the effects in a chunk of rows.
+struct EffectRows {
     extra: [Vec<f64>; 6],
     growth: Vec<f64>,
     effects: Vec<EffectColumns>,
 }
 
-impl OfEffects {
+impl EffectRows {
     fn of(dataset: &Dataset, rows: Range<usize>, start: &Model, free: &[FreeEffect]) -> Self {
         let n = rows.len();
         let mut out = Self {
@@ -350,7 +351,7 @@ impl OfEffects {
             growth: vec![0.0; n],
             effects: free
                 .iter()
-                .map(|free| EffectColumns { place: free.place, ..EffectColumns::default() })
+                .map(|free| EffectColumns { index: free.x_index, ..EffectColumns::default() })
                 .collect(),
         };
         let mut posed = start.at_condition(&Condition::default());
@@ -363,19 +364,19 @@ impl OfEffects {
                 out.extra[j][i] = rotation[j];
             }
             out.growth[i] = start.effects.iter().map(|e| e.growth(&row.condition)).sum();
-            let mut at = (usize::MAX, Vec::new(), Vec::new());
+            let mut cached = (usize::MAX, Vec::new(), Vec::new());
             for (columns, free) in out.effects.iter_mut().zip(free) {
-                if at.0 != free.index {
+                if cached.0 != free.index {
                     let growth = start.effects[free.index].growth_regressors(&row.condition);
-                    at = (free.index, posed.effect_regressors(free.index, &row.joints), growth);
+                    cached = (free.index, posed.effect_regressors(free.index, &row.joints), growth);
                 }
-                let regressor = at.1[free.parameter];
+                let regressor = cached.1[free.parameter];
                 for j in (0..6).filter(|&j| regressor[j] != 0.0) {
                     columns.rotation[j].get_or_insert_with(|| vec![0.0; n])[i] = regressor[j];
                 }
-                let grown = at.2.get(free.parameter).copied().unwrap_or(0.0);
-                if grown != 0.0 {
-                    columns.growth.get_or_insert_with(|| vec![0.0; n])[i] = grown;
+                let row_growth = cached.2.get(free.parameter).copied().unwrap_or(0.0);
+                if row_growth != 0.0 {
+                    columns.growth.get_or_insert_with(|| vec![0.0; n])[i] = row_growth;
                 }
             }
         }

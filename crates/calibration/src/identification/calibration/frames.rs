@@ -1,22 +1,22 @@
-//! Where the sensor stands and what it touches.
+//! Sensor frame, target, cable outlets and disturbances: the parameters of a measurement.
 
 use nalgebra::Vector3;
 
 use crate::measurement::sensor::disturbance::Disturbance;
 use truegrind_math::se3::Pose;
 
-/// How the sensor stands to the arm: what a calibration must find beside the arm itself.
+/// Parameters of the measurement that a calibration estimates along with the arm.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frames {
     /// The sensor's frame in the arm's base (position and pose sensors).
     pub base_from_sensor: Pose,
-    /// What the sensor touches, on the flange: hook, reflector or target. It is not the TCP.
+    /// The measured point or frame on the flange: hook, reflector or target. It is not the TCP.
     pub flange_from_target: Pose,
     /// Outlet of each cable in the base (mm).
     pub outlets_mm: Vec<Vector3<f64>>,
-    /// What must be added to each cable's free length to give its reading (mm).
+    /// Zero offset of each cable: reading minus free length (mm).
     pub zeros_mm: Vec<f64>,
-    /// What disturbed the measurement; empty for an undisturbed one.
+    /// Disturbances of the measurement.
     pub disturbances: Vec<Disturbance>,
 }
 

@@ -1,4 +1,4 @@
-//! The inner loop of a calibration: residual and Jacobian of as many rows at a time as a register holds.
+//! SIMD kernel of a calibration: residuals and Jacobian of as many rows at a time as a register holds.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -13,7 +13,7 @@ use truegrind_math::se3::{Pose, left_jacobian};
 
 type V<R> = [R; 3];
 
-/// Everything of x that is the same for all rows.
+/// Row-independent quantities at x.
 pub(super) struct State {
     tables: [LinkTable; 6],
     links_mm: [(f64, f64); 6],
@@ -22,20 +22,20 @@ pub(super) struct State {
     base_from_sensor: Pose,
     outlets: Vec<Vector3<f64>>,
     zeros: Vec<f64>,
-    /// Axes in which the sensor's rotation vector turns it, in the base.
+    /// Rotation axes of the sensor frame's rotation vector, in the base.
     sensor_axes: Matrix3<f64>,
-    /// Axes in which the target's rotation vector turns it, in the last DH frame.
+    /// Rotation axes of the target's rotation vector, in the last DH frame.
     target_axes: Matrix3<f64>,
-    /// From flange to the last DH frame.
+    /// Rotation from the flange to the last DH frame.
     flange: Matrix3<f64>,
     effects: Vec<f64>,
-    /// What disturbs each row; absent for an undisturbed measurement.
-    pushed: Option<Pushed>,
+    /// Disturbance of each row; absent for an undisturbed measurement.
+    disturbed: Option<DisturbanceColumns>,
 }
 
 /// Disturbances row by row, as columns.
 #[derive(Default)]
-struct Pushed {
+struct DisturbanceColumns {
     zero: Vec<f64>,
     frame: [Vec<f64>; 3],
     turn: [Vec<f64>; 3],
@@ -45,7 +45,7 @@ struct Pushed {
     sag: Vec<f64>,
 }
 
-impl Pushed {
+impl DisturbanceColumns {
     fn of(disturbances: &[Disturbance], columns: &Columns) -> Option<Self> {
         let profiles = &columns.profiles;
         let n = profiles.first().map(Vec::len)?;
@@ -93,7 +93,7 @@ fn load<R: Real>(like: R, columns: &[Vec<f64>; 3], at: usize) -> V<R> {
     [like.load(&columns[0], at), like.load(&columns[1], at), like.load(&columns[2], at)]
 }
 
-/// Three columns of many.
+/// Three consecutive columns.
 #[inline(always)]
 fn three<R: Real>(like: R, columns: &[Vec<f64>], first: usize, at: usize) -> V<R> {
     let mut out = [like; 3];
@@ -128,8 +128,8 @@ impl State {
             sensor_axes: left_jacobian(&sensor),
             target_axes: flange * left_jacobian(&target),
             flange,
-            effects: problem.columns.effects.iter().map(|e| x[e.place]).collect(),
-            pushed: Pushed::of(&frames.disturbances, &problem.columns),
+            effects: problem.columns.effects.iter().map(|e| x[e.index]).collect(),
+            disturbed: DisturbanceColumns::of(&frames.disturbances, &problem.columns),
         }
     }
 }
@@ -165,14 +165,33 @@ impl AnyWidth for Fill<'_> {
         let rows = lanes * WIDTH;
         match problem.sensor {
             Sensor::Cable => {
-                for place in (0..rows).step_by(R::ROWS) {
-                    cable(like, problem, state, from * WIDTH + place, jacobian, rows, place, out);
+                for row_index in (0..rows).step_by(R::ROWS) {
+                    cable_rows(
+                        like,
+                        problem,
+                        state,
+                        from * WIDTH + row_index,
+                        jacobian,
+                        rows,
+                        row_index,
+                        out,
+                    );
                 }
             }
             Sensor::Position | Sensor::Pose => {
                 let oriented = problem.sensor == Sensor::Pose;
-                for place in (0..rows).step_by(R::ROWS) {
-                    space(like, problem, state, from * WIDTH + place, jacobian, rows, place, oriented, out);
+                for row_index in (0..rows).step_by(R::ROWS) {
+                    spatial_rows(
+                        like,
+                        problem,
+                        state,
+                        from * WIDTH + row_index,
+                        jacobian,
+                        rows,
+                        row_index,
+                        oriented,
+                        out,
+                    );
                 }
             }
         }
@@ -184,13 +203,13 @@ fn splat<R: Real>(like: R, v: &Vector3<f64>) -> V<R> {
     splats(like, &[v.x, v.y, v.z])
 }
 
-/// Frames of the rows, and the factor by which their lengths have grown.
+/// Link frames of the rows, and the thermal scale factor of the links.
 #[cfg_attr(not(debug_assertions), inline(always))]
 fn frames<R: SinCos>(like: R, problem: &CalibrationProblem, state: &State, at: usize) -> (Chain<R>, R) {
     let columns = &problem.columns;
     let (mut sin, mut cos) = match &*columns.angles {
-        Angles::Worked { sin, cos } => (six(like, sin, at), six(like, cos, at)),
-        Angles::Plain(angles) => {
+        Angles::SinCos { sin, cos } => (six(like, sin, at), six(like, cos, at)),
+        Angles::Raw(angles) => {
             let (mut sin, mut cos) = ([like; 6], [like; 6]);
             for (j, angle) in six(like, angles, at).into_iter().enumerate() {
                 (sin[j], cos[j]) = sin_cos(angle);
@@ -229,7 +248,7 @@ fn six<R: Real>(like: R, columns: &[Vec<f64>; 6], at: usize) -> [R; 6] {
     out
 }
 
-/// A vector of the last DH frame, in the base.
+/// Rotates a vector from the last DH frame to the base.
 #[inline(always)]
 fn in_base<R: Real>(frames: &Chain<R>, v: &Vector3<f64>) -> V<R> {
     let (x, y, z) = (&frames.x, &frames.y[5], &frames.z[6]);
@@ -247,10 +266,10 @@ fn plus<R: Real>(a: &V<R>, b: &V<R>) -> V<R> {
 }
 
 #[cfg_attr(not(debug_assertions), inline(always))]
-fn point<R: Real>(frames: &Chain<R>, state: &State, at: usize) -> V<R> {
+fn target_point<R: Real>(frames: &Chain<R>, state: &State, at: usize) -> V<R> {
     let mut out = plus(&frames.origin[6], &in_base(frames, &state.target.translation.vector));
-    if let Some(pushed) = &state.pushed {
-        let tool = load(out[0], &pushed.tool, at);
+    if let Some(disturbed) = &state.disturbed {
+        let tool = load(out[0], &disturbed.tool, at);
         for (axis, along) in tool.iter().enumerate() {
             let direction = in_base(frames, &state.flange.column(axis).into());
             for k in 0..3 {
@@ -261,21 +280,21 @@ fn point<R: Real>(frames: &Chain<R>, state: &State, at: usize) -> V<R> {
     out
 }
 
-/// How far disturbance `index` goes in the rows.
+/// Profile of disturbance `index` in the rows.
 #[inline(always)]
 fn profile<R: Real>(like: R, problem: &CalibrationProblem, index: usize, at: usize) -> R {
     like.load(&problem.columns.profiles[index], at)
 }
 
-/// What a unit of a cable's sag adds to its length (mm m²): see the page of disturbances.
+/// Length added by unit sag of a cable (mm m²): see [`Disturbance`].
 #[inline(always)]
-fn sagging<R: Real>(away: &V<R>, length: R) -> R {
+fn sag_length<R: Real>(away: &V<R>, length: R) -> R {
     length.splat(1e-6 / 24.0) * (away[0] * away[0] + away[1] * away[1]) * length
 }
 
-/// One value of the row's cable, for each lane.
+/// Per-cable value of each lane's row.
 #[inline(always)]
-fn of_anchor<R: Real>(like: R, problem: &CalibrationProblem, at: usize, value: impl Fn(usize) -> f64) -> R {
+fn per_anchor<R: Real>(like: R, problem: &CalibrationProblem, at: usize, value: impl Fn(usize) -> f64) -> R {
     if problem.columns.anchor.is_empty() {
         return like.splat(value(0));
     }
@@ -288,51 +307,52 @@ fn of_anchor<R: Real>(like: R, problem: &CalibrationProblem, at: usize, value: i
 
 #[allow(clippy::too_many_arguments)]
 #[cfg_attr(not(debug_assertions), inline(always))]
-fn cable<R: SinCos>(
+fn cable_rows<R: SinCos>(
     like: R,
     problem: &CalibrationProblem,
     state: &State,
     at: usize,
     jacobian: bool,
     rows: usize,
-    place: usize,
+    row_index: usize,
     out: &mut [f64],
 ) {
     let weight = like.load(&problem.weights.per_mm, at);
     let (frames, scale) = frames(like, problem, state, at);
-    let p = point(&frames, state, at);
+    let p = target_point(&frames, state, at);
     let single = state.outlets.len() == 1;
     let (outlet, zero): (V<R>, R) = if single {
         (splat(like, &state.outlets[0]), like.splat(state.zeros[0]))
     } else {
         let mut outlet = [like; 3];
         for (k, coordinate) in outlet.iter_mut().enumerate() {
-            *coordinate = of_anchor(like, problem, at, |a| state.outlets[a][k]);
+            *coordinate = per_anchor(like, problem, at, |a| state.outlets[a][k]);
         }
-        (outlet, of_anchor(like, problem, at, |a| state.zeros[a]))
+        (outlet, per_anchor(like, problem, at, |a| state.zeros[a]))
     };
     let mut v = minus(&p, &outlet);
-    if let Some(pushed) = &state.pushed {
-        v = minus(&v, &load(like, &pushed.frame, at));
+    if let Some(disturbed) = &state.disturbed {
+        v = minus(&v, &load(like, &disturbed.frame, at));
     }
     let length = dot(&v, &v).sqrt();
     let mut free = length + zero;
     let mut predicted = free;
-    if let Some(pushed) = &state.pushed {
-        free += like.load(&pushed.zero, at);
-        predicted = free * like.load(&pushed.scale, at) + like.load(&pushed.sag, at) * sagging(&v, length);
+    if let Some(disturbed) = &state.disturbed {
+        free += like.load(&disturbed.zero, at);
+        predicted =
+            free * like.load(&disturbed.scale, at) + like.load(&disturbed.sag, at) * sag_length(&v, length);
     }
     let residual = weight * (predicted - like.load(&problem.columns.reading[0], at));
     let columns = problem.parameters.len();
     if !jacobian {
-        residual.store(out, place);
+        residual.store(out, row_index);
         return;
     }
-    residual.store(out, columns * rows + place);
-    // u carries the weight, so that every column comes out whitened.
-    let through = state.pushed.as_ref().map_or(like.splat(1.0), |pushed| like.load(&pushed.scale, at));
-    let pull = weight * through / length;
-    let u = scaled(pull, &v);
+    residual.store(out, columns * rows + row_index);
+    // u includes the weight, so that every column is whitened.
+    let gain = state.disturbed.as_ref().map_or(like.splat(1.0), |disturbed| like.load(&disturbed.scale, at));
+    let gradient_scale = weight * gain / length;
+    let u = scaled(gradient_scale, &v);
     let mut moment = [u; 7];
     for (moment, origin) in moment.iter_mut().zip(&frames.origin) {
         *moment = cross(&minus(&p, origin), &u);
@@ -341,29 +361,29 @@ fn cable<R: SinCos>(
     for (k, parameter) in problem.parameters.iter().enumerate() {
         let value = match *parameter {
             Parameter::Link { joint, coordinate } if coordinate.is_length() => {
-                scale * link_pull(&frames, &u, &moment, joint, coordinate)
+                scale * link_projection(&frames, &u, &moment, joint, coordinate)
             }
-            Parameter::Link { joint, coordinate } => link_pull(&frames, &u, &moment, joint, coordinate),
+            Parameter::Link { joint, coordinate } => link_projection(&frames, &u, &moment, joint, coordinate),
             Parameter::Target(axis) if axis < 3 => {
                 dot(&in_base(&frames, &state.flange.column(axis).into()), &u)
             }
             Parameter::Outlet { axis, .. } if single => -u[axis],
-            Parameter::Zero { .. } if single => weight * through,
+            Parameter::Zero { .. } if single => weight * gain,
             Parameter::Outlet { anchor, axis } => {
-                -u[axis] * of_anchor(like, problem, at, |a| f64::from(u8::from(a == anchor)))
+                -u[axis] * per_anchor(like, problem, at, |a| f64::from(u8::from(a == anchor)))
             }
             Parameter::Zero { anchor } => {
-                weight * through * of_anchor(like, problem, at, |a| f64::from(u8::from(a == anchor)))
+                weight * gain * per_anchor(like, problem, at, |a| f64::from(u8::from(a == anchor)))
             }
             Parameter::Disturbance { index, parameter } if !rotates_joints(problem, index) => {
-                let how_far = profile(like, problem, index, at);
-                how_far
+                let amplitude = profile(like, problem, index, at);
+                amplitude
                     * match problem.frames.disturbances[index].kind {
-                        Kind::Zero => weight * through,
+                        Kind::Zero => weight * gain,
                         Kind::Frame { .. } => -u[parameter.min(2)],
                         Kind::Target => dot(&in_base(&frames, &state.flange.column(parameter).into()), &u),
                         Kind::Scale => weight * free,
-                        Kind::Sag => weight * sagging(&v, length),
+                        Kind::Sag => weight * sag_length(&v, length),
                         Kind::Empirical(_) => {
                             -dot(&load(like, &problem.columns.shifts[index][parameter], at), &u)
                         }
@@ -376,16 +396,16 @@ fn cable<R: SinCos>(
                     for (joint, rotation) in effect.rotation.iter().enumerate() {
                         if let Some(rotation) = rotation {
                             sum += like.load(rotation, at)
-                                * link_pull(&frames, &u, &moment, joint, LinkCoordinate::Theta);
+                                * link_projection(&frames, &u, &moment, joint, LinkCoordinate::Theta);
                         }
                     }
                     if let Some(growth) = &effect.growth {
                         let mut grown = none;
                         for (joint, (a, d)) in state.links_mm.iter().enumerate() {
-                            grown +=
-                                like.splat(*a) * link_pull(&frames, &u, &moment, joint, LinkCoordinate::A);
-                            grown +=
-                                like.splat(*d) * link_pull(&frames, &u, &moment, joint, LinkCoordinate::D);
+                            grown += like.splat(*a)
+                                * link_projection(&frames, &u, &moment, joint, LinkCoordinate::A);
+                            grown += like.splat(*d)
+                                * link_projection(&frames, &u, &moment, joint, LinkCoordinate::D);
                         }
                         sum += like.load(growth, at) * grown;
                     }
@@ -394,19 +414,19 @@ fn cable<R: SinCos>(
             }
             Parameter::SensorFrame(_) | Parameter::Target(_) => none,
         };
-        value.store(out, k * rows + place);
+        value.store(out, k * rows + row_index);
     }
 }
 
-/// Whether a disturbance bends the joints, as effects do.
+/// Whether a disturbance rotates the joints, as effects do.
 #[inline(always)]
 fn rotates_joints(problem: &CalibrationProblem, index: usize) -> bool {
     problem.frames.disturbances[index].kind.rotates_joints()
 }
 
-/// v turned by a small rotation vector, to second order: some 1e-7 of v is left out at 0.5°.
+/// v rotated by a small rotation vector, to second order: the error is some 1e-7 of v at 0.5°.
 #[cfg_attr(not(debug_assertions), inline(always))]
-fn turned_by<R: Real>(turn: &V<R>, v: &V<R>) -> V<R> {
+fn rotate_by<R: Real>(turn: &V<R>, v: &V<R>) -> V<R> {
     let first = cross(turn, v);
     let second = cross(turn, &first);
     plus(&plus(v, &first), &scaled(v[0].splat(0.5), &second))
@@ -414,7 +434,7 @@ fn turned_by<R: Real>(turn: &V<R>, v: &V<R>) -> V<R> {
 
 /// u · ∂p for a coordinate of a link; `moment[i]` is (p − oᵢ) × u, since u·(z × r) = z·(r × u).
 #[cfg_attr(not(debug_assertions), inline(always))]
-fn link_pull<R: Real>(
+fn link_projection<R: Real>(
     frames: &Chain<R>,
     u: &V<R>,
     moment: &[V<R>; 7],
@@ -437,16 +457,16 @@ type Twist<R> = (V<R>, V<R>);
 fn link_twist<R: Real>(frames: &Chain<R>, p: &V<R>, joint: usize, coordinate: LinkCoordinate) -> Twist<R> {
     let none = [p[0].splat(0.0); 3];
     match coordinate {
-        LinkCoordinate::Theta => turning(&frames.z[joint], p, &frames.origin[joint]),
+        LinkCoordinate::Theta => rotation_about(&frames.z[joint], p, &frames.origin[joint]),
         LinkCoordinate::D => (frames.z[joint], none),
         LinkCoordinate::A => (frames.lateral[joint], none),
-        LinkCoordinate::Alpha => turning(&frames.lateral[joint], p, &frames.origin[joint + 1]),
-        LinkCoordinate::Beta => turning(&frames.y[joint], p, &frames.origin[joint + 1]),
+        LinkCoordinate::Alpha => rotation_about(&frames.lateral[joint], p, &frames.origin[joint + 1]),
+        LinkCoordinate::Beta => rotation_about(&frames.y[joint], p, &frames.origin[joint + 1]),
     }
 }
 
 #[inline(always)]
-fn turning<R: Real>(axis: &V<R>, p: &V<R>, through: &V<R>) -> Twist<R> {
+fn rotation_about<R: Real>(axis: &V<R>, p: &V<R>, through: &V<R>) -> Twist<R> {
     (cross(axis, &minus(p, through)), *axis)
 }
 
@@ -470,23 +490,23 @@ fn times<R: Real>(columns: &[V<R>; 3], v: &V<R>) -> V<R> {
 
 #[allow(clippy::too_many_arguments)]
 #[cfg_attr(not(debug_assertions), inline(always))]
-fn space<R: SinCos>(
+fn spatial_rows<R: SinCos>(
     like: R,
     problem: &CalibrationProblem,
     state: &State,
     at: usize,
     jacobian: bool,
     rows: usize,
-    place: usize,
+    row_index: usize,
     oriented: bool,
     out: &mut [f64],
 ) {
     let columns = &problem.columns;
     let weight = like.load(&problem.weights.per_mm, at);
-    let turn_weight = if oriented { like.load(&problem.weights.per_rad, at) } else { weight };
+    let rotation_weight = if oriented { like.load(&problem.weights.per_rad, at) } else { weight };
     let none = [like.splat(0.0); 3];
     let (frames, scale) = frames(like, problem, state, at);
-    let p = point(&frames, state, at);
+    let p = target_point(&frames, state, at);
     let components = if oriented { 6 } else { 3 };
     let rotation = state.base_from_sensor.rotation.to_rotation_matrix();
     let mut sensor = [none; 3];
@@ -496,18 +516,18 @@ fn space<R: SinCos>(
     let reading = three(like, &columns.reading, 0, at);
     let mut turned = times(&sensor, &reading);
     let mut origin = splat(like, &state.base_from_sensor.translation.vector);
-    // The scale multiplies what the model sees, not the reading: its noise must not look like evidence of a scale.
-    let mut through = like.splat(1.0);
-    if let Some(pushed) = &state.pushed {
-        through = like.load(&pushed.scale, at);
-        turned = turned_by(&load(like, &pushed.turn, at), &turned);
-        origin = plus(&origin, &load(like, &pushed.frame, at));
+    // The scale multiplies the predicted reading, not the measured one: noise must not look like evidence of a scale error.
+    let mut gain = like.splat(1.0);
+    if let Some(disturbed) = &state.disturbed {
+        gain = like.load(&disturbed.scale, at);
+        turned = rotate_by(&load(like, &disturbed.turn, at), &turned);
+        origin = plus(&origin, &load(like, &disturbed.frame, at));
     }
-    let seen = minus(&p, &origin);
+    let from_sensor = minus(&p, &origin);
     let last = if jacobian { problem.parameters.len() } else { 0 };
     for k in 0..3 {
-        let residual = weight * (turned[k] - through * seen[k]);
-        residual.store(out, (last * components + k) * rows + place);
+        let residual = weight * (turned[k] - gain * from_sensor[k]);
+        residual.store(out, (last * components + k) * rows + row_index);
     }
     // E = R_C R_m (R R_t)ᵀ as columns, its trace, and ½ vee(E − Eᵀ).
     let mut error = [none; 3];
@@ -517,8 +537,8 @@ fn space<R: SinCos>(
         let target = state.target.rotation.to_rotation_matrix();
         for column in 0..3 {
             let axis = times(&sensor, &three(like, &columns.reading, 3 + 3 * column, at));
-            measured[column] = match &state.pushed {
-                Some(pushed) => turned_by(&load(like, &pushed.turn, at), &axis),
+            measured[column] = match &state.disturbed {
+                Some(disturbed) => rotate_by(&load(like, &disturbed.turn, at), &axis),
                 None => axis,
             };
             modelled[column] = in_base(&frames, &target.matrix().column(column).into());
@@ -531,22 +551,22 @@ fn space<R: SinCos>(
             }
         }
         trace = error[0][0] + error[1][1] + error[2][2];
-        let half = like.splat(0.5) * turn_weight;
+        let half = like.splat(0.5) * rotation_weight;
         let vee = [
             half * (error[1][2] - error[2][1]),
             half * (error[2][0] - error[0][2]),
             half * (error[0][1] - error[1][0]),
         ];
         for (k, value) in vee.into_iter().enumerate() {
-            value.store(out, (last * components + 3 + k) * rows + place);
+            value.store(out, (last * components + 3 + k) * rows + row_index);
         }
     }
     if !jacobian {
         return;
     }
     for (k, parameter) in problem.parameters.iter().enumerate() {
-        // The reading's side moves with a sensor frame, the arm's side with everything else.
-        let mut of_sensor = false;
+        // Sensor frame parameters move the reading; all others move the arm's prediction.
+        let mut sensor_side = false;
         let twist: Twist<R> = match *parameter {
             Parameter::Link { joint, coordinate } if coordinate.is_length() => {
                 let (v, w) = link_twist(&frames, &p, joint, coordinate);
@@ -558,18 +578,18 @@ fn space<R: SinCos>(
             }
             Parameter::Target(axis) => (none, in_base(&frames, &state.target_axes.column(axis - 3).into())),
             Parameter::SensorFrame(axis) if axis < 3 => {
-                of_sensor = true;
+                sensor_side = true;
                 (splat(like, &Vector3::ith(axis, 1.0)), none)
             }
             Parameter::SensorFrame(axis) => {
-                of_sensor = true;
+                sensor_side = true;
                 let w = splat(like, &state.sensor_axes.column(axis - 3).into());
                 (cross(&w, &turned), w)
             }
             Parameter::Disturbance { index, parameter } if !rotates_joints(problem, index) => {
-                let how_far = profile(like, problem, index, at);
+                let amplitude = profile(like, problem, index, at);
                 let kind = &problem.frames.disturbances[index].kind;
-                of_sensor = !matches!(kind, Kind::Target);
+                sensor_side = !matches!(kind, Kind::Target);
                 let (v, w) = match kind {
                     Kind::Frame { .. } if parameter < 3 => (splat(like, &Vector3::ith(parameter, 1.0)), none),
                     Kind::Frame { .. } => {
@@ -577,11 +597,13 @@ fn space<R: SinCos>(
                         (cross(&w, &turned), w)
                     }
                     Kind::Target => (in_base(&frames, &state.flange.column(parameter).into()), none),
-                    Kind::Scale => ([-seen[0] / through, -seen[1] / through, -seen[2] / through], none),
+                    Kind::Scale => {
+                        ([-from_sensor[0] / gain, -from_sensor[1] / gain, -from_sensor[2] / gain], none)
+                    }
                     Kind::Empirical(_) => (load(like, &columns.shifts[index][parameter], at), none),
                     Kind::Zero | Kind::Sag | Kind::Load { .. } => (none, none),
                 };
-                (scaled(how_far, &v), scaled(how_far, &w))
+                (scaled(amplitude, &v), scaled(amplitude, &w))
             }
             Parameter::Effect { .. } | Parameter::Disturbance { .. } => {
                 let mut sum = (none, none);
@@ -606,29 +628,29 @@ fn space<R: SinCos>(
             }
             Parameter::Outlet { .. } | Parameter::Zero { .. } => (none, none),
         };
-        // A shift of the sensor and everything of the arm are seen through the scale; a turn of the sensor is not.
-        let through_scale = !matches!(
+        // The scale factor applies to the arm's prediction and to shifts of the sensor, not to its rotation.
+        let scaled_by_gain = !matches!(
             *parameter,
             Parameter::SensorFrame(3..) | Parameter::Disturbance { parameter: 3.., .. }
-        ) || !of_sensor;
-        let size = if through_scale { weight * through } else { weight };
-        let sign = if of_sensor { size } else { -size };
+        ) || !sensor_side;
+        let size = if scaled_by_gain { weight * gain } else { weight };
+        let sign = if sensor_side { size } else { -size };
         for (i, v) in twist.0.into_iter().enumerate() {
-            (sign * v).store(out, (k * components + i) * rows + place);
+            (sign * v).store(out, (k * components + i) * rows + row_index);
         }
         if oriented {
-            // δ ½vee = ½ (tr E − E) w for the sensor's side, −½ (tr E − Eᵀ) w for the arm's.
+            // δ ½vee = ½ (tr E − E) w for the sensor side, −½ (tr E − Eᵀ) w for the arm side.
             let w = twist.1;
-            let half = like.splat(0.5) * turn_weight;
-            let product: V<R> = if of_sensor {
+            let half = like.splat(0.5) * rotation_weight;
+            let product: V<R> = if sensor_side {
                 times(&error, &w)
             } else {
                 [dot(&error[0], &w), dot(&error[1], &w), dot(&error[2], &w)]
             };
             for i in 0..3 {
                 let value = half * (trace * w[i] - product[i]);
-                let value = if of_sensor { value } else { -value };
-                value.store(out, (k * components + 3 + i) * rows + place);
+                let value = if sensor_side { value } else { -value };
+                value.store(out, (k * components + 3 + i) * rows + row_index);
             }
         }
     }

@@ -1,4 +1,4 @@
-//! Passes over the rows: residuals, Jacobians and normal equations in blocks that do not depend on the number of threads.
+//! Residuals, Jacobians and normal equations, in blocks that do not depend on the number of threads.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -17,13 +17,13 @@ use truegrind_math::work::checkpoint;
 /// Groups of eight rows that share one buffer: 512 rows, which with 29 columns stay in the second-level cache.
 const BLOCK_LANES: usize = 64;
 
-/// Groups of eight rows that one thread passes over where the pass costs much: few, so that threads end together.
+/// Groups of eight rows per parallel chunk of an expensive pass: few, for load balance.
 const COST_LANES: usize = 16;
 
-/// Parameters with which such a buffer stays there.
+/// Up to this number of parameters a block of [`BLOCK_LANES`] stays in the cache.
 const FEW: usize = 64;
 
-/// Bytes of a buffer for more of them.
+/// Bytes of a buffer for more parameters.
 const BUFFER_BYTES: usize = 1 << 20;
 
 /// Groups of eight rows in a block, for p parameters and c components: a function of the problem alone, so that sums are the
@@ -56,7 +56,7 @@ impl CalibrationProblem {
     /// Residuals at `x`, n, and the Jacobian transposed, p × n, rows in the order of the trait.
     ///
     /// # Panics
-    /// Where nothing may move.
+    /// Where no parameter is free.
     pub fn linearise(&self, x: &[f64]) -> (DVector<f64>, DMatrix<f64>) {
         let state = State::of(self, x);
         let (p, n, per) = (self.parameters.len(), self.rows(), self.components());
@@ -160,7 +160,7 @@ impl Problem for CalibrationProblem {
         let (p, c) = (self.parameters.len(), self.components());
         let most = block_lanes(p, c);
         let blocks = self.blocks_of(most);
-        // A square of its own for each block would cost more than its products where parameters are many.
+        // With many parameters a square matrix per block would cost more than its products, so several blocks share one.
         let together = if p > FEW { (2 * p).div_ceil(most * WIDTH * c) } else { 1 };
         let parts: Vec<DMatrix<f64>> = blocks
             .par_chunks(together)
@@ -199,7 +199,7 @@ impl CalibrationProblem {
         (0..groups).step_by(lanes).map(|from| (from, lanes.min(groups - from))).collect()
     }
 
-    /// Writes rows in the order of the trait: observation by observation, components inside.
+    /// Writes rows in the trait's order: observation by observation, components innermost.
     fn scatter(
         &self,
         state: &State,

@@ -1,4 +1,4 @@
-//! What a calibration is asked: a start, what may move, the rows and their weights.
+//! A calibration problem: starting values, free parameters, rows and weights.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use truegrind_arm::parameter::Parameter;
 use truegrind_estimation::problem::Prior;
 use truegrind_math::se3::apply_twist;
 
-/// A calibration problem. See the module page.
+/// A calibration as a nonlinear least-squares problem. See the module page.
 #[derive(Debug, Clone)]
 pub struct CalibrationProblem {
     pub(super) start: Model,
@@ -26,10 +26,8 @@ pub struct CalibrationProblem {
 }
 
 impl CalibrationProblem {
-    /// Sets up the problem.
-    ///
-    /// `start` and `frames` are the starting values, `parameters` what may move, `priors` one for each parameter
-    /// (mean in deviations from the start) or empty, `weights` one for each row of `dataset`.
+    /// `start` and `frames` are the starting values, `parameters` the free parameters, `priors` one for each of them (mean as a
+    /// deviation from the start) or empty, `weights` one for each row of `dataset`.
     ///
     /// # Panics
     /// Where there are not as many weights as rows.
@@ -45,7 +43,7 @@ impl CalibrationProblem {
         Self::with(columns, dataset, (start, frames), parameters, priors, weights)
     }
 
-    /// Another problem of the same rows and without priors, which need not be turned into columns once more.
+    /// Another problem on the same rows, without priors; reuses the sines and cosines.
     pub(crate) fn with_parameters(
         &self,
         dataset: &Dataset,
@@ -83,21 +81,20 @@ impl CalibrationProblem {
         self.clone().with_weights(weights)
     }
 
-    /// This problem itself with other weights, one for each row.
+    /// This problem with other weights, one for each row.
     pub fn with_weights(mut self, weights: &[Weight]) -> Self {
         self.weights = Weights::of(weights, self.rows, self.sensor);
         self
     }
 
-    /// This problem itself with other priors, one for each parameter.
+    /// This problem with other priors, one for each parameter.
     pub fn with_priors(mut self, priors: &[Prior]) -> Self {
         self.priors.clear();
         self.priors.extend_from_slice(priors);
         self
     }
 
-    /// Lets go of the rows, of which only the number is kept: a fit that is done needs them no longer, and they take up
-    /// to a hundred and fifty bytes each.
+    /// Frees the rows (up to 150 bytes each) and keeps their number: a finished fit no longer needs them.
     pub(crate) fn drop_rows(&mut self) {
         (self.columns, self.weights) = (Arc::default(), Weights::default());
     }
@@ -110,7 +107,7 @@ impl CalibrationProblem {
         self.weights.per_mm[row]
     }
 
-    /// What may move, in the order of x.
+    /// The free parameters, in the order of x.
     pub fn free_parameters(&self) -> &[Parameter] {
         &self.parameters
     }
@@ -125,7 +122,7 @@ impl CalibrationProblem {
         &self.frames
     }
 
-    /// The model and the frames that `x` stands for.
+    /// The model and frames at `x`.
     pub fn apply(&self, x: &[f64]) -> (Model, Frames) {
         let (mut model, mut frames) = (self.start.clone(), self.frames.clone());
         let (mut sensor, mut tool) = (Vector6::zeros(), Vector6::zeros());

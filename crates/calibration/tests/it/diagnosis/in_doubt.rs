@@ -9,7 +9,7 @@ use truegrind_arm::parameter::Parameter;
 use truegrind_calibration::diagnosis::cause::Cause;
 use truegrind_calibration::diagnosis::diagnose::{Diagnosed, Options, diagnose};
 use truegrind_calibration::diagnosis::finding::Confidence;
-use truegrind_calibration::identification::start::starts;
+use truegrind_calibration::identification::start::candidate_frames;
 use truegrind_calibration::measurement::import;
 use truegrind_calibration::measurement::simulation::recipe::Recipe;
 use truegrind_math::se3::Pose;
@@ -36,7 +36,7 @@ fn diagnosed(
     let load = |name: &str| truegrind_arm::robots::load(name).map(|r| r.model).map_err(|e| e.to_string());
     let simulation = Recipe::parse(&recipe, "case").unwrap().simulate(load).unwrap();
     let rows = import::read("case.csv", simulation.csv.as_bytes(), &import::Options::default()).unwrap();
-    let frames = starts(&rows, &simulation.nominal).unwrap();
+    let frames = candidate_frames(&rows, &simulation.nominal).unwrap();
     let found = diagnose(&rows, "abb-irb-120", &simulation.nominal, &frames[0], &Options::default(), &|_| {})
         .unwrap();
     (simulation.actual, found)

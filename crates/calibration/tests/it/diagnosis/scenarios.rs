@@ -20,7 +20,7 @@ use truegrind_calibration::diagnosis::extension::{Freedom, Subject, fit};
 use truegrind_calibration::diagnosis::finding::{Confidence, Finding};
 use truegrind_calibration::diagnosis::validation::Validation;
 use truegrind_calibration::identification::calibration::{CalibrationProblem, Frames, Weight};
-use truegrind_calibration::identification::start::starts;
+use truegrind_calibration::identification::start::candidate_frames;
 use truegrind_calibration::measurement::dataset::{Dataset, Sensor};
 use truegrind_calibration::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
 

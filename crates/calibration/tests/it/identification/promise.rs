@@ -14,7 +14,7 @@ use truegrind_arm::model::{Joints, Model};
 use truegrind_arm::parameter::Parameter;
 use truegrind_calibration::identification::identify::{Identification, Options, identify};
 use truegrind_calibration::identification::solver::SOLVERS;
-use truegrind_calibration::identification::start::starts;
+use truegrind_calibration::identification::start::candidate_frames;
 use truegrind_calibration::identification::tolerance::Tolerance;
 use truegrind_calibration::measurement::dataset::Dataset;
 use truegrind_calibration::measurement::simulation::Simulation;

@@ -4,7 +4,7 @@
 
 use truegrind_arm::estimated::{Estimated, Judgement};
 use truegrind_calibration::diagnosis;
-use truegrind_calibration::identification::start::starts;
+use truegrind_calibration::identification::start::candidate_frames;
 use truegrind_calibration::measurement::import;
 
 use super::promise::{Case, Outcome};
@@ -100,7 +100,7 @@ fn a_diagnosis_says_every_verdict_of_an_identification() {
     let verdict = |change: &dyn Fn(&mut truegrind_arm::model::Model)| {
         let mut nominal = simulation.nominal.clone();
         change(&mut nominal);
-        let frames = starts(&dataset, &nominal).unwrap().remove(0);
+        let frames = candidate_frames(&dataset, &nominal).unwrap().remove(0);
         let mut options = diagnosis::diagnose::Options::default();
         options.selection.most = 0;
         let found =

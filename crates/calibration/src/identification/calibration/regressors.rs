@@ -1,4 +1,4 @@
-//! What loads and forms do to each row, per unit of their parameters.
+//! Regressors of load and empirical disturbances: sensor shifts and joint rotations of each row per unit of each parameter.
 
 use nalgebra::{Point3, Vector3};
 
@@ -9,17 +9,17 @@ use crate::measurement::sensor::empirical::{EmpiricalFault, second_degree};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::{Joints, Model};
 
-/// Shifts of the sensor (mm), one for each parameter, by the row and the way from the sensor to the target.
-type Push<'a> = dyn Fn(&Row, Vector3<f64>) -> Vec<Vector3<f64>> + 'a;
+/// Shifts of the sensor (mm), one for each parameter, from the row and the vector from sensor to target.
+type ShiftFn<'a> = dyn Fn(&Row, Vector3<f64>) -> Vec<Vector3<f64>> + 'a;
 
 /// Seconds in an hour.
 const HOUR_S: f64 = 3600.0;
 
-/// For each parameter the rotation of each joint (rad), row by row; for forms that turn joints.
-fn of_form(form: EmpiricalFault, dataset: &Dataset, model: &Model) -> Vec<[Option<Vec<f64>>; 6]> {
+/// Rotation of each joint (rad) per unit of each parameter, row by row, of faults that rotate joints.
+fn fault_rotations(fault: EmpiricalFault, dataset: &Dataset, model: &Model) -> Vec<[Option<Vec<f64>>; 6]> {
     let rows = &dataset.rows;
     let none = || -> [Option<Vec<f64>>; 6] { Default::default() };
-    match form {
+    match fault {
         EmpiricalFault::Latency { middle_s } => {
             let rate =
                 |r: &Row, j: usize| r.motion().and_then(|m| m.rate_per_h).map_or(0.0, |q| q[j] / HOUR_S);
@@ -66,7 +66,7 @@ fn of_form(form: EmpiricalFault, dataset: &Dataset, model: &Model) -> Vec<[Optio
     }
 }
 
-/// Static torques (N m): of the arm's own masses where they are known, else of a kilogram at the flange.
+/// Static torques (N m): of the arm's masses where these are known, otherwise of 1 kg at the flange.
 fn torques(dataset: &Dataset, model: &Model) -> Vec<Joints> {
     if model.bodies.is_none() {
         return flange_torques(dataset, model);
@@ -76,61 +76,61 @@ fn torques(dataset: &Dataset, model: &Model) -> Vec<Joints> {
     dataset.rows.iter().map(torque).collect()
 }
 
-/// For each parameter the shift of the sensor in the base (mm), row by row; for forms that shift it.
-pub fn shifts(
-    form: EmpiricalFault,
+/// Shift of the sensor in the base (mm) per unit of each parameter, row by row, of faults that shift it.
+pub fn sensor_shifts(
+    fault: EmpiricalFault,
     dataset: &Dataset,
     model: &Model,
     frames: &Frames,
 ) -> Vec<Vec<Vector3<f64>>> {
     let posed = model.at_condition(&Condition::default());
-    let touched = Point3::from(frames.flange_from_target.translation.vector);
+    let target = Point3::from(frames.flange_from_target.translation.vector);
     let sensor = |row: &Row| match dataset.sensor {
         Sensor::Cable => frames.outlets_mm[row.anchor.min(frames.outlets_mm.len().saturating_sub(1))],
         _ => frames.base_from_sensor.translation.vector,
     };
-    let pushed = |push: &Push<'_>| {
-        let count = form.names().len();
+    let shift_columns = |shift: &ShiftFn<'_>| {
+        let count = fault.names().len();
         let mut out = vec![Vec::with_capacity(dataset.rows.len()); count];
         for row in dataset.rows.iter() {
-            let away = (posed.forward(&row.joints) * touched).coords - sensor(row);
-            let here = push(row, away);
-            out.iter_mut().zip(here).for_each(|(column, v)| column.push(v));
+            let away = (posed.forward(&row.joints) * target).coords - sensor(row);
+            let here = shift(row, away);
+            out.iter_mut().zip(here).for_each(|(column, v)| column.shift(v));
         }
         out
     };
-    match form {
-        EmpiricalFault::SensorUnsettled => pushed(&|row, _| {
+    match fault {
+        EmpiricalFault::SensorUnsettled => shift_columns(&|row, _| {
             let Some(motion) = row.motion() else { return vec![Vector3::zeros()] };
             let (here, before) =
-                (posed.forward(&row.joints) * touched, posed.forward(&(row.joints - motion.step)) * touched);
+                (posed.forward(&row.joints) * target, posed.forward(&(row.joints - motion.step)) * target);
             vec![here - before]
         }),
-        EmpiricalFault::Refraction => pushed(&|row, away| {
+        EmpiricalFault::Refraction => shift_columns(&|row, away| {
             let bend = model.gravity * (away.norm_squared() * 1e-3);
             // Half way along the beam, in metres above the base.
             let height = -1e-3 * model.gravity.dot(&(sensor(row) + 0.5 * away));
             vec![bend, bend * height]
         }),
-        EmpiricalFault::Pulley => pushed(&|_, away| {
+        EmpiricalFault::Pulley => shift_columns(&|_, away| {
             let u = away.normalize();
             second_degree(&u).map(|v| u * v).to_vec()
         }),
         EmpiricalFault::Drum { from_mm, to_mm } => {
             let (low, high) = (f64::from(from_mm), f64::from(to_mm));
-            pushed(&|row, away| {
+            shift_columns(&|row, away| {
                 let u = away.normalize();
-                // The length that was read: it stays where it is when outlet and zero are found elsewhere.
+                // The measured length: independent of the estimated outlet and zero.
                 let d = if let Reading::Cable(length) = row.reading { length } else { away.norm() };
-                // From −1 to 1, as Legendre's polynomials have it.
+                // Scaled to [−1, 1] for Legendre polynomials.
                 let t = (2.0 * d - low - high) / (high - low).max(1.0);
                 vec![u * (0.5 * (3.0 * t * t - 1.0)), u * (0.5 * (5.0 * t * t * t - 3.0 * t))]
             })
         }
-        EmpiricalFault::TargetNest { second } => pushed(&|row, away| {
+        EmpiricalFault::TargetNest { second } => shift_columns(&|row, away| {
             let turn = posed.forward(&row.joints).rotation * frames.flange_from_target.rotation;
             let seen = turn.inverse() * away.normalize();
-            // All of a matrix times the direction but its trace, which lengthens the beam.
+            // A matrix times the direction, without its trace, which is a length error of the beam.
             let places = [(0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2), (2, 0), (2, 1)];
             let mut out = places.map(|(i, j)| turn * (Vector3::ith(i, 1.0) * seen[j])).to_vec();
             if second {
@@ -144,9 +144,9 @@ pub fn shifts(
 }
 
 /// Rotation of each joint (rad) per unit of each parameter of a disturbance that turns joints, row by row.
-pub fn rotations(kind: &Kind, dataset: &Dataset, model: &Model) -> Vec<[Option<Vec<f64>>; 6]> {
+pub fn joint_rotations(kind: &Kind, dataset: &Dataset, model: &Model) -> Vec<[Option<Vec<f64>>; 6]> {
     match kind {
-        Kind::Empirical(form) => of_form(*form, dataset, model),
+        Kind::Empirical(fault) => fault_rotations(*fault, dataset, model),
         Kind::Load { joints, compliance } => {
             let torques = flange_torques(dataset, model);
             let bent = |joint: usize, factor: f64| torques.iter().map(|t| factor * t[joint]).collect();
