@@ -1,14 +1,14 @@
-//! What to measure: poses that tell most of an arm, in an order that tells effects from each other, as a program.
+//! Optimal experiment design: informative measurement poses, their order, and the program that visits them.
 //!
-//! - [`candidate`]: poses that the arm reaches and the sensor sees, drawn at random; [`sight`]: a cable past the arm;
-//!   [`space`]: what it must not enter;
-//! - [`rows`]: what a reading at a pose tells of every parameter;
-//! - [`design`]: which of the candidates to take;
+//! - [`candidate`]: random reachable poses visible to the sensor; [`cable`]: clearance of a cable from the arm;
+//!   [`keep_out`]: collision checks against floor and boxes;
+//! - [`rows`]: whitened Jacobian of the readings;
+//! - [`design`]: D-optimal choice among the candidates;
 //! - `roadmap`: ways round what is kept out of;
 //! - [`schedule`]: repeats, both sides of approach, warm-up, and the order;
-//! - [`power`]: which effects the measurement can decide, and from which size on;
-//! - [`rival`]: what a diagnosis could not tell apart;
-//! - [`drive`]: the program that moves there.
+//! - [`power`]: smallest detectable size of each effect;
+//! - [`questions`]: ambiguous findings of a diagnosis;
+//! - [`program`]: the measurement program.
 
 mod blank;
 mod options;
@@ -62,11 +62,11 @@ pub struct Plan {
     pub rejections: RejectionCounts,
     /// What the rows can decide.
     pub detectability: Vec<Detectability>,
-    /// What was kept out of, at every pose and on every way.
+    /// The checked obstacles.
     pub space: KeepOut,
 }
 
-/// How much a set of poses tells.
+/// Quality of a set of poses.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Quality {
     /// Information: log det of the normal matrix in units of the priors, that matrix included.
@@ -80,7 +80,7 @@ pub struct Quality {
     pub random_reading_sigma_mm: f64,
 }
 
-/// Why there is no plan.
+/// Why planning failed.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum PlanError {
@@ -125,13 +125,13 @@ pub enum PlanError {
     NotFinite,
 }
 
-/// Random sets that the chosen one is compared with.
+/// Random sets for comparison.
 const RANDOM_SETS: usize = 10;
 
 /// Poses at which sets are compared.
 const JUDGES: usize = 300;
 
-/// Plans a measurement.
+/// Plans a measurement: candidates, design, order.
 ///
 /// # Errors
 /// [`PlanError`], when too few poses are allowed.

@@ -1,4 +1,4 @@
-//! A cable past the arm: its length, and whether it clears the links.
+//! Clearance of a cable from the arm's links.
 //!
 //! Links are capsules: the straight lines between the origins of neighbouring joint frames, with one radius. The wrist
 //! and what stands on the flange are left out, since there the cable is hooked in.

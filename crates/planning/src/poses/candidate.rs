@@ -1,4 +1,4 @@
-//! Poses to choose from: random joints within the limits that stay clear of singularities and that the sensor sees.
+//! Candidate poses: random joints within limits, away from singularities, visible to the sensor.
 
 use std::fmt;
 
@@ -16,7 +16,7 @@ use truegrind_arm::model::Joints;
 use truegrind_calibration::identification::calibration::Frames;
 use truegrind_calibration::measurement::dataset::{Row, Sensor};
 
-/// Where poses may be.
+/// Constraints on poses.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bounds {
     /// Distance that every joint keeps from its limits (rad): room to come from either side.
@@ -47,7 +47,7 @@ impl Default for Bounds {
     }
 }
 
-/// A pose that may be measured.
+/// A candidate pose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {
     /// Controller angles (rad).
@@ -60,7 +60,7 @@ pub struct Candidate {
     pub anchor: usize,
 }
 
-/// What became of random poses.
+/// Rejection counts of random poses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct RejectionCounts {
     /// Drawn.
@@ -94,7 +94,7 @@ const DRAWS_PER_CANDIDATE: usize = 60;
 /// Stretch of the cable before the hook that may pass the wrist (mm).
 pub(super) const FREE_MM: f64 = 120.0;
 
-/// Draws until `count` poses are allowed, or enough is enough. Cables take turns.
+/// Draws until `count` poses are accepted or the draws are used up. Cables alternate.
 pub fn draw(
     setup: &MeasurementSetup<'_>,
     bounds: &Bounds,
@@ -155,7 +155,7 @@ pub fn draw(
     (out, rejections)
 }
 
-/// Where the sensor stands in the base (mm).
+/// Position of the sensor in the base (mm).
 pub(super) fn sensor_mm(sensor: Sensor, frames: &Frames, anchor: usize) -> Vector3<f64> {
     match sensor {
         Sensor::Cable => frames.outlets_mm[anchor],

@@ -1,9 +1,9 @@
-//! Which candidates to take: exchange until no single exchange helps.
+//! D-optimal choice of poses by Fedorov exchange.
 //!
 //! Method: maximise f = (1 + w) log det M − w log det N, with M = R + Σ xᵢ xᵢᵀ over the readings of the chosen poses, N
 //! its block of the parameters that nobody asks about. w = 0 without questions: D-optimality. With questions, w = 3: the
 //! difference log det M − log det N is the information about what is asked alone, everything else being unknown
-//! (Ds-optimality), and has three quarters of the say. R is the identity (the priors) for D-optimality, and for O1 a
+//! (Ds-optimality), with three quarters of the weight. R is the identity (the priors) for D-optimality, and for O1 a
 //! vanishing ridge on the combinations that the candidates determine at all.
 //! Start: poses one by one, each the one that adds most. Then Fedorov's exchange, pose by pose: the pose is taken out and
 //! the best one put in its place, until a whole round changes nothing.
@@ -23,10 +23,10 @@ use truegrind_math::work::checkpoint;
 
 pub use super::options::Index;
 
-/// A choice to be made.
+/// A design problem.
 #[derive(Debug, Clone, Copy)]
 pub struct Design<'a> {
-    /// What each candidate would tell.
+    /// Whitened Jacobian of the candidates.
     pub jacobian: &'a ReadingJacobian,
     /// What is setup.
     pub index: Index,

@@ -1,4 +1,4 @@
-//! What the arm must not enter: what lies below its mounting plane, and boxes.
+//! Collision checks: links as capsules against a floor and boxes, at poses and along joint motions.
 //!
 //! Links are capsules: the lines between the origins of neighbouring joint frames, to the flange and on to the touched
 //! point, with one radius; from the wrist on with half of it. The first of them, the column on the base, never moves and
@@ -14,7 +14,7 @@ use super::setup::MeasurementSetup;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::{Joints, PreparedModel};
 
-/// What the arm must not enter, in its base.
+/// Obstacles in the arm's base.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct KeepOut {
     /// Nothing goes below this height (mm); `None` does not look.
@@ -27,7 +27,7 @@ pub struct KeepOut {
     pub approach_rad: f64,
 }
 
-/// The arm that must not enter it.
+/// Checks an arm against obstacles.
 #[derive(Debug)]
 pub(super) struct CollisionChecker<'a> {
     space: &'a KeepOut,

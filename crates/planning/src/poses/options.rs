@@ -1,28 +1,28 @@
-//! How to plan.
+//! Settings of a plan.
 
 use super::candidate::Bounds;
 use super::questions::Question;
 use super::schedule::Visits;
 use truegrind_calibration::identification::tolerance::Tolerance;
 
-/// How to plan.
+/// Settings of a plan.
 #[derive(Debug, Clone)]
 pub struct Options {
     /// Different poses.
     pub poses: usize,
-    /// What makes a set of poses good.
+    /// Optimality criterion.
     pub index: Index,
-    /// What a reading is worth.
+    /// Noise of a reading.
     pub noise: Noise,
-    /// What is known before.
+    /// Priors.
     pub tolerance: Tolerance,
     /// Poses to choose from.
     pub candidates: usize,
-    /// Where they may be.
+    /// Constraints on candidates.
     pub bounds: Bounds,
-    /// What is visited more than once.
+    /// Repeated visits.
     pub visits: Visits,
-    /// What a diagnosis could not tell apart.
+    /// Ambiguous findings of a diagnosis.
     pub questions: Vec<Question>,
     /// Non-centrality from which an effect counts as decided.
     pub decisive: f64,
@@ -62,7 +62,7 @@ impl Default for Noise {
     }
 }
 
-/// What makes a set of poses good.
+/// Optimality criterion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub enum Index {

@@ -1,4 +1,4 @@
-//! Which effects a measurement can decide, and from which size on.
+//! Power analysis: smallest size of each effect that a measurement detects.
 //!
 //! Method: with X the whitened Jacobian of geometry and frames in units of the priors, and R the whitened columns of an
 //! effect per unit of its parameters, S = RᵀR − RᵀX (I + XᵀX)⁻¹ XᵀR is what the effect shows beside everything that
@@ -21,7 +21,7 @@ use truegrind_arm::parameter::Parameter;
 use truegrind_calibration::measurement::dataset::{Row, Sensor};
 use truegrind_math::spectral;
 
-/// An effect with the smallest size that the rows decide.
+/// Smallest detectable size of an effect.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Detectability {
     /// Contract name.

@@ -1,4 +1,4 @@
-//! The plan as a program: to each pose by way of its approach, a wait, a comment.
+//! The measurement program: approach, pose, wait and comment for each row.
 //!
 //! Joint targets say joints, so the nominal arm of the controller and the real one agree on them; no tool or work object
 //! is involved.
@@ -11,7 +11,7 @@ use truegrind_calibration::measurement::dataset::Reading;
 use truegrind_programs::draft::{Draft, Step};
 use truegrind_programs::motion::{Frame, JointTarget, MotionKind, TargetValue, ToolValue, WorkObjectValue};
 
-/// How to go.
+/// Settings of the program.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ProgramSettings {
     /// Name of the module.
@@ -115,7 +115,7 @@ fn comment(plan: &Plan, setup: &MeasurementSetup<'_>, row: &Row, number: usize) 
     text
 }
 
-/// What was kept out of, in words.
+/// The checked obstacles in words.
 pub fn checked(plan: &Plan) -> String {
     let space = &plan.space;
     let boxes = match space.boxes_mm.len() {
@@ -140,7 +140,7 @@ pub fn checked(plan: &Plan) -> String {
     )
 }
 
-/// What the sensor will read of the nominal arm.
+/// Predicted reading with the nominal arm.
 pub fn reading(plan: &Plan, setup: &MeasurementSetup<'_>, row: &Row) -> Option<Reading> {
     let pose = &plan.poses[row.pose];
     let flange = setup.nominal.forward(&pose.joints, &Condition::default());

@@ -1,4 +1,4 @@
-//! What a diagnosis could not tell apart, and what a measurement that decides needs.
+//! Ambiguous findings of a diagnosis, and the effects that a further measurement must separate.
 //!
 //! Reads `truegrind.diagnosis/1`. A finding that is ambiguous becomes a question: its effect and those of its
 //! alternatives are made parameters beside the geometry, and the design weighs the poses that tell them apart. Effects
@@ -20,7 +20,7 @@ use truegrind_calibration::diagnosis::finding::Confidence;
 /// The format that is read.
 pub const SCHEMA: &str = "truegrind.diagnosis/1";
 
-/// An effect that may be the cause.
+/// A candidate cause.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct CandidateCause {
     /// Contract name.
@@ -29,14 +29,14 @@ pub struct CandidateCause {
     pub joints: Vec<usize>,
 }
 
-/// A finding with what else explains the rows.
+/// An ambiguous finding with its alternative causes.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Question {
     /// The finding, then its alternatives; one alone where an effect could not be tested.
     pub causes: Vec<CandidateCause>,
 }
 
-/// Why a text is no diagnosis.
+/// Why a diagnosis file cannot be read.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum DiagnosisFileError {

@@ -1,4 +1,4 @@
-//! What readings tell: the whitened Jacobian of a calibration at planned rows, in units of the priors.
+//! Information of readings: the whitened Jacobian of a calibration at planned rows, in units of the priors.
 //!
 //! Column k of row i is ∂rᵢ/∂xₖ · sₖ / σ, with σ the noise of the reading and sₖ the prior's standard deviation: a row of
 //! length 1 tells as much about its combination of parameters as the prior does, and the normal matrix with all priors
@@ -19,7 +19,7 @@ use truegrind_estimation::problem::Problem;
 
 pub use super::options::Noise;
 
-/// What a list of rows tells.
+/// Whitened Jacobian of a list of rows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReadingJacobian {
     /// p × (rows · scalars per row): one column for each scalar reading.

@@ -1,4 +1,4 @@
-//! The order of rows: what is visited again, from which side, and when.
+//! Order of the rows: repeats, approach directions, warm-up.
 //!
 //! - Every pose is reached from a stated side of every joint, drawn at random, so that play does not look like geometry.
 //! - Some poses are measured at once again from the other side of all joints: the difference is play and nothing else.
@@ -24,7 +24,7 @@ use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Joints;
 use truegrind_calibration::measurement::dataset::{Row as MeasuredRow, Sensor};
 
-/// What is visited more than once.
+/// Repeated visits.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Visits {
     /// Poses that are measured twice more, from the same side.

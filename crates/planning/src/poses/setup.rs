@@ -1,16 +1,16 @@
-//! What a measurement is planned for.
+//! The arm and sensor of a planned measurement.
 
 use truegrind_arm::model::Model;
 use truegrind_calibration::identification::calibration::Frames;
 use truegrind_calibration::measurement::dataset::Sensor;
 
-/// What shall be measured, with what.
+/// The arm and sensor of a planned measurement.
 #[derive(Debug, Clone)]
 pub struct MeasurementSetup<'a> {
-    /// What the controller computes with.
+    /// The nominal arm.
     pub nominal: &'a Model,
     /// The sensor.
     pub sensor: Sensor,
-    /// Where it stands and what it touches, about.
+    /// Approximate frames of sensor and target.
     pub frames: &'a Frames,
 }

@@ -95,7 +95,7 @@ pub fn sensor_shifts(
         for row in dataset.rows.iter() {
             let away = (posed.forward(&row.joints) * target).coords - sensor(row);
             let here = shift(row, away);
-            out.iter_mut().zip(here).for_each(|(column, v)| column.shift(v));
+            out.iter_mut().zip(here).for_each(|(column, v)| column.push(v));
         }
         out
     };
