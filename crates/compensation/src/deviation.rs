@@ -66,6 +66,9 @@ pub enum Status {
     Flagged,
 }
 
+/// A point closer to the surface than this is cutting (mm).
+pub(crate) const ON_SURFACE_MM: f64 = 0.5;
+
 /// One point of a path.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PathPoint {

@@ -11,6 +11,9 @@ use rayon::prelude::*;
 use truegrind_arm::inverse::budget::SearchBudget;
 use truegrind_math::work::checkpoint;
 
+/// Motions per parallel work item.
+pub(crate) const PORTION: usize = 64;
+
 /// Runs pieces in parallel, each with its share of the budget; pieces that ran out are repeated one after the other with the
 /// budget that others left over.
 pub(crate) fn shared_out<T: Send>(

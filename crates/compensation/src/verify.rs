@@ -10,7 +10,7 @@ use crate::backlash::sides::{MotionEnd, ReachedEnd, backlash_sides};
 use crate::cell::Cell;
 use crate::condition::payload::Loads;
 use crate::configuration::{configured, monitored};
-use crate::deviation::{After, Deviation, PathPoint, PathReport, Status};
+use crate::deviation::{After, Deviation, ON_SURFACE_MM, PathPoint, PathReport, Status};
 use crate::frames::frame_table::FrameTable;
 use crate::plan::reason::OutcomeReason;
 use truegrind_arm::condition::Condition;
@@ -141,9 +141,6 @@ pub fn verify(task: &VerificationTask<'_>, acting_arm: &ActingArm<'_>) -> PathRe
         held_out_mm: acting_arm.knowledge.map(|k| k.geometry.held_out.rmse),
     }
 }
-
-/// A point closer to the surface than this is cutting (mm).
-const ON_SURFACE_MM: f64 = 0.5;
 
 fn run(listing: &Listing, loads: Option<&Loads>, arms: &mut Arms<'_>, cell: &Cell) -> Vec<ExecutedEnd> {
     let frame_table = FrameTable::of(listing, arms, cell);

@@ -125,9 +125,6 @@ fn path(
     Some((curve?, within))
 }
 
-/// Motions per parallel work item.
-const PORTION: usize = 64;
-
 /// Sample points between the ends of all motions.
 #[derive(Default)]
 struct Samples {
@@ -202,10 +199,10 @@ impl Samples {
         let motions = self.ends.len();
         let portions = search_budget::shared_out(
             SearchBudget::of(search_budget::SIDES),
-            motions.div_ceil(PORTION),
+            motions.div_ceil(search_budget::PORTION),
             |portion, budget| {
-                let first = portion * PORTION;
-                let here = first..(first + PORTION).min(motions);
+                let first = portion * search_budget::PORTION;
+                let here = first..(first + search_budget::PORTION).min(motions);
                 with_budget(budget, || here.map(of).collect::<Vec<_>>())
             },
         );

@@ -169,9 +169,6 @@ pub(crate) fn forbid_segments(
     ways.forbid_after_unchanged(&found, budget) || (stays.is_none() && !found.is_empty())
 }
 
-/// Suspect motions per parallel work item.
-const PORTION: usize = 64;
-
 /// Samples for all segments of a program: at least so many, and so many per motion.
 const SAMPLES: usize = 300_000;
 /// See [`SAMPLES`].
@@ -216,13 +213,17 @@ impl SegmentChecker<'_> {
             let suspects: Vec<usize> = (0..count).into_par_iter().filter(|m| here.needs_check(*m)).collect();
             let samples = here.samples(suspects.len());
             let whole = SearchBudget::of(search_budget::WAYS);
-            let found =
-                search_budget::shared_out(whole, suspects.len().div_ceil(PORTION), |portion, budget| {
+            let found = search_budget::shared_out(
+                whole,
+                suspects.len().div_ceil(search_budget::PORTION),
+                |portion, budget| {
                     let segment_fault =
                         |motion: &usize| Some((*motion, here.segment_fault(*motion, samples, budget)?));
-                    let mine = suspects.iter().skip(portion * PORTION).take(PORTION);
+                    let mine =
+                        suspects.iter().skip(portion * search_budget::PORTION).take(search_budget::PORTION);
                     mine.filter_map(segment_fault).collect::<Vec<_>>()
-                });
+                },
+            );
             found.into_iter().flatten().collect()
         };
         for (motion, why) in &found {

@@ -200,11 +200,11 @@ fn planned(job: &Planner<'_>) -> Plan {
     let mut outcomes: Vec<MotionOutcome> = (0..count as u32).map(MotionOutcome::left).collect();
     let mut changes: Vec<Option<Change>> = (0..count).map(|_| None).collect();
     let mut slots: Vec<OutputSlots<'_>> =
-        outcomes.chunks_mut(PORTION).zip(changes.chunks_mut(PORTION)).collect();
+        outcomes.chunks_mut(search_budget::PORTION).zip(changes.chunks_mut(search_budget::PORTION)).collect();
     let portions: Vec<PortionResult> =
         search_budget::shared_out_into(whole, &mut slots, |portion, slots, budget| {
-            let first = portion * PORTION;
-            job.portion(first..(first + PORTION).min(count), slots, budget)
+            let first = portion * search_budget::PORTION;
+            job.portion(first..(first + search_budget::PORTION).min(count), slots, budget)
         });
     let mut notes = frame_table.notes();
     notes.extend(backlash_note(arms, solved));
@@ -221,9 +221,6 @@ fn planned(job: &Planner<'_>) -> Plan {
     plan.points.iter_mut().enumerate().for_each(|(index, point)| point.index = index);
     plan
 }
-
-/// Motions per parallel work item.
-const PORTION: usize = 64;
 
 /// Inputs of the plan.
 struct Planner<'a> {

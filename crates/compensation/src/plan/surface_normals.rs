@@ -2,11 +2,9 @@
 
 use nalgebra::Point3;
 
+use crate::deviation::ON_SURFACE_MM;
 use crate::plan::Plan;
 use truegrind_surfaces::SurfaceFile;
-
-/// A point closer to the surface than this is on it (mm).
-const ON_MM: f64 = 0.5;
 
 impl Plan {
     /// Adds the surface normal, and the deviation along it, to every point above the surface. Points away from the surface are
@@ -18,7 +16,7 @@ impl Plan {
                 continue;
             };
             let normal = foot.contact.normal.into_inner();
-            point.cutting &= foot.normal_mm.abs() < ON_MM;
+            point.cutting &= foot.normal_mm.abs() < ON_SURFACE_MM;
             point.normal = Some(normal);
             for deviation in [&mut point.before, &mut point.after].into_iter().flatten() {
                 deviation.normal_mm = Some(normal.dot(&deviation.vector_mm));

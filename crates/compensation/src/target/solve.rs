@@ -27,7 +27,7 @@ use crate::risk::assessment::Assessment;
 use crate::search_budget;
 use crate::segment::condition_schedule::ConditionSchedule;
 use crate::target::original_joints::{BranchGuess, OriginalProgram, OriginalTarget, TargetRef};
-use crate::target::solved_target::{PORTION, SolvedTarget, SolvedTargets, as_joints};
+use crate::target::solved_target::{SolvedTarget, SolvedTargets, as_joints};
 use truegrind_arm::estimated::{FlangePoint, RegisteredFrame};
 use truegrind_arm::inverse::budget::{SearchBudget, with_budget};
 use truegrind_arm::inverse::configuration::Configuration;
@@ -116,7 +116,7 @@ impl TargetSolver<'_> {
                 break;
             }
             let stale: Vec<bool> = (0..count)
-                .step_by(PORTION)
+                .step_by(search_budget::PORTION)
                 .map(|begin| {
                     let targets = self.targets(begin);
                     new[targets.clone()] != condition_indices[targets]
@@ -185,7 +185,7 @@ impl TargetSolver<'_> {
 
     /// The targets of the portion that begins with a motion.
     fn targets(&self, begin: usize) -> std::ops::Range<usize> {
-        self.first[begin]..self.first[(begin + PORTION).min(self.listing.motions.len())]
+        self.first[begin]..self.first[(begin + search_budget::PORTION).min(self.listing.motions.len())]
     }
 
     /// One slot per target.
@@ -204,7 +204,7 @@ impl TargetSolver<'_> {
     ) {
         let mut rest = solved;
         let mut portions: Vec<&mut [Result<SolvedTarget, OutcomeReason>]> = Vec::new();
-        for begin in (0..self.listing.motions.len()).step_by(PORTION) {
+        for begin in (0..self.listing.motions.len()).step_by(search_budget::PORTION) {
             let (here, after) = rest.split_at_mut(self.targets(begin).len());
             portions.push(here);
             rest = after;
@@ -215,7 +215,7 @@ impl TargetSolver<'_> {
                 return;
             }
             reserve_memory();
-            let targets = self.targets(portion * PORTION);
+            let targets = self.targets(portion * search_budget::PORTION);
             let condition_indices = [&before[targets.clone()], &condition_indices[targets.clone()]];
             let (target_refs, originals) = (&self.target_refs[targets.clone()], &self.originals[targets]);
             with_budget(budget, || {

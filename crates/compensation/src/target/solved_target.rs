@@ -13,9 +13,6 @@ use truegrind_arm::region::Outside;
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{Motion, MotionKind, MotionTarget, Role, TargetValue};
 
-/// Motions per parallel work item.
-pub(crate) const PORTION: usize = 64;
-
 /// One solved target.
 #[derive(Debug, Clone)]
 pub(crate) struct SolvedTarget {
