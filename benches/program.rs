@@ -110,6 +110,7 @@ fn estimated(joints: &[Joints]) -> Estimated {
         parameters: Vec::new(),
         order,
         covariance: &factor * factor.transpose(),
+        width_uncertainty: None,
         provenance: Provenance::default(),
         registered: still,
         geometry: still,

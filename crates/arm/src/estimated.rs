@@ -5,6 +5,7 @@
 mod checks;
 mod error;
 mod file;
+mod posterior;
 
 use nalgebra::{DMatrix, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
@@ -21,6 +22,7 @@ use truegrind_math::se3::{Pose, vector_from_pose};
 use truegrind_math::statistics::ErrorSummary;
 
 pub use error::{ModelFileError, SCHEMA};
+pub use posterior::{PosteriorComponent, WidthUncertainty};
 
 /// How a fit is judged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -118,6 +120,8 @@ pub struct Estimated {
     pub order: Vec<Parameter>,
     /// Covariance of the arm's parameters (mm, rad).
     pub covariance: DMatrix<f64>,
+    /// How uncertain the widths of the tolerances are that the covariance assumes; absent where they were stated.
+    pub width_uncertainty: Option<WidthUncertainty>,
     /// Where the data came from.
     pub provenance: Provenance,
     /// Errors of the nominal arm with registered frames.

@@ -30,6 +30,22 @@ impl LinkCoordinate {
     }
 }
 
+/// Link parameters that are made with one kind of tolerance.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum ToleranceGroup {
+    /// Lengths and offsets (mm).
+    Length,
+    /// Twists (rad).
+    Twist,
+    /// Joint zeros (rad).
+    JointZero,
+}
+
+impl ToleranceGroup {
+    /// How many groups there are.
+    pub const COUNT: usize = 3;
+}
+
 /// A coordinate of a frame: x, y, z (mm), then the rotation vector (rad).
 pub const FRAME_COORDINATES: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
 
@@ -76,6 +92,16 @@ pub enum Parameter {
 }
 
 impl Parameter {
+    /// The kind of manufacturing tolerance that a link parameter is made with; `None` for all other parameters.
+    pub fn tolerance_group(&self) -> Option<ToleranceGroup> {
+        let Parameter::Link { coordinate, .. } = self else { return None };
+        Some(match coordinate {
+            LinkCoordinate::A | LinkCoordinate::D => ToleranceGroup::Length,
+            LinkCoordinate::Alpha | LinkCoordinate::Beta => ToleranceGroup::Twist,
+            LinkCoordinate::Theta => ToleranceGroup::JointZero,
+        })
+    }
+
     /// The unit in which the number is held.
     pub fn unit(&self) -> &'static str {
         match self {

@@ -1,9 +1,9 @@
 //! Checks of a model file before its numbers are used: a number that is not finite would give a σ of 0, and an invalid covariance
 //! a σ of any size.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Matrix3};
 
-use super::{Estimated, EstimatedParameter, Provenance, StageErrors};
+use super::{Estimated, EstimatedParameter, Provenance, StageErrors, WidthUncertainty};
 use crate::bounds::{self, Bound, InvalidValue, JOINT_DEG, LENGTH_MM, MASS_KG};
 use crate::condition::Condition;
 use crate::model::Model;
@@ -18,6 +18,7 @@ const SIGMA: Bound = Bound::new(0.0, 1e6, "a standard deviation, 0 or more");
 const PRIOR: Bound = Bound::new(f64::MIN_POSITIVE, 1e12, "a standard deviation above 0");
 const VALUE: Bound = Bound::new(-1e9, 1e9, "a finite number within ±1e9");
 const SHARE: Bound = Bound::new(0.0, 1.0, "a share from 0 to 1");
+const LOG_WIDTH: Bound = Bound::new(-20.0, 20.0, "the logarithm of a ratio, within ±20");
 const SPACING_DEG: Bound = Bound::new(0.0, 1e4, "a distance in degrees, 0 or more");
 const TIME_H: Bound = Bound::new(-1e6, 1e6, "a time in hours");
 const TEMPERATURE_C: Bound = Bound::new(-273.15, 2000.0, "a temperature in °C");
@@ -48,7 +49,27 @@ pub(super) fn check(model: &Estimated) -> Result<(), InvalidValue> {
     for parameter in &model.parameters {
         number(parameter).map_err(|invalid| invalid.within(&format!("parameter {}", parameter.name)))?;
     }
+    if let Some(widths) = &model.width_uncertainty {
+        width_uncertainty(widths).map_err(|invalid| invalid.within("width_uncertainty"))?;
+    }
     covariance(&model.order, &model.covariance)
+}
+
+/// The distribution of the logarithms of widths: plausible numbers and a covariance.
+fn width_uncertainty(widths: &WidthUncertainty) -> Result<(), InvalidValue> {
+    LOG_WIDTH.check_all("log_mean", &widths.log_mean)?;
+    LOG_WIDTH.check_all("log_covariance", widths.log_covariance.as_flattened())?;
+    let matrix = Matrix3::from_fn(|i, j| widths.log_covariance[i][j]);
+    let smallest = matrix.symmetric_eigenvalues().min();
+    if (matrix - matrix.transpose()).amax() > 1e-9 || smallest < -1e-9 {
+        let expected = "a symmetric, positive semi-definite matrix";
+        return Err(InvalidValue::new(
+            "log_covariance",
+            format!("smallest eigenvalue {smallest:.3e}"),
+            expected,
+        ));
+    }
+    Ok(())
 }
 
 /// The estimated arm must have the joint map of the nominal one, and links near its links.

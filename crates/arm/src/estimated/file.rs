@@ -4,7 +4,8 @@ use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Estimated, EstimatedParameter, ModelFileError, Provenance, SCHEMA, StageErrors, Verdict, checks,
+    Estimated, EstimatedParameter, ModelFileError, Provenance, SCHEMA, StageErrors, Verdict,
+    WidthUncertainty, checks,
 };
 use crate::arm_file::ArmFile;
 use crate::condition::Condition;
@@ -35,6 +36,7 @@ impl Estimated {
                     .map(|i| (0..=i).map(|j| self.covariance[(i, j)]).collect())
                     .collect(),
             },
+            width_uncertainty: self.width_uncertainty,
             parameter: self.parameters.clone(),
         };
         let text = toml::to_string(&file).map_err(|e| ModelFileError::Unwritable(e.to_string()))?;
@@ -60,6 +62,7 @@ impl Estimated {
     /// #     parameters: Vec::new(),
     /// #     order: Vec::new(),
     /// #     covariance: DMatrix::zeros(0, 0),
+    /// #     width_uncertainty: None,
     /// #     provenance: Provenance::default(),
     /// #     registered: stage,
     /// #     geometry: stage,
@@ -115,6 +118,7 @@ impl Estimated {
             parameters: file.parameter,
             order,
             covariance,
+            width_uncertainty: file.width_uncertainty,
             provenance: file.provenance,
             registered: file.registered,
             geometry: file.geometry,
@@ -166,6 +170,8 @@ struct ModelFile {
     nominal: ArmFile,
     estimated: ArmFile,
     covariance: CovarianceFile,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    width_uncertainty: Option<WidthUncertainty>,
     parameter: Vec<EstimatedParameter>,
 }
 

@@ -12,7 +12,7 @@ use truegrind_arm::arm_file::ArmFile;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::estimated::{
-    Estimated, EstimatedParameter, FlangePoint, Judgement, Provenance, StageErrors, Verdict,
+    Estimated, EstimatedParameter, FlangePoint, Judgement, Provenance, StageErrors, Verdict, WidthUncertainty,
 };
 use truegrind_arm::inverse::Inverse;
 use truegrind_arm::model::{Body, Joints, Model};
@@ -117,6 +117,10 @@ fn complete() -> Estimated {
             })
             .collect(),
         covariance: &half * half.transpose(),
+        width_uncertainty: Some(WidthUncertainty {
+            log_mean: [-0.1, 0.05, -0.2],
+            log_covariance: [[0.2, 0.01, 0.02], [0.01, 0.3, 0.03], [0.02, 0.03, 0.4]],
+        }),
         order,
         provenance: Provenance { rows: 4, set_aside: vec![2], held_out: 0.2, ..Provenance::default() },
         registered: stage,

@@ -5,6 +5,7 @@
 
 mod arms;
 mod axpy;
+mod posterior;
 mod robots;
 mod files;
 mod batch;

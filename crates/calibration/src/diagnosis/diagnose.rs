@@ -23,6 +23,7 @@ use crate::identification::fit::{Fitted, Observations, frame_parameters};
 use crate::identification::identify::{
     arm_covariance, arm_parameters_of, mean_condition, parameter_table, sensor_name, with_sigma_in_region,
 };
+use crate::identification::prior_width::width_uncertainty;
 use crate::identification::start::count_distinct_poses;
 use crate::identification::tolerance::Tolerance;
 use crate::identification::verdict::{Limits, VerdictBuilder};
@@ -329,6 +330,12 @@ fn estimated(
         nominal: nominal_arm.clone(),
         model: handed.model.clone(),
         covariance: arm_covariance(handed),
+        width_uncertainty: width_uncertainty(
+            &Tolerance::default(),
+            &fitted.parameters,
+            &fitted.priors,
+            &fitted.estimate,
+        ),
         order,
         provenance: Provenance {
             file: dataset.file.clone(),

@@ -10,6 +10,7 @@ use crate::identification::fit::{
     Fitted, Observations, Outliers, Start, errors_on, fit, frame_parameters, outliers, summary_on,
 };
 use crate::identification::identifiability::Identifiability;
+use crate::identification::prior_width::width_uncertainty;
 use crate::identification::rounding::{
     AngleCovariance, NotFused, ReadoutFusion, fuse_readout, logged_covariance,
 };
@@ -190,6 +191,9 @@ pub fn identify(
         model: geometry.model.clone(),
         order: arm_parameters_of(&geometry),
         covariance: arm_covariance(&geometry),
+        width_uncertainty: Some(&options.tolerance)
+            .filter(|tolerance| tolerance.learn_widths)
+            .and_then(|t| width_uncertainty(t, &geometry.parameters, &geometry.priors, &geometry.estimate)),
         provenance: Provenance { sharpened, ..provenance(dataset, &observed, &outliers, options) },
         parameters: select_arm_parameters(&parameters),
         registered: trained.registered,

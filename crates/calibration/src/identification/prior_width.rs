@@ -20,7 +20,8 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, SymmetricEigen, Vector3};
 
 use crate::identification::tolerance::Tolerance;
-use truegrind_arm::parameter::{LinkCoordinate, Parameter};
+use truegrind_arm::estimated::WidthUncertainty;
+use truegrind_arm::parameter::{Parameter, ToleranceGroup};
 use truegrind_estimation::estimate::Estimate;
 use truegrind_estimation::problem::Prior;
 
@@ -40,17 +41,7 @@ const NODES: [(f64, f64); 5] = {
     [(-OUTER.0, OUTER.1), (-INNER.0, INNER.1), (0.0, 8.0 / 15.0), INNER, OUTER]
 };
 
-/// Groups of link parameters with a common width: lengths, twists, joint zeros.
-const GROUPS: usize = 3;
-
-fn group(parameter: &Parameter) -> Option<usize> {
-    match parameter {
-        Parameter::Link { coordinate, .. } if coordinate.is_length() => Some(0),
-        Parameter::Link { coordinate: LinkCoordinate::Theta, .. } => Some(2),
-        Parameter::Link { .. } => Some(1),
-        _ => None,
-    }
-}
+const GROUPS: usize = ToleranceGroup::COUNT;
 
 fn widths(tolerance: &mut Tolerance) -> [&mut f64; GROUPS] {
     [&mut tolerance.length_mm, &mut tolerance.angle_rad, &mut tolerance.zero_rad]
@@ -83,6 +74,34 @@ fn estimated_tolerance(
     (fine(out.length_mm) && fine(out.angle_rad) && fine(out.zero_rad)).then_some(out)
 }
 
+/// How uncertain the widths are that the covariance of `estimate` assumes: the distribution of ln (width / prior sigma) given the
+/// data. `None` where [`learn_tolerance`] keeps the catalogue's widths.
+pub fn width_uncertainty(
+    catalogue: &Tolerance,
+    parameters: &[Parameter],
+    priors: &[Prior],
+    estimate: &Estimate,
+) -> Option<WidthUncertainty> {
+    let mut widths_of = *catalogue;
+    let catalogue = widths(&mut widths_of).map(|width| *width);
+    let nodes = LinkPosterior::of(catalogue, parameters, priors, estimate)?.nodes()?;
+    // ln (prior / catalogue) of each group; irrelevant for a group without parameters.
+    let mut assumed = [0.0; GROUPS];
+    for (parameter, prior) in parameters.iter().zip(priors) {
+        if let Some(group) = parameter.tolerance_group() {
+            assumed[group as usize] = (prior.sigma / catalogue[group as usize]).ln();
+        }
+    }
+    let total: f64 = nodes.iter().map(|(_, weight)| weight).sum();
+    let mean = nodes.iter().map(|(log, weight)| log * *weight).sum::<Vector3<f64>>() / total;
+    let spread = |(log, weight): &(Vector3<f64>, f64)| (log - mean) * (log - mean).transpose() * *weight;
+    let covariance = nodes.iter().map(spread).sum::<Matrix3<f64>>() / total;
+    Some(WidthUncertainty {
+        log_mean: std::array::from_fn(|g| mean[g] - assumed[g]),
+        log_covariance: std::array::from_fn(|i| std::array::from_fn(|j| covariance[(i, j)])),
+    })
+}
+
 /// Marginal posterior of the links. Widths are parametrised by the log of their ratio to the catalogue's.
 struct LinkPosterior {
     /// A + T⁻¹, in units of the priors T, so that millimetres and radians are commensurable.
@@ -100,8 +119,11 @@ impl LinkPosterior {
         priors: &[Prior],
         estimate: &Estimate,
     ) -> Option<Self> {
-        let indices: Vec<(usize, usize)> =
-            parameters.iter().enumerate().filter_map(|(k, p)| Some((k, group(p)?))).collect();
+        let indices: Vec<(usize, usize)> = parameters
+            .iter()
+            .enumerate()
+            .filter_map(|(k, p)| Some((k, p.tolerance_group()? as usize)))
+            .collect();
         let covariance = estimate.covariance.as_ref()?;
         let unit = |i: usize| priors[indices[i].0].sigma;
         let n = indices.len();
@@ -179,8 +201,8 @@ impl LinkPosterior {
         Some((log, curvature))
     }
 
-    /// ½ ln E (τ² | rows) of each group.
-    fn root_mean_square(&self) -> Option<Vector3<f64>> {
+    /// Quadrature nodes of p(τ | data): log widths with unnormalised weights.
+    fn nodes(&self) -> Option<Vec<(Vector3<f64>, f64)>> {
         let (mode, curvature) = self.mode()?;
         // The posterior is at least as narrow as the hyperprior.
         let axes = SymmetricEigen::new(curvature);
@@ -198,9 +220,13 @@ impl LinkPosterior {
             }
         }
         let most = points.iter().map(|(_, log)| *log).fold(f64::NEG_INFINITY, f64::max);
+        Some(points.into_iter().map(|(at, log)| (at, (log - most).exp())).collect())
+    }
+
+    /// ½ ln E (τ² | rows) of each group.
+    fn root_mean_square(&self) -> Option<Vector3<f64>> {
         let (mut sum, mut squares) = (0.0, Vector3::<f64>::zeros());
-        for (at, log) in &points {
-            let weight = (log - most).exp();
+        for (at, weight) in self.nodes()? {
             sum += weight;
             squares += weight * at.map(|log| (2.0 * log).exp());
         }

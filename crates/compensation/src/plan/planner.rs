@@ -111,8 +111,7 @@ impl<'a> SolvedProgram<'a> {
             cut.corrected = cut.motions.iter().any(rewritten);
         }
         let corrected = plan.cuts.iter().filter(|cut| cut.corrected);
-        plan.probability_of_harm =
-            arms.knowledge.and_then(|knowledge| assessment.probability_of_harm_of(knowledge, corrected));
+        plan.probability_of_harm = assessment.probability_of_harm_of(corrected);
         plan
     }
 

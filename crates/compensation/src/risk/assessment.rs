@@ -19,7 +19,7 @@ use crate::risk::placement::{
 };
 use crate::risk::probability::probability_of_harm;
 use crate::risk::remedy_search::{self, UnknownPlacement};
-use truegrind_arm::estimated::{Estimated, RegisteredFrame};
+use truegrind_arm::estimated::{Estimated, PosteriorComponent, RegisteredFrame};
 use truegrind_programs::motion::Listing;
 
 /// Assessment of a program.
@@ -31,6 +31,8 @@ pub(crate) struct Assessment {
     pub(crate) cuts: Vec<CutRisk>,
     /// Contribution of each cut to the program's probability of harm.
     shares: Vec<CutContribution>,
+    /// Posterior of the arm's parameters.
+    posterior: Vec<PosteriorComponent>,
     /// The cut of each motion, as an index into `cuts`; empty without cuts.
     cut_of: Vec<Option<u32>>,
     /// The best registration of each cut, in the base; absent where the robot holds the part.
@@ -68,13 +70,12 @@ impl Assessment {
     /// Probability that correcting these cuts does harm, taken together; absent without any.
     pub(crate) fn probability_of_harm_of<'c>(
         &self,
-        knowledge: &Estimated,
         cuts: impl IntoIterator<Item = &'c CutRisk>,
     ) -> Option<f64> {
-        let mut total = ProgramTotal::of(knowledge);
+        let mut total = ProgramTotal::new(self.shares.first()?.toward.len());
         let places = cuts.into_iter().filter_map(|cut| self.cut_index(*cut.motions.first()?));
         places.filter_map(|cut_index| self.shares.get(cut_index)).for_each(|share| total.add(share));
-        total.probability_of_harm(knowledge)
+        total.probability_of_harm(&self.posterior)
     }
 
     fn cut_index(&self, motion: u32) -> Option<usize> {
@@ -152,18 +153,22 @@ pub(crate) fn assess_program(
     choice: PlacementChoice,
 ) -> Assessment {
     let EstimateContext { conditions, knowledge } = *with;
-    let mut out = Assessment { cut_of: vec![None; listing.motions.len()], ..Assessment::default() };
+    let mut out = Assessment {
+        posterior: knowledge.posterior(),
+        cut_of: vec![None; listing.motions.len()],
+        ..Assessment::default()
+    };
     let mut taken: BTreeMap<u32, Placement> = BTreeMap::new();
     for (object, motions) in &chosen.objects {
         let targets: Vec<AssessedTarget> = motions.iter().filter_map(|m| at.get(m).copied()).collect();
         let name = &listing.work_objects[*object as usize].name;
-        let found = assess_placement(name, &targets, list, conditions, knowledge, choice);
+        let found = assess_placement(name, &targets, list, conditions, knowledge, &out.posterior, choice);
         let Some((mut placement, displaced)) = found else { continue };
         if placement.applied == Placement::Shape && choice.remedies {
             let max_risk = choice.max_risk;
-            let cut_index =
+            let unknown =
                 UnknownPlacement { targets: &targets, list: &*list, conditions, knowledge, max_risk };
-            placement.remedy = remedy_search::remedy(&cut_index);
+            placement.remedy = remedy_search::remedy(&unknown);
         }
         taken.insert(*object, placement.applied);
         out.placements.push(placement);
@@ -194,7 +199,7 @@ pub(crate) fn assess_program(
     for ((motions, _), judged) in chosen.cuts.iter().zip(judged) {
         let Some((judged, judgement)) = judged else { continue };
         let probability_of_harm =
-            probability_of_harm(judgement.square, &judgement.toward, knowledge, judged.points);
+            probability_of_harm(judgement.square, &judgement.toward, &out.posterior, judged.points);
         let left_for_risk = !(probability_of_harm <= choice.max_risk);
         let cut_index = out.cuts.len() as u32;
         motions.iter().for_each(|m| out.cut_of[*m as usize] = Some(cut_index));
@@ -239,8 +244,8 @@ struct CutContribution {
 struct ProgramTotal(CutContribution);
 
 impl ProgramTotal {
-    fn of(knowledge: &Estimated) -> Self {
-        Self(CutContribution { points: 0.0, square: 0.0, toward: DVector::zeros(knowledge.order.len()) })
+    fn new(parameters: usize) -> Self {
+        Self(CutContribution { points: 0.0, square: 0.0, toward: DVector::zeros(parameters) })
     }
 
     fn add(&mut self, cut: &CutContribution) {
@@ -249,8 +254,8 @@ impl ProgramTotal {
         self.0.toward += &cut.toward;
     }
 
-    fn probability_of_harm(&self, knowledge: &Estimated) -> Option<f64> {
+    fn probability_of_harm(&self, posterior: &[PosteriorComponent]) -> Option<f64> {
         let CutContribution { points, square, toward } = &self.0;
-        (*points > 0.0).then(|| probability_of_harm(*square, toward, knowledge, points.round() as usize))
+        (*points > 0.0).then(|| probability_of_harm(*square, toward, posterior, points.round() as usize))
     }
 }

@@ -14,7 +14,7 @@ use crate::frames::frame_pair::ResolvedFrames;
 use crate::risk::probability::probability_of_harm;
 use crate::risk::registration::Registration;
 use crate::risk::remedy::Remedy;
-use truegrind_arm::estimated::Estimated;
+use truegrind_arm::estimated::{Estimated, PosteriorComponent};
 use truegrind_arm::model::Joints;
 use truegrind_math::se3::Pose;
 
@@ -129,6 +129,7 @@ pub(crate) fn assess_placement(
     list: &[ResolvedFrames],
     conditions: &ArmConditions<'_>,
     knowledge: &Estimated,
+    posterior: &[PosteriorComponent],
     choice: PlacementChoice,
 ) -> Option<(ObjectPlacement, Option<Pose>)> {
     let taught = targets.iter().any(|target| list[target.frames_index].carried.is_some());
@@ -145,7 +146,7 @@ pub(crate) fn assess_placement(
     let sigma_mm = registration.mean_square(&covariance).max(0.0).sqrt();
     let toward = twists.tr_mul(&registration.weighed(&twist));
     let probability =
-        probability_of_harm(deviation_mm * deviation_mm * off.len() as f64, &toward, knowledge, off.len());
+        probability_of_harm(deviation_mm * deviation_mm * off.len() as f64, &toward, posterior, off.len());
     let applied = match choice.placement {
         Placement::Auto if sigma_mm <= deviation_mm && probability <= choice.max_risk => Placement::Absolute,
         Placement::Auto => Placement::Shape,

@@ -1,12 +1,13 @@
 //! The probability that a correction increases the deviation that it is meant to remove.
 //!
-//! Let d be the deviation (all coordinates of the assessed points in one vector, mm) and P the covariance of its estimate. The
-//! correction does harm where the error along d exceeds half of d: with c = |d| and s² = dᵀ P d / c², the probability is
-//! Φ(−c / 2s). P = J Σ Jᵀ follows from the covariance Σ of the arm's parameters, so s² needs only the vector Jᵀ d.
+//! Let d be the correction: the estimated deviation, all coordinates of the assessed points in one vector (mm). It does harm where the
+//! true deviation δ is nearer to 0 than to d: d·δ < |d|²/2. The posterior of the arm's parameters is a mixture of normal distributions
+//! (`PosteriorComponent`): given one of them, with covariance Σ and mean shifted by μ, d·δ is normal with mean |d|² + (Jᵀd)·μ and
+//! variance (Jᵀd)ᵀ Σ (Jᵀd), so that only the vector Jᵀd is needed.
 
 use nalgebra::DVector;
 
-use truegrind_arm::estimated::Estimated;
+use truegrind_arm::estimated::PosteriorComponent;
 use truegrind_math::tail::normal_two_sided;
 
 /// Deviations below this are zero as far as a program can express them (mm).
@@ -16,19 +17,23 @@ const ZERO_DEVIATION_MM: f64 = 5e-4;
 pub(crate) fn probability_of_harm(
     square: f64,
     toward: &DVector<f64>,
-    knowledge: &Estimated,
+    posterior: &[PosteriorComponent],
     points: usize,
 ) -> f64 {
     if square <= ZERO_DEVIATION_MM * ZERO_DEVIATION_MM * points as f64 {
         return 0.0;
     }
-    let variance = toward.dot(&(&knowledge.covariance * toward));
-    if !variance.is_finite() {
-        return 1.0;
-    }
-    if variance <= 0.0 {
-        return 0.0;
-    }
-    // c / 2s = |d|² / (2 √(dᵀ P d)).
-    0.5 * normal_two_sided(0.5 * square / variance.sqrt())
+    let given = |component: &PosteriorComponent| {
+        let variance = toward.dot(&(&component.covariance * toward));
+        let margin = 0.5 * square + toward.dot(&component.shift);
+        if !variance.is_finite() || !margin.is_finite() {
+            return 1.0;
+        }
+        if variance <= 0.0 {
+            return if margin < 0.0 { 1.0 } else { 0.0 };
+        }
+        let tail = 0.5 * normal_two_sided(margin.abs() / variance.sqrt());
+        if margin < 0.0 { 1.0 - tail } else { tail }
+    };
+    posterior.iter().map(|component| component.weight * given(component)).sum()
 }

@@ -67,6 +67,7 @@ fn estimated(model: Model, joints: &[Joints]) -> Estimated {
         model,
         parameters: Vec::new(),
         covariance: DMatrix::from_diagonal_element(n, n, 1e-8),
+        width_uncertainty: None,
         order,
         provenance: Provenance::default(),
         registered: zero,

@@ -6,7 +6,7 @@ use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use truegrind_arm::parameter::{LinkCoordinate, Parameter};
 use truegrind_calibration::identification::identify::Identification;
-use truegrind_calibration::identification::prior_width::learn_tolerance;
+use truegrind_calibration::identification::prior_width::{learn_tolerance, width_uncertainty};
 use truegrind_calibration::identification::tolerance::Tolerance;
 use truegrind_estimation::estimate::{Estimate, Evaluations, Termination};
 use truegrind_estimation::problem::Prior;
@@ -175,4 +175,33 @@ fn what_the_rows_do_not_see_lies_as_far_off_as_the_width_says() {
     assert!((square - 1.0).abs() < 0.15, "mean square {square:.2}");
     assert!((66.0..77.0).contains(&share[0]) && (92.0..98.0).contains(&share[1]), "{share:?}");
     assert!((98.5..=100.0).contains(&share[2]), "{share:?}");
+}
+
+/// Mean and variance of ln (width / prior) agree with a fine sum over ln τ, for the lengths of [`summed`].
+#[test]
+fn the_uncertainty_of_a_width_is_that_of_its_posterior() {
+    let catalogue = Tolerance::default();
+    for length in [[0.1, -0.1], [0.02, 0.3], [2.0, 3.0]] {
+        let (parameters, priors, seen) =
+            estimate([length[0], length[1], 0.0, 0.0], [0.02, 0.02, 1e6, 1e6], &catalogue);
+        let found = width_uncertainty(&catalogue, &parameters, &priors, &seen).unwrap();
+        let (mut sum, mut first, mut second) = (0.0, 0.0, 0.0);
+        for k in -4000..4000 {
+            let log = f64::from(k) * 0.002;
+            let variance = log.exp().powi(2) + 0.02_f64.powi(2);
+            let rows: f64 = length.iter().map(|y| -0.5 * (y * y / variance + variance.ln())).sum();
+            let weight = (rows - 0.5 * (log / 1.1 + 1.1).powi(2)).exp();
+            sum += weight;
+            first += weight * log;
+            second += weight * log * log;
+        }
+        let (mean, variance) = (first / sum, second / sum - (first / sum).powi(2));
+        assert!((found.log_mean[0] - mean).abs() < 0.05, "{length:?}: {} for {mean}", found.log_mean[0]);
+        // Five nodes an axis, centred for the mean square of the width: the variance of its logarithm is good to a seventh.
+        let own = found.log_covariance[0][0];
+        assert!((own / variance - 1.0).abs() < 0.15, "{length:?}: {own} for {variance}");
+        // No reading tells of the zeros: the population of arms, ln τ ~ N(−s², s²).
+        assert!((found.log_mean[2] + 1.21).abs() < 0.05, "{}", found.log_mean[2]);
+        assert!((found.log_covariance[2][2] / 1.21 - 1.0).abs() < 0.15, "{}", found.log_covariance[2][2]);
+    }
 }
