@@ -148,7 +148,7 @@ fn identified(dataset: &Dataset, robot: &str, nominal: &Model) -> Option<Identif
         stated_frames: None,
     };
     let split = |d: &Dataset| split::random(d, 0.2, 0);
-    let fits = starts(dataset, nominal).ok()?.into_iter();
+    let fits = candidate_frames(dataset, nominal).ok()?.into_iter();
     let found = fits.filter_map(|frames| identify(dataset, robot, nominal, &frames, &split, &options).ok());
     found.min_by(|a, b| a.estimated.registered.fitted.rmse.total_cmp(&b.estimated.registered.fitted.rmse))
 }
