@@ -94,7 +94,7 @@ pub enum InverseError {
     },
     /// The target requires an angle outside a joint's range.
     #[error(
-        "joint {} would have to stand at {:.3}°, its range is {:.3}° to {:.3}°",
+        "joint {} would need {:.3}°, its range is {:.3}° to {:.3}°",
         joint + 1, angle_rad.to_degrees(), min_rad.to_degrees(), max_rad.to_degrees()
     )]
     OutsideLimits {
@@ -141,8 +141,8 @@ pub enum InverseError {
     },
     /// The search budget is used up: see [`budget`](super::budget).
     #[error(
-        "its joints were not sought to the end: too many targets of this program are out of reach or beside a singularity, and \
-         the work on those is bounded; correct them first, or divide the program"
+        "the search for its joints was stopped: too many targets of this program are out of reach or near a singularity, and the \
+         work on such targets is bounded; correct them first, or divide the program"
     )]
     Abandoned,
     /// The target or the seed holds NaN or an infinity.

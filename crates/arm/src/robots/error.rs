@@ -78,8 +78,8 @@ pub enum RobotError {
 pub enum NominalMismatch {
     /// It has a name of the catalogue and other links.
     #[error(
-        "its nominal arm goes by the name {name} and is not the one of the catalogue: {place}; correct the name, or give an arm \
-         of your own a name of its own"
+        "its nominal arm has the name {name} but differs from the arm of the catalogue: {place}; correct the name, or give your own arm \
+         another name"
     )]
     Name {
         /// The name.
@@ -89,7 +89,7 @@ pub enum NominalMismatch {
     },
     /// Two arms of one name differ.
     #[error(
-        "the two have one name and are not one arm: {place}; give the robot that the model was identified for"
+        "the two arms have the same name but differ: {place}; give the robot for which the model was identified"
     )]
     Arms {
         /// Where the two differ first, with both values.

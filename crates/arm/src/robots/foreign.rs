@@ -300,7 +300,7 @@ fn summarise(robot: &Robot, notes: &[String]) -> Vec<String> {
     let family = if crate::inverse::Inverse::new(&robot.model, &still, &robot.model).has_branches() {
         "a closed form is known for its inverse"
     } else {
-        "no closed form is known for its inverse: it is sought step by step"
+        "no closed form is known for its inverse, which is solved numerically"
     };
     let mut out = vec![
         format!(

@@ -349,7 +349,7 @@ const SAME: f64 = 1e-6;
 pub(super) fn difference(found: &Model, known: &Model) -> Option<String> {
     for (i, (a, b)) in found.links.iter().zip(&known.links).enumerate() {
         if a.model != b.model {
-            return Some(format!("link {} is of another kind", i + 1));
+            return Some(format!("link {} is of another model", i + 1));
         }
         for (name, a, b) in [
             ("a_mm", a.a_mm, b.a_mm),
@@ -364,11 +364,11 @@ pub(super) fn difference(found: &Model, known: &Model) -> Option<String> {
         }
     }
     if !((found.joint_map - known.joint_map).amax() <= SAME) {
-        return Some("the joint map is another one".to_owned());
+        return Some("the joint map differs".to_owned());
     }
     let flange = found.flange.inv_mul(&known.flange);
     let apart = flange.translation.vector.norm().max(flange.rotation.angle());
-    (!(apart <= SAME)).then(|| "the flange sits elsewhere".to_owned())
+    (!(apart <= SAME)).then(|| "the flange differs".to_owned())
 }
 
 /// How far a model is from a published pose: of the point (mm), and of the orientation (rad) where one is published.

@@ -264,7 +264,7 @@ fn a_name_of_the_catalogue_has_the_links_of_the_catalogue() {
     assert!(truegrind_arm::robots::check_catalogue_name("ABB-IRB-120", &nominal).is_ok());
     assert!(truegrind_arm::robots::check_catalogue_name("an-arm-of-my-own", &nominal).is_ok());
     let error = truegrind_arm::robots::check_catalogue_name("ur10", &nominal).unwrap_err().to_string();
-    assert!(error.contains("goes by the name ur10") && error.contains("link 1"), "{error}");
+    assert!(error.contains("has the name ur10") && error.contains("link 1"), "{error}");
     let mut other = nominal.clone();
     let coordinate = LinkCoordinate::D;
     other.links[3].set(coordinate, other.links[3].get(coordinate) + 0.01);

@@ -292,7 +292,7 @@ fn a_joint_outside_its_range_is_named() {
         other => panic!("{other:?}"),
     }
     let message = inverse.solve_near(&target, &joints).unwrap_err().to_string();
-    assert_eq!(message, "joint 1 would have to stand at 171.887°, its range is -165.000° to 165.000°");
+    assert_eq!(message, "joint 1 would need 171.887°, its range is -165.000° to 165.000°");
     // Its own other turn or branch may do: all() must not hand out what lies outside.
     for solution in inverse.all(&target) {
         assert_reaches(&model, &Condition::default(), &target, &solution);
