@@ -73,18 +73,18 @@ impl FindingBuilder<'_> {
         for (index, (step, finding, picture)) in judged.into_iter().enumerate() {
             let cause = &self.extended.causes[index];
             steps.push(Step { added: short_name(cause), cv_rmse_mm: step });
-            let told = findings.iter().position(|f: &Finding| {
+            let existing = findings.iter().position(|f: &Finding| {
                 cause.rows().is_none()
                     && f.effect == cause.name()
                     && f.rows.is_none()
                     && f.joints == pendant(&cause.joints())
             });
             // Thermal growth of the arm and thermal drift of the sensor have the same name but are separate findings.
-            let told = told.filter(|place| {
-                let first = places.iter().position(|p| p == place).unwrap_or(index);
+            let existing = existing.filter(|index_of| {
+                let first = places.iter().position(|p| p == index_of).unwrap_or(index);
                 self.extended.causes[first].affects_same_quantity(cause)
             });
-            if let Some(place) = told {
+            if let Some(place) = existing {
                 findings[place].cause = format!("{}; {}", findings[place].cause, finding.cause);
                 findings[place].parameters.extend(finding.parameters);
                 places.push(place);

@@ -316,9 +316,9 @@ fn review(scores: &CandidateScores<'_>, options: &Options, which: &[usize], how:
             let better = best.filter(|best| {
                 !contains_cause(std::slice::from_ref(&current.causes[index]), &best.candidate.cause)
             });
-            let stands = !current.causes[index].requires_tilt() || Cause::tilt_is_supported(&others);
-            let carries = stands && judged.own.merit > 0.0 && judged.log_p <= options.alpha.ln();
-            if better.is_some() || !carries {
+            let supported = !current.causes[index].requires_tilt() || Cause::tilt_is_supported(&others);
+            let remains = supported && judged.own.merit > 0.0 && judged.log_p <= options.alpha.ln();
+            if better.is_some() || !remains {
                 let reduced = warm_fit(subject, &others, Freedom::All, Some(current));
                 let Some(better) = better else { return Review::Changed(Box::new(reduced)) };
                 others.push(better.candidate.cause.clone());
@@ -368,8 +368,8 @@ fn judge(scores: &CandidateScores<'_>, index: usize, open: bool) -> (Accepted, D
     for other in &scored {
         let same = other.candidate.cause.is_same_finding(cause)
             || contains_cause(&current.causes, &other.candidate.cause);
-        let told = rivals.iter().any(|r| r.candidate.cause.is_same_finding(&other.candidate.cause));
-        if !same && !told && other.score.merit > 0.25 * own.score.merit.max(0.0) {
+        let listed = rivals.iter().any(|r| r.candidate.cause.is_same_finding(&other.candidate.cause));
+        if !same && !listed && other.score.merit > 0.25 * own.score.merit.max(0.0) {
             rivals.push(other.clone());
         }
         if rivals.len() >= 5 {

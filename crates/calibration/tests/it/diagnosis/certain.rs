@@ -1,5 +1,5 @@
-//! What may be called identified: what wins beside what nobody has described, comes back in halves of the rows, and is of a
-//! size that nature has. Here stand disturbances that the catalogue does not hold, or holds as one story of several.
+//! Identified causes must be significant with the model discrepancy, stable in halves of the rows, and physically plausible; tested
+//! with disturbances that the catalogue does not contain, or contains only as one of several causes.
 
 use std::sync::Arc;
 
@@ -169,14 +169,14 @@ fn what_is_not_certain_does_not_move_programs() {
             .iter()
             .any(|f| f.effect == effect.name() && f.joints == effect.joint().map(|j| vec![j + 1]))
     };
-    // What is in doubt stands there at size 0.
+    // Uncertain causes are in the model with size 0.
     let written: Vec<&Effect> = found.estimated.model.effects.iter().filter(|e| !e.is_zero()).collect();
     assert!(written.iter().all(|e| sure(e)), "{written:?}");
     assert!(written.iter().any(|e| e.joint() == Some(2)), "the gear is certain: {written:?}");
 }
 
 #[test]
-fn nature_has_no_joint_that_yields_upwards() {
+fn a_negative_compliance_is_never_identified() {
     let compliance =
         |size| Cause::Arm(Effect::JointCompliance(Compliance { joint: 1, compliance_rad_per_nm: size }));
     let play = |size| Cause::Arm(Effect::Backlash(Backlash { joint: 1, play_rad: size }));

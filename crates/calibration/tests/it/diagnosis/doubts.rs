@@ -1,5 +1,5 @@
-//! What casts doubt on a cause, so that nobody is sent to a part and no program is moved for it: rows that are no witnesses of their
-//! own, physics that would show elsewhere too, and larger faults whose law nobody knows.
+//! Doubts that keep a cause from being identified, so that no part is inspected and no program moved for it: dependent rows, physics
+//! that would show elsewhere too, and larger faults whose exact law is unknown.
 
 use std::sync::Arc;
 

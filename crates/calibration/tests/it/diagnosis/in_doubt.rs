@@ -114,7 +114,7 @@ fn a_cause_in_doubt_moves_nothing_and_stands_in_the_covariance() {
     assert!((0.4..1.25).contains(&z), "{z}");
 }
 
-/// An error of two joints is none that an arm carries; what an arm could have in its place stands for it.
+/// A model file cannot represent a two-joint error; the best representable rival replaces it.
 #[test]
 fn what_no_arm_carries_is_stood_for_by_its_best_rival() {
     let (_, found) =

@@ -303,14 +303,14 @@ fn overlapping_shifts_are_told_as_levels() {
         Kind::Frame { turning: false },
         Profile::Rows { from: 5, to: 9 },
     ));
-    let told =
+    let levels =
         piecewise_levels(&[zero(72, 535, -2.2), frame.clone(), zero(300, 387, 2.25), zero(386, 537, -0.8)]);
-    let told = told.expect("they overlap");
-    let rows: Vec<_> = told.iter().map(Cause::rows).collect();
+    let levels = levels.expect("they overlap");
+    let rows: Vec<_> = levels.iter().map(Cause::rows).collect();
     assert_eq!(rows, [Some([72, 299]), Some([388, 535]), Some([5, 9])], "ends two rows apart are one event");
-    let Cause::Measurement(second) = &told[1] else { panic!("a measurement's") };
+    let Cause::Measurement(second) = &levels[1] else { panic!("a measurement's") };
     assert!((second.values[0] + 3.0).abs() < 1e-12);
-    assert_eq!(told[2], frame, "other kinds stay as they are");
+    assert_eq!(levels[2], frame, "other kinds stay as they are");
     // A second step on top of the first: from the one state to the other.
     let steps = piecewise_levels(&[zero(100, 299, 1.0), zero(200, 299, 2.0)]).expect("they overlap");
     assert_eq!(steps, [zero(100, 199, 1.0), zero(200, 299, 3.0)]);

@@ -1,4 +1,4 @@
-//! Tables of other programs: told by their content, named in the notes, refused where they cannot be used.
+//! Tables of other programs: recognised by their content, named in the notes, refused if unusable.
 
 use truegrind_calibration::measurement::dataset::{Dataset, Reading, Sensor};
 use truegrind_calibration::measurement::import::{self, ImportError, Options};

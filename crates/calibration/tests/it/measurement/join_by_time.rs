@@ -40,9 +40,9 @@ fn pairs(data: &Dataset) -> Vec<(f64, f64)> {
 }
 
 #[test]
-fn a_point_belongs_to_the_row_nearest_in_time_and_the_rest_is_told() {
+fn a_point_joins_the_row_nearest_in_time_and_the_rest_is_noted() {
     let log = log(&["10:15:30", "10:15:40.5", "10:15:50", "10:16:00"]);
-    // Not in the order of the log, one that nobody logged, and a row that nobody measured.
+    // Not in the order of the log, with a point without a row and a row without a point.
     let points = points(&["10:15:49.8", "10:15:30.3", "10:20:00", "10:15:40.4"]);
     let data = read(&log, &points, 0.5, 0.0).unwrap();
     assert_eq!(pairs(&data), [(10.0, 200.5), (11.0, 400.5), (12.0, 100.5)]);
@@ -75,7 +75,7 @@ fn clocks_write_as_they_like() {
     let data = read(&early, &late, 0.5, 3612.0).unwrap();
     assert_eq!(pairs(&data), expected);
     assert!(data.notes[0].contains("3612 s ahead"), "{:?}", data.notes);
-    // Whoever does not know it is told how far they are apart.
+    // Without the offset, the message states the time difference.
     let said = complaint(&early, &late, 0.5);
     assert!(
         said.contains("no row lies within 0.5 s") && said.contains("3602.000 to 3612.200 s away"),
@@ -104,7 +104,7 @@ fn what_is_ambiguous_is_refused() {
         "{said}"
     );
     assert!(said.contains("and `p1`"), "{said}");
-    // A dense log of an arm that stands is not ambiguous: two readings of one pose, each with its own row.
+    // A dense log of an arm at rest is not ambiguous: two readings of one pose, each with its own row.
     let row = |k: usize| format!("10:15:30.{k},{},20,30,40,50,60\n", 10.0 + 0.001 * k as f64);
     let dense = "time,q1,q2,q3,q4,q5,q6\n".to_owned() + &(0..10).map(row).collect::<String>();
     let data = read(&dense, &points(&["10:15:30.21", "10:15:30.69"]), 1.0, 0.0).unwrap();

@@ -171,12 +171,12 @@ fn sensor(sensor: &SensorSetup) -> Result<(), InvalidValue> {
             POSITION_MM.check_all("zeros_mm", zeros_mm)?;
             LENGTH_MM.check_all("hook_mm", hook_mm)
         }
-        SensorSetup::Position { frame: stands, reflector_mm } => {
-            frame("frame", stands)?;
+        SensorSetup::Position { frame: sensor_frame, reflector_mm } => {
+            frame("frame", sensor_frame)?;
             LENGTH_MM.check_all("reflector_mm", reflector_mm)
         }
-        SensorSetup::Pose { frame: stands, target } => {
-            frame("frame", stands)?;
+        SensorSetup::Pose { frame: sensor_frame, target } => {
+            frame("frame", sensor_frame)?;
             frame("target", target)
         }
     }
