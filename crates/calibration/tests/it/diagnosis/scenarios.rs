@@ -170,7 +170,7 @@ pub struct Outcome {
 
 /// Starting frames.
 pub fn frames(dataset: &Dataset, nominal: &Model) -> Frames {
-    starts(dataset, nominal).unwrap().remove(0)
+    candidate_frames(dataset, nominal).unwrap().remove(0)
 }
 
 /// Diagnoses a run of `hidden` effects.
