@@ -60,7 +60,7 @@ fn rows(seed: u64, count: usize, target: &str) -> (Dataset, Model) {
 /// The arm identified from the rows; with the true frame of the sensor where it is stated.
 fn identified(rows: &Dataset, stated: bool) -> Identification {
     let mut options = identify::Options::default();
-    let mut frames = starts(rows, &nominal()).unwrap().remove(0);
+    let mut frames = candidate_frames(rows, &nominal()).unwrap().remove(0);
     if stated {
         options.tolerance = Tolerance { frame_mm: 0.1, frame_rad: 1e-4, ..options.tolerance };
         let turn =
@@ -218,7 +218,7 @@ fn where_the_sensors_frame_is_what_is_missing_it_is_named_and_brings_what_was_sa
 /// The covariance of the arm's parameters after rows, by the calibration's own derivatives, for a fit that starts from the
 /// previous knowledge.
 fn fitted(known: &Estimated, rows: &Dataset) -> DMatrix<f64> {
-    let frames = starts(rows, &nominal()).unwrap().remove(0);
+    let frames = candidate_frames(rows, &nominal()).unwrap().remove(0);
     let own = frame_parameters(rows);
     let parameters = [known.order.clone(), own.clone()].concat();
     let priors = Tolerance::default().priors(&parameters, &known.model);
