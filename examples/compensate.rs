@@ -1,4 +1,4 @@
-//! Rewrites a RAPID program so that the estimated arm follows it: `cargo run --example compensate`.
+//! Corrects a RAPID program for an estimated arm: `cargo run --example compensate`.
 
 #![allow(clippy::print_stdout)]
 
@@ -22,7 +22,7 @@ ENDMODULE
 ";
 
 fn main() -> Result<(), Box<dyn Error>> {
-    // The arm: here fitted to measurements that ship; any `Estimated` will do, `Estimated::parse` reads one from a file.
+    // The arm, here fitted to included measurements; `Estimated::parse` reads one from a file.
     let robot = robots::load("abb-irb-120")?;
     let csv = include_bytes!("../tests/data/irb120-tracker.csv");
     let rows = read_measurements("irb120-tracker.csv", csv, &ImportOptions::default())?;
@@ -30,7 +30,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let frames = starting_frames(&rows, &robot.model, &Tolerance::default(), true)?;
     let share = |rows: &truegrind::Dataset| split::random(rows, options.held_out, options.seed);
     let mut arm = identify(&rows, "abb-irb-120", &robot.model, &frames, &share, &options)?.estimated;
-    // A cause that is known from elsewhere can be added by hand.
+    // A cause known from other sources can be added manually.
     arm.model.effects.push(Effect::GearEccentricity(Harmonic {
         joint: 0,
         order: 1.0,

@@ -1,4 +1,4 @@
-//! Names the causes of what geometry does not explain, and writes the model that holds them: `cargo run --example diagnose`.
+//! Finds the causes of errors beyond geometry and writes the extended model: `cargo run --example diagnose`.
 
 #![allow(clippy::print_stdout)]
 
@@ -9,7 +9,7 @@ use truegrind::{
 };
 
 fn main() -> Result<(), Box<dyn Error>> {
-    // A simulated arm whose joints 2 and 3 yield to gravity and whose first gear runs out of centre.
+    // A simulated arm with compliance in joints 2 and 3 and an eccentric first gear.
     let csv = include_bytes!("../tests/data/irb120-cable.csv");
     let robot = robots::load("abb-irb-120")?;
     let rows = read_measurements("irb120-cable.csv", csv, &ImportOptions::default())?;
@@ -26,7 +26,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     for finding in &found.diagnosis.findings {
         println!("{:?}: {}", finding.confidence, finding.cause);
     }
-    // The model is a text; whether programs may be corrected with it is its verdict.
+    // The model as text; its verdict states whether it may be used.
     let model = found.estimated.to_toml()?;
     println!("{} lines of model, verdict {:?}", model.lines().count(), found.estimated.verdict.status);
     Ok(())

@@ -20,7 +20,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let rows =
         read_measurements(file.as_deref().unwrap_or("irb120-cable.csv"), &bytes, &ImportOptions::default())?;
 
-    // Where the sensor stands and what it touches; then the arm itself, judged on rows that the fit never saw.
+    // First the sensor frame and the measured point, then the arm, judged on held-out rows.
     let options = IdentifyOptions::default();
     let frames = starting_frames(&rows, &robot.model, &Tolerance::default(), options.fuse_readout)?;
     let share = |rows: &truegrind::Dataset| split::random(rows, options.held_out, options.seed);

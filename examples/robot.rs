@@ -1,8 +1,6 @@
-//! A robot of one's own, from its data sheet: `cargo run --example robot`, or with a file of one's own
-//! `cargo run --example robot -- arm.toml`.
+//! Defines a robot from its data sheet: `cargo run --example robot`, or with your own file `cargo run --example robot -- arm.toml`.
 //!
-//! Keys and their units: the files of the catalogue, `crates/arm/src/robots/`. A number that the maker does not publish is
-//! left out, never guessed.
+//! For keys and units see the catalogue in `crates/arm/src/robots/`. Omit numbers that the maker does not publish; do not guess them.
 
 #![allow(clippy::print_stdout)]
 
@@ -42,13 +40,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     let still = Condition::default();
     println!("{} of {}", robot.sheet.model, robot.sheet.maker);
 
-    // The usual mistake is a wrong zero: look at poses whose picture is in the manual.
+    // Wrong zeros are the most common mistake: check poses that are shown in the manual.
     for degrees in [[0.0; 6], [0.0, 0.0, 0.0, 0.0, 30.0, 0.0], [90.0, 0.0, 0.0, 0.0, 30.0, 0.0]] {
         let joints = Joints::from(degrees.map(f64::to_radians));
         let flange = arm.forward(&joints, &still);
         println!("joints {degrees:?}°: flange at {:.3} mm", flange.translation.vector.transpose());
     }
-    // And back again.
+    // Inverse kinematics.
     let joints = Joints::from([20.0, 10.0, -15.0, 30.0, 40.0, -60.0].map(f64::to_radians));
     let flange = arm.forward(&joints, &still);
     let found = Inverse::new(arm, &still, arm).solve_near(&flange, &Joints::zeros())?;

@@ -1,7 +1,6 @@
-//! A solver of one's own on a calibration, beside the one that ships: `cargo run --example solver`.
+//! A custom solver for a calibration, compared with the built-in one: `cargo run --example solver`.
 //!
-//! Every method of the project sees the same [`Problem`]: residuals, derivatives, normal equations, priors. So does this one,
-//! plain gradient descent with a line search along Cauchy's step, to show how far it gets.
+//! All solvers use the same [`Problem`]: residuals, derivatives, normal equations, priors. This one is gradient descent with Cauchy steps.
 
 #![allow(clippy::print_stdout)]
 
@@ -13,7 +12,7 @@ use truegrind::{
     starting_frames,
 };
 
-/// Descends `steps` times along the gradient g, by the length gᵀg / gᵀNg that is best for the linearised problem.
+/// Gradient descent with the Cauchy step length gᵀg / gᵀNg, optimal for the linearised problem.
 fn descend(problem: &dyn Problem, steps: usize) -> (Vec<f64>, f64) {
     let priors = problem.priors();
     let mut x = vec![0.0; problem.parameters()];
@@ -25,7 +24,7 @@ fn descend(problem: &dyn Problem, steps: usize) -> (Vec<f64>, f64) {
         let mut equations = problem.normal_equations(&x);
         equations.add_priors(priors, &x);
         equations.symmetrize();
-        // Columns are scaled by the priors: millimetres and radians have no common length.
+        // Columns are scaled by the prior σ, since millimetres and radians have no common unit.
         let scale = nalgebra::DVector::from_iterator(priors.len(), priors.iter().map(|p| p.sigma));
         let gradient = equations.gradient.component_mul(&scale);
         let along = gradient.component_mul(&scale);
@@ -41,7 +40,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let csv = include_bytes!("../tests/data/irb120-cable.csv");
     let rows = read_measurements("irb120-cable.csv", csv, &ImportOptions::default())?;
     let frames = starting_frames(&rows, &robot.model, &Tolerance::default(), true)?;
-    // What may move: the links' angles and the sensor. All rows weigh the same, 1/0.1 mm.
+    // Free parameters: link angles and sensor. All rows have weight 1/0.1 mm.
     let free: Vec<Parameter> = truegrind::arm::parameter::arm_parameters(&robot.model)
         .into_iter()
         .chain(truegrind::calibration::identification::fit::frame_parameters(&rows))

@@ -1,9 +1,9 @@
-"""truegrind learns how one real robot arm differs from its data sheet, names the causes, and rewrites RAPID and NC programs so
+"""truegrind learns how one real robot arm differs from its data sheet, names the causes, and corrects RAPID and NC programs so
 that the real arm follows the intended path.
 
-Lengths are millimetres and angles degrees; every name with a dimension says its unit (``q_deg``, ``position_mm``). Joint angles
-are those that the robot controller shows. Three models of one arm are kept apart: *nominal* (the data sheet, what the controller
-computes with), *estimated* (nominal and everything identified) and *actual* (the real arm, known only in a simulation).
+Lengths are millimetres and angles degrees; names of dimensional values contain the unit (``q_deg``, ``position_mm``). Joint angles are
+those displayed by the controller. Three models of an arm are distinguished: *nominal* (the data sheet, used by the controller),
+*estimated* (nominal plus everything identified) and *actual* (the real arm, known only in a simulation).
 
 >>> import truegrind as tg
 >>> rows = tg.Dataset.from_csv("poses.csv")                       # doctest: +SKIP

@@ -1,8 +1,7 @@
-"""Many programs and arms by jobs that an engine starts and repeats: what ``truegrind.dask`` and ``truegrind.ray`` have in common.
+"""Jobs over many programs and arms, common to ``truegrind.dask`` and ``truegrind.ray``.
 
-Each job runs the command line on a chunk of the units (``--units``, ``--resume``), in a process of its own: what one program brings to
-light ends that process and not the worker, and the bytes are those of the command line, whatever the engine. Nothing here imports
-one.
+Each job runs the command line on a chunk of the units (``--units``, ``--resume``) in a separate process, so that a crash does not end the
+worker, and the outputs are those of the command line for every engine. This module imports no engine.
 """
 
 from __future__ import annotations
@@ -22,18 +21,18 @@ from typing import Any, ClassVar
 from .errors import ArgumentError, TruegrindError
 
 CHUNK = 200
-"""Units of one job: some seconds of work, so that an engine's own costs do not count."""
+"""Units per job: a few seconds of work, so that the overhead of the engine is negligible."""
 
 DEATHS_WITHOUT_PROGRESS = 3
-"""As often a chunk's process may die without a unit having been begun or ended, before the engine is told."""
+"""Crashes of the process of a chunk without any progress before the engine gets an error."""
 
 NAMED = 3
-"""Units that a message names."""
+"""Largest number of units listed in a message."""
 
 
 @dataclass(frozen=True)
 class Command:
-    """A verb with its options, as it is given to the command line; the same for every chunk."""
+    """A verb of the command line with its options, the same for every chunk."""
 
     verb: str
     inputs: tuple[str, ...]
@@ -46,9 +45,9 @@ class Command:
 
 @dataclass
 class Gathered:
-    """What all jobs made together, byte for byte as one run of the command line writes it.
+    """The combined result of all jobs, byte for byte that of a single run of the command line.
 
-    ``flagged``: something was refused, flagged or failed. ``summary``: what the command line prints. ``reports``: files by kind.
+    ``flagged``: something was refused, flagged or failed. ``summary``: output of the command line. ``reports``: files by format.
     """
 
     flagged: bool
@@ -57,15 +56,15 @@ class Gathered:
     reports: dict[str, Path] = field(default_factory=dict)
 
     def rows(self) -> list[dict[str, str]]:
-        """The table, a dictionary for each program or arm; ``pandas.read_csv(found.reports["csv"])`` makes a data frame of it."""
+        """The rows of the table as dictionaries; for a data frame use ``pandas.read_csv(found.reports["csv"])``."""
         with self.reports["csv"].open(encoding="utf-8", newline="") as file:
             return list(csv.DictReader(file))
 
 
 def program() -> str:
-    """The command line on this machine: named by TRUEGRIND, else found on PATH.
+    """The command line on this machine: named by TRUEGRIND, or found on PATH.
 
-    :raises FileNotFoundError: it is not there.
+    :raises FileNotFoundError: it was not found.
     """
     found = os.environ.get("TRUEGRIND") or shutil.which("truegrind")
     if found is None:
@@ -77,8 +76,8 @@ def program() -> str:
 
 
 def options(given: Mapping[str, Any]) -> tuple[str, ...]:
-    """Keywords as options: ``max_risk=0.2`` is ``--max-risk=0.2``, ``partial=True`` is ``--partial``; ``None`` and ``False`` are left
-    out."""
+    """Converts keywords to options: ``max_risk=0.2`` to ``--max-risk=0.2``, ``partial=True`` to ``--partial``; ``None`` and ``False`` are
+    omitted."""
     out: list[str] = []
     for name, value in given.items():
         option = "--" + name.replace("_", "-")
@@ -97,24 +96,24 @@ def _text(value: object) -> str:
 
 
 def inputs(given: object) -> tuple[str, ...]:
-    """A path or several."""
+    """One or more paths."""
     if isinstance(given, (str, os.PathLike)):
         return (os.fspath(given),)
     return tuple(os.fspath(path) for path in given)  # type: ignore[union-attr]
 
 
 def listed(command: Command) -> list[dict[str, Any]]:
-    """All units, in the order of one run; they are noted in the folder of the run, whence ``gather`` knows them.
+    """All units in order; also written to the folder of the run for ``gather``.
 
-    :raises TruegrindError: what the command line refuses.
+    :raises TruegrindError: an error of the command line.
     """
     _checked(subprocess.run(command.arguments("--list-units"), capture_output=True))
     return json.loads((Path(command.work) / "run.json").read_text(encoding="utf-8"))["units"]
 
 
 def chunks(units: Sequence[dict[str, Any]], size: int) -> Iterator[str]:
-    """The units, so many at a time, as the command line takes them: one text, since an engine looks into lists and dictionaries for
-    results of other jobs, which takes longer than some programs."""
+    """The units in chunks, as text for the command line. Text, because engines search lists and dictionaries for results of other jobs,
+    which takes longer than some programs."""
     if size < 1:
         raise ArgumentError(f"chunk: {size}, expected at least 1", found=str(size), expected="at least 1")
     for start in range(0, len(units), size):
@@ -122,11 +121,11 @@ def chunks(units: Sequence[dict[str, Any]], size: int) -> Iterator[str]:
 
 
 class Started:
-    """The processes that the jobs of one run have going, where the process that called the run does the jobs: when the call ends, by
-    Ctrl-C or an error, they end with it, and none is started again."""
+    """Running processes of the jobs of a run, if they run in the calling process. When the call ends, by Ctrl-C or an error, they are
+    ended too, and none is restarted."""
 
     of_run: ClassVar[dict[str, Started]] = {}
-    """By key; kept when the run is over, for jobs that begin too late."""
+    """By key; kept after the end of the run, for jobs that start too late."""
 
     def __init__(self) -> None:
         self.key = uuid.uuid4().hex
@@ -146,10 +145,10 @@ class Started:
 
     def go_on(self) -> None:
         if self.called_off:
-            raise TruegrindError("the run was called off")
+            raise TruegrindError("the run was cancelled")
 
     def run(self, arguments: list[str], given: bytes) -> subprocess.CompletedProcess[bytes]:
-        """:raises TruegrindError: the run was called off."""
+        """:raises TruegrindError: the run was cancelled."""
         with self.lock:
             self.go_on()
             pipe = subprocess.PIPE
@@ -163,12 +162,12 @@ class Started:
 
 
 def do(command: Command, units: str, run: str | None = None) -> None:
-    """One job: does what of a chunk is not done yet. A process that dies is started again; the command line itself lists a unit that
+    """One job: processes the unfinished units of a chunk. A crashed process is restarted; the command line itself lists a unit that
     kills it every time.
 
     :param units: a list of units as JSON; see :func:`chunks`.
     :param run: the key of what this process has :class:`Started`, where the job is done by the process that called the run.
-    :raises TruegrindError: what the command line refuses.
+    :raises TruegrindError: an error of the command line.
     """
     started = Started.of_run.get(run or "") or Started()
     idle = 0
@@ -189,7 +188,7 @@ def do(command: Command, units: str, run: str | None = None) -> None:
 
 
 def _state(command: Command) -> list[tuple[str, int]]:
-    """What was begun and not ended, with how often: changes with every unit that takes its process along."""
+    """The unfinished units with their number of attempts; changes with every unit that crashes its process."""
     out = []
     for entry in os.scandir(Path(command.work) / "begun"):
         try:
@@ -200,9 +199,9 @@ def _state(command: Command) -> list[tuple[str, int]]:
 
 
 def gathered(command: Command, reports: Mapping[str, Any]) -> Gathered:
-    """Tables and pages of all jobs.
+    """Combines the results of all jobs.
 
-    :raises TruegrindError: something is missing; the message lists it.
+    :raises TruegrindError: units are missing; the message lists them.
     """
     files = {kind: Path(os.fspath(path)) for kind, path in reports.items() if path is not None}
     files.setdefault("csv", Path(command.work) / "table.csv")
@@ -215,7 +214,7 @@ def _checked(done: subprocess.CompletedProcess[bytes]) -> subprocess.CompletedPr
     if done.returncode not in (0, 1):
         text = done.stderr.decode(errors="replace").strip()
         text = text.removeprefix("error: ") or f"the command line ended with {done.returncode}"
-        # Where nothing could be done the table says why of each.
+        # If no unit succeeded, the table lists the errors.
         raise TruegrindError("\n".join([text, *filter(None, [done.stdout.decode(errors="replace").strip()])]))
     return done
 
@@ -223,7 +222,7 @@ def _checked(done: subprocess.CompletedProcess[bytes]) -> subprocess.CompletedPr
 def compensating(
     programs: object, model: object, output: object, work: object | None, given: Mapping[str, Any], with_json: bool = True
 ) -> Command:
-    """The command that corrects programs. ``with_json``: each record holds what only the report as JSON shows, motion by motion."""
+    """The command that corrects programs. ``with_json``: records contain the entries of all motions for the JSON report."""
     chosen = options({"model": model, "output": output, "brief_records": not with_json, **given})
     return Command("compensate", inputs(programs), chosen, os.fspath(work if work is not None else output))  # type: ignore[arg-type]
 

@@ -1,4 +1,4 @@
-"""How often a diagnosis finds what a simulated arm hides: one run of a power study, and the table over many."""
+"""Power study: how often a diagnosis finds the causes of a simulated arm."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from pathlib import Path
 from typing import Any
 
 Z = 1.959963984540054
-"""Two-sided 95 % of the normal distribution."""
+"""Two-sided 95 % quantile of the normal distribution."""
 
 
 @dataclass(frozen=True)
 class Study:
-    """What all runs of a power study have in common: recipes by name, each with its file and text, and what the diagnosis is told."""
+    """Data common to all runs: recipes by name with file and text, robot and options of the diagnosis."""
 
     recipes: tuple[tuple[str, str, str], ...]
     robot: str | None
@@ -27,7 +27,7 @@ class Study:
     work: str | None
 
     def key(self, recipe: str, seed: int) -> str:
-        """SHA-256 of all that decides what a run finds."""
+        """SHA-256 of everything that determines the result of a run."""
         from . import __version__
 
         text = next(text for name, _, text in self.recipes if name == recipe)
@@ -36,7 +36,7 @@ class Study:
 
 
 def run(study: Study, recipe: str, seed: int) -> dict[str, Any]:
-    """One run: an arm is simulated and diagnosed. What is done already, and noted in the folder of the study, is taken from there."""
+    """One run: simulates and diagnoses an arm, or returns the stored result."""
     import truegrind as tg
 
     place = Path(study.work) / f"{study.key(recipe, seed)}.json" if study.work else None
@@ -64,7 +64,7 @@ def run(study: Study, recipe: str, seed: int) -> dict[str, Any]:
 
 
 def robot_of(path: str, text: str) -> str:
-    """The robot of a recipe: a name of the catalogue, or a file beside the recipe. Read by its line, since Python 3.10 reads no TOML."""
+    """The robot of a recipe: a name from the catalogue, or a file beside the recipe. Found by regex, since Python 3.10 has no TOML parser."""
     found = re.search(r"""^robot\s*=\s*["']([^"'\n]+)["']""", text, re.MULTILINE)
     name = found.group(1) if found else ""
     beside = Path(path).parent / name
@@ -86,7 +86,7 @@ def _umask() -> int:
 
 
 def interval(hits: int, runs: int) -> tuple[float, float]:
-    """Wilson's 95 % interval of a share (Wilson 1927, J. Am. Stat. Assoc. 22:209)."""
+    """Wilson's 95 % interval of a proportion (Wilson 1927, J. Am. Stat. Assoc. 22:209)."""
     if runs == 0:
         return (0.0, 1.0)
     share, square = hits / runs, Z * Z
@@ -96,8 +96,8 @@ def interval(hits: int, runs: int) -> tuple[float, float]:
 
 
 def table(runs: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """One row for each recipe and each cause that any of its runs named: in how many it was named, and in how many identified, with
-    Wilson's 95 % interval of the share that named it. The cause ``None`` counts the runs that named nothing."""
+    """One row per recipe and found cause: number of runs that named it and that identified it, with Wilson's 95 % interval of the share
+    that named it. The cause ``None`` counts the runs without findings."""
     recipes: dict[str, list[dict[str, Any]]] = {}
     for one in runs:
         recipes.setdefault(one["recipe"], []).append(one)
@@ -134,7 +134,7 @@ def table(runs: list[dict[str, Any]]) -> list[dict[str, Any]]:
 def study(
     recipes: object, robot: object | None, work: object | None, options: Mapping[str, Any]
 ) -> Study:
-    """What is to be run: recipe files by name, or one or several paths."""
+    """Makes a study from recipe files by name, or from one or more paths."""
     if isinstance(recipes, (str, os.PathLike)):
         recipes = [recipes]
     named = recipes.items() if isinstance(recipes, Mapping) else ((Path(path).name, path) for path in recipes)  # type: ignore[union-attr]

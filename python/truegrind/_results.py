@@ -1,4 +1,4 @@
-"""Results that are plain tuples and tables."""
+"""Results as tuples and tables."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 class Poses(NamedTuple):
-    """Poses of the flange in the base, one row for each row of joint angles; without the first axis for a single one."""
+    """Poses of the flange in the base, one row per row of joint angles; without the first axis for a single one."""
 
     position_mm: NDArray[np.float64]
     """Origin (mm), shape (N, 3)."""
@@ -31,14 +31,14 @@ class Poses(NamedTuple):
 
 
 class Solutions(NamedTuple):
-    """Joint angles that reach poses; without the first axis for a single one."""
+    """Joint angles for poses of the flange; without the first axis for a single one."""
 
     q_deg: NDArray[np.float64]
-    """Controller angles (°), shape (N, 6); NaN in the rows of poses that were not reached."""
+    """Controller angles (°), shape (N, 6); NaN for poses that were not reached."""
     reached: NDArray[np.bool_]
     """Which poses were reached, shape (N,)."""
     why: list[str | None] | None
-    """Why a pose was not reached; ``None`` for one that was."""
+    """Reason for each pose that was not reached; ``None`` for the others."""
 
 
 def table(text: str) -> dict[str, list]:

@@ -1,4 +1,4 @@
-"""Many programs, arms and simulations on Dask: a laptop's processors, or a cluster (``dask-jobqueue``, ``dask-kubernetes``).
+"""Many programs, arms and simulations on Dask: locally or on a cluster (``dask-jobqueue``, ``dask-kubernetes``).
 
 >>> from dask.distributed import Client
 >>> from truegrind.dask import compensate_folder, diagnose_many
@@ -6,19 +6,19 @@
 >>> done = compensate_folder("programs", "arm.toml", "corrected", html="corrected.html")  # doctest: +SKIP
 >>> fleet = diagnose_many("measurements", "abb-irb-120", "models", html="fleet.html")     # doctest: +SKIP
 
-Needs ``pip install truegrind[dask]``, and the command line on every worker (on PATH, or named by TRUEGRIND). All workers see the
-folders under the same paths. Workers with one thread each are best: ``Client(threads_per_worker=1)``. Without a client jobs are started
-from this process, which is the cheapest on one machine: each is a process of the command line anyway. Workers of a cluster look at
-themselves a hundred times a second, which costs each some 3 % of a processor; where that matters:
+Requires ``pip install truegrind[dask]``, and the command line on every worker (on PATH, or named by TRUEGRIND). All workers must see the
+folders under the same paths. Use workers with one thread each: ``Client(threads_per_worker=1)``. Without a client, jobs are started from
+this process, which is cheapest on one machine, since each job is a process of the command line anyway. Workers of a cluster monitor
+themselves a hundred times a second, which costs about 3 % of a processor each; to avoid that:
 
 >>> import dask
 >>> from truegrind.dask import QUIET
 >>> with dask.config.set(QUIET):                                                          # doctest: +SKIP
 ...     client = Client(n_workers=8, threads_per_worker=1)
 
-What is written is byte for byte what one run of the command line writes. A worker that dies, and a client that is started again, cost
-what they were doing at that moment: what is done is not done again, as long as inputs, model, cell, options and version are the same.
-A program that kills whoever does it is listed in the table.
+The outputs are byte for byte those of a single run of the command line. If a worker crashes or the client is restarted, only unfinished
+units are repeated, as long as inputs, model, cell, options and version are the same. A program that crashes its process repeatedly is
+listed in the table.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ __all__ = ["CHUNK", "Gathered", "QUIET", "compensate_folder", "diagnose_many", "
 _Path = str | PathLike[str]
 
 RETRIES = 5
-"""As often Dask tries a chunk again whose worker died."""
+"""Retries by Dask of a chunk whose worker crashed."""
 
 
 QUIET = {
@@ -49,14 +49,14 @@ QUIET = {
     "distributed.admin.tick.cycle": "5s",
     "distributed.admin.system-monitor.interval": "5s",
 }
-"""Settings of Dask for workers that only wait for processes: looking at themselves a hundred times a second takes the processor from
-those. They have to stand before the cluster is started; without a client they are set."""
+"""Dask settings for workers that only wait for processes, to reduce their monitoring. Set them before the cluster starts; without a
+client they are set automatically."""
 
 
 @contextmanager
 def _client(given: Client | None, *, processes: bool):
-    """The client that was given, else the current one, else one of this machine with one thread a worker. ``processes``: each worker is
-    one. Jobs that start processes of their own need none around them, and are spared the start of interpreters with all of Dask."""
+    """The given client, or the current one, or a local one with one thread per worker. ``processes``: whether workers are processes; jobs
+    that start their own processes do not need them."""
     if given is not None:
         yield given
         return
@@ -71,7 +71,7 @@ def _client(given: Client | None, *, processes: bool):
 def _all(
     client: Client, work: Callable[..., Any], chunks: Iterable[Any], progress: Callable[[int, int], object] | None
 ) -> list[Any]:
-    """Every chunk's result in its order; one that failed for good is ``None``, and its exception comes last."""
+    """The results of all chunks in order, ``None`` for failed ones, and a final list of exceptions."""
     futures = client.map(work, list(chunks), retries=RETRIES, pure=False)
     place = {future.key: at for at, future in enumerate(futures)}
     out: list[Any] = [None] * len(futures)
@@ -98,7 +98,7 @@ def _run(command: _jobs.Command, reports: Mapping[str, Any], client: Client | No
 
 
 class _Do:
-    """A job as it travels."""
+    """A picklable job."""
 
     def __init__(self, command: _jobs.Command, run: str) -> None:
         self.command, self.run = command, run
@@ -126,15 +126,15 @@ def compensate_folder(
     """Corrects all programs below a folder, as ``truegrind compensate FOLDER --model MODEL -o OUTPUT`` does.
 
     :param programs: a folder, or several programs and folders.
-    :param model: an estimated arm.
-    :param output: the folder for what is written; what jobs keep for each other lies there too, unless ``work`` names another.
-    :param csv: where the table of all programs goes; likewise ``json``, ``html``, ``md`` and ``parquet``. What a run made without
-        ``json`` is done again where a later one asks for it.
-    :param client: of Dask; else the current one, else this machine.
-    :param chunk: programs of one job.
-    :param progress: called with the number of jobs that are done and of all.
-    :param options: those of the command line: ``cell="cell.toml"``, ``max_correction=5``, ``partial=True``.
-    :raises TruegrindError: what the command line refuses, or what could not be done, listed.
+    :param model: a model file.
+    :param output: the output folder, which also contains the records of the jobs unless ``work`` names another folder.
+    :param csv: file for the table of all programs; likewise ``json``, ``html``, ``md`` and ``parquet``. Units processed without
+        ``json`` are processed again if a later run requests it.
+    :param client: Dask client; by default the current one, or this machine.
+    :param chunk: number of programs per job.
+    :param progress: called with the numbers of finished and of all jobs.
+    :param options: options of the command line: ``cell="cell.toml"``, ``max_correction=5``, ``partial=True``.
+    :raises TruegrindError: an error of the command line, or a list of missing units.
     """
     command = _jobs.compensating(programs, model, output, work, options, with_json=json is not None)
     reports = {"csv": csv, "json": json, "html": html, "md": md, "parquet": parquet}
@@ -157,15 +157,14 @@ def diagnose_many(
     progress: Callable[[int, int], object] | None = None,
     **options: Any,
 ) -> Gathered:
-    """Diagnoses a fleet: the measurements of each arm by themselves, and one table over all, which causes, how large, which arm
-    first.
+    """Diagnoses many arms separately, and makes one table over all with causes, sizes and a ranking.
 
     :param data: a folder of measurements, or several files and folders; each file is an arm.
-    :param robot: what they are: a name of the catalogue, or a file.
+    :param robot: the robot: a name from the catalogue, or a robot file.
     :param output: the folder for models and pages.
-    :param chunk: arms of one job: a diagnosis takes seconds to minutes.
+    :param chunk: number of arms per job; a diagnosis takes seconds to minutes.
 
-    The rest is as in :func:`compensate_folder`.
+    Other parameters as in :func:`compensate_folder`.
     """
     command = _jobs.diagnosing(data, robot, output, work, options)
     reports = {"csv": csv, "json": json, "html": html, "md": md, "parquet": parquet}
@@ -182,14 +181,14 @@ def power_study(
     progress: Callable[[int, int], object] | None = None,
     **options: Any,
 ) -> list[dict[str, Any]]:
-    """How often a diagnosis would name what an arm hides: every recipe of a simulation with every seed, diagnosed.
+    """Estimates how often a diagnosis finds the causes of a simulated arm: simulates and diagnoses every recipe with every seed.
 
-    :param recipes: files of ``truegrind simulate``, such as one for each number of poses, or each noise.
-    :param seeds: of poses, noise and whatever a recipe leaves to chance; each is a run.
-    :param robot: what the diagnosis starts from; else the recipe's own.
-    :param work: a folder in which runs are kept: a study that is started again does only the rest.
-    :param options: those of :func:`truegrind.diagnose`.
-    :returns: a row for each recipe and each cause that was named: runs, named, identified, share, and its 95 % interval (Wilson).
+    :param recipes: recipe files of ``truegrind simulate``, for example one per number of poses or noise level.
+    :param seeds: seeds of poses, noise and other random values of a recipe; each is a run.
+    :param robot: nominal robot of the diagnosis; by default that of the recipe.
+    :param work: a folder for the results of runs, so that a restarted study only does the rest.
+    :param options: options of :func:`truegrind.diagnose`.
+    :returns: a row per recipe and found cause: runs, named, identified, share, and its 95 % interval (Wilson).
     """
     study = _power.study(recipes, robot, work, options)
     numbers = [int(seed) for seed in seeds]
@@ -202,7 +201,7 @@ def power_study(
 
 
 class _Run:
-    """A run of a study as it travels."""
+    """A picklable run of a study."""
 
     def __init__(self, study: _power.Study) -> None:
         self.study = study

@@ -1,13 +1,13 @@
-"""What truegrind refuses, and where. Every message says where, what was found, what was expected and what to do."""
+"""Exceptions. Messages state where the error is, what was found, what was expected, and the remedy."""
 
 from __future__ import annotations
 
 
 class TruegrindError(ValueError):
-    """Something was refused. Attributes are ``None`` where they say nothing.
+    """Base class of all errors. Attributes are ``None`` if not applicable.
 
-    ``file`` and ``sheet``: where it stands; ``row``: line of the file or row of the sheet, from 1, or the index of an array, from
-    0; ``column``: header of the column, or key of a robot file; ``found`` and ``expected``: in words.
+    ``file`` and ``sheet``: location; ``row``: line of the file or row of the sheet, from 1, or index of an array, from 0; ``column``:
+    header of the column, or key of a robot file; ``found`` and ``expected``: values as text.
     """
 
     def __init__(
@@ -30,7 +30,7 @@ class TruegrindError(ValueError):
         self.expected = expected
 
     def __reduce__(self):
-        # Errors travel between processes: keywords are no arguments of an exception otherwise.
+        # Pickling for other processes; by default keyword arguments are lost.
         places = (self.file, self.sheet, self.row, self.column, self.found, self.expected)
         return _again, (type(self), str(self), places)
 
@@ -41,35 +41,35 @@ def _again(kind: type[TruegrindError], message: str, places: tuple) -> Truegrind
 
 
 class ArgumentError(TruegrindError):
-    """An argument that cannot be: a shape, a unit, a word."""
+    """Invalid argument: shape, unit or word."""
 
 
 class DatasetError(TruegrindError):
-    """Measurements that cannot be read, or are no measurements of this arm."""
+    """Measurements that cannot be read or do not belong to this robot."""
 
 
 class RobotError(TruegrindError):
-    """No such robot, or a robot file that cannot be right."""
+    """Unknown robot or invalid robot file."""
 
 
 class ModelError(TruegrindError):
-    """A model file that cannot be used, or a model that may not be."""
+    """Invalid model file, or a model that must not be used."""
 
 
 class FitError(TruegrindError):
-    """Rows that carry no fit."""
+    """Measurements that do not suffice for a fit."""
 
 
 class ProgramError(TruegrindError):
-    """A program that is not corrected."""
+    """A program that cannot be corrected."""
 
 
 class CellError(TruegrindError):
-    """A cell file that cannot be used, or contradicts the program."""
+    """Invalid cell file, or one that contradicts the program."""
 
 
 class RecipeError(TruegrindError):
-    """A recipe of a simulation that cannot be."""
+    """Invalid recipe of a simulation."""
 
 
 class PlanError(TruegrindError):
@@ -77,12 +77,12 @@ class PlanError(TruegrindError):
 
 
 class TrackError(TruegrindError):
-    """Measurements that a track cannot take in."""
+    """Measurements that cannot be used for tracking."""
 
 
 class InverseError(TruegrindError):
-    """A pose that the arm does not reach."""
+    """A pose out of reach."""
 
 
 class Defect(TruegrindError):
-    """A defect of truegrind itself. Please report it."""
+    """Internal error of truegrind. Please report it."""

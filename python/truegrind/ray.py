@@ -1,4 +1,4 @@
-"""Many programs and arms on Ray Core, as :mod:`truegrind.dask` has them on Dask; needs ``ray`` and the command line on every node."""
+"""Many programs and arms on Ray Core, like :mod:`truegrind.dask`; requires ``ray`` and the command line on every node."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ._jobs import CHUNK, Gathered
 
 
 RETRIES = 5
-"""As often Ray tries a chunk again whose worker died."""
+"""Retries by Ray of a chunk whose worker crashed."""
 
 
 def _run(command: _jobs.Command, reports: dict[str, Any], chunk: int) -> Gathered:

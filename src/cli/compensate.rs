@@ -93,14 +93,14 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
         return compensate_one(&context, job);
     }
     let store = if arguments.shares.on() {
-        let asked = RunDescription {
+        let description = RunDescription {
             verb: "compensate",
             options: arguments.relevant_options(),
             shared,
             context: context.exit_criteria().to_value(),
             output: arguments.output.as_deref().filter(|_| !dry),
         };
-        let Some(store) = Store::open(&arguments.shares, &asked, &mut jobs)? else {
+        let Some(store) = Store::open(&arguments.shares, &description, &mut jobs)? else {
             return Ok(ExitStatus::Done);
         };
         Some(store)
@@ -123,7 +123,7 @@ fn compensate_one(context: &CompensateContext<'_>, job: &Job) -> anyhow::Result<
     }
     Batch::check(&inputs_of, &checked)?;
     let mut batch = Batch::sparing(&inputs_of);
-    // Printed after everything is written, since it says what was written.
+    // Printed after everything is written, since it lists the written files.
     let mut summary = None;
     let mut report = |planned: &mut Plan, program: &Program<'_>, files: &[ProgramFile]| {
         let listing = program.listing();

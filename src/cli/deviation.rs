@@ -122,8 +122,9 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let shared = read_log::finish();
     let store = if arguments.shares.on() {
         let options = arguments.relevant_options();
-        let asked = RunDescription { verb: "deviation", options, shared, context: Value::Null, output: None };
-        let Some(store) = Store::open(&arguments.shares, &asked, &mut jobs)? else {
+        let description =
+            RunDescription { verb: "deviation", options, shared, context: Value::Null, output: None };
+        let Some(store) = Store::open(&arguments.shares, &description, &mut jobs)? else {
             return Ok(ExitStatus::Done);
         };
         Some(store)

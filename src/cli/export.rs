@@ -97,7 +97,7 @@ fn read_back(bare: &Model, robot: &str, format: Format) -> anyhow::Result<Model>
     };
     let text = write(bare, robot, format, &[]);
     let mut back = import(&text, name, &ImportOptions::default())?.robot.model;
-    // Users convert the controller angles to those of the file, as the notes say.
+    // Users convert the controller angles to those of the file, as the notes state.
     back.joint_map *= joint_matrix(bare, format);
     Ok(back)
 }

@@ -71,14 +71,14 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let shared = read_log::finish();
     let store = if arguments.shares.on() {
         let output = arguments.output.as_deref();
-        let asked = RunDescription {
+        let description = RunDescription {
             verb: "diagnose",
             options: relevant_options(arguments),
             shared,
             context: Value::Null,
             output,
         };
-        let Some(store) = Store::open(&arguments.shares, &asked, &mut jobs)? else {
+        let Some(store) = Store::open(&arguments.shares, &description, &mut jobs)? else {
             return Ok(ExitStatus::Done);
         };
         Some(store)

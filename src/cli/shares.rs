@@ -176,21 +176,25 @@ impl Store {
     /// Opens the folder, writes `run.json`, and reduces `jobs` to the share of this job. `None` for `--list-units`.
     pub(super) fn open(
         shares: &Shares,
-        asked: &RunDescription<'_>,
+        description: &RunDescription<'_>,
         jobs: &mut Vec<Job>,
     ) -> anyhow::Result<Option<Self>> {
-        let Some(work) = shares.work.as_deref().or(asked.output) else {
+        let Some(work) = shares.work.as_deref().or(description.output) else {
             bail!("--work FOLDER is missing: the folder in which the jobs of this run keep their records");
         };
-        let run = key::of_run(asked.verb, &asked.options, asked.shared.iter().map(String::as_str));
+        let run = key::of_run(
+            description.verb,
+            &description.options,
+            description.shared.iter().map(String::as_str),
+        );
         for folder in ["done", "begun"] {
             files::make_folder(&work.join(folder))?;
         }
         let mut folders = vec![work.to_path_buf()];
-        folders.extend(asked.output.filter(|output| *output != work).map(Path::to_path_buf));
+        folders.extend(description.output.filter(|output| *output != work).map(Path::to_path_buf));
         let store = Self { work: work.to_path_buf(), run, resume: shares.resume, folders };
         if shares.units.is_none() {
-            store.list(shares, asked, jobs)?;
+            store.list(shares, description, jobs)?;
         }
         if shares.list_units {
             return Ok(None);
@@ -204,9 +208,10 @@ impl Store {
     }
 
     /// The outputs of this job: by default the table of a share goes to the folder of the run.
-    fn outputs(&self, shares: &Shares, asked: &Outputs) -> anyhow::Result<Outputs> {
-        let mut outputs = asked.clone();
-        if let (true, Some(share), None) = (cfg!(feature = "parquet"), shares.shard, &asked.pages.parquet) {
+    fn outputs(&self, shares: &Shares, requested: &Outputs) -> anyhow::Result<Outputs> {
+        let mut outputs = requested.clone();
+        if let (true, Some(share), None) = (cfg!(feature = "parquet"), shares.shard, &requested.pages.parquet)
+        {
             let tables = self.work.join(TABLES);
             files::make_folder(&tables)?;
             // Zero-padded, so that sorting by name sorts by number.
@@ -232,14 +237,14 @@ impl Store {
         Ok((store, run))
     }
 
-    fn list(&self, shares: &Shares, asked: &RunDescription<'_>, jobs: &[Job]) -> anyhow::Result<()> {
+    fn list(&self, shares: &Shares, description: &RunDescription<'_>, jobs: &[Job]) -> anyhow::Result<()> {
         let run = Run {
             schema: run::SCHEMA.to_owned(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
-            verb: asked.verb.to_owned(),
+            verb: description.verb.to_owned(),
             run: self.run.clone(),
             shares: shares.shard.map(|share| share.of),
-            context: asked.context.clone(),
+            context: description.context.clone(),
             units: jobs.iter().map(Job::unit).collect::<anyhow::Result<_>>()?,
         };
         let (path, text) = (self.work.join("run.json"), run.to_text()?);
@@ -319,9 +324,9 @@ impl Store {
 pub(super) fn outputs_with(
     store: Option<&Store>,
     shares: &Shares,
-    asked: &Outputs,
+    requested: &Outputs,
 ) -> anyhow::Result<Outputs> {
-    store.map_or_else(|| Ok(asked.clone()), |store| store.outputs(shares, asked))
+    store.map_or_else(|| Ok(requested.clone()), |store| store.outputs(shares, requested))
 }
 
 /// One job of a run.

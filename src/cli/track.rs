@@ -125,10 +125,10 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
         state_path: &state_path,
     };
     let mut flagged = false;
-    let mut said = BTreeSet::new();
+    let mut printed = BTreeSet::new();
     loop {
         files::new_round();
-        flagged |= on_threads(arguments.common.threads, || track.update(&mut said))??;
+        flagged |= on_threads(arguments.common.threads, || track.update(&mut printed))??;
         let Some(seconds) = arguments.follow else { break };
         std::thread::sleep(Duration::from_secs_f64(seconds));
     }
@@ -148,12 +148,12 @@ struct TrackContext<'a> {
 
 impl TrackContext<'_> {
     /// Processes all new data and writes model and state together. Returns whether an alarm was raised or a file failed. Messages in
-    /// `said` are not repeated.
-    fn update(&self, said: &mut BTreeSet<String>) -> anyhow::Result<bool> {
+    /// `printed` are not repeated.
+    fn update(&self, printed: &mut BTreeSet<String>) -> anyhow::Result<bool> {
         let (arguments, arm) = (self.arguments, self.arm);
         let mut tracker = self.state()?;
         let known = tracker.as_ref().map(|t| t.state().consumed.clone()).unwrap_or_default();
-        let (datasets, mut failed) = self.datasets(&known, said)?;
+        let (datasets, mut failed) = self.datasets(&known, printed)?;
         if tracker.is_none()
             && let Some(first) = first_poses(&datasets, self.options.first_poses)
         {
@@ -161,7 +161,7 @@ impl TrackContext<'_> {
                 Ok(begun) => tracker = Some(begun),
                 // The files are still growing: wait.
                 Err(error @ TrackError::TooFew { .. }) if arguments.follow.is_some() => {
-                    print_message_once(said, format!("note: {error}"));
+                    print_message_once(printed, format!("note: {error}"));
                     return Ok(false);
                 }
                 Err(error) => return Err(error.into()),
@@ -180,7 +180,7 @@ impl TrackContext<'_> {
                     Err(defect) if self.arguments.data.is_dir() || arguments.follow.is_some() => {
                         *tracker = before;
                         failed = true;
-                        print_message_once(said, format!("failed: {}: {defect:#}", dataset.file));
+                        print_message_once(printed, format!("failed: {}: {defect:#}", dataset.file));
                     }
                     Err(defect) => return Err(defect),
                 }
@@ -279,7 +279,7 @@ impl TrackContext<'_> {
     fn datasets(
         &self,
         known: &[ConsumedFile],
-        said: &mut BTreeSet<String>,
+        printed: &mut BTreeSet<String>,
     ) -> anyhow::Result<(Vec<Dataset>, bool)> {
         let waits = self.arguments.follow.is_some();
         let several = self.arguments.data.is_dir();
@@ -288,7 +288,9 @@ impl TrackContext<'_> {
             let is_new = !known.iter().any(|k| k.file == files::name(&path));
             match catch_panic(|| read(self.arguments, self.arm, &path, is_new)) {
                 Ok(dataset) => out.extend(dataset),
-                Err(error) if waits => print_message_once(said, format!("note: {error:#}; will be retried")),
+                Err(error) if waits => {
+                    print_message_once(printed, format!("note: {error:#}; will be retried"))
+                }
                 Err(error) if several => {
                     failed = true;
                     print_message(format_args!("failed: {}: {error:#}", path.display()));
@@ -301,10 +303,10 @@ impl TrackContext<'_> {
 }
 
 /// Prints a message unless it was printed before.
-fn print_message_once(said: &mut BTreeSet<String>, what: String) {
-    if !said.contains(&what) {
+fn print_message_once(printed: &mut BTreeSet<String>, what: String) {
+    if !printed.contains(&what) {
         print_message(&what);
-        said.insert(what);
+        printed.insert(what);
     }
 }
 

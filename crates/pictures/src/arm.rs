@@ -76,7 +76,7 @@ pub(super) struct Figure<'a> {
 
 /// State of an arm at one time.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Stand {
+pub(super) struct ArmState {
     /// Time.
     pub(super) time: i64,
     /// Controller angles.
@@ -85,21 +85,21 @@ pub(super) struct Stand {
     pub(super) flange_from_tool: Pose,
 }
 
-/// Draws an arm below the entity `root` at `stands`, in order of time.
+/// Draws an arm below the entity `root` at `states`, in order of time.
 pub(super) fn draw(
     store: &mut Store,
     root: &str,
     figure: Figure<'_>,
     paint: &Paint,
-    (axis, stands): (&'static str, &[Stand]),
+    (axis, states): (&'static str, &[ArmState]),
 ) -> Result<(), VisualError> {
     let arm = figure.model.at_condition(figure.condition);
-    let frames: Vec<[Pose; 7]> = stands.iter().map(|s| frames(&arm, &s.joints)).collect();
+    let frames: Vec<[Pose; 7]> = states.iter().map(|s| frames(&arm, &s.joints)).collect();
     let posed = Posed { frames: &frames, flange: figure.model.flange };
-    draw_posed(store, root, figure, &posed, paint, (axis, stands))
+    draw_posed(store, root, figure, &posed, paint, (axis, states))
 }
 
-/// The frames of an arm at each of its stands.
+/// The frames of an arm at each of its states.
 pub(super) struct Posed<'a> {
     pub(super) frames: &'a [[Pose; 7]],
     pub(super) flange: Pose,
@@ -112,14 +112,14 @@ pub(super) fn draw_posed(
     figure: Figure<'_>,
     &Posed { frames, flange }: &Posed<'_>,
     paint: &Paint,
-    (axis, stands): (&'static str, &[Stand]),
+    (axis, states): (&'static str, &[ArmState]),
 ) -> Result<(), VisualError> {
-    let Some(first) = stands.first() else { return Ok(()) };
+    let Some(first) = states.first() else { return Ok(()) };
     let length = length_mm(figure.model);
     if !shown(store, root, 0, figure.meshes, paint)? {
         foot(store, root, length, paint)?;
     }
-    let times: Vec<i64> = stands.iter().map(|s| s.time).collect();
+    let times: Vec<i64> = states.iter().map(|s| s.time).collect();
     let mut path = root.to_owned();
     for link in 0..6 {
         path = format!("{path}/link{}", link + 1);
@@ -142,10 +142,10 @@ pub(super) fn draw_posed(
     // The tool is logged when it changes.
     path = format!("{path}/tool");
     let mut last = None;
-    let mut changes: Vec<Stand> = Vec::new();
-    for stand in stands {
-        if last.replace(stand.flange_from_tool) != Some(stand.flange_from_tool) {
-            changes.push(*stand);
+    let mut changes: Vec<ArmState> = Vec::new();
+    for state in states {
+        if last.replace(state.flange_from_tool) != Some(state.flange_from_tool) {
+            changes.push(*state);
         }
     }
     let times: Vec<i64> = changes.iter().map(|s| s.time).collect();

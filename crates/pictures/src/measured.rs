@@ -20,7 +20,7 @@ use nalgebra::{Point3, Vector3};
 use rerun::components::{Color, MarkerShape, Radius};
 use rerun::{Boxes3D, LineStrips3D, Points3D, TransformAxes3D};
 
-use super::arm::{self, Figure, LinkMesh, Paint, Stand};
+use super::arm::{self, ArmState, Figure, LinkMesh, Paint};
 use super::colour::{BEFORE, INTENDED, JOINTS, REFUSED, Scale, after};
 use super::curve::{self, Pen, curve};
 use super::legend;
@@ -144,16 +144,16 @@ pub fn measured_recording(scene: &MeasuredScene<'_>) -> Result<Recording, Visual
     let mut store = Store::default();
     store.fixed("/", &rerun::ViewCoordinates::RIGHT_HAND_Z_UP())?;
     let flange_from_touched = scene.frames.map_or_else(Pose::identity, |f| f.flange_from_target);
-    let stand = |row: &Row| Stand {
+    let state = |row: &Row| ArmState {
         time: row.number as i64,
         joints: row.joints,
         flange_from_tool: flange_from_touched,
     };
-    let stands: Vec<Stand> = scene.dataset.rows.iter().map(stand).collect();
+    let states: Vec<ArmState> = scene.dataset.rows.iter().map(state).collect();
     let condition = *scene.dataset.rows[0].condition;
     let figure = |model| Figure { model, condition: &condition, meshes: scene.meshes };
-    arm::draw(&mut store, "arm/at_row", figure(scene.arm), &Paint::SOLID, (AXIS, &stands))?;
-    let shape = scene.nominal.and_then(|nominal| Shape::of(figure(nominal), figure(scene.arm), &stands));
+    arm::draw(&mut store, "arm/at_row", figure(scene.arm), &Paint::SOLID, (AXIS, &states))?;
+    let shape = scene.nominal.and_then(|nominal| Shape::of(figure(nominal), figure(scene.arm), &states));
     if let (Some(shape), Some(nominal)) = (&shape, scene.nominal) {
         shape.draw(&mut store, figure(nominal), AXIS)?;
     }

@@ -56,10 +56,10 @@ pub fn path_recording(scene: &PathScene<'_>) -> Result<Recording, VisualError> {
 
 fn arms(store: &mut Store, scene: &PathScene<'_>, plan: &Plan<'_>) -> Result<(), VisualError> {
     let ghost = Paint::ghost(BEFORE);
-    for (root, paint, stands) in
+    for (root, paint, states) in
         [("arm/after", &Paint::SOLID, &plan.after), ("arm/before", &ghost, &plan.before)]
     {
-        arm::draw(store, root, scene.figure(scene.arm), paint, (AXIS, stands))?;
+        arm::draw(store, root, scene.figure(scene.arm), paint, (AXIS, states))?;
     }
     match &plan.shape {
         Some(shape) => shape.draw(store, scene.figure(scene.nominal), AXIS),
@@ -83,9 +83,9 @@ fn layout(scene: &PathScene<'_>, plan: &Plan<'_>) -> Result<Store, VisualError> 
     let mut cell = part.clone();
     cell.push(Point3::origin());
     let length = arm::length_mm(scene.arm);
-    for stands in [&plan.before, &plan.after] {
-        for stand in stands.iter().step_by((stands.len() / 8).max(1)) {
-            cell.extend(arm::extent(&posed, &stand.joints, length));
+    for states in [&plan.before, &plan.after] {
+        for state in states.iter().step_by((states.len() / 8).max(1)) {
+            cell.extend(arm::extent(&posed, &state.joints, length));
         }
     }
     let cell_eye = Eye::on(&cell, 0.45 * out - 0.95 * side + 0.38 * Vector3::z(), 1.0, 0.92);

@@ -222,17 +222,17 @@ impl Store {
     /// The store as messages; the first one names it.
     fn messages(self, kind: StoreKind, application: &'static str) -> Result<Vec<LogMsg>, VisualError> {
         let name = |id: &str| StoreId::new(kind, application, id.to_owned());
-        let said = |store: &StoreId| {
+        let messages_of = |store: &StoreId| {
             let arrow = |c: &Chunk| Ok(LogMsg::ArrowMsg(store.clone(), c.to_arrow_msg().map_err(encoding)?));
             self.chunks.iter().map(arrow).collect::<Result<Vec<_>, _>>()
         };
-        let bytes = encoded(&said(&name("content"))?)?;
+        let bytes = encoded(&messages_of(&name("content"))?)?;
         let digest: String = Sha256::digest(&bytes).iter().take(16).map(|b| format!("{b:02x}")).collect();
         let store_id = name(&digest);
         let source = StoreSource::Other("truegrind".to_owned());
         let info = StoreInfo::new(store_id.clone(), source);
         let mut messages = vec![LogMsg::SetStoreInfo(SetStoreInfo { row_id: Tuid::ZERO, info })];
-        messages.extend(said(&store_id)?);
+        messages.extend(messages_of(&store_id)?);
         Ok(messages)
     }
 }

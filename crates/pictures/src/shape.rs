@@ -6,7 +6,7 @@
 
 use truegrind_math::se3::Pose;
 
-use super::arm::{self, Figure, Paint, Posed, Stand};
+use super::arm::{self, ArmState, Figure, Paint, Posed};
 use super::colour::{BEFORE, GHOST, round_down};
 use super::recording::{Store, VisualError};
 use nalgebra::{UnitQuaternion, Vector3};
@@ -19,7 +19,7 @@ const NOTHING_MM: f64 = 1e-6;
 
 /// Frames of both arms at all states.
 pub(super) struct Shape {
-    stands: Vec<Stand>,
+    states: Vec<ArmState>,
     nominal: Vec<[Pose; 7]>,
     exaggerated: Vec<[Pose; 7]>,
     flange: Pose,
@@ -29,14 +29,14 @@ pub(super) struct Shape {
 
 impl Shape {
     /// `None` if the arms do not differ, or without states.
-    pub(super) fn of(nominal: Figure<'_>, real: Figure<'_>, stands: &[Stand]) -> Option<Self> {
+    pub(super) fn of(nominal: Figure<'_>, real: Figure<'_>, states: &[ArmState]) -> Option<Self> {
         let [nominal_arm, real_arm] = [nominal, real].map(|f| f.model.at_condition(f.condition));
         let frames =
-            |arm: &_| -> Vec<[Pose; 7]> { stands.iter().map(|s| arm::frames(arm, &s.joints)).collect() };
+            |arm: &_| -> Vec<[Pose; 7]> { states.iter().map(|s| arm::frames(arm, &s.joints)).collect() };
         let (nominal_frames, real_frames) = (frames(&nominal_arm), frames(&real_arm));
         // Over all frames and the tool, since links may differ where the tool does not.
-        let apart = nominal_frames.iter().zip(&real_frames).zip(stands).flat_map(|((a, b), stand)| {
-            let tool = |last: &Pose, flange: &Pose| last * flange * stand.flange_from_tool;
+        let apart = nominal_frames.iter().zip(&real_frames).zip(states).flat_map(|((a, b), state)| {
+            let tool = |last: &Pose, flange: &Pose| last * flange * state.flange_from_tool;
             let ends = [(tool(&a[6], &nominal.model.flange), tool(&b[6], &real.model.flange))];
             a.iter().copied().zip(b.iter().copied()).chain(ends).collect::<Vec<_>>()
         });
@@ -50,7 +50,7 @@ impl Shape {
         let times = round_down(REACH * arm::length_mm(nominal.model) / largest);
         let exaggerated = nominal_frames.iter().zip(&real_frames).map(|(a, b)| bent(a, b, times)).collect();
         let flange = beyond(&nominal.model.flange, &real.model.flange, times);
-        Some(Self { stands: stands.to_vec(), nominal: nominal_frames, exaggerated, flange, times })
+        Some(Self { states: states.to_vec(), nominal: nominal_frames, exaggerated, flange, times })
     }
 
     /// Draws both, `arm/nominal` and `arm/exaggerated`.
@@ -63,8 +63,8 @@ impl Shape {
         let [ghost, real] = [Paint::ghost(GHOST), Paint::of(BEFORE)];
         let posed = Posed { frames: &self.nominal, flange: nominal.model.flange };
         let is = Posed { frames: &self.exaggerated, flange: self.flange };
-        arm::draw_posed(store, "arm/nominal", nominal, &posed, &ghost, (axis, &self.stands))?;
-        arm::draw_posed(store, "arm/exaggerated", nominal, &is, &real, (axis, &self.stands))
+        arm::draw_posed(store, "arm/nominal", nominal, &posed, &ghost, (axis, &self.states))?;
+        arm::draw_posed(store, "arm/exaggerated", nominal, &is, &real, (axis, &self.states))
     }
 
     /// The factor as printed in labels.

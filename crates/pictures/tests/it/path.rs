@@ -260,7 +260,7 @@ fn drawn_tool(read: &Read, root: &str, index: usize) -> Pose {
     pose
 }
 
-/// The ghost stands where the controller believes the arm to be, on the intended path; the real arm beside it is off by the stated
+/// The ghost states where the controller believes the arm to be, on the intended path; the real arm beside it is off by the stated
 /// factor times the real deviation, within a tenth.
 #[test]
 fn the_exaggerated_arm_stands_beside_the_ghost_of_the_nominal_one() {
@@ -414,7 +414,7 @@ fn marked_points_are_labelled_by_line_and_reason_once_for_each_run() {
     let text = read.summary();
     assert!(text.contains("6 × joint 5 outside the measured region"), "{text}");
     assert!(text.contains("6 flagged, 1 refused"), "{text}");
-    // Where there are no joints the arm stands still.
+    // Where there are no joints the arm states still.
     let rows = read.values::<Translation3D>("/arm/after/link1", &Transform3D::descriptor_translation());
     assert_eq!(rows.len(), 59);
 }

@@ -18,7 +18,7 @@ pub fn registered_table(reports: &[PathReport]) -> Table {
     registered(&all, by_program(reports).len() > 1)
 }
 
-/// [`block_table`], with a column for the program where there are several.
+/// [`block_table`], with a program column if there are several.
 pub(super) fn block(reports: &[&PathReport], programs: bool) -> Table {
     // The unit is in the title, so that the table fits the terminal width.
     let number = |key: &str, heading: &str| Column::number(key, heading, "", 3);
@@ -72,7 +72,7 @@ pub(super) fn block(reports: &[&PathReport], programs: bool) -> Table {
     table
 }
 
-/// [`registered_table`], with a column for the program where there are several.
+/// [`registered_table`], with a program column if there are several.
 pub(super) fn registered(reports: &[&PathReport], programs: bool) -> Table {
     let mut columns = first_columns(programs);
     columns.push(Column::number("rms_mm", "RMS", "mm", 4));

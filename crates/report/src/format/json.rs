@@ -35,7 +35,7 @@ pub fn text<T: Serialize + ?Sized>(value: &T) -> Result<String, serde_json::Erro
 
 /// The table as an object: `title`, `units` by column key, `rows` as objects by column key, `notes`.
 pub fn table(table: &Table) -> String {
-    // Keys are strings and numbers plain, so writing to memory cannot fail; should it ever, it says so.
+    // Writing to memory cannot fail; an error would be shown in the text.
     text(&Whole(table)).unwrap_or_else(|error| format!("{{\"error\": \"{error}\"}}\n"))
 }
 

@@ -72,7 +72,7 @@ impl Frame<'_> {
         if !self.x_text.is_empty() {
             bottom += LABEL as i32 + 3 * PIXEL;
         }
-        // Half of the last tick's label stands right of the axis.
+        // Half of the last tick label is right of the axis.
         let last = self.x.ticks.last().map_or(0.0, |tick| letters::width(&tick.1, LABEL) / 2.0);
         let mut chart = ChartBuilder::on(area)
             .margin_top(top)

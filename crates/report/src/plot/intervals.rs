@@ -1,5 +1,5 @@
-//! Identified parameters with their uncertainty, each in units of its own prior σ so that lengths and angles share one
-//! axis, with the real value and unit beside it.
+//! Identified parameters with their uncertainty in units of their prior σ, so that lengths and angles share an axis, with value and
+//! unit beside them.
 
 use super::axis::Axis;
 use super::canvas::{DrawingError, PIXEL};
@@ -17,9 +17,9 @@ const ROW: u32 = 22;
 /// Parameters as intervals.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Intervals {
-    /// Title inside the picture; may be empty.
+    /// Title; may be empty.
     pub title: String,
-    /// The parameters, from top to bottom.
+    /// Parameters from top to bottom.
     pub rows: Vec<Interval>,
 }
 
@@ -28,15 +28,15 @@ pub struct Intervals {
 pub struct Interval {
     /// Its name.
     pub name: String,
-    /// Unit of value, σ and prior σ, as people read it.
+    /// Unit of value, σ and prior σ.
     pub unit: String,
-    /// Its change from nominal.
+    /// Change from nominal.
     pub value: f64,
-    /// Its 1σ after the data; NaN where it is not known.
+    /// Posterior 1σ; NaN if unknown.
     pub sigma: f64,
-    /// Its 1σ before the data, the manufacturing tolerance.
+    /// Prior 1σ, the manufacturing tolerance.
     pub prior_sigma: f64,
-    /// Whether the data determine it. What they do not is drawn hollow and said to be held by its prior.
+    /// Whether the data determine it; otherwise it is drawn hollow and labelled as held by its prior.
     pub determined: bool,
 }
 
@@ -70,7 +70,7 @@ impl Intervals {
     fn draw(&self, pen: Pen<'_>) -> Result<(), DrawingError> {
         let texts: Vec<String> = self.rows.iter().map(Interval::text).collect();
         let widest = texts.iter().map(|text| letters::width(text, LABEL)).fold(0.0, f64::max);
-        // From top to bottom, so that the first name stands at the highest place.
+        // Reversed, so that the first name is at the top.
         let names: Vec<String> = self.rows.iter().rev().map(|row| row.name.clone()).collect();
         let ends = self.rows.iter().flat_map(|row| {
             let (value, sigma) = (row.value / row.prior_sigma, row.sigma / row.prior_sigma);
