@@ -193,41 +193,26 @@ fn worst_first(rows: &[Row]) -> Vec<Row> {
 
 /// One row per program.
 pub fn table(rows: &[Row]) -> Table {
-    let mut table = Table::new(
+    Table::of(
         "Programs",
-        vec![
-            Column::text("file", "Program"),
-            Column::text("status", "Status"),
-            Column::count("motions", "Motions"),
-            Column::count("changed", "Changed"),
-            Column::count("flagged", "Flagged"),
-            Column::count("refused", "Refused"),
-            Column::count("left", "Left"),
-            Column::number("covered_percent", "Covered", "%", 1),
-            Column::number("before_mm", "largest before", "mm", 3),
-            Column::number("after_mm", "largest remainder", "mm", 4),
-            Column::number("expected_mm", "expected after", "mm", 3),
-            Column::count("opaque", "Not read"),
-            Column::text("output", "Written to"),
-            Column::text("note", "Note"),
+        rows,
+        [
+            (Column::text("file", "Program"), |row| row.file.as_str().into()),
+            (Column::text("status", "Status"), |row| Cell::Judged(row.judged(), row.ended.text().to_owned())),
+            (Column::count("motions", "Motions"), |row| row.motions[0].into()),
+            (Column::count("changed", "Changed"), |row| row.motions[1].into()),
+            (Column::count("flagged", "Flagged"), |row| row.motions[2].into()),
+            (Column::count("refused", "Refused"), |row| row.motions[3].into()),
+            (Column::count("left", "Left"), |row| row.motions[4].into()),
+            (Column::number("covered_percent", "Covered", "%", 1), |row| row.covered_percent().into()),
+            (Column::number("before_mm", "largest before", "mm", 3), |row| row.before_mm.into()),
+            (Column::number("after_mm", "largest remainder", "mm", 4), |row| row.after_mm.into()),
+            (Column::number("expected_mm", "expected after", "mm", 3), |row| row.expected_mm.into()),
+            (Column::count("opaque", "Not read"), |row| row.opaque.into()),
+            (Column::text("output", "Written to"), |row| row.output.clone().into()),
+            (Column::text("note", "Note"), |row| row.remark().into()),
         ],
-    );
-    for row in rows {
-        let mut cells: Vec<Cell> =
-            vec![row.file.as_str().into(), Cell::Judged(row.judged(), row.ended.text().to_owned())];
-        cells.extend(row.motions.map(Cell::from));
-        cells.extend([
-            row.covered_percent().into(),
-            row.before_mm.into(),
-            row.after_mm.into(),
-            row.expected_mm.into(),
-            row.opaque.into(),
-            row.output.clone().into(),
-            row.remark().into(),
-        ]);
-        table.push(cells);
-    }
-    table
+    )
 }
 
 /// Totals of all rows as a sentence.

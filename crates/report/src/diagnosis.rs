@@ -167,56 +167,42 @@ fn causes(diagnosis: &Diagnosis) -> Vec<String> {
 
 /// Errors of the models on other measurements of the same arm.
 pub fn transfer_table(diagnosis: &Diagnosis) -> Table {
-    let mut table = Table::new(
+    Table::of(
         "RMSE on other measurements of this arm, only the frames refitted",
-        vec![
-            Column::text("file", "file"),
-            Column::count("rows", "rows"),
-            Column::number("nominal_rmse_mm", "data sheet", "mm", 3),
-            Column::number("geometric_rmse_mm", "geometry", "mm", 3),
-            Column::number("extended_rmse_mm", "extended", "mm", 3),
+        &diagnosis.transfers,
+        [
+            (Column::text("file", "file"), |other| other.file.as_str().into()),
+            (Column::count("rows", "rows"), |other| other.rows.into()),
+            (Column::number("nominal_rmse_mm", "data sheet", "mm", 3), |other| other.nominal_rmse_mm.into()),
+            (Column::number("geometric_rmse_mm", "geometry", "mm", 3), |other| {
+                other.geometric_rmse_mm.into()
+            }),
+            (Column::number("extended_rmse_mm", "extended", "mm", 3), |other| other.extended_rmse_mm.into()),
         ],
-    );
-    for other in &diagnosis.transfers {
-        table.push([
-            Cell::from(other.file.as_str()),
-            other.rows.into(),
-            other.nominal_rmse_mm.into(),
-            other.geometric_rmse_mm.into(),
-            other.extended_rmse_mm.into(),
-        ]);
-    }
-    table
+    )
 }
 
 /// Errors by stage.
 pub fn stage_table(diagnosis: &Diagnosis) -> Table {
-    let mut table = Table::new(
+    let fits = &diagnosis.fits;
+    let mut table = Table::of(
         "Errors by stage",
-        vec![
-            Column::text("stage", "stage"),
-            Column::number("rmse_mm", "RMSE", "mm", 3),
-            Column::number("mean_mm", "mean", "mm", 3),
-            Column::number("max_mm", "max", "mm", 3),
-            Column::number("cv_rmse_mm", "held out, random", "mm", 3),
-            Column::number("cv_blocks_rmse_mm", "held out, blocks", "mm", 3),
+        &[
+            ("nominal: frames fitted", &fits.nominal),
+            ("geometric: and links", &fits.geometric),
+            ("extended: and causes", &fits.extended),
+        ],
+        [
+            (Column::text("stage", "stage"), |(name, _)| (*name).into()),
+            (Column::number("rmse_mm", "RMSE", "mm", 3), |(_, stage)| stage.rmse_mm.into()),
+            (Column::number("mean_mm", "mean", "mm", 3), |(_, stage)| stage.mean_mm.into()),
+            (Column::number("max_mm", "max", "mm", 3), |(_, stage)| stage.max_mm.into()),
+            (Column::number("cv_rmse_mm", "held out, random", "mm", 3), |(_, stage)| stage.cv_rmse_mm.into()),
+            (Column::number("cv_blocks_rmse_mm", "held out, blocks", "mm", 3), |(_, stage)| {
+                stage.cv_blocks_rmse_mm.into()
+            }),
         ],
     );
-    let fits = &diagnosis.fits;
-    for (name, stage) in [
-        ("nominal: frames fitted", &fits.nominal),
-        ("geometric: and links", &fits.geometric),
-        ("extended: and causes", &fits.extended),
-    ] {
-        table.push([
-            Cell::from(name),
-            stage.rmse_mm.into(),
-            stage.mean_mm.into(),
-            stage.max_mm.into(),
-            stage.cv_rmse_mm.into(),
-            stage.cv_blocks_rmse_mm.into(),
-        ]);
-    }
     table.notes.push(
         "RMSE, mean and max on the rows of the fit. Held out: five random folds, and contiguous blocks, which reveal drifts and \
          jumps along the rows."
@@ -227,29 +213,23 @@ pub fn stage_table(diagnosis: &Diagnosis) -> Table {
 
 /// One row per finding.
 pub fn finding_table(diagnosis: &Diagnosis) -> Table {
-    let mut table = Table::new(
+    let mut table = Table::of(
         "Findings",
-        vec![
-            Column::text("effect", "effect"),
-            Column::text("where", "where"),
-            Column::text("confidence", "confidence"),
-            Column::number("worth_mm", "size", "mm", 3),
-            Column::significant("p_value", "p", "", 2),
-            Column::number("cv_rmse_before_mm", "held out without", "mm", 4),
-            Column::number("cv_rmse_after_mm", "held out with", "mm", 4),
+        &diagnosis.findings,
+        [
+            (Column::text("effect", "effect"), |finding| finding.effect.as_str().into()),
+            (Column::text("where", "where"), |finding| place(finding).into()),
+            (Column::text("confidence", "confidence"), |finding| word(finding.confidence).into()),
+            (Column::number("worth_mm", "size", "mm", 3), |finding| finding.worth_mm.into()),
+            (Column::significant("p_value", "p", "", 2), |finding| p_value(finding.p_value)),
+            (Column::number("cv_rmse_before_mm", "held out without", "mm", 4), |finding| {
+                finding.gain.cv_rmse_before_mm.into()
+            }),
+            (Column::number("cv_rmse_after_mm", "held out with", "mm", 4), |finding| {
+                finding.gain.cv_rmse_after_mm.into()
+            }),
         ],
     );
-    for finding in &diagnosis.findings {
-        table.push([
-            Cell::from(finding.effect.as_str()),
-            place(finding).into(),
-            word(finding.confidence).into(),
-            finding.worth_mm.into(),
-            p_value(finding.p_value),
-            finding.gain.cv_rmse_before_mm.into(),
-            finding.gain.cv_rmse_after_mm.into(),
-        ]);
-    }
     table.notes.push(
         "size: change of the readings, RMS over all rows. identified: better than its alternatives, significant once smooth unmodelled \
          trends are allowed for, and found again in halves of the rows."
@@ -260,23 +240,19 @@ pub fn finding_table(diagnosis: &Diagnosis) -> Table {
 
 /// Row ranges of a set-up that changed with time.
 fn sessions(finding: &Finding) -> Table {
-    let mut table = Table::new(
+    Table::of(
         "Sessions",
-        vec![
-            Column::text("rows", "rows"),
-            Column::text("what", "cause of a shift of these rows alone"),
-            Column::number("worth_mm", "size", "mm", 3),
+        &finding.sessions,
+        [
+            (Column::text("rows", "rows"), |session| {
+                format!("{} to {}", session.rows[0], session.rows[1]).into()
+            }),
+            (Column::text("what", "cause of a shift of these rows alone"), |session| {
+                session.effect.as_str().into()
+            }),
+            (Column::number("worth_mm", "size", "mm", 3), |session| session.worth_mm.into()),
         ],
-    );
-    for session in &finding.sessions {
-        let [from, to] = session.rows;
-        table.push([
-            Cell::from(format!("{from} to {to}")),
-            session.effect.as_str().into(),
-            session.worth_mm.into(),
-        ]);
-    }
-    table
+    )
 }
 
 /// A p-value; an underflowing one is stated as a bound.
@@ -362,49 +338,36 @@ fn parameters(finding: &Finding) -> Table {
 }
 
 fn rivals(finding: &Finding) -> Table {
-    let mut table = Table::new(
+    Table::of(
         "Alternatives fitted in its place",
-        vec![
-            Column::text("effect", "effect"),
-            Column::text("where", "where"),
-            Column::number("cv_rmse_mm", "held out", "mm", 4),
-            Column::number("beaten_by", "worse by", "2 ln Bayes factor", 1),
+        &finding.alternatives,
+        [
+            (Column::text("effect", "effect"), |rival| rival.effect.as_str().into()),
+            (Column::text("where", "where"), |rival| match (&rival.joints, rival.rows) {
+                (_, Some([from, to])) => format!("rows {from} to {to}").into(),
+                (Some(joints), _) => format!("joint {}", listed(joints)).into(),
+                _ => "all rows".into(),
+            }),
+            (Column::number("cv_rmse_mm", "held out", "mm", 4), |rival| rival.cv_rmse_mm.into()),
+            (Column::number("beaten_by", "worse by", "2 ln Bayes factor", 1), |rival| rival.beaten_by.into()),
         ],
-    );
-    for rival in &finding.alternatives {
-        let at = match (&rival.joints, rival.rows) {
-            (_, Some([from, to])) => format!("rows {from} to {to}"),
-            (Some(joints), _) => format!("joint {}", listed(joints)),
-            _ => "all rows".to_owned(),
-        };
-        table.push([
-            Cell::from(rival.effect.as_str()),
-            at.into(),
-            rival.cv_rmse_mm.into(),
-            rival.beaten_by.into(),
-        ]);
-    }
-    table
+    )
 }
 
 /// Effects that the data cannot decide.
 pub fn not_testable_table(diagnosis: &Diagnosis) -> Table {
-    let mut table = Table::new(
+    Table::of(
         "Not testable",
-        vec![
-            Column::text("effect", "effect"),
-            Column::text("reason", "why"),
-            Column::text("remedy", "what would decide"),
+        &diagnosis.not_testable,
+        [
+            (Column::text("effect", "effect"), |item| match &item.joints {
+                Some(joints) => format!("{}, joint {}", item.effect, listed(joints)).into(),
+                None => item.effect.as_str().into(),
+            }),
+            (Column::text("reason", "why"), |item| item.reason.as_str().into()),
+            (Column::text("remedy", "what would decide"), |item| item.remedy.as_str().into()),
         ],
-    );
-    for item in &diagnosis.not_testable {
-        let name = match &item.joints {
-            Some(joints) => format!("{}, joint {}", item.effect, listed(joints)),
-            None => item.effect.clone(),
-        };
-        table.push([Cell::from(name), item.reason.as_str().into(), item.remedy.as_str().into()]);
-    }
-    table
+    )
 }
 
 fn remaining(diagnosis: &Diagnosis) -> String {

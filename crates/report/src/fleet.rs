@@ -130,6 +130,15 @@ impl Row {
         }
     }
 
+    fn status_text(&self) -> String {
+        match (self.failed, self.causes.len()) {
+            (true, _) => "failed".to_owned(),
+            (false, 0) => "geometry alone".to_owned(),
+            (false, 1) => "1 cause".to_owned(),
+            (false, count) => format!("{count} causes"),
+        }
+    }
+
     fn all_causes(&self) -> Option<String> {
         let one = |cause: &Cause| {
             let worth = cause.worth_mm.map_or_else(String::new, |mm| format!(", {mm:.3} mm"));
@@ -155,54 +164,35 @@ pub fn ranks(rows: &[Row]) -> Vec<Option<usize>> {
 
 /// One row per arm, in the order of the rows.
 pub fn table(rows: &[Row]) -> Table {
-    let mut table = Table::new(
+    let ranked: Vec<(&Row, Option<usize>)> = rows.iter().zip(ranks(rows)).collect();
+    let mut table = Table::of(
         "Arms",
-        vec![
-            Column::count("rank", "Rank"),
-            Column::text("file", "Measurements"),
-            Column::text("status", "Status"),
-            Column::text("robot", "Robot"),
-            Column::count("rows", "Rows"),
-            Column::number("nominal_mm", "Data sheet", "mm", 3),
-            Column::number("geometric_mm", "Geometry", "mm", 3),
-            Column::number("extended_mm", "With causes", "mm", 3),
-            Column::number("to_gain_mm", "Gain", "mm", 3),
-            Column::number("noise_floor_mm", "Noise floor", "mm", 3),
-            Column::text("largest_cause", "Largest cause"),
-            Column::text("largest_place", "Where"),
-            Column::number("largest_worth_mm", "Its size", "mm", 3),
-            Column::text("causes", "All causes"),
-            Column::text("output", "Model"),
-            Column::text("note", "Note"),
+        &ranked,
+        [
+            (Column::count("rank", "Rank"), |(_, rank)| (*rank).into()),
+            (Column::text("file", "Measurements"), |(row, _)| row.file.as_str().into()),
+            (Column::text("status", "Status"), |(row, _)| Cell::Judged(row.judged(), row.status_text())),
+            (Column::text("robot", "Robot"), |(row, _)| row.robot.clone().into()),
+            (Column::count("rows", "Rows"), |(row, _)| (!row.failed).then_some(row.rows).into()),
+            (Column::number("nominal_mm", "Data sheet", "mm", 3), |(row, _)| row.nominal_mm.into()),
+            (Column::number("geometric_mm", "Geometry", "mm", 3), |(row, _)| row.geometric_mm.into()),
+            (Column::number("extended_mm", "With causes", "mm", 3), |(row, _)| row.extended_mm.into()),
+            (Column::number("to_gain_mm", "Gain", "mm", 3), |(row, _)| row.to_gain_mm().into()),
+            (Column::number("noise_floor_mm", "Noise floor", "mm", 3), |(row, _)| row.noise_floor_mm.into()),
+            (Column::text("largest_cause", "Largest cause"), |(row, _)| {
+                row.largest().map(|cause| cause.effect.as_str()).into()
+            }),
+            (Column::text("largest_place", "Where"), |(row, _)| {
+                row.largest().map(|cause| cause.place.as_str()).into()
+            }),
+            (Column::number("largest_worth_mm", "Its size", "mm", 3), |(row, _)| {
+                row.largest().and_then(|cause| cause.worth_mm).into()
+            }),
+            (Column::text("causes", "All causes"), |(row, _)| row.all_causes().into()),
+            (Column::text("output", "Model"), |(row, _)| row.output.clone().into()),
+            (Column::text("note", "Note"), |(row, _)| row.note.clone().into()),
         ],
     );
-    for (row, rank) in rows.iter().zip(ranks(rows)) {
-        let largest = row.largest();
-        let word = match (row.failed, row.causes.len()) {
-            (true, _) => "failed".to_owned(),
-            (false, 0) => "geometry alone".to_owned(),
-            (false, 1) => "1 cause".to_owned(),
-            (false, count) => format!("{count} causes"),
-        };
-        table.push([
-            rank.into(),
-            row.file.as_str().into(),
-            Cell::Judged(row.judged(), word),
-            row.robot.clone().into(),
-            if row.failed { Cell::Missing } else { row.rows.into() },
-            row.nominal_mm.into(),
-            row.geometric_mm.into(),
-            row.extended_mm.into(),
-            row.to_gain_mm().into(),
-            row.noise_floor_mm.into(),
-            largest.map(|cause| cause.effect.as_str()).into(),
-            largest.map(|cause| cause.place.as_str()).into(),
-            largest.and_then(|cause| cause.worth_mm).into(),
-            row.all_causes().into(),
-            row.output.clone().into(),
-            row.note.clone().into(),
-        ]);
-    }
     table.notes.push(
         "Errors are held out (five random folds). Gain: error of the data sheet minus that of the model with causes; arms are ranked by \
          it. Its size: change of the readings by the cause, RMS over all rows."

@@ -1,7 +1,6 @@
 //! Report on an identification: verdict, errors by stage, parameters, identifiability, outliers. Angles are shown in degrees.
 
 mod parameter;
-mod row;
 mod pictures;
 mod tables;
 mod words;
@@ -9,7 +8,7 @@ mod words;
 use serde_json::{Value, json};
 
 use self::parameter::{held_by_prior, in_unit, is_of_arm};
-use self::row::row_number;
+use self::tables::row_number;
 use super::document::{Block, Document, KeyFigure, Provenance, Source, Verdict};
 use super::number::Precision;
 use super::status::Status;

@@ -67,31 +67,20 @@ fn plan_reading(plan: &Plan, setup: &MeasurementSetup<'_>) -> Option<Reading> {
 
 /// Every effect with its smallest detectable size.
 pub fn effect_table(plan: &Plan) -> Table {
-    let mut table = Table::new(
+    let mut table = Table::of(
         "Detectable effects",
-        vec![
-            Column::text("effect", "Effect"),
-            Column::text("which", "Which"),
-            Column::significant("smallest", "Smallest size", "", 2),
-            Column::text("unit", "Unit"),
-            Column::significant("shows", "Shows as", "", 2),
-            Column::text("shows_unit", "Unit"),
-            Column::significant("usual", "Usual size", "", 2),
-            Column::text("decided", "Detectable"),
+        &plan.detectability,
+        [
+            (Column::text("effect", "Effect"), |found| found.effect.into()),
+            (Column::text("which", "Which"), |found| found.which.as_str().into()),
+            (Column::significant("smallest", "Smallest size", "", 2), |found| found.smallest.into()),
+            (Column::text("unit", "Unit"), |found| found.unit.into()),
+            (Column::significant("shows", "Shows as", "", 2), |found| found.shows.into()),
+            (Column::text("shows_unit", "Unit"), |found| found.shows_unit.into()),
+            (Column::significant("usual", "Usual size", "", 2), |found| found.usual.into()),
+            (Column::text("decided", "Detectable"), judged),
         ],
     );
-    for found in &plan.detectability {
-        table.push([
-            found.effect.into(),
-            found.which.as_str().into(),
-            found.smallest.into(),
-            found.unit.into(),
-            found.shows.into(),
-            found.shows_unit.into(),
-            found.usual.into(),
-            judged(found),
-        ]);
-    }
     table.notes.push(
         "Smallest size: size at which the non-centrality, with geometry and frames free, reaches --decisive in the worst phase or \
          direction. Shows as: its largest effect in a joint or at the sensor. Usual size: a small practical value in the same \

@@ -17,31 +17,21 @@ use truegrind_arm::robots::validation;
 
 /// Name, maker, designation, rated load, reach, repeatability and program language of each arm.
 pub fn catalogue_table(robots: &[Robot]) -> Table {
-    let mut table = Table::new(
+    Table::of(
         "Robot arms",
-        vec![
-            Column::text("name", "Name"),
-            Column::text("maker", "Maker"),
-            Column::text("model", "Model"),
-            Column::significant("payload_kg", "Payload", "kg", 3),
-            Column::number("reach_mm", "Reach", "mm", 0),
-            Column::number("repeatability_mm", "Repeatability", "mm", 3),
-            Column::text("dialect", "Programs"),
+        robots,
+        [
+            (Column::text("name", "Name"), |robot| robot.sheet.name.as_str().into()),
+            (Column::text("maker", "Maker"), |robot| words(&robot.sheet.maker)),
+            (Column::text("model", "Model"), |robot| words(&robot.sheet.model)),
+            (Column::significant("payload_kg", "Payload", "kg", 3), |robot| robot.sheet.payload_kg.into()),
+            (Column::number("reach_mm", "Reach", "mm", 0), |robot| robot.sheet.reach_mm.into()),
+            (Column::number("repeatability_mm", "Repeatability", "mm", 3), |robot| {
+                robot.sheet.repeatability_mm.into()
+            }),
+            (Column::text("dialect", "Programs"), |robot| robot.sheet.dialect.map(dialect).into()),
         ],
-    );
-    for robot in robots {
-        let sheet = &robot.sheet;
-        table.push([
-            sheet.name.as_str().into(),
-            words(&sheet.maker),
-            words(&sheet.model),
-            sheet.payload_kg.into(),
-            sheet.reach_mm.into(),
-            sheet.repeatability_mm.into(),
-            sheet.dialect.map(dialect).into(),
-        ]);
-    }
-    table
+    )
 }
 
 /// The links with their nominal parameters in mm and degrees.

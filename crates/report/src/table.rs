@@ -98,6 +98,18 @@ impl Table {
         Self { title: title.into(), columns, rows: Vec::new(), notes: Vec::new() }
     }
 
+    /// A table with one row per item, from columns with the functions that make their cells.
+    pub fn of<'r, T: 'r, const N: usize>(
+        title: impl Into<String>,
+        items: impl IntoIterator<Item = &'r T>,
+        columns: [(Column, fn(&T) -> Cell); N],
+    ) -> Self {
+        let rows =
+            items.into_iter().map(|item| columns.iter().map(|(_, cell)| cell(item)).collect()).collect();
+        let columns = columns.into_iter().map(|(column, _)| column).collect();
+        Self { title: title.into(), columns, rows, notes: Vec::new() }
+    }
+
     /// Adds a row.
     pub fn push(&mut self, row: impl IntoIterator<Item = Cell>) {
         self.rows.push(row.into_iter().collect());

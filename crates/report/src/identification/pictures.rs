@@ -1,8 +1,7 @@
 //! Plots of an identification.
 
 use super::parameter::{handy, held_by_prior, is_of_arm};
-use super::row::signed;
-use super::tables;
+use super::tables::{self, signed};
 use crate::plot::{Axis, Graph, Histogram, Ink, Interval, Intervals, Reference, Sample, Series};
 use truegrind_calibration::identification::identifiability::Identifiability;
 use truegrind_calibration::identification::identify::Identification;

@@ -1,14 +1,13 @@
 //! Tables of an identification.
 
 use super::parameter::{handy, held_by_prior, is_of_arm};
-use super::row::{row_number, signed};
 use crate::status::Status;
 use crate::table::{Cell, Column, Table};
 use truegrind_arm::estimated::EstimatedParameter;
 use truegrind_calibration::identification::identifiability::Identifiability;
-use truegrind_calibration::identification::identify::Identification;
+use truegrind_calibration::identification::identify::{Identification, sensor_name};
 use truegrind_calibration::identification::solver;
-use truegrind_calibration::measurement::dataset::Dataset;
+use truegrind_calibration::measurement::dataset::{Dataset, Sensor};
 use truegrind_math::statistics::ErrorSummary;
 
 /// Errors of each stage, on the rows of the fit and on held-out rows.
@@ -194,17 +193,17 @@ fn meaning(name: &str) -> &'static str {
 
 /// Error of each held-out row, frames registered and geometry.
 pub fn held_out_table(found: &Identification) -> Table {
-    let mut table = Table::new(
+    let mut table = Table::of(
         "Held-out rows",
-        vec![
-            Column::count("row", "Row"),
-            Column::number("registered_mm", "frames registered", "mm", 3),
-            Column::number("geometry_mm", "geometry", "mm", 3),
+        &by_row(found),
+        [
+            (Column::count("row", "Row"), |(row, ..)| (*row).into()),
+            (Column::number("registered_mm", "frames registered", "mm", 3), |(_, before, _)| {
+                (*before).into()
+            }),
+            (Column::number("geometry_mm", "geometry", "mm", 3), |(.., after)| (*after).into()),
         ],
     );
-    for (row, before, after) in by_row(found) {
-        table.push([row.into(), before.into(), after.into()]);
-    }
     table.notes.push("Row numbers as in the spreadsheet.".to_owned());
     table
 }
@@ -305,4 +304,14 @@ pub fn observability_table(report: &Identifiability) -> Table {
 /// A value that is defined only for some sensors or counts.
 fn cell(value: f64, meaningful: bool) -> Cell {
     if meaningful { value.into() } else { Cell::Missing }
+}
+
+/// Row number in the file; the index if the data set does not match.
+pub(super) fn row_number(dataset: &Dataset, index: usize) -> usize {
+    dataset.rows.get(index).map_or(index, |row| row.number)
+}
+
+/// Whether errors are signed (cable) rather than lengths of vectors.
+pub(super) fn signed(found: &Identification) -> bool {
+    found.estimated.provenance.sensor == sensor_name(Sensor::Cable)
 }
