@@ -49,7 +49,7 @@ impl Shape {
         }
         let times = round_down(REACH * arm::length_mm(nominal.model) / largest);
         let exaggerated = nominal_frames.iter().zip(&real_frames).map(|(a, b)| bent(a, b, times)).collect();
-        let flange = beyond(&nominal.model.flange, &real.model.flange, times);
+        let flange = extrapolate(&nominal.model.flange, &real.model.flange, times);
         Some(Self { states: states.to_vec(), nominal: nominal_frames, exaggerated, flange, times })
     }
 

@@ -35,7 +35,7 @@ pub struct MeasuredScene<'a> {
     pub keep_out_mm: &'a [[[f64; 3]; 2]],
     /// The answer in words, where there is more to be said than the file's (Markdown, lines of a list).
     pub answer: &'a [String],
-    /// How the sensor stands to the arm, where known.
+    /// Pose of the sensor relative to the arm, if known.
     pub frames: Option<&'a Frames>,
     /// What each stage leaves, the best one last; may be empty.
     pub residuals: &'a [Residuals],

@@ -57,7 +57,7 @@ pub(super) fn markdown(scene: &MeasuredScene<'_>, shape: Option<&Shape>) -> Stri
     }
     if scene.planned {
         text.push_str(
-            "- Points: where the touched point is to stand, all rows. Orange: the reading to be expected.\n",
+            "- Points: planned positions of the measured point, all rows. Orange: the expected reading.\n",
         );
     } else if scene.residuals.is_empty() {
         text.push_str("- Points: where the flange stood, all rows.\n");

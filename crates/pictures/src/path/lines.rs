@@ -1,4 +1,4 @@
-//! What stands in space: the part, paths, tool axes, marks, and the bar of colours.
+//! Objects in the 3D view: workpiece, paths, tool axes, marks, colour bar.
 
 use nalgebra::Point3;
 use rerun::components::{Color, Radius};
@@ -60,7 +60,7 @@ fn workpiece(store: &mut Store, scene: &PathScene<'_>) -> Result<(), VisualError
     store.fixed("workpiece", &mesh)
 }
 
-/// Where labels stand, so that none lies over another.
+/// Positions of labels without overlap.
 struct Labels {
     /// Intended places that have one.
     taken: Vec<Point3<f64>>,
@@ -244,7 +244,7 @@ fn runs<'a>(marked: &[&'a PathPoint]) -> Vec<Vec<&'a PathPoint>> {
     runs
 }
 
-/// Where the label of a run stands, and what it says.
+/// Position and text of the label of a run.
 fn label(run: &[&PathPoint], status: &str) -> (Point3<f64>, String) {
     let (first, last, middle) = (run[0], run[run.len() - 1], run[run.len() / 2]);
     let place = match (first.line, last.line) {

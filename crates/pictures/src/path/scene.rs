@@ -2,7 +2,7 @@
 
 use nalgebra::Point3;
 
-use crate::arm::{Figure, LinkMesh, Stand};
+use crate::arm::{ArmState, Figure, LinkMesh};
 use crate::colour::{self, Scale};
 use crate::page::bounds;
 use crate::recording::VisualError;
@@ -73,8 +73,8 @@ pub(super) struct Plan<'a> {
     /// Size of the intended path (mm).
     pub(super) extent_mm: f64,
     /// Joints along the path, after and before.
-    pub(super) after: Vec<Stand>,
-    pub(super) before: Vec<Stand>,
+    pub(super) after: Vec<ArmState>,
+    pub(super) before: Vec<ArmState>,
     /// The arm of the data sheet and the real one with its differences exaggerated, at the joints before.
     pub(super) shape: Option<Shape>,
 }
@@ -97,17 +97,17 @@ impl<'a> Plan<'a> {
         let extent_mm = (high - low).norm().max(1.0);
         let largest = sizes.iter().copied().filter(|s| s.is_finite()).fold(0.0, f64::max);
         let times = if largest > 0.0 { colour::round_down(REACH * extent_mm / largest) } else { 1.0 };
-        let stands = |joints: &dyn Fn(&PathPoint) -> Option<truegrind_arm::model::Joints>| {
-            let stand = |p: &PathPoint| {
-                joints(p).map(|joints| Stand {
+        let states = |joints: &dyn Fn(&PathPoint) -> Option<truegrind_arm::model::Joints>| {
+            let state = |p: &PathPoint| {
+                joints(p).map(|joints| ArmState {
                     time: p.index as i64,
                     joints,
                     flange_from_tool: p.flange_from_tool,
                 })
             };
-            first.points.iter().filter_map(stand).collect::<Vec<Stand>>()
+            first.points.iter().filter_map(state).collect::<Vec<ArmState>>()
         };
-        let before = stands(&|p| p.joints_before);
+        let before = states(&|p| p.joints_before);
         let shape = Shape::of(scene.figure(scene.nominal), scene.figure(scene.arm), &before);
         Ok(Self {
             first,
@@ -117,7 +117,7 @@ impl<'a> Plan<'a> {
             scale: Scale::over(sizes),
             times,
             extent_mm,
-            after: stands(&|p| p.joints_after),
+            after: states(&|p| p.joints_after),
             before,
             shape,
         })
@@ -153,7 +153,7 @@ pub(super) fn reached(point: &PathPoint, deviation: &Deviation, times: f64) -> P
     intended(point) + point.base_from_object.rotation * deviation.vector_mm * times
 }
 
-/// A name for each report that can stand in an entity's path, each different.
+/// A unique name for each report, valid in an entity path.
 fn names(reports: &[PathReport]) -> Vec<String> {
     let mut names: Vec<String> = Vec::new();
     for report in reports {
