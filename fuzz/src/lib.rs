@@ -35,7 +35,7 @@ fn changes(program: &Program<'_>) -> Vec<Change> {
         .zip(&program.listing().motions)
         .filter(|(index, motion)| index % 3 != 2 && motion.reason().is_none())
         .map(|(motion, listed)| {
-            let straightens = listed.straightens && motion % 2 == 0;
+            let straightens = listed.can_straighten && motion % 2 == 0;
             let targets = listed.targets.iter().map(|target| match target.value {
                 _ if straightens && target.role == Role::Via => NewTarget::Drop,
                 Ok(TargetValue::Cartesian(t)) => NewTarget::Cartesian {

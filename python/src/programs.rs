@@ -396,7 +396,7 @@ fn corrected(
     let mut program = sources.task(&setup);
     let loads = own_loads.then(|| Loads::of(&program));
     // The syntax trees are larger than the file and not needed once the motions are listed.
-    program.forget_trees();
+    program.drop_trees();
     let program = program;
     let listing = program.listing();
     let marked = marked(listing, &sources, &model.hash, again)?;

@@ -54,7 +54,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
         .zip(&names)
         .map(|(task, name)| TemplateProgram { name, language: task.language(), listing: task.listing() })
         .collect();
-    for comment in asking.iter().flat_map(|program| &program.listing.misstated) {
+    for comment in asking.iter().flat_map(|program| &program.listing.invalid_statements) {
         print_message(format_args!("note: {comment}"));
     }
     if asking.iter().all(|program| program.listing.motions.is_empty()) {

@@ -79,7 +79,7 @@ pub fn compensate(
         arm.model.effects.iter().any(|effect| matches!(effect, Effect::Backlash(_)) && !effect.is_zero());
     loop {
         let planned = targets.plan(&refused);
-        if program.takes(&planned.changes) {
+        if program.accepts(&planned.changes) {
             // Frees the solved targets before the edits are made; no second plan is needed.
             drop(targets);
             let rewritten = program.rewrite(&planned.changes, &rewrite)?;

@@ -260,7 +260,7 @@ pub struct Modal {
     /// Whether sensors or forces move the path (soft servo).
     pub sensor_guided: Switch,
     /// Whether the position of an axis is independent of the targets (independent mode, SingArea \LockAxis4).
-    pub axis_apart: Switch,
+    pub independent_axis: Switch,
 }
 
 impl Modal {
@@ -273,7 +273,7 @@ impl Modal {
         circle_point_orientation: Switch::Off,
         synchronised: Switch::Off,
         sensor_guided: Switch::Off,
-        axis_apart: Switch::Off,
+        independent_axis: Switch::Off,
     };
 }
 
@@ -303,9 +303,9 @@ pub struct Motion {
     /// Whether the language allows targets to be inserted before it.
     pub insertable: bool,
     /// Whether the language allows a circular motion to be replaced by straight ones.
-    pub straightens: bool,
+    pub can_straighten: bool,
     /// Whether the language allows a target to state the configuration of the arm.
-    pub configures: bool,
+    pub accepts_configuration: bool,
     /// Rapid motion (G0, FMAX): linear or joint by joint, depending on the control.
     pub rapid: bool,
     /// The axis of positive rotation of a circular motion, in the axes of its targets; `None` if only its three
@@ -331,6 +331,11 @@ impl Motion {
     /// The end of the motion.
     pub fn to(&self) -> Option<&MotionTarget> {
         self.targets.iter().rev().find(|target| target.role == Role::To)
+    }
+
+    /// The Cartesian target at the end of the motion, if it is known.
+    pub fn cartesian_end(&self) -> Option<RobTarget> {
+        self.to()?.value.ok()?.cartesian().copied()
     }
 
     /// Why this motion cannot be rewritten: first the motion's own reason, then those of its targets. `None` if it
@@ -428,19 +433,19 @@ pub struct Listing {
     /// Whether it is of NC programs, with numbered tools and work offsets.
     pub numbered: bool,
     /// Motions that call a program outside their file (NC).
-    pub outside: Vec<u32>,
+    pub external_calls: Vec<u32>,
     /// Regions that could not be parsed.
     pub opaque: Vec<OpaqueRegion>,
     /// The marks of earlier compensations, per file.
     pub marks: Vec<Option<Mark>>,
     /// Unusable comments that state something for the correction (`truegrind angles …`); nothing may be corrected
     /// before they are fixed.
-    pub misstated: Vec<Misstated>,
+    pub invalid_statements: Vec<InvalidStatement>,
 }
 
 /// A comment that states something for the correction and cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Misstated {
+pub struct InvalidStatement {
     /// Name of its file.
     pub file: String,
     /// Its line, from 1.
@@ -451,7 +456,7 @@ pub struct Misstated {
     pub expected: String,
 }
 
-impl fmt::Display for Misstated {
+impl fmt::Display for InvalidStatement {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}: line {}: {}: expected {}", self.file, self.line, self.text, self.expected)
     }
@@ -475,7 +480,7 @@ impl Listing {
     }
 
     /// Why the tool and work object of a motion do not determine where its targets are.
-    pub fn left_by_frames(&self, motion: &Motion) -> Option<Reason> {
+    pub fn frame_reason(&self, motion: &Motion) -> Option<Reason> {
         let tool = match self.tool(motion).map(|tool| &tool.value) {
             Some(Ok(tool)) => tool,
             Some(Err(Reason::Assigned)) => return Some(Reason::ToolAssigned),
@@ -512,7 +517,7 @@ impl Listing {
 pub const UNCORRECTED: &str = "Written for the nominal arm: run truegrind compensate before grinding.";
 
 /// Whether a comment is [`UNCORRECTED`], in the comment syntax of any language.
-pub(crate) fn says_uncorrected(comment: &[u8]) -> bool {
+pub(crate) fn is_uncorrected_comment(comment: &[u8]) -> bool {
     let text = comment.trim_ascii_start();
     let text =
         text.strip_prefix(b"!").or_else(|| text.strip_prefix(b";")).or_else(|| text.strip_prefix(b"("));

@@ -112,9 +112,9 @@ impl<'s> Program<'s> {
     }
 
     /// Frees the syntax trees, which listing and rewriting do not need.
-    pub fn forget_trees(&mut self) {
+    pub fn drop_trees(&mut self) {
         if let Program::Rapid(task) = self {
-            task.forget_trees();
+            task.drop_trees();
         }
     }
 
@@ -127,9 +127,9 @@ impl<'s> Program<'s> {
     }
 
     /// Whether it is known in advance that none of the changes will be refused.
-    pub fn takes(&self, changes: &[Change]) -> bool {
+    pub fn accepts(&self, changes: &[Change]) -> bool {
         match self {
-            Program::Rapid(task) => task.takes(changes),
+            Program::Rapid(task) => task.accepts(changes),
             // For NC this depends on the written text.
             Program::Nc(_) => false,
         }

@@ -37,7 +37,7 @@ const FARTHEST_DEG: f64 = 1e6;
 
 impl NewTarget {
     /// Whether a control can represent its numbers.
-    pub fn is_held(&self) -> bool {
+    pub fn is_representable(&self) -> bool {
         match self {
             NewTarget::Keep | NewTarget::Drop => true,
             NewTarget::Cartesian { position_mm, quaternion, .. } => {
@@ -51,8 +51,11 @@ impl NewTarget {
 
 impl Change {
     /// Whether a control can represent its numbers.
-    pub fn is_held(&self) -> bool {
-        self.targets.iter().chain(self.before.iter().map(|extra| &extra.target)).all(NewTarget::is_held)
+    pub fn is_representable(&self) -> bool {
+        self.targets
+            .iter()
+            .chain(self.before.iter().map(|extra| &extra.target))
+            .all(NewTarget::is_representable)
     }
 }
 

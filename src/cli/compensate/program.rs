@@ -39,7 +39,7 @@ pub(super) fn rewrite_program(
     let mut program = programs.task(&context.setup);
     let loads = context.arguments.cell.loads(&program);
     // The syntax trees are larger than the file and not needed once the motions are listed.
-    program.forget_trees();
+    program.drop_trees();
     let program = program;
     let listing = program.listing();
     let mut notes = Vec::new();

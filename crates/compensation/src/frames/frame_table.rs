@@ -50,7 +50,7 @@ impl FrameTable {
             }
             let (Some(t), Some(o)) = (listing.tool(motion), listing.work_object(motion)) else { continue };
             let (Ok(tv), Ok(ov)) = (&t.value, &o.value) else {
-                let reason = listing.left_by_frames(motion).unwrap_or(Reason::ToolUnknown);
+                let reason = listing.frame_reason(motion).unwrap_or(Reason::ToolUnknown);
                 out.places.insert((tool, object), Err(OutcomeReason::Program(reason)));
                 continue;
             };

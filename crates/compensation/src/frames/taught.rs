@@ -77,7 +77,7 @@ pub(crate) struct Teaching<'a> {
 /// comments, one sentence each; all must be resolved before anything is corrected. `nominal`: the arm that the controller
 /// computes with.
 pub fn contradictions(listing: &Listing, cell: &Cell, nominal: &Model) -> Vec<String> {
-    let commanded = listing.misstated.iter().map(ToString::to_string);
+    let commanded = listing.invalid_statements.iter().map(ToString::to_string);
     let unusable: Vec<String> =
         cell.open.iter().map(|entry| format!("cell file: {entry}")).chain(commanded).collect();
     if !unusable.is_empty() {
@@ -92,7 +92,7 @@ pub fn contradictions(listing: &Listing, cell: &Cell, nominal: &Model) -> Vec<St
         let (Some(tool), Some(object)) = (listing.tool(motion), listing.work_object(motion)) else {
             continue;
         };
-        if !seen.insert((motion.tool, motion.work_object)) || listing.left_by_frames(motion).is_some() {
+        if !seen.insert((motion.tool, motion.work_object)) || listing.frame_reason(motion).is_some() {
             continue;
         }
         let (Ok(value), Ok(place)) = (&tool.value, &object.value) else { continue };

@@ -18,7 +18,7 @@ pub fn listing_only_plan(listing: &Listing, options: &Options) -> Plan {
 fn why(listing: &Listing, motion: &Motion, options: &Options) -> OutcomeReason {
     let unknown = || motion.targets.iter().find_map(|target| target.value.as_ref().err().copied());
     let external = || motion.targets.is_empty().then_some(Reason::ExternalOnly);
-    let frames = || listing.left_by_frames(motion);
+    let frames = || listing.frame_reason(motion);
     if let Some(reason) = motion.left.or_else(unknown).or_else(external).or_else(frames) {
         return OutcomeReason::Program(reason);
     }

@@ -51,11 +51,11 @@ pub(crate) fn unchecked_notes(listing: &Listing, solved: &SolvedTargets, uncheck
             unchecked.len()
         ));
     }
-    if let Some(lines) = lines_of(listing, &listing.outside) {
+    if let Some(lines) = lines_of(listing, &listing.external_calls) {
         out.push(format!(
             "{} of the blocks call programs that are not in their file: these are assumed to leave work \
              offset, shifts, tool, units and tool centre point control unchanged ({lines})",
-            listing.outside.len()
+            listing.external_calls.len()
         ));
     }
     let curve = |m: &u32| {

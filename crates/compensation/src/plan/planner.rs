@@ -447,7 +447,7 @@ fn plan_motion<'a>(
         (segment_plan.path_deviation_mm, segment_plan.before.len());
     // All other flags hold only for the guessed configuration, so this one takes precedence.
     let guessed = options.flag_unknown_starts
-        && motion.configures
+        && motion.accepts_configuration
         && solved_targets.iter().any(|s| s.guess != BranchGuess::Known);
     let mut flag = if guessed { Some(OutcomeReason::UnknownStart) } else { segment_plan.flag };
     if let Some(corner) = job.corner(motion, path, &segment_plan, last) {

@@ -126,7 +126,7 @@ fn circle(
     let curves = Some([circle.intended, circle.commanded]);
     // Straight segments need a known orientation along the path.
     let may = segments
-        && motion.straightens
+        && motion.can_straighten
         && motion.modal.circle_point_orientation != Switch::Either
         && motion.modal.wrist_interpolation != Switch::On;
     if may && let Some((before, left)) = circle.pieces(path, arms, options) {

@@ -263,7 +263,7 @@ impl TargetSolver<'_> {
                 return MotionEnd::Unknown;
             };
             let via = targets.clone().find(|t| role(t) == Role::Via).and_then(at).map(|via| via.1);
-            let straightens = motion.straightens && self.options.circles == Circles::Segments;
+            let straightens = motion.can_straighten && self.options.circles == Circles::Segments;
             let as_joints = changes && motion.to().is_some_and(|to| as_joints(motion, to, self.options.emit));
             let may_insert = motion.insertable || straightens;
             MotionEnd::At(ReachedEnd {

@@ -51,7 +51,7 @@ reasons! {
         Displacement => "a program displacement or external axis offset is or may be active",
         Synchronised => "moves in step with another robot (\\ID, SyncMoveOn)",
         SensorGuided => "a sensor corrects, or may correct, the path (\\Corr, CorrCon, EGM, soft servo)",
-        AxisApart => "an axis is, or may be, in independent mode or locked (SingArea \\LockAxis4): the target does not determine its position",
+        IndependentAxis => "an axis is, or may be, in independent mode or locked (SingArea \\LockAxis4): the target does not determine its position",
         MovingWorkObject => "the work object is moved by an external axis",
         ToolUnknown => "the tool frame is unknown",
         WorkObjectUnknown => "the frame of the work object or work offset is unknown",

@@ -8,7 +8,7 @@ use std::ops::Range;
 use super::dialect::Dialect;
 use super::syntax::{NcTree, Syntax};
 use super::token::Token;
-use crate::motion::{Mark, says_uncorrected};
+use crate::motion::{Mark, is_uncorrected_comment};
 use crate::tree::whole_line;
 
 /// The mark of a file, if it has one.
@@ -25,7 +25,7 @@ pub fn token(tree: &NcTree<'_>) -> Option<u32> {
 /// The lines that state that the program is not corrected yet.
 pub(super) fn uncorrected(tree: &NcTree<'_>) -> Vec<Range<usize>> {
     let comments = (0..tree.len() as u32).filter(|&token| tree.kind(token) == Some(Token::Comment));
-    let marked = comments.filter(|&token| says_uncorrected(tree.text(token)));
+    let marked = comments.filter(|&token| is_uncorrected_comment(tree.text(token)));
     marked.map(|token| whole_line(tree.source(), tree.range(token, token + 1))).collect()
 }
 

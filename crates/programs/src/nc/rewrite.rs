@@ -180,7 +180,7 @@ impl Task<'_> {
         if let Some(reason) = motion.reason() {
             return Some(reason);
         }
-        if !change.is_held() {
+        if !change.is_representable() {
             return Some(Reason::NumberRange);
         }
         for new in &change.targets {
@@ -188,7 +188,7 @@ impl Task<'_> {
                 return Some(Reason::NoJointForm);
             }
         }
-        if change.straightens() && !motion.straightens {
+        if change.straightens() && !motion.can_straighten {
             return Some(Reason::NoInsertion);
         }
         if change.before.is_empty() {
@@ -230,8 +230,7 @@ impl<'s> Rewriter<'_, 's> {
         let task = self.task;
         let motion = &task.listing.motions[index as usize];
         let context = &task.contexts[index as usize];
-        let to =
-            motion.to().and_then(|target| target.value.ok().and_then(|value| value.cartesian().copied()));
+        let to = motion.cartesian_end();
         let stays = motion.left.is_some_and(|reason| !keeps_endpoint(reason));
         let straightens = change.is_some_and(Change::straightens);
         self.restate_motion_mode(motion, context, straightens);
@@ -239,12 +238,10 @@ impl<'s> Rewriter<'_, 's> {
             if context.can_restate {
                 self.restate_words(motion, context);
             }
-            let file = motion.place.file as usize;
-            self.skip_unmodified(&task.trees[file], task.dialects[file], context, motion.conditional);
+            self.skip_unmodified(motion, context);
             return Outcome::Unchanged;
         };
-        let start: [Option<f64>; 3] =
-            std::array::from_fn(|axis| self.control.position[axis].or(context.start[axis]));
+        let start = self.control.start(context);
         let new = change.and_then(|change| goal_of(motion, change)).map(|goal| {
             match self.pinned.contains(&index) {
                 true => Goal { position: to.position_mm, rotation: None, via: goal.via },
@@ -261,8 +258,7 @@ impl<'s> Rewriter<'_, 's> {
         let mut arc = None;
         let mut outcome = Outcome::Unchanged;
         if context.arc.is_some() && !straightens {
-            let file = motion.place.file as usize;
-            let by_radius = slots(&task.trees[file], task.dialects[file], context).radius.is_some();
+            let by_radius = task.block_words(motion, context).2.radius.is_some();
             let intended =
                 all(context.start).zip(via_of(motion)).map(|(from, via)| [from, via, to.position_mm]);
             arc = intended.and_then(|intended| self.arc(&mut goal, start, context, (intended, by_radius)));
@@ -277,8 +273,7 @@ impl<'s> Rewriter<'_, 's> {
                 }
             }
         }
-        let tree = &task.trees[motion.place.file as usize];
-        let mut slots = slots(tree, task.dialects[motion.place.file as usize], context);
+        let (.., mut slots) = task.block_words(motion, context);
         if straightens {
             self.straighten(motion, &mut slots, change.is_some_and(|change| change.before.is_empty()));
             outcome = Outcome::InPlace;
@@ -341,10 +336,8 @@ impl<'s> Rewriter<'_, 's> {
         let mut writer = BlockWriter::new(tree, dialect, &mut edits, slots, context);
         let unit = context.unit_mm;
         let decimals = self.options.position_decimals + u8::from(unit != 1.0) * 2;
-        let start: [Option<f64>; 3] =
-            std::array::from_fn(|axis| self.control.position[axis].or(context.start[axis]));
-        let to =
-            motion.to().and_then(|target| target.value.ok().and_then(|value| value.cartesian().copied()));
+        let start = self.control.start(context);
+        let to = motion.cartesian_end();
         let intended = to.map_or(goal.position, |to| to.position_mm);
         let mut reached = goal.position;
         for axis in 0..3 {

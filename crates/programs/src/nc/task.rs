@@ -37,7 +37,7 @@ use super::setup::{self, Setup, StatedFrame, Statement, flange_tool, statement};
 use super::syntax::{NcTree, Word, WordValue};
 use super::token::Token;
 use crate::motion::{
-    Frame, Listing, Misstated, Motion, MotionKind, OpaqueReason, OpaqueRegion, Place, Reason, Tool,
+    Frame, InvalidStatement, Listing, Motion, MotionKind, OpaqueReason, OpaqueRegion, Place, Reason, Tool,
 };
 use block::Block;
 pub(super) use block_context::{BlockArc, BlockContext, StartDependency, StateEvent};
@@ -102,7 +102,8 @@ impl<'s> Task<'s> {
             interpreter.contexts = std::mem::take(&mut task.contexts);
             interpreter.file();
             task.angles.push(interpreter.angles);
-            let open = interpreter.listing.misstated.iter_mut().filter(|comment| comment.file.is_empty());
+            let open =
+                interpreter.listing.invalid_statements.iter_mut().filter(|comment| comment.file.is_empty());
             open.for_each(|comment| comment.file.clone_from(&task.names[file]));
             let Interpreter { listing, events, contexts, .. } = interpreter;
             (task.listing, task.events, task.contexts) = (listing, events, contexts);
@@ -264,7 +265,7 @@ impl<'t, 's> Interpreter<'t, 's> {
         &Lengths([motions, speeds, zones, tools, objects, events, contexts]): &Lengths,
     ) {
         self.listing.motions.truncate(motions);
-        self.listing.outside.retain(|call| (*call as usize) < motions);
+        self.listing.external_calls.retain(|call| (*call as usize) < motions);
         self.listing.speeds.truncate(speeds);
         self.listing.zones.truncate(zones);
         self.listing.tools.truncate(tools);
@@ -343,7 +344,7 @@ impl<'t, 's> Interpreter<'t, 's> {
         let text = String::from_utf8_lossy(self.tree.text(token)).trim().to_owned();
         // [`Task::read`] fills in the name of the file.
         let (file, line) = (String::new(), self.place(token).line);
-        self.listing.misstated.push(Misstated { file, line, text, expected });
+        self.listing.invalid_statements.push(InvalidStatement { file, line, text, expected });
     }
 
     /// Lists a comment that states something for this program and cannot be used.

@@ -8,7 +8,7 @@ use std::ops::Range;
 use super::syntax::{RapidTree, Syntax, node_kind, parts, token_kind, tokens_of};
 use super::token::Token;
 use crate::edit::Edits;
-use crate::motion::{Mark, says_uncorrected};
+use crate::motion::{Mark, is_uncorrected_comment};
 use crate::tree::whole_line;
 
 /// Present and future places of the marks of one file: all that is needed of its tree after listing.
@@ -117,7 +117,7 @@ fn uncorrected(tree: &RapidTree<'_>, tokens: Range<u32>) -> Vec<Range<usize>> {
     let first = tokens.start as usize;
     let kinds = (first..).zip(&tree.kinds()[first..tokens.end as usize]);
     let comments = kinds.filter(|(_, kind)| **kind == Token::Comment).map(|(token, _)| token as u32);
-    let meant = comments.filter(|&token| says_uncorrected(tree.text(token)));
+    let meant = comments.filter(|&token| is_uncorrected_comment(tree.text(token)));
     meant.map(|token| whole_line(tree.source(), tree.range(token, token + 1))).collect()
 }
 

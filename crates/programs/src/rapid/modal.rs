@@ -141,7 +141,7 @@ impl SwitchSet {
             synchronised: self.state(Switch::Synchronised),
             // Corrections (CorrCon) reach the motions with \Corr alone.
             sensor_guided: self.state(Switch::Soft),
-            axis_apart: both(self.state(Switch::Locked), self.state(Switch::Independent)),
+            independent_axis: both(self.state(Switch::Locked), self.state(Switch::Independent)),
         }
     }
 }

@@ -51,7 +51,7 @@ impl Task<'_> {
     }
 
     /// Whether none of the changes would be refused.
-    pub fn takes(&self, changes: &[Change]) -> bool {
+    pub fn accepts(&self, changes: &[Change]) -> bool {
         changes.par_iter().with_min_len(PORTION).all(|change| {
             let motion = self.listing.motions.get(change.motion as usize);
             motion.is_some_and(|motion| self.refusal(motion, change).is_none())
@@ -63,7 +63,7 @@ impl Task<'_> {
         if let Some(reason) = motion.reason() {
             return Some(reason);
         }
-        if !change.is_held() {
+        if !change.is_representable() {
             return Some(Reason::NumberRange);
         }
         let instruction = instruction_of(motion);
@@ -79,7 +79,7 @@ impl Task<'_> {
                 _ => {}
             }
         }
-        if change.straightens() && !motion.straightens {
+        if change.straightens() && !motion.can_straighten {
             return Some(Reason::NoInsertion);
         }
         if change.before.is_empty() {

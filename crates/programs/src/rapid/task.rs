@@ -33,7 +33,7 @@ pub struct Task<'s> {
     pub names: Vec<String>,
     /// Their bytes.
     pub sources: Vec<&'s [u8]>,
-    /// The files as trees; empty after [`Task::forget_trees`].
+    /// The files as trees; empty after [`Task::drop_trees`].
     pub trees: Vec<RapidTree<'s>>,
     /// The symbol table.
     pub symbols: Box<Symbols>,
@@ -59,7 +59,7 @@ impl<'s> Task<'s> {
 
     /// Drops the trees, which are larger than the files. A rewrite does not need them; analyses of the statements
     /// (`truegrind-compensation`'s `Loads`) do, and must run before.
-    pub fn forget_trees(&mut self) {
+    pub fn drop_trees(&mut self) {
         self.trees = Vec::new();
     }
 }

@@ -568,7 +568,7 @@ fn alternatives_are_optional_so_what_stands_behind_them_comes_by_its_place() {
 
 #[test]
 fn an_axis_that_does_not_follow_the_targets_leaves_them() {
-    let apart = Some(Reason::AxisApart);
+    let apart = Some(Reason::IndependentAxis);
     let main = |body: &str| of("main", &format!("PROC main()\n{body}ENDPROC"));
     assert_eq!(main(&format!("SingArea\\LockAxis4;\n{GO}SingArea\\Wrist;\n{GO}")), [apart, None]);
     assert_eq!(main(&format!("SingArea\\LockAxis4;\n{GO}SingArea\\Off;\n{GO}")), [apart, None]);
@@ -608,7 +608,7 @@ fn a_circle_with_triggers_along_it_is_not_cut() {
         "PROC main()\nMoveC p,p,v100,fine,tool0;\nTriggC p,p,v100,i,fine,tool0;\nMoveCDO p,p,v100,fine,tool0,d,1;\nENDPROC",
     );
     let task = Task::read(&[("m.mod", source.as_bytes())]);
-    let cut: Vec<bool> = task.listing.motions.iter().map(|motion| motion.straightens).collect();
+    let cut: Vec<bool> = task.listing.motions.iter().map(|motion| motion.can_straighten).collect();
     assert_eq!(cut, [true, false, true]);
 }
 

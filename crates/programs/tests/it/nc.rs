@@ -247,7 +247,7 @@ fn a_block_that_begins_with_its_centre_can_become_straight() {
     let setup = Setup { dialect: Some(Dialect::LinuxCnc), ..Setup::default() };
     let task = Task::read(&[("x", source.as_bytes())], &setup);
     let motion = &task.listing.motions[2];
-    assert!(motion.straightens && motion.reason().is_none(), "{motion:?}");
+    assert!(motion.can_straighten && motion.reason().is_none(), "{motion:?}");
     let end = *motion.to().unwrap().value.unwrap().cartesian().unwrap();
     let new = NewTarget::Cartesian { position_mm: [40.0, 0.5, 0.0], quaternion: end.quaternion, conf: None };
     let targets = motion.targets.iter().map(|t| if t.role == Role::Via { NewTarget::Drop } else { new });

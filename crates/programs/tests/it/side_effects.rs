@@ -105,7 +105,7 @@ fn an_argument_with_side_effects_is_evaluated_once() {
         let source = source(&line);
         let task = Task::read(&[("m.mod", source.as_bytes())]);
         assert!(!task.listing.motions[1].insertable, "{speed}");
-        assert!(!task.listing.motions[1].straightens, "{speed}");
+        assert!(!task.listing.motions[1].can_straighten, "{speed}");
     }
     let source = source("MoveL p,v100,fine,tool0;\nMoveL Offs(p,9,0,0),v100\\V:=Abs(-50),fine,tool0;");
     let task = Task::read(&[("m.mod", source.as_bytes())]);

@@ -25,7 +25,7 @@ impl<'s> Rewriter<'_, 's> {
         }
         let task = self.task;
         let file = motion.place.file as usize;
-        let slots = slots(&task.trees[file], task.dialects[file], context);
+        let (.., slots) = task.block_words(motion, context);
         if slots.mode.is_none() && motion.kind == MotionKind::Circular {
             let at = slots
                 .first

@@ -1,5 +1,7 @@
 //! The state of the control while a rewritten file runs.
 
+use crate::nc::task::BlockContext;
+
 /// The state of the control at a block, where the rewritten file differs from the original. NaN: restate in any case.
 #[derive(Debug, Clone, Default)]
 pub(super) struct ControlState {
@@ -16,6 +18,11 @@ pub(super) struct ControlState {
 }
 
 impl ControlState {
+    /// The start of a motion (mm).
+    pub(super) fn start(&self, context: &BlockContext) -> [Option<f64>; 3] {
+        std::array::from_fn(|axis| self.position[axis].or(context.start[axis]))
+    }
+
     pub(super) fn invalidate_axes(&mut self, axes: u8) {
         for axis in 0..3 {
             if axes & 1 << axis != 0 {

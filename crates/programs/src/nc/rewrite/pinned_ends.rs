@@ -137,8 +137,7 @@ impl Task<'_> {
 
     /// The axes that the words of an arc name; all if fewer than two.
     fn arc_axes(&self, index: usize) -> u8 {
-        let file = self.listing.motions[index].place.file as usize;
-        let slots = slots(&self.trees[file], self.dialects[file], &self.contexts[index]);
+        let (.., slots) = self.block_words(&self.listing.motions[index], &self.contexts[index]);
         let named = |axis: &usize| slots.axes[*axis].is_some() || slots.centre[*axis].is_some();
         let axes = (0..3).filter(named).fold(0, |all, axis| all | 1 << axis);
         if u8::count_ones(axes) < 2 { ALL } else { axes }
@@ -148,9 +147,7 @@ impl Task<'_> {
     /// omitted ones are restated.
     fn axes_with_own_end(&self, index: usize) -> u8 {
         let (motion, context) = (&self.listing.motions[index], &self.contexts[index]);
-        let file = motion.place.file as usize;
-        let (tree, dialect) = (&self.trees[file], self.dialects[file]);
-        let slots = slots(tree, dialect, context);
+        let (tree, dialect, slots) = self.block_words(motion, context);
         if context.may_omit_words {
             return 0;
         }

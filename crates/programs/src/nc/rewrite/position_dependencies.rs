@@ -267,9 +267,7 @@ impl Task<'_> {
             return;
         }
         let (motion, context) = (&self.listing.motions[index as usize], &self.contexts[index as usize]);
-        let file = motion.place.file as usize;
-        let (tree, dialect) = (&self.trees[file], self.dialects[file]);
-        let slots = slots(tree, dialect, context);
+        let (tree, dialect, slots) = self.block_words(motion, context);
         for (axis, word) in slots.axes.iter().chain(&slots.angles).enumerate() {
             let counts = word
                 .as_ref()
@@ -294,9 +292,7 @@ impl Task<'_> {
             state.position = [dependencies; AXES];
             return;
         }
-        let file = motion.place.file as usize;
-        let (tree, dialect) = (&self.trees[file], self.dialects[file]);
-        let slots = slots(tree, dialect, context);
+        let (tree, dialect, slots) = self.block_words(motion, context);
         let reason = motion.reason();
         let machine = reason == Some(Reason::MachineCoordinates);
         let returns = reason == Some(Reason::ReferenceReturn);

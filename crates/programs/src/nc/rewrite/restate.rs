@@ -24,8 +24,7 @@ impl<'s> Rewriter<'_, 's> {
     pub(super) fn restate_words(&mut self, motion: &Motion, context: &BlockContext) {
         let task = self.task;
         let file = motion.place.file as usize;
-        let (tree, dialect) = (&task.trees[file], task.dialects[file]);
-        let slots = slots(tree, dialect, context);
+        let (tree, dialect, slots) = task.block_words(motion, context);
         if slots.axes.iter().all(Option::is_none) {
             return;
         }
@@ -34,8 +33,7 @@ impl<'s> Rewriter<'_, 's> {
         let decimals = self.options.position_decimals + u8::from(context.unit_mm != 1.0) * 2;
         let unit = context.unit_mm;
         let mut restated = [false; 6];
-        let to =
-            motion.to().and_then(|target| target.value.ok().and_then(|value| value.cartesian().copied()));
+        let to = motion.cartesian_end();
         for axis in 0..3 {
             let positions = self.control.position[axis].zip(context.start[axis]);
             if let Some(word) = slots.axes[axis] {
@@ -144,14 +142,9 @@ impl<'s> Rewriter<'_, 's> {
 
     /// The control state after an unmodified motion: axes with a word are as in the original, the others unchanged.
     /// After a block that may be skipped they are uncertain, and the next block must restate them.
-    pub(super) fn skip_unmodified(
-        &mut self,
-        tree: &NcTree<'s>,
-        dialect: Dialect,
-        context: &BlockContext,
-        conditional: bool,
-    ) {
-        let slots = slots(tree, dialect, context);
+    pub(super) fn skip_unmodified(&mut self, motion: &Motion, context: &BlockContext) {
+        let (.., slots) = self.task.block_words(motion, context);
+        let conditional = motion.conditional;
         for axis in 0..3 {
             if slots.axes[axis].is_some() {
                 match (self.control.position[axis], self.control.intended[axis]) {

@@ -1,11 +1,12 @@
 //! The words of one block, by what they state.
 
+use crate::motion::Motion;
 use crate::nc::dialect::Dialect;
 use crate::nc::expression::literal;
 use crate::nc::modal_state::OrientationMode;
 use crate::nc::parser::word;
 use crate::nc::syntax::{NcTree, Syntax, Word, WordValue};
-use crate::nc::task::BlockContext;
+use crate::nc::task::{BlockContext, Task};
 use crate::nc::token::Token;
 
 /// The target words of a block.
@@ -99,8 +100,21 @@ impl<'s> WordSlots<'s> {
     }
 }
 
+impl<'s> Task<'s> {
+    /// The tree and dialect of a motion's file, and the words of its block.
+    pub(super) fn block_words(
+        &self,
+        motion: &Motion,
+        context: &BlockContext,
+    ) -> (&NcTree<'s>, Dialect, WordSlots<'s>) {
+        let file = motion.place.file as usize;
+        let (tree, dialect) = (&self.trees[file], self.dialects[file]);
+        (tree, dialect, slots(tree, dialect, context))
+    }
+}
+
 /// Sorts the words of a block into slots.
-pub(super) fn slots<'s>(tree: &NcTree<'s>, dialect: Dialect, context: &BlockContext) -> WordSlots<'s> {
+fn slots<'s>(tree: &NcTree<'s>, dialect: Dialect, context: &BlockContext) -> WordSlots<'s> {
     let mut slots = WordSlots::default();
     let node = tree.nodes[context.node as usize];
     if !matches!(node.kind, Syntax::Block | Syntax::Skippable) {

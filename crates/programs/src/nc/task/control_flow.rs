@@ -320,7 +320,7 @@ impl Interpreter<'_, '_> {
     /// state: it is assumed not to, and the call is listed in [`crate::motion::Listing::outside`].
     pub(super) fn subprogram(&mut self, block: &Block<'_>, name: &str) {
         if !self.calls_own_file(block) {
-            self.listing.outside.push(self.listing.motions.len() as u32);
+            self.listing.external_calls.push(self.listing.motions.len() as u32);
         }
         self.list_left(block, name, Reason::Subprogram);
         self.join_unseen_predecessors();

@@ -41,9 +41,9 @@ impl Interpreter<'_, '_> {
             work_object: None,
             timed: false,
             insertable: false,
-            straightens: false,
+            can_straighten: false,
             rapid: kind == MotionKind::Joint,
-            configures: false,
+            accepts_configuration: false,
             axis: None,
             by_radius: false,
             modal: Modal { conf_linear: Switch::Off, conf_joint: Switch::Off, ..Modal::START },
@@ -235,7 +235,7 @@ impl Interpreter<'_, '_> {
         motion.timed = !self.state.feed_per_minute && kind != MotionKind::Joint;
         let splits = !motion.timed && self.can_split(block, &before);
         motion.insertable = splits && kind == MotionKind::Linear && !block.other_axes;
-        motion.straightens = splits && arc.is_some() && !block.opaque;
+        motion.can_straighten = splits && arc.is_some() && !block.opaque;
         motion.axis = arc.map(|block_arc| block_arc.arc.plane.axis(block_arc.positive));
         motion.by_radius = arc.is_some() && block.radius.is_some();
         let after = self.block_context(block, arc);
@@ -307,7 +307,7 @@ impl Interpreter<'_, '_> {
             let call = self.state.modal_call;
             // G66 has been listed itself.
             if !self.dialect.paren_comments() {
-                self.listing.outside.push(self.listing.motions.len() as u32 - 1);
+                self.listing.external_calls.push(self.listing.motions.len() as u32 - 1);
             }
             self.join_unseen_predecessors();
             self.state.modal_call = call;
@@ -555,7 +555,7 @@ impl Interpreter<'_, '_> {
         } else if state.feed == Err(Reason::NumberRange) && mode != MotionMode::Rapid {
             Some(Reason::NumberRange)
         } else {
-            self.listing.left_by_frames(motion)
+            self.listing.frame_reason(motion)
         }
     }
 

@@ -121,8 +121,8 @@ fn modal_refusal(motion: &Motion, displaced: bool) -> Option<Reason> {
         Some(Reason::Synchronised)
     } else if motion.modal.sensor_guided != SwitchState::Off {
         Some(Reason::SensorGuided)
-    } else if motion.modal.axis_apart != SwitchState::Off {
-        Some(Reason::AxisApart)
+    } else if motion.modal.independent_axis != SwitchState::Off {
+        Some(Reason::IndependentAxis)
     } else if displaced && motion.kind != MotionKind::AbsoluteJoint {
         Some(Reason::Displacement)
     } else {

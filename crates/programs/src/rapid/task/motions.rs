@@ -49,9 +49,9 @@ impl ListingBuilder<'_, '_> {
             work_object: None,
             timed: false,
             insertable: false,
-            straightens: false,
+            can_straighten: false,
             rapid: false,
-            configures: true,
+            accepts_configuration: true,
             axis: None,
             by_radius: false,
             modal: crate::motion::Modal::START,
@@ -218,7 +218,7 @@ impl ListingBuilder<'_, '_> {
             !options.timed && !options.whole && !nesting.guarded && !self.has_impure_argument(unit, node);
         let splits = instruction.between != Between::Nothing && instruction.also != Also::Triggers;
         motion.insertable = free && splits;
-        motion.straightens = free
+        motion.can_straighten = free
             && instruction.kind == MotionKind::Circular
             // A trigger at a distance along the movement would fire on its last piece.
             && instruction
@@ -254,7 +254,7 @@ impl ListingBuilder<'_, '_> {
         } else if instruction.kind == MotionKind::AbsoluteJoint {
             None
         } else {
-            self.listing.left_by_frames(motion)
+            self.listing.frame_reason(motion)
         };
         let speed = self.listing.speed(motion).map(|speed| &speed.value);
         own.or((speed == Some(&Err(Reason::NumberRange))).then_some(Reason::NumberRange))

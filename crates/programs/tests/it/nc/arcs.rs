@@ -176,7 +176,7 @@ fn no_block_is_inserted_before_one_that_starts_the_spindle() {
         let setup = Setup { dialect: Some(dialect), ..Setup::default() };
         let task = Task::read(&[("x", source.as_bytes())], &setup);
         assert!(task.listing.motions.iter().all(|motion| motion.reason().is_none()), "{source}");
-        (task.listing.motions[1].insertable, task.listing.motions[2].straightens)
+        (task.listing.motions[1].insertable, task.listing.motions[2].can_straighten)
     };
     for dialect in [LinuxCnc, Siemens] {
         for words in ["", "M5", "M9", "M1"] {
