@@ -20,9 +20,7 @@ use nalgebra::UnitQuaternion;
 
 use self::block_writer::{BlockWriter, differs};
 use self::control_state::ControlState;
-use self::word_slots::{
-    ANGLES, AXES, CENTRE, ORDER, RADIUS, SPIN, VECTOR, WordSlots, slots, states_increment,
-};
+use self::word_slots::{ANGLES, AXES, CENTRE, ORDER, RADIUS, SPIN, VECTOR, WordSlots, states_increment};
 use super::arc::{Arc, Plane};
 use super::dialect::Dialect;
 use super::mark;

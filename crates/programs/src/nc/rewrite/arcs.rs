@@ -1,6 +1,6 @@
 //! Arcs between commanded end points, and arcs that become straight.
 
-use super::word_slots::{WordSlots, slots};
+use super::word_slots::WordSlots;
 use super::{Goal, Rewriter, all};
 use crate::motion::{Motion, MotionKind};
 use crate::nc::arc::{Arc, Plane};

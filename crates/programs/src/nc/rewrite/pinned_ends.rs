@@ -3,7 +3,7 @@
 use std::collections::{BTreeSet, HashMap};
 
 use super::keeps_endpoint;
-use super::word_slots::{slots, states_increment};
+use super::word_slots::states_increment;
 use crate::motion::{MotionKind, Reason, WorkObjectValue};
 use crate::nc::task::{StartDependency, Task};
 use crate::rewrite::{Change, Outcome};

@@ -10,7 +10,7 @@
 use std::collections::{BTreeSet, HashMap};
 
 use super::keeps_endpoint;
-use super::word_slots::{slots, states_increment};
+use super::word_slots::states_increment;
 use crate::motion::{MotionKind, Reason};
 use crate::nc::expression::literal;
 use crate::nc::syntax::{NcTree, Word, WordValue};

@@ -1,12 +1,11 @@
 //! Unmodified motions after modified ones: omitted words are restated, so that the end points do not change.
 
 use super::block_writer::{BlockWriter, differs};
-use super::word_slots::{ANGLES, AXES, SPIN, VECTOR, WordSlots, slots, states_increment};
+use super::word_slots::{ANGLES, AXES, SPIN, VECTOR, WordSlots, states_increment};
 use super::{Rewriter, vector_names};
 use crate::motion::Motion;
 use crate::nc::dialect::Dialect;
 use crate::nc::modal_state::OrientationMode;
-use crate::nc::syntax::NcTree;
 use crate::nc::task::BlockContext;
 
 impl<'s> Rewriter<'_, 's> {
