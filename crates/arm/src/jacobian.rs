@@ -86,7 +86,12 @@ pub fn parameter_jacobian(
     let base_from_tool = base_from_flange * flange_from_tool;
     let point: [f64; 3] = base_from_tool.translation.vector.into();
     let to_world = world_from_base.rotation.to_rotation_matrix();
+    // Expressed in the base, as in most calls: no rotation to apply.
+    let unturned = ends.world_from_base[3..] == [0.0; 3];
     let in_world = |twist: Vector6<f64>| {
+        if unturned {
+            return twist;
+        }
         let v = to_world * twist.fixed_rows::<3>(0);
         let w = to_world * twist.fixed_rows::<3>(3);
         Vector6::new(v.x, v.y, v.z, w.x, w.y, w.z)

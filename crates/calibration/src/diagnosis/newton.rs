@@ -23,7 +23,7 @@ use truegrind_estimation::objective::Objective;
 use truegrind_estimation::problem::Problem;
 
 /// Predicted decrease for each scalar row below which a problem counts as solved.
-const CONVERGED: f64 = 1e-7;
+pub(super) const CONVERGED: f64 = 1e-7;
 
 /// Most steps.
 const STEPS: usize = 8;

@@ -11,10 +11,9 @@ use super::algebra::{back_and_forth, factored};
 use super::extension::{Extended, Freedom, Subject};
 use super::held::neither;
 use super::newton;
-use crate::identification::calibration::{CalibrationProblem, Weight};
 use crate::identification::fit::{Observations, errors_on};
-use crate::identification::solver::SOLVERS;
 use crate::measurement::split::{self, Split};
+use truegrind_estimation::least_squares::lm;
 use truegrind_estimation::problem::{NormalEquations, Problem};
 use truegrind_math::statistics::ErrorSummary;
 
@@ -143,32 +142,20 @@ impl Validation {
     }
 
     fn held_out(&self, fit: &Extended, splits: &[Split]) -> ErrorSummary {
-        let start_weights: Vec<Weight> = self
-            .kept
-            .iter()
-            .map(|&i| {
-                let (w, t) = (fit.weights[i], fit.robust_weight[i].sqrt());
-                Weight { per_mm: w.per_mm * t, per_rad: w.per_rad * t }
-            })
-            .collect();
         let errors: Vec<Vec<f64>> = splits
             .par_iter()
             .map(|split| {
-                let train = self.rows.subset(&split.train);
-                let weights: Vec<Weight> = split.train.iter().map(|&i| start_weights[i]).collect();
-                let problem = CalibrationProblem::new(
-                    &train.dataset,
-                    fit.problem.start(),
-                    fit.problem.starting_frames(),
-                    &fit.parameters,
-                    &fit.priors,
-                    &weights,
-                );
+                let train: Vec<usize> = split.train.iter().map(|&i| self.kept[i]).collect();
+                // A part of the fit's own problem: the regressors of its causes are known there.
+                let Some(problem) = fit.problem.subsample(&train) else { return Vec::new() };
                 let mut x = fit.x.clone();
-                if !newton::descend(&problem, &mut x) {
-                    x = SOLVERS[0].solve(&problem, &x, 0).x;
+                if !newton::descend(&*problem, &mut x) {
+                    // As near to the optimum as the other folds: a promise is compared with the cost, half the rows.
+                    let near =
+                        lm::Options { cost_tolerance: 2.0 * newton::CONVERGED, ..lm::Options::default() };
+                    x = lm::solve(&*problem, &x, &near).x;
                 }
-                let (model, frames) = problem.apply(&x);
+                let (model, frames) = fit.problem.apply(&x);
                 errors_on(&self.rows.subset(&split.test), &model, &frames)
             })
             .collect();

@@ -3,11 +3,13 @@
 //! If only the shape of a path is corrected, the residual after its best rigid registration is assessed. The probability is
 //! in `probability`.
 
-use nalgebra::{DVector, Matrix3xX, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, Matrix3xX, Vector3, Vector6};
 
 use crate::risk::placement::{Placement, TargetDeviation};
 use crate::risk::registration::Registration;
 use truegrind_arm::estimated::{Estimated, RegisteredFrame};
+use truegrind_math::gram::add_products;
+use truegrind_math::lanes::WIDTH;
 use truegrind_math::se3::Pose;
 
 /// Risk assessment of one cut.
@@ -56,24 +58,37 @@ pub(crate) fn assess_cut(
     let registration = Registration::of(&off.iter().map(|o| o.intended).collect::<Vec<_>>())?;
     let twists = registration.twists(off.iter().map(|o| &o.jacobian));
     let twist = registration.twist(off.iter().map(|o| &o.shift));
-    let (mut square, mut variance, mut of_shape) = (0.0, 0.0, 0.0);
-    let mut toward = DVector::zeros(knowledge.order.len());
-    let spread = |jacobian: &Matrix3xX<f64>| (jacobian * &knowledge.covariance).component_mul(jacobian).sum();
+    let mut square = 0.0;
+    let parameters = knowledge.order.len();
+    let mut toward = DVector::zeros(parameters);
+    let (mut shapes, mut places) =
+        (StackedRows::new(off.len(), parameters), StackedRows::new(off.len(), parameters));
     for (k, point) in off.iter().enumerate() {
         let mut shape = point.jacobian.clone();
         for p in 0..shape.ncols() {
             let moved = registration.shift(&twists.column(p).into_owned(), k);
             (0..3).for_each(|i| shape[(i, p)] -= moved[i]);
         }
-        of_shape += spread(&shape);
-        let (shift, jacobian) = match placement {
-            Placement::Shape => (point.shift - registration.shift(&twist, k), &shape),
-            _ => (point.shift, &point.jacobian),
+        let shift = match placement {
+            Placement::Shape => {
+                let shift = point.shift - registration.shift(&twist, k);
+                toward += shape.tr_mul(&shift);
+                shift
+            }
+            _ => {
+                places.set(k, &point.jacobian);
+                toward += point.jacobian.tr_mul(&point.shift);
+                point.shift
+            }
         };
         square += shift.norm_squared();
-        toward += jacobian.tr_mul(&shift);
-        variance += spread(jacobian);
+        shapes.set(k, &shape);
     }
+    let of_shape = shapes.total_variance(&knowledge.covariance);
+    let variance = match placement {
+        Placement::Shape => of_shape,
+        _ => places.total_variance(&knowledge.covariance),
+    };
     let rms = |sum: f64| (sum.max(0.0) / off.len() as f64).sqrt();
     let registered = RegisteredFrame {
         origin_mm: registration.centre.coords,
@@ -87,6 +102,46 @@ pub(crate) fn assess_cut(
         toward,
         registered,
     })
+}
+
+/// Jacobians of the points of a cut, one below the other: column-major, padded by zeros to whole groups of rows.
+struct StackedRows {
+    columns: Vec<f64>,
+    rows: usize,
+    parameters: usize,
+}
+
+impl StackedRows {
+    fn new(points: usize, parameters: usize) -> Self {
+        let rows = (3 * points).next_multiple_of(WIDTH);
+        Self { columns: vec![0.0; rows * parameters], rows, parameters }
+    }
+
+    /// Sets the Jacobian (3 × p) of point `k`.
+    fn set(&mut self, k: usize, jacobian: &Matrix3xX<f64>) {
+        for (column, values) in self.columns.chunks_exact_mut(self.rows).zip(jacobian.column_iter()) {
+            column[3 * k..3 * k + 3].copy_from_slice(values.as_slice());
+        }
+    }
+
+    /// Σ tr(J C Jᵀ) over the points, C the covariance of the parameters (p × p): tr(C Σ JᵀJ), whose sum over rows is vectorised.
+    fn total_variance(&self, covariance: &DMatrix<f64>) -> f64 {
+        let p = self.parameters;
+        if p == 0 {
+            return 0.0;
+        }
+        let mut products = DMatrix::zeros(p, p);
+        add_products(&self.columns, self.rows, products.as_mut_slice());
+        // The lower triangle is filled.
+        let mut sum = 0.0;
+        for j in 0..p {
+            sum += covariance[(j, j)] * products[(j, j)];
+            for i in j + 1..p {
+                sum += 2.0 * covariance[(i, j)] * products[(i, j)];
+            }
+        }
+        sum
+    }
 }
 
 /// The registration of a cut expressed in the base, for a stationary work object.
