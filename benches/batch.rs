@@ -1,6 +1,11 @@
 //! A folder of 1,000 programs of 1,000 targets each through the binary, file to file, all cores.
 //!
 //! `cargo bench --no-default-features --bench batch`
+//!
+//! Two cores of an AMD Zen 4 at 3.5 GHz: 3.5 s (5.7 s user, 0.6 s system); 7c20e9f took 3.2 s (5.2 + 0.35 s); 1.5 s are required.
+//! User time per motion is 5.7 µs: reading 20 %, inverse kinematics 15 %, the path between targets 17 %, edits 10 %, the assessment of risk
+//! 8 % (new since 7c20e9f), files 5 %; no function has more than 8 %. For 1.5 s a motion may take 3.0 µs; reading, inverse kinematics,
+//! edits and files alone take 2.8.
 
 use std::fmt::Write as _;
 use std::fs;

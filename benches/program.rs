@@ -1,6 +1,21 @@
 //! Reading and rewriting a RAPID module of 100,000 MoveL (15.9 MB): MB/s per core, and the way from bytes to bytes.
 //!
 //! `cargo bench --no-default-features --bench program`
+//!
+//! Counted from file to file on two cores of an AMD Zen 4 at 3.5 GHz, medians with other work stopped:
+//!
+//! | module | 7c20e9f | this code | required |
+//! |---|---|---|---|
+//! | 100,000 MoveL, 16.5 MB | 0.43 s (0.59 s user, 0.14 s system), 246 MB | 0.58 s (0.74 + 0.17 s), 165 MB | 0.3 s |
+//! | 1,180,000 MoveL, 194 MB | 9.3 s (6.9 + 7.2 s), 2.73 GB | 8.4 s (10.7 + 3.0 s, before the Jacobians of a cut were stacked), 1.68 GB | 4 s, 1.2 GB |
+//!
+//! Parsing on one thread: 238 MB/s (400 required), 525 MB/s on two; lexing 940 MB/s on two.
+//!
+//! 7c20e9f did not assess risk: that was 0.23 s of 0.83 s user, half of it tr(J C Jᵀ) of 32 points of each cut. Stacked Jacobians and one
+//! product of their columns leave 0.14 s. Of the 7.4 µs of a motion targets and checks between them have 39 %, edits and the file 12 %, reading
+//! 9 %, and no function more than 4 %. For 0.3 s on two cores a motion may take 6 µs, page faults included, which take 1.7.
+//! Memory: 68,000 pages of 4 KiB are touched at a peak of 40,000; the system clears each. With malloc keeping what is freed (trim and
+//! mmap thresholds of glibc) system time falls from 0.18 to 0.10 s; mimalloc 2.0 gains nothing.
 
 use std::fs;
 use std::hint::black_box;

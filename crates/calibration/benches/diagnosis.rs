@@ -1,6 +1,13 @@
 //! How often a diagnosis names what was hidden, and how often it names what is not there: `cargo bench -p truegrind-calibration --bench diagnosis`.
 //!
 //! Arguments: runs of each kind and sensor (default 8), clean runs of each sensor (default 40), kinds to try.
+//!
+//! Time of a diagnosis, processor seconds on an AMD Zen 4 at 3.5 GHz: UR5 grid (1,000 positions) 5.2, 7c20e9f 7.6; UR10 D (632 poses)
+//! 15.8, 7c20e9f 15.4; UR10 A (11,911 poses) 200 before fits of folds ended earlier, 7c20e9f 124; 2,500 positions along a path with three
+//! findings 0.9, with eight 5.9, 7c20e9f 1.0 and 8.6. Clock time on two cores is about 0.6 of that.
+//! UR5: selection 34 %, confirmation in halves 15 %, fits of folds 10 %, the written arm 9 %; products of columns are a third, and no
+//! other function has more than 3 %. UR10: normal equations have more than 40 %. With some 300 parameters and the 71,466 scalar rows
+//! of series A a pass multiplies 3.2 G pairs, 6.4 Gflop or 0.1 s at the peak of a core; the written arm alone takes several fits.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
