@@ -6,8 +6,8 @@
 //! 29 · 30 = 870 for its products with each other, two to an instruction; 112 bytes in, 232 through the second-level cache.
 //! At 2.9 GHz with two 512-bit units that is 13 + 9.5 ns: no pass over 1,042 rows takes less than 24 µs there.
 //! Reached on a shared Intel Xeon at 2.9 GHz: 62 µs, 39 % of that bound; the products reach 65 of 92 G/s, the rows 14 of 46.
-//! On an AMD Zen 4 at 3.5 GHz, which has 16 operations in a cycle at either width: 72 µs; 1,042 rows 0.40 ms in 6 passes; 1,042,000 rows
-//! 0.65 s on one thread, 204 ms a pass, 214 MB.
+//! On an AMD Zen 4 at 3.5 GHz, which has 16 operations in a cycle at either width: 73 µs (7c20e9f in the same run 97 to 102); the fit of
+//! 1,042 rows 0.41 ms (0.62 to 0.79); of 1,042,000 rows 0.46 to 0.54 s on one thread in 6 passes of 77 ms, 214 MB (0.62 s, 514 MB).
 
 // A benchmark says what it measured.
 #![allow(clippy::print_stderr)]
