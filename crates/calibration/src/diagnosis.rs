@@ -19,7 +19,8 @@
 //! 9. [`discrepancy`] with [`marginal`]: random functions for model discrepancy. `confirmation`: a cause is identified only if it
 //!    remains significant with them and is selected again in [`halves`] of the rows (stability selection).
 //! 10. `findings` and `merged`: findings, ranked by their `contribution`, with doubts where a larger fault confounds them
-//!     (`confounding`); `unexplained`: the rest. `written`: the arm for compensation; `in_doubt`: its covariance for uncertain
+//!     (`confounding`); `unexplained`: the rest. `written`: the arm for compensation, beside the unknown rest of
+//!     a sensor's law (`sensor_law`); `in_doubt`: its covariance for uncertain
 //!     causes; `sensor_causes`: whether causes of the measurement are fitted with it.
 //! 11. [`finding`], `summary` and [`words`]: the result, as a contract for programs and as sentences for technicians.
 //!
@@ -36,13 +37,14 @@ pub mod discrepancy;
 pub mod halves;
 pub mod marginal;
 mod confirmation;
-mod contribution;
+pub mod contribution;
 mod confounding;
 mod merged;
 mod unexplained;
 mod written;
 mod in_doubt;
 mod sensor_causes;
+mod sensor_law;
 mod contract;
 pub mod newton;
 mod design_effect;

@@ -9,7 +9,7 @@ use super::design::FullDesign;
 use super::extension::{Extended, Subject};
 
 /// Contributions of the causes of a fit.
-pub(super) struct Contributions<'a> {
+pub struct Contributions<'a> {
     fit: &'a Extended,
     whole: &'a FullDesign,
     /// Whitened columns of each cause times its estimate.
@@ -20,7 +20,7 @@ pub(super) struct Contributions<'a> {
 
 impl<'a> Contributions<'a> {
     /// Contributions of the causes of `fit`, linearised as `whole`.
-    pub(super) fn new(subject: &Subject<'_>, fit: &'a Extended, whole: &'a FullDesign) -> Self {
+    pub fn new(subject: &Subject<'_>, fit: &'a Extended, whole: &'a FullDesign) -> Self {
         let effect = |cause: &Cause| {
             Candidate::of(cause, subject).columns(&whole.design) * DVector::from_vec(cause.values())
         };
@@ -31,13 +31,13 @@ impl<'a> Contributions<'a> {
     }
 
     /// Total contribution of `causes` together (mm RMS over the observations).
-    pub(super) fn rms_mm(&self, causes: &[usize]) -> f64 {
+    pub fn rms_mm(&self, causes: &[usize]) -> f64 {
         self.in_mm(&self.sum(causes))
     }
 
     /// Unique contribution of `causes` together (mm RMS over the observations): the part that links, frames and the other causes
     /// cannot absorb.
-    pub(super) fn unique_rms_mm(&self, causes: &[usize]) -> f64 {
+    pub fn unique_rms_mm(&self, causes: &[usize]) -> f64 {
         match causes {
             [] => 0.0,
             [one] => self.unique[*one],

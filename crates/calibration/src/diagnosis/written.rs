@@ -1,13 +1,16 @@
 //! The arm for compensation: geometry and identified effects, fitted with the causes of the measurement as nuisance.
 //!
 //! Every effect in this model moves real programs, so uncertain effects are excluded; geometry absorbs part of them, and the
-//! covariance accounts for the rest (`in_doubt`). The discrepancy in time is a nuisance too: it widens the arm's covariance
-//! instead of biasing its links.
+//! covariance accounts for the rest (`in_doubt`). The discrepancy in time and that of a sensor fault's law (`sensor_law`) are nuisances
+//! too: they widen the arm's covariance instead of biasing its links.
+
+use nalgebra::DMatrix;
 
 use super::cause::Cause;
 use super::design::Linear;
 use super::discrepancy::Discrepancy;
 use super::extension::{Extended, Freedom, Subject, filled, fit};
+use super::sensor_law;
 use crate::identification::prior_width::learn_tolerance;
 use crate::identification::tolerance::Tolerance;
 use crate::measurement::sensor::disturbance::Kind;
@@ -43,9 +46,7 @@ pub(super) fn fit_written(
     let catalogue = Tolerance { frame_mm: wide.frame_mm, frame_rad: wide.frame_rad, ..Tolerance::default() };
     let tolerance = learn_tolerance(&catalogue, &kept.parameters, &kept.priors, &kept.estimate);
     let held = refit(&Subject { tolerance: &tolerance, ..*subject }, &kept.causes, &kept);
-    let written = time_discrepancy
-        .and_then(|time_discrepancy| with_time_functions(subject, &held, time_discrepancy))
-        .unwrap_or(held);
+    let written = with_random_functions(subject, &held, time_discrepancy).unwrap_or(held);
     written.whole(&Subject { tolerance: &tolerance, ..*subject })
 }
 
@@ -62,18 +63,28 @@ fn refit(subject: &Subject<'_>, causes: &[Cause], near: &Extended) -> Extended {
 /// Prior standard deviations beyond which a link estimate is implausible.
 const IMPLAUSIBLE: f64 = 6.0;
 
-/// The fit with the functions of time as random effects, by one Gauss–Newton step, since their effect is small. `None` if a link that
-/// is confounded with them becomes implausible.
-fn with_time_functions(
+/// The fit with the functions of time and of the sensor's law as random effects, by one Gauss–Newton step, since their effect is small.
+/// `None` without either, and if a link that is confounded with them becomes implausible.
+fn with_random_functions(
     subject: &Subject<'_>,
     fit: &Extended,
-    time_discrepancy: &Discrepancy,
+    time_discrepancy: Option<&Discrepancy>,
 ) -> Option<Extended> {
+    if time_discrepancy.is_none() && !sensor_law::is_needed(fit) {
+        return None;
+    }
     let numbers: Vec<usize> = subject.observed.dataset.rows.iter().map(|r| r.number).collect();
     let linear = Linear::of(subject, fit);
+    let mut functions = sensor_law::columns(subject, fit, &linear);
+    functions.extend(time_discrepancy.map(Discrepancy::in_time_columns));
+    let columns: Vec<_> = functions.iter().flat_map(|columns| columns.column_iter()).collect();
+    if columns.is_empty() {
+        return None;
+    }
+    let noise = time_discrepancy.map_or(1.0, |discrepancy| discrepancy.noise);
     let whole = linear
-        .with_random_effects(&time_discrepancy.in_time_columns())
-        .prewhitened(0.0, &numbers, time_discrepancy.noise)
+        .with_random_effects(&DMatrix::from_columns(&columns))
+        .prewhitened(0.0, &numbers, noise)
         .whole();
     let (x, covariance) = whole.estimate(fit.x.len());
     let is_implausible = |k: usize| {

@@ -11,3 +11,4 @@ mod doubts;
 mod found;
 mod in_doubt;
 mod parts;
+mod rules;
