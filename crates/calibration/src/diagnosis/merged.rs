@@ -2,13 +2,13 @@
 //!
 //! Causes of one effect and joint share a finding already. Here three or more shifts are merged ("the set-up changed with
 //! time"), as are shifts that cannot be distinguished from a smooth drift; small contributions are merged without naming a
-//! part.
+//! part. If that is still more than a person reads at once, one effect at several joints is one finding.
 
 use super::confirmation::Confirmation;
 use super::confounding::Confounding;
 use super::contribution::Contributions;
 use super::discrepancy::Discrepancy;
-use super::finding::{Confidence, Finding, Gain, Session};
+use super::finding::{Confidence, Finding, FoundParameter, Gain, Session};
 use super::picture::Picture;
 use super::words;
 
@@ -34,6 +34,9 @@ const MOST_REPORTED: usize = 9;
 
 /// Contribution, as a share of that error, from which a doubtful finding is always reported separately.
 const DOUBTFUL_SHARE: f64 = 0.1;
+
+/// Contribution, as a share of that error, from which an identified finding is always reported separately.
+const IDENTIFIED_SHARE: f64 = 0.2;
 
 /// The findings with the causes that refer to them, in the order of `findings`.
 pub(super) fn from_findings(
@@ -99,7 +102,65 @@ pub(super) fn merge_findings(
         let small_finding = findings.iter_mut().find(|s| s.finding.effect == SMALL_DISTURBANCES);
         small_finding.into_iter().for_each(|s| s.doubted = excess.clone());
     }
+    merge_joints(&mut findings, contributions, IDENTIFIED_SHARE * geometric_mm);
     findings
+}
+
+/// Merges identified findings of one effect at several joints, the smallest effect first, while more than [`MOST_REPORTED`] findings
+/// are left. Effects that contribute `separate_mm` at any joint stay separate.
+fn merge_joints(findings: &mut Vec<MergedFinding>, contributions: &Contributions<'_>, separate_mm: f64) {
+    let is_member = |s: &MergedFinding, effect: &str| {
+        let finding = &s.finding;
+        finding.effect == effect
+            && finding.confidence == Confidence::Identified
+            && finding.rows.is_none()
+            && finding.joints.as_ref().is_some_and(|joints| joints.len() == 1)
+    };
+    while findings.len() > MOST_REPORTED {
+        let largest = |effect: &str| -> Option<f64> {
+            let members: Vec<f64> = findings
+                .iter()
+                .filter(|s| is_member(s, effect))
+                .map(|s| s.finding.worth_mm.unwrap_or(f64::INFINITY))
+                .collect();
+            (members.len() > 1).then(|| members.iter().copied().fold(0.0, f64::max))
+        };
+        let smallest = findings
+            .iter()
+            .filter_map(|s| Some((largest(&s.finding.effect)?, s.finding.effect.clone())))
+            .filter(|(largest, _)| *largest < separate_mm)
+            .min_by(|a, b| a.0.total_cmp(&b.0));
+        let Some((_, effect)) = smallest else { return };
+        merge(findings, |s| is_member(s, &effect), contributions, several_joints);
+    }
+}
+
+/// One effect at several joints. Its p-value is that of the least significant of them.
+fn several_joints(members: &[MergedFinding], worth_mm: f64) -> Finding {
+    let mut members: Vec<&MergedFinding> = members.iter().collect();
+    members.sort_by_key(|s| s.finding.joints.clone());
+    let first = &members[0].finding;
+    let findings = || members.iter().map(|s| &s.finding);
+    let joint = |finding: &Finding| finding.joints.as_ref().map_or(0, |joints| joints[0]);
+    let parameters = findings().flat_map(|finding| {
+        let at = joint(finding);
+        finding.parameters.iter().map(move |parameter| FoundParameter {
+            name: format!("joint {at} {}", parameter.name),
+            ..parameter.clone()
+        })
+    });
+    Finding {
+        cause: findings().map(|f| f.cause.as_str()).collect::<Vec<_>>().join("; "),
+        joints: Some(findings().map(joint).collect()),
+        parameters: parameters.collect(),
+        evidence: findings().map(|f| f.evidence.as_str()).collect::<Vec<_>>().join("; "),
+        p_value: findings().map(|f| f.p_value).fold(0.0, f64::max),
+        non_centrality: findings().filter_map(|f| f.non_centrality).reduce(f64::min),
+        gain: gain(members.iter().copied()),
+        worth_mm: Some(worth_mm),
+        alternatives: findings().flat_map(|f| f.alternatives.iter().cloned()).collect(),
+        ..first.clone()
+    }
 }
 
 /// Causes of doubtful findings below `doubtful_mm`, smallest first, as many as exceed [`MOST_REPORTED`].
@@ -161,8 +222,8 @@ fn merge(
     *findings = others;
 }
 
-fn gain(members: &[MergedFinding]) -> Gain {
-    let gains = members.iter().map(|s| s.finding.gain);
+fn gain<'a>(members: impl IntoIterator<Item = &'a MergedFinding>) -> Gain {
+    let gains = members.into_iter().map(|s| s.finding.gain);
     gains
         .reduce(|a, b| Gain {
             cv_rmse_before_mm: a.cv_rmse_before_mm.max(b.cv_rmse_before_mm),

@@ -24,3 +24,20 @@ fn the_wire_of_the_irb_120_jumped_and_the_held_out_error_halves() {
     let names: Vec<&str> = found.diagnosis.findings.iter().map(|f| f.effect.as_str()).collect();
     assert!(names.contains(&"sensor-zero-shift") && names.contains(&"angle-rounding"), "{names:?}");
 }
+
+#[test]
+#[cfg_attr(not(measured_data), ignore = "TRUEGRIND_DATA names no folder of measured data")]
+fn the_findings_of_the_ur5_are_few_and_each_contributes() {
+    let found = diagnosed("ur5-jacobi/grid.csv", "universal-robots-ur5", &Options::default());
+    let findings = &found.diagnosis.findings;
+    let effects: Vec<&str> = findings.iter().map(|f| f.effect.as_str()).collect();
+    assert!(findings.len() <= 10, "{effects:?}");
+    // Backlash of several joints is one finding with all of them, and still moves programs.
+    let backlash = findings.iter().find(|f| f.effect == "backlash").unwrap();
+    let joints = backlash.joints.as_ref().unwrap();
+    assert!(joints.len() > 1 && backlash.parameters.len() >= joints.len(), "{backlash:?}");
+    let acting = found.estimated.model.effects.iter().filter(|e| e.name() == "backlash" && !e.is_zero());
+    assert_eq!(acting.count(), joints.len());
+    let held_out = found.diagnosis.fits.extended;
+    assert!(held_out.cv_rmse_mm < 0.0485 && held_out.cv_blocks_rmse_mm < 0.0544, "{held_out:?}");
+}
