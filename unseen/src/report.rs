@@ -160,6 +160,11 @@ fn bounded(hits: usize, all: usize) -> String {
     format!("{hits} of {all}, {share:.1} % ({:.1} to {:.1})", 100.0 * low, 100.0 * high)
 }
 
+/// The mean of probabilities, in percent.
+fn percent_of(probabilities: &[f64]) -> String {
+    format!("{:.1} %", 100.0 * probabilities.iter().sum::<f64>() / probabilities.len().max(1) as f64)
+}
+
 fn number(value: Option<f64>, digits: usize) -> String {
     value.map_or_else(|| "–".to_owned(), |v| format!("{v:.digits$}"))
 }
@@ -246,6 +251,7 @@ fn marks_in_words(of: &[&Outcome]) -> String {
     let told = parts.clone().filter(|o| o.marks.as_ref().is_ok_and(Marks::told)).count();
     let on_blocks: Vec<f64> = marks.iter().map(|m| m.blocks_mm / m.fresh_mm).collect();
     let held: Vec<f64> = marks.iter().map(|m| m.held_out_mm / m.fresh_mm).collect();
+    let by_chance: Vec<f64> = marks.iter().map(|m| m.near_by_chance).collect();
     let seconds: Vec<f64> = marks.iter().map(|m| m.seconds).collect();
     let surely = parts.clone().filter(|o| o.marks.as_ref().is_ok_and(|m| m.true_names() > 0)).count();
     let jointed: Vec<_> = parts.clone().filter(|o| !o.setting.joints.is_empty()).collect();
@@ -273,6 +279,7 @@ fn marks_in_words(of: &[&Outcome]) -> String {
         format!("error of shape over what a written model file says of it: median {}, nine in ten below {}", number(quantile(&said, 0.5), 2), number(quantile(&said, 0.9), 2)),
         format!("  not written but with --allow-doubtful: {}, not at all: {}", bounded(count(&|m| m.written == Written::Doubtful), n), bounded(count(&|m| m.written == Written::No), n)),
         format!("held-out error over that of fresh rows, quartiles: random folds {} (within 10 %: {})", quartiles(&held), bounded(near(&held), n)),
+        format!("  within 10 % as chance alone would have it: {}", percent_of(&by_chance)),
         format!("  blocks {} (within 10 %: {})", quartiles(&on_blocks), bounded(near(&on_blocks), n)),
         format!("fresh rows over the noise, quartiles: geometry alone {}; with causes {}", quartiles(&over(0)), quartiles(&over(1))),
         format!("time: median {} s, nine in ten below {} s, longest {} s", number(quantile(&seconds, 0.5), 1), number(quantile(&seconds, 0.9), 1), number(quantile(&seconds, 1.0), 1)),

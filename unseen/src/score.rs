@@ -60,6 +60,8 @@ pub struct Marks {
     pub blocks_mm: f64,
     /// What fresh rows show of the extended model (mm).
     pub fresh_mm: f64,
+    /// The probability that chance alone leaves the held-out error within 10 % of that.
+    pub near_by_chance: f64,
     /// Geometry alone on fresh rows, and the extended model, over the noise.
     pub fresh_over_noise: [f64; 2],
     /// Time (s).
@@ -154,7 +156,7 @@ pub fn marks(case: &Case, reply: &Reply) -> Result<Marks, String> {
     });
     let (visits, lines) = case.fresh();
     let fresh = text(case.sensor.kind, &lines, None);
-    let [geometry_mm, fresh_mm] = reply.fresh_mm(&fresh, &visits)?;
+    let fresh = reply.fresh(&fresh, &visits)?;
     let noise_mm = case.sensor.sigma_mm * (case.sensor.lengths() as f64).sqrt();
     Ok(Marks {
         findings: findings.collect(),
@@ -163,8 +165,9 @@ pub fn marks(case: &Case, reply: &Reply) -> Result<Marks, String> {
         shape_sigma_mm: reply.shape_sigma_mm(&case.clean(), &case.sensor.target.translation.vector),
         held_out_mm: reply.held_out_mm,
         blocks_mm: reply.held_out_blocks_mm,
-        fresh_mm,
-        fresh_over_noise: [geometry_mm, fresh_mm].map(|error| error / noise_mm),
+        fresh_mm: fresh.extended_mm,
+        near_by_chance: fresh.within_a_tenth(case.walk.visits.len()),
+        fresh_over_noise: [fresh.geometry_mm, fresh.extended_mm].map(|error| error / noise_mm),
         seconds: reply.seconds,
     })
 }

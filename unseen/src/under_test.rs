@@ -22,6 +22,7 @@ use truegrind_calibration::measurement::split;
 use crate::arms::{Angles, Pose};
 use crate::designs::Visit;
 use crate::shape::shape_sigma;
+use crate::statistics::normal_below;
 
 /// A finding, as the JSON has it.
 #[derive(Debug, Clone, PartialEq)]
@@ -84,6 +85,65 @@ pub struct Reply {
     identified: Option<Model>,
     found: Diagnosed,
     convention: AngleConvention,
+}
+
+/// Errors on fresh rows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Fresh {
+    /// Geometry alone (RMS, mm).
+    pub geometry_mm: f64,
+    /// The extended model (RMS, mm).
+    pub extended_mm: f64,
+    /// Poses that are counted.
+    pub poses: usize,
+    /// Rows of a pose.
+    pub rows_of_a_pose: f64,
+    /// Variance over the poses of the extended model's mean square at a pose, in units of the squared mean.
+    pub dispersion: f64,
+}
+
+impl Fresh {
+    /// From the errors of rows (mm), those that are counted.
+    pub fn of(geometry: &[f64], extended: &[f64], visits: &[Visit]) -> Self {
+        let mut poses: Vec<(f64, f64)> = Vec::new();
+        let mut sums = [0.0; 2];
+        for ((visit, geometry), extended) in visits.iter().zip(geometry).zip(extended) {
+            if !visit.counted {
+                continue;
+            }
+            if visit.repeat == 0 || poses.is_empty() {
+                poses.push((0.0, 0.0));
+            }
+            sums[0] += geometry * geometry;
+            sums[1] += extended * extended;
+            if let Some((sum, rows)) = poses.last_mut() {
+                *sum += extended * extended;
+                *rows += 1.0;
+            }
+        }
+        let rows: f64 = poses.iter().map(|(_, rows)| rows).sum();
+        let mean = sums[1] / rows;
+        let count = poses.len() as f64;
+        let variance =
+            poses.iter().map(|(sum, rows)| (sum / rows - mean).powi(2)).sum::<f64>() / (count - 1.0);
+        Self {
+            geometry_mm: (sums[0] / rows).sqrt(),
+            extended_mm: mean.sqrt(),
+            poses: poses.len(),
+            rows_of_a_pose: rows / count,
+            dispersion: variance / (mean * mean),
+        }
+    }
+
+    /// The probability that the errors of two independent samples of poses, these and others on `rows` rows, are within 10 % of each
+    /// other by chance alone: their mean squares are normal. Rows whose noise is correlated count as independent, so it is too large
+    /// there.
+    pub fn within_a_tenth(&self, rows: usize) -> f64 {
+        let others = rows as f64 / self.rows_of_a_pose;
+        // Half of the relative variance of a mean square is that of its root.
+        let sigma = 0.5 * (self.dispersion * (1.0 / self.poses as f64 + 1.0 / others)).sqrt();
+        normal_below(1.1_f64.ln() / sigma) - normal_below(0.9_f64.ln() / sigma)
+    }
 }
 
 fn read(text: &str) -> Result<Dataset, String> {
@@ -226,24 +286,20 @@ impl Reply {
     }
 
     /// What geometry alone and the extended model, each with its frames and causes of the measurement, get wrong on fresh rows of
-    /// the same measurement (RMS, mm): on those rows of a file that are counted.
+    /// the same measurement: on those rows of a file that are counted.
     ///
     /// # Errors
     /// What the import would say.
-    pub fn fresh_mm(&self, text: &str, visits: &[Visit]) -> Result<[f64; 2], String> {
+    pub fn fresh(&self, text: &str, visits: &[Visit]) -> Result<Fresh, String> {
         let mut rows = dataset(&read(text)?, self.convention, &self.sheet)?;
         // A fresh row stands in the measurement where its time does.
         for (row, visit) in rows.rows.iter_mut().zip(visits) {
             row.number = visit.row;
         }
         let observed = prepare(&rows, &self.sheet, true).observed;
-        Ok([&self.found.geometric, &self.found.extended].map(|fit| {
-            let errors = errors_on(&observed, &fit.model, &fit.frames);
-            let counted = errors.iter().zip(visits).filter(|(_, visit)| visit.counted);
-            let (sum, count) =
-                counted.fold((0.0, 0.0), |(sum, n), (error, _)| (sum + error * error, n + 1.0));
-            (sum / count).sqrt()
-        }))
+        let [geometry, extended] = [&self.found.geometric, &self.found.extended]
+            .map(|fit| errors_on(&observed, &fit.model, &fit.frames));
+        Ok(Fresh::of(&geometry, &extended, visits))
     }
 }
 

@@ -4,13 +4,14 @@ use std::collections::BTreeSet;
 
 use nalgebra::{UnitQuaternion, Vector3};
 use truegrind_unseen::arms::{Pose, SHEETS, Strain};
-use truegrind_unseen::draw::{Purpose, between, generator};
+use truegrind_unseen::designs::Visit;
+use truegrind_unseen::draw::{Purpose, between, generator, normal};
 use truegrind_unseen::sensors::Kind as Measures;
 use truegrind_unseen::shape::distance;
 use truegrind_unseen::stability::same;
 use truegrind_unseen::statistics::{quantile, wilson};
 use truegrind_unseen::truth::{Family, Kind, Mark, Meaning, NAMES, Parts, SOMETHING_ELSE, Truth, meanings};
-use truegrind_unseen::under_test::Finding;
+use truegrind_unseen::under_test::{Finding, Fresh};
 
 #[test]
 fn a_name_means_one_family_and_a_kind_has_one_name() {
@@ -184,4 +185,29 @@ fn only_one_file_names_the_tool() {
     for file in tool {
         assert!(!std::fs::read_to_string(&file).unwrap().contains("truegrind_unseen"), "{}", file.display());
     }
+}
+
+/// By chance alone the errors of two samples differ as their sizes allow: readings of one pose count once, and rows that are not counted
+/// not at all.
+#[test]
+fn chance_allows_what_the_numbers_of_poses_allow() {
+    let mut rng = generator(1, 2, 3, 4, Purpose::Noise);
+    let visit = |k: usize| Visit {
+        q: [0.0; 6],
+        before: [0.0; 6],
+        repeat: k % 5,
+        hours: 0.0,
+        row: k,
+        counted: k < 2500,
+    };
+    let visits: Vec<Visit> = (0..3000).map(visit).collect();
+    let poses: Vec<f64> = (0..600).map(|_| normal(&mut rng)).collect();
+    let errors: Vec<f64> = (0..3000).map(|k| if k < 2500 { poses[k / 5] } else { 100.0 }).collect();
+    let fresh = Fresh::of(&errors, &errors, &visits);
+    assert_eq!((fresh.poses, fresh.rows_of_a_pose), (500, 5.0));
+    // The square of a normal error has twice the variance of its squared mean.
+    assert!((fresh.dispersion - 2.0).abs() < 0.5 && (fresh.extended_mm - 1.0).abs() < 0.1, "{fresh:?}");
+    let exact = Fresh { dispersion: 2.0, ..fresh };
+    // σ of the logarithm of the ratio is ½ √(2 (1/500 + 1/500)): Φ(2.131) − Φ(−2.356).
+    assert!((exact.within_a_tenth(2500) - 0.9742).abs() < 1e-3, "{}", exact.within_a_tenth(2500));
 }
