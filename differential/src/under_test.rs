@@ -6,7 +6,6 @@ use nalgebra::Point3;
 use truegrind::arm::estimated::Estimated;
 use truegrind::compensation::cell::Cell;
 use truegrind::compensation::compensate::{CompensateError, Compensated, compensate};
-use truegrind::compensation::condition::payload::Loads;
 use truegrind::compensation::cut::Cuts;
 use truegrind::compensation::deviation::Status as Became;
 use truegrind::compensation::options::{self, Circles, Emit};
@@ -153,7 +152,7 @@ pub fn corrected_task(
         tolerance_mm: options.tolerance_mm,
         joint_targets: options.joint_targets,
         condition,
-        loads: options.payload.is_none().then(|| Loads::of(&program)),
+        loads: options.payload.is_none().then(|| program.loads()),
         flag_unknown_starts: true,
         points: false,
         cuts: if case.whole_cuts { Cuts::Whole } else { Cuts::Single },

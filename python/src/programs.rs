@@ -6,7 +6,6 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList, PyString, PyTuple};
 use truegrind::compensation::cell::robot_match::{cell_robot_mismatch, program_robot_mismatch};
 use truegrind::compensation::cell::Used;
-use truegrind::compensation::condition::payload::Loads;
 use truegrind::compensation::frames::surface_frames::surface_frame_contradictions;
 use truegrind::compensation::risk::placement::Placement;
 use truegrind::compensation::cell::robot_match::unreachable_motions;
@@ -394,7 +393,7 @@ fn corrected(
     report_step(&format!("reading {}", sources.name()));
     let setup = nc_setup(&cell, &arm.robot);
     let mut program = sources.task(&setup);
-    let loads = own_loads.then(|| Loads::of(&program));
+    let loads = own_loads.then(|| program.loads());
     // The syntax trees are larger than the file and not needed once the motions are listed.
     program.drop_trees();
     let program = program;
@@ -556,7 +555,7 @@ impl Run<'_> {
                 return Err(Refusal::new(Kind::Cell, found.join("; ")));
             }
         }
-        let loads = [original.as_ref().unwrap_or(&task), &task].map(|p| own_loads.then(|| Loads::of(p)));
+        let loads = [original.as_ref().unwrap_or(&task), &task].map(|p| own_loads.then(|| p.loads()));
         let name = self.programs.name();
         let (model, named, knowledge, after) = match self.actual {
             Some(actual) => (&actual.model, format!("actual arm {}", actual.name), None, After::Achieved),

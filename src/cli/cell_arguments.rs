@@ -9,10 +9,10 @@ use truegrind::arm::condition::Condition;
 use truegrind::arm::estimated::Estimated;
 use truegrind::arm::model::Model;
 use truegrind::compensation::cell::{Cell, Used};
-use truegrind::compensation::condition::payload::Loads;
 use truegrind::compensation::frames::surface_frames::surface_frame_contradictions;
 use truegrind::compensation::frames::taught::contradictions;
 use truegrind::programs::motion::Listing;
+use truegrind::programs::motion::load::Loads;
 use truegrind::programs::reading::Program;
 use truegrind::surfaces::SurfaceFile;
 
@@ -43,7 +43,7 @@ pub(super) struct CellArguments {
 impl CellArguments {
     /// The loads that the program declares; `None` if `--payload` overrides them.
     pub(super) fn loads(&self, program: &Program<'_>) -> Option<Loads> {
-        self.payload.is_none().then(|| Loads::of(program))
+        self.payload.is_none().then(|| program.loads())
     }
 
     /// Cell, surface and condition; the condition starts from that of the model.

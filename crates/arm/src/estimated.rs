@@ -6,6 +6,7 @@ mod checks;
 mod error;
 mod file;
 mod posterior;
+mod width_uncertainty;
 
 use nalgebra::{DMatrix, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
@@ -22,7 +23,7 @@ use truegrind_math::se3::{Pose, vector_from_pose};
 use truegrind_math::statistics::ErrorSummary;
 
 pub use error::{ModelFileError, SCHEMA};
-pub use posterior::{PosteriorComponent, WidthUncertainty};
+pub use width_uncertainty::{PosteriorComponent, WidthUncertainty};
 
 /// How a fit is judged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

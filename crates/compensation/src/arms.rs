@@ -1,13 +1,14 @@
 //! The nominal arm, which the controller computes with, and the estimated arm.
 
 use crate::condition::arm_conditions::ArmConditions;
-use crate::condition::payload::{Load, Loads};
+use crate::condition::payload::payload_at;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::estimated::Estimated;
 use truegrind_arm::inverse::Inverse;
 use truegrind_arm::model::Model;
 use truegrind_programs::motion::Listing;
+use truegrind_programs::motion::load::{Load, Loads};
 
 /// Whether an effect depends on the payload.
 pub(crate) fn is_load_dependent(effect: &Effect) -> bool {
@@ -47,6 +48,6 @@ impl<'a> Arms<'a> {
             return Vec::new();
         };
         let motions = listing.motions.iter().enumerate();
-        motions.map(|(index, motion)| loads.at(index, motion, listing, model)).collect()
+        motions.map(|(index, motion)| payload_at(loads, index, motion, listing, model)).collect()
     }
 }

@@ -1,9 +1,9 @@
 //! Bounds and choices of a correction.
 
-use crate::condition::payload::Loads;
 use crate::cut::Cuts;
 use crate::risk::placement::Placement;
 use truegrind_arm::condition::Condition;
+use truegrind_programs::motion::load::Loads;
 use truegrind_programs::motion::{Motion, MotionKind};
 
 /// How corrected targets are written.

@@ -8,7 +8,6 @@ use nalgebra::{Point3, Vector3};
 use crate::arms::Arms;
 use crate::backlash::sides::{MotionEnd, ReachedEnd, backlash_sides};
 use crate::cell::Cell;
-use crate::condition::payload::Loads;
 use crate::configuration::{configured, monitored};
 use crate::deviation::{After, Deviation, ON_SURFACE_MM, PathPoint, PathReport, Status};
 use crate::frames::frame_table::FrameTable;
@@ -17,6 +16,7 @@ use truegrind_arm::condition::Condition;
 use truegrind_arm::estimated::{Estimated, RegisteredFrame};
 use truegrind_arm::model::{Joints, Model};
 use truegrind_math::se3::Pose;
+use truegrind_programs::motion::load::Loads;
 use truegrind_programs::motion::{Listing, MotionKind, Reason, Role, TargetValue};
 use truegrind_surfaces::Surface;
 

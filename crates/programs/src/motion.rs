@@ -7,6 +7,7 @@
 //! Units are those of the file: mm, degrees for joint targets, quaternions scalar first and exactly as written (not
 //! normalised; [`RobTarget::pose`] and [`Frame::pose`] normalise).
 
+pub mod load;
 mod reason;
 mod target;
 

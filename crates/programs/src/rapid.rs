@@ -29,6 +29,7 @@ mod reaching_motions;
 mod flow;
 pub mod mark;
 mod task;
+mod payload;
 pub mod task_list;
 mod print;
 mod rewrite;

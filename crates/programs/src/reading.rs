@@ -2,6 +2,7 @@
 
 use crate::edit::EditError;
 use crate::motion::Listing;
+use crate::motion::load::Loads;
 use crate::nc::setup::Setup;
 use crate::rewrite::{Change, RewriteOptions, Rewritten};
 use crate::{nc, rapid};
@@ -123,6 +124,14 @@ impl<'s> Program<'s> {
         match self {
             Program::Rapid(task) => &task.listing,
             Program::Nc(task) => &task.listing,
+        }
+    }
+
+    /// The loads that it states in addition to those of its tools. NC programs state none.
+    pub fn loads(&self) -> Loads {
+        match self {
+            Program::Rapid(task) => task.loads(),
+            Program::Nc(_) => Loads::default(),
         }
     }
 

@@ -7,12 +7,12 @@ use std::collections::HashMap;
 use nalgebra::Vector3;
 
 use crate::backlash::sides::JointSides;
-use crate::condition::payload::Load;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::inverse::Inverse;
 use truegrind_arm::model::{Joints, Model, PreparedModel};
 use truegrind_math::se3::Pose;
+use truegrind_programs::motion::load::Load;
 
 /// A payload as a hash key: the bits of mass and centre.
 type LoadKey = Option<[u64; 4]>;

@@ -1,6 +1,7 @@
 //! Notes of a plan: what was not checked, what was assumed, and how backlash and payload enter.
 
 use crate::arms::{Arms, is_load_dependent};
+use crate::condition::payload::payload_at;
 use crate::options::Options;
 use crate::target::solved_target::SolvedTargets;
 use truegrind_arm::effect::Effect;
@@ -118,7 +119,7 @@ pub(crate) fn load_notes(listing: &Listing, arms: &Arms<'_>, options: &Options) 
     };
     let mut out = Vec::new();
     let motions = || listing.motions.iter().enumerate().filter(|(_, m)| m.left.is_none() && m.tool.is_some());
-    let at = |(index, motion): (usize, &Motion)| loads.at(index, motion, listing, model);
+    let at = |(index, motion): (usize, &Motion)| payload_at(loads, index, motion, listing, model);
     let stated: Vec<f64> = motions().filter_map(at).map(|load| load.mass_kg).collect();
     let silent = motions().count() - stated.len();
     let base = options.condition.payload_kg.map_or("no payload".to_owned(), |kg| format!("{kg} kg"));

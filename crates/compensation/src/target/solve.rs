@@ -15,7 +15,6 @@ use rayon::prelude::*;
 use crate::arms::Arms;
 use crate::backlash::sides::{BacklashSides, JointSides, MotionEnd, ReachedEnd, backlash_sides};
 use crate::condition::arm_conditions::select;
-use crate::condition::payload::Load;
 use crate::configuration::monitored;
 use crate::deviation::Deviation;
 use crate::feasibility::correction_bounds::forbidden;
@@ -34,6 +33,7 @@ use truegrind_arm::inverse::configuration::Configuration;
 use truegrind_arm::model::Joints;
 use truegrind_arm::region::NearestSample;
 use truegrind_math::se3::Pose;
+use truegrind_programs::motion::load::Load;
 use truegrind_programs::motion::{Listing, MotionKind, RobTarget, Role, Switch, TargetValue};
 
 /// Approximate memory that a portion keeps (bytes).

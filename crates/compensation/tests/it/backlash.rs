@@ -10,13 +10,13 @@ use truegrind_arm::effect::compliance::Compliance;
 use truegrind_arm::inverse::Inverse;
 use truegrind_arm::model::{Joints, Model};
 use truegrind_compensation::cell::Cell;
-use truegrind_compensation::condition::payload::Loads;
 use truegrind_compensation::deviation::Status;
 use truegrind_compensation::options::Options;
 use truegrind_compensation::plan::Plan;
 use truegrind_compensation::plan::planner::plan;
 use truegrind_compensation::plan::reason::OutcomeReason;
 use truegrind_math::se3::Pose;
+use truegrind_programs::motion::load::Loads;
 use truegrind_programs::motion::{Listing, MotionKind, TargetValue};
 use truegrind_programs::rapid::Task;
 use truegrind_programs::rewrite::RewriteOptions;
@@ -171,7 +171,7 @@ fn worst_end(program: &[u8], text: &str, arm: &Model) -> f64 {
 fn sides_and_loads_of_the_program_leave_nothing_and_the_middle_does() {
     let text = source();
     let task = Task::read(&[("p.mod", text.as_bytes())]);
-    let loads = Loads::of_task(&task);
+    let loads = task.loads();
     for seed in 0..3 {
         let arm = worn(seed);
         let full = options(5.0, Some(loads.clone()));
@@ -194,7 +194,7 @@ fn sides_and_loads_of_the_program_leave_nothing_and_the_middle_does() {
 fn the_path_between_targets_takes_up_the_play_where_joints_turn() {
     let text = source();
     let task = Task::read(&[("p.mod", text.as_bytes())]);
-    let loads = Loads::of_task(&task);
+    let loads = task.loads();
     let arm = worn(4);
     let meant = intended(&text);
     let off_path = |program: &[u8], planned: &Plan| {
@@ -276,7 +276,7 @@ fn joints_turn_on_lines_that_begin_in_another_object_too() {
     assert!(text.contains("tGrip;") && text.contains("wSame;"));
     let task = Task::read(&[("p.mod", text.as_bytes())]);
     let arm = worn(0);
-    let (_, program) = rewrite(&text, &arm, &options(5.0, Some(Loads::of_task(&task))));
+    let (_, program) = rewrite(&text, &arm, &options(5.0, Some(task.loads())));
     let left = worst_end(&program, &text, &arm);
     assert!(left < 1e-3, "where the object changes {left} mm are left");
 }

@@ -7,7 +7,6 @@ use truegrind_arm::effect::compliance::Compliance;
 use truegrind_arm::effect::harmonic::Harmonic;
 use truegrind_arm::parameter::arm_parameters;
 use truegrind_compensation::cell::Cell;
-use truegrind_compensation::condition::payload::Loads;
 use truegrind_compensation::risk::placement::Placement;
 use truegrind_programs::rapid::Task;
 
@@ -31,7 +30,7 @@ fn what_is_in_doubt_changes_no_program_and_is_in_its_sigma() {
     doubted.covariance = DMatrix::from_diagonal(&DVector::from_vec(variances));
     let task = Task::read(&[("p.mod", source.as_slice())]);
     // The σ decides nothing here.
-    let loads = Some(Loads::of_task(&task));
+    let loads = Some(task.loads());
     let options = Options { loads, placement: Placement::Absolute, max_risk: 1.0, ..Options::default() };
     let before = rewritten(&source, &plain, &Cell::default(), &options);
     let after = rewritten(&source, &doubted, &Cell::default(), &options);

@@ -1,6 +1,7 @@
 //! Payloads that programs state.
 
-use truegrind_compensation::condition::payload::{Grip, Load, Loads};
+use truegrind_compensation::condition::payload::payload_at;
+use truegrind_programs::motion::load::{Grip, Load, Loads};
 use truegrind_programs::rapid::Task;
 
 const HEAD: &str = "MODULE M\n PERS tooldata t := [TRUE,[[0,0,100],[1,0,0,0]],[2,[0,0,50],[1,0,0,0],0,0,0]];\n \
@@ -12,7 +13,7 @@ fn grips(body: &str) -> (Task<'static>, Loads) {
     let body = body.replace("m;", &format!("MoveL {target},v100,fine,t;")).replace("TARGET", target);
     let text: &'static str = Box::leak(format!("{HEAD}{body}ENDMODULE\n").into_boxed_str());
     let task = Task::read(&[("p.mod", text.as_bytes())]);
-    let loads = Loads::of_task(&task);
+    let loads = task.loads();
     (task, loads)
 }
 
@@ -21,7 +22,7 @@ fn masses(body: &str) -> Vec<Option<f64>> {
     let arm = super::nominal();
     let listing = &task.listing;
     (0..listing.motions.len())
-        .map(|k| loads.at(k, &listing.motions[k], listing, &arm).map(|load: Load| load.mass_kg))
+        .map(|k| payload_at(&loads, k, &listing.motions[k], listing, &arm).map(|load: Load| load.mass_kg))
         .collect()
 }
 
@@ -57,7 +58,7 @@ fn loads_add_up_at_their_common_centre_and_tload_stands_for_both() {
     let (task, loads) = grips("PROC main()\n GripLoad part;\n m;\nENDPROC\n");
     let listing = &task.listing;
     let arm = super::nominal();
-    let load = loads.at(0, &listing.motions[0], listing, &arm).unwrap();
+    let load = payload_at(&loads, 0, &listing.motions[0], listing, &arm).unwrap();
     // 2 kg at 50 mm and 3 kg at 20 mm beyond the TCP at 100 mm.
     assert!((load.centre_mm[2] - (2.0 * 50.0 + 3.0 * 120.0) / 5.0).abs() < 1e-9, "{load:?}");
     let body = "PROC main()\n GripLoad part;\n MoveL TARGET,v100,fine,t\\TLoad:=part;\n \
@@ -67,7 +68,7 @@ fn loads_add_up_at_their_common_centre_and_tload_stands_for_both() {
     let text = "MODULE M\n PERS tooldata u := [TRUE,[[0,0,1],[1,0,0,0]],[-1,[0,0,0],[1,0,0,0],0,0,0]];\n PROC main()\n \
                 MoveL [[400,0,300],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,u;\n ENDPROC\nENDMODULE\n";
     let task = Task::read(&[("p.mod", text.as_bytes())]);
-    assert_eq!(Loads::default().at(0, &task.listing.motions[0], &task.listing, &arm), None);
+    assert_eq!(payload_at(&Loads::default(), 0, &task.listing.motions[0], &task.listing, &arm), None);
 }
 
 #[test]

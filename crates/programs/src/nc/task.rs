@@ -19,6 +19,7 @@ mod siemens_names;
 mod one_shot;
 mod block;
 mod shift;
+mod file_scan;
 mod prescan;
 mod tools;
 mod words;
@@ -42,7 +43,7 @@ use crate::motion::{
 use block::Block;
 pub(super) use block_context::{BlockArc, BlockContext, StartDependency, StateEvent};
 use file_effects::FileEffects;
-use prescan::FileScan;
+use file_scan::FileScan;
 
 /// NC files that are read together: each runs on its own, the setup is common to all.
 #[derive(Debug)]
