@@ -1,25 +1,25 @@
 //! An arm that degrades over a working day, calibrated periodically or continuously: rls-2025.
 //!
-//! The paper's measurements are not public. Here its TX60 is simulated, with the physics stated in the experiment file:
-//! links warm up towards a steady state and grow, zeros of the joints wander with wear. Nothing here is therefore a
-//! measurement, and every table says so; a figure of the paper stands beside ours only where its prose states one.
+//! The paper's measurements are not public, so its TX60 is simulated with the physics stated in the experiment file:
+//! links warm up and grow towards a steady state, joint zeros drift with wear. Every table is therefore labelled as
+//! simulated. A figure of the paper is shown next to ours only where its prose states one.
 //!
-//! **Protocol.** Several groups of poses, hours apart, a full pose read at each. Of each group half identify, half
-//! verify. The frames of sensor and target come from a fit of links and frames together to the identification poses of
-//! the first group and are then frozen: with known frames four poses give 24 equations for 24 parameters, with unknown
-//! ones they do not (rank and condition number are printed). Errors are mean distances of positions.
+//! **Protocol.** Several groups of poses are measured hours apart, with a full pose reading at each. Half of each group
+//! identifies, half verifies. The frames of sensor and target are fitted together with the links to the identification
+//! poses of the first group, then frozen: with known frames four poses give 24 equations for 24 parameters, with unknown
+//! frames they do not (rank and condition number are printed). Errors are mean position distances.
 //!
-//! **Methods.** All start from the nominal arm and go from group to group, each beginning where it ended.
-//! - *RLS*: rls-2025 eq. 14, row by row in square-root form, rows weighed by the sensor; the prior of the first group is
-//!   manufacturing tolerance; each pose is linearised at the state it meets. Without forgetting, as the paper has it.
-//! - *RLS, forgetting*: the same with a factor per pose.
-//! - *LM*: the poses of the present group alone, converged, rows weighed alike. No memory of earlier groups.
-//! - *LM, memory*: the same with the last group's covariance as prior: RLS by another name.
+//! **Methods.** All start from the nominal arm and process the groups in order, each group from the previous result.
+//! - *RLS*: rls-2025 eq. 14, row by row in square-root form, rows weighted by the sensor's noise. The prior of the first
+//!   group is the manufacturing tolerance. Each pose is linearised at the current state. No forgetting, as in the paper.
+//! - *RLS, forgetting*: the same with a forgetting factor per pose.
+//! - *LM*: only the poses of the current group, converged, with the same weights. No memory of earlier groups.
+//! - *LM, memory*: the same with the last group's covariance as prior; equivalent to RLS.
 //! - *LM, stopped*: as printed elsewhere in this literature: μ = 5, mm and radians unweighted, a few steps.
 //!
-//! **What to expect.** Without forgetting, RLS *is* batch least squares of one linearisation, to rounding. A gap
-//! between RLS and LM must have another cause, and the three LM variants show which: memory, weights, or the stop. The
-//! paper's own before-figures differ between its methods (0.571 and 0.743 mm), which no method can cause.
+//! **Expected result.** Without forgetting, RLS equals batch least squares of one linearisation, to rounding. A gap
+//! between RLS and LM must have another cause; the three LM variants separate memory, weights and early stopping. The
+//! errors before calibration differ between the paper's own methods (0.571 and 0.743 mm), which no method can cause.
 
 pub(crate) mod settings;
 mod arm;
@@ -43,32 +43,32 @@ pub use verdict::{AgainstRls, Outcome};
 /// The result.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DegradationResult {
-    /// What was asked for.
+    /// Settings of the experiment.
     pub settings: Degradation,
     /// Robot.
     pub robot: String,
-    /// Poses that verify, in each group.
+    /// Verification poses in each group.
     pub verification: usize,
     /// Mean error of the nominal arm over all poses of each group (mm): Fig. 4.
     pub nominal_mm: Vec<f64>,
-    /// Mean error of the arm as known after the first group, not calibrated again (mm).
+    /// Mean error of the arm calibrated with the first group only (mm).
     pub neglected_mm: Vec<f64>,
-    /// The study of counts: Fig. 7 and Table 2.
+    /// Error over the number of poses: Fig. 7 and Table 2.
     pub counts: Vec<Count>,
     /// Periodic (all identification poses) and continuous calibration: Figs 9 to 14, Table 4.
     pub journeys: Vec<Run>,
-    /// Every way against RLS, over the arms.
+    /// Every method against RLS, over the arms.
     pub against_rls: Vec<AgainstRls>,
-    /// What the sensor alone scatters by (mm).
+    /// Mean position error from the sensor's noise alone (mm).
     pub noise_floor_mm: f64,
     /// Seed.
     pub seed: u64,
 }
 
-/// Runs the experiment on its recipe. `resolve` gives the nominal model of a robot by name.
+/// Simulates the experiment's recipe and runs all methods. `resolve` returns the nominal model of a robot by name.
 ///
 /// # Errors
-/// [`ExperimentError::Recipe`] where the recipe gives no measurements.
+/// [`ExperimentError::Recipe`] when the recipe cannot be simulated.
 pub fn run(
     settings: &Degradation,
     experiment: &str,
@@ -125,7 +125,7 @@ pub fn run(
         counts: settings.counts.iter().map(|&count| count_of(&arms, count)).collect(),
         against_rls: verdict::against_rls(&journeys),
         journeys,
-        // The mean length of a vector of three normal numbers is σ √(8/π).
+        // Mean norm of a vector of three normal variates: σ √(8/π).
         noise_floor_mm: (noise.sigma_mm + 2.0 * noise.per_metre_mm) * (8.0 / std::f64::consts::PI).sqrt(),
         seed,
     })

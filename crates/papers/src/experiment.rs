@@ -1,4 +1,4 @@
-//! Experiments as TOML: what is run, on which rows, by which methods, and what the paper printed.
+//! Experiment files (TOML): the rows, the methods, their settings, and the figures printed in the paper.
 //!
 //! ```toml
 //! name = "my-comparison"
@@ -6,10 +6,10 @@
 //! paper = "ours"
 //!
 //! [methods]
-//! reference = "B"                 # all others are compared with this one
+//! reference = "B"                 # every other method is compared with this one
 //!
 //! [methods.protocol]
-//! rows = 100                      # drawn at random from the file, anew for each case
+//! rows = 100                      # drawn at random from the file for each case
 //! held_out = 0.2
 //! cases = 10
 //!
@@ -17,7 +17,7 @@
 //! id = "A"
 //! name = "LM as printed"
 //! solver = "lm-as-printed"        # a name of `identify --method`
-//! units = "deg"                   # what its damping takes angles in
+//! units = "deg"                   # unit of angles in its damping
 //! settings = { max-iterations = 60 }
 //! paper = { rmse_mm = 0.36 }
 //!
@@ -28,8 +28,8 @@
 //! treatment = "sound"
 //! ```
 //!
-//! Exactly one of the sections `methods`, `grinding`, `uniformity`, `signed-rank` and `degradation` says of which kind
-//! an experiment is. [`Experiment::shipped`] are those that come with the program.
+//! An experiment has exactly one of the sections `methods`, `grinding`, `uniformity`, `signed-rank` and `degradation`;
+//! it determines the kind. [`Experiment::shipped`] returns those that come with the program.
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -43,20 +43,20 @@ use truegrind_calibration::identification::solver::{self, Solver};
 pub struct Experiment {
     /// Name on the command line.
     pub name: String,
-    /// One line.
+    /// Title, one line.
     pub title: String,
-    /// Where it comes from: `ltlm-2024`, `ukf-vslm-2023`, `rls-2025`, or something else.
+    /// Source: `ltlm-2024`, `ukf-vslm-2023`, `rls-2025`, or any other name.
     pub paper: String,
-    /// Tables and figures of the paper that it stands for.
+    /// Tables and figures of the paper that it reproduces.
     #[serde(default)]
     pub figures: Vec<String>,
-    /// What is done, in words.
+    /// Description of the procedure.
     #[serde(default)]
     pub about: String,
-    /// What must be known to read the result rightly.
+    /// Caveats for the interpretation of the result.
     #[serde(default)]
     pub caveats: Vec<String>,
-    /// Recipe of [`RECIPES`] that is measured where no file is given.
+    /// Recipe of [`RECIPES`] that is simulated when no file is given.
     #[serde(default)]
     pub recipe: Option<String>,
     /// Methods over splits of measured rows.
@@ -76,7 +76,7 @@ pub struct Experiment {
     pub degradation: Option<Degradation>,
 }
 
-/// What the section of an experiment says.
+/// Kind of an experiment, with its settings.
 #[derive(Debug, Clone, Copy)]
 pub enum Kind<'a> {
     /// Methods over splits of measured rows.
@@ -99,17 +99,17 @@ pub struct Methods {
     pub protocol: Protocol,
     /// Id of the method that all others are compared with.
     pub reference: String,
-    /// What the paper prints for the arm before compensation.
+    /// Errors printed in the paper for the arm before compensation.
     #[serde(default)]
     pub before: Option<PaperFigures>,
-    /// Whether tables of identified parameters are made, as the papers print them.
+    /// Whether to tabulate the identified parameters, as the papers do.
     #[serde(default)]
     pub parameters: bool,
     /// The methods.
     pub method: Vec<Method>,
 }
 
-/// Which rows, how often.
+/// Protocol: rows, split and number of cases.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Protocol {
@@ -119,46 +119,46 @@ pub struct Protocol {
     pub held_out: f64,
     /// Cases.
     pub cases: usize,
-    /// How a method is set to work where it does not say so itself.
+    /// Treatment of methods that do not state their own.
     #[serde(default)]
     pub treatment: Treatment,
-    /// What of a reading is used.
+    /// Part of a reading that is used.
     #[serde(default)]
     pub reading: ReadingUsed,
     /// The fixed point of [`ReadingUsed::Distance`], in the sensor's frame (mm).
     #[serde(default)]
     pub fixed_point_mm: [f64; 3],
-    /// Whether rounded angles are sharpened by the controller's read-out. The papers do not.
+    /// Whether the controller's read-out is used to refine rounded joint angles. The papers do not do this.
     #[serde(default)]
     pub fuse_readout: bool,
 }
 
-/// How a method is set to work.
+/// Problem that a method solves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Treatment {
-    /// As the papers do it: outlet or frames from a fit of the frames alone, then the 24 link parameters, every row
-    /// with the same weight (1 mm).
+    /// As in the papers: outlet or frames from a fit of the frames alone, then the 24 link parameters, every row with
+    /// the same weight (1 mm).
     #[default]
     Printed,
-    /// Links and frames together, rows weighed by what sensor and rounding leave, manufacturing tolerances as priors.
+    /// Links and frames together, rows weighted by sensor noise and rounding, manufacturing tolerances as priors.
     Sound,
 }
 
-/// What of a reading is used.
+/// Part of a reading that is used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ReadingUsed {
-    /// All of it.
+    /// The whole reading.
     #[default]
     AsMeasured,
     /// The position of a pose or position.
     Position,
-    /// The distance of a pose or position from a fixed point, as a cable would read it.
+    /// The distance of a pose or position from a fixed point, as measured by a cable sensor.
     Distance,
 }
 
-/// Units in which a method takes angles.
+/// Unit of angles within a method.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Units {
@@ -173,30 +173,30 @@ pub enum Units {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Method {
-    /// Short name: the paper's, where it has one.
+    /// Short name, taken from the paper where it has one.
     pub id: String,
-    /// Name in words.
+    /// Full name.
     pub name: String,
     /// Name of `identify --method`.
     pub solver: String,
     /// Units of angles.
     #[serde(default)]
     pub units: Units,
-    /// How it is set to work; the protocol's otherwise.
+    /// Treatment; the protocol's where not stated.
     #[serde(default)]
     pub treatment: Option<Treatment>,
-    /// Settings that differ from those of the solver's list.
+    /// Settings that differ from the solver's defaults.
     #[serde(default)]
     pub settings: toml::Table,
-    /// What the paper prints.
+    /// Figures printed in the paper.
     #[serde(default)]
     pub paper: Option<PaperFigures>,
-    /// What the paper says that the method identified: one entry for each link, or none at all.
+    /// Deviations that the paper states as identified by this method: one entry for each link, or none.
     #[serde(default)]
     pub paper_links: Vec<PaperLink>,
 }
 
-/// Deviations of one link from its nominal values as a paper prints them; what cannot be read there is left out.
+/// Deviations of one link from its nominal values as printed in a paper; illegible values are omitted.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PaperLink {
@@ -210,13 +210,13 @@ pub struct PaperLink {
     pub theta_deg: Option<f64>,
 }
 
-/// What a paper prints for a method.
+/// Errors and effort printed in a paper for one method.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PaperFigures {
     /// RMSE (mm).
     pub rmse_mm: Option<f64>,
-    /// Mean of the absolute errors (mm), which the papers call STD or SD.
+    /// Mean absolute error (mm), called STD or SD in the papers.
     pub mean_absolute_mm: Option<f64>,
     /// Largest error (mm).
     pub max_mm: Option<f64>,
@@ -230,19 +230,19 @@ pub struct PaperFigures {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Grinding {
-    /// A surface that ships.
+    /// Name of a shipped surface.
     pub surface: String,
-    /// Rows of one case, drawn at random from the file; all of them where not stated.
+    /// Rows of one case, drawn at random from the file; all rows where not stated.
     #[serde(default)]
     pub rows: Option<usize>,
-    /// Share of these held out to state each method's error.
+    /// Share of these rows held out to evaluate each method.
     pub held_out: f64,
-    /// Cases, each with rows of its own.
+    /// Number of cases, each with its own random rows.
     #[serde(default = "one")]
     pub cases: usize,
     /// Id of the method that all others are compared with.
     pub reference: String,
-    /// What the paper prints before compensation.
+    /// Deviations printed in the paper before compensation.
     pub before: Option<PaperPoints>,
     /// The methods.
     pub method: Vec<GrindingMethod>,
@@ -260,7 +260,7 @@ pub struct GrindingMethod {
     pub id: String,
     /// Name of `identify --method`.
     pub solver: String,
-    /// What the paper prints.
+    /// Figures printed in the paper.
     pub paper: Option<PaperPoints>,
 }
 
@@ -270,9 +270,9 @@ pub struct GrindingMethod {
 pub struct PaperPoints {
     /// P1 to P5.
     pub points_mm: [f64; 5],
-    /// As printed: the signed mean.
+    /// Signed mean, as printed.
     pub mean_mm: f64,
-    /// As printed: n − 1, of the signed values.
+    /// Standard deviation of the signed values with n − 1, as printed.
     pub sd_mm: f64,
 }
 
@@ -290,9 +290,9 @@ pub struct Uniformity {
     pub starts: usize,
     /// Lowest and highest r.
     pub range: [f64; 2],
-    /// Number of r.
+    /// Number of values of r.
     pub steps: usize,
-    /// The r that is claimed to be best.
+    /// The r that the paper claims to be best.
     pub claimed: f64,
 }
 
@@ -300,7 +300,7 @@ pub struct Uniformity {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SignedRankTables {
-    /// Id of the method that is compared with all others.
+    /// Id of the method that is compared with every other.
     pub reference: String,
     /// The tables.
     pub table: Vec<SignedRankTable>,
@@ -310,13 +310,13 @@ pub struct SignedRankTables {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SignedRankTable {
-    /// What it is.
+    /// Title.
     pub title: String,
     /// Names of the rows.
     pub rows: Vec<String>,
-    /// Methods with their figures, one for each row, and the p value that the paper prints.
+    /// Methods with one figure for each row and the p value printed in the paper.
     pub method: Vec<SignedRankMethod>,
-    /// Why the pairs are fewer than they seem.
+    /// Why fewer pairs are independent than are listed.
     pub dependence: String,
 }
 
@@ -328,7 +328,7 @@ pub struct SignedRankMethod {
     pub id: String,
     /// One figure for each row.
     pub figures: Vec<f64>,
-    /// The p value that the paper prints for the reference against this method.
+    /// The printed p value of the reference against this method.
     pub paper_p: Option<f64>,
 }
 
@@ -368,7 +368,7 @@ pub enum ExperimentError {
     },
     /// Fewer rows than the protocol asks for.
     #[error(
-        "{file} has {found} rows, experiment {experiment} asks for {asked}: run it with --rows {possible}, the same shares of \
+        "{file} has {found} rows, experiment {experiment} needs {asked}: run it with --rows {possible}, which keeps the shares with \
          fewer rows; its tables are then headed \"reduced protocol\""
     )]
     TooFewRows {
@@ -376,17 +376,17 @@ pub enum ExperimentError {
         file: String,
         /// Experiment.
         experiment: String,
-        /// Rows there are.
+        /// Rows in the file.
         found: usize,
-        /// Rows asked for.
+        /// Rows that the protocol needs.
         asked: usize,
-        /// Rows that can be asked for.
+        /// Largest usable value of `--rows`.
         possible: usize,
     },
     /// Too few rows for the parameters.
     #[error(
-        "{file}: {rows} rows leave {readings} readings to fit {parameters} parameters to, with {held_out} rows held out: \
-         experiment {experiment} needs --rows {needed} at least"
+        "{file}: {rows} rows, {held_out} of them held out, leave {readings} readings to fit {parameters} parameters: \
+         experiment {experiment} needs at least --rows {needed}"
     )]
     TooFewReadings {
         /// File.
@@ -395,31 +395,31 @@ pub enum ExperimentError {
         experiment: String,
         /// Rows of one case.
         rows: usize,
-        /// Rows held out.
+        /// Held-out rows.
         held_out: usize,
-        /// Readings left.
+        /// Readings left for the fit.
         readings: usize,
         /// Parameters.
         parameters: usize,
-        /// Rows needed.
+        /// Smallest usable value of `--rows`.
         needed: usize,
     },
     /// The file has another sensor.
-    #[error("{file}: experiment {experiment} takes {expected}, and the file has {found}")]
+    #[error("{file}: experiment {experiment} needs {expected}, the file has {found}")]
     WrongSensor {
         /// File.
         file: String,
         /// Experiment.
         experiment: String,
-        /// What the file has.
+        /// Sensor of the file.
         found: &'static str,
-        /// What is needed.
+        /// Sensor that the experiment needs.
         expected: &'static str,
     },
-    /// The rows do not place the sensor.
+    /// The rows do not determine the sensor's location.
     #[error(transparent)]
     StartError(#[from] truegrind_calibration::identification::start::StartError),
-    /// The recipe cannot be measured.
+    /// The recipe cannot be simulated.
     #[error("recipe of experiment {experiment}: {message}")]
     Recipe {
         /// Experiment.
@@ -429,7 +429,7 @@ pub enum ExperimentError {
     },
 }
 
-/// Files that ship: name for messages, text.
+/// Shipped experiment files: name for messages, text.
 const SHIPPED: [(&str, &[u8]); 10] = [
     ("ltlm-table-6.toml", include_bytes!("../../../experiments/ltlm-table-6.toml")),
     ("ltlm-table-6-80-20.toml", include_bytes!("../../../experiments/ltlm-table-6-80-20.toml")),
@@ -443,7 +443,7 @@ const SHIPPED: [(&str, &[u8]); 10] = [
     ("rls-degradation.toml", include_bytes!("../../../experiments/rls-degradation.toml")),
 ];
 
-/// Recipes that ship, by name.
+/// Shipped recipes, by name.
 pub const RECIPES: [(&str, &[u8]); 3] = [
     ("irb120-1024", include_bytes!("../../../experiments/recipes/irb120-1024.toml")),
     ("irb120-1024-position", include_bytes!("../../../experiments/recipes/irb120-1024-position.toml")),
@@ -472,7 +472,7 @@ impl Experiment {
     /// The experiments that come with the program.
     ///
     /// # Errors
-    /// As [`Experiment::parse`]; a test sees to it that there is none.
+    /// As [`Experiment::parse`]; a test checks that every shipped file parses.
     pub fn shipped() -> Result<Vec<Self>, ExperimentError> {
         SHIPPED.iter().map(|(file, bytes)| Self::parse(&String::from_utf8_lossy(bytes), file)).collect()
     }
@@ -480,7 +480,7 @@ impl Experiment {
     /// The shipped experiment of that name.
     ///
     /// # Errors
-    /// The list of those that exist.
+    /// [`ExperimentError::Unknown`], with the names that exist.
     pub fn by_name(name: &str) -> Result<Self, ExperimentError> {
         let mut all = Self::shipped()?;
         match all.iter().position(|e| e.name == name) {
@@ -492,7 +492,7 @@ impl Experiment {
         }
     }
 
-    /// What the experiment's section says.
+    /// The kind of the experiment; `None` without a section.
     pub fn kind(&self) -> Option<Kind<'_>> {
         let kinds = [
             self.methods.as_ref().map(Kind::Methods),
@@ -505,7 +505,7 @@ impl Experiment {
         found.next().filter(|_| found.next().is_none())
     }
 
-    /// Whether measured rows are needed: from a file, or from the recipe.
+    /// Whether measured rows are needed, from a file or from the recipe.
     pub fn takes_rows(&self) -> bool {
         matches!(self.kind(), Some(Kind::Methods(_) | Kind::Grinding(_)))
     }
@@ -517,7 +517,7 @@ impl Experiment {
         };
         let Some(kind) = self.kind() else {
             let sections = "one of the sections methods, grinding, uniformity, signed-rank, degradation";
-            return wrong("the file", "none or several kinds".to_owned(), sections);
+            return wrong("the file", "none or several of them".to_owned(), sections);
         };
         if let Some(recipe) = &self.recipe
             && !RECIPES.iter().any(|(name, _)| name == recipe)
@@ -530,7 +530,7 @@ impl Experiment {
             Kind::Grinding(grinding) => {
                 share("grinding.held_out", grinding.held_out, &wrong)?;
                 if grinding.cases == 0 {
-                    return wrong("grinding.cases", "0".to_owned(), "1 at least");
+                    return wrong("grinding.cases", "0".to_owned(), "at least 1");
                 }
                 if !grinding.method.iter().any(|m| m.id == grinding.reference) {
                     return wrong("grinding.reference", grinding.reference.clone(), "the id of a method");
@@ -574,7 +574,7 @@ impl Experiment {
     }
 }
 
-/// How a check complains: key, what was found, what was expected.
+/// Reports an invalid value: key, found, expected.
 type Wrong<'a> = &'a dyn Fn(&str, String, &str) -> Result<(), ExperimentError>;
 
 fn share(key: &str, value: f64, wrong: Wrong<'_>) -> Result<(), ExperimentError> {
@@ -599,7 +599,7 @@ impl Methods {
     fn check(&self, wrong: Wrong<'_>) -> Result<(), ExperimentError> {
         share("methods.protocol.held_out", self.protocol.held_out, wrong)?;
         if self.protocol.cases == 0 {
-            wrong("methods.protocol.cases", "0".to_owned(), "1 at least")?;
+            wrong("methods.protocol.cases", "0".to_owned(), "at least 1")?;
         }
         if !self.method.iter().any(|m| m.id == self.reference) {
             wrong("methods.reference", self.reference.clone(), "the id of a method")?;
@@ -625,8 +625,7 @@ impl Methods {
 }
 
 impl Method {
-    /// The solver; the first of the list for a name that there is none of, which [`Experiment::parse`] does not let
-    /// through.
+    /// The solver. [`Experiment::parse`] rejects unknown names; for one the first solver of the list is returned.
     pub fn solver(&self) -> &'static Solver {
         solver::by_name(&self.solver).unwrap_or(&solver::SOLVERS[0])
     }

@@ -1,13 +1,13 @@
-//! A ground surface before compensation and after it with what each method identified: ltlm-2024 Table 8 and Fig. 9.
+//! Deviations of a ground surface before compensation and after it with each method's model: ltlm-2024 Table 8, Fig. 9.
 //!
-//! The surface equation becomes an NC program, as in the paper; the actual arm runs it as it is, and rewritten with each
-//! method's model. The tool is measured; the work object was taught with the uncalibrated arm by three points, as in most cells: what no measurement
-//! in the cell can tell, the frame of the base against link 1, then does not count. Deviations are signed along the
-//! outward normal. Several cases draw the measured rows anew: the part and its program stay, what a method makes of the
-//! measurements does not.
+//! The surface equation becomes an NC program, as in the paper. The actual arm runs it uncorrected, and rewritten with
+//! each method's model. The tool is measured; the work object was taught at three points with the uncalibrated arm, as in
+//! most cells. The frame of the base relative to link 1, which no measurement in the cell determines, then has no effect.
+//! Deviations are signed along the outward normal. Every case draws its measured rows again; part and program are the
+//! same.
 //!
-//! The actual arm is known only where the measurements were simulated. With measurements of a real arm the sound
-//! estimate from all rows stands in for it, and the result is a prediction, labelled so.
+//! The actual arm is known only for simulated measurements. For a real arm the sound estimate from all rows replaces it,
+//! and the result is labelled as a prediction.
 
 use rayon::prelude::*;
 
@@ -47,19 +47,19 @@ use truegrind_surfaces::sample::{self, Sample};
 /// The result.
 #[derive(Debug, Clone)]
 pub struct GrindingResult {
-    /// What was asked for.
+    /// Settings of the experiment.
     pub settings: Grinding,
     /// Name of the job.
     pub surface: String,
     /// Name of its program.
     pub program: String,
-    /// Whether the actual arm is a simulated one, else the sound estimate stands in for it.
+    /// Whether the actual arm is simulated; otherwise the sound estimate replaces it.
     pub simulated: bool,
     /// Rows of one case.
     pub measured: usize,
-    /// Whether that is all there is, so that only the split differs from case to case.
+    /// Whether these are all rows of the file, so that only the split differs between cases.
     pub all_rows: bool,
-    /// Whether that is fewer than the experiment asks for.
+    /// Whether these are fewer rows than the experiment states.
     pub reduced: bool,
     /// Points of the cut.
     pub points: usize,
@@ -67,8 +67,8 @@ pub struct GrindingResult {
     pub before: Option<Block>,
     /// One row for each method.
     pub rows: Vec<GrindingRow>,
-    /// Every method against the reference, by the mean size of the deviation; absent for the reference itself and where a
-    /// method has no whole result in every case.
+    /// Every method against the reference, by the mean absolute deviation; absent for the reference itself and for a
+    /// method without a complete result in every case.
     pub against: Vec<Option<Test>>,
     /// The paths of the first case, one for each method, with deviations before and after.
     pub reports: Vec<PathReport>,
@@ -81,7 +81,7 @@ pub struct GrindingRow {
     pub id: String,
     /// The solver.
     pub solver: &'static Solver,
-    /// What the paper prints.
+    /// Deviations printed in the paper.
     pub paper: Option<PaperPoints>,
     /// One entry for each case.
     pub cases: Vec<GrindingCase>,
@@ -90,50 +90,50 @@ pub struct GrindingRow {
 /// A method in one case.
 #[derive(Debug, Clone)]
 pub struct GrindingCase {
-    /// Deviations after compensation; absent where nothing could be rewritten.
+    /// Deviations after compensation; absent when the program could not be rewritten.
     pub after: Option<Block>,
-    /// Targets that were not rewritten, because that was refused.
+    /// Number of targets whose correction was refused.
     pub refused: usize,
     /// Errors of the model on held-out measurements.
     pub held_out: ErrorSummary,
-    /// How the fit ended.
+    /// Termination of the fit.
     pub termination: Termination,
-    /// Why there is no result, where there is none.
+    /// Reason for a missing result.
     pub failure: Option<String>,
 }
 
 impl GrindingRow {
-    /// A figure of the deviations in every case; nothing where a case failed.
+    /// A figure of the deviations for every case; empty if a case failed.
     pub fn over_cases(&self, figure: fn(&Block) -> f64) -> Option<Vec<f64>> {
         self.cases.iter().map(|case| case.after.as_ref().map(figure)).collect()
     }
 
-    /// Targets that were refused in all cases together.
+    /// Number of refused targets over all cases.
     pub fn refused(&self) -> usize {
         self.cases.iter().map(|case| case.refused).sum()
     }
 
-    /// Mean size of the deviation in every case, where every target was rewritten in each.
+    /// Mean absolute deviation of every case, if every target was rewritten in each.
     pub fn sizes_mm(&self) -> Option<Vec<f64>> {
         let sizes = self.over_cases(|b| b.all.mean_absolute)?;
         (self.refused() == 0 && sizes.iter().all(|v| v.is_finite())).then_some(sizes)
     }
 }
 
-/// Bounds of a correction here (mm, rad), far beyond those of `compensate` (10 mm, 2°).
+/// Bounds of a correction (mm, rad), far above those of `compensate` (10 mm, 2°).
 const LARGEST_CORRECTION_MM: f64 = 100.0;
 const LARGEST_TURN_RAD: f64 = 0.35;
 
 /// The arm that grinds.
 #[derive(Debug, Clone, Copy)]
 pub enum Actual<'a> {
-    /// A simulated one, which no method has seen.
+    /// A simulated arm, unknown to the methods.
     Simulated(&'a Model),
     /// The sound estimate from all rows.
     Estimated,
 }
 
-/// The shop in which all methods and cases are tried.
+/// Cell and program that all methods and cases share.
 struct Shop<'a> {
     name: &'a str,
     program: &'a [u8],
@@ -150,11 +150,11 @@ struct Shop<'a> {
     after: After,
 }
 
-/// Runs the experiment. Of the options, rows of one case stand in place of those of the settings, and case k has seed + k.
+/// Runs the experiment. `options.rows` replaces the rows of the settings; case k has seed + k.
 ///
 /// # Errors
-/// [`ExperimentError`] where the surface gives no program, or the rows are too few or do not place the sensor. A method
-/// that fails is a row that says so.
+/// [`ExperimentError`] if the surface gives no program, or the rows are too few or do not determine the sensor's location.
+/// A failed method is no error but a row with the reason.
 pub fn run(
     settings: &Grinding,
     experiment: &str,
@@ -171,15 +171,15 @@ pub fn run(
     let measured = rows_of_a_case(settings, experiment, dataset, options)?;
     let surface = sample.read().map_err(|e| fail(e.to_string()))?;
     let path = toolpath(&surface, nominal, robot).map_err(|e| fail(e.to_string()))?;
-    // A tool vector and the turn about it: no convention of A, B and C is needed.
+    // A tool vector and the rotation about it need no convention for A, B and C.
     let program =
         writer::write(&path.draft, Dialect::Siemens, Angles::Wpr).map_err(|e| fail(e.to_string()))?;
     let name = format!("{}.mpf", settings.surface);
-    // Where tool and work offset lie stands in the program's comments.
+    // The program's comments state the tool and the work offset.
     let setup = Setup::default();
     let task = Program::read(&[(name.as_str(), program.as_slice())], &setup);
     let taught = taught_cell(&surface, &path, nominal, ["T1", "G54"]).map_err(|e| fail(e.to_string()))?;
-    // The paper's tool was measured.
+    // The tool was measured, as in the paper.
     let cell = Cell { tool: vec![CellFrame::of("T1", FrameOrigin::Metrology)], ..taught };
     let stand_in = match actual {
         Actual::Simulated(_) => None,
@@ -235,7 +235,7 @@ pub fn run(
     })
 }
 
-/// How many rows one case has.
+/// Number of rows of one case.
 fn rows_of_a_case(
     settings: &Grinding,
     experiment: &str,
@@ -250,26 +250,26 @@ fn rows_of_a_case(
             experiment: experiment.to_owned(),
             found: all,
             asked,
-            // With all of them every case would have the same rows.
+            // With all rows every case would be the same.
             possible: all * 4 / 5,
         });
     }
     Ok(asked)
 }
 
-/// A surface that ships, by the name of its file.
+/// A shipped surface, by the name of its file.
 fn shipped(name: &str) -> Result<&'static Sample, String> {
     let stem = |sample: &Sample| sample.file.trim_end_matches(".toml");
     sample::ALL.iter().find(|sample| stem(sample) == name).ok_or_else(|| {
         let names: Vec<&str> = sample::ALL.iter().map(stem).collect();
-        format!("no surface named {name} ships; there are {}", names.join(", "))
+        format!("no shipped surface is named {name}; available: {}", names.join(", "))
     })
 }
 
-/// What a method comes to in one case, with its path where it has one.
+/// Result of a method in one case, with its path if there is one.
 type Ground = (GrindingCase, Option<PathReport>);
 
-/// The cases, each with an entry for each method, as methods with an entry for each case; and the paths of the first case.
+/// Transposes cases with an entry for each method to methods with an entry for each case; also returns the paths of the first case.
 fn by_method(
     settings: &Grinding,
     solvers: &[&'static Solver],
@@ -292,7 +292,7 @@ fn by_method(
     (rows, reports)
 }
 
-/// Every method against the reference, by the mean size of the deviation in each case.
+/// Compares every method with the reference by the mean absolute deviation of each case.
 fn against_reference(settings: &Grinding, rows: &[GrindingRow]) -> Vec<Option<Test>> {
     let reference = rows.iter().find(|r| r.id == settings.reference).and_then(GrindingRow::sizes_mm);
     let sizes: Vec<Option<Vec<f64>>> = rows
@@ -303,7 +303,7 @@ fn against_reference(settings: &Grinding, rows: &[GrindingRow]) -> Vec<Option<Te
     paired(&reference.unwrap_or_default(), &sizes, ratio)
 }
 
-/// What a method makes of measurements.
+/// Model that a method identifies from measurements.
 fn found(
     dataset: &Dataset,
     robot: &str,
@@ -346,8 +346,8 @@ fn ground(shop: &Shop<'_>, id: &str, solver: &'static Solver, dataset: &Dataset,
     };
     case.held_out = one.estimated.geometry.held_out;
     case.termination = one.training.termination();
-    // The papers know no bounds, and judge point by point. Methods without priors move what the measurements cannot see by centimetres: here
-    // that is let through, so that its consequence is seen and not only its refusal.
+    // The papers have no bounds and judge single points. Methods without priors move unobservable parameters by
+    // centimetres; the wide bounds let such corrections pass, so that their consequence is measured.
     let bounds = RewriteBounds {
         condition: shop.condition,
         max_correction_mm: LARGEST_CORRECTION_MM,

@@ -1,18 +1,16 @@
-//! Methods side by side under the protocols of the three papers.
+//! Compares identification methods under the protocols of three papers.
 //!
-//! An experiment is a TOML file under `experiments/` ([`experiment`]); a new one needs no code. Of the kinds of
-//! experiment, each in its own file:
+//! An experiment is a TOML file under `experiments/` ([`experiment`]); a new one needs no code. Kinds of experiment:
 //!
 //! - [`protocol`]: methods over seeded splits of measured rows (ltlm-2024 Tables 6 and 7, Figs 6 to 8; ukf-vslm-2023
-//!   Tables VII to XIII, Figs 5 to 7); what differs and why is judged in [`verdict`];
-//! - [`grinding`]: a program for a surface, rewritten with what each method found (ltlm-2024 Table 8, Fig. 9);
-//! - [`uniformity`]: how evenly a chaotic map fills its interval (ltlm-2024 Figs 2 and 3);
+//!   Tables VII to XIII, Figs 5 to 7); [`verdict`] compares the methods;
+//! - [`grinding`]: a program for a surface, rewritten with each method's model (ltlm-2024 Table 8, Fig. 9);
+//! - [`uniformity`]: uniformity of a chaotic map over its interval (ltlm-2024 Figs 2 and 3);
 //! - [`signed_rank`]: a paper's own test on its own figures (ukf-vslm-2023 Tables X and XI);
-//! - [`degradation`]: an arm that warms up and wears, calibrated now and then or all the time (rls-2025).
+//! - [`degradation`]: an arm that warms up and wears, calibrated periodically or continuously (rls-2025).
 //!
-//! [`statistics`] has the tests; what each experiment came to is told in [`views`].
-//!
-//! A method may end in numbers that are none: that is a row of the table which says so, never a missing row.
+//! [`statistics`] holds the tests, [`views`] the reports. A method that ends with non-finite numbers is reported in its
+//! row of the table, never omitted.
 
 pub mod statistics;
 pub mod experiment;

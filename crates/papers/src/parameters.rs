@@ -1,10 +1,9 @@
-//! What a method identified, as the papers print it, with what they leave out: how sure each number is, and which ones
-//! the data cannot see.
+//! Identified parameters of a method, as the papers print them, with standard deviation and observability.
 //!
-//! σ comes from (JᵀJ/s² + P⁻¹)⁻¹ at the method's result, with s² the variance that the rows are left with and P
-//! manufacturing tolerances; it is thus the same kind of figure for every method, whether or not the method itself has
-//! a covariance or used a prior. Where the data brought less than half of the knowledge, the parameter is marked as not
-//! observable: what a method without priors writes there is an accident of its path.
+//! σ comes from (JᵀJ/s² + P⁻¹)⁻¹ at the method's result, with s² the residual variance of the rows and P the
+//! manufacturing tolerances. It is therefore comparable for all methods, whether or not the method has a covariance or
+//! used a prior. A parameter with less than half of its information from the data is marked as not observable: a method
+//! without priors finds an arbitrary value for it.
 
 use nalgebra::DMatrix;
 
@@ -21,14 +20,14 @@ pub struct ParameterTable {
     pub id: String,
     /// Its name.
     pub name: String,
-    /// Link parameters, in their order.
+    /// Link parameters, in the order of the chain.
     pub rows: Vec<ParameterRow>,
 }
 
 /// One parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ParameterRow {
-    /// Which.
+    /// Parameter.
     pub parameter: Parameter,
     /// Nominal value (mm or rad).
     pub nominal: f64,
@@ -36,20 +35,20 @@ pub struct ParameterRow {
     pub deviation: f64,
     /// Its standard deviation.
     pub sigma: f64,
-    /// Share of the knowledge that the data brought.
+    /// Share of the information that comes from the data.
     pub determined: f64,
-    /// The deviation that the paper prints (mm or rad), where it does.
+    /// The deviation printed in the paper (mm or rad), if any.
     pub paper: Option<f64>,
 }
 
 impl ParameterRow {
-    /// Whether the data see the parameter.
+    /// Whether the data determine the parameter.
     pub fn is_observable(&self) -> bool {
         self.determined >= 0.5
     }
 }
 
-/// The table of a method that ended at `x`; `variance` is what a row of weight 1 is left with.
+/// The table of a method that ended at `x`; `variance` is the residual variance of a row of weight 1.
 pub fn parameter_table(
     method: &Method,
     problem: &CalibrationProblem,
@@ -60,7 +59,7 @@ pub fn parameter_table(
     let priors = Tolerance::default().priors(parameters, problem.start());
     let equations = problem.normal_equations(x);
     let p = parameters.len();
-    // In units of the priors, where the unit matrix is the prior's information.
+    // In units of the priors, in which the prior's information is the unit matrix.
     let scaled = DMatrix::from_fn(p, p, |i, j| {
         let own = if i == j { 1.0 } else { 0.0 };
         equations.matrix[(i, j)] * priors[i].sigma * priors[j].sigma / variance.max(1e-12) + own
@@ -85,8 +84,8 @@ pub fn parameter_table(
     ParameterTable { id: method.id.clone(), name: method.name.clone(), rows }
 }
 
-/// What a paper states of a coordinate (mm or rad). Its classical links have d where the axes of joints 2 and 3 are
-/// parallel; ours have a turn β there, of which it says nothing.
+/// Deviation printed in a paper for a parameter (mm or rad). The papers' classical links have an offset d where the axes of
+/// joints 2 and 3 are parallel; ours have a rotation β instead, for which no value is printed.
 fn stated(link: &PaperLink, coordinate: LinkCoordinate) -> Option<f64> {
     match coordinate {
         LinkCoordinate::A => link.a_mm,

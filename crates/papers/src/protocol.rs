@@ -1,21 +1,21 @@
-//! Methods over seeded cases of one measurement file.
+//! Runs methods over seeded cases of one measurement file.
 //!
-//! A case draws its rows from the file and divides them into rows to fit and rows to judge by, both with its own seed;
-//! every method sees the same rows. Repeated poses stay on one side. Then:
+//! A case draws its rows from the file and splits them into rows of the fit and held-out rows, both with its own seed;
+//! every method gets the same rows. Repeated poses are never split. Then:
 //!
 //! 1. The frames are registered by a fit of the frames alone: outlet and cable zero, or the sensor's frame, and the
 //!    touched point. ltlm-2024 and ukf-vslm-2023 take the outlet as known; their files do not give it.
-//! 2. *As printed*: from there the 24 link parameters, every row with the same weight of 1/mm, no priors where a method
-//!    can do without. What cannot (the first covariance of a filter, the box of a swarm) takes manufacturing tolerances,
-//!    since the papers state none. R of a filter is 1 mm², not stated either.
-//! 3. *Sound*: links and frames together, rows weighed by what sensor and rounding leave, tolerances as priors. All
-//!    sound methods solve the very same problem.
-//! 4. Errors are stated on the held-out rows, signed for a cable, as the norm for a position.
-//! 5. Every least-squares method is then continued until it has converged: what it finds in the end is its problem's,
-//!    what it found before also its budget's.
+//! 2. *As printed*: from there the 24 link parameters, every row with the same weight of 1/mm, without priors where
+//!    possible. The first covariance of a filter and the box of a swarm are set to manufacturing tolerances, since the
+//!    papers do not state them. R of a filter is 1 mm², not stated either.
+//! 3. *Sound*: links and frames together, rows weighted by sensor noise and rounding, tolerances as priors. All sound
+//!    methods solve the same problem.
+//! 4. Errors are computed on the held-out rows, signed for a cable, as the norm for a position.
+//! 5. Every least-squares method is then continued to convergence: the converged result depends on the problem only, the
+//!    limited one also on the method's budget.
 //!
-//! "STD" of the papers is the mean of the absolute errors (ltlm-2024 eq. 20, ukf-vslm-2023 eq. 28), and is called so.
-//! Results are the same for any number of threads; the seconds are not, and are kept apart.
+//! "STD" of the papers is the mean absolute error (ltlm-2024 eq. 20, ukf-vslm-2023 eq. 28), and is called so here.
+//! Results do not depend on the number of threads; measured times do and are stored separately.
 
 pub(crate) mod outcome;
 
@@ -51,25 +51,25 @@ use truegrind_math::statistics::ErrorSummary;
 
 pub use self::outcome::{CurvePoint, MethodResult, Outcome};
 
-/// How an experiment is run.
+/// Options of a run.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Options {
-    /// Rows of one case in place of the protocol's.
+    /// Rows of one case instead of the protocol's number.
     pub rows: Option<usize>,
-    /// Seed of the cases: case k draws with seed + k.
+    /// Seed of the cases: case k uses seed + k.
     pub seed: u64,
-    /// Whether the rows are simulated, so that the paper's figures belong to another arm.
+    /// Whether the rows are simulated; the paper's figures then belong to another arm.
     pub simulated: bool,
-    /// Standard deviation of a length or a coordinate (mm), where it is known because the rows are simulated.
+    /// Standard deviation of a length or a coordinate (mm), known only for simulated rows.
     pub sensor_sigma_mm: f64,
 }
 
 /// The result of an experiment.
 #[derive(Debug, Clone)]
 pub struct Study {
-    /// What was run.
+    /// The experiment.
     pub experiment: Experiment,
-    /// Its section.
+    /// Its section `methods`.
     pub methods: Methods,
     /// Measurement file.
     pub file: String,
@@ -77,28 +77,28 @@ pub struct Study {
     pub sha256: String,
     /// Rows of the file.
     pub rows_in_file: usize,
-    /// The sensor, after the protocol's choice of reading.
+    /// Sensor, after the protocol selected the part of the reading.
     pub sensor: Sensor,
     /// Robot.
     pub robot: String,
     /// Rows of one case.
     pub rows: usize,
-    /// Whether that is fewer than the protocol asks for.
+    /// Whether these are fewer rows than the protocol states.
     pub reduced: bool,
     /// Whether the rows are simulated.
     pub simulated: bool,
     /// Seed of the first case.
     pub seed: u64,
-    /// What repeated poses scatter by, else what the rounding of angles leaves in a row, with the sensor's noise where it is
+    /// Scatter of repeated poses; without any, the effect of rounded angles on a row, plus the sensor's noise where it is
     /// simulated (mm).
     pub noise_floor_mm: Option<f64>,
     /// The cases.
     pub cases: Vec<Case>,
-    /// One entry for each method.
+    /// One result for each method.
     pub results: Vec<MethodResult>,
-    /// What was identified in the first case; empty where not asked for.
+    /// Parameters identified in the first case; empty unless requested.
     pub parameters: Vec<ParameterTable>,
-    /// What differs and why.
+    /// Comparison of the methods.
     pub judgement: Judgement,
 }
 
@@ -111,13 +111,13 @@ pub struct Case {
     pub train: usize,
     /// Held-out rows.
     pub test: usize,
-    /// Errors on held-out rows with frames registered and links nominal: the only fair "before".
+    /// Errors on held-out rows with frames registered and links nominal: the baseline before compensation.
     pub registered: ErrorSummary,
     /// These errors, row by row, signed for a cable (mm).
     pub registered_errors_mm: Vec<f64>,
 }
 
-/// A case with everything that methods start from.
+/// A case with the data that all methods start from.
 pub(super) struct Prepared {
     train: Observations,
     test: Observations,
@@ -131,13 +131,13 @@ struct Sound {
     weights: Vec<Weight>,
 }
 
-/// Held-out errors this many times those of registered frames are no result.
+/// A method whose held-out error exceeds that of the registered frames by this factor has diverged.
 const DIVERGED: f64 = 10.0;
 
 /// Runs a methods experiment on `dataset`, measured on `nominal`.
 ///
 /// # Errors
-/// [`ExperimentError`] where the rows cannot carry the protocol. A method that fails is no error but a row.
+/// [`ExperimentError`] if the rows do not suffice for the protocol. A method that fails is no error but a row.
 pub fn run(
     experiment: &Experiment,
     methods: &Methods,
@@ -199,7 +199,7 @@ pub fn run(
 }
 
 impl Prepared {
-    /// What a study says of the case.
+    /// The case as reported in the study.
     fn described(&self, seed: u64) -> Case {
         let errors = errors_on(&self.test, &self.registered.model, &self.registered.frames);
         Case {
@@ -212,7 +212,7 @@ impl Prepared {
     }
 }
 
-/// What a method comes to in all cases.
+/// Runs one method on all cases.
 fn result_of(
     method: &Method,
     experiment: &Experiment,
@@ -249,9 +249,9 @@ fn treatment_of(method: &Method, methods: &Methods) -> Treatment {
     method.treatment.unwrap_or(methods.protocol.treatment)
 }
 
-/// What the result of a least-squares method becomes when it is continued, on the same rows and the same cost, by steps
-/// that neither fixed damping nor a decaying step size slows. Both leave stationary points where they are, so this is
-/// where the method itself would end, thousands of its iterations later.
+/// Continues the result of a least-squares method to convergence, on the same rows and cost, without fixed damping or a
+/// decaying step size. Neither changes the stationary points, so the method itself would end here after thousands more
+/// iterations.
 fn continued(problem: &CalibrationProblem, solver: &Solver, x: &[f64]) -> Estimate {
     let options = lm::Options {
         factorisation: Factorisation::Qr,
@@ -263,7 +263,7 @@ fn continued(problem: &CalibrationProblem, solver: &Solver, x: &[f64]) -> Estima
     lm::solve(problem, x, &options)
 }
 
-/// The rows with the part of the reading that the protocol uses.
+/// The rows, reduced to the part of the reading that the protocol uses.
 fn reading_used(
     experiment: &Experiment,
     methods: &Methods,
@@ -358,7 +358,7 @@ fn prepare(
     let (train, test) = (chosen.subset(&division.train), chosen.subset(&division.test));
     let Registered { start: frames, fitted: registered } = register(&train, nominal, &Tolerance::default())?;
     let sound = sound.then(|| {
-        // The spread that links and frames leave; the same for every method.
+        // Residual spread of a fit of links and frames; the same for every method.
         let start = Start { model: nominal, frames: &frames };
         let parameters: Vec<Parameter> =
             link_parameters(nominal).into_iter().chain(frame_parameters(&train.dataset)).collect();
@@ -376,7 +376,7 @@ fn prepare(
     Ok(Prepared { train, test, registered, nominal: nominal.clone(), sound })
 }
 
-/// The problem that a method is given, what moves in it, and the root mean square of its rows' weights (1/mm).
+/// The problem of a method, its free parameters, and the root mean square of its rows' weights (1/mm).
 fn problem_of(
     case: &Prepared,
     solver: &Solver,
@@ -388,7 +388,7 @@ fn problem_of(
     let sensing = frame_parameters(train);
     let tolerance = match solver.network {
         Some(Scope::Alone) => Tolerance::default(),
-        // One problem for all: frames as registering leaves them.
+        // One problem for all methods, with the registered frames.
         _ => Tolerance {
             target_mm: 10.0,
             target_rad: 0.02,
@@ -460,8 +460,8 @@ fn judged(
     let finite = held_out.rmse.is_finite() && estimate.x.iter().all(|x| x.is_finite());
     let diverged = !finite || estimate.termination.is_failure() || held_out.rmse > DIVERGED * before;
     let rows = problem.rows().max(1) as f64;
-    // The three coordinates of a position make one distance. The orientation of a pose has no mm: there rows are taken
-    // alike.
+    // The three coordinates of a position make one distance. Orientation rows have no unit of mm: for a pose all rows
+    // count equally.
     let per = problem.rows_per_observation();
     let lengths = if per == 3 { 3.0 } else { 1.0 };
     let curve = estimate
@@ -506,7 +506,7 @@ fn parameters_of(case: &Prepared, result: &MethodResult) -> Option<ParameterTabl
     let (problem, parameters, _) = problem_of(case, result.solver, result.treatment);
     let readings = problem.rows().saturating_sub(parameters.len()).max(1) as f64;
     let variance = match result.treatment {
-        // Rows as printed are not weighed: their spread is what the fit left.
+        // Rows as printed are unweighted: their spread is that of the fit's residuals.
         Treatment::Printed => 2.0 * problem.row_cost(&outcome.x) / readings,
         Treatment::Sound => 1.0,
     };
@@ -521,7 +521,7 @@ fn noise_floor(observed: &Observations, case: &Prepared, sensor_sigma_mm: f64) -
     let shares =
         rounding::angle_shares(&observed.dataset, &registered.model, &registered.frames, &observed.angles);
     let mean = shares.iter().map(|s| s.0).sum::<f64>() / shares.len().max(1) as f64;
-    // The error of a position is the norm of three coordinates.
+    // The error of a position is the norm of its three coordinates.
     let axes = if observed.dataset.sensor == Sensor::Cable { 1.0 } else { 3.0 };
     let variance = axes * (mean + sensor_sigma_mm * sensor_sigma_mm);
     (variance > 0.0).then(|| variance.sqrt())

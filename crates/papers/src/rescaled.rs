@@ -1,15 +1,15 @@
-//! A problem whose parameters are counted in other units.
+//! A problem with its parameters in other units.
 //!
-//! A damping that is added to JᵀJ as it stands means something else for an angle in radians than for one in degrees:
-//! μ = 5 is nothing next to the square of some hundred millimetres per radian and slows every step next to the square
-//! of some millimetres per degree. The papers state no unit; with this, both can be run.
+//! Damping that is added to an unscaled JᵀJ depends on the unit of angles: μ = 5 is negligible against the square of some
+//! hundred millimetres per radian, but slows every step against the square of some millimetres per degree. The papers
+//! state no unit, so both are run.
 
 use std::ops::Range;
 
 use truegrind_estimation::estimate::Estimate;
 use truegrind_estimation::problem::{NormalEquations, Prior, Problem};
 
-/// `inner` with parameter k counted in units of `scale[k]` of its own: x of the inner problem is `scale` · x.
+/// `inner` with parameter k in units of `scale[k]`: x of the inner problem is `scale` · x.
 pub struct Rescaled<'a> {
     inner: &'a dyn Problem,
     scale: Vec<f64>,
@@ -17,7 +17,7 @@ pub struct Rescaled<'a> {
 }
 
 impl<'a> Rescaled<'a> {
-    /// Counts the parameters of `inner` in other units.
+    /// Scales the parameters of `inner`.
     pub fn new(inner: &'a dyn Problem, scale: Vec<f64>) -> Self {
         let prior = |(p, s): (&Prior, &f64)| Prior { mean: p.mean / s, sigma: p.sigma / s };
         let priors = inner.priors().iter().zip(&scale).map(prior).collect();
@@ -28,7 +28,7 @@ impl<'a> Rescaled<'a> {
         x.iter().zip(&self.scale).map(|(x, s)| x * s).collect()
     }
 
-    /// An estimate of this problem as one of the inner problem.
+    /// Converts an estimate of this problem to one of the inner problem.
     pub fn back(&self, mut estimate: Estimate) -> Estimate {
         estimate.x = self.outside(&estimate.x);
         if let Some(covariance) = &mut estimate.covariance {

@@ -1,9 +1,8 @@
-//! A paper's own signed-rank test on its own figures: reproduce the number, then say what it does not show.
+//! Repeats a paper's signed-rank test on its printed figures, and states its limits.
 //!
-//! ukf-vslm-2023 Table X takes nine pairs, three error figures on each of three data sets. RMSE, mean absolute error and
-//! maximum of one data set are three views of the same residuals, so there are three pairs, not nine; and with nine
-//! pairs of one sign p = 1/512 is the smallest that a one-sided test can give: it says that all nine point one way, not
-//! by how much. With three pairs of one sign the smallest one-sided p is 1/8.
+//! ukf-vslm-2023 Table X has nine pairs: three error figures on each of three data sets. RMSE, mean absolute error and
+//! maximum of one data set come from the same residuals, so only three pairs are independent. With nine pairs the smallest
+//! one-sided p is 1/512; it shows that all nine have the same sign, not how large they are. With three pairs it is 1/8.
 
 use crate::experiment::{SignedRankTable, SignedRankTables};
 use crate::statistics::{SignedRank, signed_rank};
@@ -11,7 +10,7 @@ use crate::statistics::{SignedRank, signed_rank};
 /// The tests of one table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TableResult {
-    /// What was asked for.
+    /// Printed table.
     pub table: SignedRankTable,
     /// One test for each method that is not the reference.
     pub tests: Vec<PairTest>,
@@ -24,7 +23,7 @@ pub struct PairTest {
     pub id: String,
     /// The test on method minus reference: positive where the reference is better.
     pub test: SignedRank,
-    /// The paper's p.
+    /// p as printed in the paper.
     pub paper_p: Option<f64>,
 }
 
@@ -41,7 +40,7 @@ pub fn run(tables: &SignedRankTables) -> Vec<TableResult> {
                 .iter()
                 .filter(|m| m.id != tables.reference)
                 .map(|m| {
-                    // Printed figures are decimal: their differences must tie where the printed ones do.
+                    // Rounded, so that equal differences of printed decimals are ties.
                     let decimal = |d: f64| (d * 1e6).round() / 1e6;
                     let differences: Vec<f64> =
                         m.figures.iter().zip(own).map(|(m, r)| decimal(m - r)).collect();

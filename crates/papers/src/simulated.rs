@@ -1,4 +1,4 @@
-//! Measurements of the recipes that ship, for who has no file at hand.
+//! Simulated measurements from the shipped recipes, for use without a measurement file.
 
 use crate::experiment::{Experiment, ExperimentError, RECIPES};
 use truegrind_arm::model::Model;
@@ -16,11 +16,11 @@ pub fn recipe(name: &str, experiment: &str) -> Result<Recipe, ExperimentError> {
     let (file, bytes) = RECIPES
         .iter()
         .find(|(known, _)| *known == name)
-        .ok_or_else(|| fail(format!("no recipe named {name} ships")))?;
+        .ok_or_else(|| fail(format!("no shipped recipe is named {name}")))?;
     Recipe::parse(&String::from_utf8_lossy(bytes), file).map_err(|e| fail(e.to_string()))
 }
 
-/// Measures the experiment's recipe. `resolve` gives the nominal model of a robot by name.
+/// Simulates the experiment's recipe. `resolve` returns the nominal model of a robot by name.
 ///
 /// # Errors
 /// [`ExperimentError::Recipe`], also where the experiment names no recipe.
@@ -32,7 +32,7 @@ pub fn measure(
     let name = experiment
         .recipe
         .as_ref()
-        .ok_or_else(|| fail("none is named: give a measurement file".to_owned()))?;
+        .ok_or_else(|| fail("the experiment names no recipe: give a measurement file".to_owned()))?;
     let recipe = recipe(name, &experiment.name)?;
     let simulation = recipe.simulate(resolve).map_err(|e| fail(e.to_string()))?;
     let file = format!("{name} (simulated)");

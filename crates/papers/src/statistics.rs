@@ -1,11 +1,11 @@
-//! Tests on paired figures: which of two methods was better on the same cases, and how sure that is.
+//! Significance tests on paired figures: whether one of two methods is better on the same cases.
 //!
-//! - [`signed_rank`]: Wilcoxon's signed-rank test with its exact distribution, ties and zeros included. No assumption
-//!   but that a difference is as likely to point one way as the other.
-//! - [`resampled_t`]: the t test with the correction of Nadeau and Bengio for cases drawn again and again from one set
-//!   of rows. Such cases share rows, so that their differences are not independent, and a test that takes them for
-//!   independent is too sure of itself, the signed-rank test too.
-//! - [`holm`]: p values corrected for having made several tests.
+//! - [`signed_rank`]: Wilcoxon's signed-rank test with its exact distribution, ties and zeros included. Its null
+//!   hypothesis is that both signs of a difference are equally likely.
+//! - [`resampled_t`]: the t test with the correction of Nadeau and Bengio for cases resampled from one set of rows. Such
+//!   cases share rows, so their differences are not independent; tests that assume independence, the signed-rank test
+//!   included, give too small p values.
+//! - [`holm`]: p values corrected for multiple tests.
 //!
 //! **Source.** Wilcoxon 1945; Demšar, "Statistical comparisons of classifiers over multiple data sets", JMLR 7, 2006;
 //! Nadeau and Bengio, "Inference for the generalization error", Machine Learning 52, 2003; Holm 1979.
@@ -19,22 +19,22 @@ use truegrind_math::statistics::mean_and_deviation;
 /// Wilcoxon's signed-rank test.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SignedRank {
-    /// Pairs that differ.
+    /// Number of pairs that differ.
     pub pairs: usize,
-    /// Pairs without difference, left out.
+    /// Number of pairs without difference, which are omitted.
     pub zeros: usize,
     /// Sum of the ranks of positive differences.
     pub positive: f64,
     /// Sum of the ranks of negative differences.
     pub negative: f64,
-    /// Probability of a sum this far from its mean, either way.
+    /// Probability of a sum at least this far from its mean, in either direction.
     pub two_sided: f64,
-    /// Probability of a positive sum this large or larger.
+    /// Probability of a positive sum at least this large.
     pub one_sided_positive: f64,
 }
 
-/// The test on differences of pairs. What is not a number counts as the largest positive difference, so that a method
-/// that diverged is the worse one; equal sizes share the mean of their ranks. Without a difference p is 1.
+/// The test on paired differences. NaN counts as the largest positive difference, so that a diverged method is the worse
+/// one; ties share the mean of their ranks. Without a difference p is 1.
 ///
 /// ```
 /// use truegrind_papers::statistics::signed_rank;
@@ -48,7 +48,7 @@ pub fn signed_rank(differences: &[f64]) -> SignedRank {
     let mut values: Vec<f64> = differences.iter().map(value).filter(|d| *d != 0.0).collect();
     values.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
     let n = values.len();
-    // Twice the ranks, so that shared ranks stay whole numbers.
+    // Twice the ranks, so that shared ranks are integers.
     let mut ranks = vec![0_usize; n];
     let mut from = 0;
     while from < n {
@@ -61,7 +61,7 @@ pub fn signed_rank(differences: &[f64]) -> SignedRank {
     }
     let total: usize = ranks.iter().sum();
     let positive: usize = ranks.iter().zip(&values).filter(|(_, v)| **v > 0.0).map(|(r, _)| r).sum();
-    // Distribution of the sum when every sign is a fair coin.
+    // Distribution of the sum if every sign has probability 1/2.
     let mut chance = vec![0.0; total + 1];
     chance[0] = 1.0;
     let mut reached = 0;
@@ -84,9 +84,9 @@ pub fn signed_rank(differences: &[f64]) -> SignedRank {
     }
 }
 
-/// The two-sided p of the t test on differences over cases that were drawn again and again from the same rows, each
-/// with `held_out` rows to one row of training (0.25 for 80/20): the variance of the mean is (1/k + held_out) s². 1
-/// where all differences are zero; not a number where a difference is none.
+/// The two-sided p of the t test on differences over k cases resampled from the same rows, where `held_out` is the ratio
+/// of held-out rows to training rows (0.25 for 80/20): the variance of the mean is (1/k + held_out) s². Returns 1 if all
+/// differences are zero, NaN if a difference is NaN.
 pub fn resampled_t(differences: &[f64], held_out: f64) -> f64 {
     let k = differences.len() as f64;
     if differences.len() < 2 {
@@ -100,8 +100,8 @@ pub fn resampled_t(differences: &[f64], held_out: f64) -> f64 {
     student_two_sided(t, k - 1.0)
 }
 
-/// Holm's correction: the p values as they are to be compared with the level when all were tested together. What is not
-/// a number stays so and is not counted.
+/// Holm's correction: p values adjusted for multiple tests, to be compared with the level. NaN is returned as NaN and not
+/// counted as a test.
 pub fn holm(p: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..p.len()).filter(|&i| !p[i].is_nan()).collect();
     order.sort_by(|&a, &b| p[a].total_cmp(&p[b]).then(a.cmp(&b)));

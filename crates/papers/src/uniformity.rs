@@ -1,9 +1,9 @@
-//! How evenly the logistic-tent map fills its interval over r: ltlm-2024 Figs 2 and 3, with the statistics that tell a
-//! property of the map from sampling noise.
+//! Uniformity of the logistic-tent map over r: ltlm-2024 Figs 2 and 3, with the statistics that distinguish a property of
+//! the map from sampling noise.
 //!
-//! The paper counts 1,000 points in 50 bins, from one start, and finds r = 0.5 "most uniform". Random points scatter by
-//! some 4.4 counts there, as much as the differences between the r. With 100,000 points the density of the map itself
-//! shows. See [`chaos::uniformity`](truegrind_estimation::chaos::uniformity).
+//! The paper counts 1,000 points in 50 bins, from one start, and finds r = 0.5 "most uniform". The counts of random points
+//! scatter by some 4.4, as much as the values of r differ. With 100,000 points the density of the map itself becomes
+//! visible. See [`chaos::uniformity`](truegrind_estimation::chaos::uniformity).
 
 use serde::Serialize;
 
@@ -14,7 +14,7 @@ use truegrind_estimation::chaos::uniformity::{self, Options, Study, Uniformity a
 /// The result.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UniformityResult {
-    /// What was asked for.
+    /// Settings of the experiment.
     pub settings: Uniformity,
     /// Figure 2 for both lengths.
     pub study: Study,
@@ -24,7 +24,7 @@ pub struct UniformityResult {
     pub maps: Vec<MapEvenness>,
 }
 
-/// How evenly one map fills its interval.
+/// Uniformity of one map.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct MapEvenness {
     /// The map.
@@ -35,7 +35,7 @@ pub struct MapEvenness {
     pub long: Evenness,
 }
 
-/// Start of the sequence of Fig. 3; the paper does not state its own.
+/// Start of the sequence of Fig. 3; not stated in the paper.
 const START: f64 = 0.37;
 
 /// Runs the study.

@@ -1,12 +1,12 @@
-//! What differs, how sure that is, and whether it is the method or only where it was stopped.
+//! Significance of the differences between methods, and whether early stopping is their cause.
 //!
-//! Every method is compared with one reference, case by case, since all saw the same rows. A difference counts as
-//! significant where both tests say so at 5 % after Holm's correction over all comparisons: the signed-rank test, exact,
-//! and the t test corrected for cases that share rows ([`statistics`](crate::statistics)). The second is
-//! there because the first believes the cases to be independent, which cases drawn from one file are not.
+//! Every method is compared with one reference, case by case, on the same rows. A difference is significant if both tests
+//! find it at 5 % after Holm's correction over all comparisons: the exact signed-rank test, and the t test corrected for
+//! cases that share rows ([`statistics`](crate::statistics)). The second is needed because the first assumes independent
+//! cases, which cases drawn from one file are not.
 //!
-//! Two least-squares methods whose errors agree to a thousandth in every case once both have converged have the same
-//! optimum: whatever they differed by before, one of them was stopped.
+//! Two least-squares methods whose converged errors agree to a thousandth in every case have the same optimum: an earlier
+//! difference is due to stopping one of them.
 
 use serde::Serialize;
 
@@ -14,10 +14,10 @@ use crate::protocol::outcome::{MethodResult, Outcome};
 use crate::statistics::{SignedRank, holm, resampled_t, signed_rank};
 use truegrind_math::statistics::median;
 
-/// Level of the tests.
+/// Significance level of the tests.
 pub const LEVEL: f64 = 0.05;
 
-/// Errors that agree to this share in every case are the same.
+/// Errors that agree to this share in every case count as the same.
 pub const SAME: f64 = 1e-3;
 
 /// All comparisons with the reference.
@@ -25,9 +25,9 @@ pub const SAME: f64 = 1e-3;
 pub struct Judgement {
     /// Id of the reference.
     pub reference: String,
-    /// Cases.
+    /// Number of cases.
     pub cases: usize,
-    /// Whether so few cases could show a significant difference at all, whatever they say.
+    /// Whether a significant difference is possible at all with this number of cases.
     pub can_be_significant: bool,
     /// One comparison for each other method.
     pub comparisons: Vec<Comparison>,
@@ -38,15 +38,15 @@ pub struct Judgement {
 pub struct Comparison {
     /// Id of the method.
     pub id: String,
-    /// As the experiment limits both.
+    /// Both under the experiment's limits.
     pub limited: Test,
-    /// Both run to convergence; absent where one has no test of convergence.
+    /// Both continued to convergence; absent if one is no least-squares method.
     pub converged: Option<Test>,
-    /// What follows.
+    /// Conclusion.
     pub conclusion: Conclusion,
 }
 
-/// Differences of errors (of held-out RMSE, where methods are compared), method minus reference: positive where the reference is better.
+/// Differences of an error (for methods the held-out RMSE), method minus reference: positive if the reference is better.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Test {
     /// Mean difference (mm).
@@ -55,9 +55,9 @@ pub struct Test {
     pub median_mm: f64,
     /// Largest difference as a share of the smaller error.
     pub largest_share: f64,
-    /// Cases in which the reference was better.
+    /// Number of cases in which the reference was better.
     pub reference_better: usize,
-    /// Cases in which the method was better.
+    /// Number of cases in which the method was better.
     pub method_better: usize,
     /// Wilcoxon's test.
     pub signed_rank: SignedRank,
@@ -65,18 +65,18 @@ pub struct Test {
     pub signed_rank_holm: f64,
     /// p of the corrected t test.
     pub resampled: f64,
-    /// The same after Holm's correction.
+    /// p of the corrected t test after Holm's correction.
     pub resampled_holm: f64,
 }
 
 impl Test {
-    /// Whether both tests find a difference.
+    /// Whether both tests find a significant difference.
     pub fn is_significant(&self) -> bool {
         self.signed_rank_holm < LEVEL && self.resampled_holm < LEVEL
     }
 }
 
-/// What follows for a pair.
+/// Conclusion for one pair.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "is", rename_all = "kebab-case")]
 pub enum Conclusion {
@@ -86,7 +86,7 @@ pub enum Conclusion {
     MethodBetter,
     /// No significant difference.
     NotSignificant,
-    /// The same optimum: what differed was where those named were stopped.
+    /// The same optimum: the methods in `stopped` were stopped before they reached it.
     SameOptimum {
         /// Ids of the methods that had not converged when they were stopped.
         stopped: Vec<String>,
@@ -98,14 +98,14 @@ pub enum Conclusion {
         /// In how many.
         cases: usize,
     },
-    /// The reference diverged in some cases: nothing can be compared with it.
+    /// The reference diverged in some cases, so nothing can be compared with it.
     ReferenceDiverged {
         /// In how many.
         cases: usize,
     },
 }
 
-/// Compares every method with the reference. `held_out` is held-out rows over rows of training.
+/// Compares every method with the reference. `held_out` is the ratio of held-out rows to training rows.
 pub fn judge(results: &[MethodResult], reference: &str, held_out: f64) -> Judgement {
     let Some(of) = results.iter().find(|r| r.method.id == reference) else {
         return Judgement {
@@ -132,7 +132,7 @@ pub fn judge(results: &[MethodResult], reference: &str, held_out: f64) -> Judgem
             .collect::<Vec<_>>(),
         held_out,
     );
-    // Two-sided, all cases of one sign, and corrected for as many comparisons.
+    // Smallest possible p: two-sided, all cases of one sign, corrected for all comparisons.
     let smallest = 2.0_f64 * 0.5_f64.powi(cases as i32) * others.len().max(1) as f64;
     let comparisons = others
         .iter()
@@ -174,7 +174,7 @@ fn conclude(
     }
 }
 
-/// Whether a method had more to find when it was stopped.
+/// Whether a method was stopped before it converged.
 fn was_stopped(result: &MethodResult) -> bool {
     let Some(converged) = &result.converged else { return false };
     result.outcomes.iter().zip(converged).any(|(a, b)| !(share(a.held_out.rmse, b.held_out.rmse) < SAME))
@@ -184,8 +184,8 @@ fn share(a: f64, b: f64) -> f64 {
     if a == b { 0.0 } else { (a - b).abs() / a.min(b) }
 }
 
-/// Every one of `others` against `reference`, case by case, corrected by Holm over all of them. `held_out` is held-out rows
-/// over rows of training. Nothing where there is nothing to compare.
+/// Compares each of `others` with `reference`, case by case, Holm-corrected over all of them. `held_out` is the ratio of
+/// held-out rows to training rows. `None` where there is nothing to compare.
 pub fn paired(reference: &[f64], others: &[Option<Vec<f64>>], held_out: f64) -> Vec<Option<Test>> {
     let mut tests: Vec<Option<Test>> =
         others.iter().map(|other| Some(test(other.as_ref()?, reference, held_out))).collect();

@@ -1,4 +1,4 @@
-//! One simulated arm with its groups of poses, each measured as warm and worn as its hour has it.
+//! One simulated arm and its groups of poses, each measured with the warm-up and wear of its time.
 
 use super::settings::Degradation;
 use crate::experiment::ExperimentError;
@@ -13,7 +13,7 @@ use truegrind_calibration::identification::tolerance::Tolerance;
 use truegrind_calibration::measurement::import;
 use truegrind_calibration::measurement::simulation::recipe::{LinkDeviation, Recipe};
 
-/// One simulated arm with its groups.
+/// One simulated arm and its groups of poses.
 pub(super) struct Arm {
     pub(super) nominal: Model,
     pub(super) frames: Frames,
@@ -21,13 +21,13 @@ pub(super) struct Arm {
     pub(super) sigma: Weight,
 }
 
-/// What was measured at one hour.
+/// One group: poses measured at the same time.
 pub(super) struct Group {
     pub(super) identify: Observations,
     pub(super) verify: Observations,
 }
 
-/// Measures the arm with this seed.
+/// Simulates the arm and its measurements with this seed.
 pub(super) fn arm(
     settings: &Degradation,
     recipe: &Recipe,
@@ -74,7 +74,7 @@ pub(super) fn arm(
         groups.push(Group { identify: observed.subset(identify), verify: observed.subset(verify) });
     }
     let noise = recipe.noise;
-    // At the tracker's usual two metres.
+    // A laser tracker at a typical distance of 2 m.
     let sigma_mm = (noise.sigma_mm + 2.0 * noise.per_metre_mm).max(1e-3);
     let sigma_rad = noise.sigma_deg.to_radians().max(1e-6);
     let first = &groups[0].identify;
@@ -98,7 +98,7 @@ pub(super) fn mean_error(arm: &Arm, rows: &Observations, model: &Model) -> f64 {
     errors.iter().sum::<f64>() / errors.len().max(1) as f64
 }
 
-/// The same of all rows of a group.
+/// Mean position error of all rows of a group (mm).
 pub(super) fn group_error(arm: &Arm, group: usize, model: &Model) -> f64 {
     let group = &arm.groups[group];
     let (a, b) = (group.identify.dataset.rows.len() as f64, group.verify.dataset.rows.len() as f64);

@@ -1,4 +1,4 @@
-//! A way of calibrating through all groups of an arm, and what so many poses can tell.
+//! Runs one calibration method through all groups of an arm, and studies how many poses are enough.
 
 use std::time::Instant;
 
@@ -12,15 +12,15 @@ use truegrind_calibration::identification::identifiability::identifiability;
 use truegrind_estimation::least_squares::lm;
 use truegrind_math::statistics::median;
 
-/// How a method goes through the groups.
+/// How a method uses the groups.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Strategy {
-    /// Recursive least squares that remembers everything.
+    /// Recursive least squares without forgetting.
     Rls,
     /// The same with a forgetting factor.
     RlsForgetting,
-    /// Levenberg–Marquardt on the present group, converged.
+    /// Levenberg–Marquardt on the current group only, converged.
     Lm,
     /// The same with the last group's covariance as prior.
     LmMemory,
@@ -29,7 +29,7 @@ pub enum Strategy {
 }
 
 impl Strategy {
-    /// All of them.
+    /// All methods.
     pub const ALL: [Strategy; 5] =
         [Strategy::Rls, Strategy::RlsForgetting, Strategy::Lm, Strategy::LmMemory, Strategy::LmStopped];
 
@@ -44,7 +44,7 @@ impl Strategy {
         }
     }
 
-    /// The paper's name for what it may have run.
+    /// The method of the paper that is closest to this one.
     pub fn paper_name(self) -> Option<&'static str> {
         match self {
             Strategy::Rls => Some("RLS"),
@@ -59,26 +59,26 @@ impl Strategy {
 pub struct Step {
     /// Group, from 0.
     pub group: usize,
-    /// Poses that identify, with what was known before this group.
+    /// Identification poses, before this group was used.
     pub identification_before_mm: f64,
-    /// The same with what is known after it.
+    /// Identification poses, after this group.
     pub identification_after_mm: f64,
-    /// Poses that verify, before.
+    /// Verification poses, before.
     pub verification_before_mm: f64,
-    /// Poses that verify, after.
+    /// Verification poses, after.
     pub verification_after_mm: f64,
 }
 
-/// A method with one count through all groups.
+/// A method with one number of poses, run through all groups.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Run {
     /// The method.
     pub way: Strategy,
-    /// Poses of each group that it takes.
+    /// Poses used in each group.
     pub count: usize,
     /// One step for each group.
     pub steps: Vec<Step>,
-    /// Mean error of the poses that verify, after, over the groups: one for each arm (mm).
+    /// Mean error of the verification poses after calibration, over the groups; one value per arm (mm).
     pub arms_mm: Vec<f64>,
     /// Seconds for all groups of one arm, median over the arms. Not the same in every run.
     #[serde(skip)]
@@ -92,22 +92,22 @@ impl Run {
     }
 }
 
-/// What so many poses can tell, with known frames.
+/// What a given number of poses determines, with known frames.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Count {
     /// Poses.
     pub poses: usize,
-    /// Equations they give.
+    /// Number of equations.
     pub equations: usize,
-    /// Rank of the Jacobian, the smallest over the arms, of 24 parameters.
+    /// Rank of the Jacobian for 24 parameters, smallest over the arms.
     pub rank: usize,
     /// Condition number in units of the priors, the largest over the arms; infinite without full rank.
     pub condition: f64,
-    /// Mean error of the poses that identify after RLS, first group (mm).
+    /// Mean error of the identification poses after RLS, first group (mm).
     pub identification_mm: f64,
-    /// Mean error of the poses that verify after RLS, first group (mm).
+    /// Mean error of the verification poses after RLS, first group (mm).
     pub verification_mm: f64,
-    /// Mean error of the poses that verify after one-shot least squares without priors, eq. 9; absent where singular.
+    /// Mean error of the verification poses after one-shot least squares without priors, eq. 9 (mm); absent where singular.
     pub without_prior_mm: Option<f64>,
 }
 
@@ -115,7 +115,7 @@ fn first_poses(rows: &Observations, count: usize) -> Observations {
     rows.subset(&(0..count.min(rows.dataset.rows.len())).collect::<Vec<_>>())
 }
 
-/// One arm through all groups.
+/// Runs one arm through all groups.
 pub(super) fn journey(settings: &Degradation, arm: &Arm, way: Strategy, count: usize) -> Run {
     let mut state = State::new(arm);
     let mut steps = Vec::with_capacity(settings.groups);
@@ -145,7 +145,7 @@ pub(super) fn journey(settings: &Degradation, arm: &Arm, way: Strategy, count: u
     Run { way, count, steps, arms_mm: vec![mean], seconds }
 }
 
-/// Means over the arms.
+/// Averages over the arms.
 pub(super) fn average(way: Strategy, count: usize, each: &[Run]) -> Run {
     let n = each.len().max(1) as f64;
     let groups = each.first().map_or(0, |j| j.steps.len());
@@ -169,7 +169,7 @@ pub(super) fn average(way: Strategy, count: usize, each: &[Run]) -> Run {
     }
 }
 
-/// The study of counts, for one of them.
+/// Evaluates one number of poses.
 pub(super) fn count_of(arms: &[Arm], count: usize) -> Count {
     let mut out = Count {
         poses: count,
@@ -190,7 +190,7 @@ pub(super) fn count_of(arms: &[Arm], count: usize) -> Count {
             out.rank = out.rank.min(seen.rank);
             out.condition = out.condition.max(seen.condition);
         }
-        // One linearisation without priors, as eq. 9 has it.
+        // One linearisation without priors (eq. 9).
         let options = lm::Options { priors: false, max_iterations: 50, ..lm::Options::default() };
         let bare = lm::solve(&problem, state.x.as_slice(), &options);
         let bare_model = problem.apply(&bare.x).0;

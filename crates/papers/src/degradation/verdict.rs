@@ -1,7 +1,7 @@
-//! Every way of calibrating against RLS with the same poses, paired over the simulated arms.
+//! Compares every calibration method with RLS on the same poses, paired over the simulated arms.
 //!
-//! The arms are drawn independently, so that Wilcoxon's test asks for no more than it is given; p is corrected by Holm over
-//! all comparisons. A difference below 2 % of the error is none that anybody would see, however sure it is.
+//! The arms are drawn independently, as Wilcoxon's test assumes; p is Holm-corrected over all comparisons. A
+//! difference below 2 % of the error counts as negligible even if it is significant.
 
 use serde::Serialize;
 
@@ -9,39 +9,39 @@ use super::journey::{Run, Strategy};
 use crate::statistics::{holm, signed_rank};
 use crate::verdict::LEVEL;
 
-/// Differences below this share of RLS's error are of no size.
+/// Differences below this share of RLS's error are negligible.
 pub(super) const SAME: f64 = 0.02;
 
-/// One way against RLS.
+/// One method against RLS.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AgainstRls {
-    /// The way.
+    /// The method.
     pub way: Strategy,
-    /// Poses of each group that both take.
+    /// Poses of each group that both use.
     pub count: usize,
-    /// Mean difference of the error after, way minus RLS (mm).
+    /// Mean difference of the error after calibration, method minus RLS (mm).
     pub mean_mm: f64,
     /// Arms on which RLS was better.
     pub rls_better: usize,
-    /// Arms.
+    /// Number of arms.
     pub arms: usize,
     /// Two-sided p of Wilcoxon's test after Holm's correction.
     pub p: f64,
-    /// What follows.
+    /// Conclusion.
     pub outcome: Outcome,
 }
 
-/// What follows for a pair.
+/// Conclusion for one pair.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Outcome {
-    /// RLS leaves less.
+    /// RLS has the smaller error.
     RlsBetter,
-    /// The other way leaves less.
+    /// The other method has the smaller error.
     WayBetter,
-    /// Whatever the sign, the difference is below 2 % of the error.
+    /// The difference is below 2 % of the error.
     Same,
-    /// Too unsure to say.
+    /// No significant difference.
     NotSignificant,
 }
 
@@ -58,7 +58,7 @@ pub(super) fn against_rls(journeys: &[Run]) -> Vec<AgainstRls> {
             let outcome = match mean_mm {
                 d if d.abs() < SAME * error => Outcome::Same,
                 d if d < 0.0 => Outcome::WayBetter,
-                // Not a number too.
+                // Also for NaN.
                 _ => Outcome::RlsBetter,
             };
             Some(AgainstRls {

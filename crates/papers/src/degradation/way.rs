@@ -1,4 +1,4 @@
-//! What is known of an arm from group to group, and the ways in which a group changes it.
+//! State of knowledge of an arm from group to group, and its update by each calibration method.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -12,7 +12,7 @@ use truegrind_estimation::filter::rls::{Memory, RecursiveLeastSquares};
 use truegrind_estimation::least_squares::lm;
 use truegrind_estimation::problem::{Prior, Problem};
 
-/// What is known of an arm: link deviations and their covariance.
+/// Estimate of an arm: link deviations and their covariance.
 pub(super) struct State {
     parameters: Vec<Parameter>,
     pub(super) x: DVector<f64>,
@@ -46,7 +46,7 @@ impl State {
         self.problem(arm, &arm.groups[0].verify, arm.sigma, &[]).apply(self.x.as_slice()).0
     }
 
-    /// Takes the rows in, pose by pose, each linearised at the state it meets.
+    /// Recursive update pose by pose, each linearised at the current state.
     pub(super) fn rls(&mut self, arm: &Arm, rows: &Observations, forgetting: f64) {
         let problem = self.problem(arm, rows, arm.sigma, &[]);
         let covariance = self.covariance.clone();
@@ -57,7 +57,7 @@ impl State {
         let (p, per) = (self.x.len(), problem.rows_per_observation());
         let (mut r, mut j) = (vec![0.0; per], vec![0.0; per * p]);
         let mut a = DVector::zeros(p);
-        // A pose has six rows: each forgets its share.
+        // A pose has six rows; each applies its root of the factor.
         let share = forgetting.powf(1.0 / per as f64);
         for pose in 0..rows.dataset.rows.len() {
             let at = recursion.x.clone();
@@ -72,7 +72,7 @@ impl State {
         self.x = recursion.x;
     }
 
-    /// The rows at once, with the covariance as prior or without any.
+    /// Batch update, with the covariance as prior or without a prior.
     pub(super) fn lm(&mut self, arm: &Arm, rows: &Observations, memory: bool) {
         let problem = self.problem(arm, rows, arm.sigma, &[]);
         let estimate = if memory {
@@ -99,7 +99,7 @@ impl State {
     }
 }
 
-/// A problem with a normal prior of full covariance: p more rows L⁻¹(x − m) with LLᵀ the covariance.
+/// A problem with a normal prior of full covariance LLᵀ, added as p rows L⁻¹(x − m).
 struct Remembering<'a> {
     inner: &'a CalibrationProblem,
     mean: DVector<f64>,

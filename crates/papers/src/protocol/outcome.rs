@@ -1,4 +1,4 @@
-//! What came out of a method, case by case.
+//! Results of a method, case by case.
 
 use serde::{Deserialize, Serialize};
 
@@ -10,17 +10,17 @@ use truegrind_math::statistics::ErrorSummary;
 /// A method over all cases.
 #[derive(Debug, Clone)]
 pub struct MethodResult {
-    /// What the experiment says of it.
+    /// The method as stated in the experiment.
     pub method: Method,
     /// The solver.
     pub solver: &'static Solver,
-    /// How it was set to work.
+    /// Treatment.
     pub treatment: Treatment,
     /// All its settings.
     pub settings: toml::Table,
-    /// One outcome for each case, as the experiment limits it.
+    /// One outcome for each case, under the experiment's limits.
     pub outcomes: Vec<Outcome>,
-    /// The same continued until it has converged, for least-squares methods; counted from where it was stopped.
+    /// The same continued to convergence, for least-squares methods; counts start at the limited result.
     pub converged: Option<Vec<Outcome>>,
 }
 
@@ -31,9 +31,9 @@ pub struct Outcome {
     pub held_out: ErrorSummary,
     /// Errors on the rows of the fit.
     pub fitted: ErrorSummary,
-    /// How the search ended.
+    /// Termination of the search.
     pub termination: Termination,
-    /// Whether the result is none: not finite, or ten times worse than registered frames alone.
+    /// Whether the method diverged: not finite, or ten times worse than registered frames alone.
     pub diverged: bool,
     /// Rows evaluated.
     pub evaluations: Evaluations,
@@ -45,9 +45,9 @@ pub struct Outcome {
     pub errors_mm: Vec<f64>,
     /// Deviations of the parameters from their start.
     pub x: Vec<f64>,
-    /// How far the farthest link parameter went, in manufacturing tolerances.
+    /// Largest deviation of a link parameter, in manufacturing tolerances.
     pub farthest: f64,
-    /// Wall clock, while other threads worked too. Not the same in every run.
+    /// Wall-clock time while other threads were running (s). Differs between runs.
     pub seconds: f64,
 }
 
@@ -56,9 +56,9 @@ pub struct Outcome {
 pub struct CurvePoint {
     /// Iteration, 0 for the start.
     pub iteration: usize,
-    /// Passes over the rows so far, those with derivatives counted too.
+    /// Passes over the rows so far, including those with derivatives.
     pub passes: f64,
-    /// Root of the mean square of the fit's errors (mm), by the fit's weights: of a length, or of the distance between two
+    /// Root mean square error of the fit (mm), with the fit's weights: of a length, or of the distance between two
     /// positions.
     pub rmse: f64,
 }

@@ -79,7 +79,7 @@ fn few_poses_are_stated_with_rank_and_condition() {
 fn what_cannot_be_used_is_said() {
     let text = include_str!("../../../../experiments/rls-degradation.toml");
     for (from, to, word) in [
-        ("continuous = [15, 20]", "continuous = [60]", "no more than identify"),
+        ("continuous = [15, 20]", "continuous = [60]", "at most degradation.identification"),
         ("forgetting = 0.95", "forgetting = 1.5", "up to 1"),
         ("arms = 10", "arms = 0", "1 of each"),
     ] {

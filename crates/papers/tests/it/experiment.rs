@@ -76,7 +76,7 @@ fn what_is_wrong_in_an_experiment_is_said() {
     assert!(Experiment::parse(SMALL, "mine.toml").is_ok());
     refused(&SMALL.replace("cases = 2", "cases = two"), &["mine.toml", "line 10"]);
     refused(&SMALL.replace("cases = 2", "casse = 2"), &["mine.toml", "casse", "held_out"]);
-    refused(&SMALL.replace("cases = 2", "cases = 0"), &["cases", "1 at least"]);
+    refused(&SMALL.replace("cases = 2", "cases = 0"), &["cases", "at least 1"]);
     refused(&SMALL.replace("held_out = 0.2", "held_out = 1.0"), &["held_out", "share"]);
     refused(&SMALL.replace("solver = \"lm\"", "solver = \"lmx\""), &["method 2 (B)", "lmx", "ukf-vslm"]);
     refused(&SMALL.replace("id = \"B\"", "id = \"A\""), &["reference"]);

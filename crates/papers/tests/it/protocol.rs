@@ -157,7 +157,7 @@ fn same_seed_same_bits_for_any_number_of_threads() {
 fn fewer_rows_are_named_with_the_command_that_takes_them() {
     let error = study(&METHODS.replace("rows = 90", "rows = 2000"), None).unwrap_err();
     let message = error.to_string();
-    for word in ["1024 rows", "asks for 2000", "--rows 1024", "reduced protocol"] {
+    for word in ["1024 rows", "needs 2000", "--rows 1024", "reduced protocol"] {
         assert!(message.contains(word), "`{word}` is not in: {message}");
     }
     let (experiment, study_reduced, _) = study(METHODS, Some(60)).unwrap();
