@@ -1,11 +1,11 @@
-//! Acceptance: whether an estimated arm holds a stated tolerance at poses that it was not fitted to.
+//! Acceptance test: whether an estimated arm meets a stated tolerance at poses not used in its fit.
 //!
-//! Method. The sensor's frame is fitted to four fifths of the poses and each pose is judged with a frame that has not seen it
-//! (five folds), or the frame is stated and nothing is fitted. The decision is the one for a measured value with an expanded
-//! uncertainty U (ISO 14253-1: k = 2): accepted where the largest error and U lie within the tolerance together, refused
-//! where the largest error exceeds it by more than U, open between them. Pose accuracy and repeatability (ISO 9283: thirty
-//! cycles at five poses) are worked out only where so many cycles were measured, path accuracy and repeatability (ten cycles) only
-//! of rows that say where on a path they were read. Those rows count for nothing else: the arm was moving.
+//! Method. The sensor's frame is fitted to four fifths of the poses, and each pose is judged with a frame fitted without it
+//! (five folds); or the frame is stated and nothing is fitted. The decision follows ISO 14253-1 for an expanded uncertainty
+//! U (k = 2): accepted if largest error plus U is within the tolerance, refused if the largest error exceeds the tolerance by
+//! more than U, undecided otherwise. Pose accuracy and repeatability (ISO 9283: thirty cycles at five poses) are computed
+//! only if enough cycles were measured; path accuracy and repeatability (ten cycles) only from rows with a position on a
+//! path. Those rows are used for nothing else, because the arm was moving.
 
 pub mod decision;
 mod error;
@@ -39,21 +39,21 @@ pub const ISO_POSES: usize = 5;
 pub const ISO_CYCLES: usize = 30;
 
 const FOLDS: usize = 5;
-/// Joints that differ by less are the pose of the fit (°).
+/// Joint differences below this count as the same pose as one of the fit (°).
 const SAME_DEG: f64 = 0.003;
 
-/// What is asked.
+/// Tolerances and uncertainties of an acceptance test.
 #[derive(Debug, Clone)]
 pub struct Options {
     /// The largest error that is accepted (mm).
     pub tolerance_mm: f64,
-    /// Expanded uncertainty of the sensor, k = 2 (mm); else twice the scatter of repeated poses, where any was repeated.
+    /// Expanded uncertainty of the sensor, k = 2 (mm); if not stated, twice the scatter of repeated poses, if there are any.
     pub uncertainty_mm: Option<f64>,
-    /// The largest error of the orientation that is accepted (rad); without it the orientation is told and not judged.
+    /// The largest accepted orientation error (rad); without it the orientation is reported and not judged.
     pub tolerance_rad: Option<f64>,
-    /// Expanded uncertainty of the sensor's orientation, k = 2 (rad); else as that of the position.
+    /// Expanded uncertainty of the sensor's orientation, k = 2 (rad); if not stated, determined as for the position.
     pub uncertainty_rad: Option<f64>,
-    /// Frames that were measured by other means: then nothing is fitted.
+    /// Frames measured by other means; then nothing is fitted.
     pub frames: Option<Frames>,
     /// Seed of the folds.
     pub seed: u64,
@@ -66,59 +66,59 @@ pub struct Cycles {
     pub poses: usize,
     /// Fewest cycles at one of them.
     pub cycles: usize,
-    /// Pose accuracy: from where the model says the arm stands to the barycentre of where it stood.
+    /// Pose accuracy: distance from the position under the model to the barycentre of the attained positions.
     pub accuracy_mm: f64,
     /// Repeatability: mean distance from the barycentre and three standard deviations of it.
     pub repeatability_mm: f64,
 }
 
-/// What was found.
+/// Result of an acceptance test.
 #[derive(Debug, Clone)]
 pub struct Acceptance {
-    /// Different poses.
+    /// Number of different poses.
     pub poses: usize,
-    /// Rows.
+    /// Number of rows.
     pub rows: usize,
-    /// Errors of the arm of the data sheet, the sensor registered to it in the same way (mm).
+    /// Errors of the nominal arm, with the sensor registered to it in the same way (mm).
     pub nominal: ErrorSummary,
-    /// Errors of the estimated arm (mm): distances, or of a cable signed lengths.
+    /// Errors of the estimated arm (mm): distances, or signed lengths for a cable.
     pub model: ErrorSummary,
-    /// The same row by row, by the number of the row in its file.
+    /// The same for each row, with the row's number in its file.
     pub errors_mm: Vec<(usize, f64)>,
-    /// Expanded uncertainty, k = 2 (mm); 0 where it is not known.
+    /// Expanded uncertainty, k = 2 (mm); 0 if unknown.
     pub uncertainty_mm: f64,
-    /// Where it comes from.
+    /// Source of the uncertainty.
     pub uncertainty: Uncertainty,
     /// The largest error that is accepted (mm).
     pub tolerance_mm: f64,
-    /// The decision by the position alone.
+    /// The decision from the position alone.
     pub decision: Decision,
-    /// What was found of the orientation, where the sensor measured it.
+    /// Result for the orientation, if the sensor measured it.
     pub orientation: Option<Orientation>,
     /// Whether a tolerance of the orientation was stated.
     pub orientation_asked: bool,
     /// Pose accuracy and repeatability, where cycles were measured.
     pub cycles: Option<Cycles>,
-    /// Most readings of one pose.
+    /// Largest number of readings at one pose.
     pub most_cycles: usize,
-    /// The paths that were measured; none from a cable, which sees no position.
+    /// The measured paths; none for a cable, which measures no position.
     pub paths: Vec<PathFound>,
     /// Smallest and largest of time (h), temperature (°C) and payload (kg), where logged.
     pub conditions: [Option<[f64; 2]>; 3],
 }
 
 impl Acceptance {
-    /// The decision by all that a tolerance was stated for: an orientation that was to be judged and was not measured is not evaluated.
+    /// The decision over all stated tolerances: not evaluated if an orientation tolerance is stated but no orientation was measured.
     pub fn overall(&self) -> Decision {
         let orientation = self.orientation.as_ref().map_or(Decision::NotEvaluated, |found| found.decision);
         if self.orientation_asked { self.decision.and(orientation) } else { self.decision }
     }
 }
 
-/// Judges `estimated` by the rows of `dataset`.
+/// Judges `estimated` with the rows of `dataset`.
 ///
 /// # Errors
-/// [`AcceptError`], where the rows are those of the fit, or do not tell where the sensor stands.
+/// [`AcceptError`] if the rows are those of the fit, or do not determine the sensor's location.
 pub fn accept(
     dataset: &Dataset,
     estimated: &Estimated,
@@ -137,7 +137,7 @@ pub fn accept(
     let observed = at_rest(&all)?;
     let paths = paths(&all, &observed, &estimated.model, options)?;
     let dataset = &observed.dataset;
-    report_step("judging the arm of the data sheet");
+    report_step("judging the nominal arm");
     let [nominal, nominal_rad] = errors(&observed, &estimated.nominal, options)?;
     report_step("judging the estimated arm");
     let [found, found_rad] = errors(&observed, &estimated.model, options)?;
@@ -193,7 +193,7 @@ fn angle(name: &'static str, found_rad: f64) -> Result<(), AcceptError> {
     if found > 0.0 && found <= 180.0 { Ok(()) } else { Err(AcceptError::Angle { name, found }) }
 }
 
-/// The same file, or more than half of the poses that the model keeps of its fit.
+/// Whether the rows are those of the fit: the same file, or more than half of the poses stored with the model.
 fn is_of_the_fit(dataset: &Dataset, estimated: &Estimated) -> bool {
     if !dataset.sha256.is_empty() && dataset.sha256 == estimated.provenance.sha256 {
         return true;
@@ -208,8 +208,8 @@ fn is_of_the_fit(dataset: &Dataset, estimated: &Estimated) -> bool {
     2 * samples.iter().filter(near).count() > samples.len()
 }
 
-/// The errors of each row, of the position (mm) and of the orientation (rad; none where none was measured), with frames that have not
-/// seen it.
+/// The errors of each row, of position (mm) and orientation (rad; none if none was measured), with frames fitted without
+/// the row.
 fn errors(observed: &Observations, model: &Model, options: &Options) -> Result<[Vec<f64>; 2], StartError> {
     let count = observed.dataset.rows.len();
     if let Some(frames) = &options.frames {
@@ -239,7 +239,7 @@ fn range(dataset: &Dataset, value: fn(&Condition) -> Option<f64>) -> Option<[f64
     })
 }
 
-/// The rows at which the arm stood.
+/// The rows measured at rest.
 fn at_rest(observed: &Observations) -> Result<Observations, AcceptError> {
     let rows = &observed.dataset.rows;
     let at_rest: Vec<usize> = (0..rows.len()).filter(|&row| rows[row].path().is_none()).collect();
@@ -250,7 +250,7 @@ fn at_rest(observed: &Observations) -> Result<Observations, AcceptError> {
     }
 }
 
-/// Path accuracy and repeatability, where paths were measured by a sensor that sees positions.
+/// Path accuracy and repeatability, if paths were measured by a sensor of positions.
 fn paths(
     all: &Observations,
     at_rest: &Observations,
@@ -263,7 +263,7 @@ fn paths(
     path::found(all, model, &frames(at_rest, model, options)?)
 }
 
-/// Those that were stated, or that fit the rows best.
+/// The stated frames, or those that fit the rows best.
 fn frames(observed: &Observations, model: &Model, options: &Options) -> Result<Frames, StartError> {
     match &options.frames {
         Some(frames) => Ok(frames.clone()),
@@ -271,7 +271,7 @@ fn frames(observed: &Observations, model: &Model, options: &Options) -> Result<F
     }
 }
 
-/// ISO 9283 at the poses with enough cycles, where there are enough of them and the sensor sees positions.
+/// ISO 9283 at the poses with enough cycles, if there are enough of them and the sensor measures positions.
 fn cycles(
     observed: &Observations,
     groups: &[Vec<usize>],

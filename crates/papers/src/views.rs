@@ -1,7 +1,7 @@
-//! Experiments of the papers: tables with the paper's figures beside ours, the verdict, and the plots.
+//! Reports of the papers' experiments: verdict, tables with the paper's figures next to ours, and plots.
 //!
-//! Nothing here changes from run to run but measured seconds: they have a table of their own ([`times`]), and a page shows
-//! them where it is asked to ([`Origin::timings`]).
+//! Only measured times differ between runs. They have a separate table ([`times`]), and a page shows them on request
+//! ([`Origin::timings`]).
 
 mod study;
 mod words;
@@ -18,7 +18,7 @@ use crate::experiment::Experiment;
 use truegrind_report::document::{Block, Document, Provenance, Source};
 use truegrind_report::table::Table;
 
-/// What went in, for the provenance of a page.
+/// Inputs of a run, for the provenance of a page.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Origin {
     /// Measurement file; absent where none is needed.
@@ -31,11 +31,11 @@ pub struct Origin {
     pub robot: Option<String>,
     /// Seed.
     pub seed: u64,
-    /// Whether measured seconds are shown, on which no two runs agree.
+    /// Whether measured times are shown, which differ between runs.
     pub timings: bool,
 }
 
-/// What the terminal shows.
+/// Summary for the terminal.
 pub fn summary(experiment: &Experiment, results: &Results) -> Document {
     let mut page = opening(experiment, results);
     match results {
@@ -49,13 +49,13 @@ pub fn summary(experiment: &Experiment, results: &Results) -> Document {
     page
 }
 
-/// The answer and its figures come before what was done and what is to be known of it.
+/// Moves the verdict and the key figures before the description and the caveats.
 fn answer_first(page: &mut Document) {
     let is_answer: [fn(&Block) -> bool; 2] =
         [|block| matches!(block, Block::Verdict(_)), |block| matches!(block, Block::KeyFigures(_))];
     for (place, is) in is_answer.into_iter().enumerate() {
         let Some(found) = page.blocks.iter().position(is).filter(|found| *found > place) else { continue };
-        // An answer to a later section stays there.
+        // A verdict below a heading belongs to its section.
         if page.blocks[..found].iter().any(|block| matches!(block, Block::Heading(..))) {
             continue;
         }
@@ -64,7 +64,7 @@ fn answer_first(page: &mut Document) {
     }
 }
 
-/// The page, with pictures.
+/// The full page, with plots.
 pub fn document(experiment: &Experiment, results: &Results, origin: &Origin) -> Document {
     let mut page = opening(experiment, results);
     match results {
@@ -92,7 +92,7 @@ pub fn document(experiment: &Experiment, results: &Results, origin: &Origin) -> 
     page
 }
 
-/// The table for programs.
+/// The table for CSV.
 pub fn table(results: &Results) -> Table {
     match results {
         Results::Methods(study) => methods::table(study),
@@ -103,7 +103,7 @@ pub fn table(results: &Results) -> Table {
     }
 }
 
-/// Measured seconds, where a kind of experiment has them.
+/// Measured times, for the kinds of experiment that have them.
 pub fn times(results: &Results) -> Option<Table> {
     match results {
         Results::Methods(study) => Some(methods::times(study)),
@@ -112,7 +112,7 @@ pub fn times(results: &Results) -> Option<Table> {
     }
 }
 
-/// Everything; schema `truegrind.comparison/1`.
+/// The whole result as JSON, schema `truegrind.comparison/1`.
 pub fn json(experiment: &Experiment, results: &Results, origin: &Origin) -> Value {
     let (kind, result) = match results {
         Results::Methods(study) => ("methods", methods::json(study)),
@@ -142,13 +142,13 @@ pub fn json(experiment: &Experiment, results: &Results, origin: &Origin) -> Valu
     })
 }
 
-/// All experiments that ship: name, what is done, and what of which paper it stands for.
+/// List of the shipped experiments: name, title, and the tables and figures that each reproduces.
 pub fn list(experiments: &[Experiment]) -> Document {
     let mut page = Document::new("Experiments");
     page.push(Block::List(
         experiments
             .iter()
-            .map(|e| format!("{}: {}. Stands for {}, {}.", e.name, e.title, e.paper, e.figures.join(", ")))
+            .map(|e| format!("{}: {}. Reproduces {}, {}.", e.name, e.title, e.paper, e.figures.join(", ")))
             .collect(),
     ));
     page
@@ -160,7 +160,7 @@ fn opening(experiment: &Experiment, results: &Results) -> Document {
     if !experiment.about.is_empty() {
         page.paragraph(experiment.about.clone());
     }
-    // Methods over cases add what follows from the rows.
+    // Methods over cases add caveats of their rows.
     if !matches!(results, Results::Methods(_)) && !experiment.caveats.is_empty() {
         page.push(Block::List(experiment.caveats.clone()));
     }

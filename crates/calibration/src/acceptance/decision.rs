@@ -1,34 +1,34 @@
-//! The rule by which a largest error, its uncertainty and a tolerance come to a decision; the same for positions and orientations.
+//! Decision rule for a largest error, its uncertainty and a tolerance (ISO 14253-1); the same for positions and orientations.
 
-/// Fewer poses decide nothing.
+/// Fewest poses for a decision.
 pub const FEWEST_POSES: usize = 100;
 
 /// The decision.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Decision {
-    /// The largest error and the uncertainty lie within the tolerance.
+    /// The largest error plus the uncertainty is within the tolerance.
     Accepted,
-    /// The largest error exceeds it by more than the uncertainty.
+    /// The largest error exceeds the tolerance by more than the uncertainty.
     Refused,
-    /// The uncertainty does not let it be decided.
+    /// Undecided because of the uncertainty.
     Open,
     /// Too few poses, nothing measured, or no tolerance.
     NotEvaluated,
 }
 
-/// Where the uncertainty of the sensor comes from.
+/// Source of the sensor's uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Uncertainty {
-    /// It was stated.
+    /// Stated by the user.
     Stated,
     /// Twice the scatter of repeated poses.
     Repeats,
-    /// Nothing tells it, and it is left out.
+    /// Unknown; taken as 0.
     Unknown,
 }
 
 impl Decision {
-    /// Of a largest error, its expanded uncertainty and a tolerance, in one unit (ISO 14253-1).
+    /// Decides on a largest error with its expanded uncertainty and a tolerance, all in one unit (ISO 14253-1).
     pub(super) fn of(poses: usize, largest: f64, uncertainty: f64, tolerance: f64) -> Self {
         if poses < FEWEST_POSES || !largest.is_finite() {
             Self::NotEvaluated
@@ -41,7 +41,7 @@ impl Decision {
         }
     }
 
-    /// Of two that are both asked for: refused where either is, accepted where both are.
+    /// Combines two required decisions: refused if either is, accepted if both are.
     pub(super) fn and(self, other: Self) -> Self {
         let order = [Self::Refused, Self::NotEvaluated, Self::Open];
         order.into_iter().find(|one| self == *one || other == *one).unwrap_or(Self::Accepted)
@@ -49,7 +49,7 @@ impl Decision {
 }
 
 impl Uncertainty {
-    /// The expanded uncertainty (k = 2) that was stated, else that of repeated readings with this standard deviation, else 0.
+    /// The expanded uncertainty (k = 2): as stated, else from the standard deviation of repeated readings, else 0.
     pub(super) fn of(stated: Option<f64>, scatter: Option<f64>) -> (f64, Self) {
         match (stated, scatter) {
             (Some(expanded), _) => (expanded, Self::Stated),

@@ -1,4 +1,4 @@
-//! Why an acceptance says nothing at all.
+//! Errors of an acceptance test.
 
 use thiserror::Error;
 
@@ -6,11 +6,11 @@ use super::decision::FEWEST_POSES;
 use crate::identification::start::StartError;
 use crate::measurement::dataset::PathPoint;
 
-/// Why nothing can be said at all.
+/// Why an acceptance test is impossible.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum AcceptError {
-    /// The tolerance or the uncertainty is no length.
+    /// The tolerance or the uncertainty is no positive length.
     #[error("{name} {found}: expected a length above 0 in mm")]
     Length {
         /// Which.
@@ -18,7 +18,7 @@ pub enum AcceptError {
         /// What was found.
         found: f64,
     },
-    /// The tolerance or the uncertainty of the orientation is no angle.
+    /// The tolerance or the uncertainty of the orientation is no valid angle.
     #[error("{name} {found}: expected an angle above 0° and up to 180°")]
     Angle {
         /// Which.
@@ -28,7 +28,7 @@ pub enum AcceptError {
     },
     /// The rows of the fit.
     #[error(
-        "{file}: these are the rows that the model was fitted to: an acceptance needs poses that were measured for it, at least \
+        "{file}: the model was fitted to these rows: an acceptance needs poses that were not used in the fit, at least \
          {FEWEST_POSES}"
     )]
     RowsOfTheFit {
@@ -37,24 +37,24 @@ pub enum AcceptError {
     },
     /// All rows were read on paths.
     #[error(
-        "{file}: all rows were read on paths (columns path, cycle, sample): an acceptance needs poses at which the arm stood, at least \
-         {FEWEST_POSES}, whose cells there are empty"
+        "{file}: all rows were measured on paths (columns path, cycle, sample): an acceptance needs at least {FEWEST_POSES} poses \
+         measured at rest, with these cells empty"
     )]
     PathsAlone {
         /// The file.
         file: String,
     },
-    /// Two rows of a path say that they are the same.
+    /// Two rows have the same path, cycle and sample.
     #[error(
-        "{file}, rows {} and {}: both are sampling point {} of cycle {} of path {}; expected one row for each: count the cycles", rows[0],
+        "{file}, rows {} and {}: both are sampling point {} of cycle {} of path {}; expected one row for each: number the cycles", rows[0],
         rows[1], point.sample, point.cycle, point.path
     )]
     PointTwice {
         /// The file.
         file: String,
-        /// What the rows are called.
+        /// Row numbers.
         rows: [usize; 2],
-        /// What both say.
+        /// Path, cycle and sample of both.
         point: PathPoint,
     },
     /// The frames cannot be found.

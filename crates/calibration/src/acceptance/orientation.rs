@@ -1,4 +1,4 @@
-//! The orientation of the target, judged as its position is, where the sensor measures it.
+//! Acceptance of the target's orientation, by the same rule as its position.
 
 use truegrind_arm::model::Model;
 use truegrind_math::statistics::ErrorSummary;
@@ -8,26 +8,26 @@ use crate::identification::calibration::Frames;
 use crate::identification::fit::Observations;
 use crate::measurement::dataset::Reading;
 
-/// What was found of the orientation. Errors are the angle of the turn between where the target was seen and where the arm says it is.
+/// Result for the orientation. An error is the rotation angle between the measured orientation of the target and that under the model.
 #[derive(Debug, Clone)]
 pub struct Orientation {
-    /// Of the arm of the data sheet, the sensor registered to it in the same way (rad).
+    /// Errors of the nominal arm, with the sensor registered to it in the same way (rad).
     pub nominal: ErrorSummary,
-    /// Of the estimated arm (rad).
+    /// Errors of the estimated arm (rad).
     pub model: ErrorSummary,
-    /// The same row by row, by the number of the row in its file (rad).
+    /// The same for each row, with the row's number in its file (rad).
     pub errors_rad: Vec<(usize, f64)>,
-    /// Expanded uncertainty, k = 2 (rad); 0 where it is not known.
+    /// Expanded uncertainty, k = 2 (rad); 0 if unknown.
     pub uncertainty_rad: f64,
-    /// Where it comes from.
+    /// Source of the uncertainty.
     pub uncertainty: Uncertainty,
-    /// The largest error that is accepted (rad), where one was stated.
+    /// The largest accepted error (rad), if stated.
     pub tolerance_rad: Option<f64>,
     /// The decision; not evaluated without a tolerance.
     pub decision: Decision,
 }
 
-/// The error of each of these rows (rad); `None` where a reading has no orientation.
+/// The error of each of these rows (rad); `None` if a reading has no orientation.
 pub(super) fn errors(
     observed: &Observations,
     rows: &[usize],

@@ -1,18 +1,18 @@
-//! Path accuracy and path repeatability (ISO 9283, positions) of the paths that were measured.
+//! Path accuracy and path repeatability (ISO 9283, positions) of the measured paths.
 //!
-//! Method. A plane stands at each of the m sampling points x_ci of the commanded path, normal to it, and the attained path j of n meets
-//! it at x_ij:
+//! Method. x_ci are the m sampling points of the commanded path. The attained path j of n intersects the plane normal to the
+//! commanded path through x_ci at x_ij:
 //!
 //! > x̄_i = Σ_j x_ij / n, AT = max_i |x̄_i − x_ci|, l_ij = |x_ij − x̄_i|, RT = max_i (l̄_i + 3 S_i), S_i² = Σ_j (l_ij − l̄_i)² / (n − 1)
 //!
-//! So a reading that came a little earlier or later along the path counts for nothing.
-//! Shapes. Rows with path, cycle and sample; the sampling points are those that every cycle has. At least ten cycles are asked for. A
-//! reading may be early or late by a twentieth of the path, and one point more.
-//! Source and departures. ISO 9283:1998, path characteristics. The commanded path is where the model says that the target is at the
-//! logged joints, in the mean over the cycles, as pose accuracy is stated under the model; its direction at a point is the mean of
-//! those from and to its neighbours; between two readings a path is straight, and its first and last piece go on for their own
-//! length. A point that some cycle does not pass is left out and counted.
-//! Checked against. A path whose figures are worked out by hand (`tests/it/acceptance/path.rs`).
+//! A reading slightly earlier or later along the path therefore has no effect.
+//! Shapes. Rows with path, cycle and sample; the sampling points are those of every cycle. At least ten cycles are required. A
+//! reading can be early or late by a twentieth of the path plus one point.
+//! Source and departures. ISO 9283:1998, path characteristics. The commanded path is the target's position under the model at
+//! the logged joints, averaged over the cycles, since pose accuracy is also stated under the model. Its direction at a point is
+//! the mean of those from and to the neighbours. A path is straight between two readings; its first and last piece are extended
+//! by their own length. A point that some cycle does not pass is omitted and counted.
+//! Checked against. A path with figures calculated by hand (`tests/it/acceptance/path.rs`).
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -29,29 +29,29 @@ use crate::measurement::dataset::Reading;
 
 /// Cycles of a path for path accuracy and repeatability (ISO 9283).
 pub const PATH_CYCLES: usize = 10;
-/// Fewest sampling points that make a path.
+/// Fewest sampling points of a path.
 pub const PATH_POINTS: usize = 3;
 
-/// What was found of one path.
+/// Result for one path.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PathFound {
-    /// Its name.
+    /// Name.
     pub path: String,
-    /// How often it was run.
+    /// Number of cycles.
     pub cycles: usize,
-    /// Sampling points that every cycle has and passes.
+    /// Sampling points that every cycle contains and passes.
     pub points: usize,
-    /// Those that were left out, since some cycle has them not or does not pass them.
+    /// Sampling points omitted because some cycle does not contain or pass them.
     pub left_out: usize,
-    /// The largest way from the commanded path to the barycentre of the attained ones (mm); the path accuracy where there are
-    /// [`PATH_CYCLES`] cycles. `None` for fewer than [`PATH_POINTS`] points.
+    /// The largest distance from the commanded path to the barycentre of the attained paths (mm); the path accuracy if there
+    /// are [`PATH_CYCLES`] cycles. `None` for fewer than [`PATH_POINTS`] points.
     pub deviation_mm: Option<f64>,
-    /// The path repeatability (mm), where there are [`PATH_CYCLES`] cycles.
+    /// The path repeatability (mm), if there are [`PATH_CYCLES`] cycles.
     pub repeatability_mm: Option<f64>,
 }
 
 impl PathFound {
-    /// The path accuracy (mm), where there are enough cycles.
+    /// The path accuracy (mm), if there are enough cycles.
     pub fn accuracy_mm(&self) -> Option<f64> {
         self.deviation_mm.filter(|_| self.cycles >= PATH_CYCLES)
     }
@@ -59,10 +59,10 @@ impl PathFound {
 
 type Place = Vector3<f64>;
 
-/// The rows of one path: by cycle, and there by sampling point.
+/// The rows of one path, by cycle and sampling point.
 type Cycles = BTreeMap<u32, BTreeMap<u32, usize>>;
 
-/// Every path of the rows, in the order in which they come.
+/// Every path of the rows, in the order of first appearance.
 pub(super) fn found(
     observed: &Observations,
     model: &Model,
@@ -122,17 +122,17 @@ fn one(name: &str, cycles: &Cycles, observed: &Observations, model: &Model, fram
     }
 }
 
-/// A sampling point under all cycles.
+/// A sampling point over all cycles.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Passed {
-    /// From the commanded point to the barycentre of where the cycles passed its plane (mm).
+    /// Distance from the commanded point to the barycentre of the cycles' intersections with its plane (mm).
     pub deviation_mm: f64,
     /// Mean distance from the barycentre and three standard deviations of it (mm).
     pub repeatability_mm: f64,
 }
 
-/// The points of a commanded path whose normal plane every attained path passes (mm). Readings of the attained paths belong to the
-/// points at the same places.
+/// The points of a commanded path whose normal plane every attained path intersects (mm). Readings of the attained paths have
+/// the same indices as the points.
 pub fn characteristics(commanded: &[Place], attained: &[Vec<Place>]) -> Vec<Passed> {
     let reach = 1 + commanded.len() / 20;
     let at = |point: usize| {
@@ -152,16 +152,16 @@ pub fn characteristics(commanded: &[Place], attained: &[Vec<Place>]) -> Vec<Pass
     (0..commanded.len()).filter_map(at).collect()
 }
 
-/// Where a path goes at one of its points: between its directions from and to the neighbours, so that both climb through the plane
-/// however unlike their lengths. `None` where it turns back or stands.
+/// Direction of a path at one of its points: the mean of the unit directions from and to the neighbours, so that both cross
+/// the plane even if their lengths are very different. `None` if the path reverses or does not move.
 fn direction(path: &[Place], point: usize) -> Option<Place> {
     let piece = |from: usize| (path.get(from + 1)? - path[from]).try_normalize(f64::EPSILON);
     let here = [point.checked_sub(1).and_then(piece), piece(point)];
     here.into_iter().flatten().sum::<Place>().try_normalize(1e-6)
 }
 
-/// Where a path passes the plane through a point normal to `along`, in that direction, on one of the pieces `near`; the passage
-/// nearest to the point.
+/// Intersection of a path with the plane through a point normal to `along`, in that direction, on one of the pieces `near`;
+/// the one nearest to the point.
 fn passing(path: &[Place], near: Range<usize>, point: &Place, along: &Place) -> Option<Place> {
     let last = path.len().checked_sub(2)?;
     let passages = (near.start..near.end.min(last + 1)).filter_map(|k| {
@@ -171,7 +171,7 @@ fn passing(path: &[Place], near: Range<usize>, point: &Place, along: &Place) -> 
         if climb.is_nan() || climb <= 0.0 {
             return None;
         }
-        // The ends go on for their own length.
+        // First and last piece are extended by their own length.
         let (least, most) = (if k == 0 { -1.0 } else { 0.0 }, if k == last { 2.0 } else { 1.0 });
         let share = -height / climb;
         (least..=most).contains(&share).then(|| from + (to - from) * share)
@@ -179,7 +179,7 @@ fn passing(path: &[Place], near: Range<usize>, point: &Place, along: &Place) -> 
     passages.min_by(|a, b| (a - point).norm().total_cmp(&(b - point).norm()))
 }
 
-/// Where a row saw the target, in the base (mm).
+/// Measured position of the target in the base (mm).
 pub(super) fn seen(observed: &Observations, row: usize, base_from_sensor: &Pose) -> Option<Vector3<f64>> {
     let place = match &observed.dataset.rows[row].reading {
         Reading::Cable(_) => return None,

@@ -90,28 +90,28 @@ impl fmt::Display for Alarm {
         if self.course == Course::Burst {
             return write!(
                 f,
-                "the {} readings from row {} of {} on are far off and agree with no one change: they are set aside, and so is what \
-                 follows until readings fit again; look at the target, the line of limits and the poses",
+                "the {} readings from row {} of {} on are outliers that no single change explains: they and the following readings are \
+                 set aside until readings fit again; check the target, the line of sight and the poses",
                 self.poses, self.since_row, self.since_file
             );
         }
         if self.course == Course::Mounted {
             write!(
                 f,
-                "{} was mounted anew at row {} of {}: moved by {:.1} mm",
+                "{} was remounted at row {} of {}: moved by {:.1} mm",
                 self.parameter, self.since_row, self.since_file, self.shift
             )?;
             if let Some(turn) = self.parts.first() {
                 write!(f, " and turned by {:.2}°", turn.shift.to_degrees())?;
             }
-            return write!(f, "; {} poses agree on it, and the track goes on from there", self.poses);
+            return write!(f, "; {} poses agree on it, and tracking continues from there", self.poses);
         }
         if self.parameter.is_empty() {
             return write!(
                 f,
-                "innovations left their bounds at row {} of {} (sum of the window {:.0}, bound {:.0}), and no single parameter \
-                 explains it so far: look at the sensor, the target, and at effects that the model does not hold; more poses may \
-                 tell",
+                "innovations exceeded their bound at row {} of {} (sum of the window {:.0}, bound {:.0}), and no single parameter \
+                 explains it so far: check the sensor, the target and effects that the model does not contain, or measure more \
+                 poses",
                 self.noticed_row, self.noticed_file, self.window_nis[0], self.window_nis[1]
             );
         }
@@ -134,9 +134,9 @@ impl fmt::Display for Alarm {
             write!(f, " (t = {hours:.3} h)")?;
         }
         if self.course == Course::Drift && self.poses > 0 {
-            write!(f, ", {:.6} {unit} with each pose", self.shift * scale / self.poses as f64)?;
+            write!(f, ", {:.6} {unit} per pose", self.shift * scale / self.poses as f64)?;
         }
-        write!(f, ", noticed at row {} of {}", self.noticed_row, self.noticed_file)?;
+        write!(f, ", detected at row {} of {}", self.noticed_row, self.noticed_file)?;
         let sure = self.parts.iter().filter(|p| p.shift.abs() > 3.0 * p.sigma);
         for (k, part) in sure.enumerate() {
             let (scale, unit) = display_unit(&part.unit);

@@ -10,13 +10,13 @@ use crate::identification::start::StartError;
 pub enum TrackError {
     /// Not enough poses yet.
     #[error(
-        "{file}: {found} poses so far, {asked} are needed to place the sensor; run it again when there are more \
-         (--first-poses asks for fewer)"
+        "{file}: {found} poses so far, {asked} are needed to locate the sensor; run it again with more poses \
+         (or lower --first-poses)"
     )]
     TooFew {
         /// File.
         file: String,
-        /// Poses there are.
+        /// Poses available.
         found: usize,
         /// Poses needed.
         asked: usize,
@@ -26,9 +26,9 @@ pub enum TrackError {
     Placing(#[from] StartError),
     /// The first poses do not fit the model.
     #[error(
-        "{file}: the first {poses} poses leave {left_mm:.3} mm under this model, which left {held_out_mm:.3} mm on rows \
-         that it had not seen: the arm has changed since, or these are not its measurements; identify it anew, or begin all \
-         the same with --sigma {left_mm:.3}"
+        "{file}: the residual of the first {poses} poses is {left_mm:.3} mm under this model, whose held-out error was \
+         {held_out_mm:.3} mm: the arm has changed since, or these are not its measurements; identify it again, or start \
+         anyway with --sigma {left_mm:.3}"
     )]
     Foreign {
         /// File.
@@ -42,7 +42,7 @@ pub enum TrackError {
     },
     /// Another sensor than before.
     #[error(
-        "{file}: has {found} readings, and the track so far has {expected}: start a new track with another --state"
+        "{file}: has {found} readings, the track so far has {expected}: start a new track with another --state"
     )]
     Sensor {
         /// File.

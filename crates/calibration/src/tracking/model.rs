@@ -61,7 +61,7 @@ impl Tracker {
 
     fn reasons(&self) -> Vec<String> {
         let mut reasons = vec![format!(
-            "tracked over {} poses since {}, {} set aside as accidents; held-out errors are those of the first \
+            "tracked over {} poses since {}, {} set aside as outliers; held-out errors are those of the first \
              identification",
             self.state.poses, self.initial.provenance.file, self.state.accidents
         )];

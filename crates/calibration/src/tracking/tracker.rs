@@ -187,7 +187,7 @@ impl Tracker {
         let snapshots = [&state.now, &state.reference, &state.middle];
         if snapshots.iter().any(|s| s.x.len() != parameters.len()) {
             return Err(wrong(
-                "the number of parameters is another than the model's: it belongs to another model",
+                "the number of parameters differs from the model's: it belongs to another model",
             ));
         }
         let filter = state.now.filter().ok_or_else(|| wrong("the root of the covariance is damaged"))?;
@@ -218,7 +218,7 @@ impl Tracker {
                 return Err(TrackError::State {
                     file: dataset.file.clone(),
                     why: format!(
-                        "the {} rows that were taken in have changed: start a new track with another --state",
+                        "the {} rows that were already processed have changed: start a new track with another --state",
                         known.rows
                     ),
                 });

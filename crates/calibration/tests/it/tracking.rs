@@ -152,7 +152,7 @@ fn measurements_that_are_not_of_this_arm_are_refused_and_not_taken_for_noise() {
     let dataset = measured(2, Some(lost));
     let error = Tracker::begin(model(), "hash", &dataset, &Options::default()).unwrap_err();
     assert!(matches!(error, TrackError::Foreign { poses: 30, .. }), "{error}");
-    assert!(error.to_string().contains("identify it anew"), "{error}");
+    assert!(error.to_string().contains("identify it again"), "{error}");
     // Who knows better says so.
     let stated = Options { sigma_mm: Some(2.0), ..Options::default() };
     assert!(Tracker::begin(model(), "hash", &dataset, &stated).is_ok());
@@ -382,7 +382,7 @@ fn what_cannot_be_tracked_is_said() {
     let mut edited = dataset.clone();
     edited.rows[3].joints[0] += 1e-3;
     let error = tracker.process_file(&edited).unwrap_err();
-    assert!(error.to_string().contains("12 rows that were taken in have changed"), "{error}");
+    assert!(error.to_string().contains("12 rows that were already processed have changed"), "{error}");
     let cable = import::read(
         "cable.csv",
         include_bytes!("../../../../tests/data/irb120-cable.csv"),
@@ -482,7 +482,7 @@ fn a_target_that_was_mounted_anew_is_one_alarm_and_the_track_goes_on() {
         let turn = alarms[0].parts.first().map(|part| part.shift.to_degrees());
         assert_eq!(turn.is_some(), turn_deg.is_some(), "{said:#?}");
         assert!(turn.zip(turn_deg).is_none_or(|(found, told)| (found - told).abs() < 0.1), "{said:#?}");
-        assert!(said[0].contains("mounted anew at row 72 of day.csv"), "{said:#?}");
+        assert!(said[0].contains("remounted at row 72 of day.csv"), "{said:#?}");
         assert!(
             tracker.state().accidents <= 2 && !tracker.mostly_set_aside(),
             "{}",

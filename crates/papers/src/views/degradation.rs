@@ -1,4 +1,4 @@
-//! An arm that degrades: periodic against continuous calibration. Every table says that it is simulated.
+//! Report of a degrading arm: periodic and continuous calibration. Every table is labelled as simulated.
 
 mod figures;
 mod series;
@@ -32,7 +32,7 @@ pub(super) fn page(page: &mut Document, result: &DegradationResult, timings: boo
     page.heading(2, "How many poses");
     figures::counts(page, result);
     page.push(counts(result));
-    page.heading(2, "Calibration kept up");
+    page.heading(2, "Repeated calibration");
     figures::ways(page, result);
     page.push(table(result));
     page.push(against_rls(result));
@@ -55,15 +55,15 @@ fn after(j: &Run) -> f64 {
     j.mean(after_of)
 }
 
-/// What causes a gap between RLS and LM, if there is one.
+/// Verdict: the causes of a gap between RLS and LM.
 fn verdict(result: &DegradationResult) -> Verdict {
     let mm = |v: f64| Precision::Decimals(4).format(v);
     let mut reasons = Vec::new();
     for count in pose_counts(result) {
         let of = |way| journey(result, way, count).map_or(f64::NAN, after);
         reasons.push(format!(
-            "{count} poses: RLS leaves {} mm, LM converged on the same group alone {}, LM with RLS's memory {}, LM stopped \
-             and unweighted {}.",
+            "{count} poses, error after calibration: RLS {} mm, LM converged on the same group alone {}, LM with RLS's memory \
+             {}, LM stopped and unweighted {}.",
             mm(of(Strategy::Rls)),
             mm(of(Strategy::Lm)),
             mm(of(Strategy::LmMemory)),
@@ -76,8 +76,8 @@ fn verdict(result: &DegradationResult) -> Verdict {
     });
     let widest = gaps.fold(0.0, f64::max);
     reasons.push(format!(
-        "RLS and LM with the same rows, weights and memory differ by {} % at most: the algorithm is not the cause. What \
-         differs is memory of earlier groups, the weights of orientations, and whether LM had converged.",
+        "RLS and LM with the same rows, weights and memory differ by at most {} %: the algorithm is not the cause of a gap. \
+         The causes are memory of earlier groups, the weights of orientations, and whether LM had converged.",
         Precision::Significant(2).format(100.0 * widest)
     ));
     let stated = |method: &str| {
@@ -88,12 +88,12 @@ fn verdict(result: &DegradationResult) -> Verdict {
         let of = |way| journey(result, way, result.settings.identification).map_or(f64::NAN, after);
         let ours = of(Strategy::Lm) / of(Strategy::Rls);
         reasons.push(format!(
-            "The paper's LM leaves {:.1} times its RLS ({rls} mm). Here LM leaves {ours:.2} times RLS when it has converged \
-             and {:.2} times when it is stopped after {} steps: {}.",
+            "The error of the paper's LM is {:.1} times that of its RLS ({rls} mm). Here it is {ours:.2} times that of RLS \
+             when LM has converged, and {:.2} times when it is stopped after {} steps: {}.",
             lm / rls,
             of(Strategy::LmStopped) / of(Strategy::Rls),
             result.settings.stopped_after,
-            if ours > 0.5 * lm / rls { "a gap like it is there" } else { "a gap like the paper's is not found" }
+            if ours > 0.5 * lm / rls { "the paper's gap is reproduced" } else { "the paper's gap is not reproduced" }
         ));
     }
     if let (Some(rls), Some(forgetting)) = (
@@ -101,7 +101,7 @@ fn verdict(result: &DegradationResult) -> Verdict {
         journey(result, Strategy::RlsForgetting, result.settings.identification),
     ) {
         reasons.push(format!(
-            "Memory without forgetting lags behind an arm that changes: in the last group RLS leaves {} mm, with forgetting {} mm.",
+            "Without forgetting the estimate lags behind a changing arm: error of RLS in the last group {} mm, with forgetting {} mm.",
             mm(rls.steps.last().map_or(f64::NAN, |s| s.verification_after_mm)),
             mm(forgetting.steps.last().map_or(f64::NAN, |s| s.verification_after_mm))
         ));
@@ -113,19 +113,19 @@ fn verdict(result: &DegradationResult) -> Verdict {
         .count();
     reasons.push(format!(
         "Over {} independent simulated arms {real} of {} comparisons with RLS are significant at 5 % after Holm's \
-         correction and larger than 2 % of the error. How large they are follows from the physics that was simulated.",
+         correction and larger than 2 % of the error. Their size depends on the simulated physics.",
         result.settings.arms,
         result.against_rls.len()
     ));
     reasons.push(
-        "Measuring 15 poses in place of 50 saves 70 % of the measuring, whatever the algorithm; the paper's 69.52 % of \
-         calculation is the same ratio of rows."
+        "Measuring 15 poses instead of 50 saves 70 % of the measuring time with any algorithm; the paper's 69.52 % of \
+         computing time reflects the same ratio of rows."
             .to_owned(),
     );
     Verdict::new(Status::Good, format!("{}: {}", capital(SIMULATED), headline(result)), reasons)
 }
 
-/// Who leaves less with all poses of a group, as measured.
+/// Errors of RLS and LM with all identification poses of a group.
 fn headline(result: &DegradationResult) -> String {
     let count = result.settings.identification;
     let of = |way| journey(result, way, count).map_or(f64::NAN, after);
@@ -133,7 +133,7 @@ fn headline(result: &DegradationResult) -> String {
     let (rls, lm) = (of(Strategy::Rls), of(Strategy::Lm));
     let (less, more) = if rls < lm { (Strategy::Rls, Strategy::Lm) } else { (Strategy::Lm, Strategy::Rls) };
     format!(
-        "with {count} poses of each group {} leaves {} mm and {} {} mm, and neither because of its algorithm",
+        "with {count} poses of each group the error is {1} mm with {0} and {3} mm with {2}; the algorithm is not the cause",
         less.name(),
         mm(of(less)),
         more.name(),
@@ -162,8 +162,8 @@ fn groups(result: &DegradationResult) -> Table {
     }
     table.notes = vec![
         format!(
-            "Mean over {} simulated arms. Links grow by {:e} per kelvin towards a further rise of {} K (links 1 to 6) with a \
-             time constant of {} h; zeros of joints 1 to 6 wander by {} °/h.",
+            "Mean over {} simulated arms. Links grow by {:e} per kelvin, towards a further rise of {} K (links 1 to 6) with a \
+             time constant of {} h; zeros of joints 1 to 6 drift by {} °/h.",
             result.settings.arms,
             result.settings.heat.growth_per_k,
             listed(&result.settings.heat.rise_k),
@@ -214,10 +214,11 @@ fn counts(result: &DegradationResult) -> Table {
         ]);
     }
     table.notes = vec![
-        "RLS; errors in mm of poses that identify (id.) and that verify (ver.), better in %. Rank of 24 link parameters with known frames, the smallest over the arms; condition in units of the tolerances, \
-         the largest. No prior: error of the poses that verify after least squares of those poses alone."
+        "RLS; errors in mm of identification (id.) and verification poses (ver.), improvement (better) in %. Rank: of 24 link \
+         parameters with known frames, smallest over the arms. Condition: in units of the tolerances, largest over the arms. \
+         No prior: error of the verification poses after least squares without priors."
             .to_owned(),
-        "Better: against the nominal arm. The paper's percentages are of its own arm.".to_owned(),
+        "Better: relative to the nominal arm. The paper's percentages are of its own arm.".to_owned(),
     ];
     table
 }
@@ -230,7 +231,7 @@ fn percent(before: f64, after: f64) -> f64 {
 pub(super) fn table(result: &DegradationResult) -> Table {
     let mut table = Table::new(
         format!(
-            "Calibration kept up over {} groups, {SIMULATED} (Figs 9 to 14, Table 4)",
+            "Repeated calibration over {} groups, {SIMULATED} (Figs 9 to 14, Table 4)",
             result.settings.groups
         ),
         vec![
@@ -267,12 +268,12 @@ pub(super) fn table(result: &DegradationResult) -> Table {
         ]);
     }
     table.notes = vec![
-        "Errors in mm, better in %. Means over groups and arms of poses that identify (id.) and that verify (ver.), ± the standard deviation over \
-         the arms. before: with what was known when \
-         the group began, for the first group the nominal arm; better: against the nominal arm. The paper's after and its percentage are of its own measured arm and its verification poses, its 0.690698 \
-         mm before them being the nominal arm; its \"LM\" stands beside the variant that comes nearest to it."
+        "Errors in mm, improvement (better) in %. Means over groups and arms of identification (id.) and verification poses \
+         (ver.), ± the standard deviation over the arms. before: with the estimate of the previous group, for the first group \
+         the nominal arm; better: relative to the nominal arm. The paper's after and its percentage are of the verification \
+         poses of its own measured arm, with 0.690698 mm for the nominal arm; its \"LM\" is shown with the closest variant."
             .to_owned(),
-        format!("{} poses of a group is the paper's periodic calibration.", result.settings.identification),
+        format!("{} poses of a group correspond to the paper's periodic calibration.", result.settings.identification),
     ];
     table
 }
@@ -306,8 +307,8 @@ fn against_rls(result: &DegradationResult) -> Table {
         ]);
     }
     table.notes = vec![format!(
-        "Mean error of the poses that verify, after, over all groups; method minus RLS, paired over the {} simulated arms. \
-         p two-sided, after Holm's correction over {} comparisons.",
+        "Mean error of the verification poses after calibration, over all groups; method minus RLS, paired over the {} \
+         simulated arms. p: two-sided, after Holm's correction over {} comparisons.",
         result.settings.arms,
         result.against_rls.len()
     )];
@@ -343,7 +344,7 @@ fn steps(result: &DegradationResult) -> Table {
     table
 }
 
-/// Measured seconds.
+/// Measured times.
 pub(super) fn times(result: &DegradationResult) -> Table {
     let mut table = Table::new(
         format!(
@@ -375,7 +376,7 @@ pub(super) fn times(result: &DegradationResult) -> Table {
     table
 }
 
-/// Everything but seconds.
+/// The whole result as JSON, without measured times.
 pub(super) fn json(result: &DegradationResult) -> Value {
     json!({
         "simulated": true,

@@ -1,4 +1,4 @@
-//! A ground surface before and after compensation with each method.
+//! Report of a ground surface before and after compensation with each method.
 
 use serde_json::{Value, json};
 
@@ -36,8 +36,8 @@ pub(super) fn page(page: &mut Document, result: &GrindingResult) {
     page.figure(
         plan(result),
         format!(
-            "The path of {} from above, coloured by the deviation along the normal, one panel before and one for each method, \
-             on a common scale; first case.",
+            "The path of {} from above, coloured by the deviation along the normal: one panel before compensation and one for \
+             each method, on a common scale; first case.",
             result.program
         ),
     );
@@ -47,7 +47,7 @@ fn label(result: &GrindingResult) -> &'static str {
     if result.simulated { "simulated actual arm" } else { "predicted on the sound estimate" }
 }
 
-/// What is shown, on which part, with how many measured rows.
+/// Title of a table: content, part, arm, number of cases and rows.
 fn title(result: &GrindingResult, what: &str) -> String {
     let protocol = if result.reduced { "Reduced protocol: " } else { "" };
     let cases = result.rows.first().map_or(0, |r| r.cases.len());
@@ -59,12 +59,12 @@ fn title(result: &GrindingResult, what: &str) -> String {
     )
 }
 
-/// Whether a row's model is the one that the program was judged by.
+/// Whether a row's model replaces the actual arm.
 fn stands_in(result: &GrindingResult, row: &GrindingRow) -> bool {
     !result.simulated && result.all_rows && row.solver.name == SOLVERS[0].name
 }
 
-/// Mean ± standard deviation over the cases; nothing where a case has no result.
+/// Mean ± standard deviation over the cases; missing if a case has no result.
 fn over(row: &GrindingRow, figure: fn(&Deviations) -> f64) -> Cell {
     row.over_cases(figure).map_or(Cell::Missing, |values| repeated::cell(&values))
 }
@@ -74,10 +74,10 @@ fn held_out(row: &GrindingRow) -> Vec<f64> {
     row.cases.iter().map(|c| c.held_out.rmse).collect()
 }
 
-/// What one part and so many draws of measurements can say.
+/// Verdict from one part and several draws of measurements.
 fn verdict(result: &GrindingResult) -> Verdict {
     let mm = |v: f64| Precision::Significant(2).format(v);
-    // A program that was only partly rewritten is no result, and what stands in for the arm is right by definition.
+    // Partly rewritten programs are not ranked, nor is the model that replaces the arm: its error is zero by definition.
     let mut order: Vec<(&GrindingRow, f64)> = result
         .rows
         .iter()
@@ -88,14 +88,14 @@ fn verdict(result: &GrindingResult) -> Verdict {
     let before = result.before.as_ref().map_or(f64::NAN, |b| b.all.mean_absolute);
     let headline = match order.first() {
         Some((best, left)) if *left < before => format!(
-            "{} leaves least: {} mm of {} mm mean size along the normal ({})",
+            "{} has the smallest deviation: {} mm, before {} mm, mean size along the normal ({})",
             best.id,
             mm(*left),
             mm(before),
             label(result)
         ),
         Some((best, left)) => format!(
-            "No method leaves less than no compensation: {} {} mm, before {} mm mean size along the normal ({})",
+            "No method improves on no compensation: {} {} mm, before {} mm, mean size along the normal ({})",
             best.id,
             mm(*left),
             mm(before),
@@ -115,15 +115,15 @@ fn verdict(result: &GrindingResult) -> Verdict {
         .collect();
     if !refused.is_empty() {
         reasons.push(format!(
-            "Not compared, since targets could not be rewritten: {}. There their figures are of a program left as it was.",
+            "Not compared, since some targets could not be rewritten: {}. At these targets the figures are of the uncorrected program.",
             refused.join(", ")
         ));
     }
     let worse: Vec<&str> = order.iter().filter(|(_, v)| *v > before).map(|(r, _)| r.id.as_str()).collect();
     if !worse.is_empty() {
         reasons.push(format!(
-            "Worse than no compensation, on the mean of the cases: {}. What the measurements do not see, a method without \
-             priors moves at will, and a program in another place or turn shows it.",
+            "Worse than no compensation, on the mean of the cases: {}. A method without priors changes parameters that the \
+             measurements do not determine; the effect appears in a program at another position or orientation.",
             worse.join(", ")
         ));
     }
@@ -131,20 +131,20 @@ fn verdict(result: &GrindingResult) -> Verdict {
     let fits = || order.iter().map(|(r, _)| mean_and_deviation(&held_out(r)).0);
     if let (Some(most), Some(least)) = (fits().reduce(f64::max), fits().reduce(f64::min)) {
         reasons.push(format!(
-            "On held-out measurements the methods leave between {} and {} mm: a good fit there is no promise for the part.",
+            "On held-out measurements the methods' errors are between {} and {} mm: a good fit there does not guarantee a good part.",
             mm(least),
             mm(most)
         ));
     }
     reasons.push(
-        "One part, in one place: the cases vary the measurements only, and another program asks for another order. The \
-         paper's Table 8 has one part and one case."
+        "One part, in one place: only the measurements vary between the cases, and another program can give another order of \
+         the methods. The paper's Table 8 has one part and one case."
             .to_owned(),
     );
     Verdict::new(Status::Good, headline, reasons)
 }
 
-/// Which methods differ from the reference in what they leave on the part.
+/// Methods whose deviation on the part differs from the reference's.
 fn against(result: &GrindingResult) -> Vec<String> {
     let reference = &result.settings.reference;
     let mut better = Vec::new();
@@ -171,20 +171,20 @@ fn against(result: &GrindingResult) -> Vec<String> {
             out.push(format!("{what}: {}.", of.join(", ")));
         }
     };
-    say(&better, &format!("Leaves significantly less on the part than {reference}"));
-    say(&worse, &format!("Leaves significantly more than {reference}"));
-    say(&alike, &format!("Not told apart from {reference} by the signed-rank test"));
+    say(&better, &format!("Significantly smaller deviation than {reference}"));
+    say(&worse, &format!("Significantly larger deviation than {reference}"));
+    say(&alike, &format!("No significant difference from {reference} in the signed-rank test"));
     if !out.is_empty() {
         out.push(
-            "Signed-rank test over the cases, two-sided, after Holm's correction; it takes the cases as independent, and \
-             they share rows."
+            "Signed-rank test over the cases, two-sided, after Holm's correction; it assumes independent cases, but they \
+             share rows."
                 .to_owned(),
         );
     }
     out
 }
 
-/// Table 8 as the paper has it, of the first case.
+/// The paper's Table 8 with our figures, first case.
 fn five(result: &GrindingResult) -> Table {
     let mut columns = vec![Column::text("id", "")];
     columns.extend((1..=5).map(|k| Column::number(format!("p{k}_mm"), format!("P{k}"), "", 2)));
@@ -219,15 +219,15 @@ fn five(result: &GrindingResult) -> Table {
         add(&row.id, row.cases.first().and_then(|c| c.after.as_ref()), row.paper);
     }
     table.notes = vec![
-        "P1 to P5 at the middles of five equal sections of the cut. mean is signed, SD is n - 1 of signed values, as in the \
-         paper's Table 8: with signs of both kinds a mean near zero says little. Its mean |d| is worked out from its points."
+        "P1 to P5 lie in the middle of five equal sections of the cut. mean is signed and SD is that of signed values with \
+         n - 1, as in the paper's Table 8; a signed mean near zero shows little. The paper's mean |d| is computed from its points."
             .to_owned(),
-        "The paper's part, path and errors are not given: its figures stand beside for their kind, not for their size.".to_owned(),
+        "The paper does not state its part, path and errors: do not compare the size of its figures with ours.".to_owned(),
     ];
     table
 }
 
-/// The points that the paper prints.
+/// The points printed in the paper.
 fn papers(result: &GrindingResult) -> Table {
     let mut columns = vec![Column::text("id", "")];
     columns.extend((1..=5).map(|k| Column::number(format!("p{k}_mm"), format!("P{k}"), "mm", 2)));
@@ -243,10 +243,10 @@ fn papers(result: &GrindingResult) -> Table {
     table
 }
 
-/// All of the cut.
+/// Deviations over the whole cut.
 pub(super) fn table(result: &GrindingResult) -> Table {
     let mut table = Table::new(
-        title(result, "All of the cut, deviation along the normal in mm"),
+        title(result, "Whole cut, deviation along the normal in mm"),
         vec![
             Column::text("id", ""),
             Column::text("solver", "Method"),
@@ -270,7 +270,7 @@ pub(super) fn table(result: &GrindingResult) -> Table {
         let failed = row.cases.iter().find_map(|c| c.failure.as_ref());
         let note = match (failed, row.refused()) {
             (Some(why), _) => format!("failed: {why}"),
-            (None, 0) if stands_in(result, row) => "stands in for the arm".to_owned(),
+            (None, 0) if stands_in(result, row) => "replaces the actual arm".to_owned(),
             (None, 0) => String::new(),
             (None, n) => format!("{n} targets refused"),
         };
@@ -287,12 +287,12 @@ pub(super) fn table(result: &GrindingResult) -> Table {
     }
     table.notes = vec![
         format!(
-            "{} points of the cut; SD is n - 1 of signed values. ± is the standard deviation over the cases. held-out: RMSE of \
-             measurements that the fit did not see.",
+            "{} points of the cut; SD is that of signed values with n - 1. ± is the standard deviation over the cases. \
+             held-out: RMSE of measurements not used in the fit.",
             result.points
         ),
-        "Corrections up to 100 mm and 20° are let through here, so that the consequence of each method is seen; compensate \
-         refuses what exceeds 10 mm or 2°."
+        "Corrections up to 100 mm and 20° are allowed here to show the effect of each method; compensate refuses those above \
+         10 mm or 2°."
             .to_owned(),
     ];
     table
@@ -330,7 +330,7 @@ fn plan(result: &GrindingResult) -> String {
     .svg()
 }
 
-/// Everything.
+/// The whole result as JSON.
 pub(super) fn json(result: &GrindingResult) -> Value {
     let case = |case: &GrindingCase| {
         json!({

@@ -38,32 +38,31 @@ pub(super) fn page(page: &mut Document, study: &Study, timings: bool) {
     page.heading(2, "Errors");
     page.figure(
         error_bars(study),
-        "Held-out errors, mean over the cases; whiskers are one standard deviation over the cases. The mean of |e| is \
-         what the papers call STD. A method that diverged in any case has no bar.",
+        "Held-out errors, mean over the cases; whiskers are one standard deviation over the cases. The papers call the mean \
+         of |e| STD. A method that diverged in any case has no bar.",
     );
     for (picture, not_drawn) in rows(study) {
         page.figure(
             picture,
             format!(
-                "Held-out rows of the first case in the order of the file; BC has its frames registered, links nominal. \
-                 Methods that diverged in any case are left out.{not_drawn}"
+                "Held-out rows of the first case in the order of the file; BC has registered frames and nominal links. \
+                 Methods that diverged in any case are omitted.{not_drawn}"
             ),
         );
     }
-    page.heading(2, "Which differences are real");
+    page.heading(2, "Significant differences");
     page.push(verdict_table(study));
     page.push(Block::List(reservations(study)));
     page.push(convergence(study));
     page.heading(2, "Convergence and cost");
     page.figure(
         curves(study, false),
-        "Root mean square of the fit over the iterations, first case, methods as printed. An iteration of one method \
-         costs something else than one of another. A curve ends where it is ten times above its start; who is there after \
-         one step has none.",
+        "RMSE of the fit over the iterations, first case, methods as printed. The cost of an iteration differs between \
+         methods. A curve ends where it exceeds ten times its start; a method that exceeds it after one step has no curve.",
     );
     page.figure(
         curves(study, true),
-        "The same over passes through the rows, those with derivatives counted once: what an engineer pays for.",
+        "The same over passes through the rows, those with derivatives counted once: a measure of the computing cost.",
     );
     page.push(cost(study));
     if timings {
@@ -74,11 +73,11 @@ pub(super) fn page(page: &mut Document, study: &Study, timings: bool) {
         );
     }
     if !study.parameters.is_empty() {
-        page.heading(2, "What was identified");
+        page.heading(2, "Identified parameters");
         page.paragraph(
-            "First case. σ holds tolerances as prior, whatever the method did. Parameters that the data do not see are \
-             marked: a number there is an accident of the method's path, and two methods that disagree on it do not \
-             contradict each other.",
+            "First case. σ includes the tolerances as prior for every method. Parameters that the data do not determine are \
+             marked: their values depend on the search only, and two methods that disagree on them do not contradict each \
+             other.",
         );
         for table in &study.parameters {
             page.push(Block::Details {
@@ -89,20 +88,20 @@ pub(super) fn page(page: &mut Document, study: &Study, timings: bool) {
     }
 }
 
-/// What is to be known of the figures beside each other.
+/// Caveats for the comparison with the paper's figures.
 fn notes(study: &Study) -> Block {
     let mut notes = Vec::new();
     if study.reduced {
         notes.push(format!(
-            "Reduced protocol: {} rows in place of {}. The paper's figures beside ours belong to the whole one.",
+            "Reduced protocol: {} rows instead of {}. The paper's figures belong to the full protocol.",
             study.rows, study.methods.protocol.rows
         ));
     }
     if study.simulated {
         notes.push(
             format!(
-                "Simulated rows of {}: the paper's figures were measured on another arm and stand beside ours for the order \
-                 of the methods, not for their size.",
+                "Simulated rows of {}: the paper's figures were measured on another arm. Compare the order of the methods, \
+                 not the size of the errors.",
                 study.robot
             ),
         );
@@ -127,12 +126,12 @@ fn key_figures(study: &Study) -> Vec<KeyFigure> {
     }
     figures.push(
         KeyFigure::new("Frames registered alone", rmse(&registered(study)).map(|r| r.0), 3, "mm")
-            .note("nominal links, the fair before"),
+            .note("nominal links, before compensation"),
     );
     figures.push(KeyFigure::new("Noise floor", study.noise_floor_mm, 3, "mm").note(if study.simulated {
-        "repeated poses, else rounding and sensor"
+        "from repeated poses, or from rounding and sensor"
     } else {
-        "repeated poses, else the rounding of angles"
+        "from repeated poses, or from the rounding of angles"
     }));
     figures
 }

@@ -1,4 +1,4 @@
-//! A paper's own signed-rank tests.
+//! Report of a paper's repeated signed-rank tests.
 
 use serde_json::{Value, json};
 
@@ -18,14 +18,14 @@ pub(super) fn summary(page: &mut Document, tables: &[TableResult]) {
     }
 }
 
-/// Half a unit of the paper's last place, for p values of 0.002 and of four digits alike.
+/// Tolerance for a printed p value: half a unit of its last digit, whether printed as 0.002 or with four digits.
 const REPRODUCED: f64 = 6e-4;
 
 fn is_reproduced(test: &PairTest) -> bool {
     test.paper_p.is_some_and(|p| (p - test.test.one_sided_positive).abs() < REPRODUCED)
 }
 
-/// Whether the numbers hold, and what they say.
+/// Whether the printed p values are reproduced, and what they show.
 fn verdict(tables: &[TableResult]) -> Verdict {
     let all = || tables.iter().flat_map(|t| &t.tests).filter(|t| t.paper_p.is_some());
     let reproduced = all().filter(|t| is_reproduced(t)).count();
@@ -49,7 +49,7 @@ fn verdict(tables: &[TableResult]) -> Verdict {
     Verdict::new(
         status,
         format!(
-            "{reproduced} of {} printed p values are reproduced; they show less than they seem to",
+            "{reproduced} of {} printed p values are reproduced; they are weaker evidence than they seem",
             all().count()
         ),
         reasons,
@@ -92,7 +92,7 @@ fn push(table: &mut Table, of: &TableResult) {
 fn one(of: &TableResult) -> Table {
     let mut table = Table::new(of.table.title.clone(), columns());
     push(&mut table, of);
-    // All rows are of this table.
+    // All rows belong to this table, so its column is not needed.
     table.columns.remove(0);
     table.rows.iter_mut().for_each(|row| drop(row.remove(0)));
     table.notes = vec![format!(

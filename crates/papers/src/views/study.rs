@@ -1,4 +1,4 @@
-//! Figures of a study that tables, pictures and sentences share.
+//! Figures of a study that tables, plots and sentences share.
 
 use crate::experiment::{Treatment, Units};
 use crate::protocol::{MethodResult, Outcome, Study};
@@ -6,13 +6,13 @@ use truegrind_calibration::measurement::dataset::Sensor;
 use truegrind_estimation::estimate::Termination;
 use truegrind_math::statistics::{ErrorSummary, median};
 
-/// Held-out errors of all cases; nothing of a method that diverged in any, since a mean over such cases is no figure.
+/// Held-out errors of all cases; `None` for a method that diverged in any, since a mean over those would be meaningless.
 pub(super) fn held_out(result: &MethodResult) -> Option<Vec<ErrorSummary>> {
     let all = result.outcomes.iter().map(|o| (!o.diverged).then_some(o.held_out));
     all.collect()
 }
 
-/// The same of the start, with frames registered.
+/// Held-out errors of all cases with registered frames and nominal links.
 pub(super) fn registered(study: &Study) -> Vec<ErrorSummary> {
     study.cases.iter().map(|c| c.registered).collect()
 }
@@ -28,7 +28,7 @@ pub(super) fn title(study: &Study, what: &str) -> String {
     format!("{protocol}{what}, {} cases of {} rows{simulated}", study.cases.len(), study.rows)
 }
 
-/// How the cases ended, in words.
+/// Summary of the cases' terminations.
 pub(super) fn ended(outcomes: &[Outcome]) -> String {
     let n = outcomes.len();
     let diverged = outcomes.iter().filter(|o| o.diverged).count();
@@ -63,7 +63,7 @@ pub(super) fn treatment(result: &MethodResult) -> &'static str {
     }
 }
 
-/// Passes over the rows of the fit: residuals alone, and with derivatives.
+/// Passes over the rows of the fit: residuals only, and with derivatives.
 pub(super) fn passes(study: &Study, result: &MethodResult) -> (f64, f64) {
     let per = match study.sensor {
         Sensor::Cable => 1,

@@ -1,4 +1,4 @@
-//! Uniformity of the logistic-tent map over r.
+//! Report of the logistic-tent map's uniformity over r.
 
 use serde_json::{Value, json};
 
@@ -25,7 +25,7 @@ pub(super) fn page(page: &mut Document, result: &UniformityResult) {
             over_r(result, long),
             format!(
                 "{} points in {} bins, mean of {} starts; the band is one standard deviation over the starts. The \
-                 line across is what random points give.",
+                 horizontal line is the value for random points.",
                 thousands(points),
                 result.settings.bins, result.settings.starts
             ),
@@ -55,11 +55,11 @@ pub(super) fn page(page: &mut Document, result: &UniformityResult) {
         }
         .svg(),
         format!(
-            "The paper's Fig. 3b. {} in each bin would be even; random counts would scatter by as much as these.",
+            "The paper's Fig. 3b. {} in each bin would be uniform; counts of random points scatter by as much as these.",
             Precision::Significant(3).format(result.settings.points as f64 / result.settings.bins as f64)
         ),
     );
-    page.heading(2, "The maps beside each other");
+    page.heading(2, "Comparison of the maps");
     page.push(maps(result));
     page.push(Block::Details {
         summary: format!("All {} values of r", result.settings.steps),
@@ -100,9 +100,9 @@ fn maps(result: &UniformityResult) -> Table {
         ]);
     }
     table.notes = vec![format!(
-        "± is the standard deviation over {} starts. Tent and Bernoulli would collapse to 0 in binary floating point; \
-             fresh digits are fed in at the far end. Logistic, sine, Chebyshev and Hénon have densities that are not \
-             uniform, and are not meant to be.",
+        "± is the standard deviation over {} starts. Tent and Bernoulli would collapse to 0 in binary floating point, so \
+             random bits are appended at the low end. Logistic, sine, Chebyshev and Hénon have non-uniform densities by \
+             design.",
         settings.starts
     )];
     table
@@ -120,13 +120,13 @@ fn verdict(result: &UniformityResult) -> Verdict {
     let random = result.study.points.first();
     let mut reasons = vec![
         format!(
-            "With {} points {} of {all} values of r lie within one sampling spread of r = {claimed}, or below; the smallest is r = {:.2}.",
+            "With {} points, {} of {all} values of r lie within one sampling spread of r = {claimed}, or below; the smallest is r = {:.2}.",
             thousands(result.settings.points),
             verdict.indistinguishable_short,
             verdict.best_short
         ),
         format!(
-            "With {} points {} values of r are more uniform by more than one sampling spread; the smallest is r = {:.2}.",
+            "With {} points, {} values of r are more uniform by more than one sampling spread; the smallest is r = {:.2}.",
             thousands(result.settings.long_points),
             verdict.better_long,
             verdict.best_long
@@ -139,7 +139,7 @@ fn verdict(result: &UniformityResult) -> Verdict {
         ));
     }
     reasons.push(
-        "It does no harm: a line search over some ten candidates does not need even points.".to_owned(),
+        "This does no harm: a line search over some ten candidates does not need uniform points.".to_owned(),
     );
     Verdict::new(if verdict.sampling_noise { Status::Warning } else { Status::Good }, headline, reasons)
 }

@@ -1,16 +1,16 @@
-//! The verdict in sentences that a careful statistician would sign.
+//! The verdict of a comparison of methods in sentences.
 
 use super::study::{name_of, passes};
 use crate::protocol::{MethodResult, Study};
 use crate::verdict::{Comparison, Conclusion, LEVEL, Test};
 use truegrind_report::number::Precision;
 
-/// A p value as people read it.
+/// Formats a p value.
 pub(super) fn p(value: f64) -> String {
     if value < 1e-4 { "< 0.0001".to_owned() } else { Precision::Significant(2).format(value) }
 }
 
-/// A few words for a table.
+/// Short conclusion for a table.
 pub(super) fn conclusion(comparison: &Comparison, reference: &str) -> String {
     match &comparison.conclusion {
         Conclusion::ReferenceBetter => format!("{reference} better"),
@@ -26,7 +26,7 @@ pub(super) fn conclusion(comparison: &Comparison, reference: &str) -> String {
     }
 }
 
-/// How many of the comparisons ended how, in one line.
+/// Counts of the conclusions, in one line.
 pub(super) fn headline(study: &Study) -> String {
     let judgement = &study.judgement;
     let count =
@@ -34,12 +34,12 @@ pub(super) fn headline(study: &Study) -> String {
     let groups = [
         (count(|c| matches!(c, Conclusion::ReferenceBetter)), "significantly worse"),
         (count(|c| matches!(c, Conclusion::MethodBetter)), "significantly better"),
-        (count(|c| matches!(c, Conclusion::SameOptimum { .. })), "of the same optimum"),
-        (count(|c| matches!(c, Conclusion::NotSignificant)), "not told apart"),
+        (count(|c| matches!(c, Conclusion::SameOptimum { .. })), "with the same optimum"),
+        (count(|c| matches!(c, Conclusion::NotSignificant)), "without significant difference"),
         (count(|c| matches!(c, Conclusion::Diverged { .. })), "diverged"),
         (
             count(|c| matches!(c, Conclusion::ReferenceDiverged { .. })),
-            "not compared, since it diverged itself",
+            "not compared, since the reference diverged",
         ),
     ];
     let parts: Vec<String> =
@@ -52,7 +52,7 @@ pub(super) fn headline(study: &Study) -> String {
     )
 }
 
-/// Which differences there are, what the paper has, which method costs least, and what they do not mean.
+/// Significant differences, the order in the paper, the cheapest methods, and the effect of the treatment.
 pub(super) fn answer(study: &Study) -> Vec<String> {
     let judgement = &study.judgement;
     let reference = &judgement.reference;
@@ -63,7 +63,7 @@ pub(super) fn answer(study: &Study) -> Vec<String> {
     out.extend(treatments(study));
     if !judgement.can_be_significant {
         out.push(format!(
-            "With {} cases and {} comparisons no difference could be significant at 5 %, whatever the figures.",
+            "With {} cases and {} comparisons no difference could be significant at 5 %, whatever its size.",
             judgement.cases,
             judgement.comparisons.len()
         ));
@@ -71,8 +71,7 @@ pub(super) fn answer(study: &Study) -> Vec<String> {
     out
 }
 
-/// What is to be known of the comparisons: methods that end alike, that were stopped, that could not be told apart, and what limits the
-/// tests.
+/// Caveats of the comparisons: methods with the same optimum, diverged and undecided methods, and the limits of the tests.
 pub(super) fn reservations(study: &Study) -> Vec<String> {
     let judgement = &study.judgement;
     let reference = &judgement.reference;
@@ -85,22 +84,21 @@ pub(super) fn reservations(study: &Study) -> Vec<String> {
         let each: Vec<String> =
             by_ranks.iter().map(|c| format!("{} ({} mm)", c.id, mm(c.limited.mean_mm))).collect();
         out.push(format!(
-            "Undecided: {} against {reference}. The signed-rank test, which takes the cases as independent, finds a \
-             difference; the t test that allows for their common rows does not.",
+            "Undecided: {} against {reference}. The signed-rank test, which assumes independent cases, finds a \
+             difference; the t test, which allows for their common rows, does not.",
             each.join(", ")
         ));
     }
     if !alike.is_empty() {
         out.push(format!(
-            "No significant difference to {reference} was found for {}: that is no proof that there is none.",
+            "No significant difference from {reference} was found for {}; this does not prove that there is none.",
             ids(&alike)
         ));
     }
     out.extend(once_converged(study));
     out.push(
-        "All cases draw their rows from one file, so they are not independent: the signed-rank test takes them as if \
-         they were, the t test is corrected for it, and a difference counts only where both find it after Holm's \
-         correction."
+        "All cases draw their rows from one file, so they are not independent. The signed-rank test assumes that they \
+         are, the t test is corrected for it; a difference counts only if both find it after Holm's correction."
             .to_owned(),
     );
     out
@@ -110,15 +108,15 @@ fn ids(comparisons: &[&Comparison]) -> String {
     comparisons.iter().map(|c| c.id.as_str()).collect::<Vec<_>>().join(", ")
 }
 
-/// Methods that end where the reference ends: whether they differ as limited, who of method and reference was stopped, and
-/// which they are.
+/// Methods with the reference's optimum, grouped by whether they differ as limited and by which of method and reference
+/// was stopped.
 struct Alike<'a> {
     was_significant: bool,
     stopped: [bool; 2],
     methods: Vec<&'a Comparison>,
 }
 
-/// What is to be said of them.
+/// One sentence for each group of methods with the reference's optimum.
 fn same_optimum(study: &Study) -> Vec<String> {
     let reference = &study.judgement.reference;
     let mut groups: Vec<Alike<'_>> = Vec::new();
@@ -164,7 +162,7 @@ fn diverged(study: &Study) -> Option<String> {
     (!all.is_empty()).then(|| format!("Diverged and not compared, with the cases: {}.", all.join(", ")))
 }
 
-/// Where methods run to convergence differ, whatever they did when they were stopped.
+/// Methods that differ significantly from the reference after convergence.
 fn once_converged(study: &Study) -> Option<String> {
     let reference = &study.judgement.reference;
     let real = |c: &&Comparison| c.converged.as_ref().is_some_and(Test::is_significant);
@@ -176,11 +174,11 @@ fn once_converged(study: &Study) -> Option<String> {
         .filter_map(|c| Some(format!("{} ({} mm)", c.id, signed_mm(c.converged.as_ref()?.mean_mm))))
         .collect();
     (!each.is_empty()).then(|| {
-        format!("Run until they converged, these differ significantly from {reference}: {}.", each.join(", "))
+        format!("After convergence these differ significantly from {reference}: {}.", each.join(", "))
     })
 }
 
-/// Whether the order that the paper prints is found.
+/// Whether the paper's best method is also best here.
 fn papers_order(study: &Study) -> Option<String> {
     let printed = |id: &str| {
         let result = study.results.iter().find(|r| r.method.id == id)?;
@@ -192,8 +190,8 @@ fn papers_order(study: &Study) -> Option<String> {
     let failed = best.outcomes.iter().filter(|o| o.diverged).count();
     if failed > 0 {
         return Some(format!(
-            "The paper has {id} first, with {least} mm. As printed, with the settings taken here, it diverged in {failed} of \
-             {} cases: its place in that order does not follow from what is printed.",
+            "The paper has {id} first, with {least} mm. As printed, with the settings used here, it diverged in {failed} of \
+             {} cases: the printed description does not reproduce its rank.",
             study.cases.len()
         ));
     }
@@ -210,16 +208,16 @@ fn papers_order(study: &Study) -> Option<String> {
             parts.push(format!("{what} {}", ids(found)));
         }
     };
-    part(&of(|c| matches!(c, Conclusion::ReferenceBetter)), "that holds significantly against");
-    part(&of(|c| matches!(c, Conclusion::MethodBetter)), "the contrary holds significantly for");
+    part(&of(|c| matches!(c, Conclusion::ReferenceBetter)), "this is significant against");
+    part(&of(|c| matches!(c, Conclusion::MethodBetter)), "the opposite is significant for");
     part(
         &of(|c| matches!(c, Conclusion::NotSignificant | Conclusion::SameOptimum { .. })),
-        "no difference is found to",
+        "there is no significant difference from",
     );
     Some(format!("The paper has {id} before all others. Here {}.", parts.join("; ")))
 }
 
-/// Which methods are not shown to be worse than any, and cost least.
+/// The methods with the least cost among those not shown to be worse than the reference.
 fn cheapest(study: &Study) -> Option<String> {
     let reference = &study.judgement.reference;
     let conclusion = |id: &str| {
@@ -248,13 +246,13 @@ fn cheapest(study: &Study) -> Option<String> {
     let which = if any_better { "significantly better" } else { "that neither test finds worse" };
     (!each.is_empty()).then(|| {
         format!(
-            "Of the methods {which} than {reference}, these ask for the fewest passes over the rows: {}.",
+            "Of the methods {which} than {reference}, these need the fewest passes over the rows: {}.",
             each.join(", ")
         )
     })
 }
 
-/// What separates printed from sound methods, where both are compared.
+/// The difference between printed and sound treatment, where both are compared.
 fn treatments(study: &Study) -> Option<String> {
     let of = |id: &str| study.results.iter().find(|r| r.method.id == id).map(|r| r.treatment);
     let reference = of(&study.judgement.reference)?;
@@ -262,16 +260,16 @@ fn treatments(study: &Study) -> Option<String> {
         study.results.iter().filter(|r| r.treatment != reference).map(|r| r.method.id.as_str()).collect();
     (!others.is_empty()).then(|| {
         format!(
-            "{} solve another problem than {}: as printed the frames stay where a fit of the frames alone put them, rows are \
-             not weighed and there are no priors; in sound form links and frames are found together. A difference between \
-             the two kinds is one of the problem, not of the search.",
+            "{} solve another problem than {}: as printed, the frames are fixed by a fit of the frames alone, rows are \
+             unweighted and there are no priors; in sound form links and frames are fitted together. A difference between \
+             the two kinds is due to the problem, not to the search.",
             others.join(", "),
             study.judgement.reference
         )
     })
 }
 
-/// A significant difference.
+/// Sentence for a significant difference.
 fn of_difference(study: &Study, comparison: &Comparison, reference: &str) -> Option<String> {
     let test = &comparison.limited;
     let (better, worse, in_cases, mean) = match comparison.conclusion {
@@ -282,7 +280,7 @@ fn of_difference(study: &Study, comparison: &Comparison, reference: &str) -> Opt
         _ => return None,
     };
     Some(format!(
-        "{} leaves {} mm less than {}, in {in_cases} of {} cases.",
+        "{} has an RMSE {} mm below that of {}, and is better in {in_cases} of {} cases.",
         name_of(study, better),
         mm(mean),
         name_of(study, worse),

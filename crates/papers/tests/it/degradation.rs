@@ -70,7 +70,7 @@ fn few_poses_are_stated_with_rank_and_condition() {
     assert_eq!((four.equations, five.equations), (24, 30));
     assert!(four.rank <= 24 && fifteen.rank == 24);
     assert!(four.condition > fifteen.condition);
-    // Few poses explain themselves and little else.
+    // Few poses are overfitted.
     assert!(four.identification_mm < four.verification_mm);
     assert!(fifteen.verification_mm < four.verification_mm);
 }

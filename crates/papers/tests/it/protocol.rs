@@ -107,9 +107,9 @@ fn the_verdict_says_what_the_paper_has_and_which_method_costs_least() {
     let results = Results::Methods(Box::new(study));
     let text = format::terminal::document(&view::summary(&experiment, &results), 400);
     for word in [
-        "Of 3 methods compared with B (LM): 1 of the same optimum, 1 not told apart, 1 diverged",
+        "Of 3 methods compared with B (LM): 1 with the same optimum, 1 without significant difference, 1 diverged",
         "Diverged and not compared, with the cases: C (3 of 3)",
-        "The paper has B before all others. Here no difference is found to A.",
+        "The paper has B before all others. Here there is no significant difference from A.",
         "fewest passes over the rows: A (3), D (",
     ] {
         assert!(text.contains(word), "`{word}` is not in: {text}");

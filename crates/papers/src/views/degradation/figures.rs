@@ -1,4 +1,4 @@
-//! The pictures of an arm that degrades: the paper's Figs 4, 7 and 9 to 14, each with what it leaves out.
+//! Plots of a degrading arm: the paper's Figs 4, 7 and 9 to 14, with additional curves.
 
 use super::series::{SIMULATED, after_of, pose_counts};
 use crate::degradation::{Count, DegradationResult, Run, Step};
@@ -9,12 +9,12 @@ use truegrind_report::plot::{Axis, Graph, Reference, Series};
 pub(super) fn groups(page: &mut Document, result: &DegradationResult) {
     let series = vec![
         by_group(result, "nominal arm", &result.nominal_mm),
-        by_group(result, "calibrated once, then neglected", &result.neglected_mm),
+        by_group(result, "calibrated once", &result.neglected_mm),
     ];
     page.figure(
         over_time(result, "Mean position error of each group", series, Axis::new("mean error", "mm")),
-        "The paper's Fig. 4 has the nominal arm. Simulated: links warm up, joint zeros wander. What the first calibration \
-         wins is lost again in hours.",
+        "The paper's Fig. 4 shows the nominal arm. Simulated: links warm up, joint zeros drift. The improvement of the first \
+         calibration is lost within hours.",
     );
 }
 
@@ -29,19 +29,19 @@ pub(super) fn counts(page: &mut Document, result: &DegradationResult) {
             x: Axis::new("poses", ""),
             y: Axis::log("mean error", "mm"),
             series: vec![
-                Series::line("poses that identify", points(|c| c.identification_mm)),
-                Series::line("poses that verify", points(|c| c.verification_mm)),
+                Series::line("identification poses", points(|c| c.identification_mm)),
+                Series::line("verification poses", points(|c| c.verification_mm)),
             ],
             references: vec![floor(result)],
             ..Graph::default()
         }
         .svg(),
-        "The paper's Fig. 7: RLS with so many poses of the first group, frames known, tolerances as prior. Few poses explain \
-         themselves.",
+        "The paper's Fig. 7: RLS over the number of poses of the first group, known frames, tolerances as prior. Few poses \
+         are overfitted.",
     );
 }
 
-/// All ways side by side, one picture for each count.
+/// All methods in one plot for each number of poses.
 pub(super) fn ways(page: &mut Document, result: &DegradationResult) {
     for count in pose_counts(result) {
         let series = result
@@ -55,14 +55,14 @@ pub(super) fn ways(page: &mut Document, result: &DegradationResult) {
                 result,
                 &format!("{count} poses of each group"),
                 series,
-                Axis::log("mean error after, poses that verify", "mm"),
+                Axis::log("mean error after, verification poses", "mm"),
             ),
-            "Each method begins where it ended in the group before.",
+            "Each method starts from its result of the previous group.",
         );
     }
 }
 
-/// Figs 9 to 14: one method and count each, the poses that identify (a) and those that verify (b).
+/// Figs 9 to 14: one method and number of poses each, identification (a) and verification poses (b).
 pub(super) fn of_the_paper(page: &mut Document, result: &DegradationResult) {
     for stated in &result.settings.paper {
         let Some(figure) = &stated.figure else { continue };
@@ -75,23 +75,23 @@ pub(super) fn of_the_paper(page: &mut Document, result: &DegradationResult) {
                 by_step(result, journey, "after", after),
             ];
             let title = format!(
-                "{} with {} poses of each group, poses that {poses}",
+                "{} with {} poses of each group, {poses} poses",
                 journey.way.name(),
                 journey.count
             );
             Block::Figure(Figure::new(
                 over_time(result, &title, series, Axis::log("mean error", "mm")),
                 format!(
-                    "The paper's {figure}({part}). Before: with what was known when the group began, for the first group \
-                     the nominal arm."
+                    "The paper's {figure}({part}). Before: with the estimate of the previous group, for the first group the \
+                     nominal arm."
                 ),
             ))
         };
         page.push(Block::Details {
             summary: format!("{figure}: {} with {} poses, group by group", journey.way.name(), journey.count),
             blocks: vec![
-                panel("a", "identify", |s| s.identification_before_mm, |s| s.identification_after_mm),
-                panel("b", "verify", |s| s.verification_before_mm, after_of),
+                panel("a", "identification", |s| s.identification_before_mm, |s| s.identification_after_mm),
+                panel("b", "verification", |s| s.verification_before_mm, after_of),
             ],
         });
     }

@@ -1,10 +1,10 @@
-//! What tables and pictures of a degrading arm share.
+//! Shared by the tables and plots of a degrading arm.
 
 use crate::degradation::{DegradationResult, Step};
 
 pub(super) const SIMULATED: &str = "simulated degradation";
 
-/// Pose counts of the journeys, each once.
+/// The numbers of poses of the journeys, each once.
 pub(super) fn pose_counts(result: &DegradationResult) -> Vec<usize> {
     let mut counts: Vec<usize> = result.journeys.iter().map(|j| j.count).collect();
     counts.dedup();

@@ -1,4 +1,4 @@
-//! Methods over cases for programs: one row for each method and case, and everything as JSON.
+//! Machine-readable results of methods over cases: a table with one row for each method and case, and JSON.
 
 use serde_json::{Value, json};
 
@@ -9,7 +9,7 @@ use crate::views::words;
 use truegrind_arm::parameter::Parameter;
 use truegrind_report::table::{Cell, Column, Table};
 
-/// The table for programs: one row for each method and case.
+/// Table for CSV: one row for each method and case.
 pub(crate) fn table(study: &Study) -> Table {
     let mut table = Table::new(
         title(study, "Every case"),
@@ -87,7 +87,7 @@ fn figures(paper: PaperFigures) -> [Cell; 3] {
     [paper.rmse_mm.into(), paper.mean_absolute_mm.into(), paper.max_mm.into()]
 }
 
-/// Everything but seconds.
+/// The whole result as JSON, without measured times.
 pub(crate) fn json(study: &Study) -> Value {
     let outcome = |o: &Outcome| {
         json!({

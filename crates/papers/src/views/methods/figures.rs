@@ -1,4 +1,4 @@
-//! The pictures of methods over cases: the papers' bars of errors and times, errors row by row, convergence.
+//! Plots of methods over cases: the papers' bars of errors and times, errors row by row, convergence.
 
 use crate::experiment::Treatment;
 use crate::protocol::{MethodResult, Study};
@@ -7,7 +7,7 @@ use truegrind_report::number::Precision;
 use truegrind_report::plot::{Axis, BarGroup, Bars, Graph, Ink, Reference, Series, distinguishable};
 use truegrind_report::repeated;
 
-/// A method that diverged has no bar: it would be the only one to be seen.
+/// A diverged method has no bar: it would dwarf all others.
 pub(super) fn error_bars(study: &Study) -> String {
     let errors: Vec<_> = study.results.iter().map(held_out).collect();
     repeated::bars(names(study), &errors, None)
@@ -24,11 +24,11 @@ pub(super) fn time_bars(study: &Study) -> String {
     .svg()
 }
 
-/// Most methods of one picture of rows: more lines cannot be told apart.
+/// Most methods in one plot of rows: more lines cannot be distinguished.
 const PANEL: usize = 4;
 
-/// Figure 7 of the papers: the held-out rows of the first case, each picture with the start beside a few methods, and the words of
-/// what is not drawn in it.
+/// Figure 7 of the papers: the held-out rows of the first case, each plot with the start and a few methods, and a note on
+/// the methods that are not drawn in it.
 pub(super) fn rows(study: &Study) -> Vec<(String, String)> {
     [Treatment::Printed, Treatment::Sound]
         .into_iter()
@@ -60,14 +60,14 @@ fn rows_of(study: &Study, treatment: Treatment) -> Vec<(String, String)> {
     pictures.collect()
 }
 
-/// Methods that are not drawn, since they run as this one.
+/// Note on methods that are not drawn because their curve is the same as this one.
 fn running_as(id: &str, alike: &[(String, String)]) -> String {
     let names: Vec<&str> =
         alike.iter().filter(|(_, same)| same == id).map(|(name, _)| name.as_str()).collect();
     match names.as_slice() {
         [] => String::new(),
-        [one] => format!(" {one} is not drawn: it runs as {id}."),
-        many => format!(" {} are not drawn: they run as {id}.", many.join(", ")),
+        [one] => format!(" {one} is not drawn: its curve is the same as {id}'s."),
+        many => format!(" {} are not drawn: their curves are the same as {id}'s.", many.join(", ")),
     }
 }
 
@@ -83,7 +83,7 @@ fn numbered(errors: &[f64]) -> Vec<[f64; 2]> {
 pub(super) fn curves(study: &Study, by_passes: bool) -> String {
     let series = study.results.iter().filter(|r| r.treatment == Treatment::Printed).filter_map(|result| {
         let outcome = result.outcomes.first()?;
-        // A curve that diverges leaves the picture where it is ten times above the start.
+        // A diverging curve is cut where it exceeds ten times the start.
         let highest = 10.0 * outcome.curve.first()?.rmse;
         let points: Vec<[f64; 2]> = outcome
             .curve
@@ -91,7 +91,7 @@ pub(super) fn curves(study: &Study, by_passes: bool) -> String {
             .take_while(|c| c.rmse <= highest)
             .map(|c| if by_passes { [c.passes.max(1.0), c.rmse] } else { [c.iteration as f64 + 1.0, c.rmse] })
             .collect();
-        // One that leaves at once has no line, and no place in the legend.
+        // A curve that diverges at once is not drawn and not in the legend.
         (points.len() > 1).then(|| Series::line(result.method.id.clone(), points))
     });
     let x = if by_passes { "passes over the rows" } else { "iteration (1 is the start)" };

@@ -1,4 +1,4 @@
-//! The tables of methods over cases: errors beside the paper's, which differences are real, budgets, parameters.
+//! Tables of methods over cases: errors with the paper's, significance, budgets, parameters.
 
 use crate::experiment::PaperFigures;
 use crate::parameters::ParameterTable;
@@ -13,7 +13,7 @@ use truegrind_report::repeated::{self, spread};
 use truegrind_report::status::Status;
 use truegrind_report::table::{Cell, Column, Table};
 
-/// The papers' table, ours and theirs side by side.
+/// Held-out errors, ours next to the paper's.
 pub(super) fn errors(study: &Study) -> Table {
     let paper = |key: &str| Column::number(format!("paper_{key}"), "paper", "mm", 2);
     let mut columns = vec![Column::text("id", ""), Column::text("method", "Method")];
@@ -40,11 +40,11 @@ pub(super) fn errors(study: &Study) -> Table {
         add(&result.method.id, &result.method.name, ours, result.method.paper);
     }
     table.notes = vec![
-        "± is the standard deviation over the cases. mean |e| is what the papers print as STD, SD or Mean (ltlm-2024 eq. \
-         20, ukf-vslm-2023 eq. 28)."
+        "± is the standard deviation over the cases. The papers print mean |e| as STD, SD or Mean (ltlm-2024 eq. 20, \
+         ukf-vslm-2023 eq. 28)."
             .to_owned(),
-        "BC, before compensation: the paper's carries the cable's constant offset; ours has its frames registered, links \
-         nominal. A method with the figures of BC found nothing better than its start."
+        "BC, before compensation: the paper's figure includes the cable's constant offset; ours has registered frames and \
+         nominal links. A method with the figures of BC did not improve on its start."
             .to_owned(),
     ];
     if study.sensor != Sensor::Cable {
@@ -52,7 +52,7 @@ pub(super) fn errors(study: &Study) -> Table {
     }
     if let Some(floor) = study.noise_floor_mm {
         let floor = Precision::Significant(2).format(floor);
-        table.notes.push(format!("Noise floor {floor} mm: below it there is nothing left to explain."));
+        table.notes.push(format!("Noise floor {floor} mm: errors cannot be reduced below it."));
     }
     table
 }
@@ -93,8 +93,9 @@ pub(super) fn verdict_table(study: &Study) -> Table {
         ]);
     }
     table.notes = vec![format!(
-        "difference: method minus {reference}, positive where {reference} is better. p two-sided, of the signed-rank test and \
-         of the t test corrected for cases that share rows, both after Holm's correction over {} comparisons. converged: the same once both were run until they converged.",
+        "difference: method minus {reference}, positive if {reference} is better. p: two-sided, of the signed-rank test and of \
+         the t test corrected for cases that share rows, both after Holm's correction over {} comparisons. converged: the \
+         difference after both have converged.",
         judgement.comparisons.len()
     )];
     table
@@ -104,7 +105,7 @@ pub(super) fn verdict(study: &Study) -> Verdict {
     Verdict::new(Status::Good, words::headline(study), words::answer(study))
 }
 
-/// What each least-squares method finds when nothing stops it.
+/// Each least-squares method as limited and after convergence.
 pub(super) fn convergence(study: &Study) -> Table {
     let mut table = Table::new(
         title(study, "Stopped and converged"),
@@ -131,25 +132,24 @@ pub(super) fn convergence(study: &Study) -> Table {
         ]);
     }
     table.notes = vec![
-        "Converged: continued on the same cost by steps that neither fixed damping nor a decaying step size slows. Both \
-         leave stationary points where they are, so this is where the method itself would end, often thousands of its \
-         iterations later along what the data hardly see. A method that still had not converged after 5,000 further steps \
-         says so."
+        "Converged: continued on the same cost without fixed damping or a decaying step size. Neither changes the stationary \
+         points, so the method itself would end here, often after thousands more iterations along poorly determined \
+         directions. Ended: also states if a method had not converged after 5,000 further steps."
             .to_owned(),
-        "farthest: how far the farthest link parameter is from the data sheet in the end, in manufacturing tolerances, mean \
-         over the cases. What goes tens of tolerances away fits the rows by what no arm is."
+        "farthest: largest final deviation of a link parameter from the data sheet, in manufacturing tolerances, mean over \
+         the cases. A deviation of tens of tolerances fits the rows with a physically implausible arm."
             .to_owned(),
     ];
     table
 }
 
-/// Mean held-out RMSE; nothing where a case diverged, since a mean over that is no figure.
+/// Mean held-out RMSE, or "diverged" if a case diverged.
 fn mean_rmse(outcomes: &[Outcome]) -> Cell {
     let all: Option<Vec<f64>> = outcomes.iter().map(|o| (!o.diverged).then_some(o.held_out.rmse)).collect();
     all.map_or_else(|| "diverged".into(), |all| spread(&all).map(|(mean, _)| mean).into())
 }
 
-/// Budgets: rows evaluated, in all and for one iteration.
+/// Budgets: passes over the rows, in total and per iteration.
 pub(super) fn cost(study: &Study) -> Table {
     let mut table = Table::new(
         title(study, "Budget of each method"),
@@ -181,9 +181,10 @@ pub(super) fn cost(study: &Study) -> Table {
         ]);
     }
     table.notes = vec![
-        "residuals, Jacobians: passes over the rows of the fit, mean over the cases; each: of them, one iteration. ukf-vslm-2023 Table VII gives Θ(iterations × \
-         rows) for all methods alike: counted, the constants differ by orders of magnitude. LTLM takes two Jacobians and \
-         2M evaluations per iteration, a filter's iteration is a sweep, a swarm's a generation."
+        "residuals, Jacobians: passes over the rows of the fit, mean over the cases; each: passes per iteration. \
+         ukf-vslm-2023 Table VII gives Θ(iterations × rows) for every method; the counted constants differ by orders of \
+         magnitude. LTLM takes two Jacobians and 2M evaluations per iteration; an iteration of a filter is a sweep, of a \
+         swarm a generation."
             .to_owned(),
     ];
     table
@@ -215,7 +216,7 @@ pub(crate) fn times(study: &Study) -> Table {
         ]);
     }
     table.notes = vec![
-        "Wall clock while other cases ran on other cores, median over the cases, without the search for convergence."
+        "Wall-clock time while other cases ran on other cores, median over the cases, without the continuation to convergence."
             .to_owned(),
     ];
     table
@@ -231,7 +232,7 @@ pub(super) fn parameter_table(parameters: &ParameterTable) -> Table {
             Column::number("compensated", "compensated", "", 3),
             Column::significant("deviation", "deviation", "", 2),
             Column::number("paper_deviation", "paper", "", 3),
-            Column::number("determined", "seen by the data", "", 2),
+            Column::number("determined", "from the data", "", 2),
             Column::text("observable", "Observable"),
         ],
     );
@@ -249,12 +250,12 @@ pub(super) fn parameter_table(parameters: &ParameterTable) -> Table {
         ]);
     }
     table.notes = vec![
-        "compensated: nominal and deviation together, as a controller would take it; ± is 1σ of the deviation.".to_owned(),
+        "compensated: nominal plus deviation, as entered in a controller; ± is 1σ of the deviation.".to_owned(),
     ];
     if parameters.rows.iter().any(|row| row.paper.is_some()) {
         table.notes.push(
-            "paper: the deviation that it prints for this method, on its own arm and rows; no target, since most of it lies in what the \
-             rows do not see. Its link 2 has an offset d2, ours a turn beta in its place."
+            "paper: the printed deviation for this method, on the paper's arm and rows; no target, since its rows do not \
+             determine most of it. The paper's link 2 has an offset d2, ours a rotation beta instead."
                 .to_owned(),
         );
     }
