@@ -1,4 +1,4 @@
-//! From intentions to motions: surfaces to programs, and what to measure.
+//! Planning: programs from surface files, and measurement poses from optimal experiment design.
 
 pub mod toolpath;
 pub mod taught_cell;

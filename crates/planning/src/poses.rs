@@ -4,7 +4,7 @@
 //!   [`keep_out`]: collision checks against floor and boxes;
 //! - [`rows`]: whitened Jacobian of the readings;
 //! - [`design`]: D-optimal choice among the candidates;
-//! - `roadmap`: ways round what is kept out of;
+//! - `roadmap`: paths around the obstacles;
 //! - [`schedule`]: repeats, both sides of approach, warm-up, and the order;
 //! - [`power`]: smallest detectable size of each effect;
 //! - [`questions`]: ambiguous findings of a diagnosis;
@@ -48,19 +48,19 @@ pub use self::setup::MeasurementSetup;
 /// A plan.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
-    /// The chosen poses, in the order in which they are first visited.
+    /// The chosen poses, in the order of their first visit.
     pub poses: Vec<Candidate>,
     /// The rows to measure, in order.
     pub rows: Vec<Row>,
-    /// Parameters that the measurement is for: of the arm, then of the sensor's frames.
+    /// The parameters to be determined: of the arm, then of the sensor's frames.
     pub parameters: Vec<Parameter>,
-    /// Predicted standard deviation of each (mm, rad), priors included.
+    /// Predicted standard deviation of each parameter (mm, rad), priors included.
     pub sigmas: Vec<f64>,
-    /// How good the chosen poses are, and as many random ones.
+    /// Quality of the chosen poses, and of as many random ones.
     pub quality: Quality,
-    /// What became of the random poses.
+    /// Rejection counts of the random poses.
     pub rejections: RejectionCounts,
-    /// What the rows can decide.
+    /// Smallest detectable size of each effect.
     pub detectability: Vec<Detectability>,
     /// The checked obstacles.
     pub space: KeepOut,
@@ -69,12 +69,12 @@ pub struct Plan {
 /// Quality of a set of poses.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Quality {
-    /// Information: log det of the normal matrix in units of the priors, that matrix included.
+    /// Information: log det of the normal matrix in units of the priors, priors included.
     pub log_det: f64,
     /// The same for as many random candidates, mean of ten draws.
     pub random_log_det: f64,
-    /// Predicted standard deviation of what the fitted arm says of a reading, root mean square over candidates that were
-    /// not chosen (mm). What no reading can see does not count.
+    /// Predicted standard deviation of a reading under the fitted arm, root mean square over candidates that were not chosen
+    /// (mm). Unobservable parameters have no effect on it.
     pub reading_sigma_mm: f64,
     /// The same after as many random candidates, mean of ten draws (mm).
     pub random_reading_sigma_mm: f64,
@@ -86,7 +86,7 @@ pub struct Quality {
 pub enum PlanError {
     /// Too few poses are allowed.
     #[error(
-        "{found} of {drawn} random poses are allowed, expected at least {wanted} to choose from ({rejections}): widen the box, \
+        "{found} of {drawn} random poses are allowed, expected at least {wanted} candidates ({rejections}): widen the box, \
          the cable's range or the joint margin, lower the floor or make the boxes to keep out of smaller"
     )]
     TooFew {
@@ -96,39 +96,39 @@ pub enum PlanError {
         drawn: usize,
         /// Needed.
         wanted: usize,
-        /// What the others failed.
+        /// Reasons for the rejections.
         rejections: RejectionCounts,
     },
-    /// What is kept out of cuts the poses that are allowed into parts, and none of them is large enough.
+    /// The obstacles divide the allowed poses into unconnected parts, none of which is large enough.
     #[error(
-        "the boxes to keep out of and the floor part the {allowed} poses that are allowed: at most {found} can be visited without \
-         entering them, expected at least {wanted}: make the boxes smaller, lower the floor, or ask for fewer poses (--poses)"
+        "the boxes to keep out of and the floor divide the {allowed} allowed poses: at most {found} can be visited without \
+         a collision, expected at least {wanted}: make the boxes smaller, lower the floor, or plan fewer poses (--poses)"
     )]
     NoWay {
-        /// Poses that are allowed.
+        /// Number of allowed poses.
         allowed: usize,
-        /// Those of the largest part that hangs together.
+        /// Number of poses in the largest connected part.
         found: usize,
         /// Needed.
         wanted: usize,
     },
-    /// The sensor is a cable of which no outlet is stated.
-    #[error("a cable needs the place of its outlet: state where in the base it comes out")]
+    /// The sensor is a cable without a stated outlet.
+    #[error("a cable needs the location of its outlet: state it in the base frame")]
     NoOutlet,
-    /// O1 knows no effects.
-    #[error("index O1 cannot weigh the questions of a diagnosis: take D-optimality")]
+    /// O1 cannot include effects.
+    #[error("index O1 cannot weight the questions of a diagnosis: use D-optimality")]
     IndexOfQuestions,
-    /// The rows tell nothing finite.
+    /// The information matrix is not positive definite.
     #[error(
-        "the normal matrix of the chosen poses is not positive: the frames or the noise hold a number that is not finite"
+        "the normal matrix of the chosen poses is not positive definite: the frames or the noise contain a non-finite number"
     )]
     NotFinite,
 }
 
-/// Random sets for comparison.
+/// Number of random sets for comparison.
 const RANDOM_SETS: usize = 10;
 
-/// Poses at which sets are compared.
+/// Number of poses at which sets are compared.
 const JUDGES: usize = 300;
 
 /// Plans a measurement: candidates, design, order.
@@ -157,7 +157,7 @@ pub fn plan(setup: &MeasurementSetup<'_>, options: &Options) -> Result<Plan, Pla
     let checker = CollisionChecker::of(setup, &options.bounds.space);
     let laid = match choose_and_order(setup, &parameters, &candidates, None, options)? {
         Some(laid) => laid,
-        // Some of the poses lie behind a box: then only those count that hang together.
+        // Obstacles separate some of the poses: only the largest connected part is used.
         None => {
             let roadmap =
                 Roadmap::between(candidates.iter().map(|candidate| candidate.joints).collect(), &checker);
@@ -183,14 +183,14 @@ pub fn plan(setup: &MeasurementSetup<'_>, options: &Options) -> Result<Plan, Pla
     Ok(Plan { poses, rows, parameters, sigmas, quality, rejections, detectability, space })
 }
 
-/// Poses that were chosen, and the order of their rows.
+/// Chosen poses, and the order of their rows.
 struct OrderedChoice {
     poses: Vec<Candidate>,
     rows: Vec<Row>,
     quality: Quality,
 }
 
-/// Chooses among candidates and puts them in order; `None` where no way is found from one to the next. `roadmap`: along which ways.
+/// Chooses among candidates and orders them; `None` if no clear path is found between two of them. `roadmap`: paths around obstacles.
 fn choose_and_order(
     setup: &MeasurementSetup<'_>,
     parameters: &[Parameter],
@@ -199,7 +199,7 @@ fn choose_and_order(
     options: &Options,
 ) -> Result<Option<OrderedChoice>, PlanError> {
     let visits = options.visits.with_questions(&options.questions);
-    // The rows that each candidate would give, with the effects in question beside the geometry.
+    // The rows of each candidate, with the columns of the questions' effects besides the geometry.
     let still = candidate::rows(candidates);
     let jacobian = rows::reading_jacobian(setup, parameters, &still, &options.questions, options);
     let design = Design { jacobian: &jacobian, index: options.index };
@@ -216,12 +216,12 @@ fn choose_and_order(
     Ok(ordered.map(|(poses, rows)| OrderedChoice { poses, rows, quality }))
 }
 
-/// What is fitted: links, then frames.
+/// The fitted parameters: links, then frames.
 fn parameters(setup: &MeasurementSetup<'_>) -> Vec<Parameter> {
     let mut out = arm_parameters(setup.nominal);
     let mut empty = Dataset::new("plan", setup.sensor, Vec::new());
     if setup.sensor == Sensor::Cable {
-        // One row of the last cable says how many there are.
+        // One row of the last cable determines the number of cables.
         let anchor = setup.frames.outlets_mm.len() - 1;
         let mut row = blank_row(0, nalgebra::Vector6::zeros(), setup.sensor);
         row.anchor = anchor;

@@ -1,4 +1,4 @@
-//! The cell file of a surface of which tool and work object were taught in place.
+//! The cell file of a surface whose tool and work object are taught in the cell.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -10,11 +10,11 @@ use truegrind_compensation::cell::{Cell, CellFrame, FrameOrigin};
 use truegrind_math::se3::Pose;
 use truegrind_surfaces::SurfaceFile;
 
-/// The cell as it is set up in most shops, with the uncalibrated arm: the tool taught by turning it about one point, the work
-/// object by three points. `names` are those of tool and work object in the program.
+/// The cell as commonly set up with the uncalibrated arm: the tool taught by reorienting it about one point, the work object
+/// by three points. `names` are those of tool and work object in the program.
 ///
 /// # Errors
-/// [`InverseError`] where the arm does not reach the points.
+/// [`InverseError`] if the arm does not reach the points.
 pub fn taught_cell(
     surface: &SurfaceFile,
     path: &Toolpath,
@@ -36,7 +36,7 @@ pub fn taught_cell(
         .iter()
         .map(|point| reached(Pose::from_parts((*point).into(), orientation)))
         .collect::<Result<Vec<[f64; 6]>, InverseError>>()?;
-    // Turned about the tip, which stays at one point above the middle of the part (rad).
+    // Rotations about the tip, which is fixed at one point above the middle of the part (rad).
     let turns = [[0.0, 0.0, 0.0], [0.4, 0.0, 0.3], [-0.4, 0.0, 0.0], [0.0, 0.4, -0.3], [0.0, -0.4, 0.0]];
     let about_tip = turns
         .iter()

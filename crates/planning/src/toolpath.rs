@@ -1,9 +1,8 @@
-//! A surface file to a program: which branch of the arm follows the whole path, with which configuration.
+//! A program from a surface file: chooses the branch of the arm that follows the whole path, and its configuration.
 //!
-//! Every branch that reaches the first point is followed along the path on the nominal arm, which is what the
-//! controller computes with; of those that get to the end inside the joint limits the one that keeps farthest from
-//! singularities is taken, and of its full turns of joints 4 and 6, which pass singularities at the same distance, the
-//! one that keeps farthest from the ends of the joints' ranges.
+//! Every branch that reaches the first point is followed along the path on the nominal arm, which the controller uses. Of
+//! those that reach the end within the joint limits, the one farthest from singularities is chosen. Full turns of joints 4
+//! and 6 have the same distance from singularities; of these the one farthest from the joint limits is chosen.
 
 use thiserror::Error;
 
@@ -18,7 +17,7 @@ use truegrind_programs::motion::{
 use truegrind_surfaces::path::{PathPoint, PointKind};
 use truegrind_surfaces::{SurfaceError, SurfaceFile};
 
-/// Why no program can be made.
+/// Why no program can be written.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ToolpathError {
@@ -36,7 +35,7 @@ pub enum ToolpathError {
     NotFollowed(Box<NotFollowed>),
 }
 
-/// The first point of a path that the branch which came farthest does not reach.
+/// The first point of a path that the best branch does not reach.
 #[derive(Debug, Error)]
 #[error(
     "{name}: point {point} of {count} at ({x:.1}, {y:.1}, {z:.1}) mm in {object} cannot be followed by {robot}: {error}; \
@@ -50,26 +49,26 @@ pub struct NotFollowed {
     pub robot: String,
     /// Point, from 1.
     pub point: usize,
-    /// Points.
+    /// Number of points.
     pub count: usize,
     /// Work object.
     pub object: String,
     /// Position in the work object (mm).
     pub position_mm: [f64; 3],
-    /// Why.
+    /// Cause.
     pub error: InverseError,
 }
 
-/// A program with the joints that its author had in mind.
+/// A program with the intended joints of every point.
 #[derive(Debug, Clone)]
 pub struct Toolpath {
-    /// What a dialect's writer makes a file of.
+    /// The program as input of a dialect's writer.
     pub draft: Draft,
     /// Points of the path, in the work object.
     pub points: Vec<PathPoint>,
     /// Nominal joints at each.
     pub joints: Vec<Joints>,
-    /// Smallest distance to singularity on the way, as [`truegrind_arm::inverse::Solution::singularity`].
+    /// Smallest distance to singularity on the path, as [`truegrind_arm::inverse::Solution::singularity`].
     pub singularity: f64,
 }
 
@@ -85,7 +84,7 @@ pub struct Toolpath {
 /// let path = toolpath(&file, &arm, "abb-irb-120")?;
 /// assert_eq!(path.points.len(), path.joints.len());
 /// assert!(path.joints.iter().all(|joints| arm.limits.violated(joints).is_none()));
-/// // Its joints put the tool where the path wants it.
+/// // Its joints place the tool at the points of the path.
 /// let tool = arm.forward(&path.joints[0], &Condition::default()) * file.tool.flange_from_tool;
 /// let setup = file.work_object.base_from_work_object * path.points[0].work_object_from_tool();
 /// assert!((tool.translation.vector - setup.translation.vector).norm() < 1e-6);
@@ -139,21 +138,21 @@ pub fn toolpath(file: &SurfaceFile, nominal: &Model, robot: &str) -> Result<Tool
 
 /// A path that one branch follows.
 struct Followed {
-    /// Smallest distance to singularity on the way.
+    /// Smallest distance to singularity on the path.
     singularity: f64,
     joints: Vec<Joints>,
 }
 
 impl Followed {
     fn better_than(&self, other: &Self, nominal: &Model) -> bool {
-        // Whole turns of joints 4 and 6 differ by rounding here.
+        // Full turns of joints 4 and 6 differ only by rounding.
         if (self.singularity - other.singularity).abs() > 1e-9 {
             return self.singularity > other.singularity;
         }
         self.reach(nominal) < other.reach(nominal)
     }
 
-    /// How far the joints leave the middle of their ranges: of each the largest share of half its range, squared and summed.
+    /// Distance of the joints from the middle of their ranges: the largest share of half the range of each joint, squared and summed.
     fn reach(&self, nominal: &Model) -> f64 {
         let limits = &nominal.limits;
         let share = |q: &Joints, j: usize| {
@@ -187,7 +186,7 @@ fn draft(
 ) -> Draft {
     let zone_mm = match file.zone.as_str() {
         "fine" => None,
-        // RAPID's z0 is 0.3 mm, all others are what they say.
+        // RAPID's z0 is 0.3 mm; all others are named by their radius in mm.
         "z0" => Some(0.3),
         named => named.trim_start_matches('z').parse().ok(),
     };
@@ -214,7 +213,7 @@ fn draft(
                 to: TargetValue::Cartesian(target),
                 via: None,
                 speed_mm_s: if cutting { file.speed_mm_s } else { file.travel_speed_mm_s },
-                // The tool stops above the first and after the last point, and nowhere on the surface.
+                // The tool stops only off the surface: before the first and after the last point.
                 zone_mm: if comes_down || next.is_none() { None } else { zone_mm },
                 comment: pass_begins.then(|| format!("pass {}", point.pass + 1)),
                 wait_s: None,

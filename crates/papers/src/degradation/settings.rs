@@ -100,7 +100,11 @@ impl Degradation {
         }
         if most > self.identification || least == 0 {
             let found = format!("{least} to {most} poses");
-            return Some(("degradation.counts", found, "at least 1 pose and at most degradation.identification"));
+            return Some((
+                "degradation.counts",
+                found,
+                "at least 1 pose and at most degradation.identification",
+            ));
         }
         if !(self.forgetting > 0.0 && self.forgetting <= 1.0) {
             return Some(("degradation.forgetting", self.forgetting.to_string(), "above 0, up to 1"));

@@ -1,18 +1,18 @@
 //! Clearance of a cable from the arm's links.
 //!
-//! Links are capsules: the straight lines between the origins of neighbouring joint frames, with one radius. The wrist
-//! and what stands on the flange are left out, since there the cable is hooked in.
+//! Links are capsules: the segments between the origins of neighbouring joint frames, with one radius. The wrist and the
+//! tool are excluded, since the cable is attached there.
 
 use nalgebra::{Point3, Vector3};
 
 use truegrind_arm::chain::Chain;
 
-/// Joint frames whose lines are checked: from the base to the wrist.
+/// Joint frames between which segments are checked: from the base to the wrist.
 const FRAMES: usize = 5;
 
-/// Smallest distance from the line between `from` and `to` (mm, base) to the links of an arm (mm).
+/// Smallest distance from the segment between `from` and `to` (mm, base) to the links of an arm (mm).
 ///
-/// The line is taken without its last stretch of `free_mm` before `to`, where the hook stands beside the wrist.
+/// The last `free_mm` before `to` are excluded, since the hook is next to the wrist.
 pub fn clearance_mm(frames: &Chain<f64>, from: &Vector3<f64>, to: &Vector3<f64>, free_mm: f64) -> f64 {
     let length = (to - from).norm();
     if length <= free_mm {
@@ -44,7 +44,7 @@ pub fn segment_distance(p1: &Vector3<f64>, q1: &Vector3<f64>, p2: &Vector3<f64>,
         } else {
             let b = d1.dot(&d2);
             let determinant = a * e - b * b;
-            // Parallel lines have the same distance everywhere: any s will do.
+            // Parallel lines have a constant distance, so any s is valid.
             let s = if determinant > POINT * a * e {
                 ((b * f - c * e) / determinant).clamp(0.0, 1.0)
             } else {

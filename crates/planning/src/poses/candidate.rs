@@ -19,7 +19,7 @@ use truegrind_calibration::measurement::dataset::{Row, Sensor};
 /// Constraints on poses.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bounds {
-    /// Distance that every joint keeps from its limits (rad): room to come from either side.
+    /// Distance of every joint from its limits (rad), so that it can be approached from both sides.
     pub margin_rad: f64,
     /// Smallest distance to singularity, as
     /// [`Inverse::smallest_singular_value`].
@@ -28,9 +28,9 @@ pub struct Bounds {
     pub box_mm: Option<[[f64; 3]; 2]>,
     /// Shortest and longest cable, or distance to the sensor (mm).
     pub distance_mm: Option<[f64; 2]>,
-    /// Distance that a cable keeps from the lines between the joints (mm); `None` does not look.
+    /// Distance of a cable from the segments between the joints (mm); `None` disables the check.
     pub clearance_mm: Option<f64>,
-    /// What the arm must not enter.
+    /// Obstacles.
     pub space: KeepOut,
 }
 
@@ -56,14 +56,14 @@ pub struct Candidate {
     pub touched_mm: Vector3<f64>,
     /// Distance to singularity.
     pub singularity: f64,
-    /// Which cable reads it.
+    /// Index of the cable that measures it.
     pub anchor: usize,
 }
 
 /// Rejection counts of random poses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct RejectionCounts {
-    /// Drawn.
+    /// Number of drawn poses.
     pub drawn: usize,
     /// Too near to a singularity.
     pub singular: usize,
@@ -73,7 +73,7 @@ pub struct RejectionCounts {
     pub distance: usize,
     /// The cable too near to a link.
     pub hidden: usize,
-    /// A link or the touched point where it must not be, at the pose or beside it.
+    /// A link or the touched point in collision, at the pose or on its approach.
     pub blocked: usize,
 }
 
@@ -81,20 +81,20 @@ impl fmt::Display for RejectionCounts {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "{} too near to a singularity, {} outside the box, {} too near to or too far from the sensor, {} with the \
-             cable too near to a link, {} with the arm below the floor or in a box to keep out of",
+            "{} too close to a singularity, {} outside the box, {} too close to or too far from the sensor, {} with the \
+            cable too close to a link, {} with the arm below the floor or in a box to keep out of",
             self.singular, self.outside, self.distance, self.hidden, self.blocked
         )
     }
 }
 
-/// Random poses drawn for each that is setup, before giving up.
+/// Most random poses drawn for each required candidate.
 const DRAWS_PER_CANDIDATE: usize = 60;
 
-/// Stretch of the cable before the hook that may pass the wrist (mm).
+/// Length of the cable before the hook that can pass the wrist (mm).
 pub(super) const FREE_MM: f64 = 120.0;
 
-/// Draws until `count` poses are accepted or the draws are used up. Cables alternate.
+/// Draws until `count` poses are accepted or the limit of draws is reached. Cables alternate.
 pub fn draw(
     setup: &MeasurementSetup<'_>,
     bounds: &Bounds,
@@ -113,7 +113,7 @@ pub fn draw(
         rejections.drawn += 1;
         let joints = Joints::from_fn(|i, _| {
             let (low, high) = (limits.min_rad[i] + bounds.margin_rad, limits.max_rad[i] - bounds.margin_rad);
-            // Joints that turn more than once say nothing new on the second turn.
+            // A second turn of a joint gives no new information.
             let (low, high) = (low.max(-std::f64::consts::PI), high.min(std::f64::consts::PI));
             if low < high { random.random_range(low..high) } else { 0.5 * (low + high) }
         });
@@ -163,7 +163,7 @@ pub(super) fn sensor_mm(sensor: Sensor, frames: &Frames, anchor: usize) -> Vecto
     }
 }
 
-/// Candidates as rows: at rest, nothing known of time and approach.
+/// Candidates as rows at rest, without time and approach.
 pub(super) fn rows(candidates: &[Candidate]) -> Vec<Row> {
     candidates
         .iter()

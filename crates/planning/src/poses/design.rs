@@ -1,12 +1,12 @@
 //! D-optimal choice of poses by Fedorov exchange.
 //!
 //! Method: maximise f = (1 + w) log det M − w log det N, with M = R + Σ xᵢ xᵢᵀ over the readings of the chosen poses, N
-//! its block of the parameters that nobody asks about. w = 0 without questions: D-optimality. With questions, w = 3: the
-//! difference log det M − log det N is the information about what is asked alone, everything else being unknown
-//! (Ds-optimality), with three quarters of the weight. R is the identity (the priors) for D-optimality, and for O1 a
-//! vanishing ridge on the combinations that the candidates determine at all.
-//! Start: poses one by one, each the one that adds most. Then Fedorov's exchange, pose by pose: the pose is taken out and
-//! the best one put in its place, until a whole round changes nothing.
+//! its block of the nuisance parameters. w = 0 without questions: D-optimality. With questions, w = 3: the difference
+//! log det M − log det N is the information about the parameters in question with all others unknown (Ds-optimality), with
+//! three quarters of the weight. R is the identity (the priors) for D-optimality, and for O1 a vanishing ridge on the
+//! combinations that the candidates determine.
+//! Start: greedy, each time the pose that adds most. Then Fedorov's exchange, pose by pose: the pose is replaced by the
+//! best one, until a whole round changes nothing.
 //! Shapes: p parameters, n candidates with m readings each; a step costs p² m n products, in one matrix product.
 //! Stops: after a round without exchange, or 12 rounds.
 //! Source: Fedorov 1972, Theory of Optimal Experiments, section 3.2, and Mitchell 1974 (DETMAX,
@@ -28,26 +28,26 @@ pub use super::options::Index;
 pub struct Design<'a> {
     /// Whitened Jacobian of the candidates.
     pub jacobian: &'a ReadingJacobian,
-    /// What is setup.
+    /// Optimality criterion.
     pub index: Index,
 }
 
 /// Weight of the questions.
 const QUESTIONS: f64 = 3.0;
 const ROUNDS: usize = 12;
-/// An exchange must add this much to count.
+/// Smallest gain of an exchange.
 const LEAST_GAIN: f64 = 1e-9;
-/// Combinations whose eigenvalue is a smaller share of the largest are not determined by any candidates.
+/// Combinations with an eigenvalue below this share of the largest are not determined by the candidates.
 const DETERMINED: f64 = 1e-12;
 
-/// log det of a positive matrix; `None` for any other.
+/// log det of a positive definite matrix; `None` for any other.
 pub fn log_det(matrix: &DMatrix<f64>) -> Option<f64> {
     let factor = Cholesky::new(matrix.clone())?;
     let sum: f64 = factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum();
     sum.is_finite().then_some(2.0 * sum)
 }
 
-/// One determinant of the sum, with its weight.
+/// One determinant of the objective, with its weight.
 struct Part {
     weight: f64,
     ridge: f64,
@@ -66,7 +66,7 @@ impl Part {
         DMatrix::identity(q, q) * self.ridge + &taken * taken.transpose()
     }
 
-    /// What each candidate would add to log det.
+    /// Gain in log det from each candidate.
     fn gains(&self, per: usize, information: &DMatrix<f64>) -> Option<Vec<f64>> {
         let inverse = Cholesky::new(information.clone())?.inverse();
         let count = self.readings.ncols() / per;
@@ -117,7 +117,7 @@ impl Design<'_> {
         Some(vec![Part { weight: 1.0 + QUESTIONS, ..whole }, rest])
     }
 
-    /// `count` different candidates, rising; `None` where a reading is not finite.
+    /// `count` different candidates in ascending order; `None` if a reading is not finite.
     pub fn choose(&self, count: usize) -> Option<Vec<usize>> {
         let (jacobian, parts) = (self.jacobian, self.parts()?);
         let per = jacobian.per_row;
@@ -159,7 +159,7 @@ impl Design<'_> {
         Some(chosen)
     }
 
-    /// The value of a set.
+    /// The objective for a set of candidates.
     pub fn value(&self, chosen: &[usize]) -> Option<f64> {
         let parts = self.parts()?;
         parts

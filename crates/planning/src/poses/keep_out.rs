@@ -1,12 +1,11 @@
 //! Collision checks: links as capsules against a floor and boxes, at poses and along joint motions.
 //!
-//! Links are capsules: the lines between the origins of neighbouring joint frames, to the flange and on to the touched
-//! point, with one radius; from the wrist on with half of it. The first of them, the column on the base, never moves and
-//! is left out.
+//! Links are capsules: the segments between the origins of neighbouring joint frames, to the flange and on to the touched
+//! point, with one radius, halved from the wrist on. The first of them, the column on the base, never moves and is excluded.
 //!
-//! A way is clear as a whole, and not at single looks at it: what runs on a link, from a place on the way to another, moves by no more
-//! than each joint turns times how far the link can be from its axis. So a look clears as much of the way as the room that it finds
-//! allows, and where that is too little the way is halved.
+//! A motion is checked continuously, not at sampled poses: a point of a link moves by no more than the sum over the joints of
+//! rotation times the largest distance of the link from the axis. One distance check therefore clears an interval of the
+//! motion; if the clearance is too small for the whole interval, the interval is halved.
 
 use nalgebra::{Point3, Vector3};
 
@@ -17,13 +16,13 @@ use truegrind_arm::model::{Joints, PreparedModel};
 /// Obstacles in the arm's base.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct KeepOut {
-    /// Nothing goes below this height (mm); `None` does not look.
+    /// Height of the floor (mm); `None` disables the check.
     pub floor_mm: Option<f64>,
-    /// Boxes that nothing enters: lower and upper corner (mm).
+    /// Forbidden boxes: lower and upper corner (mm).
     pub boxes_mm: Vec<[[f64; 3]; 2]>,
     /// Radius of the links (mm).
     pub radius_mm: f64,
-    /// How far from a pose its approach begins, in every joint (rad).
+    /// Distance from a pose at which its approach begins, in every joint (rad).
     pub approach_rad: f64,
 }
 
@@ -33,14 +32,14 @@ pub(super) struct CollisionChecker<'a> {
     space: &'a KeepOut,
     setup: &'a MeasurementSetup<'a>,
     arm: PreparedModel<'a>,
-    /// How far the ends of the segments can be from the axis of each joint that moves them (mm).
+    /// Largest distance of the ends of the segments from the axis of each joint that moves them (mm).
     levers_mm: [[f64; 6]; ENDS],
 }
 
 /// Ends of segments: base, ends of the links, flange, touched point.
 const ENDS: usize = 9;
 
-/// Moving less than this between two looks tells nothing more: a way that comes so near to what is stated counts as blocked (mm).
+/// Finest interval, as motion of an end (mm): a motion that is not cleared at this resolution counts as blocked.
 const FINEST_MM: f64 = 0.2;
 
 impl<'a> CollisionChecker<'a> {
@@ -52,8 +51,8 @@ impl<'a> CollisionChecker<'a> {
         out
     }
 
-    /// How far each end can be from each axis. The end of the link behind a joint keeps its distance from the axis, and what comes after
-    /// that link is no farther from its end than along all links between.
+    /// Largest distance of each end from each axis. The end of the link behind a joint has a constant distance from the axis;
+    /// later ends are at most the sum of the link lengths in between farther away.
     fn levers(&self) -> [[f64; 6]; ENDS] {
         let still = Joints::zeros();
         let (ends, frames) = (self.ends(&still), self.arm.frames(&still));
@@ -66,7 +65,7 @@ impl<'a> CollisionChecker<'a> {
                 if end < link {
                     return 0.0;
                 }
-                // Flange and touched point ride on the last link.
+                // Flange and touched point are fixed to the last link.
                 let rides = end.min(LINKS);
                 if rides == link {
                     return from_axis(joint, end);
@@ -77,7 +76,7 @@ impl<'a> CollisionChecker<'a> {
         })
     }
 
-    /// Whether there is anything to look for.
+    /// Whether there are obstacles.
     pub(super) fn is_active(&self) -> bool {
         self.space.floor_mm.is_some() || !self.space.boxes_mm.is_empty()
     }
@@ -94,25 +93,25 @@ impl<'a> CollisionChecker<'a> {
         })
     }
 
-    /// Whether the arm stands clear with these joints.
+    /// Whether the arm is clear of obstacles with these joints.
     pub(super) fn pose_is_clear(&self, joints: &Joints) -> bool {
         !self.is_active() || self.has_clearance(&self.ends(joints), &[0.0; ENDS])
     }
 
-    /// Whether all that moves has room about it: the radius of the link, and as much more as its ends may move (mm).
+    /// Whether all moving links have a clearance of their radius plus the motion of their ends (mm).
     fn has_clearance(&self, ends: &[Vector3<f64>; ENDS], moved_mm: &[f64; ENDS]) -> bool {
         (1..ENDS - 1).all(|segment| {
             let (a, b) = (&ends[segment], &ends[segment + 1]);
             let radius = self.space.radius_mm * if segment < WRIST { 1.0 } else { 0.5 };
-            // A point between two ends moves no more than the one that moves most.
+            // A point between two ends moves no more than the end that moves most.
             let room = radius + moved_mm[segment].max(moved_mm[segment + 1]);
-            // The end of the column stands where it stands.
+            // Only the far end: the near end of the first segment is the fixed column's.
             let above = self.space.floor_mm.is_none_or(|floor| b.z - radius - moved_mm[segment + 1] >= floor);
             above && self.space.boxes_mm.iter().all(|corners| keeps_off(a, b, corners, room))
         })
     }
 
-    /// Whether it stays clear while all joints run evenly from one place to another.
+    /// Whether a linear joint motion between two joint configurations is clear.
     pub(super) fn motion_is_clear(&self, from: &Joints, to: &Joints) -> bool {
         if !self.is_active() {
             return true;
@@ -123,7 +122,7 @@ impl<'a> CollisionChecker<'a> {
         self.interval_is_clear(from, to, &self.levers_mm.each_ref().map(moved))
     }
 
-    /// The same of a stretch on which the ends of the segments move by no more than `moved_mm`.
+    /// The same for an interval in which the ends of the segments move by no more than `moved_mm`.
     fn interval_is_clear(&self, from: &Joints, to: &Joints, moved_mm: &[f64; ENDS]) -> bool {
         let middle = from.lerp(to, 0.5);
         let (ends, half) = (self.ends(&middle), moved_mm.map(|moved| 0.5 * moved));
@@ -145,19 +144,19 @@ impl<'a> CollisionChecker<'a> {
         })
     }
 
-    /// Sides from which a pose can be approached, and from the opposite ones: `first` where they will do.
+    /// Sides from which, and from whose opposites, a pose can be approached; `first` if possible.
     pub(super) fn sides(&self, pose: &Joints, first: [i8; 6]) -> Option<[i8; 6]> {
         if !self.pose_is_clear(pose) {
             return None;
         }
-        // The opposite sides are looked at together with them.
+        // The opposite sides are checked with them, so half of the combinations suffice.
         let others = (0..1 << 5).map(|bits: u8| {
             std::array::from_fn(|joint| if joint < 5 && bits >> joint & 1 == 1 { 1 } else { -1 })
         });
         std::iter::once(first).chain(others).find(|sides| self.both_sides_clear(pose, sides))
     }
 
-    /// Stops between two places that make the way clear, taken from these: none, one or two. `None` where they do not.
+    /// Stops, chosen from `known`, that make the motion between two configurations clear: none, one or two. `None` if there are none such.
     pub(super) fn waypoints(&self, from: &Joints, to: &Joints, known: &[Joints]) -> Option<Vec<Joints>> {
         if self.motion_is_clear(from, to) {
             return Some(Vec::new());
@@ -180,21 +179,21 @@ impl<'a> CollisionChecker<'a> {
     }
 }
 
-/// Links, the last of which carries the flange.
+/// Number of links; the last carries the flange.
 const LINKS: usize = 6;
 
-/// Where flange and touched point stand among the ends.
+/// Indices of flange and touched point among the ends.
 const FLANGE: usize = 7;
 const TOUCHED: usize = 8;
 
 /// The first segment of the wrist.
 const WRIST: usize = 4;
 
-/// Stops that are tried for a way, and pairs of them.
+/// Most stops tried for a motion, and most pairs of them.
 const MOST_STOPS: usize = 200;
 const MOST_PAIRS: usize = 2000;
 
-/// Whether a capsule keeps off a box. Most are jacobian by their middles.
+/// Whether a capsule is clear of a box. The distance of its midpoint decides most cases.
 fn keeps_off(a: &Vector3<f64>, b: &Vector3<f64>, corners: &[[f64; 3]; 2], radius: f64) -> bool {
     let middle = (a + b) * 0.5;
     let away = outside(&middle, corners);
@@ -204,20 +203,20 @@ fn keeps_off(a: &Vector3<f64>, b: &Vector3<f64>, corners: &[[f64; 3]; 2], radius
     away >= radius && to_box(a, b, corners) >= radius
 }
 
-/// Distance of a point from a box (mm), 0 inside.
+/// Distance of a point from a box (mm); 0 inside.
 fn outside(point: &Vector3<f64>, [low, high]: &[[f64; 3]; 2]) -> f64 {
     Vector3::from_fn(|k, _| (low[k] - point[k]).max(point[k] - high[k]).max(0.0)).norm()
 }
 
-/// Distance of a segment from a box (mm), 0 inside. The distance of a point that runs along the segment is convex, so its
-/// least value is found by cutting off thirds.
+/// Distance of a segment from a box (mm); 0 inside. The distance is convex along the segment, so its minimum is found by
+/// ternary search.
 fn to_box(a: &Vector3<f64>, b: &Vector3<f64>, corners: &[[f64; 3]; 2]) -> f64 {
     const CUTS: usize = 48;
     let at = |t: f64| outside(&(a + (b - a) * t), corners);
     let (mut from, mut to) = (0.0, 1.0);
     for _ in 0..CUTS {
         let (first, second) = (from + (to - from) / 3.0, to - (to - from) / 3.0);
-        // Inside the box both are 0, and any place will do.
+        // Inside the box both are 0, so either third can be dropped.
         if at(first) <= at(second) {
             to = second;
         } else {

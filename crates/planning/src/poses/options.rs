@@ -8,7 +8,7 @@ use truegrind_calibration::identification::tolerance::Tolerance;
 /// Settings of a plan.
 #[derive(Debug, Clone)]
 pub struct Options {
-    /// Different poses.
+    /// Number of different poses.
     pub poses: usize,
     /// Optimality criterion.
     pub index: Index,
@@ -16,7 +16,7 @@ pub struct Options {
     pub noise: Noise,
     /// Priors.
     pub tolerance: Tolerance,
-    /// Poses to choose from.
+    /// Number of candidates.
     pub candidates: usize,
     /// Constraints on candidates.
     pub bounds: Bounds,
@@ -24,9 +24,9 @@ pub struct Options {
     pub visits: Visits,
     /// Ambiguous findings of a diagnosis.
     pub questions: Vec<Question>,
-    /// Non-centrality from which an effect counts as decided.
+    /// Non-centrality from which an effect counts as detected.
     pub decisive: f64,
-    /// Seed of everything random.
+    /// Seed of all random numbers.
     pub seed: u64,
 }
 
@@ -47,7 +47,7 @@ impl Default for Options {
     }
 }
 
-/// Standard deviations of a reading, everything counted: sensor, hook, repeatability of the arm.
+/// Total standard deviations of a reading: sensor, hook, repeatability of the arm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Noise {
     /// Of a length or a coordinate (mm).
@@ -66,7 +66,7 @@ impl Default for Noise {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub enum Index {
-    /// Determinant of the normal matrix with its priors: the volume of what stays unknown.
+    /// Determinant of the normal matrix with its priors: minimises the volume of the posterior's confidence ellipsoid.
     #[default]
     D,
     /// Observability index O1: the geometric mean of the singular values, without priors, over the combinations that

@@ -1,9 +1,9 @@
 //! Power analysis: smallest size of each effect that a measurement detects.
 //!
 //! Method: with X the whitened Jacobian of geometry and frames in units of the priors, and R the whitened columns of an
-//! effect per unit of its parameters, S = RᵀR − RᵀX (I + XᵀX)⁻¹ XᵀR is what the effect shows beside everything that
-//! geometry can imitate. An effect of parameters a has non-centrality λ = aᵀ S a; the smallest one that is sure to reach
-//! λ in its worst direction (phase, axis) has |a|² = λ / smallest eigenvalue of S.
+//! effect per unit of its parameters, S = RᵀR − RᵀX (I + XᵀX)⁻¹ XᵀR is the information about the effect that geometry
+//! cannot imitate. An effect with parameters a has non-centrality λ = aᵀ S a; the smallest size that reaches λ even in its
+//! worst direction (phase, axis) is |a|² = λ / smallest eigenvalue of S.
 //! Source: the non-central χ² of a likelihood ratio between nested linear models (Kay 1998, Fundamentals of Statistical
 //! Signal Processing II, section 7.7).
 //! Checked against: the drop of the fitted cost when the effect is put into simulated readings.
@@ -24,36 +24,36 @@ use truegrind_math::spectral;
 /// Smallest detectable size of an effect.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Detectability {
-    /// Contract name.
+    /// Machine name of the effect.
     pub effect: &'static str,
-    /// Which one: joint, order, cable.
+    /// Instance: joint, order, cable.
     pub which: String,
     /// Joint, 0-based.
     pub joint: Option<usize>,
-    /// Smallest size that is decided, in `unit`; absent where no size is.
+    /// Smallest detectable size, in `unit`; absent if no plausible size is detectable.
     pub smallest: Option<f64>,
     /// Unit of `smallest`.
     pub unit: &'static str,
-    /// What that size does at the most over the rows, in `shows_unit`.
+    /// Largest influence of that size over the rows, in `shows_unit`.
     pub shows: Option<f64>,
     /// Unit of `shows` and `usual`: ° in a joint, mm at a sensor.
     pub shows_unit: &'static str,
-    /// Size met in practice, to which `shows` compares.
+    /// Typical influence in practice, for comparison with `shows`.
     pub usual: f64,
 }
 
 impl Detectability {
-    /// Whether an effect of the size that is met in practice is decided.
+    /// Whether an effect of typical size is detected.
     pub fn is_decided(&self) -> bool {
         self.shows.is_some_and(|shows| shows <= self.usual)
     }
 }
 
-/// Sizes met in practice: degrees in a joint, millimetres at a sensor, growth of links in mm over a metre.
+/// Typical sizes in practice: degrees in a joint, millimetres at a sensor, growth of links in mm over a metre.
 const USUAL_DEG: f64 = 0.05;
 const USUAL_MM: f64 = 0.3;
 
-/// A size beyond which nobody believes an effect (° or mm): then it is not decided at all.
+/// A larger size is physically implausible (° or mm); the effect then counts as undetectable.
 const ABSURD: f64 = 20.0;
 
 /// One effect, as columns.
@@ -64,14 +64,14 @@ struct EffectColumns {
     unit: &'static str,
     shows_unit: &'static str,
     usual: f64,
-    /// From the parameters' unit to `unit`.
+    /// Factor from the parameters' unit to `unit`.
     to_unit: f64,
-    /// From the parameters' unit to `shows_unit`.
+    /// Factor from the parameters' unit to `shows_unit`.
     to_shows: f64,
     columns: DMatrix<f64>,
 }
 
-/// Every effect of the catalogue, at the rows as planned.
+/// Power of every effect of the catalogue for the planned rows.
 pub(super) fn detectability(
     setup: &MeasurementSetup<'_>,
     parameters: &[Parameter],
@@ -128,7 +128,7 @@ fn of_arm(setup: &MeasurementSetup<'_>, rows: &[Row], options: &Options) -> Vec<
     for effect in all {
         let (shown, unit, to_unit, which) = match &effect {
             Effect::JointCompliance(e) => {
-                // Massless arms and joints that no weight turns show nothing.
+                // Without gravity torque at a joint its compliance has no effect.
                 (0..1, "µrad/(N m)", 1e6, format!("joint {}", e.joint + 1))
             }
             Effect::GearEccentricity(e) => {
@@ -180,7 +180,7 @@ fn largest_turn(model: &Model, rows: &[Row]) -> f64 {
     largest
 }
 
-/// The effects of the measurement: what moves in the middle of the run, and a scale.
+/// The effects of the measurement: shifts in the middle of the run, and a scale error.
 fn of_sensor(
     setup: &MeasurementSetup<'_>,
     parameters: &[Parameter],
@@ -240,7 +240,7 @@ fn of_sensor(
     out
 }
 
-/// What a relative error of the sensor's lengths adds to each whitened reading, and the longest reading (mm).
+/// Change of each whitened reading per relative error of the sensor's lengths, and the longest reading (mm).
 fn scale_column(
     setup: &MeasurementSetup<'_>,
     rows: &[Row],

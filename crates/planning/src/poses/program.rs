@@ -1,7 +1,6 @@
 //! The measurement program: approach, pose, wait and comment for each row.
 //!
-//! Joint targets say joints, so the nominal arm of the controller and the real one agree on them; no tool or work object
-//! is involved.
+//! Targets are joint configurations, so they do not depend on the controller's nominal arm, on a tool or a work object.
 
 use super::schedule::{FIRST_ROW, Row};
 use super::{MeasurementSetup, Plan, rows};
@@ -115,7 +114,7 @@ fn comment(plan: &Plan, setup: &MeasurementSetup<'_>, row: &Row, number: usize) 
     text
 }
 
-/// The checked obstacles in words.
+/// Description of the checked obstacles.
 pub fn checked(plan: &Plan) -> String {
     let space = &plan.space;
     let boxes = match space.boxes_mm.len() {
@@ -129,13 +128,13 @@ pub fn checked(plan: &Plan) -> String {
         return "not where the arm is in the cell".to_owned();
     }
     let stops: usize = plan.rows.iter().map(|row| row.waypoints.len()).sum();
-    let rejections = match stops {
+    let stop_note = match stops {
         0 => String::new(),
         1 => ", with 1 stop on the way".to_owned(),
         stops => format!(", with {stops} stops on the way"),
     };
     format!(
-        "links (as capsules of {:.0} mm radius) and target stay {floor}{and}{boxes} at every pose and on every way between them{rejections}",
+        "links (as capsules of {:.0} mm radius) and target stay {floor}{and}{boxes} at every pose and on every way between them{stop_note}",
         space.radius_mm
     )
 }

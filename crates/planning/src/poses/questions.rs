@@ -1,8 +1,8 @@
 //! Ambiguous findings of a diagnosis, and the effects that a further measurement must separate.
 //!
-//! Reads `truegrind.diagnosis/1`. A finding that is ambiguous becomes a question: its effect and those of its
-//! alternatives are made parameters beside the geometry, and the design weighs the poses that tell them apart. Effects
-//! that only the order or the approach of the rows can show (backlash, drift, a sensor that moved) ask for visits.
+//! Reads `truegrind.diagnosis/1`. An ambiguous finding becomes a question: its effect and its alternatives become
+//! parameters besides the geometry, and the design prefers poses that distinguish them. Effects that depend on the order
+//! or the approach of the rows (backlash, drift, a moved sensor) require additional visits.
 
 use serde::Deserialize;
 use thiserror::Error;
@@ -17,22 +17,22 @@ use truegrind_arm::effect::thermal::Thermal;
 use truegrind_arm::parameter::Parameter;
 use truegrind_calibration::diagnosis::finding::Confidence;
 
-/// The format that is read.
+/// Schema of the input.
 pub const SCHEMA: &str = "truegrind.diagnosis/1";
 
 /// A candidate cause.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct CandidateCause {
-    /// Contract name.
+    /// Machine name of the effect.
     pub effect: String,
-    /// Joints, 0-based; empty where it has none.
+    /// Joints, 0-based; empty for an effect without a joint.
     pub joints: Vec<usize>,
 }
 
 /// An ambiguous finding with its alternative causes.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Question {
-    /// The finding, then its alternatives; one alone where an effect could not be tested.
+    /// The finding, then its alternatives; a single cause for an effect that could not be tested.
     pub causes: Vec<CandidateCause>,
 }
 
@@ -46,12 +46,12 @@ pub enum DiagnosisFileError {
     /// A file of another kind or version.
     #[error("`schema` is \"{found}\", expected \"{SCHEMA}\"")]
     Schema {
-        /// What it says of itself.
+        /// Stated schema.
         found: String,
     },
 }
 
-/// A part of the measurement whose place is in question.
+/// A frame or offset of the measurement that is in question.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum FramePart {
     /// A cable's zero.
@@ -74,7 +74,7 @@ impl FramePart {
     }
 }
 
-/// What is read of the file: the rest of it is for people. A diagnosis always writes these keys, so none may be missing.
+/// The keys that are read from the file. A diagnosis always writes them, so all are required.
 #[derive(Deserialize)]
 struct File {
     findings: Vec<Finding>,
@@ -109,7 +109,7 @@ fn cause(effect: &str, joints: Option<&Vec<usize>>) -> Result<CandidateCause, Di
     Ok(CandidateCause { effect: effect.to_owned(), joints: joints.collect::<Result<_, _>>()? })
 }
 
-/// The questions that a diagnosis leaves: ambiguous findings with their alternatives, and what was not testable.
+/// The open questions of a diagnosis: ambiguous findings with their alternatives, and effects that were not testable.
 ///
 /// ```
 /// use truegrind_planning::poses::questions::{DiagnosisFileError, questions};
@@ -127,7 +127,7 @@ fn cause(effect: &str, joints: Option<&Vec<usize>>) -> Result<CandidateCause, Di
 /// ```
 ///
 /// # Errors
-/// [`DiagnosisFileError`], where the text is none.
+/// [`DiagnosisFileError`] if the text is not a diagnosis.
 pub fn questions(text: &str) -> Result<Vec<Question>, DiagnosisFileError> {
     let fault = |error: serde_json::Error| DiagnosisFileError::Syntax(error.to_string());
     let Kind { schema } = serde_json::from_str(text).map_err(fault)?;
@@ -138,7 +138,7 @@ pub fn questions(text: &str) -> Result<Vec<Question>, DiagnosisFileError> {
     let of = |named: &Named| cause(&named.effect, named.joints.as_ref());
     let mut out = Vec::new();
     for finding in &file.findings {
-        // Of one that is certain nothing is asked, but it must be one.
+        // An unambiguous finding is no question, but must be valid.
         let first = cause(&finding.effect, finding.joints.as_ref())?;
         let others = finding.alternatives.iter().map(of).collect::<Result<Vec<_>, _>>()?;
         if finding.confidence == Confidence::Ambiguous {
@@ -151,9 +151,9 @@ pub fn questions(text: &str) -> Result<Vec<Question>, DiagnosisFileError> {
     Ok(out)
 }
 
-/// What an effect of that name looks like, at size zero; nothing for effects of the measurement.
+/// The effects of that name at size zero; none for effects of the measurement.
 pub fn effects_of(cause: &CandidateCause) -> Vec<Effect> {
-    // Where no joint is named, those that carry the arm.
+    // Without a named joint: those loaded by gravity.
     let joints: &[usize] = if cause.joints.is_empty() { &[1, 2] } else { &cause.joints };
     let each = |make: fn(usize) -> Effect| joints.iter().map(|&j| make(j)).collect();
     match cause.effect.as_str() {
@@ -183,12 +183,12 @@ pub(super) fn coupling(joint: usize, driver: usize) -> Effect {
     Effect::JointCoupling(Coupling { joint, driver, factor: 0.0 })
 }
 
-/// Warming up by the clock, of size zero; half an hour is the time constant of many arms.
+/// Thermal drift over time, of size zero; half an hour is a typical time constant.
 pub(super) fn thermal() -> Effect {
     Effect::ThermalDrift(Thermal { growth: 0.0, time_constant_h: 0.5, growth_per_k: 0.0, reference_c: 20.0 })
 }
 
-/// What stands in the place of sensor effects, where the poses decide.
+/// The frame parameters of a sensor effect that poses can determine.
 fn frame_part(effect: &str) -> Option<FramePart> {
     match effect {
         "sensor-zero-shift" => Some(FramePart::Zero),
@@ -198,12 +198,12 @@ fn frame_part(effect: &str) -> Option<FramePart> {
     }
 }
 
-/// Parameters that the questions are about, as far as poses can answer: effects to be added, and frames.
+/// Parameters of the questions that poses can determine: effects to be added, and frames.
 pub(super) fn columns_of(questions: &[Question]) -> (Vec<Effect>, Vec<FramePart>) {
     let (mut effects, mut frames): (Vec<Effect>, Vec<FramePart>) = (Vec::new(), Vec::new());
     for cause in questions.iter().flat_map(|q| &q.causes) {
         for effect in effects_of(cause) {
-            // Poses at rest know neither time nor side.
+            // Candidates have neither time nor approach direction.
             let by_order = matches!(effect, Effect::Backlash(_) | Effect::ThermalDrift(_));
             if !by_order && !effects.contains(&effect) {
                 effects.push(effect);
@@ -218,7 +218,7 @@ pub(super) fn columns_of(questions: &[Question]) -> (Vec<Effect>, Vec<FramePart>
     (effects, frames)
 }
 
-/// Whether an effect is asked about.
+/// Whether a question is about this effect.
 pub(super) fn any_about(questions: &[Question], effect: &str) -> bool {
     questions.iter().flat_map(|q| &q.causes).any(|s| s.effect == effect)
 }

@@ -1,29 +1,30 @@
-//! Connections between poses where boxes stand between them: along poses that are clear of each other's way.
+//! Paths between poses around obstacles, through intermediate poses with clear straight motions.
 //!
-//! Method: a probabilistic roadmap (Kavraki et al. 1996) over the candidates, whose joints are random and clear already; each is
-//! joined to the nearest ones that it reaches straight. What hangs together can be visited in any order; the rest is left out of the choice.
-//! Departures: near is counted in the first three joints, since the wrist seldom stands in its own way; the way that is found is
-//! shortened where a straight one is clear.
+//! Method: a probabilistic roadmap (Kavraki et al. 1996) over the candidates, which are random and collision-free; each is
+//! connected to the nearest ones with a clear straight motion. Poses of a connected part can be visited in any order; all others
+//! are excluded from the choice.
+//! Departures: the distance is dominated by the first three joints, since the wrist seldom causes collisions; a path is
+//! shortened where a straight motion is clear.
 
 use super::keep_out::CollisionChecker;
 use truegrind_arm::model::Joints;
 
-/// Neighbours that each place is joined to, where the way is clear.
+/// Most neighbours that each node is connected to.
 const NEAREST: usize = 12;
 
-/// What a turn of the wrist counts of one of the first three joints.
+/// Weight of a wrist joint in the distance, relative to the first three joints.
 const WRIST: f64 = 0.2;
 
-/// Places, and the straight ways between them that are clear.
+/// Nodes, and the clear straight motions between them.
 #[derive(Debug)]
 pub(super) struct Roadmap {
     places: Vec<Joints>,
-    /// For each place, the places that are reached, with the largest turn of a joint (rad).
+    /// For each node its neighbours, with the largest rotation of a joint (rad).
     ways: Vec<Vec<(usize, f64)>>,
 }
 
 impl Roadmap {
-    /// The ways between places that are clear themselves.
+    /// Connects nodes with clear straight motions.
     pub(super) fn between(places: Vec<Joints>, checker: &CollisionChecker<'_>) -> Self {
         let mut ways: Vec<Vec<(usize, f64)>> = vec![Vec::new(); places.len()];
         for (i, from) in places.iter().enumerate() {
@@ -43,7 +44,7 @@ impl Roadmap {
         Self { places, ways }
     }
 
-    /// The places of the largest part that hangs together, in their order.
+    /// The nodes of the largest connected part, in ascending order.
     pub(super) fn largest(&self) -> Vec<usize> {
         let mut part: Vec<Option<usize>> = vec![None; self.places.len()];
         let mut best: Vec<usize> = Vec::new();
@@ -70,7 +71,7 @@ impl Roadmap {
         best
     }
 
-    /// Stops between a place and where the approach to another begins. `None` where no way leads there.
+    /// Stops between a node and the start of the approach to another. `None` if there is no path.
     pub(super) fn waypoints(
         &self,
         checker: &CollisionChecker<'_>,
@@ -81,7 +82,7 @@ impl Roadmap {
         let place = |joints: &Joints| self.places.iter().position(|place| place == joints);
         let mut all: Vec<Joints> =
             self.shortest(place(from)?, place(to)?)?.into_iter().map(|place| self.places[place]).collect();
-        // The way from the pose to where its approach begins is clear.
+        // The motion from the pose to the start of its approach is clear.
         all.push(*approach);
         let (mut out, mut at) = (Vec::new(), 0);
         while at + 1 < all.len() {
@@ -93,7 +94,7 @@ impl Roadmap {
         Some(out)
     }
 
-    /// The places on the shortest way, both ends included (Dijkstra).
+    /// The nodes on the shortest path, both ends included (Dijkstra).
     fn shortest(&self, from: usize, to: usize) -> Option<Vec<usize>> {
         let count = self.places.len();
         let (mut length, mut before) = (vec![f64::INFINITY; count], vec![from; count]);

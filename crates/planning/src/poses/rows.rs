@@ -1,8 +1,8 @@
 //! Information of readings: the whitened Jacobian of a calibration at planned rows, in units of the priors.
 //!
 //! Column k of row i is ∂rᵢ/∂xₖ · sₖ / σ, with σ the noise of the reading and sₖ the prior's standard deviation: a row of
-//! length 1 tells as much about its combination of parameters as the prior does, and the normal matrix with all priors
-//! is I + Σ xᵢ xᵢᵀ.
+//! length 1 holds as much information about its combination of parameters as the prior, and the normal matrix with all
+//! priors is I + Σ xᵢ xᵢᵀ.
 
 use nalgebra::{Cholesky, DMatrix};
 
@@ -28,13 +28,13 @@ pub struct ReadingJacobian {
     pub per_row: usize,
     /// The parameters, in the order of the rows of `readings`.
     pub parameters: Vec<Parameter>,
-    /// Prior standard deviation of each (mm, rad), by which it was scaled.
+    /// Prior standard deviation of each (mm, rad), by which its column was scaled.
     pub scale: Vec<f64>,
-    /// Rows of `readings` that a diagnosis asks about; the rest is geometry.
+    /// Rows of `readings` that belong to the questions of a diagnosis; the rest is geometry.
     pub interest: Vec<usize>,
 }
 
-/// The sensor as the simulator knows it.
+/// The sensor as defined in the simulator.
 pub fn rig(setup: &MeasurementSetup<'_>) -> Rig {
     let frames = setup.frames;
     match setup.sensor {
@@ -54,8 +54,8 @@ pub fn rig(setup: &MeasurementSetup<'_>) -> Rig {
     }
 }
 
-/// Whitened Jacobian, one row per scalar reading, and the priors of its columns. `rows` need no readings: the nominal ones
-/// are put in.
+/// Whitened Jacobian, one row per scalar reading, and the priors of its columns. `rows` need no readings; nominal ones are
+/// inserted.
 pub(super) fn jacobian(
     setup: &MeasurementSetup<'_>,
     model: &Model,
@@ -87,7 +87,7 @@ pub(super) fn jacobian(
     (DMatrix::from_vec(count, parameters.len(), columns), scale)
 }
 
-/// What rows tell of the geometry, and of what `questions` are about.
+/// Whitened Jacobian of rows for the geometry and for the parameters of `questions`.
 pub(super) fn reading_jacobian(
     setup: &MeasurementSetup<'_>,
     parameters: &[Parameter],
@@ -135,7 +135,7 @@ impl ReadingJacobian {
         DMatrix::identity(p, p) + &taken * taken.transpose()
     }
 
-    /// Covariance of the parameters (mm, rad) for an information matrix; `None` where that is not positive.
+    /// Covariance of the parameters (mm, rad) for an information matrix; `None` if that is not positive definite.
     pub fn covariance(&self, information: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         let inverse = Cholesky::new(information.clone())?.inverse();
         let p = inverse.nrows();
@@ -143,11 +143,11 @@ impl ReadingJacobian {
         finite.then(|| DMatrix::from_fn(p, p, |i, j| inverse[(i, j)] * self.scale[i] * self.scale[j]))
     }
 
-    /// Predicted standard deviation of what the fitted parameters say of the lengths read in some rows, root mean square,
-    /// in units of the noise: √ mean xᵀ M⁻¹ x. `None` where M is not positive.
+    /// Predicted standard deviation of the lengths of some rows under the fitted parameters, root mean square, in units of
+    /// the noise: √ mean xᵀ M⁻¹ x. `None` if M is not positive definite.
     pub fn reading_sigma(&self, information: &DMatrix<f64>, rows: &[usize]) -> Option<f64> {
         let factor = Cholesky::new(information.clone())?;
-        // Of a pose the three coordinates, not the angles.
+        // Only the three coordinates of a pose, not its angles.
         let lengths = self.per_row.min(3);
         let sum: f64 = rows
             .iter()
@@ -159,7 +159,7 @@ impl ReadingJacobian {
         Some((sum / rows.len().max(1) as f64).sqrt())
     }
 
-    /// Standard deviation of every parameter when all rows are measured.
+    /// Standard deviation of every parameter after all rows are measured.
     pub fn sigmas(&self) -> Option<Vec<f64>> {
         let all: Vec<usize> = (0..self.rows()).collect();
         let covariance = self.covariance(&self.information(&all))?;

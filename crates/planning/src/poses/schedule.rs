@@ -1,12 +1,13 @@
 //! Order of the rows: repeats, approach directions, warm-up.
 //!
-//! - Every pose is reached from a stated side of every joint, drawn at random, so that play does not look like geometry.
-//! - Some poses are measured at once again from the other side of all joints: the difference is play and nothing else.
+//! - Every pose is approached from a stated side of every joint, drawn at random, so that backlash is not confounded with
+//!   geometry.
+//! - Some poses are measured again at once from the other side of all joints: the difference is due to backlash alone.
 //! - Some are measured again later from the same side: their scatter is the noise floor.
-//! - One is visited again and again, often at first: what warms up shows there.
+//! - One is visited repeatedly, more often at first, to detect warm-up.
 //!
-//! Poses follow each other at random, so that time and place are not confounded; where a cable would leave its range or
-//! touch a link on the way, the next pose that is reached without is taken instead.
+//! The order of poses is random, so that time and location are not confounded. If a cable would leave its range or touch a
+//! link on a motion, the next pose that can be reached without this is taken instead.
 
 use nalgebra::Point3;
 use rand::seq::SliceRandom;
@@ -27,13 +28,13 @@ use truegrind_calibration::measurement::dataset::{Row as MeasuredRow, Sensor};
 /// Repeated visits.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Visits {
-    /// Poses that are measured twice more, from the same side.
+    /// Number of poses measured twice more, from the same side.
     pub repeats: usize,
-    /// Poses that are measured again from the other side.
+    /// Number of poses measured again from the other side.
     pub both_sides: usize,
-    /// Visits of one pose over the whole run, often at first.
+    /// Number of visits of one pose over the whole run, more frequent at first.
     pub warm_up: usize,
-    /// How far from a pose its approach begins, in every joint (rad).
+    /// Distance from a pose at which its approach begins, in every joint (rad).
     pub approach_rad: f64,
     /// Time from row to row (s).
     pub seconds_per_row: f64,
@@ -52,7 +53,7 @@ impl Default for Visits {
 }
 
 impl Visits {
-    /// More of what a diagnosis asks for.
+    /// Adds the visits that the questions of a diagnosis require.
     pub(super) fn with_questions(&self, questions: &[Question]) -> Self {
         let mut out = *self;
         if any_about(questions, "backlash") {
@@ -62,7 +63,7 @@ impl Visits {
             out.warm_up = out.warm_up.max(16);
         }
         if ["sensor-zero-shift", "sensor-frame-shift", "tool-shift"].iter().any(|e| any_about(questions, e)) {
-            // A pose that comes back tells when something moved.
+            // A repeated pose shows when something moved.
             out.repeats = out.repeats.max(8);
         }
         out
@@ -75,7 +76,7 @@ impl Visits {
 pub enum Purpose {
     /// For the geometry.
     Geometry,
-    /// From the other side, for play.
+    /// From the other side, for backlash.
     OtherSide,
     /// Again, for the noise floor.
     Repeat,
@@ -84,7 +85,7 @@ pub enum Purpose {
 }
 
 impl Purpose {
-    /// A word for tables.
+    /// Label in tables.
     pub fn label(self) -> &'static str {
         match self {
             Purpose::Geometry => "geometry",
@@ -95,7 +96,7 @@ impl Purpose {
     }
 }
 
-/// The first row to measure as a spreadsheet counts it: the header stands in row 1.
+/// Spreadsheet number of the first row to measure; row 1 is the header.
 pub const FIRST_ROW: usize = 2;
 
 /// A row to measure.
@@ -107,27 +108,27 @@ pub struct Row {
     pub approach_from: Joints,
     /// The side from which each joint comes to rest: −1 from below, +1 from above.
     pub approach: [i8; 6],
-    /// Why.
+    /// Purpose.
     pub purpose: Purpose,
-    /// When, from the start (h).
+    /// Time from the start (h).
     pub time_h: f64,
-    /// Whether a cable leaves its range or comes too near to a link on the way here.
+    /// Whether a cable leaves its range or comes too close to a link on the motion to this row.
     pub cable_unclear: bool,
-    /// Joints (rad) that are rejections on the way here, where the straight one would enter what is kept out of.
+    /// Intermediate stops (rad) of the motion to this row, if the straight motion would hit an obstacle.
     pub waypoints: Vec<Joints>,
 }
 
-/// By which ways the arm goes from pose to pose where the straight one is not clear.
+/// Sources of intermediate stops for motions whose straight path is not clear.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Connections<'a> {
-    /// Places to stop at: one, or two.
+    /// Candidate stops, of which one or two are used.
     pub(super) known: &'a [Joints],
-    /// What is gone along where those do not do.
+    /// Roadmap, used if one or two stops do not suffice.
     pub(super) roadmap: Option<&'a Roadmap>,
 }
 
-/// Orders the poses and their visits. Hands back the poses in the order in which they are first visited; `None` where no way
-/// between two of them is found.
+/// Orders the poses and their visits. Returns the poses in the order of their first visit; `None` if no clear path between
+/// two of them is found.
 pub(super) fn schedule(
     setup: &MeasurementSetup<'_>,
     poses: Vec<Candidate>,
@@ -145,13 +146,13 @@ pub(super) fn schedule(
     let sides: Vec<[i8; 6]> =
         poses.iter().map(|_| std::array::from_fn(|_| if random.random_bool(0.5) { 1 } else { -1 })).collect();
     let checker = CollisionChecker::of(setup, &bounds.space);
-    // Every candidate has such sides.
+    // Every candidate has clear sides.
     let sides: Vec<[i8; 6]> = poses
         .iter()
         .zip(sides)
         .map(|(pose, sides)| checker.sides(&pose.joints, sides).unwrap_or(sides))
         .collect();
-    // Pose and purpose, with the sides of the pose or the other ones.
+    // Pose and purpose, with the sides of the pose or the opposite ones.
     let other = visits.both_sides.min(count);
     let mut list: Vec<(usize, Purpose)> = Vec::new();
     for pose in 0..count {
@@ -161,19 +162,19 @@ pub(super) fn schedule(
             list.push((pose, Purpose::OtherSide));
         }
     }
-    // Repeats: in the middle, and in the end.
+    // Repeats: in the middle and at the end.
     let repeats = visits.repeats.min(count);
     let step = count.max(1) / repeats.max(1);
     let repeated: Vec<usize> = (0..repeats).map(|k| k * step).collect();
     let middle = list.len() / 2;
-    // Those of the first half come again in the middle; the others twice in the end.
+    // Those of the first half are repeated in the middle, the others twice at the end.
     for (at, pose) in repeated.iter().enumerate() {
         let first = list.iter().position(|(p, _)| p == pose).unwrap_or(0);
         let place = if first < middle { middle + at } else { list.len() };
         list.insert(place.min(list.len()), (*pose, Purpose::Repeat));
     }
     list.extend(repeated.iter().map(|&pose| (pose, Purpose::Repeat)));
-    // Warm-up: the first pose, at times that grow by the square.
+    // Warm-up: the first pose, at quadratically growing times.
     let total = list.len() + visits.warm_up;
     for k in 1..visits.warm_up {
         let share = k as f64 / (visits.warm_up - 1) as f64;
@@ -209,7 +210,7 @@ pub(super) fn schedule(
     Some((poses, rows))
 }
 
-/// The same order with poses put off that are not reached clearly from the one before.
+/// The same order, with poses postponed that have no clear motion from the previous one.
 fn smoothed(
     setup: &MeasurementSetup<'_>,
     bounds: &Bounds,
@@ -230,10 +231,10 @@ fn smoothed(
     order
 }
 
-/// Points of a way that are looked at.
+/// Number of checked points of a motion.
 const ON_THE_WAY: usize = 16;
 
-/// Whether a cable stays in its range and off the links while the joints run from one pose to another.
+/// Whether a cable stays in its range and clear of the links during a motion.
 fn clear(setup: &MeasurementSetup<'_>, bounds: &Bounds, from: &Joints, to: &Joints, anchor: usize) -> bool {
     if setup.sensor != Sensor::Cable {
         return true;
@@ -253,7 +254,7 @@ fn clear(setup: &MeasurementSetup<'_>, bounds: &Bounds, from: &Joints, to: &Join
     })
 }
 
-/// The rows as a measurement would log them.
+/// The planned rows in the form of logged ones.
 pub(super) fn data(planned: &[Row], poses: &[Candidate]) -> Vec<MeasuredRow> {
     planned
         .iter()

@@ -74,11 +74,8 @@ pub(super) fn of_the_paper(page: &mut Document, result: &DegradationResult) {
                 by_step(result, journey, "before", before),
                 by_step(result, journey, "after", after),
             ];
-            let title = format!(
-                "{} with {} poses of each group, {poses} poses",
-                journey.way.name(),
-                journey.count
-            );
+            let title =
+                format!("{} with {} poses of each group, {poses} poses", journey.way.name(), journey.count);
             Block::Figure(Figure::new(
                 over_time(result, &title, series, Axis::log("mean error", "mm")),
                 format!(

@@ -250,7 +250,8 @@ pub(super) fn parameter_table(parameters: &ParameterTable) -> Table {
         ]);
     }
     table.notes = vec![
-        "compensated: nominal plus deviation, as entered in a controller; ± is 1σ of the deviation.".to_owned(),
+        "compensated: nominal plus deviation, as entered in a controller; ± is 1σ of the deviation."
+            .to_owned(),
     ];
     if parameters.rows.iter().any(|row| row.paper.is_some()) {
         table.notes.push(
