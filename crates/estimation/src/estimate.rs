@@ -1,23 +1,23 @@
-//! What a solver hands back: the parameters, how sure they are, what they cost, and how the search ended.
+//! Result of a solver: parameters, covariance, cost, effort and termination.
 
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-/// The result of a solver. Nothing here is hidden: the cost is the cost at `x`, also where the search failed.
+/// The result of a solver. The cost is always that at `x`, even if the search failed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimate {
     /// Parameters, p entries, in the units of the problem.
     pub x: Vec<f64>,
-    /// Covariance of `x`, p × p: the inverse of the normal matrix with priors (batch solvers), or what a filter
-    /// carries. `None` where that matrix is singular or the method has none (swarms).
+    /// Covariance of `x`, p × p: the inverse of the normal matrix with priors (batch solvers), or the covariance of a
+    /// filter's state. `None` if that matrix is singular or the method has none (swarms).
     pub covariance: Option<DMatrix<f64>>,
-    /// ½ Σ r² plus the priors' share, at `x`. Where the solver was told to ignore priors they are left out.
+    /// ½ Σ r² plus the priors' share, at `x`; without the priors if the solver ignores them.
     pub cost: f64,
-    /// What the search cost.
+    /// Rows evaluated by the search.
     pub evaluations: Evaluations,
-    /// How the search ended.
+    /// Termination of the search.
     pub termination: Termination,
-    /// One entry for each iteration, the start first.
+    /// One entry for each iteration, starting with the initial point.
     pub trace: Vec<Iteration>,
 }
 
@@ -32,9 +32,9 @@ impl Estimate {
 /// Divide by [`crate::problem::Problem::rows`] for passes over the data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Evaluations {
-    /// Rows whose residual was evaluated alone.
+    /// Rows evaluated without derivatives.
     pub residuals: u64,
-    /// Rows whose residual and derivatives were evaluated together.
+    /// Rows evaluated with derivatives.
     pub jacobians: u64,
 }
 
@@ -47,15 +47,15 @@ pub enum Termination {
     Gradient,
     /// The step is negligible against the parameters, with little damping.
     Step,
-    /// What is still to gain is a negligible part of the cost.
+    /// The predicted reduction is a negligible part of the cost.
     Cost,
-    /// Nothing is left to explain: the residuals vanish.
+    /// The residuals vanish.
     SmallResidual,
-    /// Every observation was taken in as often as asked (filters and other one-pass methods).
+    /// Every observation was processed as often as required (filters and other one-pass methods).
     DataProcessed,
-    /// The iterations allowed are used up.
+    /// The iteration limit was reached.
     IterationLimit,
-    /// No step improves the cost although none of the tests of convergence holds.
+    /// No step improves the cost although no convergence test holds.
     Stalled,
     /// The cost, a residual or a derivative was not a finite number; `x` is the last finite point.
     NotFinite,
@@ -64,14 +64,14 @@ pub enum Termination {
 }
 
 impl Termination {
-    /// Whether a test of convergence held. A one-pass method that has seen all data is *finished* but does not
-    /// claim a minimum, so it is not converged.
+    /// Whether a convergence test held. A one-pass method that has processed all data is *finished* but does not claim a
+    /// minimum, so it has not converged.
     ///
     /// ```
     /// use truegrind_estimation::estimate::Termination;
     ///
     /// assert!(Termination::Gradient.is_converged());
-    /// // To have seen every row is not to stand at a minimum, and no failure either.
+    /// // Processing every row is neither convergence to a minimum nor a failure.
     /// assert!(!Termination::DataProcessed.is_converged() && !Termination::DataProcessed.is_failure());
     /// assert_eq!(Termination::DataProcessed.to_string(), "all rows taken in");
     /// ```
@@ -79,7 +79,7 @@ impl Termination {
         matches!(self, Self::Gradient | Self::Step | Self::Cost | Self::SmallResidual)
     }
 
-    /// Whether the result is unusable as it stands.
+    /// Whether the result is unusable.
     pub fn is_failure(self) -> bool {
         matches!(self, Self::NotFinite | Self::Singular)
     }
@@ -101,20 +101,20 @@ impl std::fmt::Display for Termination {
     }
 }
 
-/// One line of the story of a search.
+/// One iteration of a search.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Iteration {
-    /// Cost at the point the iteration ended on.
+    /// Cost at the end of the iteration.
     pub cost: f64,
-    /// The same without the priors' share, where the method knows it apart.
+    /// The same without the priors' share, if the method computes it separately.
     pub row_cost: Option<f64>,
-    /// Euclidean length of the step in the method's own scaling; 0 where the step was refused.
+    /// Euclidean length of the step in the method's scaling; 0 for a refused step.
     pub step_norm: f64,
     /// Damping μ (Levenberg–Marquardt), step size (beetle, variable step size), forgetting factor, inertia.
     pub damping: Option<f64>,
-    /// Largest cosine between the residual vector and a column of the Jacobian, at the point the iteration
-    /// began on or ended on, as the method has it.
+    /// Largest cosine between the residual vector and a column of the Jacobian, at the beginning or the end of the
+    /// iteration, depending on the method.
     pub gradient_norm: Option<f64>,
-    /// Everything evaluated up to the end of this iteration.
+    /// Rows evaluated up to the end of this iteration.
     pub evaluations: Evaluations,
 }

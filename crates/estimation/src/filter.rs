@@ -1,5 +1,4 @@
-//! Recursive estimation: one observation at a time, the parameters as a state that does not move (or drifts a
-//! little).
+//! Recursive estimation: one observation at a time, with the parameters as a constant or slowly drifting state.
 //!
 //! | file | method | rows per observation of m rows, p parameters |
 //! |---|---|---|
@@ -9,10 +8,10 @@
 //! | [`pf`] | particle filter | at least one per particle |
 //! | [`rls`] | recursive least squares, square-root form (rls-2025 eq. 8 to 14) | m with derivatives, once |
 //!
-//! What a filter predicts for an observation is its residual at the present state, what it "measures" is zero,
-//! and the noise has variance 1, since residuals come divided by their standard deviation. A filter's first
-//! state is the mean of the prior where there is one and `start` elsewhere; its first covariance is diagonal,
-//! with the priors' variances, and `unknown_sigma²` for a parameter without a prior.
+//! A filter predicts the residual of an observation at the current state; the "measured" value is zero. The noise has
+//! variance 1, since residuals are divided by their standard deviation. The initial state is the mean of the prior, or
+//! `start` for a parameter without a prior; the initial covariance is diagonal, with the priors' variances, or
+//! `unknown_sigma²` without a prior.
 
 pub mod ekf;
 pub mod ukf;
@@ -27,19 +26,18 @@ use crate::estimate::{Estimate, Iteration, Termination};
 use crate::objective::Objective;
 use crate::problem::{Problem, prior_cost};
 
-/// What one observation said, before it changed the state.
+/// Innovation of one observation, before the update.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Innovation {
     /// Predicted residual, m entries, in standard deviations of the measurement.
     pub residual: DVector<f64>,
-    /// Its covariance S, m × m: what the state does not know, and the noise.
+    /// Its covariance S, m × m: uncertainty of the state plus noise.
     pub covariance: DMatrix<f64>,
-    /// Normalised innovation squared rᵀS⁻¹r: χ² with m degrees of freedom where model and noise are right.
+    /// Normalised innovation squared rᵀS⁻¹r: χ² with m degrees of freedom if model and noise are correct.
     pub nis: f64,
 }
 
-/// The state that a filter begins with: mean and covariance of the priors, `start` and `unknown_sigma` where
-/// there is none.
+/// Initial state of a filter: mean and covariance of the priors, or `start` and `unknown_sigma` without a prior.
 pub fn prior_state(problem: &dyn Problem, start: &[f64], unknown_sigma: f64) -> (DVector<f64>, DMatrix<f64>) {
     let mut x = DVector::from_column_slice(start);
     let mut variances = DVector::from_element(start.len(), unknown_sigma * unknown_sigma);
@@ -77,7 +75,7 @@ fn finish(
     }
 }
 
-/// Makes a covariance exactly symmetric after an update has rounded.
+/// Makes a covariance exactly symmetric after a rounded update.
 fn symmetrise(matrix: &mut DMatrix<f64>) {
     for j in 0..matrix.ncols() {
         for i in j + 1..matrix.nrows() {

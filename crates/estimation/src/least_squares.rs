@@ -7,7 +7,7 @@
 //! | [`gauss_newton`] | least squares of one linearisation (rls-2025 eq. 9), and repeated | 1 |
 //! | [`sslm`] | step-size Levenberg–Marquardt (ltlm-2024, M6) | 1, and rows-only passes |
 //! | [`vslm`] | variable step-size Levenberg–Marquardt (ukf-vslm-2023 eq. 15) | 1 |
-//! | [`triangular`] | the triangular factor of a Jacobian that is never held whole | 1 |
+//! | [`triangular`] | the triangular factor of a Jacobian that is never stored | 1 |
 //! | [`rank`] | rank, condition and null space from that factor | 0 |
 
 pub mod lm;
@@ -22,11 +22,11 @@ pub(crate) mod search;
 
 use serde::{Deserialize, Serialize};
 
-/// Whether a method runs as its paper prints it, or as a numerical analyst would set it up.
+/// Whether a method runs as printed in its paper, or in a numerically sound form.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Form {
-    /// To the letter of the paper, weaknesses included; the header of each file says which those are.
+    /// To the letter of the paper, including its weaknesses, which the header of each file lists.
     AsPrinted,
     /// The same idea with scaling, step control and proper stops.
     #[default]
@@ -34,14 +34,14 @@ pub enum Form {
     Robust,
 }
 
-/// How the linear system of one step is solved.
+/// Factorisation used for the linear system of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Factorisation {
-    /// Cholesky factorisation of the normal equations: one cheap pass over the rows, half of the digits.
+    /// Cholesky factorisation of the normal equations: one cheap pass over the rows, half of the significant digits.
     #[default]
     Cholesky,
-    /// QR factorisation of the stacked Jacobian: twice the arithmetic, all of the digits. For problems whose
+    /// QR factorisation of the stacked Jacobian: twice the arithmetic, all significant digits. For problems whose
     /// scaled Jacobian has a condition number beyond some 1e6.
     Qr,
 }

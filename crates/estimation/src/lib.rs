@@ -1,18 +1,17 @@
-//! Algorithms that fit a model to measurements. Nothing here knows a robot: each algorithm is tested on
-//! published problems (Moré–Garbow–Hillstrom, NIST StRD) and serves whatever implements [`problem::Problem`].
+//! Algorithms that fit a model to measurements. They are independent of robots: each is tested on published problems
+//! (Moré–Garbow–Hillstrom, NIST StRD) and solves any [`problem::Problem`].
 //!
 //! Every algorithm file has the same two items: `Options` (with a `seed` and a `Default`) and `solve(&dyn
-//! Problem, start, &Options) -> Estimate`. A solver returns whatever the data: not a number, no rows, a
-//! singular matrix end in a [`estimate::Termination`] that says so, never in a panic. Where a paper prints a
-//! weak form of a method, [`least_squares::Form`] chooses between that form, to the letter, and a sound one;
-//! the default is sound.
+//! Problem, start, &Options) -> Estimate`. A solver returns for any data: NaN, no rows or a singular matrix give a
+//! corresponding [`estimate::Termination`], never a panic. If a paper prints a weak form of a method,
+//! [`least_squares::Form`] selects that form, to the letter, or a sound one; the default is sound.
 //!
-//! - [`problem`] and [`estimate`]: what goes in and what comes out;
-//! - [`least_squares`]: all rows at once, with derivatives;
-//! - [`filter`]: one observation at a time, with a covariance that follows;
-//! - [`swarm`]: the cost alone;
+//! - [`problem`] and [`estimate`]: input and output of a solver;
+//! - [`least_squares`]: batch methods with derivatives;
+//! - [`filter`]: recursive methods with a covariance, one observation at a time;
+//! - [`swarm`]: methods that use the cost only;
 //! - [`network`]: a smooth function with many weights;
-//! - [`chaos`]: the maps that one of the least-squares methods draws its candidates from.
+//! - [`chaos`]: the maps that generate the candidates of one of the least-squares methods.
 //!
 //! ```
 //! use std::ops::Range;

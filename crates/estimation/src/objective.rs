@@ -1,4 +1,4 @@
-//! A problem together with its priors and a tally of what was asked of it: what every solver here works on.
+//! A problem with its priors and a count of evaluated rows, used by every solver.
 
 use std::ops::Range;
 
@@ -9,17 +9,17 @@ use crate::problem::{NormalEquations, Prior, Problem, prior_cost};
 pub struct Objective<'a> {
     /// The rows.
     pub problem: &'a dyn Problem,
-    /// Priors of the parameters; none where a method is run without.
+    /// Priors of the parameters; none for a method without priors.
     pub priors: &'a [Prior],
     /// Rows evaluated so far.
     pub evaluations: Evaluations,
 }
 
 impl<'a> Objective<'a> {
-    /// Counts from zero.
+    /// Starts with a count of zero.
     ///
     /// # Panics
-    /// Where `start` does not have one entry for each parameter: an error of the calling code, not of the data.
+    /// If `start` does not have one entry for each parameter: a programming error.
     pub fn new(problem: &'a dyn Problem, start: &[f64], with_priors: bool) -> Self {
         assert_eq!(start.len(), problem.parameters(), "the start must have one entry for each parameter");
         let priors = if with_priors { problem.priors() } else { &[] };
@@ -53,7 +53,7 @@ impl<'a> Objective<'a> {
     }
 }
 
-/// Whether cost and derivatives can be worked with.
+/// Whether cost and derivatives are finite.
 pub fn is_finite(equations: &NormalEquations) -> bool {
     equations.cost.is_finite() && equations.gradient.iter().all(|g| g.is_finite()) && {
         let a = &equations.matrix;

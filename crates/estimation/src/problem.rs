@@ -1,13 +1,12 @@
-//! What a solver sees of a fitting task: weighted residuals by blocks of rows, and a prior.
+//! Interface of a fitting problem: weighted residuals by blocks of rows, and a prior.
 //!
-//! The task is: minimise ½ Σ r_i(x)² + ½ Σ ((x_k − m_k) / s_k)², the second sum over parameters that have a
-//! prior. Residuals come already divided by the standard deviation of their measurement (so that the covariance
-//! of the estimate is the inverse of the normal matrix), unless a problem states otherwise.
+//! Solvers minimise ½ Σ r_i(x)² + ½ Σ ((x_k − m_k) / s_k)², the second sum over parameters with a prior. Residuals are
+//! divided by the standard deviation of their measurement (so that the covariance of the estimate is the inverse of the
+//! normal matrix), unless a problem states otherwise.
 //!
-//! A problem speaks in *rows* (one scalar residual) that come in *observations* of
-//! [`Problem::rows_per_observation`] rows (1 for a cable length, 3 for a position, 6 for a pose). Batch solvers
-//! take the normal equations or stack all rows, filters take one observation at a time, swarms ask for the cost
-//! alone.
+//! A *row* is one scalar residual; an *observation* has [`Problem::rows_per_observation`] rows (1 for a cable length, 3 for
+//! a position, 6 for a pose). Batch solvers use the normal equations or stack all rows, filters process one observation at
+//! a time, swarms use the cost only.
 
 use std::ops::Range;
 
@@ -15,14 +14,14 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use truegrind_math::work::checkpoint;
 
-/// Prior knowledge of one parameter: a normal distribution. `sigma` infinite means none.
+/// Normal prior of one parameter. Infinite `sigma` means no prior.
 ///
 /// ```
 /// use std::ops::Range;
 /// use truegrind_estimation::least_squares::lm;
 /// use truegrind_estimation::problem::{Prior, Problem};
 ///
-/// /// Reads one length; of a second one it says nothing.
+/// /// Measures one length; a second one is unobserved.
 /// struct OneOfTwo;
 ///
 /// impl Problem for OneOfTwo {
@@ -44,7 +43,7 @@ use truegrind_math::work::checkpoint;
 ///     }
 /// }
 ///
-/// // What no row sees stays where its prior holds it, as unsure as before.
+/// // A parameter without data keeps its prior mean and standard deviation.
 /// let found = lm::solve(&OneOfTwo, &[0.0, 0.0], &lm::Options::default());
 /// let sigmas = found.sigmas().ok_or("none")?;
 /// assert!((found.x[0] - 0.4).abs() < 1e-9 && (sigmas[0] - 0.01).abs() < 1e-9);
@@ -84,7 +83,7 @@ impl NormalEquations {
         self.cost += other.cost;
     }
 
-    /// Adds the priors of the parameters at `x`: one for each, or none at all; one of infinite width says nothing.
+    /// Adds the priors of the parameters at `x`: one for each, or none at all; one of infinite width has no effect.
     pub fn add_priors(&mut self, priors: &[Prior], x: &[f64]) {
         for (k, (prior, x)) in priors.iter().zip(x).enumerate() {
             if prior.sigma.is_finite() {
@@ -115,8 +114,7 @@ pub trait Problem: Sync {
         1
     }
 
-    /// Writes the residuals of `rows` at `x` into `out` (`out.len() == rows.len()`). `rows` starts and ends at
-    /// an observation's border.
+    /// Writes the residuals of `rows` at `x` into `out` (`out.len() == rows.len()`). `rows` contains whole observations.
     fn residuals(&self, x: &[f64], rows: Range<usize>, out: &mut [f64]);
 
     /// Writes residuals and their derivatives: `jacobian` is `rows.len()` × p, column-major
@@ -128,7 +126,7 @@ pub trait Problem: Sync {
         &[]
     }
 
-    /// The same task with `observations` alone, by their index; `None` where that is not offered.
+    /// The same problem with these `observations` only, by index; `None` if not supported.
     fn subsample(&self, _observations: &[usize]) -> Option<Box<dyn Problem + '_>> {
         None
     }
@@ -167,16 +165,16 @@ pub fn prior_cost(priors: &[Prior], x: &[f64]) -> f64 {
     0.5 * priors.iter().zip(x).map(term).sum::<f64>()
 }
 
-/// Rows in one chunk of parallel work: fixed, so that sums come out the same for any number of threads.
+/// Rows in one chunk of parallel work: fixed, so that sums are the same for any number of threads.
 const CHUNK_ROWS: usize = 1536;
 
-/// The rows of each observation in turn. Rows beyond the last whole observation are left out.
+/// The rows of each observation in turn. Rows beyond the last whole observation are omitted.
 pub(crate) fn observations(problem: &dyn Problem) -> impl Iterator<Item = Range<usize>> + use<> {
     let per = problem.rows_per_observation().max(1);
     (0..problem.rows() / per).map(move |i| i * per..(i + 1) * per)
 }
 
-/// What `work` makes of each chunk of rows, in order; several chunks are worked on in parallel.
+/// Results of `work` for each chunk of rows, in order; chunks are processed in parallel.
 pub(crate) fn map_chunks<P, T>(problem: &P, work: impl Fn(Range<usize>) -> T + Sync) -> Vec<T>
 where
     P: Problem + ?Sized,
@@ -187,7 +185,7 @@ where
         checkpoint();
         work(rows)
     };
-    // Handing one small chunk to the pool costs more than a swarm's whole evaluation of it.
+    // Scheduling one small chunk on the pool costs more than a swarm's whole evaluation of it.
     if chunks.len() <= 1 {
         chunks.into_iter().map(work).collect()
     } else {

@@ -1,4 +1,4 @@
-//! Swarms and other searches that ask for nothing but the cost.
+//! Swarms and other searches that use the cost only.
 //!
 //! | file | method | passes of residuals per iteration |
 //! |---|---|---|
@@ -9,10 +9,10 @@
 //! | [`qibas`] | the same with quadratic interpolation | 4 |
 //!
 //! All search in a box around `start`: parameter k in start ± reach · σ_k of its prior, or ± `unknown_reach`
-//! where it has none, and all work in coordinates that go from −1 to 1 in that box. None has derivatives, so
-//! none has a covariance or a test of convergence: they end at the iteration limit, or where the cost has
-//! vanished. Next to a least-squares method their use is to show what the same budget of evaluations buys;
-//! nothing they find is a minimum until one of those has confirmed it.
+//! where it has none, and all use coordinates from −1 to 1 in that box. None uses derivatives, so none has a covariance or
+//! a convergence test: they end at the iteration limit, or when the cost has vanished. They serve as a comparison with
+//! least-squares methods under the same budget of evaluations; a least-squares method must confirm that their result is a
+//! minimum.
 
 pub mod pso;
 pub mod de;
@@ -27,7 +27,7 @@ use crate::estimate::{Estimate, Iteration, Termination};
 use crate::objective::Objective;
 use crate::problem::{Problem, prior_cost};
 
-/// The box that is searched.
+/// The search box.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
 pub struct Region {
@@ -43,7 +43,7 @@ impl Default for Region {
     }
 }
 
-/// A search in the unit box: where it is, what it has found, what it has cost.
+/// A search in the unit box: best position, its cost, and the evaluated rows.
 struct Search<'a> {
     objective: Objective<'a>,
     centre: Vec<f64>,
@@ -56,7 +56,7 @@ struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    /// Evaluates the start, which is the first best position.
+    /// Evaluates the start, the initial best position.
     fn new(problem: &'a dyn Problem, start: &[f64], region: &Region, priors: bool, small_cost: f64) -> Self {
         let mut objective = Objective::new(problem, start, priors);
         let sigma =
@@ -80,7 +80,7 @@ impl<'a> Search<'a> {
         self.centre.iter().zip(&self.half_width).zip(u).map(|((c, h), u)| c + h * u).collect()
     }
 
-    /// Costs of positions, in order; what is not a number costs infinitely much. The best one is remembered.
+    /// Costs of positions, in order; NaN counts as infinite. Records the best one.
     fn costs(&mut self, positions: &[Vec<f64>]) -> Vec<f64> {
         let (problem, priors) = (self.objective.problem, self.objective.priors);
         let places: Vec<Vec<f64>> = positions.iter().map(|u| self.place(u)).collect();
@@ -105,7 +105,7 @@ impl<'a> Search<'a> {
         self.costs(&[position.to_vec()])[0]
     }
 
-    /// Notes the end of an iteration; true where the search is over because nothing is left to explain.
+    /// Records the end of an iteration; true if the search is finished because the cost has vanished.
     fn note(&mut self, step_norm: f64, setting: f64) -> bool {
         self.trace.push(Iteration {
             cost: self.best_cost,

@@ -1,7 +1,8 @@
-//! Sums of columns in proportion: y ← y + Σ aₖ xₖ, one column after the other.
+//! Linear combinations of columns: y ← y + Σ aₖ xₖ, one column after the other.
 //!
-//! Method: numbers in registers as wide as the machine has, each number of y by itself, so that every width gives the same bits.
-//! Cost: two operations for each number of each column, and 8 bytes of it where y stays in the first-level cache.
+//! Method: vector registers of the machine's full width. Each element of y is summed separately, so every width gives the same
+//! bits.
+//! Cost: two operations and 8 bytes for each element of each column, if y fits in the first-level cache.
 //! Checked against: the plain loop, to the bit.
 
 use super::lanes::{AnyWidth, SinCos, widest};
@@ -19,7 +20,7 @@ use super::lanes::{AnyWidth, SinCos, widest};
 /// ```
 ///
 /// # Panics
-/// Where there is no such column.
+/// If a column does not exist.
 pub fn add_scaled(terms: &[(usize, f64)], columns: &[f64], sum: &mut [f64]) {
     widest(Scaled { terms, columns, sum });
 }

@@ -1,16 +1,16 @@
-//! The numerical twin of every analytic Jacobian: central differences with Richardson extrapolation.
+//! Numerical Jacobians to check analytic ones: central differences with Richardson extrapolation.
 
 use nalgebra::DMatrix;
 
 /// Jacobian of `f` at `x` by central differences with steps `h` and `h/2`, extrapolated (error of order h⁴).
 ///
 /// Shapes: `x` has n entries, `f` fills m entries, the result is m × n. `steps[k]` is the step of `x[k]` in its own
-/// unit (a length wants some 1e-2 mm, an angle some 1e-4 rad).
+/// unit (suitable: some 1e-2 mm for a length, 1e-4 rad for an angle).
 ///
 /// ```
 /// use truegrind_math::difference::jacobian;
 ///
-/// // Where a link of 300 mm ends over its angle: the derivative at 0.5 rad is known.
+/// // The end of a link of 300 mm as a function of its angle, with a known derivative at 0.5 rad.
 /// let end = |x: &[f64], out: &mut [f64]| out.copy_from_slice(&[300.0 * x[0].cos(), 300.0 * x[0].sin()]);
 /// let found = jacobian(end, &[0.5], 2, &[1e-3]);
 /// assert!((found[(0, 0)] + 300.0 * 0.5_f64.sin()).abs() < 1e-9);

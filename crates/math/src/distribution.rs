@@ -1,7 +1,7 @@
-//! Distributions that the tests need beside the tails of [`tail`](crate::tail): Student's t and quantiles of χ².
+//! Distributions for significance tests, besides those of [`tail`](crate::tail): Student's t and quantiles of χ².
 //!
 //! **Method.** Regularised incomplete beta by Lentz' continued fraction; ln Γ by Lanczos' sum (g = 7, nine terms), good
-//! to 1e-14. Quantiles by bisection, which cannot fail on a monotonous function.
+//! to 1e-14. Quantiles by bisection, which always converges for a monotonic function.
 //!
 //! **Source.** DLMF 8.17 (dlmf.nist.gov); Lanczos 1964. **Checked against** tabulated values.
 
@@ -46,7 +46,7 @@ pub fn ln_gamma(x: f64) -> f64 {
 /// use truegrind_math::distribution::chi_square_quantile;
 /// use truegrind_math::tail::chi_square_tail;
 ///
-/// // Three coordinates of a pose leave this value in one case of twenty.
+/// // The squared norm of three normal variates exceeds this value in one case of twenty.
 /// let bound = chi_square_quantile(0.05, 3);
 /// assert!((bound - 7.8147).abs() < 1e-4);
 /// assert!((chi_square_tail(bound, 3) - 0.05).abs() < 1e-12);

@@ -1,16 +1,16 @@
-//! Products of the columns of a tall matrix with each other: what a pass over a million rows spends half of its time on.
+//! Gram matrix of a tall matrix (AᵀA), which takes half of the time of a pass over a million rows.
 //!
-//! Method: 4 × 4 pairs of columns at a time, whose sums stay in registers while the rows go by. Each sum is eight sums, of
-//! every eighth row, so that it does not depend on how many rows a register holds; they are added in one order at the end.
-//! Here, and only here, product and sum are one instruction: everywhere, with one rounding, so that every set of
-//! instructions gives the same bits, and so does a processor that has no such instruction, if slowly.
-//! Cost: for n rows and p columns n p (p + 1) operations at 8 to 16 to an instruction, and half as many bytes from the
+//! Method: tiles of 4 × 4 pairs of columns, whose sums are held in registers during the pass over the rows. Each sum consists
+//! of eight partial sums of every eighth row, so that it does not depend on the number of rows in a register; they are added
+//! in a fixed order at the end. Only here are product and sum fused (one rounding), on every machine: every instruction set
+//! then gives the same bits, including processors without a fused instruction, which are slower.
+//! Cost: for n rows and p columns n p (p + 1) operations with 8 to 16 per instruction, and half as many bytes from the
 //! second-level cache as there are operations.
 //! Checked against: nalgebra's products.
 
 use super::lanes::{AnyWidth, Real, SinCos, WIDTH, widest};
 
-/// Columns on either side of a tile: sixteen sums, and room for what goes into them.
+/// Columns on either side of a tile: sixteen sums and their factors fit in the registers.
 const TILE: usize = 4;
 
 /// Adds the products of columns with each other to the lower triangle of `square`, which is column-major: entry (i, j) of it
@@ -27,7 +27,7 @@ const TILE: usize = 4;
 /// ```
 ///
 /// # Panics
-/// Where the rows of a column are no multiple of [`WIDTH`], or `square` is not one of as many columns as there are.
+/// If the number of rows is no multiple of [`WIDTH`], or `square` does not have the size of the columns' Gram matrix.
 pub fn add_products(columns: &[f64], rows: usize, square: &mut [f64]) {
     let size = columns.len().checked_div(rows).unwrap_or(0);
     assert!(rows.is_multiple_of(WIDTH), "{rows} rows are not whole groups");
@@ -68,7 +68,7 @@ impl AnyWidth for Products<'_> {
 }
 
 impl Products<'_> {
-    /// The pairs of I columns from `i` with J columns from `j`.
+    /// The products of I columns from `i` with J columns from `j`.
     #[inline(always)]
     fn tile<R: Real, const I: usize, const J: usize>(&mut self, like: R, i: usize, j: usize) {
         let left = self.columns_from::<I>(i);

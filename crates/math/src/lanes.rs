@@ -1,10 +1,10 @@
-//! One arithmetic for one row or for several: kinematics written once over [`Real`] runs on `f64` and, with as many rows
-//! side by side as a vector register holds, on [`Lanes`].
+//! SIMD over rows: kinematics written once over [`Real`] runs on `f64` and, with as many rows as a vector register holds, on
+//! [`Lanes`].
 //!
 //! Products and sums are never fused, and every function has one formula for all widths, so a row gives the same bits
-//! alone, in lanes, and on any processor. What is to run in lanes is an [`AnyWidth`]; [`vectorised`] compiles it for each
-//! set of vector instructions and takes the widest of the machine at run time (safe: through `pulp`, no flag at build
-//! time): AVX-512 has eight rows in a register, AVX2 four, Neon two, a machine with none of them goes row by row.
+//! alone, in lanes, and on any processor. A kernel implements [`AnyWidth`]; [`vectorised`] compiles it for each vector
+//! instruction set and selects the widest at run time (safe, through `pulp`, without build flags): AVX-512 has eight rows
+//! in a register, AVX2 four, Neon two; other machines process row by row.
 
 use std::cell::Cell;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
@@ -12,11 +12,11 @@ use std::sync::OnceLock;
 
 use pulp::{Arch, Simd, WithSimd};
 
-/// Rows of a group: as many as the widest register holds. What is worked on group by group does not depend on how many
-/// rows of it travel together.
+/// Rows of a group: as many as the widest register holds. Results of work in groups do not depend on the number of rows in a
+/// register.
 pub const WIDTH: usize = 8;
 
-/// What the kinematic kernels ask of a number, or of several side by side.
+/// Operations that the kinematic kernels need, on a number or on a register of several.
 pub trait Real:
     Copy
     + Add<Output = Self>
@@ -27,30 +27,30 @@ pub trait Real:
     + AddAssign
     + SubAssign
 {
-    /// Rows that travel together; divides [`WIDTH`].
+    /// Number of rows in the register; divides [`WIDTH`].
     const ROWS: usize;
     /// The same value in every lane, in a register like this one.
     fn splat(self, value: f64) -> Self;
-    /// Neighbours of a column, in a register like this one; rows beyond its end repeat the last one.
+    /// Consecutive elements of a column, in a register like this one; beyond the end the last one is repeated.
     fn load(self, column: &[f64], from: usize) -> Self;
-    /// Writes the lanes to neighbours of a column, as far as the column goes.
+    /// Writes the lanes to consecutive elements of a column, up to its end.
     fn store(self, column: &mut [f64], from: usize);
     /// Square root.
     fn sqrt(self) -> Self;
-    /// Whether a magnitude lies above `limit` in any lane; NaN is above nothing.
+    /// Whether the magnitude exceeds `limit` in any lane; false for NaN.
     fn any_above(self, limit: f64) -> bool;
     /// 1 where the magnitude is at most `limit`, 0 elsewhere and for NaN.
     fn within(self, limit: f64) -> Self;
     /// 1 where the value is above 0, 0 elsewhere and for NaN.
     fn positive(self) -> Self;
-    /// A function of each lane by itself, for what has no vector form.
+    /// Applies a function to each lane separately, if there is no vector form.
     fn each(self, f: impl Fn(f64) -> f64) -> Self;
     /// The first numbers of a slice, in a register like this one.
     ///
     /// # Panics
-    /// Where there are fewer than [`Real::ROWS`].
+    /// If there are fewer than [`Real::ROWS`].
     fn whole(self, numbers: &[f64]) -> Self;
-    /// self · factor + term, rounded once, at every width: for sums over rows, of which no row has bits of its own.
+    /// self · factor + term with a single rounding, at every width; for sums over rows only.
     fn times_plus(self, factor: Self, term: Self) -> Self;
 }
 
@@ -100,7 +100,7 @@ impl Real for f64 {
     }
 }
 
-/// Several rows side by side in one register, with the proof that the machine has its instructions.
+/// Several rows in one register, with the token that proves that the machine has its instructions.
 #[derive(Debug, Clone, Copy)]
 pub struct Lanes<S: Simd>(S, S::f64s);
 
@@ -147,7 +147,7 @@ impl<S: Simd> Lanes<S> {
         Self(simd, simd.select_f64s(mask, simd.splat_f64s(1.0), simd.splat_f64s(0.0)))
     }
 
-    /// Lane by lane, the rest 0.
+    /// Lane by lane; all others 0.
     #[inline(always)]
     fn spread(self) -> [f64; WIDTH] {
         let mut out = [0.0; WIDTH];
@@ -165,7 +165,7 @@ impl<S: Simd> Lanes<S> {
     }
 }
 
-/// Up to eight neighbours of a column; rows beyond its end repeat the last one.
+/// Up to eight consecutive elements of a column; beyond the end the last one is repeated.
 #[cold]
 #[inline(never)]
 fn load_end(column: &[f64], from: usize) -> [f64; WIDTH] {
@@ -176,7 +176,7 @@ fn load_end(column: &[f64], from: usize) -> [f64; WIDTH] {
     out
 }
 
-/// Writes lanes as far as a column goes.
+/// Writes lanes up to the end of a column.
 #[cold]
 #[inline(never)]
 fn store_end(column: &mut [f64], from: usize, lanes: &[f64]) {
@@ -248,8 +248,7 @@ impl<S: Simd> Real for Lanes<S> {
     }
 }
 
-/// Numbers from the first of which a whole register can be read without touching two lines of the cache, which is twice as
-/// fast where little else is done.
+/// Numbers aligned so that a register is read from a single cache line, which doubles the speed of memory-bound loops.
 #[derive(Debug, Clone)]
 pub struct Buffer {
     numbers: Vec<f64>,
@@ -257,23 +256,23 @@ pub struct Buffer {
 }
 
 impl Buffer {
-    /// So many zeros.
+    /// `count` zeros.
     pub fn zeros(count: usize) -> Self {
         let numbers = vec![0.0; count + WIDTH];
         let first = aligned(&numbers);
         Self { numbers, first }
     }
 
-    /// The first `count` of them.
+    /// The first `count` numbers.
     ///
     /// # Panics
-    /// Where there are fewer.
+    /// If there are fewer.
     pub fn first_mut(&mut self, count: usize) -> &mut [f64] {
         &mut self.numbers[self.first..][..count]
     }
 }
 
-/// The place in a column, less than [`WIDTH`], from which registers lie within lines of the cache.
+/// The first index in a column, below [`WIDTH`], from which registers are aligned to cache lines.
 pub fn aligned(column: &[f64]) -> usize {
     const LINE_BYTES: usize = WIDTH * size_of::<f64>();
     column.as_ptr().align_offset(LINE_BYTES) % WIDTH
@@ -281,8 +280,8 @@ pub fn aligned(column: &[f64]) -> usize {
 
 /// Numbers that are the same in all rows.
 ///
-/// A loop and not `map`, here and wherever kernels compute: what the standard library does not promise to inline would be
-/// compiled without the vector instructions of its caller.
+/// Kernels use loops instead of `map`: functions that the standard library does not guarantee to inline would be compiled
+/// without the vector instructions of their caller.
 #[inline(always)]
 pub fn splats<R: Real, const N: usize>(like: R, values: &[f64; N]) -> [R; N] {
     let mut out = [like; N];
@@ -292,21 +291,21 @@ pub fn splats<R: Real, const N: usize>(like: R, values: &[f64; N]) -> [R; N] {
     out
 }
 
-/// Something that can be done with rows of any width.
+/// A kernel for registers of any width.
 pub trait AnyWidth {
-    /// What comes of it.
+    /// Result.
     type Output;
-    /// Does it with registers like `like`, which is 0. Everything that it calls must be `#[inline(always)]` to be compiled
-    /// along with it.
+    /// Runs the kernel with registers like `like`, which is 0. Every function that it calls must be `#[inline(always)]` to be
+    /// compiled with the same instructions.
     fn run<R: SinCos>(self, like: R) -> Self::Output;
 }
 
 /// Runs `kernel` compiled for the widest vector instructions of this machine.
 ///
-/// Products and sums are never fused, so every instruction set gives the same bits. Builds with debug assertions go row by
-/// row unless [`with_instructions`] says otherwise: there what is large need not be inlined, and is not (`cfg_attr`), since
-/// without optimisation every intermediate result of everything that is inlined has a place of its own on the stack, and
-/// all of them together are more than a thread has; and registers that travel between functions are slow.
+/// Products and sums are never fused, so every instruction set gives the same bits. Builds with debug assertions process row
+/// by row unless [`with_instructions`] is used. There large functions are not inlined (`cfg_attr`): without optimisation every
+/// intermediate result of an inlined function has its own stack slot, which together exceed a thread's stack, and passing
+/// registers between functions is slow.
 #[inline]
 pub fn vectorised<K: AnyWidth>(kernel: K) -> K::Output {
     match cfg!(debug_assertions) {
@@ -351,12 +350,12 @@ pub enum Instructions {
     Avx2,
     /// AVX-512, eight rows.
     Avx512,
-    /// The widest that there are for this machine.
+    /// The widest that this machine has.
     Widest,
 }
 
 impl Instructions {
-    /// All that this machine has.
+    /// All instruction sets of this machine.
     pub fn available() -> Vec<Self> {
         let all = [Self::Scalar, Self::Avx2, Self::Avx512, Self::Widest];
         all.into_iter().filter(|set| set.arch().is_some()).collect()
@@ -376,10 +375,10 @@ impl Instructions {
     }
 }
 
-/// Does `work` with these instructions wherever it is [`vectorised`] on this thread: for tests that the bits are the same,
-/// and for benchmarks. Instructions that the machine does not have are passed over.
+/// Runs `work` with these instructions for every [`vectorised`] kernel on this thread; for tests of bit equality and for
+/// benchmarks. Instruction sets that the machine does not have are ignored.
 pub fn with_instructions<T>(instructions: Instructions, work: impl FnOnce() -> T) -> T {
-    /// Puts back what was demanded before, also where `work` panics.
+    /// Restores the previous instruction set, also if `work` panics.
     struct Before(Option<Arch>);
     impl Drop for Before {
         fn drop(&mut self) {
@@ -393,7 +392,7 @@ pub fn with_instructions<T>(instructions: Instructions, work: impl FnOnce() -> T
 /// Sine and cosine, lane by lane; within 2 units in the last place of the correctly rounded value for |x| < 1e5 rad.
 ///
 /// Method: reduction by π/2 in three parts (Cody and Waite), then the polynomials of fdlibm's kernels on [−π/4, π/4].
-/// Larger or not finite arguments go through the standard library.
+/// Larger or non-finite arguments use the standard library.
 #[inline(always)]
 pub fn sin_cos<R: SinCos>(x: R) -> (R, R) {
     x.sin_cos_wide()
@@ -453,14 +452,14 @@ impl<S: Simd> SinCos for Lanes<S> {
     }
 }
 
-/// The road for registers in which a lane is large or not a number.
+/// Fallback for registers with a large or non-finite lane.
 #[cold]
 #[inline(never)]
 fn one_by_one(lanes: [f64; WIDTH]) -> ([f64; WIDTH], [f64; WIDTH]) {
     (lanes.map(|x| sin_cos(x).0), lanes.map(|x| sin_cos(x).1))
 }
 
-/// Up to here three parts of π/2 leave no error that shows.
+/// Largest argument for which three parts of π/2 are accurate enough.
 const LARGEST_REDUCED: f64 = 1.0e5;
 
 #[cfg_attr(not(debug_assertions), inline(always))]
@@ -471,7 +470,7 @@ fn sin_cos_reduced<R: SinCos>(x: R) -> (R, R) {
     const PART_1: f64 = 1.570_796_326_734_125_614_17;
     const PART_2: f64 = 6.077_100_506_303_965_976_60e-11;
     const PART_3: f64 = 2.022_266_248_795_950_631_54e-21;
-    // Adding and taking away 1.5·2⁵² rounds to the nearest integer and leaves it in the low bits.
+    // Adding and subtracting 1.5·2⁵² rounds to the nearest integer, which is then in the low bits.
     const ROUND: f64 = 6_755_399_441_055_744.0;
     const SINE: [f64; 6] = [
         -1.666_666_666_666_663_243_48e-1,

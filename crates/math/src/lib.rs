@@ -1,4 +1,4 @@
-//! Rigid motions, numerical differences and statistics: what every other module stands on.
+//! Mathematical basis: rigid motions, numerical derivatives, statistics, SIMD kernels, cancellable work.
 
 pub mod lanes;
 pub mod gram;

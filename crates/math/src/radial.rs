@@ -1,19 +1,19 @@
-//! Radial basis functions over a few coordinates: smooth bumps around centres that are exactly zero beyond a reach.
+//! Radial basis functions of compact support over a few coordinates: exactly zero beyond a reach.
 //!
 //! φ(r) = (1 − r)⁴ (4r + 1) for r = |u − c| / reach below 1, 0 from there (Wendland 1995, ψ₃,₁: twice continuously
-//! differentiable, positive definite in up to three dimensions). Its slope is ∂φ/∂u = −20 (1 − r)³ (u − c) / reach². A
-//! Gaussian never ends: a correction made of it would act, however little, where nothing was measured.
+//! differentiable, positive definite in up to three dimensions). Its gradient is ∂φ/∂u = −20 (1 − r)³ (u − c) / reach². A
+//! Gaussian has no bound: a correction with it would act, if only slightly, where nothing was measured.
 
 use super::lanes::Real;
 
-/// Value of the bump at `u` around `centre`, for one point or several in lanes.
+/// Value of the basis function around `centre` at `u`, for one point or several in lanes.
 ///
 /// ```
 /// use truegrind_math::radial::wendland;
 ///
 /// let centre = [0.2, -0.1];
 /// assert_eq!(wendland(&centre, &centre, 0.5), 1.0);
-/// // Not small beyond its reach, but zero.
+/// // Exactly zero beyond its reach.
 /// assert_eq!(wendland(&[0.2, 0.41], &centre, 0.5), 0.0);
 /// ```
 #[cfg_attr(not(debug_assertions), inline(always))]
@@ -52,14 +52,14 @@ fn inside<R: Real, const D: usize>(u: &[R; D], centre: &[f64; D], reach: f64) ->
     (t * t.positive(), r)
 }
 
-/// Up to `most` of `points`, each the one farthest from those taken before, beginning with the first; and the fill
-/// distance: how far the farthest point lies from its nearest centre. Ties go to the earlier point, so the choice is
-/// the same for the same points.
+/// Farthest-point sampling: up to `most` of `points`, each the one farthest from those chosen before, starting with the
+/// first; and the fill distance, the largest distance of a point from its nearest centre. Ties are resolved in favour of
+/// the earlier point, so the choice is reproducible.
 ///
 /// ```
 /// use truegrind_math::radial::farthest_point_sample;
 ///
-/// // Two heaps of poses: two centres, one in each, and no pose farther than 1 from its own.
+/// // Two clusters: one centre in each, and no point farther than 1 from its centre.
 /// let (centres, fill) = farthest_point_sample(&[[0.0], [1.0], [10.0], [9.0]], 2);
 /// assert_eq!(centres, [[0.0], [10.0]]);
 /// assert_eq!(fill, 1.0);

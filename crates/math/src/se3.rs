@@ -13,7 +13,7 @@ pub fn skew(v: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::new(0.0, -v.z, v.y, v.z, 0.0, -v.x, -v.y, v.x, 0.0)
 }
 
-/// The twist, in the frame in which both poses are given, that carries `from` to `to`: translation of the origin
+/// The twist from `from` to `to`, in the common reference frame of both: translation of the origin
 /// (mm) first, then the rotation vector (rad) of `to.rotation * from.rotation⁻¹`.
 ///
 /// ```
@@ -23,7 +23,7 @@ pub fn skew(v: &Vector3<f64>) -> Matrix3<f64> {
 /// let to = pose_from_vector(&[300.5, -0.2, 500.0, 0.0, 0.4, 0.01]);
 /// let twist = difference(&from, &to);
 /// assert!((twist.fixed_rows::<3>(0) - nalgebra::Vector3::new(0.5, -0.2, 0.0)).norm() < 1e-9);
-/// // Moved by what it lacks, a pose is the other one.
+/// // Applying the difference to one pose gives the other.
 /// assert!(difference(&apply_twist(&from, &twist), &to).norm() < 1e-12);
 /// ```
 pub fn difference(from: &Pose, to: &Pose) -> Vector6<f64> {
@@ -45,7 +45,7 @@ pub fn apply_twist(pose: &Pose, twist: &Vector6<f64>) -> Pose {
 /// use nalgebra::Point3;
 /// use truegrind_math::se3::{pose_from_vector, vector_from_pose};
 ///
-/// // A flange at 400 mm, turned by a quarter about z, and a disc that stands 100 mm off it along x.
+/// // A flange at 400 mm, rotated by 90° about z, and a tool with an offset of 100 mm along x.
 /// let base_from_flange = pose_from_vector(&[400.0, 0.0, 600.0, 0.0, 0.0, FRAC_PI_2]);
 /// let flange_from_tool = pose_from_vector(&[100.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
 /// let base_from_tool = base_from_flange * flange_from_tool;

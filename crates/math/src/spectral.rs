@@ -1,12 +1,12 @@
-//! Singular values and eigenvalues in a bounded number of steps, whatever the numbers are: the iteration of the library
-//! never ends on one that is not finite unless it is told when.
+//! Singular values and eigenvalues with a bounded number of iterations: without a limit nalgebra's iteration does not
+//! terminate for non-finite numbers.
 
 use nalgebra::{DMatrix, Dyn, Matrix6, SVD, SymmetricEigen, U6, Vector6};
 
-/// Steps after which an iteration is given up, for each row; some two or three are needed.
+/// Iteration limit per row; some two or three are needed.
 const MOST_STEPS: usize = 200;
 
-/// What the library's own iterations stop at.
+/// Tolerance of nalgebra's own iterations.
 const PRECISION: f64 = 5.0 * f64::EPSILON;
 
 /// Singular values, largest first; `None` for a matrix that is not finite.

@@ -1,14 +1,14 @@
-//! Error statistics as calibration reports state them.
+//! Error statistics of calibration reports.
 
 use serde::{Deserialize, Serialize};
 
-/// Summary of the sizes of errors, in the unit of the input (mm everywhere in truegrind).
+/// Summary of errors, in the unit of the input.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ErrorSummary {
     /// Number of values.
     pub count: usize,
-    /// Root of the mean square.
+    /// Root mean square.
     pub rmse: f64,
     /// Mean of the absolute values. The papers call it "STD" (ltlm-2024 eq. 20, ukf-vslm-2023 eq. 28).
     pub mean_absolute: f64,
@@ -53,18 +53,18 @@ impl ErrorSummary {
     }
 }
 
-/// The largest of some sizes; 0 of none, and not a number where one of them is none: an error that is not known is not 0.
+/// The largest of some values; 0 without any, NaN if one of them is NaN: an unknown error is not 0.
 pub fn largest(sizes: impl IntoIterator<Item = f64>) -> f64 {
     sizes.into_iter().fold(0.0, |most: f64, size| if size.is_nan() || size > most { size } else { most })
 }
 
-/// Mean and standard deviation (n − 1) of a list, such as one figure over ten splits.
+/// Mean and standard deviation (n − 1) of a list.
 pub fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
     let summary = ErrorSummary::of(values.iter().copied());
     (summary.mean, summary.standard_deviation)
 }
 
-/// Median; `None` of nothing. Not finite values are sorted last.
+/// Median; `None` for an empty list. Non-finite values are sorted last.
 ///
 /// ```
 /// use truegrind_math::statistics::median;

@@ -18,7 +18,7 @@ fn scaled_erfc(x: f64) -> f64 {
         }
         (1.0 - 2.0 / PI.sqrt() * sum) * (x * x).exp()
     } else {
-        // 1/(x + (1/2)/(x + 1/(x + (3/2)/(x + …)))), from far enough inside.
+        // 1/(x + (1/2)/(x + 1/(x + (3/2)/(x + …)))), evaluated from a sufficient depth.
         let mut inner = x;
         for k in (1..=80).rev() {
             inner = x + 0.5 * f64::from(k) / inner;
@@ -60,7 +60,7 @@ pub fn chi_square_tail(value: f64, freedom: usize) -> f64 {
 /// use truegrind_math::tail::{log_chi_square_tail, normal_two_sided};
 ///
 /// assert!((normal_two_sided(1.959_964) - 0.05).abs() < 1e-7);
-/// // Where the probability itself would be 0: with two degrees of freedom its logarithm is −x / 2.
+/// // The probability itself would underflow: with two degrees of freedom its logarithm is −x / 2.
 /// assert!((log_chi_square_tail(5_000.0, 2) + 2_500.0).abs() < 1e-9);
 /// ```
 pub fn normal_two_sided(value: f64) -> f64 {

@@ -1,12 +1,12 @@
-//! Long work that can be watched and called off: one hook for progress and for cancelling, from outside the library.
+//! Progress and cancellation of long computations.
 //!
-//! A caller runs its work under a [`Watch`] ([`run_watched`]). What computes says where it stands ([`report_step`]) and asks now and then
-//! whether it shall go on ([`checkpoint`]), without being handed anything: the watch is known to the threads that the work runs
-//! on. Called off, the work is unwound from its next checkpoint, so that nothing between there and the caller has to know; the
-//! caller gets [`Cancelled`] in place of a result. Outside a watch both do nothing.
+//! A caller runs its work under a [`Watch`] ([`run_watched`]). The computation reports its progress ([`report_step`]) and checks
+//! for cancellation ([`checkpoint`]); the watch is stored in the threads of the work and need not be passed. When cancelled, the
+//! work is unwound from its next checkpoint, and the caller gets [`Cancelled`] instead of a result. Outside a watch both
+//! functions do nothing.
 //!
-//! A checkpoint costs a look at the thread and one at a flag, some nanoseconds: it stands where a block of rows, a candidate or a
-//! motion begins, never in an inner loop.
+//! A checkpoint reads a thread-local variable and a flag, which takes some nanoseconds: it is placed at the beginning of a block
+//! of rows, a candidate or a motion, never in an inner loop.
 
 use std::cell::RefCell;
 use std::fmt;
@@ -14,7 +14,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// What listens to a piece of work, and can call it off.
+/// Receives the progress of a computation, and can cancel it.
 pub struct Watch {
     cancelled: AtomicBool,
     listener: Box<dyn Fn(&str) + Send + Sync>,
@@ -33,17 +33,17 @@ impl Default for Watch {
 }
 
 impl Watch {
-    /// A watch that hears of each step, from whatever thread comes to it.
+    /// A watch that is called for each step, from any thread.
     pub fn with_listener(listener: impl Fn(&str) + Send + Sync + 'static) -> Self {
         Self { cancelled: AtomicBool::new(false), listener: Box::new(listener) }
     }
 
-    /// Calls the work off: it ends at its next checkpoint.
+    /// Cancels the work, which ends at its next checkpoint.
     pub fn cancel(&self) {
         self.cancelled.store(true, Ordering::Relaxed);
     }
 
-    /// Whether it was called off.
+    /// Whether the work was cancelled.
     pub fn is_cancelled(&self) -> bool {
         self.cancelled.load(Ordering::Relaxed)
     }
@@ -65,21 +65,21 @@ thread_local! {
     static WATCH: RefCell<Option<Arc<Watch>>> = const { RefCell::new(None) };
 }
 
-/// What a thread of a watched piece of work does first.
+/// Initialises a thread of watched work.
 fn heed(watch: &Arc<Watch>) {
     WATCH.with(|place| *place.borrow_mut() = Some(watch.clone()));
 }
 
-/// Ends the work here where it was called off.
+/// Ends the work here if it was cancelled.
 pub fn checkpoint() {
     let cancelled = WATCH.with(|place| place.borrow().as_ref().is_some_and(|watch| watch.is_cancelled()));
     if cancelled {
-        // No panic: no hook hears of it, and nothing is printed.
+        // Not a panic: no panic hook is called, and nothing is printed.
         resume_unwind(Box::new(Cancelled));
     }
 }
 
-/// Says what is being done now, and ends the work where it was called off.
+/// Reports the current step, and ends the work if it was cancelled.
 pub fn report_step(step: &str) {
     checkpoint();
     let watch = WATCH.with(|place| place.borrow().clone());
@@ -88,10 +88,10 @@ pub fn report_step(step: &str) {
     }
 }
 
-/// As deep as the main thread of a program.
+/// Stack size, as of a program's main thread.
 const STACK_BYTES: usize = 8 << 20;
 
-/// Runs `work` on threads of its own, as many as the machine has unless stated, under a watch.
+/// Runs `work` on its own threads under a watch; by default as many threads as the machine has.
 ///
 /// ```
 /// use std::sync::Arc;
@@ -100,7 +100,7 @@ const STACK_BYTES: usize = 8 << 20;
 /// let watch = Arc::new(Watch::default());
 /// assert_eq!(run_watched(&watch, Some(2), || 6 * 7)?, Ok(42));
 ///
-/// // Whoever holds the watch calls the work off; here the work itself, at its second step.
+/// // Any holder of the watch can cancel the work; here the work itself, at its second step.
 /// let caller = watch.clone();
 /// let ended = run_watched(&watch, None, move || {
 ///     for step in 0.. {
@@ -116,10 +116,10 @@ const STACK_BYTES: usize = 8 << 20;
 /// ```
 ///
 /// # Errors
-/// Where the system gives no threads; inside, [`Cancelled`] where the work was called off.
+/// If the system provides no threads; inside, [`Cancelled`] if the work was cancelled.
 ///
 /// # Panics
-/// With what the work panics with.
+/// If the work panics.
 pub fn run_watched<T: Send>(
     watch: &Arc<Watch>,
     threads: Option<usize>,
@@ -131,7 +131,7 @@ pub fn run_watched<T: Send>(
         .stack_size(STACK_BYTES)
         .start_handler(move |_| heed(&heeded))
         .build()?;
-    // What the work held is lost with it, so nobody sees it half done.
+    // Unwind safety: the work's state is dropped with it, so no partial state is visible.
     let ended = catch_unwind(AssertUnwindSafe(|| pool.install(work)));
     Ok(ended.map_err(|payload| match payload.downcast::<Cancelled>() {
         Ok(cancelled) => *cancelled,

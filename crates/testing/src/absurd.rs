@@ -1,10 +1,10 @@
-//! Texts with one number put wrong at a time.
+//! Variants of a TOML text with one implausible number each.
 
-/// What is put in the place of each number.
+/// Replacements for each number.
 pub const NUMBERS: [&str; 6] = ["nan", "inf", "-inf", "1e308", "1e-308", "-1"];
 
-/// Every text that differs from a TOML text in one number, with the line and the number that was put there. Numbers in
-/// strings and comments stay.
+/// Every variant of a TOML text with one number replaced, with the line and the replacement. Numbers in strings and
+/// comments are not replaced.
 pub fn each(text: &str) -> impl Iterator<Item = (String, String)> {
     let places = places(text);
     assert!(!places.is_empty());
@@ -17,7 +17,7 @@ pub fn each(text: &str) -> impl Iterator<Item = (String, String)> {
     })
 }
 
-/// Where numbers stand: after `=`, `[` or `,`, outside strings and comments.
+/// Positions of numbers: after `=`, `[` or `,`, outside strings and comments.
 fn places(text: &str) -> Vec<(usize, usize)> {
     let bytes = text.as_bytes();
     let (mut out, mut at, mut before) = (Vec::new(), 0, b'\n');

@@ -1,8 +1,8 @@
-//! Which keys of a file nobody reads.
+//! Finds keys of a file that have no effect.
 
 use toml::{Table, Value};
 
-/// Words of which one may stand for another.
+/// Groups of interchangeable words.
 const WORDS: [&[&str]; 18] = [
     &["metrology", "taught"],
     &["uframe", "oframe"],
@@ -24,7 +24,7 @@ const WORDS: [&[&str]; 18] = [
     &["identified", "ambiguous"],
 ];
 
-/// A way to a value: keys, and places in lists of tables.
+/// Path to a value: keys and indices in lists of tables.
 type Way = Vec<Step>;
 
 #[derive(Debug, Clone)]
@@ -56,10 +56,10 @@ fn at<'v>(value: &'v mut Value, way: &[Step]) -> &'v mut Value {
     })
 }
 
-/// Values that a user might have meant instead.
+/// Plausible alternatives for a value.
 fn others(value: &Value) -> Vec<Value> {
     match value {
-        // A little, much, and so little that a range no longer holds what it should.
+        // A small change, a large one, and a value so small that a range no longer contains what it should.
         Value::Float(x) => [x * 1.01 + 0.37, x * 3.0 + 50.0, x / 5.0].map(Value::Float).to_vec(),
         Value::Integer(n) => [n + 1, n * 3 + 50, n / 5].map(Value::Integer).to_vec(),
         Value::Boolean(b) => vec![Value::Boolean(!b)],
@@ -77,7 +77,7 @@ fn others(value: &Value) -> Vec<Value> {
     }
 }
 
-/// The keys of a file that nobody reads. `seen`: what a user sees of the file, or why it is refused.
+/// The keys of a file that have no effect. `seen` returns what a user sees of the file, or the reason for its refusal.
 pub fn unread(text: &str, seen: impl Fn(&str) -> Result<String, String>) -> Vec<String> {
     let whole = Value::Table(text.parse::<Table>().unwrap());
     let written = |value: &Value| toml::to_string(value).unwrap();

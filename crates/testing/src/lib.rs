@@ -1,4 +1,4 @@
-//! What tests of several crates share. Nothing here knows what a robot is.
+//! Helpers shared by the tests of several crates; independent of robots.
 
 // A test that cannot go on panics.
 #![allow(clippy::unwrap_used, clippy::missing_panics_doc)]

@@ -11,16 +11,14 @@
 //!   second term from there.
 //!
 //! **Guards.** Doubling a binary number shifts its digits to the left, so that in floating point tent and
-//! Bernoulli reach 0 after some 53 steps from any start and stay there (logistic-tent with r = 0 is the tent).
-//! Exact arithmetic on an irrational start would bring a new digit in at the right: here it comes from
-//! SplitMix64 (Steele, Lea, Flood 2014), 2⁻⁵² in size. Any map that meets a fixed point, a cycle of two or a
-//! value outside its interval is started anew from the same source. Nothing is random: a sequence is determined
-//! by its map and start.
+//! Bernoulli reach 0 after some 53 steps from any start and remain there (logistic-tent with r = 0 is the tent).
+//! Exact arithmetic on an irrational start would append a new digit at the right; here it comes from SplitMix64
+//! (Steele, Lea, Flood 2014), 2⁻⁵² in size. A map that reaches a fixed point, a cycle of two or a value outside its
+//! interval is restarted from the same source. A sequence is determined by its map and start.
 //!
 //! **Source and departures.** Liu et al. 2024, Table 2 and eq. 11; formulas of the six others from the
 //! literature (May 1976 logistic, Hénon 1976, …), since the paper prints none. All maps but tent, Bernoulli and
-//! (nearly) logistic-tent have densities that are far from uniform; they are given as they are, not
-//! transformed.
+//! (nearly) logistic-tent have densities that are far from uniform; they are not transformed.
 //!
 //! **Checked against** the first steps by hand, 100,000 steps without collapse, and the arcsine density of
 //! logistic.
@@ -97,7 +95,7 @@ impl Map {
         sequence
     }
 
-    /// Image of a state, before guards.
+    /// Image of a state under the map, before the guards.
     fn image(self, [x, y]: [f64; 2]) -> [f64; 2] {
         let x = match self {
             Map::Logistic { r } => r * x * (1.0 - x),
@@ -115,12 +113,12 @@ impl Map {
         [x, 0.0]
     }
 
-    /// Whether the map only shifts binary digits, and thus needs new ones.
+    /// Whether the map only shifts binary digits and therefore needs new ones.
     fn shifts_digits(self) -> bool {
         matches!(self, Map::Tent | Map::Bernoulli | Map::LogisticTent { .. })
     }
 
-    /// The state's place in the unit interval.
+    /// The state's position in the unit interval.
     fn fraction(self, x: f64) -> f64 {
         match self {
             Map::Chebyshev { .. } => 0.5 * (x + 1.0),
@@ -174,7 +172,7 @@ impl Iterator for Sequence {
             next[0] += self.fresh_digits() * f64::EPSILON;
         }
         let place = self.map.fraction(next[0]);
-        // Written so that not-a-number fails too.
+        // Written so that NaN fails too.
         let inside = place > 0.0 && place < 1.0;
         if !inside || next == self.state || next == self.before {
             self.restart();

@@ -1,17 +1,16 @@
-//! How evenly a chaotic sequence fills the unit interval, and whether a difference means anything.
+//! Uniformity of a chaotic sequence on the unit interval, and the significance of differences.
 //!
-//! **Method.** The first m points of a sequence are counted in N bins, and the standard deviation of the counts
-//! is taken (ltlm-2024 eq. 12, with N − 1), once for each of many starts. Random points would give √(m/N · (1 −
-//! 1/N)) on average, and a sampling spread of that value about √(1/(2(N − 1))) of itself: differences below it
-//! are noise.
+//! **Method.** The first m points of a sequence are counted in N bins, and the standard deviation of the counts is
+//! computed (ltlm-2024 eq. 12, with N − 1) for each of many starts. For random points its expectation is
+//! √(m/N · (1 − 1/N)), with a relative sampling spread of about √(1/(2(N − 1))): smaller differences are noise.
 //!
 //! **Source and departures.** Liu et al. 2024, eq. 12, Figs 2 and 3: 50 bins, 1,000 points, one unstated start,
-//! r from 0 to 4; "r = 0.5 achieves the best uniformity". Here every r is given many starts and two lengths. At
-//! 1,000 points r = 0.5 and its neighbours cannot be told from each other or from random points; at 100,000
-//! points the density of the map itself shows, and r = 0.5 is among the less uniform of the small r. The claim
-//! is sampling noise. It does no harm: the identification does not depend on the uniformity of some ten points.
+//! r from 0 to 4; "r = 0.5 achieves the best uniformity". Here every r has many starts and two lengths. With 1,000
+//! points r = 0.5 and its neighbours cannot be distinguished from each other or from random points; with 100,000
+//! points the density of the map itself is visible, and r = 0.5 is among the less uniform of the small r. The claim
+//! is sampling noise. It is harmless: the identification does not depend on the uniformity of some ten points.
 //!
-//! **Checked against** random counts, and the figures just stated.
+//! **Checked against** random counts, and the figures above.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -21,7 +20,7 @@ use serde::{Deserialize, Serialize};
 use crate::chaos::map::Map;
 use truegrind_math::statistics::mean_and_deviation;
 
-/// How to count. The defaults are those of the paper, with many starts.
+/// Options of the count. The defaults are those of the paper, with many starts.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
 pub struct Options {
@@ -29,7 +28,7 @@ pub struct Options {
     pub points: usize,
     /// Bins of equal width.
     pub bins: usize,
-    /// Sequences, each from a start of its own.
+    /// Number of sequences, each from a different start.
     pub starts: usize,
     /// Seed of the starts.
     pub seed: u64,
@@ -48,9 +47,9 @@ pub struct Uniformity {
     pub deviation: f64,
     /// Standard deviation over the starts.
     pub spread: f64,
-    /// What independent uniform random points give on average.
+    /// Expected value for independent uniform random points.
     pub random: f64,
-    /// How much that figure scatters from sample to sample.
+    /// Sampling spread of that value.
     pub random_spread: f64,
 }
 
@@ -96,9 +95,9 @@ pub struct Point {
 /// Figure 2 with its statistics: the logistic-tent map over r.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Study {
-    /// One entry for each r asked for.
+    /// One entry for each r.
     pub points: Vec<Point>,
-    /// What follows for the r in question.
+    /// Conclusion for the claimed r.
     pub verdict: Verdict,
 }
 
@@ -111,12 +110,11 @@ pub struct Verdict {
     pub best_short: f64,
     /// The r with the smallest deviation of the long sequence.
     pub best_long: f64,
-    /// How many r, the claimed one not counted, lie within one sampling spread of it or better in the short
-    /// sequence.
+    /// Number of other r within one sampling spread of the claimed one, or better, in the short sequence.
     pub indistinguishable_short: usize,
-    /// How many r are better than the claimed one by more than one sampling spread in the long sequence.
+    /// Number of r that are better than the claimed one by more than one sampling spread in the long sequence.
     pub better_long: usize,
-    /// The claim is sampling noise: the short sequence cannot single the claimed r out, and the long one
+    /// Whether the claim is sampling noise: the short sequence does not distinguish the claimed r, and the long one
     /// prefers another.
     pub sampling_noise: bool,
 }

@@ -3,10 +3,10 @@
 //! **Method.** For each observation with residual r and Jacobian J at x: S = JPJᵀ + R, K = PJᵀS⁻¹, x ← x − Kr,
 //! P ← (I − KJ)P(I − KJ)ᵀ + KRKᵀ (Joseph's form, multiplied out so that it costs p²m); before it P ← P + Q.
 //! `iterations` above 1 repeats the linearisation at the new state within one observation (iterated filter).
-//! - [`Form::AsPrinted`]: R = 1 in each of several sweeps over the same data, P carried on: every row is
-//!   counted as often as there are sweeps, and the covariance is too small by that factor.
-//! - [`Form::Robust`]: R = number of sweeps, so that all sweeps together weigh each row once, and a later sweep
-//!   only corrects the linearisation of the earlier ones. One sweep by default.
+//! - [`Form::AsPrinted`]: R = 1 in each of several sweeps over the same data, with P continued: every row is counted
+//!   once per sweep, and the covariance is too small by that factor.
+//! - [`Form::Robust`]: R = number of sweeps, so that all sweeps together weight each row once, and a later sweep only
+//!   corrects the linearisation of the earlier ones. One sweep by default.
 //!
 //! **Shapes.** x has p entries, P is p × p, an observation has m = `rows_per_observation` rows.
 //!
@@ -30,22 +30,21 @@ use crate::least_squares::Form;
 use crate::objective::Objective;
 use crate::problem::{Problem, observations};
 
-/// How [`solve`] filters.
+/// Options of [`solve`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
 pub struct Options {
-    /// As printed, or sound.
+    /// As printed or sound.
     pub form: Form,
-    /// Times that all observations are gone through.
+    /// Number of sweeps over all observations.
     pub sweeps: usize,
     /// Linearisations within one observation.
     pub iterations: usize,
-    /// Standard deviation of what a parameter drifts from one observation to the next: one for each, or none at
-    /// all.
+    /// Standard deviation of each parameter's drift from one observation to the next; empty for constant parameters.
     pub process_sigma: Vec<f64>,
     /// First standard deviation of a parameter without a prior.
     pub unknown_sigma: f64,
-    /// Not used: the method draws nothing. Here so that all methods are called alike.
+    /// Unused: the method is deterministic. Present so that all methods have the same fields.
     pub seed: u64,
 }
 
@@ -69,7 +68,7 @@ impl Options {
     }
 }
 
-/// The running filter, for those who feed it themselves.
+/// The filter, for processing observations one by one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Filter {
     /// State: the parameters.
@@ -86,8 +85,8 @@ impl Filter {
         }
     }
 
-    /// Takes in one observation, `rows` of `problem`, whose noise has the variance `noise` (1 for whitened
-    /// rows). The state stays as it was and the answer is `None` where anything is not finite.
+    /// Processes one observation, `rows` of `problem`, with noise variance `noise` (1 for whitened rows). Returns `None`
+    /// and leaves the state unchanged if anything is not finite.
     pub fn update(
         &mut self,
         problem: &dyn Problem,
@@ -109,7 +108,7 @@ impl Filter {
             (0..m).for_each(|i| spread[(i, i)] += noise);
             let factor = spread.clone().cholesky()?;
             gain = factor.solve(&cross.transpose()).transpose();
-            // Residual that the linearisation at x foretells for the state before this observation.
+            // Residual predicted by the linearisation at x for the state before this observation.
             let residual = &r + &j * (&self.x - &x);
             let step = &gain * &residual;
             if first.is_none() {
@@ -139,7 +138,7 @@ impl Filter {
 /// use truegrind_estimation::filter::ekf;
 /// use truegrind_estimation::least_squares::lm;
 ///
-/// // A straight line with σ = 0.02, one reading after the other: in the end the filter knows what all rows at once tell.
+/// // A straight line with σ = 0.02, one reading after the other: the filter ends with the batch result.
 /// # use std::ops::Range;
 /// # use truegrind_estimation::problem::{Prior, Problem};
 /// # struct Line;
@@ -176,7 +175,7 @@ impl Filter {
 /// ```
 ///
 /// # Panics
-/// Where `start` does not have one entry for each parameter.
+/// If `start` does not have one entry for each parameter.
 pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimate {
     let mut objective = Objective::new(problem, start, true);
     let (x, covariance) = prior_state(problem, start, options.unknown_sigma);

@@ -1,7 +1,7 @@
-//! A triangular root of a covariance of which only some parameters drift: L with LLᵀ = P, where those that drift come last.
+//! A triangular root L of a covariance, LLᵀ = P, ordered so that drifting parameters come last.
 //!
-//! Process noise then touches the last block alone: with k of p parameters that drift a step costs k³ operations in place
-//! of p³, and a row p². Parameters of effects stay as they are while links and frames drift, so k is small where p is large.
+//! Process noise then changes the last block only: with k drifting of p parameters a step costs k³ operations instead of
+//! p³, and a row p². Parameters of effects are constant while links and frames drift, so k is small where p is large.
 //!
 //! **Method.** Row: with f = Lᵀa and s_j = ϕ + Σ_{i ≥ j} f_i², L ← LC, where C is the lower root of I − ffᵀ/s₀: C_jj =
 //! √(s_{j+1}/s_j), C_ij = −f_i f_j/√(s_j s_{j+1}) (Carlson 1973, for a lower root and without cancellation, since the sums are
@@ -16,15 +16,15 @@ use nalgebra::{DMatrix, DVector};
 /// The root.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Ordered {
-    /// The parameter at each place: those that stay, then those that drift.
+    /// The parameter at each position: constant ones, then drifting ones.
     order: Vec<usize>,
-    /// How many stay.
+    /// Number of constant parameters.
     still: usize,
     lower: DMatrix<f64>,
 }
 
 impl Ordered {
-    /// From any root S with SSᵀ = P. One that is triangular in this order already keeps its bits.
+    /// From any root S with SSᵀ = P. A root that is already triangular in this order is copied bit by bit.
     pub(super) fn of(root: &DMatrix<f64>, sigma: &[f64]) -> Self {
         let (order, still) = order_of(sigma, root.nrows());
         let mut lower = DMatrix::from_fn(root.nrows(), root.ncols(), |i, j| root[(order[i], j)]);
@@ -36,7 +36,7 @@ impl Ordered {
         Self { order, still, lower }
     }
 
-    /// Whether these parameters are the ones that drift here.
+    /// Whether exactly these parameters drift in this order.
     pub(super) fn fits(&self, sigma: &[f64]) -> bool {
         let drifts = |k: usize| sigma.get(k).is_some_and(|sigma| *sigma != 0.0);
         self.order.iter().enumerate().all(|(place, &k)| (place >= self.still) == drifts(k))
@@ -51,7 +51,7 @@ impl Ordered {
         out
     }
 
-    /// Lets the parameters drift; not finite sigmas leave everything as it was.
+    /// Adds process noise; non-finite sigmas change nothing.
     pub(super) fn drift(&mut self, sigma: &[f64]) {
         let (p, m) = (self.order.len(), self.still);
         let mut block = self.lower.view((m, m), (p - m, p - m)).into_owned();
@@ -65,7 +65,7 @@ impl Ordered {
         }
     }
 
-    /// Takes in a row: ϕ + aᵀPa, and Pa.
+    /// Updates with a row; returns ϕ + aᵀPa and Pa.
     pub(super) fn update(&mut self, a: &DVector<f64>, forgetting: f64) -> (f64, DVector<f64>) {
         let p = self.order.len();
         let here = DVector::from_fn(p, |place, _| a[self.order[place]]);
@@ -92,7 +92,7 @@ impl Ordered {
     }
 }
 
-/// Those that stay, then those that drift, each in their own order.
+/// The constant, then the drifting parameters, each in ascending order.
 fn order_of(sigma: &[f64], p: usize) -> (Vec<usize>, usize) {
     let drifts = |k: &usize| sigma.get(*k).is_some_and(|sigma| *sigma != 0.0);
     let (last, mut order): (Vec<usize>, Vec<usize>) = (0..p).partition(drifts);

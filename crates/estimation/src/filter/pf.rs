@@ -3,19 +3,16 @@
 //! **Method.** N particles are drawn from the prior; each observation multiplies their weights by its
 //! likelihood exp(−½‖r‖²); the estimate is the weighted mean, the covariance the weighted spread.
 //! - [`Form::AsPrinted`]: sampling, importance, resampling: where the effective number of particles 1/Σw² falls
-//!   below N/2 they are resampled systematically. Nothing ever moves a particle, so that after some dozen
-//!   precise observations all of them are copies of the best of the first N draws: the filter searches no
-//!   better than N random guesses.
-//! - [`Form::Robust`]: each likelihood is brought in by as many fractional powers as it takes to keep half of
-//!   the particles effective (tempering); after each power they are resampled and moved by a kernel that keeps
-//!   their mean and covariance (Liu and West: x ← a x + (1 − a) x̄ + h L z, with a² + h² = 1 and LLᵀ the
-//!   weighted covariance).
+//!   below N/2 they are resampled systematically. Particles never move, so after some dozen precise observations all of
+//!   them are copies of the best of the first N draws: the filter is no better than N random guesses.
+//! - [`Form::Robust`]: each likelihood is applied in as many fractional powers as needed to keep half of the particles
+//!   effective (tempering). After each power they are resampled and moved by a kernel that preserves their mean and
+//!   covariance (Liu and West: x ← a x + (1 − a) x̄ + h L z, with a² + h² = 1 and LLᵀ the weighted covariance).
 //!
 //! **Shapes.** x has p entries; N particles. An observation costs N evaluations of its rows, in the sound form
 //! for each power.
 //!
-//! **Stops.** *DataProcessed* after the last observation; *NotFinite* where all weights vanish or are not
-//! numbers.
+//! **Stops.** *DataProcessed* after the last observation; *NotFinite* if all weights vanish or are NaN.
 //!
 //! **Source and departures.** M3 of ltlm-2024, "particle filtering", without equations or numbers. Printed:
 //! Gordon, Salmond, Smith, "Novel approach to nonlinear/non-Gaussian Bayesian state estimation", 1993. Sound:
@@ -38,19 +35,19 @@ use crate::least_squares::Form;
 use crate::objective::Objective;
 use crate::problem::{Problem, observations};
 
-/// How [`solve`] filters.
+/// Options of [`solve`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
 pub struct Options {
-    /// As printed, or sound.
+    /// As printed or sound.
     pub form: Form,
     /// N.
     pub particles: usize,
-    /// h of the kernel (sound): share of the spread that is drawn anew at each move.
+    /// h of the kernel (sound): share of the spread that is resampled at each move.
     pub kernel: f64,
     /// First standard deviation of a parameter without a prior.
     pub unknown_sigma: f64,
-    /// Seed of all draws.
+    /// Seed of all random draws.
     pub seed: u64,
 }
 
@@ -67,7 +64,7 @@ impl Options {
     }
 }
 
-/// Particles, their log weights, and the sources of what is random.
+/// Particles, their log weights, and the random generators.
 struct Cloud {
     particles: Vec<DVector<f64>>,
     log_weights: Vec<f64>,
@@ -75,7 +72,7 @@ struct Cloud {
 }
 
 impl Cloud {
-    /// Weights that sum to one, or `None` where none is a positive number.
+    /// Weights that sum to one, or `None` if none is positive.
     fn weights(&self) -> Option<Vec<f64>> {
         let largest =
             self.log_weights.iter().copied().filter(|w| w.is_finite()).fold(f64::NEG_INFINITY, f64::max);
@@ -119,7 +116,7 @@ impl Cloud {
         self.log_weights.fill(0.0);
     }
 
-    /// The kernel of Liu and West. A covariance that is only semidefinite moves nothing.
+    /// The kernel of Liu and West. With a singular covariance no particle moves.
     fn shake(&mut self, mean: &DVector<f64>, covariance: DMatrix<f64>, h: f64) {
         let Some(factor) = covariance.cholesky() else { return };
         let root = factor.unpack();
@@ -138,7 +135,7 @@ fn effective(weights: &[f64]) -> f64 {
 /// Filters all observations of `problem` in order.
 ///
 /// # Panics
-/// Where `start` does not have one entry for each parameter.
+/// If `start` does not have one entry for each parameter.
 pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimate {
     let mut objective = Objective::new(problem, start, true);
     let n = options.particles.max(2);
@@ -207,7 +204,7 @@ fn tempered_power(log_likelihoods: &[f64], left: f64) -> f64 {
         });
         sum * sum / square / log_likelihoods.len() as f64
     };
-    // Not-a-number (nothing finite) is left to the caller, who finds no weights.
+    // NaN (nothing finite) is left to the caller, who finds no weights.
     if share(left).is_nan() || share(left) >= 0.5 {
         return left;
     }
@@ -216,6 +213,6 @@ fn tempered_power(log_likelihoods: &[f64], left: f64) -> f64 {
         let middle = 0.5 * (low + high);
         if share(middle) >= 0.5 { low = middle } else { high = middle }
     }
-    // Particles without any likelihood can make every power too large: go on in small steps.
+    // Particles with zero likelihood can make every power too large: continue in small steps.
     if low > 0.0 { low } else { left.min(1e-3) }
 }

@@ -8,18 +8,18 @@
 //! - [`Memory::SquareRoot`]: S with SSᵀ = P (Potter): f = Sᵀa, d = ϕ + fᵀf, k = Sf/d, S ← (S − Sf fᵀ/(d +
 //!   √(ϕd)))/√ϕ. P cannot become indefinite.
 //!
-//! Without forgetting this *is* batch least squares of one linearisation, to rounding. `linearisations` above 1
-//! begins again from the prior with ξ at the last result: Gauss–Newton, one row at a time.
+//! Without forgetting this equals batch least squares of one linearisation, to rounding. `linearisations` above 1
+//! restarts from the prior with ξ at the last result: Gauss–Newton, one row at a time.
 //!
-//! **Shapes.** x has p entries, P is p × p; rows are taken in one by one.
+//! **Shapes.** x has p entries, P is p × p; rows are processed one by one.
 //!
 //! **Stops.** *DataProcessed* after the last linearisation; *Singular* where the first rows do not determine
 //! the parameters ([`Initial::FirstRows`]); *NotFinite*.
 //!
 //! **Source and departures.** Qiao et al. 2025. The text at hand lost eq. 1 to 13: reconstructed from the
 //! definitions around them. The denominator of eq. 14 is a scalar, which holds for one row; a pose brings
-//! several, taken in one after the other, each divided by its own standard deviation. P₀ = (A₀ᵀA₀)⁻¹ from the
-//! first poses is near singular with few of them: `Initial::FirstRows` has it, the default starts from the
+//! several, processed one after the other, each divided by its own standard deviation. P₀ = (A₀ᵀA₀)⁻¹ from the
+//! first poses is near singular with few of them: `Initial::FirstRows` uses it, the default starts from the
 //! prior. The paper has no forgetting factor in eq. 14; 1 by default. Forgetting without excitation lets P grow
 //! without bound (wind-up): use process noise per parameter in [`ekf`](crate::filter::ekf) where
 //! that can happen. Potter's form: Bierman, *Factorization Methods for Discrete Sequential Estimation*, 1977,
@@ -38,7 +38,7 @@ use crate::least_squares::damped::inverse_of_normal;
 use crate::objective::Objective;
 use crate::problem::{NormalEquations, Problem, observations};
 
-/// How the covariance is kept.
+/// Stored form of the covariance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Memory {
@@ -49,32 +49,32 @@ pub enum Memory {
     SquareRoot,
 }
 
-/// What the recursion begins with.
+/// Initial state of the recursion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Initial {
     /// The priors of the problem.
     #[default]
     Prior,
-    /// Batch least squares of that many first observations, without priors (as the paper has it).
+    /// Batch least squares of this number of first observations, without priors (as in the paper).
     FirstRows(usize),
 }
 
-/// How [`solve`] filters.
+/// Options of [`solve`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
 pub struct Options {
-    /// How the covariance is kept.
+    /// Stored form of the covariance.
     pub memory: Memory,
-    /// What the recursion begins with.
+    /// Initial state of the recursion.
     pub initial: Initial,
-    /// ϕ: 1 remembers everything, 0.99 about the last hundred rows.
+    /// Forgetting factor ϕ: 1 for none, 0.99 for a memory of about a hundred rows.
     pub forgetting: f64,
-    /// Passes over the data, each linearised at the result of the one before.
+    /// Passes over the data, each linearised at the result of the previous one.
     pub linearisations: usize,
     /// First standard deviation of a parameter without a prior.
     pub unknown_sigma: f64,
-    /// Not used: the method draws nothing. Here so that all methods are called alike.
+    /// Unused: the method is deterministic. Present so that all methods have the same fields.
     pub seed: u64,
 }
 
@@ -98,7 +98,7 @@ impl Options {
     }
 }
 
-/// The running recursion, for those who feed it themselves.
+/// The recursion, for processing rows one by one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecursiveLeastSquares {
     /// The parameters.
@@ -106,7 +106,7 @@ pub struct RecursiveLeastSquares {
     kept: Kept,
 }
 
-/// What is kept of the covariance P.
+/// Stored form of the covariance P.
 #[derive(Debug, Clone, PartialEq)]
 enum Kept {
     /// P itself.
@@ -118,8 +118,7 @@ enum Kept {
 }
 
 impl RecursiveLeastSquares {
-    /// Begins with `x` and its covariance; `None` where the square-root form is asked for and the covariance is
-    /// not positive definite.
+    /// Starts with `x` and its covariance; `None` for the square-root form if the covariance is not positive definite.
     pub fn new(x: DVector<f64>, covariance: DMatrix<f64>, memory: Memory) -> Option<Self> {
         let kept = match memory {
             Memory::Covariance => Kept::Covariance(covariance),
@@ -128,12 +127,12 @@ impl RecursiveLeastSquares {
         Some(Self { x, kept })
     }
 
-    /// Goes on in square-root form from a state and the root S of its covariance, as [`RecursiveLeastSquares::root`] gave it.
+    /// Resumes in square-root form from a state and the root S of its covariance, as returned by [`RecursiveLeastSquares::root`].
     pub fn from_root(x: DVector<f64>, root: DMatrix<f64>) -> Self {
         Self { x, kept: Kept::Root(root) }
     }
 
-    /// S of the square-root form, to be saved without a loss of bits; `None` in the other.
+    /// S of the square-root form, for bit-exact storage; `None` in the other form.
     pub fn root(&self) -> Option<DMatrix<f64>> {
         match &self.kept {
             Kept::Covariance(_) => None,
@@ -154,8 +153,8 @@ impl RecursiveLeastSquares {
         }
     }
 
-    /// Takes in one row: derivatives `a` and residual `e` at the present `x`. Gives the variance ϕ + aᵀPa that
-    /// the residual was expected to have.
+    /// Processes one row: derivatives `a` and residual `e` at the current `x`. Returns ϕ + aᵀPa, the predicted variance
+    /// of the residual.
     pub fn update(&mut self, a: &DVector<f64>, e: f64, forgetting: f64) -> f64 {
         match &mut self.kept {
             Kept::Covariance(covariance) => {
@@ -190,12 +189,12 @@ impl RecursiveLeastSquares {
         }
     }
 
-    /// Lets each parameter drift by a normal step of standard deviation `sigma[k]`. A square root becomes triangular the first
-    /// time that these parameters drift (p³); after that it costs the cube of how many do. Not finite sigmas leave everything
-    /// as it was.
+    /// Adds process noise: each parameter drifts by a normal step of standard deviation `sigma[k]`. A square root becomes
+    /// triangular the first time (p³); afterwards the cost is the cube of the number of drifting parameters. Non-finite
+    /// sigmas change nothing.
     ///
     /// # Panics
-    /// Where `sigma` has not one entry for each parameter.
+    /// If `sigma` does not have one entry for each parameter.
     pub fn predict(&mut self, sigma: &[f64]) {
         assert_eq!(sigma.len(), self.x.len(), "one standard deviation for each parameter");
         if let Kept::Covariance(covariance) = &mut self.kept {
@@ -219,7 +218,7 @@ impl RecursiveLeastSquares {
 /// use truegrind_estimation::filter::rls;
 /// use truegrind_estimation::least_squares::lm;
 ///
-/// // A straight line with σ = 0.02, one reading after the other: in the end the filter knows what all rows at once tell.
+/// // A straight line with σ = 0.02, one reading after the other: the filter ends with the batch result.
 /// # use std::ops::Range;
 /// # use truegrind_estimation::problem::{Prior, Problem};
 /// # struct Line;
@@ -256,7 +255,7 @@ impl RecursiveLeastSquares {
 /// ```
 ///
 /// # Panics
-/// Where `start` does not have one entry for each parameter.
+/// If `start` does not have one entry for each parameter.
 pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimate {
     let p = start.len();
     let mut objective = Objective::new(problem, start, options.initial == Initial::Prior);

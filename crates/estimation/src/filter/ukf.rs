@@ -7,11 +7,11 @@
 //!
 //! [`Form::AsPrinted`] (ukf-vslm-2023 eq. 8 to 12, Algorithm 1): p + 2 points (the sums run from 0 to N + 1)
 //! with equal weights (W_i is not defined), no Q, no R, P set to a random number at the beginning of each sweep
-//! and the gain to zero. What it does: the points are not symmetric, so that their mean, which becomes the
-//! state, drifts along the columns of P even where the residual vanishes; without R each scalar observation is
-//! believed entirely and takes one dimension out of P, which after p rows is singular to rounding: from there on S
-//! is rounding or zero (then the gain stays at the zero it was set to), and the filter no longer listens. What it
-//! reports is what the first p rows of the last sweep say, and rounding.
+//! and the gain to zero. Consequences: the points are not symmetric, so their mean, which becomes the state, drifts
+//! along the columns of P even if the residual vanishes. Without R each scalar observation is treated as exact and
+//! removes one dimension from P, which is singular to rounding after p rows. From then on S is rounding error or zero
+//! (the gain then remains zero), and the filter ignores further rows. Its result depends on the first p rows of the last
+//! sweep and on rounding.
 //!
 //! **Shapes.** x has p entries, P is p × p, an observation has m = `rows_per_observation` rows.
 //!
@@ -38,22 +38,22 @@ use crate::least_squares::Form;
 use crate::objective::Objective;
 use crate::problem::{Problem, observations};
 
-/// How [`solve`] filters.
+/// Options of [`solve`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
 pub struct Options {
-    /// As printed, or sound.
+    /// As printed or sound.
     pub form: Form,
-    /// Times that all observations are gone through; in the sound form each sweep weighs a row by 1 / sweeps.
+    /// Number of sweeps over all observations; in the sound form each sweep weights a row by 1 / sweeps.
     pub sweeps: usize,
-    /// α: how far the sigma points reach, in standard deviations divided by √(p + κ) (sound).
+    /// α: distance of the sigma points in standard deviations, divided by √(p + κ) (sound).
     pub alpha: f64,
     /// β: 2 for a normal distribution (sound).
     pub beta: f64,
     /// κ (sound).
     pub kappa: f64,
-    /// Standard deviation of what a parameter drifts from one observation to the next (sound): one for each, or
-    /// none at all.
+    /// Standard deviation of each parameter's drift from one observation to the next (sound); empty for constant
+    /// parameters.
     pub process_sigma: Vec<f64>,
     /// First standard deviation of a parameter without a prior.
     pub unknown_sigma: f64,
@@ -83,7 +83,7 @@ impl Options {
     }
 }
 
-/// The running filter (sound form), for those who feed it themselves.
+/// The filter (sound form), for processing observations one by one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Filter {
     /// State: the parameters.
@@ -106,9 +106,8 @@ impl Filter {
         }
     }
 
-    /// Takes in one observation, `rows` of `problem`, whose noise has the variance `noise` (1 for whitened
-    /// rows). The state stays as it was and the answer is `None` where anything is not finite or P is no longer
-    /// positive definite.
+    /// Processes one observation, `rows` of `problem`, with noise variance `noise` (1 for whitened rows). Returns `None`
+    /// and leaves the state unchanged if anything is not finite or P is no longer positive definite.
     pub fn update(&mut self, problem: &dyn Problem, rows: Range<usize>, noise: f64) -> Option<Innovation> {
         let (p, m) = (self.x.len(), rows.len());
         let c = self.alpha * self.alpha * (p as f64 + self.kappa);
@@ -166,7 +165,7 @@ impl Filter {
 /// use truegrind_estimation::filter::ukf;
 /// use truegrind_estimation::least_squares::lm;
 ///
-/// // A straight line with σ = 0.02, one reading after the other: in the end the filter knows what all rows at once tell.
+/// // A straight line with σ = 0.02, one reading after the other: the filter ends with the batch result.
 /// # use std::ops::Range;
 /// # use truegrind_estimation::problem::{Prior, Problem};
 /// # struct Line;
@@ -203,7 +202,7 @@ impl Filter {
 /// ```
 ///
 /// # Panics
-/// Where `start` does not have one entry for each parameter.
+/// If `start` does not have one entry for each parameter.
 pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimate {
     match options.form {
         Form::AsPrinted => printed(problem, start, options),
@@ -277,7 +276,7 @@ fn printed(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimate 
             let prior = &states * states.transpose() * share;
             let spread = &residuals * residuals.transpose() * share;
             let cross = &states * residuals.transpose() * share;
-            // Equation 12; where S cannot be inverted the gain keeps the zero it was set to.
+            // Equation 12; if S cannot be inverted the gain remains zero.
             let gain = spread.clone().cholesky().map(|factor| factor.solve(&cross.transpose()).transpose());
             let (next, mut next_covariance) = match gain {
                 Some(gain) => (&state - &gain * &mean, prior - &gain * &spread * gain.transpose()),
@@ -301,8 +300,8 @@ fn printed(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimate 
     finish(&objective, &x, Some(covariance), end, trace)
 }
 
-/// Cholesky factor of a matrix that rounding may have made indefinite: what is left of a pivot below rounding
-/// is dropped. Column by column, so that the inner loops run along memory.
+/// Cholesky factor of a matrix that rounding can have made indefinite: pivots below rounding are set to zero. Column by
+/// column, so that the inner loops access contiguous memory.
 fn semidefinite_root(matrix: &DMatrix<f64>, root: &mut DMatrix<f64>) {
     let p = matrix.nrows();
     root.fill(0.0);

@@ -1,15 +1,14 @@
 //! Unscented Kalman filter, then variable step-size Levenberg–Marquardt (UKF-VSLM).
 //!
-//! **Method** (ukf-vslm-2023, Algorithm 1). The filter goes through the data T₃ times; what it ends on is the
-//! start of T₉ iterations of eq. 15.
-//! - [`Form::AsPrinted`]: both parts to the letter (see [`ukf`] and [`vslm`]), with line 17, X₀ = x_ukf, inside
-//!   the loop: each iteration begins where the filter ended and undoes the one before it, while the step size
-//!   has decayed further. Its result is one sweep of tiny steps from the filter's result.
+//! **Method** (ukf-vslm-2023, Algorithm 1). The filter makes T₃ sweeps over the data; its result is the start of T₉
+//! iterations of eq. 15.
+//! - [`Form::AsPrinted`]: both parts to the letter (see [`ukf`] and [`vslm`]), with line 17, X₀ = x_ukf, inside the
+//!   loop: each iteration restarts from the filter's result and discards the previous one, while the step size decays.
+//!   The final result is one sweep of tiny steps from the filter's result.
 //! - [`Form::Robust`]: one sweep of the scaled filter with Q and R, then the sound step-size method until it
 //!   converges.
 //!
-//! **Shapes, stops.** Those of the two parts; the termination is the second one's, or the first one's where it
-//! failed.
+//! **Shapes, stops.** Those of the two parts; the termination is that of the second, or of the first if it failed.
 //!
 //! **Source and departures.** Li et al. 2023, Algorithm 1. T₃ and T₉ are not stated; Table IX's two iterations
 //! of M9 are taken for both.
@@ -23,7 +22,7 @@ use crate::filter::ukf;
 use crate::least_squares::{Form, vslm};
 use crate::problem::Problem;
 
-/// How [`solve`] searches: the options of both parts.
+/// Options of [`solve`]: those of both parts.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
 pub struct Options {
@@ -43,7 +42,7 @@ impl Options {
         Self { filter, search, seed: 0 }
     }
 
-    /// The form of the filter part, which stands for the whole.
+    /// The form of the filter part, reported as the form of the whole.
     pub fn form(&self) -> Form {
         self.filter.form
     }
@@ -52,7 +51,7 @@ impl Options {
 /// Filters, then searches. The trace has both parts, one after the other.
 ///
 /// # Panics
-/// Where `start` does not have one entry for each parameter.
+/// If `start` does not have one entry for each parameter.
 pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimate {
     let filter = ukf::Options { seed: options.seed, ..options.filter.clone() };
     let first = ukf::solve(problem, start, &filter);

@@ -1,4 +1,4 @@
-//! One damped step from a linearised problem, with all memory allocated beforehand.
+//! One damped step of a linearised problem, with preallocated memory.
 //!
 //! In scaled parameters z = D x the model of the cost is c + γᵀs + ½ sᵀSs with γ = D⁻¹g and S = D⁻¹AD⁻¹, whose
 //! diagonal is 1 where D is fresh. The step solves (S + μI) s = −γ; the parameters move by h = D⁻¹s. μ is thus
@@ -66,7 +66,7 @@ impl Linearisation {
     }
 }
 
-/// What a step promises.
+/// Prediction for a step.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PredictedReduction {
     /// Reduction of the cost that the undamped quadratic model predicts.
@@ -77,11 +77,11 @@ pub(crate) struct PredictedReduction {
 
 pub(crate) struct DampedSystem {
     p: usize,
-    /// D: the largest column norms met so far (Moré 1978), 0 for a column that never was anything but zero.
+    /// D: the largest column norms so far (Moré 1978), 0 for a column that has always been zero.
     scale: Vec<f64>,
-    /// Whether D stays the identity, as the printed methods have it.
+    /// Whether D is the identity throughout, as in the printed methods.
     unscaled: bool,
-    /// Diagonal of S: 1 where the column is as large as it ever was. What a pivot is compared with.
+    /// Diagonal of S, to which pivots are compared: 1 where the column has its largest norm so far.
     diagonal: Vec<f64>,
     gradient: Vec<f64>,
     factor: Vec<f64>,
@@ -89,14 +89,12 @@ pub(crate) struct DampedSystem {
     memory: MemBuffer,
 }
 
-/// A pivot (squared length of what is left of a unit column) below this means that the column depends on the
-/// others.
+/// A pivot (squared length of the remainder of a unit column) below this means that the column depends on the others.
 fn negligible_pivot(p: usize) -> f64 {
     64.0 * p as f64 * f64::EPSILON
 }
 
-/// Damping, relative to the diagonal, that a singular system gets in addition, so that a step stays finite
-/// along its null space.
+/// Additional damping of a singular system, relative to the diagonal, so that a step is finite along its null space.
 const SINGULAR_DAMPING: f64 = 1e-9;
 
 impl DampedSystem {
@@ -119,8 +117,8 @@ impl DampedSystem {
         Self { scale: vec![1.0; p], unscaled: true, ..Self::new(p) }
     }
 
-    /// Takes over scale and gradient of a new point. The answer is the largest cosine between the residual
-    /// vector and a column of the Jacobian: 0 at a stationary point.
+    /// Sets scale and gradient of a new point. Returns the largest cosine between the residual vector and a column of the
+    /// Jacobian: 0 at a stationary point.
     pub(crate) fn enter(&mut self, at: &Linearisation) -> f64 {
         let length = (2.0 * at.cost()).sqrt();
         let mut cosine = 0.0_f64;
@@ -144,7 +142,7 @@ impl DampedSystem {
         self.scale.iter().zip(x).map(|(d, x)| (d * x).powi(2)).sum::<f64>().sqrt()
     }
 
-    /// Writes x + h into `trial` for the damping `mu`; `None` where the system has no finite solution.
+    /// Writes x + h into `trial` for the damping `mu`; `None` if the system has no finite solution.
     pub(crate) fn step(
         &mut self,
         at: &Linearisation,
@@ -189,8 +187,8 @@ impl DampedSystem {
         Some(())
     }
 
-    /// Cholesky factor of S + μI + extra · diag S; gives its smallest squared pivot against the diagonal
-    /// (without μ), `None` where it is not positive definite.
+    /// Cholesky factor of S + μI + extra · diag S; returns its smallest squared pivot relative to the diagonal (without
+    /// μ), `None` if it is not positive definite.
     fn factorise(&mut self, equations: &NormalEquations, mu: f64, extra: f64) -> Option<f64> {
         let p = self.p;
         for j in 0..p {
@@ -217,7 +215,7 @@ impl DampedSystem {
         Some(self.smallest_pivot(mu, |k| self.factor[k * p + k]))
     }
 
-    /// Without scaling μ is the user's alone, and nothing is called negligible.
+    /// Without scaling μ is set by the user only, and no pivot counts as negligible.
     fn smallest_pivot(&self, mu: f64, pivot: impl Fn(usize) -> f64) -> f64 {
         if self.unscaled || mu >= SINGULAR_DAMPING {
             return 1.0;
@@ -244,7 +242,7 @@ impl DampedSystem {
             Mat::<f64>::from_fn(2 * p, p + 1, entry).qr()
         };
         let mut qr = stacked(0.0);
-        // In QR a pivot is known to ε, not to √ε: its square is compared with ε².
+        // QR determines a pivot to ε, not to √ε: its square is compared with ε².
         if self.smallest_pivot(mu, |k| qr.thin_R()[(k, k)]) < negligible_pivot(p).powi(2) {
             qr = stacked(SINGULAR_DAMPING);
         }

@@ -1,7 +1,7 @@
 //! Least squares of one linearisation, and Gauss–Newton.
 //!
 //! **Method.** x ← x − (JᵀJ)⁻¹ Jᵀr (rls-2025 eq. 9; ukf-vslm-2023 eq. 13).
-//! - [`Form::AsPrinted`]: one step from the start, nothing else.
+//! - [`Form::AsPrinted`]: one step from the start.
 //! - [`Form::Robust`]: repeated, with scaled columns and priors, each step halved until it lowers the cost.
 //!
 //! **Shapes.** As in [`lm`](crate::least_squares::lm).
@@ -25,25 +25,25 @@ use crate::least_squares::{Factorisation, Form};
 use crate::objective::Objective;
 use crate::problem::Problem;
 
-/// How [`solve`] searches.
+/// Options of [`solve`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
 pub struct Options {
-    /// As printed, or sound.
+    /// As printed or sound.
     pub form: Form,
     /// How the step is computed.
     pub factorisation: Factorisation,
-    /// Whether the priors of the problem take part.
+    /// Whether the priors of the problem are used.
     pub priors: bool,
-    /// Most steps.
+    /// Step limit.
     pub max_iterations: usize,
-    /// Stop where what is left to gain is below this share of the cost (sound).
+    /// Stop when the predicted reduction is below this share of the cost (sound).
     pub cost_tolerance: f64,
-    /// Stop where the largest cosine between residuals and a column of J is below this (sound).
+    /// Stop when the largest cosine between residuals and a column of J is below this (sound).
     pub gradient_tolerance: f64,
-    /// Stop where the cost itself is below this (sound).
+    /// Stop when the cost itself is below this (sound).
     pub small_cost: f64,
-    /// Not used: the method draws nothing. Here so that all methods are called alike.
+    /// Unused: the method is deterministic. Present so that all methods have the same fields.
     pub seed: u64,
 }
 
@@ -105,7 +105,7 @@ const HALVINGS: usize = 30;
 /// ```
 ///
 /// # Panics
-/// Where `start` does not have one entry for each parameter.
+/// If `start` does not have one entry for each parameter.
 pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimate {
     let p = start.len();
     let printed = options.form == Form::AsPrinted;

@@ -3,33 +3,34 @@
 //! **Method.** x ← x − (JᵀJ + μI)⁻¹ Jᵀr (ltlm-2024 eq. 10).
 //! - [`Form::AsPrinted`]: μ fixed (5 in the paper), parameters unscaled, every step taken.
 //! - [`Form::Robust`]: the same step in parameters scaled by the largest column norms of J met so far, so that μ
-//!   is a pure number; μ follows the gain ratio ϱ = (actual reduction) / (predicted reduction) after Nielsen. A
-//!   step is accepted where it lowers the cost. An accepted step costs one pass over the rows, which brings
-//!   cost and normal equations together; after a refused step the next trial is first tried by its cost alone.
+//!   is a pure number; μ follows the gain ratio ϱ = (actual reduction) / (predicted reduction) after Nielsen. A step is
+//!   accepted if it lowers the cost. An accepted step costs one pass over the rows, which computes cost and normal
+//!   equations together; after a refused step the next trial is first tested by its cost alone.
 //!
-//! A task of very many observations with a prior for every parameter is first solved on one in eight of them, drawn
-//! without order and thinned again while they are many, where the first step on all of them promises more than a tenth
-//! of the cost: a pass over few rows costs little, and from there the way to the optimum of all rows is short. This is
-//! also the way round a curved valley. Many rows make what they see so stiff that steps along what only priors hold (an
-//! outlet and the base turning together) bend away from the valley's floor at once and are refused; few rows leave the
-//! valley wide. For the same reason μ then starts at nothing: damping relative to what many rows see, however light, is
-//! heavy next to a prior, and would leave the search far along the valley. All tests of convergence are made on all rows.
+//! A problem with very many observations and a prior for every parameter is first solved on a random eighth of them,
+//! thinned repeatedly while they are many, if the first step on all rows predicts a reduction above a tenth of the cost. A
+//! pass over few rows is cheap, and its optimum is close to that of all rows. This also helps in a curved valley: many rows
+//! make the directions that they determine so stiff that steps along directions determined by priors only (an outlet and
+//! the base rotating together) leave the valley floor and are refused; few rows keep the valley wide. For the same reason μ
+//! then starts near zero: even light damping relative to the information of many rows is strong relative to a prior, and
+//! would stop the search far along the valley. All convergence tests use all rows.
 //!
-//! **Shapes.** x has p entries, J is n × p and is never held: the normal equations (p × p) or, with
-//! [`Factorisation::Qr`], the triangular factor of J come from a pass over the rows. Priors are further rows.
+//! **Shapes.** x has p entries, J is n × p and is never stored: a pass over the rows gives the normal equations (p × p)
+//! or, with [`Factorisation::Qr`], the triangular factor of J. Priors are additional rows.
 //!
-//! **Stops** (sound). *Cost*: the undamped model promises less than `cost_tolerance` · cost. *Gradient*: no
-//! column of J makes a cosine above `gradient_tolerance` with r. *Step*: ‖D h‖ below `step_tolerance` · ‖D x‖.
+//! **Stops** (sound). *Cost*: the undamped model predicts a reduction below `cost_tolerance` · cost. *Gradient*: no
+//! column of J has a cosine above `gradient_tolerance` with r. *Step*: ‖D h‖ below `step_tolerance` · ‖D x‖.
 //! *SmallResidual*: cost below `small_cost`. As printed: relative change of cost or of x below tolerance, or
 //! the iteration limit ("the desired accuracy or the maximum number of iterations"); neither number is stated
 //! in the paper.
 //!
-//! **Source and departures.** Liu et al. 2024, eq. 10 (as printed). Its μ = 5 has no unit: next to JᵀJ of
-//! parameters in radians it is nothing, next to some hundred rows of millimetres per degree it slows every
-//! step; damping slows, it is no prior. Eq. 8's 1/n does not change the step and is left out. Sound: Moré, "The
+//! **Source and departures.** Liu et al. 2024, eq. 10 (as printed). Its μ = 5 has no unit: it is negligible against JᵀJ of
+//! parameters in radians, but slows every step against some hundred rows of millimetres per degree. Damping slows the
+//! search; it is no prior. Eq. 8's 1/n does not change the step and is omitted. Sound: Moré, "The
 //! Levenberg–Marquardt algorithm" (1978) for the scaling, Madsen, Nielsen, Tingleff, *Methods for non-linear
 //! least squares problems* (2004), algorithm 3.16, for μ. Departures from the latter: μ starts near zero
-//! (`initial_damping`), since priors regularise here; a step with less damping than 10⁻³ must //! its predicted reduction, and a refusal lifts μ to at least 10⁻³ at once; an almost perfect gain ratio divides μ by ten,
+//! (`initial_damping`), since priors regularise here; a step with less damping than 10⁻³ must achieve a quarter of its
+//! predicted reduction, and a refusal raises μ to at least 10⁻³ at once; an almost perfect gain ratio divides μ by ten,
 //! not by three; the start on few rows.
 //!
 //! **Checked against** the Moré–Garbow–Hillstrom problems and NIST StRD certified values, Cholesky against QR.
@@ -45,11 +46,11 @@ use crate::least_squares::{Factorisation, Form};
 use crate::objective::Objective;
 use crate::problem::Problem;
 
-/// How [`solve`] searches. Fields that a form does not use are said so.
+/// Options of [`solve`]. The comments state which form uses a field if only one does.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
 pub struct Options {
-    /// As printed, or sound.
+    /// As printed or sound.
     pub form: Form,
     /// How the step is computed.
     pub factorisation: Factorisation,
@@ -57,20 +58,19 @@ pub struct Options {
     pub mu: f64,
     /// First μ of the sound form, a pure number: relative to a unit diagonal.
     pub initial_damping: f64,
-    /// Whether the priors of the problem take part. The paper has none.
+    /// Whether the priors of the problem are used. The paper has none.
     pub priors: bool,
-    /// Most trial steps.
+    /// Limit of trial steps.
     pub max_iterations: usize,
-    /// Stop where what is left to gain is below this share of the cost.
+    /// Stop when the predicted reduction is below this share of the cost.
     pub cost_tolerance: f64,
-    /// Stop where the largest cosine between residuals and a column of J is below this (sound).
+    /// Stop when the largest cosine between residuals and a column of J is below this (sound).
     pub gradient_tolerance: f64,
-    /// Stop where the step is below this share of the parameters.
+    /// Stop when the step is below this share of the parameters.
     pub step_tolerance: f64,
-    /// Stop where the cost itself is below this. Residuals are counted in their σ, so this is an absolute
-    /// figure.
+    /// Stop when the cost itself is below this. Residuals are in units of their σ, so this is an absolute value.
     pub small_cost: f64,
-    /// Which observations a task of very many is first solved on; not used otherwise.
+    /// Seed for the choice of observations on which a large problem is first solved; unused otherwise.
     pub seed: u64,
 }
 
@@ -129,7 +129,7 @@ impl Options {
 /// # }
 /// let found = lm::solve(&Valley, &[-1.2, 1.0], &lm::Options::default());
 /// assert!((found.x[0] - 1.0).abs() < 1e-6 && (found.x[1] - 1.0).abs() < 1e-6);
-/// // A search that was cut short says so, and so does one whose start is no number.
+/// // The termination shows the iteration limit, and a start that is not finite.
 /// let short = lm::solve(&Valley, &[-1.2, 1.0], &lm::Options { max_iterations: 2, ..lm::Options::default() });
 /// assert_eq!(short.termination, Termination::IterationLimit);
 /// let lost = lm::solve(&Valley, &[f64::NAN, 1.0], &lm::Options::default());
@@ -137,7 +137,7 @@ impl Options {
 /// ```
 ///
 /// # Panics
-/// Where `start` does not have one entry for each parameter.
+/// If `start` does not have one entry for each parameter.
 pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimate {
     let mut objective = Objective::new(problem, start, options.priors);
     match options.form {
@@ -146,19 +146,19 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
     }
 }
 
-/// A first step that promises more than this share of the cost is taken on few rows.
+/// If the first step predicts a reduction above this share of the cost, the search starts on few rows.
 const FAR: f64 = 0.1;
 
-/// Observations that are few, for one parameter.
+/// Fewest observations per parameter in a thinned problem.
 const FEW_PER_PARAMETER: usize = 150;
 
-/// One out of so many observations is taken; what is left may be thinned again.
+/// One out of this number of observations is used; the subset can be thinned again.
 const ONE_OF: usize = 8;
 
-/// The optimum of some of the observations: one out of each of as many equal parts, which one by chance, so that no
-/// period of the record is met again.
+/// The optimum of a subset of the observations: a random one from each of equally long sections, so that the subset has no
+/// period of the record.
 fn on_few_rows(objective: &mut Objective<'_>, start: &[f64], options: &Options) -> Option<Vec<f64>> {
-    // Without priors few rows say far less than all of them, and their optimum may lie far off in what they hardly see.
+    // Without priors the optimum of few rows can be far away in directions that they hardly determine.
     let held = objective.priors.len() == start.len() && objective.priors.iter().all(|p| p.sigma.is_finite());
     if !held {
         return None;
@@ -173,7 +173,7 @@ fn on_few_rows(objective: &mut Objective<'_>, start: &[f64], options: &Options) 
     let part = |k: usize| k * all / few;
     let chosen: Vec<usize> = (0..few).map(|k| random.random_range(part(k)..part(k + 1))).collect();
     let thinned = problem.subsample(&chosen)?;
-    // Damping is relative to what the rows say. Any that is more than what the priors say lets go of what they hold.
+    // Damping is relative to the information of the rows. It must not exceed that of the priors.
     let options = Options { initial_damping: DAMPING_RANGE.0, ..*options };
     let found = solve(thinned.as_ref(), start, &options);
     objective.evaluations.residuals += found.evaluations.residuals;
@@ -228,7 +228,7 @@ fn gain_ratio(objective: &mut Objective<'_>, start: &[f64], options: &Options) -
             return here.finish(objective, end, trace);
         }
         let cost = here.at.cost();
-        // After a refusal the cost alone is asked for first: it is several times cheaper than the derivatives.
+        // After a refusal only the cost is evaluated first: it is several times cheaper than the derivatives.
         let worth_it = refused == 0 || {
             let new = objective.cost(&trial);
             damping.is_acceptable((cost - new) / predicted.reduction)

@@ -4,12 +4,11 @@
 //! (x_k + x₁)/2 and b = (x₁ + x₂)/2 (eq. 15), chaotic numbers N_1 … N_M in [0, 1) (eq. 11), candidates x₁ − (x₁
 //! − a)N_m and x₁ + (x₂ − b)N_m (eq. 16, 17); the best of them and x₁ starts the next iteration (eq. 18).
 //!
-//! **What it is.** N_m is one scalar for a whole candidate, so this is a line search on the inner halves of
-//! [x_k, x₁] and [x₁, x₂]. Eq. 17 is right as printed: x₂ − b = b − x₁. x₂ itself is never a candidate, so that
-//! each iteration, at the price of two Jacobians, ends at best halfway between the first and the second
-//! Levenberg–Marquardt step: compare methods per Jacobian, not per iteration. An iteration asks for two
-//! Jacobian passes (the second brings the cost of x₁) and 2M passes of residuals, 2M + 1 evaluations in the
-//! paper's count.
+//! **Properties.** N_m is one scalar for a whole candidate, so this is a line search on the inner halves of [x_k, x₁] and
+//! [x₁, x₂]. Eq. 17 is correct as printed: x₂ − b = b − x₁. x₂ itself is never a candidate, so an iteration costs two
+//! Jacobians and ends at best halfway between the first and the second Levenberg–Marquardt step: compare methods per
+//! Jacobian, not per iteration. An iteration needs two Jacobian passes (the second includes the cost of x₁) and 2M passes
+//! of residuals, 2M + 1 evaluations in the paper's count.
 //!
 //! **Shapes.** As in [`lm`](crate::least_squares::lm).
 //!
@@ -17,11 +16,10 @@
 //!
 //! **Source and departures.** Liu et al. 2024. M, N₀ and K are not stated: here 10, 0.37 and 60 by default, and
 //! the sequence N runs on from iteration to iteration. Eq. 15 mixes k and k + 1 and Algorithm I writes J_{k+1}
-//! where J_{k,1} (at x₁) is meant; both are read that way. f in eq. 10, 13 is the residual vector, not the
-//! scalar of eq. 8. μ = 5 has no unit: see `lm`. The printed form does not compare with x_k and may rise. Sound
-//! form: both steps scaled and damped by Nielsen's rule as in `lm`, the iteration taken only if its best
-//! candidate lowers the cost, and x₂ a candidate too (`second_step`), without which the method throws away what
-//! its second Jacobian has bought.
+//! where J_{k,1} (at x₁) is meant; both are interpreted so. f in eq. 10, 13 is the residual vector, not the scalar of
+//! eq. 8. μ = 5 has no unit: see `lm`. The printed form does not compare with x_k, so its cost can rise. Sound form: both
+//! steps scaled and damped by Nielsen's rule as in `lm`, the iteration accepted only if its best candidate lowers the cost,
+//! and x₂ also a candidate (`second_step`), since otherwise the second Jacobian is wasted.
 //!
 //! **Checked against** `lm` on the same published problems, and the counts above.
 
@@ -35,11 +33,11 @@ use crate::least_squares::{Factorisation, Form};
 use crate::objective::Objective;
 use crate::problem::Problem;
 
-/// How [`solve`] searches.
+/// Options of [`solve`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
 pub struct Options {
-    /// As printed, or sound.
+    /// As printed or sound.
     pub form: Form,
     /// How the two steps are computed.
     pub factorisation: Factorisation,
@@ -49,23 +47,23 @@ pub struct Options {
     pub initial_damping: f64,
     /// M: candidates on each side. Not stated in the paper.
     pub candidates: usize,
-    /// Whether x₂ is a candidate too (sound). The paper's eq. 18 does not have it.
+    /// Whether x₂ is also a candidate (sound), unlike in the paper's eq. 18.
     pub second_step: bool,
     /// The map that spreads the candidates: eq. 11 with r = 0.5.
     pub map: Map,
     /// N₀: where the sequence starts. Not stated in the paper.
     pub first: f64,
-    /// Whether the priors of the problem take part. The paper has none.
+    /// Whether the priors of the problem are used. The paper has none.
     pub priors: bool,
     /// K: most iterations. Not stated in the paper.
     pub max_iterations: usize,
-    /// Stop where what is left to gain (as printed: the relative change) is below this share of the cost.
+    /// Stop when the predicted reduction (as printed: the relative change) is below this share of the cost.
     pub cost_tolerance: f64,
-    /// Stop where the largest cosine between residuals and a column of J is below this (sound).
+    /// Stop when the largest cosine between residuals and a column of J is below this (sound).
     pub gradient_tolerance: f64,
-    /// Stop where the cost itself is below this.
+    /// Stop when the cost itself is below this.
     pub small_cost: f64,
-    /// Not used: the sequence is determined by `map` and `first`. Here so that all methods are called alike.
+    /// Unused: `map` and `first` determine the sequence. Present so that all methods have the same fields.
     pub seed: u64,
 }
 
@@ -130,7 +128,7 @@ impl Options {
 /// ```
 ///
 /// # Panics
-/// Where `start` does not have one entry for each parameter.
+/// If `start` does not have one entry for each parameter.
 pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimate {
     let p = start.len();
     let printed = options.form == Form::AsPrinted;
@@ -193,7 +191,7 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
         }
         let best = best_candidate(&mut objective, options, &mut sequence, [&here.x, &x1, &x2]);
         let before = std::mem::take(&mut here.x);
-        // The cost of x₁ came with its derivatives; where x₁ stays the best they are used again.
+        // The cost of x₁ was computed with its derivatives, which are reused if x₁ is the best.
         here = match best {
             Some((x, candidate_cost)) if candidate_cost < at1.cost() => {
                 Point { at: Linearisation::at(&mut objective, &x, options.factorisation), x }

@@ -1,22 +1,22 @@
-//! Rank, condition and null space of a least-squares problem, read off its triangular factor.
+//! Rank, condition and null space of a least-squares problem, from its triangular factor.
 //!
 //! **Method.** Column-pivoted QR of R orders the parameters by what each adds to those before it; the singular
 //! value decomposition R = U Σ Vᵀ gives rank, condition number and, as the last columns of V, the combinations
-//! of parameters that the data cannot tell apart. Both act on R (p × p), since R and the Jacobian have the same
+//! of parameters that the data do not determine. Both act on R (p × p), since R and the Jacobian have the same
 //! singular values and right singular vectors.
 //!
 //! **Shapes.** R is p × p; `right_vectors` holds one direction in each column, strongest first.
 //!
 //! **Source.** Golub and Van Loan, *Matrix Computations*, 4th ed., §5.4 and §5.5. The scaling of the columns
-//! decides what "small" means: scale by prior sigmas or by column norms before asking, never by accident of
-//! units.
+//! determines which singular values are small: scale by prior sigmas or by column norms first, so that the result does
+//! not depend on units.
 //!
 //! **Checked against** matrices made with a known null space, and a regression with a duplicated column.
 
 use faer::Mat;
 use nalgebra::DMatrix;
 
-/// What a triangular factor says about its parameters.
+/// Identifiability of the parameters of a triangular factor.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RankAnalysis {
     /// Number of singular values above the threshold.
@@ -27,34 +27,34 @@ pub struct RankAnalysis {
     pub singular_values: Vec<f64>,
     /// Right singular vectors, p × p, one column for each singular value.
     pub right_vectors: DMatrix<f64>,
-    /// Parameters in the order in which pivoting took them: the first `rank` span the identifiable space best.
+    /// Parameters in pivoting order: the first `rank` span the identifiable space best.
     pub pivots: Vec<usize>,
     /// |diagonal| of the pivoted triangle, in the order of `pivots`: what each parameter adds.
     pub pivot_sizes: Vec<f64>,
 }
 
 impl RankAnalysis {
-    /// Directions (unit columns, p × (p − rank)) along which the parameters can move without the rows noticing.
+    /// Null space (unit columns, p × (p − rank)): directions in which the parameters can change without changing the residuals.
     pub fn null_space(&self) -> DMatrix<f64> {
         let p = self.right_vectors.ncols();
         self.right_vectors.columns(self.rank, p - self.rank).into_owned()
     }
 
-    /// Parameters that a rank-revealing choice would leave out.
+    /// Parameters excluded by a rank-revealing choice.
     pub fn dependent(&self) -> &[usize] {
         &self.pivots[self.rank.min(self.pivots.len())..]
     }
 }
 
 /// Rank analysis of an upper triangular (or any) factor with p columns and at most p rows. Singular values
-/// below `tolerance` times the largest count as zero; without a tolerance p·ε is taken, which finds exact
-/// dependence only. `None` where the factor is not finite.
+/// below `tolerance` times the largest count as zero; without a tolerance p·ε is used, which finds exact dependence
+/// only. `None` if the factor is not finite.
 pub fn analyse(r: &DMatrix<f64>, tolerance: Option<f64>) -> Option<RankAnalysis> {
     let p = r.ncols();
     if p == 0 || !r.iter().all(|v| v.is_finite()) {
         return None;
     }
-    // Rows of zeros make a wide factor square without changing what it says.
+    // Rows of zeros make a wide factor square without changing its null space.
     let entry = |i: usize, j: usize| if i < r.nrows() { r[(i, j)] } else { 0.0 };
     let matrix = Mat::<f64>::from_fn(p.max(r.nrows()), p, entry);
     let svd = matrix.thin_svd().ok()?;

@@ -1,18 +1,18 @@
-//! What the Levenberg–Marquardt methods share: where a search stands, how it is damped, when it ends.
+//! Shared by the Levenberg–Marquardt methods: state of a search, damping, convergence tests.
 
 use crate::estimate::{Estimate, Iteration, Termination};
 use crate::least_squares::Factorisation;
 use crate::least_squares::damped::{DampedSystem, Linearisation, PredictedReduction};
 use crate::objective::Objective;
 
-/// Where a search stands.
+/// Current point of a search.
 pub(crate) struct Point {
     pub(crate) x: Vec<f64>,
     pub(crate) at: Linearisation,
 }
 
 impl Point {
-    /// The start, linearised, and what is told of it.
+    /// The linearised start and its trace entry.
     pub(crate) fn begin(
         objective: &mut Objective<'_>,
         start: &[f64],
@@ -23,7 +23,7 @@ impl Point {
         (Self { x: start.to_vec(), at }, vec![first])
     }
 
-    /// What is told of an iteration that ends here.
+    /// Trace entry of an iteration that ends here.
     pub(crate) fn entry(
         &self,
         step_norm: f64,
@@ -35,8 +35,8 @@ impl Point {
         Iteration { cost, row_cost: None, step_norm, damping, gradient_norm: cosine, evaluations }
     }
 
-    /// The tests that need no step: the cost itself, and the largest cosine between residuals and a column of J, where a
-    /// tolerance is stated for it.
+    /// The tests that need no step: the cost itself, and the largest cosine between residuals and a column of J, if a
+    /// tolerance is given for it.
     pub(crate) fn end(&self, small_cost: f64, cosine: f64, tolerance: Option<f64>) -> Option<Termination> {
         if self.at.cost() <= small_cost {
             return Some(Termination::SmallResidual);
@@ -63,10 +63,10 @@ pub(crate) struct Damping {
     growth: f64,
 }
 
-/// Smallest and largest μ that mean anything next to a unit diagonal in double precision.
+/// Smallest and largest μ with an effect beside a unit diagonal in double precision.
 pub(crate) const DAMPING_RANGE: (f64, f64) = (1e-16, 1e16);
 
-/// μ after the first refusal: less would hardly change the step that was refused.
+/// μ after the first refusal: less would hardly change the refused step.
 const FIRST_REFUSAL: f64 = 1e-3;
 
 impl Damping {
@@ -74,13 +74,13 @@ impl Damping {
         Self { mu: mu.clamp(DAMPING_RANGE.0, DAMPING_RANGE.1), growth: 2.0 }
     }
 
-    /// Whether a step with this gain ratio may be taken. A step with hardly any damping must keep a quarter of
-    /// the predicted reduction: otherwise one leap from a far start lands on a plateau from which nothing leads back.
+    /// Whether a step with this gain ratio is accepted. A nearly undamped step must achieve a quarter of the predicted
+    /// reduction: otherwise one leap from a distant start can end on a plateau from which the search does not return.
     pub(crate) fn is_acceptable(&self, gain: f64) -> bool {
         gain > if self.mu < FIRST_REFUSAL { 0.25 } else { 1e-4 }
     }
 
-    /// `gain` is actual over predicted reduction of a step that was taken.
+    /// Updates μ after an accepted step; `gain` is actual over predicted reduction.
     pub(crate) fn accept(&mut self, gain: f64) {
         let factor =
             if (gain - 1.0).abs() < 0.1 { 0.1 } else { (1.0 - (2.0 * gain - 1.0).powi(3)).max(1.0 / 3.0) };
@@ -98,10 +98,10 @@ impl Damping {
     }
 }
 
-/// State of a search as the convergence tests need it.
+/// State of a search for the convergence tests.
 pub(crate) struct Search {
     pub(crate) mu: f64,
-    /// Steps refused since the last one taken.
+    /// Steps refused since the last accepted one.
     pub(crate) refused: usize,
     pub(crate) cosine: f64,
     pub(crate) cost_tolerance: f64,
@@ -109,8 +109,8 @@ pub(crate) struct Search {
 }
 
 /// Convergence tests that need a step: predicted reduction of the cost, and step size. A small prediction under heavy
-/// damping proves nothing, so it is repeated almost without damping. Where the undamped model predicts more than the problem
-/// delivers (large residuals), a small prediction after refusals counts as converged if the gradient is small too.
+/// damping is inconclusive, so it is repeated almost without damping. If the undamped model predicts more than the problem
+/// achieves (large residuals), a small prediction after refusals counts as converged if the gradient is also small.
 pub(crate) fn converged(
     system: &mut DampedSystem,
     here: &Point,

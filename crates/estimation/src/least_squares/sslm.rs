@@ -1,6 +1,6 @@
 //! Levenberg–Marquardt with a step size found by search (SSLM).
 //!
-//! **Method.** x ← x − δ (JᵀJ + λI)⁻¹ Jᵀr with a step size δ that is adjusted as the search goes on.
+//! **Method.** x ← x − δ (JᵀJ + λI)⁻¹ Jᵀr with a step size δ that is adjusted during the search.
 //! - [`Form::AsPrinted`]: δ decays once for each iteration, δ₀ = 0.8, factor 0.95 (ukf-vslm-2023 eq. 15).
 //! - [`Form::Robust`]: small fixed damping of scaled columns; δ minimises the parabola through the cost at 0,
 //!   its slope there and the cost at 1, safeguarded to [0.1, 0.5] at each further trial until the cost falls
@@ -12,7 +12,7 @@
 //!
 //! **Source and departures.** ltlm-2024, Table 5, M6: "a dynamic adjustment mechanism for the algorithm's step
 //! size", without an equation; its reference is ukf-vslm-2023, whose eq. 15 is therefore taken as the printed
-//! form (the same recurrence as [`vslm`] with decay per iteration). What M6 ran exactly is not known. Sound:
+//! form (the same recurrence as [`vslm`] with decay per iteration). The exact form of M6 is not known. Sound:
 //! Nocedal and Wright, *Numerical Optimization*, 2nd ed., §3.5.
 //!
 //! **Checked against** published minima.
@@ -26,33 +26,33 @@ use crate::least_squares::{Factorisation, Form, vslm};
 use crate::objective::Objective;
 use crate::problem::Problem;
 
-/// How [`solve`] searches.
+/// Options of [`solve`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
 pub struct Options {
-    /// As printed, or sound.
+    /// As printed or sound.
     pub form: Form,
     /// λ of the printed form.
     pub lambda: f64,
     /// δ₀ of the printed form.
     pub step_size: f64,
-    /// What δ is multiplied by in the printed form.
+    /// Decay factor of δ in the printed form.
     pub decay_factor: f64,
     /// Damping of the sound form, a pure number.
     pub damping: f64,
     /// How the sound form computes its direction.
     pub factorisation: Factorisation,
-    /// Whether the priors of the problem take part.
+    /// Whether the priors of the problem are used.
     pub priors: bool,
-    /// Most iterations.
+    /// Iteration limit.
     pub max_iterations: usize,
-    /// Stop where what is left to gain (as printed: the relative change) is below this share of the cost.
+    /// Stop when the predicted reduction (as printed: the relative change) is below this share of the cost.
     pub cost_tolerance: f64,
-    /// Stop where the largest cosine between residuals and a column of J is below this (sound).
+    /// Stop when the largest cosine between residuals and a column of J is below this (sound).
     pub gradient_tolerance: f64,
-    /// Stop where the cost itself is below this.
+    /// Stop when the cost itself is below this.
     pub small_cost: f64,
-    /// Not used: the method draws nothing. Here so that all methods are called alike.
+    /// Unused: the method is deterministic. Present so that all methods have the same fields.
     pub seed: u64,
 }
 
@@ -82,7 +82,7 @@ impl Options {
     }
 }
 
-/// Share of the promised reduction that a step must bring (Armijo).
+/// Share of the predicted reduction that a step must achieve (Armijo).
 const SUFFICIENT: f64 = 1e-4;
 
 /// Most trial step sizes along one direction.
@@ -121,7 +121,7 @@ const TRIALS: usize = 20;
 /// ```
 ///
 /// # Panics
-/// Where `start` does not have one entry for each parameter.
+/// If `start` does not have one entry for each parameter.
 pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimate {
     if options.form == Form::AsPrinted {
         let printed = vslm::Options {
@@ -159,7 +159,7 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
         if predicted.reduction <= options.cost_tolerance * cost {
             return here.finish(&objective, Termination::Cost, trace);
         }
-        // With little damping the slope along the step is −2 × the promised reduction.
+        // With little damping the slope along the step is −2 × the predicted reduction.
         let slope = -2.0 * predicted.reduction;
         let mut delta = 1.0;
         let mut trials = 0;

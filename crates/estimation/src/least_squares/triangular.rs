@@ -1,9 +1,9 @@
-//! The triangular factor of a tall Jacobian, without ever holding the Jacobian.
+//! The triangular factor of a tall Jacobian, computed without storing the Jacobian.
 //!
 //! **Method.** Tall-skinny QR: each block of rows [J | r] is reduced to a triangle by Householder reflections,
 //! and the triangles are stacked and reduced again, in order. The last triangle [R c; 0 ρ] has RᵀR = JᵀJ, Rᵀc =
-//! Jᵀr and ‖c‖² + ρ² = ‖r‖². Unlike the normal equations it keeps all digits of J, so that a rank can be read
-//! off it.
+//! Jᵀr and ‖c‖² + ρ² = ‖r‖². Unlike the normal equations it preserves all digits of J, so that the rank can be
+//! determined from it.
 //!
 //! **Shapes.** J is n × p, R is p × p upper triangular (diagonal of either sign), c has p entries. Memory is
 //! one triangle for each block of some 1500 rows.
@@ -86,11 +86,11 @@ impl TriangularFactor {
     }
 }
 
-/// The triangular factor of the Jacobian at `x` with column k multiplied by `scale[k]` (priors not included):
-/// pass prior sigmas to ask what the data say beyond the priors, or ones for the plain factor.
+/// The triangular factor of the Jacobian at `x` with column k multiplied by `scale[k]` (priors not included): pass prior
+/// sigmas to compare the information of the data with that of the priors, or ones for the plain factor.
 ///
 /// # Panics
-/// Where `x` or `scale` does not have one entry for each parameter.
+/// If `x` or `scale` does not have one entry for each parameter.
 pub fn triangular_factor(problem: &dyn Problem, x: &[f64], scale: &[f64]) -> TriangularFactor {
     let p = problem.parameters();
     assert!(x.len() == p && scale.len() == p, "x and scale must have one entry for each parameter");

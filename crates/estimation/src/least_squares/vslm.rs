@@ -2,14 +2,12 @@
 //!
 //! **Method.** x ← x − δ_t (JᵀJ + λI)⁻¹ Jᵀr, δ_{t+1} = μ δ_t (ukf-vslm-2023 eq. 15), δ₀ = 0.8, μ = 0.95.
 //! - [`Form::AsPrinted`] with [`Decay::PerSample`]: Algorithm 1 to the letter. Inside each iteration a loop
-//!   over the samples applies eq. 15 to one sample after the other (its row of J, its residual) and δ decays at
-//!   each: 0.95¹⁰⁰ = 0.006, so that after one pass over 100 rows nothing moves any more, and the first rows
-//!   decide.
+//!   over the samples applies eq. 15 to one sample after the other (its row of J, its residual), and δ decays at each:
+//!   0.95¹⁰⁰ = 0.006, so after one pass over 100 rows the steps vanish, and the first rows determine the result.
 //! - [`Form::AsPrinted`] with [`Decay::PerIteration`]: eq. 15 with all rows, δ decaying once for each pass. The
-//!   steps sum to a finite length: what is left of a linear error after all of them is about e^(−δ₀/(1 − μ)) =
-//!   e^(−16).
+//!   steps sum to a finite length: the remaining share of a linear error is about e^(−δ₀/(1 − μ)) = e^(−16).
 //! - [`Form::Robust`]: scaled columns and Nielsen's damping as in [`lm`](crate::least_squares::lm);
-//!   δ falls only where a step is refused (halved) and grows back (÷ μ, at most 1) where one is taken.
+//!   δ is halved when a step is refused and grows (÷ μ, at most 1) when one is accepted.
 //!
 //! **Shapes.** As in `lm`.
 //!
@@ -18,9 +16,9 @@
 //!
 //! **Source and departures.** Li et al. 2023, eq. 15, Algorithm 1 lines 16 to 21. λ is not stated; 5 is taken
 //! over from ltlm-2024, by the same group. The paper's sign is that of E = Z − Z′. Its line 17 (X₀ = x_ukf
-//! inside the loop) undoes each iteration: `restart` has it, off unless
-//! [`ukf_vslm`](crate::filter::ukf_vslm) turns it on. A fixed decay cannot be right for every
-//! problem: it fixes how far the method can travel before it starts.
+//! inside the loop) discards each iteration: option `restart`, off unless
+//! [`ukf_vslm`](crate::filter::ukf_vslm) sets it. A fixed decay is not suitable for every problem: it limits the total
+//! length of the steps in advance.
 //!
 //! **Checked against** the printed recurrence by hand, and published minima for the sound form.
 
@@ -37,18 +35,18 @@ use crate::problem::{Problem, observations};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Decay {
-    /// After each observation, as Algorithm 1 has it.
+    /// After each observation, as in Algorithm 1.
     PerSample,
-    /// After each pass over all rows, as the text of eq. 15 has it.
+    /// After each pass over all rows, as in the text of eq. 15.
     #[default]
     PerIteration,
 }
 
-/// How [`solve`] searches.
+/// Options of [`solve`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
 pub struct Options {
-    /// As printed, or sound.
+    /// As printed or sound.
     pub form: Form,
     /// When δ decays (as printed).
     pub decay: Decay,
@@ -56,25 +54,25 @@ pub struct Options {
     pub lambda: f64,
     /// δ₀: first step size.
     pub step_size: f64,
-    /// μ: what δ is multiplied by.
+    /// μ: decay factor of δ.
     pub decay_factor: f64,
-    /// Whether each iteration begins at the start again (Algorithm 1 line 17; as printed).
+    /// Whether each iteration restarts from the initial point (Algorithm 1 line 17; as printed).
     pub restart: bool,
     /// How the sound form computes its step.
     pub factorisation: Factorisation,
     /// First damping of the sound form, a pure number.
     pub initial_damping: f64,
-    /// Whether the priors of the problem take part.
+    /// Whether the priors of the problem are used.
     pub priors: bool,
-    /// Most iterations.
+    /// Iteration limit.
     pub max_iterations: usize,
-    /// Stop where what is left to gain (as printed: the relative change) is below this share of the cost.
+    /// Stop when the predicted reduction (as printed: the relative change) is below this share of the cost.
     pub cost_tolerance: f64,
-    /// Stop where the largest cosine between residuals and a column of J is below this (sound).
+    /// Stop when the largest cosine between residuals and a column of J is below this (sound).
     pub gradient_tolerance: f64,
-    /// Stop where the cost itself is below this.
+    /// Stop when the cost itself is below this.
     pub small_cost: f64,
-    /// Not used: the method draws nothing. Here so that all methods are called alike.
+    /// Unused: the method is deterministic. Present so that all methods have the same fields.
     pub seed: u64,
 }
 
@@ -145,7 +143,7 @@ impl Options {
 /// ```
 ///
 /// # Panics
-/// Where `start` does not have one entry for each parameter.
+/// If `start` does not have one entry for each parameter.
 pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimate {
     let mut objective = Objective::new(problem, start, options.priors);
     match (options.form, options.decay) {
@@ -186,7 +184,7 @@ fn per_sample(objective: &mut Objective<'_>, start: &[f64], options: &Options) -
         here = Point { x, at };
         trace.push(here.entry(moved.sqrt(), Some(delta), None, objective));
         if (before - here.at.cost()).abs() <= options.cost_tolerance * before {
-            // The step size has died out, which says nothing about a minimum.
+            // The step size has vanished, which does not imply a minimum.
             return here.finish(objective, Termination::Stalled, trace);
         }
     }
@@ -268,7 +266,7 @@ fn sound(objective: &mut Objective<'_>, start: &[f64], options: &Options) -> Est
             return here.finish(objective, end, trace);
         }
         trial.iter_mut().zip(&here.x).for_each(|(trial, x)| *trial = x + delta * (*trial - x));
-        // Along the step the model promises δ(2 − δ) of the whole reduction (exactly so without damping).
+        // Along the step the model predicts δ(2 − δ) of the whole reduction (exact without damping).
         let promised = delta * (2.0 - delta) * predicted.reduction;
         let at = Linearisation::at(objective, &trial, options.factorisation);
         let gain = (cost - at.cost()) / promised;

@@ -1,19 +1,19 @@
 //! Radial basis function network (RBF).
 //!
 //! **Method.** y(u) = Σₖ wₖ φ(|u − cₖ| / ρ): K centres cₖ, one weight for each centre and output. With fixed centres
-//! this is linear in the weights, so that the fit is a linear [`Problem`] ([`Task`]): row i sees the outputs through
-//! its own factors mᵢ, residual rᵢ = mᵢ · y(uᵢ) − tᵢ. A cable that sees one direction of a displacement is such a row.
-//! - [`Form::AsPrinted`]: a centre on every point, Gaussian φ with ρ the mean distance between neighbours, weights of
-//!   next to no prior: the network interpolates its rows, noise included.
+//! this is linear in the weights, so the fit is a linear [`Problem`] ([`Task`]): row i has factors mᵢ for the outputs and
+//! residual rᵢ = mᵢ · y(uᵢ) − tᵢ. An example is a cable, which measures one direction of a displacement.
+//! - [`Form::AsPrinted`]: a centre on every point, Gaussian φ with ρ the mean distance between neighbours, almost no prior
+//!   on the weights: the network interpolates its rows, noise included.
 //! - [`Form::Robust`]: few centres, spread out over the points; φ of compact support (see [`radial`]), ρ three fill
-//!   distances; a normal prior on the weights, whose standard deviation is the size that the function may have.
+//!   distances; a normal prior on the weights, whose standard deviation is the expected size of the function.
 //!
 //! **Shapes.** `D` inputs, m outputs, K centres: m·K weights, output by output for each centre.
 //!
 //! **Stops.** Those of [`gauss_newton`], which is exact in one step here.
 //!
-//! **Region.** [`Network::value`] is `None` beyond the reach of every centre: a network knows nothing where nothing was
-//! measured, and must not be asked there.
+//! **Region.** [`Network::value`] is `None` beyond the reach of every centre: a network must not extrapolate beyond the
+//! measured region.
 //!
 //! **Source and departures.** M5 of ukf-vslm-2023, without equations or numbers; its reference (Chen et al. 2019, doi
 //! 10.1088/1361-6501/ab2106) predicts the position error of a target position from errors measured near it. Its 400
@@ -31,11 +31,11 @@ use crate::least_squares::{Form, gauss_newton};
 use crate::problem::{Prior, Problem};
 use truegrind_math::radial;
 
-/// How a network is laid out and trained.
+/// Options of a network and its training.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
 pub struct Options {
-    /// As printed, or sound.
+    /// As printed or sound.
     pub form: Form,
     /// K (sound).
     pub centres: usize,
@@ -43,7 +43,7 @@ pub struct Options {
     pub reach: f64,
     /// Prior standard deviation of a weight, in the unit of the outputs.
     pub weight_sigma: f64,
-    /// Not used: the method draws nothing. Here so that all methods are called alike.
+    /// Unused: the method is deterministic. Present so that all methods have the same fields.
     pub seed: u64,
 }
 
@@ -60,7 +60,7 @@ impl Options {
     }
 }
 
-/// Where the bumps stand and what shape they have.
+/// Centres and shape of the basis functions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layout<const D: usize> {
     /// The centres.
@@ -72,7 +72,7 @@ pub struct Layout<const D: usize> {
 }
 
 impl<const D: usize> Layout<D> {
-    /// Places the centres for `points`. Points that are not finite are passed over.
+    /// Chooses the centres for `points`. Non-finite points are ignored.
     pub fn of(points: &[[f64; D]], options: &Options) -> Self {
         let most = if options.form == Form::AsPrinted { points.len() } else { options.centres };
         let (centres, fill) = radial::farthest_point_sample(points, most);
@@ -86,13 +86,13 @@ impl<const D: usize> Layout<D> {
             .filter(|d| d.is_finite())
             .collect();
         let apart = neighbours.iter().sum::<f64>() / neighbours.len().max(1) as f64;
-        // With a centre on every point nothing is left to fill.
+        // With a centre on every point the fill distance is 0.
         let fill = if fill > 0.0 { fill } else { apart };
         let reach = if options.form == Form::AsPrinted { apart } else { options.reach * fill };
         Self { centres, reach: if reach > 0.0 { reach } else { 1.0 }, form: options.form }
     }
 
-    /// Value of bump k at u.
+    /// Value of basis function k at u.
     pub fn bump(&self, k: usize, u: &[f64; D]) -> f64 {
         match self.form {
             Form::Robust => radial::wendland(u, &self.centres[k], self.reach),
@@ -109,7 +109,7 @@ impl<const D: usize> Layout<D> {
 /// A trained network.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Network<const D: usize> {
-    /// Where the bumps stand.
+    /// The basis functions.
     pub layout: Layout<D>,
     /// Number of outputs m.
     pub outputs: usize,
@@ -134,7 +134,7 @@ impl<const D: usize> Network<D> {
 /// The linear problem of training: one parameter for each weight.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Task<const D: usize> {
-    /// Where the bumps stand.
+    /// The basis functions.
     pub layout: Layout<D>,
     /// Number of outputs m.
     pub outputs: usize,
@@ -142,7 +142,7 @@ pub struct Task<const D: usize> {
     pub points: Vec<[f64; D]>,
     /// Factor of each output in each row, m for each row, divided by the row's standard deviation.
     pub factors: Vec<f64>,
-    /// What each row should give, divided by its standard deviation.
+    /// Target of each row, divided by its standard deviation.
     pub targets: Vec<f64>,
     priors: Vec<Prior>,
 }
@@ -151,7 +151,7 @@ impl<const D: usize> Task<D> {
     /// Sets up the problem.
     ///
     /// # Panics
-    /// Where points, factors and targets do not belong to the same rows: an error of the calling code.
+    /// If points, factors and targets do not have the same number of rows: a programming error.
     pub fn new(points: Vec<[f64; D]>, factors: Vec<f64>, targets: Vec<f64>, options: &Options) -> Self {
         let outputs = factors.len() / points.len().max(1);
         assert_eq!(factors.len(), outputs * points.len(), "as many factors in each row");
@@ -162,7 +162,7 @@ impl<const D: usize> Task<D> {
         Self { layout, outputs, points, factors, targets, priors }
     }
 
-    /// The network that weights stand for.
+    /// The network with these weights.
     pub fn network(&self, weights: &[f64]) -> Network<D> {
         Network { layout: self.layout.clone(), outputs: self.outputs, weights: weights.to_vec() }
     }
@@ -214,7 +214,7 @@ impl<const D: usize> Problem for Task<D> {
 /// Trains: the weights that minimise the cost of `problem`, which is linear ([`Task`]).
 ///
 /// # Panics
-/// Where `start` does not have one entry for each weight.
+/// If `start` does not have one entry for each weight.
 pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimate {
     let search = gauss_newton::Options { seed: options.seed, ..gauss_newton::Options::default() };
     gauss_newton::solve(problem, start, &search)

@@ -1,26 +1,26 @@
 //! Beetle antennae search.
 //!
-//! **Method.** One beetle at u; in a random direction b of unit length its antennae smell f(u + d b) and f(u −
-//! d b), and it steps δ against the stronger smell: u ← u − δ b sign(f(u + d b) − f(u − d b)).
-//! - [`Form::AsPrinted`]: d ← 0.95 d + 0.01 and δ ← 0.95 δ at each iteration, whatever happened. As δ dies out
-//!   geometrically the beetle can travel at most δ₀/(1 − 0.95) = 20 δ₀ in all.
-//! - [`Form::Robust`]: the beetle moves only where that lowers the cost; δ shrinks after a failure and grows
-//!   after a success, and d follows δ.
+//! **Method.** One beetle at u evaluates the cost at its antennae, f(u + d b) and f(u − d b), in a random direction b of
+//! unit length, and steps δ away from the larger one: u ← u − δ b sign(f(u + d b) − f(u − d b)).
+//! - [`Form::AsPrinted`]: d ← 0.95 d + 0.01 and δ ← 0.95 δ at each iteration, regardless of success. As δ decays
+//!   geometrically, the beetle can travel at most δ₀/(1 − 0.95) = 20 δ₀ in total.
+//! - [`Form::Robust`]: the beetle moves only if that lowers the cost; δ shrinks after a failure and grows after a success,
+//!   and d follows δ.
 //!
 //! **Shapes.** u in [−1, 1]ᵖ, clamped to the box. Three evaluations for each iteration.
 //!
 //! **Stops.** *IterationLimit*, *SmallResidual*, *NotFinite*.
 //!
 //! **Source and departures.** M2 of ukf-vslm-2023, without equations: Jiang and Li, "BAS: beetle antennae
-//! search algorithm for optimization problems", 2017 (arXiv 1710.10724), with the sign for a minimum. Its factor
-//! 0.95 and its 0.01 are kept, and so is its way of taking a step whatever it brings and giving out the best place met. It
-//! begins anywhere in its box; here the walk begins at `start`.
+//! search algorithm for optimization problems", 2017 (arXiv 1710.10724), with the sign for a minimum. The factor 0.95, the
+//! 0.01, the unconditional steps and the return of the best position are the original's. The original starts anywhere in its
+//! box; here the walk starts at `start`.
 //!
-//! δ₀ is this library's reading: the package of its authors (rBAS) has 0.8 for two parameters in a box of 5 by 2, ukf-vslm-2023
-//! states none, and the default here is half of the box. It decides everything. In 24 parameters of an arm a first step of half the box throws
-//! the beetle so far from a start as good as registered frames that it never comes back below it: on simulated rows the
-//! result *is* the start (0.556 mm RMSE, 120 cable rows). With a tenth of that, the best of eight first steps tried,
-//! 0.383 mm are left, and 0.282 by the sound form. The experiments of ukf-vslm-2023 therefore state a tenth.
+//! δ₀ is chosen here: the authors' package (rBAS) has 0.8 for two parameters in a box of 5 by 2, ukf-vslm-2023 states none,
+//! and the default is half of the box. It determines the result. With 24 parameters of an arm a first step of half the box
+//! moves the beetle so far from a start as good as registered frames that its cost never falls below the start's: on
+//! simulated rows the result is the start (0.556 mm RMSE, 120 cable rows). With a tenth of it, the best of eight first steps,
+//! the RMSE is 0.383 mm, and 0.282 mm in the sound form. The experiments of ukf-vslm-2023 therefore state a tenth.
 //!
 //! **Checked against** published problems of few parameters.
 
@@ -34,11 +34,11 @@ use crate::least_squares::Form;
 use crate::problem::Problem;
 use crate::swarm::{Region, Search, distance};
 
-/// How [`solve`] searches.
+/// Options of [`solve`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
 pub struct Options {
-    /// As printed, or sound.
+    /// As printed or sound.
     pub form: Form,
     /// Iterations.
     pub max_iterations: usize,
@@ -46,15 +46,15 @@ pub struct Options {
     pub step: f64,
     /// d₀: first length of the antennae.
     pub antennae: f64,
-    /// What δ and d are multiplied by.
+    /// Decay factor of δ and d.
     pub decay: f64,
-    /// The box that is searched.
+    /// Search box.
     pub region: Region,
-    /// Whether the priors of the problem count in the cost.
+    /// Whether the cost includes the priors of the problem.
     pub priors: bool,
-    /// Stop where the cost is below this.
+    /// Stop when the cost is below this.
     pub small_cost: f64,
-    /// Seed of all draws.
+    /// Seed of all random draws.
     pub seed: u64,
 }
 
@@ -75,7 +75,7 @@ impl Default for Options {
 }
 
 impl Options {
-    /// The algorithm of 2017, priors not counted.
+    /// The algorithm of 2017, without priors.
     pub fn as_printed() -> Self {
         Self { form: Form::AsPrinted, priors: false, ..Self::default() }
     }
@@ -84,7 +84,7 @@ impl Options {
 /// Searches the box around `start`.
 ///
 /// # Panics
-/// Where `start` does not have one entry for each parameter.
+/// If `start` does not have one entry for each parameter.
 pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimate {
     walk(problem, start, options, false)
 }
@@ -127,7 +127,7 @@ pub(super) fn walk(problem: &dyn Problem, start: &[f64], options: &Options, inte
             delta *= options.decay;
             d = options.decay * d + 0.01;
         } else {
-            // One success in about five keeps the step as it is.
+            // One success in about five leaves the step unchanged.
             delta = if better { (delta / options.decay.powi(4)).min(2.0) } else { delta * options.decay };
             d = 0.5 * delta;
         }
@@ -135,8 +135,7 @@ pub(super) fn walk(problem: &dyn Problem, start: &[f64], options: &Options, inte
     search.finish()
 }
 
-/// Where the parabola through (−d, left), (0, middle), (d, right) has its lowest point, within twice the
-/// antennae.
+/// Minimum of the parabola through (−d, left), (0, middle), (d, right), within twice the antennae.
 fn vertex(d: f64, left: f64, middle: f64, right: f64) -> Option<f64> {
     let curvature = left - 2.0 * middle + right;
     let t = 0.5 * d * (left - right) / curvature;

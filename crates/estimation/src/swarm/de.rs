@@ -6,8 +6,7 @@
 //! - [`Form::Robust`]: current-to-best/1/bin, u_i + F(best − u_i) + F(u_a − u_b), F drawn anew in [0.5, 1) for
 //!   each member (dither), CR = 0.9; the start is a member.
 //!
-//! **Shapes.** u in [−1, 1]ᵖ; a coordinate that leaves the box is put halfway between the wall and where it
-//! came from.
+//! **Shapes.** u in [−1, 1]ᵖ; a coordinate that leaves the box is set halfway between the wall and its previous value.
 //!
 //! **Stops.** *IterationLimit*, *SmallResidual*, *NotFinite*.
 //!
@@ -26,11 +25,11 @@ use crate::least_squares::Form;
 use crate::problem::Problem;
 use crate::swarm::{Region, Search, distance, uniform_position};
 
-/// How [`solve`] searches.
+/// Options of [`solve`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
 pub struct Options {
-    /// As printed, or sound.
+    /// As printed or sound.
     pub form: Form,
     /// Members; 0 for ten times the number of parameters.
     pub population: usize,
@@ -40,13 +39,13 @@ pub struct Options {
     pub factor: f64,
     /// CR.
     pub crossover: f64,
-    /// The box that is searched.
+    /// Search box.
     pub region: Region,
-    /// Whether the priors of the problem count in the cost.
+    /// Whether the cost includes the priors of the problem.
     pub priors: bool,
-    /// Stop where the cost is below this.
+    /// Stop when the cost is below this.
     pub small_cost: f64,
-    /// Seed of all draws.
+    /// Seed of all random draws.
     pub seed: u64,
 }
 
@@ -67,7 +66,7 @@ impl Default for Options {
 }
 
 impl Options {
-    /// rand/1/bin, priors not counted.
+    /// rand/1/bin, without priors.
     pub fn as_printed() -> Self {
         Self { form: Form::AsPrinted, priors: false, ..Self::default() }
     }
@@ -78,7 +77,7 @@ impl Options {
 /// ```
 /// use truegrind_estimation::swarm::de;
 ///
-/// // A straight line, from the costs alone: near 1.50 and 0.20, without a claim to have converged, the same for the same seed.
+/// // A straight line, from the costs alone: near 1.50 and 0.20, not reported as converged, and reproducible with the same seed.
 /// # use std::ops::Range;
 /// # use truegrind_estimation::problem::{Prior, Problem};
 /// # struct Line;
@@ -110,7 +109,7 @@ impl Options {
 /// ```
 ///
 /// # Panics
-/// Where `start` does not have one entry for each parameter.
+/// If `start` does not have one entry for each parameter.
 pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimate {
     let p = start.len();
     let n = if options.population == 0 { 10 * p } else { options.population }.max(4);

@@ -6,8 +6,7 @@
 //! - [`Form::Robust`]: Clerc's constriction (ω = 0.7298, c = 1.4962), for which a swarm is known to contract;
 //!   the start is one of the particles.
 //!
-//! **Shapes.** u in [−1, 1]ᵖ; a particle that leaves the box is put on its wall and loses that part of its
-//! velocity.
+//! **Shapes.** u in [−1, 1]ᵖ; a particle that leaves the box is set on its wall and loses that component of its velocity.
 //!
 //! **Stops.** *IterationLimit*, *SmallResidual*, *NotFinite* where no particle ever had a finite cost.
 //!
@@ -26,23 +25,23 @@ use crate::least_squares::Form;
 use crate::problem::Problem;
 use crate::swarm::{Region, Search, distance, uniform_position};
 
-/// How [`solve`] searches.
+/// Options of [`solve`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
 pub struct Options {
-    /// As printed, or sound.
+    /// As printed or sound.
     pub form: Form,
     /// Particles.
     pub population: usize,
     /// Iterations.
     pub max_iterations: usize,
-    /// The box that is searched.
+    /// Search box.
     pub region: Region,
-    /// Whether the priors of the problem count in the cost.
+    /// Whether the cost includes the priors of the problem.
     pub priors: bool,
-    /// Stop where the cost is below this.
+    /// Stop when the cost is below this.
     pub small_cost: f64,
-    /// Seed of all draws.
+    /// Seed of all random draws.
     pub seed: u64,
 }
 
@@ -61,7 +60,7 @@ impl Default for Options {
 }
 
 impl Options {
-    /// The inertia weight of 1998, priors not counted.
+    /// The inertia weight of 1998, without priors.
     pub fn as_printed() -> Self {
         Self { form: Form::AsPrinted, priors: false, ..Self::default() }
     }
@@ -72,7 +71,7 @@ impl Options {
 /// ```
 /// use truegrind_estimation::swarm::pso;
 ///
-/// // A straight line, from the costs alone: near 1.50 and 0.20, without a claim to have converged, the same for the same seed.
+/// // A straight line, from the costs alone: near 1.50 and 0.20, not reported as converged, and reproducible with the same seed.
 /// # use std::ops::Range;
 /// # use truegrind_estimation::problem::{Prior, Problem};
 /// # struct Line;
@@ -104,7 +103,7 @@ impl Options {
 /// ```
 ///
 /// # Panics
-/// Where `start` does not have one entry for each parameter.
+/// If `start` does not have one entry for each parameter.
 pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimate {
     let p = start.len();
     let n = options.population.max(1);

@@ -2,10 +2,10 @@
 //!
 //! **Method.** u ← u + r₁ sin r₂ |r₃ P − u| or, with even odds, u + r₁ cos r₂ |r₃ P − u|, where P is the best
 //! position so far, r₂ uniform in [0, 2π), r₃ in [0, 2), and r₁ falls linearly from a = 2 to 0.
-//! - [`Form::AsPrinted`]: as above. |r₃ P − u| depends on where the origin is: the method is drawn to u = 0,
-//!   which here is the start. On deviations from a data sheet, most of which are small, that flatters it.
-//! - [`Form::Robust`]: r₃ = 1, so that only differences of positions count, and a member moves only where that
-//!   lowers its cost; the start is a member.
+//! - [`Form::AsPrinted`]: as above. |r₃ P − u| depends on the origin: the method is biased towards u = 0, which is the start
+//!   here. This is an advantage for deviations from a data sheet, most of which are small.
+//! - [`Form::Robust`]: r₃ = 1, so that only differences of positions count, and a member moves only if that lowers its
+//!   cost; the start is a member.
 //!
 //! **Shapes.** u in [−1, 1]ᵖ, clamped to the box.
 //!
@@ -27,11 +27,11 @@ use crate::least_squares::Form;
 use crate::problem::Problem;
 use crate::swarm::{Region, Search, distance, uniform_position};
 
-/// How [`solve`] searches.
+/// Options of [`solve`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
 pub struct Options {
-    /// As printed, or sound.
+    /// As printed or sound.
     pub form: Form,
     /// Members.
     pub population: usize,
@@ -39,13 +39,13 @@ pub struct Options {
     pub max_iterations: usize,
     /// a: first size of the moves.
     pub amplitude: f64,
-    /// The box that is searched.
+    /// Search box.
     pub region: Region,
-    /// Whether the priors of the problem count in the cost.
+    /// Whether the cost includes the priors of the problem.
     pub priors: bool,
-    /// Stop where the cost is below this.
+    /// Stop when the cost is below this.
     pub small_cost: f64,
-    /// Seed of all draws.
+    /// Seed of all random draws.
     pub seed: u64,
 }
 
@@ -65,7 +65,7 @@ impl Default for Options {
 }
 
 impl Options {
-    /// The algorithm of 2016, priors not counted.
+    /// The algorithm of 2016, without priors.
     pub fn as_printed() -> Self {
         Self { form: Form::AsPrinted, priors: false, ..Self::default() }
     }
@@ -74,7 +74,7 @@ impl Options {
 /// Searches the box around `start`.
 ///
 /// # Panics
-/// Where `start` does not have one entry for each parameter.
+/// If `start` does not have one entry for each parameter.
 pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimate {
     let p = start.len();
     let n = options.population.max(1);
