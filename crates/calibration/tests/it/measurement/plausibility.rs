@@ -62,7 +62,7 @@ fn a_proper_file_is_not_doubted() {
 fn lengths_in_other_units_are_named() {
     for data in sensors() {
         for (unit, words) in [
-            (LengthUnit::Metres, "metres: so read"),
+            (LengthUnit::Metres, "metres: read that way"),
             (LengthUnit::Inches, "inches"),
             (LengthUnit::Centimetres, "centimetres"),
         ] {
