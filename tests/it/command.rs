@@ -326,7 +326,7 @@ fn numbers_that_no_measurement_has_are_named_by_cell() {
     refused(&changed(&["q2"], at(9, "1e9")), &["data.csv", "row 11", "column q2", "3600"]);
     // Two columns that changed places, and a file whose header is missing.
     let swapped = CABLE.replacen("q2,q3", "q3,q2", 1);
-    refused(&swapped, &["data.csv", "columns changed places"]);
+    refused(&swapped, &["data.csv", "no two columns are swapped"]);
     let headless: String = CABLE.lines().skip(1).map(|line| format!("{line}\n")).collect();
     refused(&headless, &["put a header line"]);
 }
@@ -533,7 +533,7 @@ fn plan_writes_a_program_and_the_log_to_fill_in() {
         ],
     );
     assert!(code == 0 || code == 1, "{err}");
-    assert!(out.contains("What the rows can decide") && out.contains("backlash"), "{out}");
+    assert!(out.contains("Detectable effects") && out.contains("backlash"), "{out}");
     let program = fs::read_to_string(at.join("poses.mod")).unwrap();
     let rows = fs::read_to_string(at.join("rows.csv")).unwrap();
     // As many as rows, and one in a comment: the header line of the table makes up for it.

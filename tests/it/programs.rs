@@ -717,7 +717,7 @@ fn a_task_list_reads_no_device_and_nothing_outside_its_folder_unless_told() {
     for module in ["/dev/zero", "zero.mod", "sub", "/dev/stdin"] {
         for more in [&[][..], &["--outside"]] {
             let (code, _, err) = run(module, more);
-            assert!(code == 2 && err.contains("plain file"), "{module} {more:?}: {code} {err}");
+            assert!(code == 2 && err.contains("regular file"), "{module} {more:?}: {code} {err}");
         }
     }
 }

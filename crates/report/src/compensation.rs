@@ -348,7 +348,7 @@ fn split_reason(why: &OutcomeReason) -> (String, Option<(f64, &'static str)>) {
             plain("inverse kinematics did not converge")
         }
         OutcomeReason::CorrectionTooLarge { mm } => {
-            sized("correction exceeds --max-correction".to_owned(), mm, "mm")
+            sized("correction exceeds the bound (--max-correction)".to_owned(), mm, "mm")
         }
         OutcomeReason::RotationTooLarge { deg } => {
             sized("correction of the orientation exceeds its limit".to_owned(), deg, "°")
@@ -370,9 +370,11 @@ fn split_reason(why: &OutcomeReason) -> (String, Option<(f64, &'static str)>) {
             ratio,
             "× limit",
         ),
-        OutcomeReason::JointNotMeasured { joint, by_deg } => {
-            sized(format!("joint {} is outside the measured range", joint + 1), by_deg, "°")
-        }
+        OutcomeReason::JointNotMeasured { joint, by_deg } => sized(
+            format!("joint {} is outside the range in which the arm was measured", joint + 1),
+            by_deg,
+            "°",
+        ),
         OutcomeReason::PartOfCut { because, .. } => plain(&format!(
             "a cut is corrected as a whole or not at all, and another motion of this cut is not corrected: {because}"
         )),

@@ -51,7 +51,7 @@ enum PlacementArgument {
     `truegrind cell PROGRAM… -o cell.toml` writes a cell file in which you fill them in; docs/nc.md has a complete example for \
     each of Fanuc style, 840D, LinuxCNC and Heidenhain."
 )]
-pub(in crate::cli) struct Arguments {
+pub(crate) struct Arguments {
     /// Programs to correct: RAPID modules of one task, .pgf task lists, NC files, or folders of them.
     #[arg(required = true)]
     pub(super) programs: Vec<PathBuf>,

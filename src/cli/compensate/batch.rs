@@ -18,23 +18,23 @@ use crate::cli::programs::Job;
 use crate::cli::shares::UnitResult;
 
 /// The result for one program.
-pub(in crate::cli) struct ProgramResult {
-    pub(in crate::cli) row: Row,
+pub(crate) struct ProgramResult {
+    pub(crate) row: Row,
     /// Files to write, with their bytes.
-    pub(in crate::cli) written: Vec<(PathBuf, Vec<u8>)>,
-    pub(in crate::cli) diff: Vec<u8>,
+    pub(crate) written: Vec<(PathBuf, Vec<u8>)>,
+    pub(crate) diff: Vec<u8>,
     /// Messages for stderr.
-    pub(in crate::cli) notes: Vec<String>,
+    pub(crate) notes: Vec<String>,
     /// Whether the program may run without a look at the report: nothing was refused, flagged or doubtful.
-    pub(in crate::cli) clean: bool,
+    pub(crate) clean: bool,
     /// Whether any byte changes.
-    pub(in crate::cli) changed: bool,
+    pub(crate) changed: bool,
     /// Motions left unchanged because no file declares the data they use.
-    pub(in crate::cli) undeclared: usize,
+    pub(crate) undeclared: usize,
     /// Its entries in the JSON report; `None` if no requested output shows them.
-    pub(in crate::cli) json: Option<Vec<Value>>,
+    pub(crate) json: Option<Vec<Value>>,
     /// The entries of the cell file that it uses; `None` if it was not examined.
-    pub(in crate::cli) used: Option<Used>,
+    pub(crate) used: Option<Used>,
 }
 
 impl ProgramResult {
@@ -138,16 +138,16 @@ impl<J> RecordIn<J> {
 
 /// What the exit code depends on besides the results.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::cli) struct ExitCriteria {
+pub(crate) struct ExitCriteria {
     /// The model is nominal, so nothing was to be corrected.
-    pub(in crate::cli) nominal: bool,
+    pub(crate) nominal: bool,
     /// `--check`: nothing is expected to change.
-    pub(in crate::cli) check: bool,
+    pub(crate) check: bool,
 }
 
 impl ExitCriteria {
     /// `clean`: nothing was refused or flagged; `changed`: something was rewritten.
-    pub(in crate::cli) fn exit_status(self, clean: bool, changed: bool) -> ExitStatus {
+    pub(crate) fn exit_status(self, clean: bool, changed: bool) -> ExitStatus {
         let as_expected = match self.nominal {
             true => true,
             false if self.check => !changed,
@@ -156,7 +156,7 @@ impl ExitCriteria {
         if clean && as_expected { ExitStatus::Done } else { ExitStatus::Flagged }
     }
 
-    pub(in crate::cli) fn to_value(self) -> Value {
+    pub(crate) fn to_value(self) -> Value {
         json!({ "nominal": self.nominal, "check": self.check })
     }
 
@@ -167,15 +167,15 @@ impl ExitCriteria {
 }
 
 /// The reports over many programs.
-pub(in crate::cli) struct BatchReports<'a> {
-    pub(in crate::cli) outputs: &'a Outputs,
-    pub(in crate::cli) diff: Option<&'a Path>,
-    pub(in crate::cli) criteria: ExitCriteria,
+pub(crate) struct BatchReports<'a> {
+    pub(crate) outputs: &'a Outputs,
+    pub(crate) diff: Option<&'a Path>,
+    pub(crate) criteria: ExitCriteria,
 }
 
 impl BatchReports<'_> {
     /// Prints and writes them. `is_part`: one job of a shared run, which does not fail even if all its programs do.
-    pub(in crate::cli) fn write(
+    pub(crate) fn write(
         &self,
         done: Vec<ProgramResult>,
         mut batch: Batch,
@@ -208,7 +208,7 @@ impl BatchReports<'_> {
 }
 
 /// The reports of a shared run, made from the records of its programs.
-pub(in crate::cli) fn gathered(
+pub(crate) fn gathered(
     done: Vec<ProgramResult>,
     context: &Value,
     outputs: &Outputs,

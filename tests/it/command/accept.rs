@@ -121,7 +121,7 @@ fn the_orientation_is_told_and_judged_where_that_is_asked_for() {
         accept("later.csv", &["--tolerance-angle", "2", "--sensor-uncertainty-angle", "0.01"]);
     let said = on_one_line(&out);
     assert!(
-        code == 0 && said.contains("; largest orientation error") && said.contains("the tolerance 2.0000°"),
+        code == 0 && said.contains("; largest orientation error") && said.contains(", tolerance 2.0000°"),
         "{out}"
     );
     let half = format!("{}", 0.5 * largest);

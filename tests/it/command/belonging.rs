@@ -298,7 +298,7 @@ fn a_plan_keeps_above_the_floor_and_out_of_boxes() {
     for (wrong, words) in [
         (&["--keep-out", "1,2,3"][..], ["--keep-out", "two corners"]),
         (&["--keep-out", "0,0,0,0,1,1"], ["--keep-out", "two corners"]),
-        (&["--link-radius", "-3"], ["--link-radius", "0 or more"]),
+        (&["--link-radius", "-3"], ["--link-radius", "0 up to the reach"]),
         (&["--floor", "nan"], ["--floor", "mm"]),
         (&["--keep-out=-900,-900,-900,900,900,900"], ["box to keep out of", "smaller"]),
     ] {

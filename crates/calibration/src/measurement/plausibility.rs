@@ -158,7 +158,7 @@ pub struct InterpretationError {
 /// let found = plausibility(&data, &arm, AngleConvention::Logged);
 /// assert_eq!(found.len(), 1);
 /// assert_eq!(found[0].likely.lengths, LengthUnit::Inches);
-/// # Ok::<(), Box<dyn std::interpretation_error::Error>>(())
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn plausibility(data: &Dataset, model: &Model, stated: AngleConvention) -> Vec<UnitSuspicion> {
     let stride = data.rows.len().div_ceil(ROWS).max(1);

@@ -8,7 +8,7 @@ use truegrind_programs::motion::Reason;
 /// Reason for the status of a motion.
 ///
 /// ```
-/// use truegrind_compensation::plan::reason::Why;
+/// use truegrind_compensation::plan::reason::OutcomeReason;
 ///
 /// assert_eq!(OutcomeReason::OutsideLimits { joint: 4 }.to_string(), "joint 5 would exceed its limits");
 /// let far = OutcomeReason::CorrectionTooLarge { mm: 3.25 };

@@ -187,7 +187,7 @@ fn what_makes_up_for_an_unseen_link_is_named() {
     let with = |name: &str| sentences.iter().find(|s| s.starts_with(name)).copied().unwrap_or_default();
     assert_eq!(
         with("link1.d"),
-        "link1.d +1.0 mm is not identifiable when outlet.z +1.0 mm follows",
+        "link1.d +1.0 mm together with outlet.z +1.0 mm is not identifiable",
         "{sentences:?}"
     );
     assert!(with("link6.d").contains("target.z −1.0 mm"), "{sentences:?}");

@@ -78,9 +78,9 @@ fn a_coupled_joint_is_told_in_words() {
     sheet.published.clear();
     let robot = Robot::new(sheet, "test.toml").unwrap();
     let notes = view::joint_table(&robot).notes.join("\n");
-    assert!(notes.contains("rotation of joint 2 is −q2 of"), "{notes}");
-    assert!(notes.contains("rotation of joint 3 is q2 + q3 of"), "{notes}");
-    assert!(notes.contains("rotation of joint 6 is −0.5 · q5 + q6 of"), "{notes}");
+    assert!(notes.contains("rotation of joint 2 is −q2 in"), "{notes}");
+    assert!(notes.contains("rotation of joint 3 is q2 + q3 in"), "{notes}");
+    assert!(notes.contains("rotation of joint 6 is −0.5 · q5 + q6 in"), "{notes}");
     assert!(!notes.contains("joint 1"), "{notes}");
     // Without a published pose the page says that nothing checks the links.
     assert!(markdown::document(&view::document(&robot)).contains("nothing checks the links"));
