@@ -351,7 +351,7 @@ pub enum ExperimentError {
         file: String,
         /// Line, from 1.
         line: usize,
-        /// What was found and expected.
+        /// Found and expected.
         message: String,
     },
     /// A value that cannot be used.
@@ -363,7 +363,7 @@ pub enum ExperimentError {
         key: String,
         /// Value.
         found: String,
-        /// What it should be.
+        /// Expected values.
         expected: String,
     },
     /// Fewer rows than the protocol asks for.

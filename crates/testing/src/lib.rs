@@ -1,6 +1,6 @@
 //! Helpers shared by the tests of several crates; independent of robots.
 
-// A test that cannot go on panics.
+// Test helpers panic on failure.
 #![allow(clippy::unwrap_used, clippy::missing_panics_doc)]
 
 pub mod absurd;

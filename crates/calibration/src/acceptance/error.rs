@@ -15,7 +15,7 @@ pub enum AcceptError {
     Length {
         /// Which.
         name: &'static str,
-        /// What was found.
+        /// Stated value.
         found: f64,
     },
     /// The tolerance or the uncertainty of the orientation is no valid angle.
@@ -23,7 +23,7 @@ pub enum AcceptError {
     Angle {
         /// Which.
         name: &'static str,
-        /// What was found (°).
+        /// Stated value (°).
         found: f64,
     },
     /// The rows of the fit.

@@ -47,9 +47,9 @@ pub enum TrackError {
     Sensor {
         /// File.
         file: String,
-        /// What it has.
+        /// Sensor of the file.
         found: &'static str,
-        /// What was tracked.
+        /// Sensor of the track.
         expected: String,
     },
     /// The state file cannot be used.
@@ -79,9 +79,9 @@ pub enum StateError {
     Value {
         /// Its key.
         key: String,
-        /// What was found.
+        /// Value found.
         found: String,
-        /// What was expected.
+        /// Expected values.
         expected: &'static str,
     },
 }

@@ -13,13 +13,13 @@
 //! parameters follow them where one cannot.
 //!
 //! The sums of a drift are sums of those of a jump: B_s = B_{s+1} + A_s, and Σ w² = 2 Σ w(w + 1)/2 − Σ w. With CCᵀ = P⁻¹ + A
-//! the product C⁻¹B is accumulated in place of B, since B(:,k)ᵀ M B(:,l) is the product of its columns k and l: a pose costs
+//! the product C⁻¹B is accumulated instead of B, since B(:,k)ᵀ M B(:,l) is the product of its columns k and l: a pose costs
 //! its rows times p², and p³ is spent only once.
 //!
 //! **Shapes.** n poses of m rows, p parameters: J is nm × p, column-major. n m p² + p³ operations.
 //!
 //! **Source and departures.** Willsky and Jones, "A generalized likelihood ratio approach to the detection and estimation
-//! of jumps in linear systems", IEEE TAC 21, 1976, with the drift beside the jump.
+//! of jumps in linear systems", IEEE TAC 21, 1976, extended by the drift.
 //!
 //! **Checked against** least squares with the change as an additional parameter.
 

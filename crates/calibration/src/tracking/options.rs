@@ -16,7 +16,7 @@ pub struct Options {
     pub drift_frame_mm: f64,
     /// Random walk of a frame's orientation from pose to pose (rad).
     pub drift_frame_rad: f64,
-    /// Random walks of single parameters in place of the above, by name (`link2.theta`), in mm or rad.
+    /// Random walks of single parameters that replace the above, by name (`link2.theta`), in mm or rad.
     pub drift: BTreeMap<String, f64>,
     /// Standard deviation of a reading (mm), unmodelled effects included. Where not stated: the residual of the first poses, but
     /// at least the model's held-out error.

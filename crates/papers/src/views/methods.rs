@@ -1,4 +1,4 @@
-//! Methods over cases: errors beside the paper's, verdict, cost, convergence, parameters, plots.
+//! Report of methods over cases: errors with the paper's, verdict, cost, convergence, parameters, plots.
 
 mod data;
 mod figures;

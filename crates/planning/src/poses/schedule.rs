@@ -80,7 +80,7 @@ pub enum Purpose {
     OtherSide,
     /// Again, for the noise floor.
     Repeat,
-    /// Again, for what changes with time.
+    /// Again, for changes over time.
     WarmUp,
 }
 
