@@ -169,17 +169,20 @@ impl<R: Real> FrameColumns<R> {
     /// A frame that is fixed to this one, in the base.
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub fn compose(&self, fixed: &FrameColumns<f64>) -> Self {
-        let mut origin = self.to_base(&fixed.origin);
+        let mut origin = self.direction_in_base(&fixed.origin);
         for (carried, base) in origin.iter_mut().zip(self.origin) {
             *carried += base;
         }
         let [x, y, z] = &fixed.axes;
-        Self { axes: [self.to_base(x), self.to_base(y), self.to_base(z)], origin }
+        Self {
+            axes: [self.direction_in_base(x), self.direction_in_base(y), self.direction_in_base(z)],
+            origin,
+        }
     }
 
     /// A direction of this frame, in the base.
     #[inline(always)]
-    fn to_base(&self, v: &[f64; 3]) -> [R; 3] {
+    fn direction_in_base(&self, v: &[f64; 3]) -> [R; 3] {
         let mut out = self.origin;
         let v = splats(out[0], v);
         for (k, out) in out.iter_mut().enumerate() {

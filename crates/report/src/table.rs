@@ -92,6 +92,9 @@ pub enum Cell {
     Missing,
 }
 
+/// A column with the function that makes its cells.
+pub type TypedColumn<T> = (Column, fn(&T) -> Cell);
+
 impl Table {
     /// An empty table.
     pub fn new(title: impl Into<String>, columns: Vec<Column>) -> Self {
@@ -102,7 +105,7 @@ impl Table {
     pub fn of<'r, T: 'r, const N: usize>(
         title: impl Into<String>,
         items: impl IntoIterator<Item = &'r T>,
-        columns: [(Column, fn(&T) -> Cell); N],
+        columns: [TypedColumn<T>; N],
     ) -> Self {
         let rows =
             items.into_iter().map(|item| columns.iter().map(|(_, cell)| cell(item)).collect()).collect();
