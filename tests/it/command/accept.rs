@@ -47,7 +47,7 @@ fn a_model_is_accepted_by_poses_of_its_own() {
     let (code, out, _) = accept("later.csv", &["0.001", "--sensor-uncertainty", "0.01"]);
     assert!(code == 1 && out.contains("[failed] Not accepted"), "{out}");
     let (code, _, err) = accept("poses.csv", &["1"]);
-    assert!(code == 2 && err.contains("the rows that the model was fitted to"), "{err}");
+    assert!(code == 2 && err.contains("the model was fitted to these rows"), "{err}");
     let few: String = fs::read_to_string(at.join("later.csv"))
         .unwrap()
         .lines()

@@ -128,7 +128,7 @@ struct FileDependencies {
     mixes_axes: bool,
 }
 
-/// The two causes in [`FileDependencies::held`].
+/// The two causes in [`FileDependencies::pinned`].
 const ORIGIN: usize = 0;
 const INCREMENT: usize = 1;
 

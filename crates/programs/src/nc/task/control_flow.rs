@@ -317,7 +317,7 @@ impl Interpreter<'_, '_> {
     }
 
     /// A call is listed; the pose after it is unknown. A program that is not in the file may also change the modal
-    /// state: it is assumed not to, and the call is listed in [`crate::motion::Listing::outside`].
+    /// state: it is assumed not to, and the call is listed in [`crate::motion::Listing::external_calls`].
     pub(super) fn subprogram(&mut self, block: &Block<'_>, name: &str) {
         if !self.calls_own_file(block) {
             self.listing.external_calls.push(self.listing.motions.len() as u32);
