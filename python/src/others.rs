@@ -8,10 +8,10 @@ use pyo3::prelude::*;
 use truegrind::calibration::tracking::first_poses as first_of;
 use truegrind::math::work::report_step;
 use truegrind::planning::poses::candidate::Bounds;
+use truegrind::planning::poses::keep_out::KeepOut;
 use truegrind::planning::poses::program::{ProgramSettings, draft};
 use truegrind::planning::poses::rows::Noise;
 use truegrind::planning::poses::schedule::Visits;
-use truegrind::planning::poses::keep_out::KeepOut;
 use truegrind::report::{format, planning, tracking};
 use truegrind::robots::foreign::ImportOptions;
 use truegrind::{

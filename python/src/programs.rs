@@ -4,21 +4,21 @@ use std::path::{Path, PathBuf};
 
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList, PyString, PyTuple};
-use truegrind::compensation::cell::robot_match::{cell_robot_mismatch, program_robot_mismatch};
 use truegrind::compensation::cell::Used;
-use truegrind::compensation::frames::surface_frames::surface_frame_contradictions;
-use truegrind::compensation::risk::placement::Placement;
-use truegrind::compensation::cell::robot_match::unreachable_motions;
 use truegrind::compensation::cell::nc_setup::cell_setup;
+use truegrind::compensation::cell::robot_match::unreachable_motions;
+use truegrind::compensation::cell::robot_match::{cell_robot_mismatch, program_robot_mismatch};
+use truegrind::compensation::frames::surface_frames::surface_frame_contradictions;
 use truegrind::compensation::frames::taught::contradictions;
+use truegrind::compensation::risk::placement::Placement;
 use truegrind::math::work::report_step;
 use truegrind::programs::rapid::task_list;
 use truegrind::report::compensation::{self as view, ProgramFile};
 use truegrind::report::{deviation as deviations, format};
 use truegrind::{
     ActingArm, After, Cell, Circles, CompensateOptions, CompensatePlan, Compensated, Condition, Cuts, Emit,
-    Estimated, VerificationTask, Listing, Mark, NcSetup, PathReport, Program, Status, SurfaceFile, compensate, verify,
-    robots,
+    Estimated, Listing, Mark, NcSetup, PathReport, Program, Status, SurfaceFile, VerificationTask,
+    compensate, robots, verify,
 };
 
 use crate::arm::Stated;
@@ -164,7 +164,7 @@ fn read_surface(path: &Path) -> PyResult<SurfaceFile> {
 
 /// Control settings of the robot file for NC programs; none for an unknown robot.
 fn nc_setup(cell: &Cell, robot: &str) -> NcSetup {
-    setup(cell, robots::load(robot).ok().and_then(|robot| robot.sheet.orientation()))
+    cell_setup(cell, robots::load(robot).ok().and_then(|robot| robot.sheet.orientation()))
 }
 
 /// For each file, whether it carries the mark of this model.
@@ -404,7 +404,8 @@ fn corrected(
         let message = format!("{name} is already compensated with this model: give the original program");
         return Err(Refusal::new(Kind::Program, message).of_file(name));
     }
-    let found: Vec<String> = surface.iter().flat_map(|surface| surface_frame_contradictions(listing, surface)).collect();
+    let found: Vec<String> =
+        surface.iter().flat_map(|surface| surface_frame_contradictions(listing, surface)).collect();
     if !found.is_empty() {
         return Err(Refusal::new(Kind::Cell, format!("{}: {}", sources.name(), found.join("; "))));
     }
@@ -550,7 +551,9 @@ impl Run<'_> {
         let original = self.originals.map(|original| original.task(&setup));
         for program in original.iter().chain([&task]) {
             let mut found = contradictions(program.listing(), cell, &arm.nominal);
-            found.extend(surface.iter().flat_map(|surface| surface_frame_contradictions(program.listing(), surface)));
+            found.extend(
+                surface.iter().flat_map(|surface| surface_frame_contradictions(program.listing(), surface)),
+            );
             if !found.is_empty() {
                 return Err(Refusal::new(Kind::Cell, found.join("; ")));
             }

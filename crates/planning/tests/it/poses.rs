@@ -341,7 +341,7 @@ fn boxes_between_the_poses_are_gone_round() {
     (options.poses, options.seed) = (150, 0);
     let error = plan(&setup, &options).unwrap_err();
     assert!(matches!(error, PlanError::NoWay { allowed: 200, found: 50..150, wanted: 150 }), "{error}");
-    assert!(error.to_string().contains("ask for fewer poses"), "{error}");
+    assert!(error.to_string().contains("plan fewer poses (--poses)"), "{error}");
 }
 
 /// Sheets that links of four millimetres could pass between two looks at their way. The class: a way that is called clear although
