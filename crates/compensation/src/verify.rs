@@ -162,15 +162,15 @@ fn run(listing: &Listing, loads: Option<&Loads>, arms: &mut Arms<'_>, cell: &Cel
         .zip(flanges)
         .zip(condition_indices)
         .map(|((sent, flange), condition_index)| {
-            let frames_index = &frame_table.list[sent.frames_index];
+            let frames = &frame_table.list[sent.frames_index];
             ExecutedEnd {
                 motion: sent.motion,
                 commanded: sent.commanded,
                 joints: sent.joints,
-                reached: frames_index.real.target_of(&flange),
-                base_from_object: frames_index.real.base_from_object(&flange),
-                flange_from_tool: frames_index.real.flange_from_tool(&flange),
-                carried: frames_index.carried.clone(),
+                reached: frames.real.target_of(&flange),
+                base_from_object: frames.real.base_from_object(&flange),
+                flange_from_tool: frames.real.flange_from_tool(&flange),
+                carried: frames.carried.clone(),
                 condition_index,
             }
         })

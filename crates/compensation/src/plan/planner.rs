@@ -253,7 +253,7 @@ fn segment_end<'a>(
     let stated = motion.to().and_then(|target| target.value.as_ref().ok());
     let cartesian = stated.and_then(TargetValue::cartesian);
     Some(SegmentEnd {
-        frames_index: &frame_table.list[to.frames_index],
+        frames: &frame_table.list[to.frames_index],
         index: to.frames_index,
         intended: to.intended,
         commanded: to.commanded,

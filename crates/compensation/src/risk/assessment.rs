@@ -173,8 +173,8 @@ pub(crate) fn assess_program(
         taken.insert(*object, placement.applied);
         out.placements.push(placement);
         if let Some(motion) = displaced {
-            for (frames_index, _) in list.iter_mut().zip(objects).filter(|(_, of)| **of == *object) {
-                frames_index.real.object *= motion;
+            for (frames, _) in list.iter_mut().zip(objects).filter(|(_, of)| **of == *object) {
+                frames.real.object *= motion;
             }
         }
     }
@@ -184,15 +184,15 @@ pub(crate) fn assess_program(
         .par_iter()
         .map(|(motions, commanded)| {
             let targets: Vec<&AssessedTarget> = commanded.iter().filter_map(|m| at.get(m)).collect();
-            let frames_index = &list[targets.first()?.frames_index];
+            let frames = &list[targets.first()?.frames_index];
             let object = listing.motions[motions[0] as usize].work_object?;
             let placement = *taken.get(&object)?;
             let off: Vec<TargetDeviation> =
-                targets.iter().map(|t| TargetDeviation::of(t, frames_index, conditions, knowledge)).collect();
+                targets.iter().map(|t| TargetDeviation::of(t, frames, conditions, knowledge)).collect();
             let judgement = cut_risk::assess_cut(&off, knowledge, placement)?;
             let weight = motions.len() as f64 / off.len() as f64;
-            let carried = (!frames_index.real.holds_part)
-                .then(|| cut_risk::in_base(&judgement.registered, &frames_index.real.object));
+            let carried = (!frames.real.holds_part)
+                .then(|| cut_risk::in_base(&judgement.registered, &frames.real.object));
             Some((JudgedCut { placement, points: off.len(), weight, carried }, judgement))
         })
         .collect();

@@ -88,18 +88,18 @@ impl TargetDeviation {
     /// Under the estimated arm.
     pub(crate) fn of(
         target: &AssessedTarget,
-        frames_index: &ResolvedFrames,
+        frames: &ResolvedFrames,
         conditions: &ArmConditions<'_>,
         knowledge: &Estimated,
     ) -> Self {
         let arm = conditions.arm(target.condition_index);
         let flange = arm.forward(&target.joints);
-        let real = &frames_index.real;
+        let real = &frames.real;
         let reached = real.target_of(&flange).translation.vector;
         let tool = real.flange_from_tool(&flange);
         let found = knowledge.position_jacobian(arm, &target.joints, &tool);
         let mut jacobian = Matrix3xX::from_fn(found.ncols(), |i, k| found[(i, k)]);
-        if let Some(carried) = &frames_index.carried {
+        if let Some(carried) = &frames.carried {
             let lever = (flange * tool).translation.vector - carried.origin_mm;
             for (k, twist) in carried.twists.iter().enumerate() {
                 let moved = twist.fixed_rows::<3>(0) + twist.fixed_rows::<3>(3).cross(&lever);

@@ -243,9 +243,9 @@ impl UnknownPlacement<'_, '_> {
 
     /// Deviation of each target, relative to a frame that moves with the arm where there is one.
     fn off(&self, carried: Option<&RegisteredFrame>) -> Vec<TargetDeviation> {
-        let against = |frames_index: &ResolvedFrames| match carried {
-            Some(carried) => ResolvedFrames { carried: Some(carried.clone()), ..frames_index.clone() },
-            None => frames_index.clone(),
+        let against = |frames: &ResolvedFrames| match carried {
+            Some(carried) => ResolvedFrames { carried: Some(carried.clone()), ..frames.clone() },
+            None => frames.clone(),
         };
         let list: Vec<ResolvedFrames> = self.list.iter().map(against).collect();
         self.targets
@@ -348,8 +348,8 @@ impl UnknownPlacement<'_, '_> {
     /// reach.
     fn touched(&self) -> Option<TouchedFrame> {
         let first = self.targets.first()?;
-        let frames_index = &self.list[first.frames_index];
-        if frames_index.carried.is_some() || frames_index.real.holds_part {
+        let frames = &self.list[first.frames_index];
+        if frames.carried.is_some() || frames.real.holds_part {
             return None;
         }
         let (condition_index, arm) = (first.condition_index, self.arm()?);
@@ -360,7 +360,7 @@ impl UnknownPlacement<'_, '_> {
                 let distance = |t: &&AssessedTarget| (t.intended.translation.vector - corner).norm_squared();
                 let near = self.targets.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
                 let pose = Pose::from_parts(corner.into(), near.intended.rotation);
-                let flange = frames_index.real.flange_for(&pose);
+                let flange = frames.real.flange_for(&pose);
                 self.conditions
                     .inverse(condition_index)
                     .solve_near(&flange, &near.joints)
@@ -369,7 +369,7 @@ impl UnknownPlacement<'_, '_> {
             });
             let [Some(a), Some(b), Some(c)] = joints else { return None };
             let joints = [a, b, c];
-            let tip = frames_index.real.tool.translation.vector;
+            let tip = frames.real.tool.translation.vector;
             let points = joints.map(|q| arm.forward(&q) * Point3::from(tip));
             let frame = taught_frame(&points)?;
             let carried = carried_through(self.knowledge, arm, &tip, &joints, &points, &frame)?;

@@ -45,10 +45,10 @@ impl Circle {
         let motor = |s: f64| {
             let near = from.joints.lerp(&to.joints, s);
             let solution =
-                arms.nominal.solve_near(&to.frames_index.commanded.flange_for(&self.commanded.at(s)), &near);
+                arms.nominal.solve_near(&to.frames.commanded.flange_for(&self.commanded.at(s)), &near);
             solution.ok().map(|solution| solution.joints)
         };
-        let off = |s: f64, flange: &Pose| self.intended.distance(&to.frames_index.real.target_of(flange), s);
+        let off = |s: f64, flange: &Pose| self.intended.distance(&to.frames.real.target_of(flange), s);
         // At least one sample per eighth of a turn and per piece of a long arc.
         let sweep = self.intended.arc().map_or(0.0, |arc| arc.sweep);
         let pieces = ((sweep / std::f64::consts::FRAC_PI_4).ceil() as usize)
@@ -116,10 +116,10 @@ impl Circle {
         corners.push((from.commanded, from.joints));
         for k in 1..count {
             let share = k as f64 / count as f64;
-            let flange = to.frames_index.real.flange_for(&self.intended.at(share));
+            let flange = to.frames.real.flange_for(&self.intended.at(share));
             let near = corners[k - 1].1;
             let joints = arms.conditions.inverse(schedule.at(share)).solve_near(&flange, &near).ok()?.joints;
-            corners.push((to.frames_index.commanded.target_of(&arms.nominal.arm().forward(&joints)), joints));
+            corners.push((to.frames.commanded.target_of(&arms.nominal.arm().forward(&joints)), joints));
         }
         corners.push((to.commanded, to.joints));
         // Joints at a share of the path along the chords.
@@ -130,10 +130,10 @@ impl Circle {
             let part = u - k as f64;
             let pose = between(commanded, next, part);
             let near = joints.lerp(after, part);
-            let solution = arms.nominal.solve_near(&to.frames_index.commanded.flange_for(&pose), &near);
+            let solution = arms.nominal.solve_near(&to.frames.commanded.flange_for(&pose), &near);
             solution.ok().map(|solution| solution.joints)
         };
-        let off = |s: f64, flange: &Pose| self.intended.distance(&to.frames_index.real.target_of(flange), s);
+        let off = |s: f64, flange: &Pose| self.intended.distance(&to.frames.real.target_of(flange), s);
         let most = match path.play_operator(arms) {
             Some(play_operator) => play_operator.largest_deviation(STEPS * count, &motor, &off),
             None => {
@@ -155,7 +155,7 @@ impl Circle {
         };
         let leap = |(k, (commanded, joints)): (usize, &(Pose, Joints))| {
             let intended = self.intended.at(k as f64 / count as f64);
-            jumps_joint([&intended, commanded], joints, &to.frames_index.commanded, arms, options)
+            jumps_joint([&intended, commanded], joints, &to.frames.commanded, arms, options)
         };
         let inner = || (1..).zip(&corners[1..count]);
         let extra = (!inner().any(leap)).then(|| inner().map(corner).collect());

@@ -110,12 +110,12 @@ pub(crate) fn corner_deviation(
         return None;
     }
     let commanded = Corner::of(&segments.commanded[0], &segments.commanded[1], zone_mm);
-    let flange = |t: f64| point.frames_index.commanded.flange_for(&commanded.at(t));
+    let flange = |t: f64| point.frames.commanded.flange_for(&commanded.at(t));
     let motor = |t: f64| {
         let solution = arms.nominal.solve_near(&flange(t), &point.joints);
         solution.ok().map(|solution| solution.joints)
     };
-    let off = |t: f64, flange: &Pose| intended.distance(&point.frames_index.real.target_of(flange), t);
+    let off = |t: f64, flange: &Pose| intended.distance(&point.frames.real.target_of(flange), t);
     if condition_indices[0] != condition_indices[1] {
         let Some(start) = motor(0.0) else { return Some(f64::INFINITY) };
         let links = PlayOperator::at(&start, condition_indices[0], condition_indices[1], &arms.conditions);

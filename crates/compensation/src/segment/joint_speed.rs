@@ -47,10 +47,7 @@ pub(crate) fn fastest(
         let joints = if part == parts {
             to.joints
         } else {
-            arms.nominal
-                .solve_near(&to.frames_index.commanded.flange_for(&course.at(s)), &before)
-                .ok()?
-                .joints
+            arms.nominal.solve_near(&to.frames.commanded.flange_for(&course.at(s)), &before).ok()?.joints
         };
         for joint in 0..6 {
             let ratio = (joints[joint] - before[joint]).abs() * parts as f64 / duration_s / limits[joint];

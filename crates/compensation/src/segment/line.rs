@@ -19,7 +19,7 @@ use truegrind_programs::rewrite::{Extra, NewTarget};
 /// A corrected end of a motion.
 #[derive(Clone, Copy)]
 pub(crate) struct SegmentEnd<'a> {
-    pub(crate) frames_index: &'a ResolvedFrames,
+    pub(crate) frames: &'a ResolvedFrames,
     pub(crate) index: usize,
     /// Intended pose in the work object.
     pub(crate) intended: Pose,
@@ -41,9 +41,9 @@ impl<'a> SegmentEnd<'a> {
     /// The same flange pose expressed in the frames of `other`, as commanded and as intended. The controller starts from
     /// there on a path of that tool in that work object.
     pub(crate) fn with_frames_of(self, other: &SegmentEnd<'a>) -> Self {
-        let (old, new) = (self.frames_index, other.frames_index);
+        let (old, new) = (self.frames, other.frames);
         SegmentEnd {
-            frames_index: new,
+            frames: new,
             index: other.index,
             intended: new.real.target_of(&old.real.flange_for(&self.intended)),
             commanded: new.commanded.target_of(&old.commanded.flange_for(&self.commanded)),
@@ -151,8 +151,7 @@ fn motor_joints_at(
         Emit::Joints => Some(joints),
         Emit::Targets => {
             let commanded = between(&from.commanded, &to.commanded, s);
-            let solution =
-                arms.nominal.solve_near(&to.frames_index.commanded.flange_for(&commanded), &joints);
+            let solution = arms.nominal.solve_near(&to.frames.commanded.flange_for(&commanded), &joints);
             solution.ok().map(|solution| solution.joints)
         }
     }
@@ -162,7 +161,7 @@ fn motor_joints_at(
 ///
 /// The tool may lead or lag along the line: only the normal component counts, unless the line is too short.
 fn line_offset(from: &SegmentEnd<'_>, to: &SegmentEnd<'_>, s: f64, flange: &Pose) -> f64 {
-    let reached = to.frames_index.real.target_of(flange);
+    let reached = to.frames.real.target_of(flange);
     let intended = from.intended.translation.vector.lerp(&to.intended.translation.vector, s);
     let off = reached.translation.vector - intended;
     lateral_offset(&off, &(to.intended.translation.vector - from.intended.translation.vector))
@@ -175,11 +174,7 @@ pub(crate) fn midpoint_deviations(lines: &[&Segment<'_>], arms: &Arms<'_>, emit:
         Emit::Joints => halfway.into_iter().map(Some).collect(),
         Emit::Targets => {
             let commanded = |line: &&Segment<'_>| {
-                line.to.frames_index.commanded.flange_for(&between(
-                    &line.from.commanded,
-                    &line.to.commanded,
-                    0.5,
-                ))
+                line.to.frames.commanded.flange_for(&between(&line.from.commanded, &line.to.commanded, 0.5))
             };
             let flanges: Vec<Pose> = lines.iter().map(commanded).collect();
             let reached = arms.nominal.solve_seeded_joints(&flanges, &halfway).into_iter();
@@ -325,7 +320,7 @@ pub(crate) fn insertions(
     let extra = |stop: &InsertedTarget<'_>| {
         extra_of((&stop.at.commanded, &stop.at.joints), stop.share, options.emit, path, arms)
     };
-    let commanded = &path.to.frames_index.commanded;
+    let commanded = &path.to.frames.commanded;
     let leap = |stop: &InsertedTarget<'_>| {
         let intended = between(&path.from.intended, &path.to.intended, stop.share);
         jumps_joint([&intended, &stop.at.commanded], &stop.at.joints, commanded, arms, options)
@@ -445,10 +440,10 @@ fn end_between<'a>(
     let joints = arms
         .conditions
         .inverse(condition_index)
-        .solve_near(&to.frames_index.real.flange_for(&intended), &near)
+        .solve_near(&to.frames.real.flange_for(&intended), &near)
         .ok()?
         .joints;
-    let commanded = to.frames_index.commanded.target_of(&arms.nominal.arm().forward(&joints));
+    let commanded = to.frames.commanded.target_of(&arms.nominal.arm().forward(&joints));
     Some(SegmentEnd { intended, commanded, joints, condition_index, before: near, ..*to })
 }
 
@@ -497,8 +492,8 @@ pub(crate) fn joint_motion_deviation(path: &Segment<'_>, arms: &Arms<'_>) -> f64
     let motor = |s: f64| from.joints.lerp(&to.joints, s);
     let off = |s: f64, flange: &Pose| {
         let intended = arms.nominal.arm().forward(&from.before.lerp(&to.before, s));
-        let intended = to.frames_index.commanded.target_of(&intended).translation.vector;
-        distance(&to.frames_index.real.target_of(flange).translation.vector, &intended)
+        let intended = to.frames.commanded.target_of(&intended).translation.vector;
+        distance(&to.frames.real.target_of(flange).translation.vector, &intended)
     };
     match path.play_operator(arms) {
         Some(play_operator) => play_operator.largest_deviation(STEPS, &|s| Some(motor(s)), &off),
