@@ -15,8 +15,8 @@ use super::Estimated;
 use super::width_uncertainty::{PosteriorComponent, WidthUncertainty};
 
 impl Estimated {
-    /// The posterior of the arm's parameters as a mixture of normal distributions: one, N(x, Σ), where the widths of the tolerances
-    /// are taken as certain.
+    /// The posterior of the arm's parameters as a mixture of normal distributions; the single N(x, Σ) if the widths of the tolerances
+    /// are certain.
     pub fn posterior(&self) -> Vec<PosteriorComponent> {
         self.width_uncertainty.as_ref().and_then(|widths| self.mixture(widths)).unwrap_or_else(|| {
             let (shift, covariance) = (DVector::zeros(self.order.len()), self.covariance.clone());
@@ -24,14 +24,13 @@ impl Estimated {
         })
     }
 
-    /// `None` where Σ has no inverse, or holds more uncertainty than the priors allow (causes in doubt are added to it), so that a
-    /// wider prior is none.
+    /// `None` if Σ has no inverse, or if D makes Σ⁻¹ + D indefinite: doubtful causes are added to Σ, which can then exceed the priors.
     fn mixture(&self, widths: &WidthUncertainty) -> Option<Vec<PosteriorComponent>> {
         let n = self.order.len();
         if n == 0 || self.parameters.len() < n {
             return None;
         }
-        // In units of the priors, so that millimetres and radians are of one size.
+        // In units of the priors, so that millimetres and radians are commensurable.
         let prior =
             |k: usize| self.parameters[k].prior_sigma.filter(|_| self.order[k].tolerance_group().is_some());
         let unit: Vec<f64> =
