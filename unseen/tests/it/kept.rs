@@ -72,3 +72,11 @@ fn the_unknown_rest_of_a_sensor_law_bends_no_arm_and_is_in_its_sigma() {
         assert!(sigmas < 8.0, "{kind:?}: {sigmas} σ");
     }
 }
+
+/// A gear error with the second harmonics of two joints: nothing was reported of 20 σ, since only first orders were tried.
+#[test]
+fn a_gear_error_of_two_joints_is_found_at_its_second_orders() {
+    let marks = outcome(&Case::draw(719, Kind::TwoJointGear, 7, Limits::default())).marks.unwrap();
+    assert_eq!(false_names(&marks), Vec::<&str>::new());
+    assert!(marks.told_with_joint(), "{:?}", marks.findings);
+}

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::cause::{Cause, MAP_KNOTS};
+use super::cause::{Cause, MAP_KNOTS, parallel_neighbours};
 use super::design::Design;
 use super::extension::Subject;
 use crate::identification::calibration::{Frames, joint_rotations, sensor_shifts};
@@ -386,7 +386,7 @@ pub fn measurement_candidates(subject: &Subject<'_>) -> Vec<Candidate> {
             }
         }
     }
-    let empirical = empirical_faults(dataset, &columns)
+    let empirical = empirical_faults(subject, &columns)
         .into_iter()
         .map(|(form, tried)| (Kind::Empirical(form), Profile::Constant, tried));
     list.into_iter()
@@ -406,6 +406,24 @@ pub fn measurement_candidates(subject: &Subject<'_>) -> Vec<Candidate> {
 /// Pairs of joints for two-joint gear errors.
 const NEIGHBOURS: [(usize, usize); 10] =
     [(0, 1), (1, 0), (1, 2), (2, 1), (2, 3), (3, 2), (3, 4), (4, 3), (4, 5), (5, 4)];
+
+/// Orders of two-joint gear errors: eccentric and elliptic parts, as for a gear of its own.
+const TWO_JOINT_ORDERS: [[u8; 2]; 4] = [[1, 1], [1, 2], [2, 1], [2, 2]];
+
+/// Two-joint gear errors of neighbours that move, with the number of variants of each. Only first orders where the axes are parallel:
+/// there the weight depends on both angles, so higher orders are also what a nonlinear spring, or backlash whose side follows the
+/// load, looks like.
+fn two_joint_gears(nominal: &Model, moves: &dyn Fn(usize) -> bool) -> Vec<(EmpiricalFault, f64)> {
+    let pairs = NEIGHBOURS.into_iter().filter(|&(a, b)| moves(a) && moves(b));
+    pairs
+        .flat_map(|(joint, other)| {
+            let parallel = parallel_neighbours(nominal, joint, other).is_some();
+            let orders = if parallel { &TWO_JOINT_ORDERS[..1] } else { &TWO_JOINT_ORDERS[..] };
+            let tried = orders.len() as f64;
+            orders.iter().map(move |&orders| (EmpiricalFault::TwoJointGear { joint, other, orders }, tried))
+        })
+        .collect()
+}
 
 /// A drum fault over the range of the measured lengths.
 fn drum(dataset: &Dataset) -> EmpiricalFault {
@@ -428,7 +446,8 @@ fn latency(dataset: &Dataset) -> EmpiricalFault {
 }
 
 /// Empirical faults that the logged columns can test, with the number of variants of each.
-fn empirical_faults(dataset: &Dataset, columns: &LoggedColumns) -> Vec<(EmpiricalFault, f64)> {
+fn empirical_faults(subject: &Subject<'_>, columns: &LoggedColumns) -> Vec<(EmpiricalFault, f64)> {
+    let dataset = &subject.observed.dataset;
     let mut out = Vec::new();
     let has =
         |rate: bool| dataset.rows.iter().any(|r| r.motion().is_some_and(|m| !rate || m.rate_per_h.is_some()));
@@ -439,8 +458,7 @@ fn empirical_faults(dataset: &Dataset, columns: &LoggedColumns) -> Vec<(Empirica
     }
     let moves = |j: usize| columns.range_rad[j] > STILL_RAD;
     out.extend((0..3).map(|joint| (EmpiricalFault::NonlinearStiffness { joint }, 1.0)));
-    let pairs = NEIGHBOURS.into_iter().filter(|&(a, b)| moves(a) && moves(b));
-    out.extend(pairs.map(|(joint, other)| (EmpiricalFault::TwoJointGear { joint, other }, 1.0)));
+    out.extend(two_joint_gears(subject.nominal, &moves));
     if dataset.sensor == Sensor::Cable {
         out.extend([(EmpiricalFault::Pulley, 1.0), (drum(dataset), 1.0)]);
     } else {

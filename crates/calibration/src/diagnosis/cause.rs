@@ -35,6 +35,13 @@ const PARALLEL: f64 = 0.99;
 /// Share of the squared amplitude from which a two-joint error depends on the sum or the difference alone.
 const MOSTLY: f64 = 0.9;
 
+/// Whether the axes of two neighbouring joints (0-based) turn in the same sense; `None` where they are not parallel neighbours.
+pub(super) fn parallel_neighbours(nominal: &Model, joint: usize, other: usize) -> Option<bool> {
+    let first = joint.min(other);
+    let between = nominal.links[first].alpha_rad.cos();
+    (joint.max(other) == first + 1 && between.abs() >= PARALLEL).then_some(between > 0.0)
+}
+
 impl Cause {
     /// The contract name.
     pub fn name(&self) -> &'static str {
@@ -134,16 +141,13 @@ impl Cause {
         let Cause::Measurement(Disturbance { kind: Kind::Empirical(form), values, .. }) = self else {
             return false;
         };
-        let (EmpiricalFault::TwoJointGear { joint, other }, [a, b, c, d]) = (*form, values.as_slice()) else {
+        let (EmpiricalFault::TwoJointGear { joint, other, .. }, [a, b, c, d]) = (*form, values.as_slice())
+        else {
             return false;
         };
-        let (first, last) = (joint.min(other), joint.max(other));
-        let between = nominal.links[first].alpha_rad.cos();
-        if last != first + 1 || between.abs() < PARALLEL {
-            return false;
-        }
+        let Some(same_sense) = parallel_neighbours(nominal, joint, other) else { return false };
         let (sum, difference) = (a * a + b * b, c * c + d * d);
-        let with_weight = if between > 0.0 { sum } else { difference };
+        let with_weight = if same_sense { sum } else { difference };
         with_weight > MOSTLY * (sum + difference)
     }
 

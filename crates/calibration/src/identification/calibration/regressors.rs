@@ -48,10 +48,11 @@ fn fault_rotations(fault: EmpiricalFault, dataset: &Dataset, model: &Model) -> V
                 })
                 .to_vec()
         }
-        EmpiricalFault::TwoJointGear { joint, other } => {
+        EmpiricalFault::TwoJointGear { joint, other, orders } => {
+            let [own, others] = orders.map(f64::from);
             let angle = |r: &Row, sign: f64| {
                 let u = model.joint_map * r.joints;
-                u[joint] + sign * u[other]
+                own * u[joint] + sign * others * u[other]
             };
             [(1.0, true), (1.0, false), (-1.0, true), (-1.0, false)]
                 .map(|(sign, sine)| {

@@ -25,12 +25,14 @@ pub enum EmpiricalFault {
         /// The joint.
         joint: usize,
     },
-    /// A joint error that depends on the sum and the difference of its angle and another joint's.
+    /// A joint error with harmonics of the sum and the difference of multiples of its angle and of another joint's.
     TwoJointGear {
         /// The joint (0-based).
         joint: usize,
         /// The other.
         other: usize,
+        /// The multiples: of its own angle, of the other's.
+        orders: [u8; 2],
     },
     /// Refraction of a tracker's beam by a vertical temperature gradient: an error along gravity with the square of the distance,
     /// and its change with the height of the beam.
@@ -79,7 +81,7 @@ impl EmpiricalFault {
     pub fn joints(self) -> Vec<usize> {
         match self {
             EmpiricalFault::NonlinearStiffness { joint } => vec![joint],
-            EmpiricalFault::TwoJointGear { joint, other } => vec![joint, other],
+            EmpiricalFault::TwoJointGear { joint, other, .. } => vec![joint, other],
             _ => Vec::new(),
         }
     }

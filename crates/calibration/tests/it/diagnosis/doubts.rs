@@ -157,8 +157,10 @@ fn the_first_joint_yields_only_where_another_shows_that_the_arm_leans() {
 }
 
 fn of_two_joints(joint: usize, other: usize, values: [f64; 4]) -> Cause {
-    let disturbance =
-        Disturbance::new(Kind::Empirical(EmpiricalFault::TwoJointGear { joint, other }), Profile::Constant);
+    let disturbance = Disturbance::new(
+        Kind::Empirical(EmpiricalFault::TwoJointGear { joint, other, orders: [1, 1] }),
+        Profile::Constant,
+    );
     Cause::Measurement(Disturbance { values: values.to_vec(), ..disturbance })
 }
 

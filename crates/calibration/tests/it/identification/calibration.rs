@@ -124,7 +124,8 @@ fn disturbances(sensor: Sensor) -> Vec<Disturbance> {
     }
     let of_pose = [
         EmpiricalFault::NonlinearStiffness { joint: 1 },
-        EmpiricalFault::TwoJointGear { joint: 2, other: 3 },
+        EmpiricalFault::TwoJointGear { joint: 2, other: 3, orders: [1, 1] },
+        EmpiricalFault::TwoJointGear { joint: 4, other: 5, orders: [2, 1] },
     ];
     let of_sensor = match sensor {
         Sensor::Cable => [EmpiricalFault::Pulley, EmpiricalFault::Drum { from_mm: 500, to_mm: 1200 }],
