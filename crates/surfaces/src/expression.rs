@@ -92,6 +92,8 @@ pub struct ExpressionError {
 pub struct Expression {
     text: String,
     steps: Vec<Step>,
+    /// Most values that the steps hold at once.
+    depth: usize,
 }
 
 /// A step in postfix order: it takes its operands from the end of a stack and puts its result there.
@@ -122,7 +124,11 @@ impl Expression {
     /// The position of the first character that does not belong there, what was found and what was expected.
     pub fn parse(text: &str, variables: &[&str]) -> Result<Self, ExpressionError> {
         let steps = Reader::new(text, variables).whole()?.steps();
-        Ok(Self { text: text.to_owned(), steps })
+        let (_, depth) = steps.iter().fold((0, 1), |(top, depth), step| {
+            let top = step.top_after(top);
+            (top, depth.max(top))
+        });
+        Ok(Self { text: text.to_owned(), steps, depth })
     }
 
     /// The text as it was given.
@@ -157,22 +163,38 @@ impl Expression {
     }
 
     fn evaluated<const N: usize>(&self, at: &[f64]) -> Jet<N> {
-        let mut stack: Vec<Jet<N>> = Vec::with_capacity(16);
+        // Nearly every equation does without an allocation.
+        let (mut few, mut many) = ([Jet::constant(f64::NAN); 8], Vec::new());
+        let stack = if self.depth <= few.len() {
+            &mut few[..]
+        } else {
+            many.resize(self.depth, Jet::constant(f64::NAN));
+            &mut many[..]
+        };
+        let mut top = 0;
         for step in &self.steps {
-            let mut operand = || stack.pop().unwrap_or(Jet::constant(f64::NAN));
-            let result = match *step {
-                Step::Number(value) => Jet::constant(value),
-                Step::Variable(index) => Jet::variable(index, at[index]),
-                Step::Power(exponent) => operand().power(exponent),
-                Step::Function(function) => operand().function(function),
-                Step::Operator(sign) => {
-                    let (right, left) = (operand(), operand());
-                    left.operator(sign, right)
-                }
-            };
-            stack.push(result);
+            let last = top.max(1) - 1;
+            match *step {
+                Step::Number(value) => stack[top] = Jet::constant(value),
+                Step::Variable(index) => stack[top] = Jet::variable(index, at[index]),
+                Step::Power(exponent) => stack[last] = stack[last].power(exponent),
+                Step::Function(function) => stack[last] = stack[last].function(function),
+                Step::Operator(sign) => stack[last - 1] = stack[last - 1].operator(sign, &stack[last]),
+            }
+            top = step.top_after(top);
         }
-        stack.pop().unwrap_or(Jet::constant(f64::NAN))
+        stack[0]
+    }
+}
+
+impl Step {
+    /// How many values the stack holds after this step.
+    fn top_after(self, top: usize) -> usize {
+        match self {
+            Step::Number(_) | Step::Variable(_) => top + 1,
+            Step::Power(_) | Step::Function(_) => top,
+            Step::Operator(_) => top - 1,
+        }
     }
 }
 
@@ -194,7 +216,7 @@ impl<const N: usize> Jet<N> {
         Self { first, ..Self::constant(value) }
     }
 
-    fn operator(self, sign: char, other: Self) -> Self {
+    fn operator(&self, sign: char, other: &Self) -> Self {
         let (a, b) = (self, other);
         match sign {
             '+' => Self { value: a.value + b.value, first: a.first + b.first, second: a.second + b.second },
@@ -217,12 +239,12 @@ impl<const N: usize> Jet<N> {
             _ => {
                 let value = a.value.powf(b.value);
                 let logarithm = a.chain(a.value.ln(), [1.0 / a.value, -1.0 / (a.value * a.value)]);
-                b.operator('*', logarithm).chain(value, [value; 2])
+                b.operator('*', &logarithm).chain(value, [value; 2])
             }
         }
     }
 
-    fn power(self, exponent: f64) -> Self {
+    fn power(&self, exponent: f64) -> Self {
         // A vanishing factor, as of x¹ at zero, is not multiplied with an infinite power.
         let times = |factor: f64, x: f64| if factor == 0.0 { 0.0 } else { factor * x };
         let lower = |factor: f64, power: f64| times(factor, self.value.powf(power));
@@ -230,7 +252,7 @@ impl<const N: usize> Jet<N> {
         self.chain(self.value.powf(exponent), [lower(exponent, exponent - 1.0), bend])
     }
 
-    fn function(self, function: &Function) -> Self {
+    fn function(&self, function: &Function) -> Self {
         let value = (function.1)(self.value);
         self.chain(value, if N == 0 { [0.0; 2] } else { (function.2)(self.value, value) })
     }
@@ -449,7 +471,7 @@ impl<'a> Reader<'a> {
     fn combined(&self, left: Part, sign: char, right: Part, at: usize) -> Result<Part, ExpressionError> {
         match (left, right) {
             (Part::Number(a), Part::Number(b)) => {
-                self.finite(Jet::<0>::constant(a).operator(sign, Jet::constant(b)).value, at)
+                self.finite(Jet::<0>::constant(a).operator(sign, &Jet::constant(b)).value, at)
             }
             (base, Part::Number(exponent)) if sign == '^' => Ok(base.then(Step::Power(exponent))),
             (left, right) => {
