@@ -79,15 +79,26 @@ struct Runner {
     after: After,
 }
 
+/// Refuses options that only one program or one job can have.
+fn check_combinations(arguments: &Arguments, jobs: usize, several: bool) -> anyhow::Result<()> {
+    if several && !arguments.intended.is_empty() {
+        bail!("--intended is the original of one program: name one program, not {jobs}");
+    }
+    if arguments.shares.on() && arguments.outputs.rrd.is_some() {
+        bail!(
+            "--rrd shows the programs of a single job: it cannot be combined with options for several jobs"
+        );
+    }
+    Ok(())
+}
+
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let mut jobs = match arguments.shares.listed()? {
         Some(jobs) => jobs,
         None => programs::jobs(&arguments.programs, arguments.grouping)?,
     };
     let several = jobs.len() > 1 || arguments.shares.on();
-    if several && !arguments.intended.is_empty() {
-        bail!("--intended is the original of one program: name one program, not {}", jobs.len());
-    }
+    check_combinations(arguments, jobs.len(), several)?;
     let originals =
         if arguments.intended.is_empty() { None } else { Some(Programs::read(&arguments.intended)?) };
     let all: Vec<PathBuf> = jobs
@@ -98,11 +109,6 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
         .collect();
     let inputs: Vec<&std::path::Path> = all.iter().map(PathBuf::as_path).collect();
     Batch::check(&inputs, &arguments.outputs.files())?;
-    if arguments.shares.on() && arguments.outputs.rrd.is_some() {
-        bail!(
-            "--rrd shows the programs of a single job: it cannot be combined with options for several jobs"
-        );
-    }
     if arguments.shares.on() {
         read_log::begin();
     }

@@ -62,3 +62,4 @@ pub mod filter;
 pub mod swarm;
 pub mod network;
 pub mod chaos;
+pub mod examples;

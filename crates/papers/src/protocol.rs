@@ -75,8 +75,6 @@ pub struct Study {
     pub file: String,
     /// SHA-256 of its bytes.
     pub sha256: String,
-    /// Rows of the file.
-    pub rows_in_file: usize,
     /// Sensor, after the protocol selected the part of the reading.
     pub sensor: Sensor,
     /// Robot.
@@ -183,7 +181,6 @@ pub fn run(
         methods: methods.clone(),
         file: dataset.file.clone(),
         sha256: dataset.sha256.clone(),
-        rows_in_file: dataset.rows.len(),
         sensor: dataset.sensor,
         robot: robot.to_owned(),
         rows,

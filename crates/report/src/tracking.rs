@@ -7,6 +7,7 @@ use super::number::handy;
 use super::plot::{Axis, Graph, Reference, Series};
 use super::status::Status;
 use super::table::{Cell, Column, Table};
+use truegrind_calibration::identification::identify::sensor_name;
 use truegrind_calibration::tracking::state::ConsumedFile;
 use truegrind_calibration::tracking::{Alarm, Tracker};
 use truegrind_math::statistics::median;
@@ -14,7 +15,7 @@ use truegrind_math::statistics::median;
 /// Summary for the terminal.
 pub fn summary(tracker: &Tracker, fresh: usize, alarms: &[Alarm], model: &str) -> Document {
     let mut page = Document::new("Track");
-    page.subtitle = format!("{}, {} readings", tracker.robot(), tracker.state().sensor);
+    page.subtitle = format!("{}, {} readings", tracker.robot(), sensor_name(tracker.state().sensor));
     head(&mut page, tracker, fresh, alarms, model);
     page
 }
@@ -41,7 +42,7 @@ pub fn document(tracker: &Tracker, fresh: usize, alarms: &[Alarm], model: &str) 
             x: Axis::new("pose of the history", ""),
             y: Axis::log("NIS", ""),
             series: vec![Series::points("", points)],
-            references: vec![Reference::Horizontal(rows_per_pose(tracker), "expected mean".to_owned())],
+            references: vec![Reference::Horizontal(tracker.state().sensor.scalars() as f64, "expected mean".to_owned())],
             ..Graph::default()
         }
         .svg(),
@@ -57,14 +58,6 @@ pub fn document(tracker: &Tracker, fresh: usize, alarms: &[Alarm], model: &str) 
 fn sources(tracker: &Tracker) -> Vec<Source> {
     let of = |consumed: &ConsumedFile| Source::new(&consumed.file, "Measurements", "", Some(consumed.rows));
     tracker.state().consumed.iter().map(of).collect()
-}
-
-fn rows_per_pose(tracker: &Tracker) -> f64 {
-    match tracker.state().sensor.as_str() {
-        "cable" => 1.0,
-        "position" => 3.0,
-        _ => 6.0,
-    }
 }
 
 fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], model: &str) {
@@ -102,7 +95,7 @@ fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], 
     let nis: Vec<f64> = state.history.iter().map(|s| s.nis).filter(|n| n.is_finite()).collect();
     // A single pose after remounting may have a NIS of a million, which would dominate the mean.
     let usual = (!nis.is_empty()).then(|| median(&nis));
-    let degrees = rows_per_pose(tracker);
+    let degrees = tracker.state().sensor.scalars() as f64;
     let expected = degrees * (1.0 - 2.0 / (9.0 * degrees)).powi(3);
     page.push(vec![
         KeyFigure::new("Poses", state.poses, 0, "").note(format!("{} set aside", state.accidents)),

@@ -1,19 +1,17 @@
-//! The text of an equation: a small grammar with exact positions in front of symbolic derivatives.
+//! The text of an equation: a small grammar with exact positions, and exact first and second derivatives.
 //!
-//! **Method.** The text is read by a grammar of our own, which knows where each character stands and binds as
-//! mathematics does (`-x^2` is −(x²), `2^3^2` is 2^(3²), `1e-3` is a number). What it read is handed, with every
-//! pair of parentheses written out, to `exmex`, which differentiates it symbolically, twice, and evaluates it.
+//! **Method.** The text is read by a grammar that knows where each character stands and binds as mathematics does (`-x^2`
+//! is −(x²), `2^3^2` is 2^(3²), `1e-3` is a number), into steps in postfix order. They are evaluated on numbers, or on
+//! values that carry their gradient and their second derivatives (forward differentiation to second order).
 //!
 //! **Shapes.** Up to three variables; a gradient of three, a symmetric 3 × 3 matrix of second derivatives (unused
 //! rows zero).
 //!
-//! **Stops.** A text longer than [`LONGEST`] characters or nested deeper than [`DEEPEST`] is refused, and so is one whose
-//! second derivative has more than [`MOST_TERMS`] terms by the rules of differentiation, counted before it is taken: it
-//! grows with the third power of a product's factors, and exmex's time with more than the square of that. exmex goes into
-//! itself once for every term, with some 100 kB each time: it runs on a thread with a stack for the longest text.
+//! **Stops.** A text longer than [`LONGEST`] characters or nested deeper than [`DEEPEST`] is refused. The work of an
+//! evaluation grows with the length of the text.
 //!
-//! **Source and departures.** exmex alone reads `-x^2` as (−x)², has no `1e-3`, and reports errors without a
-//! position; hence the grammar in front. `abs(f)` is handed on as √(f²), because exmex has no derivative of it.
+//! **Source and departures.** Griewank and Walther, *Evaluating Derivatives*, 2nd ed., ch. 3 and 13. A derivative that
+//! vanishes stays zero where the outer function is infinitely steep, as it would by symbolic rules.
 //!
 //! **Checked against.** Numerical differences of every function and operator, and the conventions above.
 //!
@@ -25,19 +23,43 @@
 //! atom    = number | name | function "(" sum ")" | "(" sum ")"
 //! ```
 
-use exmex::{Differentiate, Express, FlatEx};
-use nalgebra::{Matrix3, Vector3};
+use std::f64::consts::LN_10;
+
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 /// Longest text that is read, in characters.
 pub const LONGEST: usize = 2000;
 /// Deepest nesting that is read.
 pub const DEEPEST: usize = 60;
-/// Most terms of a second derivative.
-pub const MOST_TERMS: f64 = 80_000.0;
 /// The functions an equation may use.
-pub const FUNCTIONS: [&str; 14] = [
-    "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "ln", "log10", "sqrt", "abs",
+pub static FUNCTIONS: [Function; 14] = [
+    Function("sin", f64::sin, |x, f| [x.cos(), -f]),
+    Function("cos", f64::cos, |x, f| [-x.sin(), -f]),
+    Function("tan", f64::tan, |_, f| [1.0 + f * f, 2.0 * f * (1.0 + f * f)]),
+    Function("asin", f64::asin, |x, _| arc_slopes(x)),
+    Function("acos", f64::acos, |x, _| arc_slopes(x).map(|slope| -slope)),
+    Function("atan", f64::atan, |x, _| [1.0 / (1.0 + x * x), -2.0 * x / (1.0 + x * x).powi(2)]),
+    Function("sinh", f64::sinh, |x, f| [x.cosh(), f]),
+    Function("cosh", f64::cosh, |x, f| [x.sinh(), f]),
+    Function("tanh", f64::tanh, |_, f| [1.0 - f * f, -2.0 * f * (1.0 - f * f)]),
+    Function("exp", f64::exp, |_, f| [f, f]),
+    Function("ln", f64::ln, |x, _| [1.0 / x, -1.0 / (x * x)]),
+    Function("log10", f64::log10, |x, _| [1.0 / (x * LN_10), -1.0 / (x * x * LN_10)]),
+    Function("sqrt", f64::sqrt, |_, f| [0.5 / f, -0.25 / (f * f * f)]),
+    // No slope at zero.
+    Function("abs", f64::abs, |x, f| [x / f, 0.0]),
 ];
+
+/// A function of one argument: its name, f(x), and its first and second derivative given x and f(x).
+#[derive(Debug, Clone, Copy)]
+pub struct Function(pub &'static str, fn(f64) -> f64, fn(f64, f64) -> [f64; 2]);
+
+/// Of the arc sine.
+fn arc_slopes(x: f64) -> [f64; 2] {
+    let cosine = (1.0 - x * x).sqrt();
+    [1.0 / cosine, x / (cosine * cosine * cosine)]
+}
+
 /// The constants an equation may use.
 pub const CONSTANTS: [(&str, f64); 4] = [
     ("pi", std::f64::consts::PI),
@@ -45,6 +67,11 @@ pub const CONSTANTS: [(&str, f64); 4] = [
     ("tau", std::f64::consts::TAU),
     ("e", std::f64::consts::E),
 ];
+
+/// Cost of a function beside that of a sum or product.
+const FUNCTION_COST: f64 = 5.0;
+/// Cost of an evaluation with derivatives beside that of a value.
+const DERIVATIVES_COST: f64 = 5.0;
 
 /// Why a text is not an expression, and where.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -64,25 +91,20 @@ pub struct ExpressionError {
 #[derive(Debug, Clone)]
 pub struct Expression {
     text: String,
-    /// Which of the named variables occur, in alphabetical order, as exmex requires their values.
-    used: Vec<usize>,
-    terms: Terms,
-    /// Boxed, since it occupies some 20 kB inline.
-    value: Box<FlatEx<f64>>,
-    first: Vec<FlatEx<f64>>,
-    /// Upper triangle by rows over the used variables.
-    second: Vec<FlatEx<f64>>,
+    steps: Vec<Step>,
+    /// Most values that the steps hold at once.
+    depth: usize,
 }
 
-/// Stack size for the longest text (bytes): only the used part takes memory.
-const STACK: usize = 512 << 20;
-
-/// Runs `work` on a thread with a large stack; `None` where no such thread can be started.
-fn on_ample_stack<T: Send>(work: impl FnOnce() -> T + Send) -> Option<T> {
-    std::thread::scope(|scope| {
-        let thread = std::thread::Builder::new().stack_size(STACK).spawn_scoped(scope, work);
-        thread.ok()?.join().ok()
-    })
+/// A step in postfix order: it takes its operands from the end of a stack and puts its result there.
+#[derive(Debug, Clone, Copy)]
+enum Step {
+    Number(f64),
+    Variable(usize),
+    Operator(char),
+    /// To a constant power.
+    Power(f64),
+    Function(&'static Function),
 }
 
 impl Expression {
@@ -101,62 +123,12 @@ impl Expression {
     /// # Errors
     /// The position of the first character that does not belong there, what was found and what was expected.
     pub fn parse(text: &str, variables: &[&str]) -> Result<Self, ExpressionError> {
-        let mut reader = Reader::new(text, variables);
-        let whole = reader.whole()?;
-        let terms = whole.terms();
-        // NaN counts as too many.
-        if !(terms.second <= MOST_TERMS) {
-            return Err(ExpressionError {
-                text: text.to_owned(),
-                column: 1,
-                found: format!("an expression whose second derivative has {:.3e} terms", terms.second),
-                expected: format!(
-                    "at most {MOST_TERMS}: fewer factors in a product, powers as x^3, fewer nested functions"
-                ),
-            });
-        }
-        let written = whole.written();
-        on_ample_stack(|| Self::differentiated(text, variables, &written, terms)).unwrap_or_else(|| {
-            Err(ExpressionError {
-                text: text.to_owned(),
-                column: 1,
-                found: "no memory to take its derivatives".to_owned(),
-                expected: "a shorter expression".to_owned(),
-            })
-        })
-    }
-
-    /// `written` is `text` with every pair of parentheses.
-    fn differentiated(
-        text: &str,
-        variables: &[&str],
-        written: &str,
-        terms: Terms,
-    ) -> Result<Self, ExpressionError> {
-        // The grammar admits only what exmex knows, so a refusal here names the whole text.
-        let refused = |e: exmex::ExError| ExpressionError {
-            text: text.to_owned(),
-            column: 1,
-            found: format!("something that has no derivative ({e})"),
-            expected: "a smooth expression".to_owned(),
-        };
-        let value = exmex::parse::<f64>(written).map_err(refused)?;
-        let used: Vec<usize> = variables
-            .iter()
-            .enumerate()
-            .filter(|(_, name)| value.var_names().iter().any(|n| n == *name))
-            .map(|(i, _)| i)
-            .collect();
-        let first = (0..used.len())
-            .map(|i| value.clone().partial(i))
-            .collect::<Result<Vec<_>, _>>()
-            .map_err(refused)?;
-        let second = (0..used.len())
-            .flat_map(|i| (i..used.len()).map(move |k| (i, k)))
-            .map(|(i, k)| first[i].clone().partial(k))
-            .collect::<Result<Vec<_>, _>>()
-            .map_err(refused)?;
-        Ok(Self { text: text.to_owned(), used, terms, value: Box::new(value), first, second })
+        let steps = Reader::new(text, variables).whole()?.steps();
+        let (_, depth) = steps.iter().fold((0, 1), |(top, depth), step| {
+            let top = step.top_after(top);
+            (top, depth.max(top))
+        });
+        Ok(Self { text: text.to_owned(), steps, depth })
     }
 
     /// The text as it was given.
@@ -164,133 +136,154 @@ impl Expression {
         &self.text
     }
 
-    /// Terms of the value, and of all first derivatives together, as the rules of differentiation write them; each counts for
-    /// more where the expression has functions, which take as long as several sums and products.
+    /// Cost of a value, and of its derivatives: operands, with functions, which take as long as several sums and products.
     pub(crate) fn terms(&self) -> [f64; 2] {
-        let weight = match &self.text {
-            text if text.contains("tan") => 4.0,
-            text if FUNCTIONS.iter().any(|name| text.contains(name)) => 2.5,
-            _ => 1.0,
+        let cost = |step: &Step| match step {
+            Step::Number(_) | Step::Variable(_) => 1.0,
+            Step::Function(_) | Step::Power(_) => FUNCTION_COST,
+            Step::Operator(_) => 0.0,
         };
-        [self.terms.value * weight, self.terms.first * self.used.len() as f64 * weight]
+        let value = self.steps.iter().map(cost).sum::<f64>();
+        [value, DERIVATIVES_COST * value]
     }
 
     /// Value at `at`, one number per variable; NaN or infinite where the expression has no value.
     pub fn value(&self, at: &[f64]) -> f64 {
-        self.evaluate(&self.value, at)
+        self.evaluated::<0>(at).value
     }
 
     /// First derivatives, in the order of the variables; entries beyond them are zero.
     pub fn gradient(&self, at: &[f64]) -> Vector3<f64> {
-        let mut gradient = Vector3::zeros();
-        for (i, first) in self.used.iter().zip(&self.first) {
-            gradient[*i] = self.evaluate(first, at);
-        }
-        gradient
+        self.evaluated::<3>(at).first
     }
 
     /// Second derivatives, rows and columns in the order of the variables; entries beyond them are zero.
     pub fn hessian(&self, at: &[f64]) -> Matrix3<f64> {
-        let mut hessian = Matrix3::zeros();
-        let pairs = (0..self.used.len()).flat_map(|i| (i..self.used.len()).map(move |k| (i, k)));
-        for ((i, k), second) in pairs.zip(&self.second) {
-            let (row, column, value) = (self.used[i], self.used[k], self.evaluate(second, at));
-            hessian[(row, column)] = value;
-            hessian[(column, row)] = value;
-        }
-        hessian
+        self.evaluated::<3>(at).second
     }
 
-    fn evaluate(&self, expression: &FlatEx<f64>, at: &[f64]) -> f64 {
-        let mut values = [0.0; 3];
-        for (value, i) in values.iter_mut().zip(&self.used) {
-            *value = at[*i];
+    fn evaluated<const N: usize>(&self, at: &[f64]) -> Jet<N> {
+        // Nearly every equation does without an allocation.
+        let (mut few, mut many) = ([Jet::constant(f64::NAN); 8], Vec::new());
+        let stack = if self.depth <= few.len() {
+            &mut few[..]
+        } else {
+            many.resize(self.depth, Jet::constant(f64::NAN));
+            &mut many[..]
+        };
+        let mut top = 0;
+        for step in &self.steps {
+            let last = top.max(1) - 1;
+            match *step {
+                Step::Number(value) => stack[top] = Jet::constant(value),
+                Step::Variable(index) => stack[top] = Jet::variable(index, at[index]),
+                Step::Power(exponent) => stack[last] = stack[last].power(exponent),
+                Step::Function(function) => stack[last] = stack[last].function(function),
+                Step::Operator(sign) => stack[last - 1] = stack[last - 1].operator(sign, &stack[last]),
+            }
+            top = step.top_after(top);
         }
-        expression.eval_relaxed(&values[..self.used.len()]).unwrap_or(f64::NAN)
+        stack[0]
     }
 }
 
-/// A part of an expression on its way to exmex; constants are folded so that exponents arrive as plain numbers.
+impl Step {
+    /// How many values the stack holds after this step.
+    fn top_after(self, top: usize) -> usize {
+        match self {
+            Step::Number(_) | Step::Variable(_) => top + 1,
+            Step::Power(_) | Step::Function(_) => top,
+            Step::Operator(_) => top - 1,
+        }
+    }
+}
+
+/// A value with its first and second derivatives in N variables; N = 0 is a plain number.
+#[derive(Debug, Clone, Copy)]
+struct Jet<const N: usize> {
+    value: f64,
+    first: SVector<f64, N>,
+    second: SMatrix<f64, N, N>,
+}
+
+impl<const N: usize> Jet<N> {
+    fn constant(value: f64) -> Self {
+        Self { value, first: SVector::zeros(), second: SMatrix::zeros() }
+    }
+
+    fn variable(index: usize, value: f64) -> Self {
+        let first = SVector::from_fn(|row, _| if row == index { 1.0 } else { 0.0 });
+        Self { first, ..Self::constant(value) }
+    }
+
+    fn operator(&self, sign: char, other: &Self) -> Self {
+        let (a, b) = (self, other);
+        match sign {
+            '+' => Self { value: a.value + b.value, first: a.first + b.first, second: a.second + b.second },
+            '-' => Self { value: a.value - b.value, first: a.first - b.first, second: a.second - b.second },
+            '*' => {
+                let cross = a.first * b.first.transpose();
+                let first = a.first * b.value + b.first * a.value;
+                let second = a.second * b.value + cross + cross.transpose() + b.second * a.value;
+                Self { value: a.value * b.value, first, second }
+            }
+            // Of q = a / b, from a = q b.
+            '/' => {
+                let value = a.value / b.value;
+                let first = (a.first - b.first * value) / b.value;
+                let cross = first * b.first.transpose();
+                let second = (a.second - cross - cross.transpose() - b.second * value) / b.value;
+                Self { value, first, second }
+            }
+            // exp(b ln a).
+            _ => {
+                let value = a.value.powf(b.value);
+                let logarithm = a.chain(a.value.ln(), [1.0 / a.value, -1.0 / (a.value * a.value)]);
+                b.operator('*', &logarithm).chain(value, [value; 2])
+            }
+        }
+    }
+
+    fn power(&self, exponent: f64) -> Self {
+        // A vanishing factor, as of x¹ at zero, is not multiplied with an infinite power.
+        let times = |factor: f64, x: f64| if factor == 0.0 { 0.0 } else { factor * x };
+        let lower = |factor: f64, power: f64| times(factor, self.value.powf(power));
+        let bend = lower(exponent * (exponent - 1.0), exponent - 2.0);
+        self.chain(self.value.powf(exponent), [lower(exponent, exponent - 1.0), bend])
+    }
+
+    fn function(&self, function: &Function) -> Self {
+        let value = (function.1)(self.value);
+        self.chain(value, if N == 0 { [0.0; 2] } else { (function.2)(self.value, value) })
+    }
+
+    /// f(a), given f, f′ and f″ at the value of a: f′ a′, and f″ a′ a′ᵀ + f′ a″.
+    fn chain(&self, value: f64, [slope, bend]: [f64; 2]) -> Self {
+        // A derivative that vanishes stays zero where the outer function is infinitely steep.
+        let times = |factor: f64| move |x: f64| if x == 0.0 { 0.0 } else { factor * x };
+        let second = (self.first * self.first.transpose()).map(times(bend)) + self.second.map(times(slope));
+        Self { value, first: self.first.map(times(slope)), second }
+    }
+}
+
+/// A part of an expression; constants are folded, so that exponents are plain numbers.
 enum Part {
     Number(f64),
-    Text(String, Terms),
-}
-
-/// Number of operands and functions of an expression and its derivatives, as the rules of differentiation write them.
-#[derive(Debug, Clone, Copy)]
-struct Terms {
-    value: f64,
-    first: f64,
-    second: f64,
-}
-
-impl Terms {
-    const CONSTANT: Terms = Terms { value: 1.0, first: 0.0, second: 0.0 };
-    const VARIABLE: Terms = Terms { value: 1.0, first: 1.0, second: 0.0 };
-
-    /// Of two parts under an operator.
-    fn combined(self, sign: char, other: Terms) -> Terms {
-        let (a, b) = (self, other);
-        // Constant parts and vanishing derivatives are omitted.
-        let times = |x: f64, y: f64| if x == 0.0 || y == 0.0 { 0.0 } else { x + y };
-        let value = a.value + b.value;
-        match sign {
-            '+' | '-' => Terms { value, first: a.first + b.first, second: a.second + b.second },
-            '*' => Terms {
-                value,
-                first: times(a.first, b.value) + times(a.value, b.first),
-                second: times(a.second, b.value) + 2.0 * times(a.first, b.first) + times(a.value, b.second),
-            },
-            // (a′b − ab′) / b², and its derivative by the same rule.
-            '/' if b.first > 0.0 => {
-                let over = times(a.first, b.value) + times(a.value, b.first);
-                let again =
-                    times(a.second, b.value) + 2.0 * times(a.first, b.first) + times(a.value, b.second);
-                Terms {
-                    value,
-                    first: over + b.value,
-                    second: again + 2.0 * over + 4.0 * b.value + 2.0 * b.first,
-                }
-            }
-            '/' => Terms { value, first: a.first + b.value, second: a.second + b.value },
-            // b a^(b−1) a′ for a constant power, else a^b (b′ ln a + b a′ / a).
-            _ if b.first == 0.0 => Terms { value, ..a.within(value) },
-            _ => {
-                let inner = times(b.first, a.value) + times(b.value, a.first) + a.value;
-                let again = times(b.second, a.value)
-                    + times(b.value, a.second)
-                    + 4.0 * times(a.first, b.first)
-                    + 2.0 * (a.value + a.first);
-                Terms { value, first: value + inner, second: value + 2.0 * inner + again }
-            }
-        }
-    }
-
-    /// Of an outer function with `outer` terms: f′(a) a′, and f″(a) a′² + f′(a) a″.
-    fn within(self, outer: f64) -> Terms {
-        if self.first == 0.0 {
-            return Terms { value: outer, ..Terms::CONSTANT };
-        }
-        let second = outer + 2.0 * self.first + if self.second > 0.0 { outer + self.second } else { 0.0 };
-        Terms { value: outer, first: outer + self.first, second }
-    }
+    Steps(Vec<Step>),
 }
 
 impl Part {
-    fn terms(&self) -> Terms {
+    fn steps(self) -> Vec<Step> {
         match self {
-            Part::Number(_) => Terms::CONSTANT,
-            Part::Text(_, terms) => *terms,
+            Part::Number(value) => vec![Step::Number(value)],
+            Part::Steps(steps) => steps,
         }
     }
 
-    fn written(self) -> String {
-        match self {
-            // `Display` never writes an exponent, which exmex could not read.
-            Part::Number(value) if value.is_sign_negative() => format!("(-{})", -value),
-            Part::Number(value) => format!("{value}"),
-            Part::Text(text, _) => text,
-        }
+    fn then(self, step: Step) -> Part {
+        let mut steps = self.steps();
+        steps.push(step);
+        Part::Steps(steps)
     }
 }
 
@@ -449,7 +442,9 @@ impl<'a> Reader<'a> {
                 self.advance()?;
                 match self.signed()? {
                     Part::Number(value) => Part::Number(-value),
-                    Part::Text(text, terms) => Part::Text(format!("(-{text})"), terms),
+                    Part::Steps(steps) => {
+                        self.combined(Part::Number(-1.0), '*', Part::Steps(steps), self.start)?
+                    }
                 }
             }
             Token::Sign('+') => {
@@ -474,18 +469,17 @@ impl<'a> Reader<'a> {
     }
 
     fn combined(&self, left: Part, sign: char, right: Part, at: usize) -> Result<Part, ExpressionError> {
-        if let (Part::Number(a), Part::Number(b)) = (&left, &right) {
-            let value = match sign {
-                '+' => a + b,
-                '-' => a - b,
-                '*' => a * b,
-                '/' => a / b,
-                _ => a.powf(*b),
-            };
-            return self.finite(value, at);
+        match (left, right) {
+            (Part::Number(a), Part::Number(b)) => {
+                self.finite(Jet::<0>::constant(a).operator(sign, &Jet::constant(b)).value, at)
+            }
+            (base, Part::Number(exponent)) if sign == '^' => Ok(base.then(Step::Power(exponent))),
+            (left, right) => {
+                let mut steps = left.steps();
+                steps.append(&mut right.steps());
+                Ok(Part::Steps(steps).then(Step::Operator(sign)))
+            }
         }
-        let terms = left.terms().combined(sign, right.terms());
-        Ok(Part::Text(format!("({}{sign}{})", left.written(), right.written()), terms))
     }
 
     fn finite(&self, value: f64, at: usize) -> Result<Part, ExpressionError> {
@@ -503,35 +497,31 @@ impl<'a> Reader<'a> {
                 Ok(Part::Number(value))
             }
             Token::Sign('(') => self.parenthesised(),
-            Token::Name(name) if self.variables.contains(&name.as_str()) => {
-                self.advance()?;
-                Ok(Part::Text(name, Terms::VARIABLE))
-            }
-            Token::Name(name) if FUNCTIONS.contains(&name.as_str()) => {
-                let at = self.start;
-                self.advance()?;
-                if self.token != Token::Sign('(') {
-                    return Err(self.unexpected(&format!("`(` after the function `{name}`")));
-                }
-                match self.parenthesised()? {
-                    Part::Number(value) => self.finite(constant(&name, value), at),
-                    Part::Text(text, terms) if name == "abs" => {
-                        let square = terms.within(terms.value + 1.0);
-                        Ok(Part::Text(format!("sqrt(({text})^2)"), square.within(square.value + 1.0)))
-                    }
-                    Part::Text(text, terms) => {
-                        Ok(Part::Text(format!("{name}({text})"), terms.within(terms.value + 1.0)))
-                    }
-                }
-            }
-            Token::Name(name) => match CONSTANTS.iter().find(|(known, _)| *known == name) {
-                Some((_, value)) => {
-                    self.advance()?;
-                    Ok(Part::Number(*value))
-                }
-                None => Err(self.unknown(&name)),
-            },
+            Token::Name(name) => self.named(&name),
             _ => Err(self.unexpected("a number, a variable, a function or `(`")),
+        }
+    }
+
+    fn named(&mut self, name: &str) -> Result<Part, ExpressionError> {
+        let at = self.start;
+        if let Some(index) = self.variables.iter().position(|known| *known == name) {
+            self.advance()?;
+            return Ok(Part::Steps(vec![Step::Variable(index)]));
+        }
+        if let Some((_, value)) = CONSTANTS.iter().find(|(known, _)| *known == name) {
+            self.advance()?;
+            return Ok(Part::Number(*value));
+        }
+        let Some(function) = FUNCTIONS.iter().find(|function| function.0 == name) else {
+            return Err(self.unknown(name));
+        };
+        self.advance()?;
+        if self.token != Token::Sign('(') {
+            return Err(self.unexpected(&format!("`(` after the function `{name}`")));
+        }
+        match self.parenthesised()? {
+            Part::Number(value) => self.finite((function.1)(value), at),
+            part => Ok(part.then(Step::Function(function))),
         }
     }
 
@@ -542,7 +532,7 @@ impl<'a> Reader<'a> {
             format!(
                 "one of the variables {}, the constants pi, tau, e, or a function ({})",
                 self.variables.join(", "),
-                FUNCTIONS.join(", ")
+                FUNCTIONS.each_ref().map(|function| function.0).join(", ")
             )
         };
         self.error(self.start, format!("the unknown name `{name}`"), expected)
@@ -556,28 +546,6 @@ impl<'a> Reader<'a> {
             return Err(self.unexpected(&format!("`)` for the `(` at column {opened}")));
         }
         self.advance()?;
-        Ok(match inner {
-            Part::Number(value) => Part::Number(value),
-            Part::Text(text, terms) => Part::Text(format!("({text})"), terms),
-        })
-    }
-}
-
-fn constant(function: &str, value: f64) -> f64 {
-    match function {
-        "sin" => value.sin(),
-        "cos" => value.cos(),
-        "tan" => value.tan(),
-        "asin" => value.asin(),
-        "acos" => value.acos(),
-        "atan" => value.atan(),
-        "sinh" => value.sinh(),
-        "cosh" => value.cosh(),
-        "tanh" => value.tanh(),
-        "exp" => value.exp(),
-        "ln" => value.ln(),
-        "log10" => value.log10(),
-        "sqrt" => value.sqrt(),
-        _ => value.abs(),
+        Ok(inner)
     }
 }

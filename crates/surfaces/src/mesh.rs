@@ -38,7 +38,8 @@ const LARGEST_MM: f64 = 1e6;
 /// A surface of triangles, wound counter-clockwise seen from outside.
 #[derive(Clone)]
 pub struct Mesh {
-    triangles: TriMesh,
+    /// Boxed, since it occupies some 300 bytes inline.
+    triangles: Box<TriMesh>,
     domain: Domain,
     facet_normals: Vec<Unit<Vector3<f64>>>,
     /// Smooth normal at each corner of each facet.
@@ -210,7 +211,7 @@ impl Mesh {
         let scale_mm = 2.0 * edge_mm / (3 * facets.len()) as f64;
         let stacked = stacked(&vertices, &facets, &whole);
         let mesh = Self {
-            triangles,
+            triangles: Box::new(triangles),
             domain,
             facet_normals,
             corner_normals,

@@ -52,17 +52,7 @@ pub(super) fn rewrite_program(
     if marked.iter().all(|marked| *marked) {
         return Ok(nothing_to_do(notes));
     }
-    if let Some(corrector) = context.corrector {
-        robot_match::refuse_other_program(programs, &corrector.arm.robot, &corrector.arm.nominal)?;
-        let found: Vec<String> = context
-            .surface
-            .iter()
-            .flat_map(|surface| surface_frame_contradictions(listing, surface))
-            .collect();
-        if !found.is_empty() {
-            bail!("{}: {}", programs.name(), found.join("; "));
-        }
-    }
+    refuse_other_robot_or_surface(context, programs, listing)?;
     let used = Some(Used::by(listing, &context.cell));
     let Compensated { mut plan, rewritten } =
         compensated(context, &program, Options { loads, ..context.options.clone() })?;
@@ -117,6 +107,22 @@ pub(super) fn rewrite_program(
         std::mem::forget((program, plan, rewritten));
     }
     Ok(result)
+}
+
+/// Refuses a program of another robot, and one whose frames contradict the surface.
+fn refuse_other_robot_or_surface(
+    context: &CompensateContext<'_>,
+    programs: &Programs,
+    listing: &Listing,
+) -> anyhow::Result<()> {
+    let Some(corrector) = context.corrector else { return Ok(()) };
+    robot_match::refuse_other_program(programs, &corrector.arm.robot, &corrector.arm.nominal)?;
+    let contradictions = |surface| surface_frame_contradictions(listing, surface);
+    let found: Vec<String> = context.surface.iter().flat_map(contradictions).collect();
+    if !found.is_empty() {
+        bail!("{}: {}", programs.name(), found.join("; "));
+    }
+    Ok(())
 }
 
 /// Refuses a file that is no program, and notes a program without motions.

@@ -52,11 +52,6 @@ impl Harmonic {
         self.sine_rad.hypot(self.cosine_rad)
     }
 
-    /// Phase φ (rad) with δθ = amplitude · sin(n u + φ).
-    pub fn phase_rad(&self) -> f64 {
-        self.cosine_rad.atan2(self.sine_rad)
-    }
-
     pub(super) fn joint(&self) -> Option<usize> {
         Some(self.joint)
     }

@@ -50,7 +50,7 @@ pub enum TrackError {
         /// Sensor of the file.
         found: &'static str,
         /// Sensor of the track.
-        expected: String,
+        expected: &'static str,
     },
     /// The state file cannot be used.
     #[error("{file}: {why}")]

@@ -12,6 +12,7 @@ use super::bounds::accident_bound;
 use super::state::{PoseRecord, Snapshot, extend_region};
 use super::tracker::Tracker;
 use crate::identification::calibration::Frames;
+use crate::measurement::dataset::Sensor;
 use crate::measurement::registration::points;
 use truegrind_arm::model::Joints;
 use truegrind_arm::parameter::Parameter;
@@ -49,20 +50,20 @@ struct Remount {
 impl Tracker {
     /// Number of consecutive outliers at the end of the history.
     pub(super) fn trailing_accidents(&self) -> usize {
-        let bound = accident_bound(self.rows_per_pose());
+        let bound = accident_bound(self.state.sensor.scalars());
         self.state.history.iter().rev().take_while(|record| !(record.nis <= bound)).count()
     }
 
     /// If the latest poses agree on a remounted target or sensor, continues the track there and returns the alarm.
     pub(super) fn detect_remount(&mut self) -> Option<Alarm> {
         let run = self.trailing_accidents();
-        if run < FEWEST || self.state.sensor == "cable" {
+        if run < FEWEST || self.state.sensor == Sensor::Cable {
             return None;
         }
         let history = &self.state.history;
         let poses: Vec<PoseRecord> = history[history.len() - run..].to_vec();
         let (found, old) = self.find_remount(&poses)?;
-        let alarm = alarm_of(&found, &old, &poses, self.rows_per_pose());
+        let alarm = alarm_of(&found, &old, &poses, self.state.sensor.scalars());
         self.apply_remount(&found, poses);
         Some(alarm)
     }
@@ -78,7 +79,7 @@ impl Tracker {
             mm: AGREE * self.state.sigma_mm * 3f64.sqrt(),
             rad: AGREE * self.state.sigma_rad.max(1e-5) * 3f64.sqrt(),
         };
-        let (target, sensor) = if self.state.sensor == "pose" {
+        let (target, sensor) = if self.state.sensor == Sensor::Pose {
             let readings: Vec<Pose> = poses.iter().filter_map(pose_of).collect();
             if readings.len() != poses.len() {
                 return None;

@@ -34,7 +34,7 @@ impl Tracker {
         if history.len() < window || self.state.poses < earliest {
             return None;
         }
-        let per = self.rows_per_pose();
+        let per = self.state.sensor.scalars();
         let bound = window_bound(window * per);
         // An isolated outlier is ignored; three or four consecutive ones exceed the bound.
         let counted = |at: usize| match history[at].nis {
@@ -162,7 +162,7 @@ impl Tracker {
         if run > 0 {
             return run.is_multiple_of(SETTLE).then(|| self.detect_remount()).flatten();
         }
-        let bound = accident_bound(self.rows_per_pose());
+        let bound = accident_bound(self.state.sensor.scalars());
         let fitting = self.state.history.iter().rev().take_while(|record| record.nis <= bound).count();
         if fitting >= SETTLE {
             self.state.burst_since = 0;
@@ -190,7 +190,7 @@ impl Tracker {
     /// would be meaningless: the frame can rotate far from the measured points.
     fn mean_displacement(&self, group: &Group, together: &GroupChange) -> (f64, f64) {
         let poses = &self.state.history;
-        let (per, p) = (self.rows_per_pose(), self.parameters.len());
+        let (per, p) = (self.state.sensor.scalars(), self.parameters.len());
         let rows = poses.len() * per;
         let (mut r, mut j) = (vec![0.0; rows], vec![0.0; rows * p]);
         self.problem(poses).jacobian(&self.state.reference.x, 0..rows, &mut r, &mut j);
@@ -230,7 +230,7 @@ impl Tracker {
 
     /// Whether a pose of the history is an isolated outlier. After a jump, consecutive poses are outliers.
     fn is_lone_accident(&self, at: usize) -> bool {
-        let bound = accident_bound(self.rows_per_pose());
+        let bound = accident_bound(self.state.sensor.scalars());
         let aside = |at: Option<usize>| {
             at.and_then(|at| self.state.history.get(at)).is_some_and(|s| !(s.nis <= bound))
         };
@@ -239,7 +239,7 @@ impl Tracker {
 
     fn locate_change(&self, groups: &[Group]) -> Option<Explanation> {
         let poses = &self.state.history;
-        let per = self.rows_per_pose();
+        let per = self.state.sensor.scalars();
         let reference = &self.state.reference;
         let (rows, p) = (poses.len() * per, self.parameters.len());
         let (mut r, mut j) = (vec![0.0; rows], vec![0.0; rows * p]);

@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 use super::alarm::Alarm;
 use super::error::StateError;
 use super::options::Options;
-use crate::measurement::dataset::{Reading, Row};
+use crate::identification::identify::sensor_name;
+use crate::measurement::dataset::{Reading, Row, Sensor};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Joints;
 use truegrind_arm::region::Region;
@@ -42,11 +43,11 @@ pub struct PoseRecord {
 }
 
 impl PoseRecord {
-    pub(super) fn row_of(&self, sensor: &str) -> Row {
+    pub(super) fn row_of(&self, sensor: Sensor) -> Row {
         let reading = match (sensor, self.reading.as_slice()) {
-            ("cable", [length, ..]) => Reading::Cable(*length),
-            ("position", [x, y, z, ..]) => Reading::Position(nalgebra::Vector3::new(*x, *y, *z)),
-            (_, [x, y, z, a, b, c, ..]) => {
+            (Sensor::Cable, [length, ..]) => Reading::Cable(*length),
+            (Sensor::Position, [x, y, z, ..]) => Reading::Position(nalgebra::Vector3::new(*x, *y, *z)),
+            (Sensor::Pose, [x, y, z, a, b, c, ..]) => {
                 Reading::Pose(Box::new(pose_from_vector(&[*x, *y, *z, *a, *b, *c])))
             }
             _ => Reading::Cable(f64::NAN),
@@ -115,7 +116,7 @@ pub struct State {
     /// Hash of the model that tracking began with.
     pub model_hash: String,
     /// Sensor.
-    pub sensor: String,
+    pub sensor: Sensor,
     /// Poses processed.
     pub poses: usize,
     /// Poses rejected as outliers.
@@ -207,15 +208,11 @@ impl State {
                 return wrong(key, format!("{before} with {poses} poses"), expected);
             }
         }
-        let numbers = match self.sensor.as_str() {
-            "cable" => 1,
-            "position" => 3,
-            _ => 6,
-        };
         for (k, record) in self.history.iter().enumerate() {
             let key = |name: &str| format!("history {}: {name}", k + 1);
-            if record.reading.len() != numbers {
-                let found = format!("{} numbers for the sensor {}", record.reading.len(), self.sensor);
+            if record.reading.len() != self.sensor.scalars() {
+                let found =
+                    format!("{} numbers for the sensor {}", record.reading.len(), sensor_name(self.sensor));
                 return wrong(&key("reading"), found, "1 of a cable, 3 of a position, 6 of a pose");
             }
             if record.anchor >= self.outlets_mm.len().max(1) {

@@ -135,7 +135,7 @@ impl Tracker {
         let state = State {
             schema: SCHEMA.to_owned(),
             model_hash: model_hash.to_owned(),
-            sensor: sensor_name(dataset.sensor).to_owned(),
+            sensor: dataset.sensor,
             poses: 0,
             accidents: 0,
             options: options.clone(),
@@ -173,16 +173,10 @@ impl Tracker {
         frames.zeros_mm.clone_from(&state.zeros_mm);
         frames.base_from_sensor = pose_from_vector(&state.base_from_sensor);
         frames.flange_from_target = pose_from_vector(&state.flange_from_target);
-        let sensor = match state.sensor.as_str() {
-            "cable" => Sensor::Cable,
-            "position" => Sensor::Position,
-            "pose" => Sensor::Pose,
-            other => return Err(wrong(&format!("unknown sensor \"{other}\""))),
-        };
         // One row of the last cable defines the number of outlets.
         let mut shape = Row::new(0, Joints::zeros(), Reading::Cable(0.0));
         shape.anchor = state.outlets_mm.len().saturating_sub(1);
-        let sensing = frame_parameters(&Dataset::new(file, sensor, vec![shape]));
+        let sensing = frame_parameters(&Dataset::new(file, state.sensor, vec![shape]));
         let parameters: Vec<Parameter> = model.order.iter().copied().chain(sensing).collect();
         let snapshots = [&state.now, &state.reference, &state.middle];
         if snapshots.iter().any(|s| s.x.len() != parameters.len()) {
@@ -201,12 +195,11 @@ impl Tracker {
     /// # Errors
     /// [`TrackError`] where the file has another sensor, or rows already processed have changed.
     pub fn process_file(&mut self, dataset: &Dataset) -> Result<Vec<Alarm>, TrackError> {
-        let sensor = sensor_name(dataset.sensor);
-        if sensor != self.state.sensor {
+        if dataset.sensor != self.state.sensor {
             return Err(TrackError::Sensor {
                 file: dataset.file.clone(),
-                found: sensor,
-                expected: self.state.sensor.clone(),
+                found: sensor_name(dataset.sensor),
+                expected: sensor_name(self.state.sensor),
             });
         }
         let done = self.state.consumed.iter().position(|c| c.file == dataset.file);
@@ -315,13 +308,8 @@ impl Tracker {
     }
 
     pub(super) fn problem(&self, poses: &[PoseRecord]) -> CalibrationProblem {
-        let rows: Vec<Row> = poses.iter().map(|record| record.row_of(&self.state.sensor)).collect();
-        let sensor = match self.state.sensor.as_str() {
-            "cable" => Sensor::Cable,
-            "position" => Sensor::Position,
-            _ => Sensor::Pose,
-        };
-        let dataset = Dataset::new("track", sensor, rows);
+        let rows: Vec<Row> = poses.iter().map(|record| record.row_of(self.state.sensor)).collect();
+        let dataset = Dataset::new("track", self.state.sensor, rows);
         let weights: Vec<_> = poses.iter().map(|s| Weight { per_mm: s.per_mm, per_rad: s.per_rad }).collect();
         CalibrationProblem::new(&dataset, &self.initial.model, &self.frames, &self.parameters, &[], &weights)
     }
@@ -363,14 +351,6 @@ impl Tracker {
         match r.as_slice() {
             [length] => length / per_mm,
             rows => rows.iter().take(3).map(|v| v * v).sum::<f64>().sqrt() / per_mm,
-        }
-    }
-
-    pub(super) fn rows_per_pose(&self) -> usize {
-        match self.state.sensor.as_str() {
-            "cable" => 1,
-            "position" => 3,
-            _ => 6,
         }
     }
 

@@ -135,34 +135,11 @@ impl Filter {
 ///
 /// ```
 /// use truegrind_estimation::estimate::Termination;
+/// use truegrind_estimation::examples::Line;
 /// use truegrind_estimation::filter::ekf;
 /// use truegrind_estimation::least_squares::lm;
 ///
 /// // A straight line with σ = 0.02, one reading after the other: the filter ends with the batch result.
-/// # use std::ops::Range;
-/// # use truegrind_estimation::problem::{Prior, Problem};
-/// # struct Line;
-/// # const READ: [f64; 6] = [1.52, 1.69, 1.91, 2.08, 2.33, 2.49];
-/// # impl Problem for Line {
-/// #     fn parameters(&self) -> usize {
-/// #         2
-/// #     }
-/// #     fn rows(&self) -> usize {
-/// #         READ.len()
-/// #     }
-/// #     fn residuals(&self, x: &[f64], rows: Range<usize>, out: &mut [f64]) {
-/// #         out.iter_mut().zip(rows).for_each(|(out, t)| *out = (x[0] + x[1] * t as f64 - READ[t]) / 0.02);
-/// #     }
-/// #     fn jacobian(&self, x: &[f64], rows: Range<usize>, residuals: &mut [f64], jacobian: &mut [f64]) {
-/// #         self.residuals(x, rows.clone(), residuals);
-/// #         let (offset, slope) = jacobian.split_at_mut(rows.len());
-/// #         offset.fill(1.0 / 0.02);
-/// #         slope.iter_mut().zip(rows).for_each(|(slope, t)| *slope = t as f64 / 0.02);
-/// #     }
-/// #     fn priors(&self) -> &[Prior] {
-/// #         &[Prior { mean: 0.0, sigma: 5.0 }; 2]
-/// #     }
-/// # }
 /// let filtered = ekf::solve(&Line, &[0.0, 0.0], &ekf::Options::default());
 /// assert_eq!(filtered.termination, Termination::DataProcessed);
 /// let at_once = lm::solve(&Line, &[0.0, 0.0], &lm::Options::default());

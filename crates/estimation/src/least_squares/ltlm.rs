@@ -98,30 +98,10 @@ impl Options {
 /// Minimises the cost of `problem` from `start`.
 ///
 /// ```
+/// use truegrind_estimation::examples::Valley;
 /// use truegrind_estimation::least_squares::ltlm;
 ///
-/// // Rosenbrock's valley from its usual start: 10 (y − x²) and 1 − x vanish at (1, 1).
-/// # use std::ops::Range;
-/// # use truegrind_estimation::problem::Problem;
-/// # struct Valley;
-/// # impl Problem for Valley {
-/// #     fn parameters(&self) -> usize {
-/// #         2
-/// #     }
-/// #     fn rows(&self) -> usize {
-/// #         2
-/// #     }
-/// #     fn residuals(&self, x: &[f64], rows: Range<usize>, out: &mut [f64]) {
-/// #         let all = [10.0 * (x[1] - x[0] * x[0]), 1.0 - x[0]];
-/// #         out.copy_from_slice(&all[rows]);
-/// #     }
-/// #     fn jacobian(&self, x: &[f64], rows: Range<usize>, residuals: &mut [f64], jacobian: &mut [f64]) {
-/// #         self.residuals(x, rows.clone(), residuals);
-/// #         let all = [[-20.0 * x[0], -1.0], [10.0, 0.0]];
-/// #         let columns = jacobian.chunks_mut(rows.len()).zip(all);
-/// #         columns.for_each(|(column, whole)| column.copy_from_slice(&whole[rows.clone()]));
-/// #     }
-/// # }
+/// // From the usual start to the end of the valley.
 /// let found = ltlm::solve(&Valley, &[-1.2, 1.0], &ltlm::Options::default());
 /// assert!(found.termination.is_converged(), "{}", found.termination);
 /// assert!((found.x[0] - 1.0).abs() < 1e-4 && (found.x[1] - 1.0).abs() < 1e-4);

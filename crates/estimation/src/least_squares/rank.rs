@@ -1,13 +1,12 @@
 //! Rank, condition and null space of a least-squares problem, from its triangular factor.
 //!
-//! **Method.** Column-pivoted QR of R orders the parameters by what each adds to those before it; the singular
-//! value decomposition R = U Σ Vᵀ gives rank, condition number and, as the last columns of V, the combinations
-//! of parameters that the data do not determine. Both act on R (p × p), since R and the Jacobian have the same
-//! singular values and right singular vectors.
+//! **Method.** The singular value decomposition R = U Σ Vᵀ gives rank, condition number and, as the last columns of V,
+//! the combinations of parameters that the data do not determine. It acts on R (p × p), since R and the Jacobian have the
+//! same singular values and right singular vectors.
 //!
 //! **Shapes.** R is p × p; `right_vectors` holds one direction in each column, strongest first.
 //!
-//! **Source.** Golub and Van Loan, *Matrix Computations*, 4th ed., §5.4 and §5.5. The scaling of the columns
+//! **Source.** Golub and Van Loan, *Matrix Computations*, 4th ed., §2.4 and §5.5. The scaling of the columns
 //! determines which singular values are small: scale by prior sigmas or by column norms first, so that the result does
 //! not depend on units.
 //!
@@ -27,10 +26,6 @@ pub struct RankAnalysis {
     pub singular_values: Vec<f64>,
     /// Right singular vectors, p × p, one column for each singular value.
     pub right_vectors: DMatrix<f64>,
-    /// Parameters in pivoting order: the first `rank` span the identifiable space best.
-    pub pivots: Vec<usize>,
-    /// |diagonal| of the pivoted triangle, in the order of `pivots`: what each parameter adds.
-    pub pivot_sizes: Vec<f64>,
 }
 
 impl RankAnalysis {
@@ -38,11 +33,6 @@ impl RankAnalysis {
     pub fn null_space(&self) -> DMatrix<f64> {
         let p = self.right_vectors.ncols();
         self.right_vectors.columns(self.rank, p - self.rank).into_owned()
-    }
-
-    /// Parameters excluded by a rank-revealing choice.
-    pub fn dependent(&self) -> &[usize] {
-        &self.pivots[self.rank.min(self.pivots.len())..]
     }
 }
 
@@ -60,19 +50,9 @@ pub fn analyse(r: &DMatrix<f64>, tolerance: Option<f64>) -> Option<RankAnalysis>
     let svd = matrix.thin_svd().ok()?;
     let singular_values: Vec<f64> = (0..p).map(|k| svd.S().column_vector()[k]).collect();
     let right_vectors = DMatrix::from_fn(p, p, |i, j| svd.V()[(i, j)]);
-    let pivoted = matrix.col_piv_qr();
-    let (forward, _) = pivoted.P().arrays();
-    let pivot_sizes = (0..p).map(|k| pivoted.thin_R()[(k, k)].abs()).collect();
     let (largest, smallest) = (singular_values[0], singular_values[p - 1]);
     let threshold = tolerance.unwrap_or(p as f64 * f64::EPSILON) * largest;
     let rank = singular_values.iter().filter(|s| **s > threshold).count();
     let condition = if smallest > 0.0 { largest / smallest } else { f64::INFINITY };
-    Some(RankAnalysis {
-        rank,
-        condition,
-        singular_values,
-        right_vectors,
-        pivots: forward.to_vec(),
-        pivot_sizes,
-    })
+    Some(RankAnalysis { rank, condition, singular_values, right_vectors })
 }

@@ -75,33 +75,10 @@ impl Options {
 /// Searches the box around `start`.
 ///
 /// ```
+/// use truegrind_estimation::examples::Line;
 /// use truegrind_estimation::swarm::de;
 ///
 /// // A straight line, from the costs alone: near 1.50 and 0.20, not reported as converged, and reproducible with the same seed.
-/// # use std::ops::Range;
-/// # use truegrind_estimation::problem::{Prior, Problem};
-/// # struct Line;
-/// # const READ: [f64; 6] = [1.52, 1.69, 1.91, 2.08, 2.33, 2.49];
-/// # impl Problem for Line {
-/// #     fn parameters(&self) -> usize {
-/// #         2
-/// #     }
-/// #     fn rows(&self) -> usize {
-/// #         READ.len()
-/// #     }
-/// #     fn residuals(&self, x: &[f64], rows: Range<usize>, out: &mut [f64]) {
-/// #         out.iter_mut().zip(rows).for_each(|(out, t)| *out = (x[0] + x[1] * t as f64 - READ[t]) / 0.02);
-/// #     }
-/// #     fn jacobian(&self, x: &[f64], rows: Range<usize>, residuals: &mut [f64], jacobian: &mut [f64]) {
-/// #         self.residuals(x, rows.clone(), residuals);
-/// #         let (offset, slope) = jacobian.split_at_mut(rows.len());
-/// #         offset.fill(1.0 / 0.02);
-/// #         slope.iter_mut().zip(rows).for_each(|(slope, t)| *slope = t as f64 / 0.02);
-/// #     }
-/// #     fn priors(&self) -> &[Prior] {
-/// #         &[Prior { mean: 0.0, sigma: 5.0 }; 2]
-/// #     }
-/// # }
 /// let found = de::solve(&Line, &[0.0, 0.0], &de::Options::default());
 /// assert!((found.x[0] - 1.50).abs() < 0.02 && (found.x[1] - 0.20).abs() < 0.01, "{:?}", found.x);
 /// assert!(!found.termination.is_converged() && found.covariance.is_none());

@@ -52,8 +52,6 @@ impl Default for Bounds {
 pub struct Candidate {
     /// Controller angles (rad).
     pub joints: Joints,
-    /// The touched point in the base (mm).
-    pub touched_mm: Vector3<f64>,
     /// Distance to singularity.
     pub singularity: f64,
     /// Index of the cable that measures it.
@@ -150,7 +148,7 @@ pub fn draw(
             rejections.blocked += 1;
             continue;
         }
-        out.push(Candidate { joints, touched_mm: touched.coords, singularity, anchor });
+        out.push(Candidate { joints, singularity, anchor });
     }
     (out, rejections)
 }

@@ -6,7 +6,7 @@
 use std::ops::Range;
 
 use super::dialect::Dialect;
-use super::syntax::{NcTree, Syntax};
+use super::syntax::NcTree;
 use super::token::Token;
 use crate::motion::{Mark, is_uncorrected_comment};
 use crate::tree::whole_line;
@@ -104,9 +104,4 @@ pub fn place(tree: &NcTree<'_>, dialect: Dialect) -> usize {
         at = end;
     }
     place
-}
-
-/// Whether a file has anything but comments and white space.
-pub fn is_program(tree: &NcTree<'_>) -> bool {
-    tree.nodes.iter().any(|node| matches!(node.kind, Syntax::Block | Syntax::Skippable))
 }

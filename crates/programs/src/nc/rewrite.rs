@@ -408,81 +408,87 @@ impl<'s> Rewriter<'_, 's> {
         goal: &Goal,
         file: usize,
     ) -> CommandedOrientation {
-        match context.orientation_mode {
-            OrientationMode::Unknown(_) => CommandedOrientation::Unchanged,
-            OrientationMode::Angles | OrientationMode::Rpy => {
-                let rpy = context.orientation_mode == OrientationMode::Rpy;
-                let Some(intended) = all(context.angles) else { return CommandedOrientation::Unchanged };
-                let angles =
-                    match (goal.rotation, if rpy { Some(Angles::Wpr) } else { self.task.angles[file] }) {
-                        (Some(rotation), Some(angles)) => angles.angles(&rotation, intended),
-                        _ => intended,
-                    };
-                let mut reached = angles;
-                let names: [&[u8]; 3] = if rpy { [b"A2", b"B2", b"C2"] } else { [b"A", b"B", b"C"] };
-                for axis in 0..3 {
-                    let from = self.control.angles[axis].or(context.start_angles[axis]);
-                    let word = slots.angles[axis];
-                    let increment = word
-                        .and_then(|word| states_increment(writer.tree, writer.dialect, &word))
-                        .unwrap_or(!context.absolute);
-                    let base = if increment { from.unwrap_or(0.0) } else { 0.0 };
-                    // An angle that no block before has stated has a word in this block.
-                    let keep = from.map_or(angles[axis], |from| from - base);
-                    let old_base = if increment { context.start_angles[axis] } else { Some(0.0) };
-                    let was = old_base.map_or(f64::NAN, |old| intended[axis] - old);
-                    let decimals = self.options.joint_decimals;
-                    let value = writer.write_word(
-                        ANGLES + axis,
-                        names[axis],
-                        angles[axis] - base,
-                        keep,
-                        was,
-                        decimals,
-                    );
-                    reached[axis] = value + base;
-                }
-                CommandedOrientation::Angles(reached)
+        let written = match context.orientation_mode {
+            OrientationMode::Unknown(_) => None,
+            OrientationMode::Angles => {
+                let names = [&b"A"[..], b"B", b"C"];
+                self.write_angles(writer, context, slots, goal, (names, self.task.angles[file]))
             }
-            OrientationMode::Vector => {
-                let Some((intended, intended_spin)) = context.vector else {
-                    return CommandedOrientation::Unchanged;
-                };
-                let length = intended.iter().map(|x| x * x).sum::<f64>().sqrt();
-                let (vector, spin) = match &goal.rotation {
-                    Some(rotation) => {
-                        let (vector, spin) = vector_and_spin(rotation, intended_spin);
-                        // Keep the length of the vector, which need not be 1.
-                        (vector.map(|x| x * length), spin)
-                    }
-                    None => (intended, intended_spin),
-                };
-                let decimals = self.options.quaternion_decimals;
-                let names = vector_names(writer.dialect, context);
-                let before = self.control.vector.or(context.start_vector);
-                let stated = slots.vector.iter().any(Option::is_some);
-                let holds =
-                    before.is_some_and(|(old, _)| (0..3).all(|i| !differs(old[i], vector[i], decimals)));
-                if stated || !holds {
-                    for axis in 0..3 {
-                        // An omitted component is 0.
-                        writer.write_word(
-                            VECTOR + axis,
-                            names[axis],
-                            vector[axis],
-                            0.0,
-                            intended[axis],
-                            decimals,
-                        );
-                    }
-                }
-                if writer.dialect == Dialect::Siemens {
-                    let held = before.map_or(0.0, |(_, spin)| spin);
-                    writer.write_word(SPIN, b"THETA", spin, held, intended_spin, self.options.joint_decimals);
-                }
-                CommandedOrientation::Vector(vector, spin)
+            OrientationMode::Rpy => {
+                let names = [&b"A2"[..], b"B2", b"C2"];
+                self.write_angles(writer, context, slots, goal, (names, Some(Angles::Wpr)))
+            }
+            OrientationMode::Vector => self.write_vector(writer, context, slots, goal),
+        };
+        written.unwrap_or(CommandedOrientation::Unchanged)
+    }
+
+    fn write_angles(
+        &self,
+        writer: &mut BlockWriter<'_, 's>,
+        context: &BlockContext,
+        slots: &WordSlots<'s>,
+        goal: &Goal,
+        (names, convention): ([&[u8]; 3], Option<Angles>),
+    ) -> Option<CommandedOrientation> {
+        let intended = all(context.angles)?;
+        let angles = match (goal.rotation, convention) {
+            (Some(rotation), Some(angles)) => angles.angles(&rotation, intended),
+            _ => intended,
+        };
+        let mut reached = angles;
+        for axis in 0..3 {
+            let from = self.control.angles[axis].or(context.start_angles[axis]);
+            let word = slots.angles[axis];
+            let increment = word
+                .and_then(|word| states_increment(writer.tree, writer.dialect, &word))
+                .unwrap_or(!context.absolute);
+            let base = if increment { from.unwrap_or(0.0) } else { 0.0 };
+            // An angle that no block before has stated has a word in this block.
+            let keep = from.map_or(angles[axis], |from| from - base);
+            let old_base = if increment { context.start_angles[axis] } else { Some(0.0) };
+            let was = old_base.map_or(f64::NAN, |old| intended[axis] - old);
+            let decimals = self.options.joint_decimals;
+            let value =
+                writer.write_word(ANGLES + axis, names[axis], angles[axis] - base, keep, was, decimals);
+            reached[axis] = value + base;
+        }
+        Some(CommandedOrientation::Angles(reached))
+    }
+
+    fn write_vector(
+        &self,
+        writer: &mut BlockWriter<'_, 's>,
+        context: &BlockContext,
+        slots: &WordSlots<'s>,
+        goal: &Goal,
+    ) -> Option<CommandedOrientation> {
+        let (intended, intended_spin) = context.vector?;
+        let length = intended.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let (vector, spin) = match &goal.rotation {
+            Some(rotation) => {
+                let (vector, spin) = vector_and_spin(rotation, intended_spin);
+                // Keep the length of the vector, which need not be 1.
+                (vector.map(|x| x * length), spin)
+            }
+            None => (intended, intended_spin),
+        };
+        let decimals = self.options.quaternion_decimals;
+        let names = vector_names(writer.dialect, context);
+        let before = self.control.vector.or(context.start_vector);
+        let stated = slots.vector.iter().any(Option::is_some);
+        let holds = before.is_some_and(|(old, _)| (0..3).all(|i| !differs(old[i], vector[i], decimals)));
+        if stated || !holds {
+            for axis in 0..3 {
+                // An omitted component is 0.
+                writer.write_word(VECTOR + axis, names[axis], vector[axis], 0.0, intended[axis], decimals);
             }
         }
+        if writer.dialect == Dialect::Siemens {
+            let held = before.map_or(0.0, |(_, spin)| spin);
+            writer.write_word(SPIN, b"THETA", spin, held, intended_spin, self.options.joint_decimals);
+        }
+        Some(CommandedOrientation::Vector(vector, spin))
     }
 
     /// Inserts blocks before a block, in the style of its words.

@@ -139,6 +139,11 @@ impl Instruction {
         matches!(self.also, Also::Nothing | Also::Triggers) && !self.searches()
     }
 
+    /// Whether motions can be inserted before it. A trigger at a distance along the movement would fire on its last piece.
+    pub fn splits(&self) -> bool {
+        self.between != Between::Nothing && self.also != Also::Triggers
+    }
+
     /// Least number of required arguments.
     pub fn least(&self) -> usize {
         self.pattern.bytes().filter(|&letter| letter != b'*').count()

@@ -69,9 +69,6 @@ impl SwitchSet {
     /// After a start from main: configurations monitored, everything else off.
     pub const START: SwitchSet = SwitchSet(all(OFF) & !(0o77) | ON | ON << 3);
 
-    /// On or off.
-    pub const ANY: SwitchSet = SwitchSet(all(OFF | ON));
-
     /// Join: the union of the states.
     pub fn join(self, other: SwitchSet) -> SwitchSet {
         SwitchSet(self.0 | other.0)

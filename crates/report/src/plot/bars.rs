@@ -1,14 +1,12 @@
 //! Bar charts with optional whiskers.
 
 use super::axis::Axis;
-use super::canvas::{DrawingError, PIXEL};
-use super::frame::{Entry, Frame, Glyph, Inside, picture};
+use super::frame::{Entry, Frame, Glyph, Inside};
 use super::ink::Ink;
 use super::letters;
-use super::pen::{LABEL, Paint, Pen, THIN};
+use super::pen::{HPos, LABEL, PIXEL, Paint, Pen, THIN, VPos};
 use super::scale::{Ends, Scale};
 use crate::number::{MISSING, Precision};
-use plotters::style::text_anchor::{HPos, VPos};
 
 /// A bar chart.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,10 +47,10 @@ impl Bars {
     /// The SVG, 900 × 380 pixels.
     pub fn svg(&self) -> String {
         let name = if self.title.is_empty() { self.y.text() } else { self.title.clone() };
-        picture((900, 380), &name, |pen| self.draw(pen))
+        Pen::draw((900, 380), &name, |pen| self.draw(pen))
     }
 
-    fn draw(&self, pen: Pen<'_>) -> Result<(), DrawingError> {
+    fn draw(&self, pen: &mut Pen) {
         let legend = self.groups.iter().enumerate().filter(|(_, group)| !group.name.is_empty());
         let frame = Frame {
             title: &self.title,
@@ -71,10 +69,11 @@ impl Bars {
             y_grid: true,
             right: 0,
         };
-        let inside = frame.draw(pen)?;
+        let inside = frame.draw(pen);
         if !self.groups.iter().any(|group| (0..group.values.len()).any(|index| group.value(index).is_some()))
         {
-            return inside.draw_empty(pen);
+            inside.draw_empty(pen);
+            return;
         }
         let slot = f64::from(inside.x.end - inside.x.start) / self.names.len().max(1) as f64;
         let breadth = (slot * 0.78 / self.groups.len().max(1) as f64).min(f64::from(90 * PIXEL));
@@ -83,16 +82,12 @@ impl Bars {
             for place in 0..self.names.len() {
                 let Some(center) = inside.across(place as f64) else { continue };
                 let middle = center + offset.round() as i32;
-                self.draw_bar(pen, &inside, (index, place), middle, breadth)?;
+                self.draw_bar(pen, &inside, (index, place), middle, breadth);
             }
         }
         // The zero line is drawn over the bars.
-        pen.line(
-            vec![(inside.x.start, inside.base()), (inside.x.end, inside.base())],
-            Paint::text(0.5),
-            THIN,
-            "",
-        )
+        let base = inside.base();
+        pen.line(&[(inside.x.start, base), (inside.x.end, base)], Paint::text(0.5), THIN, "");
     }
 
     fn ink(&self, group: usize) -> Ink {
@@ -120,66 +115,59 @@ impl Bars {
     /// Draws the bar of a group and category at `middle`, with whisker and number, within `breadth`.
     fn draw_bar(
         &self,
-        pen: Pen<'_>,
+        pen: &mut Pen,
         inside: &Inside,
         (index, place): (usize, usize),
         middle: i32,
         breadth: f64,
-    ) -> Result<(), DrawingError> {
+    ) {
         let group = &self.groups[index];
         let half = (breadth * 0.46).round() as i32;
         let base = inside.base();
         let Some((value, top)) = group.value(place).and_then(|value| Some((value, inside.down(value)?)))
         else {
-            return pen.text(MISSING, (middle, base - 3 * PIXEL), LABEL, HPos::Center, VPos::Bottom);
+            pen.text(MISSING, (middle, base - 3 * PIXEL), LABEL, HPos::Center, VPos::Bottom);
+            return;
         };
         let top = top.clamp(inside.y.start, inside.y.end);
-        pen.sheet.open_group(&format!(
-            "{} {} {} {}",
-            self.names[place],
-            group.name,
-            Precision::Significant(4).format(value),
-            self.y.unit
-        ));
-        pen.rectangle(
-            [(middle - half, top.min(base)), (middle + half, top.max(base))],
-            Paint(self.ink(index).rgb(), 1.0),
-        )?;
-        let mut above = top.min(base);
-        if let Some(spread) = group.deviation(place) {
-            let ends = [value - spread, value + spread]
-                .map(|end| inside.down(end).unwrap_or(inside.y.end).clamp(inside.y.start, inside.y.end));
-            draw_whisker(pen, middle, ends, half / 3)?;
-            above = above.min(ends[1]);
-        }
-        if let Some(precision) = self.labels {
-            let label = precision.format(value);
-            let size = LABEL * 0.9;
-            // Numbers wider than their bars would overlap.
-            if letters::width(&label, size) <= breadth * 1.05 {
-                let (at, side) = if value < 0.0 {
-                    (top.max(base) + 2 * PIXEL, VPos::Top)
-                } else {
-                    (above - 2 * PIXEL, VPos::Bottom)
-                };
-                pen.text(&label, (middle, at), size, HPos::Center, side)?;
+        let number = Precision::Significant(4).format(value);
+        let title = format!("{} {} {number} {}", self.names[place], group.name, self.y.unit);
+        pen.titled(&title, |pen| {
+            let corners = [(middle - half, top.min(base)), (middle + half, top.max(base))];
+            pen.rectangle(corners, Paint(self.ink(index).rgb(), 1.0));
+            let mut above = top.min(base);
+            if let Some(spread) = group.deviation(place) {
+                let ends = [value - spread, value + spread]
+                    .map(|end| inside.down(end).unwrap_or(inside.y.end).clamp(inside.y.start, inside.y.end));
+                draw_whisker(pen, middle, ends, half / 3);
+                above = above.min(ends[1]);
             }
-        }
-        pen.sheet.close_group();
-        Ok(())
+            if let Some(precision) = self.labels {
+                let label = precision.format(value);
+                let size = LABEL * 0.9;
+                // Numbers wider than their bars would overlap.
+                if letters::width(&label, size) <= breadth * 1.05 {
+                    let (at, side) = if value < 0.0 {
+                        (top.max(base) + 2 * PIXEL, VPos::Top)
+                    } else {
+                        (above - 2 * PIXEL, VPos::Bottom)
+                    };
+                    pen.text(&label, (middle, at), size, HPos::Center, side);
+                }
+            }
+        });
     }
 }
 
 /// Draws a whisker with caps.
-fn draw_whisker(pen: Pen<'_>, middle: i32, ends: [i32; 2], cap: i32) -> Result<(), DrawingError> {
+fn draw_whisker(pen: &mut Pen, middle: i32, ends: [i32; 2], cap: i32) {
     for path in [
-        vec![(middle, ends[0]), (middle, ends[1])],
-        vec![(middle - cap, ends[0]), (middle + cap, ends[0])],
-        vec![(middle - cap, ends[1]), (middle + cap, ends[1])],
+        [(middle, ends[0]), (middle, ends[1])],
+        [(middle - cap, ends[0]), (middle + cap, ends[0])],
+        [(middle - cap, ends[1]), (middle + cap, ends[1])],
     ] {
-        pen.line(path, Paint::text(0.85), THIN + 2, "")?;
+        pen.line(&path, Paint::text(0.85), THIN + 2, "");
     }
-    Ok(())
 }
 
 impl BarGroup {

@@ -1,12 +1,9 @@
 //! Colour scale and its bar.
 
-use plotters::style::text_anchor::{HPos, VPos};
-
 use super::axis::Axis;
-use super::canvas::{DrawingError, PIXEL};
 use super::ink::ColorMap;
 use super::letters;
-use super::pen::{LABEL, Paint, Pen, THIN};
+use super::pen::{HPos, LABEL, PIXEL, Paint, Pen, THIN, VPos};
 use super::scale::{Ends, Scale};
 
 const STEPS: i32 = 64;
@@ -46,11 +43,7 @@ impl Colors {
     }
 
     pub(super) fn paint(&self, fraction: f64) -> Paint {
-        Paint(self.map.rgb(fraction), 1.0)
-    }
-
-    pub(super) fn at(&self, fraction: f64) -> [u8; 3] {
-        self.map.at(fraction)
+        Paint(self.map.at(fraction), 1.0)
     }
 
     /// Width of the bar with its labels.
@@ -60,23 +53,23 @@ impl Colors {
     }
 
     /// Draws the bar with its left edge at `left`, from `top` to `bottom`.
-    pub(super) fn draw(&self, pen: Pen<'_>, left: i32, top: i32, bottom: i32) -> Result<(), DrawingError> {
+    pub(super) fn draw(&self, pen: &mut Pen, left: i32, top: i32, bottom: i32) {
         let at = |fraction: f64| bottom - (fraction * f64::from(bottom - top)).round() as i32;
         for step in 0..STEPS {
             let low = at(f64::from(step) / f64::from(STEPS));
             let paint = self.paint((f64::from(step) + 0.5) / f64::from(STEPS));
             // Each step extends to the top and is covered by the next, since touching edges would show seams.
-            pen.rectangle([(left, top), (left + BREADTH, low)], paint)?;
+            pen.rectangle([(left, top), (left + BREADTH, low)], paint);
         }
-        pen.outline([(left, top), (left + BREADTH, bottom)], Paint::text(0.5), THIN)?;
+        pen.outline([(left, top), (left + BREADTH, bottom)], Paint::text(0.5), THIN);
         let mut right = left + BREADTH;
         for (value, label) in &self.scale.ticks {
             let Some(fraction) = self.scale.fraction(*value) else { continue };
             let (y, x) = (at(fraction), left + BREADTH);
-            pen.line(vec![(x, y), (x + 4 * PIXEL, y)], Paint::text(0.5), THIN, "")?;
-            pen.text(label, (x + 7 * PIXEL, y), LABEL, HPos::Left, VPos::Center)?;
+            pen.line(&[(x, y), (x + 4 * PIXEL, y)], Paint::text(0.5), THIN, "");
+            pen.text(label, (x + 7 * PIXEL, y), LABEL, HPos::Left, VPos::Center);
             right = right.max(x + 7 * PIXEL + letters::width(label, LABEL) as i32);
         }
-        pen.upright(&self.text, (right + 5 * PIXEL, (top + bottom) / 2), LABEL)
+        pen.upright(&self.text, (right + 5 * PIXEL, (top + bottom) / 2), LABEL);
     }
 }

@@ -2,14 +2,9 @@
 
 use std::ops::Range;
 
-use plotters::chart::ChartBuilder;
-use plotters::style::FontStyle;
-use plotters::style::text_anchor::{HPos, VPos};
-
-use super::canvas::{Area, DrawingError, PIXEL};
 use super::ink::Ink;
 use super::letters;
-use super::pen::{BOLD, LABEL, Marker, Paint, Pen, THIN, TITLE, stroke, text};
+use super::pen::{BOLD, HPos, LABEL, Marker, PIXEL, Paint, Pen, Point, THIN, TITLE, VPos};
 use super::scale::Scale;
 
 const TICK: i32 = 4 * PIXEL;
@@ -47,98 +42,92 @@ pub(super) struct Entry {
 /// Symbol of an entry.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Glyph {
-    Line { dash: &'static str, width: u32, marker: Option<Marker> },
+    Line { dash: &'static str, width: i32, marker: Option<Marker> },
     Point(Marker),
     Area { alpha: f64, outlined: bool },
 }
 
 impl Frame<'_> {
-    /// Draws the frame and returns its inside, which maps values to positions on the sheet.
-    pub(super) fn draw(&self, pen: Pen<'_>) -> Result<Inside, DrawingError> {
-        let area = pen.area;
-        let mut top = EDGE;
+    /// Draws the frame over the whole picture and returns its inside, which maps values to positions.
+    pub(super) fn draw(&self, pen: &mut Pen) -> Inside {
+        let size = pen.size;
+        self.draw_panel(pen, (0, 0), size)
+    }
+
+    /// Draws the frame in a panel with this upper left corner and size.
+    pub(super) fn draw_panel(&self, pen: &mut Pen, corner: Point, size: Point) -> Inside {
+        let mut top = corner.1 + EDGE;
         if !self.title.is_empty() {
-            pen.bold(self.title, (EDGE, top), TITLE, HPos::Left, VPos::Top)?;
+            pen.bold(self.title, (corner.0 + EDGE, top), TITLE);
             top += TITLE as i32 + 6 * PIXEL;
         }
-        top = self.draw_legend(pen, top)? + 6 * PIXEL;
+        top = self.draw_legend(pen, (corner.0, top), size.0) + 6 * PIXEL;
 
         let widest = self.y.ticks.iter().map(|tick| letters::width(&tick.1, LABEL)).fold(0.0, f64::max);
         let mut left = widest as i32 + 2 * TICK + EDGE;
         if !self.y_text.is_empty() {
             left += LABEL as i32 + 4 * PIXEL;
         }
-        let mut bottom = LABEL as i32 + 2 * TICK + 8 * PIXEL;
+        let mut below = LABEL as i32 + 2 * TICK + 8 * PIXEL;
         if !self.x_text.is_empty() {
-            bottom += LABEL as i32 + 3 * PIXEL;
+            below += LABEL as i32 + 3 * PIXEL;
         }
         // Half of the last tick label is right of the axis.
         let last = self.x.ticks.last().map_or(0.0, |tick| letters::width(&tick.1, LABEL) / 2.0);
-        let mut chart = ChartBuilder::on(area)
-            .margin_top(top)
-            .margin_right(self.right.max(last as i32) + EDGE)
-            .margin_bottom(FOOT)
-            .x_label_area_size(bottom)
-            .y_label_area_size(left)
-            .build_cartesian_2d(self.x.clone(), self.y.clone())?;
-        let labels = text(LABEL, FontStyle::Normal, HPos::Center, VPos::Center);
-        let mut mesh = chart.configure_mesh();
-        mesh.bold_line_style(stroke(Paint::text(0.14), THIN))
-            .light_line_style(stroke(Paint::text(0.05), THIN))
-            .axis_style(stroke(Paint::text(0.5), THIN))
-            .label_style(labels.clone())
-            .axis_desc_style(labels)
-            .set_all_tick_mark_size(TICK)
-            .x_desc(self.x_text.clone())
-            .y_desc(self.y_text.clone());
-        if !self.x_grid {
-            mesh.disable_x_mesh();
-        }
-        if !self.y_grid {
-            mesh.disable_y_mesh();
-        }
-        mesh.draw()?;
-        let (x, y) = chart.plotting_area().get_pixel_range();
-        Ok(Inside { x, y, x_scale: self.x.clone(), y_scale: self.y.clone() })
+        let right = corner.0 + size.0 - self.right.max(last as i32) - EDGE;
+        let (left, bottom) = (corner.0 + left, corner.1 + size.1 - FOOT - below);
+        let inside = Inside {
+            x: left..right.max(left),
+            y: top..bottom.max(top),
+            x_scale: self.x.clone(),
+            y_scale: self.y.clone(),
+        };
+        inside.draw_grid(pen, self.x_grid, self.y_grid);
+        inside.draw_axes(pen);
+        pen.upright(&self.y_text, (corner.0, (top + bottom) / 2), LABEL);
+        let foot = corner.1 + size.1 - FOOT;
+        pen.text(&self.x_text, ((left + right) / 2, foot), LABEL, HPos::Center, VPos::Bottom);
+        inside
     }
 
-    fn draw_legend(&self, pen: Pen<'_>, top: i32) -> Result<i32, DrawingError> {
+    /// Draws the legend from a corner on within a width, and returns where it ends.
+    fn draw_legend(&self, pen: &mut Pen, (left, top): Point, width: i32) -> i32 {
         if self.legend.is_empty() {
-            return Ok(top);
+            return top;
         }
-        let width = pen.area.dim_in_pixel().0 as i32;
-        let (mut x, mut y) = (EDGE, top);
+        let (mut x, mut y) = (left + EDGE, top);
         for entry in &self.legend {
             let room = GLYPH + GLYPH_GAP + letters::width(&entry.name, LABEL) as i32;
-            if x > EDGE && x + room > width - EDGE {
-                (x, y) = (EDGE, y + LEGEND_LINE);
+            if x > left + EDGE && x + room > left + width - EDGE {
+                (x, y) = (left + EDGE, y + LEGEND_LINE);
             }
             let middle = y + LEGEND_LINE / 2;
-            entry.draw(pen, x, middle)?;
-            pen.text(&entry.name, (x + GLYPH + GLYPH_GAP, middle), LABEL, HPos::Left, VPos::Center)?;
+            entry.draw(pen, x, middle);
+            pen.text(&entry.name, (x + GLYPH + GLYPH_GAP, middle), LABEL, HPos::Left, VPos::Center);
             x += room + ENTRY_GAP;
         }
-        Ok(y + LEGEND_LINE)
+        y + LEGEND_LINE
     }
 }
 
 impl Entry {
-    fn draw(&self, pen: Pen<'_>, x: i32, middle: i32) -> Result<(), DrawingError> {
-        let color = self.ink.rgb();
+    fn draw(&self, pen: &mut Pen, x: i32, middle: i32) {
+        let paint = Paint(self.ink.rgb(), 1.0);
         match self.glyph {
             Glyph::Line { dash, width, marker } => {
-                pen.line(vec![(x, middle), (x + GLYPH, middle)], Paint(color, 1.0), width, dash)?;
-                match marker {
-                    Some(marker) => pen.marker(marker, (x + GLYPH / 2, middle), Paint(color, 1.0)),
-                    None => Ok(()),
+                pen.line(&[(x, middle), (x + GLYPH, middle)], paint, width, dash);
+                if let Some(marker) = marker {
+                    pen.marker(marker, (x + GLYPH / 2, middle), paint);
                 }
             }
-            Glyph::Point(marker) => pen.marker(marker, (x + GLYPH / 2, middle), Paint(color, 1.0)),
+            Glyph::Point(marker) => pen.marker(marker, (x + GLYPH / 2, middle), paint),
             Glyph::Area { alpha, outlined } => {
                 let (inset, half) = (4 * PIXEL, 6 * PIXEL);
                 let corners = [(x + inset, middle - half), (x + GLYPH - inset, middle + half)];
-                pen.rectangle(corners, Paint(color, alpha))?;
-                if outlined { pen.outline(corners, Paint(color, 1.0), BOLD) } else { Ok(()) }
+                pen.rectangle(corners, Paint(paint.0, alpha));
+                if outlined {
+                    pen.outline(corners, paint, BOLD);
+                }
             }
         }
     }
@@ -190,33 +179,48 @@ impl Inside {
     }
 
     /// Draws "no data" in the middle.
-    pub(super) fn draw_empty(&self, pen: Pen<'_>) -> Result<(), DrawingError> {
+    pub(super) fn draw_empty(&self, pen: &mut Pen) {
         let middle = (self.x.start / 2 + self.x.end / 2, self.y.start / 2 + self.y.end / 2);
-        pen.text("no data", middle, TITLE, HPos::Center, VPos::Center)
+        pen.text("no data", middle, TITLE, HPos::Center, VPos::Center);
     }
 
     /// Draws clipped to the inside, plus the size of a marker.
-    pub(super) fn clip(
-        &self,
-        pen: Pen<'_>,
-        drawing: impl FnOnce() -> Result<(), DrawingError>,
-    ) -> Result<(), DrawingError> {
-        let margin = 5 * PIXEL;
-        pen.sheet.open_window(
-            self.x.start - margin..self.x.end + margin,
-            self.y.start - margin..self.y.end + margin,
-        );
-        let drawn = drawing();
-        pen.sheet.close_window();
-        drawn
+    pub(super) fn clip(&self, pen: &mut Pen, drawing: impl FnOnce(&mut Pen)) {
+        let with_margin = |range: &Range<i32>| range.start - 5 * PIXEL..range.end + 5 * PIXEL;
+        pen.within(with_margin(&self.x), with_margin(&self.y), drawing);
     }
-}
 
-/// Draws a plot (size in pixels).
-pub(super) fn picture(
-    size: (u32, u32),
-    name: &str,
-    drawing: impl FnOnce(Pen<'_>) -> Result<(), DrawingError>,
-) -> String {
-    super::canvas::draw(size, name, |area: &Area, sheet| drawing(Pen { area, sheet }))
+    fn draw_grid(&self, pen: &mut Pen, x_grid: bool, y_grid: bool) {
+        let places = |ticks: &[(f64, String)]| ticks.iter().map(|tick| tick.0).collect::<Vec<_>>();
+        for (paint, x, y) in [
+            (Paint::text(0.05), &self.x_scale.minor, &self.y_scale.minor),
+            (Paint::text(0.14), &places(&self.x_scale.ticks), &places(&self.y_scale.ticks)),
+        ] {
+            for x in x.iter().filter(|_| x_grid).filter_map(|x| self.across(*x)) {
+                pen.line(&[(x, self.y.start), (x, self.y.end)], paint, THIN, "");
+            }
+            for y in y.iter().filter(|_| y_grid).filter_map(|y| self.down(*y)) {
+                pen.line(&[(self.x.start, y), (self.x.end, y)], paint, THIN, "");
+            }
+        }
+    }
+
+    /// Draws both axes with their ticks and labels.
+    fn draw_axes(&self, pen: &mut Pen) {
+        let paint = Paint::text(0.5);
+        let (left, bottom) = (self.x.start, self.y.end);
+        pen.line(&[(left, self.y.start), (left, bottom)], paint, THIN, "");
+        for (value, label) in &self.y_scale.ticks {
+            let Some(y) = self.down(*value).filter(|y| self.y.contains(y) || *y == bottom) else { continue };
+            pen.text(label, (left - 2 * TICK, y), LABEL, HPos::Right, VPos::Center);
+            pen.line(&[(left - TICK, y), (left, y)], paint, THIN, "");
+        }
+        pen.line(&[(left, bottom), (self.x.end, bottom)], paint, THIN, "");
+        for (value, label) in &self.x_scale.ticks {
+            let within = self.x.start..=self.x.end;
+            let Some(x) = self.across(*value).filter(|x| within.contains(x)) else { continue };
+            pen.text(label, (x, bottom + 2 * TICK), LABEL, HPos::Center, VPos::Top);
+            pen.line(&[(x, bottom), (x, bottom + TICK)], paint, THIN, "");
+        }
+    }
 }

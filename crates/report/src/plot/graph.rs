@@ -3,10 +3,9 @@
 use std::collections::BTreeSet;
 
 use super::axis::Axis;
-use super::canvas::{DrawingError, PIXEL};
-use super::frame::{Entry, Frame, Glyph, Inside, picture};
+use super::frame::{Entry, Frame, Glyph, Inside};
 use super::ink::Ink;
-use super::pen::{BOLD, Marker, Paint, Pen, THIN, dash};
+use super::pen::{BOLD, Marker, PIXEL, Paint, Pen, Point, THIN, dash};
 use super::scale::{Ends, Scale};
 
 /// Size in pixels.
@@ -126,10 +125,10 @@ impl Graph {
     /// The SVG, 900 × 420 pixels.
     pub fn svg(&self) -> String {
         let name = if self.title.is_empty() { self.y.text() } else { self.title.clone() };
-        picture(SIZE, &name, |pen| self.draw(pen))
+        Pen::draw(SIZE, &name, |pen| self.draw(pen))
     }
 
-    pub(super) fn draw(&self, pen: Pen<'_>) -> Result<(), DrawingError> {
+    pub(super) fn draw(&self, pen: &mut Pen) {
         let lines = self.series.iter().filter(|series| series.mark == Mark::Line).count();
         let drawn: Vec<Drawn<'_>> = self
             .series
@@ -146,23 +145,26 @@ impl Graph {
                 }
             })
             .collect();
-        let inside = self.frame(&drawn).draw(pen)?;
+        let inside = self.frame(&drawn).draw(pen);
         let places = |series: &Series| series.points.iter().any(|[x, y]| inside.place(*x, *y).is_some());
         if !self.series.iter().any(places) {
-            return inside.draw_empty(pen);
+            inside.draw_empty(pen);
+            return;
         }
-        inside.clip(pen, || {
+        inside.clip(pen, |pen| {
             for span in &self.spans {
-                draw_span(&inside, pen, span)?;
+                draw_span(&inside, pen, span);
             }
             for drawn in &drawn {
-                drawn.draw_bounds(&inside, pen)?;
+                drawn.draw_bounds(&inside, pen);
             }
             for reference in &self.references {
-                draw_reference(&inside, pen, reference)?;
+                draw_reference(&inside, pen, reference);
             }
-            drawn.iter().try_for_each(|drawn| drawn.draw(&inside, pen))
-        })
+            for drawn in &drawn {
+                drawn.draw(&inside, pen);
+            }
+        });
     }
 
     fn frame(&self, drawn: &[Drawn<'_>]) -> Frame<'_> {
@@ -218,27 +220,22 @@ const REFERENCE_DASH: &str = "2 3";
 const SPAN_INK: Ink = Ink::Orange;
 const SPAN_ALPHA: f64 = 0.25;
 
-fn draw_span(inside: &Inside, pen: Pen<'_>, span: &Span) -> Result<(), DrawingError> {
-    let [from, to] = span.range.map(|x| inside.across(x));
-    match (from, to) {
-        (Some(from), Some(to)) => {
-            // A single row remains visible.
-            let to = to.max(from + 3 * PIXEL);
-            pen.rectangle([(from, inside.y.start), (to, inside.y.end)], Paint(SPAN_INK.rgb(), SPAN_ALPHA))
-        }
-        _ => Ok(()),
+fn draw_span(inside: &Inside, pen: &mut Pen, span: &Span) {
+    if let [Some(from), Some(to)] = span.range.map(|x| inside.across(x)) {
+        // A single row remains visible.
+        let to = to.max(from + 3 * PIXEL);
+        pen.rectangle([(from, inside.y.start), (to, inside.y.end)], Paint(SPAN_INK.rgb(), SPAN_ALPHA));
     }
 }
 
-fn draw_reference(inside: &Inside, pen: Pen<'_>, reference: &Reference) -> Result<(), DrawingError> {
+fn draw_reference(inside: &Inside, pen: &mut Pen, reference: &Reference) {
     let ends = match reference {
         Reference::Horizontal(y, _) => inside.down(*y).map(|y| [(inside.x.start, y), (inside.x.end, y)]),
         Reference::Vertical(x, _) => inside.across(*x).map(|x| [(x, inside.y.start), (x, inside.y.end)]),
         Reference::Diagonal(_) => inside.diagonal(),
     };
-    match ends {
-        Some(ends) => pen.line(ends.to_vec(), Paint::text(0.7), THIN, REFERENCE_DASH),
-        None => Ok(()),
+    if let Some(ends) = ends {
+        pen.line(&ends, Paint::text(0.7), THIN, REFERENCE_DASH);
     }
 }
 
@@ -252,7 +249,7 @@ impl Drawn<'_> {
             .filter(|entry| !entry.name.is_empty())
     }
 
-    fn draw(&self, inside: &Inside, pen: Pen<'_>) -> Result<(), DrawingError> {
+    fn draw(&self, inside: &Inside, pen: &mut Pen) {
         let places = self.series.points.iter().map(|[x, y]| inside.place(*x, *y));
         match (self.series.mark, self.marker) {
             (Mark::Points, Some(marker)) => {
@@ -262,28 +259,22 @@ impl Drawn<'_> {
                 let mut seen = BTreeSet::new();
                 for place in places {
                     if seen.insert((place.0 / (PIXEL / 2), place.1 / (PIXEL / 2))) && inside.holds(place) {
-                        pen.marker(marker, place, Paint(self.ink.rgb(), alpha))?;
+                        pen.marker(marker, place, Paint(self.ink.rgb(), alpha));
                     }
                 }
-                Ok(())
             }
-            _ => {
-                for run in runs(places) {
-                    self.draw_run(run, pen)?;
-                }
-                Ok(())
-            }
+            _ => runs(places).into_iter().for_each(|run| self.draw_run(run, pen)),
         }
     }
 
-    fn draw_run(&self, run: Vec<(i32, i32)>, pen: Pen<'_>) -> Result<(), DrawingError> {
+    fn draw_run(&self, run: Vec<Point>, pen: &mut Pen) {
         let paint = Paint(self.ink.rgb(), 1.0);
         if let Some(marker) = self.marker {
             let all = self.series.points.len() <= POINTS_WITH_MARKER;
             let mut next = i32::MIN;
             for &place in &run {
                 if all || place.0 >= next {
-                    pen.marker(marker, place, paint)?;
+                    pen.marker(marker, place, paint);
                     next = place.0 + MARKER_DISTANCE * PIXEL;
                 }
             }
@@ -291,11 +282,11 @@ impl Drawn<'_> {
         match run[..] {
             // A single point between gaps would be invisible as a line.
             [place] if self.marker.is_none() => pen.marker(Marker::Circle, place, paint),
-            _ => pen.line(thinned(run), paint, BOLD, self.dash),
+            _ => pen.line(&thinned(run), paint, BOLD, self.dash),
         }
     }
 
-    fn draw_bounds(&self, inside: &Inside, pen: Pen<'_>) -> Result<(), DrawingError> {
+    fn draw_bounds(&self, inside: &Inside, pen: &mut Pen) {
         let bounded = self.series.points.iter().zip(&self.series.bounds);
         let places = bounded.map(|([x, _], [low, high])| inside.place(*x, *low).zip(inside.place(*x, *high)));
         let color = self.ink.rgb();
@@ -307,17 +298,16 @@ impl Drawn<'_> {
                     [(x - cap, low), (x + cap, low)],
                     [(x - cap, high), (x + cap, high)],
                 ] {
-                    pen.line(ends.to_vec(), Paint(color, 0.8), THIN, "")?;
+                    pen.line(&ends, Paint(color, 0.8), THIN, "");
                 }
             }
-            return Ok(());
+            return;
         }
         for run in runs(places) {
-            let upper = thinned(run.iter().map(|(_, high)| *high).collect());
-            let lower = thinned(run.iter().map(|(low, _)| *low).collect());
-            pen.polygon(upper.into_iter().chain(lower.into_iter().rev()).collect(), Paint(color, 0.2))?;
+            let mut outline = thinned(run.iter().map(|(_, high)| *high).collect());
+            outline.extend(thinned(run.iter().map(|(low, _)| *low).collect()).into_iter().rev());
+            pen.polygon(&outline, Paint(color, 0.2));
         }
-        Ok(())
     }
 }
 
@@ -340,11 +330,11 @@ fn runs<T>(places: impl Iterator<Item = Option<T>>) -> Vec<Vec<T>> {
 
 /// Reduces a line to at most four points per column of half a pixel (first, lowest, highest, last), which looks the same: 100,000
 /// targets then need some hundred kilobytes.
-pub(super) fn thinned(run: Vec<(i32, i32)>) -> Vec<(i32, i32)> {
+pub(super) fn thinned(run: Vec<Point>) -> Vec<Point> {
     if run.len() < 2_000 {
         return run;
     }
-    let mut kept: Vec<(i32, i32)> = Vec::new();
+    let mut kept: Vec<Point> = Vec::new();
     for column in run.chunk_by(|a, b| a.0 / (PIXEL / 2) == b.0 / (PIXEL / 2)) {
         let extreme = |index: usize, better: fn(i32, i32) -> bool| {
             (0..column.len())

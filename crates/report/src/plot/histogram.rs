@@ -1,8 +1,7 @@
 //! Histograms of one or more samples over common bins.
 
 use super::axis::Axis;
-use super::canvas::DrawingError;
-use super::frame::{Entry, Frame, Glyph, picture};
+use super::frame::{Entry, Frame, Glyph};
 use super::ink::Ink;
 use super::pen::{BOLD, Paint, Pen, dash};
 use super::scale::{Ends, Scale, linear_ticks};
@@ -82,10 +81,10 @@ impl Histogram {
         } else {
             self.title.clone()
         };
-        picture((900, 340), &name, |pen| self.draw(pen))
+        Pen::draw((900, 340), &name, |pen| self.draw(pen))
     }
 
-    fn draw(&self, pen: Pen<'_>) -> Result<(), DrawingError> {
+    fn draw(&self, pen: &mut Pen) {
         let bins = self.bins();
         let ink = |index: usize| self.samples[index].ink.unwrap_or(Ink::nth(index));
         let axis = Axis { log: false, ..self.x.clone() };
@@ -108,11 +107,12 @@ impl Histogram {
             y_grid: true,
             right: 0,
         };
-        let inside = frame.draw(pen)?;
+        let inside = frame.draw(pen);
         if bins.edges.is_empty() {
-            return inside.draw_empty(pen);
+            inside.draw_empty(pen);
+            return;
         }
-        inside.clip(pen, || {
+        inside.clip(pen, |pen| {
             for (index, counts) in bins.counts.iter().enumerate() {
                 let mut outline = Vec::new();
                 // From the first bin that holds anything to the last.
@@ -135,11 +135,10 @@ impl Histogram {
                 outline.insert(0, (first.0, base));
                 outline.push((last.0, base));
                 let color = ink(index).rgb();
-                pen.polygon(outline.clone(), Paint(color, ALPHA))?;
-                pen.line(outline, Paint(color, 1.0), BOLD, dash(index))?;
+                pen.polygon(&outline, Paint(color, ALPHA));
+                pen.line(&outline, Paint(color, 1.0), BOLD, dash(index));
             }
-            Ok(())
-        })
+        });
     }
 }
 

@@ -1,7 +1,5 @@
 //! Colours of series and colour maps.
 
-use plotters::style::RGBColor;
-
 /// Colour of a series (Okabe and Ito, "Color Universal Design", 2008), without their yellow, which is hard to see on white.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ink {
@@ -31,15 +29,15 @@ impl Ink {
         Self::CYCLE[index % Self::CYCLE.len()]
     }
 
-    pub(super) fn rgb(self) -> RGBColor {
+    pub(super) fn rgb(self) -> [u8; 3] {
         match self {
-            Ink::Blue => RGBColor(0x00, 0x72, 0xb2),
-            Ink::Vermilion => RGBColor(0xd5, 0x5e, 0x00),
-            Ink::Green => RGBColor(0x00, 0x9e, 0x73),
-            Ink::Purple => RGBColor(0xcc, 0x79, 0xa7),
-            Ink::Orange => RGBColor(0xe6, 0x9f, 0x00),
-            Ink::Sky => RGBColor(0x56, 0xb4, 0xe9),
-            Ink::Text => RGBColor(0, 0, 0),
+            Ink::Blue => [0x00, 0x72, 0xb2],
+            Ink::Vermilion => [0xd5, 0x5e, 0x00],
+            Ink::Green => [0x00, 0x9e, 0x73],
+            Ink::Purple => [0xcc, 0x79, 0xa7],
+            Ink::Orange => [0xe6, 0x9f, 0x00],
+            Ink::Sky => [0x56, 0xb4, 0xe9],
+            Ink::Text => [0, 0, 0],
         }
     }
 }
@@ -94,10 +92,5 @@ impl ColorMap {
             let [low, high] = [table[below][channel], table[below + 1][channel]].map(f64::from);
             (low + (high - low) * part).round() as u8
         })
-    }
-
-    pub(super) fn rgb(self, fraction: f64) -> RGBColor {
-        let [red, green, blue] = self.at(fraction);
-        RGBColor(red, green, blue)
     }
 }

@@ -2,14 +2,12 @@
 //! unit beside them.
 
 use super::axis::Axis;
-use super::canvas::{DrawingError, PIXEL};
-use super::frame::{EDGE, Entry, Frame, Glyph, picture};
+use super::frame::{EDGE, Entry, Frame, Glyph};
 use super::ink::Ink;
 use super::letters;
-use super::pen::{LABEL, MARKER, Marker, Paint, Pen, THIN};
+use super::pen::{HPos, LABEL, MARKER, Marker, PIXEL, Paint, Pen, THIN, VPos};
 use super::scale::{Ends, Scale};
 use crate::number::Precision;
-use plotters::style::text_anchor::{HPos, VPos};
 
 /// Height of a row in pixels.
 const ROW: u32 = 22;
@@ -64,10 +62,10 @@ impl Intervals {
     pub fn svg(&self) -> String {
         let name = if self.title.is_empty() { "identified parameters" } else { &self.title };
         let height = 110 + ROW * self.rows.len().max(2) as u32;
-        picture((900, height), name, |pen| self.draw(pen))
+        Pen::draw((900, height), name, |pen| self.draw(pen))
     }
 
-    fn draw(&self, pen: Pen<'_>) -> Result<(), DrawingError> {
+    fn draw(&self, pen: &mut Pen) {
         let texts: Vec<String> = self.rows.iter().map(Interval::text).collect();
         let widest = texts.iter().map(|text| letters::width(text, LABEL)).fold(0.0, f64::max);
         // Reversed, so that the first name is at the top.
@@ -99,17 +97,18 @@ impl Intervals {
             y_grid: false,
             right: widest as i32 + EDGE,
         };
-        let inside = frame.draw(pen)?;
+        let inside = frame.draw(pen);
         if let [Some(from), Some(to), Some(zero)] = [-1.0, 1.0, 0.0].map(|x| inside.across(x)) {
-            pen.rectangle([(from, inside.y.start), (to, inside.y.end)], Paint::text(PRIOR_ALPHA))?;
-            pen.line(vec![(zero, inside.y.start), (zero, inside.y.end)], Paint::text(0.6), THIN, "")?;
+            pen.rectangle([(from, inside.y.start), (to, inside.y.end)], Paint::text(PRIOR_ALPHA));
+            pen.line(&[(zero, inside.y.start), (zero, inside.y.end)], Paint::text(0.6), THIN, "");
         }
         if self.rows.is_empty() {
-            return inside.draw_empty(pen);
+            inside.draw_empty(pen);
+            return;
         }
         for (index, (row, text)) in self.rows.iter().zip(&texts).enumerate() {
             let Some(y) = inside.down((self.rows.len() - 1 - index) as f64) else { continue };
-            pen.text(text, (inside.x.end + EDGE, y), LABEL, HPos::Left, VPos::Center)?;
+            pen.text(text, (inside.x.end + EDGE, y), LABEL, HPos::Left, VPos::Center);
             let Some(x) = inside.across(row.value / row.prior_sigma) else { continue };
             let color = INK.rgb();
             for (sigmas, width) in [(2.0, THIN), (1.0, THICK)] {
@@ -118,26 +117,21 @@ impl Intervals {
                     [row.value - reach, row.value + reach].map(|end| inside.across(end / row.prior_sigma));
                 let [Some(from), Some(to)] = ends else { continue };
                 if row.determined {
-                    pen.line(vec![(from, y), (to, y)], Paint(color, 1.0), width, "")?;
+                    pen.line(&[(from, y), (to, y)], Paint(color, 1.0), width, "");
                 } else {
                     // The ring stays hollow.
                     for part in
                         [(from, x - MARKER), (x + MARKER, to)].into_iter().filter(|part| part.0 < part.1)
                     {
-                        pen.line(vec![(part.0, y), (part.1, y)], Paint(color, 1.0), width, "")?;
+                        pen.line(&[(part.0, y), (part.1, y)], Paint(color, 1.0), width, "");
                     }
                 }
             }
-            pen.marker(
-                if row.determined { Marker::Circle } else { Marker::Ring },
-                (x, y),
-                Paint(color, 1.0),
-            )?;
+            pen.marker(if row.determined { Marker::Circle } else { Marker::Ring }, (x, y), Paint(color, 1.0));
         }
-        Ok(())
     }
 }
 
 const INK: Ink = Ink::Blue;
-const THICK: u32 = 3 * PIXEL as u32;
+const THICK: i32 = 3 * PIXEL;
 const PRIOR_ALPHA: f64 = 0.09;

@@ -1,13 +1,10 @@
 //! Plan views of paths, coloured by a value such as their deviation, in panels with one colour bar.
 
-use plotters::style::text_anchor::{HPos, VPos};
-
 use super::axis::Axis;
-use super::canvas::{DrawingError, PIXEL};
 use super::color_bar::Colors;
-use super::frame::{EDGE, Frame, Inside, picture};
+use super::frame::{EDGE, Frame, Inside};
 use super::ink::ColorMap;
-use super::pen::{Marker, Paint, Pen, TITLE};
+use super::pen::{Marker, PIXEL, Paint, Pen, Point, TITLE};
 use super::scale::{Ends, Scale};
 
 /// Number of colours along a path; all pieces of one colour are a single element.
@@ -63,38 +60,37 @@ impl PlanView {
         // Also replaces NaN, without points.
         let inside = if aspect > 0.0 { (width * aspect * 1.1).clamp(140.0, 560.0) } else { 200.0 };
         let height = inside as u32 + 96;
-        picture((900, 30 + height * rows as u32), &name, |pen| self.draw(pen, columns, rows))
+        Pen::draw((900, 30 + height * rows as u32), &name, |pen| self.draw(pen, columns, rows))
     }
 
-    fn draw(&self, pen: Pen<'_>, columns: usize, rows: usize) -> Result<(), DrawingError> {
-        let (width, height) = pen.area.dim_in_pixel();
+    fn draw(&self, pen: &mut Pen, columns: usize, rows: usize) {
+        let (width, height) = pen.size;
         let values = self.paths.iter().flat_map(|path| &path.values).copied();
         let colors = Colors::of(&self.value, self.colors, values);
         let mut top = EDGE / 2;
         if !self.title.is_empty() {
-            pen.bold(&self.title, (EDGE, EDGE), TITLE, HPos::Left, VPos::Top)?;
+            pen.bold(&self.title, (EDGE, EDGE), TITLE);
             top += 24 * PIXEL;
         }
-        let right = width as i32 - colors.room();
-        let (across, down) = (right / columns as i32, (height as i32 - top) / rows as i32);
-        let mut bar = (top + EDGE, height as i32 - EDGE);
+        let right = width - colors.room();
+        let (across, down) = (right / columns as i32, (height - top) / rows as i32);
+        let mut bar = (top + EDGE, height - EDGE);
         for index in 0..self.paths.len().max(1) {
             let corner = ((index % columns) as i32 * across, top + (index / columns) as i32 * down);
-            let panel = pen.area.clone().shrink(corner, (across as u32, down as u32));
             let frame = self.frame(self.paths.get(index), (across, down));
-            let inside = frame.draw(Pen { area: &panel, sheet: pen.sheet })?;
+            let inside = frame.draw_panel(pen, corner, (across, down));
             if let Some(path) = self.paths.get(index) {
-                inside.clip(pen, || path.draw(&inside, &colors, pen))?;
+                inside.clip(pen, |pen| path.draw(&inside, &colors, pen));
             }
             if self.paths.get(index).is_none_or(|path| path.points.is_empty()) {
-                inside.draw_empty(pen)?;
+                inside.draw_empty(pen);
             }
             if index == 0 {
                 bar.0 = inside.y.start;
             }
             bar.1 = inside.y.end;
         }
-        colors.draw(pen, right + 6 * PIXEL, bar.0, bar.1)
+        colors.draw(pen, right + 6 * PIXEL, bar.0, bar.1);
     }
 
     /// A frame with equal scales around all paths, so that panels can be compared.
@@ -129,15 +125,15 @@ fn linear(axis: &Axis) -> Axis {
 }
 
 impl PlanPath {
-    fn draw(&self, inside: &Inside, colors: &Colors, pen: Pen<'_>) -> Result<(), DrawingError> {
-        let mut rim: Vec<Vec<(i32, i32)>> = Vec::new();
-        let mut unknown: Vec<Vec<(i32, i32)>> = Vec::new();
-        let mut shades: Vec<Vec<Vec<(i32, i32)>>> = vec![Vec::new(); SHADES + 1];
+    fn draw(&self, inside: &Inside, colors: &Colors, pen: &mut Pen) {
+        let mut rim: Vec<Vec<Point>> = Vec::new();
+        let mut unknown: Vec<Vec<Point>> = Vec::new();
+        let mut shades: Vec<Vec<Vec<Point>>> = vec![Vec::new(); SHADES + 1];
         for run in self.runs(inside) {
             if let [(place, value)] = run[..] {
                 let paint =
                     colors.fraction(value).map_or(Paint::text(0.3), |fraction| colors.paint(fraction));
-                pen.marker(Marker::Circle, place, paint)?;
+                pen.marker(Marker::Circle, place, paint);
             }
             rim.push(run.iter().map(|(place, _)| *place).collect());
             let mut last = None;
@@ -158,17 +154,16 @@ impl PlanPath {
             }
         }
         // A faint outline separates pale colours from a light page and dark ones from a dark page.
-        pen.sheet.strokes(&rim, [0; 3], 0.35, 5 * PIXEL, true);
-        pen.sheet.strokes(&unknown, [0; 3], 0.3, 34, true);
+        pen.lines(&rim, Paint::text(0.35), 5 * PIXEL, true);
+        pen.lines(&unknown, Paint::text(0.3), 34, true);
         for (shade, lines) in shades.iter().enumerate() {
-            pen.sheet.strokes(lines, colors.at(shade as f64 / SHADES as f64), 1.0, 34, true);
+            pen.lines(lines, colors.paint(shade as f64 / SHADES as f64), 34, true);
         }
-        Ok(())
     }
 
     /// Runs of the path without gaps, as positions and values; near points are merged, keeping the largest value.
-    fn runs(&self, inside: &Inside) -> Vec<Vec<((i32, i32), f64)>> {
-        let mut runs: Vec<Vec<((i32, i32), f64)>> = vec![Vec::new()];
+    fn runs(&self, inside: &Inside) -> Vec<Vec<(Point, f64)>> {
+        let mut runs: Vec<Vec<(Point, f64)>> = vec![Vec::new()];
         for (index, [x, y]) in self.points.iter().enumerate() {
             let value = self.values.get(index).copied().unwrap_or(f64::NAN);
             let Some(place) = inside.place(*x, *y) else {

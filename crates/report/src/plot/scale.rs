@@ -1,13 +1,6 @@
 //! Scales: range of an axis, ticks and labels.
 
-use std::ops::Range;
-
-use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
-
 use super::axis::Axis;
-
-/// Limit of canvas coordinates, far outside any plot.
-const FAR: f64 = 1e6;
 
 /// Smaller numbers are drawn as zero, since the powers of ten to scale them do not exist.
 const SMALLEST: f64 = 1e-290;
@@ -21,7 +14,7 @@ pub(super) struct Scale {
     /// Ticks with their labels, ascending.
     pub(super) ticks: Vec<(f64, String)>,
     /// Minor ticks.
-    minor: Vec<f64>,
+    pub(super) minor: Vec<f64>,
 }
 
 /// How the range of a scale follows from the data.
@@ -116,35 +109,6 @@ impl Scale {
             (value / 2.0 - self.low / 2.0) / (self.high / 2.0 - self.low / 2.0)
         };
         Some(fraction).filter(|fraction| fraction.is_finite() && value.is_finite())
-    }
-}
-
-impl Ranged for Scale {
-    type FormatOption = NoDefaultFormatting;
-    type ValueType = f64;
-
-    fn map(&self, value: &f64, (from, to): (i32, i32)) -> i32 {
-        let fraction = self.fraction(*value).unwrap_or(0.0);
-        (f64::from(from) + fraction * f64::from(to - from)).clamp(-FAR, FAR).round() as i32
-    }
-
-    fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
-        if hint.weight().allow_light_points() {
-            self.minor.clone()
-        } else {
-            self.ticks.iter().map(|tick| tick.0).collect()
-        }
-    }
-
-    fn range(&self) -> Range<f64> {
-        self.low..self.high
-    }
-}
-
-impl ValueFormatter<f64> for Scale {
-    fn format_ext(&self, value: &f64) -> String {
-        // Only called for the key points.
-        self.ticks.iter().find(|tick| tick.0 == *value).map(|tick| tick.1.clone()).unwrap_or_default()
     }
 }
 

@@ -1,12 +1,11 @@
 //! Heat strips: a value along a path or over rows, one strip per method.
 
 use super::axis::Axis;
-use super::canvas::{DrawingError, PIXEL};
 use super::color_bar::Colors;
-use super::frame::{EDGE, Frame, picture};
+use super::frame::{EDGE, Frame};
 use super::ink::ColorMap;
 use super::letters;
-use super::pen::{LABEL, Paint, Pen, THIN};
+use super::pen::{LABEL, PIXEL, Paint, Pen, THIN};
 use super::scale::{Ends, Scale};
 
 /// Height of a strip in pixels.
@@ -49,10 +48,10 @@ impl HeatStrip {
         // The vertical label of the colour bar needs its length.
         let text = letters::width(&self.value.text(), LABEL) as u32 / PIXEL as u32;
         let height = (100 + STRIP * self.strips.len().max(3) as u32).max(text + 40);
-        picture((900, height), &name, |pen| self.draw(pen))
+        Pen::draw((900, height), &name, |pen| self.draw(pen))
     }
 
-    fn draw(&self, pen: Pen<'_>) -> Result<(), DrawingError> {
+    fn draw(&self, pen: &mut Pen) {
         let colors =
             Colors::of(&self.value, self.colors, self.strips.iter().flat_map(|strip| &strip.values).copied());
         let longest = self.strips.iter().map(|strip| strip.values.len()).max().unwrap_or(0);
@@ -70,7 +69,7 @@ impl HeatStrip {
             y_grid: false,
             right: colors.room(),
         };
-        let inside = frame.draw(pen)?;
+        let inside = frame.draw(pen);
         let width = f64::from(inside.x.end - inside.x.start);
         let cells = longest.min(CELLS);
         let height = STRIP as i32 * PIXEL * 8 / 10;
@@ -94,15 +93,15 @@ impl HeatStrip {
             rims.push([(inside.x.start, middle - height / 2), (inside.x.end, middle + height / 2)]);
         }
         for (shade, lines) in shades.iter().enumerate() {
-            pen.sheet.strokes(lines, colors.at(shade as f64 / SHADES as f64), 1.0, height, false);
+            pen.lines(lines, colors.paint(shade as f64 / SHADES as f64), height, false);
         }
         for rim in rims {
-            pen.outline(rim, Paint::text(0.3), THIN)?;
+            pen.outline(rim, Paint::text(0.3), THIN);
         }
         if cells == 0 {
-            inside.draw_empty(pen)?;
+            inside.draw_empty(pen);
         }
-        colors.draw(pen, inside.x.end + 2 * EDGE, inside.y.start, inside.y.end)
+        colors.draw(pen, inside.x.end + 2 * EDGE, inside.y.start, inside.y.end);
     }
 }
 

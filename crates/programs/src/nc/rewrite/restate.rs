@@ -75,6 +75,29 @@ impl<'s> Rewriter<'_, 's> {
             );
             restated[axis] = true;
         }
+        self.restate_angles(&mut writer, context, &slots, &mut restated);
+        self.restate_vector(&mut writer, context, &slots, motion.conditional);
+        self.edits[file] = edits;
+        for axis in 0..3 {
+            // If the block may be skipped, the next one must restate the words again.
+            let current = motion.conditional.then_some(f64::NAN);
+            if restated[axis] {
+                self.control.position[axis] = current;
+            }
+            if restated[3 + axis] {
+                self.control.angles[axis] = current;
+            }
+        }
+    }
+
+    /// The same for the angles of the tool.
+    fn restate_angles(
+        &self,
+        writer: &mut BlockWriter<'_, 's>,
+        context: &BlockContext,
+        slots: &WordSlots<'s>,
+        restated: &mut [bool; 6],
+    ) {
         let names: Option<[&[u8]; 3]> = match context.orientation_mode {
             OrientationMode::Angles => Some([b"A", b"B", b"C"]),
             OrientationMode::Rpy => Some([b"A2", b"B2", b"C2"]),
@@ -92,18 +115,6 @@ impl<'s> Rewriter<'_, 's> {
             let decimals = self.options.joint_decimals;
             writer.write_word(ANGLES + axis, name, intended - base, current - base, f64::NAN, decimals);
             restated[3 + axis] = true;
-        }
-        self.restate_vector(&mut writer, context, &slots, motion.conditional);
-        self.edits[file] = edits;
-        for axis in 0..3 {
-            // If the block may be skipped, the next one must restate the words again.
-            let current = motion.conditional.then_some(f64::NAN);
-            if restated[axis] {
-                self.control.position[axis] = current;
-            }
-            if restated[3 + axis] {
-                self.control.angles[axis] = current;
-            }
         }
     }
 

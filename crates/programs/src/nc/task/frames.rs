@@ -42,6 +42,26 @@ impl Interpreter<'_, '_> {
             self.state.set_transform(ModalGroup::ProgrammableFrame, false);
         }
         self.invalidate_position();
+        let stated = block.has_motion_words() || block.words.iter().any(|word| word.is("RPL"));
+        let pose = self.programmed_frame(block, &name, stated);
+        match pose {
+            Some(_) if !stated => {}
+            Some(pose) => {
+                self.state.programmable_frame =
+                    Some(self.state.programmable_frame.unwrap_or_else(Pose::identity) * pose);
+            }
+            None => self.state.set_transform(ModalGroup::ProgrammableFrame, true),
+        }
+        let rotation = |pose: &Option<Pose>| pose.map_or(UnitQuaternion::identity(), |pose| pose.rotation);
+        let same = rotation(&before).angle_to(&rotation(&self.state.programmable_frame)) < 1e-9;
+        if !same || was || unsupported(&self.state) {
+            self.invalidate_pose();
+        }
+        true
+    }
+
+    /// The frame of such a block; `None` where it is unknown or no rigid motion. `stated`: whether the block has values.
+    fn programmed_frame(&self, block: &Block<'_>, name: &[u8], stated: bool) -> Option<Pose> {
         // Angles of ROT, lengths of TRANS, factors of SCALE.
         let lengths = name.ends_with(b"TRANS");
         let value = |index: usize| {
@@ -51,10 +71,9 @@ impl Interpreter<'_, '_> {
         let values: Result<Vec<Option<f64>>, Reason> =
             block.axes.iter().map(|word| word.map(value).transpose()).collect();
         let rpl = block.words.iter().find(|word| word.is("RPL"));
-        let stated = block.has_motion_words() || rpl.is_some();
         // Offsets of rotary axes change the orientation that A, B and C state.
         let rotary = block.abc.iter().any(Option::is_some) || block.other_axes;
-        let pose = match (&*name, values) {
+        match (name, values) {
             (_, Err(_)) => None,
             _ if rotary => None,
             (b"TRANS" | b"ATRANS", Ok(shift)) => {
@@ -79,21 +98,7 @@ impl Interpreter<'_, '_> {
             // Without values SCALE and MIRROR are cancelled; with values they are not rigid motions.
             _ if !stated => Some(Pose::identity()),
             _ => None,
-        };
-        match pose {
-            Some(_) if !stated => {}
-            Some(pose) => {
-                self.state.programmable_frame =
-                    Some(self.state.programmable_frame.unwrap_or_else(Pose::identity) * pose);
-            }
-            None => self.state.set_transform(ModalGroup::ProgrammableFrame, true),
         }
-        let rotation = |pose: &Option<Pose>| pose.map_or(UnitQuaternion::identity(), |pose| pose.rotation);
-        let same = rotation(&before).angle_to(&rotation(&self.state.programmable_frame)) < 1e-9;
-        if !same || was || unsupported(&self.state) {
-            self.invalidate_pose();
-        }
-        true
     }
 
     /// The programmable frame is set: at joins it is unknown.

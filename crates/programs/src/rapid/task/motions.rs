@@ -6,7 +6,7 @@ use super::{ListingBuilder, Literal, literals};
 use crate::motion::{Declaration, Motion, MotionKind, MotionTarget, Origin, Reason, Role, Routine};
 use crate::rapid::evaluate::{Context, Source};
 use crate::rapid::flow::{AbstractState, Nesting};
-use crate::rapid::instruction::{Also, Between, INSTRUCTIONS, Instruction, Slot};
+use crate::rapid::instruction::{INSTRUCTIONS, Instruction, Slot};
 use crate::rapid::predefined;
 use crate::rapid::symbol::{SymbolKind, Unit};
 use crate::rapid::syntax::{Argument, RapidTree, Syntax, arguments, expressions, parts, text_of, tokens_of};
@@ -216,14 +216,10 @@ impl ListingBuilder<'_, '_> {
         }
         let free =
             !options.timed && !options.whole && !nesting.guarded && !self.has_impure_argument(unit, node);
-        let splits = instruction.between != Between::Nothing && instruction.also != Also::Triggers;
-        motion.insertable = free && splits;
+        motion.insertable = free && instruction.splits();
         motion.can_straighten = free
             && instruction.kind == MotionKind::Circular
-            // A trigger at a distance along the movement would fire on its last piece.
-            && instruction
-                .line_form()
-                .is_some_and(|line| line.between != Between::Nothing && line.also != Also::Triggers);
+            && instruction.line_form().is_some_and(Instruction::splits);
         if has_tool {
             motion.work_object = Some(self.work_object(unit, state, work_object));
         }
