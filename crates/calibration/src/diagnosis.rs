@@ -50,6 +50,7 @@ pub mod newton;
 mod design_effect;
 pub mod extension;
 pub mod design;
+mod link_growth;
 pub mod held;
 pub mod score;
 pub mod intervals;

@@ -80,3 +80,20 @@ fn a_gear_error_of_two_joints_is_found_at_its_second_orders() {
     assert_eq!(false_names(&marks), Vec::<&str>::new());
     assert!(marks.told_with_joint(), "{:?}", marks.findings);
 }
+
+/// The search describes the growth of a warm arm by four exponentials that nearly cancel: one of them alone, beside a random course of
+/// growth, was another arm, 4 times as far off as geometry.
+#[test]
+fn the_growth_of_a_warm_arm_acts_as_a_whole() {
+    let marks = outcome(&Case::draw(701, Kind::WarmLinks, 1, Limits::default())).marks.unwrap();
+    assert!(marks.told() && !marks.worse()[0], "{:?}", marks.distances);
+}
+
+/// Along a short path links that warm up unequally move the target as a stand that drifts does: the stand was named for sure, and the
+/// arm fitted beside it was 80 % worse than geometry.
+#[test]
+fn a_stand_does_not_drift_for_sure_where_links_may_grow() {
+    let marks = outcome(&Case::draw(733, Kind::WarmLinks, 11, Limits::default())).marks.unwrap();
+    assert_eq!(false_names(&marks), Vec::<&str>::new());
+    assert!(!marks.worse()[0], "{:?}", marks.distances);
+}

@@ -177,6 +177,11 @@ impl Cause {
         }
     }
 
+    /// Whether it is thermal growth of the arm's links.
+    pub fn is_growth_of_arm(&self) -> bool {
+        matches!(self, Cause::Arm(Effect::ThermalDrift(_)))
+    }
+
     /// Whether it is in the arm: an effect, or an empirical fault of the arm.
     pub fn is_in_arm(&self) -> bool {
         match self {

@@ -25,9 +25,11 @@ use super::discrepancy::{Discrepancy, Functions};
 use super::extension::{Extended, Subject};
 use super::halves::halves;
 use super::intervals::ShiftScan;
+use super::link_growth;
 use super::score::{Score, log_p_of, score_columns, score_from, score_projected};
 use super::selection::{Accepted, Options, contains_cause};
 use super::serial_correlation::prewhiten;
+use crate::identification::tolerance::GROWTH_SIGMA;
 use crate::measurement::sensor::disturbance::{Disturbance, Profile};
 use truegrind_arm::effect::Effect;
 use truegrind_math::work::checkpoint;
@@ -292,6 +294,24 @@ impl ConfirmationContext<'_> {
         (confirmations, removed, discrepancy)
     }
 
+    /// The merit of growth of each link with the course of `cause`, if that is a drift of the sensor; else 0. Beside growth that the fit
+    /// has already, `confounding` compares the two.
+    fn growth_of_links(
+        &self,
+        cause: &Cause,
+        tried: f64,
+        design: &Design,
+        whiten: &dyn Fn(&DMatrix<f64>) -> DMatrix<f64>,
+    ) -> f64 {
+        if self.found.causes.iter().any(Cause::is_growth_of_arm) {
+            return 0.0;
+        }
+        let links = link_growth::columns(cause, self.subject, &self.linear.slopes, self.linear.per);
+        links.map_or(0.0, |links| {
+            score_columns(design, &whiten(&links), &vec![GROWTH_SIGMA; links.ncols()], tried).merit
+        })
+    }
+
     fn judged(
         &self,
         index: usize,
@@ -313,6 +333,7 @@ impl ConfirmationContext<'_> {
                 score_columns(design, &columns, &rival.candidate.cause.sizes(), rival.candidate.tried).merit
             })
             .fold(0.0, f64::max);
+        let best = best.max(self.growth_of_links(&own.candidate.cause, accepted.tried, design, whiten));
         Confirmation {
             significant: score.merit > 0.0 && log_p <= self.options.alpha.ln(),
             log_p,

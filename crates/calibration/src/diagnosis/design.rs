@@ -32,6 +32,8 @@ pub struct Slopes {
     pub by_joint: Vec<DVector<f64>>,
     /// By a common relative growth of all lengths.
     pub by_growth: DVector<f64>,
+    /// By a relative growth of each link's lengths.
+    pub by_link_growth: [DVector<f64>; 6],
     /// By the target on the flange, n × 3.
     pub by_target: DMatrix<f64>,
     /// By the sensor's frame or the outlet, n × 6 or n × 3.
@@ -160,10 +162,11 @@ impl Linear {
         let problem = fit.problem.with_parameters(dataset, &fit.model, &fit.frames, &probes, &weights);
         let slopes = linearised(&problem, &vec![0.0; probes.len()]).1;
         let column = |k: usize| slopes.row(k).transpose();
-        let mut by_growth = DVector::zeros(rows);
-        for (joint, link) in fit.model.links.iter().enumerate() {
-            by_growth += column(6 + joint) * link.a_mm + column(12 + joint) * link.d_mm;
-        }
+        let links = &fit.model.links;
+        let by_link_growth: [DVector<f64>; 6] = std::array::from_fn(|joint| {
+            column(6 + joint) * links[joint].a_mm + column(12 + joint) * links[joint].d_mm
+        });
+        let by_growth = by_link_growth.iter().fold(DVector::zeros(rows), |sum, slope| sum + slope);
         let summed = |axis: usize| {
             (0..anchors).fold(DVector::zeros(rows), |sum, a| sum + column(first_frame + 4 * a + axis))
         };
@@ -180,6 +183,7 @@ impl Linear {
         let slopes = Arc::new(Slopes {
             by_joint: (0..6).map(column).collect(),
             by_growth,
+            by_link_growth,
             by_target: DMatrix::from_columns(&[column(18), column(19), column(20)]),
             by_frame,
             by_zero,
@@ -209,6 +213,14 @@ impl Linear {
             observations.iter().flat_map(|&i| i * self.per..(i + 1) * self.per).collect();
         let residual = DVector::from_iterator(scalars.len(), scalars.iter().map(|&s| self.residual[s]));
         self.with_rows(self.rows.select_columns(&scalars), residual)
+    }
+
+    /// What a cause of the linearised `fit` adds to the whitened readings, n.
+    pub(super) fn readings_of(&self, fit: &Extended, cause: usize) -> DVector<f64> {
+        let parameters = fit.parameter_indices(cause);
+        parameters
+            .into_iter()
+            .fold(DVector::zeros(self.rows.ncols()), |sum, k| sum + self.rows.row(k).transpose() * fit.x[k])
     }
 
     /// Adds random effects: `columns`, n × m, with coefficients of variance 1.

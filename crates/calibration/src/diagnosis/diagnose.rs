@@ -112,7 +112,8 @@ pub fn diagnose(
     for (index, merged) in summary.findings.iter().enumerate() {
         merged.causes.iter().for_each(|&k| finding_of_cause[k] = index);
     }
-    let certain = merged::certain_flags(&summary.findings, &confirmed.outcome.confirmations);
+    let certain =
+        merged::certain_flags(&summary.findings, &confirmed.outcome.confirmations, &search.extended.causes);
     let extended = summary.extended.clone();
     let (mut diagnosis, pictures) = build_diagnosis(&search, &confirmed, summary, robot, notes);
     diagnosis.poses_needed = needed;

@@ -149,7 +149,7 @@ fn columns_of(matrix: &DMatrix<f64>) -> Vec<DVector<f64>> {
 }
 
 /// cos(π k u) / k over the rows, u from 0 to 1: the Karhunen–Loève series of Brownian motion.
-fn cosines(n: usize) -> DMatrix<f64> {
+pub(super) fn cosines(n: usize) -> DMatrix<f64> {
     DMatrix::from_fn(n, COSINES, |i, k| {
         let u = (i as f64 + 0.5) / n as f64;
         (std::f64::consts::PI * (k + 1) as f64 * u).cos() / (k + 1) as f64
@@ -195,8 +195,8 @@ pub struct Discrepancy {
     sizes: Vec<f64>,
     /// The nonnegligible functions, each column in units of its standard deviation.
     pub columns: DMatrix<f64>,
-    /// For each column, whether it is a function of time.
-    in_time: Vec<bool>,
+    /// The group of each column.
+    groups: Vec<Group>,
     /// Contribution of each nonnegligible group to the readings (mm RMS), largest first.
     pub contributions: Vec<(Group, f64)>,
     /// Size of the total effect on each observation (mm).
@@ -240,7 +240,7 @@ impl Discrepancy {
         let effect_mm = vec![0.0; self.effect_mm.len()];
         Self {
             columns,
-            in_time: Vec::new(),
+            groups: Vec::new(),
             contributions: Vec::new(),
             effect_mm,
             evidence: 0.0,
@@ -274,7 +274,7 @@ impl Discrepancy {
         let pure = design.pure(&columns, &projected);
         let left = &design.residual + &pure * &coefficients;
         let mut contributions = Vec::new();
-        let (mut kept, mut in_time) = (Vec::new(), Vec::new());
+        let (mut kept, mut groups) = (Vec::new(), Vec::new());
         let mut effect_mm = vec![0.0; linear.slopes.mm.len()];
         for ((group, range), size) in functions.groups.iter().zip(&sizes) {
             if size * size <= NEGLIGIBLE * noise * noise {
@@ -288,7 +288,7 @@ impl Discrepancy {
             contributions.push((*group, (square / linear.observations.max(1) as f64).sqrt()));
             effect_mm.iter_mut().zip(&lengths).for_each(|(sum, l)| *sum += l);
             kept.extend(range.clone().map(|k| (k, *size)));
-            in_time.extend(range.clone().map(|_| group.in_time()));
+            groups.extend(range.clone().map(|_| *group));
         }
         contributions.sort_by(|a, b| b.1.total_cmp(&a.1));
         let scaled: Vec<DVector<f64>> =
@@ -310,7 +310,7 @@ impl Discrepancy {
         Self {
             sizes,
             columns,
-            in_time,
+            groups,
             contributions,
             effect_mm,
             evidence,
@@ -332,9 +332,10 @@ impl Discrepancy {
         growth.map_or(0.0, |(_, mm)| *mm)
     }
 
-    /// The columns that are functions of time.
-    pub fn in_time_columns(&self) -> DMatrix<f64> {
-        let indices: Vec<usize> = (0..self.in_time.len()).filter(|&k| self.in_time[k]).collect();
+    /// The columns that are functions of time, without growth of the arm if `growth_is_known`.
+    pub fn in_time_columns(&self, growth_is_known: bool) -> DMatrix<f64> {
+        let wanted = |group: Group| group.in_time() && !(growth_is_known && group == Group::GrowthInTime);
+        let indices: Vec<usize> = (0..self.groups.len()).filter(|&k| wanted(self.groups[k])).collect();
         self.columns.select_columns(&indices)
     }
 

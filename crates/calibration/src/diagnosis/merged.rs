@@ -4,6 +4,7 @@
 //! time"), as are shifts that cannot be distinguished from a smooth drift; small contributions are merged without naming a
 //! part. If that is still more than a person reads at once, one effect at several joints is one finding.
 
+use super::cause::Cause;
 use super::confirmation::Confirmation;
 use super::confounding::Confounding;
 use super::contribution::Contributions;
@@ -183,9 +184,20 @@ fn excess(
     least.into_iter().take(beyond).flat_map(|s| s.causes.iter().copied()).collect()
 }
 
-/// For each cause, whether it is certain enough for compensation.
-pub(super) fn certain_flags(findings: &[MergedFinding], confirmations: &[Confirmation]) -> Vec<bool> {
+/// For each of `causes`, whether it is certain enough for compensation.
+pub(super) fn certain_flags(
+    findings: &[MergedFinding],
+    confirmations: &[Confirmation],
+    causes: &[Cause],
+) -> Vec<bool> {
     let mut out: Vec<bool> = confirmations.iter().map(Confirmation::is_confirmed).collect();
+    // Growth with several time constants is one course: its terms nearly cancel, so that one of them alone would be another arm.
+    for merged in findings {
+        let growth = || merged.causes.iter().copied().filter(|&k| causes[k].is_growth_of_arm());
+        if growth().any(|k| out[k]) {
+            growth().for_each(|k| out[k] = true);
+        }
+    }
     for merged in findings.iter().filter(|s| s.finding.effect != SMALL_DISTURBANCES) {
         if merged.finding.confidence == Confidence::Ambiguous {
             merged.causes.iter().for_each(|&k| out[k] = false);

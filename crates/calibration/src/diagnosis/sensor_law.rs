@@ -92,11 +92,7 @@ pub(super) fn is_needed(fit: &Extended) -> bool {
 
 fn columns_of(law: Law, subject: &Subject<'_>, fit: &Extended, linear: &Linear) -> Option<DMatrix<f64>> {
     let causes = (0..fit.causes.len()).filter(|&k| Law::of(&fit.causes[k]) == Some(law));
-    let pushed = causes
-        .flat_map(|k| fit.parameter_indices(k))
-        .fold(DVector::zeros(linear.rows.ncols()), |sum, place| {
-            sum + linear.rows.row(place).transpose() * fit.x[place]
-        });
+    let pushed = causes.fold(DVector::zeros(linear.rows.ncols()), |sum, k| sum + linear.readings_of(fit, k));
     let slopes = &linear.slopes;
     let axes: Vec<DVector<f64>> = match law {
         Law::Cable => vec![slopes.by_zero.clone()],

@@ -10,6 +10,7 @@ use super::cause::Cause;
 use super::design::Linear;
 use super::discrepancy::Discrepancy;
 use super::extension::{Extended, Freedom, Subject, filled, fit};
+use super::link_growth;
 use super::sensor_law;
 use crate::identification::prior_width::learn_tolerance;
 use crate::identification::tolerance::Tolerance;
@@ -63,20 +64,23 @@ fn refit(subject: &Subject<'_>, causes: &[Cause], near: &Extended) -> Extended {
 /// Prior standard deviations beyond which a link estimate is implausible.
 const IMPLAUSIBLE: f64 = 6.0;
 
-/// The fit with the functions of time and of the sensor's law as random effects, by one Gauss–Newton step, since their effect is small.
-/// `None` without either, and if a link that is confounded with them becomes implausible.
+/// The fit with the functions of time, of the sensor's law and of the links' growth as random effects, by one Gauss–Newton step, since their effect is small.
+/// `None` without any, and if a link that is confounded with them becomes implausible.
 fn with_random_functions(
     subject: &Subject<'_>,
     fit: &Extended,
     time_discrepancy: Option<&Discrepancy>,
 ) -> Option<Extended> {
-    if time_discrepancy.is_none() && !sensor_law::is_needed(fit) {
+    if time_discrepancy.is_none() && !sensor_law::is_needed(fit) && !link_growth::is_needed(fit) {
         return None;
     }
     let numbers: Vec<usize> = subject.observed.dataset.rows.iter().map(|r| r.number).collect();
     let linear = Linear::of(subject, fit);
     let mut functions = sensor_law::columns(subject, fit, &linear);
-    functions.extend(time_discrepancy.map(Discrepancy::in_time_columns));
+    functions.extend(link_growth::random_effects(subject, fit, &linear));
+    // Beside a random course of the arm's growth the growth that the model has would be free to take any sign.
+    let growth_is_known = fit.causes.iter().any(Cause::is_growth_of_arm);
+    functions.extend(time_discrepancy.map(|d| d.in_time_columns(growth_is_known)));
     let columns: Vec<_> = functions.iter().flat_map(|columns| columns.column_iter()).collect();
     if columns.is_empty() {
         return None;

@@ -118,10 +118,13 @@ pub fn effect_sigma(effect: &Effect, parameter: usize) -> f64 {
         Effect::GearMap(map) => 0.05_f64.to_radians() * (24.0 / map.knots_rad.len().max(1) as f64).sqrt(),
         Effect::GearRatio(_) | Effect::JointCoupling(_) => 3e-3,
         Effect::Backlash(_) => 0.2_f64.to_radians(),
-        Effect::ThermalDrift(_) => 1e-3,
+        Effect::ThermalDrift(_) => GROWTH_SIGMA,
         Effect::SmoothCorrection(_) => SMOOTH_SIGMA_RAD,
     }
 }
+
+/// Prior of relative thermal growth: aluminium by some 40 K.
+pub const GROWTH_SIGMA: f64 = 1e-3;
 
 /// Prior of a smooth correction: tenths of a millimetre at half a metre.
 pub const SMOOTH_SIGMA_RAD: f64 = 6e-4;
