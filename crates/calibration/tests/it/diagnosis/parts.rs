@@ -62,6 +62,7 @@ fn plain(n: usize, residual: impl Fn(usize) -> f64) -> Design {
     let slopes = Slopes {
         by_joint: vec![DVector::zeros(n); 6],
         by_growth: DVector::zeros(n),
+        by_link_growth: std::array::from_fn(|_| DVector::zeros(n)),
         by_target: DMatrix::zeros(n, 3),
         by_frame: DMatrix::zeros(n, 3),
         by_zero: DVector::from_element(n, 1.0),
