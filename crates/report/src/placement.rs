@@ -33,7 +33,8 @@ fn object_word(listing: &Listing) -> &'static str {
 }
 
 fn sentence(placement: &ObjectPlacement, what: &str) -> String {
-    let ObjectPlacement { work_object, applied, deviation_mm, sigma_mm, remedy, .. } = placement;
+    let ObjectPlacement { work_object, applied, deviation_mm, sigma_mm, probability_of_harm, remedy, .. } =
+        placement;
     let known = format!(
         "the path as a whole is displaced by {deviation_mm:.3} mm from its intended place (known to ± {sigma_mm:.3} mm, 1σ)"
     );
@@ -42,8 +43,9 @@ fn sentence(placement: &ObjectPlacement, what: &str) -> String {
     }
     let remedy = remedy.as_ref().map(|remedy| format!("{}; ", remedy_text(remedy, what))).unwrap_or_default();
     format!(
-        "{what} {work_object}: only the shape is corrected, the path stays in place; {known}; {remedy}--placement absolute \
-         corrects the place anyway"
+        "{what} {work_object}: only the shape is corrected, the path stays in place; {known}; correcting it too would make the path \
+         worse with a probability of {}; {remedy}--placement absolute corrects the place anyway",
+        percent_of(*probability_of_harm)
     )
 }
 
@@ -191,7 +193,7 @@ pub fn json(plan: &Plan, listing: &Listing) -> [Value; 2] {
     let placements = plan.placements.iter().map(|p| {
         json!({
             "work_object": p.work_object, "corrected": word(p.applied), "off_mm": p.deviation_mm, "sigma_mm": p.sigma_mm,
-            "taught": p.taught, "remedy": p.remedy.as_ref().map(|remedy| remedy_json(remedy, what)),
+            "chance_of_worse": p.probability_of_harm, "taught": p.taught, "remedy": p.remedy.as_ref().map(|remedy| remedy_json(remedy, what)),
         })
     });
     let cuts = plan.cuts.iter().map(|cut| {

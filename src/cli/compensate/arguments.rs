@@ -36,7 +36,8 @@ enum CirclesArgument {
 /// Whether the place of a path is corrected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum PlacementArgument {
-    /// Shape and place where the model knows the place better than it is off; the shape alone elsewhere.
+    /// Shape and place where the place is known better than it is off and correcting it does harm with a probability of at most half
+    /// of --max-risk; the shape alone elsewhere.
     Auto,
     /// The shape of the path in each work object; the path stays in place.
     Shape,

@@ -15,7 +15,7 @@ use crate::condition::arm_conditions::ArmConditions;
 use crate::frames::frame_pair::{ResolvedFrames, carried_through};
 use crate::frames::taught::taught_frame;
 use crate::risk::measurement_information::{FREE, PriorSigma, Readings, SensorPosition, factor, updated};
-use crate::risk::placement::{AssessedTarget, TargetDeviation, evenly_spaced};
+use crate::risk::placement::{AssessedTarget, TargetDeviation, accepts_position, evenly_spaced};
 use crate::risk::registration::Registration;
 use crate::risk::remedy::{Measurement, Remedy};
 use truegrind_arm::estimated::{Estimated, RegisteredFrame};
@@ -223,7 +223,7 @@ impl CurrentKnowledge {
         let along = (self.weights * left * self.weights * expected).trace() / square;
         let chance = 0.5 * normal_two_sided(0.5 * (square / along).sqrt());
         let deviation_mm = (square / self.off.len() as f64).sqrt();
-        sigma_mm <= deviation_mm && chance <= max_risk
+        accepts_position(deviation_mm, sigma_mm, chance, max_risk)
     }
 }
 

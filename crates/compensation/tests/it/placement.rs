@@ -94,6 +94,21 @@ fn a_place_that_is_known_is_corrected_and_can_be_asked_for() {
     }
 }
 
+#[test]
+fn a_place_is_corrected_within_half_of_the_accepted_risk() {
+    let (source, joints) = blade();
+    let known = Drawn::about(3, &joints, 0.7).known;
+    let applied = |max_risk: f64| {
+        let options = Options { max_risk, ..with(Placement::Auto) };
+        let (plan, _) = rewritten(&source, &known, &Cell::default(), &options);
+        plan.placements[0].clone()
+    };
+    let place = applied(1.0);
+    assert!(place.sigma_mm < place.deviation_mm && place.probability_of_harm > 1e-4, "{place:?}");
+    assert_eq!(applied(1.9 * place.probability_of_harm).applied, Placement::Shape);
+    assert_eq!(applied(2.1 * place.probability_of_harm).applied, Placement::Absolute);
+}
+
 /// Arms drawn about the estimated one with covariance F Fᵀ.
 struct Drawn {
     known: Estimated,
