@@ -1,13 +1,14 @@
 """What sharing a run costs: programs file to file by one run of the command line, by two shares and ``gather``, and by Dask.
 
 ``python benches/jobs.py FOLDER [PROGRAMS] [ROUNDS]``, with the command line on PATH or named by TRUEGRIND (release), and the package
-installed. Processor time is that of a process and of all that it started. Each way writes to a folder of its own below FOLDER, and
+installed, on Linux. Processor time is that of a process and of all that it started, servers that outlive it included. Each way writes to a folder of its own below FOLDER, and
 nothing is taken away: ext4 does not give out the numbers of files that were deleted within the last minutes, and looking for others takes
 longer than the work.
 """
 
 from __future__ import annotations
 
+import ctypes
 import math
 import os
 import resource
@@ -35,6 +36,16 @@ if __name__ == "__main__":
         compensate_folder("in", "arm.toml", "out", csv="all.csv", client=client)
 """
 
+# As the documentation of the package has it.
+QUIET_WORKERS = """
+if __name__ == "__main__":
+    import dask
+    from distributed import Client
+    from truegrind.dask import QUIET, compensate_folder
+    with dask.config.set(QUIET), Client(n_workers=2, threads_per_worker=1, dashboard_address=None) as client:
+        compensate_folder("in", "arm.toml", "out", csv="all.csv", client=client)
+"""
+
 
 # The same, and what was spent from the moment on at which the workers stood.
 STEADY = """
@@ -57,13 +68,7 @@ if __name__ == "__main__":
         Path("spent").write_text(f"{all_of_it() - before} {time.monotonic() - begin}")
 """
 
-QUIET = {
-    "DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "False",
-    "DASK_DISTRIBUTED__ADMIN__TICK__INTERVAL": "500ms",
-    "DASK_DISTRIBUTED__ADMIN__TICK__CYCLE": "5s",
-    "DASK_DISTRIBUTED__ADMIN__SYSTEM_MONITOR__INTERVAL": "5s",
-}
-"""Dask's settings of ``truegrind.dask.QUIET``, as the environment states them."""
+PR_SET_CHILD_SUBREAPER = 36
 
 
 def program(number: int) -> str:
@@ -79,17 +84,24 @@ def program(number: int) -> str:
     return "\n".join([*lines, "  ENDPROC", "ENDMODULE", ""])
 
 
-def timed(commands: list[list[str]], at: Path, more: dict[str, str] | None = None) -> tuple[float, float]:
-    """Processor time and clock time of commands that run side by side; ``more``: what their environment has besides."""
-    environment = {**os.environ, **(more or {})}
+def timed(commands: list[list[str]], at: Path) -> tuple[float, float]:
+    """Processor time and clock time of commands that run side by side."""
     begin, before = time.monotonic(), resource.getrusage(resource.RUSAGE_CHILDREN)
     said_to = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
-    running = [subprocess.Popen(command, cwd=at, env=environment, **said_to) for command in commands]
+    # What outlives its parent becomes ours, and is counted when it ends.
+    ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+    running = [subprocess.Popen(command, cwd=at, **said_to) for command in commands]
     for one in running:
         _, said = one.communicate()
         if one.returncode not in (0, 1):
             raise SystemExit(said.decode(errors="replace"))
-    clock, after = time.monotonic() - begin, resource.getrusage(resource.RUSAGE_CHILDREN)
+    clock = time.monotonic() - begin
+    while True:
+        try:
+            os.wait()
+        except ChildProcessError:
+            break
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, clock
 
 
@@ -107,23 +119,23 @@ def main() -> None:
     timed([[binary, "identify", cable, "--robot", "abb-irb-120", "-o", "arm.toml"]], at)
     base = [binary, "compensate", "in", "--model", "arm.toml", "-o", "out"]
     shares = [[*base, "--shard", f"{share}/2", "--resume", "--brief-records", "--threads", "1"] for share in (1, 2)]
-    for name, script in (("alone.py", ALONE), ("workers.py", WORKERS), ("steady.py", STEADY)):
+    scripts = {"alone.py": ALONE, "workers.py": WORKERS, "quiet.py": QUIET_WORKERS, "steady.py": STEADY}
+    for name, script in scripts.items():
         (at / name).write_text(script, encoding="utf-8")
     ways = {
         "one run": [[[*base, "--csv", "all.csv"]]],
         "two shares": [shares, [[binary, "gather", "out", "--csv", "all.csv"]]],
         "Dask": [[[sys.executable, "alone.py"]]],
         "Dask, two processes": [[[sys.executable, "workers.py"]]],
-        "the same, quiet": [[[sys.executable, "workers.py"]]],
+        "the same, quiet": [[[sys.executable, "quiet.py"]]],
         "the work alone": [[[sys.executable, "steady.py"]]],
-        "the work alone, quiet": [[[sys.executable, "steady.py"]]],
     }
     found: dict[str, list[tuple[float, float]]] = {name: [] for name in ways}
     written: set[bytes] = set()
     for number in range(rounds):
         for name, steps in ways.items():
-            parts = [timed(commands, at, QUIET if name.endswith("quiet") else None) for commands in steps]
-            if name.startswith("the work alone"):
+            parts = [timed(commands, at) for commands in steps]
+            if name == "the work alone":
                 cpu, clock = map(float, (at / "spent").read_text().split())
                 parts = [(cpu, clock)]
             found[name].append((sum(cpu for cpu, _ in parts), sum(clock for _, clock in parts)))

@@ -14,6 +14,7 @@ use truegrind::{Dataset, ImportOptions, Reading, Robot, Sensor, read_measurement
 use crate::arrays::Numbers;
 use crate::errors::{Kind, Refusal};
 use crate::files;
+use crate::running::run;
 
 /// Measured poses: logged joint angles and the readings of one sensor.
 #[pyclass(name = "Dataset", module = "truegrind", frozen)]
@@ -287,6 +288,9 @@ impl PyDataset {
     }
 }
 
+/// Size from which reading can be interrupted.
+const MANY_BYTES: usize = 1 << 20;
+
 fn read(
     py: Python<'_>,
     name: &str,
@@ -295,7 +299,9 @@ fn read(
     allow_odd_units: bool,
 ) -> PyResult<PyDataset> {
     let options = ImportOptions { sheet, allow_odd_units };
-    let rows = py.detach(|| read_measurements(name, bytes, &options)).map_err(Refusal::from)?;
+    let read = || read_measurements(name, bytes, &options).map_err(Refusal::from);
+    // Threads of its own, which Ctrl-C ends, take longer to start than a small file to read.
+    let rows = if bytes.len() > MANY_BYTES { run(py, Some(1), None, read)? } else { py.detach(read)? };
     Ok(PyDataset { rows: Arc::new(rows), odd_units: allow_odd_units })
 }
 

@@ -2,6 +2,7 @@
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use truegrind::arm::estimated;
 use truegrind::calibration::identification::start::StartError;
 use truegrind::calibration::measurement::matching::Mismatch;
 use truegrind::compensation::cell::CellError;
@@ -75,26 +76,55 @@ const KEYWORDS: [(&str, &str); 12] = [
     ("--again", "again=True"),
 ];
 
+/// A message with keywords in place of options.
+fn in_python(message: impl ToString) -> String {
+    let mut message = message.to_string();
+    for (option, keyword) in KEYWORDS {
+        if message.contains(option) {
+            message = message.replace(option, keyword);
+        }
+    }
+    message
+}
+
 impl Refusal {
     pub(crate) fn new(kind: Kind, message: impl ToString) -> Self {
-        let mut message = message.to_string();
-        for (option, keyword) in KEYWORDS {
-            if message.contains(option) {
-                message = message.replace(option, keyword);
-            }
-        }
+        let message = in_python(message);
         Self { kind, message, file: None, sheet: None, row: None, column: None, found: None, expected: None }
+    }
+
+    /// The same error in other words.
+    pub(crate) fn saying(self, message: impl ToString) -> Self {
+        Self { message: in_python(message), ..self }
     }
 
     /// An invalid argument: its name, the found and the expected value.
     pub(crate) fn argument(name: &str, found: impl ToString, expected: &str) -> Self {
         let found = found.to_string();
         let told = Self::new(Kind::Argument, format!("{name}: found {found}; expected {expected}"));
-        Self { found: Some(found), expected: Some(expected.to_owned()), ..told }
+        told.of_key(name).with(found, expected)
     }
 
     pub(crate) fn of_file(self, file: &str) -> Self {
         Self { file: Some(file.to_owned()), ..self }
+    }
+
+    /// The found and the expected value.
+    pub(crate) fn with(self, found: impl ToString, expected: impl ToString) -> Self {
+        Self { found: Some(found.to_string()), expected: Some(expected.to_string()), ..self }
+    }
+
+    /// The line of a file that is not TOML, or has other keys, and what was expected there.
+    fn of_syntax(self, fault: &str) -> Self {
+        let line =
+            fault.split_once(" at line ").and_then(|(_, rest)| rest.split([',', '\n']).next()?.parse().ok());
+        let expected = fault.lines().map(str::trim).rfind(|line| !line.is_empty()).map(str::to_owned);
+        Self { row: line, expected, ..self }
+    }
+
+    /// Key of a file, or name of an argument.
+    fn of_key(self, key: impl ToString) -> Self {
+        Self { column: Some(key.to_string()), ..self }
     }
 }
 
@@ -121,6 +151,7 @@ impl From<ImportError> for Refusal {
     fn from(error: ImportError) -> Self {
         let told = Self::new(Kind::Dataset, &error);
         let place = error.location().cloned();
+        let both = |found: &str, expected: &str| (Some(found.to_owned()), Some(expected.to_owned()));
         let (found, expected) = match &error {
             ImportError::Cell { found, expected, .. } | ImportError::Units { found, expected, .. } => {
                 (Some(found.to_string()), Some((*expected).to_owned()))
@@ -138,6 +169,19 @@ impl From<ImportError> for Refusal {
                 (Some(found.join(", ")), Some("L, or measured_x, measured_y and measured_z".to_owned()))
             }
             ImportError::UnknownSheet { sheet, sheets, .. } => (Some(sheet.clone()), Some(sheets.join(", "))),
+            ImportError::NoSheets { sheet, .. } => {
+                both(&format!("sheet {sheet}"), "no sheet for a text table")
+            }
+            ImportError::TwoSensors { tracker, .. } => both(&format!("L, {tracker}"), "one sensor"),
+            ImportError::DuplicateColumn { .. } => both("the column twice", "the column once"),
+            ImportError::TooManyJoints { joint, .. } => both(&format!("joint {joint}"), "joints 1 to 6"),
+            ImportError::Empty { .. } => both("no rows", "a header line and one row for each measured pose"),
+            ImportError::NotATable { .. } => both("other bytes", "a text table or a workbook"),
+            ImportError::Format { message, .. } => (Some(message.clone()), None),
+            ImportError::Unusable { message, .. } => match message.split_once("; expected ") {
+                Some((found, expected)) => both(found.strip_prefix("found ").unwrap_or(found), expected),
+                None => (Some(message.clone()), None),
+            },
             _ => (None, None),
         };
         let named = match &error {
@@ -160,11 +204,13 @@ impl From<Mismatch> for Refusal {
     fn from(error: Mismatch) -> Self {
         let told = Self::new(Kind::Dataset, &error);
         match error {
-            Mismatch::Units(suspicion) => Self {
-                message: format!("{} (allow_odd_units=True takes the rows at their word)", told.message),
-                file: Some(suspicion.file.clone()),
-                ..told
-            },
+            Mismatch::Units(suspicion) => {
+                let message = format!("{} (allow_odd_units=True takes the rows at their word)", told.message);
+                let differences = suspicion.differences();
+                let found: Vec<&str> = differences.iter().map(|(found, _)| *found).collect();
+                let expected = "degrees, millimetres and unit quaternions, scalar first";
+                told.saying(message).of_file(&suspicion.file).with(found.join("; "), expected)
+            }
             _ => told,
         }
     }
@@ -208,40 +254,146 @@ impl From<IdentifyError> for Refusal {
     fn from(error: IdentifyError) -> Self {
         let told = Self::new(Kind::Fit, &error);
         match error {
-            IdentifyError::TooFewRows { file, poses, needed, .. } => Self {
-                file: Some(file),
-                found: Some(format!("{poses} poses")),
-                expected: Some(format!("{needed} poses")),
-                ..told
-            },
-            IdentifyError::WrongArm { file, rmse_mm, .. } => {
-                Self { file: Some(file), found: Some(format!("{rmse_mm:.1} mm RMS")), ..told }
+            IdentifyError::TooFewRows { file, poses, needed, .. } => {
+                told.of_file(&file).with(format!("{poses} poses"), format!("{needed} poses"))
+            }
+            IdentifyError::WrongArm { file, robot, rmse_mm } => told
+                .of_file(&file)
+                .with(format!("{rmse_mm:.1} mm RMS"), format!("the measurements of {robot}")),
+            _ => told,
+        }
+    }
+}
+
+impl From<StartError> for Refusal {
+    fn from(error: StartError) -> Self {
+        let told = Self::new(Kind::Fit, &error);
+        told.of_file(&error.file)
+            .with(format!("{} poses", error.poses), format!("{} poses, not collinear", error.needed))
+    }
+}
+
+impl From<SolverError> for Refusal {
+    fn from(error: SolverError) -> Self {
+        let told = Self::new(Kind::Argument, &error).of_key("method");
+        match error {
+            SolverError::Unknown { name, known } => told.with(name, known.join(", ")),
+            _ => told,
+        }
+    }
+}
+
+impl From<ModelFileError> for Refusal {
+    fn from(error: ModelFileError) -> Self {
+        let told = Self::new(Kind::Model, &error);
+        match error {
+            ModelFileError::Syntax(fault) => told.of_syntax(&fault),
+            ModelFileError::Schema { found } => told.of_key("schema").with(found, estimated::SCHEMA),
+            ModelFileError::UnknownParameter { name } => {
+                told.of_key("covariance.order").with(name, "parameters of the arm")
+            }
+            ModelFileError::Triangle { expected } => {
+                Self { expected: Some(format!("{expected} rows")), ..told.of_key("covariance.lower") }
+            }
+            ModelFileError::Arm { part, fault } => {
+                told.of_key(format!("{part}.{}", fault.key)).with(fault.found, fault.expected)
+            }
+            ModelFileError::InvalidValue(fault) => told.of_key(fault.key).with(fault.found, fault.expected),
+            _ => told,
+        }
+    }
+}
+
+impl From<CellError> for Refusal {
+    fn from(error: CellError) -> Self {
+        let told = Self::new(Kind::Cell, &error);
+        match error {
+            CellError::TooManyPoints { name, points, .. } => {
+                told.of_key(name).with(format!("{points} points"), "four to ten points")
+            }
+            CellError::Syntax(fault) => told.of_syntax(&fault),
+            CellError::Angles { found } => {
+                let expected = told.message.split_once("expected ").map(|(_, words)| words.to_owned());
+                Self { found: Some(found), expected, ..told.of_key("angles") }
+            }
+            CellError::Frame { name, .. } => told.of_key(name),
+            CellError::Twice { name, before, .. } => {
+                told.of_key(&name).with(format!("{before}, {name}"), "one of the two")
+            }
+            CellError::UnknownAxis { axis } => told.of_key("external axis").with(axis, "a, b, c, d, e, f"),
+            CellError::AxisTwice { axis } => told.of_key(axis).with("twice", "once"),
+            _ => told,
+        }
+    }
+}
+
+impl From<RecipeError> for Refusal {
+    fn from(error: RecipeError) -> Self {
+        let told = Self::new(Kind::Recipe, &error);
+        match error {
+            RecipeError::Syntax { file, line, message } => {
+                Self { row: Some(line), expected: Some(message), ..told.of_file(&file) }
+            }
+            RecipeError::Invalid { key, found, expected } => told.of_key(key).with(found, expected),
+            RecipeError::Robot { .. } => told.of_key("robot"),
+            RecipeError::NoPose { found, wanted, .. } => {
+                told.of_key("poses").with(format!("{found} poses"), format!("{wanted} poses"))
             }
             _ => told,
         }
     }
 }
 
-/// Errors whose message is used unchanged.
-macro_rules! told {
-    ($($error:ty => $kind:ident),+ $(,)?) => {
-        $(impl From<$error> for Refusal {
-            fn from(error: $error) -> Self {
-                Self::new(Kind::$kind, error)
+impl From<PlanError> for Refusal {
+    fn from(error: PlanError) -> Self {
+        let told = Self::new(Kind::Plan, &error);
+        match error {
+            PlanError::TooFew { found, wanted, .. } | PlanError::NoWay { found, wanted, .. } => {
+                told.with(format!("{found} poses"), format!("{wanted} poses"))
             }
-        })+
-    };
+            PlanError::NoOutlet => told.of_key("outlets_mm").with("none", "the location of each outlet"),
+            _ => told,
+        }
+    }
 }
 
-told! {
-    StartError => Fit,
-    SolverError => Argument,
-    ModelFileError => Model,
-    NominalMismatch => Model,
-    CellError => Cell,
-    CompensateError => Program,
-    RecipeError => Recipe,
-    PlanError => Plan,
-    TrackError => Track,
-    TrackStateError => Track,
+impl From<TrackError> for Refusal {
+    fn from(error: TrackError) -> Self {
+        let told = Self::new(Kind::Track, &error);
+        match error {
+            TrackError::TooFew { file, found, asked } => {
+                told.of_file(&file).with(format!("{found} poses"), format!("{asked} poses"))
+            }
+            TrackError::Foreign { file, left_mm, held_out_mm, .. } => {
+                told.of_file(&file).with(format!("{left_mm:.3} mm"), format!("some {held_out_mm:.3} mm"))
+            }
+            TrackError::Sensor { file, found, expected } => told.of_file(&file).with(found, expected),
+            TrackError::State { file, .. } => told.of_file(&file),
+            TrackError::Placing(error) => Self { kind: Kind::Track, ..Self::from(error) },
+            _ => told,
+        }
+    }
+}
+
+impl From<TrackStateError> for Refusal {
+    fn from(error: TrackStateError) -> Self {
+        let told = Self::new(Kind::Track, &error);
+        match error {
+            TrackStateError::Syntax(fault) => told.of_syntax(&fault),
+            TrackStateError::Value { key, found, expected } => told.of_key(key).with(found, expected),
+            _ => told,
+        }
+    }
+}
+
+impl From<NominalMismatch> for Refusal {
+    fn from(error: NominalMismatch) -> Self {
+        Self::new(Kind::Model, error)
+    }
+}
+
+impl From<CompensateError> for Refusal {
+    fn from(error: CompensateError) -> Self {
+        Self::new(Kind::Program, error)
+    }
 }

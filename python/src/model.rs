@@ -50,12 +50,11 @@ impl PyModel {
 
     /// Parses a model file.
     fn read(text: &str, name: &str) -> Result<Self, Refusal> {
-        let told = |error: &dyn std::fmt::Display| {
+        let arm = Estimated::from_toml(text).map_err(|error| {
             let message = error.to_string();
             let message = format!("{name}: {}; a model file is what Model.save writes", message.trim_end());
-            Refusal::new(Kind::Model, message).of_file(name)
-        };
-        let arm = Estimated::from_toml(text).map_err(|error| told(&error))?;
+            Refusal::from(error).saying(message).of_file(name)
+        })?;
         robots::check_catalogue_name(&arm.robot, &arm.nominal)
             .map_err(|error| Refusal::new(Kind::Model, format!("{name}: {error}")).of_file(name))?;
         if arm.verdict.status == Judgement::Fail {

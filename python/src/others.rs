@@ -81,7 +81,8 @@ pub(crate) fn simulate(
         recipe.seed = seed.unwrap_or(recipe.seed);
         let resolve = |name: &str| {
             let found = from_name(Path::new(name), &ImportOptions::default());
-            found.map(|(robot, _)| robot.model).map_err(|error| error.to_string())
+            let said = |error: PyErr| Python::attach(|py| error.value(py).to_string());
+            found.map(|(robot, _)| robot.model).map_err(said)
         };
         let made = recipe.simulate(resolve)?;
         let rows = read_measurements(name, made.csv.as_bytes(), &Default::default())?;
@@ -261,8 +262,10 @@ pub(crate) fn plan_(
     run(py, threads, progress, || {
         report_step(&format!("choosing {poses} of {candidates} poses"));
         let setup = MeasurementSetup { nominal: &robot.model, sensor, frames: &frames };
-        let plan = plan_poses(&setup, &options)
-            .map_err(|error| Refusal::new(Kind::Plan, format!("{}: {error}", robot.sheet.name)))?;
+        let plan = plan_poses(&setup, &options).map_err(|error| {
+            let message = format!("{}: {error}", robot.sheet.name);
+            Refusal::from(error).saying(message)
+        })?;
         Ok(PyPlan { plan, robot, sensor, frames, speed_mm_s, settle_s })
     })
 }

@@ -133,7 +133,7 @@ impl Place {
                         "{name}: {}; a cell file lists [[tool]] and [[wobj]]",
                         error.to_string().trim_end()
                     );
-                    Refusal::new(Kind::Cell, message).of_file(&name)
+                    Refusal::from(error).saying(message).of_file(&name)
                 })?;
                 if let Some(first) = cell.open.first() {
                     let message = format!("{name}: not filled in yet: {first}");
@@ -183,7 +183,8 @@ fn marked(listing: &Listing, sources: &Sources, hash: &str, again: bool) -> Resu
                  the corrections add up",
                 mark.model
             );
-            return Err(Refusal::new(Kind::Program, message).of_file(name));
+            let told = Refusal::new(Kind::Program, message).of_file(name);
+            return Err(told.with(format!("the mark of model {}", mark.model), "an original program"));
         }
     }
     Ok(out)
@@ -402,12 +403,14 @@ fn corrected(
     if let Some(done) = marked.iter().position(|marked| *marked) {
         let name = &sources.files[done].0;
         let message = format!("{name} is already compensated with this model: give the original program");
-        return Err(Refusal::new(Kind::Program, message).of_file(name));
+        let told = Refusal::new(Kind::Program, message).of_file(name);
+        return Err(told.with("the mark of this model", "an original program"));
     }
     let found: Vec<String> =
         surface.iter().flat_map(|surface| surface_frame_contradictions(listing, surface)).collect();
     if !found.is_empty() {
-        return Err(Refusal::new(Kind::Cell, format!("{}: {}", sources.name(), found.join("; "))));
+        let message = format!("{}: {}", sources.name(), found.join("; "));
+        return Err(Refusal::new(Kind::Cell, message).of_file(&sources.name()));
     }
     let options = CompensateOptions { loads, ..options };
     let mark = Mark { version: env!("CARGO_PKG_VERSION").into(), model: model.hash.clone(), partial: false };
@@ -421,7 +424,10 @@ fn corrected(
             arm.robot,
             model.name
         );
-        return Err(Refusal::new(Kind::Program, message));
+        let told = Refusal::new(Kind::Program, message).of_file(&sources.name());
+        return Err(
+            told.with(format!("{motions} motions and hardly one in reach"), "a program of this robot")
+        );
     }
     if let Some(surface) = &surface {
         plan.add_normals(surface);
@@ -579,7 +585,8 @@ impl Run<'_> {
         let report = verify(&judged, &acting);
         if report.points.is_empty() {
             let message = format!("{name}: no motion has a target that is known from the text");
-            return Err(Refusal::new(Kind::Program, message));
+            let told = Refusal::new(Kind::Program, message).of_file(&name);
+            return Err(told.with("no motion", "motions with targets in the text"));
         }
         Ok(PyDeviation { reports: vec![report] })
     }

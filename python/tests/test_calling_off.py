@@ -1,14 +1,18 @@
 """Long work can be watched, and Ctrl-C ends it within 0.2 s."""
 
 import os
+import re
 import signal
 import threading
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import truegrind as tg
+
+from conftest import DATA
 
 SOON_S = 0.2
 
@@ -69,6 +73,43 @@ def test_ctrl_c_ends_a_long_fit(long_rows, after_s):
 @pytest.mark.parametrize("after_s", [0.1, 0.4, 1.0])
 def test_ctrl_c_ends_a_long_diagnosis(long_rows, after_s):
     ends_soon(after_s, lambda: tg.diagnose(long_rows, "abb-irb-120"))
+
+
+@pytest.fixture(scope="module")
+def long_recipe() -> str:
+    recipe = (DATA / "irb120-tracker.toml").read_text(encoding="utf-8")
+    return re.sub(r"(?m)^count = .*", "count = 600000", recipe)
+
+
+@pytest.fixture(scope="module")
+def long_program() -> dict[str, str]:
+    """So many lines that it takes seconds to correct."""
+    orient = "[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]"
+    lines = [
+        f"MoveL [[{330 + k % 50},{4 + k // 50 % 40},{420 + k % 7}],{orient}],v100,z1,tool0;" for k in range(200_000)
+    ]
+    return {"long.mod": "\n".join(["MODULE Long", "PROC main()", *lines, "ENDPROC", "ENDMODULE", ""])}
+
+
+@pytest.fixture(scope="module")
+def long_file(tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("rows") / "rows.csv"
+    header, row = "q1,q2,q3,q4,q5,q6,measured_x,measured_y,measured_z\n", "10.25,20.5,30.1,40.5,50.7,60.2,800.1,-41.5,900.2\n"
+    path.write_text(header + row * 1_500_000, encoding="ascii")
+    return path
+
+
+@pytest.mark.parametrize("after_s", [0.1, 0.6])
+@pytest.mark.parametrize("verb", ["simulate", "plan", "compensate", "deviation", "from_csv"])
+def test_ctrl_c_ends_whatever_takes_long(model, long_recipe, long_program, long_file, verb, after_s):
+    works = {
+        "simulate": lambda: tg.simulate(long_recipe),
+        "plan": lambda: tg.plan("abb-irb-120", "position", poses=300, candidates=20_000),
+        "compensate": lambda: tg.compensate(long_program, model, allow_doubtful=True),
+        "deviation": lambda: tg.deviation(long_program, model),
+        "from_csv": lambda: tg.Dataset.from_csv(long_file, allow_odd_units=True),
+    }
+    ends_soon(after_s, works[verb])
 
 
 def test_what_is_done_is_told_step_by_step(cable):

@@ -5,7 +5,7 @@ import pytest
 
 import truegrind as tg
 
-from conftest import DATA
+from conftest import DATA, PROGRAMS
 
 NAMES = [f"q{joint}" for joint in range(1, 7)]
 
@@ -244,6 +244,45 @@ def test_bad_input_is_refused_in_words(call, kind, words):
     with pytest.raises(kind) as raised:
         call()
     assert words in str(raised.value)
+
+
+def attributes(call) -> tuple:
+    with pytest.raises(tg.TruegrindError) as raised:
+        call()
+    error = raised.value
+    return error.file, error.row, error.column, error.found, error.expected
+
+
+def test_every_kind_of_error_says_what_was_found_where(cable, model):
+    """As attributes, so that no program has to take messages apart."""
+    table = "q1,q2,q3,q4,q5,q6,L\n1,2,3,4,5,6,700\n"
+    csv = lambda text: lambda: tg.Dataset.from_csv(text.encode(), name="a.csv")
+    assert attributes(csv(table.replace("L", "L,q7"))) == ("a.csv", 1, "q7", "joint 7", "joints 1 to 6")
+    assert attributes(csv(table.replace("q2", "q1"))) == ("a.csv", 1, "q1", "the column twice", "the column once")
+    assert attributes(csv("")) == ("a.csv", None, None, "no rows", "a header line and one row for each measured pose")
+    wide = "\n".join("1,2,3,4,5,6,700,10,20,0,0,50" for _ in range(5)) + "\n1,2,3\n"
+    file, row, _, found, expected = attributes(csv(wide))
+    assert (file, row) == ("a.csv", 6) and found.startswith("3 cells") and "12 numbers" in expected
+    assert attributes(lambda: cable_of(cable, cable.length_mm / 25.4))[3] == "the sensor's lengths look like inches"
+    toml = model.to_toml()
+    other = toml.replace("truegrind.model/1", "truegrind.model/9")
+    assert attributes(lambda: tg.Model.from_toml(other, "m.toml")) == ("m.toml", None, "schema", "truegrind.model/9", "truegrind.model/1")
+    assert attributes(lambda: tg.Model.from_toml("a = \n", "m.toml"))[:2] == ("m.toml", 1)
+    cell = lambda text: lambda: tg.compensate(PROGRAMS / "told.mod", model, cell=text, allow_doubtful=True)
+    assert attributes(cell("angles = 'euler'\n"))[2:4] == ("angles", "euler")
+    assert attributes(cell("\nangles =\n"))[1] == 2
+    assert attributes(lambda: tg.simulate("seed = 1\nrobot = 1\n"))[:2] == ("recipe.toml", 2)
+    assert attributes(lambda: tg.identify(cable, "abb-irb-120", method="guess"))[2:4] == ("method", "guess")
+    assert attributes(lambda: tg.identify(cable, "abb-irb-120", threads=0))[2:4] == ("threads", "0")
+    few = tg.Dataset.from_numpy(cable.q_deg[:3], length_mm=cable.length_mm[:3], name="few")
+    assert attributes(lambda: tg.identify(few, "abb-irb-120"))[0] == "few"
+    assert attributes(lambda: tg.track(model, few))[3:] == ("3 poses", "30 poses")
+    empty = {"e.mod": "MODULE E\nENDMODULE\n"}
+    assert attributes(lambda: tg.deviation(empty, model))[0] == "e.mod"
+
+
+def cable_of(cable, length_mm) -> tg.Identification:
+    return tg.identify(tg.Dataset.from_numpy(cable.q_deg, length_mm=length_mm), "abb-irb-120")
 
 
 def test_wrong_units_and_arms_are_named(cable):

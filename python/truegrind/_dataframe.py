@@ -29,16 +29,16 @@ def columns(frame: Any) -> dict[str, Any]:
         names = [str(name) for name in whole.column_names()]
         parts = list(whole.get_chunks())
         return {name: _joined([_column(part.get_column_by_name(name), name) for part in parts]) for name in names}
-    names = getattr(frame, "columns", None)
-    if names is None and hasattr(frame, "keys"):
-        names = list(frame.keys())
-    if names is None:
+    named = getattr(frame, "columns", None)
+    if named is None and hasattr(frame, "keys"):
+        named = list(frame.keys())
+    if named is None:
         raise DatasetError(
             f"found {type(frame).__name__}; expected a data frame: an object with __dataframe__, or columns by name",
             found=type(frame).__name__,
             expected="an object with __dataframe__, or columns by name",
         )
-    return {str(name): _plain(frame[name]) for name in names}
+    return {str(name): _plain(frame[name]) for name in named}
 
 
 def _plain(values: Any) -> Any:

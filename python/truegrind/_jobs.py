@@ -95,11 +95,11 @@ def _text(value: object) -> str:
     return os.fspath(value) if isinstance(value, os.PathLike) else str(value)
 
 
-def inputs(given: object) -> tuple[str, ...]:
+def inputs(given: Any) -> tuple[str, ...]:
     """One or more paths."""
     if isinstance(given, (str, os.PathLike)):
         return (os.fspath(given),)
-    return tuple(os.fspath(path) for path in given)  # type: ignore[union-attr]
+    return tuple(os.fspath(path) for path in given)
 
 
 def listed(command: Command) -> list[dict[str, Any]]:
@@ -220,14 +220,14 @@ def _checked(done: subprocess.CompletedProcess[bytes]) -> subprocess.CompletedPr
 
 
 def compensating(
-    programs: object, model: object, output: object, work: object | None, given: Mapping[str, Any], with_json: bool = True
+    programs: Any, model: Any, output: Any, work: Any, given: Mapping[str, Any], with_json: bool = True
 ) -> Command:
     """The command that corrects programs. ``with_json``: records contain the entries of all motions for the JSON report."""
     chosen = options({"model": model, "output": output, "brief_records": not with_json, **given})
-    return Command("compensate", inputs(programs), chosen, os.fspath(work if work is not None else output))  # type: ignore[arg-type]
+    return Command("compensate", inputs(programs), chosen, os.fspath(work if work is not None else output))
 
 
-def diagnosing(data: object, robot: object, output: object, work: object | None, given: Mapping[str, Any]) -> Command:
+def diagnosing(data: Any, robot: Any, output: Any, work: Any, given: Mapping[str, Any]) -> Command:
     """The command that diagnoses arms."""
     chosen = options({"robot": robot, "output": output, **given})
-    return Command("diagnose", inputs(data), chosen, os.fspath(work if work is not None else output))  # type: ignore[arg-type]
+    return Command("diagnose", inputs(data), chosen, os.fspath(work if work is not None else output))

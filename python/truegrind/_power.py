@@ -110,8 +110,8 @@ def table(runs: list[dict[str, Any]]) -> list[dict[str, Any]]:
             for finding in one["findings"]:
                 cause = (finding["effect"], tuple(finding["joints"] or ()))
                 seen[cause] = seen.get(cause, False) or finding["confidence"] == "identified"
-            for cause, sure in (seen or {(None, ()): False}).items():
-                named.setdefault(cause, []).append(sure)
+            for cause, identified in (seen or {(None, ()): False}).items():
+                named.setdefault(cause, []).append(identified)
         for (effect, joints), sure in sorted(named.items(), key=lambda item: (-len(item[1]), str(item[0]))):
             low, high = interval(len(sure), len(done))
             out.append(
@@ -132,15 +132,15 @@ def table(runs: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def study(
-    recipes: object, robot: object | None, work: object | None, options: Mapping[str, Any]
+    recipes: Any, robot: Any, work: Any, options: Mapping[str, Any]
 ) -> Study:
     """Makes a study from recipe files by name, or from one or more paths."""
     if isinstance(recipes, (str, os.PathLike)):
         recipes = [recipes]
-    named = recipes.items() if isinstance(recipes, Mapping) else ((Path(path).name, path) for path in recipes)  # type: ignore[union-attr]
+    named = recipes.items() if isinstance(recipes, Mapping) else ((Path(path).name, path) for path in recipes)
     texts = tuple((name, os.fspath(path), Path(path).read_text(encoding="utf-8")) for name, path in named)
     folder = None
     if work is not None:
-        folder = os.fspath(work)  # type: ignore[arg-type]
+        folder = os.fspath(work)
         Path(folder).mkdir(parents=True, exist_ok=True)
-    return Study(texts, None if robot is None else os.fspath(robot), tuple(options.items()), folder)  # type: ignore[arg-type]
+    return Study(texts, None if robot is None else os.fspath(robot), tuple(options.items()), folder)

@@ -9,7 +9,7 @@
 Requires ``pip install truegrind[dask]``, and the command line on every worker (on PATH, or named by TRUEGRIND). All workers must see the
 folders under the same paths. Use workers with one thread each: ``Client(threads_per_worker=1)``. Without a client, jobs are started from
 this process, which is cheapest on one machine, since each job is a process of the command line anyway. Workers of a cluster monitor
-themselves a hundred times a second, which costs about 3 % of a processor each; to avoid that:
+themselves a hundred times a second, which costs about 3 % of a processor each, and each imports Dask anew, half a second; to avoid both:
 
 >>> import dask
 >>> from truegrind.dask import QUIET
@@ -23,6 +23,7 @@ listed in the table.
 
 from __future__ import annotations
 
+import multiprocessing
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import contextmanager
 from os import PathLike
@@ -42,15 +43,18 @@ _Path = str | PathLike[str]
 RETRIES = 5
 """Retries by Dask of a chunk whose worker crashed."""
 
-
-QUIET = {
+QUIET: dict[str, Any] = {
     "distributed.worker.profile.enabled": False,
     "distributed.admin.tick.interval": "500ms",
     "distributed.admin.tick.cycle": "5s",
     "distributed.admin.system-monitor.interval": "5s",
+    "distributed.worker.memory.monitor-interval": "2s",
 }
-"""Dask settings for workers that only wait for processes, to reduce their monitoring. Set them before the cluster starts; without a
-client they are set automatically."""
+"""Dask settings for workers that only wait for processes: less monitoring, and workers that are forked from one process, which alone
+imports Dask (where the system can fork). Set them before the cluster starts; without a client they are set automatically."""
+
+if "forkserver" in multiprocessing.get_all_start_methods():
+    QUIET["distributed.worker.multiprocessing-method"] = "forkserver"
 
 
 @contextmanager

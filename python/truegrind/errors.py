@@ -7,7 +7,7 @@ class TruegrindError(ValueError):
     """Base class of all errors. Attributes are ``None`` if not applicable.
 
     ``file`` and ``sheet``: location; ``row``: line of the file or row of the sheet, from 1, or index of an array, from 0; ``column``:
-    header of the column, or key of a robot file; ``found`` and ``expected``: values as text.
+    header of the column, key of a file, or name of an argument; ``found`` and ``expected``: values as text.
     """
 
     def __init__(

@@ -12,7 +12,7 @@ use super::computation::{Common, watching};
 use super::exit_status::ExitStatus;
 use super::files::{self, Batch};
 use super::identify::{DataArguments, PointsArguments, read};
-use super::inputs::{self, NamedModel};
+use super::inputs::{self, NamedModel, UrdfLinks};
 use super::outputs::{Outputs, Pages};
 use super::progress::Spinner;
 use super::stated_frames::StatedFrameArguments;
@@ -45,6 +45,8 @@ pub(super) struct Arguments {
     #[arg(long)]
     robot: Option<String>,
     #[command(flatten)]
+    links: UrdfLinks,
+    #[command(flatten)]
     points: PointsArguments,
     /// Sheet of a workbook. Default: the first with the needed columns.
     #[arg(long)]
@@ -75,10 +77,11 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let hash: String =
         Sha256::digest(files::read(&arguments.model)?).iter().map(|byte| format!("{byte:02x}")).collect();
     // Refuses a robot other than that of the model.
-    inputs::nominal(&named, arguments.robot.as_deref())?;
+    inputs::nominal_between(&named, arguments.robot.as_deref(), &arguments.links)?;
     let robot = arguments.robot.clone().unwrap_or_else(|| arm.robot.clone());
     let data = DataArguments {
         points: arguments.points.clone(),
+        links: arguments.links.clone(),
         sheet: arguments.sheet.clone(),
         allow_odd_units: arguments.allow_odd_units,
         ..DataArguments::of(arguments.data.clone(), robot)

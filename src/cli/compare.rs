@@ -16,7 +16,7 @@ use truegrind::report::format;
 use super::computation::{Common, on_threads};
 use super::exit_status::ExitStatus;
 use super::files::{self, Batch};
-use super::identify::{Angles, DataArguments, PointsArguments};
+use super::identify::{Angles, DataArguments};
 use super::outputs::Outputs;
 use super::progress::Spinner;
 use super::terminal::{print_message, print_message_lines, print_result, width};
@@ -211,12 +211,10 @@ fn measured(arguments: &Arguments, experiment: &Experiment) -> anyhow::Result<Me
         )
     })?;
     let (robot, dataset) = identify::read(&DataArguments {
-        data: data.clone(),
-        robot,
-        points: PointsArguments::default(),
         sheet: arguments.sheet.clone(),
         angles: arguments.angles,
         allow_odd_units: arguments.allow_odd_units,
+        ..DataArguments::of(data.clone(), robot)
     })?;
     Ok(Measured {
         dataset,

@@ -26,7 +26,7 @@ use truegrind::robots::Robot;
 use super::computation::{Common, on_threads, watching};
 use super::exit_status::ExitStatus;
 use super::files::{self, Batch};
-use super::inputs;
+use super::inputs::{self, UrdfLinks};
 use super::outputs::Outputs;
 use super::progress::Spinner;
 use super::stated_frames::{FramePriorArguments, StatedFrameArguments};
@@ -58,6 +58,8 @@ pub(super) struct DataArguments {
     /// Robot: a name from `truegrind robots`, or a robot file.
     #[arg(long)]
     pub(super) robot: String,
+    #[command(flatten)]
+    pub(super) links: UrdfLinks,
     #[command(flatten)]
     pub(super) points: PointsArguments,
     /// Sheet of a workbook. Default: the first with the needed columns.
@@ -110,6 +112,7 @@ impl DataArguments {
         Self {
             data,
             robot,
+            links: UrdfLinks::default(),
             points: PointsArguments::default(),
             sheet: None,
             angles: None,
@@ -299,7 +302,7 @@ fn options(arguments: &Arguments, limits: Limits) -> anyhow::Result<Options> {
 /// Reads robot and measurements, and checks that their units are plausible.
 pub(super) fn read(arguments: &DataArguments) -> anyhow::Result<(Robot, Dataset)> {
     // An unknown robot is reported before missing measurements.
-    let robot = inputs::robot(&arguments.robot)?;
+    let robot = inputs::robot_between(&arguments.robot, &arguments.links)?;
     let bytes = files::read(&arguments.data)?;
     let dataset = imported(arguments, &bytes)?;
     // Free the text before the rows are processed.
@@ -310,7 +313,7 @@ pub(super) fn read(arguments: &DataArguments) -> anyhow::Result<(Robot, Dataset)
 
 /// [`read`] for measurements that are already in memory.
 pub(super) fn read_bytes(arguments: &DataArguments, bytes: &[u8]) -> anyhow::Result<(Robot, Dataset)> {
-    let robot = inputs::robot(&arguments.robot)?;
+    let robot = inputs::robot_between(&arguments.robot, &arguments.links)?;
     let dataset = measured(arguments, &robot, imported(arguments, bytes)?)?;
     Ok((robot, dataset))
 }

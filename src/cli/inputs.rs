@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow, bail};
+use clap::Args;
 use sha2::{Digest, Sha256};
 use truegrind::arm::estimated::{Estimated, Judgement};
 use truegrind::arm::model::Model;
@@ -12,14 +13,34 @@ use truegrind::robots::{self, Robot};
 use super::files;
 use super::terminal::print_message;
 
+/// Where the arm begins and ends in a URDF that holds more than one arm, or more than the arm.
+#[derive(Debug, Clone, Default, Args)]
+pub(super) struct UrdfLinks {
+    /// Base link, if --robot is a URDF. Default: the root of its tree.
+    #[arg(long, value_name = "LINK", requires = "robot")]
+    base: Option<String>,
+    /// Flange link, if --robot is a URDF. Default: tool0 or flange.
+    #[arg(long, value_name = "LINK", requires = "robot")]
+    tip: Option<String>,
+}
+
 /// A robot by catalogue name, or from a robot file of any supported format.
 pub(super) fn robot(name: &str) -> anyhow::Result<Robot> {
+    robot_between(name, &UrdfLinks::default())
+}
+
+/// A robot by catalogue name, or from a robot file; of a URDF, the arm between these links.
+pub(super) fn robot_between(name: &str, links: &UrdfLinks) -> anyhow::Result<Robot> {
     let path = Path::new(name);
     if Kind::of(name).is_some() || name.contains('/') || path.is_file() {
-        Ok(import(&files::read_text(path)?, name, &ImportOptions::default())?.robot)
-    } else {
-        Ok(robots::load(name)?)
+        let UrdfLinks { base, tip } = links.clone();
+        let choice = ImportOptions { base, tip, ..ImportOptions::default() };
+        return Ok(import(&files::read_text(path)?, name, &choice)?.robot);
     }
+    if links.base.is_some() || links.tip.is_some() {
+        bail!("--robot {name}: a robot of the catalogue; --base and --tip name links of a URDF: omit them");
+    }
+    Ok(robots::load(name)?)
 }
 
 /// A model on the command line.
@@ -93,6 +114,16 @@ pub(super) fn hash(bytes: &[u8]) -> String {
 
 /// Name and nominal arm of the robot; `--robot` must match the model.
 pub(super) fn nominal(model: &NamedModel, robot_name: Option<&str>) -> anyhow::Result<(String, Model)> {
+    nominal_between(model, robot_name, &UrdfLinks::default())
+}
+
+/// [`nominal`] with a URDF's arm between these links.
+pub(super) fn nominal_between(
+    model: &NamedModel,
+    robot_name: Option<&str>,
+    links: &UrdfLinks,
+) -> anyhow::Result<(String, Model)> {
+    let robot = |name: &str| robot_between(name, links);
     match (model, robot_name) {
         (NamedModel::Nominal, None) => bail!("--model nominal needs --robot"),
         (NamedModel::Nominal, Some(name)) => {

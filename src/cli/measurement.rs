@@ -8,7 +8,7 @@ use truegrind::calibration::measurement::import::template;
 
 use super::exit_status::ExitStatus;
 use super::files::Batch;
-use super::inputs;
+use super::inputs::{self, UrdfLinks};
 use super::terminal::print_message;
 
 /// Arguments of `measurement`.
@@ -29,6 +29,8 @@ struct Template {
     /// Robot: a name from `truegrind robots`, or a robot file.
     #[arg(long)]
     robot: String,
+    #[command(flatten)]
+    links: UrdfLinks,
     /// Quantity that the sensor measures.
     #[arg(long, value_enum, default_value_t = Reads::Position)]
     sensor: Reads,
@@ -53,7 +55,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
 }
 
 fn empty_table(arguments: &Template) -> anyhow::Result<ExitStatus> {
-    let robot = inputs::robot(&arguments.robot)?;
+    let robot = inputs::robot_between(&arguments.robot, &arguments.links)?;
     let sensor = match arguments.sensor {
         Reads::Cable => Sensor::Cable,
         Reads::Position => Sensor::Position,
@@ -74,6 +76,7 @@ fn empty_table(arguments: &Template) -> anyhow::Result<ExitStatus> {
             (0..6).map(|j| format!("J{} {} to {}°", j + 1, signed(low[j]), signed(high[j]))).collect();
         print_message(format_args!("joint ranges in the data sheet: {}", ranges.join(", ")));
     }
+    print_message("columns that may be empty can be deleted");
     print_message("`truegrind plan` chooses the most informative poses");
     Ok(ExitStatus::Done)
 }

@@ -15,7 +15,7 @@ use truegrind::surfaces::SurfaceFile;
 
 use super::exit_status::ExitStatus;
 use super::files::{self, Batch};
-use super::inputs;
+use super::inputs::{self, UrdfLinks};
 use super::output_extension;
 use super::terminal::print_message;
 use truegrind::compensation::cell::nc_setup::angle_convention;
@@ -28,6 +28,8 @@ pub(super) struct Arguments {
     /// Robot: a name from `truegrind robots`, or a robot file.
     #[arg(long)]
     robot: String,
+    #[command(flatten)]
+    links: UrdfLinks,
     /// Program to write; the extension selects RAPID (.mod), Fanuc style (.nc) or Siemens 840D (.mpf). `-` prints RAPID.
     #[arg(short, long, value_name = "PROGRAM")]
     output: PathBuf,
@@ -38,7 +40,7 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     Batch::check(&[&arguments.surface], &[&arguments.output])?;
-    let robot = inputs::robot(&arguments.robot)?;
+    let robot = inputs::robot_between(&arguments.robot, &arguments.links)?;
     let file = surface(&arguments.surface)?;
     // An output that is an input is reported first.
     files::expect(&arguments.surface)?;

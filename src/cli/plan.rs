@@ -18,7 +18,7 @@ use truegrind::report::planning as view;
 use super::computation::{Common, on_threads};
 use super::exit_status::ExitStatus;
 use super::files::{self, Batch};
-use super::inputs;
+use super::inputs::{self, UrdfLinks};
 use super::output_extension;
 use super::outputs::Outputs;
 use super::progress::Spinner;
@@ -51,6 +51,8 @@ pub(super) struct Arguments {
     /// Robot: a name from `truegrind robots`, or a robot file.
     #[arg(long)]
     robot: String,
+    #[command(flatten)]
+    links: UrdfLinks,
     /// Sensor that will measure.
     #[arg(long, value_enum)]
     sensor: SensorArgument,
@@ -138,7 +140,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     targets.extend(arguments.output.as_deref());
     let inputs_of: Vec<&std::path::Path> = arguments.diagnosis.as_deref().into_iter().collect();
     Batch::check(&inputs_of, &targets)?;
-    let robot = inputs::robot(&arguments.robot)?;
+    let robot = inputs::robot_between(&arguments.robot, &arguments.links)?;
     Batch::check(&inputs_of, &targets)?;
     arguments.output.as_deref().map_or(Ok(()), output_extension::refuse_nc)?;
     let sensor = match arguments.sensor {

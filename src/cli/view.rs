@@ -164,12 +164,8 @@ fn measurements(arguments: &Arguments, file: &Path) -> anyhow::Result<Recording>
         (None, None) => bail!("{}: give --robot or --model: the measured arm is unknown", file.display()),
     };
     let data = identify::DataArguments {
-        data: file.to_path_buf(),
-        robot,
-        points: identify::PointsArguments::default(),
         sheet: arguments.sheet.clone(),
-        angles: None,
-        allow_odd_units: false,
+        ..identify::DataArguments::of(file.to_path_buf(), robot)
     };
     let (robot, dataset) = identify::read(&data)?;
     let options = Options {

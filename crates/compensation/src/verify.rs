@@ -16,6 +16,7 @@ use truegrind_arm::condition::Condition;
 use truegrind_arm::estimated::{Estimated, RegisteredFrame};
 use truegrind_arm::model::{Joints, Model};
 use truegrind_math::se3::Pose;
+use truegrind_math::work::checkpoint;
 use truegrind_programs::motion::load::Loads;
 use truegrind_programs::motion::{Listing, MotionKind, Reason, Role, TargetValue};
 use truegrind_surfaces::Surface;
@@ -91,6 +92,7 @@ pub fn verify(task: &VerificationTask<'_>, acting_arm: &ActingArm<'_>) -> PathRe
         .iter()
         .enumerate()
         .map(|(index, first)| {
+            checkpoint();
             let motion = &task.original.motions[first.motion];
             let contact =
                 task.surface.and_then(|s| s.foot(&Point3::from(first.commanded.translation.vector)));
@@ -147,6 +149,7 @@ fn run(listing: &Listing, loads: Option<&Loads>, arms: &mut Arms<'_>, cell: &Cel
     let mut sent: Vec<CommandedEnd> = Vec::new();
     let mut near: Option<Joints> = None;
     for (index, motion) in listing.motions.iter().enumerate() {
+        checkpoint();
         if motion.left.is_some() {
             continue;
         }

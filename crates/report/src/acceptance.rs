@@ -175,12 +175,16 @@ fn orientation_reason(found: &Acceptance) -> Option<String> {
 
 fn figures(found: &Acceptance) -> Vec<KeyFigure> {
     let share = 100.0 * (1.0 - found.model.rmse / found.nominal.rmse);
+    let change = if share < 0.0 { "more" } else { "less" };
     let uncertainty = Some(found.uncertainty_mm).filter(|_| found.uncertainty != Uncertainty::Unknown);
     vec![
         KeyFigure::new("Largest error", found.model.max, 3, "mm")
             .note(format!("nominal arm: {:.3} mm", found.nominal.max)),
-        KeyFigure::new("RMS error", found.model.rmse, 3, "mm")
-            .note(format!("nominal arm: {:.3} mm ({share:.0} % less now)", found.nominal.rmse)),
+        KeyFigure::new("RMS error", found.model.rmse, 3, "mm").note(format!(
+            "nominal arm: {:.3} mm ({:.0} % {change} now)",
+            found.nominal.rmse,
+            share.abs()
+        )),
         KeyFigure::new("Tolerance", found.tolerance_mm, 3, "mm"),
         KeyFigure::new("Uncertainty of the sensor", uncertainty, 3, "mm").note("expanded, k = 2"),
         KeyFigure::new("Poses", found.poses, 0, "").note("that the model was not fitted to"),

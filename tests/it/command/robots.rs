@@ -45,6 +45,52 @@ fn what_is_understood_of_a_file_is_told_and_goes_to_a_robot_file() {
         ],
     );
     assert_eq!(code, 0, "{err}");
+    // Every verb that needs a robot takes the links too, and the arm between them is that of the robot file.
+    let between = |robot: &'static str, links: &[&'static str]| {
+        let plan = [
+            "plan",
+            "--sensor",
+            "position",
+            "--poses",
+            "8",
+            "--candidates",
+            "60",
+            "--json",
+            "--robot",
+            robot,
+        ];
+        truegrind(at, &[&plan[..], links].concat())
+    };
+    let links = ["--base", "left_base_link", "--tip", "left_tool0"];
+    let (code, one, err) = between("cell.urdf", &links);
+    assert_eq!(code, 0, "{err}");
+    let (_, other, _) = between("left.toml", &[]);
+    assert_eq!(one.replace("cell-urdf", "left"), other.replace("cell-urdf", "left"));
+    assert!(one.contains("\"q_deg\"") || one.contains("poses"), "{one}");
+    let (code, _, err) = between("cell.urdf", &[]);
+    assert!(code == 2 && err.contains("--base LINK --tip LINK"), "{err}");
+    let (code, _, err) = between("cell.urdf", &["--tip", "left_hand"]);
+    assert!(code == 2 && err.contains("left_hand"), "{err}");
+    let (code, _, err) = between("abb-irb-120", &links);
+    assert!(code == 2 && err.contains("name links of a URDF: omit them"), "{err}");
+    let (code, _, err) = between("arm.toml", &links);
+    assert!(code == 2 && err.contains("links of a URDF"), "{err}");
+    let (code, _, err) = truegrind(
+        at,
+        &[
+            "measurement",
+            "template",
+            "--robot",
+            "cell.urdf",
+            "--base",
+            "left_base_link",
+            "--tip",
+            "left_tool0",
+            "-o",
+            "empty.csv",
+        ],
+    );
+    assert!(code == 0 && err.contains("for each pose of cell-urdf"), "{err}");
     let (code, _, err) = truegrind(at, &["robots", "--check", "arm.urdf", "-o", "arm.csv"]);
     assert!(code == 2 && err.contains("expected the extension .toml"), "{err}");
     let (code, _, err) = truegrind(at, &["identify", "none.csv", "--robot", "arm.step"]);

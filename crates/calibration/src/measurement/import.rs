@@ -134,6 +134,9 @@ fn read_together(
             Table { rows, ..text.empty() }
         }
     };
+    if table.rows.iter().all(|line| line.cells.iter().all(Cell::is_empty)) {
+        return Err(ImportError::Empty { location: Location::file(log.0) });
+    }
     let (table, notes) = join(measured, table)?;
     let columns = Columns::find(log.0, &table)?;
     let mut dataset = rows::dataset(log.0, &table, &columns, options, std::iter::empty())?;

@@ -28,6 +28,7 @@ use super::dataset::{Reading, Sensor};
 use super::sensor::Rig;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::{Joints, Model};
+use truegrind_math::work::checkpoint;
 
 /// A simulated measurement.
 #[derive(Debug, Clone, PartialEq)]
@@ -116,6 +117,7 @@ impl Recipe {
         let mut rows = Vec::new();
         let mut lines = Vec::new();
         for planned in poses::plan(self, &nominal, &rig)? {
+            checkpoint();
             let number = rows.len();
             let mut truth = planned.condition;
             let mut seen_by = rig.clone();

@@ -211,10 +211,12 @@ impl FittedLinks {
         if self.first_turn < 0.0 {
             parts.push("joint 1 turns clockwise seen from above".to_owned());
         }
-        let place = self.base.translation.vector;
+        // No sign before zero.
+        let rounded = |value: f64, to: f64| (value / to).round() * to + 0.0;
+        let place = self.base.translation.vector.map(|mm| rounded(mm, 1e-3));
         let [roll, pitch, yaw] = {
             let (r, p, y) = self.base.rotation.euler_angles();
-            [r, p, y].map(f64::to_degrees)
+            [r, p, y].map(|angle| rounded(angle.to_degrees(), 1e-4))
         };
         if place.amax() >= SHOWN[0] || [roll, pitch, yaw].iter().any(|angle| angle.abs() >= SHOWN[1]) {
             parts.push(format!(

@@ -464,8 +464,8 @@ impl<'a> Tree<'a> {
             "joints",
             format!("{} arms of six joints, which end with {}", ends.len(), self.names(ends)),
             "one arm",
-            "say which one by its first and last link: `truegrind robots --check FILE --base LINK --tip LINK -o arm.toml` \
-             writes the robot file of one",
+            "say which one by its first and last link, --base LINK --tip LINK; `truegrind robots --check FILE` with them shows it, and \
+             writes its robot file with -o arm.toml",
         )
     }
 

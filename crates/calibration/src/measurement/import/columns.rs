@@ -11,6 +11,9 @@ pub(super) const POSITION: [&str; 3] = ["measured_x", "measured_y", "measured_z"
 /// The measured orientation.
 pub(super) const QUATERNION: [&str; 4] = ["measured_qw", "measured_qx", "measured_qy", "measured_qz"];
 
+/// The controller's own read-out.
+pub(super) const READOUT: [&str; 3] = ["x", "y", "z"];
+
 /// The sampling point of a row on a path.
 pub(super) const PATH: [&str; 3] = ["path", "cycle", "sample"];
 
@@ -65,7 +68,7 @@ impl Columns {
             .collect();
         let found: Vec<String> = named.iter().map(|(n, _)| n.clone()).collect();
         let letter = joint_letter(&found);
-        let is_known = |name: &str| is_known(name, letter);
+        let is_known = |name: &str| is_known(name) || joint_number(name, letter).is_some();
         let by_name = by_name(&named, letter, &location)?;
         let get = |name: &str| by_name.get(name).copied();
         let path = path_columns(&named, &get, &location)?;
@@ -84,7 +87,7 @@ impl Columns {
 
         let (sensor, reading) = sensor_columns(&get, &location, &unused, &found)?;
         let mut notes = Vec::new();
-        let readout = match ["x", "y", "z"].map(get) {
+        let readout = match READOUT.map(get) {
             [Some(x), Some(y), Some(z)] => Some([x, y, z]),
             [None, None, None] => None,
             _ => {
@@ -164,7 +167,7 @@ fn by_name<'a>(
     let mut by_name = BTreeMap::new();
     for (name, index) in named {
         let doubled = by_name.insert(name.as_str(), *index).is_some();
-        if doubled && is_known(name, letter) {
+        if doubled && (is_known(name) || joint_number(name, letter).is_some()) {
             return Err(ImportError::DuplicateColumn {
                 location: Location { column: Some(name.as_str().into()), ..location.clone() },
             });
@@ -190,11 +193,7 @@ const TITLES: usize = 20;
 
 /// The first row with a joint's name, else the first nonempty row.
 fn header_row(rows: &[Line]) -> Option<usize> {
-    let names_a_joint = |line: &Line| {
-        line.cells
-            .iter()
-            .any(|c| LETTERS.iter().any(|letter| joint_number(&c.to_string(), *letter).is_some()))
-    };
+    let names_a_joint = |line: &Line| line.cells.iter().any(|cell| joint(&cell.to_string()).is_some());
     rows.iter()
         .take(TITLES)
         .position(names_a_joint)
@@ -269,12 +268,17 @@ fn joint_letter(found: &[String]) -> char {
     LETTERS.into_iter().find(|letter| names(*letter)).unwrap_or(LETTERS[0])
 }
 
-fn is_known(name: &str, letter: char) -> bool {
+/// Whether a header is one of ours, other than a joint's.
+pub(super) fn is_known(name: &str) -> bool {
     OPTIONAL.contains(&name)
         || POSITION.contains(&name)
         || QUATERNION.contains(&name)
-        || ["x", "y", "z"].contains(&name)
-        || joint_number(name, letter).is_some()
+        || READOUT.contains(&name)
+}
+
+/// The joint that a header names.
+pub(super) fn joint(name: &str) -> Option<usize> {
+    LETTERS.into_iter().find_map(|letter| joint_number(name, letter))
 }
 
 fn joint_number(name: &str, letter: char) -> Option<usize> {

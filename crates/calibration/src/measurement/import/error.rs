@@ -4,6 +4,8 @@ use std::fmt;
 
 use thiserror::Error;
 
+use super::columns::READOUT;
+
 /// A location in a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Location {
@@ -60,6 +62,14 @@ pub enum ImportError {
         /// Message of the format's reader.
         message: String,
     },
+    /// A table of another program, or two files to be joined, without what is needed of them.
+    #[error("{location}: {message}")]
+    Unusable {
+        /// The file or row.
+        location: Location,
+        /// What was found and expected, and what to do.
+        message: String,
+    },
     /// A size limit is exceeded.
     #[error(
         "{location}: found {found}; expected {expected}; save the table alone in a new workbook, or as CSV"
@@ -109,9 +119,10 @@ pub enum ImportError {
     /// No sensor.
     #[error(
         "{location}: found no sensor's column; expected L (cable length) or measured_x, measured_y, measured_z{}; \
-         found the columns {}",
+         found the columns {}{}",
         suggestion(near),
-        list(found)
+        list(found),
+        readout_only(found)
     )]
     NoSensor {
         /// The file or sheet, with the row of the header.
@@ -194,6 +205,7 @@ impl ImportError {
         match self {
             Self::NotATable { location }
             | Self::Format { location, .. }
+            | Self::Unusable { location, .. }
             | Self::TooLarge { location, .. }
             | Self::Empty { location }
             | Self::MissingColumns { location, .. }
@@ -244,6 +256,15 @@ fn headless(found: &[String]) -> &'static str {
     let numbers = !found.is_empty() && found.iter().all(|name| name.trim().parse::<f64>().is_ok());
     if numbers {
         "; these are numbers: put a header line with the names of the columns above them"
+    } else {
+        ""
+    }
+}
+
+/// A hint where the only Cartesian columns are named as the controller's read-out.
+fn readout_only(found: &[String]) -> &'static str {
+    if READOUT.iter().all(|name| found.iter().any(|found| found == name)) {
+        "; x, y, z are the controller's own read-out: if a sensor measured them, rename them to measured_x, measured_y, measured_z"
     } else {
         ""
     }

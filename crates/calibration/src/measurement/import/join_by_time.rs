@@ -8,7 +8,7 @@ use super::clock::{FORMS, Stamp};
 use super::columns::{Columns, POSITION};
 use super::error::{ImportError, Location};
 use super::options::TimeMatching;
-use super::tracker_export::{Point, Points, broken, cells, headed};
+use super::tracker_export::{Point, Points, cells, headed, unusable};
 
 /// Columns of a log that hold the time, in this order of preference.
 const TIMES: [&str; 5] = ["time", "timestamp", "time_stamp", "datetime", "date_time"];
@@ -42,7 +42,7 @@ pub(super) fn join_by_time(
     let Some((header, column)) = header.and_then(|at| Some((at, headed(&log.rows[at], &TIMES)?))) else {
         let message =
             "has no column with the time of each row; expected `time` beside q1 to q6, such as 10:15:30.25";
-        return Err(broken(location, message.to_owned()));
+        return Err(unusable(location, message.to_owned()));
     };
     let width = log.rows.iter().map(|line| line.cells.len()).max().unwrap_or(0);
     log.rows.drain(..header);
@@ -81,7 +81,7 @@ fn times(
         .filter(|(_, line)| line.cells.iter().any(|cell| !cell.is_empty()))
         .collect();
     let stamp = |location: Location, text: &str| {
-        Stamp::of(text).ok_or_else(|| broken(location, format!("found `{text}`; expected {FORMS}")))
+        Stamp::of(text).ok_or_else(|| unusable(location, format!("found `{text}`; expected {FORMS}")))
     };
     let of_rows = rows.iter().map(|(_, line)| {
         let location =
@@ -96,7 +96,7 @@ fn times(
                 "no time after the coordinates of point `{}`, found `{}`; expected {FORMS}: export the points with their time stamps",
                 point.name, point.more
             );
-            broken(location.clone(), message)
+            unusable(location.clone(), message)
         };
         Stamp::of(&point.more).ok_or_else(without)
     });
@@ -107,7 +107,7 @@ fn times(
             "has times of {} days, and the other file has no dates; expected dates in both, or one day",
             last - first + 1
         );
-        return Err(broken(location, message));
+        return Err(unusable(location, message));
     }
     let base = of_rows.first().and_then(|stamp| stamp.day).unwrap_or(0);
     let seconds = |stamp: &Stamp| {
@@ -129,7 +129,7 @@ fn days(location: &Location, stamps: &[Stamp]) -> Result<bool, ImportError> {
     }
     let message =
         format!("{dated} of {} times have a date; expected one in every line or in none", stamps.len());
-    Err(broken(location.clone(), message))
+    Err(unusable(location.clone(), message))
 }
 
 /// The file that spans several days, with its first and last day, while the other has no dates.
@@ -194,7 +194,7 @@ impl Pairing<'_> {
                 nearest_s.first().copied().unwrap_or(f64::NAN),
                 nearest_s.last().copied().unwrap_or(f64::NAN)
             );
-            return Err(broken(location.clone(), message));
+            return Err(unusable(location.clone(), message));
         }
         self.check_unique(pairs, location)
     }
@@ -222,7 +222,7 @@ impl Pairing<'_> {
             first.number.min(last.number),
             first.number.max(last.number),
         );
-        Err(broken(Location { row: Some(point.row), ..Location::file(&self.points.file) }, message))
+        Err(unusable(Location { row: Some(point.row), ..Location::file(&self.points.file) }, message))
     }
 
     /// Refuses two points for one row. Returns the pairs in the order of the rows.
@@ -240,7 +240,7 @@ impl Pairing<'_> {
             named(one),
             named(two)
         );
-        Err(broken(Location { row: Some(self.log.rows[one.index].number), ..location.clone() }, message))
+        Err(unusable(Location { row: Some(self.log.rows[one.index].number), ..location.clone() }, message))
     }
 
     fn notes(&self, pairs: &[Pair]) -> Vec<String> {

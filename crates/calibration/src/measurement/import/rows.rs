@@ -15,6 +15,7 @@ use crate::measurement::dataset::{Dataset, Extra, PathPoint, Reading, Row, Senso
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Joints;
 use truegrind_math::se3::Pose;
+use truegrind_math::work::checkpoint;
 
 /// Largest difference of a quaternion's norm from 1: four decimals still pass.
 const QUATERNION_TOLERANCE: f64 = 1e-3;
@@ -31,8 +32,10 @@ pub(super) fn dataset(
     let reader = Reader { file, sheet: table.sheet.as_deref(), header: &table.rows[columns.header] };
     let (mut rows, mut blank, mut unnamed, mut as_text) = (Vec::new(), table.blank_lines, 0usize, 0usize);
     let mut conditions = Conditions::default();
+    let mut numbered = None;
     let lines = table.rows[columns.header + 1..].iter().map(|line| Ok(Cow::Borrowed(line)));
     for line in lines.chain(further.map(|line| line.map(Cow::Owned))) {
+        checkpoint();
         let line: Cow<'_, Line> = line?;
         let line = line.as_ref();
         let extra = line.cells.iter().skip(columns.width).filter(|c| !c.is_empty()).count();
@@ -49,6 +52,13 @@ pub(super) fn dataset(
         let widest = line.cells.iter().rposition(|c| !c.is_empty()).map_or(0, |i| i + 1);
         unnamed = unnamed.max((0..widest).filter(|&i| !headed(i) && !line.cells[i].is_empty()).count());
         as_text += line.cells.iter().filter(|c| matches!(c, Cell::Number { as_text: true, .. })).count();
+        if let Some(column) = columns.anchor {
+            let given = !line.cells.get(column).is_none_or(Cell::is_empty);
+            if *numbered.get_or_insert(given) != given {
+                let expected = "the number of a cable outlet in every row, or in none";
+                return Err(reader.wrong(line, column, expected, "number the cable outlets 1, 2, 3, …"));
+            }
+        }
         rows.push(reader.row(line, columns, &mut conditions)?);
     }
     if rows.is_empty() {
@@ -243,10 +253,9 @@ impl Reader<'_> {
             approach,
             ..Condition::default()
         };
-        let anchor = match columns.anchor {
+        let anchor = match self.optional(line, columns.anchor)?.zip(columns.anchor) {
             None => 0,
-            Some(column) => {
-                let value = self.number(line, column)?;
+            Some((value, column)) => {
                 if value < 0.0 || value.fract() != 0.0 || value > 1e6 {
                     let remedy = "number the cable outlets 1, 2, 3, …";
                     return Err(self.wrong(line, column, "the number of a cable outlet", remedy));

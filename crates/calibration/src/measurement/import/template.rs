@@ -1,5 +1,6 @@
 //! Column template of an empty measurement table.
 
+use super::columns;
 use crate::measurement::dataset::Sensor;
 
 /// A column of an empty table.
@@ -19,29 +20,39 @@ const TIME: &str = "hours since the start (may be empty)";
 const TEMPERATURE: &str = "temperature of the arm (°C, may be empty)";
 const PAYLOAD: &str = "load on the flange (kg, may be empty)";
 const SESSION: &str = "any name; another one where sensor or target were set up anew (may be empty)";
+const OUTLET: &str =
+    "number of the cable's outlet, from 1 (may be empty in all rows where there is only one)";
+const READOUT: &str =
+    "position as the controller shows it (mm, may be empty); it sharpens rounded joint angles";
+const APPROACH: &str =
+    "side from which each joint arrived, −1 or +1 (may be empty); it tells backlash from other errors";
+const PATH: &str = "for rows read while the arm runs a path, which `accept` judges: any name, which run (from 1), which sampling point \
+                    (may be empty)";
 
-/// The columns for a sensor, in the order of the template.
+/// All columns for a sensor, those that must be filled first.
 ///
 /// ```
 /// use truegrind_calibration::measurement::dataset::Sensor;
 /// use truegrind_calibration::measurement::import::template::columns;
 ///
 /// let names: Vec<&str> = columns(Sensor::Cable).iter().map(|column| column.name).collect();
-/// assert_eq!(names.join(","), "q1,q2,q3,q4,q5,q6,L,t,temperature,payload,session");
+/// assert!(names.join(",").starts_with("q1,q2,q3,q4,q5,q6,L,anchor,t,temperature,payload,session,x,y,z,approach1,"));
 /// ```
 pub fn columns(sensor: Sensor) -> Vec<Column> {
     let of = |names: &[&'static str], meaning| {
         names.iter().map(move |&name| Column { name, meaning }).collect::<Vec<_>>()
     };
-    let position = of(&["measured_x", "measured_y", "measured_z"], POSITION);
+    let position = of(&columns::POSITION, POSITION);
     let reading = match sensor {
-        Sensor::Cable => of(&["L"], CABLE),
+        Sensor::Cable => [of(&["L"], CABLE), of(&["anchor"], OUTLET)].concat(),
         Sensor::Position => position,
         Sensor::Pose => {
-            let turn = of(&["measured_qw", "measured_qx", "measured_qy", "measured_qz"], QUATERNION);
+            let turn = of(&columns::QUATERNION, QUATERNION);
             [position, turn].concat()
         }
     };
+    // A cable measures no position on a path.
+    let path = if sensor == Sensor::Cable { Vec::new() } else { of(&columns::PATH, PATH) };
     [
         of(&["q1", "q2", "q3", "q4", "q5", "q6"], JOINTS),
         reading,
@@ -49,6 +60,9 @@ pub fn columns(sensor: Sensor) -> Vec<Column> {
         of(&["temperature"], TEMPERATURE),
         of(&["payload"], PAYLOAD),
         of(&["session"], SESSION),
+        of(&columns::READOUT, READOUT),
+        of(&["approach1", "approach2", "approach3", "approach4", "approach5", "approach6"], APPROACH),
+        path,
     ]
     .concat()
 }

@@ -39,8 +39,8 @@ pub(super) struct Points {
     pub(super) all: Vec<Point>,
 }
 
-pub(super) fn broken(location: Location, message: String) -> ImportError {
-    ImportError::Format { location, message }
+pub(super) fn unusable(location: Location, message: String) -> ImportError {
+    ImportError::Unusable { location, message }
 }
 
 impl Points {
@@ -56,7 +56,7 @@ impl Points {
                     comment.contains("unit") && comment.contains(**unit) && !comment.contains("millimeter")
                 }) {
                     let message = format!("found `{unit}` in a comment on units; expected millimetres");
-                    return Err(broken(location(Some(index + 1)), message));
+                    return Err(unusable(location(Some(index + 1)), message));
                 }
                 continue;
             }
@@ -66,18 +66,20 @@ impl Points {
         }
         let names = layout(&lines).ok_or_else(|| {
             let message = "no line has a name and x, y, z; expected points as SpatialAnalyzer exports them (target, x, y, z, with group \
-                           and collection before it or not), the same in every line";
-            broken(location(lines.first().map(|(row, _)| *row)), message.to_owned())
+                           and collection before it or not), coordinates with a decimal point";
+            unusable(location(lines.first().map(|(row, _)| *row)), message.to_owned())
         })?;
         let mut all = Vec::new();
         for (row, fields) in &lines {
-            let number = |at: usize| fields.get(names + at).and_then(|text| csv::number(text, false));
+            let number = |at: usize| fields.get(names + at).and_then(|text| coordinate(text));
             let (Some(x), Some(y), Some(z)) = (number(0), number(1), number(2)) else {
                 let message = format!(
-                    "found `{}`; expected {names} names and x, y, z as in the lines above",
-                    fields.join(" ")
+                    "found `{}`; expected {names} {} and finite x, y, z (mm, with a decimal point) as in the other lines: correct \
+                     the line, or leave it out",
+                    fields.join(" "),
+                    if names == 1 { "name" } else { "names" }
                 );
-                return Err(broken(location(Some(*row)), message));
+                return Err(unusable(location(Some(*row)), message));
             };
             all.push(Point {
                 row: *row,
@@ -99,7 +101,7 @@ impl Points {
                     "point `{name}` occurs twice; expected each name once: export one group, rename the repeats, or join by time \
                      (--points-within)"
                 );
-                return Err(broken(location, message));
+                return Err(unusable(location, message));
             }
         }
         Ok(by_name)
@@ -118,7 +120,7 @@ impl Points {
             let message =
                 "has no column that names the measured points; expected `name` beside q1 to q6, or join by time (--points-within)"
                     .to_owned();
-            return Err(broken(location, message));
+            return Err(unusable(location, message));
         };
         let width = log.rows.iter().map(|line| line.cells.len()).max().unwrap_or(0);
         let mut used = 0_usize;
@@ -153,7 +155,7 @@ impl Points {
                 some(&mut without.iter().map(String::as_str)),
                 some(&mut by_name.keys().copied())
             );
-            return Err(broken(location, message));
+            return Err(unusable(location, message));
         }
         log.rows.retain(|line| !line.cells.is_empty());
         let mut notes = vec![format!("{used} rows joined by name with {} measured points", by_name.len())];
@@ -178,17 +180,23 @@ fn fields(line: &str) -> Vec<&str> {
     }
 }
 
-/// The number of names before x, y and z in every line. Names can be numbers: a coordinate has a point or an exponent.
+/// The number of names before x, y and z in most lines.
 fn layout(lines: &[(usize, Vec<&str>)]) -> Option<usize> {
-    let is_coordinate = |text: &&str| csv::number(text, false).is_some() && text.contains(['.', 'e', 'E']);
-    (1..=MOST_NAMES).find(|&names| {
-        !lines.is_empty()
-            && lines.iter().all(|(_, fields)| {
-                fields.len() >= names + 3
-                    && fields[names..names + 3].iter().all(is_coordinate)
-                    && !fields[..names].iter().any(is_coordinate)
-            })
-    })
+    let is_coordinate = |text: &&str| coordinate(text).is_some();
+    let fitting = |names: usize| {
+        let fits = |(_, fields): &&(usize, Vec<&str>)| {
+            fields.len() >= names + 3
+                && fields[names..names + 3].iter().all(is_coordinate)
+                && !fields[..names].iter().any(is_coordinate)
+        };
+        lines.iter().filter(fits).count()
+    };
+    (1..=MOST_NAMES).find(|&names| fitting(names) * 2 > lines.len())
+}
+
+/// A coordinate. Names can be numbers: a coordinate has a point or an exponent.
+fn coordinate(text: &str) -> Option<f64> {
+    csv::number(text, false).filter(|value| value.is_finite() && text.contains(['.', 'e', 'E']))
 }
 
 /// The target of a full name: `A::Main::p1`.

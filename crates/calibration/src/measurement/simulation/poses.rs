@@ -9,6 +9,7 @@ use super::stream::{Stream, stream};
 use crate::measurement::sensor::Rig;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::{Joints, Model};
+use truegrind_math::work::checkpoint;
 
 /// Draws for each pose before the recipe counts as infeasible.
 const TRIES: usize = 10_000;
@@ -72,6 +73,7 @@ fn set_conditions(rows: &mut [Planned], conditions: &RunConditions) {
 fn distinct(recipe: &Recipe, nominal: &Model, rig: &Rig) -> Result<(Vec<Joints>, usize), RecipeError> {
     let arm = nominal.at_condition(&Condition::default());
     let seen = |q: &Joints| {
+        checkpoint();
         let flange = arm.forward(q);
         let at = flange * Point3::from(rig.target_on_flange_mm());
         let inside =

@@ -7,6 +7,7 @@ use crate::measurement::dataset::{Reading, Sensor};
 use crate::measurement::sensor::Rig;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Joints;
+use truegrind_math::work::checkpoint;
 
 /// One row before rounding.
 pub(super) struct Logged {
@@ -81,6 +82,7 @@ pub(super) fn csv(recipe: &Recipe, rig: &Rig, rows: &[Logged]) -> String {
     name(anchors, &["anchor"]);
     let mut out = header.join(",") + "\n";
     for row in rows {
+        checkpoint();
         let mut cells: Vec<String> = row.joints.iter().map(|q| angle.write(q.to_degrees())).collect();
         match &row.reading {
             Reading::Cable(l) => cells.push(length.write(*l)),

@@ -1,7 +1,7 @@
 //! Reading measurement files: what is understood, and what each fault is answered with.
 
-use truegrind_calibration::measurement::dataset::{Dataset, Reading, Sensor};
-use truegrind_calibration::measurement::import::{self, ImportError, Options};
+use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row, Sensor};
+use truegrind_calibration::measurement::import::{self, ImportError, Options, template};
 
 fn read(text: &str) -> Result<Dataset, ImportError> {
     import::read("rows.csv", text.as_bytes(), &Options::default())
@@ -159,6 +159,10 @@ fn faults_are_named_with_place_and_remedy() {
             vec!["row 2, column approach1", "-1, 0 or 1"],
         ),
         (format!("{HEADER},anchor\n10,20,30,40,50,60,500,1.5\n"), vec!["row 2, column anchor", "`1.5`"]),
+        (
+            format!("{HEADER},anchor\n10,20,30,40,50,60,500,1\n11,21,31,41,51,61,501,\n"),
+            vec!["row 3, column anchor", "found an empty cell", "in every row, or in none"],
+        ),
         (format!("{HEADER},x,y,z\n10,20,30,40,50,60,500,1,,3\n"), vec!["row 2, column y", "empty cell"]),
         ("PK\u{3}\u{4}not a zip".into(), vec!["rows.csv", "cannot be read", "again"]),
         ("\0\0\0".into(), vec!["neither a text table nor a workbook"]),
@@ -231,5 +235,38 @@ proptest::proptest! {
                 proptest::prop_assert!(row.joints.iter().all(|q| q.is_finite()));
             }
         }
+    }
+}
+
+#[test]
+fn a_template_has_every_column_that_is_read_and_the_optional_ones_may_stay_empty() {
+    for sensor in [Sensor::Cable, Sensor::Position, Sensor::Pose] {
+        let columns = template::columns(sensor);
+        let names: Vec<&str> = columns.iter().map(|column| column.name).collect();
+        let needed = names.iter().position(|name| *name == "anchor" || *name == "t").unwrap();
+        let row = |k: usize, all: bool| {
+            let cell = |(at, name): (usize, &&str)| match *name {
+                _ if at >= needed && !all => String::new(),
+                "measured_qw" | "anchor" | "cycle" => "1".to_owned(),
+                "measured_qx" | "measured_qy" | "measured_qz" => "0".to_owned(),
+                name if name.starts_with("approach") => "-1".to_owned(),
+                "sample" => k.to_string(),
+                _ => (100 + 7 * at + 30 * k).to_string(),
+            };
+            names.iter().enumerate().map(cell).collect::<Vec<_>>().join(",")
+        };
+        let table = |all| format!("{}\n{}\n{}\n", names.join(","), row(0, all), row(1, all));
+        let bare = read(&table(false)).unwrap();
+        assert!(bare.notes.is_empty() && bare.rows[1].extra.is_none(), "{:?}", bare.notes);
+        assert_eq!((bare.rows[1].condition.payload_kg, bare.anchors()), (None, 1));
+        let full = read(&table(true)).unwrap();
+        assert!(full.notes.is_empty() && full.other_columns.is_empty(), "{:?}", full.notes);
+        let Row { condition, extra: Some(extra), .. } = &full.rows[1] else {
+            panic!("a row with everything")
+        };
+        assert!(condition.temperature_c.and(condition.time_h).and(condition.payload_kg).is_some());
+        assert_eq!(condition.approach, [-1; 6]);
+        assert!(extra.readout_mm.is_some() && extra.session.is_some());
+        assert_eq!(extra.path.is_some(), sensor != Sensor::Cable);
     }
 }
