@@ -24,7 +24,8 @@ use truegrind_math::se3::Pose;
 #[non_exhaustive]
 pub enum Placement {
     /// [`Placement::Absolute`] for work objects whose position is known better than its deviation and whose correction is
-    /// unlikely enough to do harm, else [`Placement::Shape`].
+    /// unlikely enough to do harm, else [`Placement::Shape`]. A work object that was taught by points that are not given has no
+    /// known position.
     #[default]
     Auto,
     /// Only the shape of the path over each work object; the path keeps its position.
@@ -54,8 +55,10 @@ pub struct ObjectPlacement {
     pub deviation_mm: f64,
     /// Predicted standard deviation of that (RMS over the points, mm).
     pub sigma_mm: f64,
-    /// Whether the work object was taught with this arm.
+    /// Whether the work object was taught with this arm, by points that are given.
     pub taught: bool,
+    /// Whether it was taught with this arm by points that are not given, so that its real position is unknown.
+    pub unlocated: bool,
     /// Measurement that would make its position known; absent where it is corrected, and where none can be predicted.
     pub remedy: Option<Remedy>,
 }
@@ -147,7 +150,9 @@ pub(crate) fn assess_placement(
     let toward = twists.tr_mul(&registration.weighed(&twist));
     let probability =
         probability_of_harm(deviation_mm * deviation_mm * off.len() as f64, &toward, posterior, off.len());
+    let unlocated = targets.iter().any(|target| list[target.frames_index].unlocated);
     let applied = match choice.placement {
+        Placement::Auto if unlocated => Placement::Shape,
         Placement::Auto if sigma_mm <= deviation_mm && probability <= choice.max_risk => Placement::Absolute,
         Placement::Auto => Placement::Shape,
         other => other,
@@ -158,6 +163,7 @@ pub(crate) fn assess_placement(
         deviation_mm,
         sigma_mm,
         taught,
+        unlocated,
         remedy: None,
     };
     if applied == Placement::Absolute || !deviation_mm.is_finite() {

@@ -8,7 +8,7 @@ use rand_distr::{Distribution, StandardNormal};
 use truegrind_arm::estimated::Estimated;
 use truegrind_arm::model::{Joints, Model};
 use truegrind_arm::parameter::{LinkCoordinate, Parameter};
-use truegrind_compensation::cell::Cell;
+use truegrind_compensation::cell::{Cell, CellFrame, FrameOrigin};
 use truegrind_compensation::deviation::{PathPoint, PathReport, Status};
 use truegrind_compensation::options::Options;
 use truegrind_compensation::plan::Plan;
@@ -92,6 +92,22 @@ fn a_place_that_is_known_is_corrected_and_can_be_asked_for() {
         let report = run_on(&known.model, &source, &program, &Cell::default());
         assert!(worst(&report, true) < 5e-4, "{}", worst(&report, true));
     }
+}
+
+#[test]
+fn what_was_taught_by_unknown_points_stays_in_place() {
+    let (source, joints) = blade();
+    let known = estimated(perturbed(1, 1.0), &joints);
+    let cell = Cell { wobj: vec![CellFrame::of("wobjBlade", FrameOrigin::Taught)], ..Cell::default() };
+    for (placement, applied) in
+        [(Placement::Auto, Placement::Shape), (Placement::Absolute, Placement::Absolute)]
+    {
+        let (plan, _) = rewritten(&source, &known, &cell, &with(placement));
+        let [found] = plan.placements.as_slice() else { panic!("{:?}", plan.placements) };
+        assert_eq!((found.applied, found.unlocated), (applied, true));
+    }
+    let (plan, _) = rewritten(&source, &known, &Cell::default(), &with(Placement::Auto));
+    assert_eq!((plan.placements[0].applied, plan.placements[0].unlocated), (Placement::Absolute, false));
 }
 
 /// Arms drawn about the estimated one with covariance F Fᵀ.
