@@ -231,7 +231,8 @@ pub fn sum(rows: &[Row]) -> String {
     )
 }
 
-/// The table for display: worst first, reasons beside the names, without the common folder and without empty columns.
+/// The table for display: worst first, reasons beside the names, without the common folder, without the remainder of the solver and
+/// without columns that say nothing.
 fn display_table(rows: &[Row]) -> Table {
     let rows = worst_first(rows);
     let mut table = table(&rows);
@@ -258,6 +259,20 @@ fn display_table(rows: &[Row]) -> Table {
             }
         }
         table.notes.push(format!("{what} {folder}"));
+    }
+    // Files usually keep their names.
+    if let (Some(file), Some(output)) = (table.column_index("file"), table.column_index("output"))
+        && table.rows.iter().all(|row| row[output] == Cell::Missing || row[output] == row[file])
+    {
+        table.remove_column(output);
+    }
+    if let Some(remainder) = table.column_index("after_mm") {
+        table.remove_column(remainder);
+    }
+    if let Some(opaque) = table.column_index("opaque")
+        && table.rows.iter().all(|row| row[opaque] == Cell::Count(0))
+    {
+        table.remove_column(opaque);
     }
     table.remove_empty_columns();
     table.excerpt(ROWS)
