@@ -302,10 +302,18 @@ fn shared_folder<'n>(names: &[&'n str]) -> Option<&'n str> {
 /// Summary for the terminal: verdict and table.
 pub fn summary(rows: &[Row]) -> Document {
     let mut page = Document::new(title(rows));
-    page.push(verdict(rows));
+    let verdict = verdict(rows);
+    page.push(verdict.clone());
     page.push(display_table(rows));
+    if rows.len() > SCREEN {
+        // The top of a long table has scrolled away.
+        page.push(Verdict { reasons: Vec::new(), ..verdict });
+    }
     page
 }
+
+/// Programs whose table fits on a screen.
+const SCREEN: usize = 20;
 
 /// Rows of the table on a terminal or page; the CSV file has all.
 const ROWS: usize = 200;
