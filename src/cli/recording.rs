@@ -136,7 +136,7 @@ pub(super) fn plan(
     Ok(pictures::measured_recording(&scene)?.rrd()?)
 }
 
-/// The bytes of the recording of a track: the poses since sensor and target were last mounted, with the residuals of the initial and
+/// The bytes of the recording of a track: the remembered poses since sensor and target were last mounted, with the residuals of the initial and
 /// the current model.
 pub(super) fn track(
     tracker: &Tracker,
@@ -179,7 +179,9 @@ pub(super) fn track(
         answer.push("no change was detected".to_owned());
     }
     answer.push(
-        "shown: the poses since sensor and target were last mounted, without those set aside".to_owned(),
+        "shown: the latest poses, as far back as the track remembers them and since sensor and target were last mounted, without \
+         those set aside"
+            .to_owned(),
     );
     let scene = MeasuredScene {
         dataset: &dataset,

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use truegrind::arm::arm_file::ArmFile;
 use truegrind::arm::model::Model;
+use truegrind::calibration::identification::identify::sensor_name;
 use truegrind::calibration::measurement::simulation::Simulation;
 use truegrind::calibration::measurement::simulation::recipe::Recipe;
 
@@ -44,7 +45,11 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
         batch.add(path, arm_text(&simulation.actual)?);
     }
     batch.write()?;
-    print_message(format_args!("{rows} rows, sensor {sensor:?}, written to {}", arguments.output.display()));
+    print_message(format_args!(
+        "{rows} rows, sensor {}, written to {}",
+        sensor_name(sensor),
+        arguments.output.display()
+    ));
     if !about.is_empty() {
         print_message(format_args!("{about}"));
     }

@@ -521,12 +521,12 @@ fn what_cannot_be_read_is_not_called_done() {
         .unwrap();
     let (code, _, err) = run("none.mod");
     assert_eq!(code, 1, "{err}");
-    assert!(err.contains("no motion found; 1 regions could not be read"), "{err}");
+    assert!(err.contains("no motion found; 1 region could not be read"), "{err}");
     let some = module("A", 5, 0.0).replace("    ConfL\\Off;\n", &format!("    ConfL\\Off;\n{broken}"));
     fs::write(at.join("some.mod"), some).unwrap();
     let (code, text, err) = run("some.mod");
     assert_eq!(code, 0, "{err}");
-    assert!(text.contains("1 regions could not be read and are unchanged;"), "{text}");
+    assert!(text.contains("1 region could not be read and is unchanged;"), "{text}");
 }
 
 #[test]

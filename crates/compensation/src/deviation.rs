@@ -112,6 +112,16 @@ pub struct PathPoint {
 }
 
 impl PathPoint {
+    /// Expected deviation after the correction (mm): remaining deviation and predicted 1σ combined, or the deviation of a point that is
+    /// not corrected.
+    pub fn expected_mm(&self) -> Option<f64> {
+        let after = self.after?.norm_mm();
+        match self.status {
+            Status::Left | Status::Refused => Some(after),
+            Status::Changed | Status::Flagged => Some(after.hypot(self.sigma_mm?)),
+        }
+    }
+
     /// The reason without its measured figures (those with a decimal point; joint numbers remain), for grouping points.
     pub fn kind_of_reason(&self) -> Option<String> {
         let plain = |word: &&str| !(word.contains('.') && word.bytes().any(|b| b.is_ascii_digit()));
@@ -172,13 +182,13 @@ impl PathReport {
     }
 
     /// Expected deviation of the cut after the correction (mm): remaining deviation and predicted 1σ combined, maximum over
-    /// all points. `None` where the remainder was achieved on an arm, or σ is unknown.
+    /// all points; a point that is not corrected keeps its deviation. `None` where the remainder was achieved on an arm, or σ is
+    /// unknown.
     pub fn expected_mm(&self) -> Option<f64> {
         if self.after == After::Achieved {
             return None;
         }
-        let each = self.cut().filter_map(|p| Some(p.after?.norm_mm().hypot(p.sigma_mm?)));
-        each.filter(|mm| mm.is_finite()).reduce(f64::max)
+        self.cut().filter_map(PathPoint::expected_mm).filter(|mm| mm.is_finite()).reduce(f64::max)
     }
 
     /// The Table-8 block; `None` without deviations.

@@ -29,29 +29,38 @@ const TOOL: f64 = 0.020;
 /// Links shorter than this share of the arm have no body.
 const SHORT: f64 = 0.02;
 
-/// Colours of an arm.
+/// Thickness of a ghost over that of the arm.
+const GHOST_GIRTH: f64 = 1.04;
+
+/// Colours and thickness of an arm.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Paint {
     pub(super) link: Rgba,
     pub(super) joint: Rgba,
     pub(super) tool: Rgba,
+    /// Factor of all radii. A ghost is a little thicker, since surfaces that coincide are drawn in stripes.
+    pub(super) girth: f64,
 }
 
 impl Paint {
     /// Neutral colours.
-    pub(super) const SOLID: Paint =
-        Paint { link: [205, 209, 215, 255], joint: [112, 120, 133, 255], tool: [150, 158, 170, 255] };
+    pub(super) const SOLID: Paint = Paint {
+        link: [205, 209, 215, 255],
+        joint: [112, 120, 133, 255],
+        tool: [150, 158, 170, 255],
+        girth: 1.0,
+    };
 
     /// A single colour.
     pub(super) fn of([r, g, b, _]: Rgba) -> Paint {
         let darker = |c: u8| (u16::from(c) * 7 / 10) as u8;
         let joint = [darker(r), darker(g), darker(b), 255];
-        Paint { link: [r, g, b, 255], joint, tool: joint }
+        Paint { link: [r, g, b, 255], joint, tool: joint, girth: 1.0 }
     }
 
     /// A single transparent colour.
     pub(super) fn ghost([r, g, b, _]: Rgba) -> Paint {
-        Paint { link: [r, g, b, 64], joint: [r, g, b, 90], tool: [r, g, b, 110] }
+        Paint { link: [r, g, b, 64], joint: [r, g, b, 90], tool: [r, g, b, 110], girth: GHOST_GIRTH }
     }
 }
 
@@ -115,7 +124,7 @@ pub(super) fn draw_posed(
     (axis, states): (&'static str, &[ArmState]),
 ) -> Result<(), VisualError> {
     let Some(first) = states.first() else { return Ok(()) };
-    let length = length_mm(figure.model);
+    let length = length_mm(figure.model) * paint.girth;
     if !shown(store, root, 0, figure.meshes, paint)? {
         foot(store, root, length, paint)?;
     }

@@ -1,8 +1,9 @@
 //! Numbers and foreign text in Markdown.
 
-/// A value in mm, or a dash if missing.
+/// A value in mm, or a dash if missing. A value that rounds to zero has no sign.
 pub(super) fn number(value: Option<f64>) -> String {
-    value.filter(|v| v.is_finite()).map_or_else(|| "–".to_owned(), |v| format!("{v:.3}"))
+    let shown = value.filter(|v| v.is_finite()).map_or_else(|| "–".to_owned(), |v| format!("{v:.3}"));
+    if shown == "-0.000" { "0.000".to_owned() } else { shown }
 }
 
 /// Foreign text as one escaped line of Markdown.

@@ -114,8 +114,10 @@ fn layout(scene: &PathScene<'_>, plan: &Plan<'_>) -> Result<Store, VisualError> 
     let sized = |name: &str, shows: &[&'static str]| {
         Pane::View(View::space(name, &[&["+ /workpiece"], shows].concat(), &part_eye))
     };
-    let mut tabs =
-        vec![Pane::View(drawn), sized("Size before [mm]", &["+ /path/before/**", "+ /path/largest/before"])];
+    let mut tabs = vec![
+        Pane::View(drawn),
+        sized("Size before [mm]", &["+ /path/before/**", "+ /path/largest/before/**"]),
+    ];
     // The remainder under the correcting model is almost zero and does not predict the arm.
     if scene.reports.iter().any(|report| report.after == After::Achieved) {
         tabs.push(sized("Size after [mm]", &["+ /path/after/**", "+ /path/largest/after/**"]));

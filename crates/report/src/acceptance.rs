@@ -391,10 +391,13 @@ fn method(found: &Acceptance, statement: &Statement) -> Vec<String> {
          all readings (the position of the robot) are not judged."
             .to_owned()
     };
+    let uncertainty = match found.uncertainty {
+        Uncertainty::Unknown => "unknown, not taken into account".to_owned(),
+        _ => format!("{:.3} mm", found.uncertainty_mm),
+    };
     let rule = format!(
-        "Decision rule of ISO 14253-1: accepted if the largest error plus the uncertainty ({:.3} mm) is within the tolerance, not \
-         accepted if the largest error exceeds the tolerance by more than the uncertainty, otherwise not decided.",
-        found.uncertainty_mm
+        "Decision rule of ISO 14253-1: accepted if the largest error plus the uncertainty ({uncertainty}) is within the tolerance, not \
+         accepted if the largest error exceeds the tolerance by more than the uncertainty, otherwise not decided."
     );
     let mut method = vec![frames, rule];
     if !found.paths.is_empty() {
@@ -406,8 +409,11 @@ fn method(found: &Acceptance, statement: &Statement) -> Vec<String> {
     }
     if let Some(turns) = found.orientation.as_ref().filter(|turns| turns.tolerance_rad.is_some()) {
         method.push(format!(
-            "The orientation is judged by the same rule at the same poses, with an uncertainty of {:.4}°; both must pass.",
-            turns.uncertainty_rad.to_degrees()
+            "The orientation is judged by the same rule at the same poses ({}); both must pass.",
+            match turns.uncertainty {
+                Uncertainty::Unknown => "its uncertainty is unknown".to_owned(),
+                _ => format!("uncertainty {:.4}°", turns.uncertainty_rad.to_degrees()),
+            }
         ));
     }
     method

@@ -231,7 +231,8 @@ pub fn sum(rows: &[Row]) -> String {
     )
 }
 
-/// The table for display: worst first, reasons beside the names, without the common folder and without empty columns.
+/// The table for display: worst first, reasons beside the names, without the common folder, without the remainder of the solver and
+/// without columns that say nothing.
 fn display_table(rows: &[Row]) -> Table {
     let rows = worst_first(rows);
     let mut table = table(&rows);
@@ -258,6 +259,20 @@ fn display_table(rows: &[Row]) -> Table {
             }
         }
         table.notes.push(format!("{what} {folder}"));
+    }
+    // Files usually keep their names.
+    if let (Some(file), Some(output)) = (table.column_index("file"), table.column_index("output"))
+        && table.rows.iter().all(|row| row[output] == Cell::Missing || row[output] == row[file])
+    {
+        table.remove_column(output);
+    }
+    if let Some(remainder) = table.column_index("after_mm") {
+        table.remove_column(remainder);
+    }
+    if let Some(opaque) = table.column_index("opaque")
+        && table.rows.iter().all(|row| row[opaque] == Cell::Count(0))
+    {
+        table.remove_column(opaque);
     }
     table.remove_empty_columns();
     table.excerpt(ROWS)
@@ -287,10 +302,18 @@ fn shared_folder<'n>(names: &[&'n str]) -> Option<&'n str> {
 /// Summary for the terminal: verdict and table.
 pub fn summary(rows: &[Row]) -> Document {
     let mut page = Document::new(title(rows));
-    page.push(verdict(rows));
+    let verdict = verdict(rows);
+    page.push(verdict.clone());
     page.push(display_table(rows));
+    if rows.len() > SCREEN {
+        // The top of a long table has scrolled away.
+        page.push(Verdict { reasons: Vec::new(), ..verdict });
+    }
     page
 }
+
+/// Programs whose table fits on a screen.
+const SCREEN: usize = 20;
 
 /// Rows of the table on a terminal or page; the CSV file has all.
 const ROWS: usize = 200;

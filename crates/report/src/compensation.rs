@@ -2,6 +2,8 @@
 
 mod first;
 
+use std::collections::BTreeSet;
+
 use serde_json::{Value, json};
 
 use self::first::key_figures;
@@ -26,8 +28,8 @@ pub struct ProgramFile {
     pub output: Option<String>,
 }
 
-/// Largest number of lines listed for a reason.
-const MAX_LINES: usize = 6;
+/// Largest number of ranges of lines listed for a reason.
+const MAX_RANGES: usize = 6;
 
 /// Rows of the table of motions on a page (about eight printed pages); the CSV file has all.
 const ROWS_ON_PAGE: usize = 600;
@@ -88,6 +90,7 @@ fn page_table(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Table {
     let mut table = table(plan, listing, files);
     table.remove_empty_columns();
     table.title.clear();
+    table.shorten_repeated("reason");
     table.excerpt(ROWS_ON_PAGE)
 }
 
@@ -101,7 +104,12 @@ fn largest_deviations(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> 
         Plan { outcomes: known.into_iter().map(|(_, outcome)| outcome.clone()).collect(), ..Plan::default() };
     let mut table = table(&only, listing, files);
     table.remove_empty_columns();
+    // What the solver leaves is no answer to how far off the arm will be.
+    if let Some(remainder) = table.column_index("after_mm") {
+        table.remove_column(remainder);
+    }
     table.title = "Largest deviations before correction".to_owned();
+    table.shorten_repeated("reason");
     table.notes.clear();
     (!table.rows.is_empty()).then_some(table)
 }
@@ -119,13 +127,12 @@ pub fn reason_table(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Ta
         ],
     );
     for group in grouped(plan) {
-        let places: Vec<Place> = group.outcomes.iter().map(|outcome| motion(outcome, listing).0).collect();
         table.push([
             status_cell(group.status),
             group.outcomes.len().into(),
-            group.reason.into(),
+            with_causes(&group).into(),
             group.worst.map(|(value, unit)| worst_text(value, unit)).into(),
-            lines(&places, files).into(),
+            lines(&group.outcomes, listing, files).into(),
         ]);
     }
     table
@@ -299,6 +306,27 @@ struct Group<'a> {
     outcomes: Vec<&'a MotionOutcome>,
 }
 
+/// The reason, with the lines of the motions that caused it if they are others than those of the group.
+fn with_causes(group: &Group<'_>) -> String {
+    const NAMED: usize = 4;
+    let causes: BTreeSet<u32> = group.outcomes.iter().filter_map(|outcome| cause(outcome)).collect();
+    let named: Vec<String> = causes.iter().take(NAMED).map(u32::to_string).collect();
+    match causes.len() {
+        0 => group.reason.clone(),
+        1 => format!("{} (line {})", group.reason, named[0]),
+        count if count <= NAMED => format!("{} (lines {})", group.reason, named.join(", ")),
+        count => format!("{} (lines {} and {} more)", group.reason, named.join(", "), count - NAMED),
+    }
+}
+
+/// Line of the motion because of which another one is not corrected.
+fn cause(outcome: &MotionOutcome) -> Option<u32> {
+    match outcome.reason? {
+        OutcomeReason::PartOfCut { line, .. } | OutcomeReason::Step { line, .. } => Some(line),
+        _ => None,
+    }
+}
+
 fn grouped(plan: &Plan) -> Vec<Group<'_>> {
     let mut groups: Vec<Group<'_>> = Vec::new();
     for outcome in plan.outcomes.iter().filter(|outcome| outcome.status != MotionStatus::Changed) {
@@ -401,26 +429,41 @@ fn worst_text(value: f64, unit: &str) -> String {
         "°" => format!("{value:.2}°"),
         "×" => format!("{value:.1} × the usual distance"),
         "× limit" => format!("{value:.2} × its limit"),
+        "%" => format!("{value:.0} %"),
         unit => format!("{value:.3} {unit}"),
     }
 }
 
-/// The first lines, grouped by file if there are several: `a.mod 12, 14; b.mod 3 and 7 more`.
-fn lines(places: &[Place], files: &[ProgramFile]) -> String {
+/// Lines as ranges of successive motions, grouped by file if there are several: `a.mod 12–14, 20; b.mod 3 and 7 more motions`.
+fn lines(outcomes: &[&MotionOutcome], listing: &Listing, files: &[ProgramFile]) -> String {
+    let mut ranges: Vec<(&MotionOutcome, Place, Place, usize)> = Vec::new();
+    for &outcome in outcomes {
+        let (place, _) = motion(outcome, listing);
+        match ranges.last_mut() {
+            Some((end, _, last, count)) if end.motion + 1 == outcome.motion && last.file == place.file => {
+                (*end, *last, *count) = (outcome, place, *count + 1);
+            }
+            _ => ranges.push((outcome, place, place, 1)),
+        }
+    }
     let mut text = String::new();
     let mut last_file = None;
-    for place in places.iter().take(MAX_LINES) {
-        if files.len() > 1 && last_file != Some(place.file) {
+    for (_, first, last, _) in ranges.iter().take(MAX_RANGES) {
+        if files.len() > 1 && last_file != Some(first.file) {
             let gap = if text.is_empty() { "" } else { "; " };
-            text.push_str(&format!("{gap}{} {}", file_name(files, *place), place.line));
-        } else {
-            let gap = if text.is_empty() { "" } else { ", " };
-            text.push_str(&format!("{gap}{}", place.line));
+            text.push_str(&format!("{gap}{} ", file_name(files, *first)));
+        } else if !text.is_empty() {
+            text.push_str(", ");
         }
-        last_file = Some(place.file);
+        text.push_str(&match first.line == last.line {
+            true => first.line.to_string(),
+            false => format!("{}–{}", first.line, last.line),
+        });
+        last_file = Some(first.file);
     }
-    if places.len() > MAX_LINES {
-        text.push_str(&format!(" and {} more", places.len() - MAX_LINES));
+    match ranges.iter().skip(MAX_RANGES).map(|range| range.3).sum() {
+        0 => text,
+        1 => text + " and 1 more motion",
+        more => text + &format!(" and {more} more motions"),
     }
-    text
 }

@@ -280,9 +280,11 @@ pub(super) fn sections(reports: &[&PathReport], level: u8) -> Vec<Block> {
     page.heading(level, "All points");
     for report in reports {
         let count = report.points.len();
+        let mut points = short_table(report);
+        points.shorten_repeated("reason");
         page.push(Block::Details {
             summary: format!("{count} points under {}", report.model),
-            blocks: vec![short_table(report).excerpt(ROWS_ON_PAGE).into()],
+            blocks: vec![points.excerpt(ROWS_ON_PAGE).into()],
         });
     }
     page.blocks

@@ -4,6 +4,7 @@
 //! with all digits. Text from files passes [`visible`] in all formats except Parquet.
 
 pub mod visible;
+pub mod words;
 pub mod terminal;
 pub mod markdown;
 pub mod csv;

@@ -33,13 +33,28 @@ fn object_word(listing: &Listing) -> &'static str {
 }
 
 fn sentence(placement: &ObjectPlacement, what: &str) -> String {
-    let ObjectPlacement { work_object, applied, deviation_mm, sigma_mm, probability_of_harm, remedy, .. } =
-        placement;
+    let ObjectPlacement {
+        work_object,
+        applied,
+        deviation_mm,
+        sigma_mm,
+        probability_of_harm,
+        remedy,
+        unlocated,
+        ..
+    } = placement;
     let known = format!(
         "the path as a whole is displaced by {deviation_mm:.3} mm from its intended place (known to ± {sigma_mm:.3} mm, 1σ)"
     );
     if *applied == Placement::Absolute {
         return format!("{what} {work_object}: shape and place are corrected; {known}");
+    }
+    if *unlocated {
+        return format!(
+            "{what} {work_object}: only the shape is corrected, the path stays in place, since the {what} was taught with this arm and \
+             its teaching points are not given; with them (cell file, teaching_deg) its place becomes known; --placement absolute \
+             takes the programmed frame as exact"
+        );
     }
     let remedy = remedy.as_ref().map(|remedy| format!("{}; ", remedy_text(remedy, what))).unwrap_or_default();
     format!(

@@ -13,7 +13,7 @@ use truegrind_planning::poses::schedule::{FIRST_ROW, Purpose};
 use truegrind_planning::poses::{MeasurementSetup, Plan};
 
 /// Rows on a page; all are in the CSV file.
-const ROWS_ON_PAGE: usize = 60;
+const ROWS_ON_PAGE: usize = 600;
 
 /// One row per reading. As CSV it is the log to fill in: joint angles, approach directions and time under the column names that
 /// `identify` reads, and the expected reading of the nominal arm.

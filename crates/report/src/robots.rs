@@ -189,13 +189,7 @@ pub fn document(robot: &Robot) -> Document {
         .filter(|part| !part.is_empty())
         .collect::<Vec<_>>()
         .join(" ");
-    if !robot.warnings.is_empty() {
-        page.push(Verdict::new(
-            Status::Warning,
-            "The robot file can be used with reservations",
-            robot.warnings.iter().cloned(),
-        ));
-    }
+    page.blocks.extend(reservations(robot));
     let figure =
         |label: &str, value: Option<f64>, decimals, unit: &str| KeyFigure::new(label, value, decimals, unit);
     let payload = KeyFigure {
@@ -242,6 +236,18 @@ pub fn document(robot: &Robot) -> Document {
     page
 }
 
+/// What is not sure about a robot file.
+fn reservations(robot: &Robot) -> Option<Block> {
+    (!robot.warnings.is_empty()).then(|| {
+        Verdict::new(
+            Status::Warning,
+            "The robot file can be used with reservations",
+            robot.warnings.iter().cloned(),
+        )
+        .into()
+    })
+}
+
 /// The published poses: a table, and their descriptions as a list.
 fn push_published(page: &mut Document, robot: &Robot) {
     let sheet = &robot.sheet;
@@ -270,6 +276,7 @@ fn push_published(page: &mut Document, robot: &Robot) {
 pub fn understood(found: &ImportedRobot) -> Document {
     let mut page = Document::new(found.robot.sheet.name.clone());
     page.subtitle = format!("interpretation of the {}", found.kind.text());
+    page.blocks.extend(reservations(&found.robot));
     page.push(Block::List(found.summary.clone()));
     page.paragraph("Compare zero pose and axes with the manual: wrong zeros are the most common mistake.");
     page
@@ -280,7 +287,8 @@ pub fn checked(found: &ImportedRobot) -> Document {
     let mut page = understood(found);
     page.push(Block::Figure(zero_pose(&found.robot)));
     let whole = document(&found.robot);
-    page.blocks.extend(whole.blocks);
+    // The reservations are on top already.
+    page.blocks.extend(whole.blocks.into_iter().filter(|block| !matches!(block, Block::Verdict(_))));
     page
 }
 

@@ -49,6 +49,9 @@ pub struct Column {
     pub precision: Precision,
 }
 
+/// Stands for the text of the row above.
+const AS_ABOVE: &str = "as above";
+
 /// Type of a column. A single cell may differ ("diverged 3/10" among errors); in a typed file it is then missing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ColumnKind {
@@ -145,6 +148,20 @@ impl Table {
     pub(super) fn remove_column(&mut self, index: usize) {
         self.columns.remove(index);
         self.rows.iter_mut().for_each(|row| drop(row.remove(index)));
+    }
+
+    /// Replaces a text that is the same as in the row above, so that a reason that many rows share is read once. For pages only.
+    pub(super) fn shorten_repeated(&mut self, key: &str) {
+        let Some(column) = self.column_index(key) else { return };
+        for row in (1..self.rows.len()).rev() {
+            if let (Cell::Text(above), Cell::Text(here)) =
+                (&self.rows[row - 1][column], &self.rows[row][column])
+                && above == here
+                && here.chars().count() > AS_ABOVE.len()
+            {
+                self.rows[row][column] = AS_ABOVE.into();
+            }
+        }
     }
 
     /// Removes the columns without any value.

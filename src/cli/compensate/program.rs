@@ -145,9 +145,8 @@ fn check_motions(
     }
     notes.push(match listing.opaque.len() {
         0 => format!("{}: contains no motion, nothing to correct", programs.name()),
-        unread => {
-            format!("{}: no motion found; {unread} regions could not be read", programs.name())
-        }
+        1 => format!("{}: no motion found; 1 region could not be read", programs.name()),
+        unread => format!("{}: no motion found; {unread} regions could not be read", programs.name()),
     });
     Ok(())
 }

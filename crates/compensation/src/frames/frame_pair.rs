@@ -60,6 +60,8 @@ pub(crate) struct ResolvedFrames {
     pub real: FramePair,
     /// How a taught work object moves with the arm's parameters; absent for any other.
     pub carried: Option<RegisteredFrame>,
+    /// Whether the work object was taught with this arm by points that are not given, so that its real place is unknown.
+    pub unlocated: bool,
     /// Assumptions, one sentence each.
     pub notes: Vec<String>,
 }
@@ -96,10 +98,13 @@ pub(crate) fn resolve_frames(
         tool_note(tool, &real_tool, &commanded, with),
         object_note(object, &real, &commanded, &real_object, with),
     ];
+    let unlocated = !commanded.holds_part
+        && real_object.taught.is_none()
+        && teaching.stated.object(object).is_some_and(|frame| frame.origin == FrameOrigin::Taught);
     // A frame on the flange moves with the arm: it has no position of its own in the base.
     let taught = real_object.taught.filter(|_| !commanded.holds_part);
     let carried = taught.zip(with.knowledge).and_then(|(t, k)| carried_frame(k, teaching.estimated, &t));
-    Ok(ResolvedFrames { commanded, real, carried, notes: notes.into_iter().flatten().collect() })
+    Ok(ResolvedFrames { commanded, real, carried, unlocated, notes: notes.into_iter().flatten().collect() })
 }
 
 fn built_in(name: &str) -> bool {
@@ -149,7 +154,7 @@ fn object_note(
             Some(format!("{what} {name} was taught: re-evaluated, it moves by {shift:.3} mm and {turn:.4}°"))
         }
         Some(_) => Some(format!(
-            "{what} {name} was taught, but its teaching points are not given: taken as exact; {}",
+            "{what} {name} was taught, but its teaching points are not given: only an absolute placement takes it as exact; {}",
             object_estimate(commanded, with)
         )),
         None if built_in(name) => None,

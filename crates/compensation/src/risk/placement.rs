@@ -24,7 +24,8 @@ use truegrind_math::se3::Pose;
 #[non_exhaustive]
 pub enum Placement {
     /// [`Placement::Absolute`] for work objects whose position is known better than its deviation and whose correction does
-    /// harm with at most half of the accepted probability, else [`Placement::Shape`].
+    /// harm with at most half of the accepted probability, else [`Placement::Shape`]. A work object that was taught by points that
+    /// are not given has no known position.
     #[default]
     Auto,
     /// Only the shape of the path over each work object; the path keeps its position.
@@ -56,8 +57,10 @@ pub struct ObjectPlacement {
     pub sigma_mm: f64,
     /// Probability that correcting the position does harm.
     pub probability_of_harm: f64,
-    /// Whether the work object was taught with this arm.
+    /// Whether the work object was taught with this arm, by points that are given.
     pub taught: bool,
+    /// Whether it was taught with this arm by points that are not given, so that its real position is unknown.
+    pub unlocated: bool,
     /// Measurement that would make its position known; absent where it is corrected, and where none can be predicted.
     pub remedy: Option<Remedy>,
 }
@@ -167,7 +170,9 @@ pub(crate) fn assess_placement(
     let toward = twists.tr_mul(&registration.weighed(&twist));
     let square = deviation_mm * deviation_mm * off.len() as f64;
     let probability_of_harm = probability_of_harm(square, &toward, posterior, off.len());
-    let accepted = accepts_position(deviation_mm, sigma_mm, probability_of_harm, choice.max_risk);
+    let unlocated = targets.iter().any(|target| list[target.frames_index].unlocated);
+    let accepted =
+        !unlocated && accepts_position(deviation_mm, sigma_mm, probability_of_harm, choice.max_risk);
     let applied = match choice.placement {
         Placement::Auto if accepted => Placement::Absolute,
         Placement::Auto => Placement::Shape,
@@ -180,6 +185,7 @@ pub(crate) fn assess_placement(
         sigma_mm,
         probability_of_harm,
         taught,
+        unlocated,
         remedy: None,
     };
     if applied == Placement::Absolute || !deviation_mm.is_finite() {

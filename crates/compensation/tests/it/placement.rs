@@ -8,7 +8,7 @@ use rand_distr::{Distribution, StandardNormal};
 use truegrind_arm::estimated::Estimated;
 use truegrind_arm::model::{Joints, Model};
 use truegrind_arm::parameter::{LinkCoordinate, Parameter};
-use truegrind_compensation::cell::Cell;
+use truegrind_compensation::cell::{Cell, CellFrame, FrameOrigin};
 use truegrind_compensation::deviation::{PathPoint, PathReport, Status};
 use truegrind_compensation::options::Options;
 use truegrind_compensation::plan::Plan;
@@ -107,6 +107,22 @@ fn a_place_is_corrected_within_half_of_the_accepted_risk() {
     assert!(place.sigma_mm < place.deviation_mm && place.probability_of_harm > 1e-4, "{place:?}");
     assert_eq!(applied(1.9 * place.probability_of_harm).applied, Placement::Shape);
     assert_eq!(applied(2.1 * place.probability_of_harm).applied, Placement::Absolute);
+}
+
+#[test]
+fn what_was_taught_by_unknown_points_stays_in_place() {
+    let (source, joints) = blade();
+    let known = estimated(perturbed(1, 1.0), &joints);
+    let cell = Cell { wobj: vec![CellFrame::of("wobjBlade", FrameOrigin::Taught)], ..Cell::default() };
+    for (placement, applied) in
+        [(Placement::Auto, Placement::Shape), (Placement::Absolute, Placement::Absolute)]
+    {
+        let (plan, _) = rewritten(&source, &known, &cell, &with(placement));
+        let [found] = plan.placements.as_slice() else { panic!("{:?}", plan.placements) };
+        assert_eq!((found.applied, found.unlocated), (applied, true));
+    }
+    let (plan, _) = rewritten(&source, &known, &Cell::default(), &with(Placement::Auto));
+    assert_eq!((plan.placements[0].applied, plan.placements[0].unlocated), (Placement::Absolute, false));
 }
 
 /// Arms drawn about the estimated one with covariance F Fᵀ.

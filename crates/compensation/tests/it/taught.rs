@@ -454,8 +454,8 @@ fn a_told_tcp_must_be_that_of_its_teaching_poses() {
     assert!(matches!(&found[..], [one] if one.contains("too much alike")), "{found:?}");
 }
 
-/// `origin = "taught"` without points is documented: said, and taken as it stands, for tools, work objects, and what is held
-/// the other way round.
+/// `origin = "taught"` without points: its numbers are taken as they stand, and a note says so, for tools, work objects, and what is
+/// held the other way round.
 #[test]
 fn taught_without_points_is_taken_as_it_stands_and_said() {
     let scene = scene(41);

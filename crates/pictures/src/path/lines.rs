@@ -1,6 +1,6 @@
 //! Objects in the 3D view: workpiece, paths, tool axes, marks, colour bar.
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 use rerun::components::{Color, Radius};
 use rerun::{Arrows3D, LineStrips3D, Mesh3D, Points3D};
 
@@ -25,7 +25,7 @@ pub(super) fn draw(store: &mut Store, scene: &PathScene<'_>, plan: &Plan<'_>) ->
     let travel = strips(points, |p| Some((intended(p), usize::from(plan.cuts(p)))));
     let travel: Vec<_> = travel.into_iter().filter(|(kind, _)| *kind == 0).collect();
     plain(store, "path/travel", &travel, TRAVEL, 0.6)?;
-    let mut labels = Labels::over(points);
+    let mut labels = Labels::over(plan);
     for &k in &plan.befores {
         let name = if k == 0 { String::new() } else { format!("_{}", plan.names[k]) };
         let title = plan.before_name(scene, k);
@@ -60,32 +60,37 @@ fn workpiece(store: &mut Store, scene: &PathScene<'_>) -> Result<(), VisualError
     store.fixed("workpiece", &mesh)
 }
 
-/// Positions of labels without overlap.
+/// Positions of labels: beside the path, where no line runs, and without overlap.
 struct Labels {
-    /// Intended places that have one.
+    /// Middle of the cut.
+    middle: Point3<f64>,
+    /// Size of the cut (mm).
+    size_mm: f64,
+    /// Positions that have one.
     taken: Vec<Point3<f64>>,
-    /// Nearer than this a second one is not shown (mm).
-    apart_mm: f64,
 }
 
-/// Labels are about so long, of the size of the path.
+/// Distance of a label from the middle of the cut, over the size of the cut: half of that, and half a label.
+const BESIDE: f64 = 0.72;
+/// Labels are about so long, over the size of the cut.
 const LABEL_LENGTH: f64 = 0.4;
 
 impl Labels {
-    fn over(points: &[PathPoint]) -> Self {
-        let size = points.iter().fold(0.0, |size: f64, p| {
-            size.max((intended(p) - points.first().map_or(Point3::origin(), intended)).norm())
-        });
-        Self { taken: Vec::new(), apart_mm: LABEL_LENGTH * size }
+    fn over(plan: &Plan<'_>) -> Self {
+        let cut: Vec<Point3<f64>> = plan.first.points.iter().filter(|p| plan.cuts(p)).map(intended).collect();
+        let (low, high) = bounds(&cut);
+        Self { middle: nalgebra::center(&low, &high), size_mm: plan.extent_mm, taken: Vec::new() }
     }
 
-    /// Whether a label at `place` is shown; the first there is.
-    fn take(&mut self, place: Point3<f64>) -> bool {
-        let free = self.taken.iter().all(|other| (other - place).norm() >= self.apart_mm);
-        if free {
+    /// Position of the label of `point`; `None` where it would overlap another.
+    fn take(&mut self, point: &PathPoint) -> Option<Point3<f64>> {
+        let away = (intended(point) - self.middle).try_normalize(1e-9).unwrap_or_else(Vector3::z);
+        let place = self.middle + away * (BESIDE * self.size_mm);
+        let free = self.taken.iter().all(|other| (other - place).norm() >= LABEL_LENGTH * self.size_mm);
+        free.then(|| {
             self.taken.push(place);
-        }
-        free
+            place
+        })
     }
 }
 
@@ -100,7 +105,7 @@ struct Run {
     expected: Option<f64>,
 }
 
-/// One path, at true scale and exaggerated, with a label at its largest deviation.
+/// One path, at true scale and exaggerated, with a label beside its largest deviation.
 fn run(
     store: &mut Store,
     plan: &Plan<'_>,
@@ -111,7 +116,7 @@ fn run(
 ) -> Result<(), VisualError> {
     let drawn = report.points.iter().filter(|p| plan.cuts(p)).filter_map(|p| which(p).map(|d| (p, d)));
     let largest = drawn.max_by(|a, b| a.1.norm_mm().total_cmp(&b.1.norm_mm()));
-    let shown = largest.is_some_and(|(point, _)| labels.take(intended(point)));
+    let place = largest.and_then(|(point, _)| labels.take(point));
     for (folder, times, width) in [("path", 1.0, 2.5), ("exaggerated", plan.times, 1.8)] {
         // At true scale the colour is all that tells the size; exaggerated, it tells which is which.
         let by_size = folder == "path";
@@ -130,18 +135,27 @@ fn run(
                 .with_radii([Radius::new_ui_points(width)]);
         store.fixed(format!("{folder}/{name}"), &lines)?;
         let Some((point, deviation)) = largest else { continue };
-        let label = Points3D::new([xyz(&reached(point, &deviation, times))])
+        let at = reached(point, &deviation, times);
+        let entity = format!("{folder}/largest/{name}");
+        let mark = Points3D::new([xyz(&at)])
             .with_radii([Radius::new_ui_points(3.5)])
+            .with_colors([Color::from(*colour)]);
+        store.fixed(entity.as_str(), &mark)?;
+        let Some(place) = place else { continue };
+        let leader = LineStrips3D::new([[xyz(&at), xyz(&place)]])
+            .with_radii([Radius::new_ui_points(0.8)])
+            .with_colors([Color::from(*colour)]);
+        store.fixed(format!("{entity}/leader"), &leader)?;
+        let size = match expected {
+            Some(mm) => format!("{mm:.3} mm expected (1σ)"),
+            None => format!("{:.3} mm", deviation.norm_mm()),
+        };
+        let label = Points3D::new([xyz(&place)])
+            .with_radii([Radius::new_ui_points(0.5)])
             .with_colors([Color::from(*colour)])
-            .with_labels([format!(
-                "{title}: {}",
-                expected.map_or_else(
-                    || format!("{:.3} mm", deviation.norm_mm()),
-                    |mm| format!("{mm:.3} mm expected (1σ)")
-                )
-            )])
-            .with_show_labels(shown);
-        store.fixed(format!("{folder}/largest/{name}"), &label)?;
+            .with_labels([format!("{title}: {size}")])
+            .with_show_labels(true);
+        store.fixed(format!("{entity}/label"), &label)?;
     }
     Ok(())
 }

@@ -29,6 +29,10 @@ pub fn verdict(plan: &Plan, listing: &Listing) -> Verdict {
         }
         (0, 0) => (Status::NotEvaluated, "Nothing was corrected"),
         (0, _) => (Status::Bad, "Nothing could be corrected"),
+        _ if no_cut(plan) => (
+            Status::Warning,
+            "No cut is corrected, only motions between cuts: the deviation of the workpiece stays",
+        ),
         (_, 0) if left > 0 => (
             Status::Warning,
             "Corrected, except for cuts where the model is too uncertain: these are unchanged",
@@ -63,10 +67,14 @@ pub fn verdict(plan: &Plan, listing: &Listing) -> Verdict {
         ));
     }
     if !listing.opaque.is_empty() {
-        reasons.push(format!(
-            "{} regions could not be read and are unchanged; motions in them are not corrected",
-            listing.opaque.len()
-        ));
+        reasons.push(match listing.opaque.len() {
+            1 => "1 region could not be read and is unchanged; motions in it are not corrected".to_owned(),
+            count => {
+                format!(
+                    "{count} regions could not be read and are unchanged; motions in them are not corrected"
+                )
+            }
+        });
     }
     let inserted: usize = plan.outcomes.iter().map(|outcome| outcome.inserted).sum();
     if inserted > 0 {
@@ -81,10 +89,15 @@ fn count_reason(plan: &Plan, is: impl Fn(&OutcomeReason) -> bool) -> usize {
     plan.outcomes.iter().filter(|outcome| outcome.reason.as_ref().is_some_and(&is)).count()
 }
 
+/// Whether the program has cuts and all of them are unchanged.
+fn no_cut(plan: &Plan) -> bool {
+    !plan.cuts.is_empty() && plan.cuts.iter().all(|cut| !cut.corrected)
+}
+
 /// Deviation before and after, as a sentence; `None` if unknown.
 fn deviations(plan: &Plan) -> Option<String> {
     let uncorrected = |mm: f64| format!("the uncorrected program deviates by up to {mm:.3} mm");
-    let Some(before) = placement::before_mm(plan) else {
+    let Some(before) = placement::before_mm(plan).filter(|_| !no_cut(plan)) else {
         return placement::largest_mm(plan).map(uncorrected);
     };
     let after = placement::expected_mm(plan)?;
@@ -97,14 +110,16 @@ fn deviations(plan: &Plan) -> Option<String> {
 pub(super) fn key_figures(plan: &Plan) -> Vec<KeyFigure> {
     let all = plan.outcomes.len();
     let shape = if placement::corrects_shape_only(plan) { "of the shape" } else { "shape and place" };
-    let mut figures = vec![match placement::before_mm(plan) {
+    let corrected = !no_cut(plan);
+    let mut figures = vec![match placement::before_mm(plan).filter(|_| corrected) {
         Some(mm) => KeyFigure::new("Largest before", mm, 3, "mm").note(format!("{shape}, corrected motions")),
         None => KeyFigure::new("Largest before", placement::largest_mm(plan), 3, "mm")
             .note("uncorrected, all motions"),
     }];
-    let expected = placement::expected_mm(plan);
+    let expected = placement::expected_mm(plan).filter(|_| corrected);
     figures.push(KeyFigure::new("Expected after", expected, 3, "mm").note(match expected {
         Some(_) => format!("{shape}, 1σ: largest of the corrected motions"),
+        None if !corrected => "no cut is corrected".to_owned(),
         None => "nothing is corrected, or the model has no σ".to_owned(),
     }));
     if let Some(chance) = plan.probability_of_harm {

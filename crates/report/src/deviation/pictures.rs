@@ -9,7 +9,7 @@ use crate::plot::{
     Axis, ColorMap, Graph, HeatStrip, Histogram, Ink, PlanPath, PlanView, Sample, Series, Span, Strip,
     distinguishable,
 };
-use truegrind_compensation::deviation::{PathPoint, PathReport, Status};
+use truegrind_compensation::deviation::{After, PathPoint, PathReport, Status};
 
 /// Largest number of plotted points; of each group of neighbours the largest deviation is kept.
 const POINTS: usize = 2000;
@@ -21,9 +21,7 @@ const MODELS: usize = 5;
 pub(super) fn all(reports: &[&PathReport]) -> Vec<Figure> {
     let mut out = vec![along(reports)];
     out.push(frequency(reports));
-    if reports.len() > 1 {
-        out.push(strips(reports));
-    }
+    out.extend(strips(reports));
     out.extend(plan(reports));
     out
 }
@@ -35,6 +33,13 @@ struct Shown<'a> {
     side: Side,
     after: bool,
     ink: Option<Ink>,
+}
+
+impl Shown<'_> {
+    /// Whether it is the remainder of the solver, which says nothing about the deviation of the real arm.
+    fn is_remainder(&self) -> bool {
+        self.after && self.report.after == After::PredictedRemainder
+    }
 }
 
 /// All curves: before (once if all reports agree), then after.
@@ -57,6 +62,12 @@ fn shown<'a>(reports: &[&'a PathReport]) -> Vec<Shown<'a>> {
     }
     out
 }
+
+/// What a plan shows in place of the predicted remainder.
+const EXPECTED: &str = "expected, 1σ";
+
+/// Joins the names of coinciding curves.
+const SAME: &str = " = ";
 
 const SIGNED: &str = "deviation along the normal";
 
@@ -94,7 +105,12 @@ fn along(reports: &[&PathReport]) -> Figure {
         })
         .collect();
     let passing = passing(reports);
-    let (series, alike) = distinguishable(series, |x| !passing.contains(&x.to_bits()));
+    let (mut series, alike) = distinguishable(series, |x| !passing.contains(&x.to_bits()));
+    for (name, same) in &alike {
+        if let Some(drawn) = series.iter_mut().find(|one| one.name.split(SAME).next() == Some(same)) {
+            drawn.name = format!("{}{SAME}{name}", drawn.name);
+        }
+    }
     let graph = Graph {
         title: "Deviation along the path".to_owned(),
         x: Axis::new("path point", ""),
@@ -108,10 +124,8 @@ fn along(reports: &[&PathReport]) -> Figure {
         caption
             .push_str(" The band is the predicted ±1σ of the model along the cut, in which the real arm is expected to run.");
     }
-    for (name, same) in alike {
-        caption.push_str(&format!(
-            " \u{201c}{name}\u{201d} is not drawn: along the cut it coincides with \u{201c}{same}\u{201d}."
-        ));
+    if !alike.is_empty() {
+        caption.push_str(" Names joined by = share a curve: they coincide along the cut.");
     }
     if !graph.spans.is_empty() {
         caption.push_str(" Shaded: points that were refused, flagged or left.");
@@ -135,6 +149,7 @@ fn frequency(reports: &[&PathReport]) -> Figure {
     let one = &reports[..reports.len().min(1)];
     let samples = shown(one)
         .into_iter()
+        .filter(|shown| !shown.is_remainder())
         .map(|s| Sample { ink: s.ink, ..Sample::new(s.name, s.report.signed_mm(s.side)) })
         .collect();
     let histogram = Histogram {
@@ -143,19 +158,28 @@ fn frequency(reports: &[&PathReport]) -> Figure {
         samples,
         bins: None,
     };
-    let mut caption = "Deviations of the points of the cut, before and after".to_owned();
+    let achieved = one.iter().any(|report| report.after == After::Achieved && has(report, AFTER));
+    let mut caption = format!(
+        "Deviations of the points of the cut, before {}",
+        if achieved { "and after" } else { "the correction" }
+    );
     if let ([report], true) = (one, reports.len() > 1) {
         caption.push_str(&format!(" with {}", report.model));
     }
     Figure::new(histogram.svg(), caption + ".")
 }
 
-fn strips(reports: &[&PathReport]) -> Figure {
+/// `None` for a single strip, which shows no more than the curve.
+fn strips(reports: &[&PathReport]) -> Option<Figure> {
     let signed = quantity(reports) == SIGNED;
-    let strips = shown(reports)
+    let strips: Vec<Strip> = shown(reports)
         .into_iter()
+        .filter(|shown| !shown.is_remainder())
         .map(|Shown { name, report, side, .. }| Strip { name, values: report.signed_mm(side) })
         .collect();
+    if reports.len() < 2 || strips.len() < 2 {
+        return None;
+    }
     let strip = HeatStrip {
         title: "Model by model".to_owned(),
         x: Axis::new("point of the cut", ""),
@@ -163,7 +187,7 @@ fn strips(reports: &[&PathReport]) -> Figure {
         colors: if signed { ColorMap::CoolWarm } else { ColorMap::Viridis },
         strips,
     };
-    Figure::new(strip.svg(), "Deviation along the cut, one strip per model on a common scale.")
+    Some(Figure::new(strip.svg(), "Deviation along the cut, one strip per model on a common scale."))
 }
 
 fn plan(reports: &[&PathReport]) -> Option<Figure> {
@@ -174,10 +198,13 @@ fn plan(reports: &[&PathReport]) -> Option<Figure> {
     let cuts = first.points.iter().any(|point| point.cutting);
     let paths: Vec<PlanPath> = shown(reports)
         .into_iter()
-        .map(|Shown { name, report, side, .. }| {
+        .map(|shown| {
+            let remainder = shown.is_remainder();
+            let Shown { name, report, side, .. } = shown;
             let kept = thinned(report, side);
             let points = kept.iter().map(|point| axes.map(|axis| intended(point)[axis])).collect();
             let value = |point: &&PathPoint| match side(point) {
+                Some(_) if remainder && point.cutting => point.expected_mm().unwrap_or(f64::NAN),
                 Some(d) if point.cutting || !cuts => {
                     if signed {
                         d.signed_mm()
@@ -187,6 +214,7 @@ fn plan(reports: &[&PathReport]) -> Option<Figure> {
                 }
                 _ => f64::NAN,
             };
+            let name = if remainder { name.replace(meaning(report.after), EXPECTED) } else { name };
             PlanPath { name, points, values: kept.iter().map(value).collect() }
         })
         .collect();
@@ -198,14 +226,17 @@ fn plan(reports: &[&PathReport]) -> Option<Figure> {
         colors: if signed { ColorMap::CoolWarm } else { ColorMap::Viridis },
         paths,
     };
-    let after = reports.iter().find(|report| has(report, AFTER)).map_or("", |report| meaning(report.after));
+    let after = reports.iter().find(|report| has(report, AFTER)).map_or("", |report| match report.after {
+        After::PredictedRemainder => " (after: size of the expected deviation, from the predicted 1σ)",
+        After::Achieved => " (after: achieved)",
+    });
     Some(Figure::new(
         view.svg(),
         format!(
             "The path in the work object, viewed along {}, coloured by its deviation; all panels share one scale{}. \
              Approaches and links are grey.",
             names[3 - axes[0] - axes[1]],
-            if after.is_empty() { String::new() } else { format!(" (after: {after})") }
+            after
         ),
     ))
 }

@@ -46,7 +46,9 @@ pub(super) fn verdict(reports: &[&PathReport]) -> Verdict {
         // A model that corrects no cut has no correction whose certainty could be judged.
         let corrects = report.cut().any(|p| !matches!(p.status, MotionStatus::Left));
         if !corrects {
-            reasons.push(format!("{} corrects no cut", report.model));
+            let because = report.cut().find_map(|p| p.reason.as_ref());
+            let because = because.map_or_else(String::new, |reason| format!(": {reason}"));
+            reasons.push(format!("{} corrects no cut{because}", report.model));
         } else if let (Some(sigma), Some(rms)) = (report.sigma_rms_mm(), before_rms(report))
             && sigma > rms
         {

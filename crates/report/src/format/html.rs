@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::visible;
+use super::{visible, words};
 use crate::document::{Block, Document, Figure, KeyFigure, Verdict};
 use crate::status::Status;
 use crate::table::{Alignment, Cell, Table};
@@ -82,12 +82,14 @@ pub fn table(table: &Table) -> String {
                 Cell::Judged(status, text) => {
                     judged(*status, if text.is_empty() { status.word() } else { text })
                 }
+                _ if sentences[index] => prose(&table.shown(row, index)),
                 _ => escape(&table.shown(row, index)),
             };
             let class = match column.alignment() {
                 Alignment::Left if sentences[index] => " class=\"words\"",
                 Alignment::Left if short[index] => " class=\"short\"",
-                other => side(other),
+                Alignment::Left => " class=\"phrase\"",
+                Alignment::Right => side(Alignment::Right),
             };
             html.push_str(&format!("<td{class}>{shown}</td>"));
         }
@@ -95,7 +97,7 @@ pub fn table(table: &Table) -> String {
     }
     html.push_str("</tbody>\n</table>\n</div>\n");
     for note in &table.notes {
-        html.push_str(&format!("<p class=\"note\">{}</p>\n", escape(note)));
+        html.push_str(&format!("<p class=\"note\">{}</p>\n", prose(note)));
     }
     html
 }
@@ -124,6 +126,46 @@ pub fn escape(text: &str) -> String {
     escaped
 }
 
+/// Escapes a sentence. Commands in backticks are set as code, and neither an option (`--max-risk`) nor a number with its unit is broken
+/// between two lines.
+///
+/// ```
+/// use truegrind_report::format::html;
+///
+/// assert_eq!(
+///     html::prose("over 99.9 %: `truegrind plan`, --max-risk"),
+///     "over 99.9\u{a0}%: <code>truegrind plan</code>, <span class=\"option\">--max-risk</span>"
+/// );
+/// ```
+pub fn prose(text: &str) -> String {
+    let mut html = String::new();
+    // An unpaired backtick is text.
+    let paired = text.matches('`').count() / 2 * 2;
+    for (number, part) in text.splitn(paired + 1, '`').enumerate() {
+        if number % 2 == 1 {
+            html.push_str(&format!("<code>{}</code>", escape(part)));
+            continue;
+        }
+        for word in words::keep_units(part, '\u{a0}').split_inclusive(' ') {
+            let start =
+                word.find("--").filter(|at| word[at + 2..].starts_with(|c: char| c.is_ascii_lowercase()));
+            let Some(start) = start else {
+                html.push_str(&escape(word));
+                continue;
+            };
+            let option = |c: char| c == '-' || c.is_ascii_alphanumeric();
+            let end = word[start..].find(|c| !option(c)).map_or(word.len(), |length| start + length);
+            html.push_str(&format!(
+                "{}<span class=\"option\">{}</span>{}",
+                escape(&word[..start]),
+                escape(&word[start..end]),
+                escape(&word[end..])
+            ));
+        }
+    }
+    html
+}
+
 fn side(alignment: Alignment) -> &'static str {
     match alignment {
         Alignment::Left => "",
@@ -138,6 +180,15 @@ fn judged(status: Status, text: &str) -> String {
         status.sign(),
         escape(text)
     )
+}
+
+/// Key figures in a row of a wide page, and of a narrower or printed one.
+const WIDE_ROW: usize = 6;
+const MEDIUM_ROW: usize = 4;
+
+/// Figures per row, at most `most`, so that the last row is nearly as full as the others.
+fn balanced(figures: usize, most: usize) -> usize {
+    figures.div_ceil(figures.div_ceil(most).max(1)).max(1)
 }
 
 /// The page under construction, with data for the table of contents.
@@ -159,7 +210,7 @@ impl Page {
     fn block(&mut self, block: &Block) {
         match block {
             Block::Heading(level, text) => self.heading((*level).clamp(2, 6), text),
-            Block::Paragraph(text) => self.push(&format!("<p>{}</p>\n", escape(text))),
+            Block::Paragraph(text) => self.push(&format!("<p>{}</p>\n", prose(text))),
             Block::List(points) => self.list(points),
             Block::KeyFigures(figures) => self.key_figures(figures),
             Block::Table(block) => self.push(&table(block)),
@@ -230,13 +281,14 @@ impl Page {
     fn list(&mut self, points: &[String]) {
         self.push("<ul>\n");
         for point in points {
-            self.push(&format!("<li>{}</li>\n", escape(point)));
+            self.push(&format!("<li>{}</li>\n", prose(point)));
         }
         self.push("</ul>\n");
     }
 
     fn key_figures(&mut self, figures: &[KeyFigure]) {
-        self.push("<dl class=\"key-figures\">\n");
+        let [wide, medium] = [WIDE_ROW, MEDIUM_ROW].map(|most| balanced(figures.len(), most));
+        self.push(&format!("<dl class=\"key-figures\" style=\"--wide:{wide};--medium:{medium}\">\n"));
         for figure in figures {
             let (shown, unit) = figure.shown();
             let unit = match unit {
@@ -253,7 +305,7 @@ impl Page {
                 self.push(&format!("<dd>{}</dd>", judged(status, status.word())));
             }
             if !figure.note.is_empty() {
-                self.push(&format!("<dd>{}</dd>", escape(&figure.note)));
+                self.push(&format!("<dd>{}</dd>", prose(&figure.note)));
             }
             self.push("</div>\n");
         }
@@ -268,7 +320,7 @@ impl Page {
             "<figure>\n{}\n<figcaption><b>Figure {}.</b> {}</figcaption>\n</figure>\n",
             svg.trim_end(),
             self.figures,
-            escape(&figure.caption)
+            prose(&figure.caption)
         ));
     }
 
@@ -278,7 +330,7 @@ impl Page {
             "<section class=\"verdict {}\">\n<p><b>{}</b> {}</p>\n",
             status.class(),
             judged(status, status.word()),
-            escape(&verdict.headline)
+            prose(&verdict.headline)
         ));
         if !verdict.reasons.is_empty() {
             self.list(&verdict.reasons);

@@ -3,7 +3,7 @@
 //! Every character is assumed to be one cell wide, which holds for all text of truegrind itself. Control characters are escaped
 //! ([`visible`]).
 
-use super::visible;
+use super::{visible, words};
 use crate::document::{Block, Document};
 use crate::status::Status;
 use crate::table::{Alignment, ColumnKind, Table};
@@ -13,10 +13,14 @@ const NARROWEST_TEXT: usize = 12;
 /// Longer cells count as sentences, which need a wider column.
 const SENTENCE: usize = 40;
 const NARROWEST_SENTENCE: usize = 24;
+/// Longer names may be broken.
+const LONGEST_NAME: usize = 28;
 const GAP: usize = 2;
+/// Stands for a space at which no line is broken.
+const GLUE: char = '\u{a0}';
 
-/// The table as lines of at most `width` characters. A wider table first omits common folders of paths, then wraps text cells, and
-/// finally continues in blocks below, which repeat as many leading columns as identify the rows. Nothing is truncated.
+/// The table as lines of at most `width` characters. A wider table first omits common folders of paths, then wraps headings and text cells,
+/// and finally continues in blocks below, which repeat as many leading columns as identify the rows. Nothing is truncated.
 pub fn table(table: &Table, width: usize) -> String {
     let mut text = String::new();
     if !table.title.is_empty() {
@@ -34,7 +38,7 @@ pub fn table(table: &Table, width: usize) -> String {
         columns.clone().for_each(|column| omit_common_folder(&mut lines[1..], column));
         widths = widest(&lines);
     }
-    shrink(table, &mut widths, width);
+    shrink(table, &lines, &mut widths, width);
     for (number, block) in blocks(&widths, identifying_columns(table, &lines[1..]), width).iter().enumerate()
     {
         if !text.is_empty() && number > 0 {
@@ -143,27 +147,39 @@ fn push_block(text: &mut String, block: &Block, width: usize) {
     }
 }
 
-/// Narrows the widest text columns until the table fits or all are at their minimum.
-fn shrink(table: &Table, widths: &mut [usize], width: usize) {
+/// Narrows columns until the table fits or all are at their minimum: first those of numbers with a long heading, then the widest text.
+fn shrink(table: &Table, lines: &[Vec<String>], widths: &mut [usize], width: usize) {
     let whole = widths.to_vec();
     let words = |c: usize| table.columns[c].alignment() == Alignment::Left;
-    while total(widths.iter().copied()) > width {
-        let widest = (0..widths.len())
-            .filter(|&c| {
-                words(c) && widths[c] > if whole[c] > SENTENCE { NARROWEST_SENTENCE } else { NARROWEST_TEXT }
-            })
-            .max_by_key(|&c| (widths[c], std::cmp::Reverse(c)));
-        match widest {
-            Some(column) => widths[column] -= 1,
-            // The table is split anyway, so only the widest columns are narrowed.
-            None => {
-                let most = (width.saturating_sub(GAP) / 2).max(NARROWEST_TEXT);
-                (0..widths.len())
-                    .filter(|&c| words(c))
-                    .for_each(|c| widths[c] = whole[c].min(most.max(widths[c])));
-                return;
-            }
+    let least: Vec<usize> = (0..widths.len()).map(|c| narrowest(lines, c, whole[c], words(c))).collect();
+    for text in [false, true] {
+        while total(widths.iter().copied()) > width {
+            let widest = (0..widths.len())
+                .filter(|&c| words(c) == text && widths[c] > least[c])
+                .max_by_key(|&c| (widths[c], std::cmp::Reverse(c)));
+            let Some(column) = widest else { break };
+            widths[column] -= 1;
         }
+    }
+    if total(widths.iter().copied()) > width {
+        // The table is split anyway, so only the widest columns are narrowed.
+        let most = (width.saturating_sub(GAP) / 2).max(NARROWEST_TEXT);
+        (0..widths.len()).filter(|&c| words(c)).for_each(|c| widths[c] = whole[c].min(most.max(widths[c])));
+    }
+}
+
+/// Least width of a column, whose heading is the first line: numbers and names without spaces are not broken.
+fn narrowest(lines: &[Vec<String>], column: usize, whole: usize, text: bool) -> usize {
+    let cells = || lines.iter().skip(1).map(|line| &line[column]);
+    let longest = cells().map(|cell| length(cell)).max().unwrap_or(0);
+    if !text {
+        let heading = lines.first().map_or("", |line| line[column].as_str());
+        return heading.split(' ').map(length).fold(longest, usize::max);
+    }
+    match whole > SENTENCE {
+        true => NARROWEST_SENTENCE,
+        false if cells().any(|cell| cell.contains(' ')) => NARROWEST_TEXT,
+        false => longest.clamp(NARROWEST_TEXT, LONGEST_NAME),
     }
 }
 
@@ -247,7 +263,7 @@ fn wrap_cell(cell: &str, width: usize) -> Vec<String> {
     }
     let width = width.max(1);
     let mut lines = vec![String::new()];
-    for word in cell.split(' ') {
+    for word in words::keep_units(cell, GLUE).split(' ') {
         let mut word = word;
         let line = &lines[lines.len() - 1];
         let joined = length(line) + usize::from(!line.is_empty()) + length(word);
@@ -272,7 +288,7 @@ fn wrap_cell(cell: &str, width: usize) -> Vec<String> {
             lines.push(String::new());
         }
     }
-    lines
+    lines.into_iter().map(|line| line.replace(GLUE, " ")).collect()
 }
 
 fn fit(cell: &str, width: usize, alignment: Alignment) -> String {
@@ -299,12 +315,12 @@ fn beside(text: &mut String, line: &str, note: &str, width: usize) {
 /// Wraps text to lines of at most `width` characters; further lines start with `indent`. A longer word, such as a file name, is not
 /// broken.
 fn wrapped(text: &str, width: usize, indent: &str) -> String {
-    let text = &*visible::text(text);
+    let text = &*words::keep_units(&visible::text(text), GLUE);
     let mut lines = String::new();
     let leading: String = text.chars().take_while(|c| *c == ' ').collect();
     let mut line = leading;
     let mut empty = true;
-    for word in text.split_whitespace() {
+    for word in text.split([' ', '\n', '\t']).filter(|word| !word.is_empty()) {
         if !empty && length(&line) + 1 + length(word) > width {
             lines.push_str(&line);
             lines.push('\n');
@@ -319,7 +335,7 @@ fn wrapped(text: &str, width: usize, indent: &str) -> String {
     }
     lines.push_str(&line);
     lines.push('\n');
-    lines
+    lines.replace(GLUE, " ")
 }
 
 /// Number of character cells; the variation selector after the warning sign has no width.

@@ -173,6 +173,8 @@ impl Graph {
         let mut legend: Vec<Entry> = drawn.iter().filter_map(Drawn::entry).collect();
         let mut levels = Vec::new();
         let mut places = Vec::new();
+        // Lines of the same name share an entry, as spans do.
+        let mut named = BTreeSet::new();
         for reference in &self.references {
             let name = match reference {
                 Reference::Horizontal(y, name) => {
@@ -185,10 +187,11 @@ impl Graph {
                 }
                 Reference::Diagonal(name) => name,
             };
-            let glyph = Glyph::Line { dash: REFERENCE_DASH, width: THIN, marker: None };
-            legend.push(Entry { name: name.clone(), ink: Ink::Text, glyph });
+            if named.insert(name) {
+                let glyph = Glyph::Line { dash: REFERENCE_DASH, width: THIN, marker: None };
+                legend.push(Entry { name: name.clone(), ink: Ink::Text, glyph });
+            }
         }
-        let mut named = BTreeSet::new();
         for span in &self.spans {
             places.extend(span.range);
             if named.insert(&span.name) {

@@ -10,7 +10,7 @@ use truegrind_compensation::plan::{MotionOutcome, Plan};
 use truegrind_programs::motion::{Listing, Reason};
 use truegrind_programs::rapid::Task;
 use truegrind_report::compensation::{self as view, ProgramFile};
-use truegrind_report::format::{csv, terminal};
+use truegrind_report::format::{csv, markdown, terminal};
 
 use super::examples::leave;
 
@@ -145,7 +145,7 @@ fn reasons_are_counted_with_their_worst_and_their_first_lines() {
 status,motions,reason,worst,lines
 refused,1,correction exceeds the bound (--max-correction),12.345 mm,grind.mod 9
 refused,1,target is out of reach,,grind.mod 10
-flagged,2,joint 5 is outside the range in which the arm was measured,7.25°,\"grind.mod 7, 8\"
+flagged,2,joint 5 is outside the range in which the arm was measured,7.25°,grind.mod 7–8
 left,1,\"joint target: states joints, not a pose (--joint-targets rewrites it too)\",,grind.mod 5
 left,1,a program displacement or external axis offset is or may be active,,other.mod 3
 ";
@@ -153,12 +153,46 @@ left,1,a program displacement or external axis offset is or may be active,,other
 }
 
 #[test]
-fn many_lines_are_cut_short() {
+fn lines_of_successive_motions_are_a_range_and_many_ranges_are_cut_short() {
     let (mut plan, listing, files) = example();
-    plan.outcomes =
-        (0..7).map(|i| outcome(i, Status::Refused, Some(OutcomeReason::NearSingularity))).collect();
+    let mut lines = |motions: &[u32]| {
+        let left =
+            |motion: &u32| outcome(*motion, Status::Left, Some(OutcomeReason::Risk { chance: 0.64404 }));
+        plan.outcomes = motions.iter().map(left).collect();
+        csv::table(&view::reason_table(&plan, &listing, &files))
+    };
+    let text = lines(&[0, 1, 2, 3, 5, 6]);
+    assert!(text.contains(",64 %,\"grind.mod 5–8, 10; other.mod 3\""), "{text}");
+    let text = lines(&[0, 2, 0, 2, 0, 2, 4, 5]);
+    assert!(text.contains("\"grind.mod 5, 7, 5, 7, 5, 7 and 2 more motions\""), "{text}");
+}
+
+#[test]
+fn a_cut_that_stays_names_the_line_that_caused_it() {
+    let (mut plan, listing, files) = example();
+    let part = |line| Some(OutcomeReason::PartOfCut { line, because: "out of reach" });
+    plan.outcomes = vec![
+        outcome(2, Status::Refused, part(9)),
+        outcome(3, Status::Refused, part(9)),
+        outcome(5, Status::Refused, Some(OutcomeReason::Step { line: 9, mm: 0.5 })),
+    ];
     let text = csv::table(&view::reason_table(&plan, &listing, &files[..1]));
-    assert!(text.contains("\"5, 6, 7, 8, 9, 10 and 1 more\""), "{text}");
+    assert!(text.contains("of this cut is not corrected: out of reach (line 9)"), "{text}");
+    assert!(text.contains("would exceed --tolerance (line 9),0.500 mm,10"), "{text}");
+}
+
+#[test]
+fn a_reason_that_rows_share_is_printed_once() {
+    let (mut plan, listing, files) = example();
+    let left = |motion| outcome(motion, Status::Left, Some(OutcomeReason::Risk { chance: 0.5 }));
+    plan.outcomes = (0..4).map(left).collect();
+    let page = view::document(&plan, &listing, &files[..1], &[]);
+    let text = markdown::document(&page);
+    assert_eq!(text.matches("worse with a probability of 50 %").count(), 2, "both tables: {text}");
+    assert_eq!(text.matches("as above").count(), 6, "{text}");
+    // Data files repeat it.
+    let rows = csv::table(&view::table(&plan, &listing, &files[..1]));
+    assert_eq!(rows.matches("worse with a probability of 50 %").count(), 4, "{rows}");
 }
 
 #[test]

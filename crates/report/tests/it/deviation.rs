@@ -315,6 +315,9 @@ fn pages_of_one_model_of_several_and_of_nothing() {
     let text = leave("deviation-one.html", &one);
     assert_eq!(text.matches("<figure>").count(), 3);
     assert!(text.contains("16 points flagged: corrected with a warning"), "one count per point");
+    // Only the curve shows the remainder of the solver, inside its band; the plan view shows what to expect.
+    assert_eq!(text.matches(">after (predicted remainder)<").count(), 1);
+    assert_eq!(text.matches(">after (expected, 1σ)<").count(), 1);
     assert!(!text.contains("NaN"));
     let several = view::document(&[
         raster("lm", After::Achieved, 0.12),
@@ -333,6 +336,10 @@ fn pages_of_one_model_of_several_and_of_nothing() {
             raster("lm-as-printed", After::Achieved, 0.3),
         ])
     );
+    // Coinciding curves are drawn once, and the legend names them all.
+    let twins = [raster("lm", After::Achieved, 0.12), raster("ltlm", After::Achieved, 0.12)];
+    let text = leave("deviation-twins.html", &view::document(&twins));
+    assert!(text.contains(">lm, achieved = ltlm, achieved<"), "legend");
     // A program of which no point is known, and no program at all.
     let empty = markdown::document(&view::document(&[report("m", Vec::new())]));
     assert!(empty.contains("unknown"), "{empty}");
@@ -349,6 +356,16 @@ fn a_correction_smaller_than_its_sigma_is_called_so() {
     let text = page(&unsure);
     assert!(text.contains("[warning] Largest deviation"), "{text}");
     assert!(text.contains("predicted 1σ of 4.000 mm exceeds the deviation that it corrects"), "{text}");
+}
+
+#[test]
+fn a_point_that_is_not_corrected_keeps_its_deviation() {
+    let mut unsure = raster("m", After::PredictedRemainder, 1e-4);
+    for point in &mut unsure.points {
+        (point.status, point.sigma_mm, point.after) = (Status::Left, Some(4.0), point.before);
+    }
+    let largest = unsure.cut().filter_map(|p| p.before.map(|d| d.norm_mm())).reduce(f64::max);
+    assert_eq!(unsure.expected_mm(), largest);
 }
 
 #[test]
