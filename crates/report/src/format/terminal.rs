@@ -45,8 +45,15 @@ pub fn table(table: &Table, width: usize) -> String {
             text.push('\n');
         }
         for (index, line) in lines.iter().enumerate() {
-            let cells: Vec<Vec<String>> = block.iter().map(|&c| wrap_cell(&line[c], widths[c])).collect();
-            for row in 0..cells.iter().map(Vec::len).max().unwrap_or(1) {
+            let mut cells: Vec<Vec<String>> = block.iter().map(|&c| wrap_cell(&line[c], widths[c])).collect();
+            let height = cells.iter().map(Vec::len).max().unwrap_or(1);
+            if index == 0 {
+                // Headings end at the rule.
+                for cell in &mut cells {
+                    cell.splice(0..0, vec![String::new(); height - cell.len()]);
+                }
+            }
+            for row in 0..height {
                 let cell = |(place, &c): (usize, &usize)| {
                     let piece = cells[place].get(row).map_or("", String::as_str);
                     fit(piece, widths[c], table.columns[c].alignment())
@@ -151,7 +158,9 @@ fn push_block(text: &mut String, block: &Block, width: usize) {
 fn shrink(table: &Table, lines: &[Vec<String>], widths: &mut [usize], width: usize) {
     let whole = widths.to_vec();
     let words = |c: usize| table.columns[c].alignment() == Alignment::Left;
-    let least: Vec<usize> = (0..widths.len()).map(|c| narrowest(lines, c, whole[c], words(c))).collect();
+    let name = LONGEST_NAME.min(width / 3);
+    let least: Vec<usize> =
+        (0..widths.len()).map(|c| narrowest(lines, c, whole[c], words(c).then_some(name))).collect();
     for text in [false, true] {
         while total(widths.iter().copied()) > width {
             let widest = (0..widths.len())
@@ -168,18 +177,19 @@ fn shrink(table: &Table, lines: &[Vec<String>], widths: &mut [usize], width: usi
     }
 }
 
-/// Least width of a column, whose heading is the first line: numbers and names without spaces are not broken.
-fn narrowest(lines: &[Vec<String>], column: usize, whole: usize, text: bool) -> usize {
+/// Least width of a column, whose heading is the first line: numbers are not broken, nor are names without spaces up to the length
+/// `name` (`None` for numbers).
+fn narrowest(lines: &[Vec<String>], column: usize, whole: usize, name: Option<usize>) -> usize {
     let cells = || lines.iter().skip(1).map(|line| &line[column]);
     let longest = cells().map(|cell| length(cell)).max().unwrap_or(0);
-    if !text {
+    let Some(name) = name else {
         let heading = lines.first().map_or("", |line| line[column].as_str());
         return heading.split(' ').map(length).fold(longest, usize::max);
-    }
+    };
     match whole > SENTENCE {
         true => NARROWEST_SENTENCE,
         false if cells().any(|cell| cell.contains(' ')) => NARROWEST_TEXT,
-        false => longest.clamp(NARROWEST_TEXT, LONGEST_NAME),
+        false => longest.min(name).max(NARROWEST_TEXT),
     }
 }
 

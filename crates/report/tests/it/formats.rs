@@ -256,14 +256,38 @@ fn a_wide_table_goes_on_below_with_its_first_column() {
     table.columns.insert(0, Column::text("method", "method"));
     table.push(std::iter::once(Cell::from("LTLM")).chain((0..6).map(|i| Cell::Number(f64::from(i)))));
     insta::assert_snapshot!(terminal::table(&table, 40), @r"
-    method  P0 [mm]  P1 [mm]  P2 [mm]
-    ──────  ───────  ───────  ───────
-    LTLM       0.00     1.00     2.00
+              P0    P1    P2    P3    P4
+    method  [mm]  [mm]  [mm]  [mm]  [mm]
+    ──────  ────  ────  ────  ────  ────
+    LTLM    0.00  1.00  2.00  3.00  4.00
 
-    method  P3 [mm]  P4 [mm]  P5 [mm]
-    ──────  ───────  ───────  ───────
-    LTLM       3.00     4.00     5.00
+              P5
+    method  [mm]
+    ──────  ────
+    LTLM    5.00
     ");
+}
+
+#[test]
+fn headings_are_wrapped_before_names_and_names_are_not_broken() {
+    let mut table = Table::new(
+        "",
+        vec![
+            Column::text("name", "Name"),
+            Column::text("maker", "Maker"),
+            Column::number("repeatability_mm", "Repeatability", "mm", 3),
+            Column::number("reach_mm", "Reach", "mm", 0),
+        ],
+    );
+    table.push(["abb-irb-4600-60-2.05".into(), "Universal Robots".into(), 0.06.into(), 2050.0.into()]);
+    let rule = [20, 16, 13, 5].map(|width| "─".repeat(width)).join("  ");
+    let expected = [
+        "                                        Repeatability  Reach",
+        "Name                  Maker                      [mm]   [mm]",
+        &rule,
+        "abb-irb-4600-60-2.05  Universal Robots          0.060   2050",
+    ];
+    assert_eq!(terminal::table(&table, 60), expected.join("\n") + "\n");
 }
 
 #[test]
