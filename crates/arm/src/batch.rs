@@ -8,7 +8,7 @@
 use super::chain::{FrameColumns, last_frame};
 use super::model::PreparedModel;
 use crate::joints::Joints;
-use truegrind_math::lanes::{AnyWidth, Real, SinCos, aligned, sin_cos, vectorised};
+use truegrind_math::lanes::{AnyWidth, Real, SinCos, WIDTH, aligned, sin_cos, vectorised};
 use truegrind_math::se3::{Pose, rotation_from_matrix};
 
 /// Controller angles of many rows (rad), one column per joint.
@@ -83,12 +83,7 @@ impl PreparedModel<'_> {
     pub fn forward_columns(&self, joints: &JointColumns, out: &mut PoseColumns) {
         let rows = joints.len();
         out.resize(rows);
-        let turn = self.model.flange.rotation.to_rotation_matrix();
-        let flange = FrameColumns {
-            axes: std::array::from_fn(|j| std::array::from_fn(|i| turn[(i, j)])),
-            origin: self.model.flange.translation.vector.into(),
-        };
-        let flange = (self.model.flange != Pose::identity()).then_some(flange);
+        let flange = self.flange_columns();
         vectorised(Forward { arm: self, flange, joints, out });
     }
 
@@ -110,10 +105,28 @@ impl PreparedModel<'_> {
     /// # Ok::<(), robots::RobotError>(())
     /// ```
     pub fn forward_many(&self, joints: &[Joints]) -> Vec<Pose> {
-        let columns: JointColumns = joints.iter().copied().collect();
-        let mut poses = PoseColumns::default();
-        self.forward_columns(&columns, &mut poses);
-        (0..joints.len()).map(|row| poses.pose(row)).collect()
+        let flange = self.flange_columns();
+        let mut out = Vec::with_capacity(joints.len());
+        for block in joints.chunks(WIDTH) {
+            let joints = std::array::from_fn(|j| std::array::from_fn(|k| block[k.min(block.len() - 1)][j]));
+            let poses = vectorised(ForwardBlock { arm: self, flange: &flange, joints });
+            out.extend((0..block.len()).map(|k| {
+                let position = nalgebra::Vector3::from_fn(|i, _| poses.origin[i][k]);
+                let matrix = nalgebra::Matrix3::from_fn(|i, j| poses.axes[j][i][k]);
+                Pose::from_parts(position.into(), rotation_from_matrix(&matrix))
+            }));
+        }
+        out
+    }
+
+    /// The flange in the last frame; absent where it is that frame.
+    fn flange_columns(&self) -> Option<FrameColumns<f64>> {
+        let turn = self.model.flange.rotation.to_rotation_matrix();
+        let flange = FrameColumns {
+            axes: std::array::from_fn(|j| std::array::from_fn(|i| turn[(i, j)])),
+            origin: self.model.flange.translation.vector.into(),
+        };
+        (self.model.flange != Pose::identity()).then_some(flange)
     }
 }
 
@@ -145,15 +158,7 @@ impl AnyWidth for Forward<'_> {
             if following < rows {
                 next = angles(like, joints, following);
             }
-            let rotation = arm.apply_effects(&arm.apply_joint_map(&angle));
-            let (mut sin, mut cos) = (rotation, rotation);
-            for j in 0..6 {
-                (sin[j], cos[j]) = sin_cos(rotation[j]);
-            }
-            let mut end = last_frame(&arm.tables, &sin, &cos);
-            if let Some(flange) = &flange {
-                end = end.compose(flange);
-            }
+            let end = flange_frame(arm, &flange, &angle);
             for k in 0..3 {
                 end.origin[k].store(&mut out.position_mm[k], from);
                 for j in 0..3 {
@@ -162,6 +167,58 @@ impl AnyWidth for Forward<'_> {
             }
             (from, following) = (following, following + R::ROWS);
         }
+    }
+}
+
+/// Eight rows' numbers side by side.
+type Eight = [f64; WIDTH];
+
+/// [`PreparedModel::forward_many`] of eight rows.
+struct ForwardBlock<'a> {
+    arm: &'a PreparedModel<'a>,
+    flange: &'a Option<FrameColumns<f64>>,
+    joints: [Eight; 6],
+}
+
+impl AnyWidth for ForwardBlock<'_> {
+    type Output = FrameColumns<Eight>;
+
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn run<R: SinCos>(self, like: R) -> FrameColumns<Eight> {
+        let mut out = FrameColumns { axes: [[[0.0; WIDTH]; 3]; 3], origin: [[0.0; WIDTH]; 3] };
+        for from in (0..WIDTH).step_by(R::ROWS) {
+            let mut angle = [like; 6];
+            for j in 0..6 {
+                angle[j] = like.load(&self.joints[j], from);
+            }
+            let end = flange_frame(self.arm, self.flange, &angle);
+            for k in 0..3 {
+                end.origin[k].store(&mut out.origin[k], from);
+                for j in 0..3 {
+                    end.axes[j][k].store(&mut out.axes[j][k], from);
+                }
+            }
+        }
+        out
+    }
+}
+
+/// The flange in the base.
+#[cfg_attr(not(debug_assertions), inline(always))]
+fn flange_frame<R: SinCos>(
+    arm: &PreparedModel<'_>,
+    flange: &Option<FrameColumns<f64>>,
+    angle: &[R; 6],
+) -> FrameColumns<R> {
+    let rotation = arm.apply_effects(&arm.apply_joint_map(angle));
+    let (mut sin, mut cos) = (rotation, rotation);
+    for j in 0..6 {
+        (sin[j], cos[j]) = sin_cos(rotation[j]);
+    }
+    let end = last_frame(&arm.tables, &sin, &cos);
+    match flange {
+        Some(flange) => end.compose(flange),
+        None => end,
     }
 }
 

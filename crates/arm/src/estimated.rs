@@ -13,13 +13,13 @@ use serde::{Deserialize, Serialize};
 
 use super::chain::{Chain, cross, minus, scaled};
 use super::condition::Condition;
-use super::jacobian::{BaseAndTool, effect_twist, parameter_jacobian};
+use super::jacobian::effect_twist;
 use super::model::{Model, PreparedModel};
 use super::parameter::{LinkCoordinate, Parameter};
 use super::region::Region;
 use crate::joints::Joints;
 use truegrind_math::lanes::{AnyWidth, Real, SinCos, WIDTH, vectorised};
-use truegrind_math::se3::{Pose, vector_from_pose};
+use truegrind_math::se3::Pose;
 use truegrind_math::statistics::ErrorSummary;
 
 pub use error::{ModelFileError, SCHEMA};
@@ -300,44 +300,10 @@ impl Estimated {
 
     /// [`Estimated::position_sigma_mm`] of many points, eight in lanes.
     pub fn position_sigmas_mm(&self, arm: &PreparedModel<'_>, points: &[FlangePoint<'_>]) -> Vec<f64> {
-        let growth: f64 = arm.model.effects.iter().map(|e| e.growth(&arm.condition)).sum();
         let mut velocities = vec![[[0.0; WIDTH]; 3]; self.order.len()];
         let mut out = Vec::with_capacity(points.len());
         for block in points.chunks(WIDTH) {
-            let row = |k: usize| &block[k.min(block.len() - 1)];
-            let angles: [Eight; 6] = std::array::from_fn(|i| std::array::from_fn(|k| row(k).joints[i]));
-            let rides: [Vector3<f64>; WIDTH] =
-                std::array::from_fn(|k| (arm.model.flange * row(k).flange_from_tool).translation.vector);
-            let rides: [Eight; 3] = std::array::from_fn(|i| std::array::from_fn(|k| rides[k][i]));
-            let at = vectorised(LinkVelocities {
-                arm,
-                angles: &angles,
-                rides: &rides,
-                scale: 1.0 + growth,
-                order: &self.order,
-                velocities: &mut velocities,
-            });
-            let point = |k: usize| -> [f64; 3] { std::array::from_fn(|i| at[i][k]) };
-            if !arm.model.effects.is_empty() {
-                for k in 0..block.len() {
-                    let frames = arm.frames(&row(k).joints);
-                    for (parameter, velocity) in self.order.iter().zip(&mut velocities) {
-                        if let Parameter::Effect { index, parameter } = *parameter {
-                            let twist =
-                                effect_twist(arm, &row(k).joints, &frames, index, parameter, &point(k));
-                            (0..3).for_each(|i| velocity[i][k] = twist[i]);
-                        }
-                    }
-                }
-            }
-            for (k, here) in block.iter().enumerate() {
-                let Some(carried) = here.carried else { continue };
-                let lever = Vector3::from(point(k)) - carried.origin_mm;
-                for (velocity, twist) in velocities.iter_mut().zip(&carried.twists) {
-                    let moved = twist.fixed_rows::<3>(0) + twist.fixed_rows::<3>(3).cross(&lever);
-                    (0..3).for_each(|i| velocity[i][k] -= moved[i]);
-                }
-            }
+            self.velocities(arm, block, &mut velocities);
             let variance =
                 vectorised(Quadratic { matrix: self.covariance.as_slice(), velocities: &velocities });
             out.extend(variance[..block.len()].iter().map(|v| root(*v)));
@@ -345,16 +311,68 @@ impl Estimated {
         out
     }
 
-    /// Derivative of the position of a point on the flange with respect to the arm's parameters: 3 × p, in the base.
+    /// Velocities of up to eight points (mm per unit of each of the arm's parameters), in the base.
+    fn velocities(&self, arm: &PreparedModel<'_>, block: &[FlangePoint<'_>], velocities: &mut [[Eight; 3]]) {
+        let growth: f64 = arm.model.effects.iter().map(|e| e.growth(&arm.condition)).sum();
+        let row = |k: usize| &block[k.min(block.len() - 1)];
+        let angles: [Eight; 6] = std::array::from_fn(|i| std::array::from_fn(|k| row(k).joints[i]));
+        let rides: [Vector3<f64>; WIDTH] =
+            std::array::from_fn(|k| (arm.model.flange * row(k).flange_from_tool).translation.vector);
+        let rides: [Eight; 3] = std::array::from_fn(|i| std::array::from_fn(|k| rides[k][i]));
+        let at = vectorised(LinkVelocities {
+            arm,
+            angles: &angles,
+            rides: &rides,
+            scale: 1.0 + growth,
+            order: &self.order,
+            velocities,
+        });
+        let point = |k: usize| -> [f64; 3] { std::array::from_fn(|i| at[i][k]) };
+        if !arm.model.effects.is_empty() {
+            for k in 0..block.len() {
+                let frames = arm.frames(&row(k).joints);
+                for (parameter, velocity) in self.order.iter().zip(&mut *velocities) {
+                    if let Parameter::Effect { index, parameter } = *parameter {
+                        let twist = effect_twist(arm, &row(k).joints, &frames, index, parameter, &point(k));
+                        (0..3).for_each(|i| velocity[i][k] = twist[i]);
+                    }
+                }
+            }
+        }
+        for (k, here) in block.iter().enumerate() {
+            let Some(carried) = here.carried else { continue };
+            let lever = Vector3::from(point(k)) - carried.origin_mm;
+            for (velocity, twist) in velocities.iter_mut().zip(&carried.twists) {
+                let moved = twist.fixed_rows::<3>(0) + twist.fixed_rows::<3>(3).cross(&lever);
+                (0..3).for_each(|i| velocity[i][k] -= moved[i]);
+            }
+        }
+    }
+
+    /// Derivatives of the positions of many points on the flange with respect to the arm's parameters, one below the other:
+    /// 3 n × p, in the base, relative to the registered frames where there are any.
+    pub fn position_jacobians(&self, arm: &PreparedModel<'_>, points: &[FlangePoint<'_>]) -> DMatrix<f64> {
+        let mut velocities = vec![[[0.0; WIDTH]; 3]; self.order.len()];
+        let mut out = DMatrix::zeros(3 * points.len(), self.order.len());
+        for (first, block) in (0..).step_by(WIDTH).zip(points.chunks(WIDTH)) {
+            self.velocities(arm, block, &mut velocities);
+            for (mut column, velocity) in out.column_iter_mut().zip(&velocities) {
+                for k in 0..block.len() {
+                    (0..3).for_each(|i| column[3 * (first + k) + i] = velocity[i][k]);
+                }
+            }
+        }
+        out
+    }
+
+    /// [`Estimated::position_jacobians`] of one point: 3 × p.
     pub fn position_jacobian(
         &self,
         arm: &PreparedModel<'_>,
         q: &Joints,
         flange_from_tool: &Pose,
     ) -> DMatrix<f64> {
-        let ends =
-            BaseAndTool { world_from_base: [0.0; 6], flange_from_tool: vector_from_pose(flange_from_tool) };
-        let full = parameter_jacobian(&ends, arm, q, &self.order);
-        DMatrix::from_fn(3, self.order.len(), |i, j| full[(i, j)])
+        let point = FlangePoint { joints: *q, flange_from_tool: *flange_from_tool, carried: None };
+        self.position_jacobians(arm, &[point])
     }
 }

@@ -131,6 +131,18 @@ impl Edits {
         }
     }
 
+    /// Extends the last edit to byte `end` of the source: by `between`, the bytes behind it that stay, and what `write` appends.
+    pub(crate) fn extend_last(&mut self, between: &[u8], end: usize, write: impl FnOnce(&mut Vec<u8>)) {
+        let Some(Part { entries, text }) = self.parts.last_mut() else { return };
+        let Some(entry) = entries.last_mut() else { return };
+        text.extend_from_slice(between);
+        write(text);
+        match (u32::try_from(end), u32::try_from(text.len())) {
+            (Ok(end), Ok(text_end)) => (entry.end, entry.text_end) = (end, text_end),
+            _ => self.too_long = true,
+        }
+    }
+
     /// Appends the edits of another list.
     pub fn append(&mut self, other: Edits) {
         self.too_long |= other.too_long;

@@ -24,7 +24,7 @@ use crate::plan::notes::{backlash_note, doubtful_effects_note, load_notes, unche
 use crate::plan::reason::OutcomeReason;
 use crate::plan::{MotionOutcome, Plan};
 use crate::risk::assessment::{Assessment, AssessmentSample, EstimateContext, assess_program};
-use crate::risk::placement::{AssessedTarget, PlacementChoice};
+use crate::risk::placement::PlacementChoice;
 use crate::search_budget;
 use crate::segment::corner::{CUT_MM, cut_of_lines};
 use crate::segment::joint_speed::{Pace, fastest};
@@ -172,14 +172,12 @@ fn assess(
     let Some(knowledge) = arms.knowledge else { return Assessment::default() };
     let chosen = AssessmentSample::of(listing, |motion| program.knows(motion));
     let loads = arms.loads(listing, options.loads.as_ref());
-    let at: BTreeMap<u32, AssessedTarget> = chosen
-        .motions()
-        .into_iter()
-        .filter_map(|motion| {
-            let load = loads.get(motion as usize).and_then(Option::as_ref);
-            Some((motion, program.commanded(motion, arms.conditions.condition_index([0; 6], load))?))
-        })
-        .collect();
+    let condition_indices: Vec<usize> = if loads.is_empty() {
+        vec![arms.conditions.condition_index([0; 6], None); listing.motions.len()]
+    } else {
+        loads.iter().map(|load| arms.conditions.condition_index([0; 6], load.as_ref())).collect()
+    };
+    let at = |motion: u32| program.commanded(motion, condition_indices[motion as usize]);
     let objects = frame_table.objects();
     let with = EstimateContext { conditions: &arms.conditions, knowledge };
     // Experiments correct every motion regardless of risk.

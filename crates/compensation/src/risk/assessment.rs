@@ -14,7 +14,7 @@ use crate::frames::frame_pair::ResolvedFrames;
 use crate::plan::reason::OutcomeReason;
 use crate::risk::cut_risk::{self, CutRisk, Judgement};
 use crate::risk::placement::{
-    self, AssessedTarget, ObjectPlacement, Placement, PlacementChoice, TargetDeviation, assess_placement,
+    self, AssessedTarget, ObjectPlacement, PathDeviation, Placement, PlacementChoice, assess_placement,
     evenly_spaced,
 };
 use crate::risk::probability::probability_of_harm;
@@ -100,20 +100,10 @@ impl AssessmentSample {
     pub(crate) fn of(listing: &Listing, reached: impl Fn(usize) -> bool) -> Self {
         let cuts: CutsOf = cut::of(listing);
         let mut of_object: BTreeMap<u32, [Vec<u32>; 2]> = BTreeMap::new();
-        // Motions of each cut, and the ends of other motions at which it begins.
-        let mut of_cut: BTreeMap<u32, [Vec<u32>; 2]> = BTreeMap::new();
+        let mut in_cuts: Vec<(u32, u32)> = Vec::with_capacity(listing.motions.len());
         for (index, motion) in (0_u32..).zip(&listing.motions) {
             let cut = cuts.root(index);
-            if let Some(root) = cut {
-                let begins = motion.previous.filter(|before| {
-                    let before_that = &listing.motions[*before as usize];
-                    cuts.root(*before) != cut
-                        && (before_that.tool, before_that.work_object) == (motion.tool, motion.work_object)
-                });
-                let [all, begin] = of_cut.entry(root).or_default();
-                all.push(index);
-                begin.extend(begins);
-            }
+            in_cuts.extend(cut.map(|root| (root, index)));
             if let Some(object) = motion.work_object.filter(|_| reached(index as usize)) {
                 of_object.entry(object).or_default()[usize::from(cut.is_none())].push(index);
             }
@@ -122,31 +112,34 @@ impl AssessmentSample {
         let objects = of_object.into_iter().map(|(object, [cuts, rest])| {
             (object, evenly_spaced(if cuts.is_empty() { &rest } else { &cuts }, placement::MOST_POINTS))
         });
-        let cuts = of_cut.into_values().filter_map(|[all, begin]| {
+        // Where a motion begins a cut: the end of one before it that is not part of the cut.
+        let begin = |(root, index): (u32, u32)| {
+            let motion = &listing.motions[index as usize];
+            let before = motion.previous.filter(|before| cuts.root(*before) != Some(root))?;
+            let before_that = &listing.motions[before as usize];
+            let same_frames =
+                (before_that.tool, before_that.work_object) == (motion.tool, motion.work_object);
+            same_frames.then_some(before)
+        };
+        // Stable: the motions of a cut stay in order.
+        in_cuts.sort_by_key(|(root, _)| *root);
+        let cuts = in_cuts.chunk_by(|a, b| a.0 == b.0).filter_map(|cut| {
+            let all: Vec<u32> = cut.iter().map(|(_, index)| *index).collect();
+            let begins = cut.iter().copied().filter_map(begin);
             let commanded: Vec<u32> =
-                begin.iter().chain(&all).copied().filter(|m| reached(*m as usize)).collect();
+                begins.chain(all.iter().copied()).filter(|m| reached(*m as usize)).collect();
             (!commanded.is_empty()).then(|| (all, evenly_spaced(&commanded, cut_risk::MOST_POINTS)))
         });
         Self { objects: objects.collect(), cuts: cuts.collect() }
     }
-
-    /// Every sampled motion, once.
-    pub(crate) fn motions(&self) -> Vec<u32> {
-        let objects = self.objects.iter().flat_map(|(_, motions)| motions);
-        let mut all: Vec<u32> =
-            objects.chain(self.cuts.iter().flat_map(|(_, commanded)| commanded)).copied().collect();
-        all.sort_unstable();
-        all.dedup();
-        all
-    }
 }
 
-/// Assesses a program. `at`: the targets of [`AssessmentSample::motions`], by motion. Work objects whose shape alone is
+/// Assesses a program. `at`: the target at the end of a sampled motion. Work objects whose shape alone is
 /// corrected are displaced in `list` to where the path really lies.
 pub(crate) fn assess_program(
     listing: &Listing,
     chosen: &AssessmentSample,
-    at: &BTreeMap<u32, AssessedTarget>,
+    at: &(dyn Fn(u32) -> Option<AssessedTarget> + Sync),
     list: &mut [ResolvedFrames],
     objects: &[u32],
     with: &EstimateContext<'_, '_>,
@@ -160,7 +153,7 @@ pub(crate) fn assess_program(
     };
     let mut taken: BTreeMap<u32, Placement> = BTreeMap::new();
     for (object, motions) in &chosen.objects {
-        let targets: Vec<AssessedTarget> = motions.iter().filter_map(|m| at.get(m).copied()).collect();
+        let targets: Vec<AssessedTarget> = motions.iter().filter_map(|m| at(*m)).collect();
         let name = &listing.work_objects[*object as usize].name;
         let found = assess_placement(name, &targets, list, conditions, knowledge, &out.posterior, choice);
         let Some((mut placement, displaced)) = found else { continue };
@@ -183,17 +176,16 @@ pub(crate) fn assess_program(
         .cuts
         .par_iter()
         .map(|(motions, commanded)| {
-            let targets: Vec<&AssessedTarget> = commanded.iter().filter_map(|m| at.get(m)).collect();
+            let targets: Vec<AssessedTarget> = commanded.iter().filter_map(|m| at(*m)).collect();
             let frames = &list[targets.first()?.frames_index];
             let object = listing.motions[motions[0] as usize].work_object?;
             let placement = *taken.get(&object)?;
-            let off: Vec<TargetDeviation> =
-                targets.iter().map(|t| TargetDeviation::of(t, frames, conditions, knowledge)).collect();
+            let off = PathDeviation::of(&targets, list, conditions, knowledge);
             let judgement = cut_risk::assess_cut(&off, knowledge, placement)?;
-            let weight = motions.len() as f64 / off.len() as f64;
+            let weight = motions.len() as f64 / targets.len() as f64;
             let carried = (!frames.real.holds_part)
                 .then(|| cut_risk::in_base(&judgement.registered, &frames.real.object));
-            Some((JudgedCut { placement, points: off.len(), weight, carried }, judgement))
+            Some((JudgedCut { placement, points: targets.len(), weight, carried }, judgement))
         })
         .collect();
     for ((motions, _), judged) in chosen.cuts.iter().zip(judged) {

@@ -3,9 +3,9 @@
 //! If only the shape of a path is corrected, the residual after its best rigid registration is assessed. The probability is
 //! in `probability`.
 
-use nalgebra::{DMatrix, DVector, Matrix3xX, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, Vector3, Vector6};
 
-use crate::risk::placement::{Placement, TargetDeviation};
+use crate::risk::placement::{PathDeviation, Placement};
 use crate::risk::registration::Registration;
 use truegrind_arm::estimated::{Estimated, RegisteredFrame};
 use truegrind_math::gram::add_products;
@@ -51,45 +51,36 @@ pub(crate) const MOST_POINTS: usize = 32;
 
 /// Assesses the points of a cut.
 pub(crate) fn assess_cut(
-    off: &[TargetDeviation],
+    off: &PathDeviation,
     knowledge: &Estimated,
     placement: Placement,
 ) -> Option<Judgement> {
-    let registration = Registration::of(&off.iter().map(|o| o.intended).collect::<Vec<_>>())?;
-    let twists = registration.twists(off.iter().map(|o| &o.jacobian));
-    let twist = registration.twist(off.iter().map(|o| &o.shift));
-    let mut square = 0.0;
-    let parameters = knowledge.order.len();
-    let mut toward = DVector::zeros(parameters);
-    let (mut shapes, mut places) =
-        (StackedRows::new(off.len(), parameters), StackedRows::new(off.len(), parameters));
-    for (k, point) in off.iter().enumerate() {
-        let mut shape = point.jacobian.clone();
-        for p in 0..shape.ncols() {
-            let moved = registration.shift(&twists.column(p).into_owned(), k);
-            (0..3).for_each(|i| shape[(i, p)] -= moved[i]);
+    let registration = Registration::of(&off.intended)?;
+    let count = off.shifts.len();
+    let twists = registration.twists(&off.jacobian);
+    let twist = registration.twist(off.shifts.iter().copied());
+    let shape_shifts: Vec<Vector3<f64>> =
+        off.shifts.iter().enumerate().map(|(k, shift)| shift - registration.shift(&twist, k)).collect();
+    let mut shape_jacobian = off.jacobian.clone();
+    for (mut column, twist) in shape_jacobian.column_iter_mut().zip(twists.column_iter()) {
+        let twist = twist.into_owned();
+        for (k, velocity) in column.as_mut_slice().as_chunks_mut().0.iter_mut().enumerate() {
+            *velocity = (Vector3::from(*velocity) - registration.shift(&twist, k)).into();
         }
-        let shift = match placement {
-            Placement::Shape => {
-                let shift = point.shift - registration.shift(&twist, k);
-                toward += shape.tr_mul(&shift);
-                shift
-            }
-            _ => {
-                places.set(k, &point.jacobian);
-                toward += point.jacobian.tr_mul(&point.shift);
-                point.shift
-            }
-        };
-        square += shift.norm_squared();
-        shapes.set(k, &shape);
     }
-    let of_shape = shapes.total_variance(&knowledge.covariance);
-    let variance = match placement {
-        Placement::Shape => of_shape,
-        _ => places.total_variance(&knowledge.covariance),
+    let of_shape = total_variance(&shape_jacobian, &knowledge.covariance);
+    let (shifts, jacobian, variance) = match placement {
+        Placement::Shape => (&shape_shifts, &shape_jacobian, of_shape),
+        _ => (&off.shifts, &off.jacobian, total_variance(&off.jacobian, &knowledge.covariance)),
     };
-    let rms = |sum: f64| (sum.max(0.0) / off.len() as f64).sqrt();
+    let square = shifts.iter().map(Vector3::norm_squared).sum();
+    let toward = |column: &[f64]| -> f64 {
+        let velocities = column.as_chunks().0.iter();
+        velocities.zip(shifts).map(|(velocity, shift)| Vector3::from(*velocity).dot(shift)).sum()
+    };
+    let columns = jacobian.column_iter().map(|column| toward(column.as_slice()));
+    let toward = DVector::from_iterator(jacobian.ncols(), columns);
+    let rms = |sum: f64| (sum.max(0.0) / count as f64).sqrt();
     let registered = RegisteredFrame {
         origin_mm: registration.centre.coords,
         twists: twists.column_iter().map(|twist| twist.into_owned()).collect(),
@@ -104,44 +95,33 @@ pub(crate) fn assess_cut(
     })
 }
 
-/// Jacobians of the points of a cut, one below the other: column-major, padded by zeros to whole groups of rows.
-struct StackedRows {
-    columns: Vec<f64>,
-    rows: usize,
-    parameters: usize,
-}
-
-impl StackedRows {
-    fn new(points: usize, parameters: usize) -> Self {
-        let rows = (3 * points).next_multiple_of(WIDTH);
-        Self { columns: vec![0.0; rows * parameters], rows, parameters }
+/// Σ tr(J C Jᵀ) over the points, whose Jacobians J are stacked (3 n × p), C the covariance of the parameters (p × p):
+/// tr(C Σ JᵀJ), whose sum over rows is vectorised.
+fn total_variance(jacobian: &DMatrix<f64>, covariance: &DMatrix<f64>) -> f64 {
+    let p = jacobian.ncols();
+    if p == 0 {
+        return 0.0;
     }
-
-    /// Sets the Jacobian (3 × p) of point `k`.
-    fn set(&mut self, k: usize, jacobian: &Matrix3xX<f64>) {
-        for (column, values) in self.columns.chunks_exact_mut(self.rows).zip(jacobian.column_iter()) {
-            column[3 * k..3 * k + 3].copy_from_slice(values.as_slice());
+    // Padded by zeros to whole groups of rows.
+    let rows = jacobian.nrows().next_multiple_of(WIDTH);
+    let padded;
+    let columns = if rows == jacobian.nrows() {
+        jacobian
+    } else {
+        padded = jacobian.clone().resize_vertically(rows, 0.0);
+        &padded
+    };
+    let mut products = DMatrix::zeros(p, p);
+    add_products(columns.as_slice(), rows, products.as_mut_slice());
+    // The lower triangle is filled.
+    let mut sum = 0.0;
+    for j in 0..p {
+        sum += covariance[(j, j)] * products[(j, j)];
+        for i in j + 1..p {
+            sum += 2.0 * covariance[(i, j)] * products[(i, j)];
         }
     }
-
-    /// Σ tr(J C Jᵀ) over the points, C the covariance of the parameters (p × p): tr(C Σ JᵀJ), whose sum over rows is vectorised.
-    fn total_variance(&self, covariance: &DMatrix<f64>) -> f64 {
-        let p = self.parameters;
-        if p == 0 {
-            return 0.0;
-        }
-        let mut products = DMatrix::zeros(p, p);
-        add_products(&self.columns, self.rows, products.as_mut_slice());
-        // The lower triangle is filled.
-        let mut sum = 0.0;
-        for j in 0..p {
-            sum += covariance[(j, j)] * products[(j, j)];
-            for i in j + 1..p {
-                sum += 2.0 * covariance[(i, j)] * products[(i, j)];
-            }
-        }
-        sum
-    }
+    sum
 }
 
 /// The registration of a cut expressed in the base, for a stationary work object.

@@ -6,7 +6,7 @@
 //! that best explains the path's deviations as the real position of the work object: what was taught or adjusted in place
 //! keeps its position, and only its shape is corrected. *Absolute* corrects both.
 
-use nalgebra::{Matrix3xX, Matrix6, Point3, Vector3, Vector6};
+use nalgebra::{DMatrix, Matrix3, Matrix6, Point3, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 
 use crate::condition::arm_conditions::ArmConditions;
@@ -14,7 +14,7 @@ use crate::frames::frame_pair::ResolvedFrames;
 use crate::risk::probability::probability_of_harm;
 use crate::risk::registration::Registration;
 use crate::risk::remedy::Remedy;
-use truegrind_arm::estimated::{Estimated, PosteriorComponent};
+use truegrind_arm::estimated::{Estimated, FlangePoint, PosteriorComponent};
 use truegrind_arm::model::Joints;
 use truegrind_math::se3::Pose;
 
@@ -78,42 +78,57 @@ pub(crate) struct AssessedTarget {
     pub(crate) condition_index: usize,
 }
 
-/// Deviation of a target and its derivative by the arm's parameters, in the axes of the work object.
+/// Deviations of the targets of a path and their derivatives by the arm's parameters, in the axes of the work object.
 #[derive(Debug, Clone)]
-pub(crate) struct TargetDeviation {
-    /// Intended position (mm).
-    pub(crate) intended: Point3<f64>,
+pub(crate) struct PathDeviation {
+    /// Intended positions (mm).
+    pub(crate) intended: Vec<Point3<f64>>,
     /// Reached minus intended (mm).
-    pub(crate) shift: Vector3<f64>,
-    /// Derivative of the position (3 × p), relative to the taught frame where there is one.
-    pub(crate) jacobian: Matrix3xX<f64>,
+    pub(crate) shifts: Vec<Vector3<f64>>,
+    /// Derivatives of the positions, one below the other (3 n × p), relative to the taught frame where there is one.
+    pub(crate) jacobian: DMatrix<f64>,
 }
 
-impl TargetDeviation {
+impl PathDeviation {
     /// Under the estimated arm.
     pub(crate) fn of(
-        target: &AssessedTarget,
-        frames: &ResolvedFrames,
+        targets: &[AssessedTarget],
+        list: &[ResolvedFrames],
         conditions: &ArmConditions<'_>,
         knowledge: &Estimated,
     ) -> Self {
-        let arm = conditions.arm(target.condition_index);
-        let flange = arm.forward(&target.joints);
-        let real = &frames.real;
-        let reached = real.target_of(&flange).translation.vector;
-        let tool = real.flange_from_tool(&flange);
-        let found = knowledge.position_jacobian(arm, &target.joints, &tool);
-        let mut jacobian = Matrix3xX::from_fn(found.ncols(), |i, k| found[(i, k)]);
-        if let Some(carried) = &frames.carried {
-            let lever = (flange * tool).translation.vector - carried.origin_mm;
-            for (k, twist) in carried.twists.iter().enumerate() {
-                let moved = twist.fixed_rows::<3>(0) + twist.fixed_rows::<3>(3).cross(&lever);
-                (0..3).for_each(|i| jacobian[(i, k)] -= moved[i]);
+        let mut out = Self {
+            intended: targets.iter().map(|target| target.intended.translation.vector.into()).collect(),
+            shifts: Vec::with_capacity(targets.len()),
+            jacobian: DMatrix::zeros(3 * targets.len(), knowledge.order.len()),
+        };
+        let mut into_object: Vec<Matrix3<f64>> = Vec::with_capacity(targets.len());
+        for run in targets.chunk_by(|a, b| a.condition_index == b.condition_index) {
+            let arm = conditions.arm(run[0].condition_index);
+            let first = into_object.len();
+            let mut points = Vec::with_capacity(run.len());
+            for target in run {
+                let ResolvedFrames { real, carried, .. } = &list[target.frames_index];
+                let flange = arm.forward(&target.joints);
+                out.shifts
+                    .push(real.target_of(&flange).translation.vector - target.intended.translation.vector);
+                let turn = real.base_from_object(&flange).rotation.inverse();
+                into_object.push(turn.to_rotation_matrix().into_inner());
+                points.push(FlangePoint {
+                    joints: target.joints,
+                    flange_from_tool: real.flange_from_tool(&flange),
+                    carried: carried.as_ref(),
+                });
+            }
+            let in_base = knowledge.position_jacobians(arm, &points);
+            out.jacobian.rows_mut(3 * first, 3 * run.len()).copy_from(&in_base);
+        }
+        for mut column in out.jacobian.column_iter_mut() {
+            for (turn, velocity) in into_object.iter().zip(column.as_mut_slice().as_chunks_mut().0) {
+                *velocity = (turn * Vector3::from(*velocity)).into();
             }
         }
-        let into_object = real.base_from_object(&flange).rotation.inverse().to_rotation_matrix();
-        let intended = Point3::from(target.intended.translation.vector);
-        Self { intended, shift: reached - intended.coords, jacobian: into_object.matrix() * jacobian }
+        out
     }
 }
 
@@ -156,20 +171,18 @@ pub(crate) fn assess_placement(
     choice: PlacementChoice,
 ) -> Option<(ObjectPlacement, Option<Pose>)> {
     let taught = targets.iter().any(|target| list[target.frames_index].carried.is_some());
-    let off: Vec<TargetDeviation> = targets
-        .iter()
-        .map(|target| TargetDeviation::of(target, &list[target.frames_index], conditions, knowledge))
-        .collect();
-    let registration = Registration::of(&off.iter().map(|o| o.intended).collect::<Vec<_>>())?;
-    let twist = registration.twist(off.iter().map(|o| &o.shift));
-    let squares = (0..off.len()).map(|k| registration.shift(&twist, k).norm_squared());
-    let deviation_mm = (squares.sum::<f64>() / off.len() as f64).sqrt();
-    let twists = registration.twists(off.iter().map(|o| &o.jacobian));
+    let off = PathDeviation::of(targets, list, conditions, knowledge);
+    let count = targets.len();
+    let registration = Registration::of(&off.intended)?;
+    let twist = registration.twist(off.shifts.iter().copied());
+    let squares = (0..count).map(|k| registration.shift(&twist, k).norm_squared());
+    let deviation_mm = (squares.sum::<f64>() / count as f64).sqrt();
+    let twists = registration.twists(&off.jacobian);
     let covariance: Matrix6<f64> = &twists * &knowledge.covariance * twists.transpose();
     let sigma_mm = registration.mean_square(&covariance).max(0.0).sqrt();
     let toward = twists.tr_mul(&registration.weighed(&twist));
-    let square = deviation_mm * deviation_mm * off.len() as f64;
-    let probability_of_harm = probability_of_harm(square, &toward, posterior, off.len());
+    let square = deviation_mm * deviation_mm * count as f64;
+    let probability_of_harm = probability_of_harm(square, &toward, posterior, count);
     let unlocated = targets.iter().any(|target| list[target.frames_index].unlocated);
     let accepted =
         !unlocated && accepts_position(deviation_mm, sigma_mm, probability_of_harm, choice.max_risk);
@@ -195,12 +208,14 @@ pub(crate) fn assess_placement(
 }
 
 /// The rigid motion that best maps the intended points to the reached ones: the linear solution, refined twice.
-fn displacement(registration: &Registration, off: &[TargetDeviation], first: Vector6<f64>) -> Pose {
+fn displacement(registration: &Registration, off: &PathDeviation, first: Vector6<f64>) -> Pose {
     let mut motion = registration.motion(&first);
     for _ in 0..2 {
-        let left: Vec<Vector3<f64>> =
-            off.iter().map(|o| motion.inverse() * (o.intended + o.shift) - o.intended).collect();
-        motion *= registration.motion(&registration.twist(left.iter()));
+        let left = |(intended, shift): (&Point3<f64>, &Vector3<f64>)| {
+            motion.inverse() * (intended + shift) - intended
+        };
+        let left = registration.twist(off.intended.iter().zip(&off.shifts).map(left));
+        motion *= registration.motion(&left);
     }
     motion
 }

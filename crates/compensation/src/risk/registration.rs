@@ -4,7 +4,7 @@
 //! and ω = (Σ (|r|² I − r rᵀ) + n ℓ² I)⁻¹ Σ r × d with r = p − c (Horn 1987 for small motions). ℓ keeps rotations that the
 //! points do not determine, about a line or a single point, at zero.
 
-use nalgebra::{Matrix3, Matrix3xX, Matrix6, Matrix6xX, Point3, Vector3, Vector6};
+use nalgebra::{DMatrix, Matrix3, Matrix6, Matrix6xX, Point3, Vector3, Vector6};
 
 use truegrind_math::se3::Pose;
 
@@ -40,11 +40,11 @@ impl Registration {
     }
 
     /// Twist (mm, rad) about the centroid that best explains the displacements `shifts` of the points.
-    pub(crate) fn twist<'a>(&self, shifts: impl Iterator<Item = &'a Vector3<f64>>) -> Vector6<f64> {
+    pub(crate) fn twist(&self, shifts: impl Iterator<Item = Vector3<f64>>) -> Vector6<f64> {
         let (mut sum, mut moment) = (Vector3::zeros(), Vector3::zeros());
         for (shift, lever) in shifts.zip(&self.levers) {
             sum += shift;
-            moment += lever.cross(shift);
+            moment += lever.cross(&shift);
         }
         let (v, w) = (sum / self.levers.len() as f64, self.turning * moment);
         Vector6::new(v.x, v.y, v.z, w.x, w.y, w.z)
@@ -55,18 +55,12 @@ impl Registration {
         twist.fixed_rows::<3>(0) + twist.fixed_rows::<3>(3).cross(&self.levers[k])
     }
 
-    /// The twists that best explain the points' velocities, one column per column of `jacobians` (one for each point).
-    pub(crate) fn twists<'a>(
-        &self,
-        jacobians: impl Iterator<Item = &'a Matrix3xX<f64>> + Clone,
-    ) -> Matrix6xX<f64> {
-        let parameters = jacobians.clone().next().map_or(0, Matrix3xX::ncols);
-        let mut out = Matrix6xX::zeros(parameters);
-        let mut shifts = Vec::with_capacity(self.levers.len());
-        for p in 0..parameters {
-            shifts.clear();
-            shifts.extend(jacobians.clone().map(|j| j.column(p).into_owned()));
-            out.set_column(p, &self.twist(shifts.iter()));
+    /// The twists that best explain the points' velocities, one column per column of `jacobian` (3 n × p).
+    pub(crate) fn twists(&self, jacobian: &DMatrix<f64>) -> Matrix6xX<f64> {
+        let mut out = Matrix6xX::zeros(jacobian.ncols());
+        for (mut twist, column) in out.column_iter_mut().zip(jacobian.column_iter()) {
+            let velocities = column.as_slice().as_chunks().0;
+            twist.copy_from(&self.twist(velocities.iter().map(|velocity| Vector3::from(*velocity))));
         }
         out
     }

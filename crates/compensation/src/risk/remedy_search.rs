@@ -15,7 +15,7 @@ use crate::condition::arm_conditions::ArmConditions;
 use crate::frames::frame_pair::{ResolvedFrames, carried_through};
 use crate::frames::taught::taught_frame;
 use crate::risk::measurement_information::{FREE, PriorSigma, Readings, SensorPosition, factor, updated};
-use crate::risk::placement::{AssessedTarget, TargetDeviation, accepts_position, evenly_spaced};
+use crate::risk::placement::{AssessedTarget, PathDeviation, accepts_position, evenly_spaced};
 use crate::risk::registration::Registration;
 use crate::risk::remedy::{Measurement, Remedy};
 use truegrind_arm::estimated::{Estimated, RegisteredFrame};
@@ -140,7 +140,7 @@ struct TouchEffect {
 /// Present knowledge of the path's position.
 struct CurrentKnowledge {
     registration: Registration,
-    off: Vec<TargetDeviation>,
+    off: PathDeviation,
     /// Present position, and its derivative by the arm's parameters.
     twist: Vector6<f64>,
     twists: DMatrix<f64>,
@@ -153,8 +153,8 @@ struct CurrentKnowledge {
 impl CurrentKnowledge {
     fn of(place: &UnknownPlacement<'_, '_>) -> Option<Self> {
         let off = place.off(None);
-        let registration = Registration::of(&off.iter().map(|o| o.intended).collect::<Vec<_>>())?;
-        let twist = registration.twist(off.iter().map(|o| &o.shift));
+        let registration = Registration::of(&off.intended)?;
+        let twist = registration.twist(off.shifts.iter().copied());
         let twists = twists_of(&registration, &off);
         let mut weights = Matrix6::zeros();
         for k in 0..6 {
@@ -197,17 +197,13 @@ impl CurrentKnowledge {
         let Some(first) = place.targets.first() else { return TouchEffect { twists, adds } };
         let object = place.list[first.frames_index].real.object;
         for touch_sigma_twists in &touched.touch_sigma_twists {
-            let shifts: Vec<Vector3<f64>> = self
-                .off
-                .iter()
-                .map(|o| {
-                    let lever = (object * o.intended).coords - touched.carried.origin_mm;
-                    let moved: Vector3<f64> = touch_sigma_twists.fixed_rows::<3>(0)
-                        + touch_sigma_twists.fixed_rows::<3>(3).cross(&lever);
-                    object.rotation.inverse() * moved
-                })
-                .collect();
-            let twist = self.registration.twist(shifts.iter());
+            let shift = |intended: &Point3<f64>| {
+                let lever = (object * intended).coords - touched.carried.origin_mm;
+                let moved: Vector3<f64> = touch_sigma_twists.fixed_rows::<3>(0)
+                    + touch_sigma_twists.fixed_rows::<3>(3).cross(&lever);
+                object.rotation.inverse() * moved
+            };
+            let twist = self.registration.twist(self.off.intended.iter().map(shift));
             adds += twist * twist.transpose();
         }
         TouchEffect { twists, adds }
@@ -222,13 +218,13 @@ impl CurrentKnowledge {
         let square = total(&expected);
         let along = (self.weights * left * self.weights * expected).trace() / square;
         let chance = 0.5 * normal_two_sided(0.5 * (square / along).sqrt());
-        let deviation_mm = (square / self.off.len() as f64).sqrt();
+        let deviation_mm = (square / self.off.shifts.len() as f64).sqrt();
         accepts_position(deviation_mm, sigma_mm, chance, max_risk)
     }
 }
 
-fn twists_of(registration: &Registration, off: &[TargetDeviation]) -> DMatrix<f64> {
-    let twists = registration.twists(off.iter().map(|o| &o.jacobian));
+fn twists_of(registration: &Registration, off: &PathDeviation) -> DMatrix<f64> {
+    let twists = registration.twists(&off.jacobian);
     DMatrix::from_fn(6, twists.ncols(), |i, k| twists[(i, k)])
 }
 
@@ -242,16 +238,13 @@ impl UnknownPlacement<'_, '_> {
     }
 
     /// Deviation of each target, relative to a frame that moves with the arm where there is one.
-    fn off(&self, carried: Option<&RegisteredFrame>) -> Vec<TargetDeviation> {
+    fn off(&self, carried: Option<&RegisteredFrame>) -> PathDeviation {
         let against = |frames: &ResolvedFrames| match carried {
             Some(carried) => ResolvedFrames { carried: Some(carried.clone()), ..frames.clone() },
             None => frames.clone(),
         };
         let list: Vec<ResolvedFrames> = self.list.iter().map(against).collect();
-        self.targets
-            .iter()
-            .map(|t| TargetDeviation::of(t, &list[t.frames_index], self.conditions, self.knowledge))
-            .collect()
+        PathDeviation::of(self.targets, &list, self.conditions, self.knowledge)
     }
 
     /// `count` of the measured poses.

@@ -136,24 +136,32 @@ pub fn write(out: &mut Vec<u8>, value: f64, decimals: u8) {
         out.extend_from_slice(format!("{value:.*}", usize::from(decimals)).as_bytes());
         return;
     }
-    if units < 0.0 {
-        out.push(b'-');
-    }
-    let mut rest = units.abs() as u64;
-    let mut digits = [b'0'; 20];
-    let mut at = digits.len();
-    let least = digits.len() - usize::from(decimals) - 1;
-    while rest > 0 || at > least {
+    // From the last digit: fraction, point, whole part, sign.
+    let mut text = [0; 24];
+    let mut at = text.len();
+    let mut put = |byte: u8| {
         at -= 1;
-        digits[at] = b'0' + (rest % 10) as u8;
-        rest /= 10;
-    }
-    let point = digits.len() - usize::from(decimals);
-    out.extend_from_slice(&digits[at..point]);
+        text[at] = byte;
+    };
+    let mut rest = units.abs() as u64;
     if decimals > 0 {
-        out.push(b'.');
-        out.extend_from_slice(&digits[point..]);
+        for _ in 0..decimals {
+            put(b'0' + (rest % 10) as u8);
+            rest /= 10;
+        }
+        put(b'.');
     }
+    loop {
+        put(b'0' + (rest % 10) as u8);
+        rest /= 10;
+        if rest == 0 {
+            break;
+        }
+    }
+    if units < 0.0 {
+        put(b'-');
+    }
+    out.extend_from_slice(&text[at..]);
 }
 
 /// Writes a value with at most so many decimals and no trailing zeros.

@@ -18,6 +18,9 @@ const QUATERNION_NOISE: f64 = 1e-10;
 /// The same for joints (degrees).
 const JOINT_NOISE_DEG: f64 = 1e-9;
 
+/// Most bytes between two numbers that become one edit: a short number with its commas.
+const NEAR: usize = 16;
+
 /// The new value of a target; `None` keeps the old configuration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Fresh {
@@ -90,9 +93,18 @@ pub(super) fn replace_numbers(
     edits: &mut Edits,
 ) -> Option<bool> {
     let before = edits.len();
+    // Numbers beside each other on one line become one edit: the list is then half as long.
+    let mut last: Option<usize> = None;
     let mut put = |numbers: &Numbers, index: usize, value: f64, decimals: u8| {
         let (start, end) = numbers.spans[index];
-        edits.replace_with(at + start as usize..at + end as usize, |out| number::write(out, value, decimals));
+        let (start, end) = (start as usize, end as usize);
+        let write = |out: &mut Vec<u8>| number::write(out, value, decimals);
+        match last.replace(end).map(|last| &text[last..start]) {
+            Some(between) if between.len() <= NEAR && !between.contains(&b'\n') => {
+                edits.extend_last(between, at + end, write);
+            }
+            _ => edits.replace_with(at + start..at + end, write),
+        }
     };
     match fresh {
         Fresh::Cartesian { position_mm, quaternion, conf } => {

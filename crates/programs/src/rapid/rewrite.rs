@@ -206,8 +206,8 @@ impl<'r, 's> Rewriter<'r, 's> {
             .map(|(portion, changes)| {
                 let mut part = Rewriter::new(task, options);
                 if let [edits] = &mut part.edits[..] {
-                    // About eight numbers of a target change, each by a few digits.
-                    *edits = Edits::with_capacity(8 * changes.len(), 64 * changes.len());
+                    // Of a target the numbers before the external axes change, some 60 digits.
+                    *edits = Edits::with_capacity(changes.len(), 80 * changes.len());
                 }
                 let (mut updates, mut computed) = (UpdatesByDeclaration::new(), Vec::new());
                 let outcomes: Vec<Outcome> = (portion * PORTION..)

@@ -50,8 +50,8 @@ impl<'s> Task<'s> {
     pub fn read(files: &[(&str, &'s [u8])]) -> Task<'s> {
         let trees: Vec<_> = files.par_iter().map(|(_, bytes)| parse(bytes)).collect();
         let symbols = Box::new(Symbols::collect(&trees));
-        let (listing, guarded) = listing(&trees, &symbols);
-        let marks = trees.iter().map(mark::Places::of).collect();
+        let ((listing, guarded), marks) =
+            rayon::join(|| listing(&trees, &symbols), || trees.iter().map(mark::Places::of).collect());
         let names = files.iter().map(|(name, _)| (*name).to_owned()).collect();
         let sources = files.iter().map(|(_, bytes)| *bytes).collect();
         Task { names, sources, trees, symbols, listing, guarded, marks }

@@ -40,7 +40,7 @@ impl ListingBuilder<'_, '_> {
         Motion {
             place: self.place(unit.file, tree.nodes[node as usize].first),
             statement: tree.node_span(node),
-            instruction: "".into(),
+            instruction: Arc::default(),
             kind: MotionKind::Unknown,
             targets: Vec::new(),
             speed: None,
