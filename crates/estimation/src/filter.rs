@@ -75,6 +75,18 @@ fn finish(
     }
 }
 
+/// A filter that has processed all data.
+fn finish_processed(
+    objective: &Objective<'_>,
+    x: &DVector<f64>,
+    covariance: Option<DMatrix<f64>>,
+    trace: Vec<Iteration>,
+) -> Estimate {
+    let finite = trace.iter().all(|i| i.cost.is_finite());
+    let end = if finite { Termination::DataProcessed } else { Termination::NotFinite };
+    finish(objective, x, covariance, end, trace)
+}
+
 /// Makes a covariance exactly symmetric after a rounded update.
 fn symmetrise(matrix: &mut DMatrix<f64>) {
     for j in 0..matrix.ncols() {

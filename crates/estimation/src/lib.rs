@@ -54,6 +54,24 @@
 //! assert!((estimate.x[1] - 0.5).abs() < 3.0 * sigmas[1]);
 //! ```
 
+/// The options of a method: each field with its meaning and its default.
+macro_rules! options {
+    ($(#[$about:meta])* pub struct $name:ident { $($(#[$doc:meta])* pub $field:ident: $type:ty = $default:expr,)* }) => {
+        $(#[$about])*
+        #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+        #[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
+        pub struct $name {
+            $($(#[$doc])* pub $field: $type,)*
+        }
+
+        impl Default for $name {
+            fn default() -> Self {
+                Self { $($field: $default,)* }
+            }
+        }
+    };
+}
+
 pub mod problem;
 pub mod estimate;
 pub mod objective;

@@ -21,25 +21,19 @@ pub mod bas;
 pub mod qibas;
 
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
 use crate::estimate::{Estimate, Iteration, Termination};
 use crate::objective::Objective;
 use crate::problem::{Problem, prior_cost};
 
-/// The search box.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
-pub struct Region {
-    /// Half width of the box, in standard deviations of the prior.
-    pub reach: f64,
-    /// Half width for a parameter without a prior, in its own unit.
-    pub unknown_reach: f64,
-}
-
-impl Default for Region {
-    fn default() -> Self {
-        Self { reach: 3.0, unknown_reach: 1.0 }
+options! {
+    /// The search box.
+    #[derive(Copy)]
+    pub struct Region {
+        /// Half width of the box, in standard deviations of the prior.
+        pub reach: f64 = 3.0,
+        /// Half width for a parameter without a prior, in its own unit.
+        pub unknown_reach: f64 = 1.0,
     }
 }
 

@@ -278,7 +278,7 @@ impl Modal {
     };
 }
 
-/// One motion instruction.
+/// One motion instruction. More than twenty fields: whatever a motion of any language states.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Motion {
     /// The location of the instruction.

@@ -25,6 +25,7 @@ pub mod orientation;
 pub mod arc;
 pub mod setup;
 pub mod mark;
+mod modal_group;
 mod modal_state;
 mod task;
 mod rewrite;

@@ -20,23 +20,18 @@ use serde::{Deserialize, Serialize};
 use crate::chaos::map::Map;
 use truegrind_math::statistics::mean_and_deviation;
 
-/// Options of the count. The defaults are those of the paper, with many starts.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
-pub struct Options {
-    /// Points of each sequence.
-    pub points: usize,
-    /// Bins of equal width.
-    pub bins: usize,
-    /// Number of sequences, each from a different start.
-    pub starts: usize,
-    /// Seed of the starts.
-    pub seed: u64,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self { points: 1_000, bins: 50, starts: 100, seed: 0 }
+options! {
+    /// Options of the count. The defaults are those of the paper, with many starts.
+    #[derive(Copy)]
+    pub struct Options {
+        /// Points of each sequence.
+        pub points: usize = 1_000,
+        /// Bins of equal width.
+        pub bins: usize = 50,
+        /// Number of sequences, each from a different start.
+        pub starts: usize = 100,
+        /// Seed of the starts.
+        pub seed: u64 = 0,
     }
 }
 

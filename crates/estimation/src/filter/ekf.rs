@@ -22,42 +22,28 @@
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
-use serde::{Deserialize, Serialize};
 
 use crate::estimate::{Estimate, Iteration, Termination};
-use crate::filter::{Innovation, entry, finish, prior_state, symmetrise};
+use crate::filter::{Innovation, entry, finish, finish_processed, prior_state, symmetrise};
 use crate::least_squares::Form;
 use crate::objective::Objective;
 use crate::problem::{Problem, observations};
 
-/// Options of [`solve`].
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
-pub struct Options {
-    /// As printed or sound.
-    pub form: Form,
-    /// Number of sweeps over all observations.
-    pub sweeps: usize,
-    /// Linearisations within one observation.
-    pub iterations: usize,
-    /// Standard deviation of each parameter's drift from one observation to the next; empty for constant parameters.
-    pub process_sigma: Vec<f64>,
-    /// First standard deviation of a parameter without a prior.
-    pub unknown_sigma: f64,
-    /// Unused: the method is deterministic. Present so that all methods have the same fields.
-    pub seed: u64,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            form: Form::Robust,
-            sweeps: 1,
-            iterations: 1,
-            process_sigma: Vec::new(),
-            unknown_sigma: 1.0,
-            seed: 0,
-        }
+options! {
+    /// Options of [`solve`].
+    pub struct Options {
+        /// As printed or sound.
+        pub form: Form = Form::Robust,
+        /// Number of sweeps over all observations.
+        pub sweeps: usize = 1,
+        /// Linearisations within one observation.
+        pub iterations: usize = 1,
+        /// Standard deviation of each parameter's drift from one observation to the next; empty for constant parameters.
+        pub process_sigma: Vec<f64> = Vec::new(),
+        /// First standard deviation of a parameter without a prior.
+        pub unknown_sigma: f64 = 1.0,
+        /// Unused: the method is deterministic. Present so that all methods have the same fields.
+        pub seed: u64 = 0,
     }
 }
 
@@ -171,10 +157,5 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
         }
         trace.push(entry(&mut objective, &filter.x, (&filter.x - before).norm()));
     }
-    let end = if trace.iter().all(|i| i.cost.is_finite()) {
-        Termination::DataProcessed
-    } else {
-        Termination::NotFinite
-    };
-    finish(&objective, &filter.x, Some(filter.covariance), end, trace)
+    finish_processed(&objective, &filter.x, Some(filter.covariance), trace)
 }

@@ -27,33 +27,27 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
 use crate::estimate::{Estimate, Termination};
-use crate::filter::{entry, finish, prior_state};
+use crate::filter::{entry, finish, finish_processed, prior_state};
 use crate::least_squares::Form;
 use crate::objective::Objective;
 use crate::problem::{Problem, observations};
 
-/// Options of [`solve`].
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
-pub struct Options {
-    /// As printed or sound.
-    pub form: Form,
-    /// N.
-    pub particles: usize,
-    /// h of the kernel (sound): share of the spread that is resampled at each move.
-    pub kernel: f64,
-    /// First standard deviation of a parameter without a prior.
-    pub unknown_sigma: f64,
-    /// Seed of all random draws.
-    pub seed: u64,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self { form: Form::Robust, particles: 1_000, kernel: 0.5, unknown_sigma: 1.0, seed: 0 }
+options! {
+    /// Options of [`solve`].
+    #[derive(Copy)]
+    pub struct Options {
+        /// As printed or sound.
+        pub form: Form = Form::Robust,
+        /// N.
+        pub particles: usize = 1_000,
+        /// h of the kernel (sound): share of the spread that is resampled at each move.
+        pub kernel: f64 = 0.5,
+        /// First standard deviation of a parameter without a prior.
+        pub unknown_sigma: f64 = 1.0,
+        /// Seed of all random draws.
+        pub seed: u64 = 0,
     }
 }
 
@@ -185,9 +179,7 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
     let weights = cloud.weights().unwrap_or_else(|| vec![1.0 / n as f64; n]);
     let (x, covariance) = cloud.moments(&weights);
     trace.push(entry(&mut objective, &x, (&x - &mean).norm()));
-    let finite = trace.iter().all(|i| i.cost.is_finite());
-    let end = if finite { Termination::DataProcessed } else { Termination::NotFinite };
-    finish(&objective, &x, Some(covariance), end, trace)
+    finish_processed(&objective, &x, Some(covariance), trace)
 }
 
 /// The largest power of the likelihood, at most `left`, that keeps half of equally weighted particles

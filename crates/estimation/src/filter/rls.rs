@@ -33,7 +33,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::estimate::{Estimate, Termination};
 use crate::filter::ordered::Ordered;
-use crate::filter::{entry, finish, prior_state};
+use crate::filter::{entry, finish, finish_processed, prior_state};
 use crate::least_squares::damped::inverse_of_normal;
 use crate::objective::Objective;
 use crate::problem::{NormalEquations, Problem, observations};
@@ -60,34 +60,22 @@ pub enum Initial {
     FirstRows(usize),
 }
 
-/// Options of [`solve`].
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
-pub struct Options {
-    /// Stored form of the covariance.
-    pub memory: Memory,
-    /// Initial state of the recursion.
-    pub initial: Initial,
-    /// Forgetting factor ϕ: 1 for none, 0.99 for a memory of about a hundred rows.
-    pub forgetting: f64,
-    /// Passes over the data, each linearised at the result of the previous one.
-    pub linearisations: usize,
-    /// First standard deviation of a parameter without a prior.
-    pub unknown_sigma: f64,
-    /// Unused: the method is deterministic. Present so that all methods have the same fields.
-    pub seed: u64,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            memory: Memory::SquareRoot,
-            initial: Initial::Prior,
-            forgetting: 1.0,
-            linearisations: 1,
-            unknown_sigma: 1e3,
-            seed: 0,
-        }
+options! {
+    /// Options of [`solve`].
+    #[derive(Copy)]
+    pub struct Options {
+        /// Stored form of the covariance.
+        pub memory: Memory = Memory::SquareRoot,
+        /// Initial state of the recursion.
+        pub initial: Initial = Initial::Prior,
+        /// Forgetting factor ϕ: 1 for none, 0.99 for a memory of about a hundred rows.
+        pub forgetting: f64 = 1.0,
+        /// Passes over the data, each linearised at the result of the previous one.
+        pub linearisations: usize = 1,
+        /// First standard deviation of a parameter without a prior.
+        pub unknown_sigma: f64 = 1e3,
+        /// Unused: the method is deterministic. Present so that all methods have the same fields.
+        pub seed: u64 = 0,
     }
 }
 
@@ -271,9 +259,7 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
         last.damping = Some(options.forgetting);
         trace.push(last);
     }
-    let finite = trace.iter().all(|i| i.cost.is_finite());
-    let end = if finite { Termination::DataProcessed } else { Termination::NotFinite };
-    finish(&objective, &point, covariance, end, trace)
+    finish_processed(&objective, &point, covariance, trace)
 }
 
 /// x₀ = ξ − (A₀ᵀA₀)⁻¹A₀ᵀr and P₀ = (A₀ᵀA₀)⁻¹ of the first observations.

@@ -30,49 +30,33 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use serde::{Deserialize, Serialize};
 
 use crate::estimate::{Estimate, Termination};
-use crate::filter::{Innovation, entry, finish, prior_state, symmetrise};
+use crate::filter::{Innovation, entry, finish, finish_processed, prior_state, symmetrise};
 use crate::least_squares::Form;
 use crate::objective::Objective;
 use crate::problem::{Problem, observations};
 
-/// Options of [`solve`].
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
-pub struct Options {
-    /// As printed or sound.
-    pub form: Form,
-    /// Number of sweeps over all observations; in the sound form each sweep weights a row by 1 / sweeps.
-    pub sweeps: usize,
-    /// α: distance of the sigma points in standard deviations, divided by √(p + κ) (sound).
-    pub alpha: f64,
-    /// β: 2 for a normal distribution (sound).
-    pub beta: f64,
-    /// κ (sound).
-    pub kappa: f64,
-    /// Standard deviation of each parameter's drift from one observation to the next (sound); empty for constant
-    /// parameters.
-    pub process_sigma: Vec<f64>,
-    /// First standard deviation of a parameter without a prior.
-    pub unknown_sigma: f64,
-    /// Seed of the random P of the printed form.
-    pub seed: u64,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            form: Form::Robust,
-            sweeps: 1,
-            alpha: 0.1,
-            beta: 2.0,
-            kappa: 0.0,
-            process_sigma: Vec::new(),
-            unknown_sigma: 1.0,
-            seed: 0,
-        }
+options! {
+    /// Options of [`solve`].
+    pub struct Options {
+        /// As printed or sound.
+        pub form: Form = Form::Robust,
+        /// Number of sweeps over all observations; in the sound form each sweep weights a row by 1 / sweeps.
+        pub sweeps: usize = 1,
+        /// α: distance of the sigma points in standard deviations, divided by √(p + κ) (sound).
+        pub alpha: f64 = 0.1,
+        /// β: 2 for a normal distribution (sound).
+        pub beta: f64 = 2.0,
+        /// κ (sound).
+        pub kappa: f64 = 0.0,
+        /// Standard deviation of each parameter's drift from one observation to the next (sound); empty for constant
+        /// parameters.
+        pub process_sigma: Vec<f64> = Vec::new(),
+        /// First standard deviation of a parameter without a prior.
+        pub unknown_sigma: f64 = 1.0,
+        /// Seed of the random P of the printed form.
+        pub seed: u64 = 0,
     }
 }
 
@@ -208,12 +192,7 @@ fn sound(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimate {
         }
         trace.push(entry(&mut objective, &filter.x, (&filter.x - before).norm()));
     }
-    let end = if trace.iter().all(|i| i.cost.is_finite()) {
-        Termination::DataProcessed
-    } else {
-        Termination::NotFinite
-    };
-    finish(&objective, &filter.x, Some(filter.covariance), end, trace)
+    finish_processed(&objective, &filter.x, Some(filter.covariance), trace)
 }
 
 fn printed(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimate {
@@ -269,12 +248,7 @@ fn printed(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimate 
         }
         trace.push(entry(&mut objective, &x, (&x - before).norm()));
     }
-    let end = if trace.iter().all(|i| i.cost.is_finite()) {
-        Termination::DataProcessed
-    } else {
-        Termination::NotFinite
-    };
-    finish(&objective, &x, Some(covariance), end, trace)
+    finish_processed(&objective, &x, Some(covariance), trace)
 }
 
 /// Cholesky factor of a matrix that rounding can have made indefinite: pivots below rounding are set to zero. Column by

@@ -16,8 +16,6 @@
 //! **Checked against** linear problems (one step is exact) and the published minima that Gauss–Newton can
 //! reach.
 
-use serde::{Deserialize, Serialize};
-
 use crate::estimate::{Estimate, Termination};
 use crate::least_squares::damped::{DampedSystem, Linearisation};
 use crate::least_squares::search::Point;
@@ -25,40 +23,26 @@ use crate::least_squares::{Factorisation, Form};
 use crate::objective::Objective;
 use crate::problem::Problem;
 
-/// Options of [`solve`].
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
-pub struct Options {
-    /// As printed or sound.
-    pub form: Form,
-    /// How the step is computed.
-    pub factorisation: Factorisation,
-    /// Whether the priors of the problem are used.
-    pub priors: bool,
-    /// Step limit.
-    pub max_iterations: usize,
-    /// Stop when the predicted reduction is below this share of the cost (sound).
-    pub cost_tolerance: f64,
-    /// Stop when the largest cosine between residuals and a column of J is below this (sound).
-    pub gradient_tolerance: f64,
-    /// Stop when the cost itself is below this (sound).
-    pub small_cost: f64,
-    /// Unused: the method is deterministic. Present so that all methods have the same fields.
-    pub seed: u64,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            form: Form::Robust,
-            factorisation: Factorisation::Cholesky,
-            priors: true,
-            max_iterations: 50,
-            cost_tolerance: 1e-10,
-            gradient_tolerance: 1e-12,
-            small_cost: 1e-20,
-            seed: 0,
-        }
+options! {
+    /// Options of [`solve`].
+    #[derive(Copy)]
+    pub struct Options {
+        /// As printed or sound.
+        pub form: Form = Form::Robust,
+        /// How the step is computed.
+        pub factorisation: Factorisation = Factorisation::Cholesky,
+        /// Whether the priors of the problem are used.
+        pub priors: bool = true,
+        /// Step limit.
+        pub max_iterations: usize = 50,
+        /// Stop when the predicted reduction is below this share of the cost (sound).
+        pub cost_tolerance: f64 = 1e-10,
+        /// Stop when the largest cosine between residuals and a column of J is below this (sound).
+        pub gradient_tolerance: f64 = 1e-12,
+        /// Stop when the cost itself is below this (sound).
+        pub small_cost: f64 = 1e-20,
+        /// Unused: the method is deterministic. Present so that all methods have the same fields.
+        pub seed: u64 = 0,
     }
 }
 

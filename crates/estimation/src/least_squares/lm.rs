@@ -37,7 +37,6 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use serde::{Deserialize, Serialize};
 
 use crate::estimate::{Estimate, Termination};
 use crate::least_squares::damped::{DampedSystem, Linearisation};
@@ -46,49 +45,32 @@ use crate::least_squares::{Factorisation, Form};
 use crate::objective::Objective;
 use crate::problem::Problem;
 
-/// Options of [`solve`]. The comments state which form uses a field if only one does.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
-pub struct Options {
-    /// As printed or sound.
-    pub form: Form,
-    /// How the step is computed.
-    pub factorisation: Factorisation,
-    /// μ of the printed form, in the square of residual per parameter unit; 5 in the paper.
-    pub mu: f64,
-    /// First μ of the sound form, a pure number: relative to a unit diagonal.
-    pub initial_damping: f64,
-    /// Whether the priors of the problem are used. The paper has none.
-    pub priors: bool,
-    /// Limit of trial steps.
-    pub max_iterations: usize,
-    /// Stop when the predicted reduction is below this share of the cost.
-    pub cost_tolerance: f64,
-    /// Stop when the largest cosine between residuals and a column of J is below this (sound).
-    pub gradient_tolerance: f64,
-    /// Stop when the step is below this share of the parameters.
-    pub step_tolerance: f64,
-    /// Stop when the cost itself is below this. Residuals are in units of their σ, so this is an absolute value.
-    pub small_cost: f64,
-    /// Seed for the choice of observations on which a large problem is first solved; unused otherwise.
-    pub seed: u64,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            form: Form::Robust,
-            factorisation: Factorisation::Cholesky,
-            mu: 5.0,
-            initial_damping: 1e-6,
-            priors: true,
-            max_iterations: 200,
-            cost_tolerance: 1e-10,
-            gradient_tolerance: 1e-12,
-            step_tolerance: 1e-14,
-            small_cost: 1e-20,
-            seed: 0,
-        }
+options! {
+    /// Options of [`solve`]. The comments state which form uses a field if only one does.
+    #[derive(Copy)]
+    pub struct Options {
+        /// As printed or sound.
+        pub form: Form = Form::Robust,
+        /// How the step is computed.
+        pub factorisation: Factorisation = Factorisation::Cholesky,
+        /// μ of the printed form, in the square of residual per parameter unit; 5 in the paper.
+        pub mu: f64 = 5.0,
+        /// First μ of the sound form, a pure number: relative to a unit diagonal.
+        pub initial_damping: f64 = 1e-6,
+        /// Whether the priors of the problem are used. The paper has none.
+        pub priors: bool = true,
+        /// Limit of trial steps.
+        pub max_iterations: usize = 200,
+        /// Stop when the predicted reduction is below this share of the cost.
+        pub cost_tolerance: f64 = 1e-10,
+        /// Stop when the largest cosine between residuals and a column of J is below this (sound).
+        pub gradient_tolerance: f64 = 1e-12,
+        /// Stop when the step is below this share of the parameters.
+        pub step_tolerance: f64 = 1e-14,
+        /// Stop when the cost itself is below this. Residuals are in units of their σ, so this is an absolute value.
+        pub small_cost: f64 = 1e-20,
+        /// Seed for the choice of observations on which a large problem is first solved; unused otherwise.
+        pub seed: u64 = 0,
     }
 }
 

@@ -23,8 +23,6 @@
 //!
 //! **Checked against** `lm` on the same published problems, and the counts above.
 
-use serde::{Deserialize, Serialize};
-
 use crate::chaos::map::{Map, Sequence};
 use crate::estimate::{Estimate, Termination};
 use crate::least_squares::damped::{DampedSystem, Linearisation};
@@ -33,58 +31,38 @@ use crate::least_squares::{Factorisation, Form};
 use crate::objective::Objective;
 use crate::problem::Problem;
 
-/// Options of [`solve`].
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
-pub struct Options {
-    /// As printed or sound.
-    pub form: Form,
-    /// How the two steps are computed.
-    pub factorisation: Factorisation,
-    /// μ of the printed form; 5 in the paper.
-    pub mu: f64,
-    /// First μ of the sound form, a pure number.
-    pub initial_damping: f64,
-    /// M: candidates on each side. Not stated in the paper.
-    pub candidates: usize,
-    /// Whether x₂ is also a candidate (sound), unlike in the paper's eq. 18.
-    pub second_step: bool,
-    /// The map that spreads the candidates: eq. 11 with r = 0.5.
-    pub map: Map,
-    /// N₀: where the sequence starts. Not stated in the paper.
-    pub first: f64,
-    /// Whether the priors of the problem are used. The paper has none.
-    pub priors: bool,
-    /// K: most iterations. Not stated in the paper.
-    pub max_iterations: usize,
-    /// Stop when the predicted reduction (as printed: the relative change) is below this share of the cost.
-    pub cost_tolerance: f64,
-    /// Stop when the largest cosine between residuals and a column of J is below this (sound).
-    pub gradient_tolerance: f64,
-    /// Stop when the cost itself is below this.
-    pub small_cost: f64,
-    /// Unused: `map` and `first` determine the sequence. Present so that all methods have the same fields.
-    pub seed: u64,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            form: Form::Robust,
-            factorisation: Factorisation::Cholesky,
-            mu: 5.0,
-            initial_damping: 1e-6,
-            candidates: 10,
-            second_step: true,
-            map: Map::LogisticTent { r: 0.5 },
-            first: 0.37,
-            priors: true,
-            max_iterations: 60,
-            cost_tolerance: 1e-10,
-            gradient_tolerance: 1e-12,
-            small_cost: 1e-20,
-            seed: 0,
-        }
+options! {
+    /// Options of [`solve`].
+    #[derive(Copy)]
+    pub struct Options {
+        /// As printed or sound.
+        pub form: Form = Form::Robust,
+        /// How the two steps are computed.
+        pub factorisation: Factorisation = Factorisation::Cholesky,
+        /// μ of the printed form; 5 in the paper.
+        pub mu: f64 = 5.0,
+        /// First μ of the sound form, a pure number.
+        pub initial_damping: f64 = 1e-6,
+        /// M: candidates on each side. Not stated in the paper.
+        pub candidates: usize = 10,
+        /// Whether x₂ is also a candidate (sound), unlike in the paper's eq. 18.
+        pub second_step: bool = true,
+        /// The map that spreads the candidates: eq. 11 with r = 0.5.
+        pub map: Map = Map::LogisticTent { r: 0.5 },
+        /// N₀: where the sequence starts. Not stated in the paper.
+        pub first: f64 = 0.37,
+        /// Whether the priors of the problem are used. The paper has none.
+        pub priors: bool = true,
+        /// K: most iterations. Not stated in the paper.
+        pub max_iterations: usize = 60,
+        /// Stop when the predicted reduction (as printed: the relative change) is below this share of the cost.
+        pub cost_tolerance: f64 = 1e-10,
+        /// Stop when the largest cosine between residuals and a column of J is below this (sound).
+        pub gradient_tolerance: f64 = 1e-12,
+        /// Stop when the cost itself is below this.
+        pub small_cost: f64 = 1e-20,
+        /// Unused: `map` and `first` determine the sequence. Present so that all methods have the same fields.
+        pub seed: u64 = 0,
     }
 }
 

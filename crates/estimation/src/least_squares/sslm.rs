@@ -17,8 +17,6 @@
 //!
 //! **Checked against** published minima.
 
-use serde::{Deserialize, Serialize};
-
 use crate::estimate::{Estimate, Termination};
 use crate::least_squares::damped::{DampedSystem, Linearisation};
 use crate::least_squares::search::Point;
@@ -26,52 +24,34 @@ use crate::least_squares::{Factorisation, Form, vslm};
 use crate::objective::Objective;
 use crate::problem::Problem;
 
-/// Options of [`solve`].
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
-pub struct Options {
-    /// As printed or sound.
-    pub form: Form,
-    /// λ of the printed form.
-    pub lambda: f64,
-    /// δ₀ of the printed form.
-    pub step_size: f64,
-    /// Decay factor of δ in the printed form.
-    pub decay_factor: f64,
-    /// Damping of the sound form, a pure number.
-    pub damping: f64,
-    /// How the sound form computes its direction.
-    pub factorisation: Factorisation,
-    /// Whether the priors of the problem are used.
-    pub priors: bool,
-    /// Iteration limit.
-    pub max_iterations: usize,
-    /// Stop when the predicted reduction (as printed: the relative change) is below this share of the cost.
-    pub cost_tolerance: f64,
-    /// Stop when the largest cosine between residuals and a column of J is below this (sound).
-    pub gradient_tolerance: f64,
-    /// Stop when the cost itself is below this.
-    pub small_cost: f64,
-    /// Unused: the method is deterministic. Present so that all methods have the same fields.
-    pub seed: u64,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            form: Form::Robust,
-            lambda: 5.0,
-            step_size: 0.8,
-            decay_factor: 0.95,
-            damping: 1e-6,
-            factorisation: Factorisation::Cholesky,
-            priors: true,
-            max_iterations: 200,
-            cost_tolerance: 1e-10,
-            gradient_tolerance: 1e-12,
-            small_cost: 1e-20,
-            seed: 0,
-        }
+options! {
+    /// Options of [`solve`].
+    #[derive(Copy)]
+    pub struct Options {
+        /// As printed or sound.
+        pub form: Form = Form::Robust,
+        /// λ of the printed form.
+        pub lambda: f64 = 5.0,
+        /// δ₀ of the printed form.
+        pub step_size: f64 = 0.8,
+        /// Decay factor of δ in the printed form.
+        pub decay_factor: f64 = 0.95,
+        /// Damping of the sound form, a pure number.
+        pub damping: f64 = 1e-6,
+        /// How the sound form computes its direction.
+        pub factorisation: Factorisation = Factorisation::Cholesky,
+        /// Whether the priors of the problem are used.
+        pub priors: bool = true,
+        /// Iteration limit.
+        pub max_iterations: usize = 200,
+        /// Stop when the predicted reduction (as printed: the relative change) is below this share of the cost.
+        pub cost_tolerance: f64 = 1e-10,
+        /// Stop when the largest cosine between residuals and a column of J is below this (sound).
+        pub gradient_tolerance: f64 = 1e-12,
+        /// Stop when the cost itself is below this.
+        pub small_cost: f64 = 1e-20,
+        /// Unused: the method is deterministic. Present so that all methods have the same fields.
+        pub seed: u64 = 0,
     }
 }
 

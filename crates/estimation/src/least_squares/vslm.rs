@@ -42,58 +42,38 @@ pub enum Decay {
     PerIteration,
 }
 
-/// Options of [`solve`].
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
-pub struct Options {
-    /// As printed or sound.
-    pub form: Form,
-    /// When δ decays (as printed).
-    pub decay: Decay,
-    /// λ of the printed form. Not stated in the paper.
-    pub lambda: f64,
-    /// δ₀: first step size.
-    pub step_size: f64,
-    /// μ: decay factor of δ.
-    pub decay_factor: f64,
-    /// Whether each iteration restarts from the initial point (Algorithm 1 line 17; as printed).
-    pub restart: bool,
-    /// How the sound form computes its step.
-    pub factorisation: Factorisation,
-    /// First damping of the sound form, a pure number.
-    pub initial_damping: f64,
-    /// Whether the priors of the problem are used.
-    pub priors: bool,
-    /// Iteration limit.
-    pub max_iterations: usize,
-    /// Stop when the predicted reduction (as printed: the relative change) is below this share of the cost.
-    pub cost_tolerance: f64,
-    /// Stop when the largest cosine between residuals and a column of J is below this (sound).
-    pub gradient_tolerance: f64,
-    /// Stop when the cost itself is below this.
-    pub small_cost: f64,
-    /// Unused: the method is deterministic. Present so that all methods have the same fields.
-    pub seed: u64,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            form: Form::Robust,
-            decay: Decay::PerIteration,
-            lambda: 5.0,
-            step_size: 0.8,
-            decay_factor: 0.95,
-            restart: false,
-            factorisation: Factorisation::Cholesky,
-            initial_damping: 1e-6,
-            priors: true,
-            max_iterations: 200,
-            cost_tolerance: 1e-10,
-            gradient_tolerance: 1e-12,
-            small_cost: 1e-20,
-            seed: 0,
-        }
+options! {
+    /// Options of [`solve`].
+    #[derive(Copy)]
+    pub struct Options {
+        /// As printed or sound.
+        pub form: Form = Form::Robust,
+        /// When δ decays (as printed).
+        pub decay: Decay = Decay::PerIteration,
+        /// λ of the printed form. Not stated in the paper.
+        pub lambda: f64 = 5.0,
+        /// δ₀: first step size.
+        pub step_size: f64 = 0.8,
+        /// μ: decay factor of δ.
+        pub decay_factor: f64 = 0.95,
+        /// Whether each iteration restarts from the initial point (Algorithm 1 line 17; as printed).
+        pub restart: bool = false,
+        /// How the sound form computes its step.
+        pub factorisation: Factorisation = Factorisation::Cholesky,
+        /// First damping of the sound form, a pure number.
+        pub initial_damping: f64 = 1e-6,
+        /// Whether the priors of the problem are used.
+        pub priors: bool = true,
+        /// Iteration limit.
+        pub max_iterations: usize = 200,
+        /// Stop when the predicted reduction (as printed: the relative change) is below this share of the cost.
+        pub cost_tolerance: f64 = 1e-10,
+        /// Stop when the largest cosine between residuals and a column of J is below this (sound).
+        pub gradient_tolerance: f64 = 1e-12,
+        /// Stop when the cost itself is below this.
+        pub small_cost: f64 = 1e-20,
+        /// Unused: the method is deterministic. Present so that all methods have the same fields.
+        pub seed: u64 = 0,
     }
 }
 

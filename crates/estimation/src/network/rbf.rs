@@ -24,32 +24,25 @@
 
 use std::ops::Range;
 
-use serde::{Deserialize, Serialize};
-
 use crate::estimate::Estimate;
 use crate::least_squares::{Form, gauss_newton};
 use crate::problem::{Prior, Problem};
 use truegrind_math::radial;
 
-/// Options of a network and its training.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
-pub struct Options {
-    /// As printed or sound.
-    pub form: Form,
-    /// K (sound).
-    pub centres: usize,
-    /// ρ in fill distances (sound): 6 and more follow a smooth field better, 3 ends soon beyond the last centre.
-    pub reach: f64,
-    /// Prior standard deviation of a weight, in the unit of the outputs.
-    pub weight_sigma: f64,
-    /// Unused: the method is deterministic. Present so that all methods have the same fields.
-    pub seed: u64,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self { form: Form::Robust, centres: 24, reach: 3.0, weight_sigma: 1.0, seed: 0 }
+options! {
+    /// Options of a network and its training.
+    #[derive(Copy)]
+    pub struct Options {
+        /// As printed or sound.
+        pub form: Form = Form::Robust,
+        /// K (sound).
+        pub centres: usize = 24,
+        /// ρ in fill distances (sound): 6 and more follow a smooth field better, 3 ends soon beyond the last centre.
+        pub reach: f64 = 3.0,
+        /// Prior standard deviation of a weight, in the unit of the outputs.
+        pub weight_sigma: f64 = 1.0,
+        /// Unused: the method is deterministic. Present so that all methods have the same fields.
+        pub seed: u64 = 0,
     }
 }
 

@@ -27,50 +27,34 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
-use serde::{Deserialize, Serialize};
 
 use crate::estimate::Estimate;
 use crate::least_squares::Form;
 use crate::problem::Problem;
 use crate::swarm::{Region, Search, distance};
 
-/// Options of [`solve`].
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
-pub struct Options {
-    /// As printed or sound.
-    pub form: Form,
-    /// Iterations.
-    pub max_iterations: usize,
-    /// δ₀: first step, in half widths of the box.
-    pub step: f64,
-    /// d₀: first length of the antennae.
-    pub antennae: f64,
-    /// Decay factor of δ and d.
-    pub decay: f64,
-    /// Search box.
-    pub region: Region,
-    /// Whether the cost includes the priors of the problem.
-    pub priors: bool,
-    /// Stop when the cost is below this.
-    pub small_cost: f64,
-    /// Seed of all random draws.
-    pub seed: u64,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            form: Form::Robust,
-            max_iterations: 1_000,
-            step: 1.0,
-            antennae: 0.5,
-            decay: 0.95,
-            region: Region::default(),
-            priors: true,
-            small_cost: 1e-20,
-            seed: 0,
-        }
+options! {
+    /// Options of [`solve`].
+    #[derive(Copy)]
+    pub struct Options {
+        /// As printed or sound.
+        pub form: Form = Form::Robust,
+        /// Iterations.
+        pub max_iterations: usize = 1_000,
+        /// δ₀: first step, in half widths of the box.
+        pub step: f64 = 1.0,
+        /// d₀: first length of the antennae.
+        pub antennae: f64 = 0.5,
+        /// Decay factor of δ and d.
+        pub decay: f64 = 0.95,
+        /// Search box.
+        pub region: Region = Region::default(),
+        /// Whether the cost includes the priors of the problem.
+        pub priors: bool = true,
+        /// Stop when the cost is below this.
+        pub small_cost: f64 = 1e-20,
+        /// Seed of all random draws.
+        pub seed: u64 = 0,
     }
 }
 

@@ -18,50 +18,34 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use serde::{Deserialize, Serialize};
 
 use crate::estimate::Estimate;
 use crate::least_squares::Form;
 use crate::problem::Problem;
 use crate::swarm::{Region, Search, distance, uniform_position};
 
-/// Options of [`solve`].
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
-pub struct Options {
-    /// As printed or sound.
-    pub form: Form,
-    /// Members; 0 for ten times the number of parameters.
-    pub population: usize,
-    /// Generations.
-    pub max_iterations: usize,
-    /// F of the printed form.
-    pub factor: f64,
-    /// CR.
-    pub crossover: f64,
-    /// Search box.
-    pub region: Region,
-    /// Whether the cost includes the priors of the problem.
-    pub priors: bool,
-    /// Stop when the cost is below this.
-    pub small_cost: f64,
-    /// Seed of all random draws.
-    pub seed: u64,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            form: Form::Robust,
-            population: 0,
-            max_iterations: 300,
-            factor: 0.5,
-            crossover: 0.9,
-            region: Region::default(),
-            priors: true,
-            small_cost: 1e-20,
-            seed: 0,
-        }
+options! {
+    /// Options of [`solve`].
+    #[derive(Copy)]
+    pub struct Options {
+        /// As printed or sound.
+        pub form: Form = Form::Robust,
+        /// Members; 0 for ten times the number of parameters.
+        pub population: usize = 0,
+        /// Generations.
+        pub max_iterations: usize = 300,
+        /// F of the printed form.
+        pub factor: f64 = 0.5,
+        /// CR.
+        pub crossover: f64 = 0.9,
+        /// Search box.
+        pub region: Region = Region::default(),
+        /// Whether the cost includes the priors of the problem.
+        pub priors: bool = true,
+        /// Stop when the cost is below this.
+        pub small_cost: f64 = 1e-20,
+        /// Seed of all random draws.
+        pub seed: u64 = 0,
     }
 }
 

@@ -20,47 +20,32 @@ use std::f64::consts::TAU;
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use serde::{Deserialize, Serialize};
 
 use crate::estimate::Estimate;
 use crate::least_squares::Form;
 use crate::problem::Problem;
 use crate::swarm::{Region, Search, distance, uniform_position};
 
-/// Options of [`solve`].
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
-pub struct Options {
-    /// As printed or sound.
-    pub form: Form,
-    /// Members.
-    pub population: usize,
-    /// Iterations.
-    pub max_iterations: usize,
-    /// a: first size of the moves.
-    pub amplitude: f64,
-    /// Search box.
-    pub region: Region,
-    /// Whether the cost includes the priors of the problem.
-    pub priors: bool,
-    /// Stop when the cost is below this.
-    pub small_cost: f64,
-    /// Seed of all random draws.
-    pub seed: u64,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            form: Form::Robust,
-            population: 30,
-            max_iterations: 500,
-            amplitude: 2.0,
-            region: Region::default(),
-            priors: true,
-            small_cost: 1e-20,
-            seed: 0,
-        }
+options! {
+    /// Options of [`solve`].
+    #[derive(Copy)]
+    pub struct Options {
+        /// As printed or sound.
+        pub form: Form = Form::Robust,
+        /// Members.
+        pub population: usize = 30,
+        /// Iterations.
+        pub max_iterations: usize = 500,
+        /// a: first size of the moves.
+        pub amplitude: f64 = 2.0,
+        /// Search box.
+        pub region: Region = Region::default(),
+        /// Whether the cost includes the priors of the problem.
+        pub priors: bool = true,
+        /// Stop when the cost is below this.
+        pub small_cost: f64 = 1e-20,
+        /// Seed of all random draws.
+        pub seed: u64 = 0,
     }
 }
 

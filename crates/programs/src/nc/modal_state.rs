@@ -2,9 +2,9 @@
 //!
 //! [`ModalState::join`] merges the states of two control-flow paths.
 
-use super::arc::Plane;
 use super::dialect::Dialect;
 use super::expression::{Evaluated, Variable};
+use super::modal_group::{ALL_GROUPS, GroupTable, ModalGroup};
 use super::orientation::{Angles, spun};
 use crate::motion::{Frame, Reason};
 use crate::shared::Map;
@@ -39,94 +39,6 @@ pub(super) enum OrientationMode {
     /// A tool vector.
     Vector,
 }
-
-/// Modal groups: a word of a group stays in effect until another word of the same group.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u8)]
-pub(super) enum ModalGroup {
-    /// G90, G91.
-    DistanceMode,
-    /// G20, G21.
-    Unit,
-    /// G17, G18, G19.
-    Plane,
-    /// G54 and following.
-    WorkOffset,
-    /// G40 to G42.
-    RadiusCompensation,
-    /// G43.4, TRAORI, M128.
-    TcpMode,
-    /// T, M6 and TOOL CALL.
-    Tool,
-    /// G43, G49, H; the cutting edge D of Siemens.
-    ToolLength,
-    /// G92, G52.
-    CoordinateShift,
-    // Coordinate transforms. Each is a group of its own, because each has its own cancel word.
-    /// G15, G16.
-    Polar,
-    /// G50, G51; cycle 11.
-    Scaling,
-    /// G50.1, G51.1, G100, G101; cycle 8.
-    Mirror,
-    /// G68, G68.2, G69; cycle 10.
-    Rotation,
-    /// G12.1, G13.1: polar interpolation.
-    PolarPath,
-    /// G7.1, G107: cylindrical interpolation.
-    Cylinder,
-    /// G7, G8, DIAMON: diameter programming.
-    Diameter,
-    /// TRANSMIT, TRACYL, TRAANG.
-    Kinematic,
-    /// ORIMKS, ORIWKS.
-    OrientationFrame,
-    /// CYCLE800, PLANE, cycle 19, G268.
-    TiltedPlane,
-    /// TRANS, ROT, SCALE, MIRROR. The transform bit is set where they are not a known rigid motion.
-    ProgrammableFrame,
-    /// TOFRAME, TOROT.
-    ToolFrame,
-    /// PAROT.
-    PartFrame,
-    /// G54.2, G54.4, G254: offsets of the table.
-    FixtureOffset,
-    /// TRANS DATUM TABLE, cycle 7 with a row of the table.
-    DatumShift,
-    /// Cycle 26: one scale for each axis.
-    AxisScaling,
-    /// Offsets of A, B, C (G92 A0).
-    RotaryOffset,
-    // Groups that matter for some motions only.
-    /// G90.1, G91.1: absolute or incremental arc centres.
-    ArcCentreMode,
-    /// ORIRPY, ORIEULER.
-    RpyConvention,
-    /// ORIROTA, ORIROTR.
-    SpinReference,
-}
-
-impl ModalGroup {
-    /// The bit of the group in a set of groups.
-    pub(super) const fn bit(self) -> u32 {
-        1 << self as u32
-    }
-}
-
-pub(super) const GROUP_COUNT: u32 = ModalGroup::SpinReference as u32 + 1;
-
-pub(super) const ALL_GROUPS: u32 = (1 << GROUP_COUNT) - 1;
-
-/// Groups that matter for arcs only.
-pub(super) const ARC_GROUPS: u32 = ModalGroup::Plane.bit() | ModalGroup::ArcCentreMode.bit();
-
-/// Groups that select the tool and its length offset.
-pub(super) const TOOL_GROUPS: u32 = ModalGroup::Tool.bit() | ModalGroup::ToolLength.bit();
-
-/// Groups that matter for every motion. `RpyConvention` and `SpinReference` only interpret some words: where they are
-/// unknown, so are the values of those words.
-pub(super) const MOTION_GROUPS: u32 =
-    ALL_GROUPS & !(ARC_GROUPS | ModalGroup::RpyConvention.bit() | ModalGroup::SpinReference.bit());
 
 /// Work offsets or tools that the program assigns, by name in upper case.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -272,22 +184,10 @@ pub(super) enum ToolLength {
     None,
 }
 
-/// The abstract state of a control between two blocks.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct ModalState {
-    pub(super) mode: MotionMode,
-    /// Whether an unsupported path starts in the direction of the motion before it.
-    pub(super) starts_tangent: bool,
-    /// G90.
-    pub(super) absolute: bool,
-    /// mm per unit: 1 or 25.4.
-    pub(super) unit_mm: f64,
-    pub(super) plane: Plane,
-    /// G90.1.
-    pub(super) centre_absolute: bool,
-    /// Tool position in the work frame (mm), coordinate shift included.
-    pub(super) position: [Evaluated; 3],
-    pub(super) orientation_mode: OrientationMode,
+/// The words that state the tool orientation, and their values.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Orientation {
+    pub(super) mode: OrientationMode,
     /// A, B, C (°).
     pub(super) abc: [Evaluated; 3],
     /// A2, B2, C2 (°).
@@ -296,61 +196,112 @@ pub(super) struct ModalState {
     pub(super) vector: [Evaluated; 3],
     /// The rotation about the tool vector (°).
     pub(super) spin: Evaluated,
-    /// Whether A2, B2, C2 are roll, pitch, yaw (ORIRPY).
-    pub(super) rpy_convention_stated: bool,
-    /// The coordinate shift of G92 and G52, added to programmed values (mm).
-    pub(super) shift: [Evaluated; 3],
-    /// Whether G92 contributes to it.
-    pub(super) origin_set: bool,
-    /// G54, G500, …
-    pub(super) work_offset: String,
-    /// The datum shift of X, Y and Z (mm, Heidenhain); `None` where an axis is unknown.
-    pub(super) datum_shift: [Option<f64>; 3],
-    /// TRANS, ROT: a frame within the work frame.
-    pub(super) programmable_frame: Option<Pose>,
-    /// The coordinate transforms in effect, as a set of groups.
-    pub(super) active_transforms: u32,
-    /// G41, G42.
-    pub(super) radius_compensation: bool,
-    /// G43.4, TRAORI, M128.
-    pub(super) tcp_mode: bool,
-    /// G43.5: I, J, K are a tool vector.
-    pub(super) vector_words: bool,
-    pub(super) tool: String,
+}
+
+impl Orientation {
+    /// Unknown for this reason, but for the rotation about the tool vector.
+    fn unknown(because: Reason, spin: Evaluated) -> Orientation {
+        let none = [Err(because); 3];
+        Orientation { mode: OrientationMode::Unknown(because), abc: none, rpy: none, vector: none, spin }
+    }
+
+    fn join(&mut self, other: &Orientation) {
+        if self.mode != other.mode {
+            self.mode = OrientationMode::Unknown(Reason::UnknownFlow);
+        }
+        join_all(&mut self.abc, &other.abc);
+        join_all(&mut self.rpy, &other.rpy);
+        join_all(&mut self.vector, &other.vector);
+        join(&mut self.spin, &other.spin);
+    }
+}
+
+/// The tool in the spindle, and its length offset.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct ActiveTool {
+    pub(super) name: String,
     /// The tool that the next M6 changes to.
-    pub(super) next_tool: Option<String>,
-    pub(super) tool_length: ToolLength,
+    pub(super) next: Option<String>,
+    pub(super) length: ToolLength,
     /// The offset number that belongs to a tool which no T has named.
     pub(super) own_length_offset: Option<u32>,
     /// The cutting edge (Siemens: D).
     pub(super) cutting_edge: u32,
-    pub(super) assigned_offsets: AssignedFrames,
-    pub(super) assigned_tools: AssignedFrames,
-    /// Whether the active work offset has been assigned and not yet selected again (Siemens).
-    pub(super) offset_pending: bool,
-    /// Whether THETA counts from the frame of the tool vector (ORIROTA).
-    pub(super) spin_absolute: bool,
-    /// What runs after each motion (G66, MCALL).
-    pub(super) modal_call: Option<Reason>,
-    /// The motion mode before a cycle (G80 of Fanuc returns to it).
-    pub(super) mode_before_cycle: MotionMode,
-    /// The state that M70 has saved.
-    pub(super) saved: Option<Box<ModalState>>,
+    /// Tools that the program assigns.
+    pub(super) assigned: AssignedFrames,
+}
+
+impl ActiveTool {
+    /// The name of the tool frame in effect: another H or D, or none, makes another tool of it.
+    pub(super) fn frame_name(&self, dialect: Dialect) -> String {
+        let own = |number: u32| self.own_length_offset == Some(number) || self.name == format!("T{number}");
+        match (dialect, self.length) {
+            (Dialect::Siemens, _) if self.cutting_edge == 1 => self.name.clone(),
+            (Dialect::Siemens, _) if self.cutting_edge == u32::MAX => format!("{} D?", self.name),
+            (Dialect::Siemens, _) => format!("{} D{}", self.name, self.cutting_edge),
+            (Dialect::Heidenhain, _) | (_, ToolLength::OfTool) => self.name.clone(),
+            (_, ToolLength::None) if self.name == "T0" => self.name.clone(),
+            (_, ToolLength::None) => "G49".to_owned(),
+            (_, ToolLength::Offset(number)) if own(number) => self.name.clone(),
+            (_, ToolLength::Offset(u32::MAX)) => "H?".to_owned(),
+            (_, ToolLength::Offset(number)) => format!("H{number}"),
+        }
+    }
+}
+
+/// The work offset in effect.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct WorkOffset {
+    /// G54, G500, …
+    pub(super) name: String,
+    /// Whether it has been assigned and not yet selected again (Siemens).
+    pub(super) pending: bool,
+    /// Work offsets that the program assigns.
+    pub(super) assigned: AssignedFrames,
+}
+
+/// Feed and exact stop.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Feed {
     /// mm/s.
-    pub(super) feed: Evaluated,
+    pub(super) rate: Evaluated,
     /// G94.
-    pub(super) feed_per_minute: bool,
+    pub(super) per_minute: bool,
     pub(super) exact_stop: bool,
     /// Whether the exact stop is modal (G61) and not of one block (G9).
     pub(super) exact_stop_modal: bool,
+}
+
+/// The abstract state of a control between two blocks.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct ModalState {
+    pub(super) groups: GroupTable,
+    pub(super) mode: MotionMode,
+    /// Whether an unsupported path starts in the direction of the motion before it.
+    pub(super) starts_tangent: bool,
+    /// The motion mode before a cycle (G80 of Fanuc returns to it).
+    pub(super) mode_before_cycle: MotionMode,
+    /// What runs after each motion (G66, MCALL).
+    pub(super) modal_call: Option<Reason>,
+    /// Tool position in the work frame (mm), coordinate shift included.
+    pub(super) position: [Evaluated; 3],
+    pub(super) orientation: Orientation,
+    /// The coordinate shift of G92 and G52, added to programmed values (mm).
+    pub(super) shift: [Evaluated; 3],
+    /// Whether G92 contributes to it.
+    pub(super) origin_set: bool,
+    pub(super) work_offset: WorkOffset,
+    /// The datum shift of X, Y and Z (mm, Heidenhain); `None` where an axis is unknown.
+    pub(super) datum_shift: [Option<f64>; 3],
+    /// TRANS, ROT: a frame within the work frame.
+    pub(super) programmable_frame: Option<Pose>,
+    pub(super) tool: ActiveTool,
+    pub(super) feed: Feed,
     /// The pole: the centre of the last CC (Heidenhain).
     pub(super) pole: [Evaluated; 2],
     pub(super) variables: Variables,
-    /// Groups whose paths disagree at a join.
-    pub(super) unknown_after_join: u32,
-    /// Groups that an unknown word may have set, and `word_reason` why.
-    pub(super) unknown_by_word: u32,
-    pub(super) word_reason: Reason,
+    /// The state that M70 has saved.
+    pub(super) saved: Option<Box<ModalState>>,
     /// The motion before this block, where every path has the same one.
     pub(super) previous: Option<u32>,
 }
@@ -359,9 +310,7 @@ pub(super) struct ModalState {
 /// read with the state before that one, so the two must agree.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct WordSemantics {
-    unit_mm: f64,
-    tcp_mode: (bool, bool),
-    radius_compensation: bool,
+    groups: [u64; 3],
     feed_per_minute: bool,
     active_transforms: u32,
     programmable_frame: Option<Pose>,
@@ -370,63 +319,52 @@ pub(super) struct WordSemantics {
 
 impl ModalState {
     pub(super) fn word_semantics(&self) -> WordSemantics {
+        let groups = [ModalGroup::Unit, ModalGroup::TcpMode, ModalGroup::RadiusCompensation];
         WordSemantics {
-            unit_mm: self.unit_mm,
-            tcp_mode: (self.tcp_mode, self.vector_words),
-            radius_compensation: self.radius_compensation,
-            feed_per_minute: self.feed_per_minute,
-            active_transforms: self.active_transforms,
+            groups: groups.map(|group| self.groups.value(group)),
+            feed_per_minute: self.feed.per_minute,
+            active_transforms: self.groups.active_transforms(),
             programmable_frame: self.programmable_frame,
-            spin_absolute: self.spin_absolute,
+            spin_absolute: self.groups.spin_absolute(),
         }
     }
 
     /// The state after power-on.
     pub(super) fn start(work_offset: &str, tool: &str) -> ModalState {
         ModalState {
+            groups: GroupTable::start(work_offset, tool),
             mode: MotionMode::Unset,
             starts_tangent: true,
-            absolute: true,
-            unit_mm: 1.0,
-            plane: Plane::XY,
-            centre_absolute: false,
+            mode_before_cycle: MotionMode::Unset,
+            modal_call: None,
             position: [Err(Reason::PositionUnknown); 3],
-            orientation_mode: OrientationMode::Unknown(Reason::OrientationUnknown),
-            abc: [Err(Reason::OrientationUnknown); 3],
-            rpy: [Err(Reason::OrientationUnknown); 3],
-            vector: [Err(Reason::OrientationUnknown); 3],
-            spin: Ok(0.0),
-            rpy_convention_stated: false,
+            orientation: Orientation::unknown(Reason::OrientationUnknown, Ok(0.0)),
             shift: [Ok(0.0); 3],
             origin_set: false,
-            work_offset: work_offset.to_owned(),
+            work_offset: WorkOffset {
+                name: work_offset.to_owned(),
+                pending: false,
+                assigned: AssignedFrames::default(),
+            },
             datum_shift: [Some(0.0); 3],
             programmable_frame: None,
-            active_transforms: 0,
-            radius_compensation: false,
-            tcp_mode: false,
-            vector_words: false,
-            tool: tool.to_owned(),
-            next_tool: None,
-            tool_length: ToolLength::OfTool,
-            own_length_offset: None,
-            cutting_edge: 1,
-            assigned_offsets: AssignedFrames::default(),
-            assigned_tools: AssignedFrames::default(),
-            offset_pending: false,
-            spin_absolute: true,
-            modal_call: None,
-            mode_before_cycle: MotionMode::Unset,
-            saved: None,
-            feed: Err(Reason::UnknownVariable),
-            feed_per_minute: true,
-            exact_stop: false,
-            exact_stop_modal: false,
+            tool: ActiveTool {
+                name: tool.to_owned(),
+                next: None,
+                length: ToolLength::OfTool,
+                own_length_offset: None,
+                cutting_edge: 1,
+                assigned: AssignedFrames::default(),
+            },
+            feed: Feed {
+                rate: Err(Reason::UnknownVariable),
+                per_minute: true,
+                exact_stop: false,
+                exact_stop_modal: false,
+            },
             pole: [Err(Reason::PositionUnknown); 2],
             variables: Variables::default(),
-            unknown_after_join: 0,
-            unknown_by_word: 0,
-            word_reason: Reason::UnknownWord,
+            saved: None,
             previous: None,
         }
     }
@@ -434,22 +372,32 @@ impl ModalState {
     /// Joins with the states of predecessors elsewhere in the file: only groups that the whole file sets to one value
     /// (`constant`) stay known.
     pub(super) fn join_unseen_predecessors(&mut self, constant: u32, assigned: AssignedKinds) {
-        let flow = Err(Reason::UnknownFlow);
-        self.mode = MotionMode::Unknown(Reason::UnknownFlow);
-        self.mode_before_cycle = self.mode;
-        self.assigned_offsets.join_unseen_predecessors(assigned.offsets, assigned.rotary);
-        self.assigned_tools.join_unseen_predecessors(assigned.tools, false);
-        self.next_tool = None;
+        let because = Reason::UnknownFlow;
+        self.invalidate_flow(because);
+        self.work_offset.assigned.join_unseen_predecessors(assigned.offsets, assigned.rotary);
+        self.tool.assigned.join_unseen_predecessors(assigned.tools, false);
         self.saved = None;
-        self.position = [flow; 3];
-        self.orientation_mode = OrientationMode::Unknown(Reason::UnknownFlow);
-        (self.abc, self.rpy, self.vector, self.spin) = ([flow; 3], [flow; 3], [flow; 3], flow);
-        self.feed = flow;
-        self.pole = [flow; 2];
-        self.variables.invalidate(Reason::UnknownFlow);
-        self.unknown_after_join |= ALL_GROUPS & !constant;
-        self.rpy_convention_stated &= constant & ModalGroup::RpyConvention.bit() != 0;
-        self.spin_absolute &= constant & ModalGroup::SpinReference.bit() != 0;
+        self.position = [Err(because); 3];
+        self.orientation = Orientation::unknown(because, Err(because));
+        self.groups.mark_unknown_after_join(ALL_GROUPS & !constant);
+    }
+
+    /// After a word of unknown effect: every group may have any value.
+    pub(super) fn invalidate_all(&mut self, because: Reason) {
+        self.invalidate_flow(because);
+        self.invalidate_position();
+        self.invalidate_orientation();
+        self.groups.mark_unknown_by_word(ALL_GROUPS, because);
+    }
+
+    /// Motion mode, feed, pole, variables and the prepared tool are unknown.
+    fn invalidate_flow(&mut self, because: Reason) {
+        self.mode = MotionMode::Unknown(because);
+        self.mode_before_cycle = self.mode;
+        self.feed.rate = Err(because);
+        self.pole = [Err(because); 2];
+        self.variables.invalidate(because);
+        self.tool.next = None;
         self.previous = None;
     }
 
@@ -459,135 +407,58 @@ impl ModalState {
     }
 
     pub(super) fn invalidate_orientation(&mut self) {
-        let none = [Err(Reason::OrientationUnknown); 3];
-        (self.abc, self.rpy, self.vector) = (none, none, none);
-        self.orientation_mode = OrientationMode::Unknown(Reason::OrientationUnknown);
-    }
-
-    /// After a word of unknown effect: every group may have any value.
-    pub(super) fn invalidate_all(&mut self, because: Reason) {
-        self.invalidate_position();
-        self.invalidate_orientation();
-        self.mode = MotionMode::Unknown(because);
-        self.mode_before_cycle = self.mode;
-        self.feed = Err(because);
-        self.pole = [Err(because); 2];
-        self.variables.invalidate(because);
-        self.unknown_by_word = ALL_GROUPS;
-        self.word_reason = because;
-        self.next_tool = None;
-    }
-
-    pub(super) fn mark_known(&mut self, group: ModalGroup) {
-        self.unknown_after_join &= !group.bit();
-        self.unknown_by_word &= !group.bit();
-    }
-
-    pub(super) fn set_transform(&mut self, group: ModalGroup, on: bool) {
-        self.active_transforms = self.active_transforms & !group.bit() | u32::from(on) << group as u32;
-    }
-
-    pub(super) fn is_transform_active(&self, group: ModalGroup) -> bool {
-        self.active_transforms & group.bit() != 0
-    }
-
-    /// The name of the tool frame in effect: another H or D, or none, makes another tool of it.
-    pub(super) fn tool_name(&self, dialect: Dialect) -> String {
-        let own = |number: u32| self.own_length_offset == Some(number) || self.tool == format!("T{number}");
-        match (dialect, self.tool_length) {
-            (Dialect::Siemens, _) if self.cutting_edge == 1 => self.tool.clone(),
-            (Dialect::Siemens, _) if self.cutting_edge == u32::MAX => format!("{} D?", self.tool),
-            (Dialect::Siemens, _) => format!("{} D{}", self.tool, self.cutting_edge),
-            (Dialect::Heidenhain, _) | (_, ToolLength::OfTool) => self.tool.clone(),
-            (_, ToolLength::None) if self.tool == "T0" => self.tool.clone(),
-            (_, ToolLength::None) => "G49".to_owned(),
-            (_, ToolLength::Offset(number)) if own(number) => self.tool.clone(),
-            (_, ToolLength::Offset(u32::MAX)) => "H?".to_owned(),
-            (_, ToolLength::Offset(number)) => format!("H{number}"),
-        }
+        self.orientation = Orientation::unknown(Reason::OrientationUnknown, self.orientation.spin);
     }
 
     /// Why one of these groups is unknown; `None` where all are known.
     pub(super) fn unknown_reason(&self, groups: u32) -> Option<Reason> {
-        if self.unknown_by_word & groups != 0 {
-            return Some(self.word_reason);
-        }
-        (self.unknown_after_join & groups != 0).then_some(Reason::UnknownFlow)
+        self.groups.unknown_reason(groups)
     }
 
     /// The join of the states of two paths: what they agree on stays known.
     pub(super) fn join(mut self, other: &ModalState) -> ModalState {
-        let join = |a: &mut Evaluated, b: &Evaluated| {
-            if *a != *b {
-                *a = Err(Reason::UnknownFlow);
-            }
-        };
-        let join_all =
-            |a: &mut [Evaluated], b: &[Evaluated]| a.iter_mut().zip(b).for_each(|(a, b)| join(a, b));
         join_all(&mut self.position, &other.position);
-        join_all(&mut self.abc, &other.abc);
-        join_all(&mut self.rpy, &other.rpy);
-        join_all(&mut self.vector, &other.vector);
-        join_all(&mut self.shift, &other.shift);
         join_all(&mut self.pole, &other.pole);
-        join(&mut self.spin, &other.spin);
-        join(&mut self.feed, &other.feed);
-        for (a, b) in self.datum_shift.iter_mut().zip(other.datum_shift) {
-            *a = a.filter(|_| *a == b);
-        }
-        if self.orientation_mode != other.orientation_mode {
-            self.orientation_mode = OrientationMode::Unknown(Reason::UnknownFlow);
-        }
-        if self.mode != other.mode {
-            self.mode = MotionMode::Unknown(Reason::UnknownFlow);
-        }
-        if self.mode_before_cycle != other.mode_before_cycle {
-            self.mode_before_cycle = MotionMode::Unknown(Reason::UnknownFlow);
-        }
-        self.unknown_after_join |= self.active_transforms ^ other.active_transforms;
-        self.active_transforms |= other.active_transforms;
-        self.assigned_offsets.join(&other.assigned_offsets);
-        self.assigned_tools.join(&other.assigned_tools);
-        self.offset_pending |= other.offset_pending;
-        self.starts_tangent |= other.starts_tangent;
-        self.origin_set |= other.origin_set;
-        self.rpy_convention_stated &= other.rpy_convention_stated;
-        self.spin_absolute &= other.spin_absolute;
-        self.modal_call = self.modal_call.or(other.modal_call);
-        if self.next_tool != other.next_tool {
-            self.next_tool = Some("T?".to_owned());
-        }
-        let edges_differ = self.cutting_edge != other.cutting_edge;
+        self.orientation.join(&other.orientation);
+        self.groups.join(&other.groups);
+        join_all(&mut self.shift, &other.shift);
+        let (tool, theirs) = (&mut self.tool, &other.tool);
+        let edges_differ = tool.cutting_edge != theirs.cutting_edge;
         for (group, differs) in [
-            (ModalGroup::DistanceMode, self.absolute != other.absolute),
-            (ModalGroup::Unit, self.unit_mm != other.unit_mm),
-            (ModalGroup::Plane, self.plane != other.plane),
-            (ModalGroup::WorkOffset, self.work_offset != other.work_offset),
+            (ModalGroup::Tool, tool.own_length_offset != theirs.own_length_offset || edges_differ),
+            (ModalGroup::ToolLength, edges_differ),
             (ModalGroup::ProgrammableFrame, self.programmable_frame != other.programmable_frame),
-            (ModalGroup::RadiusCompensation, self.radius_compensation != other.radius_compensation),
-            (ModalGroup::TcpMode, self.tcp_mode != other.tcp_mode || self.vector_words != other.vector_words),
-            (
-                ModalGroup::Tool,
-                self.tool != other.tool || self.own_length_offset != other.own_length_offset || edges_differ,
-            ),
-            (ModalGroup::ToolLength, self.tool_length != other.tool_length || edges_differ),
-            (ModalGroup::ArcCentreMode, self.centre_absolute != other.centre_absolute),
             (ModalGroup::CoordinateShift, self.shift != other.shift),
         ] {
             if differs {
-                self.unknown_after_join |= group.bit();
+                self.groups.mark_unknown_after_join(group.bit());
             }
         }
-        self.unknown_after_join |= other.unknown_after_join;
-        if other.unknown_by_word != 0 {
-            self.unknown_by_word |= other.unknown_by_word;
-            self.word_reason = other.word_reason;
+        if tool.next != theirs.next {
+            tool.next = Some("T?".to_owned());
+        }
+        tool.assigned.join(&theirs.assigned);
+        self.work_offset.assigned.join(&other.work_offset.assigned);
+        self.work_offset.pending |= other.work_offset.pending;
+        self.origin_set |= other.origin_set;
+        for (a, b) in self.datum_shift.iter_mut().zip(other.datum_shift) {
+            *a = a.filter(|_| *a == b);
+        }
+        for (mode, theirs) in
+            [(&mut self.mode, other.mode), (&mut self.mode_before_cycle, other.mode_before_cycle)]
+        {
+            if *mode != theirs {
+                *mode = MotionMode::Unknown(Reason::UnknownFlow);
+            }
+        }
+        self.starts_tangent |= other.starts_tangent;
+        self.modal_call = self.modal_call.or(other.modal_call);
+        join(&mut self.feed.rate, &other.feed.rate);
+        if self.feed.per_minute != other.feed.per_minute {
+            self.feed.rate = Err(Reason::UnknownFlow);
         }
         if self.saved != other.saved {
             self.saved = None;
-        }
-        if self.feed_per_minute != other.feed_per_minute {
-            self.feed = Err(Reason::UnknownFlow);
         }
         self.variables.join(&other.variables);
         if self.previous != other.previous {
@@ -598,17 +469,29 @@ impl ModalState {
 
     /// The tool orientation, with A, B and C in the given convention.
     pub(super) fn rotation(&self, angles: Option<Angles>) -> Result<nalgebra::UnitQuaternion<f64>, Reason> {
-        match self.orientation_mode {
+        let Orientation { mode, abc, rpy, vector, spin } = self.orientation;
+        match mode {
             OrientationMode::Unknown(reason) => Err(reason),
             OrientationMode::Angles => {
-                let values = all_known(self.abc)?;
+                let values = all_known(abc)?;
                 Ok(angles.ok_or(Reason::UnknownConvention)?.rotation(values))
             }
-            OrientationMode::Rpy if !self.rpy_convention_stated => Err(Reason::UnknownConvention),
-            OrientationMode::Rpy => Ok(Angles::Wpr.rotation(all_known(self.rpy)?)),
-            OrientationMode::Vector => spun(all_known(self.vector)?, self.spin?).ok_or(Reason::WrongShape),
+            OrientationMode::Rpy if !self.groups.rpy_convention_stated() => Err(Reason::UnknownConvention),
+            OrientationMode::Rpy => Ok(Angles::Wpr.rotation(all_known(rpy)?)),
+            OrientationMode::Vector => spun(all_known(vector)?, spin?).ok_or(Reason::WrongShape),
         }
     }
+}
+
+/// The join of two values: known where they are the same.
+fn join(a: &mut Evaluated, b: &Evaluated) {
+    if *a != *b {
+        *a = Err(Reason::UnknownFlow);
+    }
+}
+
+fn join_all(a: &mut [Evaluated], b: &[Evaluated]) {
+    a.iter_mut().zip(b).for_each(|(a, b)| join(a, b));
 }
 
 /// The three values, or the first reason why one is unknown.

@@ -31,7 +31,8 @@ use std::sync::Arc as Shared;
 use super::dialect::Dialect;
 use super::expression::{LARGEST, Variable, literal};
 use super::mark;
-use super::modal_state::{ModalGroup, ModalState, MotionMode, WordSemantics};
+use super::modal_group::ModalGroup;
+use super::modal_state::{ModalState, MotionMode, WordSemantics};
 use super::orientation::Angles;
 use super::parser::parse;
 use super::setup::{self, Setup, StatedFrame, Statement, flange_tool, statement};
@@ -114,7 +115,7 @@ impl<'s> Task<'s> {
     }
 }
 
-/// The abstract interpreter of one file.
+/// The abstract interpreter of one file. More than twenty fields: its input, its state and each list that it writes.
 pub(super) struct Interpreter<'t, 's> {
     tree: &'t NcTree<'s>,
     file: u32,
@@ -172,7 +173,7 @@ struct Lengths([usize; 7]);
 
 impl<'t, 's> Interpreter<'t, 's> {
     fn new(tree: &'t NcTree<'s>, file: u32, dialect: Dialect, setup: &'t Setup) -> Self {
-        let state = ModalState::start(if dialect == Dialect::Siemens { "G500" } else { "G54" }, "T0");
+        let state = ModalState::start(start_offset(dialect), START_TOOL);
         Interpreter {
             tree,
             file,
@@ -397,7 +398,6 @@ impl<'t, 's> Interpreter<'t, 's> {
 
     fn transfer(&mut self, block: &Block<'s>) {
         if let Some(on) = block.radius_compensation {
-            self.state.radius_compensation = on;
             self.set_group(ModalGroup::RadiusCompensation, u64::from(on));
         }
         if self.dialect == Dialect::Heidenhain && self.heidenhain(block) {
@@ -449,7 +449,7 @@ impl<'t, 's> Interpreter<'t, 's> {
                 // Controls reject F0 and F-5, and read a number that is too large differently.
                 false => Err(Reason::NumberRange),
             });
-            self.state.feed = self.length_in_mm(feed).map(|feed| feed / 60.0);
+            self.state.feed.rate = self.length_in_mm(feed).map(|feed| feed / 60.0);
         }
         self.motion(block, machine);
         self.end_of_block(block);
@@ -496,7 +496,7 @@ impl<'t, 's> Interpreter<'t, 's> {
                 }
                 _ => "T?".to_owned(),
             };
-            self.state.next_tool = Some(name);
+            self.state.tool.next = Some(name);
         }
         // LinuxCNC: M61 sets the current tool; T alone only prepares one, whatever else the file has.
         let linux = self.dialect == Dialect::LinuxCnc;
@@ -505,7 +505,7 @@ impl<'t, 's> Interpreter<'t, 's> {
             self.change_tool(number.map_or("T?".to_owned(), |number| format!("T{}", number.round())));
         }
         if (block.m.contains(&6) || !self.scan.tool_change_by_m6 && !linux)
-            && let Some(name) = self.state.next_tool.take()
+            && let Some(name) = self.state.tool.next.take()
         {
             self.change_tool(name);
         }
@@ -513,9 +513,17 @@ impl<'t, 's> Interpreter<'t, 's> {
             && let Some(index) = block.d
         {
             let edge = self.literal(&block.words[index]).map_or(u32::MAX, |edge| edge.round() as u32);
-            self.change_tool_length(|state| state.cutting_edge = edge);
+            self.change_tool_length(|tool| tool.cutting_edge = edge);
         }
     }
+}
+
+/// The tool after power-on.
+const START_TOOL: &str = "T0";
+
+/// The work offset after power-on.
+fn start_offset(dialect: Dialect) -> &'static str {
+    if dialect == Dialect::Siemens { "G500" } else { "G54" }
 }
 
 /// Whether a letter is an axis address or one that accompanies it.

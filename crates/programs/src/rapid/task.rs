@@ -109,6 +109,8 @@ impl<'s> Cached<'s> {
     }
 }
 
+/// Interprets all units and writes the listing. More than twenty fields: its input, each list that it writes, and indices
+/// over them.
 struct ListingBuilder<'a, 's> {
     trees: &'a [RapidTree<'s>],
     symbols: &'a Symbols,

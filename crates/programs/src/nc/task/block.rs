@@ -4,6 +4,8 @@ use crate::motion::Reason;
 use crate::nc::syntax::Word;
 
 /// One block: its words, by what they state.
+///
+/// More than twenty fields: one for each kind of word that a block can have, all of them read by the interpreter alone.
 #[derive(Default)]
 pub(super) struct Block<'s> {
     pub(super) node: u32,

@@ -2,7 +2,7 @@
 
 use super::super::dialect::Dialect;
 use super::super::expression::{Evaluated, Variable, numbered};
-use super::super::modal_state::ModalGroup;
+use super::super::modal_group::ModalGroup;
 use super::super::syntax::WordValue;
 use super::super::token::Token;
 use super::siemens_names::{AddressEffect, address_effect};

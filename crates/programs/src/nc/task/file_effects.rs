@@ -1,6 +1,7 @@
 //! Side effects of a whole file, by modal group. A group that the file only ever sets to one value is known at every join.
 
-use super::super::modal_state::{ALL_GROUPS, AssignedKinds, GROUP_COUNT, ModalGroup};
+use super::super::modal_group::{ALL_GROUPS, GROUP_COUNT, ModalGroup};
+use super::super::modal_state::AssignedKinds;
 
 /// What a file sets on some path.
 #[derive(Debug, Clone, Default)]
@@ -40,11 +41,4 @@ impl FileEffects {
     pub(super) fn set_varying(&mut self, group: ModalGroup) {
         self.varying |= group.bit();
     }
-}
-
-/// The FNV-1a hash of a name, as the value of a group.
-pub(super) fn name_key(text: &str) -> u64 {
-    text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
-        (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
-    })
 }

@@ -3,7 +3,8 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::super::dialect::Dialect;
-use super::super::modal_state::{ModalGroup, ModalState, TOOL_GROUPS};
+use super::super::modal_group::{ModalGroup, TOOL_GROUPS};
+use super::super::modal_state::ModalState;
 use super::super::orientation::Angles;
 use super::super::setup::{self, flange_tool};
 use super::super::syntax::{Word, WordValue};
@@ -28,18 +29,18 @@ impl Interpreter<'_, '_> {
         let name = word.name.to_ascii_uppercase();
         let adds = name[0] == b'A';
         let before = self.state.programmable_frame;
-        let unsupported = |state: &ModalState| state.is_transform_active(ModalGroup::ProgrammableFrame);
+        let unsupported = |state: &ModalState| state.groups.is_on(ModalGroup::ProgrammableFrame);
         let was = unsupported(&self.state);
         let unknown = self.state.unknown_reason(ModalGroup::ProgrammableFrame.bit()).is_some();
         self.mark_programmable_frame_set();
         if adds && unknown {
             // The frame to which it adds is unknown.
-            self.state.set_transform(ModalGroup::ProgrammableFrame, true);
+            self.state.groups.set_value(ModalGroup::ProgrammableFrame, 1);
         }
         if !adds {
             // A command that does not add replaces the whole programmable frame, and nothing else.
             self.state.programmable_frame = None;
-            self.state.set_transform(ModalGroup::ProgrammableFrame, false);
+            self.state.groups.set_value(ModalGroup::ProgrammableFrame, 0);
         }
         self.invalidate_position();
         let stated = block.has_motion_words() || block.words.iter().any(|word| word.is("RPL"));
@@ -50,7 +51,7 @@ impl Interpreter<'_, '_> {
                 self.state.programmable_frame =
                     Some(self.state.programmable_frame.unwrap_or_else(Pose::identity) * pose);
             }
-            None => self.state.set_transform(ModalGroup::ProgrammableFrame, true),
+            None => self.state.groups.set_value(ModalGroup::ProgrammableFrame, 1),
         }
         let rotation = |pose: &Option<Pose>| pose.map_or(UnitQuaternion::identity(), |pose| pose.rotation);
         let same = rotation(&before).angle_to(&rotation(&self.state.programmable_frame)) < 1e-9;
@@ -88,7 +89,7 @@ impl Interpreter<'_, '_> {
                     Some(_) if self.state.unknown_reason(ModalGroup::Plane.bit()).is_some() => {
                         angles[0] = f64::NAN
                     }
-                    Some(Ok(angle)) => angles[self.state.plane.normal] = angle,
+                    Some(Ok(angle)) => angles[self.state.groups.plane().normal] = angle,
                     Some(Err(_)) => angles[0] = f64::NAN,
                 }
                 let [x, y, z] = [angles[0], angles[1], angles[2]];
@@ -150,12 +151,14 @@ impl Interpreter<'_, '_> {
             };
             let pose = self.frame_expression(word).filter(|_| self.is_index_alone(word));
             // The active offset keeps its old value until it is selected again.
-            self.state.offset_pending |= frame == self.state.work_offset;
+            self.state.work_offset.pending |= frame == self.state.work_offset.name;
             self.assign_offset_value(&frame, pose.map(|pose| Frame::from_pose(&pose)));
         } else if word.is("$P_PFRAME") {
             self.mark_programmable_frame_set();
             self.state.programmable_frame = self.frame_expression(word);
-            self.state.set_transform(ModalGroup::ProgrammableFrame, self.state.programmable_frame.is_none());
+            self.state
+                .groups
+                .set_value(ModalGroup::ProgrammableFrame, u64::from(self.state.programmable_frame.is_none()));
             self.invalidate_pose();
         } else if word.is("$TC_DP3") || word.is("$TC_DP4") || word.is("$TC_DP5") {
             let (Some(number), Some(1)) = (index(0), index(1)) else { return self.invalidate_tools() };
@@ -168,7 +171,7 @@ impl Interpreter<'_, '_> {
             // Under G70 the data of the control stay in its own unit, under G700 they do not.
             let value = self.evaluate_word(word).0.ok().filter(|_| self.counts_in_mm());
             // The lengths that the control holds are unknown: each is NaN until the program sets it.
-            let current = match (self.state.assigned_tools.get(&tool), self.tool_value(&tool)) {
+            let current = match (self.state.tool.assigned.get(&tool), self.tool_value(&tool)) {
                 (_, Ok(frame)) | (Some(Some(frame)), _) => Some(frame),
                 (None, Err(Reason::ToolUnknown)) => {
                     Some(Frame { position_mm: [f64::NAN; 3], ..Frame::IDENTITY })
@@ -176,12 +179,13 @@ impl Interpreter<'_, '_> {
                 _ => None,
             };
             // The active tool keeps its lengths until it is selected again.
-            let may_be_active = self.state.unknown_reason(TOOL_GROUPS).is_some() || self.state.tool == tool;
+            let may_be_active =
+                self.state.unknown_reason(TOOL_GROUPS).is_some() || self.state.tool.name == tool;
             let frame = value.zip(current).filter(|_| !may_be_active).map(|(value, mut frame)| {
                 frame.position_mm[axis] = value;
                 frame
             });
-            self.state.assigned_tools.set(&tool, frame);
+            self.state.tool.assigned.set(&tool, frame);
             self.pass.effects.assigned.tools |= self.is_conditional();
             self.tool_index.clear();
             if may_be_active {
@@ -204,7 +208,7 @@ impl Interpreter<'_, '_> {
 
     /// Whether lengths are certainly in mm.
     fn counts_in_mm(&self) -> bool {
-        self.state.unit_mm == 1.0 && self.state.unknown_reason(ModalGroup::Unit.bit()).is_none()
+        self.state.groups.unit_mm() == 1.0 && self.state.unknown_reason(ModalGroup::Unit.bit()).is_none()
     }
 
     /// Whether a word has exactly one index: `$P_UIFR[1,X,TR]` sets one component.
@@ -214,7 +218,7 @@ impl Interpreter<'_, '_> {
 
     /// The program assigns a work offset; `None` if the value is unknown.
     pub(super) fn assign_offset_value(&mut self, name: &str, frame: Option<Frame>) {
-        self.state.assigned_offsets.set(name, frame);
+        self.state.work_offset.assigned.set(name, frame);
         self.pass.effects.assigned.offsets |= self.is_conditional();
         self.frame_index = None;
     }
@@ -324,7 +328,7 @@ impl Interpreter<'_, '_> {
         self.state
             .unknown_reason(ModalGroup::WorkOffset.bit())
             .is_none()
-            .then(|| self.state.work_offset.clone())
+            .then(|| self.state.work_offset.name.clone())
     }
 
     fn set_offset_values(&mut self, block: &Block<'_>, name: &str) {
@@ -336,13 +340,13 @@ impl Interpreter<'_, '_> {
         let complete = block.axes.iter().all(Option::is_some) && (block.radius.is_some() || !has_rotation);
         let mut known_value = complete || known.is_some();
         // In G91 LinuxCNC takes the values as absolute, Fanuc and Haas add them; for an ISO file this is unknown.
-        let absolute = self.state.absolute || self.dialect == Dialect::LinuxCnc;
+        let absolute = self.state.groups.absolute() || self.dialect == Dialect::LinuxCnc;
         known_value &= absolute || self.dialect != Dialect::Iso;
         for (axis, word) in block.axes.iter().enumerate() {
             let Some(index) = word else { continue };
             match self.evaluate_word(&block.words[*index]) {
-                (Ok(value), _) if absolute => frame.position_mm[axis] = value * self.state.unit_mm,
-                (Ok(value), _) => frame.position_mm[axis] += value * self.state.unit_mm,
+                (Ok(value), _) if absolute => frame.position_mm[axis] = value * self.state.groups.unit_mm(),
+                (Ok(value), _) => frame.position_mm[axis] += value * self.state.groups.unit_mm(),
                 (Err(_), _) => known_value = false,
             }
         }
@@ -355,7 +359,7 @@ impl Interpreter<'_, '_> {
         } else if absolute && block.abc.iter().all(Option::is_some) {
             self.set_rotary_offset(name, false);
         }
-        known_value &= !self.state.assigned_offsets.is_rotary(name);
+        known_value &= !self.state.work_offset.assigned.is_rotary(name);
         match block.radius.map(|index| self.number(&block.words[index])) {
             // The rotation of the work frame about z (LinuxCNC).
             Some(Some(angle)) => {
@@ -370,7 +374,7 @@ impl Interpreter<'_, '_> {
 
     /// Notes whether a work offset has offsets of rotary axes, which its frame does not hold.
     pub(super) fn set_rotary_offset(&mut self, name: &str, rotary: bool) {
-        self.state.assigned_offsets.set_rotary(name, rotary);
+        self.state.work_offset.assigned.set_rotary(name, rotary);
         self.pass.effects.assigned.rotary |= rotary && self.is_conditional();
     }
 
@@ -378,7 +382,7 @@ impl Interpreter<'_, '_> {
     pub(super) fn assign_offset(&mut self, name: &str, frame: Option<Frame>) {
         let before = self.frame_value(name).ok();
         self.assign_offset_value(name, frame);
-        let holds = name.eq_ignore_ascii_case(&self.state.work_offset);
+        let holds = name.eq_ignore_ascii_case(&self.state.work_offset.name);
         if !holds && self.state.unknown_reason(ModalGroup::WorkOffset.bit()).is_none() {
             return;
         }
@@ -392,7 +396,7 @@ impl Interpreter<'_, '_> {
 
     /// The tool of a name, as the program, the setup or a comment states it.
     pub(super) fn tool_value(&self, name: &str) -> Result<Frame, Reason> {
-        match self.state.assigned_tools.get(name) {
+        match self.state.tool.assigned.get(name) {
             // One of its lengths has not been set yet.
             Some(Some(frame)) if frame.position_mm.iter().any(|mm| mm.is_nan()) => Err(Reason::ToolUnknown),
             Some(Some(frame)) => Ok(frame),
@@ -403,7 +407,7 @@ impl Interpreter<'_, '_> {
 
     /// The work offset of a name, as the program, the setup or a comment states it.
     pub(super) fn frame_value(&self, name: &str) -> Result<Frame, Reason> {
-        match self.state.assigned_offsets.get(name) {
+        match self.state.work_offset.assigned.get(name) {
             Some(Some(frame)) => Ok(frame),
             Some(None) => Err(Reason::Assigned),
             // Without a settable offset Siemens uses the basic frame.
@@ -418,7 +422,7 @@ impl Interpreter<'_, '_> {
 
     /// The active tool.
     pub(super) fn tool(&mut self) -> u32 {
-        let name = self.state.tool_name(self.dialect);
+        let name = self.state.tool.frame_name(self.dialect);
         if let Some(&index) = self.tool_index.get(&name) {
             return index;
         }
@@ -435,13 +439,14 @@ impl Interpreter<'_, '_> {
     /// The active work frame.
     pub(super) fn work_object(&mut self) -> u32 {
         if let Some((name, pose, index)) = &self.frame_index
-            && *name == self.state.work_offset
+            && *name == self.state.work_offset.name
             && *pose == self.state.programmable_frame
         {
             return *index;
         }
-        let name = self.state.work_offset.clone();
-        let stated = if self.state.offset_pending { Err(Reason::Assigned) } else { self.frame_value(&name) };
+        let name = self.state.work_offset.name.clone();
+        let stated =
+            if self.state.work_offset.pending { Err(Reason::Assigned) } else { self.frame_value(&name) };
         let within = self.state.programmable_frame.as_ref().map_or(Frame::IDENTITY, Frame::from_pose);
         let near = stated.and_then(Frame::within_reach).and_then(|user| Ok((user, within.within_reach()?)));
         let value = near.map(|(user_frame, within)| WorkObjectValue {

@@ -1,9 +1,9 @@
 //! Heidenhain conversational blocks, which are not built of address words.
 
-use super::super::arc::Plane;
 use super::super::dialect::Dialect;
 use super::super::expression::{Evaluated, literal, numbered};
-use super::super::modal_state::{ModalGroup, MotionMode};
+use super::super::modal_group::ModalGroup;
+use super::super::modal_state::MotionMode;
 use super::super::syntax::{Word, WordValue};
 use super::super::token::Token;
 use super::{Block, Interpreter, StartDependency};
@@ -117,7 +117,7 @@ impl<'s> Interpreter<'_, 's> {
             }
             b"BEGIN" | b"END" => {
                 if words.contains(&&b"INCH"[..]) {
-                    self.state.unit_mm = 25.4;
+                    self.state.groups.set_value(ModalGroup::Unit, 200);
                 }
             }
             // Blanks, stops, strings, tables, declarations: no motion.
@@ -258,16 +258,16 @@ impl<'s> Interpreter<'_, 's> {
                     }
                     // Only speed or axis: the tool is unchanged.
                     Some(b'X' | b'Y' | b'Z' | b'S' | b'F' | b'D') => (None, rest),
-                    None => (Some(self.state.tool.clone()), rest),
+                    None => (Some(self.state.tool.name.clone()), rest),
                     _ => (Some(format!("T {word}")), after),
                 }
             }
         };
         // The working plane is perpendicular to the tool axis.
         match after.split_whitespace().next() {
-            Some("X") => self.set_plane(Plane::YZ, 190),
-            Some("Y") => self.set_plane(Plane::ZX, 180),
-            Some("Z") => self.set_plane(Plane::XY, 170),
+            Some("X") => self.set_group(ModalGroup::Plane, 190),
+            Some("Y") => self.set_group(ModalGroup::Plane, 180),
+            Some("Z") => self.set_group(ModalGroup::Plane, 170),
             _ => {}
         }
         // A length allowance that is added to the tool table.
@@ -376,7 +376,7 @@ impl<'s> Interpreter<'_, 's> {
                 [b'-', digits @ ..] => literal(digits).map(|value| -value),
                 [b'+', digits @ ..] | digits => literal(digits),
             };
-            let value = value.map(|value| value * self.state.unit_mm);
+            let value = value.map(|value| value * self.state.groups.unit_mm());
             match name {
                 b'X'..=b'Z' => {
                     let entry = &mut shift[usize::from(name - b'X')];

@@ -2,12 +2,12 @@
 
 use super::super::dialect::Dialect;
 use super::super::expression::{Evaluated, literal};
-use super::super::modal_state::{AssignedKinds, GROUP_COUNT, ModalGroup, MotionMode};
+use super::super::modal_group::{GroupTable, ModalGroup};
+use super::super::modal_state::{AssignedKinds, MotionMode};
 use super::super::syntax::WordValue;
 use super::super::token::Token;
-use super::file_effects::name_key;
 use super::siemens_names::code_name;
-use super::{Block, Interpreter, StateEvent};
+use super::{Block, Interpreter, START_TOOL, StateEvent, start_offset};
 use crate::motion::Reason;
 
 impl Interpreter<'_, '_> {
@@ -20,7 +20,8 @@ impl Interpreter<'_, '_> {
             self.pass.effects.overwrite(group, value);
             self.pass.set_before_branch |= group.bit();
         }
-        self.state.mark_known(group);
+        self.state.groups.set_value(group, value);
+        self.state.groups.mark_known(group);
     }
 
     /// Sets a group to a value that depends on the tool position.
@@ -31,16 +32,15 @@ impl Interpreter<'_, '_> {
             self.pass.effects.overwrite(group, u64::MAX);
             self.pass.set_before_branch |= group.bit();
         }
-        self.state.mark_known(group);
+        self.state.groups.mark_known(group);
     }
 
     /// Switches a coordinate transform. Cancelling one that is not active changes nothing.
     pub(super) fn switch_transform(&mut self, group: ModalGroup, on: bool) {
         let bit = group.bit();
-        if !on && !self.state.is_transform_active(group) && self.state.unknown_reason(bit).is_none() {
+        if !on && !self.state.groups.is_on(group) && self.state.unknown_reason(bit).is_none() {
             return self.set_group(group, 0);
         }
-        self.state.set_transform(group, on);
         self.set_group(group, u64::from(on));
         match group {
             ModalGroup::Diameter => self.invalidate_position(),
@@ -53,22 +53,12 @@ impl Interpreter<'_, '_> {
     pub(super) fn join_unseen_predecessors(&mut self) {
         self.pass.branched = true;
         self.pass.effects.joins += 1;
-        let siemens = self.dialect == Dialect::Siemens;
+        let start = GroupTable::start(start_offset(self.dialect), START_TOOL);
         let (mut constant, mut assigned) = (0, AssignedKinds::ALL);
         if let Some(effects) = &self.file_effects {
             assigned = effects.assigned;
-            for group in 0..GROUP_COUNT as usize {
+            for (group, start) in start.values().enumerate() {
                 let bit = 1 << group;
-                let start = match group {
-                    _ if group == ModalGroup::DistanceMode as usize => 900,
-                    _ if group == ModalGroup::Unit as usize => 21,
-                    _ if group == ModalGroup::Plane as usize => 170,
-                    _ if group == ModalGroup::WorkOffset as usize => {
-                        name_key(if siemens { "G500" } else { "G54" })
-                    }
-                    _ if group == ModalGroup::Tool as usize => name_key("T0"),
-                    _ => 0,
-                };
                 let settled = self.pass.set_before_branch & bit != 0;
                 let constant_here = match effects.value[group] {
                     // A group that the file never sets has the caller's value in a subprogram.
@@ -86,7 +76,7 @@ impl Interpreter<'_, '_> {
         self.tool_index.clear();
         // An unseen predecessor may have set an origin or prepared a tool.
         self.state.origin_set |= self.file_effects.as_ref().is_none_or(|effects| effects.sets_origin);
-        self.state.next_tool =
+        self.state.tool.next =
             (self.scan.tool_change_by_m6 || self.dialect == Dialect::LinuxCnc).then(|| "T?".to_owned());
         self.events.push(StateEvent::Join);
     }
@@ -161,7 +151,7 @@ impl Interpreter<'_, '_> {
     /// The start of a subprogram file: every group has the unknown value of the caller.
     pub(super) fn start_subprogram(&mut self) {
         self.state.join_unseen_predecessors(0, AssignedKinds::default());
-        self.state.next_tool = Some("T?".to_owned());
+        self.state.tool.next = Some("T?".to_owned());
         self.events.push(StateEvent::Join);
     }
 
@@ -170,7 +160,7 @@ impl Interpreter<'_, '_> {
         match (value?, self.state.unknown_reason(ModalGroup::Unit.bit())) {
             (0.0, _) => Ok(0.0),
             (_, Some(reason)) => Err(reason),
-            (value, None) => Ok(value * self.state.unit_mm),
+            (value, None) => Ok(value * self.state.groups.unit_mm()),
         }
     }
 
@@ -200,8 +190,7 @@ impl Interpreter<'_, '_> {
     /// Makes one group unknown; the word is not a motion.
     pub(super) fn invalidate_group(&mut self, group: ModalGroup, because: Reason) {
         self.pass.effects.set_varying(group);
-        self.state.unknown_by_word |= group.bit();
-        self.state.word_reason = because;
+        self.state.groups.mark_unknown_by_word(group.bit(), because);
         self.invalidate_pose();
     }
 
@@ -233,17 +222,16 @@ impl Interpreter<'_, '_> {
             self.events.push(StateEvent::PoseUnknown);
             return;
         };
-        let moved = self.state.work_offset != kept.work_offset || self.state.tool_length != kept.tool_length;
         let state = &mut self.state;
-        (state.absolute, state.unit_mm, state.plane) = (kept.absolute, kept.unit_mm, kept.plane);
-        (state.radius_compensation, state.centre_absolute) = (kept.radius_compensation, kept.centre_absolute);
-        (state.feed, state.feed_per_minute) = (kept.feed, kept.feed_per_minute);
-        (state.exact_stop, state.exact_stop_modal) = (kept.exact_stop, kept.exact_stop_modal);
-        (state.work_offset, state.tool_length, state.own_length_offset) =
-            (kept.work_offset.clone(), kept.tool_length, kept.own_length_offset);
+        let moved = state.work_offset.name != kept.work_offset.name || state.tool.length != kept.tool.length;
+        state.feed = kept.feed;
+        state.work_offset.name = kept.work_offset.name;
+        (state.tool.length, state.tool.own_length_offset) = (kept.tool.length, kept.tool.own_length_offset);
         if state.mode != kept.mode {
             state.mode = MotionMode::Unknown(Reason::UnknownFlow);
         }
+        // The tool in the spindle stays.
+        let tool = state.groups.value(ModalGroup::Tool);
         for group in [
             ModalGroup::DistanceMode,
             ModalGroup::Unit,
@@ -255,12 +243,10 @@ impl Interpreter<'_, '_> {
             ModalGroup::ArcCentreMode,
             ModalGroup::Diameter,
         ] {
-            let bit = group.bit();
-            state.unknown_after_join = state.unknown_after_join & !bit | kept.unknown_after_join & bit;
-            state.unknown_by_word = state.unknown_by_word & !bit | kept.unknown_by_word & bit;
+            state.groups.restore(group, &kept.groups);
             self.pass.effects.set_varying(group);
         }
-        state.set_transform(ModalGroup::Diameter, kept.is_transform_active(ModalGroup::Diameter));
+        state.groups.set_value(ModalGroup::Tool, tool);
         if moved {
             self.invalidate_pose();
         }

@@ -5,7 +5,7 @@
 //! (M96, M97, M19 R); Heidenhain iTNC 530 (M99, M104, M114, M142, M144).
 
 use super::super::dialect::Dialect;
-use super::super::modal_state::{AssignedFrames, ModalState, Variables};
+use super::super::modal_state::{AssignedFrames, Variables};
 use super::{Block, Interpreter};
 use crate::motion::Reason;
 
@@ -93,12 +93,10 @@ impl Interpreter<'_, '_> {
                 70 | 73 if linux => {
                     self.state.saved = None;
                     // Variables, work offsets and tools are not restored.
-                    let kept = ModalState {
-                        variables: Variables::default(),
-                        assigned_offsets: AssignedFrames::default(),
-                        assigned_tools: AssignedFrames::default(),
-                        ..self.state.clone()
-                    };
+                    let mut kept = self.state.clone();
+                    kept.variables = Variables::default();
+                    kept.work_offset.assigned = AssignedFrames::default();
+                    kept.tool.assigned = AssignedFrames::default();
                     self.state.saved = Some(Box::new(kept));
                 }
                 71 if linux => self.state.saved = None,

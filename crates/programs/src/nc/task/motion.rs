@@ -7,9 +7,8 @@ use nalgebra::UnitQuaternion;
 use super::super::arc::{Arc, Plane};
 use super::super::dialect::Dialect;
 use super::super::expression::Evaluated;
-use super::super::modal_state::{
-    ARC_GROUPS, MOTION_GROUPS, ModalGroup, MotionMode, OrientationMode, TOOL_GROUPS, all_known,
-};
+use super::super::modal_group::{ARC_GROUPS, MOTION_GROUPS, ModalGroup, TOOL_GROUPS};
+use super::super::modal_state::{MotionMode, OrientationMode, all_known};
 use super::super::syntax::WordValue;
 use super::{Block, BlockArc, BlockContext, Interpreter, StartDependency, StateEvent};
 use crate::motion::{
@@ -72,7 +71,7 @@ impl Interpreter<'_, '_> {
         self.state.previous = None;
         if block.spin.is_some() {
             // The spin stays unknown even if later words state the rest of the orientation.
-            self.state.spin = Err(Reason::OrientationUnknown);
+            self.state.orientation.spin = Err(Reason::OrientationUnknown);
         }
     }
 
@@ -104,15 +103,19 @@ impl Interpreter<'_, '_> {
 
     fn block_context(&self, block: &Block<'_>, arc: Option<BlockArc>) -> BlockContext {
         let state = &self.state;
-        let angles = if state.orientation_mode == OrientationMode::Rpy { &state.rpy } else { &state.abc };
-        let vector = match (state.vector, state.spin) {
+        let angles = if state.orientation.mode == OrientationMode::Rpy {
+            &state.orientation.rpy
+        } else {
+            &state.orientation.abc
+        };
+        let vector = match (state.orientation.vector, state.orientation.spin) {
             ([Ok(x), Ok(y), Ok(z)], Ok(spin)) => Some(([x, y, z], spin)),
             _ => None,
         };
         BlockContext {
             node: block.node,
-            absolute: state.absolute,
-            unit_mm: state.unit_mm,
+            absolute: state.groups.absolute(),
+            unit_mm: state.groups.unit_mm(),
             distance_mode_unknown: state.unknown_reason(ModalGroup::DistanceMode.bit()).is_some(),
             start: state.position.map(Result::ok),
             start_angles: angles.map(Result::ok),
@@ -120,8 +123,8 @@ impl Interpreter<'_, '_> {
             start_vector: vector,
             vector,
             shift: state.shift.map(Result::ok),
-            orientation_mode: state.orientation_mode,
-            vector_words: state.vector_words,
+            orientation_mode: state.orientation.mode,
+            vector_words: state.groups.vector_words(),
             arc,
             insertable: false,
             paraxial: block.paraxial,
@@ -153,7 +156,7 @@ impl Interpreter<'_, '_> {
             Some(index) => {
                 let (value, increment) = self.evaluate_word(&block.words[index]);
                 let value = value.map(|value| value * unit);
-                if increment.unwrap_or(!self.state.absolute) {
+                if increment.unwrap_or(!self.state.groups.absolute()) {
                     old[axis].and_then(|old| value.map(|value| old + value))
                 } else {
                     value
@@ -164,10 +167,11 @@ impl Interpreter<'_, '_> {
 
     /// The end position of a block.
     fn end_position(&self, block: &Block<'_>, from: &[Evaluated; 3]) -> [Evaluated; 3] {
-        let mut to = self.axis_values(block, &block.axes, from, self.state.unit_mm);
+        let mut to = self.axis_values(block, &block.axes, from, self.state.groups.unit_mm());
         for (axis, to) in to.iter_mut().enumerate() {
             let Some(index) = block.axes[axis] else { continue };
-            let increment = self.evaluate_word(&block.words[index]).1.unwrap_or(!self.state.absolute);
+            let increment =
+                self.evaluate_word(&block.words[index]).1.unwrap_or(!self.state.groups.absolute());
             if !increment {
                 *to = to.and_then(|value| self.state.shift[axis].map(|shift| value + shift));
             }
@@ -195,7 +199,7 @@ impl Interpreter<'_, '_> {
             self.state.mode
         };
         let straight = matches!(mode, MotionMode::Rapid | MotionMode::Linear);
-        let vector_words = self.state.vector_words && straight;
+        let vector_words = self.state.groups.vector_words() && straight;
         let has_centre = block.centre.iter().any(Option::is_some);
         let bends = has_centre && !vector_words || block.radius.is_some();
         // On controls with `,R` and `,C`, R, I and K of a straight block may round or chamfer its corner.
@@ -232,7 +236,7 @@ impl Interpreter<'_, '_> {
         if corner && motion.left.is_none() {
             motion.left = Some(Reason::UnsupportedPath);
         }
-        motion.timed = !self.state.feed_per_minute && kind != MotionKind::Joint;
+        motion.timed = !self.state.feed.per_minute && kind != MotionKind::Joint;
         let splits = !motion.timed && self.can_split(block, &before);
         motion.insertable = splits && kind == MotionKind::Linear && !block.other_axes;
         motion.can_straighten = splits && arc.is_some() && !block.opaque;
@@ -250,7 +254,7 @@ impl Interpreter<'_, '_> {
         self.state.position = to;
         self.update_after_motion(block, mode, machine);
         // A tool vector holds only in its own LN; later blocks have no word that states the orientation.
-        if heidenhain && self.state.orientation_mode == OrientationMode::Vector {
+        if heidenhain && self.state.orientation.mode == OrientationMode::Vector {
             self.state.invalidate_orientation();
             self.events.push(StateEvent::AxesUnknown(super::ORIENTATION));
         }
@@ -277,8 +281,11 @@ impl Interpreter<'_, '_> {
             let via = arc_midpoint(found, [from, to], rotations);
             let via_origin = if via.is_ok() { Origin::Computed } else { Origin::Unknown };
             motion.targets.push(MotionTarget { role: Role::Via, value: via, origin: via_origin, argument });
-            arc =
-                found.ok().map(|arc| BlockArc { arc, positive, centre_absolute: self.state.centre_absolute });
+            arc = found.ok().map(|arc| BlockArc {
+                arc,
+                positive,
+                centre_absolute: self.state.groups.centre_absolute(),
+            });
         }
         if motion.kind != MotionKind::Unknown {
             motion.targets.push(MotionTarget { role: Role::To, value, origin, argument });
@@ -364,7 +371,7 @@ impl Interpreter<'_, '_> {
         plain
             && !self.may_omit_words(block)
             && call.is_none_or(|call| call == Reason::Cycle)
-            && self.state.active_transforms == 0
+            && self.state.groups.active_transforms() == 0
             && self.state.unknown_reason(set_before_branch).is_none()
             && match motion.left {
                 None | Some(Reason::Skippable | Reason::UnknownFlow | Reason::UnknownWord) => true,
@@ -413,27 +420,29 @@ impl Interpreter<'_, '_> {
         // Words of one mode leave the values of the other modes unknown.
         let unknown = [Err(Reason::OrientationUnknown); 3];
         if any(&block.abc) {
-            self.state.abc = self.axis_values(block, &block.abc, &self.state.abc, 1.0);
-            (self.state.rpy, self.state.vector) = (unknown, unknown);
-            self.state.orientation_mode = OrientationMode::Angles;
+            self.state.orientation.abc =
+                self.axis_values(block, &block.abc, &self.state.orientation.abc, 1.0);
+            (self.state.orientation.rpy, self.state.orientation.vector) = (unknown, unknown);
+            self.state.orientation.mode = OrientationMode::Angles;
         }
         if any(&block.rpy) {
-            self.state.rpy = self.axis_values(block, &block.rpy, &self.state.rpy, 1.0);
-            (self.state.abc, self.state.vector) = (unknown, unknown);
-            self.state.orientation_mode = OrientationMode::Rpy;
+            self.state.orientation.rpy =
+                self.axis_values(block, &block.rpy, &self.state.orientation.rpy, 1.0);
+            (self.state.orientation.abc, self.state.orientation.vector) = (unknown, unknown);
+            self.state.orientation.mode = OrientationMode::Rpy;
         }
         let vector = if vector_words { &block.centre } else { &block.vector };
         if any(vector) {
             // An omitted component is 0.
-            self.state.vector =
+            self.state.orientation.vector =
                 vector.map(|index| index.map_or(Ok(0.0), |index| self.evaluate_word(&block.words[index]).0));
-            (self.state.abc, self.state.rpy) = (unknown, unknown);
-            self.state.orientation_mode = OrientationMode::Vector;
+            (self.state.orientation.abc, self.state.orientation.rpy) = (unknown, unknown);
+            self.state.orientation.mode = OrientationMode::Vector;
         }
         if let Some(index) = block.spin {
             let spin = self.evaluate_word(&block.words[index]).0;
-            let absolute = self.state.spin_absolute;
-            self.state.spin = if absolute { spin } else { Err(Reason::OrientationUnknown) };
+            let absolute = self.state.groups.spin_absolute();
+            self.state.orientation.spin = if absolute { spin } else { Err(Reason::OrientationUnknown) };
         }
     }
 
@@ -452,8 +461,8 @@ impl Interpreter<'_, '_> {
             return Err(Reason::UnsupportedPath);
         }
         let (start, end) = (all_known(from)?, all_known(to)?);
-        let plane = self.state.plane;
-        let unit = self.state.unit_mm;
+        let plane = self.state.groups.plane();
+        let unit = self.state.groups.unit_mm();
         if self.dialect == Dialect::Heidenhain && plane != Plane::XY {
             return Err(Reason::Transformed);
         }
@@ -468,12 +477,12 @@ impl Interpreter<'_, '_> {
         let mut centre = [0.0; 2];
         for (place, axis) in [plane.a, plane.b].into_iter().enumerate() {
             centre[place] = match block.centre[axis] {
-                None if self.state.centre_absolute => return Err(Reason::MissingArgument),
+                None if self.state.groups.centre_absolute() => return Err(Reason::MissingArgument),
                 None => start[axis],
                 Some(index) => {
                     let (value, increment) = self.evaluate_word(&block.words[index]);
                     let value = value? * unit;
-                    if increment.unwrap_or(!self.state.centre_absolute) {
+                    if increment.unwrap_or(!self.state.groups.centre_absolute()) {
                         start[axis] + value
                     } else {
                         value + self.state.shift[axis]?
@@ -512,7 +521,7 @@ impl Interpreter<'_, '_> {
     ) -> Option<Reason> {
         let state = &self.state;
         let has_orientation =
-            !matches!(state.orientation_mode, OrientationMode::Unknown(Reason::OrientationUnknown));
+            !matches!(state.orientation.mode, OrientationMode::Unknown(Reason::OrientationUnknown));
         let requires_tcp_mode =
             matches!(self.dialect, Dialect::Fanuc | Dialect::Siemens | Dialect::Heidenhain);
         if block.opaque {
@@ -533,26 +542,26 @@ impl Interpreter<'_, '_> {
             Some(reason)
         } else if let (MotionMode::Circular(_), Some(reason)) = (mode, state.unknown_reason(ARC_GROUPS)) {
             Some(reason)
-        } else if state.active_transforms != 0 {
+        } else if state.groups.active_transforms() != 0 {
             Some(Reason::Transformed)
         } else if block.other_axes && self.has_incremental_uvw() {
             Some(Reason::UnknownWord)
         } else if self.dialect == Dialect::Heidenhain
             && matches!(mode, MotionMode::Circular(_))
-            && state.plane != Plane::XY
+            && state.groups.plane() != Plane::XY
         {
             // The working plane is perpendicular to the tool axis.
             Some(Reason::Transformed)
-        } else if state.radius_compensation {
+        } else if state.groups.is_on(ModalGroup::RadiusCompensation) {
             Some(Reason::RadiusCompensation)
-        } else if has_orientation && requires_tcp_mode && !state.tcp_mode {
+        } else if has_orientation && requires_tcp_mode && !state.groups.tcp_mode() {
             Some(Reason::NoTcpMode)
         } else if self.dialect == Dialect::Heidenhain
             && matches!(mode, MotionMode::Circular(_))
             && block.radius.is_none()
         {
             Some(Reason::CentreElsewhere)
-        } else if state.feed == Err(Reason::NumberRange) && mode != MotionMode::Rapid {
+        } else if state.feed.rate == Err(Reason::NumberRange) && mode != MotionMode::Rapid {
             Some(Reason::NumberRange)
         } else {
             self.listing.frame_reason(motion)
@@ -560,7 +569,7 @@ impl Interpreter<'_, '_> {
     }
 
     fn speed(&mut self) -> Option<u32> {
-        let feed = match (self.state.feed, self.state.feed_per_minute) {
+        let feed = match (self.state.feed.rate, self.state.feed.per_minute) {
             (Ok(feed), true) => feed,
             _ => return None,
         };
@@ -580,7 +589,7 @@ impl Interpreter<'_, '_> {
     }
 
     fn zone(&mut self) -> Option<u32> {
-        if !self.state.exact_stop {
+        if !self.state.feed.exact_stop {
             return None;
         }
         let fine = ZoneValue { fine: true, tcp_mm: 0.0, orientation_mm: 0.0, orientation_deg: 0.0 };

@@ -2,6 +2,7 @@
 
 use super::super::dialect::Dialect;
 use super::super::modal_state::MotionMode;
+use super::g_codes::{Action, action};
 use super::siemens_names::code_name;
 use super::{Block, Interpreter, StateEvent};
 use crate::motion::Reason;
@@ -9,88 +10,58 @@ use crate::motion::Reason;
 impl Interpreter<'_, '_> {
     /// Applies the one-shot G codes of a block. True if its axis words are not a modelled motion.
     pub(super) fn one_shot_codes(&mut self, block: &Block<'_>) -> bool {
-        block.g.iter().any(|&code| {
-            self.non_moving_code(block, code)
-                || self.unpredictable_code(block, code)
-                || self.cycle_code(block, code)
-                || self.shift_code(block, code)
-        }) || self.m_motion(block)
+        let one_shot = |&code: &u32| {
+            action(code, self.dialect).is_some_and(|action| self.one_shot_action(block, code, action))
+        };
+        block.g.iter().any(one_shot) || self.m_motion(block)
     }
 
-    /// G codes whose block does not move: dwells, settings, poles, saved positions.
-    fn non_moving_code(&mut self, block: &Block<'_>, code: u32) -> bool {
-        let siemens = self.dialect == Dialect::Siemens;
-        match code {
+    /// Applies a one-shot G code. True if the axis words of its block are not a modelled motion.
+    fn one_shot_action(&mut self, block: &Block<'_>, code: u32, action: Action) -> bool {
+        let (iso, linux) = (self.dialect == Dialect::Iso, self.dialect == Dialect::LinuxCnc);
+        match action {
             // LinuxCNC dwells or stores the position, and then moves.
-            40 | 281 | 301 if self.dialect == Dialect::LinuxCnc => return false,
+            Action::Dwell | Action::StorePosition if linux => return false,
             // A motion on LinuxCNC, none on Fanuc; for an ISO file this is unknown.
-            40 if self.dialect == Dialect::Iso && block.has_motion_words() && block.p.is_some() => {
+            Action::Dwell if iso && block.has_motion_words() && block.p.is_some() => {
                 self.leave_unknown_end(block, code, Reason::UnknownWord);
             }
-            40 | 220 | 230 | 250 | 260 | 1030 | 1870 => {}
-            110 if !siemens => {}
-            100 if !siemens => self.set_offset(block),
-            // A pole: no motion. G110 is relative to the tool position.
-            1100 if siemens => self.mark_position_used(super::POSITION),
-            1110 | 1120 if siemens => {}
+            Action::Dwell | Action::NoMotion => {}
+            Action::PoleAtPosition => self.mark_position_used(super::POSITION),
+            Action::SetOffset => self.set_offset(block),
             // grbl stores the tool position.
-            281 | 301 if self.dialect != Dialect::Fanuc && !block.has_motion_words() => {}
-            _ => return false,
-        }
-        true
-    }
-
-    /// Motions whose end the text does not determine: cycles, reference points, probes.
-    fn unpredictable_code(&mut self, block: &Block<'_>, code: u32) -> bool {
-        let siemens = self.dialect == Dialect::Siemens;
-        let reason = match code {
-            120 | 130 | 470 | 1500 => Reason::Cycle,
-            270 | 280 | 290 | 300 => Reason::ReferenceReturn,
-            281 | 301 if self.dialect != Dialect::LinuxCnc => Reason::ReferenceReturn,
-            740 | 750 if siemens => Reason::ReferenceReturn,
-            350 | 360 | 370 | 1360 if !siemens => Reason::Probe,
-            310..=318 | 382..=385 => Reason::Probe,
-            331 => Reason::UnsupportedPath,
-            1470 | 1480 | 2470 | 2480 | 3470 | 3480 if siemens => Reason::UnsupportedPath,
-            _ => return false,
-        };
-        self.leave_unknown_end(block, code, reason);
-        match code {
-            // Measuring cycles set tools or work offsets.
-            350 | 360 | 370 | 1360 => {
+            Action::StorePosition if iso && !block.has_motion_words() => {}
+            Action::StorePosition => self.leave_unknown_end(block, code, Reason::ReferenceReturn),
+            Action::UnknownEnd(reason) => self.leave_unknown_end(block, code, reason),
+            Action::Measure => {
+                self.leave_unknown_end(block, code, Reason::Probe);
                 self.invalidate_offsets();
                 self.invalidate_tools();
             }
-            // Rigid tapping: the spindle reverses back to the start.
-            331 => self.state.mode = MotionMode::Unsupported(Reason::UnsupportedPath),
-            _ => {}
-        }
-        true
-    }
-
-    /// Motions that the control derives from other blocks or a program of its own.
-    fn cycle_code(&mut self, block: &Block<'_>, code: u32) -> bool {
-        match code {
-            // Contours and patterns, unless they are units.
-            700 | 710 if self.is_unit(block) => return false,
-            700..=769 if self.dialect != Dialect::Siemens && self.reads_contour(block, code) => {
+            Action::RigidTapping => {
+                self.leave_unknown_end(block, code, Reason::UnsupportedPath);
+                // The spindle reverses back to the start.
+                self.state.mode = MotionMode::Unsupported(Reason::UnsupportedPath);
+            }
+            Action::ContourOrUnit if self.is_unit(block, code) => return false,
+            Action::ContourOrUnit | Action::Cycle if self.reads_contour(block, code) => {
                 self.list_left(block, &code_name(code), Reason::Cycle);
                 self.invalidate_pose();
             }
-            // The rotary axes move to the tilted plane.
-            531 | 536 => {
+            Action::AlignToPlane => {
                 self.list_left(block, &code_name(code), Reason::Cycle);
                 self.invalidate_pose();
             }
-            650 => self.subprogram(block, "G65"),
-            660 | 661 => {
+            Action::Call => self.subprogram(block, "G65"),
+            Action::ModalCall => {
                 self.subprogram(block, "G66");
                 self.state.modal_call = Some(Reason::Subprogram);
             }
-            670 => {
+            Action::ModalCallEnd => {
                 self.state.modal_call = None;
                 return false;
             }
+            Action::Shift => return self.shift_code(block, code),
             _ => return false,
         }
         true
@@ -135,7 +106,7 @@ impl Interpreter<'_, '_> {
                 unknown |= 1 << axis;
             }
             if block.abc[axis].is_some() {
-                self.state.abc[axis] = Err(Reason::OrientationUnknown);
+                self.state.orientation.abc[axis] = Err(Reason::OrientationUnknown);
                 unknown |= 8 << axis;
             }
         }

@@ -2,7 +2,7 @@
 
 use super::super::dialect::Dialect;
 use super::super::expression::Evaluated;
-use super::super::modal_state::ModalGroup;
+use super::super::modal_group::ModalGroup;
 use super::{Block, Interpreter, StateEvent};
 use crate::motion::Reason;
 
@@ -27,7 +27,7 @@ impl Interpreter<'_, '_> {
                 self.state.origin_set = false;
                 self.mark_shift_stated([true; 3]);
                 self.set_group_varying(ModalGroup::CoordinateShift);
-                if self.state.is_transform_active(ModalGroup::RotaryOffset) {
+                if self.state.groups.is_on(ModalGroup::RotaryOffset) {
                     self.switch_transform(ModalGroup::RotaryOffset, false);
                 }
                 self.leave_if_motion(block, code);
@@ -67,7 +67,7 @@ impl Interpreter<'_, '_> {
 
     /// G92.1: whether it cancels every shift, or there is none.
     fn cancels_all_shifts(&self, block: &Block<'_>) -> bool {
-        let rotary = self.state.is_transform_active(ModalGroup::RotaryOffset);
+        let rotary = self.state.groups.is_on(ModalGroup::RotaryOffset);
         let none = self.state.shift == [Ok(0.0); 3]
             && !rotary
             && self
@@ -106,7 +106,7 @@ impl Interpreter<'_, '_> {
                 changes |= !same(axis, self.evaluate_word(&block.words[index]).0);
             }
         }
-        let was = self.state.is_transform_active(ModalGroup::RotaryOffset);
+        let was = self.state.groups.is_on(ModalGroup::RotaryOffset);
         if any && (changes || was) {
             self.switch_transform(ModalGroup::RotaryOffset, changes || block.abc.iter().any(Option::is_none));
         }
@@ -128,7 +128,7 @@ impl Interpreter<'_, '_> {
                 (Err(reason), _) | (_, Err(reason)) => Err(reason),
             };
         }
-        let abc = self.state.abc;
+        let abc = self.state.orientation.abc;
         self.state.origin_set = true;
         self.set_group_varying(ModalGroup::CoordinateShift);
         let named = block.axes.map(|axis| axis.is_some());

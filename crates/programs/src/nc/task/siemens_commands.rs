@@ -1,7 +1,8 @@
 //! Siemens: named commands.
 
 use super::super::dialect::Dialect;
-use super::super::modal_state::{ModalGroup, MotionMode};
+use super::super::modal_group::ModalGroup;
+use super::super::modal_state::MotionMode;
 use super::super::syntax::{Word, WordValue};
 use super::super::token::Token;
 use super::siemens_names::{is_cycle, is_harmless_call, is_keyword};
@@ -93,17 +94,12 @@ impl Interpreter<'_, '_> {
                 self.switch_transform_in_place(ModalGroup::OrientationFrame, name == b"ORIMKS")
             }
             b"ORIRPY" | b"ORIEULER" | b"ORIVIRT1" | b"ORIVIRT2" | b"ORIRPY2" => {
-                self.state.rpy_convention_stated = name == b"ORIRPY";
-                self.set_group(ModalGroup::RpyConvention, 1 + u64::from(self.state.rpy_convention_stated));
+                self.set_group(ModalGroup::RpyConvention, 1 + u64::from(name == b"ORIRPY"));
             }
-            b"ORIROTA" => {
-                self.state.spin_absolute = true;
-                self.set_group(ModalGroup::SpinReference, 0);
-            }
+            b"ORIROTA" => self.set_group(ModalGroup::SpinReference, 0),
             b"ORIROTR" | b"ORIROTT" | b"ORIROTC" => {
-                self.state.spin_absolute = false;
                 self.set_group(ModalGroup::SpinReference, 1);
-                self.state.spin = Err(Reason::OrientationUnknown);
+                self.state.orientation.spin = Err(Reason::OrientationUnknown);
             }
             b"ORIPATH" | b"ORIPATHS" | b"ORIRESET" => self.state.invalidate_orientation(),
             b"CIP" | b"CT" | b"BSPLINE" | b"ASPLINE" | b"CSPLINE" | b"POLY" | b"INVCW" | b"INVCCW" => {

@@ -2,7 +2,7 @@
 
 use super::super::dialect::Dialect;
 use super::super::expression::{Evaluated, Evaluator, LARGEST, Variable, literal};
-use super::super::modal_state::ModalGroup;
+use super::super::modal_group::ModalGroup;
 use super::super::parser::word;
 use super::super::syntax::{Syntax, Word, WordValue};
 use super::super::token::Token;
@@ -68,7 +68,7 @@ impl<'s> Interpreter<'_, 's> {
 
     /// Whether the control may align the tool with the surface normal, as under M128 and TCPM.
     fn may_turn_to_normal(&self, block: &Block<'_>) -> bool {
-        self.state.tcp_mode
+        self.state.groups.tcp_mode()
             || block.m.contains(&128)
             || self.state.unknown_reason(ModalGroup::TcpMode.bit()).is_some()
     }
