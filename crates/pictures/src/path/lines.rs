@@ -7,6 +7,7 @@ use rerun::{Arrows3D, LineStrips3D, Mesh3D, Points3D};
 use super::scene::{PathScene, Plan, intended, reached};
 use crate::colour::{BEFORE, FLAGGED, INTENDED, REFUSED, Rgba, TOOL, TRAVEL, WORKPIECE, after};
 use crate::legend;
+use crate::page::bounds;
 use crate::recording::{Store, VisualError};
 use truegrind_compensation::deviation::{Deviation, PathPoint, PathReport, Status};
 
