@@ -71,8 +71,10 @@ struct Labels {
     taken: Vec<Point3<f64>>,
 }
 
-/// Distance of a label from the middle of the cut, over the size of the cut: half of that, and half a label.
-const BESIDE: f64 = 0.72;
+/// Distance of a label from the middle of the cut, over the size of the cut: half of that, some space, and half the label by its
+/// characters.
+const BESIDE: f64 = 0.55;
+const CHARACTER: f64 = 0.0095;
 /// Labels are about so long, over the size of the cut.
 const LABEL_LENGTH: f64 = 0.4;
 
@@ -84,9 +86,10 @@ impl Labels {
     }
 
     /// Position of the label of `point`; `None` where it would overlap another.
-    fn take(&mut self, point: &PathPoint) -> Option<Point3<f64>> {
+    fn take(&mut self, point: &PathPoint, label: &str) -> Option<Point3<f64>> {
         let away = (intended(point) - self.middle).try_normalize(1e-9).unwrap_or_else(Vector3::z);
-        let place = self.middle + away * (BESIDE * self.size_mm);
+        let distance = BESIDE + CHARACTER * label.chars().count() as f64;
+        let place = self.middle + away * (distance * self.size_mm);
         let free = self.taken.iter().all(|other| (other - place).norm() >= LABEL_LENGTH * self.size_mm);
         free.then(|| {
             self.taken.push(place);
@@ -117,7 +120,11 @@ fn run(
 ) -> Result<(), VisualError> {
     let drawn = report.points.iter().filter(|p| plan.cuts(p)).filter_map(|p| which(p).map(|d| (p, d)));
     let largest = drawn.max_by(|a, b| a.1.norm_mm().total_cmp(&b.1.norm_mm()));
-    let place = largest.and_then(|(point, _)| labels.take(point));
+    let text = |deviation: &Deviation| match expected {
+        Some(mm) => format!("{title}: {mm:.3} mm expected (1σ)"),
+        None => format!("{title}: {:.3} mm", deviation.norm_mm()),
+    };
+    let place = largest.as_ref().and_then(|(point, deviation)| labels.take(point, &text(deviation)));
     for (folder, times, width) in [("path", 1.0, 2.5), ("exaggerated", plan.times, 1.8)] {
         // At true scale the colour is all that tells the size; exaggerated, it tells which is which.
         let by_size = folder == "path";
@@ -147,14 +154,10 @@ fn run(
             .with_radii([Radius::new_ui_points(0.8)])
             .with_colors([Color::from(*colour)]);
         store.fixed(format!("{entity}/leader"), &leader)?;
-        let size = match expected {
-            Some(mm) => format!("{mm:.3} mm expected (1σ)"),
-            None => format!("{:.3} mm", deviation.norm_mm()),
-        };
         let label = Points3D::new([xyz(&place)])
             .with_radii([Radius::new_ui_points(0.5)])
             .with_colors([Color::from(*colour)])
-            .with_labels([format!("{title}: {size}")])
+            .with_labels([text(&deviation)])
             .with_show_labels(true);
         store.fixed(format!("{entity}/label"), &label)?;
     }

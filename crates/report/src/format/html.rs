@@ -22,6 +22,9 @@ const SHORT: usize = 16;
 /// Tables with more rows scroll inside the page.
 const ROWS_TO_SCROLL: usize = 24;
 
+/// Tables with so many columns have less space between them.
+const COLUMNS_TO_NARROW: usize = 10;
+
 /// The document as an HTML page.
 pub fn document(document: &Document) -> String {
     let mut page = Page::default();
@@ -45,11 +48,12 @@ pub fn document(document: &Document) -> String {
 
 /// The table as an HTML fragment.
 pub fn table(table: &Table) -> String {
-    let mut html = String::from(if table.rows.len() > ROWS_TO_SCROLL {
-        "<div class=\"table long\" tabindex=\"0\">\n<table>\n"
+    let wide = if table.columns.len() >= COLUMNS_TO_NARROW { " wide" } else { "" };
+    let mut html = if table.rows.len() > ROWS_TO_SCROLL {
+        format!("<div class=\"table long{wide}\" tabindex=\"0\">\n<table>\n")
     } else {
-        "<div class=\"table\">\n<table>\n"
-    });
+        format!("<div class=\"table{wide}\">\n<table>\n")
+    };
     if !table.title.is_empty() {
         html.push_str(&format!("<caption>{}</caption>\n", escape(&table.title)));
     }

@@ -422,12 +422,12 @@ fn a_table_that_continues_below_repeats_what_tells_its_rows_apart() {
     for joint in 1..=2 {
         table.push(["gear".into(), format!("joint {joint}").into(), 0.1.into(), 0.05.into()]);
     }
-    let text = terminal::table(&table, 40);
+    let text = terminal::table(&table, 30);
     let below = text.split("\n\n").nth(1).unwrap();
     assert!(below.contains("gear    joint 1") && below.contains("gear    joint 2"), "{text}");
     // Where one column tells them apart, it stands alone.
     table.rows[1][0] = "play".into();
-    let text = terminal::table(&table, 40);
+    let text = terminal::table(&table, 30);
     assert!(!text.split("\n\n").nth(1).unwrap().contains("joint"), "{text}");
 }
 

@@ -98,7 +98,7 @@ fn one_split_has_no_deviation() {
 fn the_page_names_the_best_method_and_who_did_not_converge() {
     let page = view::document(&rows(), "abb-irb-120", &dataset());
     let text = leave("study.html", &page);
-    assert!(text.contains("lm has the smallest held-out error: 0.460 mm RMSE"));
+    assert!(text.contains("lm has the smallest held-out error: 0.460\u{a0}mm RMSE"));
     assert!(text.contains("lm-as-printed did not converge on 2 of 3 splits"));
     assert_eq!(text.matches("<figure>").count(), 2);
     let json = view::json(&rows(), "abb-irb-120", &dataset());
