@@ -232,7 +232,7 @@ impl PyDataset {
     /// ``cable``, ``position`` or ``pose``.
     #[getter]
     fn sensor(&self) -> &'static str {
-        truegrind::calibration::identification::identify::sensor_name(self.rows.sensor)
+        self.rows.sensor.name()
     }
 
     /// Remarks: skipped columns, dropped blank rows.

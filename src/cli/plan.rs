@@ -45,6 +45,7 @@ enum IndexArgument {
     O1,
 }
 
+// More than twenty fields: one for each argument of the command line.
 /// Arguments of `plan`.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {

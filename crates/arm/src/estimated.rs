@@ -17,6 +17,7 @@ use super::jacobian::effect_twist;
 use super::model::{Model, PreparedModel};
 use super::parameter::{LinkCoordinate, Parameter};
 use super::region::Region;
+use super::sensor::Sensor;
 use crate::joints::Joints;
 use truegrind_math::lanes::{AnyWidth, Real, SinCos, WIDTH, vectorised};
 use truegrind_math::se3::Pose;
@@ -70,6 +71,18 @@ pub struct EstimatedParameter {
     pub determined: f64,
 }
 
+impl EstimatedParameter {
+    /// Whether it belongs to a link.
+    pub fn is_of_link(&self) -> bool {
+        self.name.starts_with("link")
+    }
+
+    /// Whether it belongs to the arm (a link or an effect) rather than to the sensor.
+    pub fn is_of_arm(&self) -> bool {
+        self.is_of_link() || self.name.starts_with("effect")
+    }
+}
+
 /// Where an estimate came from.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -83,7 +96,7 @@ pub struct Provenance {
     /// Rows set aside as outliers, as the spreadsheet counts them.
     pub set_aside: Vec<usize>,
     /// Sensor.
-    pub sensor: String,
+    pub sensor: Sensor,
     /// Method by name.
     pub method: String,
     /// Seed of the split.

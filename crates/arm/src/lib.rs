@@ -22,6 +22,7 @@ pub mod parameter;
 pub mod jacobian;
 pub mod arm_file;
 pub mod region;
+pub mod sensor;
 pub mod estimated;
 pub mod inverse;
 pub mod batch;

@@ -70,7 +70,7 @@ pub fn document(found: &Diagnosed, dataset: &Dataset) -> Document {
         sources: vec![Source::new(&from.file, "Measurements", &from.sha256, Some(diagnosis.dataset.rows))],
         remarks: vec![
             ("Robot".to_owned(), diagnosis.dataset.robot.clone()),
-            ("Sensor".to_owned(), diagnosis.dataset.sensor.clone()),
+            ("Sensor".to_owned(), diagnosis.dataset.sensor.to_string()),
         ],
     });
     page

@@ -7,7 +7,7 @@ mod words;
 
 use serde_json::{Value, json};
 
-use self::parameter::{held_by_prior, in_unit, is_of_arm};
+use self::parameter::{held_by_prior, in_unit};
 use self::tables::row_number;
 use super::document::{Block, Document, KeyFigure, Provenance, Source, Verdict};
 use super::number::Precision;
@@ -104,7 +104,7 @@ pub fn summary(found: &Identification) -> Document {
 pub fn json(found: &Identification, dataset: &Dataset) -> Value {
     let estimated = &found.estimated;
     let parameters = |of_arm: bool| -> Vec<Value> {
-        found.parameters.iter().filter(|p| is_of_arm(p) == of_arm).map(parameter_json).collect()
+        found.parameters.iter().filter(|p| p.is_of_arm() == of_arm).map(parameter_json).collect()
     };
     let held_out: Vec<Value> = found
         .held_out
@@ -195,7 +195,7 @@ fn parameter_json(parameter: &EstimatedParameter) -> Value {
         "rad" => in_unit(parameter, 1f64.to_degrees(), "deg"),
         unit => in_unit(parameter, 1.0, unit),
     };
-    let of_arm = is_of_arm(parameter);
+    let of_arm = parameter.is_of_arm();
     json!({
         "name": shown.name,
         "unit": shown.unit,
@@ -292,7 +292,7 @@ fn provenance(found: &Identification, dataset: &Dataset) -> Provenance {
     let remark = |name: &str, value: String| (name.to_owned(), value);
     let mut remarks = vec![
         remark("Robot", found.estimated.robot.clone()),
-        remark("Sensor", from.sensor.clone()),
+        remark("Sensor", from.sensor.to_string()),
         remark("Split", format!("{} % of the rows held out", (1e4 * from.held_out).round() / 100.0)),
         remark(
             "Angles refined",

@@ -7,7 +7,6 @@ use super::number::handy;
 use super::plot::{Axis, Graph, Reference, Series};
 use super::status::Status;
 use super::table::{Cell, Column, Table};
-use truegrind_calibration::identification::identify::sensor_name;
 use truegrind_calibration::tracking::state::ConsumedFile;
 use truegrind_calibration::tracking::{Alarm, Tracker};
 use truegrind_math::statistics::median;
@@ -15,7 +14,7 @@ use truegrind_math::statistics::median;
 /// Summary for the terminal.
 pub fn summary(tracker: &Tracker, fresh: usize, alarms: &[Alarm], model: &str) -> Document {
     let mut page = Document::new("Track");
-    page.subtitle = format!("{}, {} readings", tracker.robot(), sensor_name(tracker.state().sensor));
+    page.subtitle = format!("{}, {} readings", tracker.robot(), tracker.state().sensor);
     head(&mut page, tracker, fresh, alarms, model);
     page
 }

@@ -45,6 +45,7 @@ enum PlacementArgument {
     Absolute,
 }
 
+// More than twenty fields: one for each argument of the command line.
 /// Arguments of `compensate`.
 #[derive(Debug, Clone, Args)]
 #[command(

@@ -21,7 +21,7 @@ use crate::identification::benefit::{Benefit, benefit};
 use crate::identification::calibration::Frames;
 use crate::identification::fit::{Fitted, Observations, frame_parameters};
 use crate::identification::identify::{
-    arm_covariance, arm_parameters_of, mean_condition, parameter_table, sensor_name, with_sigma_in_region,
+    arm_covariance, arm_parameters_of, mean_condition, parameter_table, with_sigma_in_region,
 };
 use crate::identification::prior_width::width_uncertainty;
 use crate::identification::start::count_distinct_poses;
@@ -254,7 +254,7 @@ fn build_diagnosis(
         dataset: Source {
             file: dataset.file.clone(),
             rows: dataset.rows.len(),
-            sensor: sensor_name(dataset.sensor).to_owned(),
+            sensor: dataset.sensor,
             robot: robot.to_owned(),
             set_aside: set_aside.len(),
         },
@@ -343,17 +343,14 @@ fn estimated(
             sha256: dataset.sha256.clone(),
             rows: dataset.rows.len() - set_aside.len(),
             set_aside: set_aside.iter().map(|&i| dataset.rows[i].number).collect(),
-            sensor: sensor_name(dataset.sensor).to_owned(),
+            sensor: dataset.sensor,
             method: "diagnose".to_owned(),
             seed: options.selection.seed,
             held_out: 0.2,
             sharpened: prepared.readout_fusion.is_ok(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
         },
-        parameters: parameter_table(handed, nominal_arm)
-            .into_iter()
-            .filter(|p| p.name.starts_with("link") || p.name.starts_with("effect"))
-            .collect(),
+        parameters: parameter_table(handed, nominal_arm).into_iter().filter(|p| p.is_of_arm()).collect(),
         registered: StageErrors { fitted: stages[0].fitted, held_out: stages[0].random },
         geometry: StageErrors { fitted: stages[2].fitted, held_out: stages[2].random },
         noise_floor_mm: diagnosis.noise_floor_mm,

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::identification::identify::IdentifyError;
 use truegrind_arm::estimated::Verdict;
+use truegrind_arm::sensor::Sensor;
 
 /// Name and version of the JSON form.
 pub const SCHEMA: &str = "truegrind.diagnosis/1";
@@ -15,8 +16,8 @@ pub struct Source {
     pub file: String,
     /// Rows.
     pub rows: usize,
-    /// `cable`, `position` or `pose`.
-    pub sensor: String,
+    /// Sensor.
+    pub sensor: Sensor,
     /// Robot by name.
     pub robot: String,
     /// Rows set aside as outliers: left out of both held-out errors.

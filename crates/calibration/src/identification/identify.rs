@@ -21,7 +21,9 @@ use crate::identification::verdict::{Limits, VerdictBuilder};
 use crate::measurement::dataset::{Dataset, Sensor};
 use crate::measurement::split::{self, NoiseFloor, Split};
 use truegrind_arm::condition::Condition;
-use truegrind_arm::estimated::{Estimated, EstimatedParameter, Judgement, Provenance, StageErrors, Verdict};
+use truegrind_arm::estimated::{
+    Estimated, EstimatedParameter, Judgement, Provenance, StageErrors, Verdict, WidthUncertainty,
+};
 use truegrind_arm::model::{Joints, Model};
 use truegrind_arm::parameter::{Parameter, arm_parameters, link_parameters};
 use truegrind_arm::region::Region;
@@ -151,15 +153,10 @@ pub fn identify(
     split: &dyn Fn(&Dataset) -> Split,
     options: &Options,
 ) -> Result<Identification, IdentifyError> {
-    report_step("looking for outliers");
-    let start = Start { model: nominal, frames };
-    let (observed, readout_fusion) = prepare_observations(dataset, nominal, options.fuse_readout);
-    check_row_count(&observed.dataset, nominal, options.held_out)?;
-    // The same outliers for every method.
-    let outliers = outliers(&observed, start, &options.tolerance, options.solver_for_frames());
+    let (observed, readout_fusion, outliers) =
+        observations_without_outliers(dataset, nominal, frames, options)?;
     let prepared = options.solver.prepare_model(nominal, dataset);
     let nominal = &prepared;
-    let observed = without(observed, &outliers);
     // Before the fits, to limit peak memory.
     let repeats = split::noise_floor(&observed.dataset);
     let region = Region::of(observed.dataset.rows.iter().map(|row| &row.joints), 0.0);
@@ -191,9 +188,7 @@ pub fn identify(
         model: geometry.model.clone(),
         order: arm_parameters_of(&geometry),
         covariance: arm_covariance(&geometry),
-        width_uncertainty: Some(&options.tolerance)
-            .filter(|tolerance| tolerance.learn_widths)
-            .and_then(|t| width_uncertainty(t, &geometry.parameters, &geometry.priors, &geometry.estimate)),
+        width_uncertainty: learned_width_uncertainty(&options.tolerance, &geometry),
         provenance: Provenance { sharpened, ..provenance(dataset, &observed, &outliers, options) },
         parameters: select_arm_parameters(&parameters),
         registered: trained.registered,
@@ -230,6 +225,28 @@ pub fn identify(
         held_out: trained.held_out,
         parameters,
     })
+}
+
+/// The rows as they are fitted, without outliers, which are the same for every method.
+fn observations_without_outliers(
+    dataset: &Dataset,
+    nominal: &Model,
+    frames: &Frames,
+    options: &Options,
+) -> Result<(Observations, Result<ReadoutFusion, NotFused>, Outliers), IdentifyError> {
+    report_step("looking for outliers");
+    let (observed, readout_fusion) = prepare_observations(dataset, nominal, options.fuse_readout);
+    check_row_count(&observed.dataset, nominal, options.held_out)?;
+    let start = Start { model: nominal, frames };
+    let outliers = outliers(&observed, start, &options.tolerance, options.solver_for_frames());
+    let observed = without(observed, &outliers);
+    Ok((observed, readout_fusion, outliers))
+}
+
+/// The uncertainty of the widths of the tolerances, where they were learned.
+fn learned_width_uncertainty(tolerance: &Tolerance, geometry: &Fitted) -> Option<WidthUncertainty> {
+    let Fitted { parameters, priors, estimate, .. } = geometry;
+    tolerance.learn_widths.then(|| width_uncertainty(tolerance, parameters, priors, estimate)).flatten()
 }
 
 /// The fit to the training rows.
@@ -283,7 +300,7 @@ fn provenance(
         sha256: dataset.sha256.clone(),
         rows: observed.dataset.rows.len(),
         set_aside: outliers.rows.iter().map(|(i, _)| dataset.rows[*i].number).collect(),
-        sensor: sensor_name(dataset.sensor).to_owned(),
+        sensor: dataset.sensor,
         method: options.solver.name.to_owned(),
         seed: options.seed,
         held_out: options.held_out,
@@ -339,23 +356,13 @@ impl Stages<'_> {
 
 /// The arm's parameters among those of a fit.
 fn select_arm_parameters(parameters: &[EstimatedParameter]) -> Vec<EstimatedParameter> {
-    let arm = |p: &&EstimatedParameter| p.name.starts_with("link") || p.name.starts_with("effect");
-    parameters.iter().filter(arm).cloned().collect()
+    parameters.iter().filter(|p| p.is_of_arm()).cloned().collect()
 }
 
 impl Options {
     /// Frames are always registered with the default solver, so that methods differ in geometry alone.
     fn solver_for_frames(&self) -> &'static Solver {
         &SOLVERS[0]
-    }
-}
-
-/// Machine name of a sensor.
-pub fn sensor_name(sensor: Sensor) -> &'static str {
-    match sensor {
-        Sensor::Cable => "cable",
-        Sensor::Position => "position",
-        Sensor::Pose => "pose",
     }
 }
 

@@ -61,7 +61,7 @@ impl VerdictBuilder {
     /// Fails for a link parameter too far from nominal. `margin` standard deviations of the estimate are subtracted first: with
     /// wide priors, weakly determined parameters scatter.
     pub fn check_links(&mut self, parameters: &[EstimatedParameter], tolerance: &Tolerance, margin: f64) {
-        for p in parameters.iter().filter(|p| p.name.starts_with("link")) {
+        for p in parameters.iter().filter(|p| p.is_of_link()) {
             let one = if p.unit == "mm" { tolerance.length_mm } else { tolerance.angle_rad };
             let off = (p.value - p.nominal).abs();
             if !((off - margin * p.sigma) / one < IMPLAUSIBLE_DEVIATION) {

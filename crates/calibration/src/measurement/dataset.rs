@@ -3,33 +3,9 @@
 mod row;
 mod rows;
 
-use serde::{Deserialize, Serialize};
-
 pub use self::row::{Extra, Motion, PathPoint, Reading, Row};
 pub use self::rows::{Iter, Rows};
-
-/// What the sensor measures of a pose.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Sensor {
-    /// Length of a draw-wire from an outlet to a hook on the flange.
-    Cable,
-    /// Position of a reflector on the flange, in the sensor's own frame.
-    Position,
-    /// Position and orientation of a target on the flange, in the sensor's own frame.
-    Pose,
-}
-
-impl Sensor {
-    /// Number of scalars in a reading.
-    pub fn scalars(self) -> usize {
-        match self {
-            Sensor::Cable => 1,
-            Sensor::Position => 3,
-            Sensor::Pose => 6,
-        }
-    }
-}
+pub use truegrind_arm::sensor::Sensor;
 
 /// A measurement file.
 #[derive(Debug, Clone, PartialEq)]

@@ -6,7 +6,6 @@ use serde::{Deserialize, Serialize};
 use super::alarm::Alarm;
 use super::error::StateError;
 use super::options::Options;
-use crate::identification::identify::sensor_name;
 use crate::measurement::dataset::{Reading, Row, Sensor};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Joints;
@@ -108,7 +107,7 @@ impl Snapshot {
     }
 }
 
-/// Persistent state of a track.
+/// Persistent state of a track. More than twenty fields: the keys of its file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct State {
@@ -211,8 +210,7 @@ impl State {
         for (k, record) in self.history.iter().enumerate() {
             let key = |name: &str| format!("history {}: {name}", k + 1);
             if record.reading.len() != self.sensor.scalars() {
-                let found =
-                    format!("{} numbers for the sensor {}", record.reading.len(), sensor_name(self.sensor));
+                let found = format!("{} numbers for the sensor {}", record.reading.len(), self.sensor);
                 return wrong(&key("reading"), found, "1 of a cable, 3 of a position, 6 of a pose");
             }
             if record.anchor >= self.outlets_mm.len().max(1) {

@@ -9,7 +9,7 @@ use super::options::Options;
 use super::state::{ConsumedFile, PoseRecord, SCHEMA, Snapshot, State, digest, extend_region};
 use crate::identification::calibration::{CalibrationProblem, Frames, Weight};
 use crate::identification::fit::{Observations, frame_parameters};
-use crate::identification::identify::{prepare_observations, sensor_name};
+use crate::identification::identify::prepare_observations;
 use crate::identification::register::register;
 use crate::identification::rounding;
 use crate::identification::tolerance::Tolerance;
@@ -198,8 +198,8 @@ impl Tracker {
         if dataset.sensor != self.state.sensor {
             return Err(TrackError::Sensor {
                 file: dataset.file.clone(),
-                found: sensor_name(dataset.sensor),
-                expected: sensor_name(self.state.sensor),
+                found: dataset.sensor.name(),
+                expected: self.state.sensor.name(),
             });
         }
         let done = self.state.consumed.iter().position(|c| c.file == dataset.file);

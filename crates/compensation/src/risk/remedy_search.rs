@@ -20,6 +20,7 @@ use crate::risk::registration::Registration;
 use crate::risk::remedy::{Measurement, Remedy};
 use truegrind_arm::estimated::{Estimated, RegisteredFrame};
 use truegrind_arm::model::{Joints, PreparedModel};
+use truegrind_arm::sensor::Sensor;
 use truegrind_math::se3::{Pose, difference};
 use truegrind_math::tail::normal_two_sided;
 
@@ -280,7 +281,7 @@ impl UnknownPlacement<'_, '_> {
         let middle = points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64;
         let out = Vector3::new(middle.x, middle.y, 0.0).try_normalize(1e-9).unwrap_or_else(Vector3::x);
         let out = if second { Vector3::z().cross(&out) } else { out };
-        if self.knowledge.provenance.sensor == "cable" {
+        if self.knowledge.provenance.sensor == Sensor::Cable {
             let farthest = points.iter().map(|p| p.xy().norm()).fold(0.0, f64::max);
             SensorPosition::Outlet(out * (OUTLET_FARTHER * farthest))
         } else {
@@ -291,7 +292,7 @@ impl UnknownPlacement<'_, '_> {
     /// Standard deviation of a reading, each coordinate (mm), from the held-out error.
     fn reading_mm(&self) -> f64 {
         let rmse = self.knowledge.geometry.held_out.rmse;
-        let coordinates: f64 = if self.knowledge.provenance.sensor == "cable" { 1.0 } else { 3.0 };
+        let coordinates: f64 = if self.knowledge.provenance.sensor == Sensor::Cable { 1.0 } else { 3.0 };
         let sigma = rmse / coordinates.sqrt();
         if sigma > 0.0 && sigma.is_finite() { sigma.max(FINEST_MM) } else { READING_MM }
     }

@@ -13,6 +13,7 @@ use truegrind_arm::estimated::Estimated;
 use truegrind_arm::inverse::Inverse;
 use truegrind_arm::model::{Joints, Model};
 use truegrind_arm::parameter::{LinkCoordinate, Parameter};
+use truegrind_arm::sensor::Sensor;
 use truegrind_calibration::identification::calibration::{CalibrationProblem, Weight};
 use truegrind_calibration::identification::fit::frame_parameters;
 use truegrind_calibration::identification::identify::{self, Identification, identify};
@@ -269,7 +270,7 @@ fn where_the_axis_of_joint_6_is_not_known_a_target_beside_it_is_named_and_brings
     let (unseen, moved) = if there.1 < back.1 { there } else { back };
     assert!(moved < 0.02, "a target on the axis moves by {moved} mm");
     known.covariance += &unseen * unseen.transpose();
-    known.provenance.sensor = "position".to_owned();
+    known.provenance.sensor = Sensor::Position;
     known.geometry.held_out.rmse = 0.03 * 3.0_f64.sqrt();
     // The position's deviation is less than its uncertainty.
     known.nominal = known.model.clone();

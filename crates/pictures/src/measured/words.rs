@@ -7,7 +7,7 @@ use crate::markdown::{cell, line, number, with_sigma};
 use crate::shape::Shape;
 use truegrind_arm::estimated::{EstimatedParameter, Judgement};
 use truegrind_calibration::diagnosis::finding::{Confidence, Diagnosis};
-use truegrind_calibration::identification::identify::{Identification, sensor_name};
+use truegrind_calibration::identification::identify::Identification;
 use truegrind_math::statistics::ErrorSummary;
 
 pub(super) fn markdown(scene: &MeasuredScene<'_>, shape: Option<&Shape>) -> String {
@@ -17,7 +17,7 @@ pub(super) fn markdown(scene: &MeasuredScene<'_>, shape: Option<&Shape>) -> Stri
         text,
         "{} rows, sensor: {}. Arm: {}.\n",
         dataset.rows.len(),
-        sensor_name(dataset.sensor),
+        dataset.sensor,
         line(scene.arm_is)
     );
     for sentence in scene.answer {

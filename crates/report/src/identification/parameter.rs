@@ -2,11 +2,6 @@
 
 use truegrind_arm::estimated::EstimatedParameter;
 
-/// Whether a parameter belongs to the arm rather than to the sensor.
-pub(super) fn is_of_arm(parameter: &EstimatedParameter) -> bool {
-    parameter.name.starts_with("link") || parameter.name.starts_with("effect")
-}
-
 /// A parameter with all values multiplied by `factor`.
 pub(super) fn in_unit(parameter: &EstimatedParameter, factor: f64, unit: &str) -> EstimatedParameter {
     EstimatedParameter {

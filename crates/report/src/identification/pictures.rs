@@ -1,6 +1,6 @@
 //! Plots of an identification.
 
-use super::parameter::{handy, held_by_prior, is_of_arm};
+use super::parameter::{handy, held_by_prior};
 use super::tables::{self, signed};
 use crate::plot::{Axis, Graph, Histogram, Ink, Interval, Intervals, Reference, Sample, Series};
 use truegrind_calibration::identification::identifiability::Identifiability;
@@ -52,7 +52,7 @@ pub(super) fn by_row(found: &Identification) -> String {
 
 /// Parameters of the arm in units of their priors.
 pub(super) fn parameters(found: &Identification) -> String {
-    let rows = found.parameters.iter().filter(|parameter| is_of_arm(parameter)).filter_map(|parameter| {
+    let rows = found.parameters.iter().filter(|parameter| parameter.is_of_arm()).filter_map(|parameter| {
         let shown = handy(parameter);
         let mut row = Interval::new(
             shown.name,

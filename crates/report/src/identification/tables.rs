@@ -1,11 +1,11 @@
 //! Tables of an identification.
 
-use super::parameter::{handy, held_by_prior, is_of_arm};
+use super::parameter::{handy, held_by_prior};
 use crate::status::Status;
 use crate::table::{Cell, Column, Table};
 use truegrind_arm::estimated::EstimatedParameter;
 use truegrind_calibration::identification::identifiability::Identifiability;
-use truegrind_calibration::identification::identify::{Identification, sensor_name};
+use truegrind_calibration::identification::identify::Identification;
 use truegrind_calibration::identification::solver;
 use truegrind_calibration::measurement::dataset::{Dataset, Sensor};
 use truegrind_math::statistics::ErrorSummary;
@@ -87,7 +87,7 @@ pub fn parameter_table(found: &Identification) -> Table {
     );
     let as_printed =
         solver::by_name(&found.estimated.provenance.method).is_ok_and(|solver| solver.as_printed);
-    for parameter in found.parameters.iter().filter(|parameter| is_of_arm(parameter)) {
+    for parameter in found.parameters.iter().filter(|parameter| parameter.is_of_arm()) {
         let shown = handy(parameter);
         table.push([
             shown.name.as_str().into(),
@@ -145,7 +145,7 @@ pub fn frame_table(found: &Identification) -> Table {
             Column::text("unit", "Unit"),
         ],
     );
-    for parameter in found.parameters.iter().filter(|parameter| !is_of_arm(parameter)) {
+    for parameter in found.parameters.iter().filter(|parameter| !parameter.is_of_arm()) {
         let shown = handy(parameter);
         table.push([
             shown.name.as_str().into(),
@@ -313,5 +313,5 @@ pub(super) fn row_number(dataset: &Dataset, index: usize) -> usize {
 
 /// Whether errors are signed (cable) rather than lengths of vectors.
 pub(super) fn signed(found: &Identification) -> bool {
-    found.estimated.provenance.sensor == sensor_name(Sensor::Cable)
+    found.estimated.provenance.sensor == Sensor::Cable
 }

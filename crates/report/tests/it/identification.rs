@@ -3,6 +3,7 @@
 use truegrind_arm::estimated::{EstimatedParameter, Judgement, StageErrors};
 use truegrind_arm::link::LinkModel;
 use truegrind_arm::parameter::{LinkCoordinate, Parameter};
+use truegrind_arm::sensor::Sensor;
 use truegrind_calibration::identification::identifiability::Identifiability;
 use truegrind_calibration::identification::identify::Identification;
 use truegrind_calibration::identification::rounding::NotFused;
@@ -82,7 +83,7 @@ geometry           held out     24      0.500          0.400    0.450     1.000 
     assert!(notes.contains("\"STD\""), "{notes}");
     // A stated frame gives the raw row; lengths of vectors have no signed mean.
     found.raw = Some(ErrorSummary::of([3.0, -4.0]));
-    found.estimated.provenance.sensor = "position".to_owned();
+    found.estimated.provenance.sensor = Sensor::Position;
     let table = view::stage_table(&found);
     assert_eq!(table.rows[0][2], Cell::Count(2));
     assert!(table.rows.iter().all(|row| row[7] == Cell::Missing));
