@@ -1,4 +1,5 @@
-//! Findings about the quality of the data: rounded angles, contradicting columns, outliers, noise floor.
+//! Findings about the quality of the data: rounded angles, contradicting columns, outliers, noise floor, angles between which
+//! nothing was measured.
 
 use super::extension::{Extended, Freedom, Subject, fit};
 use super::finding::{Confidence, Finding, FoundParameter, Gain};
@@ -145,6 +146,44 @@ pub(super) fn outlier_finding(
         p_value: 1e-2,
         doubts,
         ..words::finding("outliers", cause, confidence, evidence, no_gain(after))
+    })
+}
+
+/// An error between two measured angles of a joint that are nearer than this is known (rad): the period of most reducers is longer.
+const NEAR_RAD: f64 = 0.5 * std::f64::consts::PI / 180.0;
+
+/// Share of a joint's range that is near a measured angle below which the joint stood at single angles only.
+const SINGLE_ANGLES: f64 = 0.2;
+
+/// Fewest poses for each of these angles: random poses are single angles too where they are few.
+const POSES_OF_AN_ANGLE: usize = 4;
+
+/// A note on joints that stood at a few single angles only, as on a grid of poses. Rows that are held out stand at the same angles,
+/// so that no held-out error shows what a gear does between them.
+pub(super) fn single_angles(dataset: &Dataset) -> Option<String> {
+    let poses = split::poses(dataset).len();
+    let joints: Vec<String> = (0..6)
+        .filter_map(|joint| {
+            let mut angles: Vec<f64> = dataset.rows.iter().map(|row| row.joints[joint]).collect();
+            angles.sort_by(f64::total_cmp);
+            let (low, high) = (*angles.first()?, *angles.last()?);
+            let (mut groups, mut near) = (1, 2.0 * NEAR_RAD);
+            for pair in angles.windows(2) {
+                let apart = pair[1] - pair[0];
+                groups += usize::from(apart > 2.0 * NEAR_RAD);
+                near += apart.min(2.0 * NEAR_RAD);
+            }
+            let shared = groups > 1 && POSES_OF_AN_ANGLE * groups <= poses;
+            (shared && near < SINGLE_ANGLES * (high - low))
+                .then(|| format!("joint {} at {groups}", joint + 1))
+        })
+        .collect();
+    (!joints.is_empty()).then(|| {
+        format!(
+            "some joints stood at a few single angles only ({}): held-out errors are those at these angles, and what a gear does between them \
+             was not measured; measure further poses at other angles before programs move there",
+            joints.join(", ")
+        )
     })
 }
 

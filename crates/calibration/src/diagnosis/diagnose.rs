@@ -1,6 +1,7 @@
 //! The whole diagnosis of one data set.
 
 use super::cause::Cause;
+use super::data_quality::single_angles;
 use super::discrepancy::Discrepancy;
 use super::extension::{Extended, Subject};
 use super::finding::{DiagnoseError, Diagnosis, Fits, RangeNoise, SCHEMA, Source, Stage};
@@ -240,6 +241,7 @@ fn build_diagnosis(
             "the read-out deviates from the angles by {found_mm:.2} mm where rounding allows {expected_mm:.2} mm: it was not fused with them"
         ));
     }
+    notes.extend(single_angles(dataset));
     let mut measure_again: Vec<usize> = set_aside
         .iter()
         .chain(prepared.mismatch.rows.iter().map(|(i, _)| i))

@@ -423,13 +423,37 @@ fn cable_rows<R: SinCos>(
 fn rotates_joints(problem: &CalibrationProblem, index: usize) -> bool {
     problem.frames.disturbances[index].kind.rotates_joints()
 }
+/// sin θ / θ, (1 − cos θ) / θ² and (θ − sin θ) / θ³ of a small rotation vector θ, to relative 10⁻¹⁰ at 0.1 rad.
+#[inline(always)]
+fn rotation_series<R: Real>(turn: &V<R>) -> [R; 3] {
+    let square = dot(turn, turn);
+    let term = |c: [f64; 3]| {
+        let of = |v: f64| square.splat(v);
+        of(c[0]) - square * (of(c[1]) - square * of(c[2]))
+    };
+    [
+        term([1.0, 1.0 / 6.0, 1.0 / 120.0]),
+        term([0.5, 1.0 / 24.0, 1.0 / 720.0]),
+        term([1.0 / 6.0, 1.0 / 120.0, 1.0 / 5040.0]),
+    ]
+}
 
-/// v rotated by a small rotation vector, to second order: the error is some 1e-7 of v at 0.5°.
+/// `v` turned by a small rotation vector (Rodrigues).
 #[cfg_attr(not(debug_assertions), inline(always))]
 fn rotate_by<R: Real>(turn: &V<R>, v: &V<R>) -> V<R> {
-    let first = cross(turn, v);
-    let second = cross(turn, &first);
-    plus(&plus(v, &first), &scaled(v[0].splat(0.5), &second))
+    let [first, second, _] = rotation_series(turn);
+    let once = cross(turn, v);
+    let twice = cross(turn, &once);
+    plus(&plus(v, &scaled(first, &once)), &scaled(second, &twice))
+}
+
+/// The angular velocity of a small rotation vector that changes by `change`: its left Jacobian times that.
+#[cfg_attr(not(debug_assertions), inline(always))]
+fn angular_velocity<R: Real>(turn: &V<R>, change: &V<R>) -> V<R> {
+    let [_, first, second] = rotation_series(turn);
+    let once = cross(turn, change);
+    let twice = cross(turn, &once);
+    plus(&plus(change, &scaled(first, &once)), &scaled(second, &twice))
 }
 
 /// u · ∂p for a coordinate of a link; `moment[i]` is (p − oᵢ) × u, since u·(z × r) = z·(r × u).
@@ -518,9 +542,10 @@ fn spatial_rows<R: SinCos>(
     let mut origin = splat(like, &state.base_from_sensor.translation.vector);
     // The scale multiplies the predicted reading, not the measured one: noise must not look like evidence of a scale error.
     let mut gain = like.splat(1.0);
-    if let Some(disturbed) = &state.disturbed {
+    let turn = state.disturbed.as_ref().map(|disturbed| load(like, &disturbed.turn, at));
+    if let (Some(disturbed), Some(turn)) = (&state.disturbed, &turn) {
         gain = like.load(&disturbed.scale, at);
-        turned = rotate_by(&load(like, &disturbed.turn, at), &turned);
+        turned = rotate_by(turn, &turned);
         origin = plus(&origin, &load(like, &disturbed.frame, at));
     }
     let from_sensor = minus(&p, &origin);
@@ -537,10 +562,7 @@ fn spatial_rows<R: SinCos>(
         let target = state.target.rotation.to_rotation_matrix();
         for column in 0..3 {
             let axis = times(&sensor, &three(like, &columns.reading, 3 + 3 * column, at));
-            measured[column] = match &state.disturbed {
-                Some(disturbed) => rotate_by(&load(like, &disturbed.turn, at), &axis),
-                None => axis,
-            };
+            measured[column] = turn.map_or(axis, |turn| rotate_by(&turn, &axis));
             modelled[column] = in_base(&frames, &target.matrix().column(column).into());
         }
         for j in 0..3 {
@@ -584,6 +606,7 @@ fn spatial_rows<R: SinCos>(
             Parameter::SensorFrame(axis) => {
                 sensor_side = true;
                 let w = splat(like, &state.sensor_axes.column(axis - 3).into());
+                let w = turn.map_or(w, |turn| rotate_by(&turn, &w));
                 (cross(&w, &turned), w)
             }
             Parameter::Disturbance { index, parameter } if !rotates_joints(problem, index) => {
@@ -594,6 +617,7 @@ fn spatial_rows<R: SinCos>(
                     Kind::Frame { .. } if parameter < 3 => (splat(like, &Vector3::ith(parameter, 1.0)), none),
                     Kind::Frame { .. } => {
                         let w = splat(like, &Vector3::ith(parameter - 3, 1.0));
+                        let w = turn.map_or(w, |turn| angular_velocity(&turn, &w));
                         (cross(&w, &turned), w)
                     }
                     Kind::Target => (in_base(&frames, &state.flange.column(parameter).into()), none),

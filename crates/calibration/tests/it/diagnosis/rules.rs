@@ -128,3 +128,28 @@ fn causes_of_one_finding_are_no_rivals_of_each_other() {
     assert!(both > 1.5 * single, "{both} mm together, {single} mm at most alone");
     assert_eq!(contributions.unique_rms_mm(&[]), 0.0);
 }
+
+/// On a grid the rows that are held out stand at the angles of the others: the diagnosis says at which joints. Of joints that stood at
+/// other angles in every pose it says nothing.
+#[test]
+fn single_angles_of_a_grid_are_named() {
+    let (arm, mut rng) = (arm(), ChaCha8Rng::seed_from_u64(5));
+    let levels = [-0.6, 0.0, 0.6];
+    let rows = (0..81).map(|number| {
+        let mut q = Joints::from_fn(|_, _| rng.random_range(-0.8..0.8));
+        // Joints 1 to 4 step through the grid; an arm stops within some thousandths of a degree.
+        for (joint, place) in [27, 9, 3, 1].into_iter().enumerate() {
+            q[joint] = levels[number / place % 3] + 2e-5 * normal(&mut rng);
+        }
+        let seen = (arm.forward(&q, &Condition::default()) * Point3::new(20.0, -30.0, 80.0)).coords;
+        let noise = Vector3::from_fn(|_, _| 0.02 * normal(&mut rng));
+        Row::new(number, q, Reading::Position(seen + noise))
+    });
+    let grid = diagnosed(&Dataset::new("grid.csv", Sensor::Position, rows.collect::<Vec<Row>>()));
+    let told = |found: &Diagnosed| -> Option<String> {
+        found.diagnosis.notes.iter().find(|note| note.contains("single angles")).cloned()
+    };
+    let note = told(&grid).expect("a note");
+    assert!(note.contains("(joint 1 at 3, joint 2 at 3, joint 3 at 3, joint 4 at 3)"), "{note}");
+    assert_eq!(told(&diagnosed(&walked(2, 0.0, |rng| rng.random_range(0.05..0.6)))), None);
+}

@@ -104,8 +104,11 @@ fn dataset(sensor: Sensor, rows: usize, seed: u64) -> Dataset {
     }
 }
 
-/// One of each kind that the sensor can suffer, none of them at rest.
-fn disturbances(sensor: Sensor) -> Vec<Disturbance> {
+/// A turn of the sensor frame as a fit of a good arm finds it.
+const SMALL_TURN_RAD: f64 = 1e-3;
+
+/// One of each kind that the sensor can suffer, none of them at rest. Each part of the sensor frame's turn is about `turn_rad`.
+fn disturbances(sensor: Sensor, turn_rad: f64) -> Vec<Disturbance> {
     let rows = Profile::Rows { from: 3, to: 8 };
     let mut kinds = vec![
         (Kind::Target, rows),
@@ -155,7 +158,7 @@ fn disturbances(sensor: Sensor) -> Vec<Disturbance> {
             };
             out.values.iter_mut().enumerate().for_each(|(k, v)| *v = size * (1.0 - 0.3 * k as f64));
             if let Kind::Frame { turning: true } = out.kind {
-                out.values[3..].iter_mut().for_each(|v| *v *= 1e-3);
+                out.values[3..].iter_mut().for_each(|v| *v *= turn_rad / 0.6);
             }
             out
         })
@@ -178,7 +181,7 @@ fn parameters(sensor: Sensor) -> Vec<Parameter> {
         }
         _ => out.extend((0..6).map(Parameter::SensorFrame)),
     }
-    for (index, disturbance) in disturbances(sensor).iter().enumerate() {
+    for (index, disturbance) in disturbances(sensor, SMALL_TURN_RAD).iter().enumerate() {
         out.extend(
             (0..disturbance.values.len()).map(|parameter| Parameter::Disturbance { index, parameter }),
         );
@@ -187,29 +190,32 @@ fn parameters(sensor: Sensor) -> Vec<Parameter> {
 }
 
 fn problem(sensor: Sensor, rows: usize) -> CalibrationProblem {
-    task_with(sensor, rows, true)
+    task_with(sensor, rows, Some(SMALL_TURN_RAD))
 }
 
-fn task_with(sensor: Sensor, rows: usize, disturbed: bool) -> CalibrationProblem {
+/// With the turn of the sensor frame where measurements are disturbed.
+fn task_with(sensor: Sensor, rows: usize, disturbed: Option<f64>) -> CalibrationProblem {
     let data = dataset(sensor, rows, 7);
     let frames = Frames {
         base_from_sensor: pose_from_vector(&[12.0, -5.0, 8.0, 0.02, 0.3, -0.1]),
         flange_from_target: pose_from_vector(&[10.0, 20.0, 30.0, 0.01, -0.02, 0.05]),
         outlets_mm: vec![Vector3::new(500.0, -600.0, 50.0), Vector3::new(-300.0, 700.0, 90.0)],
         zeros_mm: vec![3.0, -4.0],
-        disturbances: if disturbed { disturbances(sensor) } else { Vec::new() },
+        disturbances: disturbed.map_or_else(Vec::new, |turn_rad| disturbances(sensor, turn_rad)),
     };
     let weights: Vec<Weight> =
         (0..rows).map(|i| Weight { per_mm: 2.0 + i as f64 * 0.01, per_rad: 300.0 }).collect();
     let mut list = parameters(sensor);
-    list.retain(|p| disturbed || !matches!(p, Parameter::Disturbance { .. }));
+    list.retain(|p| disturbed.is_some() || !matches!(p, Parameter::Disturbance { .. }));
     CalibrationProblem::new(&data, &arm(), &frames, &list, &[], &weights)
 }
 
 #[test]
 fn every_column_has_a_numerical_twin() {
     let sensors = [Sensor::Cable, Sensor::Position, Sensor::Pose];
-    for (sensor, disturbed) in sensors.into_iter().flat_map(|s| [(s, false), (s, true)]) {
+    // The last turns the sensor frame by some nine degrees.
+    let courses = [None, Some(SMALL_TURN_RAD), Some(0.1)];
+    for (sensor, disturbed) in sensors.into_iter().flat_map(|s| courses.map(|turn| (s, turn))) {
         let problem = task_with(sensor, 13, disturbed);
         let list = problem.free_parameters().to_vec();
         let mut random = ChaCha8Rng::seed_from_u64(3);
@@ -218,10 +224,11 @@ fn every_column_has_a_numerical_twin() {
             "rad" => 0.02,
             _ => 1e-5,
         };
-        // A small turn is written to second order and differentiated to first: its slope is right to that order.
-        let loose = |p: &Parameter| {
-            let turning = matches!(p, Parameter::Disturbance { .. } | Parameter::SensorFrame(_));
-            if disturbed && turning { 3e-3 } else { 2e-6 }
+        let kinds: Vec<Kind> = disturbances(sensor, SMALL_TURN_RAD).into_iter().map(|d| d.kind).collect();
+        // The torque of a load and the forms of empirical faults are taken at the starting arm.
+        let loose = |p: &Parameter| match p {
+            Parameter::Disturbance { index, .. } if !matches!(kinds[*index], Kind::Frame { .. }) => 3e-3,
+            _ => 2e-6,
         };
         let x: Vec<f64> = list.iter().map(|p| scale(p) * random.random_range(-1.0..1.0)).collect();
         let (n, p) = (problem.rows(), list.len());
@@ -237,7 +244,7 @@ fn every_column_has_a_numerical_twin() {
         for (k, parameter) in list.iter().enumerate() {
             let size = twin.column(k).amax().max(1e-3);
             let gap = (analytic.column(k) - twin.column(k)).amax() / size;
-            assert!(gap < loose(parameter), "{sensor:?} {parameter}: relative gap {gap:e}");
+            assert!(gap < loose(parameter), "{sensor:?} {disturbed:?} {parameter}: relative gap {gap:e}");
         }
     }
 }
@@ -351,7 +358,7 @@ fn a_thinned_task_has_the_rows_that_were_chosen() {
 #[test]
 fn a_row_among_very_many_is_the_same_as_among_few() {
     const MANY: usize = 50_003;
-    let (few, many) = (task_with(Sensor::Position, 13, false), task_with(Sensor::Position, MANY, false));
+    let (few, many) = (task_with(Sensor::Position, 13, None), task_with(Sensor::Position, MANY, None));
     let x = vec![1e-5; few.parameters()];
     let rows = few.rows();
     let of = |problem: &dyn Problem| {
