@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use super::{folder, truegrind};
+use super::{folder, truegrind, words_of};
 
 const RECIPE: &str = include_str!("../../data/irb120-tracker.toml");
 const ROWS: &str = include_str!("../../data/irb120-tracker.csv");
@@ -104,7 +104,7 @@ fn the_orientation_is_told_and_judged_where_that_is_asked_for() {
     assert_eq!(code, 0, "{out}{err}");
     // A terminal breaks lines.
     let on_one_line = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
-    let page = || fs::read_to_string(at.join("page.html")).unwrap();
+    let page = || words_of(&fs::read_to_string(at.join("page.html")).unwrap());
     for words in
         ["Errors of the orientation by row", "not evaluated: no tolerance was stated (--tolerance-angle)"]
     {

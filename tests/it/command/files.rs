@@ -58,7 +58,7 @@ fn verbs() -> Vec<Verb> {
             inputs: &["robot.toml"],
             outputs: &["-o"],
             needs: &[],
-            others: &[],
+            others: &["--base", "--tip"],
         },
         Verb {
             base: &[
@@ -75,6 +75,8 @@ fn verbs() -> Vec<Verb> {
             outputs: &["--json", "--csv", "--parquet", "--md", "--html"],
             needs: &[],
             others: &[
+                "--base",
+                "--tip",
                 "--model",
                 "--tolerance",
                 "--sensor-uncertainty",
@@ -101,6 +103,8 @@ fn verbs() -> Vec<Verb> {
             outputs: &["-o", "--json", "--csv", "--parquet", "--md", "--html", "--rrd"],
             needs: &[],
             others: &[
+                "--base",
+                "--tip",
                 "--robot",
                 "--points",
                 "--points-within",
@@ -132,6 +136,8 @@ fn verbs() -> Vec<Verb> {
             outputs: &["-o", "--json", "--csv", "--parquet", "--md", "--html", "--rrd"],
             needs: &[],
             others: &[
+                "--base",
+                "--tip",
                 "--robot",
                 "--points",
                 "--points-within",
@@ -178,6 +184,8 @@ fn verbs() -> Vec<Verb> {
             outputs: &["-o", "--json", "--csv", "--parquet", "--md", "--html", "--rrd"],
             needs: &[],
             others: &[
+                "--base",
+                "--tip",
                 "--robot",
                 "--sensor",
                 "--poses",
@@ -260,7 +268,7 @@ fn verbs() -> Vec<Verb> {
             inputs: &["plate.toml", "plate.stl", "robot.toml"],
             outputs: &["-o"],
             needs: &[],
-            others: &["--robot", "--inline"],
+            others: &["--base", "--tip", "--robot", "--inline"],
         },
         Verb {
             base: &[

@@ -14,6 +14,7 @@ pub mod csv;
 pub mod xlsx;
 pub mod template;
 mod clock;
+mod column_names;
 mod columns;
 mod error;
 mod join_by_time;

@@ -4,7 +4,7 @@ use std::fmt;
 
 use thiserror::Error;
 
-use super::columns::READOUT;
+use super::column_names::READOUT;
 
 /// A location in a file.
 #[derive(Debug, Clone, PartialEq, Eq)]

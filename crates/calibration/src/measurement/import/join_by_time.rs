@@ -5,7 +5,8 @@
 
 use super::cell::{Cell, Line, Table};
 use super::clock::{FORMS, Stamp};
-use super::columns::{Columns, POSITION};
+use super::column_names::POSITION;
+use super::columns::Columns;
 use super::error::{ImportError, Location};
 use super::options::TimeMatching;
 use super::tracker_export::{Point, Points, cells, headed, unusable};

@@ -1,6 +1,6 @@
 //! Column template of an empty measurement table.
 
-use super::columns;
+use super::column_names;
 use crate::measurement::dataset::Sensor;
 
 /// A column of an empty table.
@@ -42,17 +42,17 @@ pub fn columns(sensor: Sensor) -> Vec<Column> {
     let of = |names: &[&'static str], meaning| {
         names.iter().map(move |&name| Column { name, meaning }).collect::<Vec<_>>()
     };
-    let position = of(&columns::POSITION, POSITION);
+    let position = of(&column_names::POSITION, POSITION);
     let reading = match sensor {
         Sensor::Cable => [of(&["L"], CABLE), of(&["anchor"], OUTLET)].concat(),
         Sensor::Position => position,
         Sensor::Pose => {
-            let turn = of(&columns::QUATERNION, QUATERNION);
+            let turn = of(&column_names::QUATERNION, QUATERNION);
             [position, turn].concat()
         }
     };
     // A cable measures no position on a path.
-    let path = if sensor == Sensor::Cable { Vec::new() } else { of(&columns::PATH, PATH) };
+    let path = if sensor == Sensor::Cable { Vec::new() } else { of(&column_names::PATH, PATH) };
     [
         of(&["q1", "q2", "q3", "q4", "q5", "q6"], JOINTS),
         reading,
@@ -60,7 +60,7 @@ pub fn columns(sensor: Sensor) -> Vec<Column> {
         of(&["temperature"], TEMPERATURE),
         of(&["payload"], PAYLOAD),
         of(&["session"], SESSION),
-        of(&columns::READOUT, READOUT),
+        of(&column_names::READOUT, READOUT),
         of(&["approach1", "approach2", "approach3", "approach4", "approach5", "approach6"], APPROACH),
         path,
     ]

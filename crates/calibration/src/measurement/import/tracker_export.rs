@@ -7,7 +7,7 @@
 use std::collections::BTreeMap;
 
 use super::cell::{Cell, Line, Table};
-use super::columns::POSITION;
+use super::column_names::POSITION;
 use super::csv;
 use super::error::{ImportError, Location};
 
