@@ -120,6 +120,7 @@ def main() -> None:
     base = [binary, "compensate", "in", "--model", "arm.toml", "-o", "out"]
     shares = [[*base, "--shard", f"{share}/2", "--resume", "--brief-records", "--threads", "1"] for share in (1, 2)]
     scripts = {"alone.py": ALONE, "workers.py": WORKERS, "quiet.py": QUIET_WORKERS, "steady.py": STEADY}
+    scripts["large.py"] = QUIET_WORKERS.replace("client=client", "client=client, chunk=1000")
     for name, script in scripts.items():
         (at / name).write_text(script, encoding="utf-8")
     ways = {
@@ -128,6 +129,7 @@ def main() -> None:
         "Dask": [[[sys.executable, "alone.py"]]],
         "Dask, two processes": [[[sys.executable, "workers.py"]]],
         "the same, quiet": [[[sys.executable, "quiet.py"]]],
+        "and chunks of 1,000": [[[sys.executable, "large.py"]]],
         "the work alone": [[[sys.executable, "steady.py"]]],
     }
     found: dict[str, list[tuple[float, float]]] = {name: [] for name in ways}
