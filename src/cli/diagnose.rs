@@ -114,7 +114,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     if let Some(path) = &arguments.outputs.rrd {
         batch.add(path, super::recording::diagnosis(&found, &dataset, &arguments.data.robot)?);
     }
-    let unexplained = found.diagnosis.findings.iter().any(|f| f.effect == "unexplained");
+    let unexplained = found.diagnosis.is_partly_unexplained();
     let ending = write_model(&found.estimated, arguments.output.as_deref(), arguments.allow_doubtful, batch)?;
     Ok(if unexplained { ExitStatus::Flagged } else { ending })
 }

@@ -218,7 +218,7 @@ fn diagnose_arm(
     batch.write()?;
     let output = model.filter(|_| why.is_none()).map(|model| model.display().to_string());
     let poor = matches!(found.estimated.verdict.status, Judgement::Fail | Judgement::Doubtful);
-    let unexplained = diagnosis.findings.iter().any(|finding| finding.effect == "unexplained");
+    let unexplained = diagnosis.is_partly_unexplained();
     let note = why.filter(|_| arguments.output.is_some()).map(|why| format!("the model {why}"));
     let row = Row::of(job.name(), output, note, diagnosis);
     Ok((ArmResult { row, notes, clean: !poor && !unexplained }, written))

@@ -9,6 +9,9 @@ use truegrind_arm::sensor::Sensor;
 /// Name and version of the JSON form.
 pub const SCHEMA: &str = "truegrind.diagnosis/1";
 
+/// Contract name of the finding that part of the residual has no cause in the catalogue.
+pub(super) const UNEXPLAINED: &str = "unexplained";
+
 /// The rows that were diagnosed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Source {
@@ -240,3 +243,10 @@ pub struct Diagnosis {
 
 /// Errors of a diagnosis.
 pub type DiagnoseError = IdentifyError;
+
+impl Diagnosis {
+    /// Whether part of the residual has no cause in the catalogue.
+    pub fn is_partly_unexplained(&self) -> bool {
+        self.findings.iter().any(|finding| finding.effect == UNEXPLAINED)
+    }
+}

@@ -1,7 +1,7 @@
 //! The unexplained part of the residual: a significant discrepancy over poses or time, or noise.
 
 use super::discrepancy::Discrepancy;
-use super::finding::{Confidence, Finding, Gain};
+use super::finding::{Confidence, Finding, Gain, UNEXPLAINED};
 use super::residual_tests::{Structure, is_structure};
 use super::validation::StageError;
 use super::words;
@@ -94,7 +94,7 @@ impl Unexplained<'_> {
                 row_list: Some(rows),
                 p_value: (-0.5 * self.discrepancy.evidence.max(0.0)).exp().min(1.0),
                 worth_mm: Some(self.discrepancy.rms_mm()),
-                ..words::finding("unexplained", cause, Confidence::Ambiguous, self.evidence(), gain)
+                ..words::finding(UNEXPLAINED, cause, Confidence::Ambiguous, self.evidence(), gain)
             }
         })
     }

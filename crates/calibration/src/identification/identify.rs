@@ -167,10 +167,9 @@ pub fn identify(
     let sensing = frame_parameters(&observed.dataset);
     let everything = options.solver.parameters(nominal, &sensing);
     let stages = Stages { nominal, frames, sensing: &sensing, everything: &everything, options };
-    let trained = fit_training_rows(&stages, &fitted_rows, &held_rows);
-    let wrong =
+    let wrong_arm =
         |rmse_mm| IdentifyError::WrongArm { file: dataset.file.clone(), robot: robot.to_owned(), rmse_mm };
-    let trained = trained.map_err(wrong)?;
+    let trained = fit_training_rows(&stages, &fitted_rows, &held_rows).map_err(wrong_arm)?;
     let variance_inflation =
         (!options.solver.as_printed).then(|| variance_inflation(&trained.training, &held_rows));
     drop((fitted_rows, held_rows));

@@ -15,10 +15,7 @@ use truegrind_arm::effect::gear_ratio::GearRatio;
 use truegrind_arm::effect::harmonic::Harmonic;
 use truegrind_arm::effect::thermal::Thermal;
 use truegrind_arm::parameter::Parameter;
-use truegrind_calibration::diagnosis::finding::Confidence;
-
-/// Schema of the input.
-pub const SCHEMA: &str = "truegrind.diagnosis/1";
+use truegrind_calibration::diagnosis::finding::{Confidence, SCHEMA};
 
 /// A candidate cause.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
