@@ -4,13 +4,13 @@
 //! The prior width of a parameter that the data do not determine is its standard deviation, so a wrong width is a wrong sigma.
 //! The parameters that the data determine show how accurately this arm was made. The widths τ of lengths, twists and joint
 //! zeros are therefore estimated from the rows, with a hyperprior over arms: ln τ ~ N(ln τ₀ − s², s²), so that E τ² = τ₀²,
-//! where τ₀ is half the catalogue's tolerance and s corresponds to a factor of 2.2 between arms.
+//! where τ₀ is half the catalogue's tolerance and s corresponds to a factor of 2.7 between arms.
 //!
 //! Half, since 1 mm and 0.3° are what the largest of some two dozen parameters reaches, two standard deviations: Nubiola and Bonev
 //! (2013, Robotics and Computer-Integrated Manufacturing 29, 236) find up to 0.9 mm and 0.5° on an IRB 1600. Two arms with measurements
 //! by others agree: the widths estimated here are 0.43 mm (lengths), 0.29° (twists) and 0.09° (zeros) for the UR5 of Jacobi 2025, 0.54 mm,
 //! 0.05° and 0.03 to 0.05° for the UR10 of Landgraf et al. 2021; their root mean squares are 0.49 mm and 0.16°, and the differences of their logarithms (0.2, 1.8 and 0.8) scatter as those of two draws
-//! with a standard deviation of 0.8 do.
+//! with a standard deviation of 0.8 do; three differences leave 0.5 to 2 open.
 //!
 //! With A the information of the rows and b = A x̂ + T⁻¹ x̂ at the estimate x̂ with priors T, widths T' give
 //! x = (A + T'⁻¹)⁻¹ b and the log marginal likelihood
@@ -31,8 +31,8 @@ use truegrind_arm::parameter::{Parameter, ToleranceGroup};
 use truegrind_estimation::estimate::Estimate;
 use truegrind_estimation::problem::Prior;
 
-/// s, the standard deviation of ln τ over arms: a factor of 2.2.
-const SPREAD: f64 = 0.8;
+/// s, the standard deviation of ln τ over arms: a factor of 2.7.
+const SPREAD: f64 = 1.0;
 /// τ₀, the root mean square of τ over arms, relative to the catalogue's tolerance.
 const RMS_SHARE: f64 = 0.5;
 /// Bound of a width relative to the catalogue's.

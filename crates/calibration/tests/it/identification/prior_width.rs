@@ -102,7 +102,7 @@ fn small_lengths_that_are_seen_narrow_lengths_and_leave_zeros() {
 
 /// ½ ln E (τ² | rows) by a fine sum over ln τ, for readings of parameters that are made alike and read one by one.
 fn summed(readings: &[f64], sigma: f64, catalogue: f64) -> f64 {
-    let spread = 0.8_f64;
+    let spread = 1.0_f64;
     let (mut sum, mut squares) = (0.0, 0.0);
     for k in -4000..4000 {
         let log = f64::from(k) * 0.002;
@@ -148,7 +148,7 @@ fn what_the_rows_do_not_see_lies_as_far_off_as_the_width_says() {
     let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
     let (mut square, mut within) = (0.0, [0; 3]);
     for _ in 0..arms {
-        let width = OVER_ARMS * catalogue.length_mm * (0.8 * normal() - 0.64).exp();
+        let width = OVER_ARMS * catalogue.length_mm * (normal() - 1.0).exp();
         let drawn: [f64; 6] = std::array::from_fn(|_| width * normal());
         let prior = catalogue.length_mm;
         let variance = (sigma.powi(-2) + prior.powi(-2)).recip();
@@ -193,7 +193,7 @@ fn the_uncertainty_of_a_width_is_that_of_its_posterior() {
             let log = f64::from(k) * 0.002;
             let variance = log.exp().powi(2) + 0.02_f64.powi(2);
             let rows: f64 = length.iter().map(|y| -0.5 * (y * y / variance + variance.ln())).sum();
-            let weight = (rows - 0.5 * ((log - OVER_ARMS.ln()) / 0.8 + 0.8).powi(2)).exp();
+            let weight = (rows - 0.5 * ((log - OVER_ARMS.ln()) + 1.0).powi(2)).exp();
             sum += weight;
             first += weight * log;
             second += weight * log * log;
@@ -204,7 +204,7 @@ fn the_uncertainty_of_a_width_is_that_of_its_posterior() {
         let own = found.log_covariance[0][0];
         assert!((own / variance - 1.0).abs() < 0.15, "{length:?}: {own} for {variance}");
         // No reading tells of the zeros: the population of arms, ln τ ~ N(ln τ₀ − s², s²).
-        assert!((found.log_mean[2] - OVER_ARMS.ln() + 0.64).abs() < 0.05, "{}", found.log_mean[2]);
-        assert!((found.log_covariance[2][2] / 0.64 - 1.0).abs() < 0.15, "{}", found.log_covariance[2][2]);
+        assert!((found.log_mean[2] - OVER_ARMS.ln() + 1.0).abs() < 0.05, "{}", found.log_mean[2]);
+        assert!((found.log_covariance[2][2] - 1.0).abs() < 0.15, "{}", found.log_covariance[2][2]);
     }
 }
