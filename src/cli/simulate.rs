@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use clap::Args;
 use truegrind::arm::arm_file::ArmFile;
 use truegrind::arm::model::Model;
-use truegrind::calibration::identification::identify::sensor_name;
 use truegrind::calibration::measurement::simulation::Simulation;
 use truegrind::calibration::measurement::simulation::recipe::Recipe;
 
@@ -47,7 +46,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     batch.write()?;
     print_message(format_args!(
         "{rows} rows, sensor {}, written to {}",
-        sensor_name(sensor),
+        sensor.name(),
         arguments.output.display()
     ));
     if !about.is_empty() {
