@@ -23,21 +23,21 @@
 
 pub(crate) mod settings;
 mod arm;
-mod journey;
+mod strategy_run;
 mod verdict;
-mod way;
+mod calibration_state;
 
 use rayon::prelude::*;
 
 use self::arm::{Arm, arm, group_error};
-use self::journey::{average, count_of, journey};
-use self::way::State;
+use self::calibration_state::State;
+use self::strategy_run::{average, count_of, run_strategy};
 use crate::experiment::ExperimentError;
 use crate::simulated;
 use truegrind_arm::model::Model;
 
-pub use self::journey::{Count, Run, Step, Strategy};
 pub use self::settings::{Degradation, Heat, PaperCount, PaperStatement, Wear};
+pub use self::strategy_run::{Count, Run, Step, Strategy};
 pub use verdict::{AgainstRls, Outcome};
 
 /// The result.
@@ -56,7 +56,7 @@ pub struct DegradationResult {
     /// Error over the number of poses: Fig. 7 and Table 2.
     pub counts: Vec<Count>,
     /// Periodic (all identification poses) and continuous calibration: Figs 9 to 14, Table 4.
-    pub journeys: Vec<Run>,
+    pub runs: Vec<Run>,
     /// Every method against RLS, over the arms.
     pub against_rls: Vec<AgainstRls>,
     /// Mean position error from the sensor's noise alone (mm).
@@ -81,19 +81,20 @@ pub fn run(
         .into_par_iter()
         .map(|k| arm(settings, &recipe, experiment, seed + k, &resolve))
         .collect::<Result<Vec<_>, ExperimentError>>()?;
-    let mut ways: Vec<(Strategy, usize)> = vec![];
+    let mut strategies: Vec<(Strategy, usize)> = vec![];
     let mut counts = settings.continuous.clone();
     counts.push(settings.identification);
     counts.sort_unstable();
     counts.dedup();
     for count in counts {
-        ways.extend(Strategy::ALL.map(|way| (way, count)));
+        strategies.extend(Strategy::ALL.map(|strategy| (strategy, count)));
     }
-    let journeys: Vec<Run> = ways
+    let runs: Vec<Run> = strategies
         .par_iter()
-        .map(|&(way, count)| {
-            let each: Vec<Run> = arms.iter().map(|arm| journey(settings, arm, way, count)).collect();
-            average(way, count, &each)
+        .map(|&(strategy, count)| {
+            let each: Vec<Run> =
+                arms.iter().map(|arm| run_strategy(settings, arm, strategy, count)).collect();
+            average(strategy, count, &each)
         })
         .collect();
     let mean_over = |figure: &(dyn Fn(&Arm) -> f64 + Sync)| {
@@ -123,8 +124,8 @@ pub fn run(
         nominal_mm,
         neglected_mm,
         counts: settings.counts.iter().map(|&count| count_of(&arms, count)).collect(),
-        against_rls: verdict::against_rls(&journeys),
-        journeys,
+        against_rls: verdict::against_rls(&runs),
+        runs,
         // Mean norm of a vector of three normal variates: σ √(8/π).
         noise_floor_mm: (noise.sigma_mm + 2.0 * noise.per_metre_mm) * (8.0 / std::f64::consts::PI).sqrt(),
         seed,

@@ -5,7 +5,7 @@
 
 use serde::Serialize;
 
-use super::journey::{Run, Strategy};
+use super::strategy_run::{Run, Strategy};
 use crate::statistics::{holm, signed_rank};
 use crate::verdict::LEVEL;
 
@@ -16,7 +16,8 @@ pub(super) const SAME: f64 = 0.02;
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AgainstRls {
     /// The method.
-    pub way: Strategy,
+    #[serde(rename = "way")]
+    pub strategy: Strategy,
     /// Poses of each group that both use.
     pub count: usize,
     /// Mean difference of the error after calibration, method minus RLS (mm).
@@ -38,31 +39,32 @@ pub enum Outcome {
     /// RLS has the smaller error.
     RlsBetter,
     /// The other method has the smaller error.
-    WayBetter,
+    #[serde(rename = "way-better")]
+    StrategyBetter,
     /// The difference is below 2 % of the error.
     Same,
     /// No significant difference.
     NotSignificant,
 }
 
-pub(super) fn against_rls(journeys: &[Run]) -> Vec<AgainstRls> {
-    let mut out: Vec<AgainstRls> = journeys
+pub(super) fn against_rls(runs: &[Run]) -> Vec<AgainstRls> {
+    let mut out: Vec<AgainstRls> = runs
         .iter()
-        .filter(|j| j.way != Strategy::Rls)
+        .filter(|j| j.strategy != Strategy::Rls)
         .filter_map(|j| {
-            let rls = journeys.iter().find(|r| r.way == Strategy::Rls && r.count == j.count)?;
+            let rls = runs.iter().find(|r| r.strategy == Strategy::Rls && r.count == j.count)?;
             let differences: Vec<f64> = j.arms_mm.iter().zip(&rls.arms_mm).map(|(a, b)| a - b).collect();
             let arms = differences.len();
             let mean_mm = differences.iter().sum::<f64>() / arms.max(1) as f64;
             let error = rls.arms_mm.iter().sum::<f64>() / arms.max(1) as f64;
             let outcome = match mean_mm {
                 d if d.abs() < SAME * error => Outcome::Same,
-                d if d < 0.0 => Outcome::WayBetter,
+                d if d < 0.0 => Outcome::StrategyBetter,
                 // Also for NaN.
                 _ => Outcome::RlsBetter,
             };
             Some(AgainstRls {
-                way: j.way,
+                strategy: j.strategy,
                 count: j.count,
                 mean_mm,
                 rls_better: differences.iter().filter(|d| !(**d <= 0.0)).count(),

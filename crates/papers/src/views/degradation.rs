@@ -33,7 +33,7 @@ pub(super) fn page(page: &mut Document, result: &DegradationResult, timings: boo
     figures::counts(page, result);
     page.push(counts(result));
     page.heading(2, "Repeated calibration");
-    figures::ways(page, result);
+    figures::strategies(page, result);
     page.push(table(result));
     page.push(against_rls(result));
     figures::of_the_paper(page, result);
@@ -47,8 +47,8 @@ pub(super) fn page(page: &mut Document, result: &DegradationResult, timings: boo
     }
 }
 
-fn journey(result: &DegradationResult, way: Strategy, count: usize) -> Option<&Run> {
-    result.journeys.iter().find(|j| j.way == way && j.count == count)
+fn run_of(result: &DegradationResult, strategy: Strategy, count: usize) -> Option<&Run> {
+    result.runs.iter().find(|j| j.strategy == strategy && j.count == count)
 }
 
 fn after(j: &Run) -> f64 {
@@ -60,7 +60,7 @@ fn verdict(result: &DegradationResult) -> Verdict {
     let mm = |v: f64| Precision::Decimals(4).format(v);
     let mut reasons = Vec::new();
     for count in pose_counts(result) {
-        let of = |way| journey(result, way, count).map_or(f64::NAN, after);
+        let of = |strategy| run_of(result, strategy, count).map_or(f64::NAN, after);
         reasons.push(format!(
             "{count} poses, error after calibration: RLS {} mm, LM converged on the same group alone {}, LM with RLS's memory \
              {}, LM stopped and unweighted {}.",
@@ -70,8 +70,8 @@ fn verdict(result: &DegradationResult) -> Verdict {
             mm(of(Strategy::LmStopped))
         ));
     }
-    let gaps = result.journeys.iter().filter(|j| j.way == Strategy::Rls).filter_map(|rls| {
-        let lm = journey(result, Strategy::LmMemory, rls.count)?;
+    let gaps = result.runs.iter().filter(|j| j.strategy == Strategy::Rls).filter_map(|rls| {
+        let lm = run_of(result, Strategy::LmMemory, rls.count)?;
         Some((after(rls) - after(lm)).abs() / after(rls))
     });
     let widest = gaps.fold(0.0, f64::max);
@@ -85,7 +85,7 @@ fn verdict(result: &DegradationResult) -> Verdict {
         result.settings.paper.iter().find(of).and_then(|p| p.verification_after_mm)
     };
     if let (Some(rls), Some(lm)) = (stated("RLS"), stated("LM")) {
-        let of = |way| journey(result, way, result.settings.identification).map_or(f64::NAN, after);
+        let of = |strategy| run_of(result, strategy, result.settings.identification).map_or(f64::NAN, after);
         let ours = of(Strategy::Lm) / of(Strategy::Rls);
         reasons.push(format!(
             "The error of the paper's LM is {:.1} times that of its RLS ({rls} mm). Here it is {ours:.2} times that of RLS \
@@ -97,8 +97,8 @@ fn verdict(result: &DegradationResult) -> Verdict {
         ));
     }
     if let (Some(rls), Some(forgetting)) = (
-        journey(result, Strategy::Rls, result.settings.identification),
-        journey(result, Strategy::RlsForgetting, result.settings.identification),
+        run_of(result, Strategy::Rls, result.settings.identification),
+        run_of(result, Strategy::RlsForgetting, result.settings.identification),
     ) {
         reasons.push(format!(
             "Without forgetting the estimate lags behind a changing arm: error of RLS in the last group {} mm, with forgetting {} mm.",
@@ -109,7 +109,7 @@ fn verdict(result: &DegradationResult) -> Verdict {
     let real = result
         .against_rls
         .iter()
-        .filter(|a| matches!(a.outcome, Outcome::RlsBetter | Outcome::WayBetter))
+        .filter(|a| matches!(a.outcome, Outcome::RlsBetter | Outcome::StrategyBetter))
         .count();
     reasons.push(format!(
         "Over {} independent simulated arms {real} of {} comparisons with RLS are significant at 5 % after Holm's \
@@ -128,7 +128,7 @@ fn verdict(result: &DegradationResult) -> Verdict {
 /// Errors of RLS and LM with all identification poses of a group.
 fn headline(result: &DegradationResult) -> String {
     let count = result.settings.identification;
-    let of = |way| journey(result, way, count).map_or(f64::NAN, after);
+    let of = |strategy| run_of(result, strategy, count).map_or(f64::NAN, after);
     let mm = |v: f64| Precision::Decimals(3).format(v);
     let (rls, lm) = (of(Strategy::Rls), of(Strategy::Lm));
     let (less, more) = if rls < lm { (Strategy::Rls, Strategy::Lm) } else { (Strategy::Lm, Strategy::Rls) };
@@ -247,23 +247,23 @@ pub(super) fn table(result: &DegradationResult) -> Table {
         ],
     );
     let nominal = result.nominal_mm.iter().sum::<f64>() / result.nominal_mm.len().max(1) as f64;
-    for journey in &result.journeys {
+    for run in &result.runs {
         let paper = result
             .settings
             .paper
             .iter()
-            .find(|p| Some(p.method.as_str()) == journey.way.paper_name() && p.count == journey.count);
-        let figure = |f: fn(&Step) -> f64| journey.mean(f);
-        let deviation = (journey.arms_mm.len() > 1).then(|| mean_and_deviation(&journey.arms_mm).1);
+            .find(|p| Some(p.method.as_str()) == run.strategy.paper_name() && p.count == run.count);
+        let figure = |f: fn(&Step) -> f64| run.mean(f);
+        let deviation = (run.arms_mm.len() > 1).then(|| mean_and_deviation(&run.arms_mm).1);
         table.push([
-            journey.count.into(),
-            journey.way.name().into(),
+            run.count.into(),
+            run.strategy.name().into(),
             figure(|s| s.identification_before_mm).into(),
             figure(|s| s.identification_after_mm).into(),
             figure(|s| s.verification_before_mm).into(),
-            Cell::with_sigma(after(journey), deviation),
+            Cell::with_sigma(after(run), deviation),
             paper.and_then(|p| p.verification_after_mm).into(),
-            percent(nominal, after(journey)).into(),
+            percent(nominal, after(run)).into(),
             paper.and_then(|p| p.improvement_percent).into(),
         ]);
     }
@@ -293,13 +293,13 @@ fn against_rls(result: &DegradationResult) -> Table {
     for one in &result.against_rls {
         let conclusion = match one.outcome {
             Outcome::RlsBetter => "RLS better".to_owned(),
-            Outcome::WayBetter => format!("{} better", one.way.name()),
+            Outcome::StrategyBetter => format!("{} better", one.strategy.name()),
             Outcome::Same => "the same within 2 %".to_owned(),
             Outcome::NotSignificant => "no significant difference".to_owned(),
         };
         table.push([
             one.count.into(),
-            one.way.name().into(),
+            one.strategy.name().into(),
             one.mean_mm.into(),
             format!("{} of {} arms", one.rls_better, one.arms).into(),
             words::p(one.p).into(),
@@ -328,11 +328,11 @@ fn steps(result: &DegradationResult) -> Table {
             Column::number("verification_after_mm", "after", "mm", 4),
         ],
     );
-    for journey in &result.journeys {
-        for step in &journey.steps {
+    for run in &result.runs {
+        for step in &run.steps {
             table.push([
-                journey.count.into(),
-                journey.way.name().into(),
+                run.count.into(),
+                run.strategy.name().into(),
                 (step.group + 1).into(),
                 step.identification_before_mm.into(),
                 step.identification_after_mm.into(),
@@ -359,11 +359,11 @@ pub(super) fn times(result: &DegradationResult) -> Table {
         ],
     );
     let most = result.settings.identification;
-    for one in &result.journeys {
-        let all = journey(result, one.way, most).map_or(f64::NAN, |j| j.seconds);
+    for one in &result.runs {
+        let all = run_of(result, one.strategy, most).map_or(f64::NAN, |j| j.seconds);
         table.push([
             one.count.into(),
-            one.way.name().into(),
+            one.strategy.name().into(),
             one.seconds.into(),
             percent(all, one.seconds).into(),
             percent(most as f64, one.count as f64).into(),
@@ -386,7 +386,7 @@ pub(super) fn json(result: &DegradationResult) -> Value {
         "nominal_mm": result.nominal_mm,
         "neglected_mm": result.neglected_mm,
         "counts": result.counts,
-        "journeys": result.journeys,
+        "journeys": result.runs,
         "against_rls": result.against_rls,
     })
 }

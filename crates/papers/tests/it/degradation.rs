@@ -19,9 +19,9 @@ fn rls_and_lm_with_the_same_memory_agree_and_memory_is_what_helps_few_poses() {
     // The arm degrades, and neglect undoes the first calibration.
     assert!(result.nominal_mm[0] > 0.3 && result.nominal_mm[0] < 1.2, "{:?}", result.nominal_mm);
     assert!(result.neglected_mm[2] > 2.0 * result.neglected_mm[0], "{:?}", result.neglected_mm);
-    let after = |way: Strategy, count: usize| {
-        let journey = result.journeys.iter().find(|j| j.way == way && j.count == count).unwrap();
-        journey.mean(|s| s.verification_after_mm)
+    let after = |strategy: Strategy, count: usize| {
+        let run = result.runs.iter().find(|j| j.strategy == strategy && j.count == count).unwrap();
+        run.mean(|s| s.verification_after_mm)
     };
     for count in [15, 20, 50] {
         let (rls, memory) = (after(Strategy::Rls, count), after(Strategy::LmMemory, count));
@@ -29,9 +29,9 @@ fn rls_and_lm_with_the_same_memory_agree_and_memory_is_what_helps_few_poses() {
         assert!(rls < 0.5 * result.nominal_mm[0]);
     }
     // Forgetting follows an arm that changes better than remembering everything.
-    let last = |way: Strategy| {
-        let journey = result.journeys.iter().find(|j| j.way == way && j.count == 50).unwrap();
-        journey.steps.last().unwrap().verification_after_mm
+    let last = |strategy: Strategy| {
+        let run = result.runs.iter().find(|j| j.strategy == strategy && j.count == 50).unwrap();
+        run.steps.last().unwrap().verification_after_mm
     };
     assert!(last(Strategy::RlsForgetting) < last(Strategy::Rls));
 }
@@ -43,8 +43,9 @@ fn all_figures_of_the_paper_are_shown_and_every_table_says_that_it_is_simulated(
     use truegrind_report::format;
     let settings = Degradation { arms: 6, groups: 2, counts: vec![4, 15, 50], ..small() };
     let result = run(&settings, "test", "tx60-pose", 3, nominal).unwrap();
-    // Two ways with the same memory are the same, and with six arms nothing small is called a difference.
-    let memory = result.against_rls.iter().find(|a| a.way == Strategy::LmMemory && a.count == 50).unwrap();
+    // Two strategies with the same memory are the same, and with six arms nothing small is called a difference.
+    let memory =
+        result.against_rls.iter().find(|a| a.strategy == Strategy::LmMemory && a.count == 50).unwrap();
     assert_eq!(memory.outcome, truegrind_papers::degradation::Outcome::Same);
     assert!(result.against_rls.iter().all(|a| a.arms == 6 && (0.0..=1.0).contains(&a.p)));
     let experiment = Experiment::by_name("rls-degradation").unwrap();

@@ -42,13 +42,13 @@ pub(super) fn counts(page: &mut Document, result: &DegradationResult) {
 }
 
 /// All methods in one plot for each number of poses.
-pub(super) fn ways(page: &mut Document, result: &DegradationResult) {
+pub(super) fn strategies(page: &mut Document, result: &DegradationResult) {
     for count in pose_counts(result) {
         let series = result
-            .journeys
+            .runs
             .iter()
             .filter(|j| j.count == count)
-            .map(|j| by_step(result, j, j.way.name(), after_of))
+            .map(|j| by_step(result, j, j.strategy.name(), after_of))
             .collect();
         page.figure(
             over_time(
@@ -66,16 +66,17 @@ pub(super) fn ways(page: &mut Document, result: &DegradationResult) {
 pub(super) fn of_the_paper(page: &mut Document, result: &DegradationResult) {
     for stated in &result.settings.paper {
         let Some(figure) = &stated.figure else { continue };
-        let of = |j: &&Run| j.count == stated.count && j.way.paper_name() == Some(stated.method.as_str());
-        let Some(journey) = result.journeys.iter().find(of) else { continue };
+        let of =
+            |j: &&Run| j.count == stated.count && j.strategy.paper_name() == Some(stated.method.as_str());
+        let Some(run) = result.runs.iter().find(of) else { continue };
         let panel = |part: &str, poses: &str, before: fn(&Step) -> f64, after: fn(&Step) -> f64| {
             let series = vec![
                 by_group(result, "nominal arm", &result.nominal_mm),
-                by_step(result, journey, "before", before),
-                by_step(result, journey, "after", after),
+                by_step(result, run, "before", before),
+                by_step(result, run, "after", after),
             ];
             let title =
-                format!("{} with {} poses of each group, {poses} poses", journey.way.name(), journey.count);
+                format!("{} with {} poses of each group, {poses} poses", run.strategy.name(), run.count);
             Block::Figure(Figure::new(
                 over_time(result, &title, series, Axis::log("mean error", "mm")),
                 format!(
@@ -85,7 +86,7 @@ pub(super) fn of_the_paper(page: &mut Document, result: &DegradationResult) {
             ))
         };
         page.push(Block::Details {
-            summary: format!("{figure}: {} with {} poses, group by group", journey.way.name(), journey.count),
+            summary: format!("{figure}: {} with {} poses, group by group", run.strategy.name(), run.count),
             blocks: vec![
                 panel("a", "identification", |s| s.identification_before_mm, |s| s.identification_after_mm),
                 panel("b", "verification", |s| s.verification_before_mm, after_of),
@@ -119,7 +120,7 @@ fn by_group(result: &DegradationResult, name: &str, values: &[f64]) -> Series {
     Series::line(name, points)
 }
 
-fn by_step(result: &DegradationResult, journey: &Run, name: &str, figure: fn(&Step) -> f64) -> Series {
-    let points: Vec<[f64; 2]> = journey.steps.iter().map(|s| [hours(result, s.group), figure(s)]).collect();
+fn by_step(result: &DegradationResult, run: &Run, name: &str, figure: fn(&Step) -> f64) -> Series {
+    let points: Vec<[f64; 2]> = run.steps.iter().map(|s| [hours(result, s.group), figure(s)]).collect();
     Series::line(name, points)
 }

@@ -4,9 +4,9 @@ use crate::degradation::{DegradationResult, Step};
 
 pub(super) const SIMULATED: &str = "simulated degradation";
 
-/// The numbers of poses of the journeys, each once.
+/// The numbers of poses of the runs, each once.
 pub(super) fn pose_counts(result: &DegradationResult) -> Vec<usize> {
-    let mut counts: Vec<usize> = result.journeys.iter().map(|j| j.count).collect();
+    let mut counts: Vec<usize> = result.runs.iter().map(|j| j.count).collect();
     counts.dedup();
     counts
 }

@@ -5,8 +5,8 @@ use std::time::Instant;
 use serde::Serialize;
 
 use super::arm::{Arm, mean_error};
+use super::calibration_state::State;
 use super::settings::Degradation;
-use super::way::State;
 use truegrind_calibration::identification::fit::Observations;
 use truegrind_calibration::identification::identifiability::identifiability;
 use truegrind_estimation::least_squares::lm;
@@ -73,7 +73,8 @@ pub struct Step {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Run {
     /// The method.
-    pub way: Strategy,
+    #[serde(rename = "way")]
+    pub strategy: Strategy,
     /// Poses used in each group.
     pub count: usize,
     /// One step for each group.
@@ -116,7 +117,7 @@ fn first_poses(rows: &Observations, count: usize) -> Observations {
 }
 
 /// Runs one arm through all groups.
-pub(super) fn journey(settings: &Degradation, arm: &Arm, way: Strategy, count: usize) -> Run {
+pub(super) fn run_strategy(settings: &Degradation, arm: &Arm, strategy: Strategy, count: usize) -> Run {
     let mut state = State::new(arm);
     let mut steps = Vec::with_capacity(settings.groups);
     let mut seconds = 0.0;
@@ -124,7 +125,7 @@ pub(super) fn journey(settings: &Degradation, arm: &Arm, way: Strategy, count: u
         let rows = first_poses(&group.identify, count);
         let before = state.model(arm);
         let begun = Instant::now();
-        match way {
+        match strategy {
             Strategy::Rls => state.rls(arm, &rows, 1.0),
             Strategy::RlsForgetting => state.rls(arm, &rows, settings.forgetting),
             Strategy::Lm => state.lm(arm, &rows, false),
@@ -142,11 +143,11 @@ pub(super) fn journey(settings: &Degradation, arm: &Arm, way: Strategy, count: u
         });
     }
     let mean = steps.iter().map(|s: &Step| s.verification_after_mm).sum::<f64>() / steps.len().max(1) as f64;
-    Run { way, count, steps, arms_mm: vec![mean], seconds }
+    Run { strategy, count, steps, arms_mm: vec![mean], seconds }
 }
 
 /// Averages over the arms.
-pub(super) fn average(way: Strategy, count: usize, each: &[Run]) -> Run {
+pub(super) fn average(strategy: Strategy, count: usize, each: &[Run]) -> Run {
     let n = each.len().max(1) as f64;
     let groups = each.first().map_or(0, |j| j.steps.len());
     let mean = |g: usize, figure: fn(&Step) -> f64| each.iter().map(|j| figure(&j.steps[g])).sum::<f64>() / n;
@@ -161,7 +162,7 @@ pub(super) fn average(way: Strategy, count: usize, each: &[Run]) -> Run {
         .collect();
     let arms_mm = each.iter().flat_map(|j| j.arms_mm.iter().copied()).collect();
     Run {
-        way,
+        strategy,
         count,
         steps,
         arms_mm,
