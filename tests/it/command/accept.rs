@@ -106,7 +106,7 @@ fn the_orientation_is_told_and_judged_where_that_is_asked_for() {
     let on_one_line = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
     let page = || fs::read_to_string(at.join("page.html")).unwrap();
     for words in
-        ["Errors of the orientation by row", "not evaluated: no tolerance was stated", "--tolerance-angle"]
+        ["Errors of the orientation by row", "not evaluated: no tolerance was stated (--tolerance-angle)"]
     {
         assert!(page().contains(words), "{words}");
     }
