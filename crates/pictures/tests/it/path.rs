@@ -391,6 +391,27 @@ fn the_summary_has_the_block_of_table_8_and_says_what_after_is() {
     }
 }
 
+/// Labels stand beside the path, where no line runs behind them.
+#[test]
+fn a_label_stands_beside_the_path() {
+    let parts = scene_parts();
+    let cut: Vec<nalgebra::Point3<f64>> = parts.reports[0]
+        .points
+        .iter()
+        .filter(|point| point.cutting)
+        .map(|point| point.intended.translation.vector.into())
+        .collect();
+    let (low, high) = cut.iter().fold((cut[0], cut[0]), |(low, high), p| (low.inf(p), high.sup(p)));
+    let (middle, radius) = (nalgebra::center(&low, &high), 0.5 * (high - low).norm());
+    let read = read(&parts);
+    let at = read.fixed::<rerun::components::Position3D>(
+        "/exaggerated/largest/before/label",
+        &Points3D::descriptor_positions(),
+    );
+    let place = nalgebra::Point3::from(at[0].0.0.map(f64::from));
+    assert!((place - middle).norm() > 1.2 * radius, "{place} is above the path");
+}
+
 #[test]
 fn marked_points_are_labelled_by_line_and_reason_once_for_each_run() {
     let mut parts = scene_parts();

@@ -432,6 +432,22 @@ fn a_table_that_continues_below_repeats_what_tells_its_rows_apart() {
 }
 
 #[test]
+fn key_figures_fill_their_rows_and_options_are_not_broken() {
+    let page = |count: usize| {
+        let mut page = Document::new("Page");
+        page.push(vec![KeyFigure::new("Largest", 0.37, 3, "mm").note("below --max-risk, 7.2 %"); count]);
+        html::document(&page)
+    };
+    // Six in a row of a wide page, twice three in a narrower one; never one alone.
+    for (count, columns) in
+        [(6, "--wide:6;--medium:3"), (9, "--wide:5;--medium:3"), (7, "--wide:4;--medium:4")]
+    {
+        assert!(page(count).contains(columns), "{count}");
+    }
+    assert!(page(1).contains("below <span class=\"option\">--max-risk</span>, 7.2\u{a0}%"), "{}", page(1));
+}
+
+#[test]
 fn the_note_of_a_key_figure_stays_within_the_terminal() {
     let mut document = Document::new("Page");
     document.push(vec![
