@@ -66,8 +66,7 @@ fn what_is_understood_of_a_file_is_told_and_goes_to_a_robot_file() {
     assert_eq!(code, 0, "{err}");
     let (_, other, _) = between("left.toml", &[]);
     assert_eq!(one.replace("cell-urdf", "left"), other.replace("cell-urdf", "left"));
-    let plan: serde_json::Value = serde_json::from_str(&one).unwrap();
-    assert_eq!(plan["schema"], "truegrind.plan/1");
+    assert!(one.contains("truegrind.plan/1"), "{one}");
     let (code, _, err) = between("cell.urdf", &[]);
     assert!(code == 2 && err.contains("--base LINK --tip LINK"), "{err}");
     let (code, _, err) = between("cell.urdf", &["--tip", "left_hand"]);
