@@ -13,10 +13,12 @@
 //! 4. Errors are computed on the held-out rows, signed for a cable, as the norm for a position.
 //! 5. Every least-squares method is then continued to convergence: the converged result depends on the problem only, the
 //!    limited one also on the method's budget.
+//! 6. Measured rows are also diagnosed (`named_causes`).
 //!
 //! "STD" of the papers is the mean absolute error (ltlm-2024 eq. 20, ukf-vslm-2023 eq. 28), and is called so here.
 //! Results do not depend on the number of threads; measured times do and are stored separately.
 
+pub(crate) mod named_causes;
 pub(crate) mod outcome;
 
 use std::time::Instant;
@@ -27,6 +29,7 @@ use rand_chacha::rand_core::SeedableRng;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use self::named_causes::{Division, Record};
 use crate::experiment::{Experiment, ExperimentError, Method, Methods, ReadingUsed, Treatment, Units};
 use crate::parameters::{ParameterTable, parameter_table};
 use crate::rescaled::Rescaled;
@@ -49,6 +52,7 @@ use truegrind_estimation::least_squares::{Factorisation, lm};
 use truegrind_estimation::problem::Problem;
 use truegrind_math::statistics::ErrorSummary;
 
+pub use self::named_causes::NamedCauses;
 pub use self::outcome::{CurvePoint, MethodResult, Outcome};
 
 /// Options of a run.
@@ -94,6 +98,8 @@ pub struct Study {
     pub cases: Vec<Case>,
     /// One result for each method.
     pub results: Vec<MethodResult>,
+    /// The diagnosis of each case, `None` where it refused the rows; absent for simulated rows.
+    pub named_causes: Option<Vec<Option<NamedCauses>>>,
     /// Parameters identified in the first case; empty unless requested.
     pub parameters: Vec<ParameterTable>,
     /// Comparison of the methods.
@@ -117,6 +123,7 @@ pub struct Case {
 
 /// A case with the data that all methods start from.
 pub(super) struct Prepared {
+    division: Division,
     train: Observations,
     test: Observations,
     registered: Fitted,
@@ -170,6 +177,10 @@ pub fn run(
         .iter()
         .map(|method| result_of(method, experiment, methods, &prepared, &seeds))
         .collect::<Result<Vec<_>, _>>()?;
+    let named_causes = (!options.simulated).then(|| {
+        let record = Record::of(&dataset, nominal, protocol.fuse_readout);
+        prepared.par_iter().map(|case| record.diagnosed(&case.division, robot, nominal)).collect()
+    });
     let parameters = if methods.parameters {
         results.iter().filter_map(|r| parameters_of(&prepared[0], r)).collect()
     } else {
@@ -190,6 +201,7 @@ pub fn run(
         noise_floor_mm: noise_floor(&observed, &prepared[0], options.sensor_sigma_mm),
         cases,
         results,
+        named_causes,
         parameters,
         judgement,
     })
@@ -350,9 +362,12 @@ fn prepare(
     seed: u64,
     sound: bool,
 ) -> Result<Prepared, ExperimentError> {
-    let chosen = observed.subset(&drawn(observed.dataset.rows.len(), rows, seed));
-    let division = split::random(&chosen.dataset, held_out, seed);
-    let (train, test) = (chosen.subset(&division.train), chosen.subset(&division.test));
+    let drawn = drawn(observed.dataset.rows.len(), rows, seed);
+    let chosen = observed.subset(&drawn);
+    let split = split::random(&chosen.dataset, held_out, seed);
+    let (train, test) = (chosen.subset(&split.train), chosen.subset(&split.test));
+    let of_file = |rows: &[usize]| rows.iter().map(|&i| drawn[i]).collect();
+    let division = Division { train: of_file(&split.train), test: of_file(&split.test) };
     let Registered { start: frames, fitted: registered } = register(&train, nominal, &Tolerance::default())?;
     let sound = sound.then(|| {
         // Residual spread of a fit of links and frames; the same for every method.
@@ -370,7 +385,7 @@ fn prepare(
         );
         Sound { weights }
     });
-    Ok(Prepared { train, test, registered, nominal: nominal.clone(), sound })
+    Ok(Prepared { division, train, test, registered, nominal: nominal.clone(), sound })
 }
 
 /// The problem of a method, its free parameters, and the root mean square of its rows' weights (1/mm).

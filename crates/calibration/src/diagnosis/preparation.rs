@@ -111,13 +111,16 @@ pub fn prepare(dataset: &Dataset, nominal: &Model, fuse: bool) -> Prepared {
     Prepared { observed, logged, readout_fusion, mismatch, sides_from_order: silent }
 }
 
-/// Fills in the motion from the previous row; the first row has none.
+/// Fills in the motion from the previous row; the first row has none. Rows that know it keep it: they are part of a longer record.
 fn fill_motion(dataset: &mut Dataset) {
     let path = is_path(dataset);
     let rows: Vec<(Joints, Option<f64>)> =
         dataset.rows.iter().map(|r| (r.joints, r.condition.time_h)).collect();
     let n = rows.len();
     for (i, row) in dataset.rows.iter_mut().enumerate().skip(1) {
+        if row.motion().is_some() {
+            continue;
+        }
         let step = rows[i].0 - rows[i - 1].0;
         let next = (i + 1).min(n - 1);
         let hours = rows[next].1.zip(rows[i - 1].1).map(|(b, a)| b - a).filter(|h| path && *h > 0.0);

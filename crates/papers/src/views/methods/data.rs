@@ -3,8 +3,8 @@
 use serde_json::{Value, json};
 
 use crate::experiment::PaperFigures;
-use crate::protocol::{Outcome, Study};
-use crate::views::study::{title, treatment};
+use crate::protocol::{NamedCauses, Outcome, Study};
+use crate::views::study::{NAMED_CAUSES, title, treatment};
 use crate::views::words;
 use truegrind_arm::parameter::Parameter;
 use truegrind_report::table::{Cell, Column, Table};
@@ -79,6 +79,26 @@ pub(crate) fn table(study: &Study) -> Table {
             row.extend(figures(result.method.paper.unwrap_or_default()));
             table.push(row);
         }
+    }
+    let diagnosed = study.named_causes.iter().flatten().zip(&study.cases);
+    for (k, (found, case)) in diagnosed.enumerate() {
+        let mut row: Vec<Cell> = vec![
+            NAMED_CAUSES.0.into(),
+            NAMED_CAUSES.1.into(),
+            "diagnose".into(),
+            Cell::Missing,
+            protocol.into(),
+            (k + 1).into(),
+            (case.seed as usize).into(),
+        ];
+        if let Some(NamedCauses { held_out, fitted, .. }) = found {
+            let errors = [held_out.rmse, held_out.mean_absolute, held_out.max, fitted.rmse];
+            row.extend(errors.map(Cell::from));
+        }
+        row.resize(15, Cell::Missing);
+        row.push(if found.is_some() { Cell::Missing } else { "refused".into() });
+        row.resize(20, Cell::Missing);
+        table.push(row);
     }
     table
 }
@@ -156,6 +176,7 @@ pub(crate) fn json(study: &Study) -> Value {
         "noise_floor_mm": study.noise_floor_mm,
         "before": { "paper": study.methods.before, "cases": study.cases },
         "methods": methods,
+        "named_causes": study.named_causes,
         "verdict": study.judgement,
         "sentences": sentences,
         "parameters": parameters,

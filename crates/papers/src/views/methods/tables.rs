@@ -2,11 +2,14 @@
 
 use crate::experiment::PaperFigures;
 use crate::parameters::ParameterTable;
-use crate::protocol::{Outcome, Study};
+use crate::protocol::{NamedCauses, Outcome, Study};
 use crate::verdict::Conclusion;
-use crate::views::study::{ended, held_out, iterations, passes, registered, seconds, title, treatment};
+use crate::views::study::{
+    NAMED_CAUSES, ended, held_out, iterations, named_causes, passes, registered, seconds, title, treatment,
+};
 use crate::views::words;
 use truegrind_calibration::measurement::dataset::Sensor;
+use truegrind_math::statistics::median;
 use truegrind_report::document::Verdict;
 use truegrind_report::number::{Precision, handy};
 use truegrind_report::repeated::{self, spread};
@@ -39,6 +42,16 @@ pub(super) fn errors(study: &Study) -> Table {
         };
         add(&result.method.id, &result.method.name, ours, result.method.paper);
     }
+    if let Some(cases) = &study.named_causes {
+        let ours = match named_causes(cases) {
+            Some(found) => repeated::cells(&found.iter().map(|c| c.held_out).collect::<Vec<_>>()),
+            None => {
+                let n = cases.iter().filter(|case| case.is_none()).count();
+                [format!("refused {n}/{}", cases.len()).into(), Cell::Missing, Cell::Missing]
+            }
+        };
+        add(NAMED_CAUSES.0, NAMED_CAUSES.1, ours, None);
+    }
     table.notes = vec![
         "± is the standard deviation over the cases. The papers print mean |e| as STD, SD or Mean (ltlm-2024 eq. 20, \
          ukf-vslm-2023 eq. 28)."
@@ -50,11 +63,27 @@ pub(super) fn errors(study: &Study) -> Table {
     if study.sensor != Sensor::Cable {
         table.notes.push("Errors are distances between positions.".to_owned());
     }
+    table.notes.extend(of_named_causes(study));
     if let Some(floor) = study.noise_floor_mm {
         let floor = Precision::Significant(2).format(floor);
         table.notes.push(format!("Noise floor {floor} mm: errors cannot be reduced below it."));
     }
     table
+}
+
+/// What the row of the diagnosis means, with its cost in findings: absent for simulated rows.
+fn of_named_causes(study: &Study) -> Option<String> {
+    let found = named_causes(study.named_causes.as_deref()?)?;
+    let n = found.len().max(1) as f64;
+    let mean = |of: &dyn Fn(&NamedCauses) -> f64| found.iter().map(|c| of(c)).sum::<f64>() / n;
+    Some(format!(
+        "NC, named causes: `truegrind diagnose` on the same rows of the fit, with all causes that it finds: {:.1} findings in the mean of \
+         the cases, {:.1} of them identified. Its own geometry alone reaches {:.3} mm RMSE. What lies below the best of the methods \
+         no optimiser of geometry can reach.",
+        mean(&|c| c.findings as f64),
+        mean(&|c| c.identified as f64),
+        mean(&|c| c.geometry.rmse)
+    ))
 }
 
 pub(super) fn verdict_table(study: &Study) -> Table {
@@ -214,6 +243,15 @@ pub(crate) fn times(study: &Study) -> Table {
             paper.time_s.into(),
             paper.iterations.into(),
         ]);
+    }
+    if let Some(found) = study.named_causes.as_deref().and_then(named_causes) {
+        let seconds = median(&found.iter().map(|c| c.seconds).collect::<Vec<_>>());
+        let time_ms: Cell = seconds.map(|seconds| 1e3 * seconds).into();
+        table.push(
+            [NAMED_CAUSES.0.into(), NAMED_CAUSES.1.into(), time_ms]
+                .into_iter()
+                .chain([const { Cell::Missing }; 3]),
+        );
     }
     table.notes = vec![
         "Wall-clock time while other cases ran on other cores, median over the cases, without the continuation to convergence."
