@@ -120,7 +120,7 @@ fn compare_runs_an_experiment_of_ones_own_and_writes_the_same_bytes_again() {
     );
     assert_eq!(text("one.json"), text("two.json"));
     assert!(text("one.json").contains("truegrind.comparison/1"));
-    // Two rows each of the methods and of the named causes.
+    // Registered frames, two methods and the named causes, in two cases.
     assert_eq!(text("out.csv").lines().count(), 1 + 2 * 4);
     assert!(text("out.html").contains("<svg") && text("out.md").contains("Mine"));
 }
