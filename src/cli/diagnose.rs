@@ -132,6 +132,7 @@ pub(super) fn options(arguments: &Arguments) -> anyhow::Result<Options> {
         smooth: arguments.smooth,
         fuse_readout: !arguments.fit.raw_columns,
         limits: arguments.fit.limits()?,
+        arm_tolerance: arguments.fit.tolerance()?,
         ..Options::default()
     };
     options.selection.alpha = arguments.alpha;

@@ -138,6 +138,12 @@ pub(super) struct FitArguments {
     /// Largest held-out error with which the fit passes (mm).
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     limit_max: Option<f64>,
+    /// Manufacturing tolerance of link lengths (mm), used as prior σ. Default: estimated from the data, starting from 1 mm and 0.3°.
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    tolerance_length: Option<f64>,
+    /// Manufacturing tolerance of link angles and joint offsets (°), used as prior σ.
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
+    tolerance_angle: Option<f64>,
 }
 
 impl FitArguments {
@@ -149,6 +155,25 @@ impl FitArguments {
             }
         }
         Ok(Limits { rmse_mm: self.limit_rmse, max_mm: self.limit_max })
+    }
+
+    /// The tolerances of the arm; where one is stated, none is estimated from the data.
+    pub(super) fn tolerance(&self) -> anyhow::Result<Tolerance> {
+        let mut tolerance = Tolerance::default();
+        for (name, stated, place, scale) in [
+            ("--tolerance-length", self.tolerance_length, &mut tolerance.length_mm, 1.0),
+            ("--tolerance-angle", self.tolerance_angle, &mut tolerance.angle_rad, 1.0_f64.to_radians()),
+        ] {
+            if let Some(value) = stated {
+                if !(value > 0.0 && value.is_finite()) {
+                    bail!("{name} {value}: expected a number above 0");
+                }
+                *place = value * scale;
+            }
+        }
+        tolerance.zero_rad = tolerance.angle_rad;
+        tolerance.learn_widths = self.tolerance_length.is_none() && self.tolerance_angle.is_none();
+        Ok(tolerance)
     }
 }
 
@@ -172,12 +197,6 @@ pub(super) struct Arguments {
     /// Also compare all solvers over this many random splits (seeds 0, 1, …).
     #[arg(long, value_name = "SPLITS")]
     compare_methods: Option<u64>,
-    /// Manufacturing tolerance of link lengths (mm), used as prior σ. Default: estimated from the data, starting from 1 mm and 0.3°.
-    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
-    tolerance_length: Option<f64>,
-    /// Manufacturing tolerance of link angles and joint offsets (°), used as prior σ.
-    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
-    tolerance_angle: Option<f64>,
     #[command(flatten)]
     fit: FitArguments,
     #[command(flatten)]
@@ -272,23 +291,8 @@ pub(super) fn write_model(
 }
 
 fn options(arguments: &Arguments, limits: Limits) -> anyhow::Result<Options> {
-    let mut tolerance = Tolerance::default();
-    for (stated, place, scale) in [
-        (arguments.tolerance_length, &mut tolerance.length_mm, 1.0),
-        (arguments.tolerance_angle, &mut tolerance.angle_rad, 1.0_f64.to_radians()),
-    ] {
-        if let Some(value) = stated {
-            if !(value > 0.0 && value.is_finite()) {
-                bail!("tolerance {value}: expected a number above 0");
-            }
-            *place = value * scale;
-        }
-    }
-    // Stated tolerances are not estimated from the data.
-    tolerance.zero_rad = tolerance.angle_rad;
-    tolerance.learn_widths = arguments.tolerance_length.is_none() && arguments.tolerance_angle.is_none();
     Ok(Options {
-        tolerance,
+        tolerance: arguments.fit.tolerance()?,
         solver: by_name(&arguments.method)?,
         held_out: arguments.held_out,
         seed: arguments.common.seed,

@@ -205,7 +205,7 @@ pub fn stage_table(diagnosis: &Diagnosis) -> Table {
     );
     table.notes.push(
         "RMSE, mean and max on the rows of the fit. Held out: five random folds, and contiguous blocks, which reveal drifts and \
-         jumps along the rows."
+         jumps along the rows. identify holds out one share of the rows once: its figure scatters more."
             .to_owned(),
     );
     table

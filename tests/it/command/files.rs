@@ -153,6 +153,8 @@ fn verbs() -> Vec<Verb> {
                 "--raw-columns",
                 "--limit-rmse",
                 "--limit-max",
+                "--tolerance-length",
+                "--tolerance-angle",
                 "--sensor-frame",
                 "--outlet",
                 "--cable-zero",

@@ -22,12 +22,11 @@ use crate::identification::benefit::{Benefit, benefit};
 use crate::identification::calibration::Frames;
 use crate::identification::fit::{Fitted, Observations, frame_parameters};
 use crate::identification::identify::{
-    arm_covariance, arm_parameters_of, mean_condition, parameter_table, with_sigma_in_region,
+    arm_covariance, arm_parameters_of, learned_width_uncertainty, mean_condition, parameter_table,
+    with_sigma_in_region,
 };
-use crate::identification::prior_width::width_uncertainty;
 use crate::identification::start::count_distinct_poses;
-use crate::identification::tolerance::Tolerance;
-use crate::identification::verdict::{Limits, VerdictBuilder};
+use crate::identification::verdict::VerdictBuilder;
 use crate::measurement::dataset::{Dataset, Sensor};
 use crate::measurement::split;
 use truegrind_arm::estimated::{Estimated, EstimatedParameter, Judgement, Provenance, StageErrors, Verdict};
@@ -149,6 +148,12 @@ pub fn diagnose(
     })
 }
 
+/// The model with `causes` under the tolerances of the arm.
+fn written(search: &Search<'_>, causes: &[Cause], discrepancy: Option<&Discrepancy>) -> Extended {
+    let SearchContext { subject, options, .. } = &search.context;
+    fit_written(subject, &options.arm_tolerance, &search.extended, causes, discrepancy)
+}
+
 /// The arm for compensation, with its errors. Its effects are included only if they lower the held-out error of this very model, in
 /// random folds and in blocks; causes that are not part of it do not count.
 fn certain_model(
@@ -156,10 +161,8 @@ fn certain_model(
     certain: &[bool],
     discrepancy: Option<&Discrepancy>,
 ) -> (Extended, StageError) {
-    let subject = &search.context.subject;
     let of = |certain: &[bool]| {
-        let fit =
-            fit_written(subject, &search.extended, &certain_causes(&search.extended, certain), discrepancy);
+        let fit = written(search, &certain_causes(&search.extended, certain), discrepancy);
         let errors = search.validation.stage(&fit);
         (fit, errors)
     };
@@ -191,7 +194,7 @@ fn without_measurement_causes(
         return (certain_model, None);
     }
     let SearchContext { dataset, subject, .. } = search.context;
-    let without = fit_written(subject, &search.extended, &of_the_arm, None);
+    let without = written(search, &of_the_arm, None);
     let samples = Region::of(subject.observed.dataset.rows.iter().map(|row| &row.joints), 0.0).samples_deg;
     let beside = in_doubt::with_zero_causes(&without, certain_model.0.clone());
     match probability_worse(&certain_model.0, &beside, &mean_condition(dataset), &samples) {
@@ -211,12 +214,7 @@ fn with_uncertain_causes(
 ) -> Option<Extended> {
     let all = in_doubt::representable_causes(&search.extended.causes, &search.accepted);
     let missing = |cause: &Cause| !contains_cause(&fit.causes, cause);
-    all.iter().any(missing).then(|| {
-        in_doubt::with_zero_causes(
-            fit,
-            fit_written(&search.context.subject, &search.extended, &all, discrepancy),
-        )
-    })
+    all.iter().any(missing).then(|| in_doubt::with_zero_causes(fit, written(search, &all, discrepancy)))
 }
 
 /// Builds the diagnosis, and the pictures of its findings.
@@ -333,12 +331,7 @@ fn estimated(
         nominal: nominal_arm.clone(),
         model: handed.model.clone(),
         covariance: arm_covariance(handed),
-        width_uncertainty: width_uncertainty(
-            &Tolerance::default(),
-            &fitted.parameters,
-            &fitted.priors,
-            &fitted.estimate,
-        ),
+        width_uncertainty: learned_width_uncertainty(&options.arm_tolerance, fitted),
         order,
         provenance: Provenance {
             file: dataset.file.clone(),
@@ -363,10 +356,10 @@ fn estimated(
     let mut estimated = with_sigma_in_region(estimated, handed);
     let rows = &subject.observed.dataset;
     // Links and benefit are judged by the tolerances of arms, not by the wide priors of a diagnosis.
-    let plausible = Tolerance::default();
-    let benefit = benefit(fitted, rows, &estimated, &plausible, variance_inflation(fitted, rows, &stages[2]));
+    let plausible = &options.arm_tolerance;
+    let benefit = benefit(fitted, rows, &estimated, plausible, variance_inflation(fitted, rows, &stages[2]));
     let parameters = parameter_table(fitted, nominal_arm);
-    estimated.verdict = judge(fitted, rows.sensor, benefit.as_ref(), &parameters, stages, &options.limits);
+    estimated.verdict = judge(fitted, rows.sensor, benefit.as_ref(), &parameters, stages, options);
     (estimated, benefit)
 }
 
@@ -377,7 +370,7 @@ fn judge(
     benefit: Option<&Benefit>,
     parameters: &[EstimatedParameter],
     stages: &[StageError; 3],
-    limits: &Limits,
+    options: &Options,
 ) -> Verdict {
     let mut verdict = VerdictBuilder::default();
     if fitted.termination().is_converged() {
@@ -391,10 +384,10 @@ fn judge(
             stages[2].random.rmse, stages[1].random.rmse
         ));
     }
-    verdict.check_links(parameters, &Tolerance::default(), LINK_Z);
+    verdict.check_links(parameters, &options.arm_tolerance, LINK_Z);
     verdict.check_held_out(stages[0].random.rmse, stages[2].random.rmse);
     verdict.check_benefit(benefit, sensor);
-    verdict.check_limits(limits, &stages[2].random);
+    verdict.check_limits(&options.limits, &stages[2].random);
     verdict.build()
 }
 

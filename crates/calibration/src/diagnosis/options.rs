@@ -7,8 +7,11 @@ use crate::identification::verdict::Limits;
 /// Options of a diagnosis.
 #[derive(Debug, Clone)]
 pub struct Options {
-    /// Priors of links and frames: wide, so that errors that geometry can explain are never called an effect.
+    /// Priors of links and frames in the search: wide, so that errors that geometry can explain are never called an effect.
     pub tolerance: Tolerance,
+    /// Manufacturing tolerances of the arm: the written model is fitted under them and judged by them. With
+    /// [`Tolerance::learn_widths`] (the default) they are estimated from the rows.
+    pub arm_tolerance: Tolerance,
     /// Criteria of selection.
     pub selection: selection::Options,
     /// Number of contiguous blocks of the second validation.
@@ -30,6 +33,7 @@ impl Default for Options {
                 zero_rad: 1.0_f64.to_radians(),
                 ..Tolerance::default()
             },
+            arm_tolerance: Tolerance { learn_widths: true, ..Tolerance::default() },
             selection: selection::Options::default(),
             blocks: BLOCKS,
             smooth: false,

@@ -32,11 +32,12 @@ pub(super) fn has_no_model_representation(cause: &Cause) -> bool {
     matches!(cause, Cause::Measurement(d) if matches!(d.kind, Kind::Empirical(form) if form.is_in_arm()))
 }
 
-/// Fits the written model with `causes`, with tolerances learned from its own rows (with the wide ones of the search, parameters that
-/// the data do not determine would deviate more from the data sheet than real arms do). It starts near `extended`; `discrepancy` is
-/// that of the same rows.
+/// Fits the written model with `causes` under the tolerances of the arm, by default learned from its own rows (with the wide ones of
+/// the search, parameters that the data do not determine would deviate more from the data sheet than real arms do). It starts near
+/// `extended`; `discrepancy` is that of the same rows.
 pub(super) fn fit_written(
     subject: &Subject<'_>,
+    arm_tolerance: &Tolerance,
     extended: &Extended,
     causes: &[Cause],
     discrepancy: Option<&Discrepancy>,
@@ -44,8 +45,17 @@ pub(super) fn fit_written(
     let time_discrepancy = time_discrepancy(discrepancy);
     let kept = if causes == extended.causes { extended.clone() } else { refit(subject, causes, extended) };
     let wide = subject.tolerance;
-    let catalogue = Tolerance { frame_mm: wide.frame_mm, frame_rad: wide.frame_rad, ..Tolerance::default() };
-    let tolerance = learn_tolerance(&catalogue, &kept.parameters, &kept.priors, &kept.estimate);
+    let stated = Tolerance {
+        frame_mm: wide.frame_mm,
+        frame_rad: wide.frame_rad,
+        learn_widths: false,
+        ..arm_tolerance.clone()
+    };
+    let tolerance = if arm_tolerance.learn_widths {
+        learn_tolerance(&stated, &kept.parameters, &kept.priors, &kept.estimate)
+    } else {
+        stated
+    };
     let held = refit(&Subject { tolerance: &tolerance, ..*subject }, &kept.causes, &kept);
     let written = with_random_functions(subject, &held, time_discrepancy).unwrap_or(held);
     written.whole(&Subject { tolerance: &tolerance, ..*subject })

@@ -243,7 +243,10 @@ fn observations_without_outliers(
 }
 
 /// The uncertainty of the widths of the tolerances, where they were learned.
-fn learned_width_uncertainty(tolerance: &Tolerance, geometry: &Fitted) -> Option<WidthUncertainty> {
+pub(crate) fn learned_width_uncertainty(
+    tolerance: &Tolerance,
+    geometry: &Fitted,
+) -> Option<WidthUncertainty> {
     let Fitted { parameters, priors, estimate, .. } = geometry;
     tolerance.learn_widths.then(|| width_uncertainty(tolerance, parameters, priors, estimate)).flatten()
 }

@@ -13,6 +13,7 @@ use truegrind_arm::effect::Effect;
 use truegrind_arm::effect::backlash::Backlash;
 use truegrind_arm::effect::compliance::Compliance;
 use truegrind_arm::model::{Joints, Model};
+use truegrind_arm::parameter::Parameter;
 use truegrind_arm::robots;
 use truegrind_calibration::diagnosis::cause::Cause;
 use truegrind_calibration::diagnosis::diagnose::{Diagnosed, Options, diagnose};
@@ -267,4 +268,33 @@ fn the_size_of_an_arm_is_not_known_by_a_cable_on_a_drum() {
         let off = (link.value - link.nominal).abs();
         assert!(off < 3.0 * link.sigma, "{name} is {off} ± {} mm from the data sheet", link.sigma);
     }
+}
+
+/// Stated tolerances are those of the written arm: what the rows do not see has their width, and no width is estimated.
+#[test]
+fn the_written_arm_is_fitted_under_stated_tolerances() {
+    let arm = arm();
+    let dataset = run(&arm, &[], &setup(Sensor::Cable, 120, 5)).dataset;
+    let sigma = |length_mm: Option<f64>| {
+        let mut options = Options::default();
+        if let Some(length_mm) = length_mm {
+            options.arm_tolerance.length_mm = length_mm;
+            options.arm_tolerance.learn_widths = false;
+        }
+        let found = diagnose(&dataset, "arm", &arm, &frames(&dataset, &arm), &options, &|_| {}).unwrap();
+        let worst = found
+            .estimated
+            .order
+            .iter()
+            .enumerate()
+            .filter(|(_, p)| matches!(p, Parameter::Link { coordinate, .. } if coordinate.is_length()))
+            .map(|(k, _)| found.estimated.covariance[(k, k)].sqrt())
+            .fold(0.0, f64::max);
+        (worst, found.estimated.width_uncertainty.is_some())
+    };
+    let (narrow, learned) = sigma(Some(0.02));
+    assert!(!learned && narrow < 0.0201, "{narrow}");
+    let (wide, learned) = sigma(Some(2.0));
+    assert!(!learned && (0.2..2.01).contains(&wide), "{wide}");
+    assert!(sigma(None).1);
 }
