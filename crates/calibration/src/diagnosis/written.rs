@@ -49,7 +49,7 @@ pub(super) fn fit_written(
         frame_mm: wide.frame_mm,
         frame_rad: wide.frame_rad,
         learn_widths: false,
-        ..arm_tolerance.clone()
+        ..*arm_tolerance
     };
     let tolerance = if arm_tolerance.learn_widths {
         learn_tolerance(&stated, &kept.parameters, &kept.priors, &kept.estimate)
