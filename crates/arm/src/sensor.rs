@@ -5,6 +5,16 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 /// What the sensor measures of a pose.
+///
+/// Models that no measurement stands behind used to be written with an empty name, and are read as before:
+///
+/// ```
+/// use serde::Deserialize;
+/// use truegrind_arm::sensor::Sensor;
+///
+/// assert_eq!(Sensor::deserialize(toml::Value::from("")), Ok(Sensor::Position));
+/// assert!(Sensor::deserialize(toml::Value::from("tracker")).is_err());
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sensor {
@@ -12,6 +22,7 @@ pub enum Sensor {
     Cable,
     /// Position of a reflector on the flange, in the sensor's own frame.
     #[default]
+    #[serde(alias = "")]
     Position,
     /// Position and orientation of a target on the flange, in the sensor's own frame.
     Pose,
