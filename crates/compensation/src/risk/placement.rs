@@ -136,7 +136,7 @@ impl PathDeviation {
 ///
 /// A cut has to be either corrected or left, whereas its position may stay and its shape be corrected all the same. A position
 /// therefore has to earn its correction by more: at the whole of the accepted risk, 2.6 % of what `Auto` writes gets worse on 1,200
-/// simulated arms (bench `uncertainty`, seeds from 50,000,000), at half of it 1.2 %; 80 % of the positions are still corrected.
+/// simulated arms (bench `uncertainty`, seeds from 50,000,000), at half of it 1.4 %; four in five positions are still corrected.
 const POSITION_SHARE: f64 = 0.5;
 
 /// Whether [`Placement::Auto`] corrects a position that is known to `sigma_mm` and whose correction does harm with probability
