@@ -91,6 +91,10 @@ const LEAST_SIGMA: (f64, f64) = (1e-3, 1e-6);
 /// compared in units of χ².
 const SEARCHED: f64 = 1e-5;
 
+/// Most steps of Levenberg–Marquardt within a search, for the same reason. In a curved valley that only priors close the last hundredth
+/// of χ² takes hundreds of steps.
+const SEARCH_STEPS: usize = 30;
+
 /// Scalar rows times squared parameters from which the final refinement is looser.
 const MUCH_WORK: f64 = 1e8;
 
@@ -245,7 +249,7 @@ pub(super) fn warm_fit(
                 })
                 .collect();
             let problem = plain_task.reweighted(&with_robust_weights(&weights, &robust_weight));
-            let estimate = final_descent(&problem, &priors, x, nearby);
+            let estimate = final_descent(&problem, &priors, x, nearby, near.is_some());
             let (model, frames) = problem.apply(&estimate.x);
             return Extended {
                 causes: filled(causes, &model, &frames),
@@ -385,8 +389,14 @@ impl Whitened<'_> {
     }
 }
 
-/// Final descent with fixed weights.
-fn final_descent(problem: &CalibrationProblem, priors: &[Prior], mut x: Vec<f64>, nearby: bool) -> Estimate {
+/// Final descent with fixed weights. From a nearby fit it stops at the tolerance of a search, without a covariance.
+fn final_descent(
+    problem: &CalibrationProblem,
+    priors: &[Prior],
+    mut x: Vec<f64>,
+    nearby: bool,
+    near: bool,
+) -> Estimate {
     if nearby && newton::descend_to(problem, &mut x, SEARCHED) {
         return Estimate {
             covariance: None,
@@ -397,9 +407,13 @@ fn final_descent(problem: &CalibrationProblem, priors: &[Prior], mut x: Vec<f64>
             x,
         };
     }
-    if nearby {
+    if near {
         // Relative to the cost, about half the number of rows: the same tolerance as above.
-        let loose = lm::Options { cost_tolerance: 2.0 * SEARCHED, ..lm::Options::default() };
+        let loose = lm::Options {
+            cost_tolerance: 2.0 * SEARCHED,
+            max_iterations: SEARCH_STEPS,
+            ..lm::Options::default()
+        };
         return Estimate { covariance: None, ..lm::solve(problem, &x, &loose) };
     }
     lm::solve(problem, &x, &lm::Options::default())

@@ -167,6 +167,18 @@ impl DampedSystem {
         finite.then(|| PredictedReduction { reduction, step_norm: square.sqrt() })
     }
 
+    /// Moves `x`, which is not the current point, by the damped step of its own linearisation `at`, in the scale of the current point;
+    /// `false` if the system has no finite solution.
+    pub(crate) fn correct(&mut self, at: &Linearisation, mu: f64, x: &mut [f64]) -> bool {
+        let own = |k: usize| if self.scale[k] > 0.0 { at.gradient(k) / self.scale[k] } else { 0.0 };
+        let foreign = (0..self.p).map(own).collect();
+        let current = std::mem::replace(&mut self.gradient, foreign);
+        let from = x.to_vec();
+        let found = self.step(at, mu, &from, x).is_some();
+        self.gradient = current;
+        found
+    }
+
     fn solve_normal(&mut self, equations: &NormalEquations, mu: f64) -> Option<()> {
         let enough = negligible_pivot(self.p);
         let regular = |smallest: f64| smallest >= enough;

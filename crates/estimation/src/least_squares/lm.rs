@@ -5,7 +5,9 @@
 //! - [`Form::Robust`]: the same step in parameters scaled by the largest column norms of J met so far, so that μ
 //!   is a pure number; μ follows the gain ratio ϱ = (actual reduction) / (predicted reduction) after Nielsen. A step is
 //!   accepted if it lowers the cost. An accepted step costs one pass over the rows, which computes cost and normal
-//!   equations together; after a refused step the next trial is first tested by its cost alone.
+//!   equations together; after a refused step the next trial is first tested by its cost alone. A first step that does not
+//!   lower the cost is followed by a second one from where it ended: in a curved valley the first leaves the floor by the
+//!   second order of its length, and the second returns to it.
 //!
 //! A problem with very many observations and a prior for every parameter is first solved on a random eighth of them,
 //! thinned repeatedly while they are many, if the first step on all rows predicts a reduction above a tenth of the cost. A
@@ -31,7 +33,8 @@
 //! least squares problems* (2004), algorithm 3.16, for μ. Departures from the latter: μ starts near zero
 //! (`initial_damping`), since priors regularise here; a step with less damping than 10⁻³ must achieve a quarter of its
 //! predicted reduction, and a refusal raises μ to at least 10⁻³ at once; an almost perfect gain ratio divides μ by ten,
-//! not by three; the start on few rows.
+//! not by three; μ does not fall back below what was just refused; the corrective step (Nocedal and Wright, *Numerical
+//! Optimization*, 2nd ed., §15.6: second-order correction); the start on few rows.
 //!
 //! **Checked against** the Moré–Garbow–Hillstrom problems and NIST StRD certified values, Cholesky against QR.
 
@@ -195,28 +198,38 @@ fn gain_ratio(objective: &mut Objective<'_>, start: &[f64], options: &Options) -
             let new = objective.cost(&trial);
             damping.is_acceptable((cost - new) / predicted.reduction)
         };
-        let mut step_norm = 0.0;
-        let mut accepted = false;
+        let gain = |at: &Linearisation| (cost - at.cost()) / predicted.reduction;
+        let mut reached = None;
         if worth_it {
             let at = Linearisation::at(objective, &trial, options.factorisation);
-            if at.is_finite() && damping.is_acceptable((cost - at.cost()) / predicted.reduction) {
-                damping.accept((cost - at.cost()) / predicted.reduction);
-                step_norm = predicted.step_norm;
-                here.at = at;
-                std::mem::swap(&mut here.x, &mut trial);
-                cosine = system.enter(&here.at);
-                accepted = true;
+            if at.is_finite() && !damping.is_acceptable(gain(&at)) {
+                if system.correct(&at, damping.mu, &mut trial)
+                    && damping.is_acceptable((cost - objective.cost(&trial)) / predicted.reduction)
+                {
+                    reached = Some(Linearisation::at(objective, &trial, options.factorisation));
+                }
+            } else {
+                reached = Some(at);
             }
         }
+        let accepted = reached.filter(|at| at.is_finite() && damping.is_acceptable(gain(at)));
+        let step_norm = if accepted.is_some() { predicted.step_norm } else { 0.0 };
+        let is_refused = accepted.is_none();
+        if let Some(at) = accepted {
+            damping.accept(gain(&at));
+            here.at = at;
+            std::mem::swap(&mut here.x, &mut trial);
+            cosine = system.enter(&here.at);
+        }
         trace.push(here.entry(step_norm, Some(damping.mu), Some(cosine), objective));
-        if accepted {
-            refused = 0;
-        } else {
+        if is_refused {
             damping.refuse();
             refused += 1;
             if damping.is_exhausted() {
                 return here.finish(objective, Termination::Stalled, trace);
             }
+        } else {
+            refused = 0;
         }
     }
     here.finish(objective, Termination::IterationLimit, trace)

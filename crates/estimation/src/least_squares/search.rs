@@ -56,11 +56,16 @@ impl Point {
     }
 }
 
-/// Nielsen's rule for μ.
+/// Nielsen's rule for μ, which also remembers what was refused and what worked: in a curved valley μ otherwise falls below the
+/// least μ that works after every few steps, and each refusal costs several steps to come back.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Damping {
     pub(crate) mu: f64,
     growth: f64,
+    /// μ of the last accepted step.
+    accepted: f64,
+    /// A refused μ, which fades with every accepted step.
+    refused: f64,
 }
 
 /// Smallest and largest μ with an effect beside a unit diagonal in double precision.
@@ -69,9 +74,20 @@ pub(crate) const DAMPING_RANGE: (f64, f64) = (1e-16, 1e16);
 /// μ after the first refusal: less would hardly change the refused step.
 const FIRST_REFUSAL: f64 = 1e-3;
 
+/// Least μ after an accepted step, relative to the refused one that is remembered.
+const ABOVE_REFUSED: f64 = 3.0;
+
+/// Share of the refused μ that an accepted step leaves.
+const FADING: f64 = 0.3;
+
 impl Damping {
     pub(crate) fn new(mu: f64) -> Self {
-        Self { mu: mu.clamp(DAMPING_RANGE.0, DAMPING_RANGE.1), growth: 2.0 }
+        Self {
+            mu: mu.clamp(DAMPING_RANGE.0, DAMPING_RANGE.1),
+            growth: 2.0,
+            accepted: f64::INFINITY,
+            refused: 0.0,
+        }
     }
 
     /// Whether a step with this gain ratio is accepted. A nearly undamped step must achieve a quarter of the predicted
@@ -84,12 +100,17 @@ impl Damping {
     pub(crate) fn accept(&mut self, gain: f64) {
         let factor =
             if (gain - 1.0).abs() < 0.1 { 0.1 } else { (1.0 - (2.0 * gain - 1.0).powi(3)).max(1.0 / 3.0) };
-        self.mu = (self.mu * factor).max(DAMPING_RANGE.0);
+        self.accepted = self.mu;
+        self.mu = (self.mu * factor).max((ABOVE_REFUSED * self.refused).min(self.mu)).max(DAMPING_RANGE.0);
+        self.refused *= FADING;
         self.growth = 2.0;
     }
 
     pub(crate) fn refuse(&mut self) {
-        self.mu = (self.mu * self.growth).max(FIRST_REFUSAL).min(DAMPING_RANGE.1);
+        self.refused = self.mu;
+        // Where more damping has worked, less than that is not skipped.
+        let least = if self.accepted > self.mu { self.accepted.min(FIRST_REFUSAL) } else { FIRST_REFUSAL };
+        self.mu = (self.mu * self.growth).max(least).min(DAMPING_RANGE.1);
         self.growth *= 2.0;
     }
 
