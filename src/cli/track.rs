@@ -392,7 +392,7 @@ fn options(arguments: &Arguments, arm: &Estimated) -> anyhow::Result<Options> {
         let Some(at) = known.iter().position(|k| k == name) else {
             bail!("--drift {text}: no parameter {name}; the model has {}", known.join(", "));
         };
-        let scale = if arm.order[at].unit() == "rad" { 1f64.to_radians() } else { 1.0 };
+        let scale = if arm.order[at].is_angle() { 1f64.to_radians() } else { 1.0 };
         options.drift.insert(name.to_owned(), value * scale);
     }
     Ok(options)

@@ -102,21 +102,32 @@ impl Parameter {
         })
     }
 
-    /// The unit in which the number is held.
+    /// The unit in which the number is held; empty where an effect or a disturbance has its own.
     pub fn unit(&self) -> &'static str {
-        match self {
-            Parameter::SensorFrame(k) | Parameter::Target(k) => {
-                if *k < 3 {
-                    "mm"
-                } else {
-                    "rad"
-                }
-            }
-            Parameter::Link { coordinate: LinkCoordinate::A | LinkCoordinate::D, .. } => "mm",
-            Parameter::Link { .. } => "rad",
-            Parameter::Effect { .. } | Parameter::Disturbance { .. } => "",
-            Parameter::Outlet { .. } | Parameter::Zero { .. } => "mm",
+        if self.is_length() {
+            "mm"
+        } else if self.is_angle() {
+            "rad"
+        } else {
+            ""
         }
+    }
+
+    /// Whether it is a length (mm) of a link or a frame. The others of links and frames are angles (rad).
+    pub fn is_length(&self) -> bool {
+        match self {
+            Parameter::SensorFrame(k) | Parameter::Target(k) => *k < 3,
+            Parameter::Link { coordinate, .. } => {
+                matches!(coordinate, LinkCoordinate::A | LinkCoordinate::D)
+            }
+            Parameter::Outlet { .. } | Parameter::Zero { .. } => true,
+            Parameter::Effect { .. } | Parameter::Disturbance { .. } => false,
+        }
+    }
+
+    /// Whether it is an angle (rad) of a link or a frame.
+    pub fn is_angle(&self) -> bool {
+        !self.is_length() && !self.is_of_cause()
     }
 
     /// Whether the number belongs to the arm (link or effect), not to how it was measured.

@@ -442,7 +442,7 @@ fn outcome(
     let estimate = match method.units {
         Units::Rad => run(&problem, &start, seed),
         Units::Deg => {
-            let scale = parameters.iter().map(|p| if p.unit() == "mm" { 1.0 } else { 1.0_f64.to_radians() });
+            let scale = parameters.iter().map(|p| if p.is_length() { 1.0 } else { 1.0_f64.to_radians() });
             let rescaled = Rescaled::new(&problem, scale.collect());
             let estimate = run(&rescaled, &start, seed);
             rescaled.back(estimate)

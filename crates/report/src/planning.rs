@@ -111,7 +111,7 @@ pub fn sigma_table(plan: &Plan) -> Table {
         ],
     );
     for (parameter, sigma) in plan.parameters.iter().zip(&plan.sigmas) {
-        let angle = parameter.unit() == "rad";
+        let angle = parameter.is_angle();
         let (value, unit) = if angle { (sigma.to_degrees(), "°") } else { (*sigma, "mm") };
         table.push([parameter.to_string().into(), value.into(), unit.into()]);
     }

@@ -118,6 +118,12 @@ impl Cause {
         }
     }
 
+    /// Whether it is an error of the sensor's scale that does not drift.
+    pub fn is_constant_scale(&self) -> bool {
+        let Cause::Measurement(Disturbance { kind: Kind::Scale, profile, .. }) = self else { return false };
+        !matches!(profile, Profile::Exponential { .. } | Profile::Temperature { .. })
+    }
+
     /// Whether it is deflection by gravity along horizontal axes of the base, as in an arm mounted at a tilt.
     pub fn is_tilt(&self) -> bool {
         let Cause::Arm(Effect::LumpedCompliance(load)) = self else { return false };

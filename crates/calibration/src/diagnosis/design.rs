@@ -14,10 +14,10 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
 
 use super::algebra::{finite, gram, lower_factor, outer, product, product_of_transposed, solved};
-use super::extension::{Extended, Subject};
+use super::extension::{Extended, Subject, with_robust_weights};
 use super::serial_correlation::prewhiten;
 use crate::identification::calibration::CalibrationProblem;
-use crate::measurement::dataset::{Reading, Sensor};
+use crate::measurement::dataset::{Dataset, Reading, Sensor};
 use crate::measurement::sensor::disturbance::sag_mm;
 use crate::measurement::split;
 use truegrind_arm::parameter::{LinkCoordinate, Parameter};
@@ -122,6 +122,25 @@ pub struct Projected {
     pub given_back: Option<DMatrix<f64>>,
 }
 
+/// Lengths and rotations of the joints, the target, and the sensor's frame; with the index of the first of the last.
+fn probes(dataset: &Dataset) -> (Vec<Parameter>, usize) {
+    let mut probes: Vec<Parameter> = Vec::new();
+    for coordinate in [LinkCoordinate::Theta, LinkCoordinate::A, LinkCoordinate::D] {
+        probes.extend((0..6).map(|joint| Parameter::Link { joint, coordinate }));
+    }
+    probes.extend((0..3).map(Parameter::Target));
+    let first_frame = probes.len();
+    if dataset.sensor == Sensor::Cable {
+        for anchor in 0..dataset.anchors() {
+            probes.extend((0..3).map(|axis| Parameter::Outlet { anchor, axis }));
+            probes.push(Parameter::Zero { anchor });
+        }
+    } else {
+        probes.extend((0..6).map(Parameter::SensorFrame));
+    }
+    (probes, first_frame)
+}
+
 impl Linear {
     /// Linearises a fit at its estimate.
     pub fn of(subject: &Subject<'_>, fit: &Extended) -> Self {
@@ -136,29 +155,8 @@ impl Linear {
         }
         // Derivatives for the columns of candidates, at the estimate.
         let anchors = dataset.anchors();
-        let mut probes: Vec<Parameter> = Vec::new();
-        for coordinate in [LinkCoordinate::Theta, LinkCoordinate::A, LinkCoordinate::D] {
-            probes.extend((0..6).map(|joint| Parameter::Link { joint, coordinate }));
-        }
-        probes.extend((0..3).map(Parameter::Target));
-        let first_frame = probes.len();
-        if dataset.sensor == Sensor::Cable {
-            for anchor in 0..anchors {
-                probes.extend((0..3).map(|axis| Parameter::Outlet { anchor, axis }));
-                probes.push(Parameter::Zero { anchor });
-            }
-        } else {
-            probes.extend((0..6).map(Parameter::SensorFrame));
-        }
-        let weights: Vec<_> = fit
-            .weights
-            .iter()
-            .zip(&fit.robust_weight)
-            .map(|(w, t)| crate::identification::calibration::Weight {
-                per_mm: w.per_mm * t.sqrt(),
-                per_rad: w.per_rad * t.sqrt(),
-            })
-            .collect();
+        let (probes, first_frame) = probes(dataset);
+        let weights = with_robust_weights(&fit.weights, &fit.robust_weight);
         let problem = fit.problem.with_parameters(dataset, &fit.model, &fit.frames, &probes, &weights);
         let slopes = linearised(&problem, &vec![0.0; probes.len()]).1;
         let column = |k: usize| slopes.row(k).transpose();

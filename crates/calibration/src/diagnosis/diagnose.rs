@@ -98,15 +98,7 @@ pub fn diagnose(
     let structure = residual_tests::structure(&subject, &search.extended, &search.set_aside);
     let smoothed = search.fit_smooth_correction(&structure);
     let summary = summary::summarise(&search, &confirmed, &structure, smoothed);
-    let mut notes = Vec::new();
-    if let Some(needed) = needed {
-        notes.push(format!(
-            "{} rows at {} distinct poses are too few to separate effects from geometry: at least {needed} poses are needed, some hundred are \
-             usual; these results depend on the priors",
-            dataset.rows.len(),
-            count_distinct_poses(dataset, usize::MAX)
-        ));
-    }
+    let mut notes: Vec<String> = needed.map(|needed| few_poses_note(dataset, needed)).into_iter().collect();
     notes.append(&mut search.notes);
     let mut finding_of_cause = vec![0; search.found.causes.len()];
     for (index, merged) in summary.findings.iter().enumerate() {
@@ -146,6 +138,16 @@ pub fn diagnose(
         finding_of_cause,
         pictures,
     })
+}
+
+/// Says that there are too few poses.
+fn few_poses_note(dataset: &Dataset, needed: usize) -> String {
+    format!(
+        "{} rows at {} distinct poses are too few to separate effects from geometry: at least {needed} poses are needed, some hundred are \
+         usual; these results depend on the priors",
+        dataset.rows.len(),
+        count_distinct_poses(dataset, usize::MAX)
+    )
 }
 
 /// The model with `causes` under the tolerances of the arm.

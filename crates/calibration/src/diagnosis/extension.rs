@@ -428,7 +428,8 @@ fn updated_sigma(sigma: f64, spread: f64, base: &[Weight], lengths: bool) -> f64
     (total * spread * spread - share).max(0.01 * sigma * sigma).sqrt().max(smallest)
 }
 
-fn with_robust_weights(weights: &[Weight], robust_weight: &[f64]) -> Vec<Weight> {
+/// Weights of the rows with Huber's included.
+pub(super) fn with_robust_weights(weights: &[Weight], robust_weight: &[f64]) -> Vec<Weight> {
     weights
         .iter()
         .zip(robust_weight)

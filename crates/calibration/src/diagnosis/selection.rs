@@ -333,7 +333,8 @@ fn review(scores: &CandidateScores<'_>, options: &Options, which: &[usize], how:
 
 /// Whether a cause's rows or order were searched, not listed.
 fn is_searched(cause: &Cause) -> bool {
-    cause.rows().is_some() || cause.name() == "gear-transmission"
+    let is_order = matches!(cause, Cause::Arm(Effect::GearTransmission(_) | Effect::GearMap(_)));
+    cause.rows().is_some() || is_order
 }
 
 /// The score of a cause itself: from the list if it is there, else computed (for searched rows or orders).
@@ -376,8 +377,8 @@ fn judge(scores: &CandidateScores<'_>, index: usize, open: bool) -> (Accepted, D
             break;
         }
     }
-    let information_beside_growth = (cause.name() == "sensor-scale")
-        .then(|| scale_information_beside_growth(&design, &own.score.estimate));
+    let information_beside_growth =
+        cause.is_constant_scale().then(|| scale_information_beside_growth(&design, &own.score.estimate));
     let log_p = scores.catalogue.corrected_log_p(&design, &own);
     let tried = own.candidate.tried;
     (Accepted { own: own.score, log_p, tried, rivals, information_beside_growth }, design, scored)

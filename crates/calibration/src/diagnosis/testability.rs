@@ -79,12 +79,9 @@ pub(super) fn not_testable(
         );
     }
     for name in ["joint-compliance", "gear-eccentricity", "gear-ratio", "joint-coupling", "backlash"] {
+        let asked = (0..6).filter(|joint| !still.contains(joint));
         let without_sides = name == "backlash" && prepared.sides_from_order;
-        let asked = (0..6).filter(|joint| !still.contains(joint) && !without_sides);
-        let hidden: Vec<(usize, f64)> = asked
-            .map(|joint| (joint, smallest_that_shows(name, joint, left)))
-            .filter(|(_, smallest)| *smallest > PRACTICAL_RAD)
-            .collect();
+        let hidden = if without_sides { Vec::new() } else { hidden_joints(name, asked, left) };
         if !hidden.is_empty() && missing(name) {
             let joints: Vec<usize> = hidden.iter().map(|h| h.0).collect();
             let sizes: Vec<String> = hidden.iter().map(describe).collect();
@@ -100,6 +97,14 @@ pub(super) fn not_testable(
         }
     }
     out
+}
+
+/// Joints of which an effect of practical size would not show, with the smallest size that would.
+fn hidden_joints(name: &str, asked: impl Iterator<Item = usize>, left: &[Scored]) -> Vec<(usize, f64)> {
+    asked
+        .map(|joint| (joint, smallest_that_shows(name, joint, left)))
+        .filter(|(_, smallest)| *smallest > PRACTICAL_RAD)
+        .collect()
 }
 
 /// The smallest detectable peak rotation of a joint by an effect of the arm (rad); NaN where it was not tried.

@@ -123,7 +123,7 @@ impl Tracker {
         for &k in &members {
             x[k] = 0.0;
             root.row_mut(k).fill(0.0);
-            widening[k] = if self.parameters[k].unit() == "mm" { ROOM_MM } else { ROOM_RAD };
+            widening[k] = if self.parameters[k].is_length() { ROOM_MM } else { ROOM_RAD };
         }
         // Through the state's own numbers, so that a resumed track gives the same bits.
         match found.what {

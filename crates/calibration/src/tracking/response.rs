@@ -219,7 +219,7 @@ impl Tracker {
                 Parameter::Outlet { anchor, .. } => format!("outlet {}", anchor + 1),
                 _ => continue,
             };
-            let reach = if parameter.unit() == "mm" { REACH_MM } else { REACH_RAD };
+            let reach = if parameter.is_length() { REACH_MM } else { REACH_RAD };
             match groups.iter_mut().find(|g| g.name == name) {
                 Some(group) => group.members.push((k, reach)),
                 None => groups.push(Group { name, members: vec![(k, reach)] }),

@@ -42,7 +42,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::estimate::{Estimate, Termination};
-use crate::least_squares::damped::{DampedSystem, Linearisation};
+use crate::least_squares::damped::{DampedSystem, Linearisation, PredictedReduction};
 use crate::least_squares::search::{DAMPING_RANGE, Damping, Point, Search, converged};
 use crate::least_squares::{Factorisation, Form};
 use crate::objective::Objective;
@@ -169,22 +169,19 @@ fn gain_ratio(objective: &mut Objective<'_>, start: &[f64], options: &Options) -
             trace.push(here.entry(0.0, None, Some(cosine), objective));
         }
     }
-    let mut refused = 0_usize;
     for _ in 0..options.max_iterations {
         if let Some(end) = here.end(options.small_cost, cosine, Some(options.gradient_tolerance)) {
             return here.finish(objective, end, trace);
         }
         let Some(predicted) = system.step(&here.at, damping.mu, &here.x, &mut trial) else {
             damping.refuse();
-            refused += 1;
             if damping.is_exhausted() {
                 return here.finish(objective, Termination::Singular, trace);
             }
             continue;
         };
         let search = Search {
-            mu: damping.mu,
-            refused,
+            damping,
             cosine,
             cost_tolerance: options.cost_tolerance,
             step_tolerance: options.step_tolerance,
@@ -192,47 +189,50 @@ fn gain_ratio(objective: &mut Objective<'_>, start: &[f64], options: &Options) -
         if let Some(end) = converged(&mut system, &here, &predicted, &search) {
             return here.finish(objective, end, trace);
         }
-        let cost = here.at.cost();
-        // After a refusal only the cost is evaluated first: it is several times cheaper than the derivatives.
-        let worth_it = refused == 0 || {
-            let new = objective.cost(&trial);
-            damping.is_acceptable((cost - new) / predicted.reduction)
-        };
-        let gain = |at: &Linearisation| (cost - at.cost()) / predicted.reduction;
-        let mut reached = None;
-        if worth_it {
-            let at = Linearisation::at(objective, &trial, options.factorisation);
-            if at.is_finite() && !damping.is_acceptable(gain(&at)) {
-                if system.correct(&at, damping.mu, &mut trial)
-                    && damping.is_acceptable((cost - objective.cost(&trial)) / predicted.reduction)
-                {
-                    reached = Some(Linearisation::at(objective, &trial, options.factorisation));
-                }
-            } else {
-                reached = Some(at);
-            }
-        }
-        let accepted = reached.filter(|at| at.is_finite() && damping.is_acceptable(gain(at)));
-        let step_norm = if accepted.is_some() { predicted.step_norm } else { 0.0 };
-        let is_refused = accepted.is_none();
-        if let Some(at) = accepted {
-            damping.accept(gain(&at));
+        let reached = attempt(objective, &mut system, &damping, &here, &predicted, &mut trial, options);
+        if let Some((at, gain)) = reached {
+            damping.accept(gain);
             here.at = at;
             std::mem::swap(&mut here.x, &mut trial);
             cosine = system.enter(&here.at);
+            trace.push(here.entry(predicted.step_norm, Some(damping.mu), Some(cosine), objective));
+            continue;
         }
-        trace.push(here.entry(step_norm, Some(damping.mu), Some(cosine), objective));
-        if is_refused {
-            damping.refuse();
-            refused += 1;
-            if damping.is_exhausted() {
-                return here.finish(objective, Termination::Stalled, trace);
-            }
-        } else {
-            refused = 0;
+        trace.push(here.entry(0.0, Some(damping.mu), Some(cosine), objective));
+        damping.refuse();
+        if damping.is_exhausted() {
+            return here.finish(objective, Termination::Stalled, trace);
         }
     }
     here.finish(objective, Termination::IterationLimit, trace)
+}
+
+/// The problem linearised at `trial` and the gain ratio there, if that is acceptable. A first trial that is not is corrected by a
+/// second step from where it ended.
+fn attempt(
+    objective: &mut Objective<'_>,
+    system: &mut DampedSystem,
+    damping: &Damping,
+    here: &Point,
+    predicted: &PredictedReduction,
+    trial: &mut [f64],
+    options: &Options,
+) -> Option<(Linearisation, f64)> {
+    let gain = |cost: f64| (here.at.cost() - cost) / predicted.reduction;
+    // After a refusal only the cost is evaluated first: it is several times cheaper than the derivatives.
+    if damping.refusals > 0 && !damping.is_acceptable(gain(objective.cost(trial))) {
+        return None;
+    }
+    let mut at = Linearisation::at(objective, trial, options.factorisation);
+    if at.is_finite() && !damping.is_acceptable(gain(at.cost())) {
+        let corrected = system.correct(&at, damping.mu, trial);
+        if !corrected || !damping.is_acceptable(gain(objective.cost(trial))) {
+            return None;
+        }
+        at = Linearisation::at(objective, trial, options.factorisation);
+    }
+    let gain = gain(at.cost());
+    (at.is_finite() && damping.is_acceptable(gain)).then_some((at, gain))
 }
 
 fn fixed_damping(objective: &mut Objective<'_>, start: &[f64], options: &Options) -> Estimate {

@@ -98,7 +98,6 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
     let mut system = if printed { DampedSystem::unscaled(p) } else { DampedSystem::new(p) };
     let mut damping = Damping::new(if printed { options.mu } else { options.initial_damping });
     let mut sequence = options.map.sequence(options.first);
-    let mut refused = 0;
     let (mut x1, mut x2) = (vec![0.0; p], vec![0.0; p]);
     for _ in 0..options.max_iterations {
         let cost = here.at.cost();
@@ -112,16 +111,9 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
                 return here.finish(&objective, Termination::Singular, trace);
             }
             damping.refuse();
-            refused += 1;
             continue;
         };
-        let search = Search {
-            mu: damping.mu,
-            refused,
-            cosine,
-            cost_tolerance: options.cost_tolerance,
-            step_tolerance: 0.0,
-        };
+        let search = Search { damping, cosine, cost_tolerance: options.cost_tolerance, step_tolerance: 0.0 };
         if !printed && let Some(end) = converged(&mut system, &here, &predicted, &search) {
             return here.finish(&objective, end, trace);
         }
@@ -132,7 +124,6 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
                 return here.finish(&objective, Termination::NotFinite, trace);
             }
             damping.refuse();
-            refused += 1;
             trace.push(here.entry(0.0, Some(damping.mu), Some(cosine), &objective));
             if damping.is_exhausted() {
                 return here.finish(&objective, Termination::Stalled, trace);
@@ -141,7 +132,6 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
         }
         if !printed {
             damping.accept(gain);
-            refused = 0;
         }
         system.enter(&at1);
         if system.step(&at1, damping.mu, &x1, &mut x2).is_none() {

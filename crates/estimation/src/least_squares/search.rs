@@ -66,6 +66,8 @@ pub(crate) struct Damping {
     accepted: f64,
     /// A refused μ, which fades with every accepted step.
     refused: f64,
+    /// Steps refused since the last accepted one.
+    pub(crate) refusals: usize,
 }
 
 /// Smallest and largest μ with an effect beside a unit diagonal in double precision.
@@ -87,6 +89,7 @@ impl Damping {
             growth: 2.0,
             accepted: f64::INFINITY,
             refused: 0.0,
+            refusals: 0,
         }
     }
 
@@ -104,6 +107,7 @@ impl Damping {
         self.mu = (self.mu * factor).max((ABOVE_REFUSED * self.refused).min(self.mu)).max(DAMPING_RANGE.0);
         self.refused *= FADING;
         self.growth = 2.0;
+        self.refusals = 0;
     }
 
     pub(crate) fn refuse(&mut self) {
@@ -112,6 +116,7 @@ impl Damping {
         let least = if self.accepted > self.mu { self.accepted.min(FIRST_REFUSAL) } else { FIRST_REFUSAL };
         self.mu = (self.mu * self.growth).max(least).min(DAMPING_RANGE.1);
         self.growth *= 2.0;
+        self.refusals += 1;
     }
 
     pub(crate) fn is_exhausted(&self) -> bool {
@@ -121,9 +126,7 @@ impl Damping {
 
 /// State of a search for the convergence tests.
 pub(crate) struct Search {
-    pub(crate) mu: f64,
-    /// Steps refused since the last accepted one.
-    pub(crate) refused: usize,
+    pub(crate) damping: Damping,
     pub(crate) cosine: f64,
     pub(crate) cost_tolerance: f64,
     pub(crate) step_tolerance: f64,
@@ -145,15 +148,15 @@ pub(crate) fn converged(
     if predicted.reduction > enough && predicted.step_norm > tiny {
         return None;
     }
-    if search.mu <= LIGHT {
+    if search.damping.mu <= LIGHT {
         return Some(if predicted.reduction <= enough { Termination::Cost } else { Termination::Step });
     }
     let mut unused = vec![0.0; here.x.len()];
     match system.step(&here.at, LIGHT, &here.x, &mut unused) {
         Some(light) if light.reduction <= enough => Some(Termination::Cost),
         Some(light) if light.step_norm <= tiny => Some(Termination::Step),
-        _ if search.refused > 0 && search.cosine <= SMALL_COSINE => Some(Termination::Cost),
-        _ if search.refused > 0 => Some(Termination::Stalled),
+        _ if search.damping.refusals > 0 && search.cosine <= SMALL_COSINE => Some(Termination::Cost),
+        _ if search.damping.refusals > 0 => Some(Termination::Stalled),
         _ => None,
     }
 }

@@ -200,7 +200,6 @@ fn sound(objective: &mut Objective<'_>, start: &[f64], options: &Options) -> Est
     let mut delta = options.step_size;
     let mut trial = vec![0.0; p];
     let mut cosine = system.enter(&here.at);
-    let mut refused = 0;
     for _ in 0..options.max_iterations {
         let cost = here.at.cost();
         if let Some(end) = here.end(options.small_cost, cosine, Some(options.gradient_tolerance)) {
@@ -212,16 +211,9 @@ fn sound(objective: &mut Objective<'_>, start: &[f64], options: &Options) -> Est
         }
         let Some(predicted) = predicted else {
             damping.refuse();
-            refused += 1;
             continue;
         };
-        let search = Search {
-            mu: damping.mu,
-            refused,
-            cosine,
-            cost_tolerance: options.cost_tolerance,
-            step_tolerance: 0.0,
-        };
+        let search = Search { damping, cosine, cost_tolerance: options.cost_tolerance, step_tolerance: 0.0 };
         if let Some(end) = converged(&mut system, &here, &predicted, &search) {
             return here.finish(objective, end, trace);
         }
@@ -240,12 +232,10 @@ fn sound(objective: &mut Objective<'_>, start: &[f64], options: &Options) -> Est
         let step_norm = if taken { delta * predicted.step_norm } else { 0.0 };
         trace.push(here.entry(step_norm, Some(delta), Some(cosine), objective));
         if taken {
-            refused = 0;
             delta = (delta / options.decay_factor).min(1.0);
         } else {
             delta = (0.5 * delta).max(0.05);
             damping.refuse();
-            refused += 1;
             if damping.is_exhausted() {
                 return here.finish(objective, Termination::Stalled, trace);
             }

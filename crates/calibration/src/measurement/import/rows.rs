@@ -80,15 +80,7 @@ pub(super) fn dataset(
     if let Some(note) = number_anchors(&mut rows) {
         notes.push(note);
     }
-    let outlets = rows.iter().map(|row| row.anchor + 1).max().unwrap_or(1);
-    if outlets > MOST_OUTLETS {
-        return Err(ImportError::Cell {
-            location: Location { column: Some("anchor".into()), ..reader.location() },
-            found: format!("{outlets} different cable outlets").into(),
-            expected: "at most 64 in one file",
-            remedy: "each outlet adds four unknowns: put the rows of further outlets into other files",
-        });
-    }
+    check_outlets(&reader, &rows)?;
     if !options.allow_odd_units {
         check_units(&reader, &rows, columns.sensor)?;
     }
@@ -108,6 +100,20 @@ pub(super) fn dataset(
         angle_step_rad,
         readout_step_mm,
         reading_step_mm,
+    })
+}
+
+/// Refuses more outlets than can be identified.
+fn check_outlets(reader: &Reader<'_>, rows: &[Row]) -> Result<(), ImportError> {
+    let outlets = rows.iter().map(|row| row.anchor + 1).max().unwrap_or(1);
+    if outlets <= MOST_OUTLETS {
+        return Ok(());
+    }
+    Err(ImportError::Cell {
+        location: Location { column: Some("anchor".into()), ..reader.location() },
+        found: format!("{outlets} different cable outlets").into(),
+        expected: "at most 64 in one file",
+        remedy: "each outlet adds four unknowns: put the rows of further outlets into other files",
     })
 }
 

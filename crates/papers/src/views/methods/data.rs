@@ -9,33 +9,35 @@ use crate::views::words;
 use truegrind_arm::parameter::Parameter;
 use truegrind_report::table::{Cell, Column, Table};
 
+/// The columns of [`table`].
+fn columns() -> Vec<Column> {
+    vec![
+        Column::text("id", ""),
+        Column::text("method", "Method"),
+        Column::text("solver", "Solver"),
+        Column::text("treatment", "Treatment"),
+        Column::text("protocol", "Protocol"),
+        Column::count("case", "Case"),
+        Column::count("seed", "Seed"),
+        Column::number("rmse_mm", "RMSE", "mm", 4),
+        Column::number("mean_absolute_mm", "mean |e|", "mm", 4),
+        Column::number("max_mm", "max", "mm", 4),
+        Column::number("fitted_rmse_mm", "RMSE of the fit", "mm", 4),
+        Column::number("converged_rmse_mm", "RMSE converged", "mm", 4),
+        Column::count("iterations", "Iterations"),
+        Column::count("residual_rows", "Residual rows"),
+        Column::count("jacobian_rows", "Jacobian rows"),
+        Column::text("ended", "Ended"),
+        Column::text("diverged", "Diverged"),
+        Column::number("paper_rmse_mm", "paper RMSE", "mm", 2),
+        Column::number("paper_mean_absolute_mm", "paper mean |e|", "mm", 2),
+        Column::number("paper_max_mm", "paper max", "mm", 2),
+    ]
+}
+
 /// Table for CSV: one row for each method and case.
 pub(crate) fn table(study: &Study) -> Table {
-    let mut table = Table::new(
-        title(study, "Every case"),
-        vec![
-            Column::text("id", ""),
-            Column::text("method", "Method"),
-            Column::text("solver", "Solver"),
-            Column::text("treatment", "Treatment"),
-            Column::text("protocol", "Protocol"),
-            Column::count("case", "Case"),
-            Column::count("seed", "Seed"),
-            Column::number("rmse_mm", "RMSE", "mm", 4),
-            Column::number("mean_absolute_mm", "mean |e|", "mm", 4),
-            Column::number("max_mm", "max", "mm", 4),
-            Column::number("fitted_rmse_mm", "RMSE of the fit", "mm", 4),
-            Column::number("converged_rmse_mm", "RMSE converged", "mm", 4),
-            Column::count("iterations", "Iterations"),
-            Column::count("residual_rows", "Residual rows"),
-            Column::count("jacobian_rows", "Jacobian rows"),
-            Column::text("ended", "Ended"),
-            Column::text("diverged", "Diverged"),
-            Column::number("paper_rmse_mm", "paper RMSE", "mm", 2),
-            Column::number("paper_mean_absolute_mm", "paper mean |e|", "mm", 2),
-            Column::number("paper_max_mm", "paper max", "mm", 2),
-        ],
-    );
+    let mut table = Table::new(title(study, "Every case"), columns());
     let protocol = if study.reduced { "reduced" } else { "whole" };
     for (k, case) in study.cases.iter().enumerate() {
         let paper = study.methods.before.unwrap_or_default();
