@@ -500,10 +500,11 @@ impl Design {
             return columns - product_of_transposed(&self.basis, &shared);
         }
         let mut out = columns.clone();
-        for (mut column, shared) in out.column_iter_mut().zip(shared.column_iter()) {
-            // Row by row: a matrix product would pack the whole basis for a few columns.
-            for (place, q) in column.iter_mut().zip(self.basis.column_iter()) {
-                *place -= q.dot(&shared);
+        // Row by row: a matrix product would pack the whole basis for a few columns, and column by column the basis, which is larger
+        // than the caches, would be read for each.
+        for (row, q) in self.basis.column_iter().enumerate() {
+            for (k, shared) in shared.column_iter().enumerate() {
+                out[(row, k)] -= q.dot(&shared);
             }
         }
         out
