@@ -117,7 +117,7 @@ fn stated_error(arm: &Estimated) -> String {
 
 /// The error of the exported links on measurements.
 fn measured_error(data: &Path, arm: &Estimated, exported: &Model) -> anyhow::Result<String> {
-    let reading = DataArguments::of(data.to_path_buf(), arm.robot.clone());
+    let reading = DataArguments::of(data.to_path_buf(), arm.robot.as_str().into());
     let (_, rows) = read(&reading)?;
     let tolerance = Tolerance::default();
     let frames = starting_frames(&rows, &arm.nominal, &tolerance, true)?;
