@@ -40,11 +40,11 @@ fn verbs() -> Vec<Verb> {
             others: &["--seed"],
         },
         Verb {
-            base: &["export", "model.toml", "--to", "urdf", "--data", "data.csv"],
-            inputs: &["model.toml", "data.csv"],
+            base: &["export", "model.toml", "--to", "urdf", "--data", "data.csv", "--robot", "robot.toml"],
+            inputs: &["model.toml", "data.csv", "robot.toml"],
             outputs: &["-o"],
             needs: &["-o", "made.urdf"],
-            others: &["--to", "--data"],
+            others: &["--to", "--data", "--robot", "--base", "--tip"],
         },
         Verb {
             base: &["robots", "--check", "robot.toml"],

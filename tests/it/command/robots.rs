@@ -142,6 +142,7 @@ fn every_verb_that_takes_a_robot_takes_the_links_of_a_urdf() {
         &["view", "rows.csv", "--rrd", "5.rrd"],
         &["view", "rows.csv", "--model", "model.toml", "--rrd", "6.rrd"],
         &["track", "rows.csv", "--model", "model.toml", "-o", "tracks", "--rrd", "7.rrd"],
+        &["export", "model.toml", "--to", "urdf", "--data", "rows.csv", "-o", "made.urdf"],
         &["cell", "poses.mod", "-o", "cell.toml"],
         &["compensate", "poses.mod", "--model", "model.toml", "--allow-doubtful", "--dry-run"],
         &["deviation", "poses.mod", "--model", "model.toml", "--rrd", "8.rrd"],
