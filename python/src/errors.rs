@@ -362,6 +362,9 @@ impl From<PlanError> for Refusal {
             PlanError::TooFew { found, wanted, .. } | PlanError::NoWay { found, wanted, .. } => {
                 told.with(format!("{found} poses"), format!("{wanted} poses"))
             }
+            PlanError::OutletInFoot { at_mm } => {
+                told.of_key("outlets_mm").with(format!("{at_mm:?}"), "millimetres")
+            }
             PlanError::NoOutlet => told.of_key("outlets_mm").with("none", "the location of each outlet"),
             _ => told,
         }

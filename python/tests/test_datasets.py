@@ -263,6 +263,7 @@ def test_errors_name_the_place():
         (lambda: tg.forward(7, np.zeros(6)), tg.ArgumentError, "a Robot, a Model or an Arm"),
         (lambda: tg.simulate("robot = 1\n"), tg.RecipeError, "expected a string"),
         (lambda: tg.plan("abb-irb-120", "cable"), tg.ArgumentError, "outlets_mm"),
+        (lambda: tg.plan("abb-irb-120", "cable", outlets_mm=[[0.75, 0.2, 0.04]]), tg.PlanError, "multiply metres by 1000"),
         (lambda: tg.plan("abb-irb-120", "eye"), tg.ArgumentError, "sensor"),
         (lambda: tg.plan("abb-irb-120", "position", seed=-1), tg.ArgumentError, "seed: found -1"),
         (lambda: tg.plan("abb-irb-120", "position", threads=-1), tg.ArgumentError, "threads: found -1"),
