@@ -36,6 +36,14 @@ if __name__ == "__main__":
         compensate_folder("in", "arm.toml", "out", csv="all.csv", client=client)
 """
 
+# What Dask alone costs: workers that are started and ended.
+NOTHING = """
+if __name__ == "__main__":
+    from distributed import Client
+    with Client(n_workers=2, threads_per_worker=1, dashboard_address=None) as client:
+        client.wait_for_workers(2)
+"""
+
 # As the documentation of the package has it.
 QUIET_WORKERS = """
 if __name__ == "__main__":
@@ -119,7 +127,7 @@ def main() -> None:
     timed([[binary, "identify", cable, "--robot", "abb-irb-120", "-o", "arm.toml"]], at)
     base = [binary, "compensate", "in", "--model", "arm.toml", "-o", "out"]
     shares = [[*base, "--shard", f"{share}/2", "--resume", "--brief-records", "--threads", "1"] for share in (1, 2)]
-    scripts = {"alone.py": ALONE, "workers.py": WORKERS, "quiet.py": QUIET_WORKERS, "steady.py": STEADY}
+    scripts = {"alone.py": ALONE, "workers.py": WORKERS, "nothing.py": NOTHING, "quiet.py": QUIET_WORKERS, "steady.py": STEADY}
     scripts["large.py"] = QUIET_WORKERS.replace("client=client", "client=client, chunk=1000")
     for name, script in scripts.items():
         (at / name).write_text(script, encoding="utf-8")
@@ -127,6 +135,7 @@ def main() -> None:
         "one run": [[[*base, "--csv", "all.csv"]]],
         "two shares": [shares, [[binary, "gather", "out", "--csv", "all.csv"]]],
         "Dask": [[[sys.executable, "alone.py"]]],
+        "workers, nothing to do": [[[sys.executable, "nothing.py"]]],
         "Dask, two processes": [[[sys.executable, "workers.py"]]],
         "the same, quiet": [[[sys.executable, "quiet.py"]]],
         "and chunks of 1,000": [[[sys.executable, "large.py"]]],
@@ -141,9 +150,10 @@ def main() -> None:
                 cpu, clock = map(float, (at / "spent").read_text().split())
                 parts = [(cpu, clock)]
             found[name].append((sum(cpu for cpu, _ in parts), sum(clock for _, clock in parts)))
-            written.add((at / "all.csv").read_bytes())
-            (at / "all.csv").unlink()
-            (at / "out").rename(at / f"{name} {number}")
+            if (at / "out").exists():
+                written.add((at / "all.csv").read_bytes())
+                (at / "all.csv").unlink()
+                (at / "out").rename(at / f"{name} {number}")
     assert len(written) == 1, "the ways write different tables"
     plain = median(cpu for cpu, _ in found["one run"])
     print(f"{count} programs of {TARGETS} targets, median of {rounds} (processor s, clock s)")

@@ -5,10 +5,11 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use truegrind::{Condition, Inverse, InverseError, Joints, Model, Pose};
 
-use crate::arrays::{self, Numbers, Tuple, joints, rows, shaped};
+use crate::arrays::{self, Tuple, joints, numbers, rows, shaped};
 use crate::errors::{Kind, Refusal};
 use crate::model::PyModel;
 use crate::robot::{PyArm, PyRobot};
+use crate::types::{Object, Poses, Solutions};
 
 /// An arm, the nominal arm whose closed-form inverse starts the search for joints, and the default condition.
 pub(crate) struct Acting<'a> {
@@ -79,14 +80,15 @@ impl Stated {
 pub(crate) fn forward<'py>(
     py: Python<'py>,
     acting: &Acting<'_>,
-    q_deg: &Numbers<'py>,
+    q_deg: &Bound<'py, PyAny>,
     stated: &Stated,
-) -> PyResult<Bound<'py, PyAny>> {
+) -> PyResult<Object<'py, Poses>> {
+    let q_deg = numbers("q_deg", q_deg)?;
     let (q_deg, one) = rows("q_deg", q_deg.as_array(), 6)?;
     let condition = stated.on(acting.arm, &acting.condition)?;
     let (position, rotation) = arrays::forward(py, acting.arm, &condition, q_deg)?;
-    let position = shaped(py, position.into_any(), one)?;
-    let rotation = shaped(py, rotation.into_any(), one)?;
+    let position = shaped(position.into_any(), one)?;
+    let rotation = shaped(rotation.into_any(), one)?;
     arrays::named(py, Tuple::Poses, (position, rotation))
 }
 
@@ -94,17 +96,21 @@ pub(crate) fn forward<'py>(
 pub(crate) fn inverse<'py>(
     py: Python<'py>,
     acting: &Acting<'_>,
-    position_mm: &Numbers<'py>,
-    rotation: &Numbers<'py>,
-    near_deg: Option<&Numbers<'py>>,
+    position_mm: &Bound<'py, PyAny>,
+    rotation: &Bound<'py, PyAny>,
+    near_deg: Option<&Bound<'py, PyAny>>,
     stated: &Stated,
-) -> PyResult<Bound<'py, PyAny>> {
+) -> PyResult<Object<'py, Solutions>> {
+    let position_mm = numbers("position_mm", position_mm)?;
     let (places, one) = rows("position_mm", position_mm.as_array(), 3)?;
-    let targets = arrays::poses(places, rotation.as_array())?;
+    let targets = arrays::poses(places, numbers("rotation", rotation)?.as_array())?;
     let condition = stated.on(acting.arm, &acting.condition)?;
     let seeds = match near_deg {
         None => vec![Joints::zeros(); targets.len()],
-        Some(near) => seeds(rows("near_deg", near.as_array(), 6)?.0, targets.len())?,
+        Some(near) => {
+            let near = numbers("near_deg", near)?;
+            seeds(rows("near_deg", near.as_array(), 6)?.0, targets.len())?
+        }
     };
     let seeded = near_deg.is_some();
     let (arm, nominal) = (acting.arm, acting.nominal);
@@ -140,7 +146,7 @@ pub(crate) fn inverse<'py>(
     let why: Vec<Option<String>> =
         solved.iter().map(|found| found.as_ref().err().map(ToString::to_string)).collect();
     debug_assert_eq!(q_deg.shape()[0], count);
-    let (q_deg, reached) = (shaped(py, q_deg.into_any(), one)?, shaped(py, reached.into_any(), one)?);
+    let (q_deg, reached) = (shaped(q_deg.into_any(), one)?, shaped(reached.into_any(), one)?);
     arrays::named(py, Tuple::Solutions, (q_deg, reached, if one { None } else { Some(why) }))
 }
 

@@ -1,7 +1,9 @@
 //! Conversion of NumPy arrays: joint angles by rows, positions and rotations, without intermediate copies.
 
 use numpy::ndarray::{ArrayView2, ArrayViewD, Axis, Ix2};
-use numpy::{AllowTypeChange, PyArray2, PyArray3, PyArrayLikeDyn, PyArrayMethods};
+use numpy::{
+    PyArray2, PyArray3, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods,
+};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::PyTuple;
@@ -9,15 +11,43 @@ use rayon::prelude::*;
 use truegrind::{Condition, JointColumns, Joints, Model, Pose, PoseColumns};
 
 use crate::errors::Refusal;
+use crate::types::Object;
 
-/// An array of numbers, or anything NumPy converts to one.
-pub(crate) type Numbers<'py> = PyArrayLikeDyn<'py, f64, AllowTypeChange>;
+/// An array of numbers.
+pub(crate) type Numbers<'py> = PyReadonlyArrayDyn<'py, f64>;
 
 /// Rows per pass, so that joints, kernel and poses stay in cache.
 const BLOCK: usize = 512;
 
 /// Number of rows from which several threads are used.
 const MANY: usize = 16 * BLOCK;
+
+/// The doubles of an argument, copied only if NumPy has to convert them.
+///
+/// # Errors
+/// Names the argument, which holds something else than real numbers.
+pub(crate) fn numbers<'py>(name: &str, given: &Bound<'py, PyAny>) -> PyResult<Numbers<'py>> {
+    let py = given.py();
+    // Not of a subclass: a masked array hides some of its numbers.
+    if given.get_type().is(py.get_type::<PyUntypedArray>())
+        && let Ok(array) = given.cast::<PyArrayDyn<f64>>()
+        && is_aligned(array)
+    {
+        return Ok(array.readonly());
+    }
+    let helper = py.import("truegrind._results")?.getattr("doubles")?;
+    let array = helper
+        .call1((given,))
+        .map_err(|error| Refusal::argument(name, error.value(py), "an array of real numbers"))?;
+    Ok(array.cast::<PyArrayDyn<f64>>()?.readonly())
+}
+
+/// Whether each number begins where a processor reads a double at once: not so in a column of packed records.
+fn is_aligned(array: &Bound<'_, PyArrayDyn<f64>>) -> bool {
+    let size = size_of::<f64>();
+    (array.data() as usize).is_multiple_of(size)
+        && array.strides().iter().all(|stride| stride.unsigned_abs().is_multiple_of(size))
+}
 
 /// The rows of an array of shape (N, `width`), or the one row of an array of shape (`width`,).
 ///
@@ -52,12 +82,8 @@ pub(crate) fn joints(q_deg: ArrayView2<'_, f64>, row: usize) -> Joints {
 }
 
 /// One or more points: shape (N, 3), or (3,) for one.
-pub(crate) fn shaped<'py>(
-    py: Python<'py>,
-    array: Bound<'py, PyAny>,
-    one: bool,
-) -> PyResult<Bound<'py, PyAny>> {
-    if one { array.get_item(0) } else { Ok(array.into_pyobject(py)?) }
+pub(crate) fn shaped<'py>(array: Bound<'py, PyAny>, one: bool) -> PyResult<Bound<'py, PyAny>> {
+    if one { array.get_item(0) } else { Ok(array) }
 }
 
 /// Poses of the flange in the base: positions (mm), shape (N, 3), and rotation matrices, shape (N, 3, 3).
@@ -178,11 +204,11 @@ pub(crate) enum Tuple {
 }
 
 /// A named tuple of the package.
-pub(crate) fn named<'py>(
+pub(crate) fn named<'py, H>(
     py: Python<'py>,
     tuple: Tuple,
     fields: impl IntoPyObject<'py, Target = PyTuple, Output = Bound<'py, PyTuple>, Error = PyErr>,
-) -> PyResult<Bound<'py, PyAny>> {
+) -> PyResult<Object<'py, H>> {
     let classes = TUPLES.get_or_try_init(py, || -> PyResult<[Py<PyAny>; 2]> {
         let module = py.import("truegrind._results")?;
         Ok([module.getattr("Poses")?.unbind(), module.getattr("Solutions")?.unbind()])
@@ -191,5 +217,5 @@ pub(crate) fn named<'py>(
         Tuple::Poses => &classes[0],
         Tuple::Solutions => &classes[1],
     };
-    class.bind(py).call1(fields.into_pyobject(py)?)
+    Ok(class.bind(py).call1(fields.into_pyobject(py)?)?.into())
 }

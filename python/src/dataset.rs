@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use numpy::{PyArray1, PyArray2};
+use numpy::{PyArray1, PyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList};
 use truegrind::calibration::measurement::convention::AngleConvention;
@@ -11,10 +11,11 @@ use truegrind::calibration::measurement::import::{self, cell::Cell};
 use truegrind::calibration::measurement::matching::match_to_arm;
 use truegrind::{Dataset, ImportOptions, Reading, Robot, Sensor, read_measurements};
 
-use crate::arrays::Numbers;
-use crate::errors::{Kind, Refusal};
+use crate::arrays::{Numbers, numbers};
+use crate::errors::Refusal;
 use crate::files;
 use crate::running::run;
+use crate::types::{Anything, ArrayLike, Floats, Object, PathOrBytes, Sensors, Typed};
 
 /// Measured poses: logged joint angles and the readings of one sensor.
 #[pyclass(name = "Dataset", module = "truegrind", frozen)]
@@ -80,7 +81,7 @@ fn of_columns(
                     value => Cell::Number { value, as_text: false },
                 },
                 (None, _, texts) => {
-                    texts.and_then(|texts| texts[row].clone()).map_or(Cell::Empty, Cell::Text)
+                    texts.and_then(|texts| texts[row].as_deref()).map_or(Cell::Empty, Cell::of_text)
                 }
             };
         let lines = (0..count).map(|row| views.iter().map(|column| cell(column, row)).collect());
@@ -94,12 +95,12 @@ fn of_columns(
 fn add<'py>(
     columns: &mut Vec<(String, Column<'py>)>,
     argument: &str,
-    array: &Bound<'py, PyAny>,
+    array: &Numbers<'py>,
     names: &[&str],
     gaps: bool,
 ) -> PyResult<()> {
-    let shape = array.getattr("shape")?.extract::<Vec<usize>>()?;
-    let fits = match shape.as_slice() {
+    let shape = array.shape();
+    let fits = match shape {
         [_] => names.len() == 1,
         [_, width] => *width == names.len(),
         _ => false,
@@ -110,15 +111,15 @@ fn add<'py>(
         } else {
             format!("an array of shape (N, {})", names.len())
         };
-        let found = format!("an array of shape {}", crate::arrays::shown(&shape));
+        let found = format!("an array of shape {}", crate::arrays::shown(shape));
         return Err(Refusal::argument(argument, found, &expected).into());
     }
     for (place, name) in names.iter().enumerate() {
         let column = match shape.len() {
-            1 => array.clone(),
-            _ => array.get_item((pyo3::types::PySlice::full(array.py()), place))?,
+            1 => array.as_any().clone(),
+            _ => array.as_any().get_item((pyo3::types::PySlice::full(array.py()), place))?,
         };
-        columns.push(((*name).to_owned(), Column::Numbers(column.extract()?, gaps)));
+        columns.push(((*name).to_owned(), Column::Numbers(numbers(argument, &column)?, gaps)));
     }
     Ok(())
 }
@@ -128,8 +129,12 @@ impl PyDataset {
     /// Reads a text table (separated by comma, semicolon or tab) from a path or from bytes.
     #[staticmethod]
     #[pyo3(signature = (source, *, name = None, allow_odd_units = false))]
-    fn from_csv(source: &Bound<'_, PyAny>, name: Option<String>, allow_odd_units: bool) -> PyResult<Self> {
-        let (name, bytes) = bytes_of(source, name, "csv")?;
+    fn from_csv(
+        source: Object<'_, PathOrBytes>,
+        name: Option<String>,
+        allow_odd_units: bool,
+    ) -> PyResult<Self> {
+        let (name, bytes) = bytes_of(&source, name, "csv")?;
         read(source.py(), &name, &bytes, None, allow_odd_units)
     }
 
@@ -137,12 +142,12 @@ impl PyDataset {
     #[staticmethod]
     #[pyo3(signature = (source, *, sheet = None, name = None, allow_odd_units = false))]
     fn from_xlsx(
-        source: &Bound<'_, PyAny>,
+        source: Object<'_, PathOrBytes>,
         sheet: Option<String>,
         name: Option<String>,
         allow_odd_units: bool,
     ) -> PyResult<Self> {
-        let (name, bytes) = bytes_of(source, name, "xlsx")?;
+        let (name, bytes) = bytes_of(&source, name, "xlsx")?;
         read(source.py(), &name, &bytes, sheet, allow_odd_units)
     }
 
@@ -159,16 +164,16 @@ impl PyDataset {
     #[expect(clippy::too_many_arguments, reason = "keywords, each with its own unit")]
     fn from_numpy<'py>(
         py: Python<'py>,
-        q_deg: &Bound<'py, PyAny>,
-        length_mm: Option<&Bound<'py, PyAny>>,
-        position_mm: Option<&Bound<'py, PyAny>>,
-        quaternion_wxyz: Option<&Bound<'py, PyAny>>,
-        readout_mm: Option<&Bound<'py, PyAny>>,
-        time_h: Option<&Bound<'py, PyAny>>,
-        temperature_c: Option<&Bound<'py, PyAny>>,
-        payload_kg: Option<&Bound<'py, PyAny>>,
-        approach: Option<&Bound<'py, PyAny>>,
-        anchor: Option<&Bound<'py, PyAny>>,
+        q_deg: Object<'py, ArrayLike>,
+        length_mm: Option<Object<'py, ArrayLike>>,
+        position_mm: Option<Object<'py, ArrayLike>>,
+        quaternion_wxyz: Option<Object<'py, ArrayLike>>,
+        readout_mm: Option<Object<'py, ArrayLike>>,
+        time_h: Option<Object<'py, ArrayLike>>,
+        temperature_c: Option<Object<'py, ArrayLike>>,
+        payload_kg: Option<Object<'py, ArrayLike>>,
+        approach: Option<Object<'py, ArrayLike>>,
+        anchor: Option<Object<'py, ArrayLike>>,
         session: Option<Vec<Option<String>>>,
         name: &str,
         allow_odd_units: bool,
@@ -178,7 +183,6 @@ impl PyDataset {
         const SIDES: [&str; 6] =
             ["approach1", "approach2", "approach3", "approach4", "approach5", "approach6"];
         let place: &[&str] = &["measured_x", "measured_y", "measured_z"];
-        let numpy = py.import("numpy")?;
         let mut columns = Vec::new();
         for (argument, array, names, gaps) in [
             ("q_deg", Some(q_deg), &JOINTS[..], false),
@@ -193,10 +197,7 @@ impl PyDataset {
             ("anchor", anchor, &["anchor"][..], false),
         ] {
             let Some(array) = array else { continue };
-            let numbers = numpy.call_method1("asarray", (array, "float64"));
-            let numbers =
-                numbers.map_err(|error| Refusal::argument(argument, error, "an array of numbers"))?;
-            add(&mut columns, argument, &numbers, names, gaps)?;
+            add(&mut columns, argument, &numbers(argument, &array)?, names, gaps)?;
         }
         if let Some(session) = session {
             columns.push(("session".to_owned(), Column::Texts(session)));
@@ -209,14 +210,14 @@ impl PyDataset {
     /// and so on; nulls are empty cells.
     #[staticmethod]
     #[pyo3(signature = (frame, *, name = "dataframe", allow_odd_units = false))]
-    fn from_dataframe(frame: &Bound<'_, PyAny>, name: &str, allow_odd_units: bool) -> PyResult<Self> {
+    fn from_dataframe(frame: Object<'_, Anything>, name: &str, allow_odd_units: bool) -> PyResult<Self> {
         let py = frame.py();
-        let found = py.import("truegrind._dataframe")?.call_method1("columns", (frame,))?;
+        let found = py.import("truegrind._dataframe")?.call_method1("columns", (&*frame,))?;
         let mut columns = Vec::new();
         for (name, values) in found.cast::<PyDict>()?.iter() {
             let column = match values.cast::<PyList>() {
                 Ok(texts) => Column::Texts(texts.extract()?),
-                Err(_) => Column::Numbers(values.extract()?, true),
+                Err(_) => Column::Numbers(numbers(&name.to_string(), &values)?, true),
             };
             columns.push((name.extract()?, column));
         }
@@ -231,8 +232,8 @@ impl PyDataset {
 
     /// ``cable``, ``position`` or ``pose``.
     #[getter]
-    fn sensor(&self) -> &'static str {
-        self.rows.sensor.name()
+    fn sensor(&self) -> Typed<Sensors, &'static str> {
+        self.rows.sensor.name().into()
     }
 
     /// Remarks: skipped columns, dropped blank rows.
@@ -249,24 +250,27 @@ impl PyDataset {
 
     /// Logged joint angles of the controller (°), shape (N, 6).
     #[getter]
-    fn q_deg<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    fn q_deg<'py>(&self, py: Python<'py>) -> PyResult<Typed<Floats, Bound<'py, PyArray2<f64>>>> {
         let rows: Vec<Vec<f64>> =
             self.rows.rows.iter().map(|row| row.joints.iter().map(|q| q.to_degrees()).collect()).collect();
-        Ok(PyArray2::from_vec2(py, &rows)?)
+        Ok(PyArray2::from_vec2(py, &rows)?.into())
     }
 
     /// Lengths of a cable (mm), shape (N,); ``None`` for another sensor.
     #[getter]
-    fn length_mm<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+    fn length_mm<'py>(&self, py: Python<'py>) -> Option<Typed<Floats, Bound<'py, PyArray1<f64>>>> {
         let length =
             |reading: &Reading| if let Reading::Cable(length) = reading { *length } else { f64::NAN };
         (self.rows.sensor == Sensor::Cable)
-            .then(|| PyArray1::from_iter(py, self.rows.rows.iter().map(|row| length(&row.reading))))
+            .then(|| PyArray1::from_iter(py, self.rows.rows.iter().map(|row| length(&row.reading))).into())
     }
 
     /// Positions in the sensor frame (mm), shape (N, 3); ``None`` for a cable.
     #[getter]
-    fn position_mm<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
+    fn position_mm<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<Option<Typed<Floats, Bound<'py, PyArray2<f64>>>>> {
         let place = |reading: &Reading| match reading {
             Reading::Cable(_) => vec![f64::NAN; 3],
             Reading::Position(p) => p.iter().copied().collect(),
@@ -276,7 +280,7 @@ impl PyDataset {
             return Ok(None);
         }
         let rows: Vec<Vec<f64>> = self.rows.rows.iter().map(|row| place(&row.reading)).collect();
-        Ok(Some(PyArray2::from_vec2(py, &rows)?))
+        Ok(Some(PyArray2::from_vec2(py, &rows)?.into()))
     }
 
     fn __len__(&self) -> usize {
@@ -284,7 +288,7 @@ impl PyDataset {
     }
 
     fn __repr__(&self) -> String {
-        format!("<Dataset {}: {} rows, sensor {}>", self.rows.file, self.rows.rows.len(), self.sensor())
+        format!("<Dataset {}: {} rows, sensor {}>", self.rows.file, self.rows.rows.len(), *self.sensor())
     }
 }
 
@@ -312,7 +316,8 @@ impl PyDataset {
         let convention = match angles {
             None => robot.sheet.joints.angles.into(),
             Some(word) => {
-                word.parse::<AngleConvention>().map_err(|error| Refusal::new(Kind::Argument, error))?
+                let expected = "\"logged\" or \"dh\"";
+                word.parse::<AngleConvention>().map_err(|_| Refusal::argument("angles", word, expected))?
             }
         };
         let name = &robot.sheet.name;

@@ -61,11 +61,12 @@ pub(crate) struct Refusal {
 }
 
 /// Command line options and the corresponding keywords.
-const KEYWORDS: [(&str, &str); 12] = [
+const KEYWORDS: [(&str, &str); 13] = [
     ("--allow-odd-units takes the file at its word", "allow_odd_units=True takes the rows at their word"),
     ("--allow-odd-units", "allow_odd_units=True"),
     ("--allow-doubtful", "allow_doubtful=True"),
     ("--angles dh", "angles=\"dh\""),
+    ("--base LINK --tip LINK", "truegrind.Robot(file, base=LINK, tip=LINK)"),
     ("--robot", "the robot"),
     ("--first-poses", "first_poses"),
     ("--sigma", "sigma_mm ="),
@@ -75,6 +76,16 @@ const KEYWORDS: [(&str, &str); 12] = [
     ("--cell", "cell"),
     ("--again", "again=True"),
 ];
+
+/// An argument may be a whole file.
+fn clipped(mut text: String) -> String {
+    const MOST: usize = 200;
+    if let Some((end, _)) = text.char_indices().nth(MOST) {
+        text.truncate(end);
+        text.push('…');
+    }
+    text
+}
 
 /// A message with keywords in place of options.
 fn in_python(message: impl ToString) -> String {
@@ -100,7 +111,7 @@ impl Refusal {
 
     /// An invalid argument: its name, the found and the expected value.
     pub(crate) fn argument(name: &str, found: impl ToString, expected: &str) -> Self {
-        let found = found.to_string();
+        let found = clipped(found.to_string());
         let told = Self::new(Kind::Argument, format!("{name}: found {found}; expected {expected}"));
         told.of_key(name).with(found, expected)
     }
@@ -350,6 +361,9 @@ impl From<PlanError> for Refusal {
         match error {
             PlanError::TooFew { found, wanted, .. } | PlanError::NoWay { found, wanted, .. } => {
                 told.with(format!("{found} poses"), format!("{wanted} poses"))
+            }
+            PlanError::OutletInFoot { at_mm } => {
+                told.of_key("outlets_mm").with(format!("{at_mm:?}"), "millimetres")
             }
             PlanError::NoOutlet => told.of_key("outlets_mm").with("none", "the location of each outlet"),
             _ => told,

@@ -10,15 +10,16 @@ use truegrind::calibration::identification::verdict::Limits;
 use truegrind::math::work::report_step;
 use truegrind::report::{diagnosis, format, identification};
 use truegrind::{
-    Dataset, DiagnoseOptions, Diagnosed, Identification, IdentifyOptions, Robot, Tolerance, diagnose,
-    identify, solver_by_name, split, starting_frames,
+    Dataset, DiagnoseOptions, Diagnosed, Identification, IdentifyOptions, Tolerance, diagnose, identify,
+    solver_by_name, split, starting_frames,
 };
 
 use crate::dataset::PyDataset;
 use crate::errors::Refusal;
-use crate::model::{PyModel, parameter};
-use crate::robot::robot;
+use crate::model::{PyModel, parameters};
+use crate::robot::named;
 use crate::running::run;
+use crate::types::{Arrays, Dictionaries, Judgements, NamedRobot, Object, Progress, Typed};
 
 /// Result of an identification.
 #[pyclass(name = "Identification", module = "truegrind", frozen)]
@@ -37,8 +38,8 @@ impl PyIdentification {
 
     /// ``pass``, ``doubtful``, ``fail`` or ``not-evaluated``.
     #[getter]
-    fn verdict(&self) -> &'static str {
-        crate::model::word(self.found.estimated.verdict.status)
+    fn verdict(&self) -> Typed<Judgements, &'static str> {
+        crate::model::word(self.found.estimated.verdict.status).into()
     }
 
     /// Reasons for the verdict, one sentence each.
@@ -73,19 +74,19 @@ impl PyIdentification {
 
     /// All fitted parameters, including those of the sensor: dictionaries with name, unit, nominal, value, sigma, determined.
     #[getter]
-    fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
-        self.found.parameters.iter().map(|found| parameter(py, found)).collect()
+    fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Typed<Dictionaries, Vec<Bound<'py, PyDict>>>> {
+        parameters(py, &self.found.parameters)
     }
 
     /// Errors of the held-out rows (mm): row numbers, before and after, each of shape (n,).
     #[getter]
-    fn held_out<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn held_out<'py>(&self, py: Python<'py>) -> PyResult<Typed<Arrays, Bound<'py, PyDict>>> {
         let rows = &self.found.held_out;
         let out = PyDict::new(py);
         out.set_item("row", PyArray1::from_iter(py, rows.iter().map(|(row, _, _)| *row as i64)))?;
         out.set_item("before_mm", PyArray1::from_iter(py, rows.iter().map(|(_, before, _)| *before)))?;
         out.set_item("after_mm", PyArray1::from_iter(py, rows.iter().map(|(_, _, after)| *after)))?;
-        Ok(out)
+        Ok(out.into())
     }
 
     /// The full result as JSON text, schema ``truegrind.identification/1``: the bytes that ``truegrind identify --json`` writes.
@@ -109,7 +110,7 @@ impl PyIdentification {
             self.rows.rows.len(),
             self.held_out_rmse_mm(),
             self.held_out_rmse_before_mm(),
-            self.verdict()
+            *self.verdict()
         )
     }
 }
@@ -122,7 +123,7 @@ impl PyIdentification {
     name = "identify",
     signature = (
         dataset, robot, *, method = "lm", held_out = 0.2, seed = 0, fuse_readout = true, limit_rmse_mm = None,
-        limit_max_mm = None, tolerance_length_mm = None, tolerance_angle_deg = None, angles = None, threads = None,
+        limit_max_mm = None, tolerance_length_mm = None, tolerance_angle_deg = None, angles: "Literal['logged', 'dh'] | None" = None, threads = None,
         progress = None
     )
 )]
@@ -130,19 +131,20 @@ impl PyIdentification {
 pub(crate) fn identify_(
     py: Python<'_>,
     dataset: &PyDataset,
-    #[pyo3(from_py_with = robot)] robot: Robot,
+    robot: Object<'_, NamedRobot>,
     method: &str,
     held_out: f64,
-    seed: u64,
+    seed: i64,
     fuse_readout: bool,
     limit_rmse_mm: Option<f64>,
     limit_max_mm: Option<f64>,
     tolerance_length_mm: Option<f64>,
     tolerance_angle_deg: Option<f64>,
     angles: Option<&str>,
-    threads: Option<usize>,
-    progress: Option<&Bound<'_, PyAny>>,
+    threads: Option<i64>,
+    progress: Option<Object<'_, Progress>>,
 ) -> PyResult<PyIdentification> {
+    let robot = named(&robot)?;
     if !(held_out > 0.0 && held_out <= 0.9) {
         return Err(Refusal::argument("held_out", held_out, "a share above 0, up to 0.9").into());
     }
@@ -165,13 +167,13 @@ pub(crate) fn identify_(
         tolerance,
         solver: solver_by_name(method).map_err(Refusal::from)?,
         held_out,
-        seed,
+        seed: whole("seed", seed)?,
         fuse_readout,
         limit_rmse_mm,
         limit_max_mm,
         stated_frames: None,
     };
-    run(py, threads, progress, || {
+    run(py, threads, progress.as_deref(), || {
         report_step("checking units");
         let rows = dataset.of(&robot, angles)?;
         let (name, nominal) = (&robot.sheet.name, &robot.model);
@@ -194,6 +196,14 @@ pub(crate) fn positive(name: &str, value: f64) -> Result<f64, Refusal> {
     Err(Refusal::argument(name, value, "a number above 0"))
 }
 
+/// A number that is not negative, as the library counts.
+///
+/// # Errors
+/// Names the argument.
+pub(crate) fn whole<T: TryFrom<i64>>(name: &str, value: i64) -> Result<T, Refusal> {
+    T::try_from(value).map_err(|_| Refusal::argument(name, value, "a whole number, 0 or above"))
+}
+
 /// Result of a diagnosis.
 #[pyclass(name = "Diagnosis", module = "truegrind", frozen)]
 pub(crate) struct PyDiagnosis {
@@ -211,8 +221,8 @@ impl PyDiagnosis {
 
     /// ``pass``, ``doubtful``, ``fail`` or ``not-evaluated``.
     #[getter]
-    fn verdict(&self) -> &'static str {
-        crate::model::word(self.found.estimated.verdict.status)
+    fn verdict(&self) -> Typed<Judgements, &'static str> {
+        crate::model::word(self.found.estimated.verdict.status).into()
     }
 
     /// Reasons for the verdict, one sentence each.
@@ -223,9 +233,9 @@ impl PyDiagnosis {
 
     /// The causes, largest first: dictionaries as in the JSON.
     #[getter]
-    fn findings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn findings<'py>(&self, py: Python<'py>) -> PyResult<Object<'py, Dictionaries>> {
         let whole = py.import("json")?.call_method1("loads", (self.to_json()?,))?;
-        whole.get_item("findings")
+        Ok(whole.get_item("findings")?.into())
     }
 
     /// Cross-validated RMS error with geometry alone (mm).
@@ -276,7 +286,7 @@ impl PyDiagnosis {
             self.found.diagnosis.findings.len(),
             self.held_out_rmse_mm(),
             self.geometry_rmse_mm(),
-            self.verdict()
+            *self.verdict()
         )
     }
 }
@@ -289,33 +299,35 @@ impl PyDiagnosis {
     name = "diagnose",
     signature = (
         dataset, robot, *, alpha = 0.01, most = 20, blocks = 10, smooth = false, fuse_readout = true, limit_rmse_mm = None,
-        limit_max_mm = None, seed = 0, also = Vec::new(), angles = None, threads = None, progress = None
+        limit_max_mm = None, seed = 0, also = Vec::new(), angles: "Literal['logged', 'dh'] | None" = None, threads = None, progress = None
     )
 )]
 #[expect(clippy::too_many_arguments, reason = "keywords, as the options of the command line")]
 pub(crate) fn diagnose_(
     py: Python<'_>,
     dataset: &PyDataset,
-    #[pyo3(from_py_with = robot)] robot: Robot,
+    robot: Object<'_, NamedRobot>,
     alpha: f64,
-    most: usize,
-    blocks: usize,
+    most: i64,
+    blocks: i64,
     smooth: bool,
     fuse_readout: bool,
     limit_rmse_mm: Option<f64>,
     limit_max_mm: Option<f64>,
-    seed: u64,
+    seed: i64,
     also: Vec<PyRef<'_, PyDataset>>,
     angles: Option<&str>,
-    threads: Option<usize>,
-    progress: Option<&Bound<'_, PyAny>>,
+    threads: Option<i64>,
+    progress: Option<Object<'_, Progress>>,
 ) -> PyResult<PyDiagnosis> {
+    let robot = named(&robot)?;
     if !(alpha > 0.0 && alpha <= 0.5) {
         return Err(Refusal::argument("alpha", alpha, "a probability above 0, up to 0.5").into());
     }
     if blocks < 2 {
         return Err(Refusal::argument("blocks", blocks, "at least 2").into());
     }
+    let blocks = whole("blocks", blocks)?;
     for (name, limit) in [("limit_rmse_mm", limit_rmse_mm), ("limit_max_mm", limit_max_mm)] {
         if let Some(limit) = limit {
             positive(name, limit)?;
@@ -324,10 +336,10 @@ pub(crate) fn diagnose_(
     let limits = Limits { rmse_mm: limit_rmse_mm, max_mm: limit_max_mm };
     let mut options = DiagnoseOptions { blocks, smooth, fuse_readout, limits, ..DiagnoseOptions::default() };
     options.selection.alpha = alpha;
-    options.selection.most = most;
-    options.selection.seed = seed;
+    options.selection.most = whole("most", most)?;
+    options.selection.seed = whole("seed", seed)?;
     let others: Vec<&PyDataset> = also.iter().map(|other| &**other).collect();
-    run(py, threads, progress, || {
+    run(py, threads, progress.as_deref(), || {
         report_step("checking units");
         let rows = dataset.of(&robot, angles)?;
         let (name, nominal) = (&robot.sheet.name, &robot.model);

@@ -11,6 +11,7 @@ mod others;
 mod programs;
 mod robot;
 mod running;
+mod types;
 
 use pyo3::prelude::*;
 use truegrind::report::format;

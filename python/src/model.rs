@@ -11,10 +11,11 @@ use truegrind::arm::estimated::FlangePoint;
 use truegrind::{Estimated, Judgement, Pose, robots};
 
 use crate::arm::{Acting, Stated, forward, inverse};
-use crate::arrays::{Numbers, joints, rows, shaped};
+use crate::arrays::{joints, numbers, rows, shaped};
 use crate::errors::{Kind, Refusal};
 use crate::files;
 use crate::robot::PyArm;
+use crate::types::{ArrayLike, Bools, Dictionaries, Floats, Judgements, Object, Poses, Solutions, Typed};
 
 /// An estimated arm: the nominal arm, everything identified, and its covariance.
 #[pyclass(name = "Model", module = "truegrind", frozen)]
@@ -109,9 +110,6 @@ fn load(path: &Path) -> PyResult<PyModel> {
 
 #[pymethods]
 impl PyModel {
-    /// Model(path)
-    /// --
-    ///
     /// Reads a model file.
     #[new]
     fn new(path: PathBuf) -> PyResult<Self> {
@@ -152,8 +150,8 @@ impl PyModel {
 
     /// ``pass``, ``doubtful``, ``fail`` or ``not-evaluated``.
     #[getter]
-    fn verdict(&self) -> &'static str {
-        word(self.arm.verdict.status)
+    fn verdict(&self) -> Typed<Judgements, &'static str> {
+        word(self.arm.verdict.status).into()
     }
 
     /// Reasons for the verdict, one sentence each.
@@ -189,8 +187,8 @@ impl PyModel {
 
     /// Identified parameters: dictionaries with name, unit, nominal, value, sigma, determined.
     #[getter]
-    fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
-        self.arm.parameters.iter().map(|found| parameter(py, found)).collect()
+    fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Typed<Dictionaries, Vec<Bound<'py, PyDict>>>> {
+        parameters(py, &self.arm.parameters)
     }
 
     /// Names of the parameters of the arm in the order of the covariance.
@@ -201,10 +199,10 @@ impl PyModel {
 
     /// Covariance of the arm's parameters (mm, rad), shape (p, p).
     #[getter]
-    fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Typed<Floats, Bound<'py, PyArray2<f64>>>> {
         let matrix = &self.arm.covariance;
         let rows: Vec<Vec<f64>> = matrix.row_iter().map(|row| row.iter().copied().collect()).collect();
-        Ok(PyArray2::from_vec2(py, &rows)?)
+        Ok(PyArray2::from_vec2(py, &rows)?.into())
     }
 
     /// Poses of the flange in the base for controller angles (°) of shape (N, 6) or (6,): ``Poses(position_mm, rotation)``.
@@ -214,12 +212,12 @@ impl PyModel {
     fn forward<'py>(
         &self,
         py: Python<'py>,
-        q_deg: Numbers<'py>,
+        q_deg: Object<'py, ArrayLike>,
         payload_kg: Option<f64>,
         payload_centre_mm: Option<[f64; 3]>,
         temperature_c: Option<f64>,
         time_h: Option<f64>,
-    ) -> PyResult<Bound<'py, PyAny>> {
+    ) -> PyResult<Object<'py, Poses>> {
         let stated = Stated { payload_kg, payload_centre_mm, temperature_c, time_h };
         forward(py, &self.acting(), &q_deg, &stated)
     }
@@ -229,11 +227,11 @@ impl PyModel {
     fn inverse<'py>(
         &self,
         py: Python<'py>,
-        position_mm: Numbers<'py>,
-        rotation: Numbers<'py>,
-        near_deg: Option<Numbers<'py>>,
-    ) -> PyResult<Bound<'py, PyAny>> {
-        inverse(py, &self.acting(), &position_mm, &rotation, near_deg.as_ref(), &Stated::default())
+        position_mm: Object<'py, ArrayLike>,
+        rotation: Object<'py, ArrayLike>,
+        near_deg: Option<Object<'py, ArrayLike>>,
+    ) -> PyResult<Object<'py, Solutions>> {
+        inverse(py, &self.acting(), &position_mm, &rotation, near_deg.as_deref(), &Stated::default())
     }
 
     /// Predicted standard deviation of a point on the flange (mm), for controller angles (°) of shape (N, 6) or (6,). The point,
@@ -242,9 +240,10 @@ impl PyModel {
     fn sigma_mm<'py>(
         &self,
         py: Python<'py>,
-        q_deg: Numbers<'py>,
+        q_deg: Object<'py, ArrayLike>,
         tool_mm: [f64; 3],
-    ) -> PyResult<Bound<'py, PyAny>> {
+    ) -> PyResult<Object<'py, Floats>> {
+        let q_deg = numbers("q_deg", &q_deg)?;
         let (q_deg, one) = rows("q_deg", q_deg.as_array(), 6)?;
         let [x, y, z] = tool_mm;
         let sigmas = py.detach(|| {
@@ -254,16 +253,21 @@ impl PyModel {
                 .collect();
             self.arm.position_sigmas_mm(&self.arm.model.at_condition(&self.arm.condition), &points)
         });
-        shaped(py, PyArray1::from_vec(py, sigmas).into_any(), one)
+        Ok(shaped(PyArray1::from_vec(py, sigmas).into_any(), one)?.into())
     }
 
     /// Whether controller angles (°) of shape (N, 6) or (6,) are in the measured region.
-    fn measured_at<'py>(&self, py: Python<'py>, q_deg: Numbers<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn measured_at<'py>(
+        &self,
+        py: Python<'py>,
+        q_deg: Object<'py, ArrayLike>,
+    ) -> PyResult<Object<'py, Bools>> {
+        let q_deg = numbers("q_deg", &q_deg)?;
         let (q_deg, one) = rows("q_deg", q_deg.as_array(), 6)?;
         let inside: Vec<bool> = py.detach(|| {
             (0..q_deg.nrows()).map(|row| self.arm.region.outside(&joints(q_deg, row)).is_none()).collect()
         });
-        shaped(py, PyArray1::from_vec(py, inside).into_any(), one)
+        Ok(shaped(PyArray1::from_vec(py, inside).into_any(), one)?.into())
     }
 
     fn __repr__(&self) -> String {
@@ -276,11 +280,15 @@ impl PyModel {
     }
 }
 
-/// One identified number as a dictionary.
-pub(crate) fn parameter<'py>(
+/// Identified numbers as dictionaries.
+pub(crate) fn parameters<'py>(
     py: Python<'py>,
-    found: &truegrind::EstimatedParameter,
-) -> PyResult<Bound<'py, PyDict>> {
+    found: &[truegrind::EstimatedParameter],
+) -> PyResult<Typed<Dictionaries, Vec<Bound<'py, PyDict>>>> {
+    Ok(found.iter().map(|found| parameter(py, found)).collect::<PyResult<Vec<_>>>()?.into())
+}
+
+fn parameter<'py>(py: Python<'py>, found: &truegrind::EstimatedParameter) -> PyResult<Bound<'py, PyDict>> {
     let out = PyDict::new(py);
     out.set_item("name", &found.name)?;
     out.set_item("unit", &found.unit)?;

@@ -21,11 +21,14 @@ use truegrind::{
 
 use crate::dataset::PyDataset;
 use crate::errors::{Kind, Refusal};
-use crate::fits::positive;
-use crate::model::{PyModel, named};
+use crate::fits::{positive, whole};
+use crate::model::{self, PyModel};
 use crate::programs::text;
-use crate::robot::{PyArm, from_name, robot};
+use crate::robot::{PyArm, from_name, named};
 use crate::running::run;
+use crate::types::{
+    Columns, Dictionaries, NamedModel, NamedRobot, Object, OneOrMoreDatasets, PathOrText, Progress,
+};
 
 /// Simulated measurements.
 #[pyclass(name = "Simulation", module = "truegrind", frozen)]
@@ -70,15 +73,15 @@ impl PySimulation {
 #[pyo3(signature = (recipe, *, seed = None, name = "simulated.csv"))]
 pub(crate) fn simulate(
     py: Python<'_>,
-    recipe: &Bound<'_, PyAny>,
-    seed: Option<u64>,
+    recipe: Object<'_, PathOrText>,
+    seed: Option<i64>,
     name: &str,
 ) -> PyResult<PySimulation> {
-    let (text, path) = text(recipe, Kind::Recipe)?;
+    let (text, path) = text(&recipe, Kind::Recipe)?;
     let file = path.map_or("recipe.toml".to_owned(), |path| path.display().to_string());
     run(py, None, None, || {
         let mut recipe = Recipe::parse(&text, &file)?;
-        recipe.seed = seed.unwrap_or(recipe.seed);
+        recipe.seed = seed.map_or(Ok(recipe.seed), |seed| whole("seed", seed))?;
         let resolve = |name: &str| {
             let found = from_name(Path::new(name), &ImportOptions::default());
             let said = |error: PyErr| Python::attach(|py| error.value(py).to_string());
@@ -111,9 +114,9 @@ impl PyPlan {
 impl PyPlan {
     /// The rows in measuring order, one list per column of the table.
     #[getter]
-    fn poses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn poses<'py>(&self, py: Python<'py>) -> PyResult<Object<'py, Columns>> {
         let csv = format::csv::table(&planning::table(&self.plan, &self.setup()));
-        py.import("truegrind._results")?.call_method1("table", (csv,))
+        Ok(py.import("truegrind._results")?.call_method1("table", (csv,))?.into())
     }
 
     /// The RAPID program that moves to the poses.
@@ -175,7 +178,7 @@ fn place(name: &str, numbers: &[f64]) -> Result<Pose, Refusal> {
 #[pyo3(
     name = "plan",
     signature = (
-        robot, sensor, *, poses = 60, outlets_mm = None, sensor_frame = None, touched_point = None, sigma_mm = None,
+        robot, sensor: "Literal['cable', 'position', 'pose']", *, poses = 60, outlets_mm = None, sensor_frame = None, touched_point = None, sigma_mm = None,
         sigma_angle_deg = 0.006, margin_deg = 6.0, floor_mm = 0.0, speed_mm_s = 200.0, settle_s = 2.0, candidates = 2000,
         seed = 0, threads = None, progress = None
     )
@@ -183,9 +186,9 @@ fn place(name: &str, numbers: &[f64]) -> Result<Pose, Refusal> {
 #[expect(clippy::too_many_arguments, reason = "keywords, as the options of the command line")]
 pub(crate) fn plan_(
     py: Python<'_>,
-    #[pyo3(from_py_with = robot)] robot: Robot,
+    robot: Object<'_, NamedRobot>,
     sensor: &str,
-    poses: usize,
+    poses: i64,
     outlets_mm: Option<Vec<[f64; 3]>>,
     sensor_frame: Option<Vec<f64>>,
     touched_point: Option<Vec<f64>>,
@@ -195,11 +198,12 @@ pub(crate) fn plan_(
     floor_mm: f64,
     speed_mm_s: f64,
     settle_s: f64,
-    candidates: usize,
-    seed: u64,
-    threads: Option<usize>,
-    progress: Option<&Bound<'_, PyAny>>,
+    candidates: i64,
+    seed: i64,
+    threads: Option<i64>,
+    progress: Option<Object<'_, Progress>>,
 ) -> PyResult<PyPlan> {
+    let robot = named(&robot)?;
     let sensor = match sensor {
         "cable" => Sensor::Cable,
         "position" => Sensor::Position,
@@ -214,6 +218,7 @@ pub(crate) fn plan_(
     if candidates > 100_000 {
         return Err(Refusal::argument("candidates", candidates, "at most 100000; 2000 are usual").into());
     }
+    let (poses, candidates): (usize, usize) = (whole("poses", poses)?, whole("candidates", candidates)?);
     let outlets = outlets_mm.unwrap_or_default();
     if sensor == Sensor::Cable && outlets.is_empty() {
         let expected = "where in the robot's base the cable comes out, x, y, z (mm), once for each cable";
@@ -255,11 +260,11 @@ pub(crate) fn plan_(
         },
         visits: Visits { repeats: 4, both_sides: 12, warm_up: 8, approach_rad, seconds_per_row: 12.0 },
         decisive: 25.0,
-        seed,
+        seed: whole("seed", seed)?,
         ..defaults
     };
     let speed_mm_s = positive("speed_mm_s", speed_mm_s)?;
-    run(py, threads, progress, || {
+    run(py, threads, progress.as_deref(), || {
         report_step(&format!("choosing {poses} of {candidates} poses"));
         let setup = MeasurementSetup { nominal: &robot.model, sensor, frames: &frames };
         let plan = plan_poses(&setup, &options).map_err(|error| {
@@ -294,9 +299,9 @@ impl PyTrack {
 
     /// Alarms raised by these measurements: dictionaries as in the JSON.
     #[getter]
-    fn alarms<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn alarms<'py>(&self, py: Python<'py>) -> PyResult<Object<'py, Dictionaries>> {
         let whole = py.import("json")?.call_method1("loads", (self.to_json()?,))?;
-        whole.get_item("alarms")
+        Ok(whole.get_item("alarms")?.into())
     }
 
     /// The state, for ``track(..., state=...)``.
@@ -343,17 +348,17 @@ impl PyTrack {
 #[expect(clippy::too_many_arguments, reason = "keywords, as the options of the command line")]
 pub(crate) fn track_(
     py: Python<'_>,
-    model: &Bound<'_, PyAny>,
-    datasets: &Bound<'_, PyAny>,
+    model: Object<'_, NamedModel>,
+    datasets: Object<'_, OneOrMoreDatasets>,
     state: Option<&str>,
-    first_poses: Option<usize>,
+    first_poses: Option<i64>,
     sigma_mm: Option<f64>,
     allow_odd_units: bool,
-    threads: Option<usize>,
-    progress: Option<&Bound<'_, PyAny>>,
+    threads: Option<i64>,
+    progress: Option<Object<'_, Progress>>,
 ) -> PyResult<PyTrack> {
     let mut kept = None;
-    let estimated = named(model, &mut kept)?;
+    let estimated = model::named(&model, &mut kept)?;
     let given: Vec<PyRef<'_, PyDataset>> = match datasets.extract::<PyRef<'_, PyDataset>>() {
         Ok(one) => vec![one],
         Err(_) => datasets.extract()?,
@@ -364,9 +369,9 @@ pub(crate) fn track_(
         ..TrackOptions::default()
     };
     if let Some(poses) = first_poses {
-        options.first_poses = poses.max(4);
+        options.first_poses = whole("first_poses", poses.max(4))?;
     }
-    run(py, threads, progress, || {
+    run(py, threads, progress.as_deref(), || {
         let arm = &estimated.arm;
         let robot = robots::load(&arm.robot).ok();
         let convention = robot.map(|robot| robot.sheet.joints.angles.into()).unwrap_or_default();

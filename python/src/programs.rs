@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use pyo3::prelude::*;
-use pyo3::types::{PyBytes, PyDict, PyList, PyString, PyTuple};
+use pyo3::types::{PyBytes, PyDict, PyList, PyMapping, PySequence, PyString};
 use truegrind::compensation::cell::Used;
 use truegrind::compensation::cell::nc_setup::cell_setup;
 use truegrind::compensation::cell::robot_match::unreachable_motions;
@@ -28,6 +28,9 @@ use crate::fits::positive;
 use crate::model::{PyModel, named};
 use crate::robot::PyArm;
 use crate::running::run;
+use crate::types::{
+    Columns, Counts, Dictionaries, Files, NamedModel, Object, PathOrText, ProgramFiles, Progress, Typed,
+};
 
 /// The files of one program, with their names in reports.
 pub(crate) struct Sources {
@@ -54,15 +57,19 @@ fn last(name: &str) -> &str {
 /// A program: a path, several paths of modules of one task, or a dictionary of names and texts.
 pub(crate) fn sources(given: &Bound<'_, PyAny>) -> PyResult<Sources> {
     let mut out = Vec::new();
-    if let Ok(named) = given.cast::<PyDict>() {
-        for (name, text) in named.iter() {
+    if let Ok(named) = given.cast::<PyMapping>() {
+        for entry in named.items()?.iter() {
+            let (name, text): (String, Bound<'_, PyAny>) = entry.extract()?;
             let bytes = match text.cast::<PyBytes>() {
                 Ok(bytes) => bytes.as_bytes().to_vec(),
                 Err(_) => text.extract::<String>()?.into_bytes(),
             };
-            out.push((name.extract()?, bytes));
+            out.push((name, bytes));
         }
-    } else if given.cast::<PyList>().is_ok() || given.cast::<PyTuple>().is_ok() {
+    } else if let Some(text) = whole_program(given) {
+        let expected = "a path, a list of paths, or a dictionary of names and texts: {\"name.mod\": text}";
+        return Err(Refusal::argument("program", text, expected).into());
+    } else if given.cast::<PyString>().is_err() && given.cast::<PySequence>().is_ok() {
         for path in given.try_iter()? {
             read(&path?, &mut out)?;
         }
@@ -75,6 +82,13 @@ pub(crate) fn sources(given: &Bound<'_, PyAny>) -> PyResult<Sources> {
         );
     }
     Ok(Sources { files: out })
+}
+
+/// The program itself in place of its path.
+fn whole_program(given: &Bound<'_, PyAny>) -> Option<String> {
+    let text = given.cast::<PyString>().ok().and_then(|text| text.to_str().ok());
+    let bytes = given.cast::<PyBytes>().is_ok();
+    (bytes || text.is_some_and(|text| text.contains('\n'))).then(|| given.to_string())
 }
 
 /// Reads a file; a task list is replaced by the modules that it names.
@@ -212,12 +226,12 @@ impl PyCompensation {
 impl PyCompensation {
     /// The corrected files: bytes by name.
     #[getter]
-    fn programs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn programs<'py>(&self, py: Python<'py>) -> PyResult<Typed<Files, Bound<'py, PyDict>>> {
         let out = PyDict::new(py);
         for ((name, _), bytes) in self.sources.files.iter().zip(&self.corrected) {
             out.set_item(name, PyBytes::new(py, bytes))?;
         }
-        Ok(out)
+        Ok(out.into())
     }
 
     /// Whether any byte changes.
@@ -250,7 +264,7 @@ impl PyCompensation {
 
     /// Status of each motion: dictionaries as in the JSON.
     #[getter]
-    fn motions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn motions<'py>(&self, py: Python<'py>) -> PyResult<Typed<Dictionaries, Bound<'py, PyList>>> {
         let whole = py.import("json")?.call_method1("loads", (self.to_json()?,))?;
         let out = PyList::empty(py);
         for program in whole.get_item("programs")?.try_iter()? {
@@ -258,12 +272,12 @@ impl PyCompensation {
                 out.append(motion?)?;
             }
         }
-        Ok(out.into_any())
+        Ok(out.into())
     }
 
     /// Number of motions by status: changed, flagged, refused, left.
     #[getter]
-    fn counts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn counts<'py>(&self, py: Python<'py>) -> PyResult<Typed<Counts, Bound<'py, PyDict>>> {
         let out = PyDict::new(py);
         for (word, status) in [
             ("changed", Status::Changed),
@@ -273,7 +287,7 @@ impl PyCompensation {
         ] {
             out.set_item(word, self.plan.outcomes.iter().filter(|outcome| outcome.status == status).count())?;
         }
-        Ok(out)
+        Ok(out.into())
     }
 
     /// Notes on tools and work objects, and on unused entries of the cell file.
@@ -311,17 +325,18 @@ impl PyCompensation {
 #[pyo3(
     name = "compensate",
     signature = (
-        program, model, *, cell = None, surface = None, payload_kg = None, payload_centre_mm = None, emit = "targets",
-        circles = "keep", tolerance_mm = 0.05, max_correction_mm = 10.0, partial = false, placement = "auto", max_risk = 0.1,
+        program, model, *, cell = None, surface = None, payload_kg = None, payload_centre_mm = None,
+        emit: "Literal['targets', 'joints']" = "targets", circles: "Literal['keep', 'segments']" = "keep", tolerance_mm = 0.05,
+        max_correction_mm = 10.0, partial = false, placement: "Literal['auto', 'shape', 'absolute']" = "auto", max_risk = 0.1,
         joint_targets = false, again = false, allow_doubtful = false, threads = None, progress = None
     )
 )]
 #[expect(clippy::too_many_arguments, reason = "keywords, as the options of the command line")]
 pub(crate) fn compensate_(
     py: Python<'_>,
-    program: &Bound<'_, PyAny>,
-    model: &Bound<'_, PyAny>,
-    cell: Option<&Bound<'_, PyAny>>,
+    program: Object<'_, ProgramFiles>,
+    model: Object<'_, NamedModel>,
+    cell: Option<Object<'_, PathOrText>>,
     surface: Option<PathBuf>,
     payload_kg: Option<f64>,
     payload_centre_mm: Option<[f64; 3]>,
@@ -335,17 +350,17 @@ pub(crate) fn compensate_(
     joint_targets: bool,
     again: bool,
     allow_doubtful: bool,
-    threads: Option<usize>,
-    progress: Option<&Bound<'_, PyAny>>,
+    threads: Option<i64>,
+    progress: Option<Object<'_, Progress>>,
 ) -> PyResult<PyCompensation> {
     if !(0.0..=1.0).contains(&max_risk) {
         return Err(Refusal::argument("max_risk", max_risk, "a probability from 0 to 1").into());
     }
     let mut kept = None;
-    let estimated = named(model, &mut kept)?;
+    let estimated = named(&model, &mut kept)?;
     estimated.allowed(allow_doubtful)?;
-    let sources = sources(program)?;
-    let place = Place::read(cell, surface)?;
+    let sources = sources(&program)?;
+    let place = Place::read(cell.as_deref(), surface)?;
     let stated = Stated { payload_kg, payload_centre_mm, ..Stated::default() };
     let options = CompensateOptions {
         emit: match emit {
@@ -377,7 +392,7 @@ pub(crate) fn compensate_(
         ..CompensateOptions::default()
     };
     let own_loads = payload_kg.is_none();
-    run(py, threads, progress, || corrected(sources, estimated, place, options, own_loads, again))
+    run(py, threads, progress.as_deref(), || corrected(sources, estimated, place, options, own_loads, again))
 }
 
 fn corrected(
@@ -471,8 +486,8 @@ pub(crate) struct PyDeviation {
 impl PyDeviation {
     /// The points of the path, one list per column of the table (mm, °); ``None`` for missing values.
     #[getter]
-    fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        py.import("truegrind._results")?.call_method1("table", (self.to_csv(),))
+    fn points<'py>(&self, py: Python<'py>) -> PyResult<Object<'py, Columns>> {
+        Ok(py.import("truegrind._results")?.call_method1("table", (self.to_csv(),))?.into())
     }
 
     /// The points as CSV text: the bytes that ``truegrind deviation --csv`` writes.
@@ -514,27 +529,27 @@ impl PyDeviation {
 #[expect(clippy::too_many_arguments, reason = "keywords, as the options of the command line")]
 pub(crate) fn deviation_(
     py: Python<'_>,
-    program: &Bound<'_, PyAny>,
-    model: &Bound<'_, PyAny>,
-    intended: Option<&Bound<'_, PyAny>>,
+    program: Object<'_, ProgramFiles>,
+    model: Object<'_, NamedModel>,
+    intended: Option<Object<'_, ProgramFiles>>,
     actual: Option<PyRef<'_, PyArm>>,
-    cell: Option<&Bound<'_, PyAny>>,
+    cell: Option<Object<'_, PathOrText>>,
     surface: Option<PathBuf>,
     payload_kg: Option<f64>,
     payload_centre_mm: Option<[f64; 3]>,
-    threads: Option<usize>,
-    progress: Option<&Bound<'_, PyAny>>,
+    threads: Option<i64>,
+    progress: Option<Object<'_, Progress>>,
 ) -> PyResult<PyDeviation> {
     let mut kept = None;
-    let estimated = named(model, &mut kept)?;
-    let programs = sources(program)?;
-    let originals = intended.map(sources).transpose()?;
-    let place = Place::read(cell, surface)?;
+    let estimated = named(&model, &mut kept)?;
+    let programs = sources(&program)?;
+    let originals = intended.as_deref().map(sources).transpose()?;
+    let place = Place::read(cell.as_deref(), surface)?;
     let stated = Stated { payload_kg, payload_centre_mm, ..Stated::default() };
     let condition = stated.on(&estimated.arm.model, &estimated.arm.condition)?;
     let actual = actual.as_deref();
     let task = Run { estimated, actual, programs: &programs, originals: originals.as_ref(), condition };
-    run(py, threads, progress, || task.judged(&place, payload_kg.is_none()))
+    run(py, threads, progress.as_deref(), || task.judged(&place, payload_kg.is_none()))
 }
 
 /// A program run on an arm.

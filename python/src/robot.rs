@@ -10,9 +10,9 @@ use truegrind::robots::foreign::{ImportOptions, Kind as FileKind, import};
 use truegrind::{ArmFile, Condition, Model, Robot, robots};
 
 use crate::arm::{Acting, Stated, acting, forward, inverse};
-use crate::arrays::Numbers;
 use crate::errors::{Kind, Refusal};
 use crate::files;
+use crate::types::{ArrayLike, Floats, NamedArm, Object, Poses, Solutions, Typed};
 
 /// A robot with its nominal arm from the data sheet.
 #[pyclass(name = "Robot", module = "truegrind", frozen)]
@@ -31,12 +31,12 @@ impl PyRobot {
 ///
 /// # Errors
 /// `RobotError`, or `OSError` if a file cannot be opened.
-pub(crate) fn robot(named: &Bound<'_, PyAny>) -> PyResult<Robot> {
-    if let Ok(robot) = named.cast::<PyRobot>() {
+pub(crate) fn named(robot: &Bound<'_, PyAny>) -> PyResult<Robot> {
+    if let Ok(robot) = robot.cast::<PyRobot>() {
         return Ok(robot.get().robot.clone());
     }
-    let path: PathBuf = named.extract().map_err(|_| {
-        Refusal::argument("robot", named, "a Robot, a name of truegrind.robots(), or a robot file")
+    let path: PathBuf = robot.extract().map_err(|_| {
+        Refusal::argument("robot", robot, "a Robot, a name of truegrind.robots(), or a robot file")
     })?;
     Ok(from_name(&path, &ImportOptions::default())?.0)
 }
@@ -58,9 +58,6 @@ pub(crate) fn from_name(path: &std::path::Path, choice: &ImportOptions) -> PyRes
 
 #[pymethods]
 impl PyRobot {
-    /// Robot(name)
-    /// --
-    ///
     /// A robot by name (``truegrind.robots()``) or from a robot file: TOML, URDF, a table of link parameters (CSV), or the
     /// calibration of a Universal Robots arm (.conf, .yaml). ``base`` and ``tip``: base and flange link of a URDF.
     /// ``ground_joint_3``: the log states joint 3 relative to the ground, as FANUC controllers do.
@@ -99,13 +96,13 @@ impl PyRobot {
 
     /// Lowest controller angles (°), shape (6,).
     #[getter]
-    fn min_deg<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+    fn min_deg<'py>(&self, py: Python<'py>) -> Typed<Floats, Bound<'py, PyArray1<f64>>> {
         degrees(py, &self.robot.model.limits.min_rad)
     }
 
     /// Highest controller angles (°), shape (6,).
     #[getter]
-    fn max_deg<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+    fn max_deg<'py>(&self, py: Python<'py>) -> Typed<Floats, Bound<'py, PyArray1<f64>>> {
         degrees(py, &self.robot.model.limits.max_rad)
     }
 
@@ -127,7 +124,7 @@ impl PyRobot {
     }
 
     /// Poses of the flange in the base for controller angles (°) of shape (N, 6) or (6,): ``Poses(position_mm, rotation)``.
-    fn forward<'py>(&self, py: Python<'py>, q_deg: Numbers<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn forward<'py>(&self, py: Python<'py>, q_deg: Object<'py, ArrayLike>) -> PyResult<Object<'py, Poses>> {
         forward(py, &self.acting(), &q_deg, &Stated::default())
     }
 
@@ -136,11 +133,11 @@ impl PyRobot {
     fn inverse<'py>(
         &self,
         py: Python<'py>,
-        position_mm: Numbers<'py>,
-        rotation: Numbers<'py>,
-        near_deg: Option<Numbers<'py>>,
-    ) -> PyResult<Bound<'py, PyAny>> {
-        inverse(py, &self.acting(), &position_mm, &rotation, near_deg.as_ref(), &Stated::default())
+        position_mm: Object<'py, ArrayLike>,
+        rotation: Object<'py, ArrayLike>,
+        near_deg: Option<Object<'py, ArrayLike>>,
+    ) -> PyResult<Object<'py, Solutions>> {
+        inverse(py, &self.acting(), &position_mm, &rotation, near_deg.as_deref(), &Stated::default())
     }
 
     /// The data sheet as JSON text.
@@ -162,8 +159,8 @@ impl PyRobot {
     }
 }
 
-fn degrees<'py>(py: Python<'py>, angles: &[f64; 6]) -> Bound<'py, PyArray1<f64>> {
-    PyArray1::from_iter(py, Vector6::from(*angles).iter().map(|angle| angle.to_degrees()))
+fn degrees<'py>(py: Python<'py>, angles: &[f64; 6]) -> Typed<Floats, Bound<'py, PyArray1<f64>>> {
+    PyArray1::from_iter(py, Vector6::from(*angles).iter().map(|angle| angle.to_degrees())).into()
 }
 
 /// An arm without a data sheet: the actual arm of a simulation, or the nominal arm of a model.
@@ -195,12 +192,12 @@ impl PyArm {
     fn forward<'py>(
         &self,
         py: Python<'py>,
-        q_deg: Numbers<'py>,
+        q_deg: Object<'py, ArrayLike>,
         payload_kg: Option<f64>,
         payload_centre_mm: Option<[f64; 3]>,
         temperature_c: Option<f64>,
         time_h: Option<f64>,
-    ) -> PyResult<Bound<'py, PyAny>> {
+    ) -> PyResult<Object<'py, Poses>> {
         let stated = Stated { payload_kg, payload_centre_mm, temperature_c, time_h };
         forward(py, &self.acting(), &q_deg, &stated)
     }
@@ -210,11 +207,11 @@ impl PyArm {
     fn inverse<'py>(
         &self,
         py: Python<'py>,
-        position_mm: Numbers<'py>,
-        rotation: Numbers<'py>,
-        near_deg: Option<Numbers<'py>>,
-    ) -> PyResult<Bound<'py, PyAny>> {
-        inverse(py, &self.acting(), &position_mm, &rotation, near_deg.as_ref(), &Stated::default())
+        position_mm: Object<'py, ArrayLike>,
+        rotation: Object<'py, ArrayLike>,
+        near_deg: Option<Object<'py, ArrayLike>>,
+    ) -> PyResult<Object<'py, Solutions>> {
+        inverse(py, &self.acting(), &position_mm, &rotation, near_deg.as_deref(), &Stated::default())
     }
 
     /// The file of the arm (TOML), as ``truegrind simulate --arm`` writes it.
@@ -243,15 +240,15 @@ pub(crate) fn catalogue() -> Vec<String> {
 )]
 pub(crate) fn forward_of<'py>(
     py: Python<'py>,
-    arm: &Bound<'py, PyAny>,
-    q_deg: Numbers<'py>,
+    arm: Object<'py, NamedArm>,
+    q_deg: Object<'py, ArrayLike>,
     payload_kg: Option<f64>,
     payload_centre_mm: Option<[f64; 3]>,
     temperature_c: Option<f64>,
     time_h: Option<f64>,
-) -> PyResult<Bound<'py, PyAny>> {
+) -> PyResult<Object<'py, Poses>> {
     let stated = Stated { payload_kg, payload_centre_mm, temperature_c, time_h };
-    forward(py, &acting(arm)?, &q_deg, &stated)
+    forward(py, &acting(&arm)?, &q_deg, &stated)
 }
 
 /// Controller angles (°) at which an arm reaches poses of its flange, as its method ``inverse``.
@@ -259,10 +256,10 @@ pub(crate) fn forward_of<'py>(
 #[pyo3(name = "inverse", signature = (arm, position_mm, rotation, near_deg = None))]
 pub(crate) fn inverse_of<'py>(
     py: Python<'py>,
-    arm: &Bound<'py, PyAny>,
-    position_mm: Numbers<'py>,
-    rotation: Numbers<'py>,
-    near_deg: Option<Numbers<'py>>,
-) -> PyResult<Bound<'py, PyAny>> {
-    inverse(py, &acting(arm)?, &position_mm, &rotation, near_deg.as_ref(), &Stated::default())
+    arm: Object<'py, NamedArm>,
+    position_mm: Object<'py, ArrayLike>,
+    rotation: Object<'py, ArrayLike>,
+    near_deg: Option<Object<'py, ArrayLike>>,
+) -> PyResult<Object<'py, Solutions>> {
+    inverse(py, &acting(&arm)?, &position_mm, &rotation, near_deg.as_deref(), &Stated::default())
 }

@@ -14,7 +14,7 @@ use crate::errors::{Kind, Refusal};
 const LOOK: Duration = Duration::from_millis(20);
 
 /// More threads would only cost memory.
-const MOST_THREADS: usize = 1024;
+const MOST_THREADS: i64 = 1024;
 
 enum Event {
     Step(String),
@@ -25,13 +25,15 @@ enum Event {
 /// checkpoint and is raised here.
 pub(crate) fn run<T: Send>(
     py: Python<'_>,
-    threads: Option<usize>,
+    threads: Option<i64>,
     progress: Option<&Bound<'_, PyAny>>,
     work: impl FnOnce() -> Result<T, Refusal> + Send,
 ) -> PyResult<T> {
-    if threads.is_some_and(|n| !(1..=MOST_THREADS).contains(&n)) {
-        return Err(Refusal::argument("threads", threads.unwrap_or_default(), "1 to 1024").into());
-    }
+    let within = |n: i64| match usize::try_from(n) {
+        Ok(count) if (1..=MOST_THREADS).contains(&n) => Ok(count),
+        _ => Err(Refusal::argument("threads", n, "1 to 1024")),
+    };
+    let threads = threads.map(within).transpose()?;
     let (send, receive) = channel();
     let ended = send.clone();
     let watch = Arc::new(Watch::with_listener(move |step| drop(send.send(Event::Step(step.to_owned())))));

@@ -188,6 +188,30 @@ def test_gaps_and_text_of_a_data_frame():
     assert (raised.value.row, raised.value.column, raised.value.found) == (11, "q3", "an empty cell")
 
 
+def test_numbers_as_text_are_numbers_in_a_frame_too():
+    arrow = pytest.importorskip("pyarrow")
+    table = {name: values.tolist() for name, values in columns().items()}
+    file = tg.Dataset.from_dataframe(table)
+    texts = tg.Dataset.from_dataframe(arrow.table({**table, "q2": [repr(value) for value in table["q2"]]}))
+    assert same(texts, file) and any("stored as text" in note for note in texts.notes)
+
+
+@pytest.mark.parametrize("fault", ["two columns of one name", "a column of columns", "complex numbers", "lazy"])
+def test_a_frame_that_cannot_be_read_is_a_dataset_error(fault):
+    pandas = pytest.importorskip("pandas")
+    frame = pandas.DataFrame(columns())
+    if fault == "two columns of one name":
+        frame = pandas.concat([frame, frame[["q1"]]], axis=1)
+    elif fault == "a column of columns":
+        frame = pandas.concat({"a": frame}, axis=1)
+    elif fault == "complex numbers":
+        frame = frame.astype({"q2": complex})
+    else:
+        frame = pytest.importorskip("polars").from_pandas(frame).lazy()
+    with pytest.raises(tg.DatasetError, match="cannot be read"):
+        tg.Dataset.from_dataframe(frame)
+
+
 def _has(module: str) -> bool:
     try:
         __import__(module)
@@ -221,7 +245,9 @@ def test_errors_name_the_place():
         (lambda: tg.Dataset.from_numpy(np.zeros((3, 7)), length_mm=np.zeros(3)), tg.ArgumentError, "(N, 6)"),
         (lambda: tg.Dataset.from_numpy(np.zeros((3, 6)), length_mm=np.zeros(2)), tg.ArgumentError, "one for each row"),
         (lambda: tg.Dataset.from_numpy(np.zeros((3, 6)), position_mm=np.zeros(3)), tg.ArgumentError, "position_mm"),
-        (lambda: tg.Dataset.from_numpy("abc", length_mm=[1]), tg.ArgumentError, "an array of numbers"),
+        (lambda: tg.Dataset.from_numpy("abc", length_mm=[1]), tg.ArgumentError, "an array of real numbers"),
+        (lambda: tg.Dataset.from_csv(bytearray(10_000)), tg.ArgumentError, "…; expected a path, or bytes"),
+        (lambda: tg.Dataset.from_numpy(np.zeros((1, 6)), length_mm=[1], time_h=np.zeros(1, "M8[s]")), tg.ArgumentError, "time_h"),
         (lambda: tg.Dataset.from_numpy(np.zeros((0, 6)), length_mm=[]), tg.DatasetError, "no rows"),
         (lambda: tg.Dataset.from_numpy(np.zeros((3, 6))), tg.DatasetError, "no sensor"),
         (lambda: tg.Dataset.from_dataframe(3), tg.DatasetError, "expected a data frame"),
@@ -237,7 +263,10 @@ def test_errors_name_the_place():
         (lambda: tg.forward(7, np.zeros(6)), tg.ArgumentError, "a Robot, a Model or an Arm"),
         (lambda: tg.simulate("robot = 1\n"), tg.RecipeError, "expected a string"),
         (lambda: tg.plan("abb-irb-120", "cable"), tg.ArgumentError, "outlets_mm"),
+        (lambda: tg.plan("abb-irb-120", "cable", outlets_mm=[[0.75, 0.2, 0.04]]), tg.PlanError, "multiply metres by 1000"),
         (lambda: tg.plan("abb-irb-120", "eye"), tg.ArgumentError, "sensor"),
+        (lambda: tg.plan("abb-irb-120", "position", seed=-1), tg.ArgumentError, "seed: found -1"),
+        (lambda: tg.plan("abb-irb-120", "position", threads=-1), tg.ArgumentError, "threads: found -1"),
     ],
 )
 def test_bad_input_is_refused_in_words(call, kind, words):
@@ -274,6 +303,7 @@ def test_every_kind_of_error_says_what_was_found_where(cable, model):
     assert attributes(lambda: tg.simulate("seed = 1\nrobot = 1\n"))[:2] == ("recipe.toml", 2)
     assert attributes(lambda: tg.identify(cable, "abb-irb-120", method="guess"))[2:4] == ("method", "guess")
     assert attributes(lambda: tg.identify(cable, "abb-irb-120", threads=0))[2:4] == ("threads", "0")
+    assert attributes(lambda: tg.identify(cable, "abb-irb-120", angles="rad"))[2:4] == ("angles", "rad")
     few = tg.Dataset.from_numpy(cable.q_deg[:3], length_mm=cable.length_mm[:3], name="few")
     assert attributes(lambda: tg.identify(few, "abb-irb-120"))[0] == "few"
     assert attributes(lambda: tg.track(model, few))[3:] == ("3 poses", "30 poses")

@@ -78,9 +78,11 @@ def test_gnu_parallel(plant, run):
 
 def test_kubernetes(plant, run):
     """The manifests are valid by the schemas of the API; their containers' commands run as the kubelet would start them."""
-    validator = pytest.importorskip("kubernetes_validate", reason="deploy/kubernetes.yaml is not checked against the API's schemas")
+    validator = pytest.importorskip("kubernetes_validate", reason="deploy/kubernetes*.yaml are not checked against the API's schemas")
     yaml = pytest.importorskip("yaml")
-    shares, gather = yaml.safe_load_all((DEPLOY / "kubernetes.yaml").read_text(encoding="utf-8"))
+    names = ("kubernetes.yaml", "kubernetes-gather.yaml")
+    # One of each: what is applied together starts together.
+    shares, gather = (yaml.safe_load((DEPLOY / name).read_text(encoding="utf-8")) for name in names)
     for manifest in (shares, gather):
         validator.validate(manifest, validator.latest_version(), strict=True)
     with pytest.raises(validator.ValidationError):

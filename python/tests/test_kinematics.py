@@ -39,8 +39,25 @@ def test_every_layout_gives_the_same_bits(count):
 def test_numbers_of_other_types_are_taken():
     q = np.array([[10, 20, -30, 40, 50, 60]])
     wanted = ARM.forward(q.astype(float)).position_mm
-    for other in (q, q.astype(np.float32), q.tolist(), [[str(v) for v in q[0]]] and q.astype(np.int16)):
+    packed = np.frombuffer(b"x" + q.astype(float).tobytes(), np.uint8)[1:].view(float).reshape(q.shape)
+    frozen = q.astype(float)
+    frozen.flags.writeable = False
+    assert not packed.flags.aligned
+    for other in (q, q.astype(np.float32), q.tolist(), q.astype(np.int16), q.astype(">f8"), q.astype(object), packed, frozen):
         assert np.array_equal(ARM.forward(other).position_mm, wanted)
+
+
+def test_what_is_no_real_number_is_not_taken_for_one():
+    for other in (np.zeros((2, 6), complex), np.full((2, 6), "1"), np.zeros((2, 6), "M8[s]"), [[1] * 6, [2] * 5]):
+        with pytest.raises(tg.ArgumentError, match="expected an array of real numbers") as raised:
+            ARM.forward(other)
+        assert raised.value.column == "q_deg"
+    # What a mask hides was not measured.
+    hidden = np.ma.masked_array(np.zeros((2, 6)), mask=[[0] * 6, [0, 1, 0, 0, 0, 0]])
+    assert np.isnan(ARM.forward(hidden).position_mm).any(axis=1).tolist() == [False, True]
+    with pytest.raises(tg.DatasetError) as raised:
+        tg.Dataset.from_numpy(hidden, length_mm=[500, 600])
+    assert (raised.value.row, raised.value.column) == (1, "q2")
 
 
 def test_the_inverse_comes_back():

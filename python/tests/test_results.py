@@ -2,7 +2,9 @@
 
 import json
 import runpy
+from collections import deque
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 import pytest
@@ -115,6 +117,20 @@ def test_what_must_not_be_corrected_is_refused(tmp_path, model):
         tg.compensate(PROGRAMS / "told.mod", model, max_risk=1.5, allow_doubtful=True)
     with pytest.raises(tg.ArgumentError, match="tolerance_mm"):
         tg.compensate(PROGRAMS / "told.mod", model, tolerance_mm=-1, allow_doubtful=True)
+
+
+def test_a_program_is_named_by_paths_or_texts(model):
+    path = PROGRAMS / "circles.mod"
+    text = path.read_text(encoding="utf-8")
+    correct = lambda program: tg.compensate(program, model, allow_doubtful=True)
+    (wanted,) = correct(path).programs.values()
+    # Any mapping and any sequence, as the types say.
+    for given in (MappingProxyType({"circles.mod": text}), {"circles.mod": text.encode()}, deque([path]), (str(path),)):
+        assert list(correct(given).programs.values()) == [wanted]
+    for given in (text, text.encode(), (x for x in [path])):
+        with pytest.raises(tg.ArgumentError, match="a dictionary of names and texts") as raised:
+            correct(given)
+        assert len(raised.value.found) <= 201
 
 
 def after_best_motion(found: np.ndarray, wanted: np.ndarray) -> float:

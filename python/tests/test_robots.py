@@ -24,6 +24,7 @@ def test_one_of_two_arms_is_chosen_by_its_links():
     with pytest.raises(tg.RobotError, match="2 arms of six joints") as raised:
         tg.Robot(ARMS / "two-arms.urdf")
     assert raised.value.expected == "one arm" and raised.value.file.endswith("two-arms.urdf")
+    assert "truegrind.Robot(file, base=LINK, tip=LINK)" in str(raised.value)
     left = tg.Robot(ARMS / "two-arms.urdf", base="left_base_link", tip="left_tool0")
     assert np.allclose(left.forward(np.zeros(6)).position_mm, [394, 0, 640], atol=1e-9)
     with pytest.raises(tg.RobotError, match="seven_joint7"):

@@ -1,72 +1,47 @@
-"""The stub says what the module is: every name, every argument, every default."""
+"""The stub, which is generated from the module (`.ci/python` compares it), as type checkers see it."""
 
-import ast
 import inspect
+import subprocess
+import sys
 from pathlib import Path
 
+import pytest
 import truegrind
 from truegrind import _truegrind
 
-STUB = ast.parse((Path(truegrind.__file__).parent / "_truegrind.pyi").read_text(encoding="utf-8"))
-# What Python itself gives every class.
-USUAL = set(dir(object)) | {"__module__", "__init_subclass__", "__subclasshook__"}
+EXAMPLE = Path(__file__).parents[1] / "examples" / "from_rows_to_program.py"
+
+WRONG = """
+import truegrind as tg
+rows = tg.Dataset.from_csv("poses.csv")
+tg.compensate("blade.mod", "arm.toml", emit="joint")
+tg.Robot("abb-irb-120").forward(rows.q_deg).position
+tg.identify("poses.csv", "abb-irb-120")
+tg.diagnose(rows, 120, seed="one")
+found: int = tg.identify(rows, tg.Robot("abb-irb-120")).held_out_rmse_mm
+worst: list[int] = tg.deviation({"a.mod": b""}, "arm.toml").points
+"""
+"""Each line after the second is wrong, and by one type alone."""
 
 
-def stubbed(node: ast.FunctionDef) -> list[tuple[str, str, str | None]]:
-    """Name, kind and default of each argument; a default of `...` is any."""
-    arguments = node.args
-    out = []
-    plain = arguments.posonlyargs + arguments.args
-    defaults = [None] * (len(plain) - len(arguments.defaults)) + list(arguments.defaults)
-    for argument, default in zip(plain, defaults):
-        out.append((argument.arg, "plain", default and ast.unparse(default)))
-    for argument, default in zip(arguments.kwonlyargs, arguments.kw_defaults):
-        out.append((argument.arg, "keyword", default and ast.unparse(default)))
-    return [entry for entry in out if entry[0] not in ("self", "cls")]
+def mypy(at: Path, *arguments: object) -> subprocess.CompletedProcess[str]:
+    pytest.importorskip("mypy")
+    command = [sys.executable, "-m", *map(str, arguments)]
+    return subprocess.run(command, cwd=at, capture_output=True, text=True)
 
 
-def found(function: object) -> list[tuple[str, str, str | None]]:
-    kinds = {
-        inspect.Parameter.KEYWORD_ONLY: "keyword",
-        inspect.Parameter.POSITIONAL_OR_KEYWORD: "plain",
-        inspect.Parameter.POSITIONAL_ONLY: "plain",
-    }
-    out = []
-    for name, parameter in inspect.signature(function).parameters.items():
-        default = None if parameter.default is parameter.empty else parameter.default
-        default = "..." if default is ... else repr(default) if parameter.default is not parameter.empty else None
-        out.append((name, kinds[parameter.kind], default))
-    return [entry for entry in out if entry[0] not in ("self", "cls")]
+def test_the_stub_is_the_module(tmp_path):
+    done = mypy(tmp_path, "mypy.stubtest", "truegrind._truegrind")
+    assert done.returncode == 0, done.stdout + done.stderr
 
 
-def compare(where: str, node: ast.FunctionDef, function: object) -> None:
-    ours, theirs = stubbed(node), found(function)
-    assert [(name, kind) for name, kind, _ in ours] == [(name, kind) for name, kind, _ in theirs], where
-    for (name, _, ours_default), (_, _, theirs_default) in zip(ours, theirs):
-        either = "..." in (ours_default, theirs_default)
-        alike = either or (ours_default is None) == (theirs_default is None)
-        if alike and not either and ours_default is not None:
-            alike = ast.literal_eval(ours_default) == ast.literal_eval(theirs_default)
-        assert alike, f"{where}: {name} = {ours_default} in the stub, {theirs_default} in the module"
-
-
-def test_the_stub_is_the_module():
-    functions = {node.name: node for node in STUB.body if isinstance(node, ast.FunctionDef)}
-    classes = {node.name: node for node in STUB.body if isinstance(node, ast.ClassDef)}
-    there = {name for name in dir(_truegrind) if not name.startswith("__")}
-    assert there == set(functions) | set(classes)
-    for name, node in functions.items():
-        compare(name, node, getattr(_truegrind, name))
-    for name, node in classes.items():
-        methods = {item.name: item for item in node.body if isinstance(item, ast.FunctionDef)}
-        own = set(vars(getattr(_truegrind, name))) - USUAL - {"__repr__", "__doc__"}
-        assert own == set(methods) - {"__new__"}, name
-        for method, item in methods.items():
-            value = getattr(getattr(_truegrind, name), method)
-            is_property = any(isinstance(d, ast.Name) and d.id == "property" for d in item.decorator_list)
-            assert is_property == inspect.isgetsetdescriptor(value), f"{name}.{method}"
-            if not is_property and not method.startswith("__"):
-                compare(f"{name}.{method}", item, value)
+def test_type_checkers_accept_the_example_and_name_what_is_wrong(tmp_path):
+    done = mypy(tmp_path, "mypy", "--strict", EXAMPLE)
+    assert done.returncode == 0, done.stdout
+    (tmp_path / "wrong.py").write_text(WRONG, encoding="utf-8")
+    done = mypy(tmp_path, "mypy", "--strict", "wrong.py")
+    lines = {int(line.split(":")[1]) for line in done.stdout.splitlines() if ": error:" in line}
+    assert lines == set(range(4, WRONG.count("\n") + 1)), done.stdout
 
 
 def test_everything_is_exported_and_explained():
@@ -79,6 +54,6 @@ def test_everything_is_exported_and_explained():
         value = getattr(_truegrind, name)
         if inspect.isclass(value):
             assert value.__module__ == "truegrind", name
-            for member, kind in vars(value).items():
+            for member in vars(value):
                 if not member.startswith("_"):
                     assert (getattr(value, member).__doc__ or "").strip(), f"{name}.{member}"

@@ -21,6 +21,19 @@ _NO_GAPS, _NAN, _SENTINEL, _BITS, _BYTES = 0, 1, 2, 3, 4
 
 def columns(frame: Any) -> dict[str, Any]:
     """Each column by name: numbers as an array of doubles with NaN for gaps, text as a list with ``None`` for gaps."""
+    try:
+        return _columns(frame)
+    except DatasetError:
+        raise
+    except (KeyError, TypeError, ValueError) as error:
+        raise DatasetError(
+            f"this {type(frame).__name__} cannot be read: {error}; expected a data frame with one plain column for each name",
+            found=str(error),
+            expected="a data frame with one plain column for each name",
+        ) from error
+
+
+def _columns(frame: Any) -> dict[str, Any]:
     if hasattr(frame, "__dataframe__"):
         with warnings.catch_warnings():
             # pandas means to drop the protocol; what has it not is read by the names of its columns.

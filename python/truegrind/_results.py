@@ -1,10 +1,10 @@
-"""Results as tuples and tables."""
+"""Arguments as arrays, results as tuples and tables."""
 
 from __future__ import annotations
 
 import csv
 import io
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -39,6 +39,16 @@ class Solutions(NamedTuple):
     """Which poses were reached, shape (N,)."""
     why: list[str | None] | None
     """Reason for each pose that was not reached; ``None`` for the others."""
+
+
+def doubles(given: Any) -> NDArray[np.float64]:
+    """Real numbers as an aligned array of doubles; what a mask hides is NaN."""
+    if isinstance(given, np.ma.MaskedArray):
+        given = given.astype(np.float64).filled(np.nan)
+    array = np.asarray(given)
+    if array.dtype.kind not in "biufO":
+        raise TypeError(f"values of type {array.dtype}")
+    return np.require(array, np.float64, "A")
 
 
 def table(text: str) -> dict[str, list]:

@@ -1,355 +1,614 @@
-"""What the compiled module holds; ``tests/test_stubs.py`` compares it with the module itself."""
+"""
+The extension module.
+"""
 
+from _typeshed import SupportsGetItem, SupportsLenAndGetItem
 from collections.abc import Callable, Mapping, Sequence
-from os import PathLike
-from typing import Any, Literal
-
-import numpy as np
+from numpy import bool_, float64
 from numpy.typing import ArrayLike, NDArray
+from os import PathLike
+from truegrind._results import Poses, Solutions
+from typing import Any, Final, Literal, SupportsFloat, SupportsIndex, final
 
-from ._results import Poses, Solutions
+__all__ = ["__version__", "Arm", "Compensation", "Dataset", "Deviation", "Diagnosis", "Identification", "Model", "Plan", "Robot", "Simulation", "Track", "compensate", "deviation", "diagnose", "forward", "identify", "inverse", "plan", "robots", "simulate", "track"]
 
-_Path = str | PathLike[str]
-_Floats = NDArray[np.float64]
-_Verdict = Literal["pass", "doubtful", "fail", "not-evaluated"]
-_Angles = Literal["logged", "dh"]
-_Progress = Callable[[str], object]
-_Triple = tuple[float, float, float] | Sequence[float]
-_Program = _Path | Sequence[_Path] | Mapping[str, str | bytes]
+__version__: Final[str]
 
-__version__: str
-
-class Robot:
-    def __new__(
-        cls, name: _Path, *, base: str | None = None, tip: str | None = None, ground_joint_3: bool = False
-    ) -> Robot: ...
-    @staticmethod
-    def from_toml(text: str, file: str = "robot.toml") -> Robot: ...
-    @property
-    def name(self) -> str: ...
-    @property
-    def maker(self) -> str: ...
-    @property
-    def designation(self) -> str: ...
-    @property
-    def min_deg(self) -> _Floats: ...
-    @property
-    def max_deg(self) -> _Floats: ...
-    @property
-    def understood(self) -> list[str]: ...
-    @property
-    def warnings(self) -> list[str]: ...
-    def forward(self, q_deg: ArrayLike) -> Poses: ...
-    def inverse(self, position_mm: ArrayLike, rotation: ArrayLike, near_deg: ArrayLike | None = None) -> Solutions: ...
-    def to_toml(self) -> str: ...
-    def to_json(self) -> str: ...
-    def to_html(self) -> str: ...
-    def _repr_html_(self) -> str: ...
-
+@final
 class Arm:
+    """
+    An arm without a data sheet: the actual arm of a simulation, or the nominal arm of a model.
+    """
+    def __repr__(self, /) -> str: ...
+    def forward(self, /, q_deg: ArrayLike, *, payload_kg: SupportsFloat | SupportsIndex | None = None, payload_centre_mm: SupportsLenAndGetItem[SupportsFloat | SupportsIndex] | None = None, temperature_c: SupportsFloat | SupportsIndex | None = None, time_h: SupportsFloat | SupportsIndex | None = None) -> Poses:
+        """
+        Poses of the flange in the base for controller angles (°) of shape (N, 6) or (6,): ``Poses(position_mm, rotation)``.
+        Payload mass (kg) and its centre on the flange (mm), temperature (°C) and hours since power-on matter only for arms with
+        such effects.
+        """
+    def inverse(self, /, position_mm: ArrayLike, rotation: ArrayLike, near_deg: ArrayLike | None = None) -> Solutions:
+        """
+        Controller angles (°) that reach poses of the flange: ``Solutions(q_deg, reached, why)``.
+        """
     @property
-    def name(self) -> str: ...
-    def forward(
-        self,
-        q_deg: ArrayLike,
-        *,
-        payload_kg: float | None = None,
-        payload_centre_mm: _Triple | None = None,
-        temperature_c: float | None = None,
-        time_h: float | None = None,
-    ) -> Poses: ...
-    def inverse(self, position_mm: ArrayLike, rotation: ArrayLike, near_deg: ArrayLike | None = None) -> Solutions: ...
-    def to_toml(self) -> str: ...
+    def name(self, /) -> str:
+        """
+        Name of the arm.
+        """
+    def to_toml(self, /) -> str:
+        """
+        The file of the arm (TOML), as ``truegrind simulate --arm`` writes it.
+        """
 
-class Model:
-    def __new__(cls, path: _Path) -> Model: ...
-    @staticmethod
-    def load(path: _Path) -> Model: ...
-    @staticmethod
-    def from_toml(text: str, file: str = "model.toml") -> Model: ...
-    def to_toml(self) -> str: ...
-    def save(self, path: _Path, *, allow_doubtful: bool = False) -> None: ...
-    @property
-    def robot(self) -> str: ...
-    @property
-    def verdict(self) -> _Verdict: ...
-    @property
-    def reasons(self) -> list[str]: ...
-    @property
-    def hash(self) -> str: ...
-    @property
-    def held_out_rmse_mm(self) -> float: ...
-    @property
-    def held_out_rmse_before_mm(self) -> float: ...
-    @property
-    def nominal(self) -> Arm: ...
-    @property
-    def parameters(self) -> list[dict[str, Any]]: ...
-    @property
-    def order(self) -> list[str]: ...
-    @property
-    def covariance(self) -> _Floats: ...
-    def forward(
-        self,
-        q_deg: ArrayLike,
-        *,
-        payload_kg: float | None = None,
-        payload_centre_mm: _Triple | None = None,
-        temperature_c: float | None = None,
-        time_h: float | None = None,
-    ) -> Poses: ...
-    def inverse(self, position_mm: ArrayLike, rotation: ArrayLike, near_deg: ArrayLike | None = None) -> Solutions: ...
-    def sigma_mm(self, q_deg: ArrayLike, tool_mm: _Triple = ...) -> _Floats: ...
-    def measured_at(self, q_deg: ArrayLike) -> NDArray[np.bool_]: ...
-
-class Dataset:
-    @staticmethod
-    def from_csv(source: _Path | bytes, *, name: str | None = None, allow_odd_units: bool = False) -> Dataset: ...
-    @staticmethod
-    def from_xlsx(
-        source: _Path | bytes, *, sheet: str | None = None, name: str | None = None, allow_odd_units: bool = False
-    ) -> Dataset: ...
-    @staticmethod
-    def from_numpy(
-        q_deg: ArrayLike,
-        *,
-        length_mm: ArrayLike | None = None,
-        position_mm: ArrayLike | None = None,
-        quaternion_wxyz: ArrayLike | None = None,
-        readout_mm: ArrayLike | None = None,
-        time_h: ArrayLike | None = None,
-        temperature_c: ArrayLike | None = None,
-        payload_kg: ArrayLike | None = None,
-        approach: ArrayLike | None = None,
-        anchor: ArrayLike | None = None,
-        session: Sequence[str | None] | None = None,
-        name: str = "numpy",
-        allow_odd_units: bool = False,
-    ) -> Dataset: ...
-    @staticmethod
-    def from_dataframe(frame: Any, *, name: str = "dataframe", allow_odd_units: bool = False) -> Dataset: ...
-    @property
-    def file(self) -> str: ...
-    @property
-    def sensor(self) -> Literal["cable", "position", "pose"]: ...
-    @property
-    def notes(self) -> list[str]: ...
-    @property
-    def sha256(self) -> str: ...
-    @property
-    def q_deg(self) -> _Floats: ...
-    @property
-    def length_mm(self) -> _Floats | None: ...
-    @property
-    def position_mm(self) -> _Floats | None: ...
-    def __len__(self) -> int: ...
-
-class Identification:
-    @property
-    def model(self) -> Model: ...
-    @property
-    def verdict(self) -> _Verdict: ...
-    @property
-    def reasons(self) -> list[str]: ...
-    @property
-    def held_out_rmse_mm(self) -> float: ...
-    @property
-    def held_out_max_mm(self) -> float: ...
-    @property
-    def held_out_rmse_before_mm(self) -> float: ...
-    @property
-    def noise_floor_mm(self) -> float | None: ...
-    @property
-    def parameters(self) -> list[dict[str, Any]]: ...
-    @property
-    def held_out(self) -> dict[str, NDArray[Any]]: ...
-    def to_json(self) -> str: ...
-    def to_html(self) -> str: ...
-    def _repr_html_(self) -> str: ...
-
-class Diagnosis:
-    @property
-    def model(self) -> Model: ...
-    @property
-    def verdict(self) -> _Verdict: ...
-    @property
-    def reasons(self) -> list[str]: ...
-    @property
-    def findings(self) -> list[dict[str, Any]]: ...
-    @property
-    def geometry_rmse_mm(self) -> float: ...
-    @property
-    def held_out_rmse_mm(self) -> float: ...
-    @property
-    def remaining(self) -> str | None: ...
-    @property
-    def notes(self) -> list[str]: ...
-    def to_json(self) -> str: ...
-    def to_html(self) -> str: ...
-    def _repr_html_(self) -> str: ...
-
+@final
 class Compensation:
+    """
+    A corrected program.
+    """
+    def __repr__(self, /) -> str: ...
+    def _repr_html_(self, /) -> str: ...
     @property
-    def programs(self) -> dict[str, bytes]: ...
+    def changed(self, /) -> bool:
+        """
+        Whether any byte changes.
+        """
     @property
-    def changed(self) -> bool: ...
-    def save(self, path: _Path) -> None: ...
+    def counts(self, /) -> dict[str, int]:
+        """
+        Number of motions by status: changed, flagged, refused, left.
+        """
     @property
-    def motions(self) -> list[dict[str, Any]]: ...
+    def motions(self, /) -> list[dict[str, Any]]:
+        """
+        Status of each motion: dictionaries as in the JSON.
+        """
     @property
-    def counts(self) -> dict[str, int]: ...
+    def notes(self, /) -> list[str]:
+        """
+        Notes on tools and work objects, and on unused entries of the cell file.
+        """
     @property
-    def notes(self) -> list[str]: ...
-    def to_json(self) -> str: ...
-    def to_html(self) -> str: ...
-    def _repr_html_(self) -> str: ...
+    def programs(self, /) -> dict[str, bytes]:
+        """
+        The corrected files: bytes by name.
+        """
+    def save(self, /, path: str | PathLike[str]) -> None:
+        """
+        Writes the corrected files to a folder, or a single file to a path. Originals are never overwritten.
+        """
+    def to_html(self, /) -> str:
+        """
+        The report as HTML.
+        """
+    def to_json(self, /) -> str:
+        """
+        The full result as JSON text, schema ``truegrind.compensation/1``: the bytes that ``truegrind compensate --dry-run --json`` writes.
+        """
 
+@final
+class Dataset:
+    """
+    Measured poses: logged joint angles and the readings of one sensor.
+    """
+    def __len__(self, /) -> int: ...
+    def __repr__(self, /) -> str: ...
+    @property
+    def file(self, /) -> str:
+        """
+        File name as printed in reports.
+        """
+    @staticmethod
+    def from_csv(source: str | PathLike[str] | bytes, *, name: str | None = None, allow_odd_units: bool = False) -> Dataset:
+        """
+        Reads a text table (separated by comma, semicolon or tab) from a path or from bytes.
+        """
+    @staticmethod
+    def from_dataframe(frame: Any, *, name: str = "dataframe", allow_odd_units: bool = False) -> Dataset:
+        """
+        Rows from a data frame: anything with the interchange protocol ``__dataframe__`` (pandas, polars, pyarrow, …), or with named
+        columns that NumPy can convert. Columns are named as in files: q1 to q6 (°), L or measured_x, measured_y, measured_z (mm)
+        and so on; nulls are empty cells.
+        """
+    @staticmethod
+    def from_numpy(q_deg: ArrayLike, *, length_mm: ArrayLike | None = None, position_mm: ArrayLike | None = None, quaternion_wxyz: ArrayLike | None = None, readout_mm: ArrayLike | None = None, time_h: ArrayLike | None = None, temperature_c: ArrayLike | None = None, payload_kg: ArrayLike | None = None, approach: ArrayLike | None = None, anchor: ArrayLike | None = None, session: SupportsGetItem[int, str | None] | None = None, name: str = "numpy", allow_odd_units: bool = False) -> Dataset:
+        """
+        Rows from arrays: logged controller angles (°) of shape (N, 6), and the readings of one sensor: ``length_mm`` (N,) of a
+        cable, ``position_mm`` (N, 3) of a tracker, or with ``quaternion_wxyz`` (N, 4) a pose. Optional: Cartesian readout of the
+        controller ``readout_mm`` (N, 3), ``time_h``, ``temperature_c`` and ``payload_kg`` (N,), approach directions (N, 6) in
+        −1, 0, 1, number of the cable outlet ``anchor`` (N,), ``session`` labels. NaN means unknown.
+        """
+    @staticmethod
+    def from_xlsx(source: str | PathLike[str] | bytes, *, sheet: str | None = None, name: str | None = None, allow_odd_units: bool = False) -> Dataset:
+        """
+        Reads a workbook from a path or from bytes; by default the first sheet with the needed columns.
+        """
+    @property
+    def length_mm(self, /) -> NDArray[float64] | None:
+        """
+        Lengths of a cable (mm), shape (N,); ``None`` for another sensor.
+        """
+    @property
+    def notes(self, /) -> list[str]:
+        """
+        Remarks: skipped columns, dropped blank rows.
+        """
+    @property
+    def position_mm(self, /) -> NDArray[float64] | None:
+        """
+        Positions in the sensor frame (mm), shape (N, 3); ``None`` for a cable.
+        """
+    @property
+    def q_deg(self, /) -> NDArray[float64]:
+        """
+        Logged joint angles of the controller (°), shape (N, 6).
+        """
+    @property
+    def sensor(self, /) -> Literal["cable", "position", "pose"]:
+        """
+        ``cable``, ``position`` or ``pose``.
+        """
+    @property
+    def sha256(self, /) -> str:
+        """
+        SHA-256 of the file's bytes, in hex.
+        """
+
+@final
 class Deviation:
+    """
+    Deviation of a program on an arm.
+    """
+    def __repr__(self, /) -> str: ...
+    def _repr_html_(self, /) -> str: ...
     @property
-    def points(self) -> dict[str, list[Any]]: ...
-    def to_csv(self) -> str: ...
-    def to_json(self) -> str: ...
-    def to_html(self) -> str: ...
-    def _repr_html_(self) -> str: ...
+    def points(self, /) -> dict[str, list[Any]]:
+        """
+        The points of the path, one list per column of the table (mm, °); ``None`` for missing values.
+        """
+    def to_csv(self, /) -> str:
+        """
+        The points as CSV text: the bytes that ``truegrind deviation --csv`` writes.
+        """
+    def to_html(self, /) -> str:
+        """
+        The report as HTML.
+        """
+    def to_json(self, /) -> str:
+        """
+        The full result as JSON text, schema ``truegrind.deviation/1``: the bytes that ``truegrind deviation --json`` writes.
+        """
 
-class Simulation:
+@final
+class Diagnosis:
+    """
+    Result of a diagnosis.
+    """
+    def __repr__(self, /) -> str: ...
+    def _repr_html_(self, /) -> str: ...
     @property
-    def dataset(self) -> Dataset: ...
+    def findings(self, /) -> list[dict[str, Any]]:
+        """
+        The causes, largest first: dictionaries as in the JSON.
+        """
     @property
-    def csv(self) -> str: ...
+    def geometry_rmse_mm(self, /) -> float:
+        """
+        Cross-validated RMS error with geometry alone (mm).
+        """
     @property
-    def actual(self) -> Arm: ...
+    def held_out_rmse_mm(self, /) -> float:
+        """
+        Cross-validated RMS error with all causes (mm).
+        """
+    @property
+    def model(self, /) -> Model:
+        """
+        The arm with the certain causes, for compensation.
+        """
+    @property
+    def notes(self, /) -> list[str]:
+        """
+        Remarks.
+        """
+    @property
+    def reasons(self, /) -> list[str]:
+        """
+        Reasons for the verdict, one sentence each.
+        """
+    @property
+    def remaining(self, /) -> str | None:
+        """
+        The unexplained structure as a sentence; ``None`` if there is none.
+        """
+    def to_html(self, /) -> str:
+        """
+        The report as HTML.
+        """
+    def to_json(self, /) -> str:
+        """
+        The full result as JSON text, schema ``truegrind.diagnosis/1``: the bytes that ``truegrind diagnose --json`` writes.
+        """
+    @property
+    def verdict(self, /) -> Literal["pass", "doubtful", "fail", "not-evaluated"]:
+        """
+        ``pass``, ``doubtful``, ``fail`` or ``not-evaluated``.
+        """
 
+@final
+class Identification:
+    """
+    Result of an identification.
+    """
+    def __repr__(self, /) -> str: ...
+    def _repr_html_(self, /) -> str: ...
+    @property
+    def held_out(self, /) -> dict[str, NDArray[Any]]:
+        """
+        Errors of the held-out rows (mm): row numbers, before and after, each of shape (n,).
+        """
+    @property
+    def held_out_max_mm(self, /) -> float:
+        """
+        Largest error on held-out rows (mm).
+        """
+    @property
+    def held_out_rmse_before_mm(self, /) -> float:
+        """
+        RMS error on held-out rows of the nominal arm with a fitted sensor frame (mm).
+        """
+    @property
+    def held_out_rmse_mm(self, /) -> float:
+        """
+        RMS error on held-out rows (mm).
+        """
+    @property
+    def model(self, /) -> Model:
+        """
+        The estimated arm.
+        """
+    @property
+    def noise_floor_mm(self, /) -> float | None:
+        """
+        Noise of sensor and rounding (mm); ``None`` if unknown.
+        """
+    @property
+    def parameters(self, /) -> list[dict[str, Any]]:
+        """
+        All fitted parameters, including those of the sensor: dictionaries with name, unit, nominal, value, sigma, determined.
+        """
+    @property
+    def reasons(self, /) -> list[str]:
+        """
+        Reasons for the verdict, one sentence each.
+        """
+    def to_html(self, /) -> str:
+        """
+        The report as HTML.
+        """
+    def to_json(self, /) -> str:
+        """
+        The full result as JSON text, schema ``truegrind.identification/1``: the bytes that ``truegrind identify --json`` writes.
+        """
+    @property
+    def verdict(self, /) -> Literal["pass", "doubtful", "fail", "not-evaluated"]:
+        """
+        ``pass``, ``doubtful``, ``fail`` or ``not-evaluated``.
+        """
+
+@final
+class Model:
+    """
+    An estimated arm: the nominal arm, everything identified, and its covariance.
+    """
+    def __new__(cls, /, path: str | PathLike[str]) -> Model:
+        """
+        Reads a model file.
+        """
+    def __repr__(self, /) -> str: ...
+    @property
+    def covariance(self, /) -> NDArray[float64]:
+        """
+        Covariance of the arm's parameters (mm, rad), shape (p, p).
+        """
+    def forward(self, /, q_deg: ArrayLike, *, payload_kg: SupportsFloat | SupportsIndex | None = None, payload_centre_mm: SupportsLenAndGetItem[SupportsFloat | SupportsIndex] | None = None, temperature_c: SupportsFloat | SupportsIndex | None = None, time_h: SupportsFloat | SupportsIndex | None = None) -> Poses:
+        """
+        Poses of the flange in the base for controller angles (°) of shape (N, 6) or (6,): ``Poses(position_mm, rotation)``.
+        Payload mass (kg) and its centre on the flange (mm), temperature (°C) and hours since power-on replace those of the
+        measurement.
+        """
+    @staticmethod
+    def from_toml(text: str, file: str = "model.toml") -> Model:
+        """
+        Parses the text of a model file; ``file``: its name in messages and reports.
+        """
+    @property
+    def hash(self, /) -> str:
+        """
+        First twelve hex digits of the SHA-256 of the model file; written into corrected programs.
+        """
+    @property
+    def held_out_rmse_before_mm(self, /) -> float:
+        """
+        RMS error on held-out rows of the nominal arm with a fitted sensor frame (mm).
+        """
+    @property
+    def held_out_rmse_mm(self, /) -> float:
+        """
+        RMS error on held-out rows (mm).
+        """
+    def inverse(self, /, position_mm: ArrayLike, rotation: ArrayLike, near_deg: ArrayLike | None = None) -> Solutions:
+        """
+        Controller angles (°) at which this arm reaches poses of its flange: ``Solutions(q_deg, reached, why)``.
+        """
+    @staticmethod
+    def load(path: str | PathLike[str]) -> Model:
+        """
+        Reads a model file.
+        """
+    def measured_at(self, /, q_deg: ArrayLike) -> NDArray[bool_]:
+        """
+        Whether controller angles (°) of shape (N, 6) or (6,) are in the measured region.
+        """
+    @property
+    def nominal(self, /) -> Arm:
+        """
+        The nominal arm, used by the controller.
+        """
+    @property
+    def order(self, /) -> list[str]:
+        """
+        Names of the parameters of the arm in the order of the covariance.
+        """
+    @property
+    def parameters(self, /) -> list[dict[str, Any]]:
+        """
+        Identified parameters: dictionaries with name, unit, nominal, value, sigma, determined.
+        """
+    @property
+    def reasons(self, /) -> list[str]:
+        """
+        Reasons for the verdict, one sentence each.
+        """
+    @property
+    def robot(self, /) -> str:
+        """
+        Name of the robot.
+        """
+    def save(self, /, path: str | PathLike[str], *, allow_doubtful: bool = False) -> None:
+        """
+        Writes the model file; a doubtful model only if allowed, a failed one never.
+        """
+    def sigma_mm(self, /, q_deg: ArrayLike, tool_mm: SupportsLenAndGetItem[SupportsFloat | SupportsIndex] = ...) -> NDArray[float64]:
+        """
+        Predicted standard deviation of a point on the flange (mm), for controller angles (°) of shape (N, 6) or (6,). The point,
+        such as a TCP, is stated in the flange (mm).
+        """
+    def to_toml(self, /) -> str:
+        """
+        The text of the model file.
+        """
+    @property
+    def verdict(self, /) -> Literal["pass", "doubtful", "fail", "not-evaluated"]:
+        """
+        ``pass``, ``doubtful``, ``fail`` or ``not-evaluated``.
+        """
+
+@final
 class Plan:
+    """
+    A measurement plan.
+    """
+    def __len__(self, /) -> int: ...
+    def __repr__(self, /) -> str: ...
+    def _repr_html_(self, /) -> str: ...
     @property
-    def poses(self) -> dict[str, list[Any]]: ...
-    def program(self) -> str: ...
-    def to_json(self) -> str: ...
-    def to_html(self) -> str: ...
-    def _repr_html_(self) -> str: ...
-    def __len__(self) -> int: ...
+    def poses(self, /) -> dict[str, list[Any]]:
+        """
+        The rows in measuring order, one list per column of the table.
+        """
+    def program(self, /) -> str:
+        """
+        The RAPID program that moves to the poses.
+        """
+    def to_html(self, /) -> str:
+        """
+        The report as HTML.
+        """
+    def to_json(self, /) -> str:
+        """
+        The full result as JSON text, schema ``truegrind.plan/1``: the bytes that ``truegrind plan --json`` writes.
+        """
 
+@final
+class Robot:
+    """
+    A robot with its nominal arm from the data sheet.
+    """
+    def __new__(cls, /, name: str | PathLike[str], *, base: str | None = None, tip: str | None = None, ground_joint_3: bool = False) -> Robot:
+        """
+        A robot by name (``truegrind.robots()``) or from a robot file: TOML, URDF, a table of link parameters (CSV), or the
+        calibration of a Universal Robots arm (.conf, .yaml). ``base`` and ``tip``: base and flange link of a URDF.
+        ``ground_joint_3``: the log states joint 3 relative to the ground, as FANUC controllers do.
+        """
+    def __repr__(self, /) -> str: ...
+    def _repr_html_(self, /) -> str: ...
+    @property
+    def designation(self, /) -> str:
+        """
+        The maker's designation.
+        """
+    def forward(self, /, q_deg: ArrayLike) -> Poses:
+        """
+        Poses of the flange in the base for controller angles (°) of shape (N, 6) or (6,): ``Poses(position_mm, rotation)``.
+        """
+    @staticmethod
+    def from_toml(text: str, file: str = "robot.toml") -> Robot:
+        """
+        Parses the text of a robot file; ``file``: its name in messages.
+        """
+    def inverse(self, /, position_mm: ArrayLike, rotation: ArrayLike, near_deg: ArrayLike | None = None) -> Solutions:
+        """
+        Controller angles (°) that reach poses of the flange: ``Solutions(q_deg, reached, why)``.
+        """
+    @property
+    def maker(self, /) -> str:
+        """
+        Its maker.
+        """
+    @property
+    def max_deg(self, /) -> NDArray[float64]:
+        """
+        Highest controller angles (°), shape (6,).
+        """
+    @property
+    def min_deg(self, /) -> NDArray[float64]:
+        """
+        Lowest controller angles (°), shape (6,).
+        """
+    @property
+    def name(self, /) -> str:
+        """
+        Name of the robot.
+        """
+    def to_html(self, /) -> str:
+        """
+        The report as HTML.
+        """
+    def to_json(self, /) -> str:
+        """
+        The data sheet as JSON text.
+        """
+    def to_toml(self, /) -> str:
+        """
+        The robot file (TOML) of this robot.
+        """
+    @property
+    def understood(self, /) -> list[str]:
+        """
+        Interpretation of the robot file, to compare with the manual: zero pose, axes, flange; empty for the catalogue.
+        """
+    @property
+    def warnings(self, /) -> list[str]:
+        """
+        Reservations about its data sheet, one sentence each.
+        """
+
+@final
+class Simulation:
+    """
+    Simulated measurements.
+    """
+    def __repr__(self, /) -> str: ...
+    @property
+    def actual(self, /) -> Arm:
+        """
+        The arm that was measured.
+        """
+    @property
+    def csv(self, /) -> str:
+        """
+        The measurement file (CSV).
+        """
+    @property
+    def dataset(self, /) -> Dataset:
+        """
+        The measured rows.
+        """
+
+@final
 class Track:
+    """
+    Result of tracking.
+    """
+    def __repr__(self, /) -> str: ...
+    def _repr_html_(self, /) -> str: ...
     @property
-    def model(self) -> Model: ...
+    def alarms(self, /) -> list[dict[str, Any]]:
+        """
+        Alarms raised by these measurements: dictionaries as in the JSON.
+        """
     @property
-    def poses(self) -> int: ...
+    def model(self, /) -> Model:
+        """
+        The current model.
+        """
     @property
-    def alarms(self) -> list[dict[str, Any]]: ...
+    def poses(self, /) -> int:
+        """
+        Number of processed poses.
+        """
     @property
-    def state(self) -> str: ...
-    def to_json(self) -> str: ...
-    def to_html(self) -> str: ...
-    def _repr_html_(self) -> str: ...
+    def state(self, /) -> str:
+        """
+        The state, for ``track(..., state=...)``.
+        """
+    def to_html(self, /) -> str:
+        """
+        The report as HTML.
+        """
+    def to_json(self, /) -> str:
+        """
+        The full result as JSON text, schema ``truegrind.track/1``.
+        """
 
-def robots() -> list[str]: ...
-def forward(
-    arm: Robot | Model | Arm,
-    q_deg: ArrayLike,
-    *,
-    payload_kg: float | None = None,
-    payload_centre_mm: _Triple | None = None,
-    temperature_c: float | None = None,
-    time_h: float | None = None,
-) -> Poses: ...
-def inverse(
-    arm: Robot | Model | Arm, position_mm: ArrayLike, rotation: ArrayLike, near_deg: ArrayLike | None = None
-) -> Solutions: ...
-def identify(
-    dataset: Dataset,
-    robot: Robot | _Path,
-    *,
-    method: str = "lm",
-    held_out: float = 0.2,
-    seed: int = 0,
-    fuse_readout: bool = True,
-    limit_rmse_mm: float | None = None,
-    limit_max_mm: float | None = None,
-    tolerance_length_mm: float | None = None,
-    tolerance_angle_deg: float | None = None,
-    angles: _Angles | None = None,
-    threads: int | None = None,
-    progress: _Progress | None = None,
-) -> Identification: ...
-def diagnose(
-    dataset: Dataset,
-    robot: Robot | _Path,
-    *,
-    alpha: float = 0.01,
-    most: int = 20,
-    blocks: int = 10,
-    smooth: bool = False,
-    fuse_readout: bool = True,
-    limit_rmse_mm: float | None = None,
-    limit_max_mm: float | None = None,
-    seed: int = 0,
-    also: Sequence[Dataset] = ...,
-    angles: _Angles | None = None,
-    threads: int | None = None,
-    progress: _Progress | None = None,
-) -> Diagnosis: ...
-def compensate(
-    program: _Program,
-    model: Model | _Path,
-    *,
-    cell: _Path | None = None,
-    surface: _Path | None = None,
-    payload_kg: float | None = None,
-    payload_centre_mm: _Triple | None = None,
-    emit: Literal["targets", "joints"] = "targets",
-    circles: Literal["keep", "segments"] = "keep",
-    tolerance_mm: float = 0.05,
-    max_correction_mm: float = 10.0,
-    partial: bool = False,
-    placement: Literal["auto", "shape", "absolute"] = "auto",
-    max_risk: float = 0.1,
-    joint_targets: bool = False,
-    again: bool = False,
-    allow_doubtful: bool = False,
-    threads: int | None = None,
-    progress: _Progress | None = None,
-) -> Compensation: ...
-def deviation(
-    program: _Program,
-    model: Model | _Path,
-    *,
-    intended: _Program | None = None,
-    actual: Arm | None = None,
-    cell: _Path | None = None,
-    surface: _Path | None = None,
-    payload_kg: float | None = None,
-    payload_centre_mm: _Triple | None = None,
-    threads: int | None = None,
-    progress: _Progress | None = None,
-) -> Deviation: ...
-def simulate(recipe: _Path, *, seed: int | None = None, name: str = "simulated.csv") -> Simulation: ...
-def plan(
-    robot: Robot | _Path,
-    sensor: Literal["cable", "position", "pose"],
-    *,
-    poses: int = 60,
-    outlets_mm: Sequence[_Triple] | None = None,
-    sensor_frame: Sequence[float] | None = None,
-    touched_point: Sequence[float] | None = None,
-    sigma_mm: float | None = None,
-    sigma_angle_deg: float = 0.006,
-    margin_deg: float = 6.0,
-    floor_mm: float = 0.0,
-    speed_mm_s: float = 200.0,
-    settle_s: float = 2.0,
-    candidates: int = 2000,
-    seed: int = 0,
-    threads: int | None = None,
-    progress: _Progress | None = None,
-) -> Plan: ...
-def track(
-    model: Model | _Path,
-    datasets: Dataset | Sequence[Dataset],
-    *,
-    state: str | None = None,
-    first_poses: int | None = None,
-    sigma_mm: float | None = None,
-    allow_odd_units: bool = False,
-    threads: int | None = None,
-    progress: _Progress | None = None,
-) -> Track: ...
+def compensate(program: str | PathLike[str] | Sequence[str | PathLike[str]] | Mapping[str, str | bytes], model: Model | str | PathLike[str], *, cell: str | PathLike[str] | None = None, surface: str | PathLike[str] | None = None, payload_kg: SupportsFloat | SupportsIndex | None = None, payload_centre_mm: SupportsLenAndGetItem[SupportsFloat | SupportsIndex] | None = None, emit: "Literal['targets', 'joints']" = "targets", circles: "Literal['keep', 'segments']" = "keep", tolerance_mm: SupportsFloat | SupportsIndex = 0.05, max_correction_mm: SupportsFloat | SupportsIndex = 10.0, partial: bool = False, placement: "Literal['auto', 'shape', 'absolute']" = "auto", max_risk: SupportsFloat | SupportsIndex = 0.1, joint_targets: bool = False, again: bool = False, allow_doubtful: bool = False, threads: SupportsIndex | None = None, progress: Callable[[str], object] | None = None) -> Compensation:
+    """
+    Corrects a program so that the real arm follows the intended path. ``program``: a path, a list of paths (modules of one task) or a
+    dictionary of names and texts. ``cell``: a cell file or its text. ``surface``: a surface file. ``placement``: correct shape and place
+    of the path in each work object ("absolute"), its shape alone ("shape"), or the place only where the model knows it better than it
+    is off ("auto"). A cut is left unchanged if its correction makes it worse with a probability above ``max_risk``. Nothing is written;
+    use ``Compensation.save``.
+    """
+
+def deviation(program: str | PathLike[str] | Sequence[str | PathLike[str]] | Mapping[str, str | bytes], model: Model | str | PathLike[str], *, intended: str | PathLike[str] | Sequence[str | PathLike[str]] | Mapping[str, str | bytes] | None = None, actual: Arm | None = None, cell: str | PathLike[str] | None = None, surface: str | PathLike[str] | None = None, payload_kg: SupportsFloat | SupportsIndex | None = None, payload_centre_mm: SupportsLenAndGetItem[SupportsFloat | SupportsIndex] | None = None, threads: SupportsIndex | None = None, progress: Callable[[str], object] | None = None) -> Deviation:
+    """
+    Deviation of a program under a model; nothing is rewritten. With ``intended``, the original program defines the intended path, and
+    ``program`` is its corrected version. With ``actual`` (an ``Arm`` of a simulation) the programs are run on that arm.
+    """
+
+def diagnose(dataset: Dataset, robot: Robot | str | PathLike[str], *, alpha: SupportsFloat | SupportsIndex = 0.01, most: SupportsIndex = 20, blocks: SupportsIndex = 10, smooth: bool = False, fuse_readout: bool = True, limit_rmse_mm: SupportsFloat | SupportsIndex | None = None, limit_max_mm: SupportsFloat | SupportsIndex | None = None, seed: SupportsIndex = 0, also: SupportsGetItem[int, Dataset] = ..., angles: "Literal['logged', 'dh'] | None" = None, threads: SupportsIndex | None = None, progress: Callable[[str], object] | None = None) -> Diagnosis:
+    """
+    Finds the causes of errors that geometry does not explain. ``alpha``: probability of any false finding. ``most``: largest number of
+    causes. ``blocks``: number of contiguous blocks held out in turn. ``also``: further datasets of the same arm, on which the models are
+    tested with only the frames refitted.
+    """
+
+def forward(arm: Robot | Model | Arm, q_deg: ArrayLike, *, payload_kg: SupportsFloat | SupportsIndex | None = None, payload_centre_mm: SupportsLenAndGetItem[SupportsFloat | SupportsIndex] | None = None, temperature_c: SupportsFloat | SupportsIndex | None = None, time_h: SupportsFloat | SupportsIndex | None = None) -> Poses:
+    """
+    Poses of the flange of an arm (``Robot``, ``Model`` or ``Arm``), as its method ``forward``.
+    """
+
+def identify(dataset: Dataset, robot: Robot | str | PathLike[str], *, method: str = "lm", held_out: SupportsFloat | SupportsIndex = 0.2, seed: SupportsIndex = 0, fuse_readout: bool = True, limit_rmse_mm: SupportsFloat | SupportsIndex | None = None, limit_max_mm: SupportsFloat | SupportsIndex | None = None, tolerance_length_mm: SupportsFloat | SupportsIndex | None = None, tolerance_angle_deg: SupportsFloat | SupportsIndex | None = None, angles: "Literal['logged', 'dh'] | None" = None, threads: SupportsIndex | None = None, progress: Callable[[str], object] | None = None) -> Identification:
+    """
+    Fits an arm to measured poses. ``robot``: a Robot, a name from ``truegrind.robots()`` or a robot file. ``held_out``: share of rows
+    held out to estimate the error. Tolerances (mm, °): prior σ of the links. ``angles``: ``"logged"`` or ``"dh"``, by default that of
+    the robot file. ``progress`` is called with each step. The result does not depend on the number of threads.
+    """
+
+def inverse(arm: Robot | Model | Arm, position_mm: ArrayLike, rotation: ArrayLike, near_deg: ArrayLike | None = None) -> Solutions:
+    """
+    Controller angles (°) at which an arm reaches poses of its flange, as its method ``inverse``.
+    """
+
+def plan(robot: Robot | str | PathLike[str], sensor: "Literal['cable', 'position', 'pose']", *, poses: SupportsIndex = 60, outlets_mm: SupportsGetItem[int, SupportsLenAndGetItem[SupportsFloat | SupportsIndex]] | None = None, sensor_frame: SupportsGetItem[int, SupportsFloat | SupportsIndex] | None = None, touched_point: SupportsGetItem[int, SupportsFloat | SupportsIndex] | None = None, sigma_mm: SupportsFloat | SupportsIndex | None = None, sigma_angle_deg: SupportsFloat | SupportsIndex = 0.006, margin_deg: SupportsFloat | SupportsIndex = 6.0, floor_mm: SupportsFloat | SupportsIndex = 0.0, speed_mm_s: SupportsFloat | SupportsIndex = 200.0, settle_s: SupportsFloat | SupportsIndex = 2.0, candidates: SupportsIndex = 2000, seed: SupportsIndex = 0, threads: SupportsIndex | None = None, progress: Callable[[str], object] | None = None) -> Plan:
+    """
+    Chooses the poses to measure and makes a program that moves to them. ``sensor``: ``"cable"``, ``"position"`` or ``"pose"``. A cable
+    needs its ``outlets_mm`` in the base; a tracker may stand anywhere. ``touched_point``: the hook or reflector on the flange.
+    """
+
+def robots() -> list[str]:
+    """
+    Names of the robots in the catalogue.
+    """
+
+def simulate(recipe: str | PathLike[str], *, seed: SupportsIndex | None = None, name: str = "simulated.csv") -> Simulation:
+    """
+    Simulates measurements of a given "actual" arm, with effects, noise and rounding. ``recipe``: a recipe file (TOML) or its text.
+    ``seed``: seed of poses and noise, instead of that of the recipe.
+    """
+
+def track(model: Model | str | PathLike[str], datasets: Dataset | Sequence[Dataset], *, state: str | None = None, first_poses: SupportsIndex | None = None, sigma_mm: SupportsFloat | SupportsIndex | None = None, allow_odd_units: bool = False, threads: SupportsIndex | None = None, progress: Callable[[str], object] | None = None) -> Track:
+    """
+    Updates a model with new measurements: one dataset, or several in order. ``state``: state of an earlier track. ``first_poses``: number
+    of poses that locate the sensor before tracking begins.
+    """

@@ -72,28 +72,25 @@ def _client(given: Client | None, *, processes: bool):
             yield made
 
 
-def _all(
+def _done(
     client: Client, work: Callable[..., Any], chunks: Iterable[Any], progress: Callable[[int, int], object] | None
 ) -> list[Any]:
-    """The results of all chunks in order, ``None`` for failed ones, and a final list of exceptions."""
+    """All chunks in order, done or failed, as futures: fetching a result costs a job of its own, even if it is nothing."""
     futures = client.map(work, list(chunks), retries=RETRIES, pure=False)
-    place = {future.key: at for at, future in enumerate(futures)}
-    out: list[Any] = [None] * len(futures)
-    errors = []
-    for count, future in enumerate(as_completed(futures), start=1):
-        if future.status == "finished":
-            out[place[future.key]] = future.result()
-        else:
-            errors.append(future.exception())
+    for count, _ in enumerate(as_completed(futures), start=1):
         if progress is not None:
             progress(count, len(futures))
-    return [*out, errors]
+    return futures
+
+
+def _errors(futures: list[Any]) -> list[BaseException]:
+    return [future.exception() for future in futures if future.status != "finished"]
 
 
 def _run(command: _jobs.Command, reports: Mapping[str, Any], client: Client | None, chunk: int, progress) -> Gathered:
     units = _jobs.listed(command)
     with _client(client, processes=False) as client, _jobs.Started() as started:
-        *_, errors = _all(client, _Do(command, started.key), _jobs.chunks(units, chunk), progress)
+        errors = _errors(_done(client, _Do(command, started.key), _jobs.chunks(units, chunk), progress))
     try:
         return _jobs.gathered(command, reports)
     except _jobs.TruegrindError as missing:
@@ -198,10 +195,10 @@ def power_study(
     numbers = [int(seed) for seed in seeds]
     runs = [(name, seed) for name, *_ in study.recipes for seed in numbers]
     with _client(client, processes=True) as client:
-        *done, errors = _all(client, _Run(study), runs, progress)
-    if errors:
-        raise errors[0]
-    return _power.table(done)
+        futures = _done(client, _Run(study), runs, progress)
+        for error in _errors(futures):
+            raise error
+        return _power.table(client.gather(futures))
 
 
 class _Run:

@@ -77,11 +77,11 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let hash: String =
         Sha256::digest(files::read(&arguments.model)?).iter().map(|byte| format!("{byte:02x}")).collect();
     // Refuses a robot other than that of the model.
-    inputs::nominal_between(&named, arguments.robot.as_deref(), &arguments.links)?;
-    let robot = arguments.robot.clone().unwrap_or_else(|| arm.robot.clone());
+    let stated = arguments.robot.as_deref().map(|name| arguments.links.of(name));
+    inputs::nominal(&named, stated)?;
+    let robot = stated.unwrap_or(arm.robot.as_str().into());
     let data = DataArguments {
         points: arguments.points.clone(),
-        links: arguments.links.clone(),
         sheet: arguments.sheet.clone(),
         allow_odd_units: arguments.allow_odd_units,
         ..DataArguments::of(arguments.data.clone(), robot)

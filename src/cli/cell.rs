@@ -10,7 +10,7 @@ use truegrind::programs::reading::Program;
 
 use super::exit_status::ExitStatus;
 use super::files::Batch;
-use super::inputs;
+use super::inputs::{self, UrdfLinks};
 use super::programs::{self, Grouping, Programs};
 use super::terminal::print_message;
 
@@ -28,6 +28,8 @@ pub(super) struct Arguments {
     /// Robot that runs them, noted in the file: a name from `truegrind robots`, or a robot file.
     #[arg(long)]
     robot: Option<String>,
+    #[command(flatten)]
+    links: UrdfLinks,
 }
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
@@ -44,8 +46,9 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
             extension.to_string_lossy()
         );
     }
-    let robot = arguments.robot.as_deref().map(inputs::robot).transpose()?;
-    let setup = programs::setup(&Cell::default(), arguments.robot.as_deref());
+    let named = arguments.robot.as_deref().map(|name| arguments.links.of(name));
+    let robot = named.map(inputs::robot).transpose()?;
+    let setup = programs::setup(&Cell::default(), named);
     let read = jobs.iter().map(|job| Programs::read(&job.paths)).collect::<anyhow::Result<Vec<_>>>()?;
     let names: Vec<String> = read.iter().map(Programs::name).collect();
     let tasks: Vec<Program<'_>> = read.iter().map(|programs| programs.task(&setup)).collect();

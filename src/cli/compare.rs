@@ -15,12 +15,13 @@ use truegrind::report::format;
 
 use super::computation::{Common, on_threads};
 use super::exit_status::ExitStatus;
-use super::files::{self, Batch};
+use super::files::Batch;
 use super::identify::{Angles, DataArguments};
+use super::inputs::{self, UrdfLinks};
 use super::outputs::Outputs;
 use super::progress::Spinner;
 use super::terminal::{print_message, print_message_lines, print_result, width};
-use super::{identify, inputs};
+use super::{files, identify};
 
 /// Arguments of `compare`.
 #[derive(Debug, Args)]
@@ -30,6 +31,8 @@ pub(super) struct Arguments {
     /// Measured robot: a name from `truegrind robots`, or a robot file. Required with DATA.
     #[arg(long)]
     robot: Option<String>,
+    #[command(flatten)]
+    links: UrdfLinks,
     /// Experiment: a name from `--list`, or a TOML file.
     #[arg(long, required_unless_present = "list")]
     experiment: Option<String>,
@@ -134,7 +137,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
             dataset,
             nominal,
             actual: measured.actual.as_ref(),
-            robot: arguments.robot.as_deref().unwrap_or(&measured.robot),
+            robot: arguments.links.of(arguments.robot.as_deref().unwrap_or(&measured.robot)),
         };
         batch.add(path, super::recording::comparison(&compared, &summary)?);
     }
@@ -204,7 +207,7 @@ fn measured(arguments: &Arguments, experiment: &Experiment) -> anyhow::Result<Me
             sensor_sigma_mm: recipe.noise.sigma_mm,
         });
     };
-    let robot = arguments.robot.clone().ok_or_else(|| {
+    let robot = arguments.robot.as_deref().ok_or_else(|| {
         anyhow!(
             "{}: --robot is missing: name the measured robot; `truegrind robots` lists the known ones",
             data.display()
@@ -214,7 +217,7 @@ fn measured(arguments: &Arguments, experiment: &Experiment) -> anyhow::Result<Me
         sheet: arguments.sheet.clone(),
         angles: arguments.angles,
         allow_odd_units: arguments.allow_odd_units,
-        ..DataArguments::of(data.clone(), robot)
+        ..DataArguments::of(data.clone(), arguments.links.of(robot))
     })?;
     Ok(Measured {
         dataset,

@@ -27,7 +27,7 @@ use super::cell_arguments::note_unused_entries;
 use super::computation::on_threads;
 use super::exit_status::ExitStatus;
 use super::files::{self, Batch, read_log};
-use super::inputs::{self, NamedModel};
+use super::inputs::{self, NamedModel, NamedRobot};
 use super::programs::{self, Job, Programs};
 use super::progress::Spinner;
 use super::robot_match;
@@ -59,8 +59,9 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     arguments.check_numbers()?;
     let model = inputs::model(&arguments.model)?;
     inputs::refuse_doubtful(&model, arguments.allow_doubtful)?;
-    refuse_compensating_controller(arguments.robot.as_deref())?;
-    let (robot, nominal) = inputs::nominal(&model, arguments.robot.as_deref())?;
+    let stated = arguments.robot.named();
+    refuse_compensating_controller(stated)?;
+    let (robot, nominal) = inputs::nominal(&model, stated)?;
     let corrector = match &model {
         NamedModel::Nominal => None,
         NamedModel::Estimated { hash, arm, name } => {
@@ -74,7 +75,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let (cell, surface, condition) = arguments.cell.read(corrector.map(|c| c.arm))?;
     robot_match::refuse_other_cell(&cell, &robot, &nominal)?;
     let options = arguments.options(condition, jobs.len());
-    let setup = programs::setup(&cell, arguments.robot.as_deref().or(Some(robot.as_str())));
+    let setup = programs::setup(&cell, stated.or(Some(robot.as_str().into())));
     let single = matches!(jobs.as_slice(), [job] if job.under.is_none() || job.paths.len() > 1);
     let exits_after = single && !arguments.shares.on();
     let context = CompensateContext { arguments, corrector, cell, surface, setup, options, exits_after };
@@ -150,7 +151,7 @@ fn compensate_one(context: &CompensateContext<'_>, job: &Job) -> anyhow::Result<
                     real: &corrector.arm.model,
                     is: "estimated arm",
                     nominal: &corrector.arm.nominal,
-                    robot: arguments.robot.as_deref(),
+                    robot: arguments.robot.named(),
                 },
                 context.options.condition,
                 reports,
@@ -266,9 +267,9 @@ fn compensate_and_write(
 }
 
 /// Refuses a robot whose controller already compensates.
-fn refuse_compensating_controller(robot: Option<&str>) -> anyhow::Result<()> {
-    if let Some(name) = robot {
-        let robot = inputs::robot(name)?;
+fn refuse_compensating_controller(stated: Option<NamedRobot<'_>>) -> anyhow::Result<()> {
+    if let Some(named) = stated {
+        let robot = inputs::robot(named)?;
         if robot.sheet.compensates {
             bail!(
                 "{}: its controller already compensates (robot file, `compensates = true`); switch one of the two off",

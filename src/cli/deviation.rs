@@ -21,8 +21,7 @@ use super::cell_arguments::{CellArguments, note_unused_entries, refuse_contradic
 use super::computation::{Common, on_threads};
 use super::exit_status::ExitStatus;
 use super::files::{self, Batch, read_log};
-use super::inputs;
-use super::inputs::NamedModel;
+use super::inputs::{self, NamedModel, NamedRobot, StatedRobot};
 use super::outputs::Outputs;
 use super::programs::{self, Grouping, Job, Programs};
 use super::robot_match;
@@ -40,9 +39,8 @@ pub(super) struct Arguments {
     /// Estimated arms (model files), each with its own rows in the report. With --actual, the word `nominal` suffices.
     #[arg(long, required = true, num_args = 1..)]
     model: Vec<String>,
-    /// Robot. The model names it already; if given, it must match.
-    #[arg(long)]
-    robot: Option<String>,
+    #[command(flatten)]
+    robot: StatedRobot,
     /// Original program, which defines the intended path; PROGRAM is then its corrected version.
     #[arg(long, value_name = "ORIGINAL")]
     intended: Vec<PathBuf>,
@@ -115,7 +113,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let runners = runners(arguments)?;
     let first = runners.first().ok_or_else(|| anyhow!("--model names no arm"))?;
     let (cell, surface, condition) = arguments.cell.read(first.knowledge.as_deref())?;
-    let robot = arguments.robot.as_deref().or(first.robot.as_deref());
+    let robot = arguments.robot.named().or(first.robot.as_deref().map(NamedRobot::from));
     let setup = programs::setup(&cell, robot);
     let context = DeviationContext {
         runners: &runners,
@@ -160,7 +158,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     shown.write(found, Batch::sparing(&all), |batch, name, reports| {
         #[cfg(feature = "visual")]
         if let Some(path) = &arguments.outputs.rrd {
-            let arms = first.drawn(arguments.robot.as_deref());
+            let arms = first.drawn(arguments.robot.named());
             batch.add(path, super::recording::path(name, arms, condition, reports, surface.as_ref())?);
         }
         #[cfg(not(feature = "visual"))]
@@ -172,7 +170,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
 #[cfg(feature = "visual")]
 impl Runner {
     /// The arms of a recording.
-    fn drawn<'a>(&'a self, robot: Option<&'a str>) -> super::recording::Arms<'a> {
+    fn drawn<'a>(&'a self, robot: Option<NamedRobot<'a>>) -> super::recording::Arms<'a> {
         let is = if self.after == After::Achieved { "simulated actual arm" } else { "estimated arm" };
         super::recording::Arms { real: &self.model, is, nominal: &self.nominal, robot }
     }
@@ -356,7 +354,7 @@ fn runners(arguments: &Arguments) -> anyhow::Result<Vec<Runner>> {
         })?;
         let model = file.model().map_err(|e| anyhow!("{}: {e}", path.display()))?;
         let first = models.first().ok_or_else(|| anyhow!("--model is missing"))?;
-        let (robot, nominal) = inputs::nominal(first, arguments.robot.as_deref())?;
+        let (robot, nominal) = inputs::nominal(first, arguments.robot.named())?;
         let name = format!("actual arm {}", files::name(path));
         let robot = Some(robot);
         return Ok(vec![Runner { name, robot, nominal, model, knowledge: None, after: After::Achieved }]);
@@ -365,7 +363,7 @@ fn runners(arguments: &Arguments) -> anyhow::Result<Vec<Runner>> {
     models
         .into_iter()
         .map(|model| {
-            let (robot, nominal) = inputs::nominal(&model, arguments.robot.as_deref())?;
+            let (robot, nominal) = inputs::nominal(&model, arguments.robot.named())?;
             match model {
                 NamedModel::Nominal => bail!(
                     "--model nominal: the nominal arm has no deviation from itself; give an estimated arm, or --actual ARM.toml"

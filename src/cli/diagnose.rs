@@ -112,7 +112,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     )?;
     #[cfg(feature = "visual")]
     if let Some(path) = &arguments.outputs.rrd {
-        batch.add(path, super::recording::diagnosis(&found, &dataset, &arguments.data.robot)?);
+        batch.add(path, super::recording::diagnosis(&found, &dataset, arguments.data.named())?);
     }
     let unexplained = found.diagnosis.is_partly_unexplained();
     let ending = write_model(&found.estimated, arguments.output.as_deref(), arguments.allow_doubtful, batch)?;

@@ -1,6 +1,6 @@
 //! `truegrind export MODEL.toml --to urdf|dh-csv|mdh-csv|ur-yaml`: the links of an estimated arm in other formats.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::bail;
 use clap::{Args, ValueEnum};
@@ -16,7 +16,7 @@ use truegrind::robots::foreign::{ImportOptions, import};
 use super::exit_status::ExitStatus;
 use super::files::Batch;
 use super::identify::{DataArguments, read};
-use super::inputs::{self, NamedModel};
+use super::inputs::{self, NamedModel, StatedRobot};
 use super::terminal::print_message;
 
 /// Output format.
@@ -47,6 +47,8 @@ pub(super) struct Arguments {
     /// with effects have a larger error than the model.
     #[arg(long, value_name = "DATA")]
     data: Option<PathBuf>,
+    #[command(flatten)]
+    robot: StatedRobot,
 }
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
@@ -58,6 +60,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let NamedModel::Estimated { arm, .. } = &named else {
         bail!("{name}: expected a model file; `truegrind robots` shows the nominal arms");
     };
+    let stated = arguments.robot.named();
+    inputs::nominal(&named, stated)?;
     let format = match arguments.to {
         To::Urdf => Format::Urdf,
         To::DhCsv => Format::Standard,
@@ -68,7 +72,10 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let mut notes = vec![format!("{} as estimated from {}", arm.robot, arm.provenance.file)];
     notes.extend(lost_in_export(&arm.model, format));
     notes.push(match &arguments.data {
-        Some(data) => measured_error(data, arm, &read_back(&bare, &arm.robot, format)?)?,
+        Some(data) => {
+            let measured = DataArguments::of(data.clone(), stated.unwrap_or(arm.robot.as_str().into()));
+            measured_error(&measured, arm, &read_back(&bare, &arm.robot, format)?)?
+        }
         None => stated_error(arm),
     });
     let text = write(&bare, &arm.robot, format, &notes);
@@ -116,9 +123,8 @@ fn stated_error(arm: &Estimated) -> String {
 }
 
 /// The error of the exported links on measurements.
-fn measured_error(data: &Path, arm: &Estimated, exported: &Model) -> anyhow::Result<String> {
-    let reading = DataArguments::of(data.to_path_buf(), arm.robot.clone());
-    let (_, rows) = read(&reading)?;
+fn measured_error(data: &DataArguments, arm: &Estimated, exported: &Model) -> anyhow::Result<String> {
+    let (_, rows) = read(data)?;
     let tolerance = Tolerance::default();
     let frames = starting_frames(&rows, &arm.nominal, &tolerance, true)?;
     let found = transfer(&rows, &frames, &arm.nominal, exported, &arm.model, &tolerance, true);

@@ -67,7 +67,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     if arguments.shares.on() {
         read_log::begin();
     }
-    inputs::robot_between(&arguments.data.robot, &arguments.data.links)?;
+    inputs::robot(arguments.data.named())?;
     let shared = read_log::finish();
     let store = if arguments.shares.on() {
         let output = arguments.output.as_deref();

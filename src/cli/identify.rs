@@ -26,7 +26,7 @@ use truegrind::robots::Robot;
 use super::computation::{Common, on_threads, watching};
 use super::exit_status::ExitStatus;
 use super::files::{self, Batch};
-use super::inputs::{self, UrdfLinks};
+use super::inputs::{self, NamedRobot, UrdfLinks};
 use super::outputs::Outputs;
 use super::progress::Spinner;
 use super::stated_frames::{FramePriorArguments, StatedFrameArguments};
@@ -108,16 +108,21 @@ const LONGEST_S: f64 = 3600.0;
 
 impl DataArguments {
     /// A plain measurement file of a robot.
-    pub(super) fn of(data: PathBuf, robot: String) -> Self {
+    pub(super) fn of(data: PathBuf, robot: NamedRobot<'_>) -> Self {
         Self {
             data,
-            robot,
-            links: UrdfLinks::default(),
+            robot: robot.name.to_owned(),
+            links: robot.links.clone(),
             points: PointsArguments::default(),
             sheet: None,
             angles: None,
             allow_odd_units: false,
         }
+    }
+
+    /// The measured robot.
+    pub(super) fn named(&self) -> NamedRobot<'_> {
+        self.links.of(&self.robot)
     }
 
     /// The files to be read.
@@ -243,7 +248,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     )?;
     #[cfg(feature = "visual")]
     if let Some(path) = &arguments.outputs.rrd {
-        batch.add(path, super::recording::identification(&found, &dataset, &arguments.data.robot)?);
+        batch.add(path, super::recording::identification(&found, &dataset, arguments.data.named())?);
     }
     if let Some(splits) = arguments.compare_methods {
         let work = Spinner::start(format!("{} methods over {splits} splits", SOLVERS.len()));
@@ -306,7 +311,7 @@ fn options(arguments: &Arguments, limits: Limits) -> anyhow::Result<Options> {
 /// Reads robot and measurements, and checks that their units are plausible.
 pub(super) fn read(arguments: &DataArguments) -> anyhow::Result<(Robot, Dataset)> {
     // An unknown robot is reported before missing measurements.
-    let robot = inputs::robot_between(&arguments.robot, &arguments.links)?;
+    let robot = inputs::robot(arguments.named())?;
     let bytes = files::read(&arguments.data)?;
     let dataset = imported(arguments, &bytes)?;
     // Free the text before the rows are processed.
@@ -317,7 +322,7 @@ pub(super) fn read(arguments: &DataArguments) -> anyhow::Result<(Robot, Dataset)
 
 /// [`read`] for measurements that are already in memory.
 pub(super) fn read_bytes(arguments: &DataArguments, bytes: &[u8]) -> anyhow::Result<(Robot, Dataset)> {
-    let robot = inputs::robot_between(&arguments.robot, &arguments.links)?;
+    let robot = inputs::robot(arguments.named())?;
     let dataset = measured(arguments, &robot, imported(arguments, bytes)?)?;
     Ok((robot, dataset))
 }

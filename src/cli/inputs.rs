@@ -7,7 +7,7 @@ use clap::Args;
 use sha2::{Digest, Sha256};
 use truegrind::arm::estimated::{Estimated, Judgement};
 use truegrind::arm::model::Model;
-use truegrind::robots::foreign::{ImportOptions, Kind, import};
+use truegrind::robots::foreign::{ImportOptions, ImportedRobot, Kind, import};
 use truegrind::robots::{self, Robot};
 
 use super::files;
@@ -24,18 +24,58 @@ pub(super) struct UrdfLinks {
     tip: Option<String>,
 }
 
-/// A robot by catalogue name, or from a robot file of any supported format.
-pub(super) fn robot(name: &str) -> anyhow::Result<Robot> {
-    robot_between(name, &UrdfLinks::default())
+impl UrdfLinks {
+    /// The robot of this name, between these links.
+    pub(super) fn of<'a>(&'a self, name: &'a str) -> NamedRobot<'a> {
+        NamedRobot { name, links: self }
+    }
 }
 
-/// A robot by catalogue name, or from a robot file; of a URDF, the arm between these links.
-pub(super) fn robot_between(name: &str, links: &UrdfLinks) -> anyhow::Result<Robot> {
-    let path = Path::new(name);
-    if Kind::of(name).is_some() || name.contains('/') || path.is_file() {
-        let UrdfLinks { base, tip } = links.clone();
+/// The robot of a verb that may do without one.
+#[derive(Debug, Clone, Default, Args)]
+pub(super) struct StatedRobot {
+    /// Robot. The model names it already; if given, it must match.
+    #[arg(long)]
+    robot: Option<String>,
+    #[command(flatten)]
+    links: UrdfLinks,
+}
+
+impl StatedRobot {
+    pub(super) fn named(&self) -> Option<NamedRobot<'_>> {
+        self.robot.as_deref().map(|name| self.links.of(name))
+    }
+}
+
+/// A robot on the command line: a catalogue name or a robot file, and the links of a URDF.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct NamedRobot<'a> {
+    pub(super) name: &'a str,
+    pub(super) links: &'a UrdfLinks,
+}
+
+impl<'a> From<&'a str> for NamedRobot<'a> {
+    fn from(name: &'a str) -> Self {
+        static WHOLE: UrdfLinks = UrdfLinks { base: None, tip: None };
+        WHOLE.of(name)
+    }
+}
+
+impl NamedRobot<'_> {
+    /// Reads a robot file.
+    pub(super) fn import(&self) -> anyhow::Result<ImportedRobot> {
+        let UrdfLinks { base, tip } = self.links.clone();
         let choice = ImportOptions { base, tip, ..ImportOptions::default() };
-        return Ok(import(&files::read_text(path)?, name, &choice)?.robot);
+        Ok(import(&files::read_text(Path::new(self.name))?, self.name, &choice)?)
+    }
+}
+
+/// A robot by catalogue name, or from a robot file of any supported format; of a URDF, the arm between the stated links.
+pub(super) fn robot<'a>(named: impl Into<NamedRobot<'a>>) -> anyhow::Result<Robot> {
+    let named = named.into();
+    let NamedRobot { name, links } = named;
+    if Kind::of(name).is_some() || name.contains('/') || Path::new(name).is_file() {
+        return Ok(named.import()?.robot);
     }
     if links.base.is_some() || links.tip.is_some() {
         bail!("--robot {name}: a robot of the catalogue; --base and --tip name links of a URDF: omit them");
@@ -113,21 +153,11 @@ pub(super) fn hash(bytes: &[u8]) -> String {
 }
 
 /// Name and nominal arm of the robot; `--robot` must match the model.
-pub(super) fn nominal(model: &NamedModel, robot_name: Option<&str>) -> anyhow::Result<(String, Model)> {
-    nominal_between(model, robot_name, &UrdfLinks::default())
-}
-
-/// [`nominal`] with a URDF's arm between these links.
-pub(super) fn nominal_between(
-    model: &NamedModel,
-    robot_name: Option<&str>,
-    links: &UrdfLinks,
-) -> anyhow::Result<(String, Model)> {
-    let robot = |name: &str| robot_between(name, links);
-    match (model, robot_name) {
+pub(super) fn nominal(model: &NamedModel, stated: Option<NamedRobot<'_>>) -> anyhow::Result<(String, Model)> {
+    match (model, stated) {
         (NamedModel::Nominal, None) => bail!("--model nominal needs --robot"),
-        (NamedModel::Nominal, Some(name)) => {
-            let robot = robot(name)?;
+        (NamedModel::Nominal, Some(stated)) => {
+            let robot = robot(stated)?;
             Ok((robot.sheet.name.clone(), robot.model))
         }
         (NamedModel::Estimated { name, arm, .. }, stated) => {
@@ -142,7 +172,7 @@ pub(super) fn nominal_between(
                     );
                 }
                 robots::check_same_links(&arm.nominal, &robot.model)
-                    .map_err(|e| anyhow!("--robot {stated}, model {name}: {e}"))?;
+                    .map_err(|e| anyhow!("--robot {}, model {name}: {e}", stated.name))?;
             }
             Ok((arm.robot.clone(), arm.nominal.clone()))
         }

@@ -55,7 +55,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
 }
 
 fn empty_table(arguments: &Template) -> anyhow::Result<ExitStatus> {
-    let robot = inputs::robot_between(&arguments.robot, &arguments.links)?;
+    let robot = inputs::robot(arguments.links.of(&arguments.robot))?;
     let sensor = match arguments.sensor {
         Reads::Cable => Sensor::Cable,
         Reads::Position => Sensor::Position,

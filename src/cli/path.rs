@@ -40,7 +40,7 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     Batch::check(&[&arguments.surface], &[&arguments.output])?;
-    let robot = inputs::robot_between(&arguments.robot, &arguments.links)?;
+    let robot = inputs::robot(arguments.links.of(&arguments.robot))?;
     let file = surface(&arguments.surface)?;
     // An output that is an input is reported first.
     files::expect(&arguments.surface)?;

@@ -141,7 +141,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     targets.extend(arguments.output.as_deref());
     let inputs_of: Vec<&std::path::Path> = arguments.diagnosis.as_deref().into_iter().collect();
     Batch::check(&inputs_of, &targets)?;
-    let robot = inputs::robot_between(&arguments.robot, &arguments.links)?;
+    let robot = inputs::robot(arguments.links.of(&arguments.robot))?;
     Batch::check(&inputs_of, &targets)?;
     arguments.output.as_deref().map_or(Ok(()), output_extension::refuse_nc)?;
     let sensor = match arguments.sensor {
@@ -168,7 +168,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     )?;
     #[cfg(feature = "visual")]
     if let Some(path) = &arguments.outputs.rrd {
-        batch.add(path, super::recording::plan(&planned, &setup, name, &arguments.robot)?);
+        batch
+            .add(path, super::recording::plan(&planned, &setup, name, arguments.links.of(&arguments.robot))?);
     }
     if let Some(path) = &arguments.output {
         let drive = ProgramSettings {

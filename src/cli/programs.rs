@@ -13,8 +13,9 @@ use truegrind::programs::reading::{Language, Program};
 use truegrind::units::key::sha256;
 use truegrind::units::run::Unit;
 
+use super::files;
+use super::inputs::{self, NamedRobot};
 use super::terminal::print_message;
-use super::{files, inputs};
 
 /// The files of one task, read and rewritten together.
 #[derive(Debug)]
@@ -324,8 +325,8 @@ impl Programs {
 
 /// Control settings that NC programs do not contain, from the cell file and the robot file. `robot`: catalogue name or file;
 /// an unknown one is ignored.
-pub(super) fn setup(cell: &Cell, robot: Option<&str>) -> Setup {
+pub(super) fn setup(cell: &Cell, robot: Option<NamedRobot<'_>>) -> Setup {
     let orientation =
-        robot.and_then(|name| inputs::robot(name).ok()).and_then(|robot| robot.sheet.orientation());
+        robot.and_then(|named| inputs::robot(named).ok()).and_then(|robot| robot.sheet.orientation());
     compensation::cell::nc_setup::cell_setup(cell, orientation)
 }

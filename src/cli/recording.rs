@@ -21,11 +21,11 @@ use truegrind::planning::poses::program::{checked, reading};
 use truegrind::planning::poses::schedule::FIRST_ROW;
 use truegrind::planning::poses::{MeasurementSetup, Plan};
 use truegrind::report::document::{Block, Document};
-use truegrind::robots::foreign::{ImportOptions, Kind, Visual, import};
+use truegrind::robots::foreign::{Kind, Visual};
 use truegrind::surfaces::{Mesh, SurfaceFile};
 
 use super::files;
-use super::inputs;
+use super::inputs::{self, NamedRobot};
 use super::terminal::print_message;
 
 /// The arms of a recording.
@@ -37,7 +37,7 @@ pub(super) struct Arms<'a> {
     pub(super) is: &'a str,
     pub(super) nominal: &'a Model,
     /// The robot on the command line; a robot file may name meshes.
-    pub(super) robot: Option<&'a str>,
+    pub(super) robot: Option<NamedRobot<'a>>,
 }
 
 /// The bytes of the recording of a path.
@@ -82,13 +82,17 @@ pub(super) fn recording(
 pub(super) fn identification(
     found: &Identification,
     dataset: &Dataset,
-    robot: &str,
+    robot: NamedRobot<'_>,
 ) -> anyhow::Result<Vec<u8>> {
     Ok(pictures::dataset_recording(dataset, found, &meshes(Some(robot))?)?.rrd()?)
 }
 
 /// The bytes of the recording of a diagnosis.
-pub(super) fn diagnosis(found: &Diagnosed, dataset: &Dataset, robot: &str) -> anyhow::Result<Vec<u8>> {
+pub(super) fn diagnosis(
+    found: &Diagnosed,
+    dataset: &Dataset,
+    robot: NamedRobot<'_>,
+) -> anyhow::Result<Vec<u8>> {
     Ok(pictures::diagnosis_recording(dataset, found, &meshes(Some(robot))?)?.rrd()?)
 }
 
@@ -97,7 +101,7 @@ pub(super) fn plan(
     plan: &Plan,
     setup: &MeasurementSetup<'_>,
     name: &str,
-    robot: &str,
+    robot: NamedRobot<'_>,
 ) -> anyhow::Result<Vec<u8>> {
     let rows = (FIRST_ROW..).zip(&plan.rows).filter_map(|(number, row)| {
         let pose = &plan.poses[row.pose];
@@ -143,7 +147,7 @@ pub(super) fn track(
     arm: &Estimated,
     datasets: &[Dataset],
     alarms: &[Alarm],
-    robot: Option<&str>,
+    robot: Option<NamedRobot<'_>>,
 ) -> anyhow::Result<Option<Vec<u8>>> {
     let Some(first) = datasets.first() else { return Ok(None) };
     let begun = &arm.model;
@@ -211,7 +215,7 @@ pub(super) struct Compared<'a> {
     pub(super) nominal: &'a Model,
     /// The actual arm, if the rows were simulated.
     pub(super) actual: Option<&'a Model>,
-    pub(super) robot: &'a str,
+    pub(super) robot: NamedRobot<'a>,
 }
 
 /// The bytes of the recording of an experiment: arm and sensor at its rows, and the result.
@@ -258,10 +262,12 @@ pub(super) fn comparison(of: &Compared<'_>, summary: &Document) -> anyhow::Resul
 const MAX_TRIANGLES: usize = 150_000;
 
 /// The STL meshes that a URDF names. A note lists those that are not drawn.
-pub(super) fn meshes(robot: Option<&str>) -> anyhow::Result<Vec<LinkMesh>> {
-    let Some(name) = robot.filter(|name| Kind::of(name) == Some(Kind::Urdf)) else { return Ok(Vec::new()) };
+pub(super) fn meshes(robot: Option<NamedRobot<'_>>) -> anyhow::Result<Vec<LinkMesh>> {
+    let Some(robot) = robot.filter(|robot| Kind::of(robot.name) == Some(Kind::Urdf)) else {
+        return Ok(Vec::new());
+    };
+    let (name, visuals) = (robot.name, robot.import()?.visuals);
     let path = Path::new(name);
-    let visuals = import(&files::read_text(path)?, name, &ImportOptions::default())?.visuals;
     let (mut out, mut missing, mut triangles) = (Vec::new(), Vec::new(), 0);
     for Visual { frame, pose, file, unit_mm } in visuals {
         let stl = file.to_ascii_lowercase().ends_with(".stl");

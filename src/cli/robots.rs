@@ -46,7 +46,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     }
     match &arguments.name {
         Some(name) => {
-            let robot = inputs::robot(name)?;
+            let robot = inputs::robot(name.as_str())?;
             print_result(format::terminal::document(&view::document(&robot), width()))?;
         }
         None => {

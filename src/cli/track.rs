@@ -21,8 +21,7 @@ use super::defect::catch_panic;
 use super::exit_status::ExitStatus;
 use super::files::{self, Batch};
 use super::identify::Angles;
-use super::inputs;
-use super::inputs::NamedModel;
+use super::inputs::{self, NamedModel, StatedRobot};
 use super::outputs::Outputs;
 use super::terminal::print_message;
 
@@ -34,9 +33,8 @@ pub(super) struct Arguments {
     /// Model to keep up to date, as written by `truegrind identify -o`.
     #[arg(long, value_name = "MODEL.toml")]
     model: PathBuf,
-    /// Robot. The model names it already; if given, it must match.
-    #[arg(long)]
-    robot: Option<String>,
+    #[command(flatten)]
+    robot: StatedRobot,
     /// Folder for the dated models. Default: the folder of the model.
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
@@ -86,7 +84,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     };
     inputs::nominal(
         &NamedModel::Estimated { name: name.clone(), hash: hash.clone(), arm: arm.clone() },
-        arguments.robot.as_deref(),
+        arguments.robot.named(),
     )?;
     let stem = arguments.model.file_stem().map_or("model".into(), |s| s.to_string_lossy().into_owned());
     let folder = match &arguments.output {
@@ -262,7 +260,7 @@ impl TrackContext<'_> {
         )?;
         #[cfg(feature = "visual")]
         if let Some(path) = &arguments.outputs.rrd {
-            let robot = arguments.robot.as_deref();
+            let robot = arguments.robot.named();
             match super::recording::track(tracker, self.arm, datasets, alarms, robot)? {
                 Some(bytes) => batch.add(path, bytes),
                 None => print_message("note: --rrd: there is no pose to draw; nothing written"),
@@ -360,7 +358,7 @@ fn read(
     let dataset = import::read(&files::name(path), &bytes, &options)?;
     let dh = match arguments.angles {
         Some(angles) => angles == Angles::Dh,
-        None => inputs::robot(arguments.robot.as_deref().unwrap_or(&arm.robot))
+        None => inputs::robot(arguments.robot.named().unwrap_or(arm.robot.as_str().into()))
             .is_ok_and(|r| r.sheet.joints.angles == sheet::Angles::Dh),
     };
     let convention = if dh { AngleConvention::Dh } else { AngleConvention::Logged };

@@ -25,7 +25,7 @@ use super::cell_arguments::{CellArguments, note_unused_entries, refuse_contradic
 use super::computation::{Common, on_threads};
 use super::exit_status::ExitStatus;
 use super::files::{self, Batch};
-use super::inputs::NamedModel;
+use super::inputs::{NamedModel, StatedRobot};
 use super::programs::Programs;
 use super::progress::Spinner;
 use super::recording::{Arms, meshes, recording};
@@ -41,9 +41,8 @@ pub(super) struct Arguments {
     /// Estimated arm that runs the programs or predicts the measurements.
     #[arg(long, value_name = "MODEL.toml")]
     model: Option<String>,
-    /// Robot. The model names it already; if given, it must match.
-    #[arg(long)]
-    robot: Option<String>,
+    #[command(flatten)]
+    robot: StatedRobot,
     /// Sheet of a workbook. Default: the first with the needed columns.
     #[arg(long)]
     sheet: Option<String>,
@@ -147,7 +146,7 @@ fn stated_model(arguments: &Arguments) -> anyhow::Result<Option<(String, Box<Est
     match inputs::model(name)? {
         NamedModel::Nominal => Ok(None),
         model @ NamedModel::Estimated { .. } => {
-            inputs::nominal(&model, arguments.robot.as_deref())?;
+            inputs::nominal(&model, arguments.robot.named())?;
             inputs::warn_doubtful(&model);
             let NamedModel::Estimated { name, arm, .. } = model else { return Ok(None) };
             Ok(Some((name, arm)))
@@ -158,9 +157,9 @@ fn stated_model(arguments: &Arguments) -> anyhow::Result<Option<(String, Box<Est
 /// Measurements: with the residuals of the given model, or with those of an identification.
 fn measurements(arguments: &Arguments, file: &Path) -> anyhow::Result<Recording> {
     let stated = stated_model(arguments)?;
-    let robot = match (&arguments.robot, &stated) {
-        (Some(robot), _) => robot.clone(),
-        (None, Some((_, arm))) => arm.robot.clone(),
+    let robot = match (arguments.robot.named(), &stated) {
+        (Some(robot), _) => robot,
+        (None, Some((_, arm))) => arm.robot.as_str().into(),
         (None, None) => bail!("{}: give --robot or --model: the measured arm is unknown", file.display()),
     };
     let data = identify::DataArguments {
@@ -180,7 +179,7 @@ fn measurements(arguments: &Arguments, file: &Path) -> anyhow::Result<Recording>
     };
     let Some((name, arm)) = stated else {
         let found = identify::identified(&dataset, &robot.sheet.name, &robot.model, &options)?;
-        return Ok(pictures::dataset_recording(&dataset, &found, &meshes(arguments.robot.as_deref())?)?);
+        return Ok(pictures::dataset_recording(&dataset, &found, &meshes(arguments.robot.named())?)?);
     };
     // The sensor may have moved since the model was made, so the frames are refitted for both arms.
     let frames = starting_frames(&dataset, &robot.model, &options.tolerance, options.fuse_readout)?;
@@ -204,7 +203,7 @@ fn measurements(arguments: &Arguments, file: &Path) -> anyhow::Result<Recording>
         arm: &arm.model,
         arm_is: &format!("{} as estimated in {name}", arm.robot),
         nominal: Some(&arm.nominal),
-        meshes: &meshes(arguments.robot.as_deref())?,
+        meshes: &meshes(arguments.robot.named())?,
         planned: false,
         keep_out_mm: &[],
         answer: &[],
@@ -268,7 +267,7 @@ fn model(arguments: &Arguments, file: &Path) -> anyhow::Result<Recording> {
         title: &format!("{name}: {} as estimated", arm.robot),
         arm: &arm.model,
         nominal: &arm.nominal,
-        meshes: &meshes(arguments.robot.as_deref())?,
+        meshes: &meshes(arguments.robot.named())?,
         arm_is: "estimated arm",
         condition: arm.condition,
         reports: std::slice::from_ref(&report),
@@ -283,18 +282,18 @@ fn program(arguments: &Arguments, paths: &[PathBuf]) -> anyhow::Result<Recording
     let stated = stated_model(arguments)?;
     let knowledge = stated.as_ref().map(|(_, arm)| arm.as_ref());
     let (cell, surface, condition) = arguments.cell.read(knowledge)?;
-    let nominal = match (&stated, &arguments.robot) {
+    let nominal = match (&stated, arguments.robot.named()) {
         (Some((_, arm)), _) => arm.nominal.clone(),
         (None, Some(robot)) => inputs::robot(robot)?.model,
         (None, None) => {
             bail!("{}: give --robot or --model: the arm that runs it is unknown", paths[0].display())
         }
     };
-    let robot = arguments.robot.as_deref().or(knowledge.map(|k| k.robot.as_str()));
+    let robot = arguments.robot.named().or(knowledge.map(|k| k.robot.as_str().into()));
     let task = programs.task(&programs::setup(&cell, robot));
     refuse_contradictions(task.listing(), &cell, surface.as_ref(), &nominal)?;
     if let Some(robot) = robot {
-        let name = inputs::robot(robot).map_or_else(|_| robot.to_owned(), |robot| robot.sheet.name);
+        let name = inputs::robot(robot).map_or_else(|_| robot.name.to_owned(), |robot| robot.sheet.name);
         robot_match::refuse_other_cell(&cell, &name, &nominal)?;
         robot_match::refuse_other_program(&programs, &name, &nominal)?;
     }
@@ -324,6 +323,6 @@ fn program(arguments: &Arguments, paths: &[PathBuf]) -> anyhow::Result<Recording
         bail!("{program}: no motion has a reachable target that the program text determines");
     }
     let is = if knowledge.is_some() { "estimated arm" } else { "nominal arm" };
-    let arms = Arms { real: acting.model, is, nominal: &nominal, robot: arguments.robot.as_deref() };
+    let arms = Arms { real: acting.model, is, nominal: &nominal, robot: arguments.robot.named() };
     recording(&program, arms, condition, std::slice::from_ref(&report), surface.as_ref())
 }

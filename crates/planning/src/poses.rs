@@ -115,6 +115,15 @@ pub enum PlanError {
     /// The sensor is a cable without a stated outlet.
     #[error("a cable needs the location of its outlet: state it in the base frame")]
     NoOutlet,
+    /// An outlet lies in the robot's foot.
+    #[error(
+        "the cable's outlet is stated {:.3}, {:.3}, {:.3} mm from the origin of the base, in the robot's foot; expected millimetres: \
+         multiply metres by 1000", at_mm[0], at_mm[1], at_mm[2]
+    )]
+    OutletInFoot {
+        /// Location in the base frame.
+        at_mm: [f64; 3],
+    },
     /// O1 cannot include effects.
     #[error("index O1 cannot weight the questions of a diagnosis: use D-optimality")]
     IndexOfQuestions,
@@ -124,6 +133,9 @@ pub enum PlanError {
     )]
     NotFinite,
 }
+
+/// Distance from the origin of the base at which no outlet can be (mm).
+const FOOT_MM: f64 = 10.0;
 
 /// Number of random sets for comparison.
 const RANDOM_SETS: usize = 10;
@@ -136,8 +148,13 @@ const JUDGES: usize = 300;
 /// # Errors
 /// [`PlanError`], when too few poses are allowed.
 pub fn plan(setup: &MeasurementSetup<'_>, options: &Options) -> Result<Plan, PlanError> {
-    if setup.sensor == Sensor::Cable && setup.frames.outlets_mm.is_empty() {
-        return Err(PlanError::NoOutlet);
+    if setup.sensor == Sensor::Cable {
+        if setup.frames.outlets_mm.is_empty() {
+            return Err(PlanError::NoOutlet);
+        }
+        if let Some(at) = setup.frames.outlets_mm.iter().find(|at| at.norm() < FOOT_MM) {
+            return Err(PlanError::OutletInFoot { at_mm: (*at).into() });
+        }
     }
     if options.index == Index::O1 && !options.questions.is_empty() {
         return Err(PlanError::IndexOfQuestions);

@@ -11,6 +11,7 @@ use truegrind::compensation::risk::placement::Placement;
 
 use crate::cli::cell_arguments::CellArguments;
 use crate::cli::computation::Common;
+use crate::cli::inputs::StatedRobot;
 use crate::cli::outputs::Outputs;
 use crate::cli::programs::Grouping;
 use crate::cli::shares::Shares;
@@ -62,9 +63,8 @@ pub(crate) struct Arguments {
     /// Estimated arm (a model file), or the word `nominal`, with which no byte changes.
     #[arg(long)]
     pub(super) model: String,
-    /// Robot. The model names it already; if given, it must match.
-    #[arg(long)]
-    pub(super) robot: Option<String>,
+    #[command(flatten)]
+    pub(super) robot: StatedRobot,
     /// Output: a file for one program, a folder for several.
     #[arg(short, long, value_name = "OUT")]
     pub(super) output: Option<PathBuf>,

@@ -40,11 +40,11 @@ fn verbs() -> Vec<Verb> {
             others: &["--seed"],
         },
         Verb {
-            base: &["export", "model.toml", "--to", "urdf", "--data", "data.csv"],
-            inputs: &["model.toml", "data.csv"],
+            base: &["export", "model.toml", "--to", "urdf", "--data", "data.csv", "--robot", "robot.toml"],
+            inputs: &["model.toml", "data.csv", "robot.toml"],
             outputs: &["-o"],
             needs: &["-o", "made.urdf"],
-            others: &["--to", "--data"],
+            others: &["--to", "--data", "--robot", "--base", "--tip"],
         },
         Verb {
             base: &["robots", "--check", "robot.toml"],
@@ -226,6 +226,8 @@ fn verbs() -> Vec<Verb> {
             outputs: &["--times", "--json", "--csv", "--parquet", "--md", "--html", "--rrd"],
             needs: &[],
             others: &[
+                "--base",
+                "--tip",
                 "--robot",
                 "--experiment",
                 "--list",
@@ -244,6 +246,8 @@ fn verbs() -> Vec<Verb> {
             outputs: &["--state", "--json", "--csv", "--parquet", "--md", "--html", "--rrd"],
             needs: &[],
             others: &[
+                "--base",
+                "--tip",
                 "--model",
                 "--robot",
                 "--output",
@@ -289,6 +293,8 @@ fn verbs() -> Vec<Verb> {
             outputs: &["-o", "--diff", "--json", "--csv", "--parquet", "--md", "--html", "--rrd"],
             needs: &["-o", "made.mod"],
             others: &[
+                "--base",
+                "--tip",
                 "--model",
                 "--robot",
                 "--emit",
@@ -322,7 +328,7 @@ fn verbs() -> Vec<Verb> {
             inputs: &["a.mod", "robot.toml"],
             outputs: &["-o"],
             needs: &[],
-            others: &["--robot", "--each", "--together", "--outside"],
+            others: &["--base", "--tip", "--robot", "--each", "--together", "--outside"],
         },
         Verb {
             base: &["compensate", "task.pgf", "--model", "model.toml"],
@@ -375,6 +381,8 @@ fn verbs() -> Vec<Verb> {
             outputs: &["--json", "--csv", "--parquet", "--md", "--html", "--rrd"],
             needs: &[],
             others: &[
+                "--base",
+                "--tip",
                 "--model",
                 "--robot",
                 "--intended",

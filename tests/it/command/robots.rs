@@ -97,6 +97,63 @@ fn what_is_understood_of_a_file_is_told_and_goes_to_a_robot_file() {
     assert!(code == 2 && err.contains("arm.step"), "{err}");
 }
 
+/// The class: a verb that takes a robot file, and not the links between which a URDF's arm is.
+#[test]
+#[cfg(feature = "visual")]
+fn every_verb_that_takes_a_robot_takes_the_links_of_a_urdf() {
+    let dir = folder();
+    let at = dir.path();
+    fs::write(at.join("cell.urdf"), TWO).unwrap();
+    let links = ["--robot", "cell.urdf", "--base", "left_base_link", "--tip", "left_tool0"];
+    let (code, _, err) = truegrind(
+        at,
+        &["robots", "--check", "cell.urdf", links[2], links[3], links[4], links[5], "-o", "left.toml"],
+    );
+    assert_eq!(code, 0, "{err}");
+    let recipe = include_str!("../../data/irb120-cable.toml");
+    let recipe = recipe.replace("robot = \"abb-irb-120\"", "robot = \"left.toml\"");
+    fs::write(at.join("recipe.toml"), recipe).unwrap();
+    let (code, _, err) = truegrind(at, &["simulate", "recipe.toml", "-o", "rows.csv"]);
+    assert_eq!(code, 0, "{err}");
+    fs::write(
+        at.join("mine.toml"),
+        "name = \"mine\"\ntitle = \"Mine\"\npaper = \"ours\"\n[methods]\nreference = \"A\"\n[methods.protocol]\nrows = \
+         60\nheld_out = 0.2\ncases = 2\n[[methods.method]]\nid = \"A\"\nname = \"LM\"\nsolver = \"lm\"\ntreatment = \
+         \"sound\"\n",
+    )
+    .unwrap();
+    for verb in [
+        &[
+            "plan",
+            "--sensor",
+            "position",
+            "--poses",
+            "8",
+            "--candidates",
+            "60",
+            "-o",
+            "poses.mod",
+            "--rrd",
+            "1.rrd",
+        ][..],
+        &["identify", "rows.csv", "-o", "model.toml", "--allow-doubtful", "--rrd", "2.rrd"],
+        &["diagnose", "rows.csv", "--most", "1", "--rrd", "3.rrd"],
+        &["compare", "rows.csv", "--experiment", "mine.toml", "--rrd", "4.rrd"],
+        &["view", "rows.csv", "--rrd", "5.rrd"],
+        &["view", "rows.csv", "--model", "model.toml", "--rrd", "6.rrd"],
+        &["track", "rows.csv", "--model", "model.toml", "-o", "tracks", "--rrd", "7.rrd"],
+        &["export", "model.toml", "--to", "urdf", "--data", "rows.csv", "-o", "made.urdf"],
+        &["cell", "poses.mod", "-o", "cell.toml"],
+        &["compensate", "poses.mod", "--model", "model.toml", "--allow-doubtful", "--dry-run"],
+        &["deviation", "poses.mod", "--model", "model.toml", "--rrd", "8.rrd"],
+    ] {
+        let (code, _, err) = truegrind(at, &[verb, &links[..2]].concat());
+        assert!(code == 2 && err.contains("--base LINK --tip LINK"), "{verb:?}: {err}");
+        let (code, _, err) = truegrind(at, &[verb, &links[..]].concat());
+        assert!(code < 2, "{verb:?}: {err}");
+    }
+}
+
 /// What is exported is judged by itself: a model with effects is not its links.
 #[test]
 fn what_is_exported_says_its_own_error() {

@@ -56,6 +56,19 @@ fn planned(sensor: Sensor, frames: &Frames, options: &Options) -> Plan {
     plan(&MeasurementSetup { nominal: &nominal, sensor, frames }, options).unwrap()
 }
 
+/// Metres in place of millimetres: such a plan would measure from inside the robot.
+#[test]
+fn an_outlet_in_the_foot_of_the_robot_is_refused() {
+    let nominal = nominal();
+    let mut frames = cable();
+    frames.outlets_mm[0] /= 1000.0;
+    let failed =
+        plan(&MeasurementSetup { nominal: &nominal, sensor: Sensor::Cable, frames: &frames }, &small());
+    let error = failed.map(|_| ()).unwrap_err();
+    assert_eq!(error, PlanError::OutletInFoot { at_mm: [0.75, 0.2, 0.04] });
+    assert!(error.to_string().contains("0.750, 0.200, 0.040 mm"), "{error}");
+}
+
 #[test]
 fn chosen_poses_tell_more_than_random_ones() {
     for (sensor, frames, least) in

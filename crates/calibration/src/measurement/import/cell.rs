@@ -1,5 +1,6 @@
 //! Tables of cells, common to CSV and workbooks, with the line numbers that users see.
 
+use std::borrow::Cow;
 use std::fmt;
 
 /// One cell.
@@ -11,7 +12,7 @@ pub enum Cell {
     Number {
         /// The value.
         value: f64,
-        /// Whether a workbook held it as text.
+        /// Whether a workbook or a data frame held it as text.
         as_text: bool,
     },
     /// Anything else, as the user sees it.
@@ -19,6 +20,18 @@ pub enum Cell {
 }
 
 impl Cell {
+    /// A text of a workbook or a data frame: a number if it is one.
+    pub fn of_text(text: &str) -> Self {
+        let text = text.trim();
+        if text.is_empty() {
+            return Cell::Empty;
+        }
+        match number(text, false) {
+            Some(value) => Cell::Number { value, as_text: true },
+            None => Cell::Text(text.to_owned()),
+        }
+    }
+
     /// Whether nothing is there.
     pub fn is_empty(&self) -> bool {
         matches!(self, Cell::Empty)
@@ -43,6 +56,17 @@ impl fmt::Display for Cell {
             Cell::Text(text) => f.write_str(text),
         }
     }
+}
+
+/// Parses a decimal number. With `decimal_comma`, one comma is accepted in place of the point; a point and a comma together
+/// are ambiguous and remain text.
+pub(super) fn number(text: &str, decimal_comma: bool) -> Option<f64> {
+    // Spreadsheets sometimes write a typographic minus.
+    let text = if text.is_ascii() { Cow::Borrowed(text) } else { Cow::Owned(text.replace('\u{2212}', "-")) };
+    if decimal_comma && text.matches(',').count() == 1 && !text.contains('.') {
+        return text.replace(',', ".").parse().ok();
+    }
+    text.parse().ok()
 }
 
 /// One row.

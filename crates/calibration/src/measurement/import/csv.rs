@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use ::csv::{ByteRecord, ReaderBuilder};
 
-use super::cell::{Cell, Line, Table};
+use super::cell::{Cell, Line, Table, number};
 use super::error::{ImportError, Location};
 
 /// A text table, read line by line: all its cells would take several times the memory of its numbers.
@@ -122,15 +122,4 @@ fn cell(field: &str, decimal_comma: bool) -> Cell {
         Some(value) => Cell::Number { value, as_text: false },
         None => Cell::Text(field.to_owned()),
     }
-}
-
-/// Parses a decimal number. With `decimal_comma`, one comma is accepted in place of the point; a point and a comma together
-/// are ambiguous and remain text.
-pub(super) fn number(text: &str, decimal_comma: bool) -> Option<f64> {
-    // Spreadsheets sometimes write a typographic minus.
-    let text = if text.is_ascii() { Cow::Borrowed(text) } else { Cow::Owned(text.replace('\u{2212}', "-")) };
-    if decimal_comma && text.matches(',').count() == 1 && !text.contains('.') {
-        return text.replace(',', ".").parse().ok();
-    }
-    text.parse().ok()
 }

@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 
-use super::cell::{Cell, Line, Table};
+use super::cell::{Cell, Line, Table, number};
 use super::column_names::POSITION;
 use super::csv;
 use super::error::{ImportError, Location};
@@ -196,7 +196,7 @@ fn layout(lines: &[(usize, Vec<&str>)]) -> Option<usize> {
 
 /// A coordinate. Names can be numbers: a coordinate has a point or an exponent.
 fn coordinate(text: &str) -> Option<f64> {
-    csv::number(text, false).filter(|value| value.is_finite() && text.contains(['.', 'e', 'E']))
+    number(text, false).filter(|value| value.is_finite() && text.contains(['.', 'e', 'E']))
 }
 
 /// The target of a full name: `A::Main::p1`.

@@ -12,7 +12,6 @@ use calamine::{Data, DataRef, Dimensions, Reader, Xlsx, XlsxError};
 
 use super::archive::{self, Refusal};
 use super::cell::{Cell, Line, Table};
-use super::csv::number;
 use super::error::{ImportError, Location};
 
 /// Rows and columns of a sheet.
@@ -149,16 +148,7 @@ fn cell(data: &Data) -> Cell {
         Data::Empty => Cell::Empty,
         Data::Int(i) => Cell::Number { value: *i as f64, as_text: false },
         Data::Float(value) => Cell::Number { value: *value, as_text: false },
-        Data::String(text) => {
-            let text = text.trim();
-            if text.is_empty() {
-                return Cell::Empty;
-            }
-            match number(text, false) {
-                Some(value) => Cell::Number { value, as_text: true },
-                None => Cell::Text(text.to_owned()),
-            }
-        }
+        Data::String(text) => Cell::of_text(text),
         Data::Bool(b) => Cell::Text(if *b { "TRUE".into() } else { "FALSE".into() }),
         Data::DateTime(date) => Cell::Text(format!("a date (serial number {})", date.as_f64())),
         Data::DateTimeIso(text) | Data::DurationIso(text) => Cell::Text(format!("a date ({text})")),
