@@ -2,6 +2,7 @@
 
 use super::cause::Cause;
 use super::data_quality::single_angles;
+use super::decision;
 use super::discrepancy::Discrepancy;
 use super::extension::{Extended, Subject};
 use super::finding::{DiagnoseError, Diagnosis, Fits, RangeNoise, SCHEMA, Source, Stage};
@@ -22,7 +23,7 @@ use crate::identification::benefit::{Benefit, benefit};
 use crate::identification::calibration::Frames;
 use crate::identification::fit::{Fitted, Observations, frame_parameters};
 use crate::identification::identify::{
-    arm_covariance, arm_parameters_of, learned_width_uncertainty, mean_condition, parameter_table,
+    self, arm_covariance, arm_parameters_of, learned_width_uncertainty, mean_condition, parameter_table,
     with_sigma_in_region,
 };
 use crate::identification::start::count_distinct_poses;
@@ -132,7 +133,16 @@ pub fn diagnose(
     let [before, geometry, _] = search.stages;
     let stages = [before, geometry, written_stage];
     let fits = [&written, handed.as_ref().unwrap_or(&written)].map(Fitted::from);
-    let (estimated, benefit) = estimated(&context, robot, &fits, &stages, &diagnosis, &search.set_aside);
+    let with_causes = estimated(&context, robot, &fits, &stages, &diagnosis, &search.set_aside);
+    let refused = with_causes.0.verdict.status == Judgement::Fail && !search.extended.causes.is_empty();
+    let geometry_alone = refused.then(|| geometry_alone(&context, robot)).flatten();
+    if geometry_alone.is_some() {
+        diagnosis.notes.push(format!(
+            "the written arm is geometry alone, as `identify` fits it: beside the causes the arm is refused, since {}",
+            with_causes.0.verdict.reasons.first().map_or("it is implausible", String::as_str)
+        ));
+    }
+    let (estimated, benefit) = geometry_alone.unwrap_or(with_causes);
     diagnosis.verdict = Some(estimated.verdict.clone());
     let (geometric, set_aside) = (search.geometric, search.set_aside);
     Ok(Diagnosed {
@@ -146,6 +156,29 @@ pub fn diagnose(
         finding_of_cause,
         pictures,
     })
+}
+
+/// The arm with geometry alone as `identify` fits it, with its expected benefit; `None` if its verdict is not favourable.
+///
+/// A cause whose law is only nearly right can drive links that the rows determine through it alone: where links warm up unequally, a
+/// common growth is met by a link of another length whose constant part the frames take up.
+fn geometry_alone(context: &SearchContext<'_>, robot: &str) -> Option<(Estimated, Option<Benefit>)> {
+    let SearchContext { dataset, subject, options, .. } = context;
+    let defaults = identify::Options::default();
+    let alone = identify::Options {
+        tolerance: options.arm_tolerance,
+        seed: options.selection.seed,
+        fuse_readout: options.fuse_readout,
+        limit_rmse_mm: options.limits.rmse_mm,
+        limit_max_mm: options.limits.max_mm,
+        ..defaults
+    };
+    let share = |rows: &Dataset| split::random(rows, alone.held_out, alone.seed);
+    let done = identify::identify(dataset, robot, subject.nominal, subject.frames, &share, &alone).ok()?;
+    let favourable = matches!(done.estimated.verdict.status, Judgement::Pass | Judgement::NotEvaluated);
+    let mut estimated = done.estimated;
+    estimated.provenance.method = "diagnose".to_owned();
+    favourable.then_some((estimated, done.benefit))
 }
 
 /// The model with `causes` under the tolerances of the arm.
@@ -247,7 +280,15 @@ fn build_diagnosis(
         .collect();
     measure_again.sort_unstable();
     measure_again.dedup();
-    let (findings, pictures) = summary.findings.into_iter().map(|s| (s.finding, s.picture)).unzip();
+    let (mut findings, pictures): (Vec<_>, Vec<_>) =
+        summary.findings.into_iter().map(|s| (s.finding, s.picture)).unzip();
+    let asking = decision::Asking {
+        robot,
+        sensor: dataset.sensor,
+        frames: &search.extended.frames,
+        something_else: summary.something_else.as_ref(),
+    };
+    asking.complete(&mut findings);
     let diagnosis = Diagnosis {
         schema: SCHEMA.to_owned(),
         verdict: None,
@@ -265,6 +306,7 @@ fn build_diagnosis(
         findings,
         not_testable,
         remaining: summary.remaining,
+        something_else: summary.something_else,
         noise_model: noise.map(|n| RangeNoise {
             sigma_mm: n.sigma_mm,
             per_metre_mm: n.per_metre_mm,
