@@ -11,7 +11,7 @@ use truegrind::planning::poses::keep_out::KeepOut;
 use truegrind::planning::poses::program::{ProgramSettings, draft};
 use truegrind::planning::poses::rows::Noise;
 use truegrind::planning::poses::schedule::Visits;
-use truegrind::planning::poses::{MeasurementSetup, Options, plan, questions};
+use truegrind::planning::poses::{FIELD_POSES, MeasurementSetup, Options, plan, questions};
 use truegrind::programs::rapid::writer;
 use truegrind::report::planning as view;
 
@@ -57,15 +57,20 @@ pub(super) struct Arguments {
     /// Sensor that will measure.
     #[arg(long, value_enum)]
     sensor: SensorArgument,
-    /// Number of different poses; repeats are added to these.
-    #[arg(long, default_value_t = 60)]
-    poses: usize,
+    /// Number of different poses; repeats are added to these. Default: 60; for an unexplained error ten, or ten visits of one pose if it
+    /// follows time.
+    #[arg(long)]
+    poses: Option<usize>,
     /// RAPID module to write.
     #[arg(short, long, value_name = "POSES.mod")]
     output: Option<PathBuf>,
     /// Diagnosis (from `diagnose --json`): prefer poses that distinguish the causes it left ambiguous or untested.
     #[arg(long = "for", value_name = "DIAGNOSIS.json")]
     diagnosis: Option<PathBuf>,
+    /// Plan only for the finding with this number, as the diagnosis counts them; for an unexplained error: the poses that tell most about
+    /// it.
+    #[arg(long, value_name = "N", requires = "diagnosis")]
+    finding: Option<usize>,
     /// Design criterion for the set of poses.
     #[arg(long, value_enum, default_value_t = IndexArgument::D)]
     index: IndexArgument,
@@ -153,7 +158,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let reach: f64 = robot.model.links[1..].iter().map(|l| l.a_mm.abs() + l.d_mm.abs()).sum();
     let options = options(arguments, sensor, reach)?;
     let setup = MeasurementSetup { nominal: &robot.model, sensor, frames: &frames };
-    let work = Spinner::start(format!("choosing {} of {} poses", arguments.poses, arguments.candidates));
+    let work = Spinner::start(format!("choosing among {} poses", arguments.candidates));
     let planned = on_threads(arguments.common.threads, || plan(&setup, &options))?
         .map_err(|e| anyhow!("{}: {e}", robot.sheet.name))?;
     drop(work);
@@ -175,7 +180,9 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
         let drive = ProgramSettings {
             robot: name.to_owned(),
             travel_mm_s: arguments.speed,
-            settle_s: arguments.settle,
+            // Visits of one pose over a long time are waited for.
+            settle_s: arguments.settle
+                + (options.visits.seconds_per_row - arguments.seconds_per_row).max(0.0),
             ..ProgramSettings::default()
         };
         batch.add(path, writer::write(&draft(&planned, &setup, &drive))?);
@@ -184,6 +191,9 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let rough = planned.rows.iter().any(|row| row.cable_unclear);
     Ok(if rough { ExitStatus::Flagged } else { ExitStatus::Done })
 }
+
+/// Number of poses where none is stated.
+const POSES: usize = 60;
 
 /// Largest number of poses.
 const MAX_POSES: usize = 2000;
@@ -236,11 +246,12 @@ fn check_numbers(arguments: &Arguments, sigma: f64) -> anyhow::Result<()> {
             bail!("{name} {value}: expected 0 or more");
         }
     }
-    if arguments.poses < 4 {
-        bail!("--poses {}: expected at least 4; some 50 to 100 are usual", arguments.poses);
+    let poses = arguments.poses.unwrap_or(POSES);
+    if poses < 4 {
+        bail!("--poses {poses}: expected at least 4; some 50 to 100 are usual");
     }
-    if arguments.poses > MAX_POSES {
-        bail!("--poses {}: expected at most {MAX_POSES}; some 50 to 100 are usual", arguments.poses);
+    if poses > MAX_POSES {
+        bail!("--poses {poses}: expected at most {MAX_POSES}; some 50 to 100 are usual");
     }
     for (name, count) in [
         ("--repeats", arguments.repeats),
@@ -257,14 +268,14 @@ fn check_numbers(arguments: &Arguments, sigma: f64) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The questions that a diagnosis left open.
-fn questions(arguments: &Arguments) -> anyhow::Result<Vec<questions::Question>> {
+/// What a diagnosis left open.
+fn left_open(arguments: &Arguments) -> anyhow::Result<questions::Open> {
     Ok(match &arguments.diagnosis {
-        None => Vec::new(),
+        None => questions::Open::default(),
         Some(path) => {
-            let found = questions::questions(&files::read_text(path)?)
+            let found = questions::open(&files::read_text(path)?, arguments.finding)
                 .map_err(|e| anyhow!("{}: {e}", path.display()))?;
-            if found.is_empty() {
+            if found == questions::Open::default() {
                 print_message(format_args!(
                     "note: {}: the diagnosis left nothing ambiguous or untested; the poses are chosen for the geometry",
                     path.display()
@@ -303,16 +314,17 @@ fn options(arguments: &Arguments, sensor: Sensor, reach_mm: f64) -> anyhow::Resu
         (_, None) => None,
     };
     let space = space(arguments, reach_mm)?;
-    let questions = questions(arguments)?;
+    let questions::Open { questions, something_else } = left_open(arguments)?;
     let approach_rad = arguments.approach.to_radians();
-    Ok(Options {
-        poses: arguments.poses,
+    let poses = arguments.poses.unwrap_or(POSES);
+    let options = Options {
+        poses,
         index: match arguments.index {
             IndexArgument::D => Index::D,
             IndexArgument::O1 => Index::O1,
         },
         noise: Noise { reading_mm: sigma, reading_rad: arguments.sigma_angle.to_radians() },
-        candidates: arguments.candidates.max(arguments.poses),
+        candidates: arguments.candidates.max(poses + FIELD_POSES),
         bounds: Bounds {
             margin_rad: arguments.margin.to_radians().max(approach_rad),
             min_singularity: arguments.singularity,
@@ -329,8 +341,13 @@ fn options(arguments: &Arguments, sensor: Sensor, reach_mm: f64) -> anyhow::Resu
             seconds_per_row: arguments.seconds_per_row,
         },
         questions,
+        something_else: something_else.clone(),
         decisive: arguments.decisive,
         seed: arguments.common.seed,
         ..Options::default()
+    };
+    Ok(match something_else.filter(|_| arguments.finding.is_some()) {
+        Some(alone) => options.for_something_else(alone, arguments.poses.unwrap_or(FIELD_POSES)),
+        None => options,
     })
 }

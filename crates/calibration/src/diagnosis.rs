@@ -19,7 +19,8 @@
 //! 9. [`discrepancy`] with [`marginal`]: random functions for model discrepancy. `confirmation`: a cause is identified only if it
 //!    remains significant with them and is selected again in [`halves`] of the rows (stability selection).
 //! 10. `findings` and `merged`: findings, ranked by their `contribution`, with doubts where a larger fault confounds them
-//!     (`confounding`); `unexplained`: the rest. `written`: the arm for compensation, beside the unknown rest of
+//!     (`confounding`); `unexplained`: the rest, with what a planner needs of it
+//!     ([`something_else`]); [`decision`]: shares of causes that cannot be told apart, and the measurement that decides. `written`: the arm for compensation, beside the unknown rest of
 //!     a sensor's law (`sensor_law`); `in_doubt`: its covariance for uncertain
 //!     causes; `sensor_causes`: whether causes of the measurement are fitted with it.
 //! 11. [`finding`], `summary` and [`words`]: the result, as a contract for programs and as sentences for technicians.
@@ -64,7 +65,9 @@ pub mod transfer;
 pub mod residual_tests;
 mod data_quality;
 mod testability;
+pub mod something_else;
 pub mod finding;
+pub mod decision;
 pub mod words;
 pub mod picture;
 mod findings;

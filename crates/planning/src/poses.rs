@@ -4,6 +4,7 @@
 //!   [`keep_out`]: collision checks against floor and boxes;
 //! - [`rows`]: whitened Jacobian of the readings;
 //! - [`design`]: D-optimal choice among the candidates;
+//! - [`field`]: choice for an error that no cause of a diagnosis explains;
 //! - `roadmap`: paths around the obstacles;
 //! - [`schedule`]: repeats, both sides of approach, warm-up, and the order;
 //! - [`power`]: smallest detectable size of each effect;
@@ -19,6 +20,7 @@ pub mod cable;
 pub mod keep_out;
 pub mod rows;
 pub mod design;
+pub mod field;
 pub mod schedule;
 pub mod power;
 pub mod questions;
@@ -32,6 +34,7 @@ use thiserror::Error;
 use self::blank::blank_row;
 use self::candidate::{Candidate, RejectionCounts};
 use self::design::{Design, Index};
+use self::field::{FieldDesign, FieldUncertainty};
 use self::keep_out::{CollisionChecker, KeepOut};
 use self::power::Detectability;
 use self::roadmap::Roadmap;
@@ -39,10 +42,11 @@ use self::rows::ReadingJacobian;
 use self::schedule::{Connections, Row};
 use truegrind_arm::model::{Joints, Model};
 use truegrind_arm::parameter::{Parameter, arm_parameters};
+use truegrind_calibration::diagnosis::something_else::SomethingElse;
 use truegrind_calibration::identification::fit::frame_parameters;
 use truegrind_calibration::measurement::dataset::{Dataset, Sensor};
 
-pub use self::options::Options;
+pub use self::options::{FIELD_POSES, Options};
 pub use self::setup::MeasurementSetup;
 
 /// A plan.
@@ -62,6 +66,8 @@ pub struct Plan {
     pub rejections: RejectionCounts,
     /// Smallest detectable size of each effect.
     pub detectability: Vec<Detectability>,
+    /// What is known of an error that no cause explains, where poses were chosen for it.
+    pub field: Option<FieldUncertainty>,
     /// The checked obstacles.
     pub space: KeepOut,
 }
@@ -161,12 +167,13 @@ pub fn plan(setup: &MeasurementSetup<'_>, options: &Options) -> Result<Plan, Pla
     }
     let nominal = Model { effects: Vec::new(), ..setup.nominal.clone() };
     let setup = &MeasurementSetup { nominal: &nominal, ..setup.clone() };
+    let wanted = options.poses + options.something_else.as_ref().map_or(0, |_| options.field_poses);
     let (candidates, rejections) = candidate::draw(setup, &options.bounds, options.candidates, options.seed);
-    if candidates.len() < options.poses.max(1) {
+    if candidates.len() < wanted.max(1) {
         return Err(PlanError::TooFew {
             found: candidates.len(),
             drawn: rejections.drawn,
-            wanted: options.poses.max(1),
+            wanted: wanted.max(1),
             rejections,
         });
     }
@@ -180,24 +187,21 @@ pub fn plan(setup: &MeasurementSetup<'_>, options: &Options) -> Result<Plan, Pla
                 Roadmap::between(candidates.iter().map(|candidate| candidate.joints).collect(), &checker);
             let together: Vec<Candidate> =
                 roadmap.largest().into_iter().map(|i| candidates[i].clone()).collect();
-            let parted = PlanError::NoWay {
-                allowed: candidates.len(),
-                found: together.len(),
-                wanted: options.poses.max(1),
-            };
-            if together.len() < options.poses.max(1) {
+            let parted =
+                PlanError::NoWay { allowed: candidates.len(), found: together.len(), wanted: wanted.max(1) };
+            if together.len() < wanted.max(1) {
                 return Err(parted);
             }
             choose_and_order(setup, &parameters, &together, Some(&roadmap), options)?.ok_or(parted)?
         }
     };
-    let OrderedChoice { poses, rows, quality } = laid;
+    let OrderedChoice { poses, rows, quality, field } = laid;
     let measured = schedule::data(&rows, &poses);
     let final_jacobian = rows::reading_jacobian(setup, &parameters, &measured, &[], options);
     let sigmas = final_jacobian.sigmas().ok_or(PlanError::NotFinite)?;
     let detectability = power::detectability(setup, &parameters, &measured, options);
     let space = options.bounds.space.clone();
-    Ok(Plan { poses, rows, parameters, sigmas, quality, rejections, detectability, space })
+    Ok(Plan { poses, rows, parameters, sigmas, quality, rejections, detectability, field, space })
 }
 
 /// Chosen poses, and the order of their rows.
@@ -205,6 +209,7 @@ struct OrderedChoice {
     poses: Vec<Candidate>,
     rows: Vec<Row>,
     quality: Quality,
+    field: Option<FieldUncertainty>,
 }
 
 /// Chooses among candidates and orders them; `None` if no clear path is found between two of them. `roadmap`: paths around obstacles.
@@ -215,22 +220,34 @@ fn choose_and_order(
     roadmap: Option<&Roadmap>,
     options: &Options,
 ) -> Result<Option<OrderedChoice>, PlanError> {
-    let visits = options.visits.with_questions(&options.questions);
+    let mut visits = options.visits.with_questions(&options.questions);
+    if options.something_else.as_ref().is_some_and(SomethingElse::is_in_time) {
+        visits.warm_up = visits.warm_up.max(options.field_poses);
+    }
     // The rows of each candidate, with the columns of the questions' effects besides the geometry.
     let still = candidate::rows(candidates);
     let jacobian = rows::reading_jacobian(setup, parameters, &still, &options.questions, options);
     let design = Design { jacobian: &jacobian, index: options.index };
-    let chosen = design.choose(options.poses).ok_or(PlanError::NotFinite)?;
+    let mut chosen = design.choose(options.poses).ok_or(PlanError::NotFinite)?;
+    let known: Vec<Joints> = candidates.iter().map(|candidate| candidate.joints).collect();
+    let field = match &options.something_else {
+        Some(unexplained) if !unexplained.is_in_time() => {
+            let design = FieldDesign::of(unexplained, &known).ok_or(PlanError::NotFinite)?;
+            let added = design.choose(options.field_poses, &chosen);
+            chosen.extend(&added);
+            Some(uncertainty(&design, &chosen, known.len(), options.seed))
+        }
+        _ => None,
+    };
     let geometry = ReadingJacobian {
         interest: Vec::new(),
         ..rows::reading_jacobian(setup, parameters, &still, &[], options)
     };
     let quality = quality(&geometry, &chosen, options).ok_or(PlanError::NotFinite)?;
     let poses: Vec<Candidate> = chosen.iter().map(|&i| candidates[i].clone()).collect();
-    let known: Vec<Joints> = candidates.iter().map(|candidate| candidate.joints).collect();
     let ways = Connections { known: &known, roadmap };
     let ordered = schedule::schedule(setup, poses, &visits, &options.bounds, &ways, options.seed);
-    Ok(ordered.map(|(poses, rows)| OrderedChoice { poses, rows, quality }))
+    Ok(ordered.map(|(poses, rows)| OrderedChoice { poses, rows, quality, field }))
 }
 
 /// The fitted parameters: links, then frames.
@@ -246,6 +263,18 @@ fn parameters(setup: &MeasurementSetup<'_>) -> Vec<Parameter> {
     }
     out.extend(frame_parameters(&empty));
     out
+}
+
+/// What is known of the field before, after the chosen poses, and after as many random ones.
+fn uncertainty(design: &FieldDesign, chosen: &[usize], candidates: usize, seed: u64) -> FieldUncertainty {
+    let mut random = ChaCha8Rng::seed_from_u64(seed ^ 0x0066_6965_6c64);
+    let mut all: Vec<usize> = (0..candidates).collect();
+    let drawn = (0..RANDOM_SETS).map(|_| {
+        all.shuffle(&mut random);
+        design.remaining_mm(&all[..chosen.len()])
+    });
+    let random_mm = drawn.sum::<f64>() / RANDOM_SETS as f64;
+    FieldUncertainty { before_mm: design.remaining_mm(&[]), after_mm: design.remaining_mm(chosen), random_mm }
 }
 
 fn quality(jacobian: &ReadingJacobian, chosen: &[usize], options: &Options) -> Option<Quality> {

@@ -6,8 +6,11 @@ use super::number::{Precision, listed};
 use super::plot::{Axis, BarGroup, Bars, Graph, Ink, Reference, Series, Span};
 use super::status::Status;
 use super::table::{Cell, Column, Table};
+use truegrind_calibration::diagnosis::decision::DIAGNOSIS_FILE;
 use truegrind_calibration::diagnosis::diagnose::Diagnosed;
-use truegrind_calibration::diagnosis::finding::{Confidence, Diagnosis, Finding, FoundParameter};
+use truegrind_calibration::diagnosis::finding::{
+    Confidence, Diagnosis, Family, Finding, FoundParameter, Member,
+};
 use truegrind_calibration::diagnosis::picture::Picture;
 use truegrind_calibration::measurement::dataset::Dataset;
 
@@ -34,8 +37,14 @@ pub fn document(found: &Diagnosed, dataset: &Dataset) -> Document {
         if !finding.sessions.is_empty() {
             page.push(sessions(finding));
         }
+        if !finding.members.is_empty() {
+            page.push(members(finding));
+        }
         if !finding.alternatives.is_empty() {
             page.push(rivals(finding));
+        }
+        if let Some(decision) = finding.decided_by.as_ref().filter(|decision| **decision != finding.remedy) {
+            page.paragraph(format!("What decides: {decision}."));
         }
         page.paragraph(format!("What to do: {}.", finding.remedy));
     }
@@ -155,14 +164,79 @@ fn causes(diagnosis: &Diagnosis) -> Vec<String> {
         .iter()
         .filter(|f| !is_sure(f))
         .filter(named)
-        .map(|f| format!("{}, {}{}", f.effect.replace('-', " "), place(f), worth(f)))
+        .map(|f| format!("{}, {}{}{}", f.effect.replace('-', " "), place(f), worth(f), in_brief(f)))
         .collect();
     if !possible.is_empty() {
         out.push(format!("Possible, but not certain: {}", possible.join("; ")));
     }
     let rest = diagnosis.findings.iter().filter(|f| !named(f));
     out.extend(rest.map(|f| sentence(&f.cause)));
+    out.extend(decisions(diagnosis));
     out
+}
+
+/// The share of each family of an uncertain finding, for one line.
+fn in_brief(finding: &Finding) -> String {
+    let of: Vec<String> = finding.members.iter().map(member).collect();
+    if of.is_empty() { String::new() } else { format!(": {}: {}", family(finding), of.join(", ")) }
+}
+
+/// A cause that cannot be told apart from others, with its share.
+fn member(member: &Member) -> String {
+    let name = member.effect.replace('-', " ");
+    let place = match (&member.joints, member.rows) {
+        (_, Some([from, to])) => format!(" in rows {from} to {to}"),
+        (Some(joints), _) => format!(" of joint {}", listed(joints)),
+        _ => String::new(),
+    };
+    let share =
+        if member.share < 0.01 { "below 1".to_owned() } else { format!("{:.0}", 100.0 * member.share) };
+    format!("{name}{place} {share} %")
+}
+
+/// The families of the members of a finding: the only one, or each with its share, largest first.
+fn family(finding: &Finding) -> String {
+    let mut shares: Vec<(Family, f64)> = Vec::new();
+    for member in &finding.members {
+        match shares.iter_mut().find(|(family, _)| *family == member.family) {
+            Some((_, share)) => *share += member.share,
+            None => shares.push((member.family, member.share)),
+        }
+    }
+    shares.sort_by(|a, b| b.1.total_cmp(&a.1));
+    match shares[..] {
+        [(family, _)] => format!("in the {}", family.words()),
+        _ => {
+            let each =
+                shares.iter().map(|(family, share)| format!("{} {:.0} %", family.words(), 100.0 * share));
+            each.collect::<Vec<_>>().join(", ")
+        }
+    }
+}
+
+/// The measurements that decide, each once, with the numbers of their findings.
+fn decisions(diagnosis: &Diagnosis) -> Vec<String> {
+    let asked = (1..).zip(&diagnosis.findings).filter_map(|(k, f)| {
+        let number: usize = k;
+        Some((format!("{number} ({})", f.effect.replace('-', " ")), f.decided_by.as_deref()?))
+    });
+    let mut out: Vec<(&str, Vec<String>)> = Vec::new();
+    for (number, decision) in asked {
+        match out.iter_mut().find(|(same, _)| *same == decision) {
+            Some((_, numbers)) => numbers.push(number),
+            None => out.push((decision, vec![number])),
+        }
+    }
+    let file = if out.iter().any(|(decision, _)| decision.contains(DIAGNOSIS_FILE)) {
+        Some(format!("{DIAGNOSIS_FILE} is what `diagnose --json {DIAGNOSIS_FILE}` writes"))
+    } else {
+        None
+    };
+    let lines = out.into_iter().map(|(decision, numbers)| {
+        let of = if numbers.len() == 1 { "finding" } else { "findings" };
+        format!("To decide {of} {}: {decision}", numbers.join(" and "))
+    });
+    lines.chain(file).collect()
 }
 
 /// Errors of the models on other measurements of the same arm.
@@ -234,6 +308,28 @@ pub fn finding_table(diagnosis: &Diagnosis) -> Table {
         "size: change of the readings, RMS over all rows. identified: better than its alternatives, significant once smooth unmodelled \
          trends are allowed for, and found again in halves of the rows."
             .to_owned(),
+    );
+    table
+}
+
+/// The causes that cannot be told apart.
+fn members(finding: &Finding) -> Table {
+    let mut table = Table::of(
+        "Causes that these rows cannot tell apart",
+        &finding.members,
+        [
+            (Column::text("family", "family"), |member| member.family.words().into()),
+            (Column::text("effect", "effect"), |member| member.effect.as_str().into()),
+            (Column::text("where", "where"), |member| match (&member.joints, member.rows) {
+                (_, Some([from, to])) => format!("rows {from} to {to}").into(),
+                (Some(joints), _) => format!("joint {}", listed(joints)).into(),
+                _ => "all rows".into(),
+            }),
+            (Column::number("share", "share", "%", 0), |member| (100.0 * member.share).into()),
+        ],
+    );
+    table.notes.push(
+        "share: probability of the cause if exactly one of these is true and each was as likely before the measurement.".to_owned(),
     );
     table
 }

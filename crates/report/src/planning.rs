@@ -149,6 +149,13 @@ fn verdict(plan: &Plan) -> Verdict {
         "predicted 1σ of a reading at any other pose: {:.3} mm after one visit to each pose, {:.3} mm after as many random poses",
         quality.reading_sigma_mm, quality.random_reading_sigma_mm
     ));
+    if let Some(field) = &plan.field {
+        reasons.push(format!(
+            "uncertainty (1σ) of the unexplained error at any other pose: {:.3} mm now, {:.3} mm after these poses, {:.3} mm after as many random \
+             ones",
+            field.before_mm, field.after_mm, field.random_mm
+        ));
+    }
     let undecided: Vec<&Detectability> = plan.detectability.iter().filter(|d| !d.is_decided()).collect();
     if !undecided.is_empty() {
         let names: Vec<String> =
@@ -260,6 +267,11 @@ pub fn json(plan: &Plan, setup: &MeasurementSetup<'_>, robot: &str) -> Value {
     json!({
         "schema": "truegrind.plan/1",
         "robot": robot,
+        "unexplained": plan.field.map(|field| json!({
+            "before_mm": field.before_mm,
+            "after_mm": field.after_mm,
+            "random_mm": field.random_mm,
+        })),
         "quality": {
             "log_det": plan.quality.log_det,
             "random_log_det": plan.quality.random_log_det,

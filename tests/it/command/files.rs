@@ -192,6 +192,7 @@ fn verbs() -> Vec<Verb> {
                 "--sensor",
                 "--poses",
                 "--for",
+                "--finding",
                 "--index",
                 "--sigma",
                 "--sigma-angle",

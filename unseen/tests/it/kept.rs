@@ -2,7 +2,9 @@
 
 use truegrind_unseen::case::{Case, Limits};
 use truegrind_unseen::score::{Marks, outcome};
+use truegrind_unseen::table::text;
 use truegrind_unseen::truth::Kind;
+use truegrind_unseen::under_test::{Written, diagnosed};
 
 /// The marks of run `run` of a kind under the seed in which these were seen.
 fn marks(kind: Kind, run: u64) -> Marks {
@@ -96,4 +98,19 @@ fn a_stand_does_not_drift_for_sure_where_links_may_grow() {
     let marks = outcome(&Case::draw(733, Kind::WarmLinks, 11, Limits::default())).marks.unwrap();
     assert_eq!(false_names(&marks), Vec::<&str>::new());
     assert!(!marks.worse()[0], "{:?}", marks.distances);
+}
+
+/// Links that warm unequally beside one growth of all: a link of 203 mm too much met the rest, its constant part went into the frames, and
+/// the verdict refused the arm. Then it is geometry alone, as `identify` fits it, and the diagnosis says so.
+#[test]
+fn an_arm_that_is_refused_beside_its_causes_is_geometry_alone() {
+    let case = Case::draw(811, Kind::WarmLinks, 6, Limits::default());
+    let marks = outcome(&case).marks.unwrap();
+    assert_eq!(marks.written, Written::Yes);
+    assert!(marks.told());
+    let [sheet, _, identified, written] = marks.distances;
+    assert_eq!(written, identified, "the same arm as identify writes");
+    assert!(written.shape < 0.1 * sheet.shape, "{:?}", marks.distances);
+    let reply = diagnosed(&text(case.sensor.kind, &case.lines(), None), case.sheet.name).unwrap();
+    assert!(reply.json().unwrap().contains("the written arm is geometry alone, as `identify` fits it"));
 }

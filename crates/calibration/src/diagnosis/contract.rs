@@ -21,6 +21,7 @@ impl Diagnosis {
             for other in &mut finding.alternatives {
                 other.rows = other.rows.map(ends);
             }
+            finding.members.iter_mut().for_each(|member| member.rows = member.rows.map(ends));
         }
         self.measure_again = self.measure_again.iter().map(at).collect();
         self

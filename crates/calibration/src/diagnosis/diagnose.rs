@@ -2,6 +2,7 @@
 
 use super::cause::Cause;
 use super::data_quality::single_angles;
+use super::decision;
 use super::discrepancy::Discrepancy;
 use super::extension::{Extended, Subject};
 use super::finding::{DiagnoseError, Diagnosis, Fits, RangeNoise, SCHEMA, Source, Stage};
@@ -22,7 +23,7 @@ use crate::identification::benefit::{Benefit, benefit};
 use crate::identification::calibration::Frames;
 use crate::identification::fit::{Fitted, Observations, frame_parameters};
 use crate::identification::identify::{
-    arm_covariance, arm_parameters_of, learned_width_uncertainty, mean_condition, parameter_table,
+    self, arm_covariance, arm_parameters_of, learned_width_uncertainty, mean_condition, parameter_table,
     with_sigma_in_region,
 };
 use crate::identification::start::count_distinct_poses;
@@ -124,7 +125,8 @@ pub fn diagnose(
     let [before, geometry, _] = search.stages;
     let stages = [before, geometry, written_stage];
     let fits = [&written, handed.as_ref().unwrap_or(&written)].map(Fitted::from);
-    let (estimated, benefit) = estimated(&context, robot, &fits, &stages, &diagnosis, &search.set_aside);
+    let with_causes = estimated(&context, robot, &fits, &stages, &diagnosis, &search.set_aside);
+    let (estimated, benefit) = or_geometry_alone(&search, with_causes, robot, &mut diagnosis.notes);
     diagnosis.verdict = Some(estimated.verdict.clone());
     let (geometric, set_aside) = (search.geometric, search.set_aside);
     Ok(Diagnosed {
@@ -148,6 +150,48 @@ fn few_poses_note(dataset: &Dataset, needed: usize) -> String {
         dataset.rows.len(),
         count_distinct_poses(dataset, usize::MAX)
     )
+}
+
+/// The written arm with its benefit; where it is refused beside causes and geometry alone is not, that, with a note.
+fn or_geometry_alone(
+    search: &Search<'_>,
+    with_causes: (Estimated, Option<Benefit>),
+    robot: &str,
+    notes: &mut Vec<String>,
+) -> (Estimated, Option<Benefit>) {
+    let verdict = &with_causes.0.verdict;
+    if verdict.status != Judgement::Fail || search.extended.causes.is_empty() {
+        return with_causes;
+    }
+    let Some(alone) = geometry_alone(&search.context, robot) else { return with_causes };
+    notes.push(format!(
+        "the written arm is geometry alone, as `identify` fits it: beside the causes the arm is refused, since {}",
+        verdict.reasons.first().map_or("it is implausible", String::as_str)
+    ));
+    alone
+}
+
+/// The arm with geometry alone as `identify` fits it, with its expected benefit; `None` if its verdict is not favourable.
+///
+/// A cause whose law is only nearly right can drive links that the rows determine through it alone: where links warm up unequally, a
+/// common growth is met by a link of another length whose constant part the frames take up.
+fn geometry_alone(context: &SearchContext<'_>, robot: &str) -> Option<(Estimated, Option<Benefit>)> {
+    let SearchContext { dataset, subject, options, .. } = context;
+    let defaults = identify::Options::default();
+    let alone = identify::Options {
+        tolerance: options.arm_tolerance,
+        seed: options.selection.seed,
+        fuse_readout: options.fuse_readout,
+        limit_rmse_mm: options.limits.rmse_mm,
+        limit_max_mm: options.limits.max_mm,
+        ..defaults
+    };
+    let share = |rows: &Dataset| split::random(rows, alone.held_out, alone.seed);
+    let done = identify::identify(dataset, robot, subject.nominal, subject.frames, &share, &alone).ok()?;
+    let favourable = matches!(done.estimated.verdict.status, Judgement::Pass | Judgement::NotEvaluated);
+    let mut estimated = done.estimated;
+    estimated.provenance.method = "diagnose".to_owned();
+    favourable.then_some((estimated, done.benefit))
 }
 
 /// The model with `causes` under the tolerances of the arm.
@@ -249,7 +293,15 @@ fn build_diagnosis(
         .collect();
     measure_again.sort_unstable();
     measure_again.dedup();
-    let (findings, pictures) = summary.findings.into_iter().map(|s| (s.finding, s.picture)).unzip();
+    let (mut findings, pictures): (Vec<_>, Vec<_>) =
+        summary.findings.into_iter().map(|s| (s.finding, s.picture)).unzip();
+    let asking = decision::Asking {
+        robot,
+        sensor: dataset.sensor,
+        frames: &search.extended.frames,
+        something_else: summary.something_else.as_ref(),
+    };
+    asking.complete(&mut findings);
     let diagnosis = Diagnosis {
         schema: SCHEMA.to_owned(),
         verdict: None,
@@ -267,6 +319,7 @@ fn build_diagnosis(
         findings,
         not_testable,
         remaining: summary.remaining,
+        something_else: summary.something_else,
         noise_model: noise.map(|n| RangeNoise {
             sigma_mm: n.sigma_mm,
             per_metre_mm: n.per_metre_mm,

@@ -51,6 +51,15 @@ impl Group {
         !matches!(self, Group::CoarseField | Group::FineField)
     }
 
+    /// Correlation length of a field (rad); `None` for a function of time.
+    pub fn length_rad(self) -> Option<f64> {
+        match self {
+            Group::CoarseField => Some(LENGTH_RAD[0]),
+            Group::FineField => Some(LENGTH_RAD[1]),
+            _ => None,
+        }
+    }
+
     /// Description that follows "as if".
     pub fn words(self) -> &'static str {
         match self {
@@ -199,6 +208,8 @@ pub struct Discrepancy {
     groups: Vec<Group>,
     /// Contribution of each nonnegligible group to the readings (mm RMS), largest first.
     pub contributions: Vec<(Group, f64)>,
+    /// Prior standard deviation of each nonnegligible group's effect on a reading (mm), by marginal likelihood.
+    pub prior_mm: Vec<(Group, f64)>,
     /// Size of the total effect on each observation (mm).
     pub effect_mm: Vec<f64>,
     /// Twice the log Bayes factor for a discrepancy.
@@ -242,6 +253,7 @@ impl Discrepancy {
             columns,
             groups: Vec::new(),
             contributions: Vec::new(),
+            prior_mm: Vec::new(),
             effect_mm,
             evidence: 0.0,
             noise: 1.0,
@@ -274,6 +286,8 @@ impl Discrepancy {
         let pure = design.pure(&columns, &projected);
         let left = &design.residual + &pure * &coefficients;
         let mut contributions = Vec::new();
+        let mut prior_mm = Vec::new();
+        let mm = typical_mm(linear);
         let (mut kept, mut groups) = (Vec::new(), Vec::new());
         let mut effect_mm = vec![0.0; linear.slopes.mm.len()];
         for ((group, range), size) in functions.groups.iter().zip(&sizes) {
@@ -286,6 +300,7 @@ impl Discrepancy {
             let lengths: Vec<f64> = linear.slopes.mm.iter().zip(part.iter()).map(|(mm, v)| mm * v).collect();
             let square: f64 = lengths.iter().map(|l| l * l).sum();
             contributions.push((*group, (square / linear.observations.max(1) as f64).sqrt()));
+            prior_mm.push((*group, size * mm));
             effect_mm.iter_mut().zip(&lengths).for_each(|(sum, l)| *sum += l);
             kept.extend(range.clone().map(|k| (k, *size)));
             groups.extend(range.clone().map(|_| *group));
@@ -312,6 +327,7 @@ impl Discrepancy {
             columns,
             groups,
             contributions,
+            prior_mm,
             effect_mm,
             evidence,
             noise,
@@ -324,6 +340,12 @@ impl Discrepancy {
     pub fn field_mm(&self) -> f64 {
         let fields = self.contributions.iter().filter(|(group, _)| !group.in_time());
         fields.map(|(_, mm)| mm * mm).sum::<f64>().sqrt()
+    }
+
+    /// Contribution of the functions of time (mm RMS).
+    pub fn time_mm(&self) -> f64 {
+        let courses = self.contributions.iter().filter(|(group, _)| group.in_time());
+        courses.map(|(_, mm)| mm * mm).sum::<f64>().sqrt()
     }
 
     /// Contribution of growth of the arm over time (mm RMS).
@@ -354,6 +376,12 @@ impl Discrepancy {
     pub fn is_significant(&self) -> bool {
         (self.evidence > SIGNIFICANT && !self.contributions.is_empty()) || self.correlation != 0.0
     }
+}
+
+/// Length of a whitened residual of 1 (mm), root mean square over the readings that are lengths.
+pub(super) fn typical_mm(linear: &Linear) -> f64 {
+    let lengths = || linear.slopes.mm.iter().filter(|mm| **mm > 0.0);
+    (lengths().map(|mm| mm * mm).sum::<f64>() / lengths().count().max(1) as f64).sqrt()
 }
 
 /// Twice the log Bayes factor from which a discrepancy is significant: a thousand to one.

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::something_else::SomethingElse;
+
 use crate::identification::identify::IdentifyError;
 use truegrind_arm::estimated::Verdict;
 use truegrind_arm::sensor::Sensor;
@@ -10,7 +12,7 @@ use truegrind_arm::sensor::Sensor;
 pub const SCHEMA: &str = "truegrind.diagnosis/1";
 
 /// Contract name of the finding that part of the residual has no cause in the catalogue.
-pub(super) const UNEXPLAINED: &str = "unexplained";
+pub const UNEXPLAINED: &str = "unexplained";
 
 /// The rows that were diagnosed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -85,6 +87,50 @@ pub struct Gain {
     pub cv_rmse_after_mm: f64,
 }
 
+/// Branches of the tree of causes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Family {
+    /// Links, springs and warmth of the arm.
+    Arm,
+    /// Gears, play and couplings.
+    Drive,
+    /// The sensor, its cable, beam or target.
+    Sensor,
+    /// What stood or hung somewhere else than was assumed: stand, target, load.
+    SetUp,
+    /// The record: time, rounding, rows.
+    Log,
+}
+
+impl Family {
+    /// Its name in sentences.
+    pub fn words(self) -> &'static str {
+        match self {
+            Family::Arm => "arm",
+            Family::Drive => "drive",
+            Family::Sensor => "sensor",
+            Family::SetUp => "set-up",
+            Family::Log => "log",
+        }
+    }
+}
+
+/// One of the causes that cannot be told apart.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Member {
+    /// Its contract name.
+    pub effect: String,
+    /// Its joints, from 1.
+    pub joints: Option<Vec<usize>>,
+    /// Its rows.
+    pub rows: Option<[usize; 2]>,
+    /// Its branch.
+    pub family: Family,
+    /// Its share of the evidence: its probability if exactly one of the members is true and each was as likely before.
+    pub share: f64,
+}
+
 /// A rival cause that was fitted in place of the finding.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Alternative {
@@ -94,6 +140,8 @@ pub struct Alternative {
     pub joints: Option<Vec<usize>>,
     /// Its rows.
     pub rows: Option<[usize; 2]>,
+    /// Its branch of the tree of causes.
+    pub family: Family,
     /// Held-out error with it in the finding's place (mm).
     pub cv_rmse_mm: f64,
     /// Twice the log Bayes factor of the finding against it.
@@ -148,6 +196,18 @@ pub struct Finding {
     /// The displacements of a set-up that changed with time.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sessions: Vec<Session>,
+    /// Its branch of the tree of causes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub family: Option<Family>,
+    /// Twice the log Bayes factor against its best rival with smooth unmodelled trends in time and pose allowed for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub margin: Option<f64>,
+    /// The causes that cannot be told apart, this one included, with their shares, largest first; empty for a sure finding.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub members: Vec<Member>,
+    /// The measurement that decides.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub decided_by: Option<String>,
     /// Rivals, best first.
     pub alternatives: Vec<Alternative>,
     /// Recommended action in the workshop.
@@ -227,6 +287,9 @@ pub struct Diagnosis {
     pub not_testable: Vec<NotTestable>,
     /// The residual that the extended model does not explain.
     pub remaining: Option<String>,
+    /// What a planner needs to know of the part that no cause explains.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub something_else: Option<SomethingElse>,
     /// Noise that grows with range.
     pub noise_model: Option<RangeNoise>,
     /// Rows to measure again, as the data set numbers them.

@@ -6,9 +6,10 @@ use rayon::prelude::*;
 use super::candidates::Scored;
 use super::catalogue::{Candidate, LoggedColumns};
 use super::cause::{Cause, MAP_KNOTS};
+use super::decision;
 use super::design::{Design, FullDesign};
 use super::extension::{Extended, Subject};
-use super::finding::{Alternative, Confidence, Finding, Gain, Step};
+use super::finding::{Alternative, Confidence, Family, Finding, Gain, Step};
 use super::held::{FoldErrors, Reduced};
 use super::picture::{Picture, picture};
 use super::score::VISIBLE;
@@ -127,6 +128,7 @@ impl FindingBuilder<'_> {
                 effect: rival.candidate.cause.name().to_owned(),
                 joints: pendant(&rival.candidate.cause.joints()),
                 rows: rival.candidate.cause.rows(),
+                family: decision::family_of(&rival.candidate.cause),
                 cv_rmse_mm: held.rmse_mm(Some((&columns, &sizes)), self.set_aside),
                 beaten_by: own.own.merit - rival.score.merit,
             }
@@ -154,6 +156,7 @@ impl FindingBuilder<'_> {
                     effect: "link-geometry".to_owned(),
                     joints: None,
                     rows: None,
+                    family: Family::Arm,
                     cv_rmse_mm: before_mm,
                     beaten_by: own.own.merit,
                 },
@@ -174,6 +177,7 @@ impl FindingBuilder<'_> {
                 effect: map.cause.name().to_owned(),
                 joints: pendant(&map.cause.joints()),
                 rows: None,
+                family: decision::family_of(&map.cause),
                 cv_rmse_mm: held.rmse_mm(Some((&map.columns(&without), &map.cause.sizes())), self.set_aside),
                 beaten_by: own.own.merit - score(&without, &map).merit,
             });
@@ -203,6 +207,10 @@ impl FindingBuilder<'_> {
             worth_mm: None,
             doubts,
             sessions: Vec::new(),
+            family: Some(decision::family_of(cause)),
+            margin: None,
+            members: Vec::new(),
+            decided_by: None,
             alternatives,
             remedy: words::remedy(cause.name()).to_owned(),
         };

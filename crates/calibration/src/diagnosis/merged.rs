@@ -75,6 +75,8 @@ pub(super) fn merge_findings(
             merged.finding.doubts.extend(first.map(|&k| confirmations[k].doubts()).unwrap_or_default());
         }
         merged.finding.worth_mm = Some(contributions.rms_mm(&merged.causes));
+        merged.finding.margin =
+            merged.causes.iter().map(|&k| confirmations[k].margin).reduce(f64::max).filter(|m| m.is_finite());
     }
     for merged in &mut findings {
         let doubts = confounding.doubts(&merged.causes);

@@ -11,7 +11,8 @@ use super::merged::{self, MergedFinding};
 use super::picture::Picture;
 use super::residual_tests::Structure;
 use super::search::{Confirmed, Search};
-use super::unexplained::Unexplained;
+use super::something_else::SomethingElse;
+use super::unexplained::{Unexplained, something_else};
 use crate::measurement::split;
 
 /// Summary of a search.
@@ -26,6 +27,8 @@ pub(super) struct Summary {
     pub(super) noise_floor: (Option<f64>, String),
     /// The unexplained residual, in a sentence.
     pub(super) remaining: Option<String>,
+    /// The same for a planner, where it is a finding.
+    pub(super) something_else: Option<SomethingElse>,
 }
 
 /// Summarises a search. `smoothed` is the held-out error without the smooth correction (mm), if there is one.
@@ -79,11 +82,14 @@ pub(super) fn summarise(
     };
     let off_mm = off_mm(&search.extended, &search.outliers);
     let empirical_mm = confounding.largest_empirical_rms_mm();
+    let unexplained_finding = unexplained.finding();
+    let something_else =
+        unexplained_finding.is_some().then(|| something_else(&searched.observed.dataset, confirmed));
     let of_the_record = [
         rounding_finding(context.dataset, prepared, subject, &search.geometric, stages),
         mismatch_finding(context.dataset, prepared, &stages[2]),
         outlier_finding(context.dataset, &search.outliers, (off_mm, empirical_mm), &stages[2]),
-        unexplained.finding(),
+        unexplained_finding,
     ];
     let without_causes = of_the_record.into_iter().flatten();
     findings.extend(without_causes.map(|finding| MergedFinding {
@@ -93,7 +99,7 @@ pub(super) fn summarise(
         doubted: Vec::new(),
     }));
     merged::rank(&mut findings);
-    Summary { findings, steps, extended, noise_floor, remaining: unexplained.sentence() }
+    Summary { findings, steps, extended, noise_floor, remaining: unexplained.sentence(), something_else }
 }
 
 /// The largest error of some rows (mm).

@@ -1,8 +1,10 @@
 //! The unexplained part of the residual: a significant discrepancy over poses or time, or noise.
 
-use super::discrepancy::Discrepancy;
+use super::discrepancy::{Discrepancy, typical_mm};
 use super::finding::{Confidence, Finding, Gain, UNEXPLAINED};
 use super::residual_tests::{Structure, is_structure};
+use super::search::Confirmed;
+use super::something_else::{Field, RemainingAt, SomethingElse};
 use super::validation::StageError;
 use super::words;
 use crate::measurement::dataset::Dataset;
@@ -114,4 +116,53 @@ impl Unexplained<'_> {
         }
         out
     }
+}
+
+/// Most poses that are handed to a planner.
+const MOST_POSES: usize = 300;
+
+/// The same for a planner, of the searched rows.
+pub(super) fn something_else(dataset: &Dataset, confirmed: &Confirmed) -> SomethingElse {
+    let (linear, discrepancy) = (&confirmed.linear, &confirmed.outcome.discrepancy);
+    let mut fields: Vec<Field> = Vec::new();
+    for (group, sigma_mm) in &discrepancy.prior_mm {
+        fields.extend(group.length_rad().map(|length_rad| Field { length_rad, sigma_mm: *sigma_mm }));
+    }
+    let times = || dataset.rows.iter().filter_map(|row| row.condition.time_h);
+    let hours = times().fold(f64::NEG_INFINITY, f64::max) - times().fold(f64::INFINITY, f64::min);
+    SomethingElse {
+        size_mm: discrepancy.rms_mm(),
+        in_time_mm: discrepancy.time_mm(),
+        over_poses_mm: discrepancy.field_mm(),
+        correlation: discrepancy.correlation,
+        hours: Some(hours).filter(|h| h.is_finite() && *h > 0.0),
+        noise_mm: discrepancy.noise * typical_mm(linear),
+        fields,
+        poses: remaining(dataset, confirmed),
+    }
+}
+
+/// The mean residual at each pose.
+fn remaining(dataset: &Dataset, confirmed: &Confirmed) -> Vec<RemainingAt> {
+    let slopes = &confirmed.linear.slopes;
+    let (per, residual) = (confirmed.linear.per, &confirmed.whole.design.residual);
+    let shown = per.min(3);
+    let count = slopes.poses.iter().max().map_or(0, |last| last + 1);
+    let mut sums: Vec<Option<(usize, usize, Vec<f64>)>> = vec![None; count];
+    for (i, &pose) in slopes.poses.iter().enumerate() {
+        let (_, readings, sum) = sums[pose].get_or_insert_with(|| (i, 0, vec![0.0; shown]));
+        *readings += 1;
+        for (k, sum) in sum.iter_mut().enumerate() {
+            *sum += residual[i * per + k] * slopes.mm[i * per + k];
+        }
+    }
+    let sums: Vec<_> = sums.into_iter().flatten().collect();
+    let stride = sums.len().div_ceil(MOST_POSES).max(1);
+    sums.into_iter()
+        .step_by(stride)
+        .map(|(row, readings, sum)| RemainingAt {
+            joints_deg: std::array::from_fn(|j| dataset.rows[row].joints[j].to_degrees()),
+            residual_mm: sum.into_iter().map(|v| v / readings as f64).collect(),
+        })
+        .collect()
 }

@@ -1,6 +1,7 @@
 //! Sentences of the findings for service technicians: cause, evidence, remedy.
 
 use super::cause::Cause;
+use super::decision;
 use super::extension::Extended;
 use super::finding::{Confidence, Finding, FoundParameter, Gain};
 use crate::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
@@ -88,6 +89,10 @@ pub(super) fn finding(
         worth_mm: None,
         doubts: Vec::new(),
         sessions: Vec::new(),
+        family: decision::family(effect),
+        margin: None,
+        members: Vec::new(),
+        decided_by: None,
         alternatives: Vec::new(),
         remedy: remedy(effect).to_owned(),
     }

@@ -7,6 +7,7 @@ mod simulator;
 #[allow(dead_code, unreachable_pub)]
 pub(crate) mod scenarios;
 mod certain;
+mod decision;
 mod doubts;
 mod found;
 mod in_doubt;

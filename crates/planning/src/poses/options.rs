@@ -3,6 +3,7 @@
 use super::candidate::Bounds;
 use super::questions::Question;
 use super::schedule::Visits;
+use truegrind_calibration::diagnosis::something_else::SomethingElse;
 use truegrind_calibration::identification::tolerance::Tolerance;
 
 /// Settings of a plan.
@@ -24,6 +25,10 @@ pub struct Options {
     pub visits: Visits,
     /// Ambiguous findings of a diagnosis.
     pub questions: Vec<Question>,
+    /// What no cause of a diagnosis explains: poses are added that tell most about it.
+    pub something_else: Option<SomethingElse>,
+    /// Number of these poses.
+    pub field_poses: usize,
     /// Non-centrality from which an effect counts as detected.
     pub decisive: f64,
     /// Seed of all random numbers.
@@ -41,9 +46,36 @@ impl Default for Options {
             bounds: Bounds::default(),
             visits: Visits::default(),
             questions: Vec::new(),
+            something_else: None,
+            field_poses: FIELD_POSES,
             decisive: 25.0,
             seed: 0,
         }
+    }
+}
+
+/// Poses or visits for what no cause explains.
+pub const FIELD_POSES: usize = 10;
+
+impl Options {
+    /// The same for `unexplained` alone: `count` poses for an error that follows the pose, without repeats; as many visits of one pose for an error
+    /// that follows time, over as long a time as was measured before.
+    pub fn for_something_else(self, unexplained: SomethingElse, count: usize) -> Self {
+        let mut visits = Visits { repeats: 0, both_sides: 0, warm_up: 0, ..self.visits };
+        if !unexplained.is_in_time() {
+            return Self {
+                poses: 0,
+                field_poses: count,
+                something_else: Some(unexplained),
+                visits,
+                questions: Vec::new(),
+                ..self
+            };
+        }
+        visits.warm_up = count;
+        let seconds = unexplained.hours.map(|hours| 3600.0 * hours / count.saturating_sub(1).max(1) as f64);
+        visits.seconds_per_row = seconds.unwrap_or(0.0).max(visits.seconds_per_row);
+        Self { poses: 1, field_poses: 0, something_else: None, visits, questions: Vec::new(), ..self }
     }
 }
 

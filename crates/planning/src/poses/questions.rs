@@ -15,7 +15,8 @@ use truegrind_arm::effect::gear_ratio::GearRatio;
 use truegrind_arm::effect::harmonic::Harmonic;
 use truegrind_arm::effect::thermal::Thermal;
 use truegrind_arm::parameter::Parameter;
-use truegrind_calibration::diagnosis::finding::{Confidence, SCHEMA};
+use truegrind_calibration::diagnosis::finding::{Confidence, SCHEMA, UNEXPLAINED};
+use truegrind_calibration::diagnosis::something_else::SomethingElse;
 
 /// A candidate cause.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -45,6 +46,16 @@ pub enum DiagnosisFileError {
     Schema {
         /// Stated schema.
         found: String,
+    },
+    /// No open finding has the number.
+    #[error(
+        "finding {number} is no open one: expected the number of an ambiguous finding, as the report counts ({open})"
+    )]
+    Finding {
+        /// The stated number.
+        number: usize,
+        /// The open ones, in words.
+        open: String,
     },
 }
 
@@ -76,6 +87,9 @@ impl FramePart {
 struct File {
     findings: Vec<Finding>,
     not_testable: Vec<Named>,
+    // Only where part of the residual has no cause; unknown to older files.
+    #[serde(default)]
+    something_else: Option<SomethingElse>,
 }
 
 #[derive(Deserialize)]
@@ -106,7 +120,62 @@ fn cause(effect: &str, joints: Option<&Vec<usize>>) -> Result<CandidateCause, Di
     Ok(CandidateCause { effect: effect.to_owned(), joints: joints.collect::<Result<_, _>>()? })
 }
 
-/// The open questions of a diagnosis: ambiguous findings with their alternatives, and effects that were not testable.
+/// What a diagnosis left open.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Open {
+    /// Causes to tell apart.
+    pub questions: Vec<Question>,
+    /// What no cause explains.
+    pub something_else: Option<SomethingElse>,
+}
+
+/// What a diagnosis left open: everything, or only the finding with a number (from 1, as the report counts).
+///
+/// # Errors
+/// [`DiagnosisFileError`] if the text is not a diagnosis, or if that finding is not open.
+pub fn open(text: &str, number: Option<usize>) -> Result<Open, DiagnosisFileError> {
+    let File { findings, something_else, .. } = file(text)?;
+    let unexplained = |finding: &Finding| finding.effect == UNEXPLAINED && something_else.is_some();
+    let Some(number) = number else {
+        return Ok(Open { questions: questions(text)?, something_else });
+    };
+    let is_open = |finding: &Finding| finding.confidence == Confidence::Ambiguous;
+    let Some(finding) = number.checked_sub(1).and_then(|k| findings.get(k)).filter(|f| is_open(f)) else {
+        let open: Vec<String> = (1..)
+            .zip(&findings)
+            .filter(|(_, finding)| is_open(finding))
+            .map(|(k, finding)| format!("{k}: {}", finding.effect))
+            .collect();
+        let open = if open.is_empty() { "none is open".to_owned() } else { open.join(", ") };
+        return Err(DiagnosisFileError::Finding { number, open });
+    };
+    if unexplained(finding) {
+        return Ok(Open { questions: Vec::new(), something_else });
+    }
+    Ok(Open { questions: vec![finding.question()?], something_else: None })
+}
+
+impl Finding {
+    /// The finding and its alternatives.
+    fn question(&self) -> Result<Question, DiagnosisFileError> {
+        let first = cause(&self.effect, self.joints.as_ref())?;
+        let others = self.alternatives.iter().map(|other| cause(&other.effect, other.joints.as_ref()));
+        let others = others.collect::<Result<Vec<_>, _>>()?;
+        Ok(Question { causes: std::iter::once(first).chain(others).collect() })
+    }
+}
+
+/// The keys of a diagnosis.
+fn file(text: &str) -> Result<File, DiagnosisFileError> {
+    let fault = |error: serde_json::Error| DiagnosisFileError::Syntax(error.to_string());
+    let Kind { schema } = serde_json::from_str(text).map_err(fault)?;
+    if schema != SCHEMA {
+        return Err(DiagnosisFileError::Schema { found: schema });
+    }
+    serde_json::from_str(text).map_err(fault)
+}
+
+/// The causes that a diagnosis left open: ambiguous findings with their alternatives, and effects that were not testable.
 ///
 /// ```
 /// use truegrind_planning::poses::questions::{DiagnosisFileError, questions};
@@ -126,24 +195,17 @@ fn cause(effect: &str, joints: Option<&Vec<usize>>) -> Result<CandidateCause, Di
 /// # Errors
 /// [`DiagnosisFileError`] if the text is not a diagnosis.
 pub fn questions(text: &str) -> Result<Vec<Question>, DiagnosisFileError> {
-    let fault = |error: serde_json::Error| DiagnosisFileError::Syntax(error.to_string());
-    let Kind { schema } = serde_json::from_str(text).map_err(fault)?;
-    if schema != SCHEMA {
-        return Err(DiagnosisFileError::Schema { found: schema });
-    }
-    let file: File = serde_json::from_str(text).map_err(fault)?;
-    let of = |named: &Named| cause(&named.effect, named.joints.as_ref());
+    let file = file(text)?;
     let mut out = Vec::new();
     for finding in &file.findings {
         // An unambiguous finding is no question, but must be valid.
-        let first = cause(&finding.effect, finding.joints.as_ref())?;
-        let others = finding.alternatives.iter().map(of).collect::<Result<Vec<_>, _>>()?;
-        if finding.confidence == Confidence::Ambiguous {
-            out.push(Question { causes: std::iter::once(first).chain(others).collect() });
+        let question = finding.question()?;
+        if finding.confidence == Confidence::Ambiguous && finding.effect != UNEXPLAINED {
+            out.push(question);
         }
     }
     for untested in &file.not_testable {
-        out.push(Question { causes: vec![of(untested)?] });
+        out.push(Question { causes: vec![cause(&untested.effect, untested.joints.as_ref())?] });
     }
     Ok(out)
 }

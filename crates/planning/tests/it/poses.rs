@@ -8,15 +8,18 @@ use truegrind_arm::condition::Condition;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::inverse::Inverse;
 use truegrind_arm::model::{Joints, Model};
+use truegrind_calibration::diagnosis::decision::DECIDED_BY_POSES;
+use truegrind_calibration::diagnosis::diagnose::{self, diagnose};
+use truegrind_calibration::diagnosis::something_else::{Field, RemainingAt, SomethingElse};
 use truegrind_calibration::identification::calibration::{CalibrationProblem, Frames, Weight};
 use truegrind_calibration::identification::tolerance::Tolerance;
 use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row, Sensor};
 use truegrind_estimation::least_squares::lm;
 use truegrind_planning::poses::cable::{clearance_mm, segment_distance};
-use truegrind_planning::poses::candidate::Bounds;
+use truegrind_planning::poses::candidate::{Bounds, draw};
 use truegrind_planning::poses::design::{Design, Index};
 use truegrind_planning::poses::program::{ProgramSettings, draft};
-use truegrind_planning::poses::questions::{CandidateCause, effects_of, questions};
+use truegrind_planning::poses::questions::{CandidateCause, DiagnosisFileError, effects_of, open, questions};
 use truegrind_planning::poses::rows::{Noise, ReadingJacobian, rig};
 use truegrind_planning::poses::schedule::Purpose;
 use truegrind_planning::poses::{MeasurementSetup, Options, Plan, PlanError, plan};
@@ -445,4 +448,180 @@ fn a_pose_target_reads_what_it_should() {
     let Some(Reading::Pose(pose)) = rig(&setup).predict(&flange, 0) else { panic!("no pose") };
     let back = frames.base_from_sensor * *pose * frames.flange_from_target.inverse();
     assert!((back.translation.vector - flange.translation.vector).norm() < 1e-9);
+}
+
+/// An error that follows the pose by a law that the catalogue has not (mm, in the base).
+fn push(q: &Joints) -> Vector3<f64> {
+    Vector3::new(
+        0.25 * (1.1 * q[0] + 0.9 * q[1]).sin(),
+        0.2 * (0.8 * q[1] - q[2] + 0.5 * q[3]).sin(),
+        0.25 * (0.9 * q[2] + 0.9 * q[0] - 0.6 * q[4]).cos(),
+    )
+}
+
+/// What a tracker reads of it, without noise.
+fn pushed(q: &Joints) -> Vector3<f64> {
+    let frames = tracker();
+    let target = nalgebra::Point3::from(frames.flange_from_target.translation.vector);
+    let at = nominal().forward(q, &Condition::default()) * target;
+    (frames.base_from_sensor.inverse() * (at + push(q))).coords
+}
+
+/// Root mean square error of the field at `fresh` poses, predicted from the readings at `known` (mm).
+fn prediction_error_mm(
+    unexplained: &SomethingElse,
+    known: &[Joints],
+    fresh: &[Joints],
+    remaining: &dyn Fn(&Joints) -> Vector3<f64>,
+) -> f64 {
+    let covariance = |p: &Joints, q: &Joints| {
+        let square: f64 = (0..5).map(|j| (p[j] - q[j]).powi(2)).sum();
+        let of = |f: &Field| f.sigma_mm.powi(2) * (-square / (2.0 * f.length_rad.powi(2))).exp();
+        unexplained.fields.iter().map(of).sum::<f64>()
+    };
+    let mut own = DMatrix::from_fn(known.len(), known.len(), |i, j| covariance(&known[i], &known[j]));
+    (0..known.len()).for_each(|i| own[(i, i)] += unexplained.noise_mm.powi(2));
+    let read = DMatrix::from_fn(known.len(), 3, |i, k| remaining(&known[i])[k]);
+    let weights = own.cholesky().unwrap().solve(&read);
+    let errors = fresh.iter().map(|q| {
+        let shared = DMatrix::from_fn(1, known.len(), |_, i| covariance(q, &known[i]));
+        (shared * &weights - remaining(q).transpose()).norm_squared()
+    });
+    (errors.sum::<f64>() / fresh.len() as f64).sqrt()
+}
+
+/// Something that no cause explains is found, the diagnosis says how to plan ten poses for it, and readings there tell more of it than
+/// readings at ten random poses.
+#[test]
+fn ten_poses_for_what_no_cause_explains_tell_more_than_ten_random_ones() {
+    let (frames, nominal) = (tracker(), nominal());
+    let mut random = ChaCha8Rng::seed_from_u64(41);
+    let mut rows = Vec::new();
+    for number in 0..220 {
+        let centre = [0.0, 0.2, -0.3, 0.0, 0.7, 0.0];
+        let q = Joints::from_fn(|j, _| centre[j] + random.random_range(-0.9..0.9));
+        let noise = Vector3::from_fn(|_, _| {
+            0.02 * (random.random_range(-1.0..1.0_f64) + random.random_range(-1.0..1.0))
+        });
+        rows.push(Row::new(number, q, Reading::Position(pushed(&q) + noise)));
+    }
+    let dataset = Dataset::new("pushed.csv", Sensor::Position, rows);
+    // Without causes that follow it nearly: what is left is the whole of it.
+    let mut options = diagnose::Options::default();
+    options.selection.most = 0;
+    let found = diagnose(&dataset, "abb-irb-120", &nominal, &frames, &options, &|_| {}).unwrap();
+    let findings = &found.diagnosis.findings;
+    let number = 1 + findings.iter().position(|f| f.effect == "unexplained").unwrap();
+    let command = format!(
+        "truegrind plan --robot abb-irb-120 --sensor position --for DIAGNOSIS.json --finding {number}"
+    );
+    assert!(findings[number - 1].remedy.contains(&command), "{}", findings[number - 1].remedy);
+    let text = serde_json::to_string(&found.diagnosis.clone().with_rows_from_0(&dataset)).unwrap();
+    let asked = open(&text, Some(number)).unwrap();
+    assert!(asked.questions.is_empty());
+    let unexplained = asked.something_else.unwrap();
+    assert!(!unexplained.is_in_time(), "{unexplained:?}");
+    // What is handed on is what was read, to within the noise and what another fit of the links takes.
+    let remaining = |q: &Joints| {
+        let at = found.extended.model.forward(q, &Condition::default())
+            * nalgebra::Point3::from(found.extended.frames.flange_from_target.translation.vector);
+        pushed(q) - (found.extended.frames.base_from_sensor.inverse() * at).coords
+    };
+    let off = unexplained.poses.iter().map(|pose| {
+        let q = Joints::from_fn(|j, _| pose.joints_deg[j].to_radians());
+        (Vector3::from_column_slice(&pose.residual_mm) - remaining(&q)).norm_squared()
+    });
+    let off = (off.sum::<f64>() / unexplained.poses.len() as f64).sqrt();
+    assert!(off < 0.06 && off < 0.7 * unexplained.size_mm, "{off:.3} of {:.3}", unexplained.size_mm);
+    let alone = small().for_something_else(unexplained.clone(), 10);
+    let plan = planned(Sensor::Position, &frames, &alone);
+    assert_eq!((plan.poses.len(), plan.rows.len()), (10, 10));
+    let told = plan.field.unwrap();
+    assert!(told.after_mm < told.random_mm && told.random_mm < told.before_mm, "{told:?}");
+    // Measured: the error at poses that neither saw.
+    let setup = MeasurementSetup { nominal: &nominal, sensor: Sensor::Position, frames: &frames };
+    let places = |count: usize, seed: u64| -> Vec<Joints> {
+        draw(&setup, &alone.bounds, count, seed).0.iter().map(|candidate| candidate.joints).collect()
+    };
+    let before: Vec<Joints> = dataset.rows.iter().map(|row| row.joints).collect();
+    let fresh = places(400, 7);
+    let after =
+        |added: &[Joints]| prediction_error_mm(&unexplained, &[&before, added].concat(), &fresh, &remaining);
+    let chosen: Vec<Joints> = plan.poses.iter().map(|candidate| candidate.joints).collect();
+    let drawn = places(200, 8);
+    let others: Vec<f64> = drawn.chunks_exact(10).map(after).collect();
+    let mean = others.iter().sum::<f64>() / others.len() as f64;
+    let (ten, none) = (after(&chosen), after(&[]));
+    assert!(ten < mean && mean < none, "{none:.4} mm before, {ten:.4} after ten, {mean:.4} after ten random");
+}
+
+fn unexplained_in_time() -> SomethingElse {
+    SomethingElse {
+        size_mm: 0.1,
+        in_time_mm: 0.09,
+        over_poses_mm: 0.03,
+        correlation: 0.0,
+        hours: Some(1.5),
+        noise_mm: 0.02,
+        fields: vec![Field { length_rad: 1.2, sigma_mm: 0.03 }],
+        poses: vec![RemainingAt { joints_deg: [0.0; 6], residual_mm: vec![0.1] }],
+    }
+}
+
+/// What follows time is decided by one pose, read ten times over as long as before; beside other questions it is visited ten times.
+#[test]
+fn an_error_that_follows_time_asks_for_one_pose_again_and_again() {
+    let plan = planned(Sensor::Cable, &cable(), &small().for_something_else(unexplained_in_time(), 10));
+    assert_eq!((plan.poses.len(), plan.rows.len()), (1, 10));
+    let hours = plan.rows[9].time_h - plan.rows[0].time_h;
+    assert!((hours - 1.5).abs() < 1e-9, "{hours}");
+    let visits = truegrind_planning::poses::schedule::Visits { warm_up: 2, ..small().visits };
+    let options = Options { something_else: Some(unexplained_in_time()), visits, ..small() };
+    let plan = planned(Sensor::Cable, &cable(), &options);
+    let again = plan.rows.iter().filter(|row| row.purpose == Purpose::WarmUp).count();
+    assert_eq!(again, 9, "ten visits, of which the first is for the geometry");
+}
+
+#[test]
+fn a_finding_is_planned_for_by_its_number() {
+    let unexplained = serde_json::to_string(&unexplained_in_time()).unwrap();
+    let text = format!(
+        r#"{{"schema": "truegrind.diagnosis/1", "findings": [
+        {{"effect": "gear-ratio", "joints": [4], "confidence": "identified", "alternatives": []}},
+        {{"effect": "backlash", "joints": [2], "confidence": "ambiguous", "alternatives": []}},
+        {{"effect": "unexplained", "confidence": "ambiguous", "alternatives": []}}],
+        "not_testable": [{{"effect": "sensor-scale"}}], "something_else": {unexplained}}}"#
+    );
+    let all = open(&text, None).unwrap();
+    assert_eq!(
+        all.questions.len(),
+        2,
+        "the unexplained error is no question between causes: {:?}",
+        all.questions
+    );
+    assert_eq!(all.something_else, Some(unexplained_in_time()));
+    let second = open(&text, Some(2)).unwrap();
+    assert_eq!((second.questions.len(), second.something_else), (1, None));
+    assert_eq!(second.questions[0].causes[0].effect, "backlash");
+    let third = open(&text, Some(3)).unwrap();
+    assert!(third.questions.is_empty() && third.something_else.is_some());
+    for number in [0, 1, 4] {
+        let error = open(&text, Some(number)).unwrap_err();
+        assert!(matches!(error, DiagnosisFileError::Finding { .. }), "{error}");
+        assert!(error.to_string().contains("2: backlash, 3: unexplained"), "{error}");
+    }
+}
+
+/// A diagnosis sends to `plan` only those whose question `plan` has an answer for.
+#[test]
+fn what_poses_are_said_to_decide_changes_the_plan() {
+    for effect in DECIDED_BY_POSES {
+        let cause = CandidateCause { effect: effect.to_owned(), joints: Vec::new() };
+        let by_pose = !effects_of(&cause).is_empty();
+        let question = truegrind_planning::poses::questions::Question { causes: vec![cause] };
+        let options = Options { questions: vec![question], ..small() };
+        let (asked, plain) =
+            (planned(Sensor::Cable, &cable(), &options), planned(Sensor::Cable, &cable(), &small()));
+        assert_ne!(asked.rows, plain.rows, "{effect}, {by_pose}");
+    }
 }

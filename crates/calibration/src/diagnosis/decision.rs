@@ -1,0 +1,207 @@
+//! Causes that cannot be told apart: their branch of the tree of causes, their shares, and the measurement that decides.
+//!
+//! The share of a member is its marginal likelihood over the sum of all: with b the finding's own 2 ln Bayes factor against a rival, the
+//! rival's weight is exp(−b/2), the finding's 1 (Kass and Raftery 1995, equation 1, equal prior odds). Evidence is too sure where no
+//! cause is quite right (Yang and Zhu 2018): where the best rival comes nearer once smooth unmodelled trends are allowed for, all rivals do by
+//! as much.
+
+use super::cause::Cause;
+use super::finding::{Confidence, Family, Finding, Member, UNEXPLAINED};
+use super::something_else::SomethingElse;
+use crate::identification::calibration::Frames;
+use crate::measurement::dataset::Sensor;
+
+/// The file of a diagnosis in commands.
+pub const DIAGNOSIS_FILE: &str = "DIAGNOSIS.json";
+
+/// Share below which a rival is beaten and not listed.
+const LEAST_SHARE: f64 = 0.01;
+
+/// Effects that poses, repeats, both sides of approach or visits over time decide: those that `plan` has questions for.
+pub const DECIDED_BY_POSES: [&str; 9] = [
+    "joint-compliance",
+    "gear-eccentricity",
+    "gear-ratio",
+    "joint-coupling",
+    "backlash",
+    "thermal-drift",
+    "sensor-zero-shift",
+    "sensor-frame-shift",
+    "tool-shift",
+];
+
+/// The branch of a contract name; of a thermal drift the arm's.
+pub(super) fn family(effect: &str) -> Option<Family> {
+    Some(match effect {
+        "link-geometry" | "joint-compliance" | "joint-stiffness" | "thermal-drift" | "smooth-correction" => {
+            Family::Arm
+        }
+        "gear-eccentricity" | "gear-transmission" | "gear-ratio" | "gear-two-joints" | "joint-coupling"
+        | "backlash" => Family::Drive,
+        "sensor-scale" | "cable-sag" | "cable-pulley" | "cable-drum" | "air-refraction" | "target-nest" => {
+            Family::Sensor
+        }
+        "sensor-zero-shift" | "sensor-frame-shift" | "tool-shift" | "payload-change" | "setup-change" => {
+            Family::SetUp
+        }
+        "latency" | "unsettled" | "angle-rounding" | "readout-mismatch" | "outliers" => Family::Log,
+        _ => return None,
+    })
+}
+
+/// The branch of a cause.
+pub(super) fn family_of(cause: &Cause) -> Family {
+    match cause {
+        // Its stand, not the arm, follows the temperature.
+        Cause::Measurement(_) if cause.is_thermal() => Family::SetUp,
+        Cause::Arm(_) => family(cause.name()).unwrap_or(Family::Arm),
+        Cause::Measurement(_) => family(cause.name()).unwrap_or(Family::Sensor),
+    }
+}
+
+/// The finding and those of its rivals that have a share, largest first; empty if none has.
+pub fn members(finding: &Finding) -> Vec<Member> {
+    let Some(own) = finding.family else { return Vec::new() };
+    let mut out = vec![Member {
+        effect: finding.effect.clone(),
+        joints: finding.joints.clone(),
+        rows: finding.rows,
+        family: own,
+        share: 0.0,
+    }];
+    let mut logs = vec![0.0];
+    let least = finding.alternatives.iter().map(|rival| rival.beaten_by).fold(f64::INFINITY, f64::min);
+    let nearer = finding.margin.map_or(0.0, |margin| (least - margin).max(0.0));
+    for rival in &finding.alternatives {
+        let same = |m: &Member| {
+            (&m.effect, &m.joints, m.rows, m.family)
+                == (&rival.effect, &rival.joints, rival.rows, rival.family)
+        };
+        // The same name twice is one member in two variants: the better one counts.
+        let log = -0.5 * (rival.beaten_by - nearer);
+        if let Some(place) = out.iter().position(same) {
+            logs[place] = f64::max(logs[place], log);
+            continue;
+        }
+        logs.push(log);
+        out.push(Member {
+            effect: rival.effect.clone(),
+            joints: rival.joints.clone(),
+            rows: rival.rows,
+            family: rival.family,
+            share: 0.0,
+        });
+    }
+    let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let total: f64 = logs.iter().map(|log| (log - most).exp()).sum();
+    out.iter_mut().zip(&logs).for_each(|(member, log)| member.share = (log - most).exp() / total);
+    let named = (out[0].effect.clone(), out[0].joints.clone(), out[0].family);
+    let is_named = |m: &Member| (&m.effect, &m.joints, m.family) == (&named.0, &named.1, named.2);
+    out.retain(|member| member.share >= LEAST_SHARE || is_named(member));
+    out.sort_by(|a, b| b.share.total_cmp(&a.share));
+    let kept: f64 = out.iter().map(|member| member.share).sum();
+    out.iter_mut().for_each(|member| member.share /= kept);
+    if out.len() < 2 { Vec::new() } else { out }
+}
+
+/// The measurement that tells an effect from others where no plan of poses can; what to look for in it.
+fn in_words(effect: &str) -> Option<&'static str> {
+    Some(match effect {
+        "sensor-scale" => {
+            "measure a known length with the sensor (a scale bar): if it is read wrong, the sensor's scale is the cause"
+        }
+        "cable-sag" | "cable-pulley" | "cable-drum" => {
+            "move the cable's outlet to another place and measure again (`diagnose --also`): what follows the cable and not the pose is the \
+             sensor"
+        }
+        "air-refraction" => {
+            "measure the same ten poses at dawn and at noon, or from half the distance: what changes is the air"
+        }
+        "target-nest" => {
+            "measure the same ten poses with the reflector turned by 90° in its nest: what changes is the target"
+        }
+        "joint-stiffness" => {
+            "measure the same ten poses with and without a load: what changes is the stiffness"
+        }
+        "payload-change" => "weigh the tool, and measure the same ten poses with and without it",
+        "gear-two-joints" | "gear-transmission" => {
+            "turn each of these joints alone through its whole range in steps of a few degrees, and read at each: what returns with the angle \
+             is the gear"
+        }
+        "latency" => "measure the same ten poses once at rest and once in motion: what changes is the clock",
+        "unsettled" => {
+            "measure the same ten poses again with twice the wait before each reading: what changes had not settled"
+        }
+        _ => return None,
+    })
+}
+
+/// What the sentence of a decision needs.
+pub(super) struct Asking<'a> {
+    pub(super) robot: &'a str,
+    pub(super) sensor: Sensor,
+    pub(super) frames: &'a Frames,
+    pub(super) something_else: Option<&'a SomethingElse>,
+}
+
+impl Asking<'_> {
+    /// Adds members and decisions to the findings, which are in their final order.
+    pub(super) fn complete(&self, findings: &mut [Finding]) {
+        for (k, finding) in findings.iter_mut().enumerate() {
+            if finding.confidence == Confidence::Identified {
+                continue;
+            }
+            finding.members = members(finding);
+            finding.decided_by = self.decision(finding, k + 1);
+            if finding.effect == UNEXPLAINED
+                && let Some(decision) = &finding.decided_by
+            {
+                finding.remedy = decision.clone();
+            }
+        }
+    }
+
+    fn decision(&self, finding: &Finding, number: usize) -> Option<String> {
+        let plan = || self.command(number);
+        if finding.effect == UNEXPLAINED {
+            let something = self.something_else?;
+            return Some(if something.is_in_time() {
+                format!("measure one pose ten times, spread over as long a time as before: `{}`", plan())
+            } else {
+                format!("measure the ten poses that tell most about it: `{}`", plan())
+            });
+        }
+        // Sums of small things and tables of sessions have no part to decide on.
+        finding.family?;
+        finding.non_centrality?;
+        let own = [finding.effect.as_str()];
+        let named: Vec<&str> = if finding.members.is_empty() {
+            own.to_vec()
+        } else {
+            finding.members.iter().map(|member| member.effect.as_str()).collect()
+        };
+        let by_words = named.iter().find_map(|effect| in_words(effect));
+        let by_poses = named.iter().any(|effect| DECIDED_BY_POSES.contains(effect));
+        match by_words {
+            Some(words) => Some(words.to_owned()),
+            None => by_poses.then(|| format!("measure the poses of `{}`", plan())),
+        }
+    }
+
+    /// The command line that plans the poses of a finding.
+    fn command(&self, number: usize) -> String {
+        let sensor = match self.sensor {
+            Sensor::Cable => "cable",
+            Sensor::Position => "position",
+            Sensor::Pose => "pose",
+        };
+        let mut out = format!("truegrind plan --robot {} --sensor {sensor}", self.robot);
+        if self.sensor == Sensor::Cable {
+            for outlet in &self.frames.outlets_mm {
+                out.push_str(&format!(" --outlet {:.0},{:.0},{:.0}", outlet.x, outlet.y, outlet.z));
+            }
+        }
+        out.push_str(&format!(" --for {DIAGNOSIS_FILE} --finding {number} -o POSES.mod"));
+        out
+    }
+}
