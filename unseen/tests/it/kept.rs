@@ -109,7 +109,15 @@ fn an_arm_that_is_refused_beside_its_causes_is_geometry_alone() {
     assert_eq!(marks.written, Written::Yes);
     assert!(marks.told());
     let [sheet, _, identified, written] = marks.distances;
-    assert_eq!(written, identified, "the same arm as identify writes");
+    // The same arm, but for the rounding of a model file's degrees.
+    assert!(
+        (written.as_is - identified.as_is).abs() < 1e-12 * identified.as_is,
+        "{written:?} {identified:?}"
+    );
+    assert!(
+        (written.shape - identified.shape).abs() < 1e-12 * identified.shape,
+        "{written:?} {identified:?}"
+    );
     assert!(written.shape < 0.1 * sheet.shape, "{:?}", marks.distances);
     let reply = diagnosed(&text(case.sensor.kind, &case.lines(), None), case.sheet.name).unwrap();
     assert!(reply.json().unwrap().contains("the written arm is geometry alone, as `identify` fits it"));
