@@ -23,17 +23,19 @@ use crate::identification::benefit::{Benefit, benefit};
 use crate::identification::calibration::Frames;
 use crate::identification::fit::{Fitted, Observations, frame_parameters};
 use crate::identification::identify::{
-    self, arm_covariance, arm_parameters_of, learned_width_uncertainty, mean_condition, parameter_table,
-    with_sigma_in_region,
+    self, Identification, arm_covariance, arm_parameters_of, learned_width_uncertainty, mean_condition,
+    parameter_table, with_sigma_in_region,
 };
 use crate::identification::start::count_distinct_poses;
 use crate::identification::verdict::VerdictBuilder;
 use crate::measurement::dataset::{Dataset, Sensor};
 use crate::measurement::split;
+use nalgebra::DMatrix;
 use truegrind_arm::estimated::{Estimated, EstimatedParameter, Judgement, Provenance, StageErrors, Verdict};
 use truegrind_arm::model::Model;
 use truegrind_arm::parameter::arm_parameters;
 use truegrind_arm::region::Region;
+use truegrind_estimation::estimate::Estimate;
 use truegrind_estimation::problem::Problem;
 
 /// A diagnosis with its fits.
@@ -113,6 +115,7 @@ pub fn diagnose(
     let of_all = thin_rows.is_none().then_some(&confirmed.outcome.discrepancy);
     let certain_model = certain_model(&search, &certain, of_all);
     let ((written, written_stage), chance) = without_measurement_causes(&search, certain_model, of_all);
+    let written = if written.causes.is_empty() { as_identified(&context, robot, written) } else { written };
     diagnosis.notes.extend(chance.map(|chance| {
         format!(
             "the written arm is fitted without the causes of the measurement: with them it would be worse with a probability of {:.0} %, \
@@ -176,6 +179,15 @@ fn or_geometry_alone(
 /// A cause whose law is only nearly right can drive links that the rows determine through it alone: where links warm up unequally, a
 /// common growth is met by a link of another length whose constant part the frames take up.
 fn geometry_alone(context: &SearchContext<'_>, robot: &str) -> Option<(Estimated, Option<Benefit>)> {
+    let done = identified(context, robot)?;
+    let favourable = matches!(done.estimated.verdict.status, Judgement::Pass | Judgement::NotEvaluated);
+    let mut estimated = done.estimated;
+    estimated.provenance.method = "diagnose".to_owned();
+    favourable.then_some((estimated, done.benefit))
+}
+
+/// The same rows identified, with the options of the diagnosis.
+fn identified(context: &SearchContext<'_>, robot: &str) -> Option<Identification> {
     let SearchContext { dataset, subject, options, .. } = context;
     let defaults = identify::Options::default();
     let alone = identify::Options {
@@ -187,11 +199,25 @@ fn geometry_alone(context: &SearchContext<'_>, robot: &str) -> Option<(Estimated
         ..defaults
     };
     let share = |rows: &Dataset| split::random(rows, alone.held_out, alone.seed);
-    let done = identify::identify(dataset, robot, subject.nominal, subject.frames, &share, &alone).ok()?;
-    let favourable = matches!(done.estimated.verdict.status, Judgement::Pass | Judgement::NotEvaluated);
-    let mut estimated = done.estimated;
-    estimated.provenance.method = "diagnose".to_owned();
-    favourable.then_some((estimated, done.benefit))
+    identify::identify(dataset, robot, subject.nominal, subject.frames, &share, &alone).ok()
+}
+
+/// A written arm without causes, with the estimate of `identify`: what names nothing should not write another geometry. `written`
+/// where that fit has other parameters or failed.
+fn as_identified(context: &SearchContext<'_>, robot: &str, written: Extended) -> Extended {
+    let Some(Fitted { parameters, priors, estimate, model, frames, .. }) =
+        identified(context, robot).map(|done| done.geometry)
+    else {
+        return written;
+    };
+    let places: Option<Vec<usize>> =
+        written.parameters.iter().map(|p| parameters.iter().position(|q| q == p)).collect();
+    let (Some(places), Some(own)) = (places, &estimate.covariance) else { return written };
+    let covariance = DMatrix::from_fn(places.len(), places.len(), |a, b| own[(places[a], places[b])]);
+    let x: Vec<f64> = places.iter().map(|&k| estimate.x[k]).collect();
+    let priors = places.iter().map(|&k| priors[k]).collect();
+    let estimate = Estimate { x: x.clone(), covariance: Some(covariance), ..estimate };
+    Extended { priors, x, model, frames, estimate, ..written }
 }
 
 /// The model with `causes` under the tolerances of the arm.
