@@ -183,9 +183,12 @@ fn in_brief(finding: &Finding) -> String {
 
 /// A cause that cannot be told apart from others, with its share.
 fn member(member: &Member) -> String {
-    let name = member.effect.replace('-', " ");
+    let words = member.effect.replace('-', " ");
+    // "gear two joints of joints 2 and 3" says it twice.
+    let name = words.strip_suffix(" two joints").unwrap_or(&words);
     let place = match (&member.joints, member.rows) {
         (_, Some([from, to])) => format!(" in rows {from} to {to}"),
+        (Some(joints), _) if joints.len() == 2 => format!(" of joints {} and {}", joints[0], joints[1]),
         (Some(joints), _) => format!(" of joint {}", listed(joints)),
         _ => String::new(),
     };
@@ -227,11 +230,9 @@ fn decisions(diagnosis: &Diagnosis) -> Vec<String> {
             None => out.push((decision, vec![number])),
         }
     }
-    let file = if out.iter().any(|(decision, _)| decision.contains(DIAGNOSIS_FILE)) {
-        Some(format!("{DIAGNOSIS_FILE} is what `diagnose --json {DIAGNOSIS_FILE}` writes"))
-    } else {
-        None
-    };
+    let names_file = out.iter().any(|(decision, _)| decision.contains(DIAGNOSIS_FILE));
+    let file =
+        names_file.then(|| format!("{DIAGNOSIS_FILE} is what `diagnose --json {DIAGNOSIS_FILE}` writes"));
     let lines = out.into_iter().map(|(decision, numbers)| {
         let of = if numbers.len() == 1 { "finding" } else { "findings" };
         format!("To decide {of} {}: {decision}", numbers.join(" and "))
