@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::cause::{Cause, MAP_KNOTS, parallel_neighbours};
 use super::design::Design;
 use super::extension::Subject;
-use crate::identification::calibration::{Frames, joint_rotations, sensor_shifts};
+use crate::identification::calibration::{Frames, LoadedRows, joint_rotations, sensor_shifts};
 use crate::measurement::dataset::{Dataset, Reading, Sensor};
 use crate::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
 use crate::measurement::sensor::empirical::EmpiricalFault;
@@ -144,7 +144,7 @@ impl Candidate {
                 .into_iter()
                 .map(|v| Regressor::Shift(std::array::from_fn(|k| v.iter().map(|v| v[k]).collect())))
                 .collect(),
-            kind => joint_rotations(kind, dataset, nominal)
+            kind => joint_rotations(kind, &LoadedRows::new(dataset, nominal))
                 .into_iter()
                 .map(|rotation| Regressor::Arm {
                     rotation: rotation

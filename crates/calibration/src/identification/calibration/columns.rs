@@ -6,7 +6,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::frames::{Frames, Weight};
-use super::regressors::{self, joint_rotations};
+use super::regressors::{self, LoadedRows, joint_rotations};
 use crate::measurement::dataset::{Dataset, Reading, Sensor};
 use crate::measurement::sensor::disturbance::Kind;
 use truegrind_arm::condition::Condition;
@@ -250,10 +250,9 @@ impl Columns {
         padded: usize,
     ) {
         let last = dataset.rows.len().saturating_sub(1);
+        let loaded = LoadedRows::new(dataset, start);
         for (index, disturbance) in frames.disturbances.iter().enumerate() {
-            for (parameter, rotation) in
-                joint_rotations(&disturbance.kind, dataset, start).into_iter().enumerate()
-            {
+            for (parameter, rotation) in joint_rotations(&disturbance.kind, &loaded).into_iter().enumerate() {
                 let profile = &self.profiles[index];
                 let rotation: [Option<Vec<f64>>; 6] =
                     rotation.map(|r| r.map(|r| (0..padded).map(|i| profile[i] * r[i.min(last)]).collect()));

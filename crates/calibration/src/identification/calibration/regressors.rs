@@ -1,5 +1,7 @@
 //! Regressors of load and empirical disturbances: sensor shifts and joint rotations of each row per unit of each parameter.
 
+use std::cell::OnceCell;
+
 use nalgebra::{Point3, Vector3};
 
 use super::frames::Frames;
@@ -73,7 +75,8 @@ fn torques(dataset: &Dataset, model: &Model) -> Vec<Joints> {
         return flange_torques(dataset, model);
     }
     let statics = Model { effects: Vec::new(), ..model.clone() }.statics();
-    let torque = |r: &Row| statics.torques_and_jacobian(&(model.joint_map * r.joints), &r.condition).0;
+    let torque =
+        |r: &Row| Joints::from(statics.torques::<f64>(&(model.joint_map * r.joints).into(), &r.condition));
     dataset.rows.iter().map(torque).collect()
 }
 
@@ -144,12 +147,31 @@ pub fn sensor_shifts(
     }
 }
 
+/// Rows of an arm with the torques of a load, which are computed once for all disturbances that need them.
+#[derive(Debug)]
+pub struct LoadedRows<'a> {
+    dataset: &'a Dataset,
+    model: &'a Model,
+    torques: OnceCell<Vec<Joints>>,
+}
+
+impl<'a> LoadedRows<'a> {
+    /// Nothing is computed yet.
+    pub fn new(dataset: &'a Dataset, model: &'a Model) -> Self {
+        Self { dataset, model, torques: OnceCell::new() }
+    }
+
+    fn flange_torques(&self) -> &[Joints] {
+        self.torques.get_or_init(|| flange_torques(self.dataset, self.model))
+    }
+}
+
 /// Rotation of each joint (rad) per unit of each parameter of a disturbance that turns joints, row by row.
-pub fn joint_rotations(kind: &Kind, dataset: &Dataset, model: &Model) -> Vec<[Option<Vec<f64>>; 6]> {
+pub fn joint_rotations(kind: &Kind, rows: &LoadedRows<'_>) -> Vec<[Option<Vec<f64>>; 6]> {
     match kind {
-        Kind::Empirical(fault) => fault_rotations(*fault, dataset, model),
+        Kind::Empirical(fault) => fault_rotations(*fault, rows.dataset, rows.model),
         Kind::Load { joints, compliance } => {
-            let torques = flange_torques(dataset, model);
+            let torques = rows.flange_torques();
             let bent = |joint: usize, factor: f64| torques.iter().map(|t| factor * t[joint]).collect();
             match compliance {
                 Some(compliance) => {
@@ -179,6 +201,6 @@ pub fn flange_torques(dataset: &Dataset, model: &Model) -> Vec<Joints> {
     dataset
         .rows
         .iter()
-        .map(|r| statics.torques_and_jacobian(&(model.joint_map * r.joints), &kilogram).0)
+        .map(|r| Joints::from(statics.torques::<f64>(&(model.joint_map * r.joints).into(), &kilogram)))
         .collect()
 }
