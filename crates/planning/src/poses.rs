@@ -66,6 +66,8 @@ pub struct Plan {
     pub rejections: RejectionCounts,
     /// Smallest detectable size of each effect.
     pub detectability: Vec<Detectability>,
+    /// Whether the poses are to determine geometry and effects, not only an error that no cause explains.
+    pub geometry: bool,
     /// What is known of an error that no cause explains, where poses were chosen for it.
     pub field: Option<FieldUncertainty>,
     /// The checked obstacles.
@@ -199,9 +201,25 @@ pub fn plan(setup: &MeasurementSetup<'_>, options: &Options) -> Result<Plan, Pla
     let measured = schedule::data(&rows, &poses);
     let final_jacobian = rows::reading_jacobian(setup, &parameters, &measured, &[], options);
     let sigmas = final_jacobian.sigmas().ok_or(PlanError::NotFinite)?;
-    let detectability = power::detectability(setup, &parameters, &measured, options);
+    // Few visits for something else determine no arm: what they would show of it says nothing.
+    let detectability = if options.geometry {
+        power::detectability(setup, &parameters, &measured, options)
+    } else {
+        Vec::new()
+    };
     let space = options.bounds.space.clone();
-    Ok(Plan { poses, rows, parameters, sigmas, quality, rejections, detectability, field, space })
+    Ok(Plan {
+        poses,
+        rows,
+        parameters,
+        sigmas,
+        quality,
+        rejections,
+        detectability,
+        field,
+        space,
+        geometry: options.geometry,
+    })
 }
 
 /// Chosen poses, and the order of their rows.

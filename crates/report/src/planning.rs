@@ -126,6 +126,14 @@ fn rows_of(plan: &Plan, purpose: Purpose) -> usize {
     plan.rows.iter().filter(|row| row.purpose == purpose).count()
 }
 
+/// The number of different poses.
+fn poses(plan: &Plan) -> String {
+    match plan.poses.len() {
+        1 => "1 pose".to_owned(),
+        many => format!("{many} poses"),
+    }
+}
+
 fn verdict(plan: &Plan) -> Verdict {
     let minutes = plan.rows.last().map_or(0.0, |row| 60.0 * row.time_h);
     let mut reasons = vec![
@@ -137,18 +145,20 @@ fn verdict(plan: &Plan) -> Verdict {
         "poses stay within joint limits and clear of singularities".to_owned(),
     ];
     reasons.push(format!(
-        "{} rows at {} poses: {} with opposite approach direction, {} repeated, {} for warm-up",
+        "{} rows at {}: {} with opposite approach direction, {} repeated, {} for warm-up",
         plan.rows.len(),
-        plan.poses.len(),
+        poses(plan),
         rows_of(plan, Purpose::OtherSide),
         rows_of(plan, Purpose::Repeat),
         rows_of(plan, Purpose::WarmUp)
     ));
     let quality = &plan.quality;
-    reasons.push(format!(
-        "predicted 1σ of a reading at any other pose: {:.3} mm after one visit to each pose, {:.3} mm after as many random poses",
-        quality.reading_sigma_mm, quality.random_reading_sigma_mm
-    ));
+    if plan.geometry {
+        reasons.push(format!(
+            "predicted 1σ of a reading at any other pose: {:.3} mm after one visit to each pose, {:.3} mm after as many random poses",
+            quality.reading_sigma_mm, quality.random_reading_sigma_mm
+        ));
+    }
     if let Some(field) = &plan.field {
         reasons.push(format!(
             "uncertainty (1σ) of the unexplained error at any other pose: {:.3} mm now, {:.3} mm after these poses, {:.3} mm after as many random \
@@ -186,7 +196,9 @@ fn verdict(plan: &Plan) -> Verdict {
 pub fn summary(plan: &Plan, robot: &str) -> Document {
     let mut page = Document::new(format!("What to measure on {robot}"));
     page.push(verdict(plan));
-    page.push(effect_table(plan));
+    if plan.geometry {
+        page.push(effect_table(plan));
+    }
     page
 }
 
@@ -194,12 +206,38 @@ pub fn summary(plan: &Plan, robot: &str) -> Document {
 pub fn document(plan: &Plan, setup: &MeasurementSetup<'_>, robot: &str) -> Document {
     let mut page = Document::new(format!("What to measure on {robot}"));
     page.push(verdict(plan));
-    page.push(vec![
-        KeyFigure::new("Rows", plan.rows.len(), 0, "").note(format!("at {} poses", plan.poses.len())),
+    page.push(key_figures(plan));
+    page.paragraph("Obstacles in the cell are unknown to the planner: state them as boxes (--keep-out).");
+    if plan.geometry {
+        page.push(effect_table(plan));
+    }
+    page.heading(2, "Rows");
+    page.push(table(plan, setup).excerpt(ROWS_ON_PAGE));
+    if plan.geometry {
+        page.push(Block::Details {
+            summary: "Parameters".to_owned(),
+            blocks: vec![sigma_table(plan).into()],
+        });
+    }
+    page
+}
+
+/// What the plan tells at a glance: of the geometry, or of the unexplained error alone.
+fn key_figures(plan: &Plan) -> Vec<KeyFigure> {
+    let rows = KeyFigure::new("Rows", plan.rows.len(), 0, "").note(format!("at {}", poses(plan)));
+    if !plan.geometry {
+        let field = plan.field.iter().flat_map(|field| {
+            [("Unexplained error, 1σ now", field.before_mm), ("After these poses", field.after_mm)]
+                .map(|(name, mm)| KeyFigure::new(name, mm, 3, "mm").note("at any other pose"))
+        });
+        return std::iter::once(rows).chain(field).collect();
+    }
+    vec![
+        rows,
         KeyFigure::new("Remaining uncertainty", plan.quality.reading_sigma_mm, 3, "mm")
             .note("predicted 1σ of a reading at any other pose"),
         KeyFigure::new("With random poses", plan.quality.random_reading_sigma_mm, 3, "mm")
-            .note(format!("for comparison, {} poses", plan.poses.len())),
+            .note(format!("for comparison, {}", poses(plan))),
         KeyFigure::new(
             "Detectable effects",
             plan.detectability.iter().filter(|d| d.is_decided()).count(),
@@ -207,13 +245,7 @@ pub fn document(plan: &Plan, setup: &MeasurementSetup<'_>, robot: &str) -> Docum
             "",
         )
         .note(format!("of {}, at usual sizes", plan.detectability.len())),
-    ]);
-    page.paragraph("Obstacles in the cell are unknown to the planner: state them as boxes (--keep-out).");
-    page.push(effect_table(plan));
-    page.heading(2, "Rows");
-    page.push(table(plan, setup).excerpt(ROWS_ON_PAGE));
-    page.push(Block::Details { summary: "Parameters".to_owned(), blocks: vec![sigma_table(plan).into()] });
-    page
+    ]
 }
 
 /// JSON report, schema `truegrind.plan/1`.

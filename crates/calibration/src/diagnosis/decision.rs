@@ -180,12 +180,14 @@ impl Asking<'_> {
         } else {
             finding.members.iter().map(|member| member.effect.as_str()).collect()
         };
-        let by_words = named.iter().find_map(|effect| in_words(effect));
-        let by_poses = named.iter().any(|effect| DECIDED_BY_POSES.contains(effect));
-        match by_words {
-            Some(words) => Some(words.to_owned()),
-            None => by_poses.then(|| format!("measure the poses of `{}`", plan())),
-        }
+        // What the finding itself asks for comes first, then a program of poses, then what its rivals ask for.
+        let by_words =
+            |effects: &[&str]| effects.iter().find_map(|effect| in_words(effect)).map(str::to_owned);
+        let by_poses = || {
+            let decided = named.iter().any(|effect| DECIDED_BY_POSES.contains(effect));
+            decided.then(|| format!("measure the poses of `{}`", plan()))
+        };
+        by_words(&own).or_else(by_poses).or_else(|| by_words(&named))
     }
 
     /// The command line that plans the poses of a finding.

@@ -29,6 +29,8 @@ pub struct Options {
     pub something_else: Option<SomethingElse>,
     /// Number of these poses.
     pub field_poses: usize,
+    /// Whether the poses are to determine geometry and effects, not only what no cause explains.
+    pub geometry: bool,
     /// Non-centrality from which an effect counts as detected.
     pub decisive: f64,
     /// Seed of all random numbers.
@@ -48,6 +50,7 @@ impl Default for Options {
             questions: Vec::new(),
             something_else: None,
             field_poses: FIELD_POSES,
+            geometry: true,
             decisive: 25.0,
             seed: 0,
         }
@@ -69,13 +72,22 @@ impl Options {
                 something_else: Some(unexplained),
                 visits,
                 questions: Vec::new(),
+                geometry: false,
                 ..self
             };
         }
         visits.warm_up = count;
         let seconds = unexplained.hours.map(|hours| 3600.0 * hours / count.saturating_sub(1).max(1) as f64);
         visits.seconds_per_row = seconds.unwrap_or(0.0).max(visits.seconds_per_row);
-        Self { poses: 1, field_poses: 0, something_else: None, visits, questions: Vec::new(), ..self }
+        Self {
+            poses: 1,
+            field_poses: 0,
+            something_else: None,
+            visits,
+            questions: Vec::new(),
+            geometry: false,
+            ..self
+        }
     }
 }
 
