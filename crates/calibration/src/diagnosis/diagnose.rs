@@ -166,7 +166,7 @@ fn or_geometry_alone(
     if verdict.status != Judgement::Fail || search.extended.causes.is_empty() {
         return with_causes;
     }
-    let Some(alone) = geometry_alone(&search.context, robot) else { return with_causes };
+    let Some(alone) = geometry_alone(search.context, robot) else { return with_causes };
     notes.push(format!(
         "the written arm is geometry alone, as `identify` fits it: beside the causes the arm is refused, since {}",
         verdict.reasons.first().map_or("it is implausible", String::as_str)
