@@ -70,6 +70,8 @@ fn the_unknown_rest_of_a_sensor_law_bends_no_arm_and_is_in_its_sigma() {
     for (seed, kind, run) in [(223, Kind::Catenary, 4), (223, Kind::Drum, 3), (211, Kind::Nest, 2)] {
         let marks = outcome(&Case::draw(seed, kind, run, Limits::default())).marks.unwrap();
         assert!(marks.told() && !marks.worse_than_identify(), "{kind:?}: {:?}", marks.distances);
+        // The catenary's arm has no cause and is that of `identify`, 6 % worse here than the search's own geometry.
+        assert!(kind == Kind::Catenary || !marks.worse()[0], "{kind:?}: {:?}", marks.distances);
         let sigmas = marks.distances[3].shape / marks.shape_sigma_mm.unwrap();
         assert!(sigmas < 8.0, "{kind:?}: {sigmas} σ");
     }
