@@ -330,7 +330,9 @@ fn members(finding: &Finding) -> Table {
         ],
     );
     table.notes.push(
-        "share: probability of the cause if exactly one of these is true and each was as likely before the measurement.".to_owned(),
+        "share: of the evidence, if exactly one of these is true. How often the largest share is right was not measured: it is no probability, and no \
+         reason to change a part before the deciding measurement."
+            .to_owned(),
     );
     table
 }

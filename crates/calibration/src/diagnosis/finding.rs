@@ -127,7 +127,7 @@ pub struct Member {
     pub rows: Option<[usize; 2]>,
     /// Its branch.
     pub family: Family,
-    /// Its share of the evidence: its probability if exactly one of the members is true and each was as likely before.
+    /// Its share of the evidence if exactly one of the members is true and each was as likely before. Not calibrated: no probability.
     pub share: f64,
 }
 
