@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyTuple};
 use sha2::{Digest, Sha256};
 use truegrind::arm::estimated::FlangePoint;
 use truegrind::{Estimated, Judgement, Pose, robots};
@@ -15,7 +15,9 @@ use crate::arrays::{joints, numbers, rows, shaped};
 use crate::errors::{Kind, Refusal};
 use crate::files;
 use crate::robot::PyArm;
-use crate::types::{ArrayLike, Bools, Dictionaries, Floats, Judgements, Object, Poses, Solutions, Typed};
+use crate::types::{
+    Anything, ArrayLike, Bools, Dictionaries, Floats, Judgements, Object, Poses, Solutions, Typed,
+};
 
 /// An estimated arm: the nominal arm, everything identified, and its covariance.
 #[pyclass(name = "Model", module = "truegrind", frozen)]
@@ -25,6 +27,8 @@ pub(crate) struct PyModel {
     pub(crate) name: String,
     /// Short hash of the model file, written into corrected programs.
     pub(crate) hash: String,
+    /// The model file.
+    text: String,
 }
 
 /// First twelve hex digits of the SHA-256.
@@ -46,7 +50,12 @@ impl PyModel {
     /// A newly fitted model.
     pub(crate) fn found(arm: &Estimated) -> Result<Self, Refusal> {
         let text = arm.to_toml()?;
-        Ok(Self { arm: Arc::new(arm.clone()), name: "model.toml".to_owned(), hash: hash(text.as_bytes()) })
+        Ok(Self {
+            arm: Arc::new(arm.clone()),
+            name: "model.toml".to_owned(),
+            hash: hash(text.as_bytes()),
+            text,
+        })
     }
 
     /// Parses a model file.
@@ -63,7 +72,12 @@ impl PyModel {
             let message = format!("{name}: the fit behind this model failed ({why}); it is not used");
             return Err(Refusal::new(Kind::Model, message).of_file(name));
         }
-        Ok(Self { hash: hash(text.as_bytes()), name: name.to_owned(), arm: Arc::new(arm) })
+        Ok(Self {
+            hash: hash(text.as_bytes()),
+            name: name.to_owned(),
+            arm: Arc::new(arm),
+            text: text.to_owned(),
+        })
     }
 
     pub(crate) fn acting(&self) -> Acting<'_> {
@@ -268,6 +282,12 @@ impl PyModel {
             (0..q_deg.nrows()).map(|row| self.arm.region.outside(&joints(q_deg, row)).is_none()).collect()
         });
         Ok(shaped(PyArray1::from_vec(py, inside).into_any(), one)?.into())
+    }
+
+    /// A pickle holds the model file; like the file, that of a failed fit is refused when it is read.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Typed<Anything, Bound<'py, PyTuple>>> {
+        let read = py.get_type::<Self>().getattr("from_toml")?;
+        Ok((read, (&self.text, &self.name)).into_pyobject(py)?.into())
     }
 
     fn __repr__(&self) -> String {

@@ -168,3 +168,16 @@ def test_a_track_goes_on_where_it_ended(cable, model):
     assert both.poses == whole.poses == len(q)
     assert both.model.to_toml() == whole.model.to_toml()
     assert "<html" in whole.to_html() and isinstance(whole.alarms, list)
+
+
+def test_a_model_goes_to_other_processes(model):
+    """Engines pickle what a job is given."""
+    import pickle
+
+    again = pickle.loads(pickle.dumps(model))
+    assert (again.hash, again.to_toml(), again.robot) == (model.hash, model.to_toml(), model.robot)
+    q_deg = np.linspace(-20.0, 20.0, 12).reshape(2, 6)
+    assert np.array_equal(again.forward(q_deg).position_mm, model.forward(q_deg).position_mm)
+    options = {"allow_doubtful": True}
+    there, here = (tg.compensate(PROGRAMS / "told.mod", arm, **options) for arm in (again, model))
+    assert there.files == here.files
