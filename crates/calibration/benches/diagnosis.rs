@@ -133,8 +133,8 @@ fn main() {
                             .map(|a| format!("{} {:?} {:.1}", a.effect, a.joints, a.beaten_by))
                             .collect();
                         println!(
-                            "   {} {:?}: λ {:.0?}, ahead of {rivals:?}",
-                            f.effect, f.joints, f.non_centrality
+                            "   {} {:?}: λ {:.0?}, ahead of {rivals:?}; {:?}",
+                            f.effect, f.joints, f.non_centrality, f.doubts
                         );
                     }
                 }

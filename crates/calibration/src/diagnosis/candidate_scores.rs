@@ -36,13 +36,13 @@ impl Entry {
         let sizes = self.candidate.cause.sizes();
         let score =
             score_from(design.gradient_and_information(&self.projected), &sizes, self.candidate.tried);
-        Scored { candidate: Arc::clone(&self.candidate), score }
+        Scored { candidate: Arc::clone(&self.candidate), score, head_start: 0.0 }
     }
 }
 
 /// A kind of shift over all rows.
 struct Shift {
-    kind: Kind,
+    always: Arc<Candidate>,
     strip: Option<ShiftScan>,
 }
 
@@ -63,42 +63,26 @@ pub struct CandidateScores<'a> {
     fine: Vec<Vec<OnceLock<Entry>>>,
 }
 
-/// Merit bonus of a refined variant of an accepted cause over a new cause: odds of a hundred to one.
-const REFINEMENT_BONUS: f64 = 10.0;
+/// Head start of a variant of an accepted cause over other causes: odds of a hundred to one.
+const HEAD_START: f64 = 10.0;
 
 impl<'a> CandidateScores<'a> {
     /// Scores all candidates of `catalogue` against `fit`.
     pub fn of(catalogue: &'a Catalogue, subject: &'a Subject<'a>, fit: Arc<Extended>) -> Self {
         let linear = Linear::of(subject, &fit);
-        let whole = linear.whole();
+        let size = (linear.observations, linear.per);
+        let columns = |c: &Arc<Candidate>| {
+            checkpoint();
+            c.columns_of(&linear.slopes, size)
+        };
+        // Side by side, since each alone is partly in one thread.
+        let (whole, columns) =
+            rayon::join(|| linear.whole(), || catalogue.listed.par_iter().map(columns).collect::<Vec<_>>());
         let design = &whole.design;
-        let columns: Vec<_> = catalogue
-            .listed
-            .par_iter()
-            .map(|c| {
-                checkpoint();
-                c.columns(design)
-            })
-            .collect();
-        let listed = catalogue
-            .listed
-            .iter()
-            .zip(design.project_all(&columns))
-            .map(|(candidate, projected)| Entry { candidate: Arc::clone(candidate), projected })
-            .collect();
-        let known = known_load(&fit).map(|kind| {
-            let always = Disturbance::new(kind, Profile::Constant);
-            Candidate::measurement(always, &subject.observed.dataset, subject.nominal, subject.frames)
-        });
-        let shifts: Vec<&Candidate> = catalogue.shifts.iter().chain(&known).collect();
-        let shifts = shifts
-            .into_par_iter()
-            .filter_map(|candidate| {
-                let Cause::Measurement(disturbance) = &candidate.cause else { return None };
-                let strip = ShiftScan::of(design, &candidate.columns(design), &candidate.cause.sizes());
-                Some(Shift { kind: disturbance.kind.clone(), strip })
-            })
-            .collect();
+        let (projected, shifts) =
+            rayon::join(|| design.project_all(&columns), || shifts(catalogue, subject, &fit, design));
+        let listed = catalogue.listed.iter().cloned().zip(projected);
+        let listed = listed.map(|(candidate, projected)| Entry { candidate, projected }).collect();
         let fine = catalogue.fine.iter().map(|f| f.iter().map(|_| OnceLock::new()).collect()).collect();
         Self { catalogue, subject, fit, linear, whole, listed, shifts, fine }
     }
@@ -115,10 +99,10 @@ impl<'a> CandidateScores<'a> {
         }
         for scored in &mut out {
             if self.fit.causes.iter().any(|c| c.is_same_finding(&scored.candidate.cause)) {
-                scored.score.merit += REFINEMENT_BONUS;
+                scored.head_start = HEAD_START;
             }
         }
-        out.sort_by(|a, b| b.score.merit.total_cmp(&a.score.merit));
+        out.sort_by(|a, b| b.preference().total_cmp(&a.preference()));
         out
     }
 
@@ -132,20 +116,13 @@ impl<'a> CandidateScores<'a> {
             .flat_map_iter(|shift| {
                 let found = shift.strip.as_ref().map_or_else(Vec::new, |s| s.scan(design, 2));
                 found.into_iter().map(|interval| {
-                    let (from, to) = (dataset.rows[interval.from].number, dataset.rows[interval.to].number);
-                    let disturbance = Disturbance::new(shift.kind.clone(), Profile::Rows { from, to });
-                    let candidate = Candidate::measurement(
-                        disturbance,
-                        dataset,
-                        self.subject.nominal,
-                        self.subject.frames,
-                    );
-                    Candidate { tried, ..candidate }
+                    let rows = [interval.from, interval.to].map(|i| dataset.rows[i].number);
+                    Candidate { tried, ..shift.always.over_rows(dataset, rows) }
                 })
             })
             .collect();
         let (spectral, mapped) = order_spectrum::candidates(self.subject, &self.catalogue.turns, design);
-        let open: Vec<Arc<Candidate>> = found.into_iter().chain(spectral).map(Arc::new).collect();
+        let open: Vec<Arc<Candidate>> = found.into_iter().map(Arc::new).chain(spectral).collect();
         let fine: Vec<&Entry> = mapped
             .into_par_iter()
             .filter_map(|(joint, level)| {
@@ -162,10 +139,27 @@ impl<'a> CandidateScores<'a> {
         let projected = design.project_all(&columns);
         out.par_extend(open.into_par_iter().zip(projected).map(|(candidate, projected)| {
             let score = score_projected(&projected, &candidate.cause.sizes(), candidate.tried);
-            Scored { candidate, score }
+            Scored { candidate, score, head_start: 0.0 }
         }));
         out.par_extend(fine.par_iter().map(|entry| entry.score(design)));
     }
+}
+
+/// The kinds of shifts, to be scanned beside a fit with the design `design`.
+fn shifts(catalogue: &Catalogue, subject: &Subject<'_>, fit: &Extended, design: &Design) -> Vec<Shift> {
+    let known = known_load(fit).map(|kind| {
+        let always = Disturbance::new(kind, Profile::Constant);
+        Candidate::measurement(always, &subject.observed.dataset, subject.nominal, subject.frames)
+    });
+    let known = known.map(Arc::new);
+    let shifts: Vec<&Arc<Candidate>> = catalogue.shifts.iter().chain(&known).collect();
+    shifts
+        .into_par_iter()
+        .map(|candidate| {
+            let strip = ShiftScan::of(design, &candidate.columns(design), &candidate.cause.sizes());
+            Shift { always: Arc::clone(candidate), strip }
+        })
+        .collect()
 }
 
 /// An unlogged payload, with the compliances found so far.

@@ -17,6 +17,15 @@ pub struct Scored {
     pub candidate: Arc<Candidate>,
     /// Its score.
     pub score: Score,
+    /// Head start in the search that a variant of an accepted cause has over other causes; not evidence.
+    pub head_start: f64,
+}
+
+impl Scored {
+    /// Merit with the head start, by which the search ranks candidates.
+    pub fn preference(&self) -> f64 {
+        self.score.merit + self.head_start
+    }
 }
 
 /// Candidates that do not depend on a fit, built once.
@@ -26,7 +35,7 @@ pub struct Catalogue {
     /// Fine error maps of each joint, coarsest first.
     pub fine: Vec<Vec<Arc<Candidate>>>,
     /// Kinds of shifts with their regressors over all rows.
-    pub shifts: Vec<Candidate>,
+    pub shifts: Vec<Arc<Candidate>>,
     /// Number of candidate families (name and joints).
     pub families: f64,
     /// Harmonics of the joint angles, for the order spectrum.
@@ -46,15 +55,18 @@ impl Catalogue {
             kinds.push(Kind::Frame { turning: true });
         }
         kinds.push(Kind::Load { joints: vec![1, 2], compliance: None });
-        let shifts: Vec<Candidate> = kinds
+        let shifts: Vec<Arc<Candidate>> = kinds
             .into_iter()
             .map(|kind| {
                 let disturbance = Disturbance::new(kind, Profile::Constant);
-                Candidate::measurement(disturbance, dataset, subject.nominal, subject.frames)
+                Arc::new(Candidate::measurement(disturbance, dataset, subject.nominal, subject.frames))
             })
             .collect();
-        let mut families: Vec<(&str, Vec<usize>)> =
-            listed.iter().chain(&shifts).map(|c| (c.cause.name(), c.cause.joints())).collect();
+        let mut families: Vec<(&str, Vec<usize>)> = listed
+            .iter()
+            .chain(shifts.iter().map(|s| &**s))
+            .map(|c| (c.cause.name(), c.cause.joints()))
+            .collect();
         families.extend((0..6).map(|j| ("gear-transmission", vec![j])));
         families.sort();
         families.dedup();

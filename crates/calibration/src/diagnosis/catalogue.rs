@@ -9,7 +9,7 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::cause::{Cause, MAP_KNOTS, parallel_neighbours};
-use super::design::Design;
+use super::design::{Design, Slopes};
 use super::extension::Subject;
 use crate::identification::calibration::{Frames, LoadedRows, joint_rotations, sensor_shifts};
 use crate::measurement::dataset::{Dataset, Reading, Sensor};
@@ -159,9 +159,33 @@ impl Candidate {
         Self { cause: Cause::Measurement(disturbance), regressors, tried: 1.0 }
     }
 
+    /// A disturbance at all times, from row `from` to row `to` (by number) alone; `tried` as there.
+    pub fn over_rows(&self, dataset: &Dataset, [from, to]: [usize; 2]) -> Self {
+        let Cause::Measurement(always) = &self.cause else { return self.clone() };
+        let profile = Profile::Rows { from, to };
+        let inside: Vec<f64> = dataset.rows.iter().map(|row| profile.at(row)).collect();
+        let part = |values: &Vec<f64>| values.iter().zip(&inside).map(|(v, c)| v * c).collect::<Vec<f64>>();
+        let regressors = self.regressors.iter().map(|regressor| match regressor {
+            Regressor::Arm { rotation, growth } => Regressor::Arm {
+                rotation: rotation.iter().map(|(joint, values)| (*joint, part(values))).collect(),
+                growth: part(growth),
+            },
+            Regressor::Disturbance { coordinate, profile } => {
+                Regressor::Disturbance { coordinate: *coordinate, profile: part(profile) }
+            }
+            Regressor::Shift(vectors) => Regressor::Shift([0, 1, 2].map(|axis| part(&vectors[axis]))),
+        });
+        let cause = Cause::Measurement(Disturbance::new(always.kind.clone(), profile));
+        Self { cause, regressors: regressors.collect(), tried: self.tried }
+    }
+
     /// The whitened columns of the candidate, rows × parameters.
     pub fn columns(&self, design: &Design) -> DMatrix<f64> {
-        let (n, per) = (design.observations, design.per);
+        self.columns_of(&design.slopes, (design.observations, design.per))
+    }
+
+    /// The same from the derivatives alone, for (observations, scalar rows of each).
+    pub fn columns_of(&self, slopes: &Slopes, (n, per): (usize, usize)) -> DMatrix<f64> {
         let mut out = DMatrix::zeros(n * per, self.regressors.len());
         for (k, regressor) in self.regressors.iter().enumerate() {
             let mut column = out.column_mut(k);
@@ -175,20 +199,20 @@ impl Candidate {
             match regressor {
                 Regressor::Arm { rotation, growth } => {
                     for (joint, profile) in rotation {
-                        add(profile, &|s| design.slopes.by_joint[*joint][s]);
+                        add(profile, &|s| slopes.by_joint[*joint][s]);
                     }
-                    add(growth, &|s| design.slopes.by_growth[s]);
+                    add(growth, &|s| slopes.by_growth[s]);
                 }
                 Regressor::Disturbance { coordinate, profile } => match coordinate {
-                    Coordinate::Zero => add(profile, &|s| design.slopes.by_zero[s]),
-                    Coordinate::Frame(axis) => add(profile, &|s| design.slopes.by_frame[(s, *axis)]),
-                    Coordinate::Target(axis) => add(profile, &|s| design.slopes.by_target[(s, *axis)]),
-                    Coordinate::Scale => add(profile, &|s| design.slopes.by_scale[s]),
-                    Coordinate::Sag => add(profile, &|s| design.slopes.by_sag[s]),
+                    Coordinate::Zero => add(profile, &|s| slopes.by_zero[s]),
+                    Coordinate::Frame(axis) => add(profile, &|s| slopes.by_frame[(s, *axis)]),
+                    Coordinate::Target(axis) => add(profile, &|s| slopes.by_target[(s, *axis)]),
+                    Coordinate::Scale => add(profile, &|s| slopes.by_scale[s]),
+                    Coordinate::Sag => add(profile, &|s| slopes.by_sag[s]),
                 },
                 Regressor::Shift(vectors) => {
                     for (axis, profile) in vectors.iter().enumerate() {
-                        add(profile, &|s| design.slopes.by_frame[(s, axis)]);
+                        add(profile, &|s| slopes.by_frame[(s, axis)]);
                     }
                 }
             }

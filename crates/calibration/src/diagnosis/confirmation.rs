@@ -20,13 +20,13 @@ use super::algebra::{lower_factor, product, solved};
 use super::candidates::Scored;
 use super::catalogue::Candidate;
 use super::cause::Cause;
-use super::design::{Design, Linear};
+use super::design::{Design, Linear, Projected, pure_all, side_by_side};
 use super::discrepancy::{Discrepancy, Functions};
 use super::extension::{Extended, Subject};
 use super::halves::halves;
 use super::intervals::ShiftScan;
 use super::link_growth;
-use super::score::{Score, log_p_of, score_columns, score_from, score_projected};
+use super::score::{Score, is_scattered, log_p_of_pure, score_columns, score_from, score_projected};
 use super::selection::{Accepted, Options, contains_cause};
 use super::serial_correlation::prewhiten;
 use crate::identification::tolerance::GROWTH_SIGMA;
@@ -59,13 +59,14 @@ const ALLOWED_FAILURES: usize = 1;
 /// Squared correlation of a joint's approach side with its last step from which the two are confounded.
 const CONFOUNDED: f64 = 0.9;
 
-/// Twice the log Bayes factor against its best rival that a cause needs with the discrepancy in the model.
-const MARGIN: f64 = 6.0;
+/// Twice the log Bayes factor against its best rival that an identified cause needs, with and without the discrepancy in the model:
+/// 20 to 1.
+pub(super) const CLEAR: f64 = 6.0;
 
 impl Confirmation {
     /// Whether it passes all criteria for an identified cause.
     pub(super) fn is_confirmed(&self) -> bool {
-        self.is_significant() && self.margin >= MARGIN && self.is_stable() && self.changed <= ALLOWED_FAILURES
+        self.is_significant() && self.margin >= CLEAR && self.is_stable() && self.changed <= ALLOWED_FAILURES
     }
 
     /// Whether it is significant and plausible, confirmed or not.
@@ -88,7 +89,7 @@ impl Confirmation {
             out.push(
                 "not significant once smooth unmodelled trends in time and pose are allowed for".to_owned(),
             );
-        } else if self.margin < MARGIN {
+        } else if self.margin < CLEAR {
             out.push(format!(
                 "with smooth unmodelled trends allowed for, a rival is nearly as probable: twice the log Bayes factor {:.1}",
                 self.margin
@@ -152,6 +153,15 @@ pub(super) struct ConfirmationContext<'a> {
     pub sides_from_order: bool,
     /// The design of the fit, for the columns of candidates.
     pub raw: &'a Design,
+}
+
+/// Significance of a cause with the discrepancy in the model.
+#[derive(Debug, Clone, Copy)]
+struct Significance {
+    merit: f64,
+    /// Natural logarithm of the p-value, corrected for trials.
+    log_p: f64,
+    is_significant: bool,
 }
 
 /// A candidate with its columns over all rows, whitened as in the fit.
@@ -263,22 +273,26 @@ impl ConfirmationContext<'_> {
                 .prewhitened(rho, numbers, noise)
                 .whole();
             let whiten = |columns: &DMatrix<f64>| prewhiten(columns, rho, numbers, self.linear.per) / noise;
-            let judged: Vec<Confirmation> = (0..own.len())
-                .into_par_iter()
-                .map(|k| {
-                    checkpoint();
-                    let mut dropped = removed.clone();
-                    if !removed.contains(&k) {
-                        dropped.push(k);
-                    }
-                    let design = whole.without(&self.parameter_indices(&dropped));
-                    self.judged(k, &own[k], &design, &whiten)
-                })
-                .collect();
+            let columns: Vec<DMatrix<f64>> = own.par_iter().map(|own| whiten(&own.columns)).collect();
+            let projected = whole.design.project_all(&columns);
+            let beside = |k: usize| {
+                let mut dropped = removed.clone();
+                if !removed.contains(&k) {
+                    dropped.push(k);
+                }
+                whole.without(&self.parameter_indices(&dropped))
+            };
+            let judged = self.significance(own, &whole.design, (&columns, &projected), &beside);
             let worst = (0..own.len())
-                .filter(|k| !removed.contains(k) && !judged[*k].significant)
+                .filter(|k| !removed.contains(k) && !judged[*k].is_significant)
                 .max_by(|&a, &b| judged[a].log_p.total_cmp(&judged[b].log_p).then(b.cmp(&a)));
-            let Some(worst) = worst else { break judged };
+            let Some(worst) = worst else {
+                break judged
+                    .into_par_iter()
+                    .enumerate()
+                    .map(|(k, judged)| self.beside_rivals(k, &own[k], judged, &beside(k), &whiten))
+                    .collect::<Vec<Confirmation>>();
+            };
             removed.push(worst);
             discrepancy = Discrepancy::of(
                 functions,
@@ -301,7 +315,7 @@ impl ConfirmationContext<'_> {
         cause: &Cause,
         tried: f64,
         design: &Design,
-        whiten: &dyn Fn(&DMatrix<f64>) -> DMatrix<f64>,
+        whiten: &(dyn Fn(&DMatrix<f64>) -> DMatrix<f64> + Sync),
     ) -> f64 {
         if self.found.causes.iter().any(Cause::is_growth_of_arm) {
             return 0.0;
@@ -312,19 +326,58 @@ impl ConfirmationContext<'_> {
         })
     }
 
-    fn judged(
+    /// Significance of each cause in its design of `beside`, which has it not, given the whitened columns and their projections on the
+    /// whole design.
+    fn significance(
+        &self,
+        own: &[WithColumns],
+        whole: &Design,
+        (columns, projected): (&[DMatrix<f64>], &[Projected]),
+        beside: &(dyn Fn(usize) -> Design + Sync),
+    ) -> Vec<Significance> {
+        let sizes = |k: usize| own[k].candidate.cause.sizes();
+        let scored: Vec<(Design, Projected, Score)> = (0..own.len())
+            .into_par_iter()
+            .map(|k| {
+                checkpoint();
+                let design = beside(k);
+                let projected = design.project_on(&projected[k]);
+                let score = score_projected(&projected, &sizes(k), self.accepted[k].tried);
+                (design, projected, score)
+            })
+            .collect();
+        let is_scattered = |k: &usize| is_scattered(&sizes(*k), &scored[*k].2);
+        let scattered: Vec<usize> = (0..own.len()).filter(is_scattered).collect();
+        let shown: Vec<_> = scattered.iter().map(|&k| (&columns[k], &scored[k].0, &scored[k].1)).collect();
+        let mut log_p: Vec<f64> = (0..own.len()).map(|k| scored[k].2.plain_log_p(&sizes(k))).collect();
+        let of_scattered: Vec<f64> = pure_all(whole, &shown)
+            .into_par_iter()
+            .zip(&scattered)
+            .map(|(pure, &k)| log_p_of_pure(&scored[k].0, pure, &scored[k].2, &sizes(k)))
+            .collect();
+        scattered.iter().zip(of_scattered).for_each(|(&k, found)| log_p[k] = found);
+        log_p
+            .into_iter()
+            .enumerate()
+            .map(|(k, log_p)| {
+                let merit = scored[k].2.merit;
+                let log_p = (log_p + (self.accepted[k].tried * self.families).ln()).min(0.0);
+                Significance { merit, log_p, is_significant: merit > 0.0 && log_p <= self.options.alpha.ln() }
+            })
+            .collect()
+    }
+
+    /// The same with the margin to its best rival there.
+    fn beside_rivals(
         &self,
         index: usize,
         own: &WithColumns,
+        judged: Significance,
         design: &Design,
-        whiten: &dyn Fn(&DMatrix<f64>) -> DMatrix<f64>,
+        whiten: &(dyn Fn(&DMatrix<f64>) -> DMatrix<f64> + Sync),
     ) -> Confirmation {
+        checkpoint();
         let accepted = &self.accepted[index];
-        let sizes = own.candidate.cause.sizes();
-        let columns = whiten(&own.columns);
-        let score = score_columns(design, &columns, &sizes, accepted.tried);
-        let trials = (accepted.tried * self.families).ln();
-        let log_p = (log_p_of(design, || columns.clone(), &sizes, &score) + trials).min(0.0);
         let best = accepted
             .rivals
             .iter()
@@ -335,9 +388,9 @@ impl ConfirmationContext<'_> {
             .fold(0.0, f64::max);
         let best = best.max(self.growth_of_links(&own.candidate.cause, accepted.tried, design, whiten));
         Confirmation {
-            significant: score.merit > 0.0 && log_p <= self.options.alpha.ln(),
-            log_p,
-            margin: score.merit - best,
+            significant: judged.is_significant,
+            log_p: judged.log_p,
+            margin: judged.merit - best,
             recovered: 0,
             testable: 0,
             changed: 0,
@@ -464,20 +517,21 @@ impl<'a> Half<'a> {
         let mut chosen: Vec<usize> = Vec::new();
         let options = self.confirming.options;
         while chosen.len() < own.len() + 4 {
-            let best = (0..all.len())
+            let mut scored: Vec<(usize, Score)> = (0..all.len())
                 .filter(|j| !chosen.contains(j))
                 .map(|j| {
                     let candidate = &all[j].candidate;
-                    let sizes = candidate.cause.sizes();
-                    (j, score_projected(&projected[j], &sizes, candidate.tried))
+                    (j, score_projected(&projected[j], &candidate.cause.sizes(), candidate.tried))
                 })
-                .filter(|(j, score)| {
-                    let candidate = &all[*j].candidate;
-                    let trials = (candidate.tried * self.confirming.families).ln();
-                    score.merit > 0.0
-                        && score.plain_log_p(&candidate.cause.sizes()) + trials <= options.alpha.ln()
-                })
-                .max_by(|a, b| a.1.merit.total_cmp(&b.1.merit).then(b.0.cmp(&a.0)));
+                .filter(|(_, score)| score.merit > 0.0)
+                .collect();
+            scored.sort_by(|a, b| b.1.merit.total_cmp(&a.1.merit).then(a.0.cmp(&b.0)));
+            // The p-value takes eigenvalues: only until one is significant.
+            let best = scored.into_iter().find(|(j, score)| {
+                let candidate = &all[*j].candidate;
+                let trials = (candidate.tried * self.confirming.families).ln();
+                score.plain_log_p(&candidate.cause.sizes()) + trials <= options.alpha.ln()
+            });
             let Some((j, _)) = best else { break };
             chosen.push(j);
             // Projects the selected cause off all candidates.
@@ -520,14 +574,6 @@ fn ranges(columns: &[DMatrix<f64>]) -> Vec<std::ops::Range<usize>> {
             first - c.ncols()..first
         })
         .collect()
-}
-
-fn side_by_side(columns: &[DMatrix<f64>], rows: usize) -> DMatrix<f64> {
-    let mut out = DMatrix::zeros(rows, columns.iter().map(DMatrix::ncols).sum());
-    for (c, range) in columns.iter().zip(ranges(columns)) {
-        out.columns_mut(range.start, range.len()).copy_from(c);
-    }
-    out
 }
 
 fn picked(columns: &DMatrix<f64>, observations: &[usize], per: usize) -> DMatrix<f64> {

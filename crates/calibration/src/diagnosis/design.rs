@@ -147,18 +147,20 @@ impl Linear {
         let dataset = &subject.observed.dataset;
         let per = fit.problem.rows_per_observation();
         let rows = fit.problem.rows();
-        let (residual, transposed) = linearised(&fit.problem, &fit.x);
-        let precision: Vec<f64> = fit.priors.iter().map(|prior| prior.sigma.powi(-2)).collect();
-        let mut gradient = &transposed * &residual;
-        for (k, precision) in precision.iter().enumerate() {
-            gradient[k] += precision * fit.x[k];
-        }
         // Derivatives for the columns of candidates, at the estimate.
         let anchors = dataset.anchors();
         let (probes, first_frame) = probes(dataset);
         let weights = with_robust_weights(&fit.weights, &fit.robust_weight);
         let problem = fit.problem.with_parameters(dataset, &fit.model, &fit.frames, &probes, &weights);
-        let slopes = linearised(&problem, &vec![0.0; probes.len()]).1;
+        let ((residual, transposed), (_, slopes)) = rayon::join(
+            || linearised(&fit.problem, &fit.x),
+            || linearised(&problem, &vec![0.0; probes.len()]),
+        );
+        let precision: Vec<f64> = fit.priors.iter().map(|prior| prior.sigma.powi(-2)).collect();
+        let mut gradient = &transposed * &residual;
+        for (k, precision) in precision.iter().enumerate() {
+            gradient[k] += precision * fit.x[k];
+        }
         let column = |k: usize| slopes.row(k).transpose();
         let links = &fit.model.links;
         let by_link_growth: [DVector<f64>; 6] = std::array::from_fn(|joint| {
@@ -410,14 +412,8 @@ impl Design {
                 self.sparse_product(columns)
             })
             .collect();
-        let dense = || all.iter().zip(&sparse).filter(|(_, s)| s.is_none()).map(|(columns, _)| columns);
-        let mut side_by_side = DMatrix::zeros(self.rows(), dense().map(DMatrix::ncols).sum());
-        let mut first = 0;
-        for columns in dense() {
-            side_by_side.columns_mut(first, columns.ncols()).copy_from(columns);
-            first += columns.ncols();
-        }
-        let shared = product(&self.basis, &side_by_side);
+        let dense = all.iter().zip(&sparse).filter(|(_, s)| s.is_none()).map(|(columns, _)| columns);
+        let shared = product(&self.basis, &side_by_side(dense, self.rows()));
         let mut first = 0;
         let work: Vec<_> = all
             .iter()
@@ -492,10 +488,7 @@ impl Design {
 
     /// The columns with everything free projected off, n × k.
     pub fn pure(&self, columns: &DMatrix<f64>, projected: &Projected) -> DMatrix<f64> {
-        let mut shared = projected.shared.clone();
-        if let (Some(reduction), Some(back)) = (&self.reduction, &projected.given_back) {
-            shared -= product(&reduction.directions, back);
-        }
+        let shared = self.shared(projected);
         if columns.ncols() >= MANY {
             return columns - product_of_transposed(&self.basis, &shared);
         }
@@ -510,6 +503,15 @@ impl Design {
         out
     }
 
+    /// QᵀC of the columns, along what is free, p × k.
+    fn shared(&self, projected: &Projected) -> DMatrix<f64> {
+        let mut shared = projected.shared.clone();
+        if let (Some(reduction), Some(back)) = (&self.reduction, &projected.given_back) {
+            shared -= product(&reduction.directions, back);
+        }
+        shared
+    }
+
     /// Of a reduced design, the basis along the removed directions, d × n.
     pub(super) fn removed(&self) -> Option<&DMatrix<f64>> {
         let reduction = self.reduction.as_ref()?;
@@ -520,6 +522,36 @@ impl Design {
     pub fn rows(&self) -> usize {
         self.residual.len()
     }
+}
+
+/// [`Design::pure`] of several columns, each of a reduction of `whole`, with one pass over its basis.
+pub(super) fn pure_all(whole: &Design, all: &[(&DMatrix<f64>, &Design, &Projected)]) -> Vec<DMatrix<f64>> {
+    let shared: Vec<DMatrix<f64>> =
+        all.iter().map(|(_, design, projected)| design.shared(projected)).collect();
+    let taken = product_of_transposed(&whole.basis, &side_by_side(&shared, whole.basis.nrows()));
+    let mut first = 0;
+    all.iter()
+        .map(|(columns, ..)| {
+            let own = taken.columns(first, columns.ncols());
+            first += columns.ncols();
+            *columns - own
+        })
+        .collect()
+}
+
+/// All columns of some matrices of `rows` rows.
+pub(super) fn side_by_side<'a>(
+    columns: impl IntoIterator<Item = &'a DMatrix<f64>, IntoIter: Clone>,
+    rows: usize,
+) -> DMatrix<f64> {
+    let columns = columns.into_iter();
+    let mut out = DMatrix::zeros(rows, columns.clone().map(DMatrix::ncols).sum());
+    let mut first = 0;
+    for part in columns {
+        out.columns_mut(first, part.ncols()).copy_from(part);
+        first += part.ncols();
+    }
+    out
 }
 
 /// Number of columns from which a matrix product is worth packing the basis.

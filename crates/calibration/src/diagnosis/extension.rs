@@ -93,7 +93,7 @@ const SEARCHED: f64 = 1e-5;
 
 /// Most steps of Levenberg–Marquardt within a search, for the same reason. In a curved valley that only priors close the last hundredth
 /// of χ² takes hundreds of steps.
-const SEARCH_STEPS: usize = 30;
+pub(super) const SEARCH_STEPS: usize = 30;
 
 /// Scalar rows times squared parameters from which the final refinement is looser.
 const MUCH_WORK: f64 = 1e8;

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use super::candidates::Scored;
 use super::catalogue::{Candidate, LoggedColumns};
 use super::cause::{Cause, MAP_KNOTS};
+use super::confirmation::CLEAR;
 use super::decision;
 use super::design::{Design, FullDesign};
 use super::extension::{Extended, Subject};
@@ -18,9 +19,6 @@ use super::selection::Accepted;
 use super::words;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::effect::error_map::ErrorMap;
-
-/// Twice the log Bayes factor of a finding against its best rival from which it is called identified: 20 to 1.
-const CLEAR: f64 = 6.0;
 
 /// A rival (including the model without the finding) whose held-out error is below this share of the finding's is not beaten,
 /// whatever the Bayes factor.

@@ -17,6 +17,7 @@ use rayon::prelude::*;
 use super::algebra::gram;
 use super::design::Design;
 use truegrind_math::axpy::add_scaled;
+use truegrind_math::lanes::{AnyWidth, Real, SinCos, WIDTH, vectorised};
 use truegrind_math::work::checkpoint;
 
 /// Rows of a shift, as indices of observations, both included, and its evidence.
@@ -129,6 +130,82 @@ fn sums_at(cuts: &[usize], scaled: &DMatrix<f64>, basis: &DMatrix<f64>, per: usi
     out
 }
 
+/// Evidence of k parameters with information `square` and gradient `gradient` in units of their sizes, and 0 in place of 1 where
+/// the information is not positive definite: S + I = L Lᵀ and L y = g on the stack, the gain is yᵀy.
+#[inline(always)]
+fn evidence<R: Real>(
+    like: R,
+    k: usize,
+    square: impl Fn(usize, usize) -> R,
+    gradient: impl Fn(usize) -> R,
+) -> [R; 2] {
+    let (zero, one) = (like.splat(0.0), like.splat(1.0));
+    if k == 1 {
+        let (g, s) = (gradient(0), square(0, 0).each(|s| s.max(0.0)));
+        return [g * g / (s + one) - (one + s).each(f64::ln), one];
+    }
+    let (mut l, mut y) = ([zero; MOST * MOST], [zero; MOST]);
+    let (mut det, mut definite, mut gain) = (one, one, zero);
+    for a in 0..k {
+        for b in 0..=a {
+            let mut sum = if a == b { square(a, b) + one } else { square(a, b) };
+            for c in 0..b {
+                sum -= l[a * MOST + c] * l[b * MOST + c];
+            }
+            if a == b {
+                definite = definite * sum.positive();
+                det = det * sum;
+                l[a * MOST + a] = sum.sqrt();
+            } else {
+                l[a * MOST + b] = sum / l[b * MOST + b];
+            }
+        }
+        let mut sum = gradient(a);
+        for c in 0..a {
+            sum -= l[a * MOST + c] * y[c];
+        }
+        y[a] = sum / l[a * MOST + a];
+        gain += y[a] * y[a];
+    }
+    [gain - det.each(f64::ln), definite]
+}
+
+/// The evidence, or none.
+fn valid([evidence, definite]: [f64; 2]) -> f64 {
+    if definite > 0.0 { evidence } else { f64::NEG_INFINITY }
+}
+
+/// Evidence of several intervals: the lower triangles of their information and their gradients, one after the other for each entry.
+struct Evidences<'a> {
+    k: usize,
+    squares: &'a [f64],
+    gradients: &'a [f64],
+    evidence: &'a mut [f64],
+}
+
+impl AnyWidth for Evidences<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<R: SinCos>(self, like: R) {
+        let Self { k, squares, gradients, evidence: out } = self;
+        let count = out.len();
+        for at in (0..count).step_by(R::ROWS) {
+            let entry = |all: &[f64], place: usize| like.load(&all[place * count..][..count], at);
+            let [found, definite] =
+                evidence(like, k, |a, b| entry(squares, a * (a + 1) / 2 + b), |a| entry(gradients, a));
+            let (mut values, mut flags) = ([0.0; WIDTH], [0.0; WIDTH]);
+            found.store(&mut values, 0);
+            definite.store(&mut flags, 0);
+            for (place, (value, flag)) in
+                out[at..].iter_mut().take(R::ROWS).zip(values.into_iter().zip(flags))
+            {
+                *place = valid([value, flag]);
+            }
+        }
+    }
+}
+
 impl ShiftScan {
     /// Sums `columns`, given for all rows, with prior standard deviations `sizes`; `None` for too few rows or too many
     /// parameters.
@@ -169,10 +246,9 @@ impl ShiftScan {
                 checkpoint();
                 let from = self.cuts[first];
                 let mut found = Vec::new();
-                for last in first + 1..=grid {
-                    let to = self.cuts[last] - 1;
+                for (evidence, cut) in sums.from_cut(first).into_iter().zip(&self.cuts[first + 1..]) {
+                    let to = cut - 1;
                     if to + 1 >= from + SHORTEST && is_valid_end(to, n) {
-                        let evidence = sums.between_cuts(first, last);
                         found.push(Interval { from, to, evidence });
                     }
                 }
@@ -228,14 +304,38 @@ impl<'a> ScanSums<'a> {
         out
     }
 
-    /// Evidence of the observations between two cuts.
-    fn between_cuts(&self, first: usize, last: usize) -> f64 {
+    /// Evidence of the observations between the cut `first` and each later one, several in a register.
+    fn from_cut(&self, first: usize) -> Vec<f64> {
+        let (k, cuts) = (self.strip.k, &self.strip.cuts);
+        let lasts = first + 1..cuts.len();
+        let count = lasts.len();
+        let (g, low, from) = (&self.products, first * k, cuts[first]);
+        let mut squares = Vec::with_capacity(k * (k + 1) / 2 * count);
+        for a in 0..k {
+            for b in 0..=a {
+                let (by_a, by_b) = (g.column(low + a), g.column(low + b));
+                let before = self.square_at(from, a, b);
+                squares.extend(lasts.clone().map(|last| {
+                    let high = last * k;
+                    let shared = g[(high + a, high + b)] - by_b[high + a] - by_a[high + b] + by_b[low + a];
+                    self.square_at(cuts[last], a, b) - before - shared
+                }));
+            }
+        }
+        let mut gradients = Vec::with_capacity(k * count);
+        for a in 0..k {
+            let before = self.gradient[from * k + a];
+            gradients.extend(lasts.clone().map(|last| self.gradient[cuts[last] * k + a] - before));
+        }
+        let mut evidence = vec![0.0; count];
+        vectorised(Evidences { k, squares: &squares, gradients: &gradients, evidence: &mut evidence });
+        evidence
+    }
+
+    /// Prefix sum of squares.
+    fn square_at(&self, i: usize, a: usize, b: usize) -> f64 {
         let k = self.strip.k;
-        let (from, to) = (self.strip.cuts[first], self.strip.cuts[last] - 1);
-        let (g, low, high) = (&self.products, first * k, last * k);
-        self.evidence_of(from, to, |a, b| {
-            g[(high + a, high + b)] - g[(high + a, low + b)] - g[(low + a, high + b)] + g[(low + a, low + b)]
-        })
+        self.strip.square[(i * k + a) * k + b]
     }
 
     /// Evidence of observations from..=to, with the prefix sums at from and to + 1.
@@ -243,49 +343,15 @@ impl<'a> ScanSums<'a> {
         let (p, d) = (self.strip.shared.nrows(), self.given_back.as_ref().map_or(0, DMatrix::nrows));
         work.clear();
         work.extend(high.iter().zip(low).map(|(h, l)| h - l));
-        let (shared, back) = work.split_at(self.strip.k * p);
-        self.evidence_of(from, to, |a, b| {
-            dot(&shared[a * p..][..p], &shared[b * p..][..p]) - dot(&back[a * d..][..d], &back[b * d..][..d])
-        })
-    }
-
-    /// Evidence of observations from..=to, given the scalar products of the Q-products.
-    fn evidence_of(&self, from: usize, to: usize, shared: impl Fn(usize, usize) -> f64) -> f64 {
         let k = self.strip.k;
+        let (shared, back) = work.split_at(k * p);
         let square = |a: usize, b: usize| {
-            let at = |i: usize| self.strip.square[(i * k + a) * k + b];
-            at(to + 1) - at(from) - shared(a, b)
+            let shared = dot(&shared[a * p..][..p], &shared[b * p..][..p])
+                - dot(&back[a * d..][..d], &back[b * d..][..d]);
+            self.square_at(to + 1, a, b) - self.square_at(from, a, b) - shared
         };
         let gradient = |a: usize| self.gradient[(to + 1) * k + a] - self.gradient[from * k + a];
-        if k == 1 {
-            let (g, s) = (gradient(0), square(0, 0).max(0.0));
-            return g * g / (s + 1.0) - (1.0 + s).ln();
-        }
-        // S + I = L Lᵀ and L y = g on the stack: the gain is yᵀy.
-        let (mut l, mut y, mut det) = ([0.0; MOST * MOST], [0.0; MOST], 1.0);
-        for a in 0..k {
-            for b in 0..=a {
-                let mut sum = square(a, b) + f64::from(u8::from(a == b));
-                for c in 0..b {
-                    sum -= l[a * MOST + c] * l[b * MOST + c];
-                }
-                if a == b {
-                    if !(sum > 0.0) {
-                        return f64::NEG_INFINITY;
-                    }
-                    det *= sum;
-                    l[a * MOST + a] = sum.sqrt();
-                } else {
-                    l[a * MOST + b] = sum / l[b * MOST + b];
-                }
-            }
-            let mut sum = gradient(a);
-            for c in 0..a {
-                sum -= l[a * MOST + c] * y[c];
-            }
-            y[a] = sum / l[a * MOST + a];
-        }
-        dot(&y, &y) - det.ln()
+        valid(evidence(0.0, k, square, gradient))
     }
 
     /// Prefix sums at any observation, cached in `known`.

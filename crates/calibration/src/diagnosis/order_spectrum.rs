@@ -4,6 +4,8 @@
 //! over Σ |θᵢ|². Powers of e^(iu) follow by multiplication, so an order costs ten operations a row. Correlation with geometry
 //! is ignored here, which can only underestimate a peak; the few strongest are then scored like any other candidate.
 
+use std::sync::{Arc, OnceLock};
+
 use nalgebra::DVector;
 use rayon::prelude::*;
 
@@ -30,6 +32,8 @@ const KEPT: usize = 2;
 struct JointHarmonics {
     once: [Vec<f64>; 2],
     twice: [Vec<f64>; 2],
+    /// The candidate of each order, once it was asked for.
+    candidates: Vec<OnceLock<Arc<Candidate>>>,
 }
 
 /// The turns of all joints that moved; they depend on no fit.
@@ -52,7 +56,11 @@ impl AngleHarmonics {
                 };
                 [padded(f64::cos), padded(f64::sin)]
             };
-            (high - low > STILL_RAD).then(|| JointHarmonics { once: both(1.0), twice: both(2.0) })
+            (high - low > STILL_RAD).then(|| JointHarmonics {
+                once: both(1.0),
+                twice: both(2.0),
+                candidates: (LOWEST..=HIGHEST).map(|_| OnceLock::new()).collect(),
+            })
         }))
     }
 }
@@ -94,7 +102,7 @@ impl AnyWidth for Orders<'_> {
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn run<R: SinCos>(self, like: R) -> Vec<[f64; 2]> {
         let Self {
-            harmonics: JointHarmonics { once: [cosines, sines], twice: [cosines_twice, sines_twice] },
+            harmonics: JointHarmonics { once: [cosines, sines], twice: [cosines_twice, sines_twice], .. },
             pull,
         } = self;
         let mut sums = vec![[[0.0; WIDTH]; 2]; HIGHEST + 1 - LOWEST];
@@ -129,7 +137,7 @@ pub fn candidates(
     subject: &Subject<'_>,
     turns: &AngleHarmonics,
     design: &Design,
-) -> (Vec<Candidate>, Vec<(usize, usize)>) {
+) -> (Vec<Arc<Candidate>>, Vec<(usize, usize)>) {
     let dataset = &subject.observed.dataset;
     let strongest: Vec<(f64, usize, usize)> = (0..6)
         .into_par_iter()
@@ -149,12 +157,15 @@ pub fn candidates(
     mapped.dedup();
     let candidates = strongest
         .into_par_iter()
-        .map(|(_, joint, order)| {
-            let harmonic = Harmonic { joint, order: order as f64, sine_rad: 0.0, cosine_rad: 0.0 };
-            Candidate {
-                tried: (HIGHEST + 1 - LOWEST) as f64,
-                ..Candidate::arm(Effect::GearTransmission(harmonic), dataset, subject.nominal)
-            }
+        .filter_map(|(_, joint, order)| {
+            let known = turns.0[joint].as_ref()?.candidates.get(order - LOWEST)?;
+            Some(Arc::clone(known.get_or_init(|| {
+                let harmonic = Harmonic { joint, order: order as f64, sine_rad: 0.0, cosine_rad: 0.0 };
+                Arc::new(Candidate {
+                    tried: (HIGHEST + 1 - LOWEST) as f64,
+                    ..Candidate::arm(Effect::GearTransmission(harmonic), dataset, subject.nominal)
+                })
+            })))
         })
         .collect();
     (candidates, mapped)

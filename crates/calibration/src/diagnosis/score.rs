@@ -127,20 +127,32 @@ pub fn log_p_of(
     sizes: &[f64],
     score: &Score,
 ) -> f64 {
-    let plain = || score.plain_log_p(sizes);
-    // A few hundred rows do not determine the scatter of many parameters.
-    if score.gain <= SOME || sizes.len() > MOST_SCATTERED {
-        return plain();
+    if !is_scattered(sizes, score) {
+        return score.plain_log_p(sizes);
     }
     let columns = columns();
     let projected = design.project(&columns);
-    let (information, gradient) = in_sizes(&projected.information, &projected.gradient, sizes);
-    let k = columns.ncols();
-    let Some(factor) = (&information + DMatrix::identity(k, k)).cholesky() else { return plain() };
+    let pure = design.pure(&columns, &projected);
+    let (information, gradient) = (projected.information, projected.gradient);
+    log_p_of_pure(design, pure, &Score { information, gradient, ..score.clone() }, sizes)
+}
+
+/// The same for columns off which everything free is projected already.
+pub fn log_p_of_pure(design: &Design, pure: DMatrix<f64>, score: &Score, sizes: &[f64]) -> f64 {
+    let (information, gradient) = in_sizes(&score.information, &score.gradient, sizes);
+    let k = sizes.len();
+    let Some(factor) = (&information + DMatrix::identity(k, k)).cholesky() else {
+        return score.plain_log_p(sizes);
+    };
     let step = factor.solve(&gradient);
-    let scattered = scatter_statistic(design, &columns, &projected, sizes, &gradient, &step);
+    let scattered = scatter_statistic(design, pure, sizes, &gradient, &step);
     let (plain, freedom) = plain_statistic(&information, &gradient);
     log_chi_square_tail(plain.min(scattered), freedom.max(1))
+}
+
+/// Whether the empirical scatter counts: a few hundred rows do not determine that of many parameters.
+pub(super) fn is_scattered(sizes: &[f64], score: &Score) -> bool {
+    score.gain > SOME && sizes.len() <= MOST_SCATTERED
 }
 
 /// Fall of χ² below which the empirical scatter is not computed.
@@ -168,14 +180,12 @@ fn plain_statistic(information: &DMatrix<f64>, gradient: &DVector<f64>) -> (f64,
 /// indices of all rows.
 fn scatter_statistic(
     design: &Design,
-    columns: &DMatrix<f64>,
-    projected: &Projected,
+    mut pure: DMatrix<f64>,
     sizes: &[f64],
     gradient: &DVector<f64>,
     step: &DVector<f64>,
 ) -> f64 {
-    let k = columns.ncols();
-    let mut pure = design.pure(columns, projected);
+    let k = pure.ncols();
     pure.column_iter_mut().zip(sizes).for_each(|(mut column, size)| column *= *size);
     let left = &design.residual - &pure * step;
     let poses = &design.slopes.poses;

@@ -195,22 +195,32 @@ impl<'a> Search<'a> {
         ));
         let seed = options.selection.seed;
         self.validation = Validation::in_order(subject, &self.set_aside, seed, options.blocks, reach);
-        self.stages =
-            [&self.registered, &self.geometric, &self.extended].map(|fit| self.validation.stage(fit));
+        let stage = |fit: &Extended| self.validation.stage(fit);
         let passing: Vec<usize> = (0..self.found.causes.len())
             .filter(|&k| {
                 self.found.causes[k].rows().is_some() && !confirmed.outcome.confirmations[k].is_confirmed()
             })
             .collect();
-        if passing.is_empty() {
-            return;
-        }
-        let lasting = self.without(&passing);
-        let stage = self.validation.stage(&lasting);
+        let [before, geometry] = [&self.registered, &self.geometric].map(stage);
         let excursions = confirmed.outcome.discrepancy.correlation > CORRELATED_NOISE;
-        if excursions || stage.random.rmse < self.stages[2].random.rmse * SHIFT_GAIN {
-            self.stages[2] = stage;
-            self.replace_fit(lasting, &passing);
+        let kept = || stage(&self.extended);
+        let lasting = (!passing.is_empty()).then(|| {
+            let fit = self.without(&passing);
+            let errors = stage(&fit);
+            (fit, errors)
+        });
+        let (lasting, extended) = match lasting {
+            None => (None, kept()),
+            Some((fit, errors)) if excursions => (Some(fit), errors),
+            Some((fit, errors)) => {
+                let whole = kept();
+                let generalises = errors.random.rmse < whole.random.rmse * SHIFT_GAIN;
+                if generalises { (Some(fit), errors) } else { (None, whole) }
+            }
+        };
+        self.stages = [before, geometry, extended];
+        if let Some(fit) = lasting {
+            self.replace_fit(fit, &passing);
             let mut place = 0..;
             self.accepted.retain(|_| !place.next().is_some_and(|k| passing.contains(&k)));
             *confirmed = self.confirm();

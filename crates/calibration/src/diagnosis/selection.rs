@@ -40,6 +40,8 @@ impl Default for Options {
 pub struct Accepted {
     /// Its score there.
     pub own: Score,
+    /// See [`Scored::head_start`].
+    pub head_start: f64,
     /// Natural logarithm of its corrected p-value.
     pub log_p: f64,
     /// Number of variants of it that were tried.
@@ -197,7 +199,7 @@ fn causes_to_review(
     let near: Vec<Cause> = left
         .iter()
         .filter(|s| {
-            !s.candidate.cause.is_same_finding(cause) && s.score.merit > best.score.merit - DOUBT_MARGIN
+            !s.candidate.cause.is_same_finding(cause) && s.preference() > best.preference() - DOUBT_MARGIN
         })
         .map(|s| s.candidate.cause.clone())
         .collect();
@@ -223,7 +225,7 @@ fn next_candidate<'a>(
     let design = &scores.whole.design;
     let mut significant = left
         .iter()
-        .take_while(|s| s.score.merit > 0.0)
+        .take_while(|s| s.preference() > 0.0)
         .filter(|s| {
             !contains_cause(banned, &s.candidate.cause)
                 && !contains_cause(&scores.fit.causes, &s.candidate.cause)
@@ -286,7 +288,7 @@ struct ReviewOptions {
 }
 
 /// Number of causes that are scored in parallel before the model can change.
-const PARALLEL_REVIEWS: usize = 4;
+const PARALLEL_REVIEWS: usize = 2;
 
 /// Result of a review.
 enum Review {
@@ -308,8 +310,9 @@ fn review(scores: &CandidateScores<'_>, options: &Options, which: &[usize], how:
         for (&index, (judged, design, scored)) in some.iter().zip(looked) {
             let mut others = current.causes.clone();
             others.remove(index);
-            let enough = judged.own.merit + how.margin;
-            let best = scored.iter().take_while(|s| s.score.merit > enough).find(|s| {
+            let own = judged.own.merit + judged.head_start;
+            let enough = own + how.margin;
+            let best = scored.iter().take_while(|s| s.preference() > enough).find(|s| {
                 !contains_cause(&others, &s.candidate.cause)
                     && catalogue.is_significant(&design, s, options.alpha)
             });
@@ -317,7 +320,7 @@ fn review(scores: &CandidateScores<'_>, options: &Options, which: &[usize], how:
                 !contains_cause(std::slice::from_ref(&current.causes[index]), &best.candidate.cause)
             });
             let supported = !current.causes[index].requires_tilt() || Cause::tilt_is_supported(&others);
-            let remains = supported && judged.own.merit > 0.0 && judged.log_p <= options.alpha.ln();
+            let remains = supported && own > 0.0 && judged.log_p <= options.alpha.ln();
             if better.is_some() || !remains {
                 let reduced = warm_fit(subject, &others, Freedom::All, Some(current));
                 let Some(better) = better else { return Review::Changed(Box::new(reduced)) };
@@ -355,7 +358,7 @@ fn own_score(subject: &Subject<'_>, design: &Design, scored: &[Scored], cause: &
         .fold(1.0, f64::max);
     let candidate = Arc::new(Candidate { tried, ..candidate });
     let score = score(design, &candidate);
-    Scored { candidate, score }
+    Scored { candidate, score, head_start: 0.0 }
 }
 
 /// Scores a cause against the model without it. Returns the result, the design of that model, and the scores of all candidates in it.
@@ -370,7 +373,7 @@ fn judge(scores: &CandidateScores<'_>, index: usize, open: bool) -> (Accepted, D
         let same = other.candidate.cause.is_same_finding(cause)
             || contains_cause(&current.causes, &other.candidate.cause);
         let listed = rivals.iter().any(|r| r.candidate.cause.is_same_finding(&other.candidate.cause));
-        if !same && !listed && other.score.merit > 0.25 * own.score.merit.max(0.0) {
+        if !same && !listed && other.preference() > 0.25 * own.preference().max(0.0) {
             rivals.push(other.clone());
         }
         if rivals.len() >= 5 {
@@ -381,7 +384,8 @@ fn judge(scores: &CandidateScores<'_>, index: usize, open: bool) -> (Accepted, D
         cause.is_constant_scale().then(|| scale_information_beside_growth(&design, &own.score.estimate));
     let log_p = scores.catalogue.corrected_log_p(&design, &own);
     let tried = own.candidate.tried;
-    (Accepted { own: own.score, log_p, tried, rivals, information_beside_growth }, design, scored)
+    let (own, head_start) = (own.score, own.head_start);
+    (Accepted { own, head_start, log_p, tried, rivals, information_beside_growth }, design, scored)
 }
 
 /// Non-centrality of a sensor scale error of that size if a common growth of all lengths of the arm is free without a prior.

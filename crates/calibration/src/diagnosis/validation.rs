@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::algebra::{back_and_forth, factored};
-use super::extension::{Extended, Freedom, Subject};
+use super::extension::{Extended, Freedom, SEARCH_STEPS, Subject};
 use super::held::neither;
 use super::newton;
 use crate::identification::fit::{Observations, errors_on};
@@ -87,7 +87,7 @@ impl Validation {
 
     /// Errors over random folds and blocks, every fold refitted in full.
     pub fn by_refits(&self, fit: &Extended) -> [ErrorSummary; 2] {
-        [&self.random, &self.blocks].map(|splits| self.held_out(fit, splits))
+        rayon::join(|| self.held_out(fit, &self.random), || self.held_out(fit, &self.blocks)).into()
     }
 
     /// The same with every fold refitted by one step; `None` if a fold leaves parameters undetermined.
@@ -151,8 +151,11 @@ impl Validation {
                 let mut x = fit.x.clone();
                 if !newton::descend(&*problem, &mut x) {
                     // As near to the optimum as the other folds: a promise is compared with the cost, half the rows.
-                    let near =
-                        lm::Options { cost_tolerance: 2.0 * newton::CONVERGED, ..lm::Options::default() };
+                    let near = lm::Options {
+                        cost_tolerance: 2.0 * newton::CONVERGED,
+                        max_iterations: SEARCH_STEPS,
+                        ..lm::Options::default()
+                    };
                     x = lm::solve(&*problem, &x, &near).x;
                 }
                 let (model, frames) = fit.problem.apply(&x);
