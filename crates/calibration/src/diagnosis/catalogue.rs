@@ -469,6 +469,10 @@ fn latency(dataset: &Dataset) -> EmpiricalFault {
     EmpiricalFault::Latency { middle_s: if middle_s.is_finite() { middle_s.round() as i64 } else { 0 } }
 }
 
+/// Prior odds of a cause with a physical law against an expansion that stands for faults whose law is unknown: it can imitate many
+/// laws. Counted as that many variants.
+const EXPANSION_ODDS: f64 = 10.0;
+
 /// Empirical faults that the logged columns can test, with the number of variants of each.
 fn empirical_faults(subject: &Subject<'_>, columns: &LoggedColumns) -> Vec<(EmpiricalFault, f64)> {
     let dataset = &subject.observed.dataset;
@@ -481,6 +485,7 @@ fn empirical_faults(subject: &Subject<'_>, columns: &LoggedColumns) -> Vec<(Empi
         out.extend([(EmpiricalFault::ArmUnsettled, 2.0), (EmpiricalFault::SensorUnsettled, 2.0)]);
     }
     let moves = |j: usize| columns.range_rad[j] > STILL_RAD;
+    let exact = out.len();
     out.extend((0..3).map(|joint| (EmpiricalFault::NonlinearStiffness { joint }, 1.0)));
     out.extend(two_joint_gears(subject.nominal, &moves));
     if dataset.sensor == Sensor::Cable {
@@ -489,5 +494,6 @@ fn empirical_faults(subject: &Subject<'_>, columns: &LoggedColumns) -> Vec<(Empi
         out.push((EmpiricalFault::Refraction, 1.0));
         out.extend([false, true].map(|second| (EmpiricalFault::TargetNest { second }, 2.0)));
     }
+    out[exact..].iter_mut().for_each(|(_, tried)| *tried *= EXPANSION_ODDS);
     out
 }

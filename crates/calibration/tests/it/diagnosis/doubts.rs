@@ -112,7 +112,9 @@ fn few_poses_prove_nothing_however_often_they_are_read() {
         let rows = run(&arm(), &[Hidden::Warp { mm: 0.3 }], &setup).dataset;
         let found = diagnosed(&read_again(&rows, 5, 0.02, seed));
         assert_eq!(identified(&found), Vec::<&str>::new(), "{seed}");
-        assert!(found.estimated.model.effects.is_empty(), "{seed}: {:?}", found.estimated.model.effects);
+        // What is in doubt is in the file with size 0, for its covariance.
+        let effects = &found.estimated.model.effects;
+        assert!(effects.iter().all(Effect::is_zero), "{seed}: {effects:?}");
     }
 }
 
