@@ -62,9 +62,11 @@ const SINGULARITY_WATCH: f64 = 20.0;
 
 /// What the controller computes from the numbers of one target.
 pub(crate) struct WrittenTarget<'a> {
-    /// Flange poses that the controller computes, before and after.
-    pub(crate) flanges: [Pose; 2],
-    /// The latter, from the numbers as written.
+    /// Its frames, as the controller holds them.
+    pub(crate) frames: &'a FramePair,
+    /// Flange pose that the controller computes.
+    pub(crate) flange: &'a Pose,
+    /// The same from the numbers as written.
     pub(crate) read_back: &'a Pose,
     /// Its joints for them.
     pub(crate) joints: &'a Joints,
@@ -81,9 +83,9 @@ pub(crate) fn target_fault(
     arms: &Arms<'_>,
     options: &Options,
 ) -> Option<OutcomeReason> {
-    let [from, to] = &replay.flanges;
+    let flanges = || [replay.frames.flange_for(&solved.intended), *replay.flange];
     let joints = [&solved.before, replay.joints];
-    if let Some(joint_jump) = joint_jump([from, to], joints, &arms.nominal, options) {
+    if let Some(joint_jump) = joint_jump(flanges, joints, &arms.nominal, options) {
         return Some(joint_jump);
     }
     if singularity < SINGULARITY_WATCH * options.min_singularity
@@ -103,7 +105,7 @@ pub(crate) fn target_fault(
 
 /// The joint that a correction turns too far.
 fn joint_jump(
-    flanges: [&Pose; 2],
+    flanges: impl FnOnce() -> [Pose; 2],
     joints: [&Joints; 2],
     nominal: &Inverse<'_>,
     options: &Options,
@@ -114,8 +116,8 @@ fn joint_jump(
     if turned <= options.free_joint_change_rad {
         return None;
     }
-    let most = (options.joint_gain * flange_travel(flanges[0], flanges[1], nominal))
-        .max(options.free_joint_change_rad);
+    let [from, to] = flanges();
+    let most = (options.joint_gain * flange_travel(&from, &to, nominal)).max(options.free_joint_change_rad);
     (!(turned <= most)).then(|| OutcomeReason::JointJump {
         joint,
         deg: turned.to_degrees(),
@@ -136,7 +138,7 @@ pub(crate) fn jumps_joint(
     let [intended, commanded] = [intended, commanded].map(|pose| mounting.flange_for(pose));
     let before = arms.nominal.solve_near(&intended, joints);
     before.is_ok_and(|before| {
-        joint_jump([&intended, &commanded], [&before.joints, joints], &arms.nominal, options).is_some()
+        joint_jump(|| [intended, commanded], [&before.joints, joints], &arms.nominal, options).is_some()
     })
 }
 
@@ -627,7 +629,7 @@ impl PathCheck<'_> {
             return Err(Some(OutcomeReason::SingularPath));
         }
         let jumped = before().and_then(|s| {
-            joint_jump([&intended, &flange], [&s.joints, &place.joints], self.nominal, self.options)
+            joint_jump(|| [intended, flange], [&s.joints, &place.joints], self.nominal, self.options)
         });
         match jumped {
             Some(OutcomeReason::JointJump { joint, deg, most_deg, .. }) => {
