@@ -33,7 +33,7 @@ use crate::target::solved_target::{SolvedTarget, SolvedTargets, as_joints};
 use truegrind_arm::inverse::budget::{SearchBudget, with_budget};
 use truegrind_arm::inverse::{Inverse, InverseError};
 use truegrind_arm::model::Joints;
-use truegrind_math::se3::Pose;
+use truegrind_math::se3::{Pose, angle_bound_rad};
 use truegrind_programs::motion::{Listing, Motion, MotionKind, MotionTarget, RobTarget, Switch, TargetValue};
 
 /// Largest rate of change of a margin with flange travel: the sine of the wrist angle changes with the rotation of the tool
@@ -146,6 +146,12 @@ pub(crate) fn jumps_joint(
 fn flange_travel(from: &Pose, to: &Pose, nominal: &Inverse<'_>) -> f64 {
     let shift = (to.translation.vector - from.translation.vector).norm();
     shift / nominal.length_mm() + from.rotation.angle_to(&to.rotation)
+}
+
+/// An upper bound of [`flange_travel`].
+fn travel_bound(from: &Pose, to: &Pose, nominal: &Inverse<'_>) -> f64 {
+    let shift = (to.translation.vector - from.translation.vector).norm();
+    shift / nominal.length_mm() + angle_bound_rad(&from.rotation, &to.rotation)
 }
 
 /// Forbids motions whose segment or start does not allow their correction; returns whether any was.
@@ -412,14 +418,12 @@ impl SegmentChecker<'_> {
         if !self.curve(motion) {
             return false;
         }
+        let clear = |travel| self.is_clear([&from.joints[1], &to.after], [&there, &here], travel * LEVER);
+        let (start, end, nominal) = (&from.commanded, &to.commanded, &self.arms.nominal);
         // The commanded circle is longer than its chord.
         motion.kind == MotionKind::Circular
             || from.frames_index != to.frames_index
-            || !self.is_clear(
-                [&from.joints[1], &to.after],
-                [&there, &here],
-                flange_travel(&from.commanded, &to.commanded, &self.arms.nominal) * LEVER,
-            )
+            || !clear(travel_bound(start, end, nominal)) && !clear(flange_travel(start, end, nominal))
     }
 
     /// Whether a segment between these joints is certainly free of faults.
