@@ -467,7 +467,9 @@ fn plan_motion<'a>(
         Role::Via if segment_plan.straight => NewTarget::Drop,
         _ => new_target(target, solved, motion, options),
     };
-    let new_targets: Vec<NewTarget> = motion.targets.iter().zip(solved_targets()).map(new).collect();
+    // Not collected: without a known length that takes room for four.
+    let mut new_targets = Vec::with_capacity(targets.len());
+    new_targets.extend(motion.targets.iter().zip(solved_targets()).map(new));
     outcome.after_mm = solved_targets().last().map(|s| s.deviation_mm[1]);
     let change = Change { motion: index as u32, targets: new_targets, before: segment_plan.before.clone() };
     let status = if flag.is_some() { Status::Flagged } else { Status::Changed };
