@@ -20,7 +20,9 @@
 //!
 //! An AMD Zen 5 at 4.17 GHz has two multipliers and two adders of 512 bits: 32 operations in a cycle where products and sums balance, 133 G/s.
 //! Medians there, under load: forward 74 to 82 M/s (36 % of the bound) and 31 M/s, AVX2 48 and 18.5, 7c20e9f in turn 22.5 and 12.6; inverse
-//! 11.1 and 4.9 M/s (30 %), AVX2 7.1 and 3.1, 7c20e9f 4.9 and 2.3. Of the inverse the kernel takes 72 %, judging each row 22 %.
+//! 11.1 and 4.9 M/s (30 %), AVX2 7.1 and 3.1, 7c20e9f 4.9 and 2.3. Eight rows of a path that are
+//! certainly accepted are judged together, in lanes: in turn at a load of 20 the inverse went from 11.4-11.8 and 5.2-5.4 M/s to 12.4-13.0 and 5.2-5.8
+//! (AVX2 7.0 and 3.1 to 7.6 and 3.2); judging row by row had 22 % of the time.
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};

@@ -24,7 +24,7 @@ use self::outputs::{
 };
 use self::program::rewrite_program;
 use super::cell_arguments::note_unused_entries;
-use super::computation::on_threads;
+use super::computation::{on_threads, on_threads_that_wait};
 use super::exit_status::ExitStatus;
 use super::files::{self, Batch, read_log};
 use super::inputs::{self, NamedModel, NamedRobot};
@@ -203,7 +203,7 @@ fn compensate_many(
         whole: arguments.outputs.pages.json.is_some(),
     };
     let done: Vec<ProgramResult> =
-        on_threads(arguments.common.threads, || process_units(store, jobs, &steps))??;
+        on_threads_that_wait(arguments.common.threads, || process_units(store, jobs, &steps))??;
     drop(work);
     for done in &done {
         for note in &done.notes {

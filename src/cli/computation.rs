@@ -40,13 +40,23 @@ pub(super) fn watching<T: Send>(
     Ok(run_watched(&watch, check_threads(threads)?, work)??)
 }
 
+/// [`on_threads`] for work that waits for the disk in between: without a number, one thread more than there are processors, which
+/// computes meanwhile.
+pub(super) fn on_threads_that_wait<T: Send>(
+    threads: Option<usize>,
+    work: impl FnOnce() -> T + Send,
+) -> anyhow::Result<T> {
+    on_threads(threads.or_else(|| Some((rayon::current_num_threads() + 1).min(MOST_THREADS))), work)
+}
+
 /// Runs `work` on the given number of threads.
 pub(super) fn on_threads<T: Send>(
     threads: Option<usize>,
     work: impl FnOnce() -> T + Send,
 ) -> anyhow::Result<T> {
     match check_threads(threads)? {
-        None => Ok(work()),
+        // On a thread of the pool: this one would sleep and be woken at every parallel step.
+        None => Ok(rayon::join(work, || ()).0),
         Some(n) => Ok(rayon::ThreadPoolBuilder::new().num_threads(n).build()?.install(work)),
     }
 }

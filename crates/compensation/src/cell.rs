@@ -541,14 +541,12 @@ impl Used {
             let touched = |tool: &CellFrame| pointer.is_none_or(|name| setup::same(name, &tool.name));
             out.tool.extend((0..cell.tool.len()).filter(|&k| touched(&cell.tool[k])));
         }
-        let targets = listing.motions.iter().flat_map(|motion| &motion.targets);
-        let mut moved = [false; 6];
-        for value in targets.filter_map(|target| target.value.as_ref().ok()) {
-            (0..6).for_each(|axis| moved[axis] |= value.external()[axis].is_some());
-        }
+        let moves = |axis: usize| {
+            let mut targets = listing.motions.iter().flat_map(|motion| &motion.targets);
+            targets.any(|target| target.value.as_ref().is_ok_and(|value| value.external()[axis].is_some()))
+        };
         let axes = cell.external.iter().enumerate();
-        out.external
-            .extend(axes.filter(|(_, a)| a.index().is_some_and(|k| moved[k])).map(|(place, _)| place));
+        out.external.extend(axes.filter(|(_, a)| a.index().is_some_and(moves)).map(|(place, _)| place));
         out
     }
 

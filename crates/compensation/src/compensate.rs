@@ -80,10 +80,10 @@ pub fn compensate(
     loop {
         let planned = targets.plan(&refused);
         if program.accepts(&planned.changes) {
-            // Frees the solved targets before the edits are made; no second plan is needed.
-            drop(targets);
-            let rewritten = program.rewrite(&planned.changes, &rewrite)?;
-            return Ok(agreed(planned, rewritten, &BTreeMap::new(), program));
+            // Frees the solved targets while the edits are made; no second plan is needed.
+            let ((), rewritten) =
+                rayon::join(|| drop(targets), || program.rewrite(&planned.changes, &rewrite));
+            return Ok(agreed(planned, rewritten?, &BTreeMap::new(), program));
         }
         let rewritten = program.rewrite(&planned.changes, &rewrite)?;
         let found = refusals(&planned, &rewritten, listing);

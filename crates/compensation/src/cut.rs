@@ -9,8 +9,11 @@
 //! refuses too much rather than too little. A call of a routine with several callers separates cuts; so do instructions whose
 //! path is not in the text (calls with targets, cycles), since the motions after them belong to other cuts.
 
+use rayon::prelude::*;
+
 use crate::deviation::Status;
 use crate::plan::reason::OutcomeReason;
+use crate::search_budget::MANY;
 use truegrind_programs::motion::{Listing, Motion, MotionKind, Reason};
 
 /// Treatment of a cut in which some motion cannot be corrected.
@@ -44,27 +47,26 @@ impl CutsOf {
 /// The cuts of a listing.
 pub(crate) fn of(listing: &Listing) -> CutsOf {
     let motions = &listing.motions;
+    let may_cut: Vec<bool> = motions.iter().map(may_cut).collect();
     let mut root: Vec<u32> = (0..motions.len() as u32).collect();
     let mut runs_into = Vec::new();
     for (index, motion) in (0_u32..).zip(motions) {
-        let stands_before = index.checked_sub(1).filter(|before| {
-            let before = &motions[*before as usize];
-            before.place.file == motion.place.file && before.routine == motion.routine
-        });
-        let mut starts: Vec<u32> = motion.previous.into_iter().collect();
-        if motion.previous.is_none() {
-            starts.extend(stands_before);
-        }
-        for start in starts {
-            if one_cut(&motions[start as usize], motion, listing) {
-                runs_into.push((start, index));
-                let (a, b) = (find(&mut root, start), find(&mut root, index));
-                root[a.max(b) as usize] = a.min(b);
-            }
+        let stands_before = || {
+            let before = &motions[index.checked_sub(1)? as usize];
+            let same_text = before.place.file == motion.place.file && before.routine == motion.routine;
+            same_text.then_some(index - 1)
+        };
+        let Some(start) = motion.previous.or_else(stands_before) else { continue };
+        if may_cut[start as usize]
+            && may_cut[index as usize]
+            && goes_on(&motions[start as usize], motion, listing)
+        {
+            runs_into.push((start, index));
+            let (a, b) = (find(&mut root, start), find(&mut root, index));
+            root[a.max(b) as usize] = a.min(b);
         }
     }
-    let of =
-        (0_u32..).zip(motions).map(|(index, motion)| cuts(motion).then(|| find(&mut root, index))).collect();
+    let of = (0_u32..).zip(may_cut).map(|(index, may_cut)| may_cut.then(|| find(&mut root, index))).collect();
     CutsOf { of, runs_into }
 }
 
@@ -78,7 +80,7 @@ fn find(root: &mut [u32], mut index: u32) -> u32 {
 }
 
 /// Whether the tool may cut during a motion.
-fn cuts(motion: &Motion) -> bool {
+fn may_cut(motion: &Motion) -> bool {
     let path = matches!(motion.kind, MotionKind::Linear | MotionKind::Circular)
         // A path that is given in the text but consists of neither lines nor arcs, or an unknown
         // instruction.
@@ -87,18 +89,14 @@ fn cuts(motion: &Motion) -> bool {
     path && motion.left != Some(Reason::Probe) && !motion.instruction.contains("Search")
 }
 
-/// Whether a motion continues the cut of the previous one without a stop.
-fn one_cut(before: &Motion, motion: &Motion, listing: &Listing) -> bool {
+/// Whether a motion goes on from the previous one without a stop, in the same frames.
+fn goes_on(before: &Motion, motion: &Motion, listing: &Listing) -> bool {
     let stops = listing.zone(before).is_some_and(|zone| zone.value.as_ref().is_ok_and(|zone| zone.fine));
-    cuts(before)
-        && cuts(motion)
-        && !stops
-        && before.tool == motion.tool
-        && before.work_object == motion.work_object
+    !stops && before.same_frames(motion)
 }
 
 /// Why a motion remains unmodified, with its status.
-type Obstacle<'a> = &'a dyn Fn(u32) -> Option<(Status, OutcomeReason)>;
+type Obstacle<'a> = &'a (dyn Fn(u32) -> Option<(Status, OutcomeReason)> + Sync);
 
 /// The motions that could be corrected but remain unmodified with the rest of their cut.
 pub(crate) fn rest_of_cuts(
@@ -106,21 +104,22 @@ pub(crate) fn rest_of_cuts(
     cuts: &CutsOf,
     blocking_reason: Obstacle<'_>,
 ) -> Vec<(u32, OutcomeReason)> {
+    let motions = (0..cuts.of.len() as u32).into_par_iter().with_min_len(MANY);
+    let blocked: Vec<(u32, u32, OutcomeReason)> =
+        motions.filter_map(|index| Some((index, cuts.root(index)?, blocking_reason(index)?.1))).collect();
+    if blocked.is_empty() {
+        return Vec::new();
+    }
     // The first motion of each cut that remains unmodified for its own reason.
     let mut cause: Vec<Option<OutcomeReason>> = vec![None; cuts.of.len()];
-    for (index, cut) in (0_u32..).zip(&cuts.of) {
-        let Some(cut) = cut.map(|cut| cut as usize) else { continue };
-        if cause[cut].is_none()
-            && let Some((_, why)) = blocking_reason(index)
-        {
-            let line = listing.motions[index as usize].place.line;
-            cause[cut] = Some(OutcomeReason::PartOfCut { line, because: why.kind() });
-        }
+    for (index, cut, why) in &blocked {
+        let line = listing.motions[*index as usize].place.line;
+        cause[*cut as usize].get_or_insert(OutcomeReason::PartOfCut { line, because: why.kind() });
     }
     (0_u32..)
         .zip(&cuts.of)
         .filter_map(|(index, cut)| Some((index, cause[(*cut)? as usize]?)))
-        .filter(|(index, _)| blocking_reason(*index).is_none())
+        .filter(|(index, _)| blocked.binary_search_by_key(index, |(blocked, ..)| *blocked).is_err())
         .collect()
 }
 

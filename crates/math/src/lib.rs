@@ -9,5 +9,6 @@ pub mod statistics;
 pub mod distribution;
 pub mod tail;
 pub mod radial;
+pub mod rounding;
 pub mod spectral;
 pub mod work;

@@ -329,6 +329,11 @@ pub struct Motion {
 }
 
 impl Motion {
+    /// Whether both motions have the same tool and the same work object, as most neighbours do.
+    pub fn same_frames(&self, other: &Motion) -> bool {
+        (self.tool, self.work_object) == (other.tool, other.work_object)
+    }
+
     /// The end of the motion.
     pub fn to(&self) -> Option<&MotionTarget> {
         self.targets.iter().rev().find(|target| target.role == Role::To)

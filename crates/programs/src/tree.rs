@@ -10,6 +10,8 @@
 
 use std::ops::Range;
 
+use rayon::prelude::*;
+
 use crate::motion::{OpaqueReason, Span};
 
 /// A range extended to its whole line, with blanks and line end, if nothing else is on the line.
@@ -93,16 +95,13 @@ impl<'s, T: Copy, N: Copy> Tree<'s, T, N> {
     pub fn append(&mut self, parts: &[Self])
     where
         T: Send + Sync,
-        N: Sync,
     {
-        let Tree { kinds, starts, lines, .. } = self;
-        rayon::join(
-            || parts.iter().for_each(|part| starts.extend_from_slice(&part.starts)),
-            || {
-                parts.iter().for_each(|part| kinds.extend_from_slice(&part.kinds));
-                parts.iter().for_each(|part| lines.extend_from_slice(&part.lines));
-            },
-        );
+        const AT_ONCE: usize = 1 << 16;
+        for part in parts {
+            self.starts.par_extend(part.starts.par_iter().with_min_len(AT_ONCE).copied());
+            self.kinds.par_extend(part.kinds.par_iter().with_min_len(AT_ONCE).copied());
+            self.lines.extend_from_slice(&part.lines);
+        }
     }
 
     /// Appends the token that begins at `start`; it ends where the next begins.

@@ -73,9 +73,9 @@ pub struct Row {
 impl Row {
     /// The row of a planned program.
     pub fn of(file: String, output: Option<String>, ended: Ended, plan: &Plan, listing: &Listing) -> Row {
-        let count = |motion_status: MotionStatus| {
-            plan.outcomes.iter().filter(|outcome| outcome.status == motion_status).count()
-        };
+        let mut counts = [0; 4];
+        plan.outcomes.iter().for_each(|outcome| counts[outcome.status as usize] += 1);
+        let count = |motion_status: MotionStatus| counts[motion_status as usize];
         let written = |motion_status: MotionStatus| {
             matches!(motion_status, MotionStatus::Changed | MotionStatus::Flagged)
         };

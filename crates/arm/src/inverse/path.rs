@@ -8,6 +8,7 @@ use super::kernel::{Outputs, Solved};
 use super::{Branch, Inverse, InverseError, Solution, same_branch};
 use crate::chain::FrameColumns;
 use crate::joints::{self, Joints};
+use crate::model::Limits;
 use truegrind_math::lanes::{AnyWidth, SinCos, WIDTH, vectorised};
 use truegrind_math::se3::Pose;
 
@@ -97,6 +98,15 @@ impl Inverse<'_> {
                 }
             }
             self.solve_lanes(block, &seeds, outputs, &mut lanes, &mut solved);
+            if self.is_steady(block, &lanes, &solved, (&last, &margins)) {
+                for k in 0..WIDTH {
+                    let row = lane(&solved, k);
+                    let joints = Joints::from(row.mapped);
+                    (stride, last, margins) = (joints - last, joints, row.margins[1]);
+                    out.push(Ok(keep(row.solution(&joints), margins)));
+                }
+                continue;
+            }
             for (k, target) in block.iter().enumerate() {
                 let row = lane(&solved, k);
                 let joints = self.controller_angles(&row.mapped);
@@ -228,6 +238,22 @@ impl Inverse<'_> {
         }
     }
 
+    /// Whether [`Inverse::along`] certainly accepts all eight rows of a block, each from the one before, the first from `before`. What
+    /// is near a bound is left to the judgement of single rows.
+    #[inline(always)]
+    fn is_steady(
+        &self,
+        block: &[Pose],
+        targets: &Targets,
+        solved: &Solved<Eight>,
+        (last, margins): (&Joints, &[f64; 3]),
+    ) -> bool {
+        block.len() == WIDTH
+            && self.map_inverse.is_some()
+            && self.arm.map_is_identity()
+            && vectorised(Steady { limits: &self.arm.model.limits, targets, solved, last, margins })
+    }
+
     fn path_joints(&self, joints: &Joints, margins: &[f64; 3]) -> PathJoints {
         let branch = self.structure.has_branches().then(|| Branch::of(margins));
         PathJoints { joints: *joints, configuration: configuration::of(branch, joints), margins: *margins }
@@ -349,6 +375,57 @@ impl AnyWidth for Block<'_> {
             }
         }
     }
+}
+
+/// See [`Inverse::is_steady`].
+struct Steady<'a> {
+    limits: &'a Limits,
+    targets: &'a Targets,
+    solved: &'a Solved<Eight>,
+    last: &'a Joints,
+    margins: &'a [f64; 3],
+}
+
+impl AnyWidth for Steady<'_> {
+    type Output = bool;
+
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn run<R: SinCos>(self, like: R) -> bool {
+        let Self { limits: Limits { min_rad, max_rad, .. }, targets, solved, last, margins } = self;
+        let mut steady = like.splat(1.0);
+        for from in (0..WIDTH).step_by(R::ROWS) {
+            let singularity = like.load(&solved.singularity, from);
+            steady =
+                steady * like.load(&solved.converged, from) * (singularity - like.splat(1e-6)).positive();
+            for joint in 0..6 {
+                let angle = like.load(&solved.mapped[joint], from);
+                let seed = like.load(&targets.start[joint], from);
+                let before = like.load(&shifted(last[joint], &solved.mapped[joint]), from);
+                // The seed differs from the row before by a few strides.
+                steady = steady
+                    * (angle - before).within(0.9 * STEADY_STRIDE_RAD)
+                    * (angle - seed).within(STEADY_STRIDE_RAD)
+                    * (angle - like.splat(min_rad[joint])).positive()
+                    * (like.splat(max_rad[joint]) - angle).positive();
+            }
+            for k in 0..3 {
+                let end = like.load(&solved.margins[1][k], from);
+                let before = like.load(&shifted(margins[k], &solved.margins[1][k]), from);
+                steady = steady
+                    * (end * like.load(&solved.margins[0][k], from)).positive()
+                    * (end * before).positive();
+            }
+        }
+        !(like.splat(1.0) - steady).any_above(0.0)
+    }
+}
+
+/// Each row's value in the row before, the first one's `before`.
+#[inline(always)]
+fn shifted(before: f64, rows: &Eight) -> Eight {
+    let mut out = [before; WIDTH];
+    out[1..].copy_from_slice(&rows[..WIDTH - 1]);
+    out
 }
 
 #[inline(always)]

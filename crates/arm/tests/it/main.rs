@@ -13,6 +13,7 @@ mod effect;
 mod search_budget;
 mod foreign;
 mod forward;
+mod rounding;
 mod gram;
 mod inverse;
 mod inverse_path;

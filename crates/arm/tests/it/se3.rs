@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, UnitQuaternion, Vector3, Vector6};
 use truegrind_math::difference::jacobian;
 use truegrind_math::se3::{
-    Pose, apply_twist, difference, left_jacobian, left_jacobian_inverse, pose_from_vector,
+    Pose, angle_bound_rad, apply_twist, difference, left_jacobian, left_jacobian_inverse, pose_from_vector,
     rotation_from_matrix, skew, vector_from_pose,
 };
 
@@ -86,6 +86,23 @@ fn left_jacobian_has_a_numerical_twin_and_its_inverse_undoes_it() {
             }
             let identity = analytic * left_jacobian_inverse(&phi);
             assert!((identity - Matrix3::identity()).amax() < 1e-11, "{phi}: {identity}");
+        }
+    }
+}
+
+#[test]
+fn the_bound_of_an_angle_lies_above_it_and_close() {
+    let mut random = generator(12);
+    for exponent in -12..=0 {
+        for _ in 0..1000 {
+            let a = pose(&mut random).rotation;
+            let b = a * UnitQuaternion::from_scaled_axis(vector(&mut random, 1.8 * 10f64.powi(exponent)));
+            // The other quaternion of the same rotation.
+            let other = UnitQuaternion::new_unchecked(-b.into_inner());
+            let angle = a.angle_to(&b);
+            for bound in [angle_bound_rad(&a, &b), angle_bound_rad(&other, &a)] {
+                assert!(angle <= bound && bound <= 1.12 * angle + 1e-6, "{angle:e} {bound:e}");
+            }
         }
     }
 }

@@ -33,7 +33,7 @@ use crate::target::solved_target::{SolvedTarget, SolvedTargets, as_joints};
 use truegrind_arm::inverse::budget::{SearchBudget, with_budget};
 use truegrind_arm::inverse::{Inverse, InverseError};
 use truegrind_arm::model::Joints;
-use truegrind_math::se3::Pose;
+use truegrind_math::se3::{Pose, angle_bound_rad};
 use truegrind_programs::motion::{Listing, Motion, MotionKind, MotionTarget, RobTarget, Switch, TargetValue};
 
 /// Largest rate of change of a margin with flange travel: the sine of the wrist angle changes with the rotation of the tool
@@ -62,9 +62,11 @@ const SINGULARITY_WATCH: f64 = 20.0;
 
 /// What the controller computes from the numbers of one target.
 pub(crate) struct WrittenTarget<'a> {
-    /// Flange poses that the controller computes, before and after.
-    pub(crate) flanges: [Pose; 2],
-    /// The latter, from the numbers as written.
+    /// Its frames, as the controller holds them.
+    pub(crate) frames: &'a FramePair,
+    /// Flange pose that the controller computes.
+    pub(crate) flange: &'a Pose,
+    /// The same from the numbers as written.
     pub(crate) read_back: &'a Pose,
     /// Its joints for them.
     pub(crate) joints: &'a Joints,
@@ -81,9 +83,9 @@ pub(crate) fn target_fault(
     arms: &Arms<'_>,
     options: &Options,
 ) -> Option<OutcomeReason> {
-    let [from, to] = &replay.flanges;
+    let flanges = || [replay.frames.flange_for(&solved.intended), *replay.flange];
     let joints = [&solved.before, replay.joints];
-    if let Some(joint_jump) = joint_jump([from, to], joints, &arms.nominal, options) {
+    if let Some(joint_jump) = joint_jump(flanges, joints, &arms.nominal, options) {
         return Some(joint_jump);
     }
     if singularity < SINGULARITY_WATCH * options.min_singularity
@@ -103,7 +105,7 @@ pub(crate) fn target_fault(
 
 /// The joint that a correction turns too far.
 fn joint_jump(
-    flanges: [&Pose; 2],
+    flanges: impl FnOnce() -> [Pose; 2],
     joints: [&Joints; 2],
     nominal: &Inverse<'_>,
     options: &Options,
@@ -114,8 +116,8 @@ fn joint_jump(
     if turned <= options.free_joint_change_rad {
         return None;
     }
-    let most = (options.joint_gain * flange_travel(flanges[0], flanges[1], nominal))
-        .max(options.free_joint_change_rad);
+    let [from, to] = flanges();
+    let most = (options.joint_gain * flange_travel(&from, &to, nominal)).max(options.free_joint_change_rad);
     (!(turned <= most)).then(|| OutcomeReason::JointJump {
         joint,
         deg: turned.to_degrees(),
@@ -136,7 +138,7 @@ pub(crate) fn jumps_joint(
     let [intended, commanded] = [intended, commanded].map(|pose| mounting.flange_for(pose));
     let before = arms.nominal.solve_near(&intended, joints);
     before.is_ok_and(|before| {
-        joint_jump([&intended, &commanded], [&before.joints, joints], &arms.nominal, options).is_some()
+        joint_jump(|| [intended, commanded], [&before.joints, joints], &arms.nominal, options).is_some()
     })
 }
 
@@ -144,6 +146,12 @@ pub(crate) fn jumps_joint(
 fn flange_travel(from: &Pose, to: &Pose, nominal: &Inverse<'_>) -> f64 {
     let shift = (to.translation.vector - from.translation.vector).norm();
     shift / nominal.length_mm() + from.rotation.angle_to(&to.rotation)
+}
+
+/// An upper bound of [`flange_travel`].
+fn travel_bound(from: &Pose, to: &Pose, nominal: &Inverse<'_>) -> f64 {
+    let shift = (to.translation.vector - from.translation.vector).norm();
+    shift / nominal.length_mm() + angle_bound_rad(&from.rotation, &to.rotation)
 }
 
 /// Forbids motions whose segment or start does not allow their correction; returns whether any was.
@@ -410,14 +418,12 @@ impl SegmentChecker<'_> {
         if !self.curve(motion) {
             return false;
         }
+        let clear = |travel| self.is_clear([&from.joints[1], &to.after], [&there, &here], travel * LEVER);
+        let (start, end, nominal) = (&from.commanded, &to.commanded, &self.arms.nominal);
         // The commanded circle is longer than its chord.
         motion.kind == MotionKind::Circular
             || from.frames_index != to.frames_index
-            || !self.is_clear(
-                [&from.joints[1], &to.after],
-                [&there, &here],
-                flange_travel(&from.commanded, &to.commanded, &self.arms.nominal) * LEVER,
-            )
+            || !clear(travel_bound(start, end, nominal)) && !clear(flange_travel(start, end, nominal))
     }
 
     /// Whether a segment between these joints is certainly free of faults.
@@ -627,7 +633,7 @@ impl PathCheck<'_> {
             return Err(Some(OutcomeReason::SingularPath));
         }
         let jumped = before().and_then(|s| {
-            joint_jump([&intended, &flange], [&s.joints, &place.joints], self.nominal, self.options)
+            joint_jump(|| [intended, flange], [&s.joints, &place.joints], self.nominal, self.options)
         });
         match jumped {
             Some(OutcomeReason::JointJump { joint, deg, most_deg, .. }) => {

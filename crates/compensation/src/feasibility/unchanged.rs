@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::arms::Arms;
-use crate::cut::{self, Cuts};
+use crate::cut::{self, Cuts, CutsOf};
 use crate::deviation::Status;
 use crate::feasibility::arc_feasibility::infeasible_arcs;
 use crate::feasibility::singularity::forbid_segments;
@@ -25,10 +25,10 @@ pub(crate) fn unchanged_motions(
     frame_table: &FrameTable,
     arms: &Arms<'_>,
     options: &Options,
+    cuts: &CutsOf,
     refused: &BTreeMap<u32, OutcomeReason>,
 ) -> BTreeMap<u32, OutcomeReason> {
     let mut stays = refused.clone();
-    let cuts = cut::of(listing);
     // For segments that start where another motion remains unmodified, over all rounds.
     let mut budget = SearchBudget::of(search_budget::WAYS);
     let mut forbidden = forbid_segments(listing, solved, frame_table, arms, options, None, &mut budget);
@@ -39,8 +39,8 @@ pub(crate) fn unchanged_motions(
         let solved_so_far = &*solved;
         let kept = |motion: u32| blocking_reason(motion, listing, solved_so_far, options, &stays);
         let more = match options.cuts {
-            Cuts::Whole => cut::rest_of_cuts(listing, &cuts, &kept),
-            Cuts::Partial => cut::steps(listing, &cuts, &kept, options.tolerance_mm, &|motion| {
+            Cuts::Whole => cut::rest_of_cuts(listing, cuts, &kept),
+            Cuts::Partial => cut::steps(listing, cuts, &kept, options.tolerance_mm, &|motion| {
                 solved
                     .of(motion as usize)
                     .last()

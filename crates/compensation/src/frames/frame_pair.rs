@@ -1,5 +1,7 @@
 //! Tool and work object of a motion: as commanded, and as they really are.
 
+use std::cell::LazyCell;
+
 use nalgebra::{Point3, Vector3};
 
 use crate::cell::FrameOrigin;
@@ -23,6 +25,7 @@ pub(crate) struct FramePair {
 
 impl FramePair {
     /// Flange pose that puts the tool at a target in the work object.
+    #[inline]
     pub(crate) fn flange_for(&self, object_from_tool: &Pose) -> Pose {
         if self.holds_part {
             self.tool * (self.object * object_from_tool).inverse()
@@ -32,6 +35,7 @@ impl FramePair {
     }
 
     /// The target in the work object that corresponds to a flange pose.
+    #[inline]
     pub(crate) fn target_of(&self, base_from_flange: &Pose) -> Pose {
         if self.holds_part {
             self.object.inverse() * base_from_flange.inverse() * self.tool
@@ -72,8 +76,8 @@ pub(crate) struct ResolveContext<'a> {
     pub(crate) knowledge: Option<&'a Estimated>,
     /// The inverse of the nominal arm.
     pub(crate) inverse: &'a Inverse<'a>,
-    /// Typical joints, at which the effect of an unknown origin is estimated.
-    pub(crate) typical_at: Joints,
+    /// Typical joints, at which the effect of an unknown origin is estimated; a search, which frames of known origin do not need.
+    pub(crate) typical_at: LazyCell<Joints, Box<dyn Fn() -> Joints + 'a>>,
 }
 
 /// Resolves a frame pair from the program's values and the cell file.
@@ -209,7 +213,7 @@ const NO_ESTIMATE: &str = "how far it would move had it been taught cannot be es
 /// tool is touched once with the centre of the flange.
 fn tool_estimate(commanded: &FramePair, with: &ResolveContext<'_>) -> String {
     let Teaching { nominal, estimated, .. } = with.teaching;
-    let typical_at = &with.typical_at;
+    let typical_at: &Joints = &with.typical_at;
     if commanded.holds_part {
         let flange = |arm: &PreparedModel<'_>| arm.forward(typical_at).translation.vector;
         let shift = (flange(estimated) - flange(nominal)).norm();
@@ -237,7 +241,7 @@ fn tool_estimate(commanded: &FramePair, with: &ResolveContext<'_>) -> String {
 /// How far a taught work object would move: its origin and 100 mm along x and y, touched near a typical pose.
 fn object_estimate(commanded: &FramePair, with: &ResolveContext<'_>) -> String {
     let Teaching { nominal, estimated, .. } = with.teaching;
-    let typical_at = &with.typical_at;
+    let typical_at: &Joints = &with.typical_at;
     let inverse = with.inverse;
     let orientation = commanded.target_of(&nominal.forward(typical_at)).rotation;
     let touched: Vec<Point3<f64>> = [[0.0, 0.0], [100.0, 0.0], [0.0, 100.0]]

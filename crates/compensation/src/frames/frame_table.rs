@@ -1,5 +1,6 @@
 //! Frame table of a program: every pair of tool and work object once, and the external axes that carry the base.
 
+use std::cell::LazyCell;
 use std::collections::{HashMap, HashSet};
 
 use crate::arms::Arms;
@@ -12,7 +13,7 @@ use crate::search_budget;
 use truegrind_arm::inverse::budget::{SearchBudget, with_budget};
 use truegrind_arm::model::Joints;
 use truegrind_math::se3::Pose;
-use truegrind_programs::motion::{Listing, Motion, Reason, RobTarget, Switch, WorkObjectValue};
+use truegrind_programs::motion::{Listing, Motion, Reason, RobTarget, Switch, TargetValue, WorkObjectValue};
 
 /// Frame pairs by (tool, work object).
 pub(crate) struct FrameTable {
@@ -39,13 +40,10 @@ impl FrameTable {
         let teaching = Teaching::of(arms.nominal.arm(), arms.estimated.arm(), cell, listing);
         let first_motions = first_motions(listing);
         let mut budget = SearchBudget::of(search_budget::FRAMES);
-        let mut last = None;
-        for motion in &listing.motions {
+        for run in listing.motions.chunk_by(Motion::same_frames) {
+            let motion = &run[0];
             let (Some(tool), Some(object)) = (motion.tool, motion.work_object) else { continue };
-            // Usually the same as in the previous motion.
-            if last.replace((tool, object)) == Some((tool, object))
-                || out.places.contains_key(&(tool, object))
-            {
+            if out.places.contains_key(&(tool, object)) {
                 continue;
             }
             let (Some(t), Some(o)) = (listing.tool(motion), listing.work_object(motion)) else { continue };
@@ -56,7 +54,8 @@ impl FrameTable {
             };
             let here = first_motions.get(&(tool, object)).map_or(&[][..], Vec::as_slice);
             let found = with_budget(&mut budget, || {
-                let typical_at = typical_joints(here, tv.frame.pose(), ov, arms);
+                let typical = || typical_joints(here, tv.frame.pose(), ov, arms);
+                let typical_at = LazyCell::new(Box::new(typical) as Box<dyn Fn() -> Joints + '_>);
                 let (teaching, inverse) = (&teaching, &arms.nominal);
                 resolve_frames(
                     (t, tv),
@@ -89,8 +88,8 @@ impl FrameTable {
         let longest = flange + links.iter().map(|link| link.a_mm.abs() + link.d_mm.abs()).sum::<f64>();
         let (mut first, mut moves) = ([None; 6], [false; 6]);
         for motion in &listing.motions {
-            let targets = motion.targets.iter().filter_map(|target| target.value.ok());
-            for target in targets.filter_map(|value| value.cartesian().copied()) {
+            let values = motion.targets.iter().filter_map(|target| target.value.as_ref().ok());
+            for target in values.filter_map(TargetValue::cartesian) {
                 if target.external == [None; 6] {
                     continue;
                 }
@@ -153,12 +152,10 @@ impl FrameTable {
 fn first_motions(listing: &Listing) -> HashMap<(u32, u32), Vec<&Motion>> {
     const ASKED: usize = 50;
     let mut out: HashMap<(u32, u32), Vec<&Motion>> = HashMap::new();
-    for motion in &listing.motions {
-        let (Some(tool), Some(object)) = (motion.tool, motion.work_object) else { continue };
+    for run in listing.motions.chunk_by(Motion::same_frames) {
+        let (Some(tool), Some(object)) = (run[0].tool, run[0].work_object) else { continue };
         let here = out.entry((tool, object)).or_default();
-        if here.len() < ASKED {
-            here.push(motion);
-        }
+        here.extend(run.iter().take(ASKED - here.len()));
     }
     out
 }

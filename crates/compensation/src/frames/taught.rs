@@ -22,7 +22,7 @@ use crate::frames::teaching_geometry::{
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::{Joints, Model, PreparedModel};
 use truegrind_math::se3::Pose;
-use truegrind_programs::motion::{Listing, Tool, ToolValue, WorkObject, WorkObjectValue};
+use truegrind_programs::motion::{Listing, Motion, Tool, ToolValue, WorkObject, WorkObjectValue};
 
 /// A tool that touched teaching points.
 #[derive(Debug, Clone, PartialEq)]
@@ -88,7 +88,8 @@ pub fn contradictions(listing: &Listing, cell: &Cell, nominal: &Model) -> Vec<St
     let teaching = Teaching::of(&arm, &arm, cell, listing);
     let (mut seen, mut said) = (HashSet::new(), HashSet::new());
     let mut out: Vec<String> = Vec::new();
-    for motion in &listing.motions {
+    for run in listing.motions.chunk_by(Motion::same_frames) {
+        let motion = &run[0];
         let (Some(tool), Some(object)) = (listing.tool(motion), listing.work_object(motion)) else {
             continue;
         };

@@ -21,6 +21,10 @@ pub struct Undeclared {
 /// The undeclared tools and work objects of a listing, in order of first use.
 pub fn undeclared(listing: &Listing) -> Vec<Undeclared> {
     let mut found: BTreeMap<(bool, &str), Undeclared> = BTreeMap::new();
+    let tools = listing.tools.iter().any(|tool| nowhere(tool.value.as_ref().err()));
+    if !tools && !listing.work_objects.iter().any(|object| nowhere(object.value.as_ref().err())) {
+        return Vec::new();
+    }
     for motion in &listing.motions {
         for (tool, name) in names(listing, motion) {
             let line = motion.place.line;
@@ -35,13 +39,15 @@ pub fn undeclared(listing: &Listing) -> Vec<Undeclared> {
 
 /// Undeclared frames of a motion, and whether each is a tool.
 fn names<'a>(listing: &'a Listing, motion: &Motion) -> impl Iterator<Item = (bool, &'a str)> {
-    let nowhere = |reason: Option<&Reason>| {
-        matches!(reason, Some(Reason::Undeclared | Reason::ToolUnknown | Reason::WorkObjectUnknown))
-    };
     let tool = listing.tool(motion).filter(|tool| nowhere(tool.value.as_ref().err()));
     let object = listing.work_object(motion).filter(|object| nowhere(object.value.as_ref().err()));
     let tool = tool.map(|tool| (true, tool.name.as_str()));
     tool.into_iter().chain(object.map(|object| (false, object.name.as_str())))
+}
+
+/// Whether a frame has no value for this reason because no file declares it.
+fn nowhere(reason: Option<&Reason>) -> bool {
+    matches!(reason, Some(Reason::Undeclared | Reason::ToolUnknown | Reason::WorkObjectUnknown))
 }
 
 /// One sentence for each, with the remedy.

@@ -11,10 +11,12 @@
 
 use std::collections::BTreeMap;
 
+use rayon::prelude::*;
+
 use crate::arms::Arms;
 use crate::cell::Cell;
 use crate::configuration::monitored;
-use crate::cut::Cuts;
+use crate::cut::{self, Cuts, CutsOf};
 use crate::deviation::{PathPoint, Status};
 use crate::feasibility::unchanged::{blocking_reason, unchanged_motions};
 use crate::frames::frame_pair::FramePair;
@@ -56,6 +58,7 @@ pub(crate) struct SolvedProgram<'a> {
     frame_table: FrameTable,
     /// The original program, if joints have backlash: only then are targets solved again.
     program: Option<OriginalProgram<'a>>,
+    cuts: CutsOf,
     assessment: Assessment,
     solved: SolvedTargets,
     /// The unmodified motions that `solved` was computed with.
@@ -72,7 +75,8 @@ impl<'a> SolvedProgram<'a> {
         let mut arms = Arms::of(estimated, &options.condition);
         let mut frame_table = FrameTable::of(listing, &arms, cell);
         let program = OriginalProgram::of(listing, &arms, &frame_table);
-        let assessment = assess(listing, &program, &mut arms, &mut frame_table, options);
+        let cuts = cut::of(listing);
+        let assessment = assess(listing, &cuts, &program, &mut arms, &mut frame_table, options);
         let solved_unchanged = assessment.risky();
         let solved = solve_targets(
             listing,
@@ -84,7 +88,7 @@ impl<'a> SolvedProgram<'a> {
             &solved_unchanged,
         );
         let program = arms.conditions.has_play().then_some(program);
-        Self { listing, options, arms, frame_table, program, assessment, solved, solved_unchanged }
+        Self { listing, options, arms, frame_table, program, cuts, assessment, solved, solved_unchanged }
     }
 
     /// The plan in which the motions that the writer refused (`refused`, by index) remain unmodified, and with them their
@@ -118,7 +122,7 @@ impl<'a> SolvedProgram<'a> {
     /// The motions that remain unmodified. With backlash, an unmodified motion changes the sides from which joints arrive at
     /// later targets: all targets are then solved again.
     fn unchanged_for(&mut self, refused: &BTreeMap<u32, OutcomeReason>) -> BTreeMap<u32, OutcomeReason> {
-        let Self { listing, options, arms, frame_table, program, assessment, solved, solved_unchanged } =
+        let Self { listing, options, arms, frame_table, program, cuts, assessment, solved, solved_unchanged } =
             self;
         let mut refused = refused.clone();
         for (motion, why) in assessment.risky() {
@@ -133,7 +137,7 @@ impl<'a> SolvedProgram<'a> {
             } else {
                 solved.allow_again();
             }
-            let unchanged = unchanged_motions(listing, solved, frame_table, arms, options, &refused);
+            let unchanged = unchanged_motions(listing, solved, frame_table, arms, options, cuts, &refused);
             if !arms.conditions.has_play() {
                 return unchanged;
             }
@@ -164,13 +168,14 @@ impl<'a> SolvedProgram<'a> {
 /// really lies.
 fn assess(
     listing: &Listing,
+    cuts: &CutsOf,
     program: &OriginalProgram<'_>,
     arms: &mut Arms<'_>,
     frame_table: &mut FrameTable,
     options: &Options,
 ) -> Assessment {
     let Some(knowledge) = arms.knowledge else { return Assessment::default() };
-    let chosen = AssessmentSample::of(listing, |motion| program.knows(motion));
+    let chosen = AssessmentSample::of(listing, cuts, |motion| program.knows(motion));
     let loads = arms.loads(listing, options.loads.as_ref());
     let condition_indices: Vec<usize> = if loads.is_empty() {
         vec![arms.conditions.condition_index([0; 6], None); listing.motions.len()]
@@ -194,8 +199,9 @@ fn planned(job: &Planner<'_>) -> Plan {
     let count = listing.motions.len();
     let whole = SearchBudget::of(search_budget::PATHS).with_near_solves(search_budget::path_steps(count));
     // Filled in place: concatenating per-portion lists would hold everything twice.
-    let mut outcomes: Vec<MotionOutcome> = (0..count as u32).map(MotionOutcome::left).collect();
-    let mut changes: Vec<Option<Change>> = (0..count).map(|_| None).collect();
+    let motions = (0..count as u32).into_par_iter().with_min_len(search_budget::MANY);
+    let mut outcomes: Vec<MotionOutcome> = motions.clone().map(MotionOutcome::left).collect();
+    let mut changes: Vec<Option<Change>> = motions.map(|_| None).collect();
     let mut slots: Vec<OutputSlots<'_>> =
         outcomes.chunks_mut(search_budget::PORTION).zip(changes.chunks_mut(search_budget::PORTION)).collect();
     let portions: Vec<PortionResult> =
@@ -266,7 +272,7 @@ fn segment_end<'a>(
 struct PlannedMotion {
     change: Option<Change>,
     outcome: MotionOutcome,
-    point: Option<PathPoint>,
+    point: Option<Box<PathPoint>>,
     /// The segment to it, where all its targets are corrected.
     segment_plan: Option<SegmentPlan>,
 }
@@ -323,7 +329,7 @@ impl<'a> Planner<'a> {
                 out.unchecked.push(index as u32);
             }
             (*outcome, *change) = (worked.outcome, worked.change);
-            out.points.extend(worked.point);
+            out.points.extend(worked.point.map(|point| *point));
         }
         out
     }
@@ -390,9 +396,8 @@ impl<'a> Planner<'a> {
         }
         let path = self.path(previous)?;
         let middle = midpoint_deviations(&[&path], self.arms, self.options.emit)[0];
-        let solved_targets: Vec<&SolvedTarget> =
-            self.solved.of(previous).iter().filter_map(|t| t.as_ref().ok()).collect();
-        deviation(&SegmentPlan::of(before, Some(&path), &solved_targets, middle, self.arms, self.options))
+        let via = circle_point(self.solved.of(previous));
+        deviation(&SegmentPlan::of(before, Some(&path), via, middle, self.arms, self.options))
     }
 }
 
@@ -408,7 +413,7 @@ fn plan_motion<'a>(
     let Planner { listing, solved, arms, options, .. } = *job;
     let motion = &listing.motions[index];
     let mut outcome = MotionOutcome::left(index as u32);
-    let finish = |mut outcome: MotionOutcome, status, reason, change, point: Option<PathPoint>| {
+    let finish = |mut outcome: MotionOutcome, status, reason, change, point: Option<Box<PathPoint>>| {
         outcome.status = status;
         outcome.reason = reason;
         let point = point.map(|mut p| {
@@ -430,7 +435,7 @@ fn plan_motion<'a>(
             outcome.shape_sigma_mm = to.shape_sigma_mm;
             options.points.then(|| {
                 let real = &job.frame_table.list[to.frames_index].real;
-                path_point(motion, to, real, job.assessment.shape_alone(index as u32))
+                Box::new(path_point(motion, to, real, job.assessment.shape_alone(index as u32)))
             })
         }
         _ => None,
@@ -438,15 +443,15 @@ fn plan_motion<'a>(
     if let Some((status, why)) = blocking_reason(index as u32, listing, solved, options, job.unchanged) {
         return finish(outcome, status, Some(why), None, point);
     }
-    let solved_targets: Vec<&SolvedTarget> = targets.iter().filter_map(|t| t.as_ref().ok()).collect();
+    let solved_targets = || targets.iter().flatten();
     // The segment from the previous motion.
-    let segment_plan = SegmentPlan::of(motion, path, &solved_targets, middle_mm, arms, options);
+    let segment_plan = SegmentPlan::of(motion, path, circle_point(targets), middle_mm, arms, options);
     (outcome.path_deviation_mm, outcome.inserted) =
         (segment_plan.path_deviation_mm, segment_plan.before.len());
     // All other flags hold only for the guessed configuration, so this one takes precedence.
     let guessed = options.flag_unknown_starts
         && motion.accepts_configuration
-        && solved_targets.iter().any(|s| s.guess != BranchGuess::Known);
+        && solved_targets().any(|s| s.guess != BranchGuess::Known);
     let mut flag = if guessed { Some(OutcomeReason::UnknownStart) } else { segment_plan.flag };
     if let Some(corner) = job.corner(motion, path, &segment_plan, last) {
         outcome.path_deviation_mm =
@@ -457,16 +462,24 @@ fn plan_motion<'a>(
     }
     let flag =
         flag.or_else(|| path.and_then(|path| too_fast(index, motion, listing, path, &segment_plan, arms)));
-    let flag = flag.or_else(|| solved_targets.iter().find_map(|s| uncertainty_flag(s, arms)));
-    let new = |(target, solved): (&MotionTarget, &&SolvedTarget)| match target.role {
+    let flag = flag.or_else(|| solved_targets().find_map(|s| uncertainty_flag(s, arms)));
+    let new = |(target, solved): (&MotionTarget, &SolvedTarget)| match target.role {
         Role::Via if segment_plan.straight => NewTarget::Drop,
         _ => new_target(target, solved, motion, options),
     };
-    let new_targets: Vec<NewTarget> = motion.targets.iter().zip(&solved_targets).map(new).collect();
-    outcome.after_mm = solved_targets.last().map(|s| s.deviation_mm[1]);
+    // Not collected: without a known length that takes room for four.
+    let mut new_targets = Vec::with_capacity(targets.len());
+    new_targets.extend(motion.targets.iter().zip(solved_targets()).map(new));
+    outcome.after_mm = solved_targets().last().map(|s| s.deviation_mm[1]);
     let change = Change { motion: index as u32, targets: new_targets, before: segment_plan.before.clone() };
     let status = if flag.is_some() { Status::Flagged } else { Status::Changed };
     PlannedMotion { segment_plan: Some(segment_plan), ..finish(outcome, status, flag, Some(change), point) }
+}
+
+/// The circle point of a motion with one.
+fn circle_point(targets: &[Result<SolvedTarget, OutcomeReason>]) -> Option<&SolvedTarget> {
+    let [Ok(via), Ok(_)] = targets else { return None };
+    Some(via)
 }
 
 /// A joint that would exceed its speed limit at the programmed speed: the controller slows down there, or stops.

@@ -9,7 +9,7 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 
 use crate::condition::arm_conditions::ArmConditions;
-use crate::cut::{self, CutsOf};
+use crate::cut::CutsOf;
 use crate::frames::frame_pair::ResolvedFrames;
 use crate::plan::reason::OutcomeReason;
 use crate::risk::cut_risk::{self, CutRisk, Judgement};
@@ -97,8 +97,7 @@ pub(crate) struct AssessmentSample {
 
 impl AssessmentSample {
     /// From those motions for which `reached` holds.
-    pub(crate) fn of(listing: &Listing, reached: impl Fn(usize) -> bool) -> Self {
-        let cuts: CutsOf = cut::of(listing);
+    pub(crate) fn of(listing: &Listing, cuts: &CutsOf, reached: impl Fn(usize) -> bool) -> Self {
         let mut of_object: BTreeMap<u32, [Vec<u32>; 2]> = BTreeMap::new();
         let mut in_cuts: Vec<(u32, u32)> = Vec::with_capacity(listing.motions.len());
         for (index, motion) in (0_u32..).zip(&listing.motions) {
@@ -116,10 +115,7 @@ impl AssessmentSample {
         let begin = |(root, index): (u32, u32)| {
             let motion = &listing.motions[index as usize];
             let before = motion.previous.filter(|before| cuts.root(*before) != Some(root))?;
-            let before_that = &listing.motions[before as usize];
-            let same_frames =
-                (before_that.tool, before_that.work_object) == (motion.tool, motion.work_object);
-            same_frames.then_some(before)
+            listing.motions[before as usize].same_frames(motion).then_some(before)
         };
         // Stable: the motions of a cut stay in order.
         in_cuts.sort_by_key(|(root, _)| *root);
@@ -172,7 +168,7 @@ pub(crate) fn assess_program(
         }
     }
     let list: &[ResolvedFrames] = list;
-    let judged: Vec<Option<(JudgedCut, Judgement)>> = chosen
+    let judged: Vec<Option<(JudgedCut, Judgement, f64)>> = chosen
         .cuts
         .par_iter()
         .map(|(motions, commanded)| {
@@ -185,13 +181,13 @@ pub(crate) fn assess_program(
             let weight = motions.len() as f64 / targets.len() as f64;
             let carried = (!frames.real.holds_part)
                 .then(|| cut_risk::in_base(&judgement.registered, &frames.real.object));
-            Some((JudgedCut { placement, points: targets.len(), weight, carried }, judgement))
+            let points = targets.len();
+            let harm = probability_of_harm(judgement.square, &judgement.toward, &out.posterior, points);
+            Some((JudgedCut { placement, points, weight, carried }, judgement, harm))
         })
         .collect();
     for ((motions, _), judged) in chosen.cuts.iter().zip(judged) {
-        let Some((judged, judgement)) = judged else { continue };
-        let probability_of_harm =
-            probability_of_harm(judgement.square, &judgement.toward, &out.posterior, judged.points);
+        let Some((judged, judgement, probability_of_harm)) = judged else { continue };
         let left_for_risk = !(probability_of_harm <= choice.max_risk);
         let cut_index = out.cuts.len() as u32;
         motions.iter().for_each(|m| out.cut_of[*m as usize] = Some(cut_index));

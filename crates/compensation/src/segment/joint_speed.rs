@@ -8,6 +8,7 @@
 use crate::arms::Arms;
 use crate::segment::curve::Curve;
 use crate::segment::line::SegmentEnd;
+use truegrind_math::se3::angle_bound_rad;
 use truegrind_programs::motion::SpeedValue;
 
 /// Programmed speed of a motion.
@@ -28,11 +29,16 @@ pub(crate) fn fastest(
     arms: &Arms<'_>,
 ) -> Option<(usize, f64)> {
     let limits = arms.nominal.arm().model.limits.speed_rad_s?;
-    let (length_mm, turn_deg) = (course.length_mm(), course.turn_rad().to_degrees());
-    let duration_s = match pace {
+    let length_mm = course.length_mm();
+    let needed_s = |turn_deg: f64| match pace {
         Pace::Speed(speed) => (length_mm / speed.tcp_mm_s).max(turn_deg / speed.orientation_deg_s),
         Pace::Duration(duration_s) => *duration_s,
     };
+    // Most lines turn so little that it changes neither the duration nor the number of parts.
+    let bound_deg = angle_bound_rad(&course.from.rotation, &course.to.rotation).to_degrees();
+    let negligible = course.arc().is_none() && bound_deg < PART_DEG && needed_s(bound_deg) == needed_s(0.0);
+    let turn_deg = if negligible { 0.0 } else { course.turn_rad().to_degrees() };
+    let duration_s = needed_s(turn_deg);
     if !(duration_s > 1e-6 && duration_s.is_finite()) {
         return None;
     }

@@ -12,7 +12,7 @@ use crate::options::{Emit, Options};
 use crate::segment::condition_schedule::{CHORD_MM, ConditionSchedule};
 use crate::segment::curve::{between, lateral_offset};
 use truegrind_arm::model::Joints;
-use truegrind_math::se3::Pose;
+use truegrind_math::se3::{Pose, angle_bound_rad};
 use truegrind_programs::motion::MotionKind;
 use truegrind_programs::rewrite::{Extra, NewTarget};
 
@@ -232,8 +232,9 @@ fn deviation_without_play(
     middle: f64,
 ) -> f64 {
     let length = distance(&from.intended.translation.vector, &to.intended.translation.vector);
-    let turn = from.intended.rotation.angle_to(&to.intended.rotation);
-    if length < PIECE_MM && turn < 0.2 && middle < CLEARLY_STRAIGHT_MM {
+    let [a, b] = [&from.intended.rotation, &to.intended.rotation];
+    let turns_little = || angle_bound_rad(a, b) < SMALL_TURN_RAD || a.angle_to(b) < SMALL_TURN_RAD;
+    if length < PIECE_MM && middle < CLEARLY_STRAIGHT_MM && turns_little() {
         return middle;
     }
     largest(pieces_of(from, to), &|s| offset_at(from, to, s, condition_index, arms, emit)).max(middle)
@@ -284,6 +285,9 @@ fn largest_between_samples(a: (f64, f64), b: (f64, f64), off: &dyn Fn(f64) -> f6
     ];
     halves[0].max(halves[1]).max(middle)
 }
+
+/// Largest rotation along a line that its midpoint can judge (rad).
+const SMALL_TURN_RAD: f64 = 0.2;
 
 /// Below this the midpoint of a short line suffices: the deviation is a parabola to leading order.
 const CLEARLY_STRAIGHT_MM: f64 = 0.01;

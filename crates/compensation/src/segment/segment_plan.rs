@@ -29,11 +29,12 @@ pub(crate) struct SegmentPlan {
 }
 
 impl SegmentPlan {
-    /// For a motion whose targets are all corrected. `middle_mm`: deviation of its commanded line at the midpoint.
+    /// For a motion whose targets are all corrected. `via`: its circle point. `middle_mm`: deviation of its commanded line at the
+    /// midpoint.
     pub(crate) fn of(
         motion: &Motion,
         path: Option<&Segment<'_>>,
-        good: &[&SolvedTarget],
+        via: Option<&SolvedTarget>,
         middle_mm: f64,
         arms: &Arms<'_>,
         options: &Options,
@@ -45,13 +46,13 @@ impl SegmentPlan {
                 ..SegmentPlan::default()
             };
         };
-        match (motion.kind, good) {
+        match (motion.kind, via) {
             (MotionKind::Linear, _) => line(motion, path, middle_mm, arms, options),
             (MotionKind::Joint, _) => SegmentPlan {
                 path_deviation_mm: Some(joint_motion_deviation(path, arms)),
                 ..SegmentPlan::default()
             },
-            (MotionKind::Circular, [via, _]) => circle(motion, path, via, segments, arms, options),
+            (MotionKind::Circular, Some(via)) => circle(motion, path, via, segments, arms, options),
             _ => SegmentPlan::default(),
         }
     }

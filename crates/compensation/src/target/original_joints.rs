@@ -142,10 +142,11 @@ fn originals(
     // Now the targets that depend on the previous motion, in order; a run consists of consecutive motions
     // of the listing.
     let mut budget = SearchBudget::of(search_budget::STARTS);
+    let monitors: Vec<Switch> =
+        listing.motions.par_iter().with_min_len(search_budget::MANY).map(monitored).collect();
     let mut motion = 0;
     while motion < listing.motions.len() {
-        let chained =
-            |m: usize| listing.motions[m].left.is_none() && monitored(&listing.motions[m]) == Switch::Off;
+        let chained = |m: usize| monitors[m] == Switch::Off && listing.motions[m].left.is_none();
         if !chained(motion) {
             motion += 1;
             continue;
@@ -167,7 +168,7 @@ fn originals(
         solve_run(&target_refs[run.clone()], &mut near, arms, frame_table, &mut budget, &mut out[run]);
         motion = end;
     }
-    guess_if_possibly_unmonitored(listing, target_refs, first, arms, frame_table, &mut out);
+    guess_if_possibly_unmonitored(listing, &monitors, target_refs, first, arms, frame_table, &mut out);
     out
 }
 
@@ -175,14 +176,16 @@ fn originals(
 /// unchecked: from an unknown start, or from one that is guessed itself.
 fn guess_if_possibly_unmonitored(
     listing: &Listing,
+    monitors: &[Switch],
     target_refs: &[TargetRef<'_>],
     first: &[usize],
     arms: &Arms<'_>,
     frame_table: &FrameTable,
     out: &mut Originals,
 ) {
-    for (index, motion) in listing.motions.iter().enumerate() {
-        if motion.left.is_some() || monitored(motion) != Switch::Either {
+    for (index, monitored) in monitors.iter().enumerate() {
+        let motion = &listing.motions[index];
+        if *monitored != Switch::Either || motion.left.is_some() {
             continue;
         }
         let before = match motion.previous.map(|previous| previous as usize) {

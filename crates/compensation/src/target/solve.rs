@@ -32,6 +32,7 @@ use truegrind_arm::inverse::budget::{SearchBudget, with_budget};
 use truegrind_arm::inverse::configuration::Configuration;
 use truegrind_arm::model::Joints;
 use truegrind_arm::region::NearestSample;
+use truegrind_math::rounding::round;
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::load::Load;
 use truegrind_programs::motion::{Listing, MotionKind, RobTarget, Role, Switch, TargetValue};
@@ -169,7 +170,11 @@ impl TargetSolver<'_> {
             let originals = || self.originals[targets].iter().cloned().collect::<Result<_, _>>().ok();
             Some((motion as u32, failed.then(originals)??))
         };
-        (0..self.listing.motions.len()).filter_map(originals).collect()
+        (0..self.listing.motions.len())
+            .into_par_iter()
+            .with_min_len(search_budget::MANY)
+            .filter_map(originals)
+            .collect()
     }
 
     /// Motions of which a target has a guessed branch.
@@ -180,7 +185,8 @@ impl TargetSolver<'_> {
                 .flatten()
                 .any(|start| start.guess == BranchGuess::Guessed)
         };
-        (0..self.listing.motions.len()).filter(guessed).map(|m| m as u32).collect()
+        let motions = (0..self.listing.motions.len()).into_par_iter().with_min_len(search_budget::MANY);
+        motions.filter(guessed).map(|m| m as u32).collect()
     }
 
     /// The targets of the portion that begins with a motion.
@@ -354,9 +360,8 @@ fn solve_portion(
         }
         let real = real(&w.start);
         let intended = w.start.intended;
-        let in_object = |reached: &Pose| Deviation::between(&intended, reached, &Pose::identity(), None);
-        let deviations =
-            [w.reached_before, real.target_of(&reached_after[k])].map(|reached| in_object(&reached));
+        let reached = [w.reached_before, real.target_of(&reached_after[k])];
+        let deviation = |reached: Pose| Deviation::between(&intended, &reached, &Pose::identity(), None);
         let play_uncertainty_mm = conditions.play_uncertainty_mm(w.condition_index, &w.after, &tools[k]);
         let (conf, margins) = branches[k];
         let mut solved = SolvedTarget {
@@ -368,8 +373,8 @@ fn solve_portion(
             cfx_before: w.start.cfx,
             conf,
             margins: [w.start.margins, margins],
-            deviation_mm: deviations.map(|deviation| deviation.norm_mm()),
-            deviations: options.points.then(|| Box::new(deviations)),
+            deviation_mm: reached.map(|pose| (pose.translation.vector - intended.translation.vector).norm()),
+            deviations: options.points.then(|| Box::new(reached.map(deviation))),
             sigma_mm: absolute[k].unwrap_or(0.0).hypot(play_uncertainty_mm),
             shape_sigma_mm: of_shape[k]
                 .or_else(|| assessment.sigma_of_cut_mm(cut_of(w)))
@@ -381,10 +386,10 @@ fn solve_portion(
             forbidden: None,
         };
         solved.forbidden = forbidden(&solved, w.singularity, arms, options).or_else(|| {
-            let commanded = &frame_table.list[solved.frames_index].commanded;
-            let flanges = [commanded.flange_for(&intended), told_flanges[k]];
+            let frames = &frame_table.list[solved.frames_index].commanded;
             let stated = if joint_form(w) { None } else { stated(&target_refs[w.index]) };
-            let replay = WrittenTarget { flanges, read_back: &read_back[k], joints: &last[k], stated };
+            let (flange, read_back, joints) = (&told_flanges[k], &read_back[k], &last[k]);
+            let replay = WrittenTarget { frames, flange, read_back, joints, stated };
             target_fault(&solved, w.singularity, &replay, arms, options)
         });
         out[w.index] = Ok(solved);
@@ -460,9 +465,9 @@ fn replay_controller(
     let mounting = |w: &ReachableTarget| &frame_table.list[w.start.frames_index].commanded;
     let commanded: Vec<Pose> =
         reachable.iter().zip(&told_flanges).map(|(w, flange)| mounting(w).target_of(flange)).collect();
-    let hears = |(w, commanded): (&ReachableTarget, &Pose)| {
-        mounting(w).flange_for(&rounded(commanded, options.position_decimals))
-    };
+    let scale = 10f64.powi(i32::from(options.position_decimals));
+    let hears =
+        |(w, commanded): (&ReachableTarget, &Pose)| mounting(w).flange_for(&rounded(commanded, scale));
     let read_back: Vec<Pose> = reachable.iter().zip(&commanded).map(hears).collect();
     let reached = if reachable.iter().all(joint_form) {
         Vec::new()
@@ -534,11 +539,10 @@ struct ReachableTarget {
     reached_before: Pose,
 }
 
-/// A pose as it will be read back: positions with so many decimals, quaternions with seven.
-fn rounded(pose: &Pose, decimals: u8) -> Pose {
-    let scale = 10f64.powi(i32::from(decimals));
-    let position = pose.translation.vector.map(|v| (v * scale).round() / scale);
-    let q = pose.rotation.quaternion().coords.map(|v| (v * 1e7).round() / 1e7);
+/// A pose as it will be read back: positions in units of 1 / `scale` mm, quaternions with seven decimals.
+fn rounded(pose: &Pose, scale: f64) -> Pose {
+    let position = pose.translation.vector.map(|v| round(v * scale) / scale);
+    let q = pose.rotation.quaternion().coords.map(|v| round(v * 1e7) / 1e7);
     Pose::from_parts(
         position.into(),
         nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::from_vector(q)),

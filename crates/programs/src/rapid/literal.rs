@@ -14,11 +14,13 @@ pub const ROBTARGET: &[usize] = &[3, 4, 4, 6];
 /// The groups of a jointtarget: robax, extax.
 pub const JOINTTARGET: &[usize] = &[6, 6];
 
-/// The numbers of a literal: their values, and their byte ranges relative to the literal's first byte, sign included.
+/// The numbers of a literal: their values, their decimals, and their byte ranges relative to the literal's first byte, sign included.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Numbers {
     /// Values in order.
     pub values: [f64; 17],
+    /// Decimals that each states.
+    pub decimals: [u8; 17],
     /// First byte and one past the last.
     pub spans: [(u32, u32); 17],
 }
@@ -38,8 +40,11 @@ pub fn places(text: &[u8], shape: &[usize], values: &[f64]) -> Option<Numbers> {
     let passed = |number| {
         let rest = unsigned(number).0;
         match number::plain(rest) {
-            Some((_, length)) => Some((&rest[length..], 0.0)),
-            None => Some((lexer::number(rest).ok()?.0, 0.0)),
+            Some((_, length, decimals)) => Some((&rest[length..], (0.0, decimals))),
+            None => {
+                let (after, text) = lexer::number(rest).ok()?;
+                Some((after, (0.0, number::decimals(text))))
+            }
         }
     };
     let (mut found, count, _) = groups(text, shape, passed)?;
@@ -47,14 +52,14 @@ pub fn places(text: &[u8], shape: &[usize], values: &[f64]) -> Option<Numbers> {
     (count == values.len()).then_some(found)
 }
 
-/// The groups of an aggregate, each number taken by `read`; how many there are, and the bytes after the last group.
+/// The groups of an aggregate, each number taken by `read` with its decimals; how many there are, and the bytes after the last group.
 #[inline]
 fn groups<'s>(
     text: &'s [u8],
     shape: &[usize],
-    read: impl Fn(&'s [u8]) -> Option<(&'s [u8], f64)>,
+    read: impl Fn(&'s [u8]) -> Option<(&'s [u8], (f64, u8))>,
 ) -> Option<(Numbers, usize, &'s [u8])> {
-    let mut found = Numbers { values: [0.0; 17], spans: [(0, 0); 17] };
+    let mut found = Numbers { values: [0.0; 17], decimals: [0; 17], spans: [(0, 0); 17] };
     let mut count = 0;
     let mut rest = symbol(b'[')(text).ok()?.0;
     for (index, &length) in shape.iter().enumerate() {
@@ -67,8 +72,8 @@ fn groups<'s>(
                 rest = symbol(b',')(rest).ok()?.0;
             }
             let start = trivia(rest);
-            let (after, value) = read(start)?;
-            found.values[count] = value;
+            let after;
+            (after, (found.values[count], found.decimals[count])) = read(start)?;
             found.spans[count] = ((text.len() - start.len()) as u32, (text.len() - after.len()) as u32);
             count += 1;
             rest = after;
@@ -102,16 +107,18 @@ fn symbol(wanted: u8) -> impl Fn(&[u8]) -> Rest<'_, ()> {
     }
 }
 
-/// A number with an optional sign.
+/// A number with an optional sign, and its decimals.
 #[inline]
-fn signed(input: &[u8]) -> Rest<'_, f64> {
+fn signed(input: &[u8]) -> Rest<'_, (f64, u8)> {
     let (rest, negative) = unsigned(input);
-    if let Some((value, length)) = number::plain(rest) {
-        return Ok((&rest[length..], if negative { -value } else { value }));
-    }
-    let (rest, text) = lexer::number(rest)?;
-    let value = number::value(text).ok_or(nom::Err::Error(()))?;
-    Ok((rest, if negative { -value } else { value }))
+    let (rest, value, decimals) = match number::plain(rest) {
+        Some((value, length, decimals)) => (&rest[length..], value, decimals),
+        None => {
+            let (rest, text) = lexer::number(rest)?;
+            (rest, number::value(text).ok_or(nom::Err::Error(()))?, number::decimals(text))
+        }
+    };
+    Ok((rest, (if negative { -value } else { value }, decimals)))
 }
 
 /// The text behind a sign, and whether the sign is a minus.
@@ -122,9 +129,4 @@ fn unsigned(input: &[u8]) -> (&[u8], bool) {
         [b'+', rest @ ..] => (trivia(rest), false),
         _ => (input, false),
     }
-}
-
-/// The decimals that the number in `span` of a literal states.
-pub fn decimals(text: &[u8], span: (u32, u32)) -> u8 {
-    number::decimals(&text[span.0 as usize..span.1 as usize])
 }

@@ -1,5 +1,7 @@
 //! Numbers: their value, their decimals, and writing them.
 
+use truegrind_math::rounding::round;
+
 /// Powers of ten that are exact in double precision.
 const TEN: [f64; 23] = [
     1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18,
@@ -59,17 +61,17 @@ pub fn value(text: &[u8]) -> Option<f64> {
     std::str::from_utf8(text).ok()?.parse().ok()
 }
 
-/// The value and the length of a number at the beginning of a text, in one pass, where it is a plain one: digits with or
-/// without a point, or "not connected". `None` says nothing.
+/// The value, the length and the decimals of a number at the beginning of a text, in one pass, where it is a plain one: digits
+/// with or without a point, or "not connected". `None` says nothing.
 #[inline]
-pub fn plain(text: &[u8]) -> Option<(f64, usize)> {
+pub fn plain(text: &[u8]) -> Option<(f64, usize, u8)> {
     let (mut mantissa, mut index, mut point) = (0_u64, 0, None);
     while let Some(&byte) = text.get(index) {
         match byte {
             b'0'..=b'9' => mantissa = mantissa.wrapping_mul(10).wrapping_add(u64::from(byte - b'0')),
             b'.' if point.is_none() => point = Some(index + 1),
             b'E' if mantissa == 9 && index == 1 && text.get(2..5) == Some(b"+09") => {
-                return (!text.get(5).is_some_and(u8::is_ascii_digit)).then_some((9e9, 5));
+                return (!text.get(5).is_some_and(u8::is_ascii_digit)).then_some((9e9, 5, 0));
             }
             // An exponent or a radix, or letters that do not belong here.
             byte if byte.is_ascii_alphabetic() => return None,
@@ -83,7 +85,7 @@ pub fn plain(text: &[u8]) -> Option<(f64, usize)> {
     }
     // Exact in one division (Clinger 1990, the fast path).
     let decimals = point.map_or(0, |point| index - point);
-    Some((mantissa as f64 / TEN[decimals], index))
+    Some((mantissa as f64 / TEN[decimals], index, (decimals as u8).min(MOST_DECIMALS)))
 }
 
 /// A signed whole number; far beyond the range of a double it stays there.
@@ -119,7 +121,12 @@ pub fn decimals(text: &[u8]) -> u8 {
 
 /// The value rounded to so many decimals, as a whole number of units of the last one.
 pub fn units(value: f64, decimals: u8) -> f64 {
-    (value * TEN[usize::from(decimals.min(MOST_DECIMALS))]).round()
+    round(value * TEN[usize::from(decimals.min(MOST_DECIMALS))])
+}
+
+/// Half a unit of the last of so many decimals.
+pub fn half_unit(decimals: u8) -> f64 {
+    0.5 / TEN[usize::from(decimals.min(MOST_DECIMALS))]
 }
 
 /// Rounds to so many decimals.
@@ -136,33 +143,37 @@ pub fn write(out: &mut Vec<u8>, value: f64, decimals: u8) {
         out.extend_from_slice(format!("{value:.*}", usize::from(decimals)).as_bytes());
         return;
     }
-    // From the last digit: fraction, point, whole part, sign.
-    let mut text = [0; 24];
-    let mut at = text.len();
-    let mut put = |byte: u8| {
-        at -= 1;
-        text[at] = byte;
-    };
+    // From the last digit, two at a time.
+    let mut digits = [b'0'; 20];
+    let mut at = digits.len();
     let mut rest = units.abs() as u64;
-    if decimals > 0 {
-        for _ in 0..decimals {
-            put(b'0' + (rest % 10) as u8);
-            rest /= 10;
-        }
-        put(b'.');
+    while rest > 0 {
+        at -= 2;
+        digits[at..at + 2].copy_from_slice(&PAIRS[(rest % 100) as usize]);
+        rest /= 100;
     }
-    loop {
-        put(b'0' + (rest % 10) as u8);
-        rest /= 10;
-        if rest == 0 {
-            break;
-        }
-    }
+    let point = digits.len() - usize::from(decimals);
+    at += usize::from(digits.get(at) == Some(&b'0'));
     if units < 0.0 {
-        put(b'-');
+        out.push(b'-');
     }
-    out.extend_from_slice(&text[at..]);
+    out.extend_from_slice(&digits[at.min(point - 1)..point]);
+    if decimals > 0 {
+        out.push(b'.');
+        out.extend_from_slice(&digits[point..]);
+    }
 }
+
+/// 00 to 99.
+const PAIRS: [[u8; 2]; 100] = {
+    let mut pairs = [[b'0'; 2]; 100];
+    let mut k = 0;
+    while k < 100 {
+        pairs[k] = [b'0' + (k / 10) as u8, b'0' + (k % 10) as u8];
+        k += 1;
+    }
+    pairs
+};
 
 /// Writes a value with at most so many decimals and no trailing zeros.
 pub fn write_short(out: &mut Vec<u8>, value: f64, decimals: u8) {

@@ -30,8 +30,7 @@ pub(super) enum Fresh {
 
 /// Half a unit of the last decimal, and never less than noise.
 fn differs(old: f64, new: f64, decimals: u8, noise: f64) -> bool {
-    let half = 0.5 * 10_f64.powi(-i32::from(decimals));
-    (new - old).abs() > half.max(noise)
+    (new - old).abs() > number::half_unit(decimals).max(noise)
 }
 
 /// A quaternion of length 1 with the sign that agrees with `like`.
@@ -116,9 +115,8 @@ pub(super) fn replace_numbers(
                 }
                 None => literal::numbers(text, ROBTARGET)?,
             };
-            let decimals = |index: usize| literal::decimals(text, numbers.spans[index]);
             for (index, &new) in position_mm.iter().enumerate() {
-                let decimals = decimals(index).max(options.position_decimals);
+                let decimals = numbers.decimals[index].max(options.position_decimals);
                 if differs(numbers.values[index], new, decimals, POSITION_NOISE_MM) {
                     put(&numbers, index, new, decimals);
                 }
@@ -127,7 +125,7 @@ pub(super) fn replace_numbers(
             written.copy_from_slice(&numbers.values[3..7]);
             let new = aligned(quaternion, &written);
             let old = aligned(&written, &written);
-            let places = [3, 4, 5, 6].map(|index| decimals(index).max(options.quaternion_decimals));
+            let places = [3, 4, 5, 6].map(|index| numbers.decimals[index].max(options.quaternion_decimals));
             let turned = (0..4).any(|index| differs(old[index], new[index], places[index], QUATERNION_NOISE));
             if turned {
                 let new = rounded(&new, &places);
@@ -148,7 +146,7 @@ pub(super) fn replace_numbers(
         Fresh::Joint { robot_deg } => {
             let numbers = literal::numbers(text, JOINTTARGET)?;
             for (index, &new) in robot_deg.iter().enumerate() {
-                let decimals = literal::decimals(text, numbers.spans[index]).max(options.joint_decimals);
+                let decimals = numbers.decimals[index].max(options.joint_decimals);
                 if differs(numbers.values[index], new, decimals, JOINT_NOISE_DEG) {
                     put(&numbers, index, new, decimals);
                 }

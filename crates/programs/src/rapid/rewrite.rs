@@ -66,13 +66,13 @@ impl Task<'_> {
         if !change.is_representable() {
             return Some(Reason::NumberRange);
         }
-        let instruction = instruction_of(motion);
+        let instruction = || instruction_of(motion);
         for (target, new) in motion.targets.iter().zip(&change.targets) {
             let Ok(value) = &target.value else { continue };
             match (new, value) {
                 (NewTarget::Cartesian { .. }, TargetValue::Joint(_)) => return Some(Reason::WrongKind),
                 (NewTarget::Joint { .. }, TargetValue::Cartesian(_))
-                    if instruction.is_none_or(|instruction| instruction.joint_form.is_none()) =>
+                    if instruction().is_none_or(|instruction| instruction.joint_form.is_none()) =>
                 {
                     return Some(Reason::NoJointForm);
                 }
@@ -86,7 +86,7 @@ impl Task<'_> {
             return None;
         }
         let guarded = self.guarded[change.motion as usize];
-        let written = instruction.and_then(|instruction| written_as(instruction, change));
+        let written = instruction().and_then(|instruction| written_as(instruction, change));
         let between = written.map_or(Between::Nothing, |instruction| instruction.between);
         if guarded || motion.timed || between == Between::Nothing {
             return Some(Reason::NoInsertion);

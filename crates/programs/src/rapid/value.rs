@@ -1,5 +1,7 @@
 //! Abstract values of RAPID expressions, and the components of the predefined types.
 
+use truegrind_math::rounding::round;
+
 use crate::motion::{
     FARTHEST_MM, Frame, JointTarget, Reason, RobTarget, SpeedValue, TargetValue, ToolValue, WorkObjectValue,
     ZoneValue,
@@ -201,7 +203,7 @@ pub fn cartesian_target(
     }
     within_reach(&position_mm)?;
     usable(&quaternion)?;
-    let conf = conf.map(|value| value.round() as i32);
+    let conf = conf.map(|value| round(value) as i32);
     Ok(TargetValue::Cartesian(RobTarget { position_mm, quaternion, conf, external: external(axes) }))
 }
 

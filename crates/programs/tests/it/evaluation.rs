@@ -194,9 +194,10 @@ fn a_number_read_in_one_pass_is_the_same_number() {
         if index % 4 == 0 {
             text.splice(0..0, *b"9E+09");
         }
-        if let Some((value, length)) = number::plain(&text) {
+        if let Some((value, length, decimals)) = number::plain(&text) {
             let (rest, number) = lexer::number(&text).unwrap();
-            assert_eq!((number.len(), number::value(number)), (length, Some(value)), "{text:?} {rest:?}");
+            let whole = (number::value(number), number.len(), number::decimals(number));
+            assert_eq!(whole, (Some(value), length, decimals), "{text:?} {rest:?}");
             told += 1;
         }
     }

@@ -4,6 +4,8 @@
 //! ahead is what it would read there; anywhere else it reads the part itself. What is read ahead ends before the first
 //! thing that is no whole statement without fault.
 
+use rayon::prelude::*;
+
 use super::{Block, Parser};
 use crate::rapid::syntax::Syntax;
 use crate::rapid::token::Token;
@@ -77,7 +79,7 @@ impl Parser<'_, '_> {
                 block.kind == around || around == Syntax::Proc && block.kind.is_routine()
             });
         if here && ahead.nodes.len() > 1 {
-            self.nodes.extend_from_slice(&ahead.nodes[1..]);
+            self.nodes.par_extend(ahead.nodes[1..].par_iter().with_min_len(FAR).copied());
             (self.at, self.last) = (ahead.at, ahead.last);
         }
     }
