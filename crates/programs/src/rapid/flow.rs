@@ -1,8 +1,7 @@
 //! Abstract interpreter of one routine: the values of data, the switches and the reaching motions before each statement.
 //!
-//! Method: a forward may-analysis over the structured statements, one pass per routine. [`AbstractState`] holds constants
-//! (constant propagation, [`Known`]), a [`SwitchSet`] and the [`ReachingMotions`]; each statement kind has a transfer
-//! function; branches meet in [`AbstractState::join`]. Loops need no fixpoint: whatever a loop writes is unknown at its head.
+//! Method: a forward may-analysis over the structured statements, one pass per routine ([`crate::dataflow`]). [`AbstractState`]
+//! holds constants (constant propagation, [`Known`]), a [`SwitchSet`] and the [`ReachingMotions`].
 //! Labels and error handlers start in a state that joins every point of the routine. Calls apply the callee's side-effect
 //! summary ([`super::symbol::SideEffects`]) and its exit switches. Volatile data, which an interrupt routine, an error handler
 //! or the controller may write, is never known. A parameter by reference may alias outside data or another parameter: a write
@@ -18,9 +17,10 @@ use super::predefined;
 use super::reaching_motions::ReachingMotions;
 use super::symbol::facts::{counts_from_position, is_resuming_handler};
 use super::symbol::{SymbolKind, Unit};
-use super::syntax::{Syntax, arguments, parts, token_kind};
+use super::syntax::{RapidTree, Syntax, arguments, parts, token_kind};
 use super::token::{Token, same_name};
 use super::value::Value;
+use crate::dataflow::{Control, Lattice, Nesting, Transfer};
 use crate::motion::{Frame, Reason};
 use crate::tree::Child;
 
@@ -34,8 +34,8 @@ const MAX_VALUE_SIZE: usize = 4096;
 /// Longer arrays are not tracked element by element.
 const MAX_ELEMENTS: f64 = 64.0;
 
-/// Abstract state before a statement.
-#[derive(Debug, Clone, PartialEq)]
+/// Abstract state before a statement; by default of one that control flow cannot reach.
+#[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct AbstractState {
     pub(super) known: Known,
     pub(super) modal: SwitchSet,
@@ -51,28 +51,27 @@ impl AbstractState {
     pub(super) fn displacement(&self) -> Option<Result<Frame, Reason>> {
         self.known.get(&DISPLACEMENT).map(|value| value.frame())
     }
+}
 
-    fn join(self, other: AbstractState) -> AbstractState {
+impl Lattice for AbstractState {
+    fn join(&mut self, other: &Self) {
         if !self.reachable {
-            return other;
+            return self.clone_from(other);
         }
         if !other.reachable {
-            return self;
+            return;
         }
-        let mut known = self
+        let displaced = [&*self, other].map(|state| state.known.contains_key(&DISPLACEMENT));
+        self.known = self
             .known
             .joined(&other.known, &|a: Option<&Value>, b: Option<&Value>| Some(join_values(a?, b?)));
         // Known on one branch only: unknown at the join.
-        if self.known.contains_key(&DISPLACEMENT) != other.known.contains_key(&DISPLACEMENT) {
-            known.insert(DISPLACEMENT, Value::Unknown(Reason::Displacement));
+        if displaced[0] != displaced[1] {
+            self.known.insert(DISPLACEMENT, Value::Unknown(Reason::Displacement));
         }
-        AbstractState {
-            known,
-            modal: self.modal.join(other.modal),
-            previous: self.previous.filter(|_| self.previous == other.previous),
-            reaching: self.reaching.join(other.reaching),
-            reachable: true,
-        }
+        self.modal = self.modal.join(other.modal);
+        self.previous = self.previous.filter(|_| self.previous == other.previous);
+        self.reaching.join(&other.reaching);
     }
 }
 
@@ -112,15 +111,6 @@ pub(super) trait Visitor {
     fn record_cycle_restart(&mut self, modal: SwitchSet);
 }
 
-/// Control structures around a statement.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Nesting {
-    pub(super) in_loop: bool,
-    pub(super) conditional: bool,
-    /// Whether a compact IF guards this statement alone.
-    pub(super) guarded: bool,
-}
-
 /// Interprets one unit; returns the switches at its end.
 pub(super) fn interpret_unit(
     evaluator: &Evaluator<'_, '_>,
@@ -137,6 +127,7 @@ pub(super) fn interpret_unit(
     let mut interpreter = Interpreter {
         evaluator,
         unit,
+        state: AbstractState::default(),
         visitor,
         exits,
         any,
@@ -182,8 +173,10 @@ pub(super) fn interpret_unit(
             }
         }
     }
-    let end = interpreter.transfer_block(unit.node, state, Nesting::default());
-    if end.reachable { interpreter.exits.join(end.modal) } else { interpreter.exits }
+    interpreter.state = state;
+    interpreter.walk(unit.node, Nesting::default());
+    let Interpreter { state, exits, .. } = interpreter;
+    if state.reachable { exits.join(state.modal) } else { exits }
 }
 
 /// The parameters of a unit that may alias outside data or each other.
@@ -198,6 +191,7 @@ fn aliases(evaluator: &Evaluator<'_, '_>, unit: Unit) -> Vec<u32> {
 struct Interpreter<'w, 'a, 's> {
     evaluator: &'w Evaluator<'a, 's>,
     unit: Unit,
+    state: AbstractState,
     visitor: &'w mut dyn Visitor,
     exits: SwitchSet,
     /// The switches that any statement of the unit may set: those at a point reachable from anywhere.
@@ -214,155 +208,128 @@ struct Interpreter<'w, 'a, 's> {
     aliases: Vec<u32>,
 }
 
-impl Interpreter<'_, '_, '_> {
-    /// Transfers a state through the statements under a node.
-    fn transfer_block(&mut self, node: u32, mut state: AbstractState, nesting: Nesting) -> AbstractState {
-        let tree = &self.evaluator.trees[self.unit.file as usize];
-        let (mut child, end) = (node + 1, node + tree.nodes[node as usize].size);
-        while child < end {
-            let kind = tree.nodes[child as usize].kind;
-            if !(self.unit.routine.is_none() && (kind.is_routine() || kind == Syntax::Module)) {
-                state = self.transfer_statement(child, kind, state, nesting);
-            }
-            child += tree.nodes[child as usize].size;
+/// What a node of a unit is for the flow of control.
+pub(super) fn control(tree: &RapidTree<'_>, unit: Unit, node: u32) -> Control {
+    match tree.nodes[node as usize].kind {
+        kind if unit.routine.is_none() && (kind.is_routine() || kind == Syntax::Module) => Control::Apart,
+        Syntax::Body => Control::Sequence,
+        Syntax::CompactIf => Control::Optional,
+        Syntax::If | Syntax::Test => Control::Branches,
+        Syntax::Branch | Syntax::Case => {
+            let first = parts(tree, node).next().and_then(|first| token_kind(tree, first));
+            Control::Branch { otherwise: matches!(first, Some(Token::Else | Token::Default)) }
         }
-        state
+        Syntax::For | Syntax::While => Control::Loop,
+        Syntax::ErrorClause | Syntax::UndoClause | Syntax::BackwardClause => Control::Handler,
+        Syntax::Label => Control::Label,
+        kind if kind.is_expression() => Control::Expression,
+        _ => Control::Simple,
+    }
+}
+
+impl Transfer for Interpreter<'_, '_, '_> {
+    type State = AbstractState;
+
+    fn state(&mut self) -> &mut AbstractState {
+        &mut self.state
     }
 
-    fn transfer_statement(
-        &mut self,
-        node: u32,
-        kind: Syntax,
-        mut state: AbstractState,
-        nesting: Nesting,
-    ) -> AbstractState {
-        let conditional = Nesting { conditional: true, guarded: false, ..nesting };
-        match kind {
-            Syntax::Body => self.transfer_block(node, state, nesting),
-            Syntax::Call | Syntax::LateCall => self.transfer_call(node, state, nesting),
-            Syntax::Assignment => {
-                self.transfer_assignment(node, &mut state);
-                state
-            }
-            Syntax::If => self.transfer_branches(node, state, conditional, Token::Else),
-            Syntax::Test => self.transfer_branches(node, state, conditional, Token::Default),
-            Syntax::CompactIf => {
-                // The condition is evaluated on both branches.
-                self.invalidate_condition(node, &mut state);
-                let before = state.clone();
-                let guarded = Nesting { guarded: true, ..conditional };
-                self.transfer_block(node, state, guarded).join(before)
-            }
-            Syntax::For | Syntax::While => self.transfer_loop(node, kind, state, nesting),
-            Syntax::ErrorClause | Syntax::UndoClause | Syntax::BackwardClause => {
-                let entry = self.state_at_any_point();
-                let end = self.transfer_block(node, entry, conditional);
-                if end.reachable && kind == Syntax::ErrorClause {
-                    self.exits = self.exits.join(end.modal);
-                }
-                if end.reachable && kind == Syntax::UndoClause && self.evaluator.symbols.restarts_main {
-                    self.visitor.record_cycle_restart(end.modal);
-                }
-                // Control does not fall through into the handler.
-                state
-            }
-            Syntax::Label => state.join(self.state_at_any_point()),
+    fn size(&self, node: u32) -> u32 {
+        self.evaluator.trees[self.unit.file as usize].nodes[node as usize].size
+    }
+
+    fn control(&self, node: u32) -> Control {
+        control(&self.evaluator.trees[self.unit.file as usize], self.unit, node)
+    }
+
+    fn transfer(&mut self, node: u32, nesting: Nesting) {
+        let mut state = std::mem::take(&mut self.state);
+        match self.kind(node) {
+            Syntax::Call | Syntax::LateCall => state = self.transfer_call(node, state, nesting),
+            Syntax::Assignment => self.transfer_assignment(node, &mut state),
             Syntax::Return => {
                 self.invalidate_changed(node, &mut state);
                 self.exits = self.exits.join(state.modal);
-                AbstractState { reachable: false, ..state }
+                state.reachable = false;
             }
             Syntax::Raise if self.resumes => {
                 // The handler may resume after it.
                 self.join_switches(self.handler_switches, &mut state);
-                AbstractState { previous: None, reaching: self.any_motion(), ..state }
+                (state.previous, state.reaching) = (None, self.any_motion());
             }
             // A caller that catches the error joins all switches set here.
-            Syntax::Goto | Syntax::Raise => AbstractState { reachable: false, ..state },
+            Syntax::Goto | Syntax::Raise => state.reachable = false,
             Syntax::Leave => {
                 self.exits = self.exits.join(state.modal);
-                AbstractState { reachable: false, ..state }
+                state.reachable = false;
             }
             Syntax::Opaque | Syntax::Unwritten => {
                 // Unparsed text may write anything.
-                AbstractState {
-                    previous: None,
-                    reaching: self.any_motion(),
-                    known: self.state_at_any_point().known,
-                    ..state
-                }
+                (state.previous, state.reaching) = (None, self.any_motion());
+                state.known = self.state_at_any_point().known;
             }
-            // Conditions and bounds: their function calls.
-            _ => {
-                self.invalidate_changed(node, &mut state);
-                state
+            _ => self.invalidate_changed(node, &mut state),
+        }
+        self.state = state;
+    }
+
+    fn join_any_point(&mut self) {
+        let any = self.state_at_any_point();
+        self.state.join(&any);
+    }
+
+    fn evaluate(&mut self, node: u32) {
+        let mut state = std::mem::take(&mut self.state);
+        self.invalidate_changed(node, &mut state);
+        self.state = state;
+    }
+
+    fn enter_loop(&mut self, node: u32) {
+        self.state.reaching = self.state.reaching.in_loop();
+        self.invalidate_iterations(node);
+    }
+
+    fn leave_loop(&mut self, node: u32, before: &AbstractState) {
+        self.invalidate_iterations(node);
+        self.state.reaching.leave_loop(&before.reaching);
+    }
+
+    fn end_handler(&mut self, node: u32, end: AbstractState) {
+        match self.kind(node) {
+            Syntax::ErrorClause if end.reachable => self.exits = self.exits.join(end.modal),
+            Syntax::UndoClause if end.reachable && self.evaluator.symbols.restarts_main => {
+                self.visitor.record_cycle_restart(end.modal);
             }
+            _ => {}
         }
     }
 
-    /// A loop: everything that it writes is unknown at its head and behind it, which holds for every number of iterations.
-    fn transfer_loop(
-        &mut self,
-        node: u32,
-        kind: Syntax,
-        mut entry: AbstractState,
-        nesting: Nesting,
-    ) -> AbstractState {
-        entry.modal = entry.modal.join(self.switches_set_under(node));
-        entry.previous = None;
-        let outside = std::mem::take(&mut entry.reaching);
-        entry.reaching = outside.in_loop();
-        let displaces = self.may_displace(node);
-        let invalidate = |interpreter: &mut Self, state: &mut AbstractState| {
-            interpreter.invalidate_changed(node, state);
-            if kind == Syntax::While {
-                // The condition may wait for another task.
-                interpreter.invalidate_shared(state);
-            }
-            if displaces {
-                state.known.insert(DISPLACEMENT, Value::Unknown(Reason::Displacement));
-            }
-        };
-        invalidate(self, &mut entry);
-        let inside = Nesting { in_loop: true, guarded: false, ..nesting };
-        let mut after = self.transfer_block(node, entry.clone(), inside).join(entry);
-        invalidate(self, &mut after);
-        after.previous = None;
-        after.reaching = after.reaching.after_loop(&outside);
-        after
+    /// TRYNEXT skips all branches where a condition raises an error.
+    fn may_pass_branches(&self) -> bool {
+        self.resumes
+    }
+}
+
+impl Interpreter<'_, '_, '_> {
+    fn kind(&self, node: u32) -> Syntax {
+        self.evaluator.trees[self.unit.file as usize].nodes[node as usize].kind
     }
 
-    fn transfer_branches(
-        &mut self,
-        node: u32,
-        mut state: AbstractState,
-        nesting: Nesting,
-        otherwise: Token,
-    ) -> AbstractState {
-        let tree = &self.evaluator.trees[self.unit.file as usize];
-        let mut joined: Option<AbstractState> = None;
-        let mut complete = false;
-        for branch in tree.child_nodes(node) {
-            if !matches!(tree.nodes[branch as usize].kind, Syntax::Branch | Syntax::Case) {
-                self.invalidate_changed(branch, &mut state);
-                continue;
-            }
-            // A condition is evaluated before all following branches.
-            self.invalidate_condition(branch, &mut state);
-            let first = parts(tree, branch).next();
-            complete |= first.and_then(|first| token_kind(tree, first)) == Some(otherwise);
-            let end = self.transfer_block(branch, state.clone(), nesting);
-            joined = Some(match joined {
-                Some(joined) => joined.join(end),
-                None => end,
-            });
+    /// Everything that a loop may change in any number of iterations is unknown.
+    fn invalidate_iterations(&mut self, node: u32) {
+        let mut state = std::mem::take(&mut self.state);
+        let sets = self.switches_set_under(node);
+        state.modal = state.modal.join(sets);
+        state.previous = None;
+        self.invalidate_changed(node, &mut state);
+        if self.kind(node) == Syntax::While {
+            // The condition may wait for another task.
+            self.invalidate_shared(&mut state);
         }
-        match joined {
-            // TRYNEXT skips all branches where a condition raises an error.
-            Some(joined) if complete && !self.resumes => joined,
-            Some(joined) => joined.join(state),
-            None => state,
+        if !sets.is_unset(Switch::Displacement) {
+            state.known.insert(DISPLACEMENT, Value::Unknown(Reason::Displacement));
         }
+        self.state = state;
     }
 
     /// State at a point that can be reached from anywhere in the routine.
@@ -386,13 +353,9 @@ impl Interpreter<'_, '_, '_> {
         }
         // A handler may resume after a failed motion, or from anywhere.
         let also = if self.resumes { std::mem::take(before) } else { ReachingMotions::default() };
-        *before = ReachingMotions::after(motion).join(also);
+        *before = ReachingMotions::after(motion);
+        before.join(&also);
         before.any |= self.moved_between;
-    }
-
-    /// Whether statements under a node may change the program displacement.
-    fn may_displace(&mut self, node: u32) -> bool {
-        !self.switches_set_under(node).is_unset(Switch::Displacement)
     }
 
     /// The displacement after PDispSet, PDispOn, PDispAdd or PDispOff.

@@ -14,6 +14,7 @@
 
 use super::syntax::{RapidTree, arguments};
 use super::token::same_name;
+use crate::dataflow::{FiniteLattice, Lattice};
 use crate::motion::{Modal, Switch as SwitchState};
 use crate::tree::Child;
 
@@ -141,6 +142,17 @@ impl SwitchSet {
             independent_axis: both(self.state(Switch::Locked), self.state(Switch::Independent)),
         }
     }
+}
+
+impl Lattice for SwitchSet {
+    fn join(&mut self, other: &Self) {
+        self.0 |= other.0;
+    }
+}
+
+impl FiniteLattice for SwitchSet {
+    /// The bits.
+    const HEIGHT: usize = 3 * COUNT as usize;
 }
 
 /// Transfer function of an instruction: the switches that it sets; the others are empty.

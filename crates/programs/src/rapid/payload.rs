@@ -12,12 +12,14 @@ use std::collections::HashMap;
 use rayon::prelude::*;
 
 use super::evaluate::{Context, Evaluator, Known};
+use super::flow::control;
 use super::predefined;
 use super::symbol::Unit;
-use super::syntax::{RapidTree, Syntax, arguments, parts, token_kind};
+use super::syntax::{RapidTree, Syntax, arguments};
 use super::task::Task;
 use super::token::{Token, same_name};
 use super::value::Value;
+use crate::dataflow::{Callees, Control, Edge, Exits, FiniteLattice, Lattice, Nesting, Transfer, propagate};
 use crate::motion::load::{Grip, Load, Loads};
 use crate::tree::Child;
 
@@ -43,12 +45,34 @@ fn states_no_load(task: &Task<'_>) -> bool {
     })
 }
 
-/// Gripped load at a statement of a routine. `None`: as at entry of the routine.
-type State = Option<Grip>;
+/// Two loads that differ are unknown.
+impl Lattice for Grip {
+    fn join(&mut self, other: &Self) {
+        if self != other {
+            *self = Grip::Unknown;
+        }
+    }
+}
 
-/// Join of two states.
-fn joined(a: State, b: State) -> State {
-    if a == b { a } else { Some(Grip::Unknown) }
+impl FiniteLattice for Grip {
+    const HEIGHT: usize = 1;
+}
+
+/// Gripped load at a statement of a routine. `None`: as at its entry.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Gripped(Option<Grip>);
+
+impl Gripped {
+    const UNKNOWN: Gripped = Gripped(Some(Grip::Unknown));
+    const AS_AT_ENTRY: Gripped = Gripped(None);
+}
+
+impl Lattice for Gripped {
+    fn join(&mut self, other: &Self) {
+        if self != other {
+            *self = Self::UNKNOWN;
+        }
+    }
 }
 
 /// Abstract interpretation of all statements of a task.
@@ -58,21 +82,16 @@ struct GripAnalysis<'t, 's> {
     /// Motions by file and first byte of their statement.
     motions: HashMap<(u32, u32), usize>,
     /// Each visited motion: its index, the state and the unit.
-    met: Vec<(usize, State, usize)>,
-    /// Calls: called unit, state at the call, calling unit.
-    calls: Vec<(usize, State, usize)>,
-    /// State at the end of each unit; unknown while it is being computed.
-    exits: Vec<Option<State>>,
+    met: Vec<(usize, Gripped, u32)>,
+    /// Calls: calling unit, called unit, state at the call.
+    calls: Vec<Edge<Gripped>>,
+    /// State at the end of each unit.
+    exits: Exits<Gripped>,
     totals: HashMap<usize, Load>,
-    unit: usize,
-    dry_run: bool,
 }
 
 /// Mass of `load0`, which means no load (kg).
 const NOTHING_KG: f64 = 0.001;
-
-/// Largest call depth.
-const DEPTH: usize = 12;
 
 impl<'t, 's> GripAnalysis<'t, 's> {
     fn new(task: &'t Task<'s>) -> Self {
@@ -83,23 +102,18 @@ impl<'t, 's> GripAnalysis<'t, 's> {
             motions: motions.map(|(i, m)| ((m.place.file, m.statement.start), i)).collect(),
             met: Vec::new(),
             calls: Vec::new(),
-            exits: vec![None; task.symbols.units.len()],
+            exits: Exits { known: vec![None; task.symbols.units.len()], depth: 0 },
             totals: HashMap::new(),
-            unit: 0,
-            dry_run: false,
         }
     }
 
     fn run(mut self) -> Loads {
-        for unit in 0..self.task.symbols.units.len() {
-            self.unit = unit;
-            let exit = self.walk(self.task.symbols.units[unit], 0);
-            self.exits[unit] = Some(exit);
-        }
-        for unit in 0..self.exits.len() {
-            // The next cycle starts with the load of this one.
-            if let Some(exit) = self.exits[unit].filter(|_| self.is_main(unit)) {
-                self.calls.push((unit, exit, unit));
+        for unit in 0..self.task.symbols.units.len() as u32 {
+            let exit = self.interpret(unit);
+            self.exits.known[unit as usize] = Some(exit);
+            if self.is_main(unit as usize) {
+                // The next cycle starts with the load of this one.
+                self.calls.push((unit, unit, exit));
             }
         }
         let mut grips = vec![Grip::Unknown; self.task.listing.motions.len()];
@@ -108,40 +122,24 @@ impl<'t, 's> GripAnalysis<'t, 's> {
         }
         let entries = self.entries();
         for (motion, state, unit) in &self.met {
-            grips[*motion] = state.unwrap_or(entries[*unit]);
+            grips[*motion] = state.0.unwrap_or(entries[*unit as usize]);
         }
         Loads { grips, totals: self.totals }
     }
 
     /// Gripped load at entry of each unit: none at the start of main; elsewhere the join over all calls.
-    fn entries(&self) -> Vec<Grip> {
+    fn entries(&mut self) -> Vec<Grip> {
         let symbols = &self.task.symbols;
         let units = &symbols.units;
         let begins = |unit: usize| units[unit].routine.is_none() || self.is_main(unit);
         let mut entries: Vec<Option<Grip>> =
             (0..units.len()).map(|unit| begins(unit).then_some(Grip::Empty)).collect();
         // Computed calls and interrupts can occur with any load.
-        let late = symbols.late_callees.iter().flat_map(|late| late.iter().copied());
-        let interrupting = (0..).zip(&symbols.interrupts).filter(|(_, interrupts)| **interrupts);
-        for routine in late.chain(interrupting.map(|(routine, _)| routine)) {
-            entries[symbols.routines[routine as usize].unit as usize] = Some(Grip::Unknown);
+        let late = symbols.late_list.iter().flat_map(|list| &symbols.late_lists[*list as usize]);
+        for routine in late.chain(&symbols.interrupt_routines) {
+            entries[symbols.unit_of(*routine) as usize] = Some(Grip::Unknown);
         }
-        for _ in 0..=units.len() {
-            let mut changed = false;
-            for (callee, state, caller) in &self.calls {
-                let Some(arriving) = state.or(entries[*caller]) else { continue };
-                let new = match entries[*callee] {
-                    None => arriving,
-                    Some(old) if old == arriving => old,
-                    Some(_) => Grip::Unknown,
-                };
-                changed |= entries[*callee] != Some(new);
-                entries[*callee] = Some(new);
-            }
-            if !changed {
-                break;
-            }
-        }
+        propagate(&mut entries, &mut self.calls, |state, entry| state.0.or(*entry));
         // Never called in these files.
         entries.into_iter().map(|entry| entry.unwrap_or(Grip::Unknown)).collect()
     }
@@ -153,109 +151,6 @@ impl<'t, 's> GripAnalysis<'t, 's> {
 
     fn tree(&self, unit: Unit) -> &'t RapidTree<'s> {
         &self.task.trees[unit.file as usize]
-    }
-
-    fn walk(&mut self, unit: Unit, depth: usize) -> State {
-        let mut exits: Vec<State> = Vec::new();
-        let end = self.block(unit, unit.node, Some(None), &mut exits, depth);
-        let all = exits.into_iter().chain(end);
-        all.reduce(joined).flatten()
-    }
-
-    /// The statements under a node; the state is `None` where control does not continue.
-    fn block(
-        &mut self,
-        unit: Unit,
-        node: u32,
-        mut state: Option<State>,
-        exits: &mut Vec<State>,
-        depth: usize,
-    ) -> Option<State> {
-        let tree = self.tree(unit);
-        let (mut child, end) = (node + 1, node + tree.nodes[node as usize].size);
-        while child < end {
-            let kind = tree.nodes[child as usize].kind;
-            if !(unit.routine.is_none() && (kind.is_routine() || kind == Syntax::Module)) {
-                state = self.statement(unit, child, state, exits, depth);
-            }
-            child += tree.nodes[child as usize].size;
-        }
-        state
-    }
-
-    fn statement(
-        &mut self,
-        unit: Unit,
-        node: u32,
-        state: Option<State>,
-        exits: &mut Vec<State>,
-        depth: usize,
-    ) -> Option<State> {
-        let tree = self.tree(unit);
-        let either = |a: Option<State>, b: Option<State>| match (a, b) {
-            (Some(a), Some(b)) => Some(joined(a, b)),
-            (a, b) => a.or(b),
-        };
-        let unsure =
-            |statements_may_grip: bool| if statements_may_grip { Some(Some(Grip::Unknown)) } else { state };
-        match tree.nodes[node as usize].kind {
-            Syntax::Body => self.block(unit, node, state, exits, depth),
-            Syntax::Call => self.call(unit, node, state, depth),
-            Syntax::LateCall => unsure(true),
-            Syntax::CompactIf => {
-                let state = unsure(self.condition_may_grip(unit, node));
-                either(self.block(unit, node, state, exits, depth), state)
-            }
-            Syntax::If | Syntax::Test => {
-                let (mut out, mut complete) = (None, false);
-                // Conditions are evaluated first.
-                let function_may_grip = |node: u32| self.condition_may_grip(unit, node);
-                let state = unsure(function_may_grip(node) || tree.child_nodes(node).any(function_may_grip));
-                for branch in tree.child_nodes(node) {
-                    if !matches!(tree.nodes[branch as usize].kind, Syntax::Branch | Syntax::Case) {
-                        continue;
-                    }
-                    let first = parts(tree, branch).next().and_then(|first| token_kind(tree, first));
-                    complete |= matches!(first, Some(Token::Else | Token::Default));
-                    out = either(out, self.block(unit, branch, state, exits, depth));
-                }
-                if complete { out } else { either(out, state) }
-            }
-            Syntax::For | Syntax::While => {
-                // On re-entry the load gripped in the loop may or may not be held.
-                let entry = unsure(self.statements_may_grip(unit, node));
-                let passed = if self.condition_may_grip(unit, node) { entry } else { state };
-                either(self.block(unit, node, entry, exits, depth), passed)
-            }
-            Syntax::ErrorClause | Syntax::UndoClause | Syntax::BackwardClause => {
-                let anywhere =
-                    if self.statements_may_grip(unit, unit.node) { Some(Some(Grip::Unknown)) } else { state };
-                self.block(unit, node, anywhere, exits, depth);
-                state
-            }
-            Syntax::Label => {
-                if self.statements_may_grip(unit, unit.node) {
-                    Some(Some(Grip::Unknown))
-                } else {
-                    state.or(Some(None))
-                }
-            }
-            Syntax::Return | Syntax::Raise | Syntax::Leave => {
-                exits.extend(state);
-                None
-            }
-            Syntax::Goto => None,
-            Syntax::Opaque | Syntax::Unwritten => unsure(true),
-            _ => unsure(self.function_may_grip(unit, node)),
-        }
-    }
-
-    /// Whether evaluating a condition or bound of a statement may change the gripped load.
-    fn condition_may_grip(&self, unit: Unit, node: u32) -> bool {
-        let tree = self.tree(unit);
-        tree.child_nodes(node).any(|child| {
-            tree.nodes[child as usize].kind.is_expression() && self.function_may_grip(unit, child)
-        })
     }
 
     /// Whether a function call under a node may change the gripped load.
@@ -294,79 +189,148 @@ impl<'t, 's> GripAnalysis<'t, 's> {
             _ => false,
         })
     }
+}
 
-    fn load(&self, unit: Unit, value: Child) -> Option<Load> {
-        let known = Known::new();
-        let context = Context::new(unit.file, unit.scope, &known);
-        load_of(&self.evaluator.value(context, value))
+impl Callees for GripAnalysis<'_, '_> {
+    type Exit = Gripped;
+
+    fn exits(&mut self) -> &mut Exits<Gripped> {
+        &mut self.exits
     }
 
-    fn call(&mut self, unit: Unit, node: u32, state: Option<State>, depth: usize) -> Option<State> {
-        let state = state?;
-        let tree = self.tree(unit);
+    fn any_exit(&self, _unit: u32) -> Gripped {
+        Gripped::UNKNOWN
+    }
+
+    fn interpret(&mut self, index: u32) -> Gripped {
+        let unit = self.task.symbols.units[index as usize];
+        let state = Some(Gripped::AS_AT_ENTRY);
+        let mut walk = GripWalk { analysis: self, unit, index, state, end: None };
+        walk.walk(unit.node, Nesting::default());
+        let GripWalk { state, mut end, .. } = walk;
+        end.join(&state);
+        end.unwrap_or(Gripped::AS_AT_ENTRY)
+    }
+}
+
+/// Interpretation of one unit.
+struct GripWalk<'w, 't, 's> {
+    analysis: &'w mut GripAnalysis<'t, 's>,
+    unit: Unit,
+    index: u32,
+    /// `None` where control does not continue.
+    state: Option<Gripped>,
+    /// The state where the unit is left before its end.
+    end: Option<Gripped>,
+}
+
+impl Transfer for GripWalk<'_, '_, '_> {
+    type State = Option<Gripped>;
+
+    fn state(&mut self) -> &mut Self::State {
+        &mut self.state
+    }
+
+    fn size(&self, node: u32) -> u32 {
+        self.analysis.tree(self.unit).nodes[node as usize].size
+    }
+
+    fn control(&self, node: u32) -> Control {
+        control(self.analysis.tree(self.unit), self.unit, node)
+    }
+
+    fn transfer(&mut self, node: u32, _nesting: Nesting) {
+        match self.analysis.tree(self.unit).nodes[node as usize].kind {
+            Syntax::Call => self.call(node),
+            Syntax::Return | Syntax::Raise | Syntax::Leave => {
+                self.end.join(&self.state);
+                self.state = None;
+            }
+            Syntax::Goto => self.state = None,
+            Syntax::LateCall | Syntax::Opaque | Syntax::Unwritten => self.state = Some(Gripped::UNKNOWN),
+            _ => self.evaluate(node),
+        }
+    }
+
+    fn join_any_point(&mut self) {
+        let gripped = match self.analysis.statements_may_grip(self.unit, self.unit.node) {
+            true => Gripped::UNKNOWN,
+            false => Gripped::AS_AT_ENTRY,
+        };
+        self.state.join(&Some(gripped));
+    }
+
+    fn evaluate(&mut self, node: u32) {
+        if self.analysis.function_may_grip(self.unit, node) {
+            self.state = Some(Gripped::UNKNOWN);
+        }
+    }
+
+    /// On re-entry the load gripped in the loop may or may not be held.
+    fn enter_loop(&mut self, node: u32) {
+        if self.analysis.statements_may_grip(self.unit, node) {
+            self.state = Some(Gripped::UNKNOWN);
+        }
+    }
+
+    fn leave_loop(&mut self, node: u32, _before: &Self::State) {
+        self.conditions(node);
+    }
+}
+
+impl GripWalk<'_, '_, '_> {
+    fn load(&self, value: Child) -> Option<Load> {
+        let known = Known::new();
+        let context = Context::new(self.unit.file, self.unit.scope, &known);
+        load_of(&self.analysis.evaluator.value(context, value))
+    }
+
+    fn call(&mut self, node: u32) {
+        let Some(mut state) = self.state else { return };
+        let unit = self.unit;
+        let tree = self.analysis.tree(unit);
         let name = tree.text(tree.nodes[node as usize].first);
         if predefined::grips(name) {
             let value = arguments(tree, node).find(|a| !a.optional).and_then(|a| a.value);
-            return Some(Some(match value.and_then(|value| self.load(unit, value)) {
+            self.state = Some(Gripped(Some(match value.and_then(|value| self.load(value)) {
                 Some(load) if load.mass_kg > NOTHING_KG => Grip::Holds(load),
                 Some(_) => Grip::Empty,
                 None => Grip::Unknown,
-            }));
+            })));
+            return;
         }
+        let recorded = self.analysis.exits.depth == 0;
         let start = tree.node_span(node).start;
-        if let Some(&motion) = self.motions.get(&(unit.file, start))
-            && !self.dry_run
+        if let Some(&motion) = self.analysis.motions.get(&(unit.file, start))
+            && recorded
         {
-            self.met.push((motion, state, self.unit));
+            self.analysis.met.push((motion, state, self.index));
             let option = arguments(tree, node)
                 .find(|a| a.optional && a.name.is_some_and(|name| same_name(tree.text(name), b"TLoad")));
-            let total = option.and_then(|a| a.value).and_then(|value| self.load(unit, value));
+            let total = option.and_then(|a| a.value).and_then(|value| self.load(value));
             // load0 leaves the tool's own load in force.
             if let Some(total) = total.filter(|total| total.mass_kg > NOTHING_KG) {
-                self.totals.insert(motion, total);
+                self.analysis.totals.insert(motion, total);
             }
         }
-        let state = if self.function_may_grip(unit, node) { Some(Grip::Unknown) } else { state };
-        let routine = match *self.task.symbols.callees(unit.scope, name) {
-            [] if self.may_grip(unit, node) => return Some(Some(Grip::Unknown)),
-            [] => return Some(state),
-            [routine] => routine,
-            // One of several possible callees.
-            ref several if !self.dry_run => {
-                for routine in several {
-                    let callee = self.task.symbols.routines[*routine as usize].unit as usize;
-                    self.calls.push((callee, state, self.unit));
-                }
-                return Some(if self.may_grip(unit, node) { Some(Grip::Unknown) } else { state });
-            }
-            _ => return Some(if self.may_grip(unit, node) { Some(Grip::Unknown) } else { state }),
-        };
-        let callee = self.task.symbols.units.iter().position(|unit| unit.routine == Some(routine));
-        let Some(callee) = callee else { return Some(Some(Grip::Unknown)) };
-        if !self.dry_run {
-            self.calls.push((callee, state, self.unit));
+        if self.analysis.function_may_grip(unit, node) {
+            state = Gripped::UNKNOWN;
         }
-        Some(match self.exit_of(callee, depth) {
-            None => state,
-            known => known,
-        })
-    }
-
-    /// State at the end of a unit.
-    fn exit_of(&mut self, unit: usize, depth: usize) -> State {
-        if let Some(exit) = self.exits[unit] {
-            return exit;
+        let symbols = &self.analysis.task.symbols;
+        let called = symbols.callees(unit.scope, name);
+        if recorded {
+            let calls = called.iter().map(|routine| (self.index, symbols.unit_of(*routine), state));
+            self.analysis.calls.extend(calls);
         }
-        if depth >= DEPTH {
-            return Some(Grip::Unknown);
-        }
-        // Recursive calls are not followed further.
-        self.exits[unit] = Some(Some(Grip::Unknown));
-        let dry_run = std::mem::replace(&mut self.dry_run, true);
-        let exit = self.walk(self.task.symbols.units[unit], depth + 1);
-        self.dry_run = dry_run;
-        self.exits[unit] = Some(exit);
-        exit
+        self.state = Some(match *called {
+            [routine] => match self.analysis.exit_of(symbols.unit_of(routine)) {
+                Gripped::AS_AT_ENTRY => state,
+                known => known,
+            },
+            // None of the program, or one of several.
+            _ if self.analysis.may_grip(unit, node) => Gripped::UNKNOWN,
+            _ => state,
+        });
     }
 }
 

@@ -15,7 +15,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::evaluate::Evaluator;
-use super::flow::{AbstractState, CallSite, Nesting, Visitor, interpret_unit};
+use super::flow::{AbstractState, CallSite, Visitor, interpret_unit};
 use super::instruction::{self, INSTRUCTIONS};
 use super::mark;
 use super::modal::SwitchSet;
@@ -23,6 +23,7 @@ use super::parser::parse;
 use super::reaching_motions::ReachingMotions;
 use super::symbol::{SwitchExit, Symbols, Unit};
 use super::syntax::{RapidTree, Syntax};
+use crate::dataflow::{Callees, Exits, Nesting};
 use crate::motion::{Listing, OpaqueRegion, Place, Reason, Role};
 use literals::Literals;
 
@@ -125,10 +126,8 @@ struct ListingBuilder<'a, 's> {
     units: Vec<u32>,
     unit: u32,
     sites: Vec<(u32, CallSite)>,
-    exits: Vec<Option<SwitchSet>>,
-    depth: u32,
-    /// While only the exit switches of a routine are computed: nothing is listed.
-    silent: bool,
+    /// The switches at the end of each routine, "as at the entry" included.
+    exits: Exits<SwitchSet>,
     /// Whether a displacement is counted from the end of any motion.
     position_used: bool,
     /// The units in which one is counted from the robot's position at their entry. A call determines that position; a new cycle,
@@ -168,9 +167,6 @@ struct Literal {
     joints: bool,
 }
 
-/// Greatest call depth to which the exit states of routines are computed; beyond it they may be anything that the routine sets.
-const CALL_DEPTH: u32 = 12;
-
 impl<'a, 's> ListingBuilder<'a, 's> {
     fn new(trees: &'a [RapidTree<'s>], symbols: &'a Symbols) -> Self {
         ListingBuilder {
@@ -184,9 +180,7 @@ impl<'a, 's> ListingBuilder<'a, 's> {
             units: Vec::new(),
             unit: 0,
             sites: Vec::new(),
-            exits: vec![None; symbols.routines.len()],
-            depth: 0,
-            silent: false,
+            exits: Exits { known: vec![None; symbols.routines.len()], depth: 0 },
             position_used: false,
             position_used_at_entry: Vec::new(),
             names: vec![None; INSTRUCTIONS.len()],
@@ -230,10 +224,8 @@ impl<'a, 's> ListingBuilder<'a, 's> {
         for &unit in &self.symbols.callees_first {
             let Some(routine) = units[unit as usize].routine else { continue };
             match self.symbols.switch_exits[unit as usize] {
-                SwitchExit::Unchanged => self.exits[routine as usize] = Some(SwitchSet::ENTRY),
-                SwitchExit::Changed { called: true } => {
-                    self.exit_switches(routine);
-                }
+                SwitchExit::Unchanged => self.exits.known[routine as usize] = Some(SwitchSet::ENTRY),
+                SwitchExit::Changed { called: true } => drop(self.exit_of(routine)),
                 SwitchExit::Changed { called: false } => {}
             }
         }
@@ -242,13 +234,18 @@ impl<'a, 's> ListingBuilder<'a, 's> {
             let evaluator = Evaluator::new(self.trees, self.symbols);
             let exit = interpret_unit(&evaluator, *unit, self);
             if let Some(routine) = unit.routine {
-                self.exits[routine as usize] = Some(exit);
+                self.exits.known[routine as usize] = Some(exit);
                 if self.mains.contains(&routine) {
                     // The next cycle begins with the switches at the end of this one.
                     self.record_cycle_restart(exit);
                 }
             }
         }
+    }
+
+    /// Whether only the exit switches of a routine are computed: nothing is listed.
+    fn is_silent(&self) -> bool {
+        self.exits.depth > 0
     }
 
     /// Inserts the targets that are written in the instructions as numbers.
@@ -273,9 +270,27 @@ impl<'a, 's> ListingBuilder<'a, 's> {
     }
 }
 
+impl Callees for ListingBuilder<'_, '_> {
+    type Exit = SwitchSet;
+
+    fn exits(&mut self) -> &mut Exits<SwitchSet> {
+        &mut self.exits
+    }
+
+    /// As at the entry, or as any statement in it or its callees may set.
+    fn any_exit(&self, routine: u32) -> SwitchSet {
+        SwitchSet::ENTRY.join(self.symbols.effects_of(routine).switches)
+    }
+
+    fn interpret(&mut self, routine: u32) -> SwitchSet {
+        let unit = self.symbols.units[self.symbols.routines[routine as usize].unit as usize];
+        interpret_unit(&Evaluator::new(self.trees, self.symbols), unit, self)
+    }
+}
+
 impl Visitor for ListingBuilder<'_, '_> {
     fn visit_call(&mut self, unit: Unit, node: u32, state: &AbstractState, nesting: Nesting) -> Option<u32> {
-        if self.silent {
+        if self.is_silent() {
             return None;
         }
         let tree = &self.trees[unit.file as usize];
@@ -296,50 +311,31 @@ impl Visitor for ListingBuilder<'_, '_> {
     }
 
     fn exit_switches(&mut self, routine: u32) -> SwitchSet {
-        if let Some(exit) = self.exits[routine as usize] {
-            return exit;
-        }
-        let found = &self.symbols.routines[routine as usize];
-        // As at the entry, or as any statement in it or its callees may set.
-        let any_exit = SwitchSet::ENTRY.join(found.effects.switches);
-        if self.depth >= CALL_DEPTH {
-            return any_exit;
-        }
-        // Assumed for recursive calls while the routine is interpreted.
-        self.exits[routine as usize] = Some(any_exit);
-        let unit = self.symbols.units[found.unit as usize];
-        let was = std::mem::replace(&mut self.silent, true);
-        self.depth += 1;
-        let evaluator = Evaluator::new(self.trees, self.symbols);
-        let exit = interpret_unit(&evaluator, unit, self);
-        self.depth -= 1;
-        self.silent = was;
-        self.exits[routine as usize] = Some(exit);
-        exit
+        self.exit_of(routine)
     }
 
     fn record_call(&mut self, site: CallSite) {
-        if !self.silent {
+        if !self.is_silent() {
             self.sites.push((self.unit, site));
         }
     }
 
     fn record_late_call(&mut self, modal: SwitchSet) {
-        if !self.silent {
+        if !self.is_silent() {
             let late = &mut self.late[self.unit as usize];
             *late = late.join(modal);
         }
     }
 
     fn record_external_call(&mut self, modal: SwitchSet) {
-        if !self.silent {
+        if !self.is_silent() {
             let outside = &mut self.outside[self.unit as usize];
             *outside = outside.join(modal);
         }
     }
 
     fn record_position_use(&mut self, standing: &ReachingMotions) {
-        if self.silent {
+        if self.is_silent() {
             return;
         }
         match standing.motions() {

@@ -42,14 +42,6 @@ impl Interpreter<'_, '_, '_> {
         }
     }
 
-    /// Invalidates what the expressions of a statement, such as its condition, may write.
-    pub(super) fn invalidate_condition(&mut self, node: u32, state: &mut AbstractState) {
-        let tree = &self.evaluator.trees[self.unit.file as usize];
-        for asked in tree.child_nodes(node).filter(|&node| tree.nodes[node as usize].kind.is_expression()) {
-            self.invalidate_changed(asked, state);
-        }
-    }
-
     /// Invalidates what one statement or function writes, callees not counted.
     pub(super) fn invalidate_written(&self, node: u32, state: &mut AbstractState) {
         let tree = &self.evaluator.trees[self.unit.file as usize];

@@ -1,5 +1,7 @@
 //! Side effects: the writes of one statement, the side-effect summary of a routine, and a unit's effect on the switches.
 
+use crate::dataflow::{FiniteLattice, Lattice};
+use crate::motion::Reason;
 use crate::rapid::modal::SwitchSet;
 
 /// A routine that may write more outside data than this counts as writing anything.
@@ -49,21 +51,6 @@ pub struct SideEffects {
 }
 
 impl SideEffects {
-    /// Joins a callee's summary into this one.
-    pub(super) fn join(&mut self, callee: &SideEffects) {
-        self.writes_anything |= callee.writes_anything;
-        self.moves |= callee.moves;
-        self.waits |= callee.waits;
-        self.grips |= callee.grips;
-        self.impure |= callee.impure;
-        self.uses_position |= callee.uses_position;
-        self.switches = self.switches.join(callee.switches);
-        self.writes.extend_from_slice(&callee.writes);
-        if self.writes.len() > 4 * MAX_WRITES {
-            self.normalise();
-        }
-    }
-
     /// Sorts the writes and widens too many of them to "anything".
     pub(super) fn normalise(&mut self) {
         self.writes.sort_unstable();
@@ -73,6 +60,38 @@ impl SideEffects {
             self.writes.clear();
         }
     }
+}
+
+impl Lattice for SideEffects {
+    fn join(&mut self, callee: &Self) {
+        self.writes_anything |= callee.writes_anything;
+        self.moves |= callee.moves;
+        self.waits |= callee.waits;
+        self.grips |= callee.grips;
+        self.impure |= callee.impure;
+        self.uses_position |= callee.uses_position;
+        self.switches = self.switches.join(callee.switches);
+        self.writes.extend_from_slice(&callee.writes);
+        self.normalise();
+    }
+}
+
+impl FiniteLattice for SideEffects {
+    /// The writes, "anything", five flags.
+    const HEIGHT: usize = MAX_WRITES + 1 + 5 + SwitchSet::HEIGHT;
+}
+
+/// Why data may be written: an assignment hides that it is also handed over.
+impl Lattice for Reason {
+    fn join(&mut self, other: &Self) {
+        if self != other {
+            *self = Reason::Assigned;
+        }
+    }
+}
+
+impl FiniteLattice for Reason {
+    const HEIGHT: usize = 1;
 }
 
 /// Effect of a unit on the switches that act in execution order.

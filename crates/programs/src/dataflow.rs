@@ -1,0 +1,304 @@
+//! Program analysis, whatever the language: facts that only grow, and a walk over structured statements.
+//!
+//! - [`Lattice`]: facts with a join. [`propagate`] finds the least facts that hold along every edge of a graph: side effects, which
+//!   flow from callees to callers, and states at entry, which flow from callers to callees.
+//! - [`Transfer`]: the transfer function of a language. Its `walk` takes the abstract state through sequences, branches, loops, handlers
+//!   and labels, and joins it where paths meet. Loops need no fixpoint: at the head and behind the loop the language makes unknown
+//!   whatever the loop changes, which holds for every number of iterations.
+//! - [`Callees`]: the state at the end of each callee, found when it is first asked for.
+//!
+//! Method: monotone frameworks with a worklist (Nielson, Nielson, Hankin, Principles of Program Analysis, 1999, §2.4 and §6.1).
+//! The order of the worklist is the reverse post-order, in which a graph without cycles takes one step a node.
+//!
+//! A language brings its syntax tree, its side effects and its transfer function; RAPID (`rapid/flow`, `rapid/symbol/solve`,
+//! `rapid/payload`) and NC (`nc/task`) do.
+
+use std::collections::BTreeSet;
+
+/// Facts that hold on several paths: an element of a join semi-lattice.
+pub(crate) trait Lattice {
+    /// Joins the facts of another path.
+    fn join(&mut self, other: &Self);
+}
+
+/// A lattice in which no fact can grow for ever.
+pub(crate) trait FiniteLattice: Lattice + Clone + PartialEq {
+    /// How many times a fact can grow.
+    const HEIGHT: usize;
+}
+
+/// `None`: nothing arrives here.
+impl<F: Lattice + Clone> Lattice for Option<F> {
+    fn join(&mut self, other: &Self) {
+        match (self, other) {
+            (Some(fact), Some(other)) => fact.join(other),
+            (this @ None, other) => this.clone_from(other),
+            (Some(_), None) => {}
+        }
+    }
+}
+
+impl<F: FiniteLattice> FiniteLattice for Option<F> {
+    const HEIGHT: usize = 1 + F::HEIGHT;
+}
+
+/// An edge of a graph: from, to, and what happens to the facts along it.
+pub(crate) type Edge<E> = (u32, u32, E);
+
+/// The edges that leave a node; `edges` are sorted by where they begin.
+fn leaving<E>(edges: &[Edge<E>], node: u32) -> &[Edge<E>] {
+    let first = edges.partition_point(|edge| edge.0 < node);
+    &edges[first..first + edges[first..].partition_point(|edge| edge.0 == node)]
+}
+
+/// Post-order: each node after those to which its edges lead, except along cycles. `edges` are sorted by where they begin.
+pub(crate) fn post_order<E>(nodes: usize, edges: &[Edge<E>]) -> Vec<u32> {
+    let mut order = Vec::with_capacity(nodes);
+    let mut seen = vec![false; nodes];
+    let mut open = Vec::new();
+    for root in 0..nodes as u32 {
+        if !std::mem::replace(&mut seen[root as usize], true) {
+            open.push((root, leaving(edges, root)));
+        }
+        while let Some((node, rest)) = open.last_mut() {
+            if let Some(((_, to, _), others)) = rest.split_first() {
+                *rest = others;
+                if !std::mem::replace(&mut seen[*to as usize], true) {
+                    open.push((*to, leaving(edges, *to)));
+                }
+            } else {
+                order.push(*node);
+                open.pop();
+            }
+        }
+    }
+    order
+}
+
+/// Least fixpoint: `facts` grow until each holds what `arriving` makes, along every edge, of the facts where the edge begins.
+pub(crate) fn propagate<F: FiniteLattice, E>(
+    facts: &mut [F],
+    edges: &mut [Edge<E>],
+    arriving: impl Fn(&E, &F) -> F,
+) {
+    edges.sort_by_key(|edge| edge.0);
+    let mut order = post_order(facts.len(), edges);
+    order.reverse();
+    let mut rank = vec![0; order.len()];
+    (0..).zip(&order).for_each(|(at, &node)| rank[node as usize] = at);
+    let mut open: BTreeSet<u32> = (0..order.len() as u32).collect();
+    let mut steps = 0;
+    while let Some(at) = open.pop_first() {
+        steps += 1;
+        debug_assert!(
+            steps <= order.len() * (1 + F::HEIGHT),
+            "a fact grows more often than its lattice is high"
+        );
+        let node = order[at as usize];
+        for (_, to, along) in leaving(edges, node) {
+            let arriving = arriving(along, &facts[node as usize]);
+            let fact = &mut facts[*to as usize];
+            let before = fact.clone();
+            fact.join(&arriving);
+            if *fact != before {
+                open.insert(rank[*to as usize]);
+            }
+        }
+    }
+}
+
+/// What a node is for the flow of control.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Control {
+    /// One after another: its children.
+    Sequence,
+    /// No control flow of its own: [`Transfer::transfer`].
+    Simple,
+    /// A simple one that may be skipped.
+    Skippable,
+    /// A condition and what it guards.
+    Optional,
+    /// One of its branches.
+    Branches,
+    /// A branch; whether it is taken where no other is.
+    Branch {
+        /// ELSE, DEFAULT.
+        otherwise: bool,
+    },
+    /// Any number of times its children.
+    Loop,
+    /// Entered from anywhere in the routine, and never from the statement before it.
+    Handler,
+    /// Entered from the statement before it and from anywhere.
+    Label,
+    /// A condition or bound.
+    Expression,
+    /// Another routine.
+    Apart,
+}
+
+/// Control structures around a statement.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Nesting {
+    pub(crate) in_loop: bool,
+    pub(crate) conditional: bool,
+    /// Whether a condition guards this statement alone.
+    pub(crate) guarded: bool,
+}
+
+/// The transfer function of a language, over the nodes of a [`crate::tree::Tree`].
+pub(crate) trait Transfer {
+    /// The abstract state before a statement.
+    type State: Lattice + Clone;
+
+    /// The current state.
+    fn state(&mut self) -> &mut Self::State;
+    /// The number of nodes in a subtree.
+    fn size(&self, node: u32) -> u32;
+    /// What a node is.
+    fn control(&self, node: u32) -> Control;
+    /// The state after a simple statement.
+    fn transfer(&mut self, node: u32, nesting: Nesting);
+    /// Joins the state with those of every point of the routine.
+    fn join_any_point(&mut self);
+    /// The state after a condition or bound.
+    fn evaluate(&mut self, _node: u32) {}
+    /// At the head of a loop: what the loop changes is unknown.
+    fn enter_loop(&mut self, _node: u32) {}
+    /// Behind a loop that was entered with `before`.
+    fn leave_loop(&mut self, _node: u32, _before: &Self::State) {}
+    /// At the end of a handler.
+    fn end_handler(&mut self, _node: u32, _end: Self::State) {}
+    /// Whether control may pass all branches although one of them is for all other cases.
+    fn may_pass_branches(&self) -> bool {
+        false
+    }
+
+    /// Takes the state through the children of a node.
+    fn walk(&mut self, node: u32, nesting: Nesting) {
+        let (mut child, end) = (node + 1, node + self.size(node));
+        while child < end {
+            self.step(child, nesting);
+            child += self.size(child);
+        }
+    }
+
+    /// Takes the state through a node.
+    fn step(&mut self, node: u32, nesting: Nesting) {
+        let conditional = Nesting { conditional: true, guarded: false, ..nesting };
+        let guarded = Nesting { guarded: true, ..conditional };
+        match self.control(node) {
+            Control::Sequence => self.walk(node, nesting),
+            Control::Simple | Control::Branch { .. } => self.transfer(node, nesting),
+            Control::Skippable => {
+                let skipped = self.state().clone();
+                self.transfer(node, guarded);
+                self.state().join(&skipped);
+            }
+            Control::Optional => {
+                self.conditions(node);
+                let skipped = self.state().clone();
+                self.walk(node, guarded);
+                self.state().join(&skipped);
+            }
+            Control::Branches => self.branches(node, conditional),
+            Control::Loop => {
+                let before = self.state().clone();
+                self.enter_loop(node);
+                self.walk(node, Nesting { in_loop: true, guarded: false, ..nesting });
+                self.state().join(&before);
+                self.leave_loop(node, &before);
+            }
+            Control::Handler => {
+                let before = self.state().clone();
+                self.join_any_point();
+                self.walk(node, conditional);
+                let end = std::mem::replace(self.state(), before);
+                self.end_handler(node, end);
+            }
+            Control::Label => self.join_any_point(),
+            Control::Expression => self.evaluate(node),
+            Control::Apart => {}
+        }
+    }
+
+    /// The conditions of a statement or branch.
+    fn conditions(&mut self, node: u32) {
+        let (mut child, end) = (node + 1, node + self.size(node));
+        while child < end {
+            if self.control(child) == Control::Expression {
+                self.evaluate(child);
+            }
+            child += self.size(child);
+        }
+    }
+
+    /// Branches: a condition is evaluated before its branch and all that follow.
+    fn branches(&mut self, node: u32, nesting: Nesting) {
+        let (mut joined, mut complete) = (None, false);
+        let (mut child, end) = (node + 1, node + self.size(node));
+        while child < end {
+            if let Control::Branch { otherwise } = self.control(child) {
+                self.conditions(child);
+                complete |= otherwise;
+                let before = self.state().clone();
+                self.walk(child, nesting);
+                let after = std::mem::replace(self.state(), before);
+                joined.join(&Some(after));
+            } else {
+                self.evaluate(child);
+            }
+            child += self.size(child);
+        }
+        if let Some(joined) = joined {
+            let passed = std::mem::replace(self.state(), joined);
+            if !complete || self.may_pass_branches() {
+                self.state().join(&passed);
+            }
+        }
+    }
+}
+
+/// What holds at the end of each callee.
+#[derive(Debug)]
+pub(crate) struct Exits<F> {
+    /// As far as it is known.
+    pub(crate) known: Vec<Option<F>>,
+    /// How many calls deep the interpreter is: while it is, only the end of a callee is asked for.
+    pub(crate) depth: u32,
+}
+
+/// Greatest call depth to which callees are interpreted.
+const CALL_DEPTH: u32 = 12;
+
+/// Ends of callees by interpretation.
+pub(crate) trait Callees {
+    /// What holds at an end.
+    type Exit: Copy;
+
+    /// What is known.
+    fn exits(&mut self) -> &mut Exits<Self::Exit>;
+    /// What holds at the end of a callee of which nothing is known; assumed for recursive calls.
+    fn any_exit(&self, callee: u32) -> Self::Exit;
+    /// Interprets a callee.
+    fn interpret(&mut self, callee: u32) -> Self::Exit;
+
+    /// What holds at the end of a callee.
+    fn exit_of(&mut self, callee: u32) -> Self::Exit {
+        let any = self.any_exit(callee);
+        let exits = self.exits();
+        if let Some(exit) = exits.known[callee as usize] {
+            return exit;
+        }
+        if exits.depth >= CALL_DEPTH {
+            return any;
+        }
+        exits.known[callee as usize] = Some(any);
+        exits.depth += 1;
+        let exit = self.interpret(callee);
+        let exits = self.exits();
+        exits.depth -= 1;
+        exits.known[callee as usize] = Some(exit);
+        exit
+    }
+}
