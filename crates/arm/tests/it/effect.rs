@@ -6,7 +6,7 @@ use truegrind_arm::condition::Condition;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::effect::backlash::Backlash;
 use truegrind_arm::effect::thermal::Thermal;
-use truegrind_arm::model::{Joints, Model, PreparedModel};
+use truegrind_arm::model::{Joints, MappedJoints, Model, PreparedModel};
 use truegrind_math::difference::jacobian;
 use truegrind_math::lanes::{AnyWidth, Instructions, SinCos, WIDTH, vectorised, with_instructions};
 
@@ -85,7 +85,7 @@ fn every_slope_has_a_numerical_twin() {
         for effect in &model.effects {
             let twin = jacobian(
                 |x, out| {
-                    let there = Joints::from_column_slice(x);
+                    let there = MappedJoints(Joints::from_column_slice(x));
                     out.copy_from_slice(effect.offset(&statics, &there, &condition).as_slice());
                 },
                 u.as_slice(),
@@ -93,7 +93,7 @@ fn every_slope_has_a_numerical_twin() {
                 &[2e-4; 6],
             );
             let twin = Matrix6::from_column_slice(twin.as_slice());
-            assert_near(&effect.jacobian(&statics, &u, &condition), &twin, 1e-9, effect.name());
+            assert_near(&effect.jacobian(&statics, &MappedJoints(u), &condition), &twin, 1e-9, effect.name());
         }
     }
 }
@@ -133,12 +133,12 @@ fn an_effect_is_the_sum_of_its_regressors() {
     for effect in &effects {
         let parameters = effect.parameters();
         let sum: Joints = effect
-            .regressors(&statics, &u, &condition)
+            .regressors(&statics, &MappedJoints(u), &condition)
             .iter()
             .zip(&parameters)
             .map(|(regressor, parameter)| regressor * parameter.value)
             .sum();
-        let rotation = effect.offset(&statics, &u, &condition);
+        let rotation = effect.offset(&statics, &MappedJoints(u), &condition);
         assert!((rotation - sum).amax() < 1e-15, "{}", effect.name());
         let mut turned = [0.0; 6];
         effect.add_offset(&statics, &u.into(), &torque, &condition, &mut turned);
