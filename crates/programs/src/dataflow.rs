@@ -1,34 +1,22 @@
-//! Program analysis, whatever the language: facts that only grow, and a walk over structured statements.
+//! Program analysis, whatever the language: [`Lattice`], facts with a join; [`propagate`], the least facts that hold along the edges of a
+//! graph (side effects flow from callees to callers, states at entry from callers to callees); [`Transfer`], the transfer function of a
+//! language, taken over its statements. A language brings its syntax tree, its side effects and its transfer function: RAPID in
+//! `rapid/flow`, NC in `nc/task`.
 //!
-//! - [`Lattice`]: facts with a join. [`propagate`] finds the least facts that hold along every edge of a graph: side effects, which
-//!   flow from callees to callers, and states at entry, which flow from callers to callees.
-//! - [`Transfer`]: the transfer function of a language. Its `walk` takes the abstract state through sequences, branches, loops, handlers
-//!   and labels, and joins it where paths meet. Loops need no fixpoint: at the head and behind the loop the language makes unknown
-//!   whatever the loop changes, which holds for every number of iterations.
-//! - [`Callees`]: the state at the end of each callee, found when it is first asked for.
-//!
-//! Method: monotone frameworks with a worklist (Nielson, Nielson, Hankin, Principles of Program Analysis, 1999, §2.4 and §6.1).
-//! The order of the worklist is the reverse post-order, in which a graph without cycles takes one step a node.
-//!
-//! A language brings its syntax tree, its side effects and its transfer function; RAPID (`rapid/flow`, `rapid/symbol/solve`,
-//! `rapid/payload`) and NC (`nc/task`) do.
+//! Method: monotone frameworks with a worklist in reverse post-order (Nielson, Nielson, Hankin, Principles of Program Analysis, 1999,
+//! §2.4 and §6.1). Loops need no fixpoint: what a loop changes is unknown at its head and behind it, which holds for every number of
+//! iterations.
 
 use std::collections::BTreeSet;
 
 /// Facts that hold on several paths: an element of a join semi-lattice.
-pub(crate) trait Lattice {
+pub(crate) trait Lattice: Clone {
     /// Joins the facts of another path.
     fn join(&mut self, other: &Self);
 }
 
-/// A lattice in which no fact can grow for ever.
-pub(crate) trait FiniteLattice: Lattice + Clone + PartialEq {
-    /// How many times a fact can grow.
-    const HEIGHT: usize;
-}
-
 /// `None`: nothing arrives here.
-impl<F: Lattice + Clone> Lattice for Option<F> {
+impl<F: Lattice> Lattice for Option<F> {
     fn join(&mut self, other: &Self) {
         match (self, other) {
             (Some(fact), Some(other)) => fact.join(other),
@@ -36,10 +24,6 @@ impl<F: Lattice + Clone> Lattice for Option<F> {
             (Some(_), None) => {}
         }
     }
-}
-
-impl<F: FiniteLattice> FiniteLattice for Option<F> {
-    const HEIGHT: usize = 1 + F::HEIGHT;
 }
 
 /// An edge of a graph: from, to, and what happens to the facts along it.
@@ -75,9 +59,11 @@ pub(crate) fn post_order<E>(nodes: usize, edges: &[Edge<E>]) -> Vec<u32> {
     order
 }
 
-/// Least fixpoint: `facts` grow until each holds what `arriving` makes, along every edge, of the facts where the edge begins.
-pub(crate) fn propagate<F: FiniteLattice, E>(
+/// Least fixpoint: `facts` grow until each holds what `arriving` makes, along every edge, of the facts where the edge begins. None
+/// can grow more than `height` times, which bounds the steps.
+pub(crate) fn propagate<F: Lattice + PartialEq, E>(
     facts: &mut [F],
+    height: usize,
     edges: &mut [Edge<E>],
     arriving: impl Fn(&E, &F) -> F,
 ) {
@@ -90,10 +76,7 @@ pub(crate) fn propagate<F: FiniteLattice, E>(
     let mut steps = 0;
     while let Some(at) = open.pop_first() {
         steps += 1;
-        debug_assert!(
-            steps <= order.len() * (1 + F::HEIGHT),
-            "a fact grows more often than its lattice is high"
-        );
+        debug_assert!(steps <= order.len() * (1 + height), "a fact grew too often");
         let node = order[at as usize];
         for (_, to, along) in leaving(edges, node) {
             let arriving = arriving(along, &facts[node as usize]);
@@ -149,7 +132,7 @@ pub(crate) struct Nesting {
 /// The transfer function of a language, over the nodes of a [`crate::tree::Tree`].
 pub(crate) trait Transfer {
     /// The abstract state before a statement.
-    type State: Lattice + Clone;
+    type State: Lattice;
 
     /// The current state.
     fn state(&mut self) -> &mut Self::State;
@@ -256,49 +239,5 @@ pub(crate) trait Transfer {
                 self.state().join(&passed);
             }
         }
-    }
-}
-
-/// What holds at the end of each callee.
-#[derive(Debug)]
-pub(crate) struct Exits<F> {
-    /// As far as it is known.
-    pub(crate) known: Vec<Option<F>>,
-    /// How many calls deep the interpreter is: while it is, only the end of a callee is asked for.
-    pub(crate) depth: u32,
-}
-
-/// Greatest call depth to which callees are interpreted.
-const CALL_DEPTH: u32 = 12;
-
-/// Ends of callees by interpretation.
-pub(crate) trait Callees {
-    /// What holds at an end.
-    type Exit: Copy;
-
-    /// What is known.
-    fn exits(&mut self) -> &mut Exits<Self::Exit>;
-    /// What holds at the end of a callee of which nothing is known; assumed for recursive calls.
-    fn any_exit(&self, callee: u32) -> Self::Exit;
-    /// Interprets a callee.
-    fn interpret(&mut self, callee: u32) -> Self::Exit;
-
-    /// What holds at the end of a callee.
-    fn exit_of(&mut self, callee: u32) -> Self::Exit {
-        let any = self.any_exit(callee);
-        let exits = self.exits();
-        if let Some(exit) = exits.known[callee as usize] {
-            return exit;
-        }
-        if exits.depth >= CALL_DEPTH {
-            return any;
-        }
-        exits.known[callee as usize] = Some(any);
-        exits.depth += 1;
-        let exit = self.interpret(callee);
-        let exits = self.exits();
-        exits.depth -= 1;
-        exits.known[callee as usize] = Some(exit);
-        exit
     }
 }

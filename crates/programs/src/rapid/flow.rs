@@ -13,6 +13,7 @@ mod invalidate;
 use super::evaluate::{Context, Evaluator, Known};
 use super::instruction::{self, Also, INSTRUCTIONS};
 use super::modal::{Switch, SwitchSet, switches_set_by};
+use super::payload::{self, Gripped};
 use super::predefined;
 use super::reaching_motions::ReachingMotions;
 use super::symbol::facts::{counts_from_position, is_resuming_handler};
@@ -39,11 +40,12 @@ const MAX_ELEMENTS: f64 = 64.0;
 pub(super) struct AbstractState {
     pub(super) known: Known,
     pub(super) modal: SwitchSet,
+    pub(super) gripped: Gripped,
     pub(super) previous: Option<u32>,
     /// The motions that may be the last executed; tracked only where the program depends on them.
     reaching: ReachingMotions,
     /// Whether control flow can reach the statement.
-    reachable: bool,
+    pub(super) reachable: bool,
 }
 
 impl AbstractState {
@@ -70,6 +72,7 @@ impl Lattice for AbstractState {
             self.known.insert(DISPLACEMENT, Value::Unknown(Reason::Displacement));
         }
         self.modal = self.modal.join(other.modal);
+        self.gripped.join(&other.gripped);
         self.previous = self.previous.filter(|_| self.previous == other.previous);
         self.reaching.join(&other.reaching);
     }
@@ -86,19 +89,28 @@ fn join_values(a: &Value, b: &Value) -> Value {
     }
 }
 
-/// A call of a routine of the program, with the switches at the call.
+/// A call of a routine of the program, with the switches and the load at the call.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct CallSite {
     pub(super) routine: u32,
     pub(super) modal: SwitchSet,
+    pub(super) gripped: Gripped,
+}
+
+/// What holds at the end of a routine, "as at the entry" included.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Exit {
+    pub(super) modal: SwitchSet,
+    /// `None` where it never ends.
+    pub(super) gripped: Option<Gripped>,
 }
 
 /// Receives what the interpreter finds.
 pub(super) trait Visitor {
     /// A call; returns the index of the motion if it is one.
     fn visit_call(&mut self, unit: Unit, node: u32, state: &AbstractState, nesting: Nesting) -> Option<u32>;
-    /// The switches at the end of a routine, "as at the entry" included.
-    fn exit_switches(&mut self, routine: u32) -> SwitchSet;
+    /// What holds at the end of a routine.
+    fn exit_of(&mut self, routine: u32) -> Exit;
     /// A call of a routine of the program.
     fn record_call(&mut self, site: CallSite);
     /// A call by a computed name, with the switches at the call.
@@ -107,20 +119,16 @@ pub(super) trait Visitor {
     fn record_external_call(&mut self, modal: SwitchSet);
     /// A displacement is counted from the robot's current position.
     fn record_position_use(&mut self, reaching: &ReachingMotions);
-    /// The next cycle enters main with these switches.
-    fn record_cycle_restart(&mut self, modal: SwitchSet);
+    /// The next cycle enters main with these switches and this load.
+    fn record_cycle_restart(&mut self, modal: SwitchSet, gripped: Gripped);
 }
 
-/// Interprets one unit; returns the switches at its end.
-pub(super) fn interpret_unit(
-    evaluator: &Evaluator<'_, '_>,
-    unit: Unit,
-    visitor: &mut dyn Visitor,
-) -> SwitchSet {
+/// Interprets one unit; returns what holds at its end.
+pub(super) fn interpret_unit(evaluator: &Evaluator<'_, '_>, unit: Unit, visitor: &mut dyn Visitor) -> Exit {
     let symbols = evaluator.symbols;
     let tree = &evaluator.trees[unit.file as usize];
     let resumes = tree.child_nodes(unit.node).any(|clause| is_resuming_handler(tree, clause));
-    let (exits, any, handler_switches) = (SwitchSet::EMPTY, SwitchSet::EMPTY, SwitchSet::EMPTY);
+    let (any, handler_switches) = (SwitchSet::EMPTY, SwitchSet::EMPTY);
     let aliases = aliases(evaluator, unit);
     let moved_between = symbols.may_move_between_statements(evaluator.trees, unit);
     let tracks_motions = symbols.uses_position();
@@ -129,8 +137,9 @@ pub(super) fn interpret_unit(
         unit,
         state: AbstractState::default(),
         visitor,
-        exits,
+        exit: Exit::default(),
         any,
+        any_gripped: Gripped::default(),
         handler_switches,
         resumes,
         moved_between,
@@ -144,12 +153,16 @@ pub(super) fn interpret_unit(
         && tree.child_nodes(unit.node).any(|clause| is_exception_clause(tree.nodes[clause as usize].kind))
     {
         // An error may leave a callee at any point.
-        interpreter.any = interpreter.any.join(symbols.routines[routine as usize].effects.switches);
+        interpreter.any = interpreter.any.join(symbols.effects_of(routine).switches);
+    }
+    if interpreter.may_grip_under(unit.node) {
+        interpreter.any_gripped = Gripped::UNKNOWN;
     }
     let reaching = if tracks_motions { ReachingMotions::routine_entry() } else { ReachingMotions::default() };
     let mut state = AbstractState {
         known: Known::new(),
         modal: SwitchSet::ENTRY,
+        gripped: Gripped::default(),
         previous: None,
         reaching,
         reachable: true,
@@ -175,8 +188,11 @@ pub(super) fn interpret_unit(
     }
     interpreter.state = state;
     interpreter.walk(unit.node, Nesting::default());
-    let Interpreter { state, exits, .. } = interpreter;
-    if state.reachable { exits.join(state.modal) } else { exits }
+    let state = std::mem::take(&mut interpreter.state);
+    if state.reachable {
+        interpreter.leave(&state);
+    }
+    interpreter.exit
 }
 
 /// The parameters of a unit that may alias outside data or each other.
@@ -193,9 +209,11 @@ struct Interpreter<'w, 'a, 's> {
     unit: Unit,
     state: AbstractState,
     visitor: &'w mut dyn Visitor,
-    exits: SwitchSet,
+    exit: Exit,
     /// The switches that any statement of the unit may set: those at a point reachable from anywhere.
     any: SwitchSet,
+    /// The load at such a point.
+    any_gripped: Gripped,
     /// The switches that an error handler may set before it resumes, and those that trap routines leave set.
     handler_switches: SwitchSet,
     /// Whether an error handler resumes the statements, so that a callee may have ended anywhere.
@@ -249,24 +267,29 @@ impl Transfer for Interpreter<'_, '_, '_> {
             Syntax::Assignment => self.transfer_assignment(node, &mut state),
             Syntax::Return => {
                 self.invalidate_changed(node, &mut state);
-                self.exits = self.exits.join(state.modal);
+                self.leave(&state);
                 state.reachable = false;
             }
             Syntax::Raise if self.resumes => {
                 // The handler may resume after it.
                 self.join_switches(self.handler_switches, &mut state);
                 (state.previous, state.reaching) = (None, self.any_motion());
+                state.gripped.join(&self.any_gripped);
             }
-            // A caller that catches the error joins all switches set here.
-            Syntax::Goto | Syntax::Raise => state.reachable = false,
+            Syntax::Raise => {
+                // A caller that catches the error joins all switches set here.
+                self.exit.gripped.join(&state.reachable.then_some(state.gripped));
+                state.reachable = false;
+            }
+            Syntax::Goto => state.reachable = false,
             Syntax::Leave => {
-                self.exits = self.exits.join(state.modal);
+                self.leave(&state);
                 state.reachable = false;
             }
             Syntax::Opaque | Syntax::Unwritten => {
                 // Unparsed text may write anything.
                 (state.previous, state.reaching) = (None, self.any_motion());
-                state.known = self.state_at_any_point().known;
+                (state.known, state.gripped) = (self.state_at_any_point().known, Gripped::UNKNOWN);
             }
             _ => self.invalidate_changed(node, &mut state),
         }
@@ -287,18 +310,25 @@ impl Transfer for Interpreter<'_, '_, '_> {
     fn enter_loop(&mut self, node: u32) {
         self.state.reaching = self.state.reaching.in_loop();
         self.invalidate_iterations(node);
+        if self.may_grip_under(node) {
+            self.state.gripped = Gripped::UNKNOWN;
+        }
     }
 
     fn leave_loop(&mut self, node: u32, before: &AbstractState) {
+        // What is gripped on re-entry may be anything that the loop grips, but not behind it.
+        let gripped = self.state.gripped;
         self.invalidate_iterations(node);
+        self.state.gripped = gripped;
+        self.conditions(node);
         self.state.reaching.leave_loop(&before.reaching);
     }
 
     fn end_handler(&mut self, node: u32, end: AbstractState) {
         match self.kind(node) {
-            Syntax::ErrorClause if end.reachable => self.exits = self.exits.join(end.modal),
+            Syntax::ErrorClause if end.reachable => self.leave(&end),
             Syntax::UndoClause if end.reachable && self.evaluator.symbols.restarts_main => {
-                self.visitor.record_cycle_restart(end.modal);
+                self.visitor.record_cycle_restart(end.modal, end.gripped);
             }
             _ => {}
         }
@@ -313,6 +343,12 @@ impl Transfer for Interpreter<'_, '_, '_> {
 impl Interpreter<'_, '_, '_> {
     fn kind(&self, node: u32) -> Syntax {
         self.evaluator.trees[self.unit.file as usize].nodes[node as usize].kind
+    }
+
+    /// The routine ends in a state.
+    fn leave(&mut self, state: &AbstractState) {
+        self.exit.modal = self.exit.modal.join(state.modal);
+        self.exit.gripped.join(&state.reachable.then_some(state.gripped));
     }
 
     /// Everything that a loop may change in any number of iterations is unknown.
@@ -338,7 +374,14 @@ impl Interpreter<'_, '_, '_> {
         if !self.any.is_entry(Switch::Displacement) {
             known.insert(DISPLACEMENT, Value::Unknown(Reason::Displacement));
         }
-        AbstractState { known, modal: self.any, previous: None, reaching: self.any_motion(), reachable: true }
+        AbstractState {
+            known,
+            modal: self.any,
+            gripped: self.any_gripped,
+            previous: None,
+            reaching: self.any_motion(),
+            reachable: true,
+        }
     }
 
     /// Any motion may be the last executed.
@@ -412,7 +455,7 @@ impl Interpreter<'_, '_, '_> {
             return handler_switches;
         }
         let left = |all: SwitchSet, routine: &u32| {
-            all.join(self.visitor.exit_switches(*routine).substitute_entry(SwitchSet::EMPTY))
+            all.join(self.visitor.exit_of(*routine).modal.substitute_entry(SwitchSet::EMPTY))
         };
         symbols.interrupt_routines.iter().fold(handler_switches, left)
     }
@@ -435,9 +478,9 @@ impl Interpreter<'_, '_, '_> {
                 out = out.join(symbols.late_switches_of(self.unit));
             }
             for &routine in called {
-                out = out.join(self.visitor.exit_switches(routine));
+                out = out.join(self.visitor.exit_of(routine).modal);
                 if self.resumes || tree.nodes[node as usize].kind == Syntax::Function {
-                    out = out.join(symbols.routines[routine as usize].effects.switches);
+                    out = out.join(symbols.effects_of(routine).switches);
                 }
             }
         }
@@ -490,6 +533,9 @@ impl Interpreter<'_, '_, '_> {
         }
         let called = if late { &[] } else { symbols.callees(self.unit.scope, name) };
         if late || called.is_empty() && predefined::calls_by_name(name) {
+            if self.may_grip(node) {
+                state.gripped = Gripped::UNKNOWN;
+            }
             self.transfer_late_call(&mut state);
             return state;
         }
@@ -497,8 +543,12 @@ impl Interpreter<'_, '_, '_> {
             [_, ..] => self.transfer_routine_call(called, name, &mut state),
             [] if predefined::effect(name).is_some() => {
                 if predefined::begins_cycle(name) {
-                    self.visitor.record_cycle_restart(state.modal);
+                    self.visitor.record_cycle_restart(state.modal, state.gripped);
                     return AbstractState { reachable: false, ..state };
+                }
+                if predefined::grips(name) {
+                    let context = Context::new(self.unit.file, self.unit.scope, &state.known);
+                    state.gripped = payload::gripped_by(self.evaluator, context, tree, node);
                 }
                 if predefined::displaces(name).is_some() {
                     state.previous = None;
@@ -573,26 +623,28 @@ impl Interpreter<'_, '_, '_> {
     /// A call of a routine of the program; of any of `called` where several modules declare the name.
     fn transfer_routine_call(&mut self, called: &[u32], name: &[u8], state: &mut AbstractState) {
         let symbols = self.evaluator.symbols;
-        let sets =
-            |all: SwitchSet, routine: &u32| all.join(symbols.routines[*routine as usize].effects.switches);
+        let sets = |all: SwitchSet, routine: &u32| all.join(symbols.effects_of(*routine).switches);
         let sets = called.iter().fold(SwitchSet::EMPTY, sets);
         if self.resumes {
             // An error may have left it anywhere, and RETRY may call it again.
             self.join_switches(sets, state);
         }
-        if called.iter().any(|routine| symbols.routines[*routine as usize].effects.uses_position) {
+        if called.iter().any(|routine| symbols.effects_of(*routine).uses_position) {
             self.visitor.record_position_use(&state.reaching);
         }
-        if self.tracks_motions
-            && called.iter().any(|routine| symbols.routines[*routine as usize].effects.moves)
-        {
+        if self.tracks_motions && called.iter().any(|routine| symbols.effects_of(*routine).moves) {
             state.reaching.any = true;
         }
         let mut exit = SwitchSet::EMPTY;
+        let mut gripped = None;
         for &routine in called {
-            self.visitor.record_call(CallSite { routine, modal: state.modal });
-            exit = exit.join(self.visitor.exit_switches(routine));
+            let AbstractState { modal, gripped: before, .. } = *state;
+            self.visitor.record_call(CallSite { routine, modal, gripped: before });
+            let end = self.visitor.exit_of(routine);
+            exit = exit.join(end.modal);
+            gripped.join(&end.gripped.map(|gripped| gripped.after(before)));
         }
+        state.gripped = gripped.unwrap_or(state.gripped);
         if exit == SwitchSet::EMPTY {
             state.reachable = self.resumes;
             return;

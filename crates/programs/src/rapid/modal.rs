@@ -14,7 +14,7 @@
 
 use super::syntax::{RapidTree, arguments};
 use super::token::same_name;
-use crate::dataflow::{FiniteLattice, Lattice};
+use crate::dataflow::Lattice;
 use crate::motion::{Modal, Switch as SwitchState};
 use crate::tree::Child;
 
@@ -69,6 +69,9 @@ impl SwitchSet {
     pub const EMPTY: SwitchSet = SwitchSet(0);
     /// After a start from main: configurations monitored, everything else off.
     pub const START: SwitchSet = SwitchSet(all(OFF) & !(0o77) | ON | ON << 3);
+
+    /// How many times a set can grow.
+    pub(crate) const HEIGHT: usize = 3 * COUNT as usize;
 
     /// Join: the union of the states.
     pub fn join(self, other: SwitchSet) -> SwitchSet {
@@ -148,11 +151,6 @@ impl Lattice for SwitchSet {
     fn join(&mut self, other: &Self) {
         self.0 |= other.0;
     }
-}
-
-impl FiniteLattice for SwitchSet {
-    /// The bits.
-    const HEIGHT: usize = 3 * COUNT as usize;
 }
 
 /// Transfer function of an instruction: the switches that it sets; the others are empty.

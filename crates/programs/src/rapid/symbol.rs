@@ -13,7 +13,7 @@ mod writes;
 
 use std::collections::{HashMap, HashSet};
 
-pub use self::effects::{SideEffects, SwitchExit, Write, WriteKind};
+pub use self::effects::{SideEffects, Write, WriteKind};
 use super::instruction;
 use super::modal::SwitchSet;
 use super::syntax::{Data, RapidTree, RoutineHead, Syntax, data, parts, routine_head, text_of, token_kind};
@@ -156,8 +156,8 @@ pub struct Symbols {
     pub written: Vec<Vec<u32>>,
     /// Post-order of the call graph: each unit after its callees, except along recursive calls.
     pub callees_first: Vec<u32>,
-    /// Effect of each unit on the switches.
-    pub switch_exits: Vec<SwitchExit>,
+    /// Whether anything calls each unit by its name.
+    pub called: Vec<bool>,
     /// The calls and functions of each unit that set a switch or call a routine of the program, in order.
     pub switch_calls: Vec<Vec<u32>>,
     /// The list of routines that each unit may call by a computed name: index into `late_lists`.
@@ -174,6 +174,8 @@ pub struct Symbols {
     interrupts_move_robot: bool,
     /// The switches that any statement sets.
     pub all_switches: SwitchSet,
+    /// Whether anything in the files is named as what states a load (GripLoad, TLoad).
+    pub states_loads: bool,
     /// Whether ExitCycle may restart main in the middle of a cycle.
     pub restarts_main: bool,
     /// The routines of each global name that several modules declare, in lower case.
@@ -193,6 +195,7 @@ impl Symbols {
         }
         symbols.declare_loop_variables(trees);
         symbols.collect_namesakes(trees);
+        symbols.states_loads = facts::name_loads(trees);
         symbols.solve_effects(trees);
         symbols
     }

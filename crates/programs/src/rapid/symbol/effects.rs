@@ -1,6 +1,6 @@
-//! Side effects: the writes of one statement, the side-effect summary of a routine, and a unit's effect on the switches.
+//! Side effects: the writes of one statement, and the side-effect summary of a routine.
 
-use crate::dataflow::{FiniteLattice, Lattice};
+use crate::dataflow::Lattice;
 use crate::motion::Reason;
 use crate::rapid::modal::SwitchSet;
 
@@ -51,6 +51,9 @@ pub struct SideEffects {
 }
 
 impl SideEffects {
+    /// How many times they can grow: the writes, "anything", five flags, the switches.
+    pub(super) const HEIGHT: usize = MAX_WRITES + 6 + SwitchSet::HEIGHT;
+
     /// Sorts the writes and widens too many of them to "anything".
     pub(super) fn normalise(&mut self) {
         self.writes.sort_unstable();
@@ -76,11 +79,6 @@ impl Lattice for SideEffects {
     }
 }
 
-impl FiniteLattice for SideEffects {
-    /// The writes, "anything", five flags.
-    const HEIGHT: usize = MAX_WRITES + 1 + 5 + SwitchSet::HEIGHT;
-}
-
 /// Why data may be written: an assignment hides that it is also handed over.
 impl Lattice for Reason {
     fn join(&mut self, other: &Self) {
@@ -88,20 +86,4 @@ impl Lattice for Reason {
             *self = Reason::Assigned;
         }
     }
-}
-
-impl FiniteLattice for Reason {
-    const HEIGHT: usize = 1;
-}
-
-/// Effect of a unit on the switches that act in execution order.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum SwitchExit {
-    /// They are at its end as at its entry.
-    Unchanged,
-    /// Its statements may set some.
-    Changed {
-        /// Whether anything calls it.
-        called: bool,
-    },
 }

@@ -7,14 +7,13 @@
 
 use std::collections::HashSet;
 
-use super::effects::{SideEffects, SwitchExit, Write, WriteKind};
+use super::effects::{SideEffects, Write, WriteKind};
 use super::facts::{UnitFacts, is_resuming_handler};
 use super::late_binding::ProcedureIndex;
 use super::writes::component_path;
 use super::{Symbol, SymbolKind, Symbols, Unit};
 use crate::dataflow::{Edge, Lattice, post_order, propagate};
 use crate::motion::Reason;
-use crate::rapid::modal::SwitchSet;
 use crate::rapid::syntax::{RapidTree, Syntax};
 use crate::rapid::token::folded;
 
@@ -58,7 +57,7 @@ impl Symbols {
         for facts in &all {
             let called = procedures.matches(&facts.interrupts) as usize;
             procedures.lists[called].iter().for_each(|&routine| self.interrupts[routine as usize] = true);
-            self.all_switches = self.all_switches.join(facts.switches);
+            self.all_switches = self.all_switches.join(facts.effects.switches);
             self.restarts_main |= facts.restarts_main;
         }
         self.late_lists = procedures.lists;
@@ -67,20 +66,9 @@ impl Symbols {
         self.solve_side_effects(&all);
         self.interrupts_move_robot = self.find_moving_interrupts(trees);
         self.solve_volatile_data(trees, &all);
-        let mut called = vec![false; all.len()];
-        for &routine in all.iter().flat_map(|facts| &facts.calls) {
-            called[self.unit_of(routine) as usize] = true;
-        }
-        for (at, facts) in all.into_iter().enumerate() {
-            let unchanged = match self.units[at].routine {
-                Some(routine) => self.effects_of(routine).switches == SwitchSet::EMPTY,
-                None => facts.switch_calls.is_empty(),
-            };
-            let exit =
-                if unchanged { SwitchExit::Unchanged } else { SwitchExit::Changed { called: called[at] } };
-            self.switch_exits.push(exit);
-            self.switch_calls.push(facts.switch_calls);
-        }
+        self.called = vec![false; all.len()];
+        calls.iter().for_each(|(_, callee, ())| self.called[*callee as usize] = true);
+        self.switch_calls = all.into_iter().map(|facts| facts.switch_calls).collect();
     }
 
     /// The side-effect summary of a routine.
@@ -172,7 +160,7 @@ impl Symbols {
                 }
             }
         }
-        propagate(&mut written, &mut passed, |(), reason| *reason);
+        propagate(&mut written, 2, &mut passed, |(), reason| *reason);
         for (routine, first) in self.routines.iter_mut().zip(firsts) {
             let count = routine.head.parameters.len();
             routine.parameter_writes = written[first..first + count].to_vec();
@@ -190,16 +178,8 @@ impl Symbols {
             let writes_parameter = unit.routine.is_some_and(|routine| {
                 self.routines[routine as usize].parameter_writes.iter().any(Option::is_some)
             });
-            let mut effects = SideEffects {
-                impure: facts.impure || facts.calls_unknown || writes_parameter || !writes.is_empty(),
-                writes,
-                writes_anything: facts.calls_unknown,
-                moves: facts.moves,
-                waits: facts.waits,
-                grips: facts.grips,
-                uses_position: facts.uses_position,
-                switches: facts.switches,
-            };
+            let mut effects = SideEffects { writes, ..facts.effects };
+            effects.impure |= effects.writes_anything || writes_parameter || !effects.writes.is_empty();
             effects.normalise();
             effects
         };
@@ -218,7 +198,7 @@ impl Symbols {
         }
         edges.sort_unstable();
         edges.dedup();
-        propagate(&mut effects, &mut edges, |&late, callee| match late {
+        propagate(&mut effects, SideEffects::HEIGHT, &mut edges, |&late, callee| match late {
             true => SideEffects { grips: callee.grips, switches: callee.switches, ..SideEffects::default() },
             false => callee.clone(),
         });
@@ -250,8 +230,7 @@ impl Symbols {
                 let end = clause + tree.nodes[clause as usize].size;
                 let facts = self.facts_of(trees, *unit, clause + 1..end);
                 let writes = facts.writes.iter().map(|write| write.symbol).collect();
-                let writes_anything = facts.calls_unknown;
-                add(&SideEffects { writes, writes_anything, ..SideEffects::default() });
+                add(&SideEffects { writes, ..facts.effects });
                 for callee in facts.calls {
                     add(self.effects_of(callee));
                 }

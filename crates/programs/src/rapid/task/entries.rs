@@ -1,10 +1,12 @@
-//! Entry switches: a fixpoint along the calls, and the motions that the switches exclude from changes.
+//! Switches and loads with which units are entered: fixpoints along the calls; the motions that the switches exclude from changes.
 
 use super::ListingBuilder;
 use crate::dataflow::{Edge, propagate};
+use crate::motion::load::{Grip, Loads};
 use crate::motion::{Motion, MotionKind, Reason, Switch as SwitchState};
 use crate::rapid::flow::CallSite;
 use crate::rapid::modal::{Switch, SwitchSet};
+use crate::rapid::payload::Gripped;
 
 impl ListingBuilder<'_, '_> {
     /// Refuses all motions where a displacement may be counted from the end of any of them.
@@ -50,7 +52,7 @@ impl ListingBuilder<'_, '_> {
             called[unit_of(site.routine) as usize] |= *unit != unit_of(site.routine);
         }
         // Before a routine that no file calls, another routine has run, or none.
-        let before = self.exits.known.iter().flatten().fold(SwitchSet::EMPTY, |all, exit| all.join(*exit));
+        let before = self.exits.iter().flatten().fold(SwitchSet::EMPTY, |all, exit| all.join(exit.modal));
         let alone = SwitchSet::START.join(before.substitute_entry(SwitchSet::EMPTY));
         let mut entries: Vec<SwitchSet> = Vec::with_capacity(units.len());
         for (unit, &called) in units.iter().zip(&called) {
@@ -84,7 +86,9 @@ impl ListingBuilder<'_, '_> {
         let global = symbols.routines.iter().filter(|routine| !routine.head.local);
         edges.extend(global.map(|routine| (unknown, routine.unit, SwitchSet::ENTRY)));
         loop {
-            propagate(&mut entries, &mut edges, |modal, entry| modal.substitute_entry(*entry));
+            propagate(&mut entries, SwitchSet::HEIGHT, &mut edges, |modal, entry| {
+                modal.substitute_entry(*entry)
+            });
             let of_units = &mut entries[..units.len()];
             // A cycle of routines that only call each other has no entry yet.
             if !of_units.contains(&SwitchSet::EMPTY) {
@@ -93,6 +97,36 @@ impl ListingBuilder<'_, '_> {
             }
             of_units.iter_mut().filter(|entry| **entry == SwitchSet::EMPTY).for_each(|entry| *entry = alone);
         }
+    }
+
+    /// The load at each motion.
+    pub(super) fn loads(&mut self) -> Loads {
+        let (symbols, totals) = (self.symbols, std::mem::take(&mut self.totals));
+        if symbols.interrupt_routines.iter().any(|routine| symbols.effects_of(*routine).grips) {
+            return Loads { grips: vec![Grip::Unknown; self.grips.len()], totals };
+        }
+        let entries = self.solve_entry_loads();
+        let at = |(gripped, unit): (&Gripped, &u32)| gripped.0.unwrap_or(entries[*unit as usize]);
+        Loads { grips: self.grips.iter().zip(&self.units).map(at).collect(), totals }
+    }
+
+    /// Fixpoint: none at the start of main; elsewhere the join over all calls.
+    fn solve_entry_loads(&self) -> Vec<Grip> {
+        let symbols = self.symbols;
+        let start = |routine: Option<u32>| routine.is_none_or(|routine| self.mains.contains(&routine));
+        let begins = symbols.units.iter().map(|unit| start(unit.routine).then_some(Grip::Empty));
+        let mut entries: Vec<Option<Grip>> = begins.collect();
+        // Computed calls and interrupts can occur with any load.
+        let late = symbols.late_list.iter().flat_map(|list| &symbols.late_lists[*list as usize]);
+        for routine in late.chain(&symbols.interrupt_routines) {
+            entries[symbols.unit_of(*routine) as usize] = Some(Grip::Unknown);
+        }
+        let calls =
+            self.sites.iter().map(|(unit, site)| (*unit, symbols.unit_of(site.routine), site.gripped));
+        let mut calls: Vec<Edge<Gripped>> = calls.collect();
+        propagate(&mut entries, 2, &mut calls, |gripped, entry| gripped.0.or(*entry));
+        // Never called in these files.
+        entries.into_iter().map(|entry| entry.unwrap_or(Grip::Unknown)).collect()
     }
 }
 
