@@ -52,7 +52,7 @@ fn torque_is_the_negative_gradient_of_the_potential_energy() {
         let mut random = generator(42);
         for _ in 0..5 {
             let u = joints_within(&model, &mut random);
-            let (torque, slope) = statics.torques_and_jacobian(&u, &condition);
+            let (torque, slope) = statics.torques_and_jacobian(&MappedJoints(u), &condition);
             let gradient = jacobian(|x, out| out[0] = energy(x), u.as_slice(), 1, &[2e-3; 6]);
             for j in 0..6 {
                 assert!((torque[j] + gradient[(0, j)]).abs() < 1e-7, "{}: joint {j}", sheet.name);
@@ -60,7 +60,10 @@ fn torque_is_the_negative_gradient_of_the_potential_energy() {
             let twin = jacobian(
                 |x, out| {
                     out.copy_from_slice(
-                        statics.torques_and_jacobian(&Joints::from_column_slice(x), &condition).0.as_slice(),
+                        statics
+                            .torques_and_jacobian(&MappedJoints(Joints::from_column_slice(x)), &condition)
+                            .0
+                            .as_slice(),
                     );
                 },
                 u.as_slice(),
