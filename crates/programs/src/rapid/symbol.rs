@@ -195,7 +195,6 @@ impl Symbols {
         }
         symbols.declare_loop_variables(trees);
         symbols.collect_namesakes(trees);
-        symbols.states_loads = facts::name_loads(trees);
         symbols.solve_effects(trees);
         symbols
     }

@@ -8,7 +8,7 @@
 use std::collections::HashSet;
 
 use super::effects::{SideEffects, Write, WriteKind};
-use super::facts::{UnitFacts, is_resuming_handler};
+use super::facts::{UnitFacts, is_resuming_handler, name_loads};
 use super::late_binding::ProcedureIndex;
 use super::writes::component_path;
 use super::{Symbol, SymbolKind, Symbols, Unit};
@@ -64,6 +64,7 @@ impl Symbols {
         let interrupting = (0..).zip(&self.interrupts).filter(|&(_, &interrupts)| interrupts);
         self.interrupt_routines = interrupting.map(|(routine, _)| routine).collect();
         self.solve_side_effects(&all);
+        self.states_loads = name_loads(trees);
         self.interrupts_move_robot = self.find_moving_interrupts(trees);
         self.solve_volatile_data(trees, &all);
         self.called = vec![false; all.len()];
