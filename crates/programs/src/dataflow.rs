@@ -173,15 +173,13 @@ pub(crate) trait Transfer {
         match self.control(node) {
             Control::Sequence => self.walk(node, nesting),
             Control::Simple | Control::Branch { .. } => self.transfer(node, nesting),
-            Control::Skippable => {
-                let skipped = self.state().clone();
-                self.transfer(node, guarded);
-                self.state().join(&skipped);
-            }
-            Control::Optional => {
+            kind @ (Control::Skippable | Control::Optional) => {
                 self.conditions(node);
                 let skipped = self.state().clone();
-                self.walk(node, guarded);
+                match kind {
+                    Control::Skippable => self.transfer(node, guarded),
+                    _ => self.walk(node, guarded),
+                }
                 self.state().join(&skipped);
             }
             Control::Branches => self.branches(node, conditional),

@@ -128,7 +128,6 @@ pub(super) fn interpret_unit(evaluator: &Evaluator<'_, '_>, unit: Unit, visitor:
     let symbols = evaluator.symbols;
     let tree = &evaluator.trees[unit.file as usize];
     let resumes = tree.child_nodes(unit.node).any(|clause| is_resuming_handler(tree, clause));
-    let (any, handler_switches) = (SwitchSet::EMPTY, SwitchSet::EMPTY);
     let aliases = aliases(evaluator, unit);
     let moved_between = symbols.may_move_between_statements(evaluator.trees, unit);
     let tracks_motions = symbols.uses_position();
@@ -138,9 +137,9 @@ pub(super) fn interpret_unit(evaluator: &Evaluator<'_, '_>, unit: Unit, visitor:
         state: AbstractState::default(),
         visitor,
         exit: Exit::default(),
-        any,
+        any: SwitchSet::EMPTY,
         any_gripped: Gripped::default(),
-        handler_switches,
+        handler_switches: SwitchSet::EMPTY,
         resumes,
         moved_between,
         tracks_motions,
@@ -159,14 +158,8 @@ pub(super) fn interpret_unit(evaluator: &Evaluator<'_, '_>, unit: Unit, visitor:
         interpreter.any_gripped = Gripped::UNKNOWN;
     }
     let reaching = if tracks_motions { ReachingMotions::routine_entry() } else { ReachingMotions::default() };
-    let mut state = AbstractState {
-        known: Known::new(),
-        modal: SwitchSet::ENTRY,
-        gripped: Gripped::default(),
-        previous: None,
-        reaching,
-        reachable: true,
-    };
+    let mut state =
+        AbstractState { modal: SwitchSet::ENTRY, reaching, reachable: true, ..AbstractState::default() };
     // ExitCycle restarts main without reinitialising its variables.
     if unit
         .routine
@@ -374,14 +367,8 @@ impl Interpreter<'_, '_, '_> {
         if !self.any.is_entry(Switch::Displacement) {
             known.insert(DISPLACEMENT, Value::Unknown(Reason::Displacement));
         }
-        AbstractState {
-            known,
-            modal: self.any,
-            gripped: self.any_gripped,
-            previous: None,
-            reaching: self.any_motion(),
-            reachable: true,
-        }
+        let (modal, gripped, reaching) = (self.any, self.any_gripped, self.any_motion());
+        AbstractState { known, modal, gripped, previous: None, reaching, reachable: true }
     }
 
     /// Any motion may be the last executed.
