@@ -17,7 +17,7 @@ pub mod bounds;
 mod parameter;
 mod statics;
 
-use nalgebra::Matrix6;
+use nalgebra::{Matrix6, Vector6};
 use serde::{Deserialize, Serialize};
 
 use self::backlash::Backlash;
@@ -30,7 +30,7 @@ use self::lumped_compliance::LumpedCompliance;
 use self::smooth_correction::SmoothCorrection;
 use self::thermal::Thermal;
 use crate::condition::Condition;
-use crate::joints::Joints;
+use crate::joints::MappedJoints;
 use truegrind_math::lanes::SinCos;
 
 pub use self::parameter::EffectParameter;
@@ -116,12 +116,17 @@ impl Effect {
     }
 
     /// Derivatives of the joint rotations with respect to each parameter, at mapped joint angles `u` (rad).
-    pub fn regressors(&self, statics: &Statics, u: &Joints, condition: &Condition) -> Vec<Joints> {
+    pub fn regressors(
+        &self,
+        statics: &Statics,
+        u: &MappedJoints,
+        condition: &Condition,
+    ) -> Vec<Vector6<f64>> {
         each!(self, e => e.regressors(statics, u, condition))
     }
 
     /// Offset that the effect adds to the joint rotations (rad).
-    pub fn offset(&self, statics: &Statics, u: &Joints, condition: &Condition) -> Joints {
+    pub fn offset(&self, statics: &Statics, u: &MappedJoints, condition: &Condition) -> Vector6<f64> {
         each!(self, e => e.offset(statics, u, condition))
     }
 
@@ -171,7 +176,7 @@ impl Effect {
     }
 
     /// Derivative of [`Effect::offset`] with respect to u.
-    pub fn jacobian(&self, statics: &Statics, u: &Joints, condition: &Condition) -> Matrix6<f64> {
+    pub fn jacobian(&self, statics: &Statics, u: &MappedJoints, condition: &Condition) -> Matrix6<f64> {
         each!(self, e => e.jacobian(statics, u, condition))
     }
 

@@ -33,7 +33,7 @@ use super::chain::FrameColumns;
 use super::condition::Condition;
 use super::link::Link;
 use super::model::{Model, PreparedModel};
-use crate::joints::{self, Joints, Limits};
+use crate::joints::{self, Joints, Limits, MappedJoints};
 use truegrind_math::se3::Pose;
 use truegrind_math::spectral;
 
@@ -255,16 +255,16 @@ impl<'a> Inverse<'a> {
 
     /// The kernel's solution, if it is accepted.
     fn accepted(&self, solved: &Solved<f64>, seed: &Joints) -> Option<Solution> {
-        let joints = self.controller_angles(&solved.mapped);
+        let joints = self.controller_angles(MappedJoints(solved.mapped.into()));
         self.is_accepted(solved, &joints, seed).then_some(solved.solution(&joints))
     }
 
     /// Controller angles for mapped ones.
     #[inline(always)]
-    fn controller_angles(&self, mapped: &[f64; 6]) -> Joints {
+    fn controller_angles(&self, MappedJoints(mapped): MappedJoints) -> Joints {
         match &self.map_inverse {
-            Some(inverse) if !self.arm.map_is_identity() => inverse * Joints::from(*mapped),
-            _ => Joints::from(*mapped),
+            Some(inverse) if !self.arm.map_is_identity() => inverse * mapped,
+            _ => mapped,
         }
     }
 

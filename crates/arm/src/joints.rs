@@ -1,9 +1,30 @@
 //! Joint angles and their ranges.
 
+use std::ops::Index;
+
 use nalgebra::Vector6;
 
 /// Joint angles of the controller (rad).
 pub type Joints = Vector6<f64>;
+
+/// Joint angles of the mapped arm (rad): each the rotation of its own axis, before the effects.
+/// [`Model::mapped`](crate::model::Model::mapped) makes them of the controller's; kernels take them as arrays.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MappedJoints(pub Vector6<f64>);
+
+impl Index<usize> for MappedJoints {
+    type Output = f64;
+
+    fn index(&self, joint: usize) -> &f64 {
+        &self.0[joint]
+    }
+}
+
+impl From<MappedJoints> for [f64; 6] {
+    fn from(mapped: MappedJoints) -> [f64; 6] {
+        mapped.0.into()
+    }
+}
 
 /// Range and speed of the joints, in the controller's angles.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,6 +1,6 @@
 //! An arm: links, joint map, limits, masses, effects, and the forward map from logged joints to the flange.
 
-use nalgebra::{Matrix6, Vector3};
+use nalgebra::{Matrix6, Vector3, Vector6};
 
 use super::chain::{self, Chain, LinkTable};
 use super::condition::Condition;
@@ -10,7 +10,7 @@ use truegrind_math::lanes::{Real, SinCos, sin_cos};
 use truegrind_math::se3::Pose;
 
 pub use super::body::Body;
-pub use super::joints::{Joints, Limits};
+pub use super::joints::{Joints, Limits, MappedJoints};
 
 /// A six-axis arm. See the chapter page for the order of the parts.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,6 +32,11 @@ pub struct Model {
 }
 
 impl Model {
+    /// The angles of the mapped arm for those of the controller.
+    pub fn mapped(&self, q: &Joints) -> MappedJoints {
+        MappedJoints(self.joint_map * q)
+    }
+
     /// Pose of the flange in the base. For many poses under one condition take [`Model::at_condition`] once.
     ///
     /// ```
@@ -137,7 +142,7 @@ impl PreparedModel<'_> {
     }
 
     /// DH joint rotations (offsets of the links not included): joint map, then the joint effects.
-    pub fn joint_rotations(&self, q: &Joints) -> Joints {
+    pub fn joint_rotations(&self, q: &Joints) -> Vector6<f64> {
         self.apply_effects(&self.apply_joint_map(&(*q).into())).into()
     }
 
@@ -205,7 +210,7 @@ impl PreparedModel<'_> {
     pub fn rotation_jacobian(&self, q: &Joints) -> Matrix6<f64> {
         let mut slope = Matrix6::identity();
         if let Some(statics) = &self.statics {
-            let mapped = self.model.joint_map * q;
+            let mapped = self.model.mapped(q);
             let torque = self.loaded.then(|| statics.torques_and_jacobian(&mapped, &self.condition).1);
             for effect in &self.model.effects {
                 match (effect, &torque) {
@@ -220,8 +225,8 @@ impl PreparedModel<'_> {
     }
 
     /// Derivatives of the joint rotations with respect to the parameters of effect `index`.
-    pub fn effect_regressors(&self, index: usize, q: &Joints) -> Vec<Joints> {
-        let mapped = self.model.joint_map * q;
+    pub fn effect_regressors(&self, index: usize, q: &Joints) -> Vec<Vector6<f64>> {
+        let mapped = self.model.mapped(q);
         match (&self.statics, self.model.effects.get(index)) {
             (Some(statics), Some(effect)) => effect.regressors(statics, &mapped, &self.condition),
             _ => Vec::new(),

@@ -4,6 +4,7 @@
 //! - [`edit`]: sorted, disjoint edits; bytes outside them never change; [`diff`] prints them.
 //! - [`motion`]: the motions of a program in any language, as a [`motion::Listing`].
 //! - [`rewrite`]: changes to motions in any language, and their outcomes.
+//! - `dataflow`: program analysis for every language: joins, fixpoints, the walk over statements.
 //! - [`shared`]: persistent maps with cheap copies and joins, for abstract states.
 //! - [`draft`]: new programs, independent of the language.
 //! - [`rapid`]: ABB's RAPID: front end, evaluation, rewriting, writing.
@@ -29,6 +30,7 @@
 //! ```
 
 pub mod tree;
+mod dataflow;
 pub mod shared;
 pub mod edit;
 pub mod label;

@@ -542,3 +542,15 @@ pub struct Mark {
     /// Whether cuts may be corrected in part.
     pub partial: bool,
 }
+
+/// The index of an equal item among the last, else of the new one: thousands of different inline speeds must not cost
+/// their square.
+pub(crate) fn intern<T: PartialEq>(list: &mut Vec<T>, item: T) -> u32 {
+    match list.iter().rev().take(256).position(|other| *other == item) {
+        Some(back) => (list.len() - 1 - back) as u32,
+        None => {
+            list.push(item);
+            list.len() as u32 - 1
+        }
+    }
+}

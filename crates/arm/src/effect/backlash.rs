@@ -1,12 +1,12 @@
 //! Backlash: the joint rests on one or the other flank, depending on the side it came from: δθⱼ = b/2 · approachⱼ.
 
-use nalgebra::Matrix6;
+use nalgebra::{Matrix6, Vector6};
 use serde::{Deserialize, Serialize};
 
 use crate::condition::Condition;
 use crate::effect::parameter::EffectParameter;
 use crate::effect::statics::Statics;
-use crate::joints::Joints;
+use crate::joints::MappedJoints;
 use truegrind_math::lanes::Real;
 
 /// Play of one joint.
@@ -48,13 +48,18 @@ impl Backlash {
         self.play_rad = value;
     }
 
-    pub(super) fn regressors(&self, _: &Statics, _: &Joints, condition: &Condition) -> Vec<Joints> {
-        let mut out = Joints::zeros();
+    pub(super) fn regressors(
+        &self,
+        _: &Statics,
+        _: &MappedJoints,
+        condition: &Condition,
+    ) -> Vec<Vector6<f64>> {
+        let mut out = Vector6::zeros();
         out[self.joint] = 0.5 * f64::from(condition.approach[self.joint]);
         vec![out]
     }
 
-    pub(super) fn offset(&self, statics: &Statics, u: &Joints, condition: &Condition) -> Joints {
+    pub(super) fn offset(&self, statics: &Statics, u: &MappedJoints, condition: &Condition) -> Vector6<f64> {
         self.regressors(statics, u, condition)[0] * self.play_rad
     }
 
@@ -64,7 +69,7 @@ impl Backlash {
         out[self.joint] += out[self.joint].splat(self.play_rad * 0.5 * side);
     }
 
-    pub(super) fn jacobian(&self, _: &Statics, _: &Joints, _: &Condition) -> Matrix6<f64> {
+    pub(super) fn jacobian(&self, _: &Statics, _: &MappedJoints, _: &Condition) -> Matrix6<f64> {
         Matrix6::zeros()
     }
 }

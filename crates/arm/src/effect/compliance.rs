@@ -3,13 +3,13 @@
 //! δθⱼ = cⱼ τⱼ(u), with cⱼ the torsional compliance (rad/(N m)) and τⱼ the static torque about the axis.
 //! Source: the elastostatic joint model of Nubiola and Bonev 2013 (doi 10.1016/j.rcim.2012.06.004), section 3.
 
-use nalgebra::Matrix6;
+use nalgebra::{Matrix6, Vector6};
 use serde::{Deserialize, Serialize};
 
 use crate::condition::Condition;
 use crate::effect::parameter::EffectParameter;
 use crate::effect::statics::Statics;
-use crate::joints::Joints;
+use crate::joints::MappedJoints;
 use truegrind_math::lanes::Real;
 
 /// Compliance of one joint.
@@ -51,13 +51,18 @@ impl Compliance {
         self.compliance_rad_per_nm = value;
     }
 
-    pub(super) fn regressors(&self, statics: &Statics, u: &Joints, condition: &Condition) -> Vec<Joints> {
-        let mut out = Joints::zeros();
+    pub(super) fn regressors(
+        &self,
+        statics: &Statics,
+        u: &MappedJoints,
+        condition: &Condition,
+    ) -> Vec<Vector6<f64>> {
+        let mut out = Vector6::zeros();
         out[self.joint] = statics.torques_and_jacobian(u, condition).0[self.joint];
         vec![out]
     }
 
-    pub(super) fn offset(&self, statics: &Statics, u: &Joints, condition: &Condition) -> Joints {
+    pub(super) fn offset(&self, statics: &Statics, u: &MappedJoints, condition: &Condition) -> Vector6<f64> {
         self.regressors(statics, u, condition)[0] * self.compliance_rad_per_nm
     }
 
@@ -66,7 +71,12 @@ impl Compliance {
         out[self.joint] += torque[self.joint].splat(self.compliance_rad_per_nm) * torque[self.joint];
     }
 
-    pub(super) fn jacobian(&self, statics: &Statics, u: &Joints, condition: &Condition) -> Matrix6<f64> {
+    pub(super) fn jacobian(
+        &self,
+        statics: &Statics,
+        u: &MappedJoints,
+        condition: &Condition,
+    ) -> Matrix6<f64> {
         let mut out = Matrix6::zeros();
         self.add_jacobian(&statics.torques_and_jacobian(u, condition).1, &mut out);
         out

@@ -1,12 +1,12 @@
 //! Coupling: one joint moves along with another, as in the gear trains of wrists: δθⱼ = κ uᵢ.
 
-use nalgebra::Matrix6;
+use nalgebra::{Matrix6, Vector6};
 use serde::{Deserialize, Serialize};
 
 use crate::condition::Condition;
 use crate::effect::parameter::EffectParameter;
 use crate::effect::statics::Statics;
-use crate::joints::Joints;
+use crate::joints::MappedJoints;
 use truegrind_math::lanes::Real;
 
 /// Coupling of joint `driver` into joint `joint`.
@@ -34,13 +34,13 @@ impl Coupling {
         self.factor = value;
     }
 
-    pub(super) fn regressors(&self, _: &Statics, u: &Joints, _: &Condition) -> Vec<Joints> {
-        let mut out = Joints::zeros();
+    pub(super) fn regressors(&self, _: &Statics, u: &MappedJoints, _: &Condition) -> Vec<Vector6<f64>> {
+        let mut out = Vector6::zeros();
         out[self.joint] = u[self.driver];
         vec![out]
     }
 
-    pub(super) fn offset(&self, statics: &Statics, u: &Joints, condition: &Condition) -> Joints {
+    pub(super) fn offset(&self, statics: &Statics, u: &MappedJoints, condition: &Condition) -> Vector6<f64> {
         self.regressors(statics, u, condition)[0] * self.factor
     }
 
@@ -54,7 +54,7 @@ impl Coupling {
         self.add_offset(step, out);
     }
 
-    pub(super) fn jacobian(&self, _: &Statics, _: &Joints, _: &Condition) -> Matrix6<f64> {
+    pub(super) fn jacobian(&self, _: &Statics, _: &MappedJoints, _: &Condition) -> Matrix6<f64> {
         let mut out = Matrix6::zeros();
         out[(self.joint, self.driver)] = self.factor;
         out

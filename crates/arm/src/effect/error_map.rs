@@ -8,13 +8,13 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::Matrix6;
+use nalgebra::{Matrix6, Vector6};
 use serde::{Deserialize, Serialize};
 
 use crate::condition::Condition;
 use crate::effect::parameter::EffectParameter;
 use crate::effect::statics::Statics;
-use crate::joints::Joints;
+use crate::joints::MappedJoints;
 use truegrind_math::lanes::Real;
 
 /// Map of one joint.
@@ -103,9 +103,9 @@ impl ErrorMap {
         weights.iter().enumerate().map(|(k, w)| w * self.knots_rad[(first + k) % count]).sum()
     }
 
-    pub(super) fn regressors(&self, _: &Statics, u: &Joints, _: &Condition) -> Vec<Joints> {
+    pub(super) fn regressors(&self, _: &Statics, u: &MappedJoints, _: &Condition) -> Vec<Vector6<f64>> {
         let count = self.knots_rad.len();
-        let mut out = vec![Joints::zeros(); count];
+        let mut out = vec![Vector6::zeros(); count];
         let (first, weights, _) = self.near(u[self.joint]);
         for (k, w) in weights.iter().enumerate() {
             if let Some(place) = out.get_mut((first + k) % count.max(1)) {
@@ -115,8 +115,8 @@ impl ErrorMap {
         out
     }
 
-    pub(super) fn offset(&self, _: &Statics, u: &Joints, _: &Condition) -> Joints {
-        let mut out = Joints::zeros();
+    pub(super) fn offset(&self, _: &Statics, u: &MappedJoints, _: &Condition) -> Vector6<f64> {
+        let mut out = Vector6::zeros();
         let (first, weights, _) = self.near(u[self.joint]);
         out[self.joint] = self.sum(first, &weights);
         out
@@ -139,7 +139,7 @@ impl ErrorMap {
         out[self.joint] += slope * step[self.joint];
     }
 
-    pub(super) fn jacobian(&self, _: &Statics, u: &Joints, _: &Condition) -> Matrix6<f64> {
+    pub(super) fn jacobian(&self, _: &Statics, u: &MappedJoints, _: &Condition) -> Matrix6<f64> {
         let mut out = Matrix6::zeros();
         let (first, _, slopes) = self.near(u[self.joint]);
         out[(self.joint, self.joint)] = self.sum(first, &slopes);

@@ -1,12 +1,12 @@
 //! A gear ratio that is not the nominal one: δθⱼ = ρ uⱼ.
 
-use nalgebra::Matrix6;
+use nalgebra::{Matrix6, Vector6};
 use serde::{Deserialize, Serialize};
 
 use crate::condition::Condition;
 use crate::effect::parameter::EffectParameter;
 use crate::effect::statics::Statics;
-use crate::joints::Joints;
+use crate::joints::MappedJoints;
 use truegrind_math::lanes::Real;
 
 /// Ratio error of one joint.
@@ -46,13 +46,13 @@ impl GearRatio {
         self.error = value;
     }
 
-    pub(super) fn regressors(&self, _: &Statics, u: &Joints, _: &Condition) -> Vec<Joints> {
-        let mut out = Joints::zeros();
+    pub(super) fn regressors(&self, _: &Statics, u: &MappedJoints, _: &Condition) -> Vec<Vector6<f64>> {
+        let mut out = Vector6::zeros();
         out[self.joint] = u[self.joint];
         vec![out]
     }
 
-    pub(super) fn offset(&self, statics: &Statics, u: &Joints, condition: &Condition) -> Joints {
+    pub(super) fn offset(&self, statics: &Statics, u: &MappedJoints, condition: &Condition) -> Vector6<f64> {
         self.regressors(statics, u, condition)[0] * self.error
     }
 
@@ -66,7 +66,7 @@ impl GearRatio {
         self.add_offset(step, out);
     }
 
-    pub(super) fn jacobian(&self, _: &Statics, _: &Joints, _: &Condition) -> Matrix6<f64> {
+    pub(super) fn jacobian(&self, _: &Statics, _: &MappedJoints, _: &Condition) -> Matrix6<f64> {
         let mut out = Matrix6::zeros();
         out[(self.joint, self.joint)] = self.error;
         out

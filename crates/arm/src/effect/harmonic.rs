@@ -3,13 +3,13 @@
 //! δθⱼ = S sin(n uⱼ) + C cos(n uⱼ), n per turn of the joint.
 //! Source: Ma et al. 2018 (doi 10.1016/j.rcim.2017.09.006) for joint-dependent periodic errors of gears and encoders.
 
-use nalgebra::Matrix6;
+use nalgebra::{Matrix6, Vector6};
 use serde::{Deserialize, Serialize};
 
 use crate::condition::Condition;
 use crate::effect::parameter::EffectParameter;
 use crate::effect::statics::Statics;
-use crate::joints::Joints;
+use crate::joints::MappedJoints;
 use truegrind_math::lanes::{SinCos, sin_cos};
 
 /// One harmonic of one joint.
@@ -67,17 +67,17 @@ impl Harmonic {
         *(if index == 0 { &mut self.sine_rad } else { &mut self.cosine_rad }) = value;
     }
 
-    pub(super) fn regressors(&self, _: &Statics, u: &Joints, _: &Condition) -> Vec<Joints> {
+    pub(super) fn regressors(&self, _: &Statics, u: &MappedJoints, _: &Condition) -> Vec<Vector6<f64>> {
         let (sin, cos) = (self.order * u[self.joint]).sin_cos();
-        let (mut first, mut second) = (Joints::zeros(), Joints::zeros());
+        let (mut first, mut second) = (Vector6::zeros(), Vector6::zeros());
         first[self.joint] = sin;
         second[self.joint] = cos;
         vec![first, second]
     }
 
-    pub(super) fn offset(&self, _: &Statics, u: &Joints, _: &Condition) -> Joints {
+    pub(super) fn offset(&self, _: &Statics, u: &MappedJoints, _: &Condition) -> Vector6<f64> {
         let (sin, cos) = (self.order * u[self.joint]).sin_cos();
-        let mut out = Joints::zeros();
+        let mut out = Vector6::zeros();
         out[self.joint] = self.sine_rad * sin + self.cosine_rad * cos;
         out
     }
@@ -96,7 +96,7 @@ impl Harmonic {
         out[self.joint] += slope * step[self.joint];
     }
 
-    pub(super) fn jacobian(&self, _: &Statics, u: &Joints, _: &Condition) -> Matrix6<f64> {
+    pub(super) fn jacobian(&self, _: &Statics, u: &MappedJoints, _: &Condition) -> Matrix6<f64> {
         let (sin, cos) = (self.order * u[self.joint]).sin_cos();
         let mut out = Matrix6::zeros();
         out[(self.joint, self.joint)] = self.order * (self.sine_rad * cos - self.cosine_rad * sin);

@@ -7,14 +7,14 @@
 //! and flange, and first moments in the frames between them, span it whatever the masses are.
 //! Source: the elastostatic joint model of Nubiola and Bonev 2013 (doi 10.1016/j.rcim.2012.06.004) with the masses freed.
 
-use nalgebra::Matrix6;
+use nalgebra::{Matrix6, Vector6};
 use serde::{Deserialize, Serialize};
 
 use crate::chain::{Chain, cross, dot, minus, scaled};
 use crate::condition::Condition;
 use crate::effect::parameter::EffectParameter;
 use crate::effect::statics::{GRAVITY, Statics};
-use crate::joints::Joints;
+use crate::joints::MappedJoints;
 use truegrind_math::lanes::{Real, SinCos, splats};
 
 /// One lump.
@@ -101,19 +101,19 @@ impl LumpedCompliance {
         dot(&frames.z[self.joint], &cross(&lever, &g))
     }
 
-    pub(super) fn regressors(&self, statics: &Statics, u: &Joints, _: &Condition) -> Vec<Joints> {
+    pub(super) fn regressors(&self, statics: &Statics, u: &MappedJoints, _: &Condition) -> Vec<Vector6<f64>> {
         let frames = statics.frames::<f64>(&(*u).into());
         self.lump
             .iter()
             .map(|lump| {
-                let mut out = Joints::zeros();
+                let mut out = Vector6::zeros();
                 out[self.joint] = self.torque(statics, &frames, lump);
                 out
             })
             .collect()
     }
 
-    pub(super) fn offset(&self, statics: &Statics, u: &Joints, _: &Condition) -> Joints {
+    pub(super) fn offset(&self, statics: &Statics, u: &MappedJoints, _: &Condition) -> Vector6<f64> {
         let mut out = [0.0; 6];
         self.add_offset(statics, &(*u).into(), &mut out);
         out.into()
@@ -127,7 +127,7 @@ impl LumpedCompliance {
         }
     }
 
-    pub(super) fn jacobian(&self, statics: &Statics, u: &Joints, _: &Condition) -> Matrix6<f64> {
+    pub(super) fn jacobian(&self, statics: &Statics, u: &MappedJoints, _: &Condition) -> Matrix6<f64> {
         let frames = statics.frames::<f64>(&(*u).into());
         let mut out = Matrix6::zeros();
         for lump in &self.lump {

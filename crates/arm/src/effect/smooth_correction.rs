@@ -9,13 +9,13 @@
 //! is a displacement in mm. Departure: here it is the turn of three joints that makes such a displacement, since a
 //! cable or a position does not tell how the hand would turn with it.
 
-use nalgebra::Matrix6;
+use nalgebra::{Matrix6, Vector6};
 use serde::{Deserialize, Serialize};
 
 use crate::condition::Condition;
 use crate::effect::parameter::EffectParameter;
 use crate::effect::statics::Statics;
-use crate::joints::Joints;
+use crate::joints::MappedJoints;
 use truegrind_math::lanes::Real;
 use truegrind_math::radial;
 
@@ -34,7 +34,7 @@ pub const JOINTS: usize = 3;
 /// let mut learned = SmoothCorrection::still(vec![[0.2, -0.3, 0.1]], 0.5);
 /// learned.weights_rad[0] = [1e-4, 0.0, -2e-4];
 /// let (near, far) = (Joints::new(0.2, -0.3, 0.1, 0.0, 0.4, 0.0), Joints::new(1.2, 0.4, 0.1, 0.0, 0.4, 0.0));
-/// assert!(learned.reaches(&near) && !learned.reaches(&far));
+/// assert!(learned.reaches(&plain.mapped(&near)) && !learned.reaches(&plain.mapped(&far)));
 /// let arm = Model { effects: vec![Effect::SmoothCorrection(learned)], ..plain };
 /// let still = Default::default();
 /// let added = |q: &Joints| arm.at_condition(&still).joint_rotations(q) - q;
@@ -61,7 +61,7 @@ impl SmoothCorrection {
     }
 
     /// Whether mapped joint angles lie within the reach of a centre; elsewhere the correction is zero.
-    pub fn reaches(&self, u: &Joints) -> bool {
+    pub fn reaches(&self, u: &MappedJoints) -> bool {
         let v = [u[0], u[1], u[2]];
         self.centres_rad.iter().any(|c| radial::distance(&v, c) < self.reach_rad)
     }
@@ -81,13 +81,13 @@ impl SmoothCorrection {
         }
     }
 
-    pub(super) fn regressors(&self, _: &Statics, u: &Joints, _: &Condition) -> Vec<Joints> {
+    pub(super) fn regressors(&self, _: &Statics, u: &MappedJoints, _: &Condition) -> Vec<Vector6<f64>> {
         let v = [u[0], u[1], u[2]];
         let mut out = Vec::with_capacity(JOINTS * self.centres_rad.len());
         for centre in &self.centres_rad {
             let bump: f64 = radial::wendland(&v, centre, self.reach_rad);
             for joint in 0..JOINTS {
-                let mut turn = Joints::zeros();
+                let mut turn = Vector6::zeros();
                 turn[joint] = bump;
                 out.push(turn);
             }
@@ -95,7 +95,7 @@ impl SmoothCorrection {
         out
     }
 
-    pub(super) fn offset(&self, _: &Statics, u: &Joints, _: &Condition) -> Joints {
+    pub(super) fn offset(&self, _: &Statics, u: &MappedJoints, _: &Condition) -> Vector6<f64> {
         let mut out = [0.0; 6];
         self.add_offset(&(*u).into(), &mut out);
         out.into()
@@ -123,7 +123,7 @@ impl SmoothCorrection {
         }
     }
 
-    pub(super) fn jacobian(&self, _: &Statics, u: &Joints, _: &Condition) -> Matrix6<f64> {
+    pub(super) fn jacobian(&self, _: &Statics, u: &MappedJoints, _: &Condition) -> Matrix6<f64> {
         let mut out = Matrix6::zeros();
         for column in 0..JOINTS {
             let (mut step, mut moved) = ([0.0; 6], [0.0; 6]);

@@ -1,11 +1,11 @@
 //! The static torques of an arm, for effects that need them.
 
-use nalgebra::{Matrix6, Vector3};
+use nalgebra::{Matrix6, Vector3, Vector6};
 
 use crate::body::Body;
 use crate::chain::{self, Chain, LinkTable, cross, dot};
 use crate::condition::Condition;
-use crate::joints::Joints;
+use crate::joints::MappedJoints;
 use crate::link::Link;
 use truegrind_math::lanes::{SinCos, sin_cos, splats};
 
@@ -30,10 +30,14 @@ impl Statics {
 
     /// Torque of gravity about each joint axis (N m) at mapped angles `u`, and its derivative ∂τⱼ/∂uᵢ, which is
     /// symmetric because torque is the gradient of the potential energy.
-    pub fn torques_and_jacobian(&self, u: &Joints, condition: &Condition) -> (Joints, Matrix6<f64>) {
+    pub fn torques_and_jacobian(
+        &self,
+        u: &MappedJoints,
+        condition: &Condition,
+    ) -> (Vector6<f64>, Matrix6<f64>) {
         let (frames, levers) = self.levers::<f64>(&(*u).into(), condition);
         let g = self.gravity_newton();
-        let torque = Joints::from_fn(|j, _| dot(&frames.z[j], &cross(&levers[j], &g)));
+        let torque = Vector6::from_fn(|j, _| dot(&frames.z[j], &cross(&levers[j], &g)));
         let turned: [[f64; 3]; 6] = std::array::from_fn(|i| cross(&cross(&frames.z[i], &levers[i]), &g));
         let slope = Matrix6::from_fn(|j, i| dot(&frames.z[j.min(i)], &turned[j.max(i)]));
         (torque, slope)

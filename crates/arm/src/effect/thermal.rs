@@ -2,13 +2,13 @@
 //!
 //! Source: the first-order warm-up of industrial arms in Yin et al. 2014 (doi 10.1007/s00170-014-5902-y).
 
-use nalgebra::Matrix6;
+use nalgebra::{Matrix6, Vector6};
 use serde::{Deserialize, Serialize};
 
 use crate::condition::Condition;
 use crate::effect::parameter::EffectParameter;
 use crate::effect::statics::Statics;
-use crate::joints::Joints;
+use crate::joints::MappedJoints;
 
 /// Growth of the links.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -52,15 +52,15 @@ impl Thermal {
         ]
     }
 
-    pub(super) fn regressors(&self, _: &Statics, _: &Joints, _: &Condition) -> Vec<Joints> {
-        vec![Joints::zeros(); 2]
+    pub(super) fn regressors(&self, _: &Statics, _: &MappedJoints, _: &Condition) -> Vec<Vector6<f64>> {
+        vec![Vector6::zeros(); 2]
     }
 
-    pub(super) fn offset(&self, _: &Statics, _: &Joints, _: &Condition) -> Joints {
-        Joints::zeros()
+    pub(super) fn offset(&self, _: &Statics, _: &MappedJoints, _: &Condition) -> Vector6<f64> {
+        Vector6::zeros()
     }
 
-    pub(super) fn jacobian(&self, _: &Statics, _: &Joints, _: &Condition) -> Matrix6<f64> {
+    pub(super) fn jacobian(&self, _: &Statics, _: &MappedJoints, _: &Condition) -> Matrix6<f64> {
         Matrix6::zeros()
     }
 }

@@ -171,7 +171,7 @@ impl Inverse<'_> {
             return Err(InverseError::Abandoned);
         }
         let around = near.copied().unwrap_or_else(|| Joints::from_fn(|axis, _| self.middle(axis)));
-        let seeds = self.structure.seeds(&goal.last, &(self.arm.model.joint_map * around).into());
+        let seeds = self.structure.seeds(&goal.last, &self.arm.model.mapped(&around).into());
         let beyond_mm = seeds.iter().map(|s| s.beyond_mm).fold(f64::INFINITY, f64::min);
         if self.structure.is_surely_unreachable(&goal.last, beyond_mm, self.model_distance_mm) {
             return Err(InverseError::Unreachable { beyond_mm });
@@ -242,7 +242,7 @@ impl Inverse<'_> {
         let folded = |o: &Outcome| self.margins(&o.joints).iter().any(|m| m.abs() < NEAR_FOLD);
         let Some(map_inverse) = self.map_inverse.filter(|_| found.iter().any(folded)) else { return found };
         let around = near.copied().unwrap_or_else(|| Joints::from_fn(|axis, _| self.middle(axis)));
-        let mapped = (self.arm.model.joint_map * around).into();
+        let mapped = self.arm.model.mapped(&around).into();
         let mut search = Search { inverse: self, goal, around, found, stuck: Vec::new() };
         for k in 0..PERTURBED_TARGETS {
             let width = PERTURBATION[k % PERTURBATION.len()];

@@ -7,7 +7,7 @@ use super::configuration::{self, Configuration};
 use super::kernel::{Outputs, Solved};
 use super::{Branch, Inverse, InverseError, Solution, same_branch};
 use crate::chain::FrameColumns;
-use crate::joints::{self, Joints};
+use crate::joints::{self, Joints, MappedJoints};
 use crate::model::Limits;
 use truegrind_math::lanes::{AnyWidth, SinCos, WIDTH, vectorised};
 use truegrind_math::se3::Pose;
@@ -101,7 +101,7 @@ impl Inverse<'_> {
             if self.is_steady(block, &lanes, &solved, (&last, &margins)) {
                 for k in 0..WIDTH {
                     let row = lane(&solved, k);
-                    let joints = Joints::from(row.mapped);
+                    let joints = self.controller_angles(MappedJoints(row.mapped.into()));
                     (stride, last, margins) = (joints - last, joints, row.margins[1]);
                     out.push(Ok(keep(row.solution(&joints), margins)));
                 }
@@ -109,7 +109,7 @@ impl Inverse<'_> {
             }
             for (k, target) in block.iter().enumerate() {
                 let row = lane(&solved, k);
-                let joints = self.controller_angles(&row.mapped);
+                let joints = self.controller_angles(MappedJoints(row.mapped.into()));
                 // Lanes are valid while strides are short and the branch is kept.
                 if self.is_accepted(&row, &joints, &seeds[k])
                     && joints::max_joint_difference(&joints, &last) < MAX_STRIDE_RAD
@@ -189,7 +189,7 @@ impl Inverse<'_> {
             self.solve_lanes(targets, &padded(seeds), Outputs::Joints, &mut lanes, &mut solved);
             for (k, (target, seed)) in targets.iter().zip(seeds).enumerate() {
                 let row = lane(&solved, k);
-                let joints = self.controller_angles(&row.mapped);
+                let joints = self.controller_angles(MappedJoints(row.mapped.into()));
                 out.push(match self.is_accepted(&row, &joints, seed) {
                     true => self.check_limits(&joints).map(|()| self.path_joints(&joints, &row.margins[1])),
                     false => {
@@ -231,7 +231,7 @@ impl Inverse<'_> {
 
     /// The kernel's solution where it is accepted, else the searched one.
     fn judged(&self, row: &Solved<f64>, target: &Pose, seed: &Joints) -> Result<Solution, InverseError> {
-        let joints = self.controller_angles(&row.mapped);
+        let joints = self.controller_angles(MappedJoints(row.mapped.into()));
         match self.is_accepted(row, &joints, seed) {
             true => self.check_limits(&joints).map(|()| row.solution(&joints)),
             false => self.solve_near(target, seed),

@@ -6,7 +6,7 @@ use truegrind_arm::condition::Condition;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::effect::backlash::Backlash;
 use truegrind_arm::effect::thermal::Thermal;
-use truegrind_arm::model::{Joints, Model, PreparedModel};
+use truegrind_arm::model::{Joints, MappedJoints, Model, PreparedModel};
 use truegrind_math::difference::jacobian;
 use truegrind_math::lanes::{AnyWidth, Instructions, SinCos, WIDTH, vectorised, with_instructions};
 
@@ -52,7 +52,7 @@ fn torque_is_the_negative_gradient_of_the_potential_energy() {
         let mut random = generator(42);
         for _ in 0..5 {
             let u = joints_within(&model, &mut random);
-            let (torque, slope) = statics.torques_and_jacobian(&u, &condition);
+            let (torque, slope) = statics.torques_and_jacobian(&MappedJoints(u), &condition);
             let gradient = jacobian(|x, out| out[0] = energy(x), u.as_slice(), 1, &[2e-3; 6]);
             for j in 0..6 {
                 assert!((torque[j] + gradient[(0, j)]).abs() < 1e-7, "{}: joint {j}", sheet.name);
@@ -60,7 +60,10 @@ fn torque_is_the_negative_gradient_of_the_potential_energy() {
             let twin = jacobian(
                 |x, out| {
                     out.copy_from_slice(
-                        statics.torques_and_jacobian(&Joints::from_column_slice(x), &condition).0.as_slice(),
+                        statics
+                            .torques_and_jacobian(&MappedJoints(Joints::from_column_slice(x)), &condition)
+                            .0
+                            .as_slice(),
                     );
                 },
                 u.as_slice(),
@@ -85,7 +88,7 @@ fn every_slope_has_a_numerical_twin() {
         for effect in &model.effects {
             let twin = jacobian(
                 |x, out| {
-                    let there = Joints::from_column_slice(x);
+                    let there = MappedJoints(Joints::from_column_slice(x));
                     out.copy_from_slice(effect.offset(&statics, &there, &condition).as_slice());
                 },
                 u.as_slice(),
@@ -93,7 +96,7 @@ fn every_slope_has_a_numerical_twin() {
                 &[2e-4; 6],
             );
             let twin = Matrix6::from_column_slice(twin.as_slice());
-            assert_near(&effect.jacobian(&statics, &u, &condition), &twin, 1e-9, effect.name());
+            assert_near(&effect.jacobian(&statics, &MappedJoints(u), &condition), &twin, 1e-9, effect.name());
         }
     }
 }
@@ -133,12 +136,12 @@ fn an_effect_is_the_sum_of_its_regressors() {
     for effect in &effects {
         let parameters = effect.parameters();
         let sum: Joints = effect
-            .regressors(&statics, &u, &condition)
+            .regressors(&statics, &MappedJoints(u), &condition)
             .iter()
             .zip(&parameters)
             .map(|(regressor, parameter)| regressor * parameter.value)
             .sum();
-        let rotation = effect.offset(&statics, &u, &condition);
+        let rotation = effect.offset(&statics, &MappedJoints(u), &condition);
         assert!((rotation - sum).amax() < 1e-15, "{}", effect.name());
         let mut turned = [0.0; 6];
         effect.add_offset(&statics, &u.into(), &torque, &condition, &mut turned);

@@ -93,7 +93,7 @@ impl Candidate {
         let mut rotation: Vec<[Option<Vec<f64>>; 6]> = vec![Default::default(); count];
         let mut growth = vec![Vec::new(); count];
         for (i, row) in dataset.rows.iter().enumerate() {
-            let u = nominal.joint_map * row.joints;
+            let u = nominal.mapped(&row.joints);
             for (k, turn) in effect.regressors(&statics, &u, &row.condition).iter().enumerate() {
                 for j in (0..6).filter(|&j| turn[j] != 0.0) {
                     rotation[k][j].get_or_insert_with(|| vec![0.0; n])[i] = turn[j];

@@ -109,7 +109,7 @@ fn reached(subject: &Subject<'_>, effect: &Effect) -> Vec<bool> {
     let Effect::GearMap(map) = effect else { return vec![true; effect.parameters().len()] };
     let mut out = vec![false; map.knots_rad.len()];
     for row in subject.observed.dataset.rows.iter() {
-        let knots = map.reached((subject.nominal.joint_map * row.joints)[map.joint]);
+        let knots = map.reached(subject.nominal.mapped(&row.joints)[map.joint]);
         knots.into_iter().for_each(|k| out[k] = true);
     }
     out

@@ -43,7 +43,7 @@ impl AngleHarmonics {
     /// Computes them for the rows of a data set.
     pub fn of(subject: &Subject<'_>) -> Self {
         let rows = &subject.observed.dataset.rows;
-        let mapped: Vec<_> = rows.iter().map(|r| subject.nominal.joint_map * r.joints).collect();
+        let mapped: Vec<_> = rows.iter().map(|r| subject.nominal.mapped(&r.joints)).collect();
         Self(std::array::from_fn(|joint| {
             let angles = || mapped.iter().map(|q| q[joint]);
             let (low, high) =

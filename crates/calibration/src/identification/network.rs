@@ -14,7 +14,7 @@ pub fn with_network(model: &Model, dataset: &Dataset, options: &Options) -> Mode
         .rows
         .iter()
         .map(|row| {
-            let u = model.joint_map * row.joints;
+            let u = model.mapped(&row.joints);
             [u[0], u[1], u[2]]
         })
         .collect();

@@ -116,7 +116,7 @@ impl<'a> CollisionChecker<'a> {
         if !self.is_active() {
             return true;
         }
-        let turns = self.setup.nominal.joint_map * (to - from);
+        let turns = self.setup.nominal.mapped(&(to - from)).0;
         let moved =
             |levers: &[f64; 6]| levers.iter().zip(&turns).map(|(lever, turn)| lever * turn.abs()).sum();
         self.interval_is_clear(from, to, &self.levers_mm.each_ref().map(moved))

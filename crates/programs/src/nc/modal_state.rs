@@ -1,11 +1,12 @@
 //! The abstract modal state of a control: the value of every modal group, or the reason why the text does not determine it.
 //!
-//! [`ModalState::join`] merges the states of two control-flow paths.
+//! Its [`Lattice::join`] merges the states of two control-flow paths.
 
 use super::dialect::Dialect;
 use super::expression::{Evaluated, Variable};
 use super::modal_group::{ALL_GROUPS, GroupTable, ModalGroup};
 use super::orientation::{Angles, spun};
+use crate::dataflow::Lattice;
 use crate::motion::{Frame, Reason};
 use crate::shared::Map;
 use truegrind_math::se3::Pose;
@@ -415,8 +416,25 @@ impl ModalState {
         self.groups.unknown_reason(groups)
     }
 
-    /// The join of the states of two paths: what they agree on stays known.
-    pub(super) fn join(mut self, other: &ModalState) -> ModalState {
+    /// The tool orientation, with A, B and C in the given convention.
+    pub(super) fn rotation(&self, angles: Option<Angles>) -> Result<nalgebra::UnitQuaternion<f64>, Reason> {
+        let Orientation { mode, abc, rpy, vector, spin } = self.orientation;
+        match mode {
+            OrientationMode::Unknown(reason) => Err(reason),
+            OrientationMode::Angles => {
+                let values = all_known(abc)?;
+                Ok(angles.ok_or(Reason::UnknownConvention)?.rotation(values))
+            }
+            OrientationMode::Rpy if !self.groups.rpy_convention_stated() => Err(Reason::UnknownConvention),
+            OrientationMode::Rpy => Ok(Angles::Wpr.rotation(all_known(rpy)?)),
+            OrientationMode::Vector => spun(all_known(vector)?, spin?).ok_or(Reason::WrongShape),
+        }
+    }
+}
+
+/// What both paths agree on stays known.
+impl Lattice for ModalState {
+    fn join(&mut self, other: &Self) {
         join_all(&mut self.position, &other.position);
         join_all(&mut self.pole, &other.pole);
         self.orientation.join(&other.orientation);
@@ -463,22 +481,6 @@ impl ModalState {
         self.variables.join(&other.variables);
         if self.previous != other.previous {
             self.previous = None;
-        }
-        self
-    }
-
-    /// The tool orientation, with A, B and C in the given convention.
-    pub(super) fn rotation(&self, angles: Option<Angles>) -> Result<nalgebra::UnitQuaternion<f64>, Reason> {
-        let Orientation { mode, abc, rpy, vector, spin } = self.orientation;
-        match mode {
-            OrientationMode::Unknown(reason) => Err(reason),
-            OrientationMode::Angles => {
-                let values = all_known(abc)?;
-                Ok(angles.ok_or(Reason::UnknownConvention)?.rotation(values))
-            }
-            OrientationMode::Rpy if !self.groups.rpy_convention_stated() => Err(Reason::UnknownConvention),
-            OrientationMode::Rpy => Ok(Angles::Wpr.rotation(all_known(rpy)?)),
-            OrientationMode::Vector => spun(all_known(vector)?, spin?).ok_or(Reason::WrongShape),
         }
     }
 }

@@ -1,9 +1,8 @@
 //! Abstract interpretation of NC files: every motion block, with the modal state in which it runs.
 //!
-//! Blocks are interpreted in the order of the text; [`Interpreter::transfer`] is the transfer function of a block. At
-//! a label, a loop or the start of a subprogram the state is joined with states of unseen predecessors, so that only
-//! modal groups which the whole file sets to one value stay known. A block that may be skipped is joined with the
-//! state before it.
+//! Blocks are interpreted in the order of the text ([`crate::dataflow`]); one that may be skipped is joined with the state
+//! before it. At a label, a loop or the start of a subprogram the state is joined with states of unseen predecessors, so that
+//! only modal groups which the whole file sets to one value stay known.
 
 mod modal_codes;
 mod siemens_commands;
@@ -36,8 +35,9 @@ use super::modal_state::{ModalState, MotionMode, WordSemantics};
 use super::orientation::Angles;
 use super::parser::parse;
 use super::setup::{self, Setup, StatedFrame, Statement, flange_tool, statement};
-use super::syntax::{NcTree, Word, WordValue};
+use super::syntax::{NcTree, Syntax, Word, WordValue};
 use super::token::Token;
+use crate::dataflow::{Control, Nesting, Transfer};
 use crate::motion::{
     Frame, InvalidStatement, Listing, Motion, MotionKind, OpaqueReason, OpaqueRegion, Place, Reason, Tool,
 };
@@ -132,6 +132,8 @@ pub(super) struct Interpreter<'t, 's> {
     pass: Pass,
     /// Variables that the file has assigned so far.
     assigned_variables: HashSet<Variable>,
+    /// Memory for the words of a block.
+    block: Option<Box<Block<'s>>>,
     /// Whether the current block may be skipped.
     in_skippable_block: bool,
     /// The semantics of words before the current block.
@@ -171,6 +173,46 @@ struct Pass {
 /// The lengths of the lists before a file.
 struct Lengths([usize; 7]);
 
+impl Transfer for Interpreter<'_, '_> {
+    type State = ModalState;
+
+    fn state(&mut self) -> &mut ModalState {
+        &mut self.state
+    }
+
+    fn size(&self, node: u32) -> u32 {
+        self.tree.nodes[node as usize].size
+    }
+
+    fn control(&self, block: u32) -> Control {
+        match self.tree.nodes[block as usize].kind {
+            Syntax::Skippable => Control::Skippable,
+            _ => Control::Simple,
+        }
+    }
+
+    fn transfer(&mut self, node: u32, nesting: Nesting) {
+        let mut block = self.block.take().unwrap_or_default();
+        self.collect_words(node, &mut block);
+        self.has_nc_blocks |=
+            !block.opaque && (!block.g.is_empty() || !block.m.is_empty() || block.has_motion_words());
+        self.in_skippable_block = nesting.guarded;
+        self.interpret(&block);
+        self.block = Some(block);
+        if nesting.guarded {
+            self.in_skippable_block = false;
+            // A program end or jump in it happens only where it is not skipped.
+            self.pass.program_ended = false;
+            self.frame_index = None;
+            self.tool_index.clear();
+        }
+    }
+
+    fn join_any_point(&mut self) {
+        self.join_unseen_predecessors();
+    }
+}
+
 impl<'t, 's> Interpreter<'t, 's> {
     fn new(tree: &'t NcTree<'s>, file: u32, dialect: Dialect, setup: &'t Setup) -> Self {
         let state = ModalState::start(start_offset(dialect), START_TOOL);
@@ -187,6 +229,7 @@ impl<'t, 's> Interpreter<'t, 's> {
             file_effects: None,
             pass: Pass::default(),
             assigned_variables: HashSet::new(),
+            block: None,
             in_skippable_block: false,
             word_semantics: WordSemantics::default(),
             cycle_is_program: false,
@@ -242,11 +285,7 @@ impl<'t, 's> Interpreter<'t, 's> {
         } else if self.scan.restarts_at_end {
             self.join_unseen_predecessors();
         }
-        let mut block = Block::default();
-        let blocks: Vec<u32> = self.tree.child_nodes(0).collect();
-        for node in blocks {
-            self.block(node, &mut block);
-        }
+        self.walk(0, Nesting::default());
     }
 
     fn lengths(&self) -> Lengths {
@@ -358,26 +397,6 @@ impl<'t, 's> Interpreter<'t, 's> {
         });
     }
 
-    fn block(&mut self, node: u32, block: &mut Block<'s>) {
-        self.collect_words(node, block);
-        self.has_nc_blocks |=
-            !block.opaque && (!block.g.is_empty() || !block.m.is_empty() || block.has_motion_words());
-        if !block.skippable {
-            self.interpret(block);
-            return;
-        }
-        let before = self.state.clone();
-        self.in_skippable_block = true;
-        self.interpret(block);
-        self.in_skippable_block = false;
-        // A program end or jump in it happens only where it is not skipped.
-        self.pass.program_ended = false;
-        let after = std::mem::replace(&mut self.state, before);
-        self.state = after.join(&self.state);
-        self.frame_index = None;
-        self.tool_index.clear();
-    }
-
     /// Interprets a block in the state before it.
     fn interpret(&mut self, block: &Block<'s>) {
         if std::mem::take(&mut self.pass.program_ended) {
@@ -392,11 +411,12 @@ impl<'t, 's> Interpreter<'t, 's> {
         let values = self.evaluate_assignments(block);
         let before = self.pass.effects.joins;
         self.word_semantics = self.state.word_semantics();
-        self.transfer(block);
+        self.transfer_words(block);
         self.apply_assignments(values, self.pass.effects.joins != before);
     }
 
-    fn transfer(&mut self, block: &Block<'s>) {
+    /// The transfer function of a block.
+    fn transfer_words(&mut self, block: &Block<'s>) {
         if let Some(on) = block.radius_compensation {
             self.set_group(ModalGroup::RadiusCompensation, u64::from(on));
         }

@@ -1,8 +1,7 @@
 //! Abstract interpreter of one routine: the values of data, the switches and the reaching motions before each statement.
 //!
-//! Method: a forward may-analysis over the structured statements, one pass per routine. [`AbstractState`] holds constants
-//! (constant propagation, [`Known`]), a [`SwitchSet`] and the [`ReachingMotions`]; each statement kind has a transfer
-//! function; branches meet in [`AbstractState::join`]. Loops need no fixpoint: whatever a loop writes is unknown at its head.
+//! Method: a forward may-analysis over the structured statements, one pass per routine ([`crate::dataflow`]). [`AbstractState`]
+//! holds constants (constant propagation, [`Known`]), a [`SwitchSet`] and the [`ReachingMotions`].
 //! Labels and error handlers start in a state that joins every point of the routine. Calls apply the callee's side-effect
 //! summary ([`super::symbol::SideEffects`]) and its exit switches. Volatile data, which an interrupt routine, an error handler
 //! or the controller may write, is never known. A parameter by reference may alias outside data or another parameter: a write
@@ -14,13 +13,15 @@ mod invalidate;
 use super::evaluate::{Context, Evaluator, Known};
 use super::instruction::{self, Also, INSTRUCTIONS};
 use super::modal::{Switch, SwitchSet, switches_set_by};
+use super::payload::{self, Gripped};
 use super::predefined;
 use super::reaching_motions::ReachingMotions;
 use super::symbol::facts::{counts_from_position, is_resuming_handler};
 use super::symbol::{SymbolKind, Unit};
-use super::syntax::{Syntax, arguments, parts, token_kind};
+use super::syntax::{RapidTree, Syntax, arguments, parts, token_kind};
 use super::token::{Token, same_name};
 use super::value::Value;
+use crate::dataflow::{Control, Lattice, Nesting, Transfer};
 use crate::motion::{Frame, Reason};
 use crate::tree::Child;
 
@@ -34,16 +35,17 @@ const MAX_VALUE_SIZE: usize = 4096;
 /// Longer arrays are not tracked element by element.
 const MAX_ELEMENTS: f64 = 64.0;
 
-/// Abstract state before a statement.
-#[derive(Debug, Clone, PartialEq)]
+/// Abstract state before a statement; by default of one that control flow cannot reach.
+#[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct AbstractState {
     pub(super) known: Known,
     pub(super) modal: SwitchSet,
+    pub(super) gripped: Gripped,
     pub(super) previous: Option<u32>,
     /// The motions that may be the last executed; tracked only where the program depends on them.
     reaching: ReachingMotions,
     /// Whether control flow can reach the statement.
-    reachable: bool,
+    pub(super) reachable: bool,
 }
 
 impl AbstractState {
@@ -51,28 +53,28 @@ impl AbstractState {
     pub(super) fn displacement(&self) -> Option<Result<Frame, Reason>> {
         self.known.get(&DISPLACEMENT).map(|value| value.frame())
     }
+}
 
-    fn join(self, other: AbstractState) -> AbstractState {
+impl Lattice for AbstractState {
+    fn join(&mut self, other: &Self) {
         if !self.reachable {
-            return other;
+            return self.clone_from(other);
         }
         if !other.reachable {
-            return self;
+            return;
         }
-        let mut known = self
+        let displaced = [&*self, other].map(|state| state.known.contains_key(&DISPLACEMENT));
+        self.known = self
             .known
             .joined(&other.known, &|a: Option<&Value>, b: Option<&Value>| Some(join_values(a?, b?)));
         // Known on one branch only: unknown at the join.
-        if self.known.contains_key(&DISPLACEMENT) != other.known.contains_key(&DISPLACEMENT) {
-            known.insert(DISPLACEMENT, Value::Unknown(Reason::Displacement));
+        if displaced[0] != displaced[1] {
+            self.known.insert(DISPLACEMENT, Value::Unknown(Reason::Displacement));
         }
-        AbstractState {
-            known,
-            modal: self.modal.join(other.modal),
-            previous: self.previous.filter(|_| self.previous == other.previous),
-            reaching: self.reaching.join(other.reaching),
-            reachable: true,
-        }
+        self.modal = self.modal.join(other.modal);
+        self.gripped.join(&other.gripped);
+        self.previous = self.previous.filter(|_| self.previous == other.previous);
+        self.reaching.join(&other.reaching);
     }
 }
 
@@ -87,19 +89,28 @@ fn join_values(a: &Value, b: &Value) -> Value {
     }
 }
 
-/// A call of a routine of the program, with the switches at the call.
+/// A call of a routine of the program, with the switches and the load at the call.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct CallSite {
     pub(super) routine: u32,
     pub(super) modal: SwitchSet,
+    pub(super) gripped: Gripped,
+}
+
+/// What holds at the end of a routine, "as at the entry" included.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Exit {
+    pub(super) modal: SwitchSet,
+    /// `None` where it never ends.
+    pub(super) gripped: Option<Gripped>,
 }
 
 /// Receives what the interpreter finds.
 pub(super) trait Visitor {
     /// A call; returns the index of the motion if it is one.
     fn visit_call(&mut self, unit: Unit, node: u32, state: &AbstractState, nesting: Nesting) -> Option<u32>;
-    /// The switches at the end of a routine, "as at the entry" included.
-    fn exit_switches(&mut self, routine: u32) -> SwitchSet;
+    /// What holds at the end of a routine.
+    fn exit_of(&mut self, routine: u32) -> Exit;
     /// A call of a routine of the program.
     fn record_call(&mut self, site: CallSite);
     /// A call by a computed name, with the switches at the call.
@@ -108,39 +119,27 @@ pub(super) trait Visitor {
     fn record_external_call(&mut self, modal: SwitchSet);
     /// A displacement is counted from the robot's current position.
     fn record_position_use(&mut self, reaching: &ReachingMotions);
-    /// The next cycle enters main with these switches.
-    fn record_cycle_restart(&mut self, modal: SwitchSet);
+    /// The next cycle enters main with these switches and this load.
+    fn record_cycle_restart(&mut self, modal: SwitchSet, gripped: Gripped);
 }
 
-/// Control structures around a statement.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Nesting {
-    pub(super) in_loop: bool,
-    pub(super) conditional: bool,
-    /// Whether a compact IF guards this statement alone.
-    pub(super) guarded: bool,
-}
-
-/// Interprets one unit; returns the switches at its end.
-pub(super) fn interpret_unit(
-    evaluator: &Evaluator<'_, '_>,
-    unit: Unit,
-    visitor: &mut dyn Visitor,
-) -> SwitchSet {
+/// Interprets one unit; returns what holds at its end.
+pub(super) fn interpret_unit(evaluator: &Evaluator<'_, '_>, unit: Unit, visitor: &mut dyn Visitor) -> Exit {
     let symbols = evaluator.symbols;
     let tree = &evaluator.trees[unit.file as usize];
     let resumes = tree.child_nodes(unit.node).any(|clause| is_resuming_handler(tree, clause));
-    let (exits, any, handler_switches) = (SwitchSet::EMPTY, SwitchSet::EMPTY, SwitchSet::EMPTY);
     let aliases = aliases(evaluator, unit);
     let moved_between = symbols.may_move_between_statements(evaluator.trees, unit);
     let tracks_motions = symbols.uses_position();
     let mut interpreter = Interpreter {
         evaluator,
         unit,
+        state: AbstractState::default(),
         visitor,
-        exits,
-        any,
-        handler_switches,
+        exit: Exit::default(),
+        any: SwitchSet::EMPTY,
+        any_gripped: Gripped::default(),
+        handler_switches: SwitchSet::EMPTY,
         resumes,
         moved_between,
         tracks_motions,
@@ -153,16 +152,14 @@ pub(super) fn interpret_unit(
         && tree.child_nodes(unit.node).any(|clause| is_exception_clause(tree.nodes[clause as usize].kind))
     {
         // An error may leave a callee at any point.
-        interpreter.any = interpreter.any.join(symbols.routines[routine as usize].effects.switches);
+        interpreter.any = interpreter.any.join(symbols.effects_of(routine).switches);
+    }
+    if interpreter.may_grip_under(unit.node) {
+        interpreter.any_gripped = Gripped::UNKNOWN;
     }
     let reaching = if tracks_motions { ReachingMotions::routine_entry() } else { ReachingMotions::default() };
-    let mut state = AbstractState {
-        known: Known::new(),
-        modal: SwitchSet::ENTRY,
-        previous: None,
-        reaching,
-        reachable: true,
-    };
+    let mut state =
+        AbstractState { modal: SwitchSet::ENTRY, reaching, reachable: true, ..AbstractState::default() };
     // ExitCycle restarts main without reinitialising its variables.
     if unit
         .routine
@@ -182,8 +179,13 @@ pub(super) fn interpret_unit(
             }
         }
     }
-    let end = interpreter.transfer_block(unit.node, state, Nesting::default());
-    if end.reachable { interpreter.exits.join(end.modal) } else { interpreter.exits }
+    interpreter.state = state;
+    interpreter.walk(unit.node, Nesting::default());
+    let state = std::mem::take(&mut interpreter.state);
+    if state.reachable {
+        interpreter.leave(&state);
+    }
+    interpreter.exit
 }
 
 /// The parameters of a unit that may alias outside data or each other.
@@ -198,10 +200,13 @@ fn aliases(evaluator: &Evaluator<'_, '_>, unit: Unit) -> Vec<u32> {
 struct Interpreter<'w, 'a, 's> {
     evaluator: &'w Evaluator<'a, 's>,
     unit: Unit,
+    state: AbstractState,
     visitor: &'w mut dyn Visitor,
-    exits: SwitchSet,
+    exit: Exit,
     /// The switches that any statement of the unit may set: those at a point reachable from anywhere.
     any: SwitchSet,
+    /// The load at such a point.
+    any_gripped: Gripped,
     /// The switches that an error handler may set before it resumes, and those that trap routines leave set.
     handler_switches: SwitchSet,
     /// Whether an error handler resumes the statements, so that a callee may have ended anywhere.
@@ -214,155 +219,146 @@ struct Interpreter<'w, 'a, 's> {
     aliases: Vec<u32>,
 }
 
-impl Interpreter<'_, '_, '_> {
-    /// Transfers a state through the statements under a node.
-    fn transfer_block(&mut self, node: u32, mut state: AbstractState, nesting: Nesting) -> AbstractState {
-        let tree = &self.evaluator.trees[self.unit.file as usize];
-        let (mut child, end) = (node + 1, node + tree.nodes[node as usize].size);
-        while child < end {
-            let kind = tree.nodes[child as usize].kind;
-            if !(self.unit.routine.is_none() && (kind.is_routine() || kind == Syntax::Module)) {
-                state = self.transfer_statement(child, kind, state, nesting);
-            }
-            child += tree.nodes[child as usize].size;
+/// What a node of a unit is for the flow of control.
+pub(super) fn control(tree: &RapidTree<'_>, unit: Unit, node: u32) -> Control {
+    match tree.nodes[node as usize].kind {
+        kind if unit.routine.is_none() && (kind.is_routine() || kind == Syntax::Module) => Control::Apart,
+        Syntax::Body => Control::Sequence,
+        Syntax::CompactIf => Control::Optional,
+        Syntax::If | Syntax::Test => Control::Branches,
+        Syntax::Branch | Syntax::Case => {
+            let first = parts(tree, node).next().and_then(|first| token_kind(tree, first));
+            Control::Branch { otherwise: matches!(first, Some(Token::Else | Token::Default)) }
         }
-        state
+        Syntax::For | Syntax::While => Control::Loop,
+        Syntax::ErrorClause | Syntax::UndoClause | Syntax::BackwardClause => Control::Handler,
+        Syntax::Label => Control::Label,
+        kind if kind.is_expression() => Control::Expression,
+        _ => Control::Simple,
+    }
+}
+
+impl Transfer for Interpreter<'_, '_, '_> {
+    type State = AbstractState;
+
+    fn state(&mut self) -> &mut AbstractState {
+        &mut self.state
     }
 
-    fn transfer_statement(
-        &mut self,
-        node: u32,
-        kind: Syntax,
-        mut state: AbstractState,
-        nesting: Nesting,
-    ) -> AbstractState {
-        let conditional = Nesting { conditional: true, guarded: false, ..nesting };
-        match kind {
-            Syntax::Body => self.transfer_block(node, state, nesting),
-            Syntax::Call | Syntax::LateCall => self.transfer_call(node, state, nesting),
-            Syntax::Assignment => {
-                self.transfer_assignment(node, &mut state);
-                state
-            }
-            Syntax::If => self.transfer_branches(node, state, conditional, Token::Else),
-            Syntax::Test => self.transfer_branches(node, state, conditional, Token::Default),
-            Syntax::CompactIf => {
-                // The condition is evaluated on both branches.
-                self.invalidate_condition(node, &mut state);
-                let before = state.clone();
-                let guarded = Nesting { guarded: true, ..conditional };
-                self.transfer_block(node, state, guarded).join(before)
-            }
-            Syntax::For | Syntax::While => self.transfer_loop(node, kind, state, nesting),
-            Syntax::ErrorClause | Syntax::UndoClause | Syntax::BackwardClause => {
-                let entry = self.state_at_any_point();
-                let end = self.transfer_block(node, entry, conditional);
-                if end.reachable && kind == Syntax::ErrorClause {
-                    self.exits = self.exits.join(end.modal);
-                }
-                if end.reachable && kind == Syntax::UndoClause && self.evaluator.symbols.restarts_main {
-                    self.visitor.record_cycle_restart(end.modal);
-                }
-                // Control does not fall through into the handler.
-                state
-            }
-            Syntax::Label => state.join(self.state_at_any_point()),
+    fn size(&self, node: u32) -> u32 {
+        self.evaluator.trees[self.unit.file as usize].nodes[node as usize].size
+    }
+
+    fn control(&self, node: u32) -> Control {
+        control(&self.evaluator.trees[self.unit.file as usize], self.unit, node)
+    }
+
+    fn transfer(&mut self, node: u32, nesting: Nesting) {
+        let mut state = std::mem::take(&mut self.state);
+        match self.kind(node) {
+            Syntax::Call | Syntax::LateCall => state = self.transfer_call(node, state, nesting),
+            Syntax::Assignment => self.transfer_assignment(node, &mut state),
             Syntax::Return => {
                 self.invalidate_changed(node, &mut state);
-                self.exits = self.exits.join(state.modal);
-                AbstractState { reachable: false, ..state }
+                self.leave(&state);
+                state.reachable = false;
             }
             Syntax::Raise if self.resumes => {
                 // The handler may resume after it.
                 self.join_switches(self.handler_switches, &mut state);
-                AbstractState { previous: None, reaching: self.any_motion(), ..state }
+                (state.previous, state.reaching) = (None, self.any_motion());
+                state.gripped.join(&self.any_gripped);
             }
-            // A caller that catches the error joins all switches set here.
-            Syntax::Goto | Syntax::Raise => AbstractState { reachable: false, ..state },
+            Syntax::Raise => {
+                // A caller that catches the error joins all switches set here.
+                self.exit.gripped.join(&state.reachable.then_some(state.gripped));
+                state.reachable = false;
+            }
+            Syntax::Goto => state.reachable = false,
             Syntax::Leave => {
-                self.exits = self.exits.join(state.modal);
-                AbstractState { reachable: false, ..state }
+                self.leave(&state);
+                state.reachable = false;
             }
             Syntax::Opaque | Syntax::Unwritten => {
                 // Unparsed text may write anything.
-                AbstractState {
-                    previous: None,
-                    reaching: self.any_motion(),
-                    known: self.state_at_any_point().known,
-                    ..state
-                }
+                (state.previous, state.reaching) = (None, self.any_motion());
+                (state.known, state.gripped) = (self.state_at_any_point().known, Gripped::UNKNOWN);
             }
-            // Conditions and bounds: their function calls.
-            _ => {
-                self.invalidate_changed(node, &mut state);
-                state
-            }
+            _ => self.invalidate_changed(node, &mut state),
+        }
+        self.state = state;
+    }
+
+    fn join_any_point(&mut self) {
+        let any = self.state_at_any_point();
+        self.state.join(&any);
+    }
+
+    fn evaluate(&mut self, node: u32) {
+        let mut state = std::mem::take(&mut self.state);
+        self.invalidate_changed(node, &mut state);
+        self.state = state;
+    }
+
+    fn enter_loop(&mut self, node: u32) {
+        self.state.reaching = self.state.reaching.in_loop();
+        self.invalidate_iterations(node);
+        if self.may_grip_under(node) {
+            self.state.gripped = Gripped::UNKNOWN;
         }
     }
 
-    /// A loop: everything that it writes is unknown at its head and behind it, which holds for every number of iterations.
-    fn transfer_loop(
-        &mut self,
-        node: u32,
-        kind: Syntax,
-        mut entry: AbstractState,
-        nesting: Nesting,
-    ) -> AbstractState {
-        entry.modal = entry.modal.join(self.switches_set_under(node));
-        entry.previous = None;
-        let outside = std::mem::take(&mut entry.reaching);
-        entry.reaching = outside.in_loop();
-        let displaces = self.may_displace(node);
-        let invalidate = |interpreter: &mut Self, state: &mut AbstractState| {
-            interpreter.invalidate_changed(node, state);
-            if kind == Syntax::While {
-                // The condition may wait for another task.
-                interpreter.invalidate_shared(state);
-            }
-            if displaces {
-                state.known.insert(DISPLACEMENT, Value::Unknown(Reason::Displacement));
-            }
-        };
-        invalidate(self, &mut entry);
-        let inside = Nesting { in_loop: true, guarded: false, ..nesting };
-        let mut after = self.transfer_block(node, entry.clone(), inside).join(entry);
-        invalidate(self, &mut after);
-        after.previous = None;
-        after.reaching = after.reaching.after_loop(&outside);
-        after
+    fn leave_loop(&mut self, node: u32, before: &AbstractState) {
+        // What is gripped on re-entry may be anything that the loop grips, but not behind it.
+        let gripped = self.state.gripped;
+        self.invalidate_iterations(node);
+        self.state.gripped = gripped;
+        self.conditions(node);
+        self.state.reaching.leave_loop(&before.reaching);
     }
 
-    fn transfer_branches(
-        &mut self,
-        node: u32,
-        mut state: AbstractState,
-        nesting: Nesting,
-        otherwise: Token,
-    ) -> AbstractState {
-        let tree = &self.evaluator.trees[self.unit.file as usize];
-        let mut joined: Option<AbstractState> = None;
-        let mut complete = false;
-        for branch in tree.child_nodes(node) {
-            if !matches!(tree.nodes[branch as usize].kind, Syntax::Branch | Syntax::Case) {
-                self.invalidate_changed(branch, &mut state);
-                continue;
+    fn end_handler(&mut self, node: u32, end: AbstractState) {
+        match self.kind(node) {
+            Syntax::ErrorClause if end.reachable => self.leave(&end),
+            Syntax::UndoClause if end.reachable && self.evaluator.symbols.restarts_main => {
+                self.visitor.record_cycle_restart(end.modal, end.gripped);
             }
-            // A condition is evaluated before all following branches.
-            self.invalidate_condition(branch, &mut state);
-            let first = parts(tree, branch).next();
-            complete |= first.and_then(|first| token_kind(tree, first)) == Some(otherwise);
-            let end = self.transfer_block(branch, state.clone(), nesting);
-            joined = Some(match joined {
-                Some(joined) => joined.join(end),
-                None => end,
-            });
+            _ => {}
         }
-        match joined {
-            // TRYNEXT skips all branches where a condition raises an error.
-            Some(joined) if complete && !self.resumes => joined,
-            Some(joined) => joined.join(state),
-            None => state,
+    }
+
+    /// TRYNEXT skips all branches where a condition raises an error.
+    fn may_pass_branches(&self) -> bool {
+        self.resumes
+    }
+}
+
+impl Interpreter<'_, '_, '_> {
+    fn kind(&self, node: u32) -> Syntax {
+        self.evaluator.trees[self.unit.file as usize].nodes[node as usize].kind
+    }
+
+    /// The routine ends in a state.
+    fn leave(&mut self, state: &AbstractState) {
+        self.exit.modal = self.exit.modal.join(state.modal);
+        self.exit.gripped.join(&state.reachable.then_some(state.gripped));
+    }
+
+    /// Everything that a loop may change in any number of iterations is unknown.
+    fn invalidate_iterations(&mut self, node: u32) {
+        let mut state = std::mem::take(&mut self.state);
+        let sets = self.switches_set_under(node);
+        state.modal = state.modal.join(sets);
+        state.previous = None;
+        self.invalidate_changed(node, &mut state);
+        if self.kind(node) == Syntax::While {
+            // The condition may wait for another task.
+            self.invalidate_shared(&mut state);
         }
+        if !sets.is_unset(Switch::Displacement) {
+            state.known.insert(DISPLACEMENT, Value::Unknown(Reason::Displacement));
+        }
+        self.state = state;
     }
 
     /// State at a point that can be reached from anywhere in the routine.
@@ -371,7 +367,8 @@ impl Interpreter<'_, '_, '_> {
         if !self.any.is_entry(Switch::Displacement) {
             known.insert(DISPLACEMENT, Value::Unknown(Reason::Displacement));
         }
-        AbstractState { known, modal: self.any, previous: None, reaching: self.any_motion(), reachable: true }
+        let (modal, gripped, reaching) = (self.any, self.any_gripped, self.any_motion());
+        AbstractState { known, modal, gripped, previous: None, reaching, reachable: true }
     }
 
     /// Any motion may be the last executed.
@@ -386,13 +383,9 @@ impl Interpreter<'_, '_, '_> {
         }
         // A handler may resume after a failed motion, or from anywhere.
         let also = if self.resumes { std::mem::take(before) } else { ReachingMotions::default() };
-        *before = ReachingMotions::after(motion).join(also);
+        *before = ReachingMotions::after(motion);
+        before.join(&also);
         before.any |= self.moved_between;
-    }
-
-    /// Whether statements under a node may change the program displacement.
-    fn may_displace(&mut self, node: u32) -> bool {
-        !self.switches_set_under(node).is_unset(Switch::Displacement)
     }
 
     /// The displacement after PDispSet, PDispOn, PDispAdd or PDispOff.
@@ -449,7 +442,7 @@ impl Interpreter<'_, '_, '_> {
             return handler_switches;
         }
         let left = |all: SwitchSet, routine: &u32| {
-            all.join(self.visitor.exit_switches(*routine).substitute_entry(SwitchSet::EMPTY))
+            all.join(self.visitor.exit_of(*routine).modal.substitute_entry(SwitchSet::EMPTY))
         };
         symbols.interrupt_routines.iter().fold(handler_switches, left)
     }
@@ -472,9 +465,9 @@ impl Interpreter<'_, '_, '_> {
                 out = out.join(symbols.late_switches_of(self.unit));
             }
             for &routine in called {
-                out = out.join(self.visitor.exit_switches(routine));
+                out = out.join(self.visitor.exit_of(routine).modal);
                 if self.resumes || tree.nodes[node as usize].kind == Syntax::Function {
-                    out = out.join(symbols.routines[routine as usize].effects.switches);
+                    out = out.join(symbols.effects_of(routine).switches);
                 }
             }
         }
@@ -527,6 +520,9 @@ impl Interpreter<'_, '_, '_> {
         }
         let called = if late { &[] } else { symbols.callees(self.unit.scope, name) };
         if late || called.is_empty() && predefined::calls_by_name(name) {
+            if self.may_grip(node) {
+                state.gripped = Gripped::UNKNOWN;
+            }
             self.transfer_late_call(&mut state);
             return state;
         }
@@ -534,8 +530,12 @@ impl Interpreter<'_, '_, '_> {
             [_, ..] => self.transfer_routine_call(called, name, &mut state),
             [] if predefined::effect(name).is_some() => {
                 if predefined::begins_cycle(name) {
-                    self.visitor.record_cycle_restart(state.modal);
+                    self.visitor.record_cycle_restart(state.modal, state.gripped);
                     return AbstractState { reachable: false, ..state };
+                }
+                if predefined::grips(name) {
+                    let context = Context::new(self.unit.file, self.unit.scope, &state.known);
+                    state.gripped = payload::gripped_by(self.evaluator, context, tree, node);
                 }
                 if predefined::displaces(name).is_some() {
                     state.previous = None;
@@ -610,26 +610,28 @@ impl Interpreter<'_, '_, '_> {
     /// A call of a routine of the program; of any of `called` where several modules declare the name.
     fn transfer_routine_call(&mut self, called: &[u32], name: &[u8], state: &mut AbstractState) {
         let symbols = self.evaluator.symbols;
-        let sets =
-            |all: SwitchSet, routine: &u32| all.join(symbols.routines[*routine as usize].effects.switches);
+        let sets = |all: SwitchSet, routine: &u32| all.join(symbols.effects_of(*routine).switches);
         let sets = called.iter().fold(SwitchSet::EMPTY, sets);
         if self.resumes {
             // An error may have left it anywhere, and RETRY may call it again.
             self.join_switches(sets, state);
         }
-        if called.iter().any(|routine| symbols.routines[*routine as usize].effects.uses_position) {
+        if called.iter().any(|routine| symbols.effects_of(*routine).uses_position) {
             self.visitor.record_position_use(&state.reaching);
         }
-        if self.tracks_motions
-            && called.iter().any(|routine| symbols.routines[*routine as usize].effects.moves)
-        {
+        if self.tracks_motions && called.iter().any(|routine| symbols.effects_of(*routine).moves) {
             state.reaching.any = true;
         }
         let mut exit = SwitchSet::EMPTY;
+        let mut gripped = None;
         for &routine in called {
-            self.visitor.record_call(CallSite { routine, modal: state.modal });
-            exit = exit.join(self.visitor.exit_switches(routine));
+            let AbstractState { modal, gripped: before, .. } = *state;
+            self.visitor.record_call(CallSite { routine, modal, gripped: before });
+            let end = self.visitor.exit_of(routine);
+            exit = exit.join(end.modal);
+            gripped.join(&end.gripped.map(|gripped| gripped.after(before)));
         }
+        state.gripped = gripped.unwrap_or(state.gripped);
         if exit == SwitchSet::EMPTY {
             state.reachable = self.resumes;
             return;

@@ -14,6 +14,7 @@
 
 use super::syntax::{RapidTree, arguments};
 use super::token::same_name;
+use crate::dataflow::Lattice;
 use crate::motion::{Modal, Switch as SwitchState};
 use crate::tree::Child;
 
@@ -68,6 +69,9 @@ impl SwitchSet {
     pub const EMPTY: SwitchSet = SwitchSet(0);
     /// After a start from main: configurations monitored, everything else off.
     pub const START: SwitchSet = SwitchSet(all(OFF) & !(0o77) | ON | ON << 3);
+
+    /// How many times a set can grow.
+    pub(crate) const HEIGHT: usize = 3 * COUNT as usize;
 
     /// Join: the union of the states.
     pub fn join(self, other: SwitchSet) -> SwitchSet {
@@ -140,6 +144,12 @@ impl SwitchSet {
             sensor_guided: self.state(Switch::Soft),
             independent_axis: both(self.state(Switch::Locked), self.state(Switch::Independent)),
         }
+    }
+}
+
+impl Lattice for SwitchSet {
+    fn join(&mut self, other: &Self) {
+        self.0 |= other.0;
     }
 }
 

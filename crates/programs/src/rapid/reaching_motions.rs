@@ -2,6 +2,8 @@
 //!
 //! A displacement counted from the robot's current position (PDispOn without \ExeP) requires that none of these endpoints moves.
 
+use crate::dataflow::Lattice;
+
 /// A set of motions, one of which was executed last.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct ReachingMotions {
@@ -34,10 +36,27 @@ impl ReachingMotions {
         Self { any: true, ..Self::default() }
     }
 
-    /// Join: the union.
-    pub(super) fn join(mut self, other: Self) -> Self {
+    /// At the head of a loop, after any number of iterations.
+    pub(super) fn in_loop(&self) -> Self {
+        Self { any_in_loop: true, ..self.clone() }
+    }
+
+    /// Behind a loop that was entered with `outside`.
+    pub(super) fn leave_loop(&mut self, outside: &Self) {
+        self.any_in_loop = outside.any_in_loop;
+    }
+
+    /// The motions; `None` where any may have been the last.
+    pub(super) fn motions(&self) -> Option<&[u32]> {
+        (!self.any && !self.any_in_loop).then_some(&self.motions)
+    }
+}
+
+/// The union.
+impl Lattice for ReachingMotions {
+    fn join(&mut self, other: &Self) {
         if self.motions != other.motions {
-            self.motions.extend(other.motions);
+            self.motions.extend_from_slice(&other.motions);
             self.motions.sort_unstable();
             self.motions.dedup();
         }
@@ -47,21 +66,5 @@ impl ReachingMotions {
         self.any |= other.any;
         self.any_in_loop |= other.any_in_loop;
         self.entry |= other.entry;
-        self
-    }
-
-    /// At the head of a loop, after any number of iterations.
-    pub(super) fn in_loop(&self) -> Self {
-        Self { any_in_loop: true, ..self.clone() }
-    }
-
-    /// Behind a loop that was entered with `outside`.
-    pub(super) fn after_loop(self, outside: &Self) -> Self {
-        Self { any_in_loop: outside.any_in_loop, ..self }
-    }
-
-    /// The motions; `None` where any may have been the last.
-    pub(super) fn motions(&self) -> Option<&[u32]> {
-        (!self.any && !self.any_in_loop).then_some(&self.motions)
     }
 }

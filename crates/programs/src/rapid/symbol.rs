@@ -12,9 +12,8 @@ mod solve;
 mod writes;
 
 use std::collections::{HashMap, HashSet};
-use std::sync::Arc;
 
-pub use self::effects::{SideEffects, SwitchExit, Write, WriteKind};
+pub use self::effects::{SideEffects, Write, WriteKind};
 use super::instruction;
 use super::modal::SwitchSet;
 use super::syntax::{Data, RapidTree, RoutineHead, Syntax, data, parts, routine_head, text_of, token_kind};
@@ -157,13 +156,15 @@ pub struct Symbols {
     pub written: Vec<Vec<u32>>,
     /// Post-order of the call graph: each unit after its callees, except along recursive calls.
     pub callees_first: Vec<u32>,
-    /// Effect of each unit on the switches.
-    pub switch_exits: Vec<SwitchExit>,
+    /// Whether anything calls each unit by its name.
+    pub called: Vec<bool>,
     /// The calls and functions of each unit that set a switch or call a routine of the program, in order.
     pub switch_calls: Vec<Vec<u32>>,
-    /// The routines that each unit may call by a computed name, sorted.
-    pub late_callees: Vec<Arc<[u32]>>,
-    /// The switches that they set.
+    /// The list of routines that each unit may call by a computed name: index into `late_lists`.
+    pub late_list: Vec<u32>,
+    /// Those lists, each sorted.
+    pub late_lists: Vec<Vec<u32>>,
+    /// The switches that the routines of each list set.
     pub late_switches: Vec<SwitchSet>,
     /// Whether each routine may run between any two statements: a trap routine, or called while the robot moves.
     pub interrupts: Vec<bool>,
@@ -173,6 +174,8 @@ pub struct Symbols {
     interrupts_move_robot: bool,
     /// The switches that any statement sets.
     pub all_switches: SwitchSet,
+    /// Whether anything in the files is named as what states a load (GripLoad, TLoad).
+    pub states_loads: bool,
     /// Whether ExitCycle may restart main in the middle of a cycle.
     pub restarts_main: bool,
     /// The routines of each global name that several modules declare, in lower case.
@@ -278,12 +281,17 @@ impl Symbols {
 
     /// The routines that a unit may call by a computed name.
     pub fn late_callees_of(&self, unit: Unit) -> &[u32] {
-        self.unit_index(unit).and_then(|at| self.late_callees.get(at)).map_or(&[], |late| late)
+        self.unit_index(unit).map_or(&[], |at| &self.late_lists[self.late_list[at] as usize])
     }
 
     /// The switches set by the routines that a unit may call by a computed name.
     pub fn late_switches_of(&self, unit: Unit) -> SwitchSet {
-        self.unit_index(unit).map_or(SwitchSet::EMPTY, |at| self.late_switches[at])
+        self.unit_index(unit).map_or(SwitchSet::EMPTY, |at| self.late_switches[self.late_list[at] as usize])
+    }
+
+    /// The unit of a routine.
+    pub fn unit_of(&self, routine: u32) -> u32 {
+        self.routines[routine as usize].unit
     }
 
     fn unit_index(&self, unit: Unit) -> Option<usize> {

@@ -3,7 +3,7 @@
 //! [`ListingBuilder`] runs the abstract interpreter ([`super::flow`]) over every unit, lists the motions that it visits, and
 //! solves which switches each unit may be entered with.
 
-mod entry_switches;
+mod entries;
 mod frames;
 mod literals;
 mod motions;
@@ -14,15 +14,18 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::evaluate::Evaluator;
-use super::flow::{AbstractState, CallSite, Nesting, Visitor, interpret_unit};
+use super::evaluate::{Context, Evaluator};
+use super::flow::{AbstractState, CallSite, Exit, Visitor, interpret_unit};
 use super::instruction::{self, INSTRUCTIONS};
 use super::mark;
 use super::modal::SwitchSet;
 use super::parser::parse;
+use super::payload::{self, Gripped};
 use super::reaching_motions::ReachingMotions;
-use super::symbol::{SwitchExit, Symbols, Unit};
+use super::symbol::{Symbols, Unit};
 use super::syntax::{RapidTree, Syntax};
+use crate::dataflow::Nesting;
+use crate::motion::load::{Load, Loads};
 use crate::motion::{Listing, OpaqueRegion, Place, Reason, Role};
 use literals::Literals;
 
@@ -39,6 +42,8 @@ pub struct Task<'s> {
     pub symbols: Box<Symbols>,
     /// The motions that they command.
     pub listing: Listing,
+    /// The loads that they state.
+    loads: Loads,
     /// Whether a compact IF guards each motion alone.
     pub(super) guarded: Vec<bool>,
     /// Present and future places of each file's marks.
@@ -50,22 +55,26 @@ impl<'s> Task<'s> {
     pub fn read(files: &[(&str, &'s [u8])]) -> Task<'s> {
         let trees: Vec<_> = files.par_iter().map(|(_, bytes)| parse(bytes)).collect();
         let symbols = Box::new(Symbols::collect(&trees));
-        let ((listing, guarded), marks) =
+        let ((listing, loads, guarded), marks) =
             rayon::join(|| listing(&trees, &symbols), || trees.iter().map(mark::Places::of).collect());
         let names = files.iter().map(|(name, _)| (*name).to_owned()).collect();
         let sources = files.iter().map(|(_, bytes)| *bytes).collect();
-        Task { names, sources, trees, symbols, listing, guarded, marks }
+        Task { names, sources, trees, symbols, listing, loads, guarded, marks }
     }
 
-    /// Drops the trees, which are larger than the files. A rewrite does not need them; analyses of the statements
-    /// (`truegrind-compensation`'s `Loads`) do, and must run before.
+    /// The loads that the modules state.
+    pub fn loads(&self) -> Loads {
+        self.loads.clone()
+    }
+
+    /// Drops the trees, which are larger than the files and which a rewrite does not need.
     pub fn drop_trees(&mut self) {
         self.trees = Vec::new();
     }
 }
 
-/// The listing, and whether a compact IF guards each motion alone.
-fn listing(trees: &[RapidTree<'_>], symbols: &Symbols) -> (Listing, Vec<bool>) {
+/// The listing, its loads, and whether a compact IF guards each motion alone.
+fn listing(trees: &[RapidTree<'_>], symbols: &Symbols) -> (Listing, Loads, Vec<bool>) {
     let mut builder = ListingBuilder::new(trees, symbols);
     // Interpretation is sequential; targets written as numbers do not depend on it and are read on the other threads.
     let (mut builder, literals) = rayon::join(
@@ -80,7 +89,8 @@ fn listing(trees: &[RapidTree<'_>], symbols: &Symbols) -> (Listing, Vec<bool>) {
     builder.refuse_motions_before_displacement();
     builder.other_uses();
     builder.declared_tools();
-    (builder.listing, builder.guarded)
+    let loads = if symbols.states_loads { builder.loads() } else { Loads::default() };
+    (builder.listing, loads, builder.guarded)
 }
 
 /// Cache of look-ups by scope and name.
@@ -125,10 +135,13 @@ struct ListingBuilder<'a, 's> {
     units: Vec<u32>,
     unit: u32,
     sites: Vec<(u32, CallSite)>,
-    exits: Vec<Option<SwitchSet>>,
+    /// What holds at the end of each routine.
+    exits: Vec<Option<Exit>>,
+    /// How deep the calls are whose ends alone are computed: nothing is listed in them.
     depth: u32,
-    /// While only the exit switches of a routine are computed: nothing is listed.
-    silent: bool,
+    /// The load at each motion, "as at the entry" included, and those that motions state in total.
+    grips: Vec<Gripped>,
+    totals: HashMap<usize, Load>,
     /// Whether a displacement is counted from the end of any motion.
     position_used: bool,
     /// The units in which one is counted from the robot's position at their entry. A call determines that position; a new cycle,
@@ -186,7 +199,8 @@ impl<'a, 's> ListingBuilder<'a, 's> {
             sites: Vec::new(),
             exits: vec![None; symbols.routines.len()],
             depth: 0,
-            silent: false,
+            grips: Vec::new(),
+            totals: HashMap::new(),
             position_used: false,
             position_used_at_entry: Vec::new(),
             names: vec![None; INSTRUCTIONS.len()],
@@ -229,12 +243,14 @@ impl<'a, 's> ListingBuilder<'a, 's> {
         // Exit switches of callees first, however long the chain of calls is.
         for &unit in &self.symbols.callees_first {
             let Some(routine) = units[unit as usize].routine else { continue };
-            match self.symbols.switch_exits[unit as usize] {
-                SwitchExit::Unchanged => self.exits[routine as usize] = Some(SwitchSet::ENTRY),
-                SwitchExit::Changed { called: true } => {
-                    self.exit_switches(routine);
-                }
-                SwitchExit::Changed { called: false } => {}
+            if self.symbols.effects_of(routine).switches == SwitchSet::EMPTY {
+                let gripped = match self.symbols.states_loads {
+                    true => self.exit_of(routine).gripped,
+                    false => Some(Gripped::default()),
+                };
+                self.exits[routine as usize] = Some(Exit { modal: SwitchSet::ENTRY, gripped });
+            } else if self.symbols.called[unit as usize] {
+                self.exit_of(routine);
             }
         }
         for (index, unit) in units.iter().enumerate() {
@@ -244,8 +260,8 @@ impl<'a, 's> ListingBuilder<'a, 's> {
             if let Some(routine) = unit.routine {
                 self.exits[routine as usize] = Some(exit);
                 if self.mains.contains(&routine) {
-                    // The next cycle begins with the switches at the end of this one.
-                    self.record_cycle_restart(exit);
+                    // The next cycle begins with the switches and the load at the end of this one.
+                    self.record_cycle_restart(exit.modal, exit.gripped.unwrap_or_default());
                 }
             }
         }
@@ -275,7 +291,7 @@ impl<'a, 's> ListingBuilder<'a, 's> {
 
 impl Visitor for ListingBuilder<'_, '_> {
     fn visit_call(&mut self, unit: Unit, node: u32, state: &AbstractState, nesting: Nesting) -> Option<u32> {
-        if self.silent {
+        if self.depth > 0 {
             return None;
         }
         let tree = &self.trees[unit.file as usize];
@@ -292,54 +308,57 @@ impl Visitor for ListingBuilder<'_, '_> {
         self.modal.push(state.modal);
         self.displaced.push(matches!(state.displacement(), Some(Ok(_))));
         self.units.push(self.unit);
+        if self.symbols.states_loads {
+            self.grips.push(if state.reachable { state.gripped } else { Gripped::UNKNOWN });
+            let context = Context::new(unit.file, unit.scope, &state.known);
+            let total = payload::total_load(&self.evaluator, context, tree, node).filter(|_| state.reachable);
+            self.totals.extend(total.map(|total| (self.listing.motions.len() - 1, total)));
+        }
         Some(self.listing.motions.len() as u32 - 1)
     }
 
-    fn exit_switches(&mut self, routine: u32) -> SwitchSet {
+    fn exit_of(&mut self, routine: u32) -> Exit {
         if let Some(exit) = self.exits[routine as usize] {
             return exit;
         }
-        let found = &self.symbols.routines[routine as usize];
         // As at the entry, or as any statement in it or its callees may set.
-        let any_exit = SwitchSet::ENTRY.join(found.effects.switches);
+        let modal = SwitchSet::ENTRY.join(self.symbols.effects_of(routine).switches);
+        let any = Exit { modal, gripped: Some(Gripped::UNKNOWN) };
         if self.depth >= CALL_DEPTH {
-            return any_exit;
+            return any;
         }
         // Assumed for recursive calls while the routine is interpreted.
-        self.exits[routine as usize] = Some(any_exit);
-        let unit = self.symbols.units[found.unit as usize];
-        let was = std::mem::replace(&mut self.silent, true);
+        self.exits[routine as usize] = Some(any);
         self.depth += 1;
-        let evaluator = Evaluator::new(self.trees, self.symbols);
-        let exit = interpret_unit(&evaluator, unit, self);
+        let unit = self.symbols.units[self.symbols.unit_of(routine) as usize];
+        let exit = interpret_unit(&Evaluator::new(self.trees, self.symbols), unit, self);
         self.depth -= 1;
-        self.silent = was;
         self.exits[routine as usize] = Some(exit);
         exit
     }
 
     fn record_call(&mut self, site: CallSite) {
-        if !self.silent {
+        if self.depth == 0 {
             self.sites.push((self.unit, site));
         }
     }
 
     fn record_late_call(&mut self, modal: SwitchSet) {
-        if !self.silent {
+        if self.depth == 0 {
             let late = &mut self.late[self.unit as usize];
             *late = late.join(modal);
         }
     }
 
     fn record_external_call(&mut self, modal: SwitchSet) {
-        if !self.silent {
+        if self.depth == 0 {
             let outside = &mut self.outside[self.unit as usize];
             *outside = outside.join(modal);
         }
     }
 
     fn record_position_use(&mut self, standing: &ReachingMotions) {
-        if self.silent {
+        if self.depth > 0 {
             return;
         }
         match standing.motions() {
@@ -355,9 +374,9 @@ impl Visitor for ListingBuilder<'_, '_> {
         }
     }
 
-    fn record_cycle_restart(&mut self, modal: SwitchSet) {
+    fn record_cycle_restart(&mut self, modal: SwitchSet, gripped: Gripped) {
         for at in 0..self.mains.len() {
-            self.record_call(CallSite { routine: self.mains[at], modal });
+            self.record_call(CallSite { routine: self.mains[at], modal, gripped });
         }
     }
 }

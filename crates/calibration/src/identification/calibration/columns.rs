@@ -178,7 +178,7 @@ impl Columns {
         if n == 0 {
             return Self::default();
         }
-        let mapped = |i: usize, j: usize| (start.joint_map * row(i).joints)[j];
+        let mapped = |i: usize, j: usize| start.mapped(&row(i).joints)[j];
         let components = match dataset.sensor {
             Sensor::Cable => 1,
             Sensor::Position => 3,
@@ -358,7 +358,7 @@ impl EffectRows {
             if posed.condition != *row.condition {
                 posed = start.at_condition(&row.condition);
             }
-            let rotation = posed.joint_rotations(&row.joints) - start.joint_map * row.joints;
+            let rotation = posed.joint_rotations(&row.joints) - start.mapped(&row.joints).0;
             for j in 0..6 {
                 out.extra[j][i] = rotation[j];
             }

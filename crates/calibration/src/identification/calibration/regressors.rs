@@ -2,14 +2,14 @@
 
 use std::cell::OnceCell;
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Point3, Vector3, Vector6};
 
 use super::frames::Frames;
 use crate::measurement::dataset::{Dataset, Reading, Row, Sensor};
 use crate::measurement::sensor::disturbance::Kind;
 use crate::measurement::sensor::empirical::{EmpiricalFault, second_degree};
 use truegrind_arm::condition::Condition;
-use truegrind_arm::model::{Joints, Model};
+use truegrind_arm::model::Model;
 
 /// Shifts of the sensor (mm), one for each parameter, from the row and the vector from sensor to target.
 type ShiftFn<'a> = dyn Fn(&Row, Vector3<f64>) -> Vec<Vector3<f64>> + 'a;
@@ -53,7 +53,7 @@ fn fault_rotations(fault: EmpiricalFault, dataset: &Dataset, model: &Model) -> V
         EmpiricalFault::TwoJointGear { joint, other, orders } => {
             let [own, others] = orders.map(f64::from);
             let angle = |r: &Row, sign: f64| {
-                let u = model.joint_map * r.joints;
+                let u = model.mapped(&r.joints);
                 own * u[joint] + sign * others * u[other]
             };
             [(1.0, true), (1.0, false), (-1.0, true), (-1.0, false)]
@@ -70,13 +70,13 @@ fn fault_rotations(fault: EmpiricalFault, dataset: &Dataset, model: &Model) -> V
 }
 
 /// Static torques (N m): of the arm's masses where these are known, otherwise of 1 kg at the flange.
-fn torques(dataset: &Dataset, model: &Model) -> Vec<Joints> {
+fn torques(dataset: &Dataset, model: &Model) -> Vec<Vector6<f64>> {
     if model.bodies.is_none() {
         return flange_torques(dataset, model);
     }
     let statics = Model { effects: Vec::new(), ..model.clone() }.statics();
     let torque =
-        |r: &Row| Joints::from(statics.torques::<f64>(&(model.joint_map * r.joints).into(), &r.condition));
+        |r: &Row| Vector6::from(statics.torques::<f64>(&model.mapped(&r.joints).into(), &r.condition));
     dataset.rows.iter().map(torque).collect()
 }
 
@@ -152,7 +152,7 @@ pub fn sensor_shifts(
 pub struct LoadedRows<'a> {
     dataset: &'a Dataset,
     model: &'a Model,
-    torques: OnceCell<Vec<Joints>>,
+    torques: OnceCell<Vec<Vector6<f64>>>,
 }
 
 impl<'a> LoadedRows<'a> {
@@ -161,7 +161,7 @@ impl<'a> LoadedRows<'a> {
         Self { dataset, model, torques: OnceCell::new() }
     }
 
-    fn flange_torques(&self) -> &[Joints] {
+    fn flange_torques(&self) -> &[Vector6<f64>] {
         self.torques.get_or_init(|| flange_torques(self.dataset, self.model))
     }
 }
@@ -194,13 +194,13 @@ pub fn joint_rotations(kind: &Kind, rows: &LoadedRows<'_>) -> Vec<[Option<Vec<f6
 }
 
 /// Torque about each joint of 1 kg at the flange, for every row (N m).
-pub fn flange_torques(dataset: &Dataset, model: &Model) -> Vec<Joints> {
+pub fn flange_torques(dataset: &Dataset, model: &Model) -> Vec<Vector6<f64>> {
     let bare = Model { bodies: None, effects: Vec::new(), ..model.clone() };
     let statics = bare.statics();
     let kilogram = Condition { payload_kg: Some(1.0), ..Condition::default() };
     dataset
         .rows
         .iter()
-        .map(|r| Joints::from(statics.torques::<f64>(&(model.joint_map * r.joints).into(), &kilogram)))
+        .map(|r| Vector6::from(statics.torques::<f64>(&model.mapped(&r.joints).into(), &kilogram)))
         .collect()
 }

@@ -10,7 +10,7 @@ use super::super::setup::{self, flange_tool};
 use super::super::syntax::{Word, WordValue};
 use super::super::token::Token;
 use super::{Block, Interpreter};
-use crate::motion::{Frame, Reason, Tool, WorkObject, WorkObjectValue};
+use crate::motion::{Frame, Reason, Tool, WorkObject, WorkObjectValue, intern};
 use truegrind_math::se3::Pose;
 
 impl Interpreter<'_, '_> {
@@ -461,16 +461,5 @@ impl Interpreter<'_, '_> {
         let index = intern(&mut self.listing.work_objects, work_object);
         self.frame_index = Some((name, self.state.programmable_frame, index));
         index
-    }
-}
-
-/// The index of an equal item, else of the new one.
-fn intern<T: PartialEq>(list: &mut Vec<T>, item: T) -> u32 {
-    match list.iter().rev().take(256).position(|other| *other == item) {
-        Some(back) => (list.len() - 1 - back) as u32,
-        None => {
-            list.push(item);
-            list.len() as u32 - 1
-        }
     }
 }

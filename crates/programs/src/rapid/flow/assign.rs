@@ -1,6 +1,7 @@
 //! Transfer function of assignments: to a whole, a component or an element.
 
 use super::{AbstractState, Interpreter, MAX_ELEMENTS, MAX_VALUE_SIZE};
+use crate::dataflow::Lattice;
 use crate::motion::Reason;
 use crate::rapid::evaluate::{Context, index_of};
 use crate::rapid::symbol::SymbolKind;
@@ -59,7 +60,7 @@ impl Interpreter<'_, '_, '_> {
             (self.resumes && (self.may_fail(place) || self.may_fail(expression))).then(|| state.clone());
         self.store(place, value, state);
         if let Some(skipped) = skipped {
-            *state = std::mem::replace(state, skipped.clone()).join(skipped);
+            state.join(&skipped);
         }
     }
 

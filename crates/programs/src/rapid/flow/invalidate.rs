@@ -1,8 +1,10 @@
 //! Invalidation of known values: data that a statement writes, that callees may write, and that other tasks may write meanwhile.
 
 use super::{AbstractState, CallSite, DISPLACEMENT, Interpreter};
+use crate::dataflow::Transfer;
 use crate::motion::Reason;
 use crate::rapid::modal::{Switch, SwitchSet};
+use crate::rapid::payload::Gripped;
 use crate::rapid::predefined;
 use crate::rapid::symbol::SymbolKind;
 use crate::rapid::syntax::Syntax;
@@ -25,14 +27,18 @@ impl Interpreter<'_, '_, '_> {
                 Syntax::LateCall => self.invalidate_nonlocal(state),
                 Syntax::Call => self.invalidate_called(name, kind, state),
                 Syntax::Function => {
+                    if self.may_grip(node) {
+                        state.gripped = Gripped::UNKNOWN;
+                    }
                     for &routine in symbols.callees(self.unit.scope, name) {
-                        let sets = symbols.routines[routine as usize].effects.switches;
+                        let sets = symbols.effects_of(routine).switches;
                         if self.resumes {
                             // RETRY may call it again after an error in it.
                             self.join_switches(sets, state);
                         }
                         self.join_switches(self.handler_switches, state);
-                        self.visitor.record_call(CallSite { routine, modal: state.modal });
+                        let AbstractState { modal, gripped, .. } = *state;
+                        self.visitor.record_call(CallSite { routine, modal, gripped });
                         self.join_switches(sets, state);
                     }
                     self.invalidate_called(name, kind, state);
@@ -42,11 +48,29 @@ impl Interpreter<'_, '_, '_> {
         }
     }
 
-    /// Invalidates what the expressions of a statement, such as its condition, may write.
-    pub(super) fn invalidate_condition(&mut self, node: u32, state: &mut AbstractState) {
+    /// Whether any statement or function under a node may change the gripped load.
+    pub(super) fn may_grip_under(&self, node: u32) -> bool {
+        let end = node + self.size(node);
+        self.evaluator.symbols.states_loads && (node..end).any(|node| self.may_grip(node))
+    }
+
+    /// Whether a statement or function may change the gripped load.
+    pub(super) fn may_grip(&self, node: u32) -> bool {
         let tree = &self.evaluator.trees[self.unit.file as usize];
-        for asked in tree.child_nodes(node).filter(|&node| tree.nodes[node as usize].kind.is_expression()) {
-            self.invalidate_changed(asked, state);
+        let symbols = self.evaluator.symbols;
+        let any_grips = |routines: &[u32]| routines.iter().any(|routine| symbols.effects_of(*routine).grips);
+        let found = tree.nodes[node as usize];
+        match found.kind {
+            Syntax::LateCall | Syntax::Opaque => true,
+            Syntax::Call | Syntax::Function => {
+                let name = tree.text(found.first);
+                match symbols.callees(self.unit.scope, name) {
+                    [] if predefined::calls_by_name(name) => any_grips(symbols.late_callees_of(self.unit)),
+                    [] => found.kind == Syntax::Call && predefined::grips(name),
+                    called => any_grips(called),
+                }
+            }
+            _ => false,
         }
     }
 
@@ -103,7 +127,7 @@ impl Interpreter<'_, '_, '_> {
             called @ [_, ..] => {
                 let mut moves = false;
                 for &routine in called {
-                    let effects = &symbols.routines[routine as usize].effects;
+                    let effects = symbols.effects_of(routine);
                     for &symbol in &effects.writes {
                         self.invalidate(symbol, state);
                     }

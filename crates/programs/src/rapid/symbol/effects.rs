@@ -1,5 +1,7 @@
-//! Side effects: the writes of one statement, the side-effect summary of a routine, and a unit's effect on the switches.
+//! Side effects: the writes of one statement, and the side-effect summary of a routine.
 
+use crate::dataflow::Lattice;
+use crate::motion::Reason;
 use crate::rapid::modal::SwitchSet;
 
 /// A routine that may write more outside data than this counts as writing anything.
@@ -49,20 +51,8 @@ pub struct SideEffects {
 }
 
 impl SideEffects {
-    /// Joins a callee's summary into this one.
-    pub(super) fn join(&mut self, callee: &SideEffects) {
-        self.writes_anything |= callee.writes_anything;
-        self.moves |= callee.moves;
-        self.waits |= callee.waits;
-        self.grips |= callee.grips;
-        self.impure |= callee.impure;
-        self.uses_position |= callee.uses_position;
-        self.switches = self.switches.join(callee.switches);
-        self.writes.extend_from_slice(&callee.writes);
-        if self.writes.len() > 4 * MAX_WRITES {
-            self.normalise();
-        }
-    }
+    /// How many times they can grow: the writes, "anything", five flags, the switches.
+    pub(super) const HEIGHT: usize = MAX_WRITES + 6 + SwitchSet::HEIGHT;
 
     /// Sorts the writes and widens too many of them to "anything".
     pub(super) fn normalise(&mut self) {
@@ -75,14 +65,25 @@ impl SideEffects {
     }
 }
 
-/// Effect of a unit on the switches that act in execution order.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum SwitchExit {
-    /// They are at its end as at its entry.
-    Unchanged,
-    /// Its statements may set some.
-    Changed {
-        /// Whether anything calls it.
-        called: bool,
-    },
+impl Lattice for SideEffects {
+    fn join(&mut self, callee: &Self) {
+        self.writes_anything |= callee.writes_anything;
+        self.moves |= callee.moves;
+        self.waits |= callee.waits;
+        self.grips |= callee.grips;
+        self.impure |= callee.impure;
+        self.uses_position |= callee.uses_position;
+        self.switches = self.switches.join(callee.switches);
+        self.writes.extend_from_slice(&callee.writes);
+        self.normalise();
+    }
+}
+
+/// Why data may be written: an assignment hides that it is also handed over.
+impl Lattice for Reason {
+    fn join(&mut self, other: &Self) {
+        if self != other {
+            *self = Reason::Assigned;
+        }
+    }
 }

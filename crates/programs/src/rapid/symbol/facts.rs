@@ -5,12 +5,13 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::effects::Write;
+use super::effects::{SideEffects, Write};
 use super::late_binding::NamePattern;
 use super::writes::literal_data_name;
 use super::{Symbols, Unit};
+use crate::dataflow::Lattice;
 use crate::rapid::instruction::{self, Also, INSTRUCTIONS};
-use crate::rapid::modal::{SwitchSet, switches_set_by};
+use crate::rapid::modal::switches_set_by;
 use crate::rapid::predefined;
 use crate::rapid::syntax::{Argument, RapidTree, Syntax, arguments, parts};
 use crate::rapid::token::{Token, folded, same_name};
@@ -22,19 +23,12 @@ pub(super) struct UnitFacts {
     pub(super) writes: Vec<Write>,
     /// The routines that it calls: its edges in the call graph.
     pub(super) calls: Vec<u32>,
-    /// Whether it calls unknown code.
-    pub(super) calls_unknown: bool,
-    pub(super) moves: bool,
-    pub(super) waits: bool,
-    pub(super) grips: bool,
-    pub(super) impure: bool,
-    pub(super) uses_position: bool,
+    /// What they do besides; the writes are above.
+    pub(super) effects: SideEffects,
     /// Types whose data it writes by a computed name; `None` for any type.
     pub(super) writes_by_name: Vec<Option<Vec<u8>>>,
     /// The calls that set a switch or call a routine of the program.
     pub(super) switch_calls: Vec<u32>,
-    /// The switches that it sets.
-    pub(super) switches: SwitchSet,
     /// Name patterns of its calls by a computed name.
     pub(super) late_calls: BTreeSet<NamePattern>,
     /// Name patterns of the procedures that it lets the controller call while the robot moves.
@@ -51,15 +45,9 @@ impl UnitFacts {
         self.switch_calls.extend(next.switch_calls);
         self.interrupts.extend(next.interrupts);
         self.late_calls.extend(next.late_calls);
-        self.calls_unknown |= next.calls_unknown;
-        self.moves |= next.moves;
-        self.waits |= next.waits;
-        self.grips |= next.grips;
-        self.impure |= next.impure;
-        self.uses_position |= next.uses_position;
+        self.effects.join(&next.effects);
         self.writes_by_name.extend(next.writes_by_name);
         self.restarts_main |= next.restarts_main;
-        self.switches = self.switches.join(next.switches);
         self
     }
 
@@ -107,7 +95,7 @@ impl Symbols {
                 continue;
             }
             if kind == Syntax::Call && self.is_plain_motion(tree, unit.scope, node) {
-                (facts.moves, facts.impure) = (true, true);
+                (facts.effects.moves, facts.effects.impure) = (true, true);
                 node += 1;
                 continue;
             }
@@ -121,10 +109,10 @@ impl Symbols {
                 }
                 Syntax::Call | Syntax::Function => self.add_call(tree, unit, (node, kind), &mut facts),
                 // The condition may depend on another task.
-                Syntax::While => facts.waits = true,
+                Syntax::While => facts.effects.waits = true,
                 _ => {}
             }
-            facts.impure |= self.is_node_impure(tree, unit.scope, node);
+            facts.effects.impure |= self.is_node_impure(tree, unit.scope, node);
             node += 1;
         }
         facts
@@ -140,10 +128,10 @@ impl Symbols {
             && let Some(switches) = switches_set_by(tree, node, name)
         {
             facts.add_switch_call(node);
-            facts.switches = facts.switches.join(switches);
+            facts.effects.switches = facts.effects.switches.join(switches);
         }
         if is_call && self.is_motion(unit.scope, name) {
-            facts.moves = true;
+            facts.effects.moves = true;
             if instruction::find(name).is_some_and(|known| INSTRUCTIONS[known].also == Also::Calls) {
                 let name = arguments(tree, node).filter(|argument| !argument.optional).last();
                 facts.interrupts.insert(NamePattern::of(tree, (name.and_then(|name| name.value), 0, false)));
@@ -159,15 +147,17 @@ impl Symbols {
                 let name = arguments(tree, node).find(|argument| !argument.optional);
                 add_late_call(tree, (node, name.and_then(|name| name.value)), facts);
             }
-            [] if predefined::effect(name).is_none() => (facts.calls_unknown, facts.moves) = (true, true),
+            [] if predefined::effect(name).is_none() => {
+                (facts.effects.writes_anything, facts.effects.moves) = (true, true)
+            }
             [] => {
-                facts.moves |= predefined::displaces(name).is_some();
+                facts.effects.moves |= predefined::displaces(name).is_some();
                 facts.restarts_main |= predefined::begins_cycle(name);
-                facts.uses_position |= counts_from_position(tree, node, name);
-                facts.waits |= predefined::waits(name);
-                facts.grips |= predefined::grips(name);
+                facts.effects.uses_position |= counts_from_position(tree, node, name);
+                facts.effects.waits |= predefined::waits(name);
+                facts.effects.grips |= predefined::grips(name);
                 // It may write data of any caller.
-                facts.calls_unknown |= self.writes_unknown_data(tree, unit.scope, node, name);
+                facts.effects.writes_anything |= self.writes_unknown_data(tree, unit.scope, node, name);
                 if name.eq_ignore_ascii_case(b"SetAllDataVal") {
                     let type_name = |name| self.resolved_type(unit.scope, &folded(name)).to_vec();
                     facts.writes_by_name.push(literal_data_name(tree, node).map(type_name));
@@ -239,7 +229,7 @@ impl Symbols {
 
 /// A call by a computed name.
 fn add_late_call(tree: &RapidTree<'_>, (node, name): (u32, Option<Child>), facts: &mut UnitFacts) {
-    (facts.calls_unknown, facts.moves) = (true, true);
+    (facts.effects.writes_anything, facts.effects.moves) = (true, true);
     facts.add_switch_call(node);
     // CallByVar appends a number to the name that it is given.
     let numbered = tree.nodes[node as usize].kind == Syntax::Call;
@@ -266,4 +256,15 @@ pub(crate) fn is_resuming_handler(tree: &RapidTree<'_>, clause: u32) -> bool {
     };
     let end = clause + tree.nodes[clause as usize].size;
     tree.nodes[clause as usize].kind == Syntax::ErrorClause && (clause..end).any(resumes)
+}
+
+/// Whether anything in the files has the name of GripLoad or of the option TLoad.
+pub(super) fn name_loads(trees: &[RapidTree<'_>]) -> bool {
+    trees.iter().any(|tree| {
+        tree.kinds().par_chunks(PORTION as usize).enumerate().any(|(portion, kinds)| {
+            let names = (portion as u32 * PORTION..).zip(kinds).filter(|(_, kind)| **kind == Token::Ident);
+            let mut texts = names.map(|(token, _)| tree.text(token));
+            texts.any(|text| same_name(text, b"GripLoad") || same_name(text, b"TLoad"))
+        })
+    })
 }

@@ -4,7 +4,6 @@
 //! patterns, and units with the same patterns, share one list.
 
 use std::collections::{BTreeSet, HashMap};
-use std::sync::Arc;
 
 use super::Symbols;
 use crate::rapid::syntax::{RapidTree, Syntax, parts};
@@ -80,7 +79,9 @@ pub(super) struct ProcedureIndex {
     backward: Vec<(Vec<u8>, u32)>,
     /// Required parameters of each routine.
     required: Vec<usize>,
-    found: HashMap<BTreeSet<NamePattern>, Arc<[u32]>>,
+    found: HashMap<BTreeSet<NamePattern>, u32>,
+    /// The routines that match, sorted, for each set of patterns.
+    pub(super) lists: Vec<Vec<u32>>,
 }
 
 impl ProcedureIndex {
@@ -101,11 +102,11 @@ impl ProcedureIndex {
             forward.iter().map(|(name, at)| (turned(name), *at)).collect();
         forward.sort_unstable();
         backward.sort_unstable();
-        ProcedureIndex { forward, backward, required, found: HashMap::new() }
+        ProcedureIndex { forward, backward, required, found: HashMap::new(), lists: Vec::new() }
     }
 
-    /// The procedures that match any of the patterns, sorted.
-    pub(super) fn matches(&mut self, patterns: &BTreeSet<NamePattern>) -> Arc<[u32]> {
+    /// The procedures that match any of the patterns: index into `lists`.
+    pub(super) fn matches(&mut self, patterns: &BTreeSet<NamePattern>) -> u32 {
         let few = patterns.len() <= MAX_COMPARED;
         let covered = |one: &NamePattern| {
             few && patterns
@@ -113,15 +114,16 @@ impl ProcedureIndex {
                 .any(|other| other != one && other.covers(one) && !(one.covers(other) && other > one))
         };
         let least: BTreeSet<NamePattern> = patterns.iter().filter(|one| !covered(one)).cloned().collect();
-        if let Some(found) = self.found.get(&least) {
-            return found.clone();
+        if let Some(&found) = self.found.get(&least) {
+            return found;
         }
         let mut all: Vec<u32> = least.iter().flat_map(|one| self.match_one(one)).collect();
         all.sort_unstable();
         all.dedup();
-        let all: Arc<[u32]> = all.into();
-        self.found.insert(least, all.clone());
-        all
+        let list = self.lists.len() as u32;
+        self.lists.push(all);
+        self.found.insert(least, list);
+        list
     }
 
     fn match_one(&self, pattern: &NamePattern) -> Vec<u32> {

@@ -1,21 +1,19 @@
 //! Interprocedural side effects: fixpoints over the call graph, on the facts of each unit.
 //!
-//! Method: flow-insensitive may-analysis. Two fixpoints, callees first so that one pass suffices without recursion: which
-//! parameters by reference each routine writes, then the side-effect summary of each routine. Both only grow. Unknown code (a
-//! routine that no file declares) and a call by a computed name may write everything outside their caller. A third step marks
-//! volatile data: what an interrupt routine, an error handler that resumes, or the controller may write between any two
-//! statements.
+//! Method: flow-insensitive may-analysis. Two least fixpoints ([`propagate`]): which parameters by reference are written, then the
+//! side-effect summary of each routine. Unknown code (a routine that no file declares) and a call by a computed name may write
+//! everything outside their caller. A third step marks volatile data: what an interrupt routine, an error handler that resumes,
+//! or the controller may write between any two statements.
 
-use std::collections::{HashMap, HashSet};
-use std::sync::Arc;
+use std::collections::HashSet;
 
-use super::effects::{SideEffects, SwitchExit, Write, WriteKind};
-use super::facts::{UnitFacts, is_resuming_handler};
+use super::effects::{SideEffects, Write, WriteKind};
+use super::facts::{UnitFacts, is_resuming_handler, name_loads};
 use super::late_binding::ProcedureIndex;
 use super::writes::component_path;
 use super::{Symbol, SymbolKind, Symbols, Unit};
+use crate::dataflow::{Edge, Lattice, post_order, propagate};
 use crate::motion::Reason;
-use crate::rapid::modal::SwitchSet;
 use crate::rapid::syntax::{RapidTree, Syntax};
 use crate::rapid::token::folded;
 
@@ -33,7 +31,10 @@ impl Symbols {
             }
         }
         let mut all = self.collect_facts(trees);
-        self.callees_first = self.order_callees_first(&all);
+        let calls =
+            (0..).zip(&all).flat_map(|(unit, facts)| facts.calls.iter().map(move |&callee| (unit, callee)));
+        let calls: Vec<Edge<()>> = calls.map(|(unit, callee)| (unit, self.unit_of(callee), ())).collect();
+        self.callees_first = post_order(all.len(), &calls);
         if self.solve_parameter_writes(trees) {
             // Calls write more than their own text shows.
             all = self.collect_facts(trees);
@@ -51,69 +52,29 @@ impl Symbols {
         }
         self.record_writes_by_name(&all);
         let mut procedures = ProcedureIndex::of(self, trees);
-        self.late_callees = all.iter().map(|facts| procedures.matches(&facts.late_calls)).collect();
+        self.late_list = all.iter().map(|facts| procedures.matches(&facts.late_calls)).collect();
         self.interrupts = self.routines.iter().map(|routine| routine.head.kind == Syntax::Trap).collect();
         for facts in &all {
-            for &routine in procedures.matches(&facts.interrupts).iter() {
-                self.interrupts[routine as usize] = true;
-            }
-            self.all_switches = self.all_switches.join(facts.switches);
+            let called = procedures.matches(&facts.interrupts) as usize;
+            procedures.lists[called].iter().for_each(|&routine| self.interrupts[routine as usize] = true);
+            self.all_switches = self.all_switches.join(facts.effects.switches);
             self.restarts_main |= facts.restarts_main;
         }
+        self.late_lists = procedures.lists;
         let interrupting = (0..).zip(&self.interrupts).filter(|&(_, &interrupts)| interrupts);
         self.interrupt_routines = interrupting.map(|(routine, _)| routine).collect();
         self.solve_side_effects(&all);
+        self.states_loads = name_loads(trees);
         self.interrupts_move_robot = self.find_moving_interrupts(trees);
-        self.late_switches = self.late_call_effects().into_iter().map(|(_, switches)| switches).collect();
         self.solve_volatile_data(trees, &all);
-        let mut called = vec![false; all.len()];
-        for &routine in all.iter().flat_map(|facts| &facts.calls) {
-            called[self.routines[routine as usize].unit as usize] = true;
-        }
-        for (at, facts) in all.into_iter().enumerate() {
-            let unchanged = match self.units[at].routine {
-                Some(routine) => self.effects_of(routine).switches == SwitchSet::EMPTY,
-                None => facts.switch_calls.is_empty(),
-            };
-            let exit =
-                if unchanged { SwitchExit::Unchanged } else { SwitchExit::Changed { called: called[at] } };
-            self.switch_exits.push(exit);
-            self.switch_calls.push(facts.switch_calls);
-        }
+        self.called = vec![false; all.len()];
+        calls.iter().for_each(|(_, callee, ())| self.called[*callee as usize] = true);
+        self.switch_calls = all.into_iter().map(|facts| facts.switch_calls).collect();
     }
 
     /// The side-effect summary of a routine.
-    pub(super) fn effects_of(&self, routine: u32) -> &SideEffects {
+    pub(in crate::rapid) fn effects_of(&self, routine: u32) -> &SideEffects {
         &self.routines[routine as usize].effects
-    }
-
-    /// Post-order of the call graph: each unit after its callees, except along recursive calls.
-    fn order_callees_first(&self, all: &[UnitFacts]) -> Vec<u32> {
-        let mut out = Vec::with_capacity(all.len());
-        let mut seen = vec![false; all.len()];
-        let mut stack: Vec<(u32, usize)> = Vec::new();
-        for root in 0..all.len() as u32 {
-            if std::mem::replace(&mut seen[root as usize], true) {
-                continue;
-            }
-            stack.push((root, 0));
-            while let Some((unit, next)) = stack.last_mut() {
-                match all[*unit as usize].calls.get(*next) {
-                    Some(&routine) => {
-                        *next += 1;
-                        let callee = self.routines[routine as usize].unit;
-                        if !std::mem::replace(&mut seen[callee as usize], true) {
-                            stack.push((callee, 0));
-                        }
-                    }
-                    None => {
-                        out.push(*unit);
-                        stack.pop();
-                    }
-                }
-            }
-        }
-        out
     }
 
     fn record_write(&mut self, tree: &RapidTree<'_>, write: &Write) {
@@ -153,116 +114,99 @@ impl Symbols {
         }
     }
 
-    /// Fixpoint: the parameters by reference that each routine writes, itself or through its callees. Whether there is any.
+    /// Fixpoint: the parameters by reference that each routine writes, itself or by passing them on. Whether there is any.
     fn solve_parameter_writes(&mut self, trees: &[RapidTree<'_>]) -> bool {
-        let by_reference =
-            |routine: u32| self.routines[routine as usize].head.parameters.iter().any(|p| p.by_reference);
-        let units = self.callees_first.iter().map(|&unit| self.units[unit as usize]);
-        let units: Vec<(Unit, u32)> =
-            units.filter_map(|unit| Some((unit, unit.routine.filter(|&r| by_reference(r))?))).collect();
-        let mut any = false;
-        loop {
-            let mut grown = false;
-            for &(unit, routine) in &units {
-                for (index, reason) in self.parameters_written_by(&trees[unit.file as usize], unit, routine) {
-                    let written = &mut self.routines[routine as usize].parameter_writes[index];
-                    if *written != Some(Reason::Assigned) && *written != Some(reason) {
-                        *written = Some(reason);
-                        grown = true;
-                    }
-                }
-            }
-            any |= grown;
-            if !grown {
-                return any;
-            }
+        // The parameters of all routines, one after another.
+        let mut firsts = Vec::with_capacity(self.routines.len());
+        let mut written: Vec<Option<Reason>> = Vec::new();
+        for routine in &self.routines {
+            firsts.push(written.len());
+            written.resize(written.len() + routine.head.parameters.len(), None);
         }
-    }
-
-    /// The parameters that the statements of a routine write.
-    fn parameters_written_by(&self, tree: &RapidTree<'_>, unit: Unit, routine: u32) -> Vec<(usize, Reason)> {
-        let parameters = &self.routines[routine as usize].head.parameters;
-        let mut out = Vec::new();
-        for node in unit.node + 1..unit.node + tree.nodes[unit.node as usize].size {
-            if !tree.nodes[node as usize].kind.may_change() {
+        let mut passed: Vec<Edge<()>> = Vec::new();
+        for unit in &self.units {
+            let Some(routine) = unit.routine else { continue };
+            let parameters = &self.routines[routine as usize].head.parameters;
+            if !parameters.iter().any(|parameter| parameter.by_reference) {
                 continue;
             }
-            self.for_each_write(tree, unit.scope, node, &mut |write| {
-                let symbol = &self.symbols[write.symbol as usize];
-                if symbol.kind != SymbolKind::Parameter || symbol.scope != unit.scope {
-                    return;
+            let own = |symbol: u32| {
+                let symbol = &self.symbols[symbol as usize];
+                let is_own = symbol.kind == SymbolKind::Parameter && symbol.scope == unit.scope;
+                let mut all = parameters.iter();
+                let at = all.position(|p| is_own && p.name == symbol.name && p.by_reference)?;
+                Some(firsts[routine as usize] + at)
+            };
+            let tree = &trees[unit.file as usize];
+            for node in unit.node + 1..unit.node + tree.nodes[unit.node as usize].size {
+                let found = tree.nodes[node as usize];
+                if !found.kind.may_change() {
+                    continue;
                 }
-                let index = parameters.iter().position(|p| p.name == symbol.name && p.by_reference);
-                let handed_over = write.kind == WriteKind::HandedOver;
-                let reason = if handed_over { Reason::HandedOver } else { Reason::Assigned };
-                out.extend(index.map(|index| (index, reason)));
-            });
+                self.for_each_write(tree, unit.scope, node, &mut |write| {
+                    let handed_over = write.kind == WriteKind::HandedOver;
+                    let reason = if handed_over { Reason::HandedOver } else { Reason::Assigned };
+                    if let Some(at) = own(write.symbol) {
+                        written[at].join(&Some(reason));
+                    }
+                });
+                let is_call = matches!(found.kind, Syntax::Call | Syntax::Function);
+                if is_call && !self.is_plain_motion(tree, unit.scope, node) {
+                    let callees = self.callees(unit.scope, tree.text(found.first));
+                    self.for_each_passed(tree, node, callees, &mut |callee, index, argument| {
+                        let data = argument.value.and_then(|value| self.root(tree, unit.scope, value));
+                        let from = firsts[callee as usize] + index;
+                        passed.extend(data.and_then(own).map(|at| (from as u32, at as u32, ())));
+                    });
+                }
+            }
         }
-        out
-    }
-
-    /// For each unit, the joined effects of the routines that it may call by a computed name: whether they grip, and the
-    /// switches that they set.
-    fn late_call_effects(&self) -> Vec<(bool, SwitchSet)> {
-        // Many units share one list.
-        let mut known: HashMap<*const u32, (bool, SwitchSet)> = HashMap::new();
-        let joined = |callees: &Arc<[u32]>| {
-            let effects = callees.iter().map(|&routine| self.effects_of(routine));
-            effects.fold((false, SwitchSet::EMPTY), |(grips, switches), effects| {
-                (grips || effects.grips, switches.join(effects.switches))
-            })
-        };
-        let callees = self.late_callees.iter();
-        callees.map(|callees| *known.entry(callees.as_ptr()).or_insert_with(|| joined(callees))).collect()
+        propagate(&mut written, 2, &mut passed, |(), reason| *reason);
+        for (routine, first) in self.routines.iter_mut().zip(firsts) {
+            let count = routine.head.parameters.len();
+            routine.parameter_writes = written[first..first + count].to_vec();
+        }
+        written.iter().any(Option::is_some)
     }
 
     /// Fixpoint: the side-effect summary of each routine.
     fn solve_side_effects(&mut self, all: &[UnitFacts]) {
-        for (facts, unit) in all.iter().zip(&self.units) {
-            let Some(routine) = unit.routine else { continue };
+        let own = |(facts, unit): (&UnitFacts, &Unit)| {
             let outside = |symbol: u32| self.symbols[symbol as usize].scope != unit.scope;
             let writes: Vec<u32> =
                 facts.writes.iter().map(|write| write.symbol).filter(|&s| outside(s)).collect();
             // A parameter by reference is data of the caller.
-            let writes_parameter =
-                self.routines[routine as usize].parameter_writes.iter().any(Option::is_some);
-            let mut effects = SideEffects {
-                impure: facts.impure || facts.calls_unknown || writes_parameter || !writes.is_empty(),
-                writes,
-                writes_anything: facts.calls_unknown,
-                moves: facts.moves,
-                waits: facts.waits,
-                grips: facts.grips,
-                uses_position: facts.uses_position,
-                switches: facts.switches,
-            };
+            let writes_parameter = unit.routine.is_some_and(|routine| {
+                self.routines[routine as usize].parameter_writes.iter().any(Option::is_some)
+            });
+            let mut effects = SideEffects { writes, ..facts.effects };
+            effects.impure |= effects.writes_anything || writes_parameter || !effects.writes.is_empty();
             effects.normalise();
-            self.routines[routine as usize].effects = effects;
+            effects
+        };
+        let mut effects: Vec<SideEffects> = all.iter().zip(&self.units).map(own).collect();
+        // Behind the units a node for each list of routines that a computed name may call; what else such a call may do is a fact
+        // of its caller.
+        let lists = all.len() as u32;
+        effects.resize(all.len() + self.late_lists.len(), SideEffects::default());
+        let mut edges: Vec<Edge<bool>> = Vec::new();
+        for ((caller, facts), list) in (0..).zip(all).zip(&self.late_list) {
+            edges.extend(facts.calls.iter().map(|&callee| (self.unit_of(callee), caller, false)));
+            edges.push((lists + list, caller, false));
         }
-        loop {
-            let mut grown = false;
-            let late = self.late_call_effects();
-            for &unit in &self.callees_first {
-                let Some(routine) = self.units[unit as usize].routine else { continue };
-                let mut effects = std::mem::take(&mut self.routines[routine as usize].effects);
-                // All but the writes, of which the number tells whether they grew.
-                let size = |effects: &SideEffects| {
-                    let count = effects.writes.len();
-                    (count, SideEffects { writes: Vec::new(), ..*effects })
-                };
-                let before = size(&effects);
-                let (grips, switches) = late[unit as usize];
-                effects.grips |= grips;
-                effects.switches = effects.switches.join(switches);
-                for &callee in &all[unit as usize].calls {
-                    effects.join(self.effects_of(callee));
-                }
-                effects.normalise();
-                grown |= before != size(&effects);
+        for (list, callees) in (lists..).zip(&self.late_lists) {
+            edges.extend(callees.iter().map(|&callee| (self.unit_of(callee), list, true)));
+        }
+        edges.sort_unstable();
+        edges.dedup();
+        propagate(&mut effects, SideEffects::HEIGHT, &mut edges, |&late, callee| match late {
+            true => SideEffects { grips: callee.grips, switches: callee.switches, ..SideEffects::default() },
+            false => callee.clone(),
+        });
+        self.late_switches = effects.split_off(all.len()).iter().map(|effects| effects.switches).collect();
+        for (unit, effects) in self.units.iter().zip(effects) {
+            if let Some(routine) = unit.routine {
                 self.routines[routine as usize].effects = effects;
-            }
-            if !grown {
-                return;
             }
         }
     }
@@ -287,8 +231,7 @@ impl Symbols {
                 let end = clause + tree.nodes[clause as usize].size;
                 let facts = self.facts_of(trees, *unit, clause + 1..end);
                 let writes = facts.writes.iter().map(|write| write.symbol).collect();
-                let writes_anything = facts.calls_unknown;
-                add(&SideEffects { writes, writes_anything, ..SideEffects::default() });
+                add(&SideEffects { writes, ..facts.effects });
                 for callee in facts.calls {
                     add(self.effects_of(callee));
                 }

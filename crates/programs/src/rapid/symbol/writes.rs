@@ -1,8 +1,8 @@
 //! The writes of one statement: which data an assignment, call or function writes, callees counted by the parameters that
 //! they write.
 
+use super::Symbols;
 use super::effects::{Write, WriteKind};
-use super::{RoutineScope, Symbols};
 use crate::motion::Reason;
 use crate::rapid::instruction::{self, Also, INSTRUCTIONS, Instruction, Slot};
 use crate::rapid::predefined::{self, Effect};
@@ -66,9 +66,14 @@ impl Symbols {
         }
         let root = |argument: &Argument| self.root(tree, scope, argument.value?);
         let callees = self.callees(scope, name);
-        for routine in callees.iter().map(|&routine| &self.routines[routine as usize]) {
-            self.writes_of_routine(tree, scope, node, routine, add);
-        }
+        self.for_each_passed(tree, node, callees, &mut |routine, index, argument| match self.routines
+            [routine as usize]
+            .parameter_writes[index]
+        {
+            Some(Reason::HandedOver) => add(root(argument), WriteKind::HandedOver),
+            Some(_) => add(root(argument), WriteKind::Whole),
+            None => {}
+        });
         if !callees.is_empty() {
             return;
         }
@@ -112,28 +117,28 @@ impl Symbols {
         }
     }
 
-    /// The arguments that a routine of the program writes.
-    fn writes_of_routine(
+    /// Reports the arguments of a call: routine, index of its parameter, argument.
+    pub(super) fn for_each_passed(
         &self,
         tree: &RapidTree<'_>,
-        scope: u32,
         node: u32,
-        routine: &RoutineScope,
-        add: &mut dyn FnMut(Option<u32>, WriteKind),
+        callees: &[u32],
+        report: &mut dyn FnMut(u32, usize, &Argument),
     ) {
-        let root = |argument: &Argument| self.root(tree, scope, argument.value?);
-        let mut required = (0..).zip(&routine.head.parameters).filter(|(_, parameter)| !parameter.optional);
-        for argument in arguments(tree, node) {
-            let index: Option<usize> = match argument.name {
-                None => required.next().map(|(index, _)| index),
-                Some(name) => self.parameter(routine.scope, tree.text(name)).and_then(|name| {
-                    routine.head.parameters.iter().position(|parameter| parameter.name == name)
-                }),
-            };
-            match index.and_then(|index| routine.parameter_writes[index]) {
-                Some(Reason::HandedOver) => add(root(&argument), WriteKind::HandedOver),
-                Some(_) => add(root(&argument), WriteKind::Whole),
-                None => {}
+        for &callee in callees {
+            let routine = &self.routines[callee as usize];
+            let mut required =
+                (0..).zip(&routine.head.parameters).filter(|(_, parameter)| !parameter.optional);
+            for argument in arguments(tree, node) {
+                let index: Option<usize> = match argument.name {
+                    None => required.next().map(|(index, _)| index),
+                    Some(name) => self.parameter(routine.scope, tree.text(name)).and_then(|name| {
+                        routine.head.parameters.iter().position(|parameter| parameter.name == name)
+                    }),
+                };
+                if let Some(index) = index {
+                    report(callee, index, &argument);
+                }
             }
         }
     }

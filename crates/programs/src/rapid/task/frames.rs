@@ -2,7 +2,7 @@
 
 use super::super::flow::AbstractState;
 use super::ListingBuilder;
-use crate::motion::{Frame, Place, Reason, Speed, Tool, WorkObject, Zone};
+use crate::motion::{Frame, Place, Reason, Speed, Tool, WorkObject, Zone, intern};
 use crate::rapid::evaluate::{Context, Known};
 use crate::rapid::symbol::{SymbolKind, Unit};
 use crate::rapid::syntax::{text_of, tokens_of};
@@ -149,17 +149,5 @@ impl<'s> ListingBuilder<'_, 's> {
             self.work_objects.put(scope, text, index);
         }
         index
-    }
-}
-
-/// The index of an equal item among the last, else of the new one: thousands of different inline speeds must not cost
-/// their square.
-fn intern<T: PartialEq>(list: &mut Vec<T>, item: T) -> u32 {
-    match list.iter().rev().take(256).position(|other| *other == item) {
-        Some(back) => (list.len() - 1 - back) as u32,
-        None => {
-            list.push(item);
-            list.len() as u32 - 1
-        }
     }
 }

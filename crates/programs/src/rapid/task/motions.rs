@@ -3,9 +3,10 @@
 use std::sync::Arc;
 
 use super::{ListingBuilder, Literal, literals};
+use crate::dataflow::Nesting;
 use crate::motion::{Declaration, Motion, MotionKind, MotionTarget, Origin, Reason, Role, Routine};
 use crate::rapid::evaluate::{Context, Source};
-use crate::rapid::flow::{AbstractState, Nesting};
+use crate::rapid::flow::AbstractState;
 use crate::rapid::instruction::{INSTRUCTIONS, Instruction, Slot};
 use crate::rapid::predefined;
 use crate::rapid::symbol::{SymbolKind, Unit};

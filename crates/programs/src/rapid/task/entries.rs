@@ -1,11 +1,12 @@
-//! Entry switches: a fixpoint over the call graph, and the motions that the switches exclude from changes.
-
-use std::collections::BTreeMap;
+//! Switches and loads with which units are entered: fixpoints along the calls; the motions that the switches exclude from changes.
 
 use super::ListingBuilder;
+use crate::dataflow::{Edge, propagate};
+use crate::motion::load::{Grip, Loads};
 use crate::motion::{Motion, MotionKind, Reason, Switch as SwitchState};
 use crate::rapid::flow::CallSite;
 use crate::rapid::modal::{Switch, SwitchSet};
+use crate::rapid::payload::Gripped;
 
 impl ListingBuilder<'_, '_> {
     /// Refuses all motions where a displacement may be counted from the end of any of them.
@@ -41,17 +42,17 @@ impl ListingBuilder<'_, '_> {
         }
     }
 
-    /// Fixpoint over the call graph: the switches with which each unit may be entered.
+    /// Fixpoint: the switches with which each unit may be entered.
     fn solve_entry_switches(&self) -> Vec<SwitchSet> {
         let (units, symbols) = (&self.symbols.units, self.symbols);
-        let unit_of = |routine: u32| symbols.routines[routine as usize].unit;
+        let unit_of = |routine: u32| symbols.unit_of(routine);
         let mut called = vec![false; units.len()];
         for (unit, site) in &self.sites {
             // A recursive call is no entry.
             called[unit_of(site.routine) as usize] |= *unit != unit_of(site.routine);
         }
         // Before a routine that no file calls, another routine has run, or none.
-        let before = self.exits.iter().flatten().fold(SwitchSet::EMPTY, |all, exit| all.join(*exit));
+        let before = self.exits.iter().flatten().fold(SwitchSet::EMPTY, |all, exit| all.join(exit.modal));
         let alone = SwitchSet::START.join(before.substitute_entry(SwitchSet::EMPTY));
         let mut entries: Vec<SwitchSet> = Vec::with_capacity(units.len());
         for (unit, &called) in units.iter().zip(&called) {
@@ -69,49 +70,63 @@ impl ListingBuilder<'_, '_> {
                 Some(_) => alone,
             });
         }
-        // Callers first: one pass suffices without recursion.
-        let mut rank = vec![0_u32; units.len()];
-        for (at, &unit) in (0..).zip(&symbols.callees_first) {
-            rank[unit as usize] = at;
+        // Behind the units a node for each list of routines that a computed name may call, and one for unknown code.
+        let lists = units.len() as u32;
+        let unknown = lists + symbols.late_lists.len() as u32;
+        entries.resize(unknown as usize + 1, SwitchSet::EMPTY);
+        let called = self.sites.iter().map(|(unit, site)| (*unit, unit_of(site.routine), site.modal));
+        let mut edges: Vec<Edge<SwitchSet>> = called.collect();
+        for (unit, list) in (0..lists).zip(&symbols.late_list) {
+            edges.push((unit, lists + list, self.late[unit as usize]));
+            edges.push((unit, unknown, self.outside[unit as usize]));
         }
-        let mut sites: Vec<&(u32, CallSite)> = self.sites.iter().collect();
-        sites.sort_by_key(|(unit, _)| std::cmp::Reverse(rank[*unit as usize]));
+        for (list, callees) in (lists..).zip(&symbols.late_lists) {
+            edges.extend(callees.iter().map(|&routine| (list, unit_of(routine), SwitchSet::ENTRY)));
+        }
+        let global = symbols.routines.iter().filter(|routine| !routine.head.local);
+        edges.extend(global.map(|routine| (unknown, routine.unit, SwitchSet::ENTRY)));
         loop {
-            let before = entries.clone();
-            for (unit, site) in &sites {
-                let arriving = site.modal.substitute_entry(entries[*unit as usize]);
-                let callee = &mut entries[unit_of(site.routine) as usize];
-                *callee = callee.join(arriving);
-            }
-            let mut outside = SwitchSet::EMPTY;
-            // Many units share one list of routines.
-            let mut late: BTreeMap<*const u32, (SwitchSet, &[u32])> = BTreeMap::new();
-            for (unit, &entry) in entries.iter().enumerate().take(units.len()) {
-                outside = outside.join(self.outside[unit].substitute_entry(entry));
-                let called = &symbols.late_callees[unit];
-                let arriving = &mut late.entry(called.as_ptr()).or_insert((SwitchSet::EMPTY, called)).0;
-                *arriving = arriving.join(self.late[unit].substitute_entry(entry));
-            }
-            for (arriving, called) in late.into_values().filter(|(arriving, _)| *arriving != SwitchSet::EMPTY)
-            {
-                for &routine in called {
-                    let callee = &mut entries[unit_of(routine) as usize];
-                    *callee = callee.join(arriving);
-                }
-            }
-            for routine in symbols.routines.iter().filter(|routine| !routine.head.local) {
-                let callee = &mut entries[routine.unit as usize];
-                *callee = callee.join(outside);
-            }
-            if before != entries {
-                continue;
-            }
+            propagate(&mut entries, SwitchSet::HEIGHT, &mut edges, |modal, entry| {
+                modal.substitute_entry(*entry)
+            });
+            let of_units = &mut entries[..units.len()];
             // A cycle of routines that only call each other has no entry yet.
-            if !entries.contains(&SwitchSet::EMPTY) {
+            if !of_units.contains(&SwitchSet::EMPTY) {
+                entries.truncate(units.len());
                 return entries;
             }
-            entries.iter_mut().filter(|entry| **entry == SwitchSet::EMPTY).for_each(|entry| *entry = alone);
+            of_units.iter_mut().filter(|entry| **entry == SwitchSet::EMPTY).for_each(|entry| *entry = alone);
         }
+    }
+
+    /// The load at each motion.
+    pub(super) fn loads(&mut self) -> Loads {
+        let (symbols, totals) = (self.symbols, std::mem::take(&mut self.totals));
+        if symbols.interrupt_routines.iter().any(|routine| symbols.effects_of(*routine).grips) {
+            return Loads { grips: vec![Grip::Unknown; self.grips.len()], totals };
+        }
+        let entries = self.solve_entry_loads();
+        let at = |(gripped, unit): (&Gripped, &u32)| gripped.0.unwrap_or(entries[*unit as usize]);
+        Loads { grips: self.grips.iter().zip(&self.units).map(at).collect(), totals }
+    }
+
+    /// Fixpoint: none at the start of main; elsewhere the join over all calls.
+    fn solve_entry_loads(&self) -> Vec<Grip> {
+        let symbols = self.symbols;
+        let start = |routine: Option<u32>| routine.is_none_or(|routine| self.mains.contains(&routine));
+        let begins = symbols.units.iter().map(|unit| start(unit.routine).then_some(Grip::Empty));
+        let mut entries: Vec<Option<Grip>> = begins.collect();
+        // Computed calls and interrupts can occur with any load.
+        let late = symbols.late_list.iter().flat_map(|list| &symbols.late_lists[*list as usize]);
+        for routine in late.chain(&symbols.interrupt_routines) {
+            entries[symbols.unit_of(*routine) as usize] = Some(Grip::Unknown);
+        }
+        let calls =
+            self.sites.iter().map(|(unit, site)| (*unit, symbols.unit_of(site.routine), site.gripped));
+        let mut calls: Vec<Edge<Gripped>> = calls.collect();
+        propagate(&mut entries, 2, &mut calls, |gripped, entry| gripped.0.or(*entry));
+        // Never called in these files.
+        entries.into_iter().map(|entry| entry.unwrap_or(Grip::Unknown)).collect()
     }
 }
 
