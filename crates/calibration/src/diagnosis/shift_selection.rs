@@ -2,7 +2,9 @@
 //!
 //! The rows of a shift are searched, so a row helps to choose the shift that judges it. Drift that is met by steps, and error outside the
 //! catalogue, then look explained also on rows whose values no fit used. Here the shifts of the model are dropped; on the other rows of each
-//! fold they are searched again, of the same kinds, as long as they are supported, to first order and with all else refitted. The difference to the same folds with the shifts as found is what their choice adds to the mean square error.
+//! fold they are searched again, of the same kinds, as long as they are supported, to first order and with all else refitted: from none
+//! and from those found, of which the one wins that describes these other rows better. The difference to the same folds with the shifts
+//! as found is what their choice adds to the mean square error.
 //!
 //! Source: Varma and Simon 2006 (bias of cross-validation without the selection, nested cross-validation).
 
@@ -49,13 +51,25 @@ pub(super) fn added_mm2(
         }
     }
     let shifts: Vec<Shift> = kinds
-        .into_iter()
+        .iter()
         .map(|kind| {
-            let always = Cause::Measurement(Disturbance::new(kind.clone(), Profile::Constant));
+            let always = Cause::Measurement(Disturbance::new((*kind).clone(), Profile::Constant));
             let mut columns = Candidate::of(&always, subject).columns(raw);
             let sizes = always.sizes();
             columns.column_iter_mut().zip(&sizes).for_each(|(mut column, size)| column *= *size);
             Shift { columns, sizes: vec![1.0; sizes.len()] }
+        })
+        .collect();
+    let rows = &subject.observed.dataset.rows;
+    let found_shifts: Vec<Chosen> = places
+        .iter()
+        .filter_map(|&k| {
+            let Cause::Measurement(Disturbance { kind, .. }) = &found.causes[k] else { return None };
+            let [from, to] = found.causes[k].rows()?;
+            let inside = |i: &usize| (from..=to).contains(&rows[*i].number);
+            let first = (0..rows.len()).find(inside)?;
+            let last = (0..rows.len()).rfind(inside)?;
+            Some((kinds.iter().position(|known| *known == kind)?, first, last))
         })
         .collect();
     let parameters: Vec<usize> = places.iter().flat_map(|&k| found.parameter_indices(k)).collect();
@@ -64,7 +78,7 @@ pub(super) fn added_mm2(
         .par_iter()
         .map(|split| {
             let test: Vec<usize> = split.test.iter().copied().filter(|i| !set_aside.contains(i)).collect();
-            let again = searched(&base, &shifts, &split.train, places.len());
+            let again = Fold::of(&base, &shifts, &split.train).searched(&found_shifts);
             let square = again.held_out_mm2(&split.train, &test) - linear.held_out_mm2(&split.train, &test);
             [square, test.len() as f64]
         })
@@ -73,50 +87,95 @@ pub(super) fn added_mm2(
     square / count.max(1.0)
 }
 
-/// A shift in some of the rows of a fold: its kind, first and last row.
+/// A shift: its kind, first and last observation.
 type Chosen = (usize, usize, usize);
 
-/// The fit with shifts that are searched in the rows `train`: one after the other, then each again beside the others, then further ones.
-/// There can be twice as many as were found, since a search one by one needs more.
-fn searched(base: &Linear, shifts: &[Shift], train: &[usize], found: usize) -> Linear {
-    let whole = base.part(train).whole().design;
-    let of_train: Vec<DMatrix<f64>> =
-        shifts.iter().map(|shift| picked_rows(&shift.columns, train, base.per)).collect();
-    let columns = |&(kind, from, to): &Chosen| within(&of_train[kind], base.per, from, to);
-    let bar = 2.0 * tried(train.len() as f64).ln();
-    let best = |design: &Design| {
-        let scanned = of_train.iter().zip(shifts).enumerate().filter_map(|(kind, (columns, shift))| {
-            let scan = ShiftScan::of(design, columns, &shift.sizes)?;
-            Some((kind, *scan.scan(design, 1).first()?))
+/// The rows of a fold that are not held out.
+struct Fold<'a> {
+    base: &'a Linear,
+    shifts: &'a [Shift],
+    train: &'a [usize],
+    /// The columns of each kind in these rows.
+    columns: Vec<DMatrix<f64>>,
+    /// The design without shifts.
+    plain: Design,
+    /// Twice the logarithm of the number of intervals.
+    bar: f64,
+}
+
+impl<'a> Fold<'a> {
+    fn of(base: &'a Linear, shifts: &'a [Shift], train: &'a [usize]) -> Self {
+        let columns = shifts.iter().map(|shift| picked_rows(&shift.columns, train, base.per)).collect();
+        let plain = base.part(train).whole().design;
+        Self { base, shifts, train, columns, plain, bar: 2.0 * tried(train.len() as f64).ln() }
+    }
+
+    /// The fit with the shifts that describe these rows best. `found` are those of all rows.
+    fn searched(&self, found: &[Chosen]) -> Linear {
+        let here = |i: usize| self.train.partition_point(|&row| row < i);
+        let known = found.iter().filter_map(|&(kind, from, to)| {
+            let (first, end) = (here(from), here(to + 1));
+            (first < end).then(|| (kind, first, end - 1))
         });
-        let best = scanned.max_by(|a, b| a.1.evidence.total_cmp(&b.1.evidence));
-        best.filter(|(_, interval)| interval.evidence > bar).map(|(kind, i)| (kind, i.from, i.to))
-    };
-    let beside = |chosen: &[Chosen]| {
-        chosen.iter().fold(whole.clone(), |design, shift| design.with_random_effects(&columns(shift)))
-    };
-    let mut chosen: Vec<Chosen> = Vec::new();
-    let further = |chosen: &mut Vec<Chosen>| {
-        let mut design = beside(chosen);
-        while chosen.len() < 2 * found
-            && let Some(next) = best(&design)
+        let [anew, near] = [Vec::new(), known.collect()].map(|start| self.improved(start, 2 * found.len()));
+        let best = if self.criterion(&near) <= self.criterion(&anew) { near } else { anew };
+        let of_all = best.iter().map(|&(kind, from, to)| {
+            within(&self.shifts[kind].columns, self.base.per, self.train[from], self.train[to])
+        });
+        of_all.fold(self.base.clone(), |fit, columns| fit.with_random_effects(&columns))
+    }
+
+    /// Adds shifts one by one, searches each again beside the others, and adds further ones, `most` in all.
+    fn improved(&self, start: Vec<Chosen>, most: usize) -> Vec<Chosen> {
+        let mut chosen = self.extended(start, most);
+        for first in chosen.clone() {
+            checkpoint();
+            let others: Vec<Chosen> = chosen.iter().copied().filter(|shift| *shift != first).collect();
+            let again = self.best(&self.beside(&others));
+            chosen = others.into_iter().chain(again).collect();
+        }
+        self.extended(chosen, most)
+    }
+
+    fn extended(&self, mut chosen: Vec<Chosen>, most: usize) -> Vec<Chosen> {
+        let mut design = self.beside(&chosen);
+        while chosen.len() < most
+            && let Some(next) = self.best(&design)
         {
             checkpoint();
-            design = design.with_random_effects(&columns(&next));
+            design = design.with_random_effects(&self.columns_of(&next));
             chosen.push(next);
         }
-    };
-    further(&mut chosen);
-    for first in chosen.clone() {
-        let others: Vec<Chosen> = chosen.iter().copied().filter(|shift| *shift != first).collect();
-        let again = best(&beside(&others));
-        chosen = others.into_iter().chain(again).collect();
+        chosen
     }
-    further(&mut chosen);
-    let effects = chosen
-        .iter()
-        .map(|&(kind, from, to)| within(&shifts[kind].columns, base.per, train[from], train[to]));
-    effects.fold(base.clone(), |fit, columns| fit.with_random_effects(&columns))
+
+    /// The best further shift, if it is supported.
+    fn best(&self, design: &Design) -> Option<Chosen> {
+        let scanned =
+            self.columns.iter().zip(self.shifts).enumerate().filter_map(|(kind, (columns, shift))| {
+                let scan = ShiftScan::of(design, columns, &shift.sizes)?;
+                Some((kind, *scan.scan(design, 1).first()?))
+            });
+        let best = scanned.max_by(|a, b| a.1.evidence.total_cmp(&b.1.evidence));
+        best.filter(|(_, interval)| interval.evidence > self.bar).map(|(kind, i)| (kind, i.from, i.to))
+    }
+
+    fn columns_of(&self, &(kind, from, to): &Chosen) -> DMatrix<f64> {
+        within(&self.columns[kind], self.base.per, from, to)
+    }
+
+    fn beside(&self, chosen: &[Chosen]) -> Design {
+        chosen
+            .iter()
+            .fold(self.plain.clone(), |design, shift| design.with_random_effects(&self.columns_of(shift)))
+    }
+
+    /// χ² and, as in a search, a penalty for each parameter and each interval.
+    fn criterion(&self, chosen: &[Chosen]) -> f64 {
+        let rows = self.plain.residual.len() as f64;
+        let penalty = |&(kind, ..): &Chosen| self.columns[kind].ncols() as f64 * rows.ln() + self.bar;
+        self.beside(chosen).residual.norm_squared() + chosen.iter().map(penalty).sum::<f64>()
+    }
 }
 
 /// Columns of a shift in the observations `from` to `to`.
