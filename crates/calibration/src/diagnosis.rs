@@ -34,6 +34,7 @@ pub mod cause;
 pub mod catalogue;
 mod algebra;
 mod serial_correlation;
+mod shift_selection;
 pub mod discrepancy;
 pub mod halves;
 pub mod marginal;

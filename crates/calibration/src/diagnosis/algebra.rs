@@ -154,3 +154,9 @@ pub(super) fn eigen(a: &DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f64>)> {
     let vectors = DMatrix::from_fn(n, n, |i, k| found.U()[(i, k)]);
     values.iter().all(|v| v.is_finite()).then_some((values, vectors))
 }
+
+/// The scalar rows of some observations, `per` each.
+pub(super) fn picked_rows(columns: &DMatrix<f64>, observations: &[usize], per: usize) -> DMatrix<f64> {
+    let scalars: Vec<usize> = observations.iter().flat_map(|&i| i * per..(i + 1) * per).collect();
+    columns.select_rows(&scalars)
+}

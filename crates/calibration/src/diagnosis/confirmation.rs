@@ -16,7 +16,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::algebra::{lower_factor, product, solved};
+use super::algebra::{lower_factor, picked_rows, product, solved};
 use super::candidates::Scored;
 use super::catalogue::Candidate;
 use super::cause::Cause;
@@ -420,7 +420,7 @@ impl<'a> Half<'a> {
         let numbers: Vec<usize> = rows.iter().map(|&i| numbers[i]).collect();
         let (rho, noise) = (discrepancy.correlation, discrepancy.noise);
         let part = confirming.linear.part(rows);
-        let columns = picked(&discrepancy.columns, rows, confirming.linear.per);
+        let columns = picked_rows(&discrepancy.columns, rows, confirming.linear.per);
         let linear = part.with_random_effects(&columns).prewhitened(rho, &numbers, noise);
         Self { confirming, rows, numbers, rho, noise, linear }
     }
@@ -428,7 +428,7 @@ impl<'a> Half<'a> {
     /// Columns of all rows, in the rows of this half.
     fn columns(&self, of_all: &DMatrix<f64>) -> DMatrix<f64> {
         let per = self.linear.per;
-        prewhiten(&picked(of_all, self.rows, per), self.rho, &self.numbers, per) / self.noise
+        prewhiten(&picked_rows(of_all, self.rows, per), self.rho, &self.numbers, per) / self.noise
     }
 
     /// For each cause, whether it is recovered and whether its size differs; `None` if undetectable in this half.
@@ -574,9 +574,4 @@ fn ranges(columns: &[DMatrix<f64>]) -> Vec<std::ops::Range<usize>> {
             first - c.ncols()..first
         })
         .collect()
-}
-
-fn picked(columns: &DMatrix<f64>, observations: &[usize], per: usize) -> DMatrix<f64> {
-    let scalars: Vec<usize> = observations.iter().flat_map(|&i| i * per..(i + 1) * per).collect();
-    columns.select_rows(&scalars)
 }

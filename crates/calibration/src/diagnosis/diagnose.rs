@@ -6,7 +6,7 @@ use super::decision;
 use super::discrepancy::Discrepancy;
 use super::extension::{Extended, Subject};
 use super::finding::{DiagnoseError, Diagnosis, Fits, RangeNoise, SCHEMA, Source, Stage};
-use super::in_doubt;
+use super::in_doubt::{self, MissingError};
 use super::merged;
 pub use super::options::Options;
 use super::picture::Picture;
@@ -18,7 +18,7 @@ use super::sensor_causes::{self, probability_worse};
 use super::summary::{self, Summary};
 use super::testability::not_testable;
 use super::validation::{StageError, nominal};
-use super::written::{certain_causes, fit_written, time_discrepancy};
+use super::written::{certain_causes, fit_written, time_discrepancy, under_correlated_noise};
 use crate::identification::benefit::{Benefit, benefit};
 use crate::identification::calibration::Frames;
 use crate::identification::fit::{Fitted, Observations, frame_parameters};
@@ -100,6 +100,7 @@ pub fn diagnose(
     search.purge_validation(&mut confirmed);
     let structure = residual_tests::structure(&subject, &search.extended, &search.set_aside);
     let smoothed = search.fit_smooth_correction(&structure);
+    search.repeat_choice_of_shifts(&confirmed);
     let summary = summary::summarise(&search, &confirmed, &structure, smoothed);
     let mut notes: Vec<String> = needed.map(|needed| few_poses_note(dataset, needed)).into_iter().collect();
     notes.append(&mut search.notes);
@@ -115,7 +116,11 @@ pub fn diagnose(
     let of_all = thin_rows.is_none().then_some(&confirmed.outcome.discrepancy);
     let certain_model = certain_model(&search, &certain, of_all);
     let ((written, written_stage), chance) = without_measurement_causes(&search, certain_model, of_all);
-    let written = if written.causes.is_empty() { as_identified(&context, robot, written) } else { written };
+    let written = if written.causes.is_empty() {
+        as_identified(&context, robot, &written, of_all).unwrap_or(written)
+    } else {
+        written
+    };
     diagnosis.notes.extend(chance.map(|chance| {
         format!(
             "the written arm is fitted without the causes of the measurement: with them it would be worse with a probability of {:.0} %, \
@@ -124,12 +129,11 @@ pub fn diagnose(
             100.0 * sensor_causes::MOST_PROBABILITY
         )
     }));
+    let handing = Handing { search: &search, discrepancy: of_all, noise_floor_mm: diagnosis.noise_floor_mm };
     let handed = with_uncertain_causes(&search, &written, of_all);
-    let [before, geometry, _] = search.stages;
-    let stages = [before, geometry, written_stage];
-    let fits = [&written, handed.as_ref().unwrap_or(&written)].map(Fitted::from);
-    let with_causes = estimated(&context, robot, &fits, &stages, &diagnosis, &search.set_aside);
-    let (estimated, benefit) = or_geometry_alone(&search, with_causes, robot, &mut diagnosis.notes);
+    let with_causes =
+        handing.estimated(robot, [&written, handed.as_ref().unwrap_or(&written)], &written_stage);
+    let (estimated, benefit) = handing.or_geometry_alone(with_causes, robot, &mut diagnosis.notes);
     diagnosis.verdict = Some(estimated.verdict.clone());
     let (geometric, set_aside) = (search.geometric, search.set_aside);
     Ok(Diagnosed {
@@ -155,35 +159,58 @@ fn few_poses_note(dataset: &Dataset, needed: usize) -> String {
     )
 }
 
-/// The written arm with its benefit; where it is refused beside causes and geometry alone is not, that, with a note.
-fn or_geometry_alone(
-    search: &Search<'_>,
-    with_causes: (Estimated, Option<Benefit>),
-    robot: &str,
-    notes: &mut Vec<String>,
-) -> (Estimated, Option<Benefit>) {
-    let verdict = &with_causes.0.verdict;
-    if verdict.status != Judgement::Fail || search.extended.causes.is_empty() {
-        return with_causes;
-    }
-    let Some(alone) = geometry_alone(search.context, robot) else { return with_causes };
-    notes.push(format!(
-        "the written arm is geometry alone, as `identify` fits it: beside the causes the arm is refused, since {}",
-        verdict.reasons.first().map_or("it is implausible", String::as_str)
-    ));
-    alone
+/// What is needed to hand over an arm.
+struct Handing<'a> {
+    search: &'a Search<'a>,
+    discrepancy: Option<&'a Discrepancy>,
+    noise_floor_mm: Option<f64>,
 }
 
-/// The arm with geometry alone as `identify` fits it, with its expected benefit; `None` if its verdict is not favourable.
-///
-/// A cause whose law is only nearly right can drive links that the rows determine through it alone: where links warm up unequally, a
-/// common growth is met by a link of another length whose constant part the frames take up.
-fn geometry_alone(context: &SearchContext<'_>, robot: &str) -> Option<(Estimated, Option<Benefit>)> {
-    let done = identified(context, robot)?;
-    let favourable = matches!(done.estimated.verdict.status, Judgement::Pass | Judgement::NotEvaluated);
-    let mut estimated = done.estimated;
-    estimated.provenance.method = "diagnose".to_owned();
-    favourable.then_some((estimated, done.benefit))
+impl Handing<'_> {
+    /// The arm of a fit for compensation, with its expected benefit; `handed` is the same with uncertain causes. What both lack stands in
+    /// the covariance.
+    fn estimated(
+        &self,
+        robot: &str,
+        [written, handed]: [&Extended; 2],
+        stage: &StageError,
+    ) -> (Estimated, Option<Benefit>) {
+        let search = self.search;
+        let missing = in_doubt::missing_errors(&search.context.subject, &search.extended, handed);
+        let [before, geometry, _] = search.stages;
+        let fits = [written, handed].map(Fitted::from);
+        estimated(search, robot, (&fits, missing), &[before, geometry, *stage], self.noise_floor_mm)
+    }
+
+    /// The written arm with its benefit; where it is refused beside causes and geometry alone is not, that, with a note.
+    ///
+    /// A cause whose law is only nearly right can drive links that the rows determine through it alone: where links warm up unequally,
+    /// a common growth is met by a link of another length whose constant part the frames take up.
+    fn or_geometry_alone(
+        &self,
+        with_causes: (Estimated, Option<Benefit>),
+        robot: &str,
+        notes: &mut Vec<String>,
+    ) -> (Estimated, Option<Benefit>) {
+        let verdict = &with_causes.0.verdict;
+        if verdict.status != Judgement::Fail || self.search.extended.causes.is_empty() {
+            return with_causes;
+        }
+        let plain = written(self.search, &[], None);
+        let Some(alone) = as_identified(&self.search.context, robot, &plain, self.discrepancy) else {
+            return with_causes;
+        };
+        // An arm that is refused as implausible does not say how far this one may be off.
+        let alone = self.estimated(robot, [&alone; 2], &self.search.validation.stage(&alone));
+        if !matches!(alone.0.verdict.status, Judgement::Pass | Judgement::NotEvaluated) {
+            return with_causes;
+        }
+        notes.push(format!(
+            "the written arm is geometry alone, as `identify` fits it: beside the causes the arm is refused, since {}",
+            verdict.reasons.first().map_or("it is implausible", String::as_str)
+        ));
+        alone
+    }
 }
 
 /// The same rows identified, with the options of the diagnosis.
@@ -202,22 +229,27 @@ fn identified(context: &SearchContext<'_>, robot: &str) -> Option<Identification
     identify::identify(dataset, robot, subject.nominal, subject.frames, &share, &alone).ok()
 }
 
-/// A written arm without causes, with the estimate of `identify`: what names nothing should not write another geometry. `written`
-/// where that fit has other parameters or failed.
-fn as_identified(context: &SearchContext<'_>, robot: &str, written: Extended) -> Extended {
-    let Some(Fitted { parameters, priors, estimate, model, frames, .. }) =
-        identified(context, robot).map(|done| done.geometry)
-    else {
-        return written;
-    };
-    let places: Option<Vec<usize>> =
-        written.parameters.iter().map(|p| parameters.iter().position(|q| q == p)).collect();
-    let (Some(places), Some(own)) = (places, &estimate.covariance) else { return written };
+/// A written arm without causes, with the estimate of `identify`: what names nothing should not write another geometry. `None` where that
+/// fit has other parameters or failed.
+fn as_identified(
+    context: &SearchContext<'_>,
+    robot: &str,
+    written: &Extended,
+    discrepancy: Option<&Discrepancy>,
+) -> Option<Extended> {
+    let Fitted { parameters, priors, estimate, model, frames, problem, .. } =
+        identified(context, robot)?.geometry;
+    let place = |p| parameters.iter().position(|q| q == p);
+    let places = written.parameters.iter().map(place).collect::<Option<Vec<usize>>>()?;
+    // Rows that it rejects are few: those left count as consecutive.
+    let numbers: Vec<usize> = (0..problem.rows() / problem.rows_per_observation()).collect();
+    let own = estimate.covariance.as_ref()?;
+    let own = under_correlated_noise(&problem, &estimate.x, own, discrepancy, &numbers);
     let covariance = DMatrix::from_fn(places.len(), places.len(), |a, b| own[(places[a], places[b])]);
     let x: Vec<f64> = places.iter().map(|&k| estimate.x[k]).collect();
     let priors = places.iter().map(|&k| priors[k]).collect();
     let estimate = Estimate { x: x.clone(), covariance: Some(covariance), ..estimate };
-    Extended { priors, x, model, frames, estimate, ..written }
+    Some(Extended { priors, x, model, frames, estimate, ..written.clone() })
 }
 
 /// The model with `causes` under the tolerances of the arm.
@@ -266,7 +298,8 @@ fn without_measurement_causes(
         return (certain_model, None);
     }
     let SearchContext { dataset, subject, .. } = search.context;
-    let without = written(search, &of_the_arm, None);
+    let correlated = discrepancy.filter(|d| d.correlation > 0.0);
+    let without = written(search, &of_the_arm, correlated);
     let samples = Region::of(subject.observed.dataset.rows.iter().map(|row| &row.joints), 0.0).samples_deg;
     let beside = in_doubt::with_zero_causes(&without, certain_model.0.clone());
     match probability_worse(&certain_model.0, &beside, &mean_condition(dataset), &samples) {
@@ -395,19 +428,19 @@ fn stage(errors: &StageError) -> Stage {
     }
 }
 
-/// The arm for compensation and its expected benefit, from the written fit and the same with uncertain causes.
+/// The arm for compensation and its expected benefit, from the written fit and the same with uncertain causes, and what both lack.
 fn estimated(
-    context: &SearchContext<'_>,
+    search: &Search<'_>,
     robot: &str,
-    [fitted, handed]: &[Fitted; 2],
+    ([fitted, handed], missing): (&[Fitted; 2], Vec<MissingError>),
     stages: &[StageError; 3],
-    diagnosis: &Diagnosis,
-    set_aside: &[usize],
+    noise_floor_mm: Option<f64>,
 ) -> (Estimated, Option<Benefit>) {
-    let SearchContext { dataset, prepared, subject, options, .. } = context;
+    let SearchContext { dataset, prepared, subject, options, .. } = search.context;
+    let set_aside = &search.set_aside;
     let nominal_arm = subject.nominal;
     let order = arm_parameters_of(handed);
-    let estimated = Estimated {
+    let mut estimated = Estimated {
         robot: robot.to_owned(),
         nominal: nominal_arm.clone(),
         model: handed.model.clone(),
@@ -429,11 +462,12 @@ fn estimated(
         parameters: parameter_table(handed, nominal_arm).into_iter().filter(|p| p.is_of_arm()).collect(),
         registered: StageErrors { fitted: stages[0].fitted, held_out: stages[0].random },
         geometry: StageErrors { fitted: stages[2].fitted, held_out: stages[2].random },
-        noise_floor_mm: diagnosis.noise_floor_mm,
+        noise_floor_mm,
         verdict: Verdict { status: Judgement::NotEvaluated, reasons: Vec::new() },
         region: Region::of(subject.observed.dataset.rows.iter().map(|row| &row.joints), 0.0),
         condition: mean_condition(dataset),
     };
+    in_doubt::add_missing_errors(&mut estimated, missing);
     let mut estimated = with_sigma_in_region(estimated, handed);
     let rows = &subject.observed.dataset;
     // Links and benefit are judged by the tolerances of arms, not by the wide priors of a diagnosis.

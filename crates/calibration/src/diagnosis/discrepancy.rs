@@ -18,7 +18,9 @@ use rand_distr::{Distribution, StandardNormal};
 use super::design::{Linear, Slopes};
 use super::extension::Subject;
 use super::marginal::{self, Variances};
-use super::serial_correlation::{correlation_range, lag_one_correlation, prewhiten};
+use super::serial_correlation::{
+    NEGLIGIBLE as NEGLIGIBLE_CORRELATION, correlation_range, lag_one_correlation, prewhiten,
+};
 use crate::identification::calibration::flange_torques;
 use crate::measurement::dataset::{Dataset, Sensor};
 use truegrind_arm::model::Model;
@@ -370,6 +372,19 @@ impl Discrepancy {
     pub fn rms_mm(&self) -> f64 {
         let square: f64 = self.effect_mm.iter().map(|l| l * l).sum();
         (square / self.effect_mm.len().max(1) as f64).sqrt()
+    }
+
+    /// Of serially correlated noise, φ and a: the correlation is a φ^d at a distance of d rows. At the range it has fallen to
+    /// [`NEGLIGIBLE_CORRELATION`].
+    pub fn noise_process(&self) -> (f64, f64) {
+        let (near, range) = (self.correlation, self.correlation_range as f64);
+        if range < 2.0 || near <= NEGLIGIBLE_CORRELATION {
+            return (near, 1.0);
+        }
+        let decay = (NEGLIGIBLE_CORRELATION / near).powf((range - 1.0).recip());
+        // Faster than by the correlation of neighbours it cannot fall.
+        let decay = decay.max(near);
+        (decay, near / decay)
     }
 
     /// Whether there is significant discrepancy.

@@ -32,7 +32,7 @@ pub(super) fn lag_one_correlation(
 }
 
 /// Correlation below which residuals count as independent.
-const NEGLIGIBLE: f64 = 0.1;
+pub(super) const NEGLIGIBLE: f64 = 0.1;
 
 /// Largest lag that is tested, as a share of all rows.
 const MOST_LAG_SHARE: f64 = 0.04;

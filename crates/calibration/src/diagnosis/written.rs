@@ -7,15 +7,17 @@
 use nalgebra::DMatrix;
 
 use super::cause::Cause;
-use super::design::Linear;
+use super::design::{Linear, linearised};
 use super::discrepancy::Discrepancy;
 use super::extension::{Extended, Freedom, Subject, filled, fit};
 use super::link_growth;
 use super::sensor_law;
+use crate::identification::calibration::CalibrationProblem;
 use crate::identification::prior_width::learn_tolerance;
 use crate::identification::tolerance::Tolerance;
 use crate::measurement::sensor::disturbance::Kind;
 use truegrind_arm::parameter::Parameter;
+use truegrind_estimation::problem::Problem;
 
 /// The causes of a fit for the written model: all causes of the measurement, and those effects of the arm that are `certain`.
 pub(super) fn certain_causes(extended: &Extended, certain: &[bool]) -> Vec<Cause> {
@@ -57,7 +59,8 @@ pub(super) fn fit_written(
         stated
     };
     let held = refit(&Subject { tolerance: &tolerance, ..*subject }, &kept.causes, &kept);
-    let written = with_random_functions(subject, &held, time_discrepancy).unwrap_or(held);
+    let written = with_random_functions(subject, &held, time_discrepancy)
+        .unwrap_or_else(|| with_correlated_noise(subject, held, discrepancy));
     written.whole(&Subject { tolerance: &tolerance, ..*subject })
 }
 
@@ -69,6 +72,46 @@ pub(super) fn time_discrepancy(discrepancy: Option<&Discrepancy>) -> Option<&Dis
 
 fn refit(subject: &Subject<'_>, causes: &[Cause], near: &Extended) -> Extended {
     fit(subject, causes, Freedom::All, Some(near))
+}
+
+/// The fit with its covariance under serially correlated noise.
+fn with_correlated_noise(
+    subject: &Subject<'_>,
+    mut fit: Extended,
+    discrepancy: Option<&Discrepancy>,
+) -> Extended {
+    let numbers: Vec<usize> = subject.observed.dataset.rows.iter().map(|row| row.number).collect();
+    let under = |own| under_correlated_noise(&fit.problem, &fit.x, own, discrepancy, &numbers);
+    fit.estimate.covariance = fit.estimate.covariance.as_ref().map(under);
+    fit
+}
+
+/// The covariance that an estimate has under serially correlated noise. `own` is that for independent rows, `numbers` are the rows.
+///
+/// With C = `own`, J the whitened Jacobian, Λ the prior precisions and R the correlation of the noise, the estimate has the covariance
+/// C (JᵀR J + Λ) C = C + C Jᵀ(R − 1)J C. R is that of a first-order process beside independent noise, a φ^d between rows d apart, with
+/// the found correlation of neighbours and range. The estimate remains: rows weighted by R would be more efficient, but what is
+/// correlated can be model error along a path, and without it the rows would hardly determine the arm's lengths.
+/// Source: White 1980; Newey and West 1987 (covariance of least squares under correlated errors).
+pub(super) fn under_correlated_noise(
+    problem: &CalibrationProblem,
+    x: &[f64],
+    own: &DMatrix<f64>,
+    discrepancy: Option<&Discrepancy>,
+    numbers: &[usize],
+) -> DMatrix<f64> {
+    let Some(discrepancy) = discrepancy.filter(|d| d.correlation > 0.0) else { return own.clone() };
+    let (decay, share) = discrepancy.noise_process();
+    let (_, rows) = linearised(problem, x);
+    let (p, per) = (rows.nrows(), problem.rows_per_observation());
+    let mut before = DMatrix::zeros(p, per);
+    let mut pairs = DMatrix::zeros(p, p);
+    for (i, gap) in numbers.windows(2).map(|pair| pair[1].abs_diff(pair[0])).enumerate() {
+        before += rows.columns(i * per, per);
+        before *= decay.powi(gap.clamp(1, 1000) as i32);
+        pairs.gemm(share, &rows.columns((i + 1) * per, per), &before.transpose(), 1.0);
+    }
+    own + own * (&pairs + pairs.transpose()) * own
 }
 
 /// Prior standard deviations beyond which a link estimate is implausible.

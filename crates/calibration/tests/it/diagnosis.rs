@@ -13,3 +13,4 @@ mod found;
 mod in_doubt;
 mod parts;
 mod rules;
+mod shift_selection;

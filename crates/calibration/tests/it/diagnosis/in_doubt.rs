@@ -1,15 +1,20 @@
 //! What was found and is not certain: it moves nothing, and the covariance of the written arm says what it may be.
 
-use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Point3, Vector3};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::estimated::Estimated;
 use truegrind_arm::model::{Joints, Model};
 use truegrind_arm::parameter::Parameter;
+use truegrind_arm::robots;
 use truegrind_calibration::diagnosis::cause::Cause;
 use truegrind_calibration::diagnosis::diagnose::{Diagnosed, Options, diagnose};
 use truegrind_calibration::diagnosis::finding::Confidence;
 use truegrind_calibration::identification::start::candidate_frames;
+use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row, Sensor};
 use truegrind_calibration::measurement::import;
 use truegrind_calibration::measurement::simulation::recipe::Recipe;
 use truegrind_math::se3::Pose;
@@ -54,8 +59,9 @@ fn shape(points: &[Vector3<f64>]) -> DMatrix<f64> {
     DMatrix::identity(3 * points.len(), 3 * points.len()) - &basis * basis.transpose()
 }
 
-/// Root mean square of the true errors of the shape over their σ, axis by axis, at the tool over the measured region.
-fn errors_in_sigma(estimated: &Estimated, actual: &Model) -> f64 {
+/// Root mean square of the true errors of the shape over their σ, axis by axis, at the tool over the measured region. The actual arm is
+/// at angles of which `turned` makes those of its model.
+fn errors_in_sigma(estimated: &Estimated, actual: &Model, turned: fn(&Joints) -> Joints) -> f64 {
     let (still, tool) = (Condition::default(), Pose::translation(20.0, -10.0, 150.0));
     let (known, real) = (estimated.model.at_condition(&still), actual.at_condition(&still));
     let poses: Vec<Joints> = estimated
@@ -69,8 +75,11 @@ fn errors_in_sigma(estimated: &Estimated, actual: &Model) -> f64 {
         (arm.forward(q) * tool).translation.vector
     };
     let places: Vec<Vector3<f64>> = poses.iter().map(|q| at(&known, q)).collect();
-    let off: Vec<f64> =
-        poses.iter().zip(&places).flat_map(|(q, place)| (place - at(&real, q)).as_slice().to_vec()).collect();
+    let off: Vec<f64> = poses
+        .iter()
+        .zip(&places)
+        .flat_map(|(q, place)| (place - at(&real, &turned(q))).as_slice().to_vec())
+        .collect();
     let mut jacobian = DMatrix::zeros(3 * poses.len(), estimated.order.len());
     for (k, q) in poses.iter().enumerate() {
         jacobian.rows_mut(3 * k, 3).copy_from(&estimated.position_jacobian(&known, q, &tool));
@@ -110,7 +119,7 @@ fn a_cause_in_doubt_moves_nothing_and_stands_in_the_covariance() {
     for (sigma, size) in sigmas.iter().zip(size.unwrap()) {
         assert!(*sigma >= 0.9 * size.abs() && *sigma < 4.0 * size.abs() + 1e-4, "{sigma} of {size}");
     }
-    let z = errors_in_sigma(&found.estimated, &actual);
+    let z = errors_in_sigma(&found.estimated, &actual, Joints::clone);
     assert!((0.4..1.25).contains(&z), "{z}");
 }
 
@@ -127,4 +136,36 @@ fn what_no_arm_carries_is_stood_for_by_its_best_rival() {
     // It may be as large as it is.
     let sigmas = sigmas(&found.estimated, index);
     assert!(sigmas[0] > 0.5 * 1.9e-4 && sigmas[0] < 2.0 * 1.9e-4, "{sigmas:?}");
+}
+
+/// A gear error of joint 1 that depends on joint 2 as well.
+fn turned(q: &Joints) -> Joints {
+    let mut out = *q;
+    out[0] += 5e-4 * (q[0] + 2.0 * q[1] + 0.3).sin();
+    out
+}
+
+/// Where no rival explains it, the written arm lacks the whole error, and its covariance says how large that is.
+#[test]
+fn what_no_file_carries_and_no_rival_explains_is_as_uncertain_as_it_is_large() {
+    let (arm, mut rng) = (robots::load("abb-irb-120").unwrap().model, ChaCha8Rng::seed_from_u64(5));
+    let (still, target) = (Condition::default(), Point3::new(38.2, 12.6, 61.3));
+    let rows: Vec<Row> = (0..400)
+        .map(|number| {
+            let q = Joints::from_fn(|_, _| rng.random_range(-1.1..1.1));
+            let seen = (arm.forward(&turned(&q), &still) * target).coords;
+            let noise = Vector3::from_fn(|_, _| {
+                let normal: f64 = StandardNormal.sample(&mut rng);
+                0.02 * normal
+            });
+            Row::new(number, q, Reading::Position(seen + noise))
+        })
+        .collect();
+    let rows = Dataset::new("turned.csv", Sensor::Position, rows);
+    let frames = candidate_frames(&rows, &arm).unwrap();
+    let found = diagnose(&rows, "arm", &arm, &frames[0], &Options::default(), &|_| {}).unwrap();
+    assert!(found.diagnosis.findings.iter().any(|f| f.effect == "gear-two-joints"));
+    assert!(found.estimated.model.effects.iter().all(Effect::is_zero), "it moves no program");
+    let z = errors_in_sigma(&found.estimated, &arm, turned);
+    assert!((0.5..1.5).contains(&z), "{z}");
 }
