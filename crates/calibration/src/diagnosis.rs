@@ -34,7 +34,6 @@ pub mod cause;
 pub mod catalogue;
 mod algebra;
 mod serial_correlation;
-mod shift_selection;
 pub mod discrepancy;
 pub mod halves;
 pub mod marginal;

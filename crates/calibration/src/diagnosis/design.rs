@@ -223,13 +223,6 @@ impl Linear {
             .fold(DVector::zeros(self.rows.ncols()), |sum, k| sum + self.rows.row(k).transpose() * fit.x[k])
     }
 
-    /// The model without the parameters at `dropped`, whose effect on the readings is added back.
-    pub(super) fn reduced(&self, dropped: &[usize]) -> Self {
-        let kept: Vec<usize> = (0..self.x.len()).filter(|k| !dropped.contains(k)).collect();
-        let of = |all: &[f64]| kept.iter().map(|&k| all[k]).collect();
-        self.with(self.rows.select_rows(&kept), self.without(dropped), of(&self.x), of(&self.precision))
-    }
-
     /// Adds random effects: `columns`, n × m, with coefficients of variance 1.
     pub(super) fn with_random_effects(&self, columns: &DMatrix<f64>) -> Self {
         let (p, m) = (self.rows.nrows(), columns.ncols());
@@ -370,11 +363,6 @@ impl FullDesign {
         (self.x.rows(0, count).iter().copied().collect(), gram(&solved(&self.lower, picked)))
     }
 
-    /// The estimate after one Gauss–Newton step.
-    pub(super) fn optimum(&self) -> &DVector<f64> {
-        &self.x
-    }
-
     /// The design of the model without the parameters at `dropped`, by removing directions from the full basis.
     ///
     /// With Z = L⁻¹E for the dropped columns E of the identity and ZᵀZ = M Mᵀ, U = Z M⁻ᵀ is orthonormal, the smaller
@@ -401,24 +389,6 @@ impl FullDesign {
 }
 
 impl Design {
-    /// Adds random effects to a design that is not reduced: `columns`, n × m, with coefficients of variance 1.
-    pub(super) fn with_random_effects(&self, columns: &DMatrix<f64>) -> Self {
-        let m = columns.ncols();
-        let shared = product(&self.basis, columns);
-        let normal = DMatrix::identity(m, m) + gram(columns) - gram(&shared);
-        let pure = columns - product_of_transposed(&self.basis, &shared);
-        let lower = lower_factor(normal);
-        let rows = solved(&lower, pure.transpose());
-        let half = solved(&lower, DMatrix::from_columns(&[columns.tr_mul(&self.residual)]));
-        let mut residual = self.residual.clone();
-        residual.gemv_tr(-1.0, &rows, &half.column(0), 1.0);
-        let p = self.basis.nrows();
-        let mut basis = DMatrix::zeros(p + m, self.basis.ncols());
-        basis.rows_mut(0, p).copy_from(&self.basis);
-        basis.rows_mut(p, m).copy_from(&rows);
-        Self { residual, basis: Arc::new(basis), ..self.clone() }
-    }
-
     /// The design of a fit with all parameters free.
     pub fn of(subject: &Subject<'_>, fit: &Extended) -> Self {
         Linear::of(subject, fit).whole().design

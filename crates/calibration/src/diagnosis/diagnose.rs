@@ -100,7 +100,6 @@ pub fn diagnose(
     search.purge_validation(&mut confirmed);
     let structure = residual_tests::structure(&subject, &search.extended, &search.set_aside);
     let smoothed = search.fit_smooth_correction(&structure);
-    search.repeat_choice_of_shifts(&confirmed);
     let summary = summary::summarise(&search, &confirmed, &structure, smoothed);
     let mut notes: Vec<String> = needed.map(|needed| few_poses_note(dataset, needed)).into_iter().collect();
     notes.append(&mut search.notes);

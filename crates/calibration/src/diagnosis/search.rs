@@ -11,12 +11,10 @@ use super::options::Options;
 use super::preparation::Prepared;
 use super::residual_tests::{self, Structure};
 use super::selection::{self, Accepted, Selection};
-use super::shift_selection;
 use super::validation::{StageError, Validation};
 use crate::identification::network::with_network;
 use crate::measurement::dataset::Dataset;
 use crate::measurement::sensor::disturbance::{Disturbance, Profile};
-use crate::measurement::split;
 
 /// The rows, the fits' subjects and the options of a search.
 pub(super) struct SearchContext<'a> {
@@ -226,24 +224,6 @@ impl<'a> Search<'a> {
             let mut place = 0..;
             self.accepted.retain(|_| !place.next().is_some_and(|k| passing.contains(&k)));
             *confirmed = self.confirm();
-        }
-    }
-
-    /// Adds to the held-out error what the choice of the rows of shifts costs, which the folds so far do not repeat.
-    pub(super) fn repeat_choice_of_shifts(&mut self, confirmed: &Confirmed) {
-        let SearchContext { searched, options, .. } = self.context;
-        let rows = &searched.observed.dataset;
-        let folds = split::purged(rows, 5, self.correlation_range, options.selection.seed);
-        let aside: &[usize] = if self.context.is_thinned() { &[] } else { &self.set_aside };
-        let linear = (&confirmed.linear, &confirmed.whole.design);
-        let added = shift_selection::added_mm2(searched, &self.found, linear, &folds, aside);
-        let error = &mut self.stages[2].random.rmse;
-        let before = *error;
-        *error = (before * before + added.max(0.0)).sqrt();
-        if *error > before {
-            self.notes.push(format!(
-                "the held-out error in random folds includes the choice of the rows of shifts: {error:.4} mm, with their rows known {before:.4} mm"
-            ));
         }
     }
 

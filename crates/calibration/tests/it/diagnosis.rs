@@ -13,4 +13,3 @@ mod found;
 mod in_doubt;
 mod parts;
 mod rules;
-mod shift_selection;
