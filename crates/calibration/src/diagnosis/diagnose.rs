@@ -196,7 +196,7 @@ impl Handing<'_> {
             return with_causes;
         }
         let plain = written(self.search, &[], None);
-        let Some(alone) = as_identified(&self.search.context, robot, &plain, self.discrepancy) else {
+        let Some(alone) = as_identified(self.search.context, robot, &plain, self.discrepancy) else {
             return with_causes;
         };
         // An arm that is refused as implausible does not say how far this one may be off.

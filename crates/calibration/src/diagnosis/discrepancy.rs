@@ -375,7 +375,7 @@ impl Discrepancy {
     }
 
     /// Of serially correlated noise, φ and a: the correlation is a φ^d at a distance of d rows. At the range it has fallen to
-    /// [`NEGLIGIBLE_CORRELATION`].
+    /// `NEGLIGIBLE_CORRELATION`.
     pub fn noise_process(&self) -> (f64, f64) {
         let (near, range) = (self.correlation, self.correlation_range as f64);
         if range < 2.0 || near <= NEGLIGIBLE_CORRELATION {

@@ -246,7 +246,7 @@ impl ShiftScan {
                 checkpoint();
                 let from = self.cuts[first];
                 let mut found = Vec::new();
-                for (evidence, cut) in sums.from_cut(first).into_iter().zip(&self.cuts[first + 1..]) {
+                for (evidence, cut) in sums.after_cut(first).into_iter().zip(&self.cuts[first + 1..]) {
                     let to = cut - 1;
                     if to + 1 >= from + SHORTEST && is_valid_end(to, n) {
                         found.push(Interval { from, to, evidence });
@@ -305,7 +305,7 @@ impl<'a> ScanSums<'a> {
     }
 
     /// Evidence of the observations between the cut `first` and each later one, several in a register.
-    fn from_cut(&self, first: usize) -> Vec<f64> {
+    fn after_cut(&self, first: usize) -> Vec<f64> {
         let (k, cuts) = (self.strip.k, &self.strip.cuts);
         let lasts = first + 1..cuts.len();
         let count = lasts.len();
