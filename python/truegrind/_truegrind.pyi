@@ -304,6 +304,10 @@ class Model:
         """
         Reads a model file.
         """
+    def __reduce__(self, /) -> Any:
+        """
+        A pickle holds the model file; like the file, that of a failed fit is refused when it is read.
+        """
     def __repr__(self, /) -> str: ...
     @property
     def covariance(self, /) -> NDArray[float64]:
