@@ -182,4 +182,4 @@ def test_a_model_goes_to_other_processes(model):
     assert np.allclose(there, here, rtol=0.0, atol=1e-9) and np.array_equal(further, there)
     options = {"allow_doubtful": True}
     there, here = (tg.compensate(PROGRAMS / "told.mod", arm, **options) for arm in (again, model))
-    assert there.files == here.files
+    assert there.programs == here.programs
