@@ -239,30 +239,3 @@ pub(crate) trait Transfer {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// The nodes from which one can be reached, as bits.
-    impl Lattice for u8 {
-        fn join(&mut self, other: &Self) {
-            *self |= other;
-        }
-    }
-
-    /// 0 → 1 ⇄ 2 → 3, and 4 alone; along 2 → 3 nothing but 2 arrives.
-    #[test]
-    fn facts_arrive_along_edges_and_around_cycles() {
-        let mut edges = vec![(2, 3, true), (2, 1, false), (0, 1, false), (1, 2, false)];
-        let mut facts: Vec<u8> = (0..5).map(|node| 1 << node).collect();
-        propagate(&mut facts, 8, &mut edges, |&masked, &fact| if masked { fact & 0b100 } else { fact });
-        assert_eq!(facts, [0b1, 0b111, 0b111, 0b1100, 0b1_0000]);
-    }
-
-    #[test]
-    fn callees_come_before_callers() {
-        let edges = [(0, 1, ()), (0, 2, ()), (1, 2, ()), (2, 3, ())];
-        assert_eq!(post_order(4, &edges), [3, 2, 1, 0]);
-    }
-}

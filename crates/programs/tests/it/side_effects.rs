@@ -82,6 +82,26 @@ fn a_target_with_side_effects_is_unmodified() {
     assert!(reason.is_some());
 }
 
+/// A side effect reaches every routine of a cycle of calls and all that call into it.
+#[test]
+fn a_side_effect_is_found_around_a_cycle_of_calls() {
+    let routines = "FUNC num ping(num k)\nIF k>0 RETURN pong(k-1);\nRETURN 1;\nENDFUNC\n\
+        FUNC num pong(num k)\nIF k>9 EFFECT\nRETURN ping(k);\nENDFUNC\n\
+        FUNC num above(num k)\nRETURN 1+ping(k);\nENDFUNC\n\
+        FUNC num top(num k)\nRETURN above(k)*2;\nENDFUNC\n";
+    for function in ["ping", "pong", "above", "top"] {
+        for (effect, expected) in [("n:=k;", Some(Reason::RunTimeOffset)), ("RETURN 3;", None)] {
+            let source = format!(
+                "MODULE M\n{DATA}VAR num m;\nPROC main()\nn:=5;\nm:={function}(3);\nMoveL Offs(p,n,0,0),v100,fine,tool0;\nENDPROC\n\
+                {}ENDMODULE\n",
+                routines.replace("EFFECT", effect)
+            );
+            let task = Task::read(&[("m.mod", source.as_bytes())]);
+            assert_eq!(task.listing.motions[0].reason(), expected, "{source}");
+        }
+    }
+}
+
 #[test]
 fn a_target_without_side_effects_is_replaced() {
     for target in
