@@ -2,8 +2,10 @@
 
 use std::ops::Range;
 
+use nalgebra::DVector;
+
 use crate::estimate::Evaluations;
-use crate::problem::{NormalEquations, Prior, Problem, prior_cost};
+use crate::problem::{NormalEquations, Prior, Problem, add_prior_gradient, prior_cost};
 
 /// A problem with its priors, counting what is evaluated.
 pub struct Objective<'a> {
@@ -38,6 +40,14 @@ impl<'a> Objective<'a> {
         let mut equations = self.problem.normal_equations(x);
         equations.add_priors(self.priors, x);
         equations
+    }
+
+    /// Cost and gradient with priors: one pass of Jacobians without their products.
+    pub fn gradient(&mut self, x: &[f64]) -> (f64, DVector<f64>) {
+        self.evaluations.jacobians += self.problem.rows() as u64;
+        let (cost, mut gradient) = self.problem.gradient(x);
+        add_prior_gradient(self.priors, x, &mut gradient);
+        (cost + prior_cost(self.priors, x), gradient)
     }
 
     /// Residuals and derivatives (column-major) of a block of rows.

@@ -156,6 +156,28 @@ pub trait Problem: Sync {
         parts.iter().for_each(|part| total.add(part));
         total
     }
+
+    /// Cost ½ Σ r² and gradient Jᵀr of all rows at `x`, without priors: with many parameters much cheaper than the normal equations.
+    fn gradient(&self, x: &[f64]) -> (f64, DVector<f64>) {
+        let p = self.parameters();
+        let parts = map_chunks(self, |rows| {
+            let n = rows.len();
+            let (mut r, mut j) = (vec![0.0; n], vec![0.0; n * p]);
+            self.jacobian(x, rows, &mut r, &mut j);
+            let (j, r) = (DMatrix::from_vec(n, p, j), DVector::from_vec(r));
+            (0.5 * r.norm_squared(), j.tr_mul(&r))
+        });
+        parts.into_iter().fold((0.0, DVector::zeros(p)), |sum, part| (sum.0 + part.0, sum.1 + part.1))
+    }
+}
+
+/// Adds the gradient of the priors at `x`.
+pub(crate) fn add_prior_gradient(priors: &[Prior], x: &[f64], gradient: &mut DVector<f64>) {
+    for (k, (prior, x)) in priors.iter().zip(x).enumerate() {
+        if prior.sigma.is_finite() {
+            gradient[k] += (x - prior.mean) / (prior.sigma * prior.sigma);
+        }
+    }
 }
 
 /// ½ Σ ((x − mean)/sigma)² over the parameters that have a prior.

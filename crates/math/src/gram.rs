@@ -35,6 +35,52 @@ pub fn add_products(columns: &[f64], rows: usize, square: &mut [f64]) {
     widest(Products { columns, rows, size, square });
 }
 
+/// Adds the products of the last column with every column to `out`, one entry each: the last row of what [`add_products`] adds, in the
+/// same bits, for a share 2 / (p + 1) of its operations.
+///
+/// ```
+/// use truegrind_math::gram::add_products_with_last;
+///
+/// let columns: Vec<f64> = (0..8).map(f64::from).chain([1.0; 8]).collect();
+/// let mut out = [0.0; 2];
+/// add_products_with_last(&columns, 8, &mut out);
+/// assert_eq!(out, [28.0, 8.0]);
+/// ```
+///
+/// # Panics
+/// If the number of rows is no multiple of [`WIDTH`], or `out` does not have one entry for each column.
+pub fn add_products_with_last(columns: &[f64], rows: usize, out: &mut [f64]) {
+    let size = columns.len().checked_div(rows).unwrap_or(0);
+    assert!(rows.is_multiple_of(WIDTH), "{rows} rows are not whole groups");
+    assert!(columns.len() == size * rows && (rows == 0 || out.len() == size), "not a matrix");
+    widest(LastRow { columns, rows, size, out });
+}
+
+struct LastRow<'a> {
+    columns: &'a [f64],
+    rows: usize,
+    size: usize,
+    out: &'a mut [f64],
+}
+
+impl AnyWidth for LastRow<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<R: SinCos>(self, like: R) {
+        let columns = Columns { columns: self.columns, rows: self.rows };
+        let last = self.size.saturating_sub(1);
+        let whole = self.size - self.size % TILE;
+        for j in (0..whole).step_by(TILE) {
+            let sums = columns.tile::<R, 1, TILE>(like, last, j);
+            self.out[j..j + TILE].iter_mut().zip(sums[0]).for_each(|(out, sum)| *out += sum);
+        }
+        for j in whole..self.size {
+            self.out[j] += columns.tile::<R, 1, 1>(like, last, j)[0][0];
+        }
+    }
+}
+
 struct Products<'a> {
     columns: &'a [f64],
     rows: usize,
@@ -68,11 +114,31 @@ impl AnyWidth for Products<'_> {
 }
 
 impl Products<'_> {
-    /// The products of I columns from `i` with J columns from `j`.
+    /// Adds the products of I columns from `i` with J columns from `j`.
     #[inline(always)]
     fn tile<R: Real, const I: usize, const J: usize>(&mut self, like: R, i: usize, j: usize) {
-        let left = self.columns_from::<I>(i);
-        let right = self.columns_from::<J>(j);
+        let sums = Columns { columns: self.columns, rows: self.rows }.tile::<R, I, J>(like, i, j);
+        for k in 0..I {
+            for l in 0..J {
+                if i + k >= j + l {
+                    self.square[(j + l) * self.size + i + k] += sums[k][l];
+                }
+            }
+        }
+    }
+}
+
+struct Columns<'a> {
+    columns: &'a [f64],
+    rows: usize,
+}
+
+impl<'a> Columns<'a> {
+    /// The products of I columns from `i` with J columns from `j`.
+    #[inline(always)]
+    fn tile<R: Real, const I: usize, const J: usize>(&self, like: R, i: usize, j: usize) -> [[f64; J]; I] {
+        let left = self.from::<I>(i);
+        let right = self.from::<J>(j);
         let zero = like.splat(0.0);
         let mut eight = [[[0.0; WIDTH]; J]; I];
         for part in (0..WIDTH).step_by(R::ROWS) {
@@ -99,19 +165,11 @@ impl Products<'_> {
                 }
             }
         }
-        for k in 0..I {
-            for l in 0..J {
-                if i + k >= j + l {
-                    let s = &eight[k][l];
-                    let sum = ((s[0] + s[4]) + (s[2] + s[6])) + ((s[1] + s[5]) + (s[3] + s[7]));
-                    self.square[(j + l) * self.size + i + k] += sum;
-                }
-            }
-        }
+        eight.map(|row| row.map(|s| ((s[0] + s[4]) + (s[2] + s[6])) + ((s[1] + s[5]) + (s[3] + s[7]))))
     }
 
     #[inline(always)]
-    fn columns_from<const N: usize>(&self, first: usize) -> [&'_ [f64]; N] {
+    fn from<const N: usize>(&self, first: usize) -> [&'a [f64]; N] {
         let mut out = [&self.columns[..0]; N];
         for (k, column) in out.iter_mut().enumerate() {
             *column = &self.columns[(first + k) * self.rows..][..self.rows];

@@ -134,13 +134,23 @@ impl State {
     }
 }
 
+/// The axes along which a residual is differentiated. Its length, and with it the cost and the gradient, are the same along all.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Axes {
+    /// Of the base, as residuals are written.
+    Base,
+    /// Of the sensor's frame. Only then do the derivatives vanish where base and sensor turn together about the first joint, which no
+    /// row sees: along the base's axes the residual itself turns, and JᵀJ shows curvature where the cost has none.
+    Sensor,
+}
+
 /// See [`CalibrationProblem::fill`].
 pub(super) fn fill(
     problem: &CalibrationProblem,
     state: &State,
     from: usize,
     lanes: usize,
-    jacobian: bool,
+    jacobian: Option<Axes>,
     out: &mut [f64],
 ) {
     vectorised(Fill { problem, state, from, lanes, jacobian, out });
@@ -152,7 +162,7 @@ struct Fill<'a> {
     state: &'a State,
     from: usize,
     lanes: usize,
-    jacobian: bool,
+    jacobian: Option<Axes>,
     out: &'a mut [f64],
 }
 
@@ -171,7 +181,7 @@ impl AnyWidth for Fill<'_> {
                         problem,
                         state,
                         from * WIDTH + row_index,
-                        jacobian,
+                        jacobian.is_some(),
                         rows,
                         row_index,
                         out,
@@ -519,7 +529,7 @@ fn spatial_rows<R: SinCos>(
     problem: &CalibrationProblem,
     state: &State,
     at: usize,
-    jacobian: bool,
+    jacobian: Option<Axes>,
     rows: usize,
     row_index: usize,
     oriented: bool,
@@ -549,7 +559,7 @@ fn spatial_rows<R: SinCos>(
         origin = plus(&origin, &load(like, &disturbed.frame, at));
     }
     let from_sensor = minus(&p, &origin);
-    let last = if jacobian { problem.parameters.len() } else { 0 };
+    let last = if jacobian.is_some() { problem.parameters.len() } else { 0 };
     for k in 0..3 {
         let residual = weight * (turned[k] - gain * from_sensor[k]);
         residual.store(out, (last * components + k) * rows + row_index);
@@ -583,12 +593,12 @@ fn spatial_rows<R: SinCos>(
             value.store(out, (last * components + 3 + k) * rows + row_index);
         }
     }
-    if !jacobian {
-        return;
-    }
+    let Some(axes) = jacobian else { return };
     for (k, parameter) in problem.parameters.iter().enumerate() {
         // Sensor frame parameters move the reading; all others move the arm's prediction.
         let mut sensor_side = false;
+        // Rotation of the axes, which the residual of an orientation does not follow.
+        let mut turns_axes = false;
         let twist: Twist<R> = match *parameter {
             Parameter::Link { joint, coordinate } if coordinate.is_length() => {
                 let (v, w) = link_twist(&frames, &p, joint, coordinate);
@@ -607,7 +617,14 @@ fn spatial_rows<R: SinCos>(
                 sensor_side = true;
                 let w = splat(like, &state.sensor_axes.column(axis - 3).into());
                 let w = turn.map_or(w, |turn| rotate_by(&turn, &w));
-                (cross(&w, &turned), w)
+                match axes {
+                    Axes::Base => (cross(&w, &turned), w),
+                    // With r = measured − modelled, ω × measured − ω × r.
+                    Axes::Sensor => {
+                        turns_axes = true;
+                        (cross(&w, &scaled(gain, &from_sensor)), w)
+                    }
+                }
             }
             Parameter::Disturbance { index, parameter } if !rotates_joints(problem, index) => {
                 let amplitude = profile(like, problem, index, at);
@@ -663,10 +680,11 @@ fn spatial_rows<R: SinCos>(
             (sign * v).store(out, (k * components + i) * rows + row_index);
         }
         if oriented {
-            // δ ½vee = ½ (tr E − E) w for the sensor side, −½ (tr E − Eᵀ) w for the arm side.
+            // δ ½vee = ½ (tr E − E) w for the sensor side, −½ (tr E − Eᵀ) w for the arm side. Along axes that turn with the sensor
+            // w × ½vee = −½ (E − Eᵀ) w is subtracted, which leaves the arm's with the other sign.
             let w = twist.1;
             let half = like.splat(0.5) * rotation_weight;
-            let product: V<R> = if sensor_side {
+            let product: V<R> = if sensor_side && !turns_axes {
                 times(&error, &w)
             } else {
                 [dot(&error[0], &w), dot(&error[1], &w), dot(&error[2], &w)]

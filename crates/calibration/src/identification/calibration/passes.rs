@@ -6,11 +6,11 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
 
-use super::kernel::{self, State};
+use super::kernel::{self, Axes, State};
 use super::problem::CalibrationProblem;
 use crate::measurement::dataset::Sensor;
 use truegrind_estimation::problem::{NormalEquations, Prior, Problem};
-use truegrind_math::gram::add_products;
+use truegrind_math::gram::{add_products, add_products_with_last};
 use truegrind_math::lanes::{Buffer, WIDTH};
 use truegrind_math::work::checkpoint;
 
@@ -92,7 +92,7 @@ impl CalibrationProblem {
 
     /// Fills columns of residuals (last) and Jacobian for `lanes` groups of eight rows from group `from`:
     /// `out[(k · components + c) · (8 · lanes) + i]`, k = p for the residual.
-    fn fill(&self, state: &State, from: usize, lanes: usize, jacobian: bool, out: &mut [f64]) {
+    fn fill(&self, state: &State, from: usize, lanes: usize, jacobian: Option<Axes>, out: &mut [f64]) {
         kernel::fill(self, state, from, lanes, jacobian, out);
     }
 }
@@ -148,14 +148,42 @@ impl Problem for CalibrationProblem {
             .map(|(from, lanes)| {
                 checkpoint();
                 let mut out = vec![0.0; c * lanes * WIDTH];
-                self.fill(&state, from, lanes, false, &mut out);
+                self.fill(&state, from, lanes, None, &mut out);
                 0.5 * out.iter().map(|r| r * r).sum::<f64>()
             })
             .collect();
         parts.iter().sum()
     }
 
+    /// JᵀJ is that of the residuals as the sensor sees them (`kernel::Axes::Sensor`).
     fn normal_equations(&self, x: &[f64]) -> NormalEquations {
+        let p = self.parameters.len();
+        // [J r]ᵀ[J r], the residual in the last column.
+        let square = self.products(x, (p + 1, p + 1), add_products);
+        let mut out = NormalEquations {
+            matrix: square.view((0, 0), (p, p)).into_owned(),
+            gradient: DVector::from_iterator(p, square.row(p).iter().take(p).copied()),
+            cost: 0.5 * square[(p, p)],
+        };
+        out.symmetrize();
+        out
+    }
+
+    fn gradient(&self, x: &[f64]) -> (f64, DVector<f64>) {
+        let p = self.parameters.len();
+        let row = self.products(x, (p + 1, 1), add_products_with_last);
+        (0.5 * row[p], DVector::from_column_slice(&row.as_slice()[..p]))
+    }
+}
+
+impl CalibrationProblem {
+    /// Sums, over blocks of rows, of products of the columns of [J r], which `add` adds to a matrix of the given shape.
+    fn products(
+        &self,
+        x: &[f64],
+        shape: (usize, usize),
+        add: impl Fn(&[f64], usize, &mut [f64]) + Sync,
+    ) -> DMatrix<f64> {
         let state = State::of(self, x);
         let (p, c) = (self.parameters.len(), self.components());
         let most = block_lanes(p, c);
@@ -168,27 +196,19 @@ impl Problem for CalibrationProblem {
                 || Buffer::zeros((p + 1) * c * most * WIDTH),
                 |buffer, blocks| {
                     checkpoint();
-                    let mut square = DMatrix::zeros(p + 1, p + 1);
+                    let mut sums = DMatrix::zeros(shape.0, shape.1);
                     for &(from, lanes) in blocks {
                         let rows = c * lanes * WIDTH;
                         let columns = buffer.first_mut((p + 1) * rows);
-                        self.fill(&state, from, lanes, true, columns);
-                        // [J r]ᵀ[J r], the residual in the last column.
-                        add_products(columns, rows, square.as_mut_slice());
+                        self.fill(&state, from, lanes, Some(Axes::Sensor), columns);
+                        add(columns, rows, sums.as_mut_slice());
                     }
-                    square
+                    sums
                 },
             )
             .collect();
         let total = parts.into_iter().reduce(|sum, part| sum + part);
-        let square = total.unwrap_or_else(|| DMatrix::zeros(p + 1, p + 1));
-        let mut out = NormalEquations {
-            matrix: square.view((0, 0), (p, p)).into_owned(),
-            gradient: DVector::from_iterator(p, square.row(p).iter().take(p).copied()),
-            cost: 0.5 * square[(p, p)],
-        };
-        out.symmetrize();
-        out
+        total.unwrap_or_else(|| DMatrix::zeros(shape.0, shape.1))
     }
 }
 
@@ -210,7 +230,7 @@ impl CalibrationProblem {
         let (p, c) = (self.parameters.len(), self.components());
         let (first, last) = (observations.start / WIDTH, observations.end.div_ceil(WIDTH));
         let total = observations.len() * c;
-        let with_jacobian = jacobian.is_some();
+        let axes = jacobian.is_some().then_some(Axes::Base);
         let mut places: Vec<&mut [f64]> = Vec::new();
         if let Some(jacobian) = jacobian {
             places.extend(jacobian.chunks_mut(total.max(1)).take(p));
@@ -218,12 +238,12 @@ impl CalibrationProblem {
         if let Some(residuals) = residuals {
             places.push(residuals);
         }
-        let columns = if with_jacobian { p + 1 } else { 1 };
+        let columns = if axes.is_some() { p + 1 } else { 1 };
         let mut buffer = vec![0.0; columns * c * BLOCK_LANES.min(last - first) * WIDTH];
         for from in (first..last).step_by(BLOCK_LANES) {
             let lanes = BLOCK_LANES.min(last - from);
             let rows = lanes * WIDTH;
-            self.fill(state, from, lanes, with_jacobian, &mut buffer[..columns * c * rows]);
+            self.fill(state, from, lanes, axes, &mut buffer[..columns * c * rows]);
             let (begin, end) =
                 (observations.start.max(from * WIDTH), observations.end.min(from * WIDTH + rows));
             for (k, place) in places.iter_mut().enumerate() {
