@@ -13,7 +13,7 @@ use super::lanes::{AnyWidth, Real, SinCos, WIDTH, widest};
 /// Columns on either side of a tile: sixteen sums and their factors fit in the registers.
 const TILE: usize = 4;
 
-/// Adds the products of columns with each other to the lower triangle of `square`, which is column-major: entry (i, j) of it
+/// Adds the products of columns with each other (zero columns, such as those of a knot that no row reaches, cost nothing) to the lower triangle of `square`, which is column-major: entry (i, j) of it
 /// gains Σₖ aₖᵢ aₖⱼ for i ≥ j.
 ///
 /// ```
@@ -32,7 +32,9 @@ pub fn add_products(columns: &[f64], rows: usize, square: &mut [f64]) {
     let size = columns.len().checked_div(rows).unwrap_or(0);
     assert!(rows.is_multiple_of(WIDTH), "{rows} rows are not whole groups");
     assert!(columns.len() == size * rows && (rows == 0 || square.len() == size * size), "not a matrix");
-    widest(Products { columns, rows, size, square });
+    let all = Columns { columns, rows };
+    let used: Vec<usize> = (0..size).filter(|&k| !all.is_zero(k)).collect();
+    widest(Products { columns: all, used: &used, size, square });
 }
 
 /// Adds the products of the last column with every column to `out`, one entry each: the last row of what [`add_products`] adds, in the
@@ -72,18 +74,19 @@ impl AnyWidth for LastRow<'_> {
         let last = self.size.saturating_sub(1);
         let whole = self.size - self.size % TILE;
         for j in (0..whole).step_by(TILE) {
-            let sums = columns.tile::<R, 1, TILE>(like, last, j);
+            let sums = columns.tile::<R, 1, TILE>(like, &[last], &[j, j + 1, j + 2, j + 3]);
             self.out[j..j + TILE].iter_mut().zip(sums[0]).for_each(|(out, sum)| *out += sum);
         }
         for j in whole..self.size {
-            self.out[j] += columns.tile::<R, 1, 1>(like, last, j)[0][0];
+            self.out[j] += columns.tile::<R, 1, 1>(like, &[last], &[j])[0][0];
         }
     }
 }
 
 struct Products<'a> {
-    columns: &'a [f64],
-    rows: usize,
+    columns: Columns<'a>,
+    /// The columns that are not zero, in ascending order.
+    used: &'a [usize],
     size: usize,
     square: &'a mut [f64],
 }
@@ -93,7 +96,7 @@ impl AnyWidth for Products<'_> {
 
     #[inline(always)]
     fn run<R: SinCos>(mut self, like: R) {
-        let size = self.size;
+        let size = self.used.len();
         for i in (0..size).step_by(TILE) {
             for j in (0..i).step_by(TILE) {
                 match size - i {
@@ -114,31 +117,38 @@ impl AnyWidth for Products<'_> {
 }
 
 impl Products<'_> {
-    /// Adds the products of I columns from `i` with J columns from `j`.
+    /// Adds the products of I used columns from the `i`-th with J from the `j`-th.
     #[inline(always)]
     fn tile<R: Real, const I: usize, const J: usize>(&mut self, like: R, i: usize, j: usize) {
-        let sums = Columns { columns: self.columns, rows: self.rows }.tile::<R, I, J>(like, i, j);
+        let (left, right) = (&self.used[i..i + I], &self.used[j..j + J]);
+        let sums = self.columns.tile::<R, I, J>(like, left, right);
         for k in 0..I {
             for l in 0..J {
                 if i + k >= j + l {
-                    self.square[(j + l) * self.size + i + k] += sums[k][l];
+                    self.square[right[l] * self.size + left[k]] += sums[k][l];
                 }
             }
         }
     }
 }
 
+#[derive(Clone, Copy)]
 struct Columns<'a> {
     columns: &'a [f64],
     rows: usize,
 }
 
 impl<'a> Columns<'a> {
-    /// The products of I columns from `i` with J columns from `j`.
+    /// The products of I columns `left` with J columns `right`.
     #[inline(always)]
-    fn tile<R: Real, const I: usize, const J: usize>(&self, like: R, i: usize, j: usize) -> [[f64; J]; I] {
-        let left = self.from::<I>(i);
-        let right = self.from::<J>(j);
+    fn tile<R: Real, const I: usize, const J: usize>(
+        self,
+        like: R,
+        left: &[usize],
+        right: &[usize],
+    ) -> [[f64; J]; I] {
+        let left = self.those::<I>(left);
+        let right = self.those::<J>(right);
         let zero = like.splat(0.0);
         let mut eight = [[[0.0; WIDTH]; J]; I];
         for part in (0..WIDTH).step_by(R::ROWS) {
@@ -169,11 +179,20 @@ impl<'a> Columns<'a> {
     }
 
     #[inline(always)]
-    fn from<const N: usize>(&self, first: usize) -> [&'a [f64]; N] {
+    fn those<const N: usize>(self, which: &[usize]) -> [&'a [f64]; N] {
         let mut out = [&self.columns[..0]; N];
-        for (k, column) in out.iter_mut().enumerate() {
-            *column = &self.columns[(first + k) * self.rows..][..self.rows];
+        for (column, &k) in out.iter_mut().zip(which) {
+            *column = self.column(k);
         }
         out
+    }
+
+    #[inline(always)]
+    fn column(self, k: usize) -> &'a [f64] {
+        &self.columns[k * self.rows..][..self.rows]
+    }
+
+    fn is_zero(self, k: usize) -> bool {
+        self.column(k).chunks(WIDTH).all(|part| part.iter().all(|v| *v == 0.0))
     }
 }
