@@ -249,25 +249,19 @@ impl<S: Simd> Real for Lanes<S> {
 }
 
 /// Numbers aligned so that a register is read from a single cache line, which doubles the speed of memory-bound loops.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Buffer {
     numbers: Vec<f64>,
     first: usize,
 }
 
 impl Buffer {
-    /// `count` zeros.
-    pub fn zeros(count: usize) -> Self {
-        let numbers = vec![0.0; count + WIDTH];
-        let first = aligned(&numbers);
-        Self { numbers, first }
-    }
-
-    /// The first `count` numbers.
-    ///
-    /// # Panics
-    /// If there are fewer.
+    /// The first `count` numbers, as they were left; grows with zeros.
     pub fn first_mut(&mut self, count: usize) -> &mut [f64] {
+        if self.numbers.len() < self.first + count {
+            self.numbers = vec![0.0; count + WIDTH];
+            self.first = aligned(&self.numbers);
+        }
         &mut self.numbers[self.first..][..count]
     }
 }

@@ -1,5 +1,6 @@
 //! Residuals, Jacobians and normal equations, in blocks that do not depend on the number of threads.
 
+use std::cell::RefCell;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -25,6 +26,11 @@ const FEW: usize = 64;
 
 /// Bytes of a buffer for more parameters.
 const BUFFER_BYTES: usize = 1 << 20;
+
+thread_local! {
+    /// Columns of a block of rows, written anew for each: to clear them for every pass would take a tenth of it.
+    static COLUMNS: RefCell<Buffer> = RefCell::default();
+}
 
 /// Groups of eight rows in a block, for p parameters and c components: a function of the problem alone, so that sums are the
 /// same for any number of threads.
@@ -190,23 +196,20 @@ impl CalibrationProblem {
         let blocks = self.blocks_of(most);
         // With many parameters a square matrix per block would cost more than its products, so several blocks share one.
         let together = if p > FEW { (2 * p).div_ceil(most * WIDTH * c) } else { 1 };
-        let parts: Vec<DMatrix<f64>> = blocks
-            .par_chunks(together)
-            .map_init(
-                || Buffer::zeros((p + 1) * c * most * WIDTH),
-                |buffer, blocks| {
-                    checkpoint();
-                    let mut sums = DMatrix::zeros(shape.0, shape.1);
-                    for &(from, lanes) in blocks {
-                        let rows = c * lanes * WIDTH;
-                        let columns = buffer.first_mut((p + 1) * rows);
-                        self.fill(&state, from, lanes, Some(Axes::Sensor), columns);
-                        add(columns, rows, sums.as_mut_slice());
-                    }
-                    sums
-                },
-            )
-            .collect();
+        let part = |blocks: &[(usize, usize)]| {
+            checkpoint();
+            let mut sums = DMatrix::zeros(shape.0, shape.1);
+            COLUMNS.with_borrow_mut(|buffer| {
+                for &(from, lanes) in blocks {
+                    let rows = c * lanes * WIDTH;
+                    let columns = buffer.first_mut((p + 1) * rows);
+                    self.fill(&state, from, lanes, Some(Axes::Sensor), columns);
+                    add(columns, rows, sums.as_mut_slice());
+                }
+            });
+            sums
+        };
+        let parts: Vec<DMatrix<f64>> = blocks.par_chunks(together).map(part).collect();
         let total = parts.into_iter().reduce(|sum, part| sum + part);
         total.unwrap_or_else(|| DMatrix::zeros(shape.0, shape.1))
     }
