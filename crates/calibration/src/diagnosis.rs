@@ -30,6 +30,7 @@
 //! The prior of a candidate's size is part of its evidence, which penalises candidates with many parameters.
 
 pub mod preparation;
+pub mod cause_kind;
 pub mod cause;
 pub mod catalogue;
 mod algebra;

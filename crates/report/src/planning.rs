@@ -71,7 +71,7 @@ pub fn effect_table(plan: &Plan) -> Table {
         "Detectable effects",
         &plan.detectability,
         [
-            (Column::text("effect", "Effect"), |found| found.effect.into()),
+            (Column::text("effect", "Effect"), |found| found.effect.as_str().into()),
             (Column::text("which", "Which"), |found| found.which.as_str().into()),
             (Column::significant("smallest", "Smallest size", "", 2), |found| found.smallest.into()),
             (Column::text("unit", "Unit"), |found| found.unit.into()),

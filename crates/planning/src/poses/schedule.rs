@@ -23,6 +23,7 @@ use super::roadmap::Roadmap;
 use super::setup::MeasurementSetup;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Joints;
+use truegrind_calibration::diagnosis::cause_kind::CauseKind;
 use truegrind_calibration::measurement::dataset::{Row as MeasuredRow, Sensor};
 
 /// Repeated visits.
@@ -56,13 +57,16 @@ impl Visits {
     /// Adds the visits that the questions of a diagnosis require.
     pub(super) fn with_questions(&self, questions: &[Question]) -> Self {
         let mut out = *self;
-        if any_about(questions, "backlash") {
+        if any_about(questions, CauseKind::Backlash) {
             out.both_sides = out.both_sides.max(20);
         }
-        if any_about(questions, "thermal-drift") {
+        if any_about(questions, CauseKind::ThermalDrift) {
             out.warm_up = out.warm_up.max(16);
         }
-        if ["sensor-zero-shift", "sensor-frame-shift", "tool-shift"].iter().any(|e| any_about(questions, e)) {
+        if [CauseKind::SensorZeroShift, CauseKind::SensorFrameShift, CauseKind::ToolShift]
+            .iter()
+            .any(|&e| any_about(questions, e))
+        {
             // A repeated pose shows when something moved.
             out.repeats = out.repeats.max(8);
         }
