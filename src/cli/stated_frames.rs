@@ -134,14 +134,14 @@ impl StatedFrameArguments {
                         );
                     }
                 }
-                for (place, text) in frames.outlets_mm.iter_mut().zip(&self.outlet) {
-                    *place = Vector3::from(triple("--outlet", text)?);
+                for (frame_value, text) in frames.outlets_mm.iter_mut().zip(&self.outlet) {
+                    *frame_value = Vector3::from(triple("--outlet", text)?);
                 }
-                for (place, text) in frames.zeros_mm.iter_mut().zip(&self.cable_zero) {
+                for (frame_value, text) in frames.zeros_mm.iter_mut().zip(&self.cable_zero) {
                     let [value] = numbers("--cable-zero", text)?[..] else {
                         bail!("--cable-zero {text}: expected one number (mm)");
                     };
-                    *place = value;
+                    *frame_value = value;
                 }
             }
             Sensor::Position | Sensor::Pose => {

@@ -394,8 +394,8 @@ impl Cell {
         if let Some(wrong) = cell.external.iter().find(|axis| axis.index().is_none()) {
             return Err(CellError::UnknownAxis { axis: wrong.axis });
         }
-        for (place, axis) in cell.external.iter().enumerate() {
-            if cell.external[..place].iter().any(|other| other.index() == axis.index()) {
+        for (index, axis) in cell.external.iter().enumerate() {
+            if cell.external[..index].iter().any(|other| other.index() == axis.index()) {
                 return Err(CellError::AxisTwice { axis: axis.axis });
             }
         }
@@ -463,9 +463,9 @@ struct NameIndex<'a> {
 impl<'a> NameIndex<'a> {
     fn of(frames: &'a [CellFrame]) -> Self {
         let (mut lower, mut plain) = (HashMap::new(), HashMap::new());
-        for (place, frame) in frames.iter().enumerate() {
-            lower.entry(frame.name.to_ascii_lowercase()).or_insert_with(Vec::new).push(place);
-            plain.entry(setup::plain(&frame.name)).or_insert_with(Vec::new).push(place);
+        for (index, frame) in frames.iter().enumerate() {
+            lower.entry(frame.name.to_ascii_lowercase()).or_insert_with(Vec::new).push(index);
+            plain.entry(setup::plain(&frame.name)).or_insert_with(Vec::new).push(index);
         }
         Self { frames, lower, plain }
     }
@@ -544,14 +544,14 @@ impl Used {
     /// tool where that is not stated), and the external axes of its targets.
     pub fn by(listing: &Listing, cell: &Cell) -> Self {
         let stated = CellLookup::of(cell, listing);
-        let place =
+        let index =
             |list: &[CellFrame], found: &CellFrame| list.iter().position(|one| std::ptr::eq(one, found));
         let mut out = Self::default();
         for tool in listing.tools.iter().chain(&listing.declared_tools) {
-            out.tool.extend(stated.tools(tool).iter().filter_map(|found| place(&cell.tool, found)));
+            out.tool.extend(stated.tools(tool).iter().filter_map(|found| index(&cell.tool, found)));
         }
         for object in &listing.work_objects {
-            out.wobj.extend(stated.objects(object).iter().filter_map(|found| place(&cell.wobj, found)));
+            out.wobj.extend(stated.objects(object).iter().filter_map(|found| index(&cell.wobj, found)));
         }
         let taught = out.wobj.iter().map(|&k| &cell.wobj[k]).chain(out.tool.iter().map(|&k| &cell.tool[k]));
         let taught: Vec<&CellFrame> = taught.filter(|frame| !frame.teaching_deg.is_empty()).collect();
@@ -565,7 +565,7 @@ impl Used {
             targets.any(|target| target.value.as_ref().is_ok_and(|value| value.external()[axis].is_some()))
         };
         let axes = cell.external.iter().enumerate();
-        out.external.extend(axes.filter(|(_, a)| a.index().is_some_and(moves)).map(|(place, _)| place));
+        out.external.extend(axes.filter(|(_, a)| a.index().is_some_and(moves)).map(|(index, _)| index));
         out
     }
 
@@ -582,7 +582,7 @@ impl Used {
             surface.is_none_or(|s| frame.name != s.tool.name && frame.name != s.work_object.name)
         };
         let frames = |kind: FrameKind, list: &[CellFrame], used: &BTreeSet<usize>| {
-            let unused = list.iter().enumerate().filter(|(place, frame)| !used.contains(place) && own(frame));
+            let unused = list.iter().enumerate().filter(|(index, frame)| !used.contains(index) && own(frame));
             let say = |(_, frame): (usize, &CellFrame)| {
                 format!(
                     "cell file: {kind} \"{}\" is not used by any program: is its name spelt as in the program?",
@@ -599,7 +599,7 @@ impl Used {
         };
         let mut out = frames(FrameKind::Tool, &cell.tool, &self.tool);
         out.extend(frames(FrameKind::Wobj, &cell.wobj, &self.wobj));
-        let unused = cell.external.iter().enumerate().filter(|(place, _)| !self.external.contains(place));
+        let unused = cell.external.iter().enumerate().filter(|(index, _)| !self.external.contains(index));
         out.extend(unused.map(|(_, axis)| {
             format!("cell file: external axis '{}' does not occur in any target of any program", axis.axis)
         }));

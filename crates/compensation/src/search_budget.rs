@@ -34,10 +34,10 @@ pub(crate) fn shared_out_into<P: Send, T: Send>(
     work: impl Fn(usize, &mut P, &mut SearchBudget) -> T + Sync,
 ) -> Vec<T> {
     let pieces = places.len();
-    let one = |(piece, place): (usize, &mut P)| {
+    let one = |(piece, slot): (usize, &mut P)| {
         checkpoint();
         let mut budget = whole.share(piece, pieces);
-        (work(piece, place, &mut budget), budget)
+        (work(piece, slot, &mut budget), budget)
     };
     let done: Vec<(T, SearchBudget)> = places.par_iter_mut().enumerate().map(one).collect();
     let mut rest = SearchBudget::of(done.iter().map(|(_, left)| left.evaluations).sum())

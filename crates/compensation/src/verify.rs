@@ -235,8 +235,8 @@ fn commanded_end(
     let mounting = &frame_table.list[frames_index].commanded;
     let (commanded, joints) = match value {
         TargetValue::Cartesian(t) => {
-            if let Some(why) = frame_table.moving_base(&t) {
-                return Err(why);
+            if let Some(reason) = frame_table.moving_base(&t) {
+                return Err(reason);
             }
             let commanded = t.pose();
             let flange = mounting.flange_for(&commanded);

@@ -356,10 +356,10 @@ fn grouped(plan: &Plan) -> Vec<Group<'_>> {
 }
 
 /// A reason without the numbers of a single motion, and its value.
-fn split_reason(why: &OutcomeReason) -> (String, Option<(f64, &'static str)>) {
+fn split_reason(reason: &OutcomeReason) -> (String, Option<(f64, &'static str)>) {
     let plain = |text: &str| (text.to_owned(), None);
     let sized = |text: String, value: f64, unit| (text, Some((value, unit)).filter(|_| value.is_finite()));
-    match *why {
+    match *reason {
         OutcomeReason::Inverse(InverseError::Unreachable { beyond_mm }) => {
             sized("target is out of reach".to_owned(), beyond_mm, "mm")
         }

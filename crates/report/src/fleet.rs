@@ -92,7 +92,7 @@ impl Row {
     }
 
     /// The row of an arm that could not be diagnosed.
-    pub fn failed(file: String, why: String) -> Row {
+    pub fn failed(file: String, reason: String) -> Row {
         Row {
             file,
             robot: None,
@@ -103,7 +103,7 @@ impl Row {
             noise_floor_mm: None,
             causes: Vec::new(),
             output: None,
-            note: Some(why),
+            note: Some(reason),
             failed: true,
         }
     }
@@ -313,8 +313,8 @@ fn verdict(rows: &[Row]) -> Verdict {
     };
     /// Largest number of listed failures; the table has all.
     const MAX_FAILED: usize = 20;
-    let why = |row: &&Row| format!("{}: {}", row.file, row.note.as_deref().unwrap_or("failed"));
-    let mut reasons: Vec<String> = failed.iter().take(MAX_FAILED).map(why).collect();
+    let reason = |row: &&Row| format!("{}: {}", row.file, row.note.as_deref().unwrap_or("failed"));
+    let mut reasons: Vec<String> = failed.iter().take(MAX_FAILED).map(reason).collect();
     if failed.len() > MAX_FAILED {
         reasons.push(format!("and {} more arms that could not be diagnosed", failed.len() - MAX_FAILED));
     }

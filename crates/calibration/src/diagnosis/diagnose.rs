@@ -19,7 +19,7 @@ use super::sensor_causes::{self, probability_worse};
 use super::summary::{self, Summary};
 use super::testability::not_testable;
 use super::validation::{StageError, nominal};
-use super::written::{certain_causes, fit_written, time_discrepancy, under_correlated_noise};
+use super::written_model::{certain_causes, fit_written, time_discrepancy, under_correlated_noise};
 use crate::identification::benefit::{Benefit, benefit};
 use crate::identification::calibration::Frames;
 use crate::identification::fit::{Fitted, Observations, frame_parameters};

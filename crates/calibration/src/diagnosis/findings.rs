@@ -12,7 +12,7 @@ use super::decision;
 use super::design::{Design, FullDesign};
 use super::extension::{Extended, Subject};
 use super::finding::{Alternative, Confidence, Family, Finding, Gain, Step};
-use super::held::{FoldErrors, Reduced};
+use super::held_out::{FoldErrors, Reduced};
 use super::picture::{Picture, picture};
 use super::score::VISIBLE;
 use super::score::{non_centrality, score};

@@ -12,7 +12,7 @@ use super::catalogue::Candidate;
 use super::cause::Cause;
 use super::design::Design;
 use super::extension::{Extended, Freedom, Subject, fit, warm_fit};
-use super::held::FoldErrors;
+use super::held_out::FoldErrors;
 use super::levels;
 use super::score::{Score, score};
 use crate::measurement::split::{self, Split};

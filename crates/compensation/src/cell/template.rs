@@ -200,7 +200,7 @@ impl Writer {
             named.label.as_ref().map_or_else(String::new, |label| format!("a comment calls it {label}"));
         self.line(&format!("name = {}", quoted(&named.name)), &called.replace(['\n', '\r'], " "));
         self.ask("origin", "metrology | taught");
-        let place = if is_tool { "the tool's tip on the flange" } else { "its zero in the robot's base" };
+        let meaning = if is_tool { "the tool's tip on the flange" } else { "its zero in the robot's base" };
         match named.commanded {
             Ok(commanded) => {
                 let Frame { position_mm: p, quaternion: q } = Frame::from_pose(&commanded);
@@ -219,7 +219,7 @@ impl Writer {
                 );
             }
             Err(_) => {
-                self.ask("position_mm", &format!("{place}: [x, y, z] in mm"));
+                self.ask("position_mm", &format!("{meaning}: [x, y, z] in mm"));
                 self.line("# quaternion_wxyz = [1, 0, 0, 0]", "where it is turned: w, x, y, z");
             }
         }

@@ -96,12 +96,12 @@ pub fn contradictions(listing: &Listing, cell: &Cell, nominal: &Model) -> Vec<St
         if !seen.insert((motion.tool, motion.work_object)) || listing.frame_reason(motion).is_some() {
             continue;
         }
-        let (Ok(value), Ok(place)) = (&tool.value, &object.value) else { continue };
+        let (Ok(value), Ok(frame_value)) = (&tool.value, &object.value) else { continue };
         let found = [
             duplicate_entries(FrameKind::Tool, &teaching.stated.tools(tool), &tool.name),
             duplicate_entries(FrameKind::Wobj, &teaching.stated.objects(object), &object.name),
             teaching.tool(tool, value).err(),
-            teaching.object(object, place).err(),
+            teaching.object(object, frame_value).err(),
         ];
         for fault in found.into_iter().flatten() {
             if said.insert(fault.clone()) {
@@ -423,9 +423,9 @@ impl<'a> Teaching<'a> {
         for tool in tools {
             let Ok(value) = &tool.value else { continue };
             let (in_text, held, frame) = (tool.place.is_some(), value.robhold, value.frame.pose());
-            let place = frame.translation.vector.iter().chain(frame.rotation.coords.iter());
+            let frame_value = frame.translation.vector.iter().chain(frame.rotation.coords.iter());
             // Adding 0 maps −0 to 0.
-            let bits: Vec<u64> = place.map(|v| (v + 0.0).to_bits()).collect();
+            let bits: Vec<u64> = frame_value.map(|v| (v + 0.0).to_bits()).collect();
             if seen.insert((tool.name.as_str(), in_text, held, bits)) {
                 let labels = self.stated.labels_of(&tool.name).to_vec();
                 let stated = self.stated.tool(tool);

@@ -189,11 +189,11 @@ fn of_sensor(
     let per = raw.nrows() / rows.len().max(1);
     let mut out = Vec::new();
     let mut step = |effect, which: &str, of: &dyn Fn(&Parameter) -> bool| {
-        let places: Vec<usize> = (0..parameters.len()).filter(|&k| of(&parameters[k])).collect();
-        if places.is_empty() {
+        let indices: Vec<usize> = (0..parameters.len()).filter(|&k| of(&parameters[k])).collect();
+        if indices.is_empty() {
             return;
         }
-        let mut columns = raw.select_columns(&places);
+        let mut columns = raw.select_columns(&indices);
         let half = raw.nrows() / (2 * per) * per;
         columns.rows_mut(0, half).fill(0.0);
         out.push(EffectColumns {

@@ -174,16 +174,16 @@ pub(super) fn schedule(
     // Those of the first half are repeated in the middle, the others twice at the end.
     for (at, pose) in repeated.iter().enumerate() {
         let first = list.iter().position(|(p, _)| p == pose).unwrap_or(0);
-        let place = if first < middle { middle + at } else { list.len() };
-        list.insert(place.min(list.len()), (*pose, Purpose::Repeat));
+        let index = if first < middle { middle + at } else { list.len() };
+        list.insert(index.min(list.len()), (*pose, Purpose::Repeat));
     }
     list.extend(repeated.iter().map(|&pose| (pose, Purpose::Repeat)));
     // Warm-up: the first pose, at quadratically growing times.
     let total = list.len() + visits.warm_up;
     for k in 1..visits.warm_up {
         let share = k as f64 / (visits.warm_up - 1) as f64;
-        let place = ((share * share * total as f64) as usize).clamp(k, list.len());
-        list.insert(place, (0, Purpose::WarmUp));
+        let index = ((share * share * total as f64) as usize).clamp(k, list.len());
+        list.insert(index, (0, Purpose::WarmUp));
     }
     let posed_rows = list.iter().enumerate().map(|(number, &(pose, purpose))| {
         let sign = if purpose == Purpose::OtherSide { -1 } else { 1 };
@@ -206,10 +206,10 @@ pub(super) fn schedule(
         let waypoints = checker.waypoints(&from, &to, connections.known);
         rows[k].waypoints =
             waypoints.or_else(|| connections.roadmap?.waypoints(&checker, &from, pose, &to))?;
-        let places: Vec<Joints> =
+        let stops: Vec<Joints> =
             std::iter::once(from).chain(rows[k].waypoints.iter().copied()).chain([to]).collect();
         let anchor = poses[rows[k].pose].anchor;
-        rows[k].cable_unclear = !places.windows(2).all(|way| clear(setup, bounds, &way[0], &way[1], anchor));
+        rows[k].cable_unclear = !stops.windows(2).all(|way| clear(setup, bounds, &way[0], &way[1], anchor));
     }
     Some((poses, rows))
 }

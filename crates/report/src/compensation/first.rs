@@ -58,8 +58,9 @@ pub fn verdict(plan: &Plan, listing: &Listing) -> Verdict {
                 .to_owned(),
         );
     }
-    let steps =
-        count_reason(plan, |why| matches!(why, OutcomeReason::PartOfCut { .. } | OutcomeReason::Step { .. }));
+    let steps = count_reason(plan, |reason| {
+        matches!(reason, OutcomeReason::PartOfCut { .. } | OutcomeReason::Step { .. })
+    });
     if steps > 0 {
         reasons.push(format!(
             "{steps} correctable motions are unchanged, since another motion of their cut cannot be corrected: correcting a part of a cut \
