@@ -30,7 +30,7 @@ pub(super) struct StatedFrameArguments {
 #[derive(Debug, Clone, Default, Args)]
 pub(super) struct FramePriorArguments {
     /// Uncertainty of --sensor-frame, or of --outlet and --cable-zero: standard deviation in mm and, for the rotation of a frame, in
-    /// degrees (default: that of the mm at one metre). The fit then uses them as a prior, so that the place of a path can be
+    /// degrees (default: that of the mm at one metre). The fit then uses them as a prior, so that the placement of a path can be
     /// corrected.
     #[arg(long, value_name = "MM[,DEG]", allow_hyphen_values = true)]
     frame_sigma: Option<String>,

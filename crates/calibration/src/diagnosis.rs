@@ -20,8 +20,8 @@
 //!    remains significant with them and is selected again in [`halves`] of the rows (stability selection).
 //! 10. `findings` and `merged`: findings, ranked by their `contribution`, with doubts where a larger fault confounds them
 //!     (`confounding`); `unexplained`: the rest, with what a planner needs of it
-//!     ([`something_else`]); [`decision`]: shares of causes that cannot be told apart, and the measurement that decides. `written_model`: the arm for compensation, beside the unknown rest of
-//!     a sensor's law (`sensor_law`); `in_doubt`: its covariance for uncertain
+//!     ([`something_else`]); [`decision`]: shares of causes that cannot be told apart, and the measurement that decides. `written_model`: the arm for compensation, fitted beside the
+//!     unknown rest of a sensor's law (`sensor_law`); `in_doubt`: its covariance for uncertain
 //!     causes; `sensor_causes`: whether causes of the measurement are fitted with it.
 //! 11. [`finding`], `summary` and [`words`]: the result, as a contract for programs and as sentences for technicians.
 //!

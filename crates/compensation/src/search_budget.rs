@@ -14,7 +14,7 @@ use truegrind_math::work::checkpoint;
 /// Motions per parallel work item.
 pub(crate) const PORTION: usize = 64;
 
-/// Motions that are looked at in less time than another thread takes to wake up.
+/// Motions that are processed in less time than another thread takes to wake up.
 pub(crate) const MANY: usize = 4096;
 
 /// Runs pieces in parallel, each with its share of the budget; pieces that ran out are repeated one after the other with the

@@ -191,7 +191,7 @@ fn figures(found: &Acceptance) -> Vec<KeyFigure> {
     ]
 }
 
-/// The figures of both arms; a signed mean where the sensor tells a sign.
+/// The figures of both arms; a signed mean if the sensor has a sign.
 pub fn table(found: &Acceptance, sensor: Sensor) -> Table {
     let mut table = Table::new(
         "Errors",

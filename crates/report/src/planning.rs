@@ -222,7 +222,7 @@ pub fn document(plan: &Plan, setup: &MeasurementSetup<'_>, robot: &str) -> Docum
     page
 }
 
-/// What the plan tells at a glance: of the geometry, or of the unexplained error alone.
+/// The plan at a glance: what it determines of the geometry, or of the unexplained error alone.
 fn key_figures(plan: &Plan) -> Vec<KeyFigure> {
     let rows = KeyFigure::new("Rows", plan.rows.len(), 0, "").note(format!("at {}", poses(plan)));
     if !plan.geometry {

@@ -83,7 +83,7 @@ impl Destination {
     /// Resolves the destination of an output.
     ///
     /// # Errors
-    /// It is a folder, a read-only file, or lies in a missing folder.
+    /// It is a folder, a read-only file, or in a missing folder.
     pub(super) fn of(named: &Path) -> anyhow::Result<Self> {
         let destination =
             |path: &Path, kind, key| Self { named: named.to_path_buf(), path: path.to_path_buf(), kind, key };

@@ -120,7 +120,7 @@ pub fn members(finding: &Finding) -> Vec<Member> {
     if out.len() < 2 { Vec::new() } else { out }
 }
 
-/// The measurement that tells an effect from others where no plan of poses can; what to look for in it.
+/// The measurement that separates an effect from others where no plan of poses can, and what to look for in it.
 fn in_words(effect: CauseKind) -> Option<&'static str> {
     Some(match effect {
         CauseKind::SensorScale => {

@@ -200,7 +200,7 @@ pub struct Finding {
     /// Twice the log Bayes factor against its best rival with smooth unmodelled trends in time and pose allowed for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub margin: Option<f64>,
-    /// The causes that cannot be told apart, this one included, with their shares, largest first; empty for a sure finding.
+    /// The causes that cannot be told apart, this one included, with their shares, largest first; empty for an identified finding.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub members: Vec<Member>,
     /// The measurement that decides.

@@ -126,7 +126,7 @@ fn run(
     };
     let position = largest.as_ref().and_then(|(point, deviation)| labels.take(point, &text(deviation)));
     for (folder, times, width) in [("path", 1.0, 2.5), ("exaggerated", plan.times, 1.8)] {
-        // At true scale the colour is all that tells the size; exaggerated, it tells which is which.
+        // At true scale only the colour shows the size; exaggerated, it separates the curves.
         let by_size = folder == "path";
         let coloured = strips(&report.points, |p| {
             let deviation = which(p).filter(|d| plan.cuts(p) && d.norm_mm().is_finite())?;

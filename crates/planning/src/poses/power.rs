@@ -6,7 +6,7 @@
 //! worst direction (phase, axis) is |a|² = λ / smallest eigenvalue of S.
 //! Source: the non-central χ² of a likelihood ratio between nested linear models (Kay 1998, Fundamentals of Statistical
 //! Signal Processing II, section 7.7).
-//! Checked against: the drop of the fitted cost when the effect is put into simulated readings.
+//! Checked against: the drop of the fitted cost when the effect is added to simulated readings.
 
 use nalgebra::{Cholesky, DMatrix};
 

@@ -110,7 +110,7 @@ fn deviations(plan: &Plan) -> Option<String> {
 
 pub(super) fn key_figures(plan: &Plan) -> Vec<KeyFigure> {
     let all = plan.outcomes.len();
-    let shape = if placement::corrects_shape_only(plan) { "of the shape" } else { "shape and place" };
+    let shape = if placement::corrects_shape_only(plan) { "of the shape" } else { "shape and placement" };
     let corrected = !no_cut(plan);
     let mut figures = vec![match placement::before_mm(plan).filter(|_| corrected) {
         Some(mm) => KeyFigure::new("Largest before", mm, 3, "mm").note(format!("{shape}, corrected motions")),

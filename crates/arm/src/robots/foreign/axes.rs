@@ -180,7 +180,7 @@ fn between(
     })
 }
 
-/// The last link and the flange behind it; the link takes as much of the flange as it can represent.
+/// The last link and the flange after it; the link takes as much of the flange as it can represent.
 fn last(flange: &Pose) -> (LinkSheet, Pose) {
     let position = flange.translation.vector;
     let z = flange.rotation * Vector3::z();

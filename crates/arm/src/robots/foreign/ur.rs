@@ -1,7 +1,7 @@
 //! The calibration of a Universal Robots arm: its controller's `calibration.conf`, and the kinematics file that ROS drivers take
 //! from it (`ur_calibration`).
 //!
-//! The first holds deviations from the maker's table, so it must be told whose: a line `robot = universal-robots-…` above its
+//! The first holds deviations from the maker's table, so it must say whose: a line `robot = universal-robots-…` above its
 //! first section. The second holds the place of each joint in the one before, about whose z it turns; its base is the
 //! controller's ("Base"), its last frame the controller's flange.
 //!
