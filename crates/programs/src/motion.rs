@@ -329,6 +329,40 @@ pub struct Motion {
 }
 
 impl Motion {
+    /// A motion of which only this is known; `routine` and what stands in the statement follow.
+    pub(crate) fn new(
+        place: Place,
+        statement: Span,
+        instruction: Arc<str>,
+        kind: MotionKind,
+        modal: Modal,
+    ) -> Self {
+        Motion {
+            place,
+            statement,
+            instruction,
+            kind,
+            targets: Vec::new(),
+            speed: None,
+            zone: None,
+            tool: None,
+            work_object: None,
+            timed: false,
+            insertable: false,
+            can_straighten: false,
+            accepts_configuration: false,
+            rapid: false,
+            axis: None,
+            by_radius: false,
+            modal,
+            in_loop: false,
+            conditional: false,
+            previous: None,
+            routine: None,
+            left: None,
+        }
+    }
+
     /// Whether both motions have the same tool and the same work object, as most neighbours do.
     pub fn same_frames(&self, other: &Motion) -> bool {
         (self.tool, self.work_object) == (other.tool, other.work_object)

@@ -43,9 +43,8 @@ fn sentence(placement: &ObjectPlacement, what: &str) -> String {
         unlocated,
         ..
     } = placement;
-    let known = format!(
-        "the path as a whole is displaced by {deviation_mm:.3} mm (known to ± {sigma_mm:.3} mm, 1σ)"
-    );
+    let known =
+        format!("the path as a whole is displaced by {deviation_mm:.3} mm (known to ± {sigma_mm:.3} mm, 1σ)");
     if *applied == Placement::Absolute {
         return format!("{what} {work_object}: shape and placement are corrected; {known}");
     }
@@ -85,31 +84,24 @@ pub fn cut_table(plan: &Plan, listing: &Listing) -> Option<Table> {
     if plan.cuts.is_empty() {
         return None;
     }
-    let mut table = Table::new(
-        "Cuts by the probability that the correction makes them worse",
-        vec![
-            Column::text("lines", "Lines"),
-            Column::count("motions", "Motions"),
-            Column::text("judged", "Judged"),
-            Column::number("off_mm", "before", "mm", 3),
-            Column::number("sigma_mm", "1σ", "mm", 3),
-            Column::number("worse_percent", "worse", "%", 1),
-            Column::text("fate", "Outcome"),
-        ],
-    );
     let mut order: Vec<&CutRisk> = plan.cuts.iter().collect();
     order.sort_by(|a, b| b.probability_of_harm.total_cmp(&a.probability_of_harm));
-    for cut in order.iter().take(MAX_LISTED) {
-        table.push([
-            lines(cut, listing).into(),
-            cut.motions.len().into(),
-            word(cut.assessed).into(),
-            cut.deviation_mm.into(),
-            cut.sigma_mm.into(),
-            (100.0 * cut.probability_of_harm).into(),
-            outcome_word(cut).into(),
-        ]);
-    }
+    let rows = order.iter().take(MAX_LISTED).map(|cut| (*cut, lines(cut, listing)));
+    let mut table = Table::of(
+        "Cuts by the probability that the correction makes them worse",
+        &rows.collect::<Vec<_>>(),
+        [
+            (Column::text("lines", "Lines"), |(_, lines)| lines.as_str().into()),
+            (Column::count("motions", "Motions"), |(cut, _)| cut.motions.len().into()),
+            (Column::text("judged", "Judged"), |(cut, _)| word(cut.assessed).into()),
+            (Column::number("off_mm", "before", "mm", 3), |(cut, _)| cut.deviation_mm.into()),
+            (Column::number("sigma_mm", "1σ", "mm", 3), |(cut, _)| cut.sigma_mm.into()),
+            (Column::number("worse_percent", "worse", "%", 1), |(cut, _)| {
+                (100.0 * cut.probability_of_harm).into()
+            }),
+            (Column::text("fate", "Outcome"), |(cut, _)| outcome_word(cut).into()),
+        ],
+    );
     let more = order.len().saturating_sub(MAX_LISTED);
     if more > 0 {
         table.notes.push(format!("{more} more cuts with a smaller probability are not listed."));

@@ -20,6 +20,15 @@ use truegrind_math::spectral;
 /// Peak joint rotation of an effect of practical size (rad).
 const PRACTICAL_RAD: f64 = 0.15 * std::f64::consts::PI / 180.0;
 
+/// Effects of the arm that geometry and frames can imitate in unfavourable poses.
+const CONFOUNDED_WITH_GEOMETRY: [CauseKind; 5] = [
+    CauseKind::JointCompliance,
+    CauseKind::GearEccentricity,
+    CauseKind::GearRatio,
+    CauseKind::JointCoupling,
+    CauseKind::Backlash,
+];
+
 /// Effects that these rows cannot detect, with the smallest detectable size.
 pub(super) fn not_testable(
     dataset: &Dataset,
@@ -79,19 +88,13 @@ pub(super) fn not_testable(
             "turn every axis through its whole range",
         );
     }
-    for kind in [
-        CauseKind::JointCompliance,
-        CauseKind::GearEccentricity,
-        CauseKind::GearRatio,
-        CauseKind::JointCoupling,
-        CauseKind::Backlash,
-    ] {
-        let asked = (0..6).filter(|joint| !still.contains(joint));
+    for kind in CONFOUNDED_WITH_GEOMETRY {
         let without_sides = kind == CauseKind::Backlash && prepared.sides_from_order;
+        let asked = (0..6).filter(|joint| !still.contains(joint));
         let hidden = if without_sides { Vec::new() } else { hidden_joints(kind, asked, left) };
         if !hidden.is_empty() && missing(kind) {
-            let joints: Vec<usize> = hidden.iter().map(|h| h.0).collect();
-            let sizes: Vec<String> = hidden.iter().map(describe).collect();
+            let (joints, sizes): (Vec<usize>, Vec<String>) =
+                hidden.iter().map(|hidden| (hidden.0, describe(hidden))).unzip();
             add(
                 kind,
                 pendant(&joints),

@@ -28,29 +28,13 @@ impl Interpreter<'_, '_> {
 
     fn new_motion(&mut self, block: &Block<'_>, name: &str, kind: MotionKind) -> Motion {
         let first = block.words.first().map_or(self.tree.nodes[block.node as usize].first, |word| word.first);
+        let (place, statement) = (self.place(first), self.tree.node_span(block.node));
+        let modal = Modal { conf_linear: Switch::Off, conf_joint: Switch::Off, ..Modal::START };
         Motion {
-            place: self.place(first),
-            statement: self.tree.node_span(block.node),
-            instruction: self.instruction(name),
-            kind,
-            targets: Vec::new(),
-            speed: None,
-            zone: None,
-            tool: None,
-            work_object: None,
-            timed: false,
-            insertable: false,
-            can_straighten: false,
             rapid: kind == MotionKind::Joint,
-            accepts_configuration: false,
-            axis: None,
-            by_radius: false,
-            modal: Modal { conf_linear: Switch::Off, conf_joint: Switch::Off, ..Modal::START },
-            in_loop: false,
             conditional: block.skippable,
             previous: self.state.previous,
-            routine: None,
-            left: None,
+            ..Motion::new(place, statement, self.instruction(name), kind, modal)
         }
     }
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{ListingBuilder, Literal, literals};
 use crate::dataflow::Nesting;
-use crate::motion::{Declaration, Motion, MotionKind, MotionTarget, Origin, Reason, Role, Routine};
+use crate::motion::{Declaration, Modal, Motion, MotionKind, MotionTarget, Origin, Reason, Role, Routine};
 use crate::rapid::evaluate::{Context, Source};
 use crate::rapid::flow::AbstractState;
 use crate::rapid::instruction::{INSTRUCTIONS, Instruction, Slot};
@@ -38,29 +38,15 @@ impl ListingBuilder<'_, '_> {
 
     fn motion(&mut self, unit: Unit, node: u32, state: &AbstractState, nesting: Nesting) -> Motion {
         let tree = &self.trees[unit.file as usize];
+        let (place, statement) =
+            (self.place(unit.file, tree.nodes[node as usize].first), tree.node_span(node));
         Motion {
-            place: self.place(unit.file, tree.nodes[node as usize].first),
-            statement: tree.node_span(node),
-            instruction: Arc::default(),
-            kind: MotionKind::Unknown,
-            targets: Vec::new(),
-            speed: None,
-            zone: None,
-            tool: None,
-            work_object: None,
-            timed: false,
-            insertable: false,
-            can_straighten: false,
-            rapid: false,
             accepts_configuration: true,
-            axis: None,
-            by_radius: false,
-            modal: crate::motion::Modal::START,
             in_loop: nesting.in_loop,
             conditional: nesting.conditional,
             previous: state.previous,
             routine: self.routine_of(unit),
-            left: None,
+            ..Motion::new(place, statement, Arc::default(), MotionKind::Unknown, Modal::START)
         }
     }
 
