@@ -84,9 +84,9 @@ fn may_cut(motion: &Motion) -> bool {
     let path = matches!(motion.kind, MotionKind::Linear | MotionKind::Circular)
         // A path that is given in the text but consists of neither lines nor arcs, or an unknown
         // instruction.
-        || matches!(motion.left, Some(Reason::UnsupportedPath | Reason::UnknownInstruction | Reason::NoMotionCode));
+        || matches!(motion.own_reason, Some(Reason::UnsupportedPath | Reason::UnknownInstruction | Reason::NoMotionCode));
     // A search motion ends, and stops, at its signal.
-    path && motion.left != Some(Reason::Probe) && !motion.instruction.contains("Search")
+    path && motion.own_reason != Some(Reason::Probe) && !motion.instruction.contains("Search")
 }
 
 /// Whether a motion goes on from the previous one without a stop, in the same frames.

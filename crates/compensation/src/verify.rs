@@ -150,7 +150,7 @@ fn run(listing: &Listing, loads: Option<&Loads>, arms: &mut Arms<'_>, cell: &Cel
     let mut near: Option<Joints> = None;
     for (index, motion) in listing.motions.iter().enumerate() {
         checkpoint();
-        if motion.left.is_some() {
+        if motion.own_reason.is_some() {
             continue;
         }
         if let Ok(there) = commanded_end(index, listing, arms, &frame_table, near.as_ref()) {

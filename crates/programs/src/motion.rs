@@ -325,7 +325,7 @@ pub struct Motion {
     /// Index into [`Listing::routines`]; `None` outside routines.
     pub routine: Option<u32>,
     /// Why the motion as a whole must stay unmodified, apart from its targets; the first reason that applies.
-    pub left: Option<Reason>,
+    pub own_reason: Option<Reason>,
 }
 
 impl Motion {
@@ -359,7 +359,7 @@ impl Motion {
             conditional: false,
             previous: None,
             routine: None,
-            left: None,
+            own_reason: None,
         }
     }
 
@@ -381,7 +381,7 @@ impl Motion {
     /// Why this motion cannot be rewritten: first the motion's own reason, then those of its targets. `None` if it
     /// can.
     pub fn reason(&self) -> Option<Reason> {
-        self.left.or_else(|| self.targets.iter().find_map(|target| target.value.err()))
+        self.own_reason.or_else(|| self.targets.iter().find_map(|target| target.value.err()))
     }
 }
 

@@ -82,7 +82,7 @@ pub(crate) fn blocking_reason(
     unchanged_motions: &BTreeMap<u32, OutcomeReason>,
 ) -> Option<(Status, OutcomeReason)> {
     let motion = &listing.motions[index as usize];
-    if let Some(reason) = motion.left.map(OutcomeReason::Program) {
+    if let Some(reason) = motion.own_reason.map(OutcomeReason::Program) {
         return Some((unchanged(reason), reason));
     }
     let targets = solved.of(index as usize);

@@ -19,7 +19,7 @@ fn unmodified_reason(listing: &Listing, motion: &Motion, options: &Options) -> O
     let unknown = || motion.targets.iter().find_map(|target| target.value.as_ref().err().copied());
     let external = || motion.targets.is_empty().then_some(Reason::ExternalOnly);
     let frames = || listing.frame_reason(motion);
-    if let Some(reason) = motion.left.or_else(unknown).or_else(external).or_else(frames) {
+    if let Some(reason) = motion.own_reason.or_else(unknown).or_else(external).or_else(frames) {
         return OutcomeReason::Program(reason);
     }
     if is_rewritable(motion, options) { OutcomeReason::NoChange } else { OutcomeReason::JointTarget }

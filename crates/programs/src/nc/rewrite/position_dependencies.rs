@@ -288,7 +288,7 @@ impl Task<'_> {
         if known {
             self.pin_path_dependent_increments(index, state);
         }
-        if known && motion.left.is_none_or(keeps_endpoint) {
+        if known && motion.own_reason.is_none_or(keeps_endpoint) {
             // It is rewritten, or omitted words are restated.
             let dependencies = if moves { Dependencies::on_motion(index) } else { Dependencies::NONE };
             state.position = [dependencies; AXES];

@@ -49,7 +49,7 @@ impl Interpreter<'_, '_> {
     /// Lists a motion that is never modified.
     pub(super) fn list_left(&mut self, block: &Block<'_>, name: &str, reason: Reason) {
         let mut motion = self.new_motion(block, name, MotionKind::Unknown);
-        motion.left = Some(reason);
+        motion.own_reason = Some(reason);
         let context = self.block_context(block, None);
         self.push(motion, context);
         self.state.previous = None;
@@ -216,9 +216,9 @@ impl Interpreter<'_, '_> {
         motion.zone = self.zone();
         motion.tool = Some(self.tool());
         motion.work_object = Some(self.work_object());
-        motion.left = self.reason_to_leave(block, mode, machine, &motion);
-        if corner && motion.left.is_none() {
-            motion.left = Some(Reason::UnsupportedPath);
+        motion.own_reason = self.reason_to_leave(block, mode, machine, &motion);
+        if corner && motion.own_reason.is_none() {
+            motion.own_reason = Some(Reason::UnsupportedPath);
         }
         motion.timed = !self.state.feed.per_minute && kind != MotionKind::Joint;
         let splits = !motion.timed && self.can_split(block, &before);
@@ -357,7 +357,7 @@ impl Interpreter<'_, '_> {
             && call.is_none_or(|call| call == Reason::Cycle)
             && self.state.groups.active_transforms() == 0
             && self.state.unknown_reason(set_before_branch).is_none()
-            && match motion.left {
+            && match motion.own_reason {
                 None | Some(Reason::Skippable | Reason::UnknownFlow | Reason::UnknownWord) => true,
                 Some(Reason::UnsupportedPath) => block.corner,
                 Some(Reason::Cycle) => call.is_some(),

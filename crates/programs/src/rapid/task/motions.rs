@@ -211,10 +211,10 @@ impl ListingBuilder<'_, '_> {
             motion.work_object = Some(self.work_object(unit, state, work_object));
         }
         let complete = to && via && count >= instruction.least();
-        motion.left = self.refusal(&motion, instruction, &options, complete);
+        motion.own_reason = self.refusal(&motion, instruction, &options, complete);
         // Replacing an impure expression would drop its effect. An unknown target is refused for that reason instead.
         let known = motion.targets.iter().all(|target| target.value.is_ok());
-        motion.left = motion.left.or((self.impure && known).then_some(Reason::SideEffect));
+        motion.own_reason = motion.own_reason.or((self.impure && known).then_some(Reason::SideEffect));
         motion
     }
 
@@ -297,7 +297,7 @@ impl ListingBuilder<'_, '_> {
         } else if let Some(moves) = predefined::displaces(name).filter(|_| !late) {
             let mut motion = self.motion(unit, node, state, nesting);
             motion.instruction = display(name).into();
-            motion.left = Some(moves?);
+            motion.own_reason = Some(moves?);
             return Some(motion);
         } else if predefined::effect(name).is_none() || late {
             for argument in arguments(tree, node) {
@@ -320,7 +320,7 @@ impl ListingBuilder<'_, '_> {
             }
             motion.targets.push(target);
         }
-        motion.left = Some(match (late, routine) {
+        motion.own_reason = Some(match (late, routine) {
             (true, _) => Reason::LateBinding,
             (false, Some(_)) => Reason::OwnRoutine,
             (false, None) => Reason::UnknownInstruction,
