@@ -33,35 +33,16 @@ pub const DECIDED_BY_POSES: [CauseKind; 9] = [
 
 /// The branch of a kind; of a thermal drift the arm's; none for findings that merge several.
 pub(super) fn family(effect: CauseKind) -> Option<Family> {
+    use CauseKind::*;
     Some(match effect {
-        CauseKind::LinkGeometry
-        | CauseKind::JointCompliance
-        | CauseKind::JointStiffness
-        | CauseKind::ThermalDrift
-        | CauseKind::SmoothCorrection => Family::Arm,
-        CauseKind::GearEccentricity
-        | CauseKind::GearTransmission
-        | CauseKind::GearRatio
-        | CauseKind::GearTwoJoints
-        | CauseKind::JointCoupling
-        | CauseKind::Backlash => Family::Drive,
-        CauseKind::SensorScale
-        | CauseKind::CableSag
-        | CauseKind::CablePulley
-        | CauseKind::CableDrum
-        | CauseKind::AirRefraction
-        | CauseKind::TargetNest => Family::Sensor,
-        CauseKind::SensorZeroShift
-        | CauseKind::SensorFrameShift
-        | CauseKind::ToolShift
-        | CauseKind::PayloadChange
-        | CauseKind::SetupChange => Family::SetUp,
-        CauseKind::Latency
-        | CauseKind::Unsettled
-        | CauseKind::AngleRounding
-        | CauseKind::ReadoutMismatch
-        | CauseKind::Outliers => Family::Log,
-        CauseKind::SmallDisturbances | CauseKind::Unexplained => return None,
+        LinkGeometry | JointCompliance | JointStiffness | ThermalDrift | SmoothCorrection => Family::Arm,
+        GearEccentricity | GearTransmission | GearRatio | GearTwoJoints | JointCoupling | Backlash => {
+            Family::Drive
+        }
+        SensorScale | CableSag | CablePulley | CableDrum | AirRefraction | TargetNest => Family::Sensor,
+        SensorZeroShift | SensorFrameShift | ToolShift | PayloadChange | SetupChange => Family::SetUp,
+        Latency | Unsettled | AngleRounding | ReadoutMismatch | Outliers => Family::Log,
+        SmallDisturbances | Unexplained => return None,
     })
 }
 
@@ -122,32 +103,29 @@ pub fn members(finding: &Finding) -> Vec<Member> {
 
 /// The measurement that separates an effect from others where no plan of poses can, and what to look for in it.
 fn in_words(effect: CauseKind) -> Option<&'static str> {
+    use CauseKind::*;
     Some(match effect {
-        CauseKind::SensorScale => {
+        SensorScale => {
             "measure a known length with the sensor (a scale bar): if it is read wrong, the sensor's scale is the cause"
         }
-        CauseKind::CableSag | CauseKind::CablePulley | CauseKind::CableDrum => {
+        CableSag | CablePulley | CableDrum => {
             "move the cable's outlet to another place and measure again (`diagnose --also`): what follows the cable and not the pose is the \
              sensor"
         }
-        CauseKind::AirRefraction => {
+        AirRefraction => {
             "measure the same ten poses at dawn and at noon, or from half the distance: what changes is the air"
         }
-        CauseKind::TargetNest => {
+        TargetNest => {
             "measure the same ten poses with the reflector turned by 90° in its nest: what changes is the target"
         }
-        CauseKind::JointStiffness => {
-            "measure the same ten poses with and without a load: what changes is the stiffness"
-        }
-        CauseKind::PayloadChange => "weigh the tool, and measure the same ten poses with and without it",
-        CauseKind::GearTwoJoints | CauseKind::GearTransmission => {
+        JointStiffness => "measure the same ten poses with and without a load: what changes is the stiffness",
+        PayloadChange => "weigh the tool, and measure the same ten poses with and without it",
+        GearTwoJoints | GearTransmission => {
             "turn each of these joints alone through its whole range in steps of a few degrees, and read at each: what returns with the angle \
              is the gear"
         }
-        CauseKind::Latency => {
-            "measure the same ten poses once at rest and once in motion: what changes is the clock"
-        }
-        CauseKind::Unsettled => {
+        Latency => "measure the same ten poses once at rest and once in motion: what changes is the clock",
+        Unsettled => {
             "measure the same ten poses again with twice the wait before each reading: what changes had not settled"
         }
         _ => return None,
