@@ -352,7 +352,7 @@ impl Cell {
     /// Reads a cell file.
     ///
     /// ```
-    /// use truegrind_compensation::cell::{Cell, CellError, FrameOrigin};
+    /// use truegrind_compensation::cell::{Cell, CellError, FrameKind, FrameOrigin};
     ///
     /// let cell = Cell::from_toml("[[tool]]\nname = \"tDisc\"\norigin = \"metrology\"\nposition_mm = [0, 0, 120]\n")?;
     /// assert_eq!(cell.tool[0].origin, FrameOrigin::Metrology);
