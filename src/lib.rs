@@ -83,6 +83,7 @@ pub use truegrind_calibration::measurement::split::{self, NoiseFloor, Split};
 
 // Identification, diagnosis and tracking.
 pub use truegrind_calibration::diagnosis::cause::Cause;
+pub use truegrind_calibration::diagnosis::cause_kind::CauseKind;
 pub use truegrind_calibration::diagnosis::diagnose::{Diagnosed, Options as DiagnoseOptions, diagnose};
 pub use truegrind_calibration::diagnosis::finding::{
     Alternative, Confidence, DiagnoseError, Diagnosis, Finding, Fits, FoundParameter, Gain, NotTestable,

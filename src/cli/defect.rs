@@ -9,21 +9,21 @@ use std::sync::{Mutex, PoisonError};
 
 /// Source locations of the latest panics, by message: only the hook knows the location, and a panic may be caught on another
 /// thread.
-static PLACES: Mutex<VecDeque<(String, String)>> = Mutex::new(VecDeque::new());
+static LOCATIONS: Mutex<VecDeque<(String, String)>> = Mutex::new(VecDeque::new());
 
-const MOST_PLACES: usize = 64;
+const MOST_LOCATIONS: usize = 64;
 
 /// Replaces the panic hook by one that prints nothing; the message is printed where the panic is caught.
 pub(super) fn install_silent_hook() {
     std::panic::set_hook(Box::new(|info| {
         let message = message(info.payload());
-        let place = info.location().map(|at| format!("{}:{}", at.file(), at.line())).unwrap_or_default();
-        let mut places = PLACES.lock().unwrap_or_else(PoisonError::into_inner);
-        if places.iter().all(|(known, _)| *known != message) {
-            places.push_back((message, place));
+        let location = info.location().map(|at| format!("{}:{}", at.file(), at.line())).unwrap_or_default();
+        let mut locations = LOCATIONS.lock().unwrap_or_else(PoisonError::into_inner);
+        if locations.iter().all(|(known, _)| *known != message) {
+            locations.push_back((message, location));
         }
-        if places.len() > MOST_PLACES {
-            places.pop_front();
+        if locations.len() > MOST_LOCATIONS {
+            locations.pop_front();
         }
     }));
 }
@@ -35,11 +35,11 @@ pub(super) fn install_silent_hook() {
 pub(super) fn catch_panic<T>(work: impl FnOnce() -> anyhow::Result<T>) -> anyhow::Result<T> {
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|payload| {
         let message = message(&*payload);
-        let places = PLACES.lock().unwrap_or_else(PoisonError::into_inner);
-        let place = places.iter().find(|(known, _)| *known == message).map_or("", |(_, place)| place);
+        let locations = LOCATIONS.lock().unwrap_or_else(PoisonError::into_inner);
+        let location = locations.iter().find(|(known, _)| *known == message).map_or("", |(_, location)| location);
         Err(anyhow::anyhow!(
             "internal error of truegrind {}, not of the input: please report it with the command and the input files \
-             ({message}; {place})",
+             ({message}; {location})",
             env!("CARGO_PKG_VERSION")
         ))
     })

@@ -197,8 +197,8 @@ pub(super) struct ProgramReports {
 }
 
 impl UnitResult for ProgramReports {
-    fn failed(job: &Job, why: &str) -> Self {
-        Self { name: job.name(), reports: Vec::new(), used: None, failed: Some(why.to_owned()) }
+    fn failed(job: &Job, reason: &str) -> Self {
+        Self { name: job.name(), reports: Vec::new(), used: None, failed: Some(reason.to_owned()) }
     }
 
     fn is_failed(&self) -> bool {

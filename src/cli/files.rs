@@ -16,18 +16,18 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 
 use super::terminal::write_stdout;
+use destination::{Destination, Kind, parent};
 use in_place::InPlace;
 use pending::Pending;
-use place::{Kind, Place, parent};
 
+pub(super) use destination::is_stdout;
 pub(super) use ledger::new_round;
-pub(super) use place::is_stdout;
 
 mod in_place;
 mod ledger;
 pub(super) mod run_files;
 mod pending;
-mod place;
+mod destination;
 pub(super) mod sync;
 pub(super) mod read_log;
 
@@ -203,56 +203,57 @@ impl Batch {
     pub(super) fn write(self) -> anyhow::Result<()> {
         self.inputs.iter().try_for_each(|input| expect(input))?;
         let named: Vec<&Path> = self.files.iter().map(|(path, _)| path.as_path()).collect();
-        let places = ledger::take(&named)?;
+        let destinations = ledger::take(&named)?;
         let (mut ready, mut over, mut last) = (Vec::new(), Vec::new(), Vec::new());
-        for (place, (_, bytes)) in places.iter().zip(&self.files) {
-            let failed = || format!("{}: cannot be written; nothing was changed", place.named.display());
-            match write_temporary(place, bytes, self.synced_later).with_context(failed)? {
-                Some(pending) => ready.push((place, pending)),
-                None if matches!(place.kind, Kind::Over(_)) => {
-                    over.push((place, bytes, InPlace::open(&place.path).with_context(failed)?));
+        for (destination, (_, bytes)) in destinations.iter().zip(&self.files) {
+            let failed =
+                || format!("{}: cannot be written; nothing was changed", destination.named.display());
+            match write_temporary(destination, bytes, self.synced_later).with_context(failed)? {
+                Some(pending) => ready.push((destination, pending)),
+                None if matches!(destination.kind, Kind::Over(_)) => {
+                    over.push((destination, bytes, InPlace::open(&destination.path).with_context(failed)?));
                 }
-                None => last.push((place, bytes)),
+                None => last.push((destination, bytes)),
             }
         }
         // Writes that can still fail because the disk is full go first, so that they can be undone.
         for index in 0..over.len() {
-            let (place, bytes, file) = &mut over[index];
+            let (destination, bytes, file) = &mut over[index];
             if let Err(error) = file.put(bytes) {
-                let named = place.named.display().to_string();
+                let named = destination.named.display().to_string();
                 over[..index].iter_mut().for_each(|(_, _, file)| drop(file.restore()));
                 return Err(error)
                     .with_context(|| format!("{named}: cannot be written; nothing was changed"));
             }
         }
-        let mut done: Vec<&Place> = over.iter().map(|(place, ..)| *place).collect();
-        for (place, file) in ready {
-            file.put().with_context(|| incomplete(place, "put in place", &done, &places))?;
-            ledger::note_put(place);
-            done.push(place);
+        let mut done: Vec<&Destination> = over.iter().map(|(destination, ..)| *destination).collect();
+        for (destination, file) in ready {
+            file.put().with_context(|| incomplete(destination, "put in place", &done, &destinations))?;
+            ledger::note_put(destination);
+            done.push(destination);
         }
-        for (place, bytes) in last {
-            match place.kind {
+        for (destination, bytes) in last {
+            match destination.kind {
                 Kind::Stdout => write_stdout(bytes)?,
-                _ => write_through(&place.path, bytes)
-                    .with_context(|| incomplete(place, "written", &done, &places))?,
+                _ => write_through(&destination.path, bytes)
+                    .with_context(|| incomplete(destination, "written", &done, &destinations))?,
             }
-            done.push(place);
+            done.push(destination);
         }
         Ok(())
     }
 }
 
 /// Error text if an output fails after others were put in place: lists which are new and which are not.
-fn incomplete(failed: &Place, what: &str, done: &[&Place], all: &[Place]) -> String {
-    let names = |of: &mut dyn Iterator<Item = &Place>| {
-        of.map(|place| place.named.display().to_string()).collect::<Vec<_>>().join(", ")
+fn incomplete(failed: &Destination, what: &str, done: &[&Destination], all: &[Destination]) -> String {
+    let names = |of: &mut dyn Iterator<Item = &Destination>| {
+        of.map(|destination| destination.named.display().to_string()).collect::<Vec<_>>().join(", ")
     };
     let here = format!("{}: cannot be {what}", failed.named.display());
     if done.is_empty() {
         return format!("{here}; nothing was changed");
     }
-    let open = |place: &&Place| !done.iter().any(|other| std::ptr::eq(*other, *place));
+    let open = |destination: &&Destination| !done.iter().any(|other| std::ptr::eq(*other, *destination));
     format!(
         "{here}; already replaced: {}; unchanged: {}",
         names(&mut done.iter().copied()),
@@ -262,14 +263,14 @@ fn incomplete(failed: &Place, what: &str, done: &[&Place], all: &[Place]) -> Str
 
 /// Writes a temporary file beside the output; `None` for streams, stdout and files written in place. `later`: a new file is synced
 /// later.
-fn write_temporary(place: &Place, bytes: &[u8], later: bool) -> std::io::Result<Option<Pending>> {
-    let over = match &place.kind {
+fn write_temporary(destination: &Destination, bytes: &[u8], later: bool) -> std::io::Result<Option<Pending>> {
+    let over = match &destination.kind {
         Kind::Stdout | Kind::Stream => return Ok(None),
         Kind::Over(meta) if link_count(meta) > 1 => return Ok(None),
         Kind::Over(meta) => Some(meta),
         Kind::New => None,
     };
-    match Pending::write(place.path.clone(), &parent(&place.path), over, bytes, later) {
+    match Pending::write(destination.path.clone(), &parent(&destination.path), over, bytes, later) {
         Err(error) if over.is_some() && error.kind() == std::io::ErrorKind::PermissionDenied => Ok(None),
         done => done.map(Some),
     }

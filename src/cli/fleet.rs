@@ -18,7 +18,7 @@ use super::computation::{Common, on_threads};
 use super::diagnose::{Arguments, diagnose_rows, options};
 use super::exit_status::ExitStatus;
 use super::files::{self, Batch, read_log};
-use super::identify::{DataArguments, read_bytes, why_not_written};
+use super::identify::{DataArguments, read_bytes, reason_not_written};
 use super::inputs;
 use super::outputs::Outputs;
 use super::programs::{Job, found_below};
@@ -128,7 +128,7 @@ fn jobs(arguments: &Arguments) -> anyhow::Result<Vec<Job>> {
 /// Path of the model of an arm in the output folder.
 fn model_path(job: &Job) -> PathBuf {
     let file = job.paths.first().map(PathBuf::as_path).unwrap_or(Path::new(""));
-    job.place(file).with_extension("toml")
+    job.relative_output(file).with_extension("toml")
 }
 
 /// Refuses two arms with the same output file.
@@ -157,8 +157,8 @@ pub(super) struct ArmResult {
 }
 
 impl UnitResult for ArmResult {
-    fn failed(job: &Job, why: &str) -> Self {
-        Self { row: Row::failed(job.name(), why.to_owned()), notes: Vec::new(), clean: false }
+    fn failed(job: &Job, reason: &str) -> Self {
+        Self { row: Row::failed(job.name(), reason.to_owned()), notes: Vec::new(), clean: false }
     }
 
     fn is_failed(&self) -> bool {
@@ -195,14 +195,14 @@ fn diagnose_arm(
     let found = diagnose_rows(arguments, options, &robot.sheet.name, &robot.model, &dataset, &[])?;
     let diagnosis = &found.diagnosis;
     let notes: Vec<String> = diagnosis.notes.iter().chain(&dataset.notes).cloned().collect();
-    let why = why_not_written(&found.estimated, arguments.allow_doubtful);
+    let reason = reason_not_written(&found.estimated, arguments.allow_doubtful);
     let model = arguments.output.as_ref().map(|folder| folder.join(model_path(job)));
     let mut made = Vec::new();
     if let Some(model) = &model {
         let json = serde_json::to_value(diagnosis.clone().with_rows_from_0(&dataset))?;
         made.push((model.with_extension("json"), format::json::text(&json)?));
         made.push((model.with_extension("html"), format::html::document(&page::document(&found, &dataset))));
-        if why.is_none() {
+        if reason.is_none() {
             made.push((model.clone(), found.estimated.to_toml()?));
         }
     }
@@ -216,10 +216,10 @@ fn diagnose_arm(
         batch.add(path, text);
     }
     batch.write()?;
-    let output = model.filter(|_| why.is_none()).map(|model| model.display().to_string());
+    let output = model.filter(|_| reason.is_none()).map(|model| model.display().to_string());
     let poor = matches!(found.estimated.verdict.status, Judgement::Fail | Judgement::Doubtful);
     let unexplained = diagnosis.is_partly_unexplained();
-    let note = why.filter(|_| arguments.output.is_some()).map(|why| format!("the model {why}"));
+    let note = reason.filter(|_| arguments.output.is_some()).map(|reason| format!("the model {reason}"));
     let row = Row::of(job.name(), output, note, diagnosis);
     Ok((ArmResult { row, notes, clean: !poor && !unexplained }, written))
 }

@@ -140,9 +140,9 @@ fn check_complete<T>(run: &Run, jobs: &[Job], states: &[UnitState<T>]) -> anyhow
         let what = match state {
             UnitState::Done(_) => continue,
             UnitState::Missing => job.name(),
-            UnitState::Changed(places) => {
-                let places: Vec<String> = places.iter().map(|place| place.display().to_string()).collect();
-                format!("{} (outputs changed after they were written: {})", job.name(), places.join(", "))
+            UnitState::Changed(paths) => {
+                let paths: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
+                format!("{} (outputs changed after they were written: {})", job.name(), paths.join(", "))
             }
         };
         open.push((run.shares.map(|of| Share::of_name(&job.name_below(), of)), what));

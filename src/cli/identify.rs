@@ -165,7 +165,7 @@ impl FitArguments {
     /// The tolerances of the arm; where one is stated, none is estimated from the data.
     pub(super) fn tolerance(&self) -> anyhow::Result<Tolerance> {
         let mut tolerance = Tolerance::default();
-        for (name, stated, place, scale) in [
+        for (name, stated, target, scale) in [
             ("--tolerance-length", self.tolerance_length, &mut tolerance.length_mm, 1.0),
             ("--tolerance-angle", self.tolerance_angle, &mut tolerance.angle_rad, 1.0_f64.to_radians()),
         ] {
@@ -173,7 +173,7 @@ impl FitArguments {
                 if !(value > 0.0 && value.is_finite()) {
                     bail!("{name} {value}: expected a number above 0");
                 }
-                *place = value * scale;
+                *target = value * scale;
             }
         }
         tolerance.zero_rad = tolerance.angle_rad;
@@ -266,13 +266,13 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
 }
 
 /// Why a model is not written; `None` if its verdict allows it.
-pub(super) fn why_not_written(estimated: &Estimated, allow_doubtful: bool) -> Option<String> {
-    let why = match estimated.verdict.status {
+pub(super) fn reason_not_written(estimated: &Estimated, allow_doubtful: bool) -> Option<String> {
+    let reason = match estimated.verdict.status {
         Judgement::Fail => "the fit failed",
         Judgement::Doubtful if !allow_doubtful => "the model is doubtful (--allow-doubtful writes it anyway)",
         _ => return None,
     };
-    Some(format!("was not written, because {why}: {}", estimated.verdict.reasons.join("; ")))
+    Some(format!("was not written, because {reason}: {}", estimated.verdict.reasons.join("; ")))
 }
 
 /// Writes the reports, and the model if its verdict allows it.
@@ -284,9 +284,9 @@ pub(super) fn write_model(
 ) -> anyhow::Result<ExitStatus> {
     let status = estimated.verdict.status;
     if let Some(path) = output {
-        if let Some(why) = why_not_written(estimated, allow_doubtful) {
+        if let Some(reason) = reason_not_written(estimated, allow_doubtful) {
             batch.write()?;
-            bail!("{} {why}", path.display());
+            bail!("{} {reason}", path.display());
         }
         batch.add(path, estimated.to_toml()?);
     }

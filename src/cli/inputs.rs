@@ -186,6 +186,6 @@ pub(super) fn beside(path: &Path, name: &str) -> PathBuf {
 
 /// Reads a file named in another file.
 pub(super) fn read_beside(path: &Path, name: &str) -> anyhow::Result<Vec<u8>> {
-    let place = beside(path, name);
-    files::read(&place).with_context(|| format!("named in {}", path.display()))
+    let full_path = beside(path, name);
+    files::read(&full_path).with_context(|| format!("named in {}", path.display()))
 }

@@ -12,7 +12,7 @@ use super::files;
 const RAPID: &str = ".mod, .modx, .prg, .sys (RAPID)";
 const NC: &str = ".nc (Fanuc style), .mpf, .spf (840D), .ngc (LinuxCNC), .h (Heidenhain) and the other extensions of NC files";
 
-/// The language that the extension of an output stands for; `None` without extension, as for stdout and devices.
+/// The language of an output's extension; `None` without extension, as for stdout and devices.
 fn language_of(output: &Path) -> anyhow::Result<Option<Language>> {
     let Some(extension) = output.extension() else { return Ok(None) };
     let list = extension.eq_ignore_ascii_case("pgf");
@@ -39,7 +39,7 @@ pub(super) fn refuse_nc(output: &Path) -> anyhow::Result<()> {
     }
 }
 
-/// Refuses an output whose extension stands for another language or another control than that of its source.
+/// Refuses an output whose extension belongs to another language or control than its source.
 pub(super) fn refuse_other_language(output: &Path, source: &Path, bytes: &[u8]) -> anyhow::Result<()> {
     let extension = |path: &Path| path.extension().map(|extension| extension.to_ascii_lowercase());
     if extension(output) == extension(source) {

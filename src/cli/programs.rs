@@ -101,13 +101,13 @@ impl Job {
     }
 
     /// The path of a file in the output folder: relative to the given folder or to its task list.
-    pub(super) fn place(&self, path: &Path) -> PathBuf {
+    pub(super) fn relative_output(&self, path: &Path) -> PathBuf {
         let beside_list = || self.paths.iter().filter(|path| is_list(path)).filter_map(|list| list.parent());
         let below = self.under.as_deref().into_iter().chain(beside_list());
-        let place = below
+        let relative = below
             .filter_map(|under| path.strip_prefix(under).ok())
-            .find(|place| place.components().all(|part| matches!(part, Component::Normal(_))));
-        place.map_or_else(|| files::name(path).into(), Path::to_path_buf)
+            .find(|relative| relative.components().all(|part| matches!(part, Component::Normal(_))));
+        relative.map_or_else(|| files::name(path).into(), Path::to_path_buf)
     }
 }
 
@@ -165,19 +165,19 @@ fn find_module(folder: &Path, name: &str) -> PathBuf {
     if literal.exists() {
         return literal;
     }
-    let mut place = folder.to_path_buf();
+    let mut resolved = folder.to_path_buf();
     for part in name.split(['\\', '/']).filter(|part| !part.is_empty() && *part != ".") {
-        let next = place.join(part);
-        let open = if place.as_os_str().is_empty() { Path::new(".") } else { place.as_path() };
+        let next = resolved.join(part);
+        let open = if resolved.as_os_str().is_empty() { Path::new(".") } else { resolved.as_path() };
         let alike = || {
             let entries = std::fs::read_dir(open).ok()?;
             let names = entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
             let same = names.filter(|name| name.to_lowercase() == part.to_lowercase());
-            Some(place.join(same.min()?))
+            Some(resolved.join(same.min()?))
         };
-        place = if next.exists() { next } else { alike().unwrap_or(next) };
+        resolved = if next.exists() { next } else { alike().unwrap_or(next) };
     }
-    if place.is_file() { place } else { literal }
+    if resolved.is_file() { resolved } else { literal }
 }
 
 /// The tasks that the command line names. Named RAPID modules form one task unless `each` is set; every task list, NC file
@@ -286,11 +286,11 @@ impl Programs {
         for path in paths {
             let bytes = files::read(path)?;
             if is_list(path) {
-                for place in listed(path, &bytes) {
-                    check_listed(path, &place, false)?;
+                for resolved in listed(path, &bytes) {
+                    check_listed(path, &resolved, false)?;
                     let module =
-                        files::read(&place).with_context(|| format!("named in {}", path.display()))?;
-                    files.push((place, module));
+                        files::read(&resolved).with_context(|| format!("named in {}", path.display()))?;
+                    files.push((resolved, module));
                 }
                 lists.push((path.clone(), bytes));
             } else {

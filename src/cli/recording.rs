@@ -271,12 +271,12 @@ pub(super) fn meshes(robot: Option<NamedRobot<'_>>) -> anyhow::Result<Vec<LinkMe
     let (mut out, mut missing, mut triangles) = (Vec::new(), Vec::new(), 0);
     for Visual { frame, pose, file, unit_mm } in visuals {
         let stl = file.to_ascii_lowercase().ends_with(".stl");
-        let Some(place) = mesh_file(path, &file).filter(|_| stl) else {
+        let Some(file_path) = mesh_file(path, &file).filter(|_| stl) else {
             missing.push(file);
             continue;
         };
-        let drawn = Mesh::triangles_of_stl(&files::read(&place)?, unit_mm)
-            .map_err(|error| anyhow::anyhow!("{}: {error}", place.display()))?;
+        let drawn = Mesh::triangles_of_stl(&files::read(&file_path)?, unit_mm)
+            .map_err(|error| anyhow::anyhow!("{}: {error}", file_path.display()))?;
         triangles += drawn.triangles.len();
         if triangles > MAX_TRIANGLES {
             missing.push(file);
@@ -298,9 +298,9 @@ pub(super) fn meshes(robot: Option<NamedRobot<'_>>) -> anyhow::Result<Vec<LinkMe
 /// Path of a mesh of a URDF: `package://NAME/…` in a folder NAME above or beside the file, or beside the file; other names relative
 /// to the file.
 fn mesh_file(urdf: &Path, name: &str) -> Option<PathBuf> {
-    let is_there = |place: PathBuf| place.is_file().then_some(place);
-    if let Some(place) = name.strip_prefix("file://") {
-        return is_there(PathBuf::from(place));
+    let is_there = |file_path: PathBuf| file_path.is_file().then_some(file_path);
+    if let Some(file_path) = name.strip_prefix("file://") {
+        return is_there(PathBuf::from(file_path));
     }
     let Some(in_package) = name.strip_prefix("package://") else {
         return is_there(inputs::beside(urdf, name));

@@ -84,7 +84,7 @@ impl Shares {
 /// The result of a unit, with its record.
 pub(super) trait UnitResult: Sized + Send {
     /// The result of a unit that failed.
-    fn failed(job: &Job, why: &str) -> Self;
+    fn failed(job: &Job, reason: &str) -> Self;
     /// Whether the unit failed.
     fn is_failed(&self) -> bool;
     /// The record as JSON, bit-exact.
@@ -281,16 +281,16 @@ impl Store {
 
     /// The outputs of a unit that changed after they were written.
     pub(super) fn changed<R>(&self, done: &Recorded<R>) -> Vec<PathBuf> {
-        let place = |output: &Output| match output.below {
+        let output_path = |output: &Output| match output.below {
             true => self.work.join(&output.file),
             false => PathBuf::from(&output.file),
         };
-        let places = done.outputs.iter().map(|output| (place(output), &output.sha256));
-        let other = places.filter(|(place, hash)| {
-            let bytes = files::read_state(place);
+        let paths = done.outputs.iter().map(|output| (output_path(output), &output.sha256));
+        let other = paths.filter(|(output_path, hash)| {
+            let bytes = files::read_state(output_path);
             !bytes.is_ok_and(|bytes| key::sha256(&bytes) == **hash)
         });
-        other.map(|(place, _)| place).collect()
+        other.map(|(output_path, _)| output_path).collect()
     }
 
     fn keep<T: UnitResult>(
@@ -383,11 +383,11 @@ impl<'s> JobSession<'s> {
             }
         }
         if times >= MOST_BEGUN {
-            let why = format!(
+            let reason = format!(
                 "processing it crashed {times} times, the last times with nothing else running: too little memory, or a defect of \
                  truegrind, which please report (--resume skips it; without --resume it is tried again)"
             );
-            let kept = T::failed(job, &why);
+            let kept = T::failed(job, &reason);
             self.store.keep(&key, job, &kept, Ended::Killed, Vec::new())?;
             run_files::remove(&begun);
             return Ok(Some(kept));

@@ -30,7 +30,7 @@ pub(super) struct StatedFrameArguments {
 #[derive(Debug, Clone, Default, Args)]
 pub(super) struct FramePriorArguments {
     /// Uncertainty of --sensor-frame, or of --outlet and --cable-zero: standard deviation in mm and, for the rotation of a frame, in
-    /// degrees (default: that of the mm at one metre). The fit then uses them as a prior, so that the place of a path can be
+    /// degrees (default: that of the mm at one metre). The fit then uses them as a prior, so that the placement of a path can be
     /// corrected.
     #[arg(long, value_name = "MM[,DEG]", allow_hyphen_values = true)]
     frame_sigma: Option<String>,
@@ -134,14 +134,14 @@ impl StatedFrameArguments {
                         );
                     }
                 }
-                for (place, text) in frames.outlets_mm.iter_mut().zip(&self.outlet) {
-                    *place = Vector3::from(triple("--outlet", text)?);
+                for (frame_value, text) in frames.outlets_mm.iter_mut().zip(&self.outlet) {
+                    *frame_value = Vector3::from(triple("--outlet", text)?);
                 }
-                for (place, text) in frames.zeros_mm.iter_mut().zip(&self.cable_zero) {
+                for (frame_value, text) in frames.zeros_mm.iter_mut().zip(&self.cable_zero) {
                     let [value] = numbers("--cable-zero", text)?[..] else {
                         bail!("--cable-zero {text}: expected one number (mm)");
                     };
-                    *place = value;
+                    *frame_value = value;
                 }
             }
             Sensor::Position | Sensor::Pose => {

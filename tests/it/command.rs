@@ -20,6 +20,7 @@ mod robots;
 mod same;
 mod shares;
 mod text;
+mod verbs;
 
 const CABLE: &str = include_str!("../data/irb120-cable.csv");
 

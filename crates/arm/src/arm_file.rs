@@ -3,7 +3,7 @@
 use nalgebra::{Matrix6, Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::bounds::{self, InvalidValue, LENGTH_MM, SPEED_DEG_S, TWIST_DEG, display_number};
+use super::bounds::{self, InvalidValue, LENGTH_MM, SPEED_DEG_S, display_number};
 use super::effect::Effect;
 use super::effect::bounds::effects;
 use super::link::{Link, LinkModel};
@@ -169,15 +169,7 @@ impl ArmFile {
             }
         }
         for (i, link) in self.link.iter().enumerate() {
-            let key = |name: &str| format!("link {} {name}", i + 1);
-            for (name, value) in [("a_mm", link.a_mm), ("d_mm", link.d_mm)] {
-                LENGTH_MM.check(|| key(name), value)?;
-            }
-            let turns =
-                [("alpha_deg", link.alpha_deg), ("theta_deg", link.theta_deg), ("beta_deg", link.beta_deg)];
-            for (name, value) in turns {
-                TWIST_DEG.check(|| key(name), value)?;
-            }
+            bounds::link(i, [link.a_mm, link.d_mm], [link.alpha_deg, link.theta_deg, link.beta_deg])?;
         }
         bounds::bodies(self.body.as_deref().unwrap_or_default())?;
         effects(&self.effect)

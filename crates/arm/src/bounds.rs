@@ -142,6 +142,25 @@ pub fn joint_map(rows: &[[f64; 6]; 6]) -> Result<(), InvalidValue> {
     ))
 }
 
+/// Lengths a and d (mm) and angles alpha, theta and beta (°) of link `index`, counted from 0.
+///
+/// # Errors
+/// [`InvalidValue`].
+pub(crate) fn link(
+    index: usize,
+    [a, d]: [f64; 2],
+    [alpha, theta, beta]: [f64; 3],
+) -> Result<(), InvalidValue> {
+    let key = |name: &str| format!("link {} {name}", index + 1);
+    for (name, value) in [("a_mm", a), ("d_mm", d)] {
+        LENGTH_MM.check(|| key(name), value)?;
+    }
+    for (name, value) in [("alpha_deg", alpha), ("theta_deg", theta), ("beta_deg", beta)] {
+        TWIST_DEG.check(|| key(name), value)?;
+    }
+    Ok(())
+}
+
 /// Mass and centre of a link.
 ///
 /// # Errors

@@ -43,7 +43,7 @@ impl Link {
     /// use nalgebra::Point3;
     /// use truegrind_arm::link::{Link, LinkModel};
     ///
-    /// // An upper arm of 270 mm whose joint stands at 90°: its end lies on y, its own x axis along y.
+    /// // An upper arm of 270 mm with its joint at 90°: its end is on y, and its own x axis points along y.
     /// let link = Link { model: LinkModel::Dh, a_mm: 270.0, d_mm: 0.0, alpha_rad: 0.0, theta_rad: 0.0, beta_rad: 0.0 };
     /// let end = link.pose(FRAC_PI_2);
     /// assert!((end * Point3::origin() - Point3::new(0.0, 270.0, 0.0)).norm() < 1e-12);

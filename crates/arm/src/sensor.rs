@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 /// What the sensor measures of a pose.
 ///
-/// Models that no measurement stands behind used to be written with an empty name, and are read as before:
+/// Models without a measurement used to be written with an empty name, which is read as [`Sensor::Position`]:
 ///
 /// ```
 /// use serde::Deserialize;

@@ -217,7 +217,7 @@ fn errors(observed: &Observations, model: &Model, options: &Options) -> Result<[
         let turns = orientation::errors(observed, &rows, model, frames).unwrap_or_default();
         return Ok([errors_on(observed, model, frames), turns]);
     }
-    let (mut places, mut turns) = (vec![f64::NAN; count], vec![f64::NAN; count]);
+    let (mut position_errors, mut turns) = (vec![f64::NAN; count], vec![f64::NAN; count]);
     let mut oriented = true;
     for Split { train, test } in folds(&observed.dataset, FOLDS, options.seed) {
         let frames = register(&observed.subset(&train), model, &Tolerance::default())?.fitted.frames;
@@ -226,9 +226,9 @@ fn errors(observed: &Observations, model: &Model, options: &Options) -> Result<[
             None => oriented = false,
         }
         let errors = errors_on(&observed.subset(&test), model, &frames);
-        test.into_iter().zip(errors).for_each(|(row, error)| places[row] = error);
+        test.into_iter().zip(errors).for_each(|(row, error)| position_errors[row] = error);
     }
-    Ok([places, if oriented { turns } else { Vec::new() }])
+    Ok([position_errors, if oriented { turns } else { Vec::new() }])
 }
 
 fn range(dataset: &Dataset, value: fn(&Condition) -> Option<f64>) -> Option<[f64; 2]> {
@@ -294,7 +294,7 @@ fn cycles(
             rows.iter().filter_map(|&row| seen(observed, row, &frames.base_from_sensor)).collect();
         let count = attained.len() as f64;
         let barycentre = attained.iter().sum::<Vector3<f64>>() / count;
-        let distances = ErrorSummary::of(attained.iter().map(|place| (place - barycentre).norm()));
+        let distances = ErrorSummary::of(attained.iter().map(|position| (position - barycentre).norm()));
         let row = &observed.dataset.rows[rows[0]];
         let target = model.at_condition(&row.condition).forward(&row.joints) * frames.flange_from_target;
         out.accuracy_mm = out.accuracy_mm.max((target.translation.vector - barycentre).norm());

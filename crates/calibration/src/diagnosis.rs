@@ -13,15 +13,15 @@
 //! 6. [`selection`]: accepts the best candidate that is significant after correction for all trials and lowers the held-out
 //!    error; then drops or exchanges accepted causes while that helps; repeats. [`levels`] rewrites overlapping shifts as
 //!    piecewise-constant levels.
-//! 7. [`validation`]: held-out errors of all stages by refits; [`held`]: those of candidates, steps and rivals to first order.
+//! 7. [`validation`]: held-out errors of all stages by refits; [`held_out`]: those of candidates, steps and rivals to first order.
 //! 8. [`residual_tests`], `data_quality` and `testability`: outliers, noise that grows with range, unexplained structure;
 //!    rounding and contradicting columns; effects that the data cannot detect.
 //! 9. [`discrepancy`] with [`marginal`]: random functions for model discrepancy. `confirmation`: a cause is identified only if it
 //!    remains significant with them and is selected again in [`halves`] of the rows (stability selection).
 //! 10. `findings` and `merged`: findings, ranked by their `contribution`, with doubts where a larger fault confounds them
 //!     (`confounding`); `unexplained`: the rest, with what a planner needs of it
-//!     ([`something_else`]); [`decision`]: shares of causes that cannot be told apart, and the measurement that decides. `written`: the arm for compensation, beside the unknown rest of
-//!     a sensor's law (`sensor_law`); `in_doubt`: its covariance for uncertain
+//!     ([`something_else`]); [`decision`]: shares of causes that cannot be told apart, and the measurement that decides. `written_model`: the arm for compensation, fitted beside the
+//!     unknown rest of a sensor's law (`sensor_law`); `in_doubt`: its covariance for uncertain
 //!     causes; `sensor_causes`: whether causes of the measurement are fitted with it.
 //! 11. [`finding`], `summary` and [`words`]: the result, as a contract for programs and as sentences for technicians.
 //!
@@ -30,6 +30,7 @@
 //! The prior of a candidate's size is part of its evidence, which penalises candidates with many parameters.
 
 pub mod preparation;
+pub mod cause_kind;
 pub mod cause;
 pub mod catalogue;
 mod algebra;
@@ -42,7 +43,7 @@ pub mod contribution;
 mod confounding;
 mod merged;
 mod unexplained;
-mod written;
+mod written_model;
 mod in_doubt;
 mod sensor_causes;
 mod sensor_law;
@@ -52,7 +53,7 @@ mod design_effect;
 pub mod extension;
 pub mod design;
 mod link_growth;
-pub mod held;
+pub mod held_out;
 pub mod score;
 pub mod intervals;
 pub mod candidates;

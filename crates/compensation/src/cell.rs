@@ -33,6 +33,7 @@ pub mod robot_match;
 pub mod template;
 
 use std::collections::{BTreeSet, HashMap};
+use std::fmt;
 
 use nalgebra::{Quaternion, UnitQuaternion};
 use serde::{Deserialize, Serialize};
@@ -170,8 +171,8 @@ pub enum CellError {
     /// Inconsistent keys of a frame, or an impossible number.
     #[error("{kind} \"{name}\": {what}")]
     Frame {
-        /// `tool` or `wobj`.
-        kind: &'static str,
+        /// Its section.
+        kind: FrameKind,
         /// Its name.
         name: String,
         /// The key and its fault.
@@ -180,8 +181,8 @@ pub enum CellError {
     /// One frame under two equivalent names.
     #[error("{kind} \"{name}\" is stated twice (as \"{before}\" before): keep one of the two")]
     Twice {
-        /// `tool` or `wobj`.
-        kind: &'static str,
+        /// Its section.
+        kind: FrameKind,
         /// Its name.
         name: String,
         /// Name of the first.
@@ -206,8 +207,8 @@ pub enum CellError {
         cell.word(), surface.word()
     )]
     Contradicted {
-        /// `tool` or `wobj`.
-        kind: &'static str,
+        /// Its section.
+        kind: FrameKind,
         /// Its name.
         name: String,
         /// Origin in the cell file.
@@ -223,9 +224,27 @@ const MOST_DEG: f64 = 3600.0;
 /// Limit of the sum of squared numbers of teaching points of tools: 500 of one tool, ten of each of 2,500.
 const MOST_TEACHING: usize = 250_000;
 
+/// A frame's section of a cell file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FrameKind {
+    /// `[[tool]]`.
+    Tool,
+    /// `[[wobj]]`, a work object or work offset.
+    Wobj,
+}
+
+impl fmt::Display for FrameKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            FrameKind::Tool => "tool",
+            FrameKind::Wobj => "wobj",
+        })
+    }
+}
+
 impl CellFrame {
     /// Checks that its keys are consistent and its numbers possible.
-    fn check(&self, kind: &'static str) -> Result<(), CellError> {
+    fn check(&self, kind: FrameKind) -> Result<(), CellError> {
         let wrong =
             |what: &str| Err(CellError::Frame { kind, name: self.name.clone(), what: what.to_owned() });
         if self.name.trim().is_empty() {
@@ -260,12 +279,12 @@ impl CellFrame {
                 "{key} has no effect without teaching_deg: give the teaching points, or remove it"
             ));
         }
-        if kind == "tool" && self.teaches.is_some() {
+        if kind == FrameKind::Tool && self.teaches.is_some() {
             return wrong("teaches is for work objects: a tool's points teach its TCP");
         }
         let (least, most) = match (kind, &self.taught_with) {
-            ("tool", None) => (4, usize::MAX),
-            ("tool", Some(_)) => (1, usize::MAX),
+            (FrameKind::Tool, None) => (4, usize::MAX),
+            (FrameKind::Tool, Some(_)) => (1, usize::MAX),
             _ => (3, 3),
         };
         if found > 0 && !(least..=most).contains(&found) {
@@ -333,14 +352,14 @@ impl Cell {
     /// Reads a cell file.
     ///
     /// ```
-    /// use truegrind_compensation::cell::{Cell, CellError, FrameOrigin};
+    /// use truegrind_compensation::cell::{Cell, CellError, FrameKind, FrameOrigin};
     ///
     /// let cell = Cell::from_toml("[[tool]]\nname = \"tDisc\"\norigin = \"metrology\"\nposition_mm = [0, 0, 120]\n")?;
     /// assert_eq!(cell.tool[0].origin, FrameOrigin::Metrology);
     /// assert_eq!(cell.tool[0].pose().map(|pose| pose.translation.z), Some(120.0));
     /// // One tool under two names.
     /// let twice = "[[tool]]\nname = \"T8\"\norigin = \"metrology\"\n[[tool]]\nname = \"T08\"\norigin = \"taught\"\n";
-    /// assert!(matches!(Cell::from_toml(twice), Err(CellError::Twice { kind: "tool", .. })));
+    /// assert!(matches!(Cell::from_toml(twice), Err(CellError::Twice { kind: FrameKind::Tool, .. })));
     /// # Ok::<(), CellError>(())
     /// ```
     ///
@@ -352,7 +371,7 @@ impl Cell {
         if let Some(found) = cell.angles.as_ref().filter(|word| Angles::of(word).is_none()) {
             return Err(CellError::Angles { found: found.clone() });
         }
-        for (kind, frames) in [("tool", &cell.tool), ("wobj", &cell.wobj)] {
+        for (kind, frames) in [(FrameKind::Tool, &cell.tool), (FrameKind::Wobj, &cell.wobj)] {
             let mut stated: HashMap<String, &CellFrame> = HashMap::new();
             for frame in frames {
                 frame.check(kind)?;
@@ -375,8 +394,8 @@ impl Cell {
         if let Some(wrong) = cell.external.iter().find(|axis| axis.index().is_none()) {
             return Err(CellError::UnknownAxis { axis: wrong.axis });
         }
-        for (place, axis) in cell.external.iter().enumerate() {
-            if cell.external[..place].iter().any(|other| other.index() == axis.index()) {
+        for (index, axis) in cell.external.iter().enumerate() {
+            if cell.external[..index].iter().any(|other| other.index() == axis.index()) {
                 return Err(CellError::AxisTwice { axis: axis.axis });
             }
         }
@@ -390,8 +409,8 @@ impl Cell {
     pub fn with_surface(mut self, surface: &SurfaceFile) -> Result<Self, CellError> {
         let (tool, object) = (&surface.tool, &surface.work_object);
         for (kind, frames, name, origin) in [
-            ("tool", &mut self.tool, &tool.name, tool.origin),
-            ("wobj", &mut self.wobj, &object.name, object.origin),
+            (FrameKind::Tool, &mut self.tool, &tool.name, tool.origin),
+            (FrameKind::Wobj, &mut self.wobj, &object.name, object.origin),
         ] {
             let Some(origin) = origin.map(FrameOrigin::from) else { continue };
             match frames.iter().find(|frame| setup::same(&frame.name, name)) {
@@ -444,9 +463,9 @@ struct NameIndex<'a> {
 impl<'a> NameIndex<'a> {
     fn of(frames: &'a [CellFrame]) -> Self {
         let (mut lower, mut plain) = (HashMap::new(), HashMap::new());
-        for (place, frame) in frames.iter().enumerate() {
-            lower.entry(frame.name.to_ascii_lowercase()).or_insert_with(Vec::new).push(place);
-            plain.entry(setup::plain(&frame.name)).or_insert_with(Vec::new).push(place);
+        for (index, frame) in frames.iter().enumerate() {
+            lower.entry(frame.name.to_ascii_lowercase()).or_insert_with(Vec::new).push(index);
+            plain.entry(setup::plain(&frame.name)).or_insert_with(Vec::new).push(index);
         }
         Self { frames, lower, plain }
     }
@@ -525,14 +544,14 @@ impl Used {
     /// tool where that is not stated), and the external axes of its targets.
     pub fn by(listing: &Listing, cell: &Cell) -> Self {
         let stated = CellLookup::of(cell, listing);
-        let place =
+        let index =
             |list: &[CellFrame], found: &CellFrame| list.iter().position(|one| std::ptr::eq(one, found));
         let mut out = Self::default();
         for tool in listing.tools.iter().chain(&listing.declared_tools) {
-            out.tool.extend(stated.tools(tool).iter().filter_map(|found| place(&cell.tool, found)));
+            out.tool.extend(stated.tools(tool).iter().filter_map(|found| index(&cell.tool, found)));
         }
         for object in &listing.work_objects {
-            out.wobj.extend(stated.objects(object).iter().filter_map(|found| place(&cell.wobj, found)));
+            out.wobj.extend(stated.objects(object).iter().filter_map(|found| index(&cell.wobj, found)));
         }
         let taught = out.wobj.iter().map(|&k| &cell.wobj[k]).chain(out.tool.iter().map(|&k| &cell.tool[k]));
         let taught: Vec<&CellFrame> = taught.filter(|frame| !frame.teaching_deg.is_empty()).collect();
@@ -546,7 +565,7 @@ impl Used {
             targets.any(|target| target.value.as_ref().is_ok_and(|value| value.external()[axis].is_some()))
         };
         let axes = cell.external.iter().enumerate();
-        out.external.extend(axes.filter(|(_, a)| a.index().is_some_and(moves)).map(|(place, _)| place));
+        out.external.extend(axes.filter(|(_, a)| a.index().is_some_and(moves)).map(|(index, _)| index));
         out
     }
 
@@ -562,8 +581,8 @@ impl Used {
         let own = |frame: &CellFrame| {
             surface.is_none_or(|s| frame.name != s.tool.name && frame.name != s.work_object.name)
         };
-        let frames = |kind: &str, list: &[CellFrame], used: &BTreeSet<usize>| {
-            let unused = list.iter().enumerate().filter(|(place, frame)| !used.contains(place) && own(frame));
+        let frames = |kind: FrameKind, list: &[CellFrame], used: &BTreeSet<usize>| {
+            let unused = list.iter().enumerate().filter(|(index, frame)| !used.contains(index) && own(frame));
             let say = |(_, frame): (usize, &CellFrame)| {
                 format!(
                     "cell file: {kind} \"{}\" is not used by any program: is its name spelt as in the program?",
@@ -578,9 +597,9 @@ impl Used {
             }
             out
         };
-        let mut out = frames("tool", &cell.tool, &self.tool);
-        out.extend(frames("wobj", &cell.wobj, &self.wobj));
-        let unused = cell.external.iter().enumerate().filter(|(place, _)| !self.external.contains(place));
+        let mut out = frames(FrameKind::Tool, &cell.tool, &self.tool);
+        out.extend(frames(FrameKind::Wobj, &cell.wobj, &self.wobj));
+        let unused = cell.external.iter().enumerate().filter(|(index, _)| !self.external.contains(index));
         out.extend(unused.map(|(_, axis)| {
             format!("cell file: external axis '{}' does not occur in any target of any program", axis.axis)
         }));

@@ -92,17 +92,17 @@ pub fn compensate(
         if found.is_empty() || options.cuts == Cuts::Single && !play {
             return Ok(agreed(planned, rewritten, &found, program));
         }
-        for (motion, why) in found {
-            refused.entry(motion).or_insert(why);
+        for (motion, reason) in found {
+            refused.entry(motion).or_insert(reason);
         }
         round += 1;
         if round >= MOST_ROUNDS
-            && let Some((first, why)) = refused.iter().next()
+            && let Some((first, reason)) = refused.iter().next()
         {
             // No agreement was reached: every round removed more motions, so the whole program remains
             // unmodified.
             let line = listing.motions[*first as usize].place.line;
-            let rest = OutcomeReason::PartOfCut { line, because: why.kind() };
+            let rest = OutcomeReason::PartOfCut { line, because: reason.kind() };
             for change in &planned.changes {
                 refused.entry(change.motion).or_insert(rest);
             }
@@ -154,9 +154,9 @@ fn reconcile(planned: &mut Plan, rewritten: &Rewritten, refused: &BTreeMap<u32, 
             row.status = Status::Left;
             row.reason = Some(OutcomeReason::NoChange);
         }
-        if let Some(why) = refused.get(&change.motion) {
+        if let Some(reason) = refused.get(&change.motion) {
             row.status = Status::Refused;
-            row.reason = Some(*why);
+            row.reason = Some(*reason);
             row.after_mm = row.before_mm;
         }
     }

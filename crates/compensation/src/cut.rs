@@ -84,9 +84,9 @@ fn may_cut(motion: &Motion) -> bool {
     let path = matches!(motion.kind, MotionKind::Linear | MotionKind::Circular)
         // A path that is given in the text but consists of neither lines nor arcs, or an unknown
         // instruction.
-        || matches!(motion.left, Some(Reason::UnsupportedPath | Reason::UnknownInstruction | Reason::NoMotionCode));
+        || matches!(motion.own_reason, Some(Reason::UnsupportedPath | Reason::UnknownInstruction | Reason::NoMotionCode));
     // A search motion ends, and stops, at its signal.
-    path && motion.left != Some(Reason::Probe) && !motion.instruction.contains("Search")
+    path && motion.own_reason != Some(Reason::Probe) && !motion.instruction.contains("Search")
 }
 
 /// Whether a motion goes on from the previous one without a stop, in the same frames.
@@ -112,9 +112,9 @@ pub(crate) fn rest_of_cuts(
     }
     // The first motion of each cut that remains unmodified for its own reason.
     let mut cause: Vec<Option<OutcomeReason>> = vec![None; cuts.of.len()];
-    for (index, cut, why) in &blocked {
+    for (index, cut, reason) in &blocked {
         let line = listing.motions[*index as usize].place.line;
-        cause[*cut as usize].get_or_insert(OutcomeReason::PartOfCut { line, because: why.kind() });
+        cause[*cut as usize].get_or_insert(OutcomeReason::PartOfCut { line, because: reason.kind() });
     }
     (0_u32..)
         .zip(&cuts.of)
@@ -138,17 +138,17 @@ pub(crate) fn steps(
         neighbours[*a as usize].push(*b);
         neighbours[*b as usize].push(*a);
     }
-    let mut stays: Vec<bool> = (0..count as u32).map(|index| blocking_reason(index).is_some()).collect();
-    let mut open: Vec<u32> = (0..count as u32).filter(|index| stays[*index as usize]).collect();
+    let mut unchanged: Vec<bool> = (0..count as u32).map(|index| blocking_reason(index).is_some()).collect();
+    let mut open: Vec<u32> = (0..count as u32).filter(|index| unchanged[*index as usize]).collect();
     let mut out = Vec::new();
     while let Some(index) = open.pop() {
-        for lateral_offset in std::mem::take(&mut neighbours[index as usize]) {
-            let mm = shift_mm(lateral_offset);
-            if !stays[lateral_offset as usize] && !(mm <= tolerance_mm) {
+        for neighbour in std::mem::take(&mut neighbours[index as usize]) {
+            let mm = shift_mm(neighbour);
+            if !unchanged[neighbour as usize] && !(mm <= tolerance_mm) {
                 let line = listing.motions[index as usize].place.line;
-                out.push((lateral_offset, OutcomeReason::Step { line, mm }));
-                stays[lateral_offset as usize] = true;
-                open.push(lateral_offset);
+                out.push((neighbour, OutcomeReason::Step { line, mm }));
+                unchanged[neighbour as usize] = true;
+                open.push(neighbour);
             }
         }
     }

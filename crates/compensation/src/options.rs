@@ -102,5 +102,5 @@ impl Default for Options {
 
 /// Whether a motion is of a kind that can be rewritten.
 pub(crate) fn is_rewritable(motion: &Motion, options: &Options) -> bool {
-    motion.left.is_none() && (motion.kind != MotionKind::AbsoluteJoint || options.joint_targets)
+    motion.own_reason.is_none() && (motion.kind != MotionKind::AbsoluteJoint || options.joint_targets)
 }

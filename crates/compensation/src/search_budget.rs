@@ -14,7 +14,7 @@ use truegrind_math::work::checkpoint;
 /// Motions per parallel work item.
 pub(crate) const PORTION: usize = 64;
 
-/// Motions that are looked at in less time than another thread takes to wake up.
+/// Motions that are processed in less time than another thread takes to wake up.
 pub(crate) const MANY: usize = 4096;
 
 /// Runs pieces in parallel, each with its share of the budget; pieces that ran out are repeated one after the other with the
@@ -34,10 +34,10 @@ pub(crate) fn shared_out_into<P: Send, T: Send>(
     work: impl Fn(usize, &mut P, &mut SearchBudget) -> T + Sync,
 ) -> Vec<T> {
     let pieces = places.len();
-    let one = |(piece, place): (usize, &mut P)| {
+    let one = |(piece, slot): (usize, &mut P)| {
         checkpoint();
         let mut budget = whole.share(piece, pieces);
-        (work(piece, place, &mut budget), budget)
+        (work(piece, slot, &mut budget), budget)
     };
     let done: Vec<(T, SearchBudget)> = places.par_iter_mut().enumerate().map(one).collect();
     let mut rest = SearchBudget::of(done.iter().map(|(_, left)| left.evaluations).sum())

@@ -150,7 +150,7 @@ fn run(listing: &Listing, loads: Option<&Loads>, arms: &mut Arms<'_>, cell: &Cel
     let mut near: Option<Joints> = None;
     for (index, motion) in listing.motions.iter().enumerate() {
         checkpoint();
-        if motion.left.is_some() {
+        if motion.own_reason.is_some() {
             continue;
         }
         if let Ok(there) = commanded_end(index, listing, arms, &frame_table, near.as_ref()) {
@@ -235,8 +235,8 @@ fn commanded_end(
     let mounting = &frame_table.list[frames_index].commanded;
     let (commanded, joints) = match value {
         TargetValue::Cartesian(t) => {
-            if let Some(why) = frame_table.moving_base(&t) {
-                return Err(why);
+            if let Some(reason) = frame_table.moving_base(&t) {
+                return Err(reason);
             }
             let commanded = t.pose();
             let flange = mounting.flange_for(&commanded);

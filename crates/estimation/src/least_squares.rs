@@ -2,7 +2,7 @@
 //!
 //! | file | method | Jacobian passes per iteration |
 //! |---|---|---|
-//! | [`lm`] | Levenberg–Marquardt, as printed (ltlm-2024 eq. 10) and sound | 1 |
+//! | [`lm`] | Levenberg–Marquardt, as printed (ltlm-2024 eq. 10) and robust | 1 |
 //! | [`ltlm`] | logistic-tent chaotic Levenberg–Marquardt (ltlm-2024, Algorithm I) | 2, and 2M rows-only passes |
 //! | [`gauss_newton`] | least squares of one linearisation (rls-2025 eq. 9), and repeated | 1 |
 //! | [`sslm`] | step-size Levenberg–Marquardt (ltlm-2024, M6) | 1, and rows-only passes |
@@ -22,7 +22,7 @@ pub(crate) mod search;
 
 use serde::{Deserialize, Serialize};
 
-/// Whether a method runs as printed in its paper, or in a numerically sound form.
+/// Whether a method runs as printed in its paper, or in a numerically robust form.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Form {

@@ -4,7 +4,7 @@
 //! Every algorithm file has the same two items: `Options` (with a `seed` and a `Default`) and `solve(&dyn
 //! Problem, start, &Options) -> Estimate`. A solver returns for any data: NaN, no rows or a singular matrix give a
 //! corresponding [`estimate::Termination`], never a panic. If a paper prints a weak form of a method,
-//! [`least_squares::Form`] selects that form, to the letter, or a sound one; the default is sound.
+//! [`least_squares::Form`] selects that form, to the letter, or a robust one; the default is robust.
 //!
 //! - [`problem`] and [`estimate`]: input and output of a solver;
 //! - [`least_squares`]: batch methods with derivatives;

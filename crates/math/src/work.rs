@@ -66,13 +66,13 @@ thread_local! {
 }
 
 /// Initialises a thread of watched work.
-fn heed(watch: &Arc<Watch>) {
-    WATCH.with(|place| *place.borrow_mut() = Some(watch.clone()));
+fn watch_this_thread(watch: &Arc<Watch>) {
+    WATCH.with(|current| *current.borrow_mut() = Some(watch.clone()));
 }
 
 /// Ends the work here if it was cancelled.
 pub fn checkpoint() {
-    let cancelled = WATCH.with(|place| place.borrow().as_ref().is_some_and(|watch| watch.is_cancelled()));
+    let cancelled = WATCH.with(|current| current.borrow().as_ref().is_some_and(|watch| watch.is_cancelled()));
     if cancelled {
         // Not a panic: no panic hook is called, and nothing is printed.
         resume_unwind(Box::new(Cancelled));
@@ -82,7 +82,7 @@ pub fn checkpoint() {
 /// Reports the current step, and ends the work if it was cancelled.
 pub fn report_step(step: &str) {
     checkpoint();
-    let watch = WATCH.with(|place| place.borrow().clone());
+    let watch = WATCH.with(|current| current.borrow().clone());
     if let Some(watch) = watch {
         (watch.listener)(step);
     }
@@ -125,11 +125,11 @@ pub fn run_watched<T: Send>(
     threads: Option<usize>,
     work: impl FnOnce() -> T + Send,
 ) -> Result<Result<T, Cancelled>, rayon::ThreadPoolBuildError> {
-    let heeded = watch.clone();
+    let watch_of_threads = watch.clone();
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads.unwrap_or(0))
         .stack_size(STACK_BYTES)
-        .start_handler(move |_| heed(&heeded))
+        .start_handler(move |_| watch_this_thread(&watch_of_threads))
         .build()?;
     // Unwind safety: the work's state is dropped with it, so no partial state is visible.
     let ended = catch_unwind(AssertUnwindSafe(|| pool.install(work)));

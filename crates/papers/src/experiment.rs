@@ -615,9 +615,9 @@ impl Methods {
             }
             solver_named(&key, &method.solver, wrong)?;
             if let Ok(solver) = solver::by_name(&method.solver)
-                && let Err(why) = solver.configured(&method.settings)
+                && let Err(reason) = solver.configured(&method.settings)
             {
-                wrong(&key, why.to_string(), "settings of that method")?;
+                wrong(&key, reason.to_string(), "settings of that method")?;
             }
         }
         Ok(())

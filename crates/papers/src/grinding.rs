@@ -339,8 +339,8 @@ fn ground(shop: &Shop<'_>, id: &str, solver: &'static Solver, dataset: &Dataset,
     };
     let one = match found(dataset, shop.robot, shop.nominal, solver, shop.held_out, seed) {
         Ok(one) => one,
-        Err(why) => {
-            case.failure = Some(why);
+        Err(reason) => {
+            case.failure = Some(reason);
             return (case, None);
         }
     };
@@ -365,8 +365,8 @@ fn ground(shop: &Shop<'_>, id: &str, solver: &'static Solver, dataset: &Dataset,
     });
     let (planned, bytes) = match written {
         Ok(written) => written,
-        Err(why) => {
-            case.failure = Some(why);
+        Err(reason) => {
+            case.failure = Some(reason);
             return (case, None);
         }
     };

@@ -74,9 +74,9 @@ pub fn map(share: f64) -> Rgba {
     if share.is_nan() {
         return TRAVEL;
     }
-    let place = (FIRST + (1.0 - FIRST) * share.clamp(0.0, 1.0)) * (VIRIDIS.len() - 1) as f64;
-    let below = (place as usize).min(VIRIDIS.len() - 2);
-    let part = place - below as f64;
+    let position = (FIRST + (1.0 - FIRST) * share.clamp(0.0, 1.0)) * (VIRIDIS.len() - 1) as f64;
+    let below = (position as usize).min(VIRIDIS.len() - 2);
+    let part = position - below as f64;
     let blend = |k: usize| {
         let (a, b) = (f64::from(VIRIDIS[below][k]), f64::from(VIRIDIS[below + 1][k]));
         (a + (b - a) * part).round() as u8

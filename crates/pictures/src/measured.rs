@@ -202,12 +202,12 @@ fn cloud(
         .with_radii([Radius::new_ui_points(3.0)]);
     store.fixed("touched", &points)?;
     let aside = scene.dataset.rows.iter().zip(touched).filter(|(r, _)| scene.set_aside.contains(&r.number));
-    let (labels, places): (Vec<String>, Vec<[f32; 3]>) =
+    let (labels, positions): (Vec<String>, Vec<[f32; 3]>) =
         aside.map(|(r, p)| (format!("row {} set aside", r.number), xyz(p))).unzip();
-    if places.is_empty() {
+    if positions.is_empty() {
         return Ok(());
     }
-    let marks = Points3D::new(places)
+    let marks = Points3D::new(positions)
         .with_colors([Color::from(REFUSED)])
         .with_radii([Radius::new_ui_points(5.0)])
         .with_labels(labels)
@@ -276,24 +276,25 @@ fn sensor(store: &mut Store, scene: &MeasuredScene<'_>, touched: &[Point3<f64>])
         .rows
         .iter()
         .filter_map(|r| {
-            let place = match &r.reading {
+            let position = match &r.reading {
                 Reading::Position(p) => Point3::from(*p),
                 Reading::Pose(pose) => Point3::from(pose.translation.vector),
                 Reading::Cable(_) => return None,
             };
-            Some((r.number as i64, xyz(&(frames.base_from_sensor * place))))
+            Some((r.number as i64, xyz(&(frames.base_from_sensor * position))))
         })
         .collect();
-    let (times, places): (Vec<i64>, Vec<[f32; 3]>) = seen.into_iter().unzip();
+    let (times, positions): (Vec<i64>, Vec<[f32; 3]>) = seen.into_iter().unzip();
     let from = xyz(&Point3::from(frames.base_from_sensor.translation.vector));
-    let rays =
-        LineStrips3D::new(places.iter().map(|to| [from, *to])).columns_of_unit_batches().map_err(encoding)?;
+    let rays = LineStrips3D::new(positions.iter().map(|to| [from, *to]))
+        .columns_of_unit_batches()
+        .map_err(encoding)?;
     store.over("sensor/ray", (AXIS, &times), rays)?;
     let style = LineStrips3D::update_fields()
         .with_colors([Color::from(BEFORE)])
         .with_radii([Radius::new_ui_points(1.0)]);
     store.fixed("sensor/ray", &style)?;
-    let columns = Points3D::new(places).columns_of_unit_batches().map_err(encoding)?;
+    let columns = Points3D::new(positions).columns_of_unit_batches().map_err(encoding)?;
     store.over("read", (AXIS, &times), columns)?;
     let style =
         Points3D::update_fields().with_colors([Color::from(BEFORE)]).with_radii([Radius::new_ui_points(6.0)]);

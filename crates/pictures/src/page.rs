@@ -125,8 +125,8 @@ impl Eye {
         let up = back.cross(&side);
         // Apparent size of the box at its depth.
         let half = |axis: &Vector3<f64>| {
-            let places = points.iter().map(|p| (p - middle).dot(axis));
-            let (low, high) = places.fold((0.0f64, 0.0f64), |(low, high), v| (low.min(v), high.max(v)));
+            let coordinates = points.iter().map(|p| (p - middle).dot(axis));
+            let (low, high) = coordinates.fold((0.0f64, 0.0f64), |(low, high), v| (low.min(v), high.max(v)));
             (0.5 * (high - low), 0.5 * (high + low))
         };
         let ((_, right), (_, above)) = (half(&side), half(&up));

@@ -123,7 +123,7 @@ pub enum PlanError {
     /// The sensor is a cable without a stated outlet.
     #[error("a cable needs the location of its outlet: state it in the base frame")]
     NoOutlet,
-    /// An outlet lies in the robot's foot.
+    /// An outlet is inside the robot's foot.
     #[error(
         "the cable's outlet is stated {:.3}, {:.3}, {:.3} mm from the origin of the base, in the robot's foot; expected millimetres: \
          multiply metres by 1000", at_mm[0], at_mm[1], at_mm[2]

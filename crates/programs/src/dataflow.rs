@@ -4,7 +4,7 @@
 //! `rapid/flow`, NC in `nc/task`.
 //!
 //! Method: monotone frameworks with a worklist in reverse post-order (Nielson, Nielson, Hankin, Principles of Program Analysis, 1999,
-//! §2.4 and §6.1). Loops need no fixpoint: what a loop changes is unknown at its head and behind it, which holds for every number of
+//! §2.4 and §6.1). Loops need no fixpoint: what a loop changes is unknown at its head and after it, which holds for every number of
 //! iterations.
 
 use std::collections::BTreeSet;

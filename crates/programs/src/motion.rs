@@ -325,10 +325,44 @@ pub struct Motion {
     /// Index into [`Listing::routines`]; `None` outside routines.
     pub routine: Option<u32>,
     /// Why the motion as a whole must stay unmodified, apart from its targets; the first reason that applies.
-    pub left: Option<Reason>,
+    pub own_reason: Option<Reason>,
 }
 
 impl Motion {
+    /// A motion of which only this is known; `routine` and what stands in the statement follow.
+    pub(crate) fn new(
+        place: Place,
+        statement: Span,
+        instruction: Arc<str>,
+        kind: MotionKind,
+        modal: Modal,
+    ) -> Self {
+        Motion {
+            place,
+            statement,
+            instruction,
+            kind,
+            targets: Vec::new(),
+            speed: None,
+            zone: None,
+            tool: None,
+            work_object: None,
+            timed: false,
+            insertable: false,
+            can_straighten: false,
+            accepts_configuration: false,
+            rapid: false,
+            axis: None,
+            by_radius: false,
+            modal,
+            in_loop: false,
+            conditional: false,
+            previous: None,
+            routine: None,
+            own_reason: None,
+        }
+    }
+
     /// Whether both motions have the same tool and the same work object, as most neighbours do.
     pub fn same_frames(&self, other: &Motion) -> bool {
         (self.tool, self.work_object) == (other.tool, other.work_object)
@@ -347,7 +381,7 @@ impl Motion {
     /// Why this motion cannot be rewritten: first the motion's own reason, then those of its targets. `None` if it
     /// can.
     pub fn reason(&self) -> Option<Reason> {
-        self.left.or_else(|| self.targets.iter().find_map(|target| target.value.err()))
+        self.own_reason.or_else(|| self.targets.iter().find_map(|target| target.value.err()))
     }
 }
 

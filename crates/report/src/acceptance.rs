@@ -191,31 +191,26 @@ fn figures(found: &Acceptance) -> Vec<KeyFigure> {
     ]
 }
 
-/// The figures of both arms; a signed mean where the sensor tells a sign.
+/// The figures of both arms; a signed mean if the sensor has a sign.
 pub fn table(found: &Acceptance, sensor: Sensor) -> Table {
-    let mut table = Table::new(
-        "Errors",
-        vec![
-            Column::text("arm", "Arm"),
-            Column::number("rmse_mm", "RMSE", "mm", 3),
-            Column::number("mean_absolute_mm", "mean |e|", "mm", 3),
-            Column::number("standard_deviation_mm", "SD", "mm", 3),
-            Column::number("max_mm", "max", "mm", 3),
-            Column::number("mean_mm", "signed mean", "mm", 3),
-        ],
-    );
     let signed = sensor == Sensor::Cable;
-    for (name, errors) in [("data sheet, sensor registered", &found.nominal), ("estimated", &found.model)] {
-        table.push([
-            name.into(),
-            errors.rmse.into(),
-            errors.mean_absolute.into(),
-            errors.standard_deviation.into(),
-            errors.max.into(),
-            Some(errors.mean).filter(|_| signed).into(),
-        ]);
-    }
-    table
+    let arms = [("data sheet, sensor registered", &found.nominal), ("estimated", &found.model)];
+    Table::of(
+        "Errors",
+        &arms.map(|(arm, errors)| (arm, errors, Some(errors.mean).filter(|_| signed))),
+        [
+            (Column::text("arm", "Arm"), |(arm, ..)| (*arm).into()),
+            (Column::number("rmse_mm", "RMSE", "mm", 3), |(_, errors, _)| errors.rmse.into()),
+            (Column::number("mean_absolute_mm", "mean |e|", "mm", 3), |(_, errors, _)| {
+                errors.mean_absolute.into()
+            }),
+            (Column::number("standard_deviation_mm", "SD", "mm", 3), |(_, errors, _)| {
+                errors.standard_deviation.into()
+            }),
+            (Column::number("max_mm", "max", "mm", 3), |(_, errors, _)| errors.max.into()),
+            (Column::number("mean_mm", "signed mean", "mm", 3), |(.., mean)| (*mean).into()),
+        ],
+    )
 }
 
 /// Orientation errors and the decision on them.

@@ -47,7 +47,7 @@ pub fn table(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Table {
         Column::number("before_mm", "before", "mm", 3),
         Column::number("after_mm", "remainder", "mm", 4),
         Column::number("shape_sigma_mm", "1σ shape", "mm", 3),
-        Column::number("sigma_mm", "1σ place", "mm", 3),
+        Column::number("sigma_mm", "1σ placement", "mm", 3),
         Column::number("bend_mm", "between", "mm", 3),
         Column::count("inserted", "Inserted"),
         Column::text("reason", "Reason"),
@@ -78,7 +78,7 @@ pub fn table(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Table {
     table.notes.push(
         "before: deviation of the tool at the end of the uncorrected motion. remainder: predicted remainder, which rounding and \
          inverse kinematics leave under the same model; a motion that is left or refused keeps its deviation. 1σ: predicted from \
-         the covariance of the model, for the shape of the cut (after its best rigid registration) and for its place. between: \
+         the covariance of the model, for the shape of the cut (after its best rigid registration) and for its placement. between: \
          deviation from the intended path between the targets. Inserted: number of targets inserted before the end of the motion."
             .to_owned(),
     );
@@ -219,7 +219,7 @@ pub fn document(plan: &Plan, listing: &Listing, files: &[ProgramFile], reports: 
     }
     let placed = placement::sentences(plan, listing);
     if !placed.is_empty() {
-        page.heading(2, "Shape and place");
+        page.heading(2, "Shape and placement");
         page.push(Block::List(placed));
     }
     if let Some(mut cuts) = placement::cut_table(plan, listing) {
@@ -356,10 +356,10 @@ fn grouped(plan: &Plan) -> Vec<Group<'_>> {
 }
 
 /// A reason without the numbers of a single motion, and its value.
-fn split_reason(why: &OutcomeReason) -> (String, Option<(f64, &'static str)>) {
+fn split_reason(reason: &OutcomeReason) -> (String, Option<(f64, &'static str)>) {
     let plain = |text: &str| (text.to_owned(), None);
     let sized = |text: String, value: f64, unit| (text, Some((value, unit)).filter(|_| value.is_finite()));
-    match *why {
+    match *reason {
         OutcomeReason::Inverse(InverseError::Unreachable { beyond_mm }) => {
             sized("target is out of reach".to_owned(), beyond_mm, "mm")
         }

@@ -6,6 +6,7 @@ use super::number::{Precision, listed};
 use super::plot::{Axis, BarGroup, Bars, Graph, Ink, Reference, Series, Span};
 use super::status::Status;
 use super::table::{Cell, Column, Table};
+use truegrind_calibration::diagnosis::cause_kind::CauseKind;
 use truegrind_calibration::diagnosis::decision::DIAGNOSIS_FILE;
 use truegrind_calibration::diagnosis::diagnose::Diagnosed;
 use truegrind_calibration::diagnosis::finding::{
@@ -152,7 +153,7 @@ pub fn summary(found: &Diagnosed) -> Document {
 fn causes(diagnosis: &Diagnosis) -> Vec<String> {
     let worth = |f: &Finding| f.worth_mm.map_or_else(String::new, |mm| format!(" ({mm:.3} mm)"));
     let is_sure = |f: &&Finding| f.confidence == Confidence::Identified;
-    let named = |f: &&Finding| !["unexplained", "small-disturbances"].contains(&f.effect.as_str());
+    let named = |f: &&Finding| !matches!(f.effect, CauseKind::Unexplained | CauseKind::SmallDisturbances);
     let mut out: Vec<String> = diagnosis
         .findings
         .iter()
@@ -164,7 +165,7 @@ fn causes(diagnosis: &Diagnosis) -> Vec<String> {
         .iter()
         .filter(|f| !is_sure(f))
         .filter(named)
-        .map(|f| format!("{}, {}{}{}", f.effect.replace('-', " "), place(f), worth(f), in_brief(f)))
+        .map(|f| format!("{}, {}{}{}", f.effect.words(), place(f), worth(f), in_brief(f)))
         .collect();
     if !possible.is_empty() {
         out.push(format!("Possible, but not certain: {}", possible.join("; ")));
@@ -183,7 +184,7 @@ fn in_brief(finding: &Finding) -> String {
 
 /// A cause that cannot be told apart from others, with its share.
 fn member(member: &Member) -> String {
-    let words = member.effect.replace('-', " ");
+    let words = member.effect.words();
     // "gear two joints of joints 2 and 3" says it twice.
     let name = words.strip_suffix(" two joints").unwrap_or(&words);
     let place = match (&member.joints, member.rows) {
@@ -221,7 +222,7 @@ fn family(finding: &Finding) -> String {
 fn decisions(diagnosis: &Diagnosis) -> Vec<String> {
     let asked = (1..).zip(&diagnosis.findings).filter_map(|(k, f)| {
         let number: usize = k;
-        Some((format!("{number} ({})", f.effect.replace('-', " ")), f.decided_by.as_deref()?))
+        Some((format!("{number} ({})", f.effect.words()), f.decided_by.as_deref()?))
     });
     let mut out: Vec<(&str, Vec<String>)> = Vec::new();
     for (number, decision) in asked {
@@ -385,7 +386,7 @@ fn sentence(text: &str) -> String {
 }
 
 fn title(finding: &Finding) -> String {
-    format!("{}, {}", sentence(&finding.effect.replace('-', " ")), place(finding))
+    format!("{}, {}", sentence(&finding.effect.words()), place(finding))
 }
 
 fn reasons(finding: &Finding) -> Vec<String> {

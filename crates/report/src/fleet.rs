@@ -12,13 +12,14 @@ use super::document::{Document, KeyFigure, Verdict};
 use super::kept;
 use super::status::Status;
 use super::table::{Cell, Column, Table};
+use truegrind_calibration::diagnosis::cause_kind::CauseKind;
 use truegrind_calibration::diagnosis::finding::{Confidence, Diagnosis};
 
 /// A cause found for an arm.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Cause {
-    /// Machine name of the effect.
-    pub effect: String,
+    /// Its kind.
+    pub effect: CauseKind,
     /// Joints or rows.
     pub place: String,
     /// One sentence for a technician.
@@ -68,7 +69,7 @@ impl Row {
     pub fn of(file: String, output: Option<String>, note: Option<String>, found: &Diagnosis) -> Row {
         let fits = &found.fits;
         let causes = found.findings.iter().map(|finding| Cause {
-            effect: finding.effect.clone(),
+            effect: finding.effect,
             place: diagnosis::place(finding),
             sentence: finding.cause.clone(),
             identified: finding.confidence == Confidence::Identified,
@@ -91,7 +92,7 @@ impl Row {
     }
 
     /// The row of an arm that could not be diagnosed.
-    pub fn failed(file: String, why: String) -> Row {
+    pub fn failed(file: String, reason: String) -> Row {
         Row {
             file,
             robot: None,
@@ -102,7 +103,7 @@ impl Row {
             noise_floor_mm: None,
             causes: Vec::new(),
             output: None,
-            note: Some(why),
+            note: Some(reason),
             failed: true,
         }
     }
@@ -143,7 +144,7 @@ impl Row {
         let one = |cause: &Cause| {
             let worth = cause.worth_mm.map_or_else(String::new, |mm| format!(", {mm:.3} mm"));
             let doubt = if cause.identified { "" } else { ", not certain" };
-            format!("{} ({}{worth}{doubt})", cause.effect.replace('-', " "), cause.place)
+            format!("{} ({}{worth}{doubt})", cause.effect.words(), cause.place)
         };
         let all: Vec<String> = self.causes.iter().map(one).collect();
         (!all.is_empty()).then(|| all.join("; "))
@@ -203,10 +204,10 @@ pub fn table(rows: &[Row]) -> Table {
 
 /// Causes over all arms, with their number and size.
 pub fn cause_table(rows: &[Row]) -> Table {
-    let mut found: BTreeMap<&str, Vec<(&Row, &Cause)>> = BTreeMap::new();
+    let mut found: BTreeMap<CauseKind, Vec<(&Row, &Cause)>> = BTreeMap::new();
     for row in rows {
         for cause in &row.causes {
-            found.entry(&cause.effect).or_default().push((row, cause));
+            found.entry(cause.effect).or_default().push((row, cause));
         }
     }
     let arms = |of: &[(&Row, &Cause)]| {
@@ -231,7 +232,7 @@ pub fn cause_table(rows: &[Row]) -> Table {
         let size = |cause: &Cause| cause.worth_mm.unwrap_or(0.0);
         let Some((at, largest)) = of.iter().max_by(|a, b| size(a.1).total_cmp(&size(b.1))) else { continue };
         table.push([
-            effect.replace('-', " ").into(),
+            effect.words().into(),
             arms(&of).into(),
             arms(&of.iter().copied().filter(|(_, cause)| cause.identified).collect::<Vec<_>>()).into(),
             largest.worth_mm.into(),
@@ -312,8 +313,8 @@ fn verdict(rows: &[Row]) -> Verdict {
     };
     /// Largest number of listed failures; the table has all.
     const MAX_FAILED: usize = 20;
-    let why = |row: &&Row| format!("{}: {}", row.file, row.note.as_deref().unwrap_or("failed"));
-    let mut reasons: Vec<String> = failed.iter().take(MAX_FAILED).map(why).collect();
+    let reason = |row: &&Row| format!("{}: {}", row.file, row.note.as_deref().unwrap_or("failed"));
+    let mut reasons: Vec<String> = failed.iter().take(MAX_FAILED).map(reason).collect();
     if failed.len() > MAX_FAILED {
         reasons.push(format!("and {} more arms that could not be diagnosed", failed.len() - MAX_FAILED));
     }

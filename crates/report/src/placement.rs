@@ -21,7 +21,7 @@ fn word(placement: Placement) -> &'static str {
     }
 }
 
-/// One sentence per work object: what was corrected and why, and which measurement would determine its place.
+/// One sentence per work object: what was corrected and why, and which measurement would determine its placement.
 pub fn sentences(plan: &Plan, listing: &Listing) -> Vec<String> {
     let what = object_word(listing);
     plan.placements.iter().map(|placement| sentence(placement, what)).collect()
@@ -43,38 +43,37 @@ fn sentence(placement: &ObjectPlacement, what: &str) -> String {
         unlocated,
         ..
     } = placement;
-    let known = format!(
-        "the path as a whole is displaced by {deviation_mm:.3} mm from its intended place (known to ± {sigma_mm:.3} mm, 1σ)"
-    );
+    let known =
+        format!("the path as a whole is displaced by {deviation_mm:.3} mm (known to ± {sigma_mm:.3} mm, 1σ)");
     if *applied == Placement::Absolute {
-        return format!("{what} {work_object}: shape and place are corrected; {known}");
+        return format!("{what} {work_object}: shape and placement are corrected; {known}");
     }
     if *unlocated {
         return format!(
-            "{what} {work_object}: only the shape is corrected, the path stays in place, since the {what} was taught with this arm and \
-             its teaching points are not given; with them (cell file, teaching_deg) its place becomes known; --placement absolute \
+            "{what} {work_object}: only the shape is corrected, not the placement, since the {what} was taught with this arm and its \
+             teaching points are not given; with them (cell file, teaching_deg) the placement becomes known; --placement absolute \
              takes the programmed frame as exact"
         );
     }
     let remedy = remedy.as_ref().map(|remedy| format!("{}; ", remedy_text(remedy, what))).unwrap_or_default();
     format!(
-        "{what} {work_object}: only the shape is corrected, the path stays in place; {known}; correcting it too would make the path \
-         worse with a probability of {}; {remedy}--placement absolute corrects the place anyway",
+        "{what} {work_object}: only the shape is corrected, not the placement; {known}; correcting that too would make the path worse \
+         with a probability of {}; {remedy}--placement absolute corrects it anyway",
         percent_of(*probability_of_harm)
     )
 }
 
-/// The measurement that would determine a place, its duration and the remaining uncertainty.
+/// The measurement that would determine a placement, its duration and the remaining uncertainty.
 fn remedy_text(remedy: &Remedy, what: &str) -> String {
     let what = remedy.measurements.iter().map(|m| m.instruction(what)).collect::<Vec<_>>().join(", and ");
     let (minutes, left) = (remedy.minutes(), remedy.sigma_mm);
     if remedy.suffices {
         format!(
-            "cheapest measurement that would determine the place: {what} (about {minutes:.0} minutes; leaves ± {left:.3} mm)"
+            "cheapest measurement that would determine the placement: {what} (about {minutes:.0} minutes; leaves ± {left:.3} mm)"
         )
     } else {
         format!(
-            "no considered measurement would determine the place well enough to correct it; the best one, {what} (about \
+            "no considered measurement would determine the placement well enough to correct it; the best one, {what} (about \
              {minutes:.0} minutes), leaves ± {left:.3} mm"
         )
     }
@@ -85,31 +84,24 @@ pub fn cut_table(plan: &Plan, listing: &Listing) -> Option<Table> {
     if plan.cuts.is_empty() {
         return None;
     }
-    let mut table = Table::new(
-        "Cuts by the probability that the correction makes them worse",
-        vec![
-            Column::text("lines", "Lines"),
-            Column::count("motions", "Motions"),
-            Column::text("judged", "Judged"),
-            Column::number("off_mm", "before", "mm", 3),
-            Column::number("sigma_mm", "1σ", "mm", 3),
-            Column::number("worse_percent", "worse", "%", 1),
-            Column::text("fate", "Outcome"),
-        ],
-    );
     let mut order: Vec<&CutRisk> = plan.cuts.iter().collect();
     order.sort_by(|a, b| b.probability_of_harm.total_cmp(&a.probability_of_harm));
-    for cut in order.iter().take(MAX_LISTED) {
-        table.push([
-            lines(cut, listing).into(),
-            cut.motions.len().into(),
-            word(cut.assessed).into(),
-            cut.deviation_mm.into(),
-            cut.sigma_mm.into(),
-            (100.0 * cut.probability_of_harm).into(),
-            outcome_word(cut).into(),
-        ]);
-    }
+    let rows = order.iter().take(MAX_LISTED).map(|cut| (*cut, lines(cut, listing)));
+    let mut table = Table::of(
+        "Cuts by the probability that the correction makes them worse",
+        &rows.collect::<Vec<_>>(),
+        [
+            (Column::text("lines", "Lines"), |(_, lines)| lines.as_str().into()),
+            (Column::count("motions", "Motions"), |(cut, _)| cut.motions.len().into()),
+            (Column::text("judged", "Judged"), |(cut, _)| word(cut.assessed).into()),
+            (Column::number("off_mm", "before", "mm", 3), |(cut, _)| cut.deviation_mm.into()),
+            (Column::number("sigma_mm", "1σ", "mm", 3), |(cut, _)| cut.sigma_mm.into()),
+            (Column::number("worse_percent", "worse", "%", 1), |(cut, _)| {
+                (100.0 * cut.probability_of_harm).into()
+            }),
+            (Column::text("fate", "Outcome"), |(cut, _)| outcome_word(cut).into()),
+        ],
+    );
     let more = order.len().saturating_sub(MAX_LISTED);
     if more > 0 {
         table.notes.push(format!("{more} more cuts with a smaller probability are not listed."));

@@ -71,7 +71,7 @@ pub fn effect_table(plan: &Plan) -> Table {
         "Detectable effects",
         &plan.detectability,
         [
-            (Column::text("effect", "Effect"), |found| found.effect.into()),
+            (Column::text("effect", "Effect"), |found| found.effect.as_str().into()),
             (Column::text("which", "Which"), |found| found.which.as_str().into()),
             (Column::significant("smallest", "Smallest size", "", 2), |found| found.smallest.into()),
             (Column::text("unit", "Unit"), |found| found.unit.into()),
@@ -222,7 +222,7 @@ pub fn document(plan: &Plan, setup: &MeasurementSetup<'_>, robot: &str) -> Docum
     page
 }
 
-/// What the plan tells at a glance: of the geometry, or of the unexplained error alone.
+/// The plan at a glance: what it determines of the geometry, or of the unexplained error alone.
 fn key_figures(plan: &Plan) -> Vec<KeyFigure> {
     let rows = KeyFigure::new("Rows", plan.rows.len(), 0, "").note(format!("at {}", poses(plan)));
     if !plan.geometry {

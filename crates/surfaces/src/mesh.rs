@@ -384,12 +384,12 @@ fn recognised(bytes: &[u8]) -> Result<Vec<u8>, SurfaceError> {
 
 /// Vertices without duplicates, and their facets of non-zero area.
 fn joined(vertices: &[Point3<f64>], facets: &[[u32; 3]], flipped: bool) -> (Vec<Point3<f64>>, Vec<[u32; 3]>) {
-    let mut places: BTreeMap<[u64; 3], u32> = BTreeMap::new();
+    let mut indices: BTreeMap<[u64; 3], u32> = BTreeMap::new();
     let mut kept = Vec::new();
-    let places: Vec<u32> = vertices
+    let indices: Vec<u32> = vertices
         .iter()
         .map(|v| {
-            *places.entry([v.x, v.y, v.z].map(|c| (c + 0.0).to_bits())).or_insert_with(|| {
+            *indices.entry([v.x, v.y, v.z].map(|c| (c + 0.0).to_bits())).or_insert_with(|| {
                 kept.push(*v);
                 kept.len() as u32 - 1
             })
@@ -397,7 +397,7 @@ fn joined(vertices: &[Point3<f64>], facets: &[[u32; 3]], flipped: bool) -> (Vec<
         .collect();
     let facets = facets
         .iter()
-        .map(|f| f.map(|i| places[i as usize]))
+        .map(|f| f.map(|i| indices[i as usize]))
         .map(|[a, b, c]| if flipped { [a, c, b] } else { [a, b, c] })
         .filter(|f| {
             let [a, b, c] = f.map(|i| kept[i as usize]);

@@ -14,7 +14,7 @@
 //! **Shapes.** A curve is a function of a share 0…1 to a point; what comes back are shares in ascending order, both
 //! ends included.
 //!
-//! **Stops.** A curve is looked at in at most [`FINEST`] places.
+//! **Stops.** A curve is sampled at no more than [`FINEST`] points.
 //!
 //! **Source and departures.** The cusp formula is derived here from the law of cosines; for small h and κ it is the
 //! √(8Rh) of the handbooks.

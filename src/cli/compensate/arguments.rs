@@ -34,15 +34,15 @@ enum CirclesArgument {
     Segments,
 }
 
-/// Whether the place of a path is corrected.
+/// Whether the placement of a path is corrected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum PlacementArgument {
-    /// Shape and place where the place is known better than it is off and correcting it does harm with a probability of at most half
-    /// of --max-risk; the shape alone elsewhere.
+    /// The shape of the path in each work object; its placement too if it is off by more than the model's uncertainty and the
+    /// correction does harm with a probability of at most half of --max-risk.
     Auto,
-    /// The shape of the path in each work object; the path stays in place.
+    /// Only the shape of the path in each work object.
     Shape,
-    /// Shape and place.
+    /// Shape and placement.
     Absolute,
 }
 
@@ -84,7 +84,7 @@ pub(crate) struct Arguments {
     /// whole cut then stays unchanged.
     #[arg(long)]
     partial: bool,
-    /// Correct shape and place of the path, or its shape alone. Use `shape` for work objects that were taught or adjusted in
+    /// Correct shape and placement of the path, or its shape alone. Use `shape` for work objects that were taught or adjusted in
     /// place.
     #[arg(long, value_enum, default_value_t = PlacementArgument::Auto)]
     placement: PlacementArgument,

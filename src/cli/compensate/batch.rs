@@ -79,8 +79,8 @@ struct RecordIn<J> {
 }
 
 impl UnitResult for ProgramResult {
-    fn failed(job: &Job, why: &str) -> Self {
-        let row = Row::without(job.name(), Ended::Failed, Some(why.to_owned()));
+    fn failed(job: &Job, reason: &str) -> Self {
+        let row = Row::without(job.name(), Ended::Failed, Some(reason.to_owned()));
         Self { json: Some(Vec::new()), ..Self::empty(row, Vec::new()) }
     }
 

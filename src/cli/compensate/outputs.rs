@@ -36,7 +36,7 @@ pub(super) fn output_files(
     if output.is_file() {
         bail!("{} is a file, but there are several programs: name a folder", output.display());
     }
-    Ok(programs.files.iter().map(|(path, _)| Some(output.join(job.place(path)))).collect())
+    Ok(programs.files.iter().map(|(path, _)| Some(output.join(job.relative_output(path)))).collect())
 }
 
 pub(super) const MISSING_OUTPUT: &str =
@@ -47,16 +47,16 @@ pub(super) fn refuse_shared_output(jobs: &[Job]) -> anyhow::Result<()> {
     let mut taken: HashMap<PathBuf, PathBuf> = HashMap::new();
     for job in jobs {
         for path in job.files() {
-            let place = job.place(&path);
-            match taken.get(&place) {
+            let relative = job.relative_output(&path);
+            match taken.get(&relative) {
                 Some(first) if *first == path => bail!("{} is named twice", path.display()),
                 Some(first) => bail!(
                     "{} and {} would both be written to {} in the output folder: run them separately, each into its own folder",
                     first.display(),
                     path.display(),
-                    place.display()
+                    relative.display()
                 ),
-                None => taken.insert(place, path),
+                None => taken.insert(relative, path),
             };
         }
     }
@@ -77,7 +77,7 @@ pub(super) fn refuse_report_over_program(
     }
     for job in jobs {
         for path in job.files() {
-            let there = files::canonical_path(&folder.join(job.place(&path)));
+            let there = files::canonical_path(&folder.join(job.relative_output(&path)));
             if let Some((report, _)) = reports.iter().find(|(_, whole)| Some(whole) == there.as_ref()) {
                 bail!(
                     "{} is where {} will be written: name another file for the report",

@@ -98,7 +98,7 @@ pub(super) fn rewrite_program(
     let undeclared =
         [Reason::Undeclared, Reason::ToolUnknown, Reason::WorkObjectUnknown].map(OutcomeReason::Program);
     result.undeclared =
-        plan.outcomes.iter().filter(|o| o.reason.is_some_and(|why| undeclared.contains(&why))).count();
+        plan.outcomes.iter().filter(|o| o.reason.is_some_and(|reason| undeclared.contains(&reason))).count();
     result.clean = is_clean(context, &plan, listing, result.changed);
     result.used = used;
     report(&mut plan, &program, &files)?;

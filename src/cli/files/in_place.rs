@@ -17,8 +17,8 @@ pub(super) struct InPlace {
 
 impl InPlace {
     /// Opens the file and keeps its content.
-    pub(super) fn open(place: &Path) -> io::Result<Self> {
-        let mut file = fs::OpenOptions::new().read(true).write(true).open(place)?;
+    pub(super) fn open(destination: &Path) -> io::Result<Self> {
+        let mut file = fs::OpenOptions::new().read(true).write(true).open(destination)?;
         let mut old = Vec::new();
         file.read_to_end(&mut old)?;
         Ok(Self { file, old })

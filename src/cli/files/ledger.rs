@@ -10,7 +10,7 @@ use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
 use anyhow::bail;
 
-use super::place::{Identity, Key, Place};
+use super::destination::{Destination, Identity, Key};
 
 #[derive(Debug, Default)]
 struct Ledger {
@@ -85,22 +85,22 @@ fn stdout_file() -> Option<&'static Identity> {
 /// # Errors
 /// An output is an input, two outputs are one file, or one cannot be written.
 pub(super) fn promise(outputs: &[&Path]) -> anyhow::Result<()> {
-    let mut places: Vec<Place> = Vec::new();
+    let mut destinations: Vec<Destination> = Vec::new();
     for output in outputs {
-        let place = Place::of(output)?;
+        let destination = Destination::of(output)?;
         refuse_same_file(
-            &place,
-            places.iter().filter_map(|other| Some((other.key.as_ref()?, other.named.as_path()))),
+            &destination,
+            destinations.iter().filter_map(|other| Some((other.key.as_ref()?, other.named.as_path()))),
         )?;
-        places.push(place);
+        destinations.push(destination);
     }
     let mut ledger = ledger();
-    for place in &places {
-        ledger.refuse_inputs(place)?;
+    for destination in &destinations {
+        ledger.refuse_inputs(destination)?;
     }
-    for place in places {
-        if let Some(Key::There(identity)) = place.key {
-            ledger.promised.insert(identity, place.named);
+    for destination in destinations {
+        if let Some(Key::There(identity)) = destination.key {
+            ledger.promised.insert(identity, destination.named);
         }
     }
     Ok(())
@@ -110,28 +110,28 @@ pub(super) fn promise(outputs: &[&Path]) -> anyhow::Result<()> {
 ///
 /// # Errors
 /// As [`promise`], and if this run has already written one of them.
-pub(super) fn take(outputs: &[&Path]) -> anyhow::Result<Vec<Place>> {
-    let mut places: Vec<Place> = Vec::new();
+pub(super) fn take(outputs: &[&Path]) -> anyhow::Result<Vec<Destination>> {
+    let mut destinations: Vec<Destination> = Vec::new();
     let mut ledger = ledger();
     for output in outputs {
-        let place = Place::of(output)?;
-        ledger.refuse_inputs(&place)?;
+        let destination = Destination::of(output)?;
+        ledger.refuse_inputs(&destination)?;
         refuse_same_file(
-            &place,
-            places.iter().filter_map(|other| Some((other.key.as_ref()?, other.named.as_path()))),
+            &destination,
+            destinations.iter().filter_map(|other| Some((other.key.as_ref()?, other.named.as_path()))),
         )?;
-        refuse_same_file(&place, ledger.written_like(&place))?;
-        places.push(place);
+        refuse_same_file(&destination, ledger.written_like(&destination))?;
+        destinations.push(destination);
     }
-    for place in &places {
-        if let Some(key) = &place.key {
-            ledger.written.insert(key.clone(), place.named.clone());
+    for destination in &destinations {
+        if let Some(key) = &destination.key {
+            ledger.written.insert(key.clone(), destination.named.clone());
             if let Some(alike) = without_case(key) {
                 ledger.alike.entry(alike).or_default().push(key.clone());
             }
         }
     }
-    Ok(places)
+    Ok(destinations)
 }
 
 /// Registers a file that this process has just created: an earlier file with its inode number is gone.
@@ -144,9 +144,11 @@ pub(super) fn note_made(path: &Path, meta: &Metadata) {
 }
 
 /// Registers a new file that was renamed into place.
-pub(super) fn note_put(place: &Place) {
-    if let Ok(meta) = fs::metadata(&place.path) {
-        ledger().written.insert(Key::There(Identity::of(&place.path, &meta)), place.named.clone());
+pub(super) fn note_put(destination: &Destination) {
+    if let Ok(meta) = fs::metadata(&destination.path) {
+        ledger()
+            .written
+            .insert(Key::There(Identity::of(&destination.path, &meta)), destination.named.clone());
     }
 }
 
@@ -167,7 +169,7 @@ fn without_case(key: &Key) -> Option<(Identity, String)> {
 
 impl Ledger {
     /// Written outputs that may be the same file.
-    fn written_like(&self, place: &Place) -> impl Iterator<Item = (&Key, &Path)> {
+    fn written_like(&self, destination: &Destination) -> impl Iterator<Item = (&Key, &Path)> {
         // Another job may have replaced our file; its inode number may then be reused.
         let is_still = |key: &Key, named: &Path| match key {
             Key::There(identity) => {
@@ -175,19 +177,22 @@ impl Ledger {
             }
             _ => true,
         };
-        let same = place.key.as_ref().and_then(|key| self.written.get_key_value(key));
+        let same = destination.key.as_ref().and_then(|key| self.written.get_key_value(key));
         let same = same.filter(|(key, named)| is_still(key, named));
-        let alike = place.key.as_ref().and_then(without_case).and_then(|alike| self.alike.get(&alike));
+        let alike = destination.key.as_ref().and_then(without_case).and_then(|alike| self.alike.get(&alike));
         let alike = alike.into_iter().flatten().filter_map(|key| self.written.get_key_value(key));
         same.into_iter().chain(alike).map(|(key, named)| (key, named.as_path()))
     }
 
-    fn refuse_inputs(&self, place: &Place) -> anyhow::Result<()> {
-        match &place.key {
+    fn refuse_inputs(&self, destination: &Destination) -> anyhow::Result<()> {
+        match &destination.key {
             Some(Key::There(identity)) => match self.read.get(identity) {
-                Some(input) => refuse_input(&place.named, input),
+                Some(input) => refuse_input(&destination.named, input),
                 None if stdout_file() == Some(identity) => {
-                    bail!("{}: stdout already goes to this file; name another output", place.named.display())
+                    bail!(
+                        "{}: stdout already goes to this file; name another output",
+                        destination.named.display()
+                    )
                 }
                 None => Ok(()),
             },
@@ -203,23 +208,23 @@ fn refuse_input(output: &Path, input: &Path) -> anyhow::Result<()> {
 
 /// Refuses two outputs that are one file.
 fn refuse_same_file<'a>(
-    place: &Place,
+    destination: &Destination,
     others: impl Iterator<Item = (&'a Key, &'a Path)>,
 ) -> anyhow::Result<()> {
     for (key, named) in others {
-        if !place.meets(key) {
+        if !destination.meets(key) {
             continue;
         }
         if *key == Key::Stdout {
             bail!("two outputs go to stdout: name a file for all but one");
         }
-        if named == place.named {
+        if named == destination.named {
             bail!("{} is named for two outputs: the second would overwrite the first", named.display());
         }
         bail!(
             "{} and {} are the same file: the second output would overwrite the first",
             named.display(),
-            place.named.display()
+            destination.named.display()
         );
     }
     Ok(())

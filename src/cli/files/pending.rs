@@ -15,7 +15,7 @@ use super::ledger;
 #[derive(Debug)]
 pub(super) struct Pending {
     file: Written,
-    place: PathBuf,
+    destination: PathBuf,
 }
 
 #[derive(Debug)]
@@ -26,13 +26,13 @@ enum Written {
 }
 
 impl Pending {
-    /// Writes `bytes` to a file in the folder of `place`. A file that replaces another gets its permissions and owner; a new one
+    /// Writes `bytes` to a file in the folder of `destination`. A file that replaces another gets its permissions and owner; a new one
     /// gets those of the `umask`, and is not synced here if `later` is set.
     ///
     /// # Errors
     /// [`io::ErrorKind::PermissionDenied`] if the folder is not writable or a new file cannot get the owner of the old one.
     pub(super) fn write(
-        place: PathBuf,
+        destination: PathBuf,
         folder: &Path,
         over: Option<&Metadata>,
         bytes: &[u8],
@@ -47,15 +47,15 @@ impl Pending {
         if over.is_some() || !later {
             file.handle().sync_all()?;
         }
-        Ok(Self { file, place })
+        Ok(Self { file, destination })
     }
 
     /// Moves the file into place, replacing an existing one.
     pub(super) fn put(self) -> io::Result<()> {
         match self.file {
-            Written::Named(file) => file.persist(&self.place).map(drop).map_err(|error| error.error),
+            Written::Named(file) => file.persist(&self.destination).map(drop).map_err(|error| error.error),
             #[cfg(target_os = "linux")]
-            Written::Nameless(file) => nameless::put(&file, &self.place),
+            Written::Nameless(file) => nameless::put(&file, &self.destination),
         }
     }
 }
@@ -129,18 +129,19 @@ mod nameless {
         format!("/proc/self/fd/{}", file.as_raw_fd())
     }
 
-    fn link(file: &File, place: &Path) -> Result<(), Errno> {
-        linkat(CWD, path_of(file), CWD, place, AtFlags::SYMLINK_FOLLOW)
+    fn link(file: &File, destination: &Path) -> Result<(), Errno> {
+        linkat(CWD, path_of(file), CWD, destination, AtFlags::SYMLINK_FOLLOW)
     }
 
     /// Names the file. `linkat` cannot replace a file, so an existing one is replaced by a rename.
-    pub(super) fn put(file: &File, place: &Path) -> io::Result<()> {
-        match link(file, place) {
+    pub(super) fn put(file: &File, destination: &Path) -> io::Result<()> {
+        match link(file, destination) {
             Err(Errno::EXIST) => {}
             done => return Ok(done?),
         }
-        let folder = place.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let folder =
+            destination.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
         let other = tempfile::Builder::new().make_in(folder, |other| Ok(link(file, other)?))?;
-        other.into_temp_path().persist(place).map_err(|error| error.error)
+        other.into_temp_path().persist(destination).map_err(|error| error.error)
     }
 }

@@ -83,7 +83,7 @@ impl ErrorMap {
             (2.0 * s - 1.5 * s * s) * scale,
             0.5 * t * t * scale,
         ];
-        // A place that is not finite reaches no knot that exists, and comes out as the first.
+        // An angle that is not finite has no knot; its weight goes to the first.
         let first = if place.is_finite() { (place as usize + count - 1) % count } else { 0 };
         (first, weights, slopes)
     }

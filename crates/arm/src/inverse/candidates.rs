@@ -157,7 +157,7 @@ impl Inverse<'_> {
         out
     }
 
-    /// Converged solutions on all branches, limits not looked at; each joint on the turn nearest to `near`, or to the
+    /// Converged solutions on all branches, joint limits ignored; each joint on the turn nearest to `near`, or to the
     /// middle of its range. An error where there is none. `margins` are those of `near`; `spread` more
     /// seeds are spread over the joint ranges.
     fn branches(

@@ -156,10 +156,10 @@ fn urdf(model: &Model, name: &str, notes: &[String]) -> String {
     }
     let _ = writeln!(out, "<robot name=\"{plain}\">\n  <link name=\"base_link\"/>");
     let frames = model.at_condition(&Condition::default()).frames(&Joints::zeros());
-    let (places, signs, ranges) = (joint_frames(model), signs(model), Ranges::of(model));
+    let (poses, signs, ranges) = (joint_frames(model), signs(model), Ranges::of(model));
     let mut at = Pose::identity();
     for i in 0..6 {
-        at *= places[i];
+        at *= poses[i];
         let parent = if i == 0 { "base_link".to_owned() } else { format!("link_{i}") };
         let _ = write!(out, "  <link name=\"link_{}\"", i + 1);
         match &model.bodies {
@@ -181,7 +181,7 @@ fn urdf(model: &Model, name: &str, notes: &[String]) -> String {
             "  <joint name=\"joint_{n}\" type=\"revolute\">\n    <parent link=\"{parent}\"/>\n    <child link=\"link_{n}\"/>\n    \
              <origin {}/>\n    <axis xyz=\"0 0 {sign}\"/>\n    <limit lower=\"{low}\" upper=\"{high}\" velocity=\"{speed}\" \
              effort=\"0\"/>\n  </joint>",
-            origin(&places[i]),
+            origin(&poses[i]),
             n = i + 1,
             sign = signs[i],
             low = ranges.low_rad[i],
@@ -193,7 +193,7 @@ fn urdf(model: &Model, name: &str, notes: &[String]) -> String {
         out,
         "  <link name=\"tool0\"/>\n  <joint name=\"flange\" type=\"fixed\">\n    <parent link=\"link_6\"/>\n    <child \
          link=\"tool0\"/>\n    <origin {}/>\n  </joint>\n</robot>",
-        origin(&places[6])
+        origin(&poses[6])
     );
     out
 }
@@ -252,10 +252,10 @@ fn ur_yaml(model: &Model, notes: &[String]) -> String {
         let _ = writeln!(out, "# {note}");
     }
     out.push_str("kinematics:\n");
-    let mut places = joint_frames(model);
+    let mut poses = joint_frames(model);
     // The last frame turns about its own z, along which it may stand anywhere.
-    places[5] *= Pose::translation(0.0, 0.0, model.links[5].d_mm);
-    for (name, pose) in UR.iter().zip(&places) {
+    poses[5] *= Pose::translation(0.0, 0.0, model.links[5].d_mm);
+    for (name, pose) in UR.iter().zip(&poses) {
         let place = pose.translation.vector / 1000.0;
         let (roll, pitch, yaw) = pose.rotation.euler_angles();
         let _ = writeln!(

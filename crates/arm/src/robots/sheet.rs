@@ -1,4 +1,4 @@
-//! The TOML schema of a robot file, and the model that a sheet stands for. Lengths are mm, angles degrees, masses kg.
+//! The TOML schema of a robot file, and the model that a sheet describes. Lengths are mm, angles degrees, masses kg.
 //!
 //! ```toml
 //! [[robot]]
@@ -11,7 +11,7 @@
 //! [[robot.link]]               # six times, T = Rz(theta) Tz(d) Tx(a) Rx(alpha), ltlm-2024 eq. 2
 //! model = "dh"                 # or "hayati", T = Rz(theta) Tx(a) Rx(alpha) Ry(beta), where the next axis is parallel
 //! a_mm = 0.0
-//! d_mm = 290.0                 # 0 on a hayati link: the sum with a neighbour's d stands there
+//! d_mm = 290.0                 # 0 on a hayati link, whose d is added to a neighbour's
 //! alpha_deg = -90.0
 //! theta_deg = 0.0              # added to the mapped joint angle
 //!
@@ -215,7 +215,7 @@ pub struct Mounting {
     /// Direction of gravity in the base frame; need not have length 1.
     #[serde(default = "downwards")]
     pub gravity: [f64; 3],
-    /// Where the centre of the mounting face lies in the base frame (mm): some controllers have their origin higher up.
+    /// Centre of the mounting face in the base frame (mm): some controllers have their origin higher up.
     #[serde(default)]
     pub plate_mm: [f64; 3],
 }
@@ -269,7 +269,7 @@ pub struct Published {
     pub point: Point,
     /// Joints as the map takes them, without the offsets theta (°).
     pub joints_deg: [f64; 6],
-    /// Where the point lies in the base (mm).
+    /// The point in the base frame (mm).
     pub position_mm: Option<[f64; 3]>,
     /// Or how far it lies from axis 1 (mm).
     pub radius_mm: Option<f64>,

@@ -8,7 +8,7 @@ use nalgebra::{Matrix6, Vector6};
 use super::error::RobotError;
 use super::sheet::{DataSheet, LinkSheet, Point, Published, unit_quaternion};
 use crate::bounds::{
-    self, Bound, DIRECTION, InvalidValue, JOINT_DEG, LENGTH_MM, MASS_KG, POSITION_MM, SPEED_DEG_S, TWIST_DEG,
+    self, Bound, DIRECTION, InvalidValue, JOINT_DEG, LENGTH_MM, MASS_KG, POSITION_MM, SPEED_DEG_S,
 };
 use crate::link::LinkModel;
 use crate::model::Model;
@@ -81,15 +81,7 @@ pub(super) fn check(sheet: &DataSheet) -> Result<Vec<String>, Fault> {
 /// Every number must be finite and within its bounds.
 fn bounded(sheet: &DataSheet) -> Result<(), InvalidValue> {
     for (i, link) in sheet.link.iter().enumerate() {
-        let key = |name: &str| format!("link {} {name}", i + 1);
-        for (name, value) in [("a_mm", link.a_mm), ("d_mm", link.d_mm)] {
-            LENGTH_MM.check(|| key(name), value)?;
-        }
-        let turns =
-            [("alpha_deg", link.alpha_deg), ("theta_deg", link.theta_deg), ("beta_deg", link.beta_deg)];
-        for (name, value) in turns {
-            TWIST_DEG.check(|| key(name), value)?;
-        }
+        bounds::link(i, [link.a_mm, link.d_mm], [link.alpha_deg, link.theta_deg, link.beta_deg])?;
     }
     let joints = &sheet.joints;
     JOINT_DEG.check_all("joints.min_deg", joints.min_deg.iter().flatten())?;

@@ -57,7 +57,7 @@ impl PathFound {
     }
 }
 
-type Place = Vector3<f64>;
+type Position = Vector3<f64>;
 
 /// The rows of one path, by cycle and sampling point.
 type Cycles = BTreeMap<u32, BTreeMap<u32, usize>>;
@@ -91,22 +91,22 @@ fn one(name: &str, cycles: &Cycles, observed: &Observations, model: &Model, fram
     let all: BTreeSet<u32> = cycles.values().flat_map(BTreeMap::keys).copied().collect();
     let shared: Vec<u32> =
         all.iter().copied().filter(|sample| cycles.values().all(|rows| rows.contains_key(sample))).collect();
-    let commanded: Vec<Place> = shared
+    let commanded: Vec<Position> = shared
         .iter()
         .map(|sample| {
-            let places = cycles.values().map(|rows| {
+            let positions = cycles.values().map(|rows| {
                 let row = &observed.dataset.rows[rows[sample]];
                 let flange = model.at_condition(&row.condition).forward(&row.joints);
                 (flange * frames.flange_from_target).translation.vector
             });
-            places.sum::<Place>() / cycles.len() as f64
+            positions.sum::<Position>() / cycles.len() as f64
         })
         .collect();
-    let attained: Vec<Vec<Place>> = cycles
+    let attained: Vec<Vec<Position>> = cycles
         .values()
         .map(|rows| {
-            let place = |sample| seen(observed, rows[sample], &frames.base_from_sensor);
-            shared.iter().filter_map(place).collect()
+            let position = |sample| seen(observed, rows[sample], &frames.base_from_sensor);
+            shared.iter().filter_map(position).collect()
         })
         .collect();
     let measures = characteristics(&commanded, &attained);
@@ -133,17 +133,17 @@ pub struct Passed {
 
 /// The points of a commanded path whose normal plane every attained path intersects (mm). Readings of the attained paths have
 /// the same indices as the points.
-pub fn characteristics(commanded: &[Place], attained: &[Vec<Place>]) -> Vec<Passed> {
+pub fn characteristics(commanded: &[Position], attained: &[Vec<Position>]) -> Vec<Passed> {
     let reach = 1 + commanded.len() / 20;
     let at = |point: usize| {
         let along = direction(commanded, point)?;
         let near = point.saturating_sub(reach + 1)..point + reach + 1;
-        let passed: Vec<Place> = attained
+        let passed: Vec<Position> = attained
             .iter()
             .map(|path| passing(path, near.clone(), &commanded[point], &along))
             .collect::<Option<_>>()?;
-        let barycentre = passed.iter().sum::<Place>() / passed.len() as f64;
-        let distances = ErrorSummary::of(passed.iter().map(|place| (place - barycentre).norm()));
+        let barycentre = passed.iter().sum::<Position>() / passed.len() as f64;
+        let distances = ErrorSummary::of(passed.iter().map(|position| (position - barycentre).norm()));
         Some(Passed {
             deviation_mm: (barycentre - commanded[point]).norm(),
             repeatability_mm: distances.mean + 3.0 * distances.standard_deviation,
@@ -154,15 +154,15 @@ pub fn characteristics(commanded: &[Place], attained: &[Vec<Place>]) -> Vec<Pass
 
 /// Direction of a path at one of its points: the mean of the unit directions from and to the neighbours, so that both cross
 /// the plane even if their lengths are very different. `None` if the path reverses or does not move.
-fn direction(path: &[Place], point: usize) -> Option<Place> {
+fn direction(path: &[Position], point: usize) -> Option<Position> {
     let piece = |from: usize| (path.get(from + 1)? - path[from]).try_normalize(f64::EPSILON);
     let here = [point.checked_sub(1).and_then(piece), piece(point)];
-    here.into_iter().flatten().sum::<Place>().try_normalize(1e-6)
+    here.into_iter().flatten().sum::<Position>().try_normalize(1e-6)
 }
 
 /// Intersection of a path with the plane through a point normal to `along`, in that direction, on one of the pieces `near`;
 /// the one nearest to the point.
-fn passing(path: &[Place], near: Range<usize>, point: &Place, along: &Place) -> Option<Place> {
+fn passing(path: &[Position], near: Range<usize>, point: &Position, along: &Position) -> Option<Position> {
     let last = path.len().checked_sub(2)?;
     let passages = (near.start..near.end.min(last + 1)).filter_map(|k| {
         let [from, to] = [path[k], path[k + 1]];
@@ -181,10 +181,10 @@ fn passing(path: &[Place], near: Range<usize>, point: &Place, along: &Place) -> 
 
 /// Measured position of the target in the base (mm).
 pub(super) fn seen(observed: &Observations, row: usize, base_from_sensor: &Pose) -> Option<Vector3<f64>> {
-    let place = match &observed.dataset.rows[row].reading {
+    let position = match &observed.dataset.rows[row].reading {
         Reading::Cable(_) => return None,
-        Reading::Position(place) => *place,
+        Reading::Position(position) => *position,
         Reading::Pose(pose) => pose.translation.vector,
     };
-    Some((base_from_sensor * Point3::from(place)).coords)
+    Some((base_from_sensor * Point3::from(position)).coords)
 }

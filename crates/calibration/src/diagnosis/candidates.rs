@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::catalogue::{Candidate, arm_candidates, fine_maps, measurement_candidates};
+use super::cause_kind::CauseKind;
 use super::design::Design;
 use super::extension::Subject;
 use super::order_spectrum::AngleHarmonics;
@@ -62,12 +63,12 @@ impl Catalogue {
                 Arc::new(Candidate::measurement(disturbance, dataset, subject.nominal, subject.frames))
             })
             .collect();
-        let mut families: Vec<(&str, Vec<usize>)> = listed
+        let mut families: Vec<(CauseKind, Vec<usize>)> = listed
             .iter()
             .chain(shifts.iter().map(|s| &**s))
-            .map(|c| (c.cause.name(), c.cause.joints()))
+            .map(|c| (c.cause.kind(), c.cause.joints()))
             .collect();
-        families.extend((0..6).map(|j| ("gear-transmission", vec![j])));
+        families.extend((0..6).map(|j| (CauseKind::GearTransmission, vec![j])));
         families.sort();
         families.dedup();
         let families = families.len() as f64;

@@ -469,7 +469,7 @@ fn latency(dataset: &Dataset) -> EmpiricalFault {
     EmpiricalFault::Latency { middle_s: if middle_s.is_finite() { middle_s.round() as i64 } else { 0 } }
 }
 
-/// Prior odds of a cause with a physical law against an expansion that stands for faults whose law is unknown: it can imitate many
+/// Prior odds of a cause with a physical law against an expansion for faults whose law is unknown: it can imitate many
 /// laws. Counted as that many variants.
 const EXPANSION_ODDS: f64 = 10.0;
 

@@ -1,5 +1,6 @@
-//! A candidate cause: an effect of the arm or a disturbance of the measurement, by its contract name.
+//! A candidate cause: an effect of the arm or a disturbance of the measurement.
 
+use super::cause_kind::CauseKind;
 use crate::identification::tolerance::{Tolerance, effect_sigma};
 use crate::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
 use crate::measurement::sensor::empirical::EmpiricalFault;
@@ -43,19 +44,28 @@ pub(super) fn parallel_neighbours(nominal: &Model, joint: usize, other: usize) -
 }
 
 impl Cause {
-    /// The contract name.
-    pub fn name(&self) -> &'static str {
+    /// Its kind, which variants share: harmonics and error map of a gear, drift of the arm and of the sensor's stand.
+    pub fn kind(&self) -> CauseKind {
         match self {
-            Cause::Arm(effect) => effect.name(),
+            Cause::Arm(effect) => effect.into(),
             Cause::Measurement(disturbance) => match (&disturbance.kind, &disturbance.profile) {
-                (Kind::Empirical(form), _) => form.name(),
-                (Kind::Load { .. }, _) => "payload-change",
-                (_, Profile::Exponential { .. } | Profile::Temperature { .. }) => "thermal-drift",
-                (Kind::Zero, _) => "sensor-zero-shift",
-                (Kind::Frame { .. }, _) => "sensor-frame-shift",
-                (Kind::Target, _) => "tool-shift",
-                (Kind::Scale, _) => "sensor-scale",
-                (Kind::Sag, _) => "cable-sag",
+                (Kind::Empirical(fault), _) => match fault {
+                    EmpiricalFault::Latency { .. } => CauseKind::Latency,
+                    EmpiricalFault::ArmUnsettled | EmpiricalFault::SensorUnsettled => CauseKind::Unsettled,
+                    EmpiricalFault::NonlinearStiffness { .. } => CauseKind::JointStiffness,
+                    EmpiricalFault::TwoJointGear { .. } => CauseKind::GearTwoJoints,
+                    EmpiricalFault::Refraction => CauseKind::AirRefraction,
+                    EmpiricalFault::Pulley => CauseKind::CablePulley,
+                    EmpiricalFault::Drum { .. } => CauseKind::CableDrum,
+                    EmpiricalFault::TargetNest { .. } => CauseKind::TargetNest,
+                },
+                (Kind::Load { .. }, _) => CauseKind::PayloadChange,
+                (_, Profile::Exponential { .. } | Profile::Temperature { .. }) => CauseKind::ThermalDrift,
+                (Kind::Zero, _) => CauseKind::SensorZeroShift,
+                (Kind::Frame { .. }, _) => CauseKind::SensorFrameShift,
+                (Kind::Target, _) => CauseKind::ToolShift,
+                (Kind::Scale, _) => CauseKind::SensorScale,
+                (Kind::Sag, _) => CauseKind::CableSag,
             },
         }
     }
@@ -233,6 +243,6 @@ impl Cause {
             (None, None) => true,
             _ => false,
         };
-        self.name() == other.name() && self.joints() == other.joints() && rows_meet
+        self.kind() == other.kind() && self.joints() == other.joints() && rows_meet
     }
 }

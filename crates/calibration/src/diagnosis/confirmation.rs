@@ -20,6 +20,7 @@ use super::algebra::{lower_factor, picked_rows, product, solved};
 use super::candidates::Scored;
 use super::catalogue::Candidate;
 use super::cause::Cause;
+use super::cause_kind::CauseKind;
 use super::design::{Design, Linear, Projected, pure_all, side_by_side};
 use super::discrepancy::{Discrepancy, Functions};
 use super::extension::{Extended, Subject};
@@ -237,7 +238,8 @@ impl ConfirmationContext<'_> {
     /// a cause was found, or the joint's steps have one size, so that side and step are proportional.
     fn is_confounded_with_lag(&self, cause: &Cause) -> bool {
         let Cause::Arm(Effect::Backlash(backlash)) = cause else { return false };
-        let lags = self.found.causes.iter().any(|c| ["unsettled", "latency"].contains(&c.name()));
+        let lags =
+            self.found.causes.iter().any(|c| [CauseKind::Unsettled, CauseKind::Latency].contains(&c.kind()));
         self.sides_from_order && (lags || self.has_uniform_steps(backlash.joint))
     }
 

@@ -113,7 +113,7 @@ impl Confounding<'_> {
             (0..self.causes.len()).filter(rough).find(|&k| own < self.contributions.unique_rms_mm(&[k]))?;
         Some(format!(
             "beyond all other causes it explains {own:.4} mm, less than {}, whose exact law is unknown: it might be a residue of that",
-            self.causes[larger].name()
+            self.causes[larger].kind()
         ))
     }
 
@@ -204,15 +204,15 @@ impl Confounding<'_> {
     /// An empirical sensor fault next to a larger one of another part of the sensor.
     fn by_other_sensor_fault(&self, causes: &[usize], own: f64) -> Option<String> {
         let of_cable = |k: usize| self.causes[k].is_in_cable();
-        let name = self.causes[causes[0]].name();
+        let name = self.causes[causes[0]].kind();
         let larger = self
             .others(causes)
             .filter(|&k| self.causes[k].is_empirical() && !self.causes[k].is_in_arm())
-            .filter(|&k| self.causes[k].name() != name && !(of_cable(k) && of_cable(causes[0])))
+            .filter(|&k| self.causes[k].kind() != name && !(of_cable(k) && of_cable(causes[0])))
             .find(|&k| own < self.contributions.unique_rms_mm(&[k]))?;
         Some(format!(
             "it contributes less than {} and might be a residue of that",
-            self.causes[larger].name()
+            self.causes[larger].kind()
         ))
     }
 }

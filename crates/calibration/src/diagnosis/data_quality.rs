@@ -1,6 +1,7 @@
 //! Findings about the quality of the data: rounded angles, contradicting columns, outliers, noise floor, angles between which
 //! nothing was measured.
 
+use super::cause_kind::CauseKind;
 use super::extension::{Extended, Freedom, Subject, fit};
 use super::finding::{Confidence, Finding, FoundParameter, Gain};
 use super::preparation::Prepared;
@@ -69,7 +70,7 @@ pub(super) fn rounding_finding(
     Some(Finding {
         parameters: vec![read_parameter("step", step.to_degrees(), "°")],
         worth_mm: Some(share.sqrt()),
-        ..words::finding("angle-rounding", cause, Confidence::Identified, evidence, gain)
+        ..words::finding(CauseKind::AngleRounding, cause, Confidence::Identified, evidence, gain)
     })
 }
 
@@ -99,7 +100,7 @@ pub(super) fn mismatch_finding(
     Some(Finding {
         row_list: Some(rows.iter().map(|(i, _)| dataset.rows[*i].number).collect()),
         parameters: vec![read_parameter("largest mismatch", largest, "mm")],
-        ..words::finding("readout-mismatch", cause, Confidence::Identified, evidence, no_gain(after))
+        ..words::finding(CauseKind::ReadoutMismatch, cause, Confidence::Identified, evidence, no_gain(after))
     })
 }
 
@@ -145,7 +146,7 @@ pub(super) fn outlier_finding(
         row_list: Some(list),
         p_value: 1e-2,
         doubts,
-        ..words::finding("outliers", cause, confidence, evidence, no_gain(after))
+        ..words::finding(CauseKind::Outliers, cause, confidence, evidence, no_gain(after))
     })
 }
 

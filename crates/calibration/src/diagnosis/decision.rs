@@ -6,7 +6,8 @@
 //! as much.
 
 use super::cause::Cause;
-use super::finding::{Confidence, Family, Finding, Member, UNEXPLAINED};
+use super::cause_kind::CauseKind;
+use super::finding::{Confidence, Family, Finding, Member};
 use super::something_else::SomethingElse;
 use crate::identification::calibration::Frames;
 use crate::measurement::dataset::Sensor;
@@ -18,34 +19,30 @@ pub const DIAGNOSIS_FILE: &str = "DIAGNOSIS.json";
 const LEAST_SHARE: f64 = 0.01;
 
 /// Effects that poses, repeats, both sides of approach or visits over time decide: those that `plan` has questions for.
-pub const DECIDED_BY_POSES: [&str; 9] = [
-    "joint-compliance",
-    "gear-eccentricity",
-    "gear-ratio",
-    "joint-coupling",
-    "backlash",
-    "thermal-drift",
-    "sensor-zero-shift",
-    "sensor-frame-shift",
-    "tool-shift",
+pub const DECIDED_BY_POSES: [CauseKind; 9] = [
+    CauseKind::JointCompliance,
+    CauseKind::GearEccentricity,
+    CauseKind::GearRatio,
+    CauseKind::JointCoupling,
+    CauseKind::Backlash,
+    CauseKind::ThermalDrift,
+    CauseKind::SensorZeroShift,
+    CauseKind::SensorFrameShift,
+    CauseKind::ToolShift,
 ];
 
-/// The branch of a contract name; of a thermal drift the arm's.
-pub(super) fn family(effect: &str) -> Option<Family> {
+/// The branch of a kind; of a thermal drift the arm's; none for findings that merge several.
+pub(super) fn family(effect: CauseKind) -> Option<Family> {
+    use CauseKind::*;
     Some(match effect {
-        "link-geometry" | "joint-compliance" | "joint-stiffness" | "thermal-drift" | "smooth-correction" => {
-            Family::Arm
+        LinkGeometry | JointCompliance | JointStiffness | ThermalDrift | SmoothCorrection => Family::Arm,
+        GearEccentricity | GearTransmission | GearRatio | GearTwoJoints | JointCoupling | Backlash => {
+            Family::Drive
         }
-        "gear-eccentricity" | "gear-transmission" | "gear-ratio" | "gear-two-joints" | "joint-coupling"
-        | "backlash" => Family::Drive,
-        "sensor-scale" | "cable-sag" | "cable-pulley" | "cable-drum" | "air-refraction" | "target-nest" => {
-            Family::Sensor
-        }
-        "sensor-zero-shift" | "sensor-frame-shift" | "tool-shift" | "payload-change" | "setup-change" => {
-            Family::SetUp
-        }
-        "latency" | "unsettled" | "angle-rounding" | "readout-mismatch" | "outliers" => Family::Log,
-        _ => return None,
+        SensorScale | CableSag | CablePulley | CableDrum | AirRefraction | TargetNest => Family::Sensor,
+        SensorZeroShift | SensorFrameShift | ToolShift | PayloadChange | SetupChange => Family::SetUp,
+        Latency | Unsettled | AngleRounding | ReadoutMismatch | Outliers => Family::Log,
+        SmallDisturbances | Unexplained => return None,
     })
 }
 
@@ -54,8 +51,8 @@ pub(super) fn family_of(cause: &Cause) -> Family {
     match cause {
         // Its stand, not the arm, follows the temperature.
         Cause::Measurement(_) if cause.is_thermal() => Family::SetUp,
-        Cause::Arm(_) => family(cause.name()).unwrap_or(Family::Arm),
-        Cause::Measurement(_) => family(cause.name()).unwrap_or(Family::Sensor),
+        Cause::Arm(_) => family(cause.kind()).unwrap_or(Family::Arm),
+        Cause::Measurement(_) => family(cause.kind()).unwrap_or(Family::Sensor),
     }
 }
 
@@ -63,7 +60,7 @@ pub(super) fn family_of(cause: &Cause) -> Family {
 pub fn members(finding: &Finding) -> Vec<Member> {
     let Some(own) = finding.family else { return Vec::new() };
     let mut out = vec![Member {
-        effect: finding.effect.clone(),
+        effect: finding.effect,
         joints: finding.joints.clone(),
         rows: finding.rows,
         family: own,
@@ -85,7 +82,7 @@ pub fn members(finding: &Finding) -> Vec<Member> {
         }
         logs.push(log);
         out.push(Member {
-            effect: rival.effect.clone(),
+            effect: rival.effect,
             joints: rival.joints.clone(),
             rows: rival.rows,
             family: rival.family,
@@ -95,7 +92,7 @@ pub fn members(finding: &Finding) -> Vec<Member> {
     let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let total: f64 = logs.iter().map(|log| (log - most).exp()).sum();
     out.iter_mut().zip(&logs).for_each(|(member, log)| member.share = (log - most).exp() / total);
-    let named = (out[0].effect.clone(), out[0].joints.clone(), out[0].family);
+    let named = (out[0].effect, out[0].joints.clone(), out[0].family);
     let is_named = |m: &Member| (&m.effect, &m.joints, m.family) == (&named.0, &named.1, named.2);
     out.retain(|member| member.share >= LEAST_SHARE || is_named(member));
     out.sort_by(|a, b| b.share.total_cmp(&a.share));
@@ -104,32 +101,31 @@ pub fn members(finding: &Finding) -> Vec<Member> {
     if out.len() < 2 { Vec::new() } else { out }
 }
 
-/// The measurement that tells an effect from others where no plan of poses can; what to look for in it.
-fn in_words(effect: &str) -> Option<&'static str> {
+/// The measurement that separates an effect from others where no plan of poses can, and what to look for in it.
+fn in_words(effect: CauseKind) -> Option<&'static str> {
+    use CauseKind::*;
     Some(match effect {
-        "sensor-scale" => {
+        SensorScale => {
             "measure a known length with the sensor (a scale bar): if it is read wrong, the sensor's scale is the cause"
         }
-        "cable-sag" | "cable-pulley" | "cable-drum" => {
+        CableSag | CablePulley | CableDrum => {
             "move the cable's outlet to another place and measure again (`diagnose --also`): what follows the cable and not the pose is the \
              sensor"
         }
-        "air-refraction" => {
+        AirRefraction => {
             "measure the same ten poses at dawn and at noon, or from half the distance: what changes is the air"
         }
-        "target-nest" => {
+        TargetNest => {
             "measure the same ten poses with the reflector turned by 90° in its nest: what changes is the target"
         }
-        "joint-stiffness" => {
-            "measure the same ten poses with and without a load: what changes is the stiffness"
-        }
-        "payload-change" => "weigh the tool, and measure the same ten poses with and without it",
-        "gear-two-joints" | "gear-transmission" => {
+        JointStiffness => "measure the same ten poses with and without a load: what changes is the stiffness",
+        PayloadChange => "weigh the tool, and measure the same ten poses with and without it",
+        GearTwoJoints | GearTransmission => {
             "turn each of these joints alone through its whole range in steps of a few degrees, and read at each: what returns with the angle \
              is the gear"
         }
-        "latency" => "measure the same ten poses once at rest and once in motion: what changes is the clock",
-        "unsettled" => {
+        Latency => "measure the same ten poses once at rest and once in motion: what changes is the clock",
+        Unsettled => {
             "measure the same ten poses again with twice the wait before each reading: what changes had not settled"
         }
         _ => return None,
@@ -153,7 +149,7 @@ impl Asking<'_> {
             }
             finding.members = members(finding);
             finding.decided_by = self.decision(finding, k + 1);
-            if finding.effect == UNEXPLAINED
+            if finding.effect == CauseKind::Unexplained
                 && let Some(decision) = &finding.decided_by
             {
                 finding.remedy = decision.clone();
@@ -163,7 +159,7 @@ impl Asking<'_> {
 
     fn decision(&self, finding: &Finding, number: usize) -> Option<String> {
         let plan = || self.command(number);
-        if finding.effect == UNEXPLAINED {
+        if finding.effect == CauseKind::Unexplained {
             let something = self.something_else?;
             return Some(if something.is_in_time() {
                 format!("measure one pose ten times, spread over as long a time as before: `{}`", plan())
@@ -174,15 +170,15 @@ impl Asking<'_> {
         // Sums of small things and tables of sessions have no part to decide on.
         finding.family?;
         finding.non_centrality?;
-        let own = [finding.effect.as_str()];
-        let named: Vec<&str> = if finding.members.is_empty() {
+        let own = [finding.effect];
+        let named: Vec<CauseKind> = if finding.members.is_empty() {
             own.to_vec()
         } else {
-            finding.members.iter().map(|member| member.effect.as_str()).collect()
+            finding.members.iter().map(|member| member.effect).collect()
         };
         // What the finding itself asks for comes first, then a program of poses, then what its rivals ask for.
         let by_words =
-            |effects: &[&str]| effects.iter().find_map(|effect| in_words(effect)).map(str::to_owned);
+            |effects: &[CauseKind]| effects.iter().find_map(|&effect| in_words(effect)).map(str::to_owned);
         let by_poses = || {
             let decided = named.iter().any(|effect| DECIDED_BY_POSES.contains(effect));
             decided.then(|| format!("measure the poses of `{}`", plan()))

@@ -1,6 +1,7 @@
 //! The whole diagnosis of one data set.
 
 use super::cause::Cause;
+use super::cause_kind::CauseKind;
 use super::data_quality::single_angles;
 use super::decision;
 use super::discrepancy::Discrepancy;
@@ -18,7 +19,7 @@ use super::sensor_causes::{self, probability_worse};
 use super::summary::{self, Summary};
 use super::testability::not_testable;
 use super::validation::{StageError, nominal};
-use super::written::{certain_causes, fit_written, time_discrepancy, under_correlated_noise};
+use super::written_model::{certain_causes, fit_written, time_discrepancy, under_correlated_noise};
 use crate::identification::benefit::{Benefit, benefit};
 use crate::identification::calibration::Frames;
 use crate::identification::fit::{Fitted, Observations, frame_parameters};
@@ -332,9 +333,9 @@ fn build_diagnosis(
     let SearchContext { dataset, prepared, subject, searched, .. } = search.context;
     let (stages, set_aside) = (&search.stages, &search.set_aside);
     let noise = residual_tests::noise_model(subject, &search.extended, set_aside);
-    let names: Vec<String> = search.found.causes.iter().map(|c| c.name().to_owned()).collect();
+    let kinds: Vec<CauseKind> = search.found.causes.iter().map(|c| c.kind()).collect();
     let rows = &searched.observed.dataset;
-    let not_testable = not_testable(rows, &confirmed.whole.design, &search.left, &names, prepared);
+    let not_testable = not_testable(rows, &confirmed.whole.design, &search.left, &kinds, prepared);
     if let Err(why) = &prepared.readout_fusion
         && dataset.angle_step_rad.is_some()
         && let crate::identification::rounding::NotFused::Mismatch { found_mm, expected_mm } = why

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::cause_kind::CauseKind;
 use super::something_else::SomethingElse;
 
 use crate::identification::identify::IdentifyError;
@@ -10,9 +11,6 @@ use truegrind_arm::sensor::Sensor;
 
 /// Name and version of the JSON form.
 pub const SCHEMA: &str = "truegrind.diagnosis/1";
-
-/// Contract name of the finding that part of the residual has no cause in the catalogue.
-pub const UNEXPLAINED: &str = "unexplained";
 
 /// The rows that were diagnosed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -119,8 +117,8 @@ impl Family {
 /// One of the causes that cannot be told apart.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Member {
-    /// Its contract name.
-    pub effect: String,
+    /// Its kind.
+    pub effect: CauseKind,
     /// Its joints, from 1.
     pub joints: Option<Vec<usize>>,
     /// Its rows.
@@ -134,8 +132,8 @@ pub struct Member {
 /// A rival cause that was fitted in place of the finding.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Alternative {
-    /// Its contract name.
-    pub effect: String,
+    /// Its kind.
+    pub effect: CauseKind,
     /// Its joints, from 1.
     pub joints: Option<Vec<usize>>,
     /// Its rows.
@@ -153,8 +151,8 @@ pub struct Alternative {
 pub struct Session {
     /// Rows as the data set numbers them, both ends included.
     pub rows: [usize; 2],
-    /// Contract name of a shift of these rows alone.
-    pub effect: String,
+    /// Kind of a shift of these rows alone.
+    pub effect: CauseKind,
     /// The same in a sentence.
     pub cause: String,
     /// Contribution to the readings (mm RMS over all rows).
@@ -164,8 +162,8 @@ pub struct Session {
 /// A finding.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Finding {
-    /// Contract name of the effect.
-    pub effect: String,
+    /// Its kind.
+    pub effect: CauseKind,
     /// One sentence for a technician.
     pub cause: String,
     /// Confidence.
@@ -202,7 +200,7 @@ pub struct Finding {
     /// Twice the log Bayes factor against its best rival with smooth unmodelled trends in time and pose allowed for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub margin: Option<f64>,
-    /// The causes that cannot be told apart, this one included, with their shares, largest first; empty for a sure finding.
+    /// The causes that cannot be told apart, this one included, with their shares, largest first; empty for an identified finding.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub members: Vec<Member>,
     /// The measurement that decides.
@@ -217,8 +215,8 @@ pub struct Finding {
 /// An effect that these rows cannot detect.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NotTestable {
-    /// Contract name.
-    pub effect: String,
+    /// Its kind.
+    pub effect: CauseKind,
     /// Joints, from 1, if only some are undetectable.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub joints: Option<Vec<usize>>,
@@ -310,6 +308,6 @@ pub type DiagnoseError = IdentifyError;
 impl Diagnosis {
     /// Whether part of the residual has no cause in the catalogue.
     pub fn is_partly_unexplained(&self) -> bool {
-        self.findings.iter().any(|finding| finding.effect == UNEXPLAINED)
+        self.findings.iter().any(|finding| finding.effect == CauseKind::Unexplained)
     }
 }

@@ -6,12 +6,13 @@ use rayon::prelude::*;
 use super::candidates::Scored;
 use super::catalogue::{Candidate, LoggedColumns};
 use super::cause::{Cause, MAP_KNOTS};
+use super::cause_kind::CauseKind;
 use super::confirmation::CLEAR;
 use super::decision;
 use super::design::{Design, FullDesign};
 use super::extension::{Extended, Subject};
 use super::finding::{Alternative, Confidence, Family, Finding, Gain, Step};
-use super::held::{FoldErrors, Reduced};
+use super::held_out::{FoldErrors, Reduced};
 use super::picture::{Picture, picture};
 use super::score::VISIBLE;
 use super::score::{non_centrality, score};
@@ -74,7 +75,7 @@ impl FindingBuilder<'_> {
             steps.push(Step { added: short_name(cause), cv_rmse_mm: step });
             let existing = findings.iter().position(|f: &Finding| {
                 cause.rows().is_none()
-                    && f.effect == cause.name()
+                    && f.effect == cause.kind()
                     && f.rows.is_none()
                     && f.joints == pendant(&cause.joints())
             });
@@ -123,7 +124,7 @@ impl FindingBuilder<'_> {
             let columns = rival.candidate.columns(without);
             let sizes = rival.candidate.cause.sizes();
             Alternative {
-                effect: rival.candidate.cause.name().to_owned(),
+                effect: rival.candidate.cause.kind(),
                 joints: pendant(&rival.candidate.cause.joints()),
                 rows: rival.candidate.cause.rows(),
                 family: decision::family_of(&rival.candidate.cause),
@@ -151,7 +152,7 @@ impl FindingBuilder<'_> {
             alternatives.insert(
                 0,
                 Alternative {
-                    effect: "link-geometry".to_owned(),
+                    effect: CauseKind::LinkGeometry,
                     joints: None,
                     rows: None,
                     family: Family::Arm,
@@ -169,10 +170,10 @@ impl FindingBuilder<'_> {
             );
         }
         if let Some(map) = self.any_curve(cause)
-            && !alternatives.iter().any(|a| a.effect == map.cause.name())
+            && !alternatives.iter().any(|a| a.effect == map.cause.kind())
         {
             alternatives.push(Alternative {
-                effect: map.cause.name().to_owned(),
+                effect: map.cause.kind(),
                 joints: pendant(&map.cause.joints()),
                 rows: None,
                 family: decision::family_of(&map.cause),
@@ -184,7 +185,7 @@ impl FindingBuilder<'_> {
         let lambda = non_centrality(&own.own.information, &values);
         let picture = picture(self.subject, cause, &without, &self.whole.design);
         let finding = Finding {
-            effect: cause.name().to_owned(),
+            effect: cause.kind(),
             cause: words::describe_cause(cause, &parameters, last),
             confidence: if clear { Confidence::Identified } else { Confidence::Ambiguous },
             rows: cause.rows(),
@@ -210,7 +211,7 @@ impl FindingBuilder<'_> {
             members: Vec::new(),
             decided_by: None,
             alternatives,
-            remedy: words::remedy(cause.name()).to_owned(),
+            remedy: words::remedy(cause.kind()).to_owned(),
         };
         (finding, picture)
     }
@@ -223,12 +224,12 @@ fn counted(count: usize, what: &str) -> String {
 pub(super) fn short_name(cause: &Cause) -> String {
     let joints = cause.joints();
     match (joints.as_slice(), cause.rows()) {
-        ([], Some([from, to])) => format!("{} in rows {from} to {to}", cause.name()),
-        ([], None) => cause.name().to_owned(),
-        ([joint], _) => format!("{} of joint {}", cause.name(), joint + 1),
+        ([], Some([from, to])) => format!("{} in rows {from} to {to}", cause.kind()),
+        ([], None) => cause.kind().to_string(),
+        ([joint], _) => format!("{} of joint {}", cause.kind(), joint + 1),
         (many, _) => {
             let list: Vec<String> = many.iter().map(|j| (j + 1).to_string()).collect();
-            format!("{} of joints {}", cause.name(), list.join(" and "))
+            format!("{} of joints {}", cause.kind(), list.join(" and "))
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Covariance of the written arm that accounts for uncertain causes.
 //!
-//! Uncertain causes move no program (`written`), but they are probably real: the links fitted without them have absorbed part of
+//! Uncertain causes move no program (`written_model`), but they are probably real: the links fitted without them have absorbed part of
 //! them, and the rest is missing. With x₀ the written parameters, these causes at size 0, and x₁, C₁ those of the fit with them, the
 //! error of the written arm has the second moment
 //!
@@ -27,7 +27,7 @@ use super::cause::Cause;
 use super::design::Linear;
 use super::extension::{Extended, Subject, filled};
 use super::selection::{Accepted, contains_cause};
-use super::written::has_no_model_representation;
+use super::written_model::has_no_model_representation;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::effect::harmonic::Harmonic;
 use truegrind_arm::estimated::{Estimated, EstimatedParameter};
@@ -49,7 +49,7 @@ pub(super) fn representable_causes(causes: &[Cause], accepted: &[Accepted]) -> V
     out
 }
 
-/// The arm of `written` extended by the further causes of `with` at size 0, with the covariance of the module documentation.
+/// The arm of `written_model` extended by the further causes of `with` at size 0, with the covariance of the module documentation.
 pub(super) fn with_zero_causes(written: &Extended, with: Extended) -> Extended {
     let mut from: Vec<Option<usize>> = with
         .parameters

@@ -5,6 +5,7 @@
 //! part. If that is still more than a person reads at once, one effect at several joints is one finding.
 
 use super::cause::Cause;
+use super::cause_kind::CauseKind;
 use super::confirmation::Confirmation;
 use super::confounding::Confounding;
 use super::contribution::Contributions;
@@ -102,7 +103,7 @@ pub(super) fn merge_findings(
         let excess_only = !excess.is_empty();
         let build = |members: &[MergedFinding], mm: f64| small_disturbances(members, mm, excess_only);
         merge(&mut findings, |s| small(s) || is_excess(s), contributions, build);
-        let small_finding = findings.iter_mut().find(|s| s.finding.effect == SMALL_DISTURBANCES);
+        let small_finding = findings.iter_mut().find(|s| s.finding.effect == CauseKind::SmallDisturbances);
         small_finding.into_iter().for_each(|s| s.doubted = excess.clone());
     }
     merge_joints(&mut findings, contributions, IDENTIFIED_SHARE * geometric_mm);
@@ -112,7 +113,7 @@ pub(super) fn merge_findings(
 /// Merges identified findings of one effect at several joints, the smallest effect first, while more than [`MOST_REPORTED`] findings
 /// are left. Effects that contribute `separate_mm` at any joint stay separate.
 fn merge_joints(findings: &mut Vec<MergedFinding>, contributions: &Contributions<'_>, separate_mm: f64) {
-    let is_member = |s: &MergedFinding, effect: &str| {
+    let is_member = |s: &MergedFinding, effect: CauseKind| {
         let finding = &s.finding;
         finding.effect == effect
             && finding.confidence == Confidence::Identified
@@ -120,7 +121,7 @@ fn merge_joints(findings: &mut Vec<MergedFinding>, contributions: &Contributions
             && finding.joints.as_ref().is_some_and(|joints| joints.len() == 1)
     };
     while findings.len() > MOST_REPORTED {
-        let largest = |effect: &str| -> Option<f64> {
+        let largest = |effect: CauseKind| -> Option<f64> {
             let members: Vec<f64> = findings
                 .iter()
                 .filter(|s| is_member(s, effect))
@@ -130,11 +131,11 @@ fn merge_joints(findings: &mut Vec<MergedFinding>, contributions: &Contributions
         };
         let smallest = findings
             .iter()
-            .filter_map(|s| Some((largest(&s.finding.effect)?, s.finding.effect.clone())))
+            .filter_map(|s| Some((largest(s.finding.effect)?, s.finding.effect)))
             .filter(|(largest, _)| *largest < separate_mm)
             .min_by(|a, b| a.0.total_cmp(&b.0));
         let Some((_, effect)) = smallest else { return };
-        merge(findings, |s| is_member(s, &effect), contributions, several_joints);
+        merge(findings, |s| is_member(s, effect), contributions, several_joints);
     }
 }
 
@@ -200,7 +201,7 @@ pub(super) fn certain_flags(
             growth().for_each(|k| out[k] = true);
         }
     }
-    for merged in findings.iter().filter(|s| s.finding.effect != SMALL_DISTURBANCES) {
+    for merged in findings.iter().filter(|s| s.finding.effect != CauseKind::SmallDisturbances) {
         if merged.finding.confidence == Confidence::Ambiguous {
             merged.causes.iter().for_each(|&k| out[k] = false);
         }
@@ -208,9 +209,6 @@ pub(super) fn certain_flags(
     findings.iter().flat_map(|s| &s.doubted).for_each(|&k| out[k] = false);
     out
 }
-
-/// Contract name of the merged small disturbances.
-const SMALL_DISTURBANCES: &str = "small-disturbances";
 
 /// Sorts findings by descending contribution; those without one come last (stable).
 pub(super) fn rank(findings: &mut [MergedFinding]) {
@@ -252,7 +250,7 @@ fn setup_change(members: &[MergedFinding], worth_mm: f64, steps: bool, smooth: b
         .filter_map(|s| {
             Some(Session {
                 rows: s.finding.rows?,
-                effect: s.finding.effect.clone(),
+                effect: s.finding.effect,
                 cause: s.finding.cause.clone(),
                 worth_mm: s.finding.worth_mm.unwrap_or(0.0),
             })
@@ -275,7 +273,7 @@ fn setup_change(members: &[MergedFinding], worth_mm: f64, steps: bool, smooth: b
         p_value: least_p_value(members),
         worth_mm: Some(worth_mm),
         sessions,
-        ..words::finding("setup-change", cause, confidence, evidence, gain(members))
+        ..words::finding(CauseKind::SetupChange, cause, confidence, evidence, gain(members))
     }
 }
 
@@ -298,6 +296,6 @@ fn small_disturbances(members: &[MergedFinding], worth_mm: f64, excess_only: boo
     Finding {
         p_value: least_p_value(members),
         worth_mm: Some(worth_mm),
-        ..words::finding(SMALL_DISTURBANCES, cause, Confidence::Ambiguous, evidence, gain(members))
+        ..words::finding(CauseKind::SmallDisturbances, cause, Confidence::Ambiguous, evidence, gain(members))
     }
 }

@@ -12,7 +12,7 @@ use super::catalogue::Candidate;
 use super::cause::Cause;
 use super::design::Design;
 use super::extension::{Extended, Freedom, Subject, fit, warm_fit};
-use super::held::FoldErrors;
+use super::held_out::FoldErrors;
 use super::levels;
 use super::score::{Score, score};
 use crate::measurement::split::{self, Split};
@@ -125,7 +125,7 @@ pub fn select(subject: &Subject<'_>, options: &Options, progress: &(dyn Fn(&str)
             }
         };
         let cause = best.candidate.cause.clone();
-        progress(&format!("{}. {}", current.causes.len() + 1, cause.name()));
+        progress(&format!("{}. {}", current.causes.len() + 1, cause.kind()));
         let to_review = causes_to_review(best, &left, &mut close_calls);
         let mut causes = current.causes.clone();
         causes.push(cause.clone());
@@ -351,7 +351,7 @@ fn own_score(subject: &Subject<'_>, design: &Design, scored: &[Scored], cause: &
     let tried = scored
         .iter()
         .filter(|s| {
-            s.candidate.cause.name() == cause.name()
+            s.candidate.cause.kind() == cause.kind()
                 && s.candidate.cause.rows().is_some() == cause.rows().is_some()
         })
         .map(|s| s.candidate.tried)

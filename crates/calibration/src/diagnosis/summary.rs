@@ -6,7 +6,7 @@ use super::data_quality::{mismatch_finding, noise_floor, outlier_finding, roundi
 use super::extension::Extended;
 use super::finding::{Finding, Step};
 use super::findings::FindingBuilder;
-use super::held::FoldErrors;
+use super::held_out::FoldErrors;
 use super::merged::{self, MergedFinding};
 use super::picture::Picture;
 use super::residual_tests::Structure;

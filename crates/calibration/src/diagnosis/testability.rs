@@ -6,6 +6,7 @@ use nalgebra::DVector;
 use super::candidates::Scored;
 use super::catalogue::{LoggedColumns, Regressor, STILL_RAD};
 use super::cause::Cause;
+use super::cause_kind::CauseKind;
 use super::design::Design;
 use super::finding::NotTestable;
 use super::findings::pendant;
@@ -19,23 +20,32 @@ use truegrind_math::spectral;
 /// Peak joint rotation of an effect of practical size (rad).
 const PRACTICAL_RAD: f64 = 0.15 * std::f64::consts::PI / 180.0;
 
+/// Effects of the arm that geometry and frames can imitate in unfavourable poses.
+const CONFOUNDED_WITH_GEOMETRY: [CauseKind; 5] = [
+    CauseKind::JointCompliance,
+    CauseKind::GearEccentricity,
+    CauseKind::GearRatio,
+    CauseKind::JointCoupling,
+    CauseKind::Backlash,
+];
+
 /// Effects that these rows cannot detect, with the smallest detectable size.
 pub(super) fn not_testable(
     dataset: &Dataset,
     whole: &Design,
     left: &[Scored],
-    found: &[String],
+    found: &[CauseKind],
     prepared: &Prepared,
 ) -> Vec<NotTestable> {
     let columns = LoggedColumns::of(dataset);
     let mut out = Vec::new();
-    let missing = |name: &str| !found.iter().any(|f| f == name);
-    let mut add = |effect: &str, joints: Option<Vec<usize>>, reason: String, remedy: &str| {
-        out.push(NotTestable { effect: effect.to_owned(), joints, reason, remedy: remedy.to_owned() });
+    let missing = |kind| !found.contains(&kind);
+    let mut add = |effect, joints: Option<Vec<usize>>, reason: String, remedy: &str| {
+        out.push(NotTestable { effect, joints, reason, remedy: remedy.to_owned() });
     };
-    if prepared.sides_from_order && missing("backlash") {
+    if prepared.sides_from_order && missing(CauseKind::Backlash) {
         add(
-            "backlash",
+            CauseKind::Backlash,
             None,
             "no approach columns, and the order of the rows does not show it".to_owned(),
             "measure each pose from both sides and log approach1 to approach6",
@@ -43,7 +53,7 @@ pub(super) fn not_testable(
     }
     if columns.hours.is_none() && columns.temperature.is_none() {
         add(
-            "thermal-drift",
+            CauseKind::ThermalDrift,
             None,
             "neither time nor temperature is logged".to_owned(),
             "log t and temperature, and measure from a cold start",
@@ -51,17 +61,17 @@ pub(super) fn not_testable(
     }
     if dataset.rows.iter().all(|r| r.readout_mm().is_none()) {
         add(
-            "readout-mismatch",
+            CauseKind::ReadoutMismatch,
             None,
             "the controller's own x, y, z are not logged".to_owned(),
             "log the controller's Cartesian read-out beside the angles",
         );
     }
-    if missing("sensor-scale") {
+    if missing(CauseKind::SensorScale) {
         let one = scale_information_beside_growth(whole, &DVector::from_element(1, 1e-3));
         if one < VISIBLE {
             add(
-                "sensor-scale",
+                CauseKind::SensorScale,
                 None,
                 "a scale error of 0.1 % is indistinguishable from links that are all longer by 0.1 %"
                     .to_owned(),
@@ -72,21 +82,21 @@ pub(super) fn not_testable(
     let still: Vec<usize> = (0..6).filter(|&j| columns.range_rad[j] <= STILL_RAD).collect();
     if !still.is_empty() {
         add(
-            "gear-eccentricity",
+            CauseKind::GearEccentricity,
             pendant(&still),
             "these axes hardly moved".to_owned(),
             "turn every axis through its whole range",
         );
     }
-    for name in ["joint-compliance", "gear-eccentricity", "gear-ratio", "joint-coupling", "backlash"] {
+    for kind in CONFOUNDED_WITH_GEOMETRY {
+        let without_sides = kind == CauseKind::Backlash && prepared.sides_from_order;
         let asked = (0..6).filter(|joint| !still.contains(joint));
-        let without_sides = name == "backlash" && prepared.sides_from_order;
-        let hidden = if without_sides { Vec::new() } else { hidden_joints(name, asked, left) };
-        if !hidden.is_empty() && missing(name) {
-            let joints: Vec<usize> = hidden.iter().map(|h| h.0).collect();
-            let sizes: Vec<String> = hidden.iter().map(describe).collect();
+        let hidden = if without_sides { Vec::new() } else { hidden_joints(kind, asked, left) };
+        if !hidden.is_empty() && missing(kind) {
+            let (joints, sizes): (Vec<usize>, Vec<String>) =
+                hidden.iter().map(|hidden| (hidden.0, describe(hidden))).unzip();
             add(
-                name,
+                kind,
                 pendant(&joints),
                 format!(
                     "in these poses it is confounded with geometry and frames; smallest detectable peak: {}",
@@ -100,18 +110,18 @@ pub(super) fn not_testable(
 }
 
 /// Joints of which an effect of practical size would not show, with the smallest size that would.
-fn hidden_joints(name: &str, asked: impl Iterator<Item = usize>, left: &[Scored]) -> Vec<(usize, f64)> {
+fn hidden_joints(kind: CauseKind, asked: impl Iterator<Item = usize>, left: &[Scored]) -> Vec<(usize, f64)> {
     asked
-        .map(|joint| (joint, smallest_that_shows(name, joint, left)))
+        .map(|joint| (joint, smallest_that_shows(kind, joint, left)))
         .filter(|(_, smallest)| *smallest > PRACTICAL_RAD)
         .collect()
 }
 
 /// The smallest detectable peak rotation of a joint by an effect of the arm (rad); NaN where it was not tried.
-fn smallest_that_shows(name: &str, joint: usize, left: &[Scored]) -> f64 {
+fn smallest_that_shows(kind: CauseKind, joint: usize, left: &[Scored]) -> f64 {
     let asked = |s: &&Scored| {
         let cause = &s.candidate.cause;
-        cause.name() == name
+        cause.kind() == kind
             && cause.joints().last() == Some(&joint)
             && !matches!(cause, Cause::Arm(Effect::GearMap(_) | Effect::LumpedCompliance(_)))
     };

@@ -1,7 +1,8 @@
 //! The unexplained part of the residual: a significant discrepancy over poses or time, or noise.
 
+use super::cause_kind::CauseKind;
 use super::discrepancy::{Discrepancy, typical_mm};
-use super::finding::{Confidence, Finding, Gain, UNEXPLAINED};
+use super::finding::{Confidence, Finding, Gain};
 use super::residual_tests::{Structure, is_structure};
 use super::search::Confirmed;
 use super::something_else::{Field, RemainingAt, SomethingElse};
@@ -96,7 +97,7 @@ impl Unexplained<'_> {
                 row_list: Some(rows),
                 p_value: (-0.5 * self.discrepancy.evidence.max(0.0)).exp().min(1.0),
                 worth_mm: Some(self.discrepancy.rms_mm()),
-                ..words::finding(UNEXPLAINED, cause, Confidence::Ambiguous, self.evidence(), gain)
+                ..words::finding(CauseKind::Unexplained, cause, Confidence::Ambiguous, self.evidence(), gain)
             }
         })
     }

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::algebra::{back_and_forth, factored};
 use super::extension::{Extended, Freedom, SEARCH_STEPS, Subject};
-use super::held::neither;
+use super::held_out::neither;
 use super::newton;
 use crate::identification::fit::{Observations, errors_on};
 use crate::measurement::split::{self, Split};

@@ -1,6 +1,7 @@
 //! Sentences of the findings for service technicians: cause, evidence, remedy.
 
 use super::cause::Cause;
+use super::cause_kind::CauseKind;
 use super::decision;
 use super::extension::Extended;
 use super::finding::{Confidence, Finding, FoundParameter, Gain};
@@ -68,14 +69,14 @@ fn norm(parameters: &[FoundParameter]) -> f64 {
 
 /// A finding of `effect` with its usual remedy and without rows, joints, parameters or rivals.
 pub(super) fn finding(
-    effect: &str,
+    effect: CauseKind,
     cause: String,
     confidence: Confidence,
     evidence: String,
     gain: Gain,
 ) -> Finding {
     Finding {
-        effect: effect.to_owned(),
+        effect,
         cause,
         confidence,
         rows: None,
@@ -249,94 +250,88 @@ fn describe_empirical_fault(form: EmpiricalFault, parameters: &[FoundParameter])
 
 /// The residual pattern that reveals a cause.
 pub fn describe_pattern(cause: &Cause) -> String {
+    use CauseKind::*;
     let joint = cause.joints().first().map_or(0, |j| j + 1);
-    match cause.name() {
-        "joint-compliance" => format!("the residual follows the static torque on joint {joint}"),
-        "gear-eccentricity" => format!("the residual about joint {joint} oscillates with its angle"),
-        "gear-transmission" => format!("the residual about joint {joint} is periodic in its angle"),
-        "gear-ratio" => format!("the residual about joint {joint} is proportional to its angle"),
-        "joint-coupling" => format!("the residual about a joint grows with the angle of joint {joint}"),
-        "backlash" => format!("the residual about joint {joint} changes sign with the approach side"),
-        "thermal-drift" => "the residual grows with time or temperature".to_owned(),
-        "payload-change" => {
+    match cause.kind() {
+        JointCompliance => format!("the residual follows the static torque on joint {joint}"),
+        GearEccentricity => format!("the residual about joint {joint} oscillates with its angle"),
+        GearTransmission => format!("the residual about joint {joint} is periodic in its angle"),
+        GearRatio => format!("the residual about joint {joint} is proportional to its angle"),
+        JointCoupling => format!("the residual about a joint grows with the angle of joint {joint}"),
+        Backlash => format!("the residual about joint {joint} changes sign with the approach side"),
+        ThermalDrift => "the residual grows with time or temperature".to_owned(),
+        PayloadChange => {
             "the residual follows the torque of a mass at the flange in these rows alone".to_owned()
         }
-        "sensor-zero-shift" => "the cable's residual steps by one amount in these rows".to_owned(),
-        "sensor-frame-shift" => "the residual steps by one vector in the base in these rows".to_owned(),
-        "tool-shift" => "the residual steps by one vector on the flange in these rows".to_owned(),
-        "latency" => "the residual follows the speed of the joints".to_owned(),
-        "unsettled" => "the residual points to the previous pose".to_owned(),
-        "joint-stiffness" => format!("the residual about joint {joint} follows powers of its torque"),
-        "gear-two-joints" => {
-            format!("the residual about joint {joint} oscillates with the angles of two joints")
-        }
-        "air-refraction" => "the vertical residual grows with the square of the distance".to_owned(),
-        "cable-pulley" => "the residual follows the direction of the cable".to_owned(),
-        "cable-drum" => "the residual follows powers of the cable's length".to_owned(),
-        "target-nest" => "the residual follows the direction of the beam in the target's frame".to_owned(),
-        "sensor-scale" => "the residual is proportional to the reading".to_owned(),
-        "cable-sag" => "the residual grows with the square of the cable's horizontal span".to_owned(),
+        SensorZeroShift => "the cable's residual steps by one amount in these rows".to_owned(),
+        SensorFrameShift => "the residual steps by one vector in the base in these rows".to_owned(),
+        ToolShift => "the residual steps by one vector on the flange in these rows".to_owned(),
+        Latency => "the residual follows the speed of the joints".to_owned(),
+        Unsettled => "the residual points to the previous pose".to_owned(),
+        JointStiffness => format!("the residual about joint {joint} follows powers of its torque"),
+        GearTwoJoints => format!("the residual about joint {joint} oscillates with the angles of two joints"),
+        AirRefraction => "the vertical residual grows with the square of the distance".to_owned(),
+        CablePulley => "the residual follows the direction of the cable".to_owned(),
+        CableDrum => "the residual follows powers of the cable's length".to_owned(),
+        TargetNest => "the residual follows the direction of the beam in the target's frame".to_owned(),
+        SensorScale => "the residual is proportional to the reading".to_owned(),
+        CableSag => "the residual grows with the square of the cable's horizontal span".to_owned(),
         _ => "see the picture".to_owned(),
     }
 }
 
 /// The recommended action.
-pub fn remedy(effect: &str) -> &'static str {
+pub fn remedy(effect: CauseKind) -> &'static str {
+    use CauseKind::*;
     match effect {
-        "joint-compliance" => {
+        JointCompliance => {
             "compensate with this model, which includes the compliance; check belts and reducer preload if it has grown"
         }
-        "gear-eccentricity" => {
+        GearEccentricity => {
             "compensate with this model; at the next repair, reseat or replace the eccentric gear or encoder ring"
         }
-        "gear-transmission" => {
-            "compensate with this model; inspect the reducer for wear if the amplitude grows"
-        }
-        "gear-ratio" => "compare the ratio in the controller's motor configuration with the installed gear",
-        "joint-coupling" => {
+        GearTransmission => "compensate with this model; inspect the reducer for wear if the amplitude grows",
+        GearRatio => "compare the ratio in the controller's motor configuration with the installed gear",
+        JointCoupling => {
             "check the coupling ratio in the controller's configuration; the wrist's gear train might have been replaced"
         }
-        "backlash" => {
+        Backlash => {
             "approach every point from the same side, or compensate with the approach side; adjust the gear mesh"
         }
-        "thermal-drift" => "warm the arm up before measuring and grinding, or measure in both states",
-        "payload-change" => {
+        ThermalDrift => "warm the arm up before measuring and grinding, or measure in both states",
+        PayloadChange => {
             "log the payload of every row; measure these rows again with the payload of the program"
         }
-        "sensor-zero-shift" => {
+        SensorZeroShift => {
             "check the cable's clamp and drum; measure a reference point before and after each session"
         }
-        "sensor-frame-shift" => {
-            "fix the sensor's stand; measure reference points before and after each session"
-        }
-        "tool-shift" => "fasten the hook or reflector; measure the rows after the slip again",
-        "sensor-scale" => "check the sensor against a length standard",
-        "latency" => "record angles and readings with the same clock, or measure at rest",
-        "unsettled" => "wait longer before each reading",
-        "joint-stiffness" => {
+        SensorFrameShift => "fix the sensor's stand; measure reference points before and after each session",
+        ToolShift => "fasten the hook or reflector; measure the rows after the slip again",
+        SensorScale => "check the sensor against a length standard",
+        Latency => "record angles and readings with the same clock, or measure at rest",
+        Unsettled => "wait longer before each reading",
+        JointStiffness => {
             "measure this joint with and without load, approached under the same torque; the written model includes only the linear part"
         }
-        "gear-two-joints" => {
+        GearTwoJoints => {
             "measure both joints over their whole range, one at a time and together; inspect the cable that crosses them"
         }
-        "air-refraction" => {
+        AirRefraction => {
             "measure at uniform air temperature and short distance, or with the tracker at the height of the arm"
         }
-        "cable-pulley" => {
+        CablePulley => {
             "inspect outlet and pulley; measure with the cable in one direction as far as possible"
         }
-        "cable-drum" => "check the cable sensor against a length standard over its whole range",
-        "target-nest" => "turn the target towards the sensor; check its nest and replace the reflector",
-        "cable-sag" => "increase the cable's tension or shorten the distance",
-        "angle-rounding" => "log angles with more digits",
-        "readout-mismatch" => {
-            "record angles and read-out at the same time, at rest; measure these rows again"
-        }
-        "outliers" => "measure these rows again",
-        "setup-change" => {
+        CableDrum => "check the cable sensor against a length standard over its whole range",
+        TargetNest => "turn the target towards the sensor; check its nest and replace the reflector",
+        CableSag => "increase the cable's tension or shorten the distance",
+        AngleRounding => "log angles with more digits",
+        ReadoutMismatch => "record angles and read-out at the same time, at rest; measure these rows again",
+        Outliers => "measure these rows again",
+        SetupChange => {
             "measure reference points before and after each session, and repeat the rows of displaced sessions"
         }
-        "small-disturbances" => "none: the model includes those that are the arm's",
+        SmallDisturbances => "none: the model includes those that are the arm's",
         _ => "measure more poses where the picture shows the largest residuals",
     }
 }

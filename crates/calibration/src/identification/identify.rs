@@ -379,9 +379,9 @@ pub fn prepare_observations(
         Ok((report, angles)) => {
             (Observations { dataset: rows, angles: AngleCovariance::each(angles) }, Ok(report))
         }
-        Err(why) => {
+        Err(reason) => {
             let angles = logged_covariance(dataset);
-            (Observations { dataset: rows, angles }, Err(why))
+            (Observations { dataset: rows, angles }, Err(reason))
         }
     }
 }
@@ -507,13 +507,13 @@ pub(crate) fn arm_parameters_of(fitted: &Fitted) -> Vec<Parameter> {
 
 /// Covariance block of the arm's parameters: marginal over the frames.
 pub(crate) fn arm_covariance(fitted: &Fitted) -> nalgebra::DMatrix<f64> {
-    let places: Vec<usize> =
+    let indices: Vec<usize> =
         fitted.parameters.iter().enumerate().filter(|(_, p)| p.is_of_arm()).map(|(k, _)| k).collect();
-    let n = places.len();
+    let n = indices.len();
     match &fitted.estimate.covariance {
-        Some(c) => nalgebra::DMatrix::from_fn(n, n, |i, j| c[(places[i], places[j])]),
+        Some(c) => nalgebra::DMatrix::from_fn(n, n, |i, j| c[(indices[i], indices[j])]),
         None => nalgebra::DMatrix::from_fn(n, n, |i, j| {
-            if i == j { fitted.priors[places[i]].sigma.powi(2) } else { 0.0 }
+            if i == j { fitted.priors[indices[i]].sigma.powi(2) } else { 0.0 }
         }),
     }
 }

@@ -56,18 +56,18 @@ fn first_rows(data: &Dataset) -> Vec<usize> {
     let same = same_pose_rad(data);
     let reach = same * WEIGHTS.iter().sum::<f64>();
     let along = |row: &Row| row.joints.iter().zip(WEIGHTS).map(|(q, w)| q * w).sum::<f64>() + 0.0;
-    let place: Vec<f64> = data.rows.iter().map(along).collect();
+    let key: Vec<f64> = data.rows.iter().map(along).collect();
     let mut order: Vec<usize> = (0..data.rows.len()).collect();
-    order.sort_by(|&a, &b| place[a].total_cmp(&place[b]).then(a.cmp(&b)));
+    order.sort_by(|&a, &b| key[a].total_cmp(&key[b]).then(a.cmp(&b)));
     let mut group: Vec<usize> = (0..data.rows.len()).collect();
     // Bitwise equal rows are represented by the first of them, so that a pose measured a thousand times is not compared a
     // million times. They are neighbours in the order.
     let mut distinct: Vec<(usize, [u64; 10])> = Vec::new();
     let mut last = None;
     order.retain(|&i| {
-        if last != Some(place[i]) {
+        if last != Some(key[i]) {
             distinct.clear();
-            last = Some(place[i]);
+            last = Some(key[i]);
         }
         let bits = bits(&data.rows[i]);
         match distinct.iter().find(|(_, known)| *known == bits) {
@@ -77,7 +77,7 @@ fn first_rows(data: &Dataset) -> Vec<usize> {
         group[i] == i
     });
     for (k, &i) in order.iter().enumerate() {
-        for &j in order[k + 1..].iter().take_while(|&&j| place[j] - place[i] <= reach) {
+        for &j in order[k + 1..].iter().take_while(|&&j| key[j] - key[i] <= reach) {
             let (a, b) = (root(&mut group, i), root(&mut group, j));
             if a != b
                 && (data.rows[i].joints - data.rows[j].joints).amax() <= same
@@ -332,14 +332,14 @@ pub fn noise_floor_rad(data: &Dataset) -> Option<f64> {
 }
 
 /// Pooled scatter of repeated readings without copies.
-fn pooled_scatter(data: &Dataset, place: impl Fn(&Row) -> Option<Vector3<f64>>) -> Option<NoiseFloor> {
-    pooled_scatter_by(data, |row, _| place(row))
+fn pooled_scatter(data: &Dataset, quantity: impl Fn(&Row) -> Option<Vector3<f64>>) -> Option<NoiseFloor> {
+    pooled_scatter_by(data, |row, _| quantity(row))
 }
 
 /// [`pooled_scatter`] of a quantity relative to the first row of its pose, outlet and approach (flagged by `true`).
 fn pooled_scatter_by(
     data: &Dataset,
-    mut place: impl FnMut(&Row, bool) -> Option<Vector3<f64>>,
+    mut quantity: impl FnMut(&Row, bool) -> Option<Vector3<f64>>,
 ) -> Option<NoiseFloor> {
     with_poses(data, |poses| {
         let (mut all, mut own, mut finest) = (Scatter::default(), Scatter::default(), f64::INFINITY);
@@ -350,7 +350,7 @@ fn pooled_scatter_by(
                 alike.entry((row.anchor, row.condition.approach)).or_default().push(i);
             }
             for rows in alike.into_values().filter(|rows| rows.len() > 1) {
-                let of = |(k, &i): (usize, &usize)| place(&data.rows[i], k == 0);
+                let of = |(k, &i): (usize, &usize)| quantity(&data.rows[i], k == 0);
                 let readings: Vec<Vector3<f64>> = rows.iter().enumerate().filter_map(of).collect();
                 all.add(&readings);
                 own.add(&distinct(&readings));

@@ -53,12 +53,12 @@ pub enum TrackError {
         expected: &'static str,
     },
     /// The state file cannot be used.
-    #[error("{file}: {why}")]
+    #[error("{file}: {reason}")]
     State {
         /// File.
         file: String,
         /// Why.
-        why: String,
+        reason: String,
     },
 }
 

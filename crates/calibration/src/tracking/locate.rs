@@ -238,9 +238,9 @@ pub fn locate(
                     continue;
                 }
                 let Some((shift, sigma, ratio)) = sums.change(parameter, form, n - since) else { continue };
-                let place = &mut best[form as usize];
-                if place.is_none_or(|b| ratio > b.ratio) {
-                    *place = Some(Change { parameter, since, form, shift, sigma, ratio });
+                let slot = &mut best[form as usize];
+                if slot.is_none_or(|b| ratio > b.ratio) {
+                    *slot = Some(Change { parameter, since, form, shift, sigma, ratio });
                 }
             }
         }

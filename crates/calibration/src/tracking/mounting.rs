@@ -41,7 +41,7 @@ enum Mounted {
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Remount {
     what: Mounted,
-    place: Pose,
+    pose: Pose,
     /// RMS distance of the single poses' locations from it (mm).
     scatter_mm: f64,
     poses: usize,
@@ -84,8 +84,8 @@ impl Tracker {
             if readings.len() != poses.len() {
                 return None;
             }
-            let each = |place: &dyn Fn(&Pose, &Pose) -> Pose| -> Vec<Pose> {
-                flanges.iter().zip(&readings).map(|(flange, reading)| place(flange, reading)).collect()
+            let each = |pose: &dyn Fn(&Pose, &Pose) -> Pose| -> Vec<Pose> {
+                flanges.iter().zip(&readings).map(|(flange, reading)| pose(flange, reading)).collect()
             };
             let target = each(&|flange, reading| flange.inverse() * frames.base_from_sensor * reading);
             let sensor = each(&|flange, reading| flange * frames.flange_from_target * reading.inverse());
@@ -97,13 +97,13 @@ impl Tracker {
             (Mounted::Target, target, frames.flange_from_target),
             (Mounted::Sensor, sensor, frames.base_from_sensor),
         ];
-        let far = |place: &Pose, old: &Pose| {
-            (place.translation.vector - old.translation.vector).norm() > KNOCKED_MM
-                || place.rotation.angle_to(&old.rotation) > KNOCKED_RAD
+        let far = |pose: &Pose, old: &Pose| {
+            (pose.translation.vector - old.translation.vector).norm() > KNOCKED_MM
+                || pose.rotation.angle_to(&old.rotation) > KNOCKED_RAD
         };
         let all = candidates.into_iter().filter_map(|(what, found, old)| {
-            let (place, scatter_mm, poses) = found?;
-            far(&place, &old).then_some((Remount { what, place, scatter_mm, poses }, old))
+            let (pose, scatter_mm, poses) = found?;
+            far(&pose, &old).then_some((Remount { what, pose, scatter_mm, poses }, old))
         });
         all.min_by(|(a, _), (b, _)| a.scatter_mm.total_cmp(&b.scatter_mm))
     }
@@ -128,11 +128,11 @@ impl Tracker {
         // Through the state's own numbers, so that a resumed track gives the same bits.
         match found.what {
             Mounted::Target => {
-                self.state.flange_from_target = vector_from_pose(&found.place);
+                self.state.flange_from_target = vector_from_pose(&found.pose);
                 self.frames.flange_from_target = pose_from_vector(&self.state.flange_from_target);
             }
             Mounted::Sensor => {
-                self.state.base_from_sensor = vector_from_pose(&found.place);
+                self.state.base_from_sensor = vector_from_pose(&found.pose);
                 self.frames.base_from_sensor = pose_from_vector(&self.state.base_from_sensor);
             }
         }
@@ -169,7 +169,7 @@ fn alarm_of(found: &Remount, old: &Pose, poses: &[PoseRecord], per: usize) -> Al
         },
         unit: "mm".to_owned(),
         course: Course::Mounted,
-        shift: (found.place.translation.vector - old.translation.vector).norm(),
+        shift: (found.pose.translation.vector - old.translation.vector).norm(),
         sigma: found.scatter_mm / many,
         poses: poses.len(),
         ratio: 0.0,
@@ -180,7 +180,7 @@ fn alarm_of(found: &Remount, old: &Pose, poses: &[PoseRecord], per: usize) -> Al
             .then(|| Part {
                 parameter: "turn".to_owned(),
                 unit: "rad".to_owned(),
-                shift: found.place.rotation.angle_to(&old.rotation),
+                shift: found.pose.rotation.angle_to(&old.rotation),
                 sigma: 0.0,
             })
             .into_iter()
@@ -235,22 +235,22 @@ struct Agreement {
 
 impl Agreement {
     /// Mean of the locations if at least four in five agree, their RMS scatter (mm), and their number.
-    fn consensus(&self, places: &[Pose]) -> Consensus {
+    fn consensus(&self, poses: &[Pose]) -> Consensus {
         let agrees = |a: &Pose, b: &Pose| {
             (a.translation.vector - b.translation.vector).norm() <= self.mm
                 && a.rotation.angle_to(&b.rotation) <= self.rad
         };
-        let count = |place: &Pose| places.iter().filter(|other| agrees(place, other)).count();
-        let best = places.iter().max_by_key(|place| count(place))?;
-        let own: Vec<&Pose> = places.iter().filter(|other| agrees(best, other)).collect();
-        if own.len() < FEWEST || 5 * own.len() < 4 * places.len() {
+        let count = |pose: &Pose| poses.iter().filter(|other| agrees(pose, other)).count();
+        let best = poses.iter().max_by_key(|pose| count(pose))?;
+        let own: Vec<&Pose> = poses.iter().filter(|other| agrees(best, other)).collect();
+        if own.len() < FEWEST || 5 * own.len() < 4 * poses.len() {
             return None;
         }
         let share = 1.0 / own.len() as f64;
-        let mean = own.iter().map(|place| place.translation.vector).sum::<Vector3<f64>>() * share;
-        let turns = own.iter().map(|place| (best.rotation.inverse() * place.rotation).scaled_axis());
+        let mean = own.iter().map(|pose| pose.translation.vector).sum::<Vector3<f64>>() * share;
+        let turns = own.iter().map(|pose| (best.rotation.inverse() * pose.rotation).scaled_axis());
         let turn = best.rotation * UnitQuaternion::from_scaled_axis(turns.sum::<Vector3<f64>>() * share);
-        let square = own.iter().map(|place| (place.translation.vector - mean).norm_squared()).sum::<f64>();
+        let square = own.iter().map(|pose| (pose.translation.vector - mean).norm_squared()).sum::<f64>();
         Some((Pose::from_parts(mean.into(), turn), (square * share).sqrt(), own.len()))
     }
 }

@@ -129,7 +129,7 @@ impl Tracker {
             RecursiveLeastSquares::new(DVector::zeros(parameters.len()), covariance, Memory::SquareRoot)
                 .ok_or_else(|| TrackError::State {
                     file: model.provenance.file.clone(),
-                    why: "the model's covariance is not positive definite".to_owned(),
+                    reason: "the model's covariance is not positive definite".to_owned(),
                 })?;
         let snapshot = Snapshot::of(&filter, 0);
         let state = State {
@@ -164,7 +164,7 @@ impl Tracker {
     /// # Errors
     /// [`TrackError::State`] where the state does not belong to the model or is damaged.
     pub fn resume(model: &Estimated, state: State, file: &str) -> Result<Self, TrackError> {
-        let wrong = |why: &str| TrackError::State { file: file.to_owned(), why: why.to_owned() };
+        let wrong = |reason: &str| TrackError::State { file: file.to_owned(), reason: reason.to_owned() };
         if state.schema != SCHEMA {
             return Err(wrong(&format!("`schema` is \"{}\", expected \"{SCHEMA}\"", state.schema)));
         }
@@ -210,7 +210,7 @@ impl Tracker {
             {
                 return Err(TrackError::State {
                     file: dataset.file.clone(),
-                    why: format!(
+                    reason: format!(
                         "the {} rows that were already processed have changed: start a new track with another --state",
                         known.rows
                     ),

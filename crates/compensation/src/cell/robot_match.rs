@@ -38,17 +38,18 @@ const FEWEST: usize = 5;
 /// Number of unreachable motions, where the arm reaches hardly any: the program belongs to another arm. A program with a few
 /// unreachable targets does not.
 pub fn unreachable_motions(plan: &Plan) -> Option<usize> {
-    let untold = |why: &OutcomeReason| {
+    let untold = |reason: &OutcomeReason| {
         matches!(
-            why,
+            reason,
             OutcomeReason::Program(_)
                 | OutcomeReason::MovingBase { .. }
                 | OutcomeReason::CellContradiction
                 | OutcomeReason::JointTarget
-        ) || *why == OutcomeReason::Inverse(InverseError::Abandoned)
+        ) || *reason == OutcomeReason::Inverse(InverseError::Abandoned)
     };
-    let unreached =
-        |why: &OutcomeReason| matches!(why, OutcomeReason::Inverse(_) | OutcomeReason::OutsideLimits { .. });
+    let unreached = |reason: &OutcomeReason| {
+        matches!(reason, OutcomeReason::Inverse(_) | OutcomeReason::OutsideLimits { .. })
+    };
     let judged = || plan.outcomes.iter().filter(|outcome| !outcome.reason.as_ref().is_some_and(untold));
     let all = judged().count();
     let without = judged().filter(|outcome| outcome.reason.as_ref().is_some_and(unreached)).count();

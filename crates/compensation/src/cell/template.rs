@@ -158,10 +158,10 @@ impl Writer {
         };
         let _ = writeln!(
             self.text,
-            "# The cell of {}: where its tools and work objects lie, and how that is known.\n\
-             # Replace every \"?\"; before that nothing is corrected with this file. What stands behind # is optional.\n\
-             # An origin is \"metrology\" where the numbers are true as they stand (CAD, measured), and \"taught\" where\n\
-             # they come from points that the arm touched before it was calibrated.\n",
+            "# The cell of {}: the positions of its tools and work objects, and how they are known.\n\
+             # Replace every \"?\"; until then nothing is corrected with this file. What follows # is optional.\n\
+             # An origin is \"metrology\" if the numbers are exact (CAD, measured), and \"taught\" if they come from\n\
+             # points that the arm touched before it was calibrated.\n",
             names.replace(['\n', '\r'], " ")
         );
         match robot {
@@ -200,7 +200,7 @@ impl Writer {
             named.label.as_ref().map_or_else(String::new, |label| format!("a comment calls it {label}"));
         self.line(&format!("name = {}", quoted(&named.name)), &called.replace(['\n', '\r'], " "));
         self.ask("origin", "metrology | taught");
-        let place = if is_tool { "the tool's tip on the flange" } else { "its zero in the robot's base" };
+        let meaning = if is_tool { "the tool's tip on the flange" } else { "its zero in the robot's base" };
         match named.commanded {
             Ok(commanded) => {
                 let Frame { position_mm: p, quaternion: q } = Frame::from_pose(&commanded);
@@ -219,8 +219,8 @@ impl Writer {
                 );
             }
             Err(_) => {
-                self.ask("position_mm", &format!("{place}: [x, y, z] in mm"));
-                self.line("# quaternion_wxyz = [1, 0, 0, 0]", "where it is turned: w, x, y, z");
+                self.ask("position_mm", &format!("{meaning}: [x, y, z] in mm"));
+                self.line("# quaternion_wxyz = [1, 0, 0, 0]", "if it is rotated: w, x, y, z");
             }
         }
         if is_tool {

@@ -37,13 +37,13 @@ pub(crate) fn infeasible_arcs(
     solved: &SolvedTargets,
     frame_table: &FrameTable,
     options: &Options,
-    stays: &BTreeMap<u32, OutcomeReason>,
+    unchanged_motions: &BTreeMap<u32, OutcomeReason>,
 ) -> BTreeMap<u32, OutcomeReason> {
-    let mut infeasible_arcs = circles(listing, solved, frame_table, options, stays);
+    let mut infeasible_arcs = circles(listing, solved, frame_table, options, unchanged_motions);
     let corrected = |index: u32, infeasible_arcs: &BTreeMap<u32, OutcomeReason>| {
         is_rewritable(&listing.motions[index as usize], options)
             && all_corrected(solved.of(index as usize))
-            && !stays.contains_key(&index)
+            && !unchanged_motions.contains_key(&index)
             && !infeasible_arcs.contains_key(&index)
     };
     for (index, motion) in (0_u32..).zip(&listing.motions) {
@@ -73,13 +73,13 @@ fn circles(
     solved: &SolvedTargets,
     frame_table: &FrameTable,
     options: &Options,
-    stays: &BTreeMap<u32, OutcomeReason>,
+    unchanged_motions: &BTreeMap<u32, OutcomeReason>,
 ) -> BTreeMap<u32, OutcomeReason> {
     let mut infeasible_arcs = BTreeMap::new();
     for (index, motion) in (0_u32..).zip(&listing.motions) {
         if motion.kind != MotionKind::Circular
             || !is_rewritable(motion, options)
-            || stays.contains_key(&index)
+            || unchanged_motions.contains_key(&index)
         {
             continue;
         }
@@ -96,7 +96,7 @@ fn circles(
         let corrected = is_rewritable(before, options)
             && all_corrected(targets)
             && !infeasible_arcs.contains_key(&previous)
-            && !stays.contains_key(&previous);
+            && !unchanged_motions.contains_key(&previous);
         if corrected {
             continue;
         }

@@ -28,16 +28,16 @@ pub(crate) fn unchanged_motions(
     cuts: &CutsOf,
     refused: &BTreeMap<u32, OutcomeReason>,
 ) -> BTreeMap<u32, OutcomeReason> {
-    let mut stays = refused.clone();
+    let mut out = refused.clone();
     // For segments that start where another motion remains unmodified, over all rounds.
     let mut budget = SearchBudget::of(search_budget::WAYS);
     let mut forbidden = forbid_segments(listing, solved, frame_table, arms, options, None, &mut budget);
     let mut rounds = (MOST_VISITS / listing.motions.len().max(1)).clamp(FEWEST_ROUNDS, MOST_ROUNDS);
     loop {
-        let before = stays.len();
-        stays.extend(infeasible_arcs(listing, solved, frame_table, options, &stays));
+        let before = out.len();
+        out.extend(infeasible_arcs(listing, solved, frame_table, options, &out));
         let solved_so_far = &*solved;
-        let kept = |motion: u32| blocking_reason(motion, listing, solved_so_far, options, &stays);
+        let kept = |motion: u32| blocking_reason(motion, listing, solved_so_far, options, &out);
         let more = match options.cuts {
             Cuts::Whole => cut::rest_of_cuts(listing, cuts, &kept),
             Cuts::Partial => cut::steps(listing, cuts, &kept, options.tolerance_mm, &|motion| {
@@ -49,19 +49,19 @@ pub(crate) fn unchanged_motions(
             }),
             Cuts::Single => Vec::new(),
         };
-        stays.extend(more);
-        if stays.len() == before && !forbidden {
-            return stays;
+        out.extend(more);
+        if out.len() == before && !forbidden {
+            return out;
         }
         rounds -= 1;
         if rounds == 0 {
             // No fixpoint was reached: every round pinned more motions, so the whole program remains
             // unmodified.
             let all = 0..listing.motions.len() as u32;
-            stays.extend(all.filter(|m| !stays.contains_key(m)).map(|m| (m, ABANDONED)).collect::<Vec<_>>());
-            return stays;
+            out.extend(all.filter(|m| !out.contains_key(m)).map(|m| (m, ABANDONED)).collect::<Vec<_>>());
+            return out;
         }
-        forbidden = forbid_segments(listing, solved, frame_table, arms, options, Some(&stays), &mut budget);
+        forbidden = forbid_segments(listing, solved, frame_table, arms, options, Some(&out), &mut budget);
     }
 }
 
@@ -79,18 +79,17 @@ pub(crate) fn blocking_reason(
     listing: &Listing,
     solved: &SolvedTargets,
     options: &Options,
-    stays: &BTreeMap<u32, OutcomeReason>,
+    unchanged_motions: &BTreeMap<u32, OutcomeReason>,
 ) -> Option<(Status, OutcomeReason)> {
     let motion = &listing.motions[index as usize];
-    if let Some(reason) = motion.left {
-        let why = OutcomeReason::Program(reason);
-        return Some((unchanged(why), why));
+    if let Some(reason) = motion.own_reason.map(OutcomeReason::Program) {
+        return Some((unchanged(reason), reason));
     }
     let targets = solved.of(index as usize);
     let errors = || targets.iter().filter_map(|target| target.as_ref().err().copied());
-    let unknown = errors().find(|why| matches!(why, OutcomeReason::Program(_)));
-    if let Some(why) = unknown.or_else(|| errors().next()) {
-        return Some((unchanged(why), why));
+    let unknown = errors().find(|reason| matches!(reason, OutcomeReason::Program(_)));
+    if let Some(reason) = unknown.or_else(|| errors().next()) {
+        return Some((unchanged(reason), reason));
     }
     if targets.is_empty() {
         return Some((Status::Left, OutcomeReason::Program(Reason::ExternalOnly)));
@@ -99,13 +98,13 @@ pub(crate) fn blocking_reason(
         return Some((Status::Left, OutcomeReason::JointTarget));
     }
     let forbidden = targets.iter().find_map(|target| target.as_ref().ok().and_then(|s| s.forbidden));
-    let why = forbidden.or_else(|| stays.get(&index).copied())?;
-    Some((if matches!(why, OutcomeReason::Risk { .. }) { Status::Left } else { Status::Refused }, why))
+    let reason = forbidden.or_else(|| unchanged_motions.get(&index).copied())?;
+    Some((if matches!(reason, OutcomeReason::Risk { .. }) { Status::Left } else { Status::Refused }, reason))
 }
 
 /// Status of an unmodified motion: left where the text states too little, refused where what it states is impossible.
-fn unchanged(why: OutcomeReason) -> Status {
-    match why {
+fn unchanged(reason: OutcomeReason) -> Status {
+    match reason {
         OutcomeReason::Program(Reason::BeyondReach | Reason::NumberRange) => Status::Refused,
         OutcomeReason::Program(_) => Status::Left,
         _ => Status::Refused,

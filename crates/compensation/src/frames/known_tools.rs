@@ -33,14 +33,14 @@ impl<'a> KnownTools<'a> {
     pub(crate) fn of(list: Vec<KnownTool<'a>>) -> Self {
         let mut lower: HashMap<String, Vec<usize>> = HashMap::new();
         let mut plain: HashMap<String, Vec<usize>> = HashMap::new();
-        for (place, known) in list.iter().enumerate() {
+        for (index, known) in list.iter().enumerate() {
             let labels = known.labels.iter().copied().filter(|_| !known.in_text);
             let stated = known.stated.map(|stated| stated.name.as_str());
             for name in std::iter::once(known.name.as_str()).chain(stated).chain(labels) {
-                lower.entry(name.to_ascii_lowercase()).or_default().push(place);
+                lower.entry(name.to_ascii_lowercase()).or_default().push(index);
             }
             if !known.in_text {
-                plain.entry(setup::plain(&known.name)).or_default().push(place);
+                plain.entry(setup::plain(&known.name)).or_default().push(index);
             }
         }
         Self { list, lower, plain }
@@ -50,10 +50,10 @@ impl<'a> KnownTools<'a> {
     pub(crate) fn called(&self, name: &str) -> impl Iterator<Item = &KnownTool<'a>> {
         let lower = self.lower.get(&name.to_ascii_lowercase()).into_iter().flatten();
         let plain = self.plain.get(&setup::plain(name)).into_iter().flatten();
-        let mut places: Vec<usize> = lower.chain(plain).copied().collect();
-        places.sort_unstable();
-        places.dedup();
-        places.into_iter().map(|place| &self.list[place])
+        let mut indices: Vec<usize> = lower.chain(plain).copied().collect();
+        indices.sort_unstable();
+        indices.dedup();
+        indices.into_iter().map(|index| &self.list[index])
     }
 }
 

@@ -17,8 +17,8 @@ pub fn surface_frame_contradictions(listing: &Listing, surface: &SurfaceFile) ->
     if surface.tool.origin == Some(Origin::Metrology) {
         let means = |tool: &&Tool| named(listing, &tool.name, tool.place.is_some(), &surface.tool.name);
         let commanded = listing.tools.iter().filter(means).filter_map(|tool| tool.value.as_ref().ok());
-        let places: Vec<Pose> = commanded.map(|value| value.frame.pose()).collect();
-        add(fault("tool", &surface.tool.name, &surface.tool.flange_from_tool, &places));
+        let poses: Vec<Pose> = commanded.map(|value| value.frame.pose()).collect();
+        add(fault("tool", &surface.tool.name, &surface.tool.flange_from_tool, &poses));
     }
     if surface.work_object.origin == Some(Origin::Metrology) {
         let stated = &surface.work_object;
@@ -29,8 +29,8 @@ pub fn surface_frame_contradictions(listing: &Listing, surface: &SurfaceFile) ->
             let whole = value.user_frame.pose() * value.object_frame.pose();
             Some(object.displacement.map_or(whole, |frame| whole * frame.pose().inverse()))
         };
-        let places: Vec<Pose> = listing.work_objects.iter().filter(means).filter_map(undisplaced).collect();
-        add(fault("work_object", &stated.name, &stated.base_from_work_object, &places));
+        let poses: Vec<Pose> = listing.work_objects.iter().filter(means).filter_map(undisplaced).collect();
+        add(fault("work_object", &stated.name, &stated.base_from_work_object, &poses));
     }
     out
 }
@@ -45,8 +45,8 @@ fn named(listing: &Listing, name: &str, in_text: bool, stated: &str) -> bool {
 
 /// The sentence for a stated frame that no frame of the program matches.
 fn fault(kind: &str, name: &str, stated: &Pose, commanded: &[Pose]) -> Option<String> {
-    let apart = |place: &&Pose| FrameDistance::of(stated, place);
-    if commanded.iter().any(|place| apart(&place).within(WRITTEN_TOLERANCE)) {
+    let apart = |pose: &&Pose| FrameDistance::of(stated, pose);
+    if commanded.iter().any(|pose| apart(&pose).within(WRITTEN_TOLERANCE)) {
         return None;
     }
     let nearest = commanded.iter().min_by(|a, b| apart(a).mm.total_cmp(&apart(b).mm))?;

@@ -14,7 +14,7 @@ use std::collections::HashSet;
 
 use nalgebra::{Point3, Vector3};
 
-use crate::cell::{Cell, CellFrame, CellLookup, FrameOrigin, Teaches};
+use crate::cell::{Cell, CellFrame, CellLookup, FrameKind, FrameOrigin, Teaches};
 use crate::frames::known_tools::{KnownTool, KnownTools, MOST_NAMES};
 use crate::frames::teaching_geometry::{
     FixedPoint, explained, fixed_point, frame_of, half_step_rad, radians, rounded, touched,
@@ -96,12 +96,12 @@ pub fn contradictions(listing: &Listing, cell: &Cell, nominal: &Model) -> Vec<St
         if !seen.insert((motion.tool, motion.work_object)) || listing.frame_reason(motion).is_some() {
             continue;
         }
-        let (Ok(value), Ok(place)) = (&tool.value, &object.value) else { continue };
+        let (Ok(value), Ok(frame_value)) = (&tool.value, &object.value) else { continue };
         let found = [
-            duplicate_entries("tool", &teaching.stated.tools(tool), &tool.name),
-            duplicate_entries("wobj", &teaching.stated.objects(object), &object.name),
+            duplicate_entries(FrameKind::Tool, &teaching.stated.tools(tool), &tool.name),
+            duplicate_entries(FrameKind::Wobj, &teaching.stated.objects(object), &object.name),
             teaching.tool(tool, value).err(),
-            teaching.object(object, place).err(),
+            teaching.object(object, frame_value).err(),
         ];
         for fault in found.into_iter().flatten() {
             if said.insert(fault.clone()) {
@@ -113,7 +113,7 @@ pub fn contradictions(listing: &Listing, cell: &Cell, nominal: &Model) -> Vec<St
 }
 
 /// Two entries of the cell file for one frame of the program.
-fn duplicate_entries(kind: &str, found: &[&CellFrame], name: &str) -> Option<String> {
+fn duplicate_entries(kind: FrameKind, found: &[&CellFrame], name: &str) -> Option<String> {
     let mut found = found.iter().copied();
     let first = found.next()?;
     // A repeated statement is no contradiction.
@@ -147,7 +147,7 @@ impl<'a> Teaching<'a> {
         let stands = RealTool { pose: commanded, moved_mm: None };
         let Some(stated) = self.stated.tool(tool) else { return Ok(stands) };
         if tool.place.is_some() {
-            agrees("tool", stated, &commanded)?;
+            agrees(FrameKind::Tool, stated, &commanded)?;
         }
         self.commanded_tool(stated, &commanded, value.robhold)
     }
@@ -170,7 +170,7 @@ impl<'a> Teaching<'a> {
                 ));
             }
             (Some(_), false) => {
-                let pointer = self.pointer("tool", stated, true)?;
+                let pointer = self.pointer(FrameKind::Tool, stated, true)?;
                 let tip = |arm: &PreparedModel<'_>, joints: &[Joints], tcp: &Vector3<f64>| {
                     let touched = joints.iter().map(|q| (arm.forward(q) * Point3::from(*tcp)).coords);
                     touched.sum::<Vector3<f64>>() / joints.len() as f64
@@ -240,7 +240,7 @@ impl<'a> Teaching<'a> {
         let displaced = object.displacement.map_or_else(Pose::identity, |frame| frame.pose());
         let undisplaced = user * within * displaced.inverse();
         if object.place.is_some() {
-            agrees("wobj", stated, &user)?;
+            agrees(FrameKind::Wobj, stated, &user)?;
         }
         if stated.origin == FrameOrigin::Metrology || stated.teaching_deg.is_empty() {
             return Ok(as_told);
@@ -258,7 +258,7 @@ impl<'a> Teaching<'a> {
             Teaches::Oframe => (undisplaced, displaced),
         };
         let part = value.robhold;
-        let pointer = self.pointer("wobj", stated, !part)?;
+        let pointer = self.pointer(FrameKind::Wobj, stated, !part)?;
         let in_line = || {
             format!(
                 "cell file: wobj \"{}\": its three teaching points are collinear: the third must be off the \
@@ -302,9 +302,12 @@ impl<'a> Teaching<'a> {
         pointer: &TouchingTool,
     ) -> String {
         let teaches = stated.teaches.unwrap_or_default();
-        let (frame, instead) = match teaches {
-            Teaches::Uframe => ("user frame (uframe)", "oframe"),
-            Teaches::Oframe => ("user frame with its object frame (uframe · oframe)", "uframe"),
+        let (frame, other_frame) = match teaches {
+            Teaches::Uframe => ("user frame (uframe)", "with its object frame: write teaches = \"oframe\""),
+            Teaches::Oframe => (
+                "user frame with its object frame (uframe · oframe)",
+                "without its object frame: write teaches = \"uframe\"",
+            ),
         };
         let fits = |known: &&KnownTool| {
             known.held != part
@@ -313,9 +316,7 @@ impl<'a> Teaching<'a> {
         };
         let known = &self.tools().list;
         let cause = if FrameDistance::of(nominal, other).within(bound) {
-            let place =
-                if instead == "oframe" { "with its object frame" } else { "without its object frame" };
-            format!("they define the frame {place}: write teaches = \"{instead}\"")
+            format!("they define the frame {other_frame}")
         } else if let Some(tool) = known.iter().find(fits) {
             format!("they fit tool {}: write taught_with = \"{}\"", tool.name, tool.name)
         } else {
@@ -341,7 +342,7 @@ impl<'a> Teaching<'a> {
     }
 
     /// The tool that touched the teaching points of `stated`; `held`: whether the robot must hold it.
-    fn pointer(&self, kind: &str, stated: &CellFrame, held: bool) -> Result<TouchingTool, String> {
+    fn pointer(&self, kind: FrameKind, stated: &CellFrame, held: bool) -> Result<TouchingTool, String> {
         let here = format!("cell file: {kind} \"{}\"", stated.name);
         let known = self.tools();
         let holds = if held { "that the robot holds" } else { "that is stationary" };
@@ -422,9 +423,9 @@ impl<'a> Teaching<'a> {
         for tool in tools {
             let Ok(value) = &tool.value else { continue };
             let (in_text, held, frame) = (tool.place.is_some(), value.robhold, value.frame.pose());
-            let place = frame.translation.vector.iter().chain(frame.rotation.coords.iter());
+            let frame_value = frame.translation.vector.iter().chain(frame.rotation.coords.iter());
             // Adding 0 maps −0 to 0.
-            let bits: Vec<u64> = place.map(|v| (v + 0.0).to_bits()).collect();
+            let bits: Vec<u64> = frame_value.map(|v| (v + 0.0).to_bits()).collect();
             if seen.insert((tool.name.as_str(), in_text, held, bits)) {
                 let labels = self.stated.labels_of(&tool.name).to_vec();
                 let stated = self.stated.tool(tool);
@@ -458,13 +459,16 @@ impl<'a> Teaching<'a> {
 }
 
 /// Whether the cell file agrees with the program about the position of a frame, if it states one.
-fn agrees(kind: &str, stated: &CellFrame, commanded: &Pose) -> Result<(), String> {
+fn agrees(kind: FrameKind, stated: &CellFrame, commanded: &Pose) -> Result<(), String> {
     let Some(placed) = stated.pose() else { return Ok(()) };
     let apart = FrameDistance::of(&placed, commanded);
     if apart.within(WRITTEN_TOLERANCE) {
         return Ok(());
     }
-    let what = if kind == "tool" { "frame" } else { "user frame" };
+    let what = match kind {
+        FrameKind::Tool => "frame",
+        FrameKind::Wobj => "user frame",
+    };
     Err(format!(
         "cell file: {kind} \"{}\": position_mm and quaternion_wxyz are {:.2} mm and {:.3}° away from the \
          {what} that the program declares, at {}: a RAPID program states it itself; remove them, or correct \

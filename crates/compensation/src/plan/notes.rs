@@ -61,7 +61,7 @@ pub(crate) fn unchecked_notes(listing: &Listing, solved: &SolvedTargets, uncheck
     }
     let curve = |m: &u32| {
         let motion = &listing.motions[*m as usize];
-        motion.left.is_none()
+        motion.own_reason.is_none()
             && motion.modal.wrist_interpolation == Switch::On
             && matches!(motion.kind, MotionKind::Linear | MotionKind::Circular)
     };
@@ -118,7 +118,8 @@ pub(crate) fn load_notes(listing: &Listing, arms: &Arms<'_>, options: &Options) 
         return Vec::new();
     };
     let mut out = Vec::new();
-    let motions = || listing.motions.iter().enumerate().filter(|(_, m)| m.left.is_none() && m.tool.is_some());
+    let motions =
+        || listing.motions.iter().enumerate().filter(|(_, m)| m.own_reason.is_none() && m.tool.is_some());
     let at = |(index, motion): (usize, &Motion)| payload_at(loads, index, motion, listing, model);
     let stated: Vec<f64> = motions().filter_map(at).map(|load| load.mass_kg).collect();
     let silent = motions().count() - stated.len();

@@ -70,7 +70,7 @@ pub enum OutcomeReason {
     },
     /// The corrected segment passes too close to a singularity.
     SingularPath,
-    /// The corrected target lies in another configuration.
+    /// The corrected target has another configuration.
     OtherBranch,
     /// The program does not determine the configuration that the controller selects, and the intended one is not the nearest.
     AmbiguousBranch,

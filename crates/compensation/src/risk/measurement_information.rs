@@ -7,7 +7,7 @@
 //! I = AᵀWA − AᵀWB (BᵀWB + N)⁻¹ BᵀWA,
 //!
 //! and a covariance C = F Fᵀ becomes F (1 + Fᵀ I F)⁻¹ Fᵀ (Bayes, linear and normal). *Stating* what an earlier measurement
-//! had to estimate is worth the information of its readings with a narrow prior less that with a wide one.
+//! had to estimate adds the information of its readings with a narrow prior minus that with a wide one.
 
 use nalgebra::{Cholesky, DMatrix, Matrix3, Vector3};
 

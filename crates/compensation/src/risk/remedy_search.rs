@@ -57,15 +57,15 @@ pub(crate) struct UnknownPlacement<'a, 'm> {
 
 /// The cheapest measurement, or pair, that would make its position known; the best one where none suffices. `None` where
 /// nothing can be predicted: invalid covariance.
-pub(crate) fn remedy(place: &UnknownPlacement<'_, '_>) -> Option<Remedy> {
-    let known = CurrentKnowledge::of(place)?;
-    let touched = place.touched().map(|touched| known.touching(place, &touched));
-    let candidates = candidates(touched.is_some(), place.has_rows());
-    let informations = InformationTable::of(place, &candidates);
+pub(crate) fn remedy(placement: &UnknownPlacement<'_, '_>) -> Option<Remedy> {
+    let known = CurrentKnowledge::of(placement)?;
+    let touched = placement.touched().map(|touched| known.touching(placement, &touched));
+    let candidates = candidates(touched.is_some(), placement.has_rows());
+    let informations = InformationTable::of(placement, &candidates);
     let foreseen: Vec<(f64, Remedy)> = candidates
         .into_par_iter()
         .filter_map(|measurements| {
-            let remedy = known.with(measurements, &informations, touched.as_ref(), place.max_risk)?;
+            let remedy = known.with(measurements, &informations, touched.as_ref(), placement.max_risk)?;
             Some((remedy.minutes(), remedy))
         })
         .collect();
@@ -77,19 +77,19 @@ pub(crate) fn remedy(place: &UnknownPlacement<'_, '_>) -> Option<Remedy> {
 /// The candidates.
 fn candidates(touch: bool, rows: bool) -> Vec<Vec<Measurement>> {
     use Measurement::{Beside, Frame, More, Plate, Station, Touch};
-    let (lateral_offset, plate) = (Beside { poses: POSES }, Plate { poses: POSES });
+    let (beside_target, plate) = (Beside { poses: POSES }, Plate { poses: POSES });
     let (station, more) = (Station { poses: POSES }, More { poses: MORE_POSES });
     let mut out = Vec::new();
     if touch {
         out.push(vec![Touch]);
     }
     if rows {
-        let alone = [Frame, lateral_offset, plate, station, more];
+        let alone = [Frame, beside_target, plate, station, more];
         out.extend(alone.map(|measurement| vec![measurement]));
-        out.extend([lateral_offset, plate, station].map(|measurement| vec![Frame, measurement]));
+        out.extend([beside_target, plate, station].map(|measurement| vec![Frame, measurement]));
     }
     if touch && rows {
-        out.extend([lateral_offset, plate].map(|measurement| vec![Touch, measurement]));
+        out.extend([beside_target, plate].map(|measurement| vec![Touch, measurement]));
     }
     out
 }
@@ -99,7 +99,7 @@ fn candidates(touch: bool, rows: bool) -> Vec<Vec<Measurement>> {
 struct InformationTable(Vec<((Measurement, bool), DMatrix<f64>)>);
 
 impl InformationTable {
-    fn of(place: &UnknownPlacement<'_, '_>, candidates: &[Vec<Measurement>]) -> Self {
+    fn of(placement: &UnknownPlacement<'_, '_>, candidates: &[Vec<Measurement>]) -> Self {
         let mut asked: Vec<(Measurement, bool)> = Vec::new();
         for set in candidates {
             let stated = set.contains(&Measurement::Frame);
@@ -109,7 +109,7 @@ impl InformationTable {
                 }
             }
         }
-        let one = |asked: (Measurement, bool)| (asked, place.information(asked.0, asked.1));
+        let one = |asked: (Measurement, bool)| (asked, placement.information(asked.0, asked.1));
         Self(asked.into_par_iter().map(one).collect())
     }
 
@@ -152,8 +152,8 @@ struct CurrentKnowledge {
 }
 
 impl CurrentKnowledge {
-    fn of(place: &UnknownPlacement<'_, '_>) -> Option<Self> {
-        let off = place.off(None);
+    fn of(placement: &UnknownPlacement<'_, '_>) -> Option<Self> {
+        let off = placement.off(None);
         let registration = Registration::of(&off.intended)?;
         let twist = registration.twist(off.shifts.iter().copied());
         let twists = twists_of(&registration, &off);
@@ -161,7 +161,7 @@ impl CurrentKnowledge {
         for k in 0..6 {
             weights.set_column(k, &registration.weighed(&Matrix6::identity().column(k).into_owned()));
         }
-        let factor = factor(&place.knowledge.covariance)?;
+        let factor = factor(&placement.knowledge.covariance)?;
         let part = &twists * &factor;
         let covariance = Matrix6::from_iterator((&part * part.transpose()).iter().copied());
         Some(Self { registration, off, twist, twists, weights, covariance, factor })
@@ -192,11 +192,11 @@ impl CurrentKnowledge {
     }
 
     /// Effect of touching.
-    fn touching(&self, place: &UnknownPlacement<'_, '_>, touched: &TouchedFrame) -> TouchEffect {
-        let twists = twists_of(&self.registration, &place.off(Some(&touched.carried)));
+    fn touching(&self, placement: &UnknownPlacement<'_, '_>, touched: &TouchedFrame) -> TouchEffect {
+        let twists = twists_of(&self.registration, &placement.off(Some(&touched.carried)));
         let mut adds = Matrix6::zeros();
-        let Some(first) = place.targets.first() else { return TouchEffect { twists, adds } };
-        let object = place.list[first.frames_index].real.object;
+        let Some(first) = placement.targets.first() else { return TouchEffect { twists, adds } };
+        let object = placement.list[first.frames_index].real.object;
         for touch_sigma_twists in &touched.touch_sigma_twists {
             let shift = |intended: &Point3<f64>| {
                 let lever = (object * intended).coords - touched.carried.origin_mm;

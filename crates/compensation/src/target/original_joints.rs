@@ -87,7 +87,7 @@ impl<'a> OriginalProgram<'a> {
         let mut target_refs: Vec<TargetRef<'_>> = Vec::with_capacity(listing.motions.len());
         for (index, motion) in (0..).zip(&listing.motions) {
             first.push(target_refs.len());
-            if motion.left.is_none() {
+            if motion.own_reason.is_none() {
                 target_refs.extend(motion.targets.iter().map(|target| TargetRef { index, motion, target }));
             }
         }
@@ -146,7 +146,7 @@ fn originals(
         listing.motions.par_iter().with_min_len(search_budget::MANY).map(monitored).collect();
     let mut motion = 0;
     while motion < listing.motions.len() {
-        let chained = |m: usize| monitors[m] == Switch::Off && listing.motions[m].left.is_none();
+        let chained = |m: usize| monitors[m] == Switch::Off && listing.motions[m].own_reason.is_none();
         if !chained(motion) {
             motion += 1;
             continue;
@@ -185,7 +185,7 @@ fn guess_if_possibly_unmonitored(
 ) {
     for (index, monitored) in monitors.iter().enumerate() {
         let motion = &listing.motions[index];
-        if *monitored != Switch::Either || motion.left.is_some() {
+        if *monitored != Switch::Either || motion.own_reason.is_some() {
             continue;
         }
         let before = match motion.previous.map(|previous| previous as usize) {

@@ -81,13 +81,13 @@ pub(crate) struct SolvedTargets {
 
 impl SolvedTargets {
     /// Forbids a change of a motion; without effect where its last target was not solved.
-    pub(crate) fn forbid(&mut self, motion: usize, why: OutcomeReason) {
+    pub(crate) fn forbid(&mut self, motion: usize, reason: OutcomeReason) {
         let targets = self.first[motion]..self.first[motion + 1];
         if let Some(last) = targets.last()
             && let Ok(solved) = &mut self.targets[last]
         {
             self.forbade.push((last, solved.forbidden));
-            solved.forbidden = Some(why);
+            solved.forbidden = Some(reason);
         }
     }
 

@@ -7,6 +7,7 @@ mod frame_change;
 mod cut;
 mod doubtful_effects;
 mod segment;
+mod circles;
 mod payload;
 mod placement;
 mod backlash;

@@ -32,7 +32,7 @@ use crate::problem::{Problem, observations};
 options! {
     /// Options of [`solve`].
     pub struct Options {
-        /// As printed or sound.
+        /// As printed or robust.
         pub form: Form = Form::Robust,
         /// Number of sweeps over all observations.
         pub sweeps: usize = 1,

@@ -9,13 +9,13 @@
 //!   effective (tempering). After each power they are resampled and moved by a kernel that preserves their mean and
 //!   covariance (Liu and West: x ← a x + (1 − a) x̄ + h L z, with a² + h² = 1 and LLᵀ the weighted covariance).
 //!
-//! **Shapes.** x has p entries; N particles. An observation costs N evaluations of its rows, in the sound form
+//! **Shapes.** x has p entries; N particles. An observation costs N evaluations of its rows, in the robust form
 //! for each power.
 //!
 //! **Stops.** *DataProcessed* after the last observation; *NotFinite* if all weights vanish or are NaN.
 //!
 //! **Source and departures.** M3 of ltlm-2024, "particle filtering", without equations or numbers. Printed:
-//! Gordon, Salmond, Smith, "Novel approach to nonlinear/non-Gaussian Bayesian state estimation", 1993. Sound:
+//! Gordon, Salmond, Smith, "Novel approach to nonlinear/non-Gaussian Bayesian state estimation", 1993. Robust:
 //! Liu and West, "Combined parameter and state estimation in simulation-based filtering", 2001; Del Moral,
 //! Doucet, Jasra, "Sequential Monte Carlo samplers", 2006, for the tempering. The kernel is exact for normal
 //! posteriors only, and its spread carries a sampling error of about √(p/N).
@@ -38,11 +38,11 @@ options! {
     /// Options of [`solve`].
     #[derive(Copy)]
     pub struct Options {
-        /// As printed or sound.
+        /// As printed or robust.
         pub form: Form = Form::Robust,
         /// N.
         pub particles: usize = 1_000,
-        /// h of the kernel (sound): share of the spread that is resampled at each move.
+        /// h of the kernel (robust): share of the spread that is resampled at each move.
         pub kernel: f64 = 0.5,
         /// First standard deviation of a parameter without a prior.
         pub unknown_sigma: f64 = 1.0,

@@ -17,7 +17,7 @@
 //!
 //! **Stops.** *DataProcessed* after the sweeps; *NotFinite* or *Singular* at the first update that fails.
 //!
-//! **Source and departures.** Sound: Wan and van der Merwe, "The unscented Kalman filter for nonlinear
+//! **Source and departures.** Robust: Wan and van der Merwe, "The unscented Kalman filter for nonlinear
 //! estimation", 2000, with the state transition the identity. Printed: Li et al. 2023; X₀ at index 0, columns
 //! of the Cholesky factor of (p + 1)P at 1 … p, minus the first of them at p + 1; the random number multiplies
 //! the variances of the priors, since it has no unit.
@@ -40,17 +40,17 @@ use crate::problem::{Problem, observations};
 options! {
     /// Options of [`solve`].
     pub struct Options {
-        /// As printed or sound.
+        /// As printed or robust.
         pub form: Form = Form::Robust,
-        /// Number of sweeps over all observations; in the sound form each sweep weights a row by 1 / sweeps.
+        /// Number of sweeps over all observations; in the robust form each sweep weights a row by 1 / sweeps.
         pub sweeps: usize = 1,
-        /// α: distance of the sigma points in standard deviations, divided by √(p + κ) (sound).
+        /// α: distance of the sigma points in standard deviations, divided by √(p + κ) (robust).
         pub alpha: f64 = 0.1,
-        /// β: 2 for a normal distribution (sound).
+        /// β: 2 for a normal distribution (robust).
         pub beta: f64 = 2.0,
-        /// κ (sound).
+        /// κ (robust).
         pub kappa: f64 = 0.0,
-        /// Standard deviation of each parameter's drift from one observation to the next (sound); empty for constant
+        /// Standard deviation of each parameter's drift from one observation to the next (robust); empty for constant
         /// parameters.
         pub process_sigma: Vec<f64> = Vec::new(),
         /// First standard deviation of a parameter without a prior.
@@ -67,7 +67,7 @@ impl Options {
     }
 }
 
-/// The filter (sound form), for processing observations one by one.
+/// The filter (robust form), for processing observations one by one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Filter {
     /// State: the parameters.
@@ -167,11 +167,11 @@ impl Filter {
 pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimate {
     match options.form {
         Form::AsPrinted => printed(problem, start, options),
-        Form::Robust => sound(problem, start, options),
+        Form::Robust => robust(problem, start, options),
     }
 }
 
-fn sound(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimate {
+fn robust(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimate {
     let mut objective = Objective::new(problem, start, true);
     let (x, covariance) = prior_state(problem, start, options.unknown_sigma);
     let Options { alpha, beta, kappa, .. } = *options;

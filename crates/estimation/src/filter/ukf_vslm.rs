@@ -5,7 +5,7 @@
 //! - [`Form::AsPrinted`]: both parts to the letter (see [`ukf`] and [`vslm`]), with line 17, X₀ = x_ukf, inside the
 //!   loop: each iteration restarts from the filter's result and discards the previous one, while the step size decays.
 //!   The final result is one sweep of tiny steps from the filter's result.
-//! - [`Form::Robust`]: one sweep of the scaled filter with Q and R, then the sound step-size method until it
+//! - [`Form::Robust`]: one sweep of the scaled filter with Q and R, then the robust step-size method until it
 //!   converges.
 //!
 //! **Shapes, stops.** Those of the two parts; the termination is that of the second, or of the first if it failed.
@@ -13,7 +13,7 @@
 //! **Source and departures.** Li et al. 2023, Algorithm 1. T₃ and T₉ are not stated; Table IX's two iterations
 //! of M9 are taken for both.
 //!
-//! **Checked against** the two parts, and batch least squares for the sound form.
+//! **Checked against** the two parts, and batch least squares for the robust form.
 
 use serde::{Deserialize, Serialize};
 

@@ -6,11 +6,11 @@
 //!
 //! **Shapes.** As in [`lm`](crate::least_squares::lm).
 //!
-//! **Stops.** As printed: after `max_iterations` steps (1), or *Singular* where JᵀJ cannot be inverted. Sound:
+//! **Stops.** As printed: after `max_iterations` steps (1), or *Singular* where JᵀJ cannot be inverted. Robust:
 //! *Cost*, *Gradient* and *SmallResidual* as in `lm`; *Stalled* where thirty halvings do not help.
 //!
 //! **Source and departures.** Qiao et al. 2025, eq. 8 and 9 (the printed equations are lost in the text at hand
-//! and reconstructed from their definitions); Li et al. 2023, eq. 13. Sound: Nocedal and Wright, *Numerical
+//! and reconstructed from their definitions); Li et al. 2023, eq. 13. Robust: Nocedal and Wright, *Numerical
 //! Optimization*, 2nd ed., §10.3.
 //!
 //! **Checked against** linear problems (one step is exact) and the published minima that Gauss–Newton can
@@ -27,7 +27,7 @@ options! {
     /// Options of [`solve`].
     #[derive(Copy)]
     pub struct Options {
-        /// As printed or sound.
+        /// As printed or robust.
         pub form: Form = Form::Robust,
         /// How the step is computed.
         pub factorisation: Factorisation = Factorisation::Cholesky,
@@ -35,11 +35,11 @@ options! {
         pub priors: bool = true,
         /// Step limit.
         pub max_iterations: usize = 50,
-        /// Stop when the predicted reduction is below this share of the cost (sound).
+        /// Stop when the predicted reduction is below this share of the cost (robust).
         pub cost_tolerance: f64 = 1e-10,
-        /// Stop when the largest cosine between residuals and a column of J is below this (sound).
+        /// Stop when the largest cosine between residuals and a column of J is below this (robust).
         pub gradient_tolerance: f64 = 1e-12,
-        /// Stop when the cost itself is below this (sound).
+        /// Stop when the cost itself is below this (robust).
         pub small_cost: f64 = 1e-20,
         /// Unused: the method is deterministic. Present so that all methods have the same fields.
         pub seed: u64 = 0,

@@ -20,7 +20,7 @@
 //! **Shapes.** x has p entries, J is n × p and is never stored: a pass over the rows gives the normal equations (p × p)
 //! or, with [`Factorisation::Qr`], the triangular factor of J. Priors are additional rows.
 //!
-//! **Stops** (sound). *Cost*: the undamped model predicts a reduction below `cost_tolerance` · cost. *Gradient*: no
+//! **Stops** (robust). *Cost*: the undamped model predicts a reduction below `cost_tolerance` · cost. *Gradient*: no
 //! column of J has a cosine above `gradient_tolerance` with r. *Step*: ‖D h‖ below `step_tolerance` · ‖D x‖.
 //! *SmallResidual*: cost below `small_cost`. As printed: relative change of cost or of x below tolerance, or
 //! the iteration limit ("the desired accuracy or the maximum number of iterations"); neither number is stated
@@ -28,7 +28,7 @@
 //!
 //! **Source and departures.** Liu et al. 2024, eq. 10 (as printed). Its μ = 5 has no unit: it is negligible against JᵀJ of
 //! parameters in radians, but slows every step against some hundred rows of millimetres per degree. Damping slows the
-//! search; it is no prior. Eq. 8's 1/n does not change the step and is omitted. Sound: Moré, "The
+//! search; it is no prior. Eq. 8's 1/n does not change the step and is omitted. Robust: Moré, "The
 //! Levenberg–Marquardt algorithm" (1978) for the scaling, Madsen, Nielsen, Tingleff, *Methods for non-linear
 //! least squares problems* (2004), algorithm 3.16, for μ. Departures from the latter: μ starts near zero
 //! (`initial_damping`), since priors regularise here; a step with less damping than 10⁻³ must achieve a quarter of its
@@ -52,13 +52,13 @@ options! {
     /// Options of [`solve`]. The comments state which form uses a field if only one does.
     #[derive(Copy)]
     pub struct Options {
-        /// As printed or sound.
+        /// As printed or robust.
         pub form: Form = Form::Robust,
         /// How the step is computed.
         pub factorisation: Factorisation = Factorisation::Cholesky,
         /// μ of the printed form, in the square of residual per parameter unit; 5 in the paper.
         pub mu: f64 = 5.0,
-        /// First μ of the sound form, a pure number: relative to a unit diagonal.
+        /// First μ of the robust form, a pure number: relative to a unit diagonal.
         pub initial_damping: f64 = 1e-6,
         /// Whether the priors of the problem are used. The paper has none.
         pub priors: bool = true,
@@ -66,7 +66,7 @@ options! {
         pub max_iterations: usize = 200,
         /// Stop when the predicted reduction is below this share of the cost.
         pub cost_tolerance: f64 = 1e-10,
-        /// Stop when the largest cosine between residuals and a column of J is below this (sound).
+        /// Stop when the largest cosine between residuals and a column of J is below this (robust).
         pub gradient_tolerance: f64 = 1e-12,
         /// Stop when the step is below this share of the parameters.
         pub step_tolerance: f64 = 1e-14,

@@ -17,7 +17,7 @@
 //! **Source and departures.** Liu et al. 2024. M, N₀ and K are not stated: here 10, 0.37 and 60 by default, and
 //! the sequence N runs on from iteration to iteration. Eq. 15 mixes k and k + 1 and Algorithm I writes J_{k+1}
 //! where J_{k,1} (at x₁) is meant; both are interpreted so. f in eq. 10, 13 is the residual vector, not the scalar of
-//! eq. 8. μ = 5 has no unit: see `lm`. The printed form does not compare with x_k, so its cost can rise. Sound form: both
+//! eq. 8. μ = 5 has no unit: see `lm`. The printed form does not compare with x_k, so its cost can rise. Robust form: both
 //! steps scaled and damped by Nielsen's rule as in `lm`, the iteration accepted only if its best candidate lowers the cost,
 //! and x₂ also a candidate (`second_step`), since otherwise the second Jacobian is wasted.
 //!
@@ -35,17 +35,17 @@ options! {
     /// Options of [`solve`].
     #[derive(Copy)]
     pub struct Options {
-        /// As printed or sound.
+        /// As printed or robust.
         pub form: Form = Form::Robust,
         /// How the two steps are computed.
         pub factorisation: Factorisation = Factorisation::Cholesky,
         /// μ of the printed form; 5 in the paper.
         pub mu: f64 = 5.0,
-        /// First μ of the sound form, a pure number.
+        /// First μ of the robust form, a pure number.
         pub initial_damping: f64 = 1e-6,
         /// M: candidates on each side. Not stated in the paper.
         pub candidates: usize = 10,
-        /// Whether x₂ is also a candidate (sound), unlike in the paper's eq. 18.
+        /// Whether x₂ is also a candidate (robust), unlike in the paper's eq. 18.
         pub second_step: bool = true,
         /// The map that spreads the candidates: eq. 11 with r = 0.5.
         pub map: Map = Map::LogisticTent { r: 0.5 },
@@ -57,7 +57,7 @@ options! {
         pub max_iterations: usize = 60,
         /// Stop when the predicted reduction (as printed: the relative change) is below this share of the cost.
         pub cost_tolerance: f64 = 1e-10,
-        /// Stop when the largest cosine between residuals and a column of J is below this (sound).
+        /// Stop when the largest cosine between residuals and a column of J is below this (robust).
         pub gradient_tolerance: f64 = 1e-12,
         /// Stop when the cost itself is below this.
         pub small_cost: f64 = 1e-20,

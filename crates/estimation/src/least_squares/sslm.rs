@@ -12,7 +12,7 @@
 //!
 //! **Source and departures.** ltlm-2024, Table 5, M6: "a dynamic adjustment mechanism for the algorithm's step
 //! size", without an equation; its reference is ukf-vslm-2023, whose eq. 15 is therefore taken as the printed
-//! form (the same recurrence as [`vslm`] with decay per iteration). The exact form of M6 is not known. Sound:
+//! form (the same recurrence as [`vslm`] with decay per iteration). The exact form of M6 is not known. Robust:
 //! Nocedal and Wright, *Numerical Optimization*, 2nd ed., §3.5.
 //!
 //! **Checked against** published minima.
@@ -28,7 +28,7 @@ options! {
     /// Options of [`solve`].
     #[derive(Copy)]
     pub struct Options {
-        /// As printed or sound.
+        /// As printed or robust.
         pub form: Form = Form::Robust,
         /// λ of the printed form.
         pub lambda: f64 = 5.0,
@@ -36,9 +36,9 @@ options! {
         pub step_size: f64 = 0.8,
         /// Decay factor of δ in the printed form.
         pub decay_factor: f64 = 0.95,
-        /// Damping of the sound form, a pure number.
+        /// Damping of the robust form, a pure number.
         pub damping: f64 = 1e-6,
-        /// How the sound form computes its direction.
+        /// How the robust form computes its direction.
         pub factorisation: Factorisation = Factorisation::Cholesky,
         /// Whether the priors of the problem are used.
         pub priors: bool = true,
@@ -46,7 +46,7 @@ options! {
         pub max_iterations: usize = 200,
         /// Stop when the predicted reduction (as printed: the relative change) is below this share of the cost.
         pub cost_tolerance: f64 = 1e-10,
-        /// Stop when the largest cosine between residuals and a column of J is below this (sound).
+        /// Stop when the largest cosine between residuals and a column of J is below this (robust).
         pub gradient_tolerance: f64 = 1e-12,
         /// Stop when the cost itself is below this.
         pub small_cost: f64 = 1e-20,

@@ -11,7 +11,7 @@
 //!
 //! **Shapes.** As in `lm`.
 //!
-//! **Stops.** Sound: as `lm`. As printed: relative change of cost below tolerance, or the iterations (20, Table
+//! **Stops.** Robust: as `lm`. As printed: relative change of cost below tolerance, or the iterations (20, Table
 //! IX).
 //!
 //! **Source and departures.** Li et al. 2023, eq. 15, Algorithm 1 lines 16 to 21. λ is not stated; 5 is taken
@@ -20,7 +20,7 @@
 //! [`ukf_vslm`](crate::filter::ukf_vslm) sets it. A fixed decay is not suitable for every problem: it limits the total
 //! length of the steps in advance.
 //!
-//! **Checked against** the printed recurrence by hand, and published minima for the sound form.
+//! **Checked against** the printed recurrence by hand, and published minima for the robust form.
 
 use serde::{Deserialize, Serialize};
 
@@ -46,7 +46,7 @@ options! {
     /// Options of [`solve`].
     #[derive(Copy)]
     pub struct Options {
-        /// As printed or sound.
+        /// As printed or robust.
         pub form: Form = Form::Robust,
         /// When δ decays (as printed).
         pub decay: Decay = Decay::PerIteration,
@@ -58,9 +58,9 @@ options! {
         pub decay_factor: f64 = 0.95,
         /// Whether each iteration restarts from the initial point (Algorithm 1 line 17; as printed).
         pub restart: bool = false,
-        /// How the sound form computes its step.
+        /// How the robust form computes its step.
         pub factorisation: Factorisation = Factorisation::Cholesky,
-        /// First damping of the sound form, a pure number.
+        /// First damping of the robust form, a pure number.
         pub initial_damping: f64 = 1e-6,
         /// Whether the priors of the problem are used.
         pub priors: bool = true,
@@ -68,7 +68,7 @@ options! {
         pub max_iterations: usize = 200,
         /// Stop when the predicted reduction (as printed: the relative change) is below this share of the cost.
         pub cost_tolerance: f64 = 1e-10,
-        /// Stop when the largest cosine between residuals and a column of J is below this (sound).
+        /// Stop when the largest cosine between residuals and a column of J is below this (robust).
         pub gradient_tolerance: f64 = 1e-12,
         /// Stop when the cost itself is below this.
         pub small_cost: f64 = 1e-20,
@@ -109,7 +109,7 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
     match (options.form, options.decay) {
         (Form::AsPrinted, Decay::PerSample) => per_sample(&mut objective, start, options),
         (Form::AsPrinted, Decay::PerIteration) => per_iteration(&mut objective, start, options),
-        (Form::Robust, _) => sound(&mut objective, start, options),
+        (Form::Robust, _) => robust(&mut objective, start, options),
     }
 }
 
@@ -189,7 +189,7 @@ fn per_iteration(objective: &mut Objective<'_>, start: &[f64], options: &Options
     here.finish(objective, Termination::IterationLimit, trace)
 }
 
-fn sound(objective: &mut Objective<'_>, start: &[f64], options: &Options) -> Estimate {
+fn robust(objective: &mut Objective<'_>, start: &[f64], options: &Options) -> Estimate {
     let p = start.len();
     let (mut here, mut trace) = Point::begin(objective, start, options.factorisation);
     if !here.at.is_finite() {

@@ -33,11 +33,11 @@ options! {
     /// Options of a network and its training.
     #[derive(Copy)]
     pub struct Options {
-        /// As printed or sound.
+        /// As printed or robust.
         pub form: Form = Form::Robust,
-        /// K (sound).
+        /// K (robust).
         pub centres: usize = 24,
-        /// ρ in fill distances (sound): 6 and more follow a smooth field better, 3 ends soon beyond the last centre.
+        /// ρ in fill distances (robust): 6 and more follow a smooth field better, 3 ends soon beyond the last centre.
         pub reach: f64 = 3.0,
         /// Prior standard deviation of a weight, in the unit of the outputs.
         pub weight_sigma: f64 = 1.0,
@@ -60,7 +60,7 @@ pub struct Layout<const D: usize> {
     pub centres: Vec<[f64; D]>,
     /// ρ.
     pub reach: f64,
-    /// Gaussian (as printed) or of compact support (sound).
+    /// Gaussian (as printed) or of compact support (robust).
     pub form: Form,
 }
 

@@ -20,7 +20,7 @@
 //! and the default is half of the box. It determines the result. With 24 parameters of an arm a first step of half the box
 //! moves the beetle so far from a start as good as registered frames that its cost never falls below the start's: on
 //! simulated rows the result is the start (0.556 mm RMSE, 120 cable rows). With a tenth of it, the best of eight first steps,
-//! the RMSE is 0.383 mm, and 0.282 mm in the sound form. The experiments of ukf-vslm-2023 therefore state a tenth.
+//! the RMSE is 0.383 mm, and 0.282 mm in the robust form. The experiments of ukf-vslm-2023 therefore state a tenth.
 //!
 //! **Checked against** published problems of few parameters.
 
@@ -37,7 +37,7 @@ options! {
     /// Options of [`solve`].
     #[derive(Copy)]
     pub struct Options {
-        /// As printed or sound.
+        /// As printed or robust.
         pub form: Form = Form::Robust,
         /// Iterations.
         pub max_iterations: usize = 1_000,
@@ -76,7 +76,7 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
 /// The beetle's walk, with or without the parabola of [`qibas`](crate::swarm::qibas).
 pub(super) fn walk(problem: &dyn Problem, start: &[f64], options: &Options, interpolate: bool) -> Estimate {
     let p = start.len();
-    let sound = options.form == Form::Robust;
+    let robust = options.form == Form::Robust;
     let mut search = Search::new(problem, start, &options.region, options.priors, options.small_cost);
     let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
     let mut u = vec![0.0; p];
@@ -100,14 +100,14 @@ pub(super) fn walk(problem: &dyn Problem, start: &[f64], options: &Options, inte
             }
         }
         let better = next_cost < cost;
-        let step = if !sound || better { distance(&u, &next) } else { 0.0 };
-        if !sound || better {
+        let step = if !robust || better { distance(&u, &next) } else { 0.0 };
+        if !robust || better {
             (u, cost) = (next, next_cost);
         }
         if search.note(step, delta) {
             break;
         }
-        if !sound {
+        if !robust {
             delta *= options.decay;
             d = options.decay * d + 0.01;
         } else {

@@ -11,7 +11,7 @@
 //! **Stops.** *IterationLimit*, *SmallResidual*, *NotFinite*.
 //!
 //! **Source and departures.** M7 of ukf-vslm-2023, without equations. Printed: Storn and Price, "Differential
-//! evolution", 1997; its advice of ten members for each parameter is the default (`population` 0). Sound: Das
+//! evolution", 1997; its advice of ten members for each parameter is the default (`population` 0). Robust: Das
 //! and Suganthan, "Differential evolution: a survey of the state-of-the-art", 2011.
 //!
 //! **Checked against** published problems of few parameters.
@@ -28,7 +28,7 @@ options! {
     /// Options of [`solve`].
     #[derive(Copy)]
     pub struct Options {
-        /// As printed or sound.
+        /// As printed or robust.
         pub form: Form = Form::Robust,
         /// Members; 0 for ten times the number of parameters.
         pub population: usize = 0,

@@ -11,7 +11,7 @@
 //! **Stops.** *IterationLimit*, *SmallResidual*, *NotFinite* where no particle ever had a finite cost.
 //!
 //! **Source and departures.** M4 of ukf-vslm-2023, without equations. Printed: Shi and Eberhart, "A modified
-//! particle swarm optimizer", 1998. Sound: Clerc and Kennedy, "The particle swarm — explosion, stability, and
+//! particle swarm optimizer", 1998. Robust: Clerc and Kennedy, "The particle swarm — explosion, stability, and
 //! convergence", 2002.
 //!
 //! **Checked against** published problems of few parameters.
@@ -28,7 +28,7 @@ options! {
     /// Options of [`solve`].
     #[derive(Copy)]
     pub struct Options {
-        /// As printed or sound.
+        /// As printed or robust.
         pub form: Form = Form::Robust,
         /// Particles.
         pub population: usize = 40,

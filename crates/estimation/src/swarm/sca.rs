@@ -30,7 +30,7 @@ options! {
     /// Options of [`solve`].
     #[derive(Copy)]
     pub struct Options {
-        /// As printed or sound.
+        /// As printed or robust.
         pub form: Form = Form::Robust,
         /// Members.
         pub population: usize = 30,
@@ -63,11 +63,11 @@ impl Options {
 pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimate {
     let p = start.len();
     let n = options.population.max(1);
-    let sound = options.form == Form::Robust;
+    let robust = options.form == Form::Robust;
     let mut search = Search::new(problem, start, &options.region, options.priors, options.small_cost);
     let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
     let mut members: Vec<Vec<f64>> = (0..n).map(|_| uniform_position(&mut rng, p)).collect();
-    if sound {
+    if robust {
         members[0].fill(0.0);
     }
     let mut costs = search.costs(&members);
@@ -78,14 +78,14 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
         for member in &mut moved {
             for (u, best) in member.iter_mut().zip(&best) {
                 let r2 = rng.random_range(0.0..TAU);
-                let r3 = if sound { 1.0 } else { rng.random_range(0.0..2.0) };
+                let r3 = if robust { 1.0 } else { rng.random_range(0.0..2.0) };
                 let wave = if rng.random::<f64>() < 0.5 { r2.sin() } else { r2.cos() };
                 *u = (*u + r1 * wave * (r3 * best - *u).abs()).clamp(-1.0, 1.0);
             }
         }
         let new = search.costs(&moved);
         for (i, member) in moved.into_iter().enumerate() {
-            if !sound || new[i] < costs[i] {
+            if !robust || new[i] < costs[i] {
                 costs[i] = new[i];
                 members[i] = member;
             }

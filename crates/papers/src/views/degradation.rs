@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use self::series::{SIMULATED, after_of, pose_counts};
 use super::words;
-use crate::degradation::{DegradationResult, Outcome, PaperStatement, Run, Step, Strategy};
+use crate::degradation::{DegradationResult, Outcome, PaperStatement, Run, Strategy};
 use truegrind_math::statistics::mean_and_deviation;
 use truegrind_report::document::{Block, Document, Verdict};
 use truegrind_report::number::Precision;
@@ -180,39 +180,37 @@ fn listed(values: &[f64]) -> String {
 }
 
 fn counts(result: &DegradationResult) -> Table {
-    let mut table = Table::new(
+    let nominal = result.nominal_mm.first().copied().unwrap_or(f64::NAN);
+    let rows = result.counts.iter().map(|count| {
+        let paper = result.settings.paper_counts.iter().find(|p| p.count == count.poses);
+        let better = [count.identification_mm, count.verification_mm].map(|mm| percent(nominal, mm));
+        (count, better, paper)
+    });
+    let mut table = Table::of(
         format!("How many poses, first group, {SIMULATED} (Fig. 7, Table 2)"),
-        vec![
-            Column::count("poses", "Poses"),
-            Column::count("equations", "Equations"),
-            Column::count("rank", "Rank"),
-            Column::significant("condition", "Condition", "", 2),
-            Column::number("identification_mm", "id.", "", 4),
-            Column::number("verification_mm", "ver.", "", 4),
-            Column::number("identification_percent", "id. better", "", 1),
-            Column::number("paper_identification_percent", "paper", "", 1),
-            Column::number("verification_percent", "ver. better", "", 1),
-            Column::number("paper_verification_percent", "paper", "", 1),
-            Column::number("without_prior_mm", "no prior", "", 4),
+        &rows.collect::<Vec<_>>(),
+        [
+            (Column::count("poses", "Poses"), |(count, ..)| count.poses.into()),
+            (Column::count("equations", "Equations"), |(count, ..)| count.equations.into()),
+            (Column::count("rank", "Rank"), |(count, ..)| count.rank.into()),
+            (Column::significant("condition", "Condition", "", 2), |(count, ..)| count.condition.into()),
+            (Column::number("identification_mm", "id.", "", 4), |(count, ..)| count.identification_mm.into()),
+            (Column::number("verification_mm", "ver.", "", 4), |(count, ..)| count.verification_mm.into()),
+            (Column::number("identification_percent", "id. better", "", 1), |(_, better, _)| {
+                better[0].into()
+            }),
+            (Column::number("paper_identification_percent", "paper", "", 1), |(.., paper)| {
+                paper.map(|p| p.identification_percent).into()
+            }),
+            (Column::number("verification_percent", "ver. better", "", 1), |(_, better, _)| better[1].into()),
+            (Column::number("paper_verification_percent", "paper", "", 1), |(.., paper)| {
+                paper.map(|p| p.verification_percent).into()
+            }),
+            (Column::number("without_prior_mm", "no prior", "", 4), |(count, ..)| {
+                count.without_prior_mm.into()
+            }),
         ],
     );
-    let nominal = result.nominal_mm.first().copied().unwrap_or(f64::NAN);
-    for count in &result.counts {
-        let paper = result.settings.paper_counts.iter().find(|p| p.count == count.poses);
-        table.push([
-            count.poses.into(),
-            count.equations.into(),
-            count.rank.into(),
-            count.condition.into(),
-            count.identification_mm.into(),
-            count.verification_mm.into(),
-            percent(nominal, count.identification_mm).into(),
-            paper.map(|p| p.identification_percent).into(),
-            percent(nominal, count.verification_mm).into(),
-            paper.map(|p| p.verification_percent).into(),
-            count.without_prior_mm.into(),
-        ]);
-    }
     table.notes = vec![
         "RLS; errors in mm of identification (id.) and verification poses (ver.), improvement (better) in %. Rank: of 24 link \
          parameters with known frames, smallest over the arms. Condition: in units of the tolerances, largest over the arms. \
@@ -229,44 +227,44 @@ fn percent(before: f64, after: f64) -> f64 {
 
 /// Figures 9 to 14 and Table 4, as means over the groups.
 pub(super) fn table(result: &DegradationResult) -> Table {
-    let mut table = Table::new(
+    let nominal = result.nominal_mm.iter().sum::<f64>() / result.nominal_mm.len().max(1) as f64;
+    let rows = result.runs.iter().map(|run| {
+        let is_of_run = |p: &&PaperStatement| {
+            Some(p.method.as_str()) == run.strategy.paper_name() && p.count == run.count
+        };
+        (run, percent(nominal, after(run)), result.settings.paper.iter().find(is_of_run))
+    });
+    let mut table = Table::of(
         format!(
             "Repeated calibration over {} groups, {SIMULATED} (Figs 9 to 14, Table 4)",
             result.settings.groups
         ),
-        vec![
-            Column::count("poses", "Poses"),
-            Column::text("method", "Method"),
-            Column::number("identification_before_mm", "id. before", "", 3),
-            Column::number("identification_after_mm", "after", "", 3),
-            Column::number("verification_before_mm", "ver. before", "", 3),
-            Column::number("verification_after_mm", "after", "", 3),
-            Column::number("paper_after_mm", "paper", "", 3),
-            Column::number("improvement_percent", "better", "", 1),
-            Column::number("paper_improvement_percent", "paper", "", 1),
+        &rows.collect::<Vec<_>>(),
+        [
+            (Column::count("poses", "Poses"), |(run, ..)| run.count.into()),
+            (Column::text("method", "Method"), |(run, ..)| run.strategy.name().into()),
+            (Column::number("identification_before_mm", "id. before", "", 3), |(run, ..)| {
+                run.mean(|s| s.identification_before_mm).into()
+            }),
+            (Column::number("identification_after_mm", "after", "", 3), |(run, ..)| {
+                run.mean(|s| s.identification_after_mm).into()
+            }),
+            (Column::number("verification_before_mm", "ver. before", "", 3), |(run, ..)| {
+                run.mean(|s| s.verification_before_mm).into()
+            }),
+            (Column::number("verification_after_mm", "after", "", 3), |(run, ..)| {
+                let deviation = (run.arms_mm.len() > 1).then(|| mean_and_deviation(&run.arms_mm).1);
+                Cell::with_sigma(after(run), deviation)
+            }),
+            (Column::number("paper_after_mm", "paper", "", 3), |(.., paper)| {
+                paper.and_then(|p| p.verification_after_mm).into()
+            }),
+            (Column::number("improvement_percent", "better", "", 1), |(_, better, _)| (*better).into()),
+            (Column::number("paper_improvement_percent", "paper", "", 1), |(.., paper)| {
+                paper.and_then(|p| p.improvement_percent).into()
+            }),
         ],
     );
-    let nominal = result.nominal_mm.iter().sum::<f64>() / result.nominal_mm.len().max(1) as f64;
-    for run in &result.runs {
-        let paper = result
-            .settings
-            .paper
-            .iter()
-            .find(|p| Some(p.method.as_str()) == run.strategy.paper_name() && p.count == run.count);
-        let figure = |f: fn(&Step) -> f64| run.mean(f);
-        let deviation = (run.arms_mm.len() > 1).then(|| mean_and_deviation(&run.arms_mm).1);
-        table.push([
-            run.count.into(),
-            run.strategy.name().into(),
-            figure(|s| s.identification_before_mm).into(),
-            figure(|s| s.identification_after_mm).into(),
-            figure(|s| s.verification_before_mm).into(),
-            Cell::with_sigma(after(run), deviation),
-            paper.and_then(|p| p.verification_after_mm).into(),
-            percent(nominal, after(run)).into(),
-            paper.and_then(|p| p.improvement_percent).into(),
-        ]);
-    }
     table.notes = vec![
         "Errors in mm, improvement (better) in %. Means over groups and arms of identification (id.) and verification poses \
          (ver.), ± the standard deviation over the arms. before: with the estimate of the previous group, for the first group \
@@ -279,33 +277,25 @@ pub(super) fn table(result: &DegradationResult) -> Table {
 }
 
 fn against_rls(result: &DegradationResult) -> Table {
-    let mut table = Table::new(
+    let mut table = Table::of(
         format!("Every method against RLS with the same poses, {SIMULATED}"),
-        vec![
-            Column::count("poses", "Poses"),
-            Column::text("method", "Method"),
-            Column::number("difference_mm", "difference", "mm", 4),
-            Column::text("better_in", "RLS better in"),
-            Column::text("p", "p, signed rank"),
-            Column::text("conclusion", "Conclusion"),
+        &result.against_rls,
+        [
+            (Column::count("poses", "Poses"), |one| one.count.into()),
+            (Column::text("method", "Method"), |one| one.strategy.name().into()),
+            (Column::number("difference_mm", "difference", "mm", 4), |one| one.mean_mm.into()),
+            (Column::text("better_in", "RLS better in"), |one| {
+                format!("{} of {} arms", one.rls_better, one.arms).into()
+            }),
+            (Column::text("p", "p, signed rank"), |one| words::p(one.p).into()),
+            (Column::text("conclusion", "Conclusion"), |one| match one.outcome {
+                Outcome::RlsBetter => "RLS better".into(),
+                Outcome::StrategyBetter => format!("{} better", one.strategy.name()).into(),
+                Outcome::Same => "the same within 2 %".into(),
+                Outcome::NotSignificant => "no significant difference".into(),
+            }),
         ],
     );
-    for one in &result.against_rls {
-        let conclusion = match one.outcome {
-            Outcome::RlsBetter => "RLS better".to_owned(),
-            Outcome::StrategyBetter => format!("{} better", one.strategy.name()),
-            Outcome::Same => "the same within 2 %".to_owned(),
-            Outcome::NotSignificant => "no significant difference".to_owned(),
-        };
-        table.push([
-            one.count.into(),
-            one.strategy.name().into(),
-            one.mean_mm.into(),
-            format!("{} of {} arms", one.rls_better, one.arms).into(),
-            words::p(one.p).into(),
-            conclusion.into(),
-        ]);
-    }
     table.notes = vec![format!(
         "Mean error of the verification poses after calibration, over all groups; method minus RLS, paired over the {} \
          simulated arms. p: two-sided, after Holm's correction over {} comparisons.",
@@ -316,32 +306,28 @@ fn against_rls(result: &DegradationResult) -> Table {
 }
 
 fn steps(result: &DegradationResult) -> Table {
-    let mut table = Table::new(
+    let rows = result.runs.iter().flat_map(|run| run.steps.iter().map(move |step| (run, step)));
+    Table::of(
         format!("Group by group, {SIMULATED}"),
-        vec![
-            Column::count("poses", "Poses"),
-            Column::text("method", "Method"),
-            Column::count("group", "Group"),
-            Column::number("identification_before_mm", "identify, before", "mm", 4),
-            Column::number("identification_after_mm", "after", "mm", 4),
-            Column::number("verification_before_mm", "verify, before", "mm", 4),
-            Column::number("verification_after_mm", "after", "mm", 4),
+        &rows.collect::<Vec<_>>(),
+        [
+            (Column::count("poses", "Poses"), |(run, _)| run.count.into()),
+            (Column::text("method", "Method"), |(run, _)| run.strategy.name().into()),
+            (Column::count("group", "Group"), |(_, step)| (step.group + 1).into()),
+            (Column::number("identification_before_mm", "identify, before", "mm", 4), |(_, step)| {
+                step.identification_before_mm.into()
+            }),
+            (Column::number("identification_after_mm", "after", "mm", 4), |(_, step)| {
+                step.identification_after_mm.into()
+            }),
+            (Column::number("verification_before_mm", "verify, before", "mm", 4), |(_, step)| {
+                step.verification_before_mm.into()
+            }),
+            (Column::number("verification_after_mm", "after", "mm", 4), |(_, step)| {
+                step.verification_after_mm.into()
+            }),
         ],
-    );
-    for run in &result.runs {
-        for step in &run.steps {
-            table.push([
-                run.count.into(),
-                run.strategy.name().into(),
-                (step.group + 1).into(),
-                step.identification_before_mm.into(),
-                step.identification_after_mm.into(),
-                step.verification_before_mm.into(),
-                step.verification_after_mm.into(),
-            ]);
-        }
-    }
-    table
+    )
 }
 
 /// Measured times.

@@ -269,7 +269,7 @@ pub(super) fn table(result: &GrindingResult) -> Table {
     for row in &result.rows {
         let failed = row.cases.iter().find_map(|c| c.failure.as_ref());
         let note = match (failed, row.refused()) {
-            (Some(why), _) => format!("failed: {why}"),
+            (Some(reason), _) => format!("failed: {reason}"),
             (None, 0) if stands_in(result, row) => "replaces the actual arm".to_owned(),
             (None, 0) => String::new(),
             (None, n) => format!("{n} targets refused"),

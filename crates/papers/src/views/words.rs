@@ -136,14 +136,14 @@ fn same_optimum(study: &Study) -> Vec<String> {
             (true, _) => "differ significantly as limited".to_owned(),
             (false, _) => "do not differ significantly as limited".to_owned(),
         };
-        let why = match group.stopped {
+        let reason = match group.stopped {
             [false, false] => "all had converged".to_owned(),
             [true, false] => format!("{} stopped before they converged, {reference} was not", were(of)),
             [false, true] => format!("only {reference} was stopped before it converged"),
             [true, true] => "all were stopped before they converged".to_owned(),
         };
         let and = if significant { "but" } else { "and" };
-        format!("{} and {reference} {before}, {and} end at the same errors: {why}.", ids(of))
+        format!("{} and {reference} {before}, {and} end at the same errors: {reason}.", ids(of))
     };
     groups.iter().map(sentence).collect()
 }
@@ -226,7 +226,7 @@ fn cheapest(study: &Study) -> Option<String> {
     };
     let any_better =
         study.results.iter().any(|r| conclusion(&r.method.id) == Some(&Conclusion::MethodBetter));
-    let stays = |r: &&MethodResult| match conclusion(&r.method.id) {
+    let is_not_worse = |r: &&MethodResult| match conclusion(&r.method.id) {
         None => !any_better && r.outcomes.iter().all(|o| !o.diverged),
         Some(Conclusion::MethodBetter) => true,
         Some(Conclusion::NotSignificant | Conclusion::SameOptimum { .. }) => !any_better,
@@ -235,7 +235,7 @@ fn cheapest(study: &Study) -> Option<String> {
     let mut left: Vec<(&str, f64)> = study
         .results
         .iter()
-        .filter(stays)
+        .filter(is_not_worse)
         .map(|r| {
             let (residuals, jacobians) = passes(study, r);
             (r.method.id.as_str(), residuals + jacobians)

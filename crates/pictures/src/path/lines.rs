@@ -89,11 +89,11 @@ impl Labels {
     fn take(&mut self, point: &PathPoint, label: &str) -> Option<Point3<f64>> {
         let away = (intended(point) - self.middle).try_normalize(1e-9).unwrap_or_else(Vector3::z);
         let distance = BESIDE + CHARACTER * label.chars().count() as f64;
-        let place = self.middle + away * (distance * self.size_mm);
-        let free = self.taken.iter().all(|other| (other - place).norm() >= LABEL_LENGTH * self.size_mm);
+        let position = self.middle + away * (distance * self.size_mm);
+        let free = self.taken.iter().all(|other| (other - position).norm() >= LABEL_LENGTH * self.size_mm);
         free.then(|| {
-            self.taken.push(place);
-            place
+            self.taken.push(position);
+            position
         })
     }
 }
@@ -124,9 +124,9 @@ fn run(
         Some(mm) => format!("{title}: {mm:.3} mm expected (1σ)"),
         None => format!("{title}: {:.3} mm", deviation.norm_mm()),
     };
-    let place = largest.as_ref().and_then(|(point, deviation)| labels.take(point, &text(deviation)));
+    let position = largest.as_ref().and_then(|(point, deviation)| labels.take(point, &text(deviation)));
     for (folder, times, width) in [("path", 1.0, 2.5), ("exaggerated", plan.times, 1.8)] {
-        // At true scale the colour is all that tells the size; exaggerated, it tells which is which.
+        // At true scale only the colour shows the size; exaggerated, it separates the curves.
         let by_size = folder == "path";
         let coloured = strips(&report.points, |p| {
             let deviation = which(p).filter(|d| plan.cuts(p) && d.norm_mm().is_finite())?;
@@ -149,12 +149,12 @@ fn run(
             .with_radii([Radius::new_ui_points(3.5)])
             .with_colors([Color::from(*colour)]);
         store.fixed(entity.as_str(), &mark)?;
-        let Some(place) = place else { continue };
-        let leader = LineStrips3D::new([[xyz(&at), xyz(&place)]])
+        let Some(position) = position else { continue };
+        let leader = LineStrips3D::new([[xyz(&at), xyz(&position)]])
             .with_radii([Radius::new_ui_points(0.8)])
             .with_colors([Color::from(*colour)]);
         store.fixed(format!("{entity}/leader"), &leader)?;
-        let label = Points3D::new([xyz(&place)])
+        let label = Points3D::new([xyz(&position)])
             .with_radii([Radius::new_ui_points(0.5)])
             .with_colors([Color::from(*colour)])
             .with_labels([text(&deviation)])
@@ -168,12 +168,12 @@ fn run(
 /// no place, the line breaks.
 fn strips(
     points: &[PathPoint],
-    place: impl Fn(&PathPoint) -> Option<(Point3<f64>, usize)>,
+    position: impl Fn(&PathPoint) -> Option<(Point3<f64>, usize)>,
 ) -> Vec<(usize, Vec<Point3<f64>>)> {
     let mut strips: Vec<(usize, Vec<Point3<f64>>)> = Vec::new();
     let mut last: Option<Point3<f64>> = None;
     for point in points {
-        let Some((here, kind)) = place(point) else {
+        let Some((here, kind)) = position(point) else {
             last = None;
             continue;
         };
@@ -265,7 +265,7 @@ fn runs<'a>(marked: &[&'a PathPoint]) -> Vec<Vec<&'a PathPoint>> {
 /// Position and text of the label of a run.
 fn label(run: &[&PathPoint], status: &str) -> (Point3<f64>, String) {
     let (first, last, middle) = (run[0], run[run.len() - 1], run[run.len() / 2]);
-    let place = match (first.line, last.line) {
+    let position = match (first.line, last.line) {
         (0, _) | (_, 0) if first.index == last.index => format!("point {}", first.index),
         (0, _) | (_, 0) => format!("points {}–{}", first.index, last.index),
         (a, b) if a == b => format!("line {a}"),
@@ -274,7 +274,7 @@ fn label(run: &[&PathPoint], status: &str) -> (Point3<f64>, String) {
     let same = run.iter().all(|point| point.reason == first.reason);
     let which = if same { "" } else { " (the first)" };
     let reason = first.reason.as_deref().map(|r| format!(": {}{which}", short(r))).unwrap_or_default();
-    (intended(middle), format!("{place} {status}{reason}"))
+    (intended(middle), format!("{position} {status}{reason}"))
 }
 
 /// A reason as long as a label in a picture may be; the text beside it has the whole.

@@ -60,8 +60,8 @@ impl Part {
         let q = self.readings.nrows();
         let rows: Vec<usize> = (0..chosen.len()).filter(|k| Some(*k) != without).map(|k| chosen[k]).collect();
         let mut taken = DMatrix::zeros(q, rows.len() * per);
-        for (place, &row) in rows.iter().enumerate() {
-            taken.columns_mut(place * per, per).copy_from(&self.readings.columns(row * per, per));
+        for (index, &row) in rows.iter().enumerate() {
+            taken.columns_mut(index * per, per).copy_from(&self.readings.columns(row * per, per));
         }
         DMatrix::identity(q, q) * self.ridge + &taken * taken.transpose()
     }
@@ -141,13 +141,13 @@ impl Design<'_> {
         }
         for _ in 0..ROUNDS {
             let mut changed = false;
-            for place in 0..chosen.len() {
-                let all = gains(&chosen, Some(place))?;
+            for index in 0..chosen.len() {
+                let all = gains(&chosen, Some(index))?;
                 let Some(other) = best(&all, &taken) else { break };
-                if all[other] > all[chosen[place]] + LEAST_GAIN {
-                    taken[chosen[place]] = false;
+                if all[other] > all[chosen[index]] + LEAST_GAIN {
+                    taken[chosen[index]] = false;
                     taken[other] = true;
-                    chosen[place] = other;
+                    chosen[index] = other;
                     changed = true;
                 }
             }

@@ -19,7 +19,7 @@ use truegrind_arm::model::Joints;
 use truegrind_calibration::diagnosis::something_else::SomethingElse;
 use truegrind_math::work::checkpoint;
 
-/// Candidates that are looked at, the first of them: they are random, and more cost their square.
+/// Number of candidates considered. They are random, so the first ones serve; the cost grows with the square.
 const MOST: usize = 2000;
 
 /// Joints that the field depends on: the last one rotates the target about itself.
@@ -97,7 +97,7 @@ impl FieldDesign {
         self.covariance.ger(-1.0 / variance, &column, &column, 1.0);
     }
 
-    /// `count` different candidates, the one that tells most first, none of `taken`.
+    /// `count` different candidates, the most informative first, without those in `taken`.
     pub fn choose(&self, count: usize, taken: &[usize]) -> Vec<usize> {
         let mut state = self.clone();
         let mut chosen: Vec<usize> = Vec::with_capacity(count);

@@ -51,7 +51,7 @@ impl<'a> CollisionChecker<'a> {
         out
     }
 
-    /// Largest distance of each end from each axis. The end of the link behind a joint has a constant distance from the axis;
+    /// Largest distance of each end from each axis. The end of the link after a joint has a constant distance from the axis;
     /// later ends are at most the sum of the link lengths in between farther away.
     fn levers(&self) -> [[f64; 6]; ENDS] {
         let still = Joints::zeros();

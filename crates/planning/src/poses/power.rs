@@ -6,7 +6,7 @@
 //! worst direction (phase, axis) is |a|² = λ / smallest eigenvalue of S.
 //! Source: the non-central χ² of a likelihood ratio between nested linear models (Kay 1998, Fundamentals of Statistical
 //! Signal Processing II, section 7.7).
-//! Checked against: the drop of the fitted cost when the effect is put into simulated readings.
+//! Checked against: the drop of the fitted cost when the effect is added to simulated readings.
 
 use nalgebra::{Cholesky, DMatrix};
 
@@ -18,14 +18,15 @@ use truegrind_arm::condition::Condition;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::model::Model;
 use truegrind_arm::parameter::Parameter;
+use truegrind_calibration::diagnosis::cause_kind::CauseKind;
 use truegrind_calibration::measurement::dataset::{Row, Sensor};
 use truegrind_math::spectral;
 
 /// Smallest detectable size of an effect.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Detectability {
-    /// Machine name of the effect.
-    pub effect: &'static str,
+    /// The kind of effect.
+    pub effect: CauseKind,
     /// Instance: joint, order, cable.
     pub which: String,
     /// Joint, 0-based.
@@ -58,7 +59,7 @@ const ABSURD: f64 = 20.0;
 
 /// One effect, as columns.
 struct EffectColumns {
-    effect: &'static str,
+    effect: CauseKind,
     which: String,
     joint: Option<usize>,
     unit: &'static str,
@@ -116,11 +117,9 @@ pub(super) fn detectability(
 fn of_arm(setup: &MeasurementSetup<'_>, rows: &[Row], options: &Options) -> Vec<EffectColumns> {
     let mut out = Vec::new();
     let degrees = 1.0_f64.to_degrees();
-    let all: Vec<Effect> = ["joint-compliance", "gear-ratio", "backlash"]
+    let all: Vec<Effect> = [CauseKind::JointCompliance, CauseKind::GearRatio, CauseKind::Backlash]
         .iter()
-        .flat_map(|name| {
-            (0..6).flat_map(|j| effects_of(&CandidateCause { effect: (*name).to_owned(), joints: vec![j] }))
-        })
+        .flat_map(|&effect| (0..6).flat_map(move |j| effects_of(&CandidateCause { effect, joints: vec![j] })))
         .chain((0..6).flat_map(|j| [harmonic(j, 1.0), harmonic(j, 2.0)]))
         .chain([(4, 3), (5, 4), (5, 3)].map(|(joint, driver)| coupling(joint, driver)))
         .chain([thermal()])
@@ -153,10 +152,9 @@ fn of_arm(setup: &MeasurementSetup<'_>, rows: &[Row], options: &Options) -> Vec<
             Effect::GearEccentricity(_) => (degrees, "°", USUAL_DEG),
             _ => (degrees * largest_turn(&model, rows), "°", USUAL_DEG),
         };
-        let name = effect.name();
         let joint = effect.joint();
         out.push(EffectColumns {
-            effect: name,
+            effect: CauseKind::from(&effect),
             which,
             joint,
             unit,
@@ -191,11 +189,11 @@ fn of_sensor(
     let per = raw.nrows() / rows.len().max(1);
     let mut out = Vec::new();
     let mut step = |effect, which: &str, of: &dyn Fn(&Parameter) -> bool| {
-        let places: Vec<usize> = (0..parameters.len()).filter(|&k| of(&parameters[k])).collect();
-        if places.is_empty() {
+        let indices: Vec<usize> = (0..parameters.len()).filter(|&k| of(&parameters[k])).collect();
+        if indices.is_empty() {
             return;
         }
-        let mut columns = raw.select_columns(&places);
+        let mut columns = raw.select_columns(&indices);
         let half = raw.nrows() / (2 * per) * per;
         columns.rows_mut(0, half).fill(0.0);
         out.push(EffectColumns {
@@ -211,23 +209,23 @@ fn of_sensor(
         });
     };
     if setup.sensor == Sensor::Cable {
-        step("sensor-zero-shift", "in the middle of the run", &|p| {
+        step(CauseKind::SensorZeroShift, "in the middle of the run", &|p| {
             matches!(p, Parameter::Zero { anchor: 0 })
         });
-        step("sensor-frame-shift", "outlet, in the middle of the run", &|p| {
+        step(CauseKind::SensorFrameShift, "outlet, in the middle of the run", &|p| {
             matches!(p, Parameter::Outlet { anchor: 0, .. })
         });
     } else {
         step(
-            "sensor-frame-shift",
+            CauseKind::SensorFrameShift,
             "in the middle of the run",
             &|p| matches!(p, Parameter::SensorFrame(k) if *k < 3),
         );
     }
-    step("tool-shift", "in the middle of the run", &|p| matches!(p, Parameter::Target(k) if *k < 3));
+    step(CauseKind::ToolShift, "in the middle of the run", &|p| matches!(p, Parameter::Target(k) if *k < 3));
     let (columns, longest) = scale_column(setup, rows, per, options);
     out.push(EffectColumns {
-        effect: "sensor-scale",
+        effect: CauseKind::SensorScale,
         which: "all readings".to_owned(),
         joint: None,
         unit: "‰",

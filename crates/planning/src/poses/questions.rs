@@ -15,14 +15,15 @@ use truegrind_arm::effect::gear_ratio::GearRatio;
 use truegrind_arm::effect::harmonic::Harmonic;
 use truegrind_arm::effect::thermal::Thermal;
 use truegrind_arm::parameter::Parameter;
-use truegrind_calibration::diagnosis::finding::{Confidence, SCHEMA, UNEXPLAINED};
+use truegrind_calibration::diagnosis::cause_kind::CauseKind;
+use truegrind_calibration::diagnosis::finding::{Confidence, SCHEMA};
 use truegrind_calibration::diagnosis::something_else::SomethingElse;
 
 /// A candidate cause.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct CandidateCause {
-    /// Machine name of the effect.
-    pub effect: String,
+    /// Its kind.
+    pub effect: CauseKind,
     /// Joints, 0-based; empty for an effect without a joint.
     pub joints: Vec<usize>,
 }
@@ -99,7 +100,7 @@ struct Kind {
 
 #[derive(Deserialize)]
 struct Finding {
-    effect: String,
+    effect: CauseKind,
     confidence: Confidence,
     joints: Option<Vec<usize>>,
     alternatives: Vec<Named>,
@@ -107,17 +108,17 @@ struct Finding {
 
 #[derive(Deserialize)]
 struct Named {
-    effect: String,
+    effect: CauseKind,
     #[serde(default)]
     joints: Option<Vec<usize>>,
 }
 
-fn cause(effect: &str, joints: Option<&Vec<usize>>) -> Result<CandidateCause, DiagnosisFileError> {
+fn cause(effect: CauseKind, joints: Option<&Vec<usize>>) -> Result<CandidateCause, DiagnosisFileError> {
     let joints = joints.into_iter().flatten().map(|&joint| match joint {
         1..=6 => Ok(joint - 1),
         _ => Err(DiagnosisFileError::Syntax(format!("{effect}: joints: found {joint}, expected 1 to 6"))),
     });
-    Ok(CandidateCause { effect: effect.to_owned(), joints: joints.collect::<Result<_, _>>()? })
+    Ok(CandidateCause { effect, joints: joints.collect::<Result<_, _>>()? })
 }
 
 /// What a diagnosis left open.
@@ -135,7 +136,8 @@ pub struct Open {
 /// [`DiagnosisFileError`] if the text is not a diagnosis, or if that finding is not open.
 pub fn open(text: &str, number: Option<usize>) -> Result<Open, DiagnosisFileError> {
     let File { findings, something_else, .. } = file(text)?;
-    let unexplained = |finding: &Finding| finding.effect == UNEXPLAINED && something_else.is_some();
+    let unexplained =
+        |finding: &Finding| finding.effect == CauseKind::Unexplained && something_else.is_some();
     let Some(number) = number else {
         return Ok(Open { questions: questions(text)?, something_else });
     };
@@ -158,8 +160,8 @@ pub fn open(text: &str, number: Option<usize>) -> Result<Open, DiagnosisFileErro
 impl Finding {
     /// The finding and its alternatives.
     fn question(&self) -> Result<Question, DiagnosisFileError> {
-        let first = cause(&self.effect, self.joints.as_ref())?;
-        let others = self.alternatives.iter().map(|other| cause(&other.effect, other.joints.as_ref()));
+        let first = cause(self.effect, self.joints.as_ref())?;
+        let others = self.alternatives.iter().map(|other| cause(other.effect, other.joints.as_ref()));
         let others = others.collect::<Result<Vec<_>, _>>()?;
         Ok(Question { causes: std::iter::once(first).chain(others).collect() })
     }
@@ -200,12 +202,12 @@ pub fn questions(text: &str) -> Result<Vec<Question>, DiagnosisFileError> {
     for finding in &file.findings {
         // An unambiguous finding is no question, but must be valid.
         let question = finding.question()?;
-        if finding.confidence == Confidence::Ambiguous && finding.effect != UNEXPLAINED {
+        if finding.confidence == Confidence::Ambiguous && finding.effect != CauseKind::Unexplained {
             out.push(question);
         }
     }
     for untested in &file.not_testable {
-        out.push(Question { causes: vec![cause(&untested.effect, untested.joints.as_ref())?] });
+        out.push(Question { causes: vec![cause(untested.effect, untested.joints.as_ref())?] });
     }
     Ok(out)
 }
@@ -215,19 +217,21 @@ pub fn effects_of(cause: &CandidateCause) -> Vec<Effect> {
     // Without a named joint: those loaded by gravity.
     let joints: &[usize] = if cause.joints.is_empty() { &[1, 2] } else { &cause.joints };
     let each = |make: fn(usize) -> Effect| joints.iter().map(|&j| make(j)).collect();
-    match cause.effect.as_str() {
-        "joint-compliance" => {
+    match cause.effect {
+        CauseKind::JointCompliance => {
             each(|joint| Effect::JointCompliance(Compliance { joint, compliance_rad_per_nm: 0.0 }))
         }
-        "gear-eccentricity" => joints.iter().flat_map(|&j| [harmonic(j, 1.0), harmonic(j, 2.0)]).collect(),
-        "gear-ratio" => each(|joint| Effect::GearRatio(GearRatio { joint, error: 0.0 })),
-        "joint-coupling" => match *joints {
+        CauseKind::GearEccentricity => {
+            joints.iter().flat_map(|&j| [harmonic(j, 1.0), harmonic(j, 2.0)]).collect()
+        }
+        CauseKind::GearRatio => each(|joint| Effect::GearRatio(GearRatio { joint, error: 0.0 })),
+        CauseKind::JointCoupling => match *joints {
             [joint, driver, ..] if joint != driver => vec![coupling(joint, driver)],
             [joint] => vec![coupling(joint, if joint == 0 { 1 } else { joint - 1 })],
             _ => Vec::new(),
         },
-        "backlash" => each(|joint| Effect::Backlash(Backlash { joint, play_rad: 0.0 })),
-        "thermal-drift" => vec![thermal()],
+        CauseKind::Backlash => each(|joint| Effect::Backlash(Backlash { joint, play_rad: 0.0 })),
+        CauseKind::ThermalDrift => vec![thermal()],
         _ => Vec::new(),
     }
 }
@@ -248,11 +252,11 @@ pub(super) fn thermal() -> Effect {
 }
 
 /// The frame parameters of a sensor effect that poses can determine.
-fn frame_part(effect: &str) -> Option<FramePart> {
+fn frame_part(effect: CauseKind) -> Option<FramePart> {
     match effect {
-        "sensor-zero-shift" => Some(FramePart::Zero),
-        "sensor-frame-shift" => Some(FramePart::Sensor),
-        "tool-shift" => Some(FramePart::Touched),
+        CauseKind::SensorZeroShift => Some(FramePart::Zero),
+        CauseKind::SensorFrameShift => Some(FramePart::Sensor),
+        CauseKind::ToolShift => Some(FramePart::Touched),
         _ => None,
     }
 }
@@ -268,7 +272,7 @@ pub(super) fn columns_of(questions: &[Question]) -> (Vec<Effect>, Vec<FramePart>
                 effects.push(effect);
             }
         }
-        if let Some(frame) = frame_part(&cause.effect)
+        if let Some(frame) = frame_part(cause.effect)
             && !frames.contains(&frame)
         {
             frames.push(frame);
@@ -278,6 +282,6 @@ pub(super) fn columns_of(questions: &[Question]) -> (Vec<Effect>, Vec<FramePart>
 }
 
 /// Whether a question is about this effect.
-pub(super) fn any_about(questions: &[Question], effect: &str) -> bool {
+pub(super) fn any_about(questions: &[Question], effect: CauseKind) -> bool {
     questions.iter().flat_map(|q| &q.causes).any(|s| s.effect == effect)
 }

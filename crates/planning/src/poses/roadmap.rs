@@ -18,45 +18,45 @@ const WRIST: f64 = 0.2;
 /// Nodes, and the clear straight motions between them.
 #[derive(Debug)]
 pub(super) struct Roadmap {
-    places: Vec<Joints>,
+    nodes: Vec<Joints>,
     /// For each node its neighbours, with the largest rotation of a joint (rad).
-    ways: Vec<Vec<(usize, f64)>>,
+    edges: Vec<Vec<(usize, f64)>>,
 }
 
 impl Roadmap {
     /// Connects nodes with clear straight motions.
-    pub(super) fn between(places: Vec<Joints>, checker: &CollisionChecker<'_>) -> Self {
-        let mut ways: Vec<Vec<(usize, f64)>> = vec![Vec::new(); places.len()];
-        for (i, from) in places.iter().enumerate() {
+    pub(super) fn between(nodes: Vec<Joints>, checker: &CollisionChecker<'_>) -> Self {
+        let mut edges: Vec<Vec<(usize, f64)>> = vec![Vec::new(); nodes.len()];
+        for (i, from) in nodes.iter().enumerate() {
             let mut near: Vec<(usize, f64)> =
-                (0..places.len()).filter(|&j| j != i).map(|j| (j, apart(from, &places[j]))).collect();
+                (0..nodes.len()).filter(|&j| j != i).map(|j| (j, apart(from, &nodes[j]))).collect();
             near.sort_by(|a, b| a.1.total_cmp(&b.1));
             near.truncate(NEAREST);
             for (j, _) in near {
-                let known = ways[i].iter().any(|(other, _)| *other == j);
-                if !known && checker.motion_is_clear(from, &places[j]) {
-                    let turn = (from - places[j]).amax();
-                    ways[i].push((j, turn));
-                    ways[j].push((i, turn));
+                let known = edges[i].iter().any(|(other, _)| *other == j);
+                if !known && checker.motion_is_clear(from, &nodes[j]) {
+                    let turn = (from - nodes[j]).amax();
+                    edges[i].push((j, turn));
+                    edges[j].push((i, turn));
                 }
             }
         }
-        Self { places, ways }
+        Self { nodes, edges }
     }
 
     /// The nodes of the largest connected part, in ascending order.
     pub(super) fn largest(&self) -> Vec<usize> {
-        let mut part: Vec<Option<usize>> = vec![None; self.places.len()];
+        let mut part: Vec<Option<usize>> = vec![None; self.nodes.len()];
         let mut best: Vec<usize> = Vec::new();
-        for start in 0..self.places.len() {
+        for start in 0..self.nodes.len() {
             if part[start].is_some() {
                 continue;
             }
             part[start] = Some(start);
             let (mut members, mut at) = (vec![start], 0);
-            while let Some(place) = members.get(at).copied() {
+            while let Some(node) = members.get(at).copied() {
                 at += 1;
-                for (next, _) in &self.ways[place] {
+                for (next, _) in &self.edges[node] {
                     if part[*next].is_none() {
                         part[*next] = Some(start);
                         members.push(*next);
@@ -79,9 +79,9 @@ impl Roadmap {
         to: &Joints,
         approach: &Joints,
     ) -> Option<Vec<Joints>> {
-        let place = |joints: &Joints| self.places.iter().position(|place| place == joints);
+        let node = |joints: &Joints| self.nodes.iter().position(|node| node == joints);
         let mut all: Vec<Joints> =
-            self.shortest(place(from)?, place(to)?)?.into_iter().map(|place| self.places[place]).collect();
+            self.shortest(node(from)?, node(to)?)?.into_iter().map(|node| self.nodes[node]).collect();
         // The motion from the pose to the start of its approach is clear.
         all.push(*approach);
         let (mut out, mut at) = (Vec::new(), 0);
@@ -96,7 +96,7 @@ impl Roadmap {
 
     /// The nodes on the shortest path, both ends included (Dijkstra).
     fn shortest(&self, from: usize, to: usize) -> Option<Vec<usize>> {
-        let count = self.places.len();
+        let count = self.nodes.len();
         let (mut length, mut before) = (vec![f64::INFINITY; count], vec![from; count]);
         let mut open = vec![true; count];
         length[from] = 0.0;
@@ -109,7 +109,7 @@ impl Roadmap {
                 break;
             }
             open[next] = false;
-            for &(other, turn) in &self.ways[next] {
+            for &(other, turn) in &self.edges[next] {
                 if length[next] + turn < length[other] {
                     length[other] = length[next] + turn;
                     before[other] = next;

@@ -127,9 +127,9 @@ impl ReadingJacobian {
     pub fn information(&self, rows: &[usize]) -> DMatrix<f64> {
         let p = self.readings.nrows();
         let mut taken = DMatrix::zeros(p, rows.len() * self.per_row);
-        for (place, &row) in rows.iter().enumerate() {
+        for (index, &row) in rows.iter().enumerate() {
             taken
-                .columns_mut(place * self.per_row, self.per_row)
+                .columns_mut(index * self.per_row, self.per_row)
                 .copy_from(&self.readings.columns(row * self.per_row, self.per_row));
         }
         DMatrix::identity(p, p) + &taken * taken.transpose()

@@ -23,6 +23,7 @@ use super::roadmap::Roadmap;
 use super::setup::MeasurementSetup;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Joints;
+use truegrind_calibration::diagnosis::cause_kind::CauseKind;
 use truegrind_calibration::measurement::dataset::{Row as MeasuredRow, Sensor};
 
 /// Repeated visits.
@@ -56,13 +57,16 @@ impl Visits {
     /// Adds the visits that the questions of a diagnosis require.
     pub(super) fn with_questions(&self, questions: &[Question]) -> Self {
         let mut out = *self;
-        if any_about(questions, "backlash") {
+        if any_about(questions, CauseKind::Backlash) {
             out.both_sides = out.both_sides.max(20);
         }
-        if any_about(questions, "thermal-drift") {
+        if any_about(questions, CauseKind::ThermalDrift) {
             out.warm_up = out.warm_up.max(16);
         }
-        if ["sensor-zero-shift", "sensor-frame-shift", "tool-shift"].iter().any(|e| any_about(questions, e)) {
+        if [CauseKind::SensorZeroShift, CauseKind::SensorFrameShift, CauseKind::ToolShift]
+            .iter()
+            .any(|&e| any_about(questions, e))
+        {
             // A repeated pose shows when something moved.
             out.repeats = out.repeats.max(8);
         }
@@ -170,16 +174,16 @@ pub(super) fn schedule(
     // Those of the first half are repeated in the middle, the others twice at the end.
     for (at, pose) in repeated.iter().enumerate() {
         let first = list.iter().position(|(p, _)| p == pose).unwrap_or(0);
-        let place = if first < middle { middle + at } else { list.len() };
-        list.insert(place.min(list.len()), (*pose, Purpose::Repeat));
+        let index = if first < middle { middle + at } else { list.len() };
+        list.insert(index.min(list.len()), (*pose, Purpose::Repeat));
     }
     list.extend(repeated.iter().map(|&pose| (pose, Purpose::Repeat)));
     // Warm-up: the first pose, at quadratically growing times.
     let total = list.len() + visits.warm_up;
     for k in 1..visits.warm_up {
         let share = k as f64 / (visits.warm_up - 1) as f64;
-        let place = ((share * share * total as f64) as usize).clamp(k, list.len());
-        list.insert(place, (0, Purpose::WarmUp));
+        let index = ((share * share * total as f64) as usize).clamp(k, list.len());
+        list.insert(index, (0, Purpose::WarmUp));
     }
     let posed_rows = list.iter().enumerate().map(|(number, &(pose, purpose))| {
         let sign = if purpose == Purpose::OtherSide { -1 } else { 1 };
@@ -202,10 +206,10 @@ pub(super) fn schedule(
         let waypoints = checker.waypoints(&from, &to, connections.known);
         rows[k].waypoints =
             waypoints.or_else(|| connections.roadmap?.waypoints(&checker, &from, pose, &to))?;
-        let places: Vec<Joints> =
+        let stops: Vec<Joints> =
             std::iter::once(from).chain(rows[k].waypoints.iter().copied()).chain([to]).collect();
         let anchor = poses[rows[k].pose].anchor;
-        rows[k].cable_unclear = !places.windows(2).all(|way| clear(setup, bounds, &way[0], &way[1], anchor));
+        rows[k].cable_unclear = !stops.windows(2).all(|way| clear(setup, bounds, &way[0], &way[1], anchor));
     }
     Some((poses, rows))
 }

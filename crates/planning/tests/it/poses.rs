@@ -8,6 +8,7 @@ use truegrind_arm::condition::Condition;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::inverse::Inverse;
 use truegrind_arm::model::{Joints, Model};
+use truegrind_calibration::diagnosis::cause_kind::CauseKind;
 use truegrind_calibration::diagnosis::decision::DECIDED_BY_POSES;
 use truegrind_calibration::diagnosis::diagnose::{self, diagnose};
 use truegrind_calibration::diagnosis::something_else::{Field, RemainingAt, SomethingElse};
@@ -257,28 +258,27 @@ fn what_the_plan_promises_to_decide_it_decides() {
     let options = Options { noise: Noise { reading_mm: 0.05, reading_rad: 1e-4 }, ..small() };
     for (sensor, frames) in [(Sensor::Cable, cable()), (Sensor::Position, tracker())] {
         let found = planned(sensor, &frames, &options);
-        let smallest = |effect: &str, joint: usize| {
+        let smallest = |effect: CauseKind, joint: usize| {
             let of = |d: &&truegrind_planning::poses::power::Detectability| {
                 d.effect == effect && d.joint == Some(joint)
             };
             found.detectability.iter().find(of).and_then(|d| d.smallest).unwrap()
         };
         for (name, joint, unit) in [
-            ("joint-compliance", 1, 1e-6),
-            ("gear-ratio", 2, 1e-3),
-            ("backlash", 1, 1.0_f64.to_radians()),
-            ("backlash", 3, 1.0_f64.to_radians()),
+            (CauseKind::JointCompliance, 1, 1e-6),
+            (CauseKind::GearRatio, 2, 1e-3),
+            (CauseKind::Backlash, 1, 1.0_f64.to_radians()),
+            (CauseKind::Backlash, 3, 1.0_f64.to_radians()),
         ] {
-            let mut effect =
-                effects_of(&CandidateCause { effect: name.into(), joints: vec![joint] }).remove(0);
+            let mut effect = effects_of(&CandidateCause { effect: name, joints: vec![joint] }).remove(0);
             effect.set(0, smallest(name, joint) * unit);
             let lambda = 2.0 * left_by_geometry(&found, sensor, &frames, effect, &options);
             assert!((lambda / 25.0 - 1.0).abs() < 0.1, "{sensor:?} {name} {joint}: λ = {lambda}");
         }
         // Of two parameters the worst direction: any other phase shows more.
         let mut effect =
-            effects_of(&CandidateCause { effect: "gear-eccentricity".into(), joints: vec![2] }).remove(0);
-        let size = smallest("gear-eccentricity", 2).to_radians();
+            effects_of(&CandidateCause { effect: CauseKind::GearEccentricity, joints: vec![2] }).remove(0);
+        let size = smallest(CauseKind::GearEccentricity, 2).to_radians();
         for phase in [0.0_f64, 0.8, 1.6, 2.4] {
             effect.set(0, size * phase.cos());
             effect.set(1, size * phase.sin());
@@ -300,22 +300,25 @@ fn a_diagnosis_that_is_ambiguous_gets_the_poses_that_decide() {
         "not_testable": [{"effect": "backlash", "reason": "no approach columns", "remedy": "both sides"}] }"#;
     let asked = questions(text).unwrap();
     assert_eq!(asked.len(), 2, "{asked:?}");
-    assert_eq!(asked[0].causes[0], CandidateCause { effect: "joint-compliance".into(), joints: vec![1] });
+    assert_eq!(asked[0].causes[0], CandidateCause { effect: CauseKind::JointCompliance, joints: vec![1] });
     let plain = Options { poses: 24, ..small() };
     let deciding = Options { questions: asked, ..plain.clone() };
-    let shows = |options: &Options, effect: &str| {
+    let shows = |options: &Options, effect: CauseKind| {
         let found = planned(Sensor::Cable, &cable(), options);
         let of =
             |d: &&truegrind_planning::poses::power::Detectability| d.effect == effect && d.joint == Some(1);
         found.detectability.iter().find(of).and_then(|d| d.shows).unwrap()
     };
-    let (before, after) = (shows(&plain, "joint-compliance"), shows(&deciding, "joint-compliance"));
+    let (before, after) =
+        (shows(&plain, CauseKind::JointCompliance), shows(&deciding, CauseKind::JointCompliance));
     assert!(after < before, "smaller compliance is decided: {after:.4} against {before:.4} degrees");
     let both = planned(Sensor::Cable, &cable(), &deciding);
     let sides = both.rows.iter().filter(|r| r.purpose == Purpose::OtherSide).count();
     assert_eq!(sides, 20, "more from both sides, for backlash");
     assert!(questions(r#"{"schema": "other/1"}"#).unwrap_err().to_string().contains("truegrind.diagnosis/1"));
     assert!(questions("no json").is_err());
+    let unknown = questions(&text.replace("gear-ratio", "gear-rato")).unwrap_err().to_string();
+    assert!(unknown.contains("unknown variant `gear-rato`"), "{unknown}");
 }
 
 #[test]
@@ -616,7 +619,7 @@ fn a_finding_is_planned_for_by_its_number() {
 #[test]
 fn what_poses_are_said_to_decide_changes_the_plan() {
     for effect in DECIDED_BY_POSES {
-        let cause = CandidateCause { effect: effect.to_owned(), joints: Vec::new() };
+        let cause = CandidateCause { effect, joints: Vec::new() };
         let by_pose = !effects_of(&cause).is_empty();
         let question = truegrind_planning::poses::questions::Question { causes: vec![cause] };
         let options = Options { questions: vec![question], ..small() };

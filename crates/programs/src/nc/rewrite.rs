@@ -229,7 +229,7 @@ impl<'s> Rewriter<'_, 's> {
         let motion = &task.listing.motions[index as usize];
         let context = &task.contexts[index as usize];
         let to = motion.cartesian_end();
-        let stays = motion.left.is_some_and(|reason| !keeps_endpoint(reason));
+        let stays = motion.own_reason.is_some_and(|reason| !keeps_endpoint(reason));
         let straightens = change.is_some_and(Change::straightens);
         self.restate_motion_mode(motion, context, straightens);
         let Some(to) = to.filter(|_| !stays) else {

@@ -271,7 +271,8 @@ impl<'t, 's> Interpreter<'t, 's> {
             self.interpret_file();
         }
         // A text without one readable NC block is no program and has no motions.
-        let unread = |motion: &Motion| matches!(motion.left, Some(Reason::Unreadable | Reason::UnknownWord));
+        let unread =
+            |motion: &Motion| matches!(motion.own_reason, Some(Reason::Unreadable | Reason::UnknownWord));
         if !self.has_nc_blocks && self.listing.motions[lengths.0[0]..].iter().all(unread) {
             self.truncate_to(&lengths);
             self.events.push(StateEvent::FileStart);

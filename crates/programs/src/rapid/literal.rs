@@ -121,7 +121,7 @@ fn signed(input: &[u8]) -> Rest<'_, (f64, u8)> {
     Ok((rest, (if negative { -value } else { value }, decimals)))
 }
 
-/// The text behind a sign, and whether the sign is a minus.
+/// The text after a sign, and whether the sign is a minus.
 #[inline]
 fn unsigned(input: &[u8]) -> (&[u8], bool) {
     match input {

@@ -1,7 +1,7 @@
 //! The mark: the comment line that records that a file was compensated.
 //!
-//! `! truegrind 0.1.0 model 3f9a…`, and `partial` behind it where cuts may be corrected in part, on a line of its own after the head of each MODULE in which something changed: a
-//! controller keeps the modules of a file apart.
+//! `! truegrind 0.1.0 model 3f9a…`, followed by `partial` if cuts may be corrected in part, on a line of its own after the head of
+//! each MODULE in which something changed: a controller keeps the modules of a file apart.
 
 use std::ops::Range;
 

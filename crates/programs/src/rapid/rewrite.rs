@@ -301,7 +301,7 @@ impl<'r, 's> Rewriter<'r, 's> {
         edits.replace_with(span.range(), |out| print::literal(out, &value, self.options));
     }
 
-    /// Changes the instruction to the linear one and deletes the circle point with the comma behind it; a comment between them
+    /// Changes the instruction to the linear one and deletes the circle point with the comma after it; a comment between them
     /// is kept.
     fn straighten(&mut self, motion: &Motion) {
         let Some(line) = instruction_of(motion).and_then(Instruction::line_form) else { return };
@@ -509,7 +509,7 @@ fn written_as(instruction: &'static Instruction, change: &Change) -> Option<&'st
     if change.straightens() { instruction.line_form() } else { Some(instruction) }
 }
 
-/// The bytes of a circle point, and those of the comma behind it with the blanks before the next argument.
+/// The bytes of a circle point, and those of the comma after it with the blanks before the next argument.
 fn circle_point(source: &[u8], motion: &Motion) -> Option<[std::ops::Range<usize>; 2]> {
     let via = motion.targets.iter().find(|target| target.role == Role::Via)?;
     let mut argument = via.argument.range();

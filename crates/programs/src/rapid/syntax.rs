@@ -378,7 +378,7 @@ pub fn routine_head(tree: &RapidTree<'_>, node: u32) -> Option<RoutineHead> {
     named.then_some(head)
 }
 
-/// The parameters of a list. `\a | b` are two of which a call gives one or none: what stands behind `|` is optional too.
+/// The parameters of a list. Of `\a | b` a call gives one or none: the parameter after `|` is optional too.
 fn parameters(tree: &RapidTree<'_>, list: u32) -> Vec<Parameter> {
     let mut out = Vec::new();
     let mut alternative = false;

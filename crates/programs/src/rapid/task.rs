@@ -364,7 +364,9 @@ impl Visitor for ListingBuilder<'_, '_> {
         match standing.motions() {
             Some(motions) => {
                 for motion in motions {
-                    self.listing.motions[*motion as usize].left.get_or_insert(Reason::BeforeDisplacement);
+                    self.listing.motions[*motion as usize]
+                        .own_reason
+                        .get_or_insert(Reason::BeforeDisplacement);
                 }
             }
             None => self.position_used = true,

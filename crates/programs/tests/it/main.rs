@@ -12,6 +12,8 @@ mod slow;
 mod numbers;
 mod evaluation;
 mod modal_state;
+mod error_handlers;
+mod known_data;
 mod writing;
 mod edits;
 mod nc;

@@ -479,7 +479,7 @@ fn round_trip(name: &str, bytes: &[u8], setup: &Setup, by: [f64; 3], turn_deg: f
             changes.iter().zip(&rewritten.outcomes).find(|(change, _)| change.motion == index as u32);
         let refused = change.is_some_and(|(_, outcome)| matches!(outcome, Outcome::Refused(_)));
         let change = change.filter(|_| !refused).map(|(change, _)| change);
-        if old.left.is_some() && old.left == new.left {
+        if old.own_reason.is_some() && old.own_reason == new.own_reason {
             continue;
         }
         assert_eq!(old.reason(), new.reason(), "{place}");

@@ -159,7 +159,7 @@ fn every_reason_to_leave_a_motion_has_a_sample() {
     let mut seen = BTreeSet::new();
     let mut look = |listing: &Listing| {
         for motion in &listing.motions {
-            seen.extend(motion.left);
+            seen.extend(motion.own_reason);
             seen.extend(motion.targets.iter().filter_map(|target| target.value.err()));
         }
         seen.extend(listing.tools.iter().filter_map(|tool| tool.value.err()));

@@ -174,7 +174,7 @@ fn a_displacement_from_the_robot_position_pins_the_motions_of_every_path() {
         let task = Task::read(&[("m.mod", source.as_bytes())]);
         // A loop that displaces already leaves the next cycle.
         let stays = [Some(Reason::BeforeDisplacement), Some(Reason::Displacement)];
-        let before = |motion: &truegrind_programs::motion::Motion| stays.contains(&motion.left);
+        let before = |motion: &truegrind_programs::motion::Motion| stays.contains(&motion.own_reason);
         task.listing.motions.iter().map(before).collect()
     };
     const GO: &str = "MoveL p,v100,fine,tool0;\n";

@@ -58,8 +58,9 @@ pub fn verdict(plan: &Plan, listing: &Listing) -> Verdict {
                 .to_owned(),
         );
     }
-    let steps =
-        count_reason(plan, |why| matches!(why, OutcomeReason::PartOfCut { .. } | OutcomeReason::Step { .. }));
+    let steps = count_reason(plan, |reason| {
+        matches!(reason, OutcomeReason::PartOfCut { .. } | OutcomeReason::Step { .. })
+    });
     if steps > 0 {
         reasons.push(format!(
             "{steps} correctable motions are unchanged, since another motion of their cut cannot be corrected: correcting a part of a cut \
@@ -109,7 +110,7 @@ fn deviations(plan: &Plan) -> Option<String> {
 
 pub(super) fn key_figures(plan: &Plan) -> Vec<KeyFigure> {
     let all = plan.outcomes.len();
-    let shape = if placement::corrects_shape_only(plan) { "of the shape" } else { "shape and place" };
+    let shape = if placement::corrects_shape_only(plan) { "of the shape" } else { "shape and placement" };
     let corrected = !no_cut(plan);
     let mut figures = vec![match placement::before_mm(plan).filter(|_| corrected) {
         Some(mm) => KeyFigure::new("Largest before", mm, 3, "mm").note(format!("{shape}, corrected motions")),

@@ -72,34 +72,29 @@ pub fn stage_table(found: &Identification) -> Table {
 
 /// The arm's parameters: nominal, estimated ± σ, deviation; angles in degrees.
 pub fn parameter_table(found: &Identification) -> Table {
-    let mut table = Table::new(
-        "Estimated parameters",
-        vec![
-            Column::text("name", "Parameter"),
-            Column::significant("nominal", "Nominal", "", 6),
-            Column::significant("value", "Estimated ± σ", "", 2),
-            Column::number("deviation", "Deviation", "", 4),
-            Column::text("unit", "Unit"),
-            Column::significant("prior_sigma", "Tolerance", "", 2),
-            Column::number("determined_percent", "Determined", "%", 0),
-            Column::text("held", "Held by"),
-        ],
-    );
     let as_printed =
         solver::by_name(&found.estimated.provenance.method).is_ok_and(|solver| solver.as_printed);
-    for parameter in found.parameters.iter().filter(|parameter| parameter.is_of_arm()) {
-        let shown = handy(parameter);
-        table.push([
-            shown.name.as_str().into(),
-            shown.nominal.into(),
-            Cell::with_sigma(shown.value, Some(shown.sigma)),
-            (shown.value - shown.nominal).into(),
-            shown.unit.as_str().into(),
-            shown.prior_sigma.into(),
-            (100.0 * shown.determined).into(),
-            held(parameter, as_printed),
-        ]);
-    }
+    let of_arm = found.parameters.iter().filter(|parameter| parameter.is_of_arm());
+    let mut table = Table::of(
+        "Estimated parameters",
+        &of_arm.map(|parameter| (handy(parameter), held(parameter, as_printed))).collect::<Vec<_>>(),
+        [
+            (Column::text("name", "Parameter"), |(shown, _)| shown.name.as_str().into()),
+            (Column::significant("nominal", "Nominal", "", 6), |(shown, _)| shown.nominal.into()),
+            (Column::significant("value", "Estimated ± σ", "", 2), |(shown, _)| {
+                Cell::with_sigma(shown.value, Some(shown.sigma))
+            }),
+            (Column::number("deviation", "Deviation", "", 4), |(shown, _)| {
+                (shown.value - shown.nominal).into()
+            }),
+            (Column::text("unit", "Unit"), |(shown, _)| shown.unit.as_str().into()),
+            (Column::significant("prior_sigma", "Tolerance", "", 2), |(shown, _)| shown.prior_sigma.into()),
+            (Column::number("determined_percent", "Determined", "%", 0), |(shown, _)| {
+                (100.0 * shown.determined).into()
+            }),
+            (Column::text("held", "Held by"), |(_, held)| held.clone()),
+        ],
+    );
     table.notes.push(
         "Tolerance: standard deviation of the prior, the manufacturing tolerance. Determined: share contributed by the data, \
          1 − (σ / tolerance)². A parameter below 50 % is known more from its prior than from the data; if it changed anyway, the data \

@@ -79,10 +79,10 @@ impl Bars {
         let breadth = (slot * 0.78 / self.groups.len().max(1) as f64).min(f64::from(90 * PIXEL));
         for index in 0..self.groups.len() {
             let offset = (index as f64 - (self.groups.len() as f64 - 1.0) / 2.0) * breadth;
-            for place in 0..self.names.len() {
-                let Some(center) = inside.across(place as f64) else { continue };
+            for position in 0..self.names.len() {
+                let Some(center) = inside.across(position as f64) else { continue };
                 let middle = center + offset.round() as i32;
-                self.draw_bar(pen, &inside, (index, place), middle, breadth);
+                self.draw_bar(pen, &inside, (index, position), middle, breadth);
             }
         }
         // The zero line is drawn over the bars.
@@ -117,26 +117,26 @@ impl Bars {
         &self,
         pen: &mut Pen,
         inside: &Inside,
-        (index, place): (usize, usize),
+        (index, position): (usize, usize),
         middle: i32,
         breadth: f64,
     ) {
         let group = &self.groups[index];
         let half = (breadth * 0.46).round() as i32;
         let base = inside.base();
-        let Some((value, top)) = group.value(place).and_then(|value| Some((value, inside.down(value)?)))
+        let Some((value, top)) = group.value(position).and_then(|value| Some((value, inside.down(value)?)))
         else {
             pen.text(MISSING, (middle, base - 3 * PIXEL), LABEL, HPos::Center, VPos::Bottom);
             return;
         };
         let top = top.clamp(inside.y.start, inside.y.end);
         let number = Precision::Significant(4).format(value);
-        let title = format!("{} {} {number} {}", self.names[place], group.name, self.y.unit);
+        let title = format!("{} {} {number} {}", self.names[position], group.name, self.y.unit);
         pen.titled(&title, |pen| {
             let corners = [(middle - half, top.min(base)), (middle + half, top.max(base))];
             pen.rectangle(corners, Paint(self.ink(index).rgb(), 1.0));
             let mut above = top.min(base);
-            if let Some(spread) = group.deviation(place) {
+            if let Some(spread) = group.deviation(position) {
                 let ends = [value - spread, value + spread]
                     .map(|end| inside.down(end).unwrap_or(inside.y.end).clamp(inside.y.start, inside.y.end));
                 draw_whisker(pen, middle, ends, half / 3);

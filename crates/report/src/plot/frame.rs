@@ -145,7 +145,7 @@ pub(super) struct Inside {
 
 impl Inside {
     /// Position of a point; `None` if it is not finite, or not positive on a logarithmic axis.
-    pub(super) fn place(&self, x: f64, y: f64) -> Option<(i32, i32)> {
+    pub(super) fn position(&self, x: f64, y: f64) -> Option<(i32, i32)> {
         Some((self.across(x)?, self.down(y)?))
     }
 
@@ -165,7 +165,7 @@ impl Inside {
     pub(super) fn diagonal(&self) -> Option<[(i32, i32); 2]> {
         let (x, y) = (&self.x_scale, &self.y_scale);
         let (low, high) = (x.low.max(y.low), x.high.min(y.high));
-        if low < high { Some([self.place(low, low)?, self.place(high, high)?]) } else { None }
+        if low < high { Some([self.position(low, low)?, self.position(high, high)?]) } else { None }
     }
 
     /// Position of zero on the vertical axis, or of the end nearest to zero.
@@ -191,10 +191,10 @@ impl Inside {
     }
 
     fn draw_grid(&self, pen: &mut Pen, x_grid: bool, y_grid: bool) {
-        let places = |ticks: &[(f64, String)]| ticks.iter().map(|tick| tick.0).collect::<Vec<_>>();
+        let positions = |ticks: &[(f64, String)]| ticks.iter().map(|tick| tick.0).collect::<Vec<_>>();
         for (paint, x, y) in [
             (Paint::text(0.05), &self.x_scale.minor, &self.y_scale.minor),
-            (Paint::text(0.14), &places(&self.x_scale.ticks), &places(&self.y_scale.ticks)),
+            (Paint::text(0.14), &positions(&self.x_scale.ticks), &positions(&self.y_scale.ticks)),
         ] {
             for x in x.iter().filter(|_| x_grid).filter_map(|x| self.across(*x)) {
                 pen.line(&[(x, self.y.start), (x, self.y.end)], paint, THIN, "");

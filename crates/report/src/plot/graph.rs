@@ -146,8 +146,9 @@ impl Graph {
             })
             .collect();
         let inside = self.frame(&drawn).draw(pen);
-        let places = |series: &Series| series.points.iter().any(|[x, y]| inside.place(*x, *y).is_some());
-        if !self.series.iter().any(places) {
+        let positions =
+            |series: &Series| series.points.iter().any(|[x, y]| inside.position(*x, *y).is_some());
+        if !self.series.iter().any(positions) {
             inside.draw_empty(pen);
             return;
         }
@@ -172,7 +173,7 @@ impl Graph {
         let bounds = self.series.iter().flat_map(|series| &series.bounds).flatten().copied();
         let mut legend: Vec<Entry> = drawn.iter().filter_map(Drawn::entry).collect();
         let mut levels = Vec::new();
-        let mut places = Vec::new();
+        let mut positions = Vec::new();
         // Lines of the same name share an entry, as spans do.
         let mut named = BTreeSet::new();
         for reference in &self.references {
@@ -182,7 +183,7 @@ impl Graph {
                     name
                 }
                 Reference::Vertical(x, name) => {
-                    places.push(*x);
+                    positions.push(*x);
                     name
                 }
                 Reference::Diagonal(name) => name,
@@ -193,7 +194,7 @@ impl Graph {
             }
         }
         for span in &self.spans {
-            places.extend(span.range);
+            positions.extend(span.range);
             if named.insert(&span.name) {
                 let glyph = Glyph::Area { alpha: SPAN_ALPHA, outlined: false };
                 legend.push(Entry { name: span.name.clone(), ink: SPAN_INK, glyph });
@@ -203,7 +204,7 @@ impl Graph {
         // Lines extend to the edges; points keep a distance.
         let loose = self.series.iter().any(|series| series.mark == Mark::Points);
         let ends = if loose { Ends::Loose } else { Ends::Tight };
-        let x = points().map(|[x, _]| *x).chain(places);
+        let x = points().map(|[x, _]| *x).chain(positions);
         let y = points().map(|[_, y]| *y).chain(bounds).chain(levels);
         Frame {
             title: &self.title,
@@ -253,20 +254,22 @@ impl Drawn<'_> {
     }
 
     fn draw(&self, inside: &Inside, pen: &mut Pen) {
-        let places = self.series.points.iter().map(|[x, y]| inside.place(*x, *y));
+        let positions = self.series.points.iter().map(|[x, y]| inside.position(*x, *y));
         match (self.series.mark, self.marker) {
             (Mark::Points, Some(marker)) => {
-                let places: Vec<_> = places.flatten().collect();
-                let alpha = if places.len() > 300 { 0.55 } else { 0.85 };
+                let positions: Vec<_> = positions.flatten().collect();
+                let alpha = if positions.len() > 300 { 0.55 } else { 0.85 };
                 // Points within half a pixel of each other are drawn once.
                 let mut seen = BTreeSet::new();
-                for place in places {
-                    if seen.insert((place.0 / (PIXEL / 2), place.1 / (PIXEL / 2))) && inside.holds(place) {
-                        pen.marker(marker, place, Paint(self.ink.rgb(), alpha));
+                for position in positions {
+                    if seen.insert((position.0 / (PIXEL / 2), position.1 / (PIXEL / 2)))
+                        && inside.holds(position)
+                    {
+                        pen.marker(marker, position, Paint(self.ink.rgb(), alpha));
                     }
                 }
             }
-            _ => runs(places).into_iter().for_each(|run| self.draw_run(run, pen)),
+            _ => runs(positions).into_iter().for_each(|run| self.draw_run(run, pen)),
         }
     }
 
@@ -275,26 +278,27 @@ impl Drawn<'_> {
         if let Some(marker) = self.marker {
             let all = self.series.points.len() <= POINTS_WITH_MARKER;
             let mut next = i32::MIN;
-            for &place in &run {
-                if all || place.0 >= next {
-                    pen.marker(marker, place, paint);
-                    next = place.0 + MARKER_DISTANCE * PIXEL;
+            for &position in &run {
+                if all || position.0 >= next {
+                    pen.marker(marker, position, paint);
+                    next = position.0 + MARKER_DISTANCE * PIXEL;
                 }
             }
         }
         match run[..] {
             // A single point between gaps would be invisible as a line.
-            [place] if self.marker.is_none() => pen.marker(Marker::Circle, place, paint),
+            [position] if self.marker.is_none() => pen.marker(Marker::Circle, position, paint),
             _ => pen.line(&thinned(run), paint, BOLD, self.dash),
         }
     }
 
     fn draw_bounds(&self, inside: &Inside, pen: &mut Pen) {
         let bounded = self.series.points.iter().zip(&self.series.bounds);
-        let places = bounded.map(|([x, _], [low, high])| inside.place(*x, *low).zip(inside.place(*x, *high)));
+        let positions =
+            bounded.map(|([x, _], [low, high])| inside.position(*x, *low).zip(inside.position(*x, *high)));
         let color = self.ink.rgb();
         if self.series.mark == Mark::Points {
-            for ((x, low), (_, high)) in places.flatten() {
+            for ((x, low), (_, high)) in positions.flatten() {
                 let cap = 3 * PIXEL;
                 for ends in [
                     [(x, low), (x, high)],
@@ -306,7 +310,7 @@ impl Drawn<'_> {
             }
             return;
         }
-        for run in runs(places) {
+        for run in runs(positions) {
             let mut outline = thinned(run.iter().map(|(_, high)| *high).collect());
             outline.extend(thinned(run.iter().map(|(low, _)| *low).collect()).into_iter().rev());
             pen.polygon(&outline, Paint(color, 0.2));
@@ -315,12 +319,12 @@ impl Drawn<'_> {
 }
 
 /// Runs without gaps.
-fn runs<T>(places: impl Iterator<Item = Option<T>>) -> Vec<Vec<T>> {
+fn runs<T>(positions: impl Iterator<Item = Option<T>>) -> Vec<Vec<T>> {
     let mut runs = Vec::new();
     let mut run = Vec::new();
-    for place in places {
-        match place {
-            Some(place) => run.push(place),
+    for position in positions {
+        match position {
+            Some(position) => run.push(position),
             None if run.is_empty() => {}
             None => runs.push(std::mem::take(&mut run)),
         }

@@ -123,8 +123,8 @@ impl Histogram {
                 let Some((first, last)) = held else { continue };
                 for (bin, &count) in counts.iter().enumerate().take(last + 1).skip(first) {
                     let ends = [
-                        inside.place(bins.edges[bin], count as f64),
-                        inside.place(bins.edges[bin + 1], count as f64),
+                        inside.position(bins.edges[bin], count as f64),
+                        inside.position(bins.edges[bin + 1], count as f64),
                     ];
                     outline.extend(ends.into_iter().flatten());
                 }

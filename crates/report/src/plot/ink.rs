@@ -84,10 +84,10 @@ impl ColorMap {
     /// RGB colour at a fraction of the range, clamped to 0..1.
     pub fn at(self, fraction: f64) -> [u8; 3] {
         let table = self.table();
-        let place = fraction.clamp(0.0, 1.0) * (table.len() - 1) as f64;
+        let position = fraction.clamp(0.0, 1.0) * (table.len() - 1) as f64;
         // NaN becomes 0; callers exclude it.
-        let below = (place as usize).min(table.len() - 2);
-        let part = place - below as f64;
+        let below = (position as usize).min(table.len() - 2);
+        let part = position - below as f64;
         std::array::from_fn(|channel| {
             let [low, high] = [table[below][channel], table[below + 1][channel]].map(f64::from);
             (low + (high - low) * part).round() as u8

@@ -130,12 +130,12 @@ impl PlanPath {
         let mut unknown: Vec<Vec<Point>> = Vec::new();
         let mut shades: Vec<Vec<Vec<Point>>> = vec![Vec::new(); SHADES + 1];
         for run in self.runs(inside) {
-            if let [(place, value)] = run[..] {
+            if let [(position, value)] = run[..] {
                 let paint =
                     colors.fraction(value).map_or(Paint::text(0.3), |fraction| colors.paint(fraction));
-                pen.marker(Marker::Circle, place, paint);
+                pen.marker(Marker::Circle, position, paint);
             }
-            rim.push(run.iter().map(|(place, _)| *place).collect());
+            rim.push(run.iter().map(|(position, _)| *position).collect());
             let mut last = None;
             for pair in run.windows(2) {
                 // The piece between two points shows their mean value.
@@ -166,22 +166,22 @@ impl PlanPath {
         let mut runs: Vec<Vec<(Point, f64)>> = vec![Vec::new()];
         for (index, [x, y]) in self.points.iter().enumerate() {
             let value = self.values.get(index).copied().unwrap_or(f64::NAN);
-            let Some(place) = inside.place(*x, *y) else {
+            let Some(position) = inside.position(*x, *y) else {
                 runs.push(Vec::new());
                 continue;
             };
             let Some(run) = runs.last_mut() else { continue };
             match run.last_mut() {
                 Some((before, kept))
-                    if (place.0 - before.0).abs() < NEAR
-                        && (place.1 - before.1).abs() < NEAR
+                    if (position.0 - before.0).abs() < NEAR
+                        && (position.1 - before.1).abs() < NEAR
                         && kept.is_nan() == value.is_nan() =>
                 {
                     if value.abs() > kept.abs() {
                         *kept = value;
                     }
                 }
-                _ => run.push((place, value)),
+                _ => run.push((position, value)),
             }
         }
         runs.retain(|run| !run.is_empty());

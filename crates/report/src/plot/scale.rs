@@ -81,23 +81,30 @@ impl Scale {
     /// Scale with a given range.
     pub(super) fn between(low: f64, high: f64, log: bool, ticks: usize) -> Self {
         if log {
-            let places = log_ticks(low, high, ticks);
+            let positions = log_ticks(low, high, ticks);
             let decade = (high / low).log10() / ticks.max(1) as f64;
-            let minor = if decade < 1.0 { minor_ticks(low, high, &places) } else { Vec::new() };
+            let minor = if decade < 1.0 { minor_ticks(low, high, &positions) } else { Vec::new() };
             // Same style for all labels of an axis.
-            let plain = places.iter().all(|&place| (1e-3..1e5).contains(&place));
-            let label = |place: f64| if plain { format!("{place}") } else { power(place) };
-            Self { low, high, log, ticks: places.iter().map(|&place| (place, label(place))).collect(), minor }
+            let plain = positions.iter().all(|&position| (1e-3..1e5).contains(&position));
+            let label = |position: f64| if plain { format!("{position}") } else { power(position) };
+            Self {
+                low,
+                high,
+                log,
+                ticks: positions.iter().map(|&position| (position, label(position))).collect(),
+                minor,
+            }
         } else {
-            let places = linear_ticks(low, high, ticks);
-            let labels = linear_labels(&places);
-            Self { low, high, log, ticks: places.into_iter().zip(labels).collect(), minor: Vec::new() }
+            let positions = linear_ticks(low, high, ticks);
+            let labels = linear_labels(&positions);
+            Self { low, high, log, ticks: positions.into_iter().zip(labels).collect(), minor: Vec::new() }
         }
     }
 
     /// Scale for categories at 0, 1, 2, …
     pub(super) fn named(names: &[String]) -> Self {
-        let ticks = names.iter().enumerate().map(|(place, name)| (place as f64, name.clone())).collect();
+        let ticks =
+            names.iter().enumerate().map(|(position, name)| (position as f64, name.clone())).collect();
         Self { low: -0.5, high: names.len().max(1) as f64 - 0.5, log: false, ticks, minor: Vec::new() }
     }
 
@@ -125,14 +132,14 @@ pub fn linear_ticks(low: f64, high: f64, wanted: usize) -> Vec<f64> {
     }
     let (factor, exponent) = step(span / wanted.max(1) as f64);
     // Ticks are exact: an integer times or divided by a power of ten, so that 0.3 is 0.3.
-    let place = |count: f64| {
+    let position = |count: f64| {
         if exponent < 0 {
             count * factor / 10f64.powi(-exponent)
         } else {
             count * factor * 10f64.powi(exponent)
         }
     };
-    let width = place(1.0);
+    let width = position(1.0);
     let (first, last) = ((low / width - 1e-9).ceil(), (high / width + 1e-9).floor());
     if width == 0.0 || first.abs().max(last.abs()) > 1e15 {
         return vec![low, high];
@@ -142,7 +149,7 @@ pub fn linear_ticks(low: f64, high: f64, wanted: usize) -> Vec<f64> {
         return linear_ticks(low, high, wanted + 1);
     }
     let count = (last - first) as usize;
-    (0..=count).map(|i| place(first + i as f64) + 0.0).collect()
+    (0..=count).map(|i| position(first + i as f64) + 0.0).collect()
 }
 
 /// Powers of ten in a positive range, thinned if there are too many; with twos and fives if there are few, and round linear numbers
@@ -164,14 +171,15 @@ pub fn log_ticks(low: f64, high: f64, wanted: usize) -> Vec<f64> {
         let stride = (decades as usize + 1).div_ceil(wanted.max(2)) as i32;
         return (first..=last).filter(|power| power.rem_euclid(stride) == 0).map(ten).collect();
     }
-    let inside =
-        |place: &f64| place.is_finite() && *place >= low * (1.0 - 1e-9) && *place <= high * (1.0 + 1e-9);
-    let places: Vec<f64> = (first - 1..=last)
+    let inside = |position: &f64| {
+        position.is_finite() && *position >= low * (1.0 - 1e-9) && *position <= high * (1.0 + 1e-9)
+    };
+    let positions: Vec<f64> = (first - 1..=last)
         .flat_map(|power| [1.0, 2.0, 5.0].map(|factor| factor * ten(power)))
-        .map(|place| format!("{place:.3e}").parse().unwrap_or(place))
+        .map(|position| format!("{position:.3e}").parse().unwrap_or(position))
         .filter(inside)
         .collect();
-    if places.len() >= 3 { places } else { linear_ticks(low, high, wanted) }
+    if positions.len() >= 3 { positions } else { linear_ticks(low, high, wanted) }
 }
 
 /// 10^power; negative powers by division, which is more accurate.
@@ -184,8 +192,8 @@ fn minor_ticks(low: f64, high: f64, ticks: &[f64]) -> Vec<f64> {
     let (first, last) = (low.log10().floor() as i32, high.log10().ceil() as i32);
     (first..last)
         .flat_map(|power| (2..10).map(move |factor| f64::from(factor) * ten(power)))
-        .filter(|place| (low..=high).contains(place))
-        .filter(|place| ticks.iter().all(|tick| (tick / place - 1.0).abs() > 1e-6))
+        .filter(|position| (low..=high).contains(position))
+        .filter(|position| ticks.iter().all(|tick| (tick / position - 1.0).abs() > 1e-6))
         .collect()
 }
 
@@ -202,9 +210,9 @@ fn step(size: f64) -> (f64, i32) {
 }
 
 /// Labels with enough digits to distinguish the ticks; with exponents for very small or large numbers.
-fn linear_labels(places: &[f64]) -> Vec<String> {
-    let size = places.iter().fold(0.0f64, |size, place| size.max(place.abs()));
-    let width = match places {
+fn linear_labels(positions: &[f64]) -> Vec<String> {
+    let size = positions.iter().fold(0.0f64, |size, position| size.max(position.abs()));
+    let width = match positions {
         [first, second, ..] => (second - first).abs(),
         _ => size,
     };
@@ -212,21 +220,21 @@ fn linear_labels(places: &[f64]) -> Vec<String> {
     if size >= 1e6 || (size > 0.0 && size < 1e-3) {
         let digits = usize::try_from(exponent(size) - exponent(width)).unwrap_or(0).min(15);
         let power = exponent(size);
-        return places
+        return positions
             .iter()
-            .map(|place| match *place {
+            .map(|position| match *position {
                 0.0 => "0".to_owned(),
-                place => format!("{:.digits$}·10{}", place / 10f64.powi(power), raised(power)),
+                position => format!("{:.digits$}·10{}", position / 10f64.powi(power), raised(power)),
             })
             .collect();
     }
     let decimals = usize::try_from(-exponent(width)).unwrap_or(0).min(15);
-    places.iter().map(|place| format!("{place:.decimals$}")).collect()
+    positions.iter().map(|position| format!("{position:.decimals$}")).collect()
 }
 
 /// `10⁻⁶`, `2·10⁻⁶`.
-fn power(place: f64) -> String {
-    let text = format!("{place:.0e}");
+fn power(position: f64) -> String {
+    let text = format!("{position:.0e}");
     match text.split_once('e') {
         Some(("1", exponent)) => format!("10{}", raised(exponent.parse().unwrap_or(0))),
         Some((factor, exponent)) => format!("{factor}·10{}", raised(exponent.parse().unwrap_or(0))),

@@ -1,11 +1,12 @@
 //! The table over arms.
 
+use truegrind_calibration::diagnosis::cause_kind::CauseKind;
 use truegrind_report::fleet::{Cause, Row, cause_table, document, json, ranks, summary, table};
 use truegrind_report::format::{csv, markdown, terminal};
 
-fn cause(effect: &str, worth_mm: f64, identified: bool) -> Cause {
+fn cause(effect: CauseKind, worth_mm: f64, identified: bool) -> Cause {
     Cause {
-        effect: effect.to_owned(),
+        effect,
         place: "joint 2".to_owned(),
         sentence: format!("{effect} of joint 2"),
         identified,
@@ -36,8 +37,13 @@ fn the_arm_with_most_to_gain_comes_first() {
     let rows = [
         row("quiet.csv", 0.4, 0.3, vec![]),
         Row::failed("lost.csv".to_owned(), "no column q1".to_owned()),
-        row("worn.csv", 2.0, 0.2, vec![cause("backlash", 0.9, false), cause("joint-compliance", 0.5, true)]),
-        row("same.csv", 0.4, 0.3, vec![cause("backlash", 0.1, true)]),
+        row(
+            "worn.csv",
+            2.0,
+            0.2,
+            vec![cause(CauseKind::Backlash, 0.9, false), cause(CauseKind::JointCompliance, 0.5, true)],
+        ),
+        row("same.csv", 0.4, 0.3, vec![cause(CauseKind::Backlash, 0.1, true)]),
     ];
     assert_eq!(ranks(&rows), [Some(2), None, Some(1), Some(3)]);
     let text = csv::table(&table(&rows));
@@ -51,7 +57,7 @@ fn the_arm_with_most_to_gain_comes_first() {
     let causes = csv::table(&cause_table(&rows));
     assert!(causes.contains("backlash,2,1,0.9,\"worn.csv, joint 2\""), "{causes}");
     // Two joints of one arm are one arm.
-    let two = vec![cause("backlash", 0.3, true), cause("backlash", 0.2, true)];
+    let two = vec![cause(CauseKind::Backlash, 0.3, true), cause(CauseKind::Backlash, 0.2, true)];
     let causes = csv::table(&cause_table(&[row("both.csv", 1.0, 0.1, two)]));
     assert!(causes.contains("backlash,1,1,0.3,"), "{causes}");
     assert_eq!(json(&rows)["arms"][2]["rank"], 1);

@@ -180,9 +180,9 @@ fn between(
     })
 }
 
-/// The last link and the flange behind it; the link takes as much of the flange as it can represent.
+/// The last link and the flange after it; the link takes as much of the flange as it can represent.
 fn last(flange: &Pose) -> (LinkSheet, Pose) {
-    let place = flange.translation.vector;
+    let position = flange.translation.vector;
     let z = flange.rotation * Vector3::z();
     let x = flange.rotation * Vector3::x();
     let upright = z.x.hypot(z.y) < 1e-12;
@@ -194,7 +194,7 @@ fn last(flange: &Pose) -> (LinkSheet, Pose) {
     let link = LinkSheet {
         model: LinkModel::Dh,
         a_mm: 0.0,
-        d_mm: zero_if_tiny(place.z),
+        d_mm: zero_if_tiny(position.z),
         alpha_deg: alpha.to_degrees(),
         theta_deg: zero_if_tiny(theta.to_degrees()),
         beta_deg: 0.0,
@@ -213,16 +213,16 @@ impl FittedLinks {
         }
         // No sign before zero.
         let rounded = |value: f64, to: f64| (value / to).round() * to + 0.0;
-        let place = self.base.translation.vector.map(|mm| rounded(mm, 1e-3));
+        let position = self.base.translation.vector.map(|mm| rounded(mm, 1e-3));
         let [roll, pitch, yaw] = {
             let (r, p, y) = self.base.rotation.euler_angles();
             [r, p, y].map(|angle| rounded(angle.to_degrees(), 1e-4))
         };
-        if place.amax() >= SHOWN[0] || [roll, pitch, yaw].iter().any(|angle| angle.abs() >= SHOWN[1]) {
+        if position.amax() >= SHOWN[0] || [roll, pitch, yaw].iter().any(|angle| angle.abs() >= SHOWN[1]) {
             parts.push(format!(
                 "axis 1 is not the z axis of the file's base: positions are those of a base on axis 1, which lies at \
                  ({:.3}, {:.3}, {:.3}) mm in the file's, turned by roll {roll:.4}°, pitch {pitch:.4}°, yaw {yaw:.4}°",
-                place.x, place.y, place.z
+                position.x, position.y, position.z
             ));
         }
         (!parts.is_empty()).then(|| parts.join("; "))

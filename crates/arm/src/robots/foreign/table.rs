@@ -80,7 +80,7 @@ impl<'a> Table<'a> {
         self.rows[row].1.get(column).copied().unwrap_or_default()
     }
 
-    fn place(&self, row: usize, column: usize) -> String {
+    fn location(&self, row: usize, column: usize) -> String {
         format!("line {}, column {}", self.rows[row].0, self.header[column])
     }
 
@@ -89,7 +89,7 @@ impl<'a> Table<'a> {
         let plain = if self.decimal_comma { text.replace(',', ".") } else { text.to_owned() };
         plain.replace('\u{2212}', "-").parse().ok().filter(|value: &f64| value.is_finite()).ok_or_else(|| {
             let found = if text.is_empty() { "an empty cell".to_owned() } else { format!("`{text}`") };
-            foreign_error(self.file, self.place(row, column), found, "a finite number", "correct the cell")
+            foreign_error(self.file, self.location(row, column), found, "a finite number", "correct the cell")
         })
     }
 
@@ -168,7 +168,7 @@ impl<'a> Table<'a> {
                 let found = format!("`{}`, and `{first}` above", self.cell(row, column));
                 return Err(foreign_error(
                     self.file,
-                    self.place(row, column),
+                    self.location(row, column),
                     found,
                     EXPECTED,
                     "a table is of one convention",
@@ -180,7 +180,7 @@ impl<'a> Table<'a> {
             "modified" => Ok(true),
             other => Err(foreign_error(
                 self.file,
-                self.place(0, column),
+                self.location(0, column),
                 format!("`{other}`"),
                 EXPECTED,
                 "write one of the two",

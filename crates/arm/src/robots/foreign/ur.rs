@@ -1,7 +1,7 @@
 //! The calibration of a Universal Robots arm: its controller's `calibration.conf`, and the kinematics file that ROS drivers take
 //! from it (`ur_calibration`).
 //!
-//! The first holds deviations from the maker's table, so it must be told whose: a line `robot = universal-robots-…` above its
+//! The first holds deviations from the maker's table, so it must say whose: a line `robot = universal-robots-…` above its
 //! first section. The second holds the place of each joint in the one before, about whose z it turns; its base is the
 //! controller's ("Base"), its last frame the controller's flange.
 //!
@@ -52,7 +52,7 @@ pub(super) fn read_yaml(text: &str, file: &str) -> Result<ForeignArm, RobotError
             joint = NAMES.iter().position(|name| *name == key);
             continue;
         }
-        let (Some(joint), Some(place)) = (joint, PLACES.iter().position(|name| *name == key)) else {
+        let (Some(joint), Some(column)) = (joint, PLACES.iter().position(|name| *name == key)) else {
             continue;
         };
         let value: Option<f64> = value.parse().ok().filter(|value: &f64| value.is_finite());
@@ -66,9 +66,9 @@ pub(super) fn read_yaml(text: &str, file: &str) -> Result<ForeignArm, RobotError
                 "correct it",
             )
         })?;
-        found[joint][place] = Some(value);
+        found[joint][column] = Some(value);
     }
-    let mut places = [Pose::identity(); 6];
+    let mut poses = [Pose::identity(); 6];
     for (joint, values) in found.iter().enumerate() {
         if let Some(missing) = values.iter().position(Option::is_none) {
             return Err(foreign_error(
@@ -80,10 +80,10 @@ pub(super) fn read_yaml(text: &str, file: &str) -> Result<ForeignArm, RobotError
             ));
         }
         let [x, y, z, roll, pitch, yaw] = values.map(Option::unwrap_or_default);
-        places[joint] = from_rpy(Vector3::new(x, y, z) * 1000.0, [roll, pitch, yaw]);
+        poses[joint] = from_rpy(Vector3::new(x, y, z) * 1000.0, [roll, pitch, yaw]);
     }
     Ok(foreign(
-        places.map(about_z),
+        poses.map(about_z),
         Pose::identity(),
         file,
         "kinematics as the driver read them from the controller",

@@ -1,7 +1,7 @@
 //! URDF: the joints between two links of a tree.
 //!
 //! The arm within the tree is not guessed: a tree with exactly one chain of six moving joints is unambiguous, with the flange in
-//! `tool0` or `flange` if present; any other requires base and tip. Lengths are metres and angles radians; links behind a fixed
+//! `tool0` or `flange` if present; any other requires base and tip. Lengths are metres and angles radians; links after a fixed
 //! joint belong to the link before it, with their masses.
 
 use std::borrow::Cow;
@@ -408,7 +408,7 @@ impl<'a> Tree<'a> {
         }
     }
 
-    /// The joints to the flange, where a link has the name of one; joints behind it belong to a gripper.
+    /// The joints to the flange, where a link has the name of one; joints after it belong to a gripper.
     fn to_flange(&self, base: &'a str) -> Result<Option<Vec<usize>>, RobotError> {
         let named = |link: &str, name: &str| {
             link.strip_suffix(name).is_some_and(|rest| rest.is_empty() || rest.ends_with(['_', '-', '/']))
@@ -502,7 +502,7 @@ impl<'a> Tree<'a> {
         if moving.len() == 6 { Ok(moving) } else { Err(self.not_six(&moving)) }
     }
 
-    /// The path to the flange behind the sixth joint.
+    /// The path to the flange after the sixth joint.
     fn tip_behind(&self, base: &'a str, end: usize) -> Result<Vec<usize>, RobotError> {
         let behind: Vec<&str> = self
             .links_behind(end)
@@ -624,7 +624,7 @@ impl<'a> Tree<'a> {
         let shown = |(link, drawn): &(&str, LinkMesh)| {
             let path = self.path(base, link)?;
             let own = self.moving(&path);
-            // Links behind a gripper joint do not belong to the arm.
+            // Links after a gripper joint do not belong to the arm.
             if !moving.starts_with(&own) {
                 return None;
             }
@@ -645,7 +645,7 @@ impl<'a> Tree<'a> {
         for (link, body) in &self.masses {
             let Some(path) = self.path(base, link) else { continue };
             let own = self.moving(&path);
-            // Links behind a gripper joint do not belong to the arm.
+            // Links after a gripper joint do not belong to the arm.
             let Some(place) = moving.iter().position(|joint| own.last() == Some(joint)) else { continue };
             let frame = path.iter().fold(Pose::identity(), |pose, joint| pose * self.joints[*joint].before);
             let centre = frame * Point3::from(body.centre_mm);

@@ -63,20 +63,6 @@ pub fn second_degree(u: &Vector3<f64>) -> [f64; 5] {
 }
 
 impl EmpiricalFault {
-    /// The contract name.
-    pub fn name(self) -> &'static str {
-        match self {
-            EmpiricalFault::Latency { .. } => "latency",
-            EmpiricalFault::ArmUnsettled | EmpiricalFault::SensorUnsettled => "unsettled",
-            EmpiricalFault::NonlinearStiffness { .. } => "joint-stiffness",
-            EmpiricalFault::TwoJointGear { .. } => "gear-two-joints",
-            EmpiricalFault::Refraction => "air-refraction",
-            EmpiricalFault::Pulley => "cable-pulley",
-            EmpiricalFault::Drum { .. } => "cable-drum",
-            EmpiricalFault::TargetNest { .. } => "target-nest",
-        }
-    }
-
     /// The joints concerned (0-based).
     pub fn joints(self) -> Vec<usize> {
         match self {

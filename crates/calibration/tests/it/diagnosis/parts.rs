@@ -13,7 +13,7 @@ use truegrind_calibration::diagnosis::cause::Cause;
 use truegrind_calibration::diagnosis::design::{Design, Linear, Slopes};
 use truegrind_calibration::diagnosis::diagnose::Options;
 use truegrind_calibration::diagnosis::extension::{Extended, Freedom, Subject, fit};
-use truegrind_calibration::diagnosis::held::FoldErrors;
+use truegrind_calibration::diagnosis::held_out::FoldErrors;
 use truegrind_calibration::diagnosis::intervals::scan;
 use truegrind_calibration::diagnosis::levels::piecewise_levels;
 use truegrind_calibration::diagnosis::newton::descend;

@@ -358,7 +358,7 @@ fn compare(hidden: &[Hidden], found: &Diagnosed) -> (usize, usize) {
                 ) => a.joint == b.joint && a.order == b.order,
                 (Cause::Arm(Effect::ThermalDrift(_) | Effect::JointCompliance(_)), _) => false,
                 _ => {
-                    wanted.name() == got.name()
+                    wanted.kind() == got.kind()
                         && wanted.joints() == got.joints()
                         && wanted.rows() == got.rows()
                 }

@@ -136,30 +136,30 @@ pub(super) fn verdict(study: &Study) -> Verdict {
 
 /// Each least-squares method as limited and after convergence.
 pub(super) fn convergence(study: &Study) -> Table {
-    let mut table = Table::new(
+    let rows = study.results.iter().filter_map(|result| Some((result, result.converged.as_ref()?)));
+    let mut table = Table::of(
         title(study, "Stopped and converged"),
-        vec![
-            Column::text("id", ""),
-            Column::number("rmse_mm", "RMSE as limited", "mm", 4),
-            Column::number("iterations", "iterations", "", 1),
-            Column::number("converged_rmse_mm", "converged", "mm", 4),
-            Column::number("converged_iterations", "further steps", "", 1),
-            Column::significant("farthest", "farthest", "", 2),
-            Column::text("converged_ended", "Ended"),
+        &rows.collect::<Vec<_>>(),
+        [
+            (Column::text("id", ""), |(result, _)| result.method.id.as_str().into()),
+            (Column::number("rmse_mm", "RMSE as limited", "mm", 4), |(result, _)| {
+                mean_rmse(&result.outcomes)
+            }),
+            (Column::number("iterations", "iterations", "", 1), |(result, _)| {
+                iterations(&result.outcomes).into()
+            }),
+            (Column::number("converged_rmse_mm", "converged", "mm", 4), |(_, converged)| {
+                mean_rmse(converged)
+            }),
+            (Column::number("converged_iterations", "further steps", "", 1), |(_, converged)| {
+                iterations(converged).into()
+            }),
+            (Column::significant("farthest", "farthest", "", 2), |(_, converged)| {
+                (converged.iter().map(|o| o.farthest).sum::<f64>() / converged.len().max(1) as f64).into()
+            }),
+            (Column::text("converged_ended", "Ended"), |(_, converged)| ended(converged).into()),
         ],
     );
-    for result in &study.results {
-        let Some(converged) = &result.converged else { continue };
-        table.push([
-            result.method.id.as_str().into(),
-            mean_rmse(&result.outcomes),
-            iterations(&result.outcomes).into(),
-            mean_rmse(converged),
-            iterations(converged).into(),
-            (converged.iter().map(|o| o.farthest).sum::<f64>() / converged.len().max(1) as f64).into(),
-            ended(converged).into(),
-        ]);
-    }
     table.notes = vec![
         "Converged: continued on the same cost without fixed damping or a decaying step size. Neither changes the stationary \
          points, so the method itself would end here, often after thousands more iterations along poorly determined \
@@ -180,35 +180,27 @@ fn mean_rmse(outcomes: &[Outcome]) -> Cell {
 
 /// Budgets: passes over the rows, in total and per iteration.
 pub(super) fn cost(study: &Study) -> Table {
-    let mut table = Table::new(
+    let rows =
+        study.results.iter().map(|result| (result, passes(study, result), iterations(&result.outcomes)));
+    let mut table = Table::of(
         title(study, "Budget of each method"),
-        vec![
-            Column::text("id", ""),
-            Column::text("solver", "Solver"),
-            Column::text("treatment", "Treatment"),
-            Column::number("iterations", "iterations", "", 1),
-            Column::number("residual_passes", "residuals", "", 0),
-            Column::number("residual_passes_per_iteration", "each", "", 1),
-            Column::number("jacobian_passes", "Jacobians", "", 0),
-            Column::number("jacobian_passes_per_iteration", "each", "", 1),
-            Column::text("ended", "Ended"),
+        &rows.collect::<Vec<_>>(),
+        [
+            (Column::text("id", ""), |(result, ..)| result.method.id.as_str().into()),
+            (Column::text("solver", "Solver"), |(result, ..)| result.solver.name.into()),
+            (Column::text("treatment", "Treatment"), |(result, ..)| treatment(result).into()),
+            (Column::number("iterations", "iterations", "", 1), |(.., n)| (*n).into()),
+            (Column::number("residual_passes", "residuals", "", 0), |(_, passes, _)| passes.0.into()),
+            (Column::number("residual_passes_per_iteration", "each", "", 1), |(_, passes, n)| {
+                (passes.0 / n).into()
+            }),
+            (Column::number("jacobian_passes", "Jacobians", "", 0), |(_, passes, _)| passes.1.into()),
+            (Column::number("jacobian_passes_per_iteration", "each", "", 1), |(_, passes, n)| {
+                (passes.1 / n).into()
+            }),
+            (Column::text("ended", "Ended"), |(result, ..)| ended(&result.outcomes).into()),
         ],
     );
-    for result in &study.results {
-        let (residuals, jacobians) = passes(study, result);
-        let n = iterations(&result.outcomes);
-        table.push([
-            result.method.id.as_str().into(),
-            result.solver.name.into(),
-            treatment(result).into(),
-            n.into(),
-            residuals.into(),
-            (residuals / n).into(),
-            jacobians.into(),
-            (jacobians / n).into(),
-            ended(&result.outcomes).into(),
-        ]);
-    }
     table.notes = vec![
         "residuals, Jacobians: passes over the rows of the fit, mean over the cases; each: passes per iteration. \
          ukf-vslm-2023 Table VII gives Θ(iterations × rows) for every method; the counted constants differ by orders of \
@@ -261,32 +253,29 @@ pub(crate) fn times(study: &Study) -> Table {
 }
 
 pub(super) fn parameter_table(parameters: &ParameterTable) -> Table {
-    let mut table = Table::new(
+    let rows = parameters.rows.iter().map(|row| (row, handy(row.parameter.unit())));
+    let mut table = Table::of(
         format!("Link parameters by {} {}", parameters.id, parameters.name),
-        vec![
-            Column::text("parameter", "Parameter"),
-            Column::text("unit", "Unit"),
-            Column::number("nominal", "nominal", "", 3),
-            Column::number("compensated", "compensated", "", 3),
-            Column::significant("deviation", "deviation", "", 2),
-            Column::number("paper_deviation", "paper", "", 3),
-            Column::number("determined", "from the data", "", 2),
-            Column::text("observable", "Observable"),
+        &rows.collect::<Vec<_>>(),
+        [
+            (Column::text("parameter", "Parameter"), |(row, _)| row.parameter.to_string().into()),
+            (Column::text("unit", "Unit"), |(_, (_, unit))| (*unit).into()),
+            (Column::number("nominal", "nominal", "", 3), |(row, (scale, _))| (row.nominal * scale).into()),
+            (Column::number("compensated", "compensated", "", 3), |(row, (scale, _))| {
+                ((row.nominal + row.deviation) * scale).into()
+            }),
+            (Column::significant("deviation", "deviation", "", 2), |(row, (scale, _))| {
+                Cell::with_sigma(row.deviation * scale, Some(row.sigma * scale))
+            }),
+            (Column::number("paper_deviation", "paper", "", 3), |(row, (scale, _))| {
+                row.paper.map(|v| v * scale).into()
+            }),
+            (Column::number("determined", "from the data", "", 2), |(row, _)| row.determined.into()),
+            (Column::text("observable", "Observable"), |(row, _)| {
+                if row.is_observable() { "yes" } else { "no" }.into()
+            }),
         ],
     );
-    for row in &parameters.rows {
-        let (scale, unit) = handy(row.parameter.unit());
-        table.push([
-            row.parameter.to_string().into(),
-            unit.into(),
-            (row.nominal * scale).into(),
-            ((row.nominal + row.deviation) * scale).into(),
-            Cell::with_sigma(row.deviation * scale, Some(row.sigma * scale)),
-            row.paper.map(|v| v * scale).into(),
-            row.determined.into(),
-            if row.is_observable() { "yes" } else { "no" }.into(),
-        ]);
-    }
     table.notes = vec![
         "compensated: nominal plus deviation, as entered in a controller; ± is 1σ of the deviation."
             .to_owned(),

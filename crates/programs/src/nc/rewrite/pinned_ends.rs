@@ -34,7 +34,7 @@ impl Task<'_> {
             }
             pinned_axes[at as usize] |= if differ { ALL } else { axes };
             if before.kind != MotionKind::Circular && before.reason().is_none() {
-                before.left =
+                before.own_reason =
                     Some(if circular { Reason::BeforeUnmodifiedArc } else { Reason::BeforeUnmodifiedPath });
             }
             // If the motion before may be skipped, the one before that also ends here.

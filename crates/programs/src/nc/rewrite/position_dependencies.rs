@@ -133,8 +133,8 @@ const ORIGIN: usize = 0;
 const INCREMENT: usize = 1;
 
 impl FileDependencies {
-    fn pin_position(&mut self, why: usize, axis: usize) {
-        self.pinned[why][axis].add(&self.position[axis]);
+    fn pin_position(&mut self, dependency: usize, axis: usize) {
+        self.pinned[dependency][axis].add(&self.position[axis]);
     }
 
     fn pin_origin(&mut self, axis: usize) {
@@ -161,8 +161,10 @@ impl FileDependencies {
             }
             StateEvent::ShiftRestored => self.origin.iter_mut().for_each(|origin| origin.origins = true),
             StateEvent::PositionUsed { axes, read } => {
-                let why = if read { INCREMENT } else { ORIGIN };
-                (0..AXES).filter(|axis| axes & 1 << axis != 0).for_each(|axis| self.pin_position(why, axis));
+                let dependency = if read { INCREMENT } else { ORIGIN };
+                (0..AXES)
+                    .filter(|axis| axes & 1 << axis != 0)
+                    .for_each(|axis| self.pin_position(dependency, axis));
             }
             StateEvent::Branch => self.branch(),
             StateEvent::Join => {
@@ -196,9 +198,9 @@ impl FileDependencies {
 
     /// The motions that must not move, by cause.
     fn pinned_motions(&self) -> [DependencySet; 2] {
-        std::array::from_fn(|why| {
+        std::array::from_fn(|dependency| {
             let mut all = DependencySet::default();
-            for (axis, pinned) in self.pinned[why].iter().enumerate() {
+            for (axis, pinned) in self.pinned[dependency].iter().enumerate() {
                 let none = DependencySet::default();
                 let origins = self.origins.get(axis).unwrap_or(&none);
                 all.join(&pinned.clone().resolved(&self.branches[axis], origins));
@@ -286,7 +288,7 @@ impl Task<'_> {
         if known {
             self.pin_path_dependent_increments(index, state);
         }
-        if known && motion.left.is_none_or(keeps_endpoint) {
+        if known && motion.own_reason.is_none_or(keeps_endpoint) {
             // It is rewritten, or omitted words are restated.
             let dependencies = if moves { Dependencies::on_motion(index) } else { Dependencies::NONE };
             state.position = [dependencies; AXES];

@@ -30,7 +30,7 @@ impl Interpreter<'_, '_> {
             })
     }
 
-    /// Tracks whether the block lies in the contour that a lathe cycle reads.
+    /// Tracks whether the block is in the contour that a lathe cycle reads.
     pub(super) fn contour_of(&mut self, block: &Block<'_>) {
         let number = block.words.iter().take(2).find(|word| word.address() == Some(b'N'));
         let number = number.and_then(|word| self.literal(word)).map(|number| number as u64);

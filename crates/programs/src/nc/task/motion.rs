@@ -28,29 +28,13 @@ impl Interpreter<'_, '_> {
 
     fn new_motion(&mut self, block: &Block<'_>, name: &str, kind: MotionKind) -> Motion {
         let first = block.words.first().map_or(self.tree.nodes[block.node as usize].first, |word| word.first);
+        let (place, statement) = (self.place(first), self.tree.node_span(block.node));
+        let modal = Modal { conf_linear: Switch::Off, conf_joint: Switch::Off, ..Modal::START };
         Motion {
-            place: self.place(first),
-            statement: self.tree.node_span(block.node),
-            instruction: self.instruction(name),
-            kind,
-            targets: Vec::new(),
-            speed: None,
-            zone: None,
-            tool: None,
-            work_object: None,
-            timed: false,
-            insertable: false,
-            can_straighten: false,
             rapid: kind == MotionKind::Joint,
-            accepts_configuration: false,
-            axis: None,
-            by_radius: false,
-            modal: Modal { conf_linear: Switch::Off, conf_joint: Switch::Off, ..Modal::START },
-            in_loop: false,
             conditional: block.skippable,
             previous: self.state.previous,
-            routine: None,
-            left: None,
+            ..Motion::new(place, statement, self.instruction(name), kind, modal)
         }
     }
 
@@ -65,7 +49,7 @@ impl Interpreter<'_, '_> {
     /// Lists a motion that is never modified.
     pub(super) fn list_left(&mut self, block: &Block<'_>, name: &str, reason: Reason) {
         let mut motion = self.new_motion(block, name, MotionKind::Unknown);
-        motion.left = Some(reason);
+        motion.own_reason = Some(reason);
         let context = self.block_context(block, None);
         self.push(motion, context);
         self.state.previous = None;
@@ -232,9 +216,9 @@ impl Interpreter<'_, '_> {
         motion.zone = self.zone();
         motion.tool = Some(self.tool());
         motion.work_object = Some(self.work_object());
-        motion.left = self.reason_to_leave(block, mode, machine, &motion);
-        if corner && motion.left.is_none() {
-            motion.left = Some(Reason::UnsupportedPath);
+        motion.own_reason = self.reason_to_leave(block, mode, machine, &motion);
+        if corner && motion.own_reason.is_none() {
+            motion.own_reason = Some(Reason::UnsupportedPath);
         }
         motion.timed = !self.state.feed.per_minute && kind != MotionKind::Joint;
         let splits = !motion.timed && self.can_split(block, &before);
@@ -373,7 +357,7 @@ impl Interpreter<'_, '_> {
             && call.is_none_or(|call| call == Reason::Cycle)
             && self.state.groups.active_transforms() == 0
             && self.state.unknown_reason(set_before_branch).is_none()
-            && match motion.left {
+            && match motion.own_reason {
                 None | Some(Reason::Skippable | Reason::UnknownFlow | Reason::UnknownWord) => true,
                 Some(Reason::UnsupportedPath) => block.corner,
                 Some(Reason::Cycle) => call.is_some(),

@@ -1,4 +1,4 @@
-//! The predefined functions whose result the text tells: target functions, rotations, arithmetic.
+//! The predefined functions whose result the text determines: target functions, rotations, arithmetic.
 //!
 //! Method: as the RAPID reference says. `Offs` adds in the object frame and keeps the orientation; `RelTool` moves along
 //! the axes of the target's tool frame and then turns about its x, the new y and the new z.

@@ -21,7 +21,7 @@ impl ListingBuilder<'_, '_> {
         };
         if self.position_used || self.position_used_at_entry.iter().any(begins_anywhere) {
             for motion in &mut self.listing.motions {
-                motion.left.get_or_insert(Reason::BeforeDisplacement);
+                motion.own_reason.get_or_insert(Reason::BeforeDisplacement);
             }
         }
     }
@@ -33,11 +33,11 @@ impl ListingBuilder<'_, '_> {
         for (((motion, modal), unit), displaced) in motions.zip(&self.displaced) {
             let states = modal.substitute_entry(entries[*unit as usize]);
             motion.modal = states.modal();
-            if motion.left.is_none() {
+            if motion.own_reason.is_none() {
                 // A known displacement is part of the work object.
                 let unknown = !displaced && states.state(Switch::Displacement) != SwitchState::Off;
                 let offset = states.state(Switch::ExternalOffset) != SwitchState::Off;
-                motion.left = modal_refusal(motion, unknown || offset);
+                motion.own_reason = modal_refusal(motion, unknown || offset);
             }
         }
     }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{ListingBuilder, Literal, literals};
 use crate::dataflow::Nesting;
-use crate::motion::{Declaration, Motion, MotionKind, MotionTarget, Origin, Reason, Role, Routine};
+use crate::motion::{Declaration, Modal, Motion, MotionKind, MotionTarget, Origin, Reason, Role, Routine};
 use crate::rapid::evaluate::{Context, Source};
 use crate::rapid::flow::AbstractState;
 use crate::rapid::instruction::{INSTRUCTIONS, Instruction, Slot};
@@ -38,29 +38,15 @@ impl ListingBuilder<'_, '_> {
 
     fn motion(&mut self, unit: Unit, node: u32, state: &AbstractState, nesting: Nesting) -> Motion {
         let tree = &self.trees[unit.file as usize];
+        let (place, statement) =
+            (self.place(unit.file, tree.nodes[node as usize].first), tree.node_span(node));
         Motion {
-            place: self.place(unit.file, tree.nodes[node as usize].first),
-            statement: tree.node_span(node),
-            instruction: Arc::default(),
-            kind: MotionKind::Unknown,
-            targets: Vec::new(),
-            speed: None,
-            zone: None,
-            tool: None,
-            work_object: None,
-            timed: false,
-            insertable: false,
-            can_straighten: false,
-            rapid: false,
             accepts_configuration: true,
-            axis: None,
-            by_radius: false,
-            modal: crate::motion::Modal::START,
             in_loop: nesting.in_loop,
             conditional: nesting.conditional,
             previous: state.previous,
             routine: self.routine_of(unit),
-            left: None,
+            ..Motion::new(place, statement, Arc::default(), MotionKind::Unknown, Modal::START)
         }
     }
 
@@ -225,10 +211,10 @@ impl ListingBuilder<'_, '_> {
             motion.work_object = Some(self.work_object(unit, state, work_object));
         }
         let complete = to && via && count >= instruction.least();
-        motion.left = self.refusal(&motion, instruction, &options, complete);
+        motion.own_reason = self.refusal(&motion, instruction, &options, complete);
         // Replacing an impure expression would drop its effect. An unknown target is refused for that reason instead.
         let known = motion.targets.iter().all(|target| target.value.is_ok());
-        motion.left = motion.left.or((self.impure && known).then_some(Reason::SideEffect));
+        motion.own_reason = motion.own_reason.or((self.impure && known).then_some(Reason::SideEffect));
         motion
     }
 
@@ -311,7 +297,7 @@ impl ListingBuilder<'_, '_> {
         } else if let Some(moves) = predefined::displaces(name).filter(|_| !late) {
             let mut motion = self.motion(unit, node, state, nesting);
             motion.instruction = display(name).into();
-            motion.left = Some(moves?);
+            motion.own_reason = Some(moves?);
             return Some(motion);
         } else if predefined::effect(name).is_none() || late {
             for argument in arguments(tree, node) {
@@ -334,7 +320,7 @@ impl ListingBuilder<'_, '_> {
             }
             motion.targets.push(target);
         }
-        motion.left = Some(match (late, routine) {
+        motion.own_reason = Some(match (late, routine) {
             (true, _) => Reason::LateBinding,
             (false, Some(_)) => Reason::OwnRoutine,
             (false, None) => Reason::UnknownInstruction,

@@ -324,7 +324,7 @@ fn the_extension_determines_the_dialect_where_the_text_does_not() {
     // DIN/ISO of Heidenhain has other meanings: nothing is changed.
     let task =
         Task::read(&[("a.nc", b"%X G71 *\nN1 G54 X+10 Y+5 *\nN2 G01 X+1 Y+2 Z+3 *\n")], &Setup::default());
-    assert!(task.listing.motions.iter().all(|motion| motion.left == Some(UnknownWord)));
+    assert!(task.listing.motions.iter().all(|motion| motion.own_reason == Some(UnknownWord)));
     // A text that is no program has no motions.
     for text in ["Dear reader,\nnothing here moves.\n", "q1_deg,q2_deg,x_mm\n0,1,2\n3.5,4,5\n"] {
         let task = Task::read(&[("a.txt", text.as_bytes())], &Setup::default());

@@ -227,7 +227,7 @@ proptest! {
             // At the start of a path that is neither line nor arc nothing has moved.
             let path = before.listing.motions.get(index + 1);
             if let Some(path) = path
-                && path.left == Some(UnsupportedPath)
+                && path.own_reason == Some(UnsupportedPath)
                 && !["RND", "G1", "G0"].contains(&&*path.instruction)
             {
                 prop_assert!(!taken(index), "motion {}\n{}\n{}", index, source, text);

@@ -1,6 +1,6 @@
 //! Statements read ahead of their place: the later parts of a large file, on other threads.
 //!
-//! A part begins behind a `;`. Where the parser comes to its first token right in the body of a routine, what was read
+//! A part begins after a `;`. Where the parser comes to its first token right in the body of a routine, what was read
 //! ahead is what it would read there; anywhere else it reads the part itself. What is read ahead ends before the first
 //! thing that is no whole statement without fault.
 

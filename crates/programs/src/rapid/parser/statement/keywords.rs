@@ -45,7 +45,7 @@ impl Token {
             )
     }
 
-    /// Whether a statement begins with it that its keyword tells.
+    /// Whether it begins a statement that this keyword identifies.
     pub(super) fn begins_with_keyword(self) -> bool {
         matches!(
             self,

@@ -64,7 +64,7 @@ pub(super) enum Kind {
 
 /// Destination of an output, links followed.
 #[derive(Debug, Clone)]
-pub(super) struct Place {
+pub(super) struct Destination {
     /// As the user named it.
     pub(super) named: PathBuf,
     /// The file to be written.
@@ -79,16 +79,16 @@ pub(crate) fn is_stdout(path: &Path) -> bool {
     ["-", "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"].iter().any(|name| path == Path::new(name))
 }
 
-impl Place {
+impl Destination {
     /// Resolves the destination of an output.
     ///
     /// # Errors
-    /// It is a folder, a read-only file, or lies in a missing folder.
+    /// It is a folder, a read-only file, or in a missing folder.
     pub(super) fn of(named: &Path) -> anyhow::Result<Self> {
-        let place =
+        let destination =
             |path: &Path, kind, key| Self { named: named.to_path_buf(), path: path.to_path_buf(), kind, key };
         if is_stdout(named) {
-            return Ok(place(Path::new("-"), Kind::Stdout, Some(Key::Stdout)));
+            return Ok(destination(Path::new("-"), Kind::Stdout, Some(Key::Stdout)));
         }
         let meta = match fs::metadata(named) {
             Ok(meta) => meta,
@@ -102,7 +102,7 @@ impl Place {
                 let name =
                     name.with_context(|| format!("{}: expected the name of a file", named.display()))?;
                 let key = Key::New(Identity::of(&folder, &meta), name);
-                return Ok(place(&path, Kind::New, Some(key)));
+                return Ok(destination(&path, Kind::New, Some(key)));
             }
             Err(error) => {
                 return Err(error).with_context(|| format!("{}: cannot be written", named.display()));
@@ -114,7 +114,7 @@ impl Place {
         let identity = Identity::of(named, &meta);
         if !meta.is_file() {
             let key = (!is_device(&meta)).then_some(Key::There(identity));
-            return Ok(place(named, Kind::Stream, key));
+            return Ok(destination(named, Kind::Stream, key));
         }
         if meta.permissions().readonly() {
             bail!("{} is read-only and is not overwritten; name another output", named.display());
@@ -131,8 +131,8 @@ impl Place {
             return Self::of(named);
         }
         Ok(match real {
-            Some(real) => place(&real, Kind::Over(meta), Some(Key::There(identity))),
-            None => place(named, Kind::Stream, Some(Key::There(identity))),
+            Some(real) => destination(&real, Kind::Over(meta), Some(Key::There(identity))),
+            None => destination(named, Kind::Stream, Some(Key::There(identity))),
         })
     }
 

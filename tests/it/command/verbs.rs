@@ -1,0 +1,323 @@
+//! Every verb with its options, for tests that walk all of them.
+
+// Options that several verbs share.
+const ROBOT: [&str; 3] = ["--robot", "--base", "--tip"];
+const DATA: [&str; 6] =
+    ["--points", "--points-within", "--points-ahead", "--sheet", "--angles", "--allow-odd-units"];
+const FIT: [&str; 5] =
+    ["--raw-columns", "--limit-rmse", "--limit-max", "--tolerance-length", "--tolerance-angle"];
+const FRAMES: [&str; 4] = ["--sensor-frame", "--outlet", "--cable-zero", "--touched-point"];
+const COMMON: [&str; 2] = ["--seed", "--threads"];
+const SHARES: [&str; 5] = ["--shard", "--resume", "--work", "--units", "--list-units"];
+const PROGRAMS: [&str; 3] = ["--each", "--together", "--outside"];
+
+/// A verb as it is walked.
+pub(super) struct Verb {
+    /// The verb and its inputs; `{out}` stands for nothing yet.
+    pub(super) base: &'static [&'static str],
+    /// Files that it reads, those that its files name among them.
+    pub(super) inputs: &'static [&'static str],
+    /// Options that name an output.
+    pub(super) outputs: &'static [&'static str],
+    /// What it needs where another output is tried: `-o FILE` or what stands for it.
+    pub(super) needs: &'static [&'static str],
+    /// Options that name an input or no file.
+    pub(super) others: &'static [&'static [&'static str]],
+}
+
+pub(super) const CELL: [&str; 4] = ["--cell", "--surface", "--payload", "--payload-centre"];
+
+pub(super) fn verbs() -> Vec<Verb> {
+    vec![
+        Verb {
+            base: &["simulate", "recipe.toml"],
+            inputs: &["recipe.toml", "robot.toml"],
+            outputs: &["-o", "--arm"],
+            needs: &["-o", "made"],
+            others: &[&["--seed"]],
+        },
+        Verb {
+            base: &["export", "model.toml", "--to", "urdf", "--data", "data.csv", "--robot", "robot.toml"],
+            inputs: &["model.toml", "data.csv", "robot.toml"],
+            outputs: &["-o"],
+            needs: &["-o", "made.urdf"],
+            others: &[&ROBOT, &["--to", "--data"]],
+        },
+        Verb {
+            base: &["robots", "--check", "robot.toml"],
+            inputs: &["robot.toml"],
+            outputs: &["-o", "--html"],
+            needs: &[],
+            others: &[&["--check", "--base", "--tip", "--ground-joint-3"]],
+        },
+        Verb {
+            base: &["measurement", "template", "--robot", "robot.toml"],
+            inputs: &["robot.toml"],
+            outputs: &["-o"],
+            needs: &[],
+            others: &[&["--base", "--tip"]],
+        },
+        Verb {
+            base: &[
+                "accept",
+                "later.csv",
+                "--model",
+                "model.toml",
+                "--tolerance",
+                "1",
+                "--robot",
+                "robot.toml",
+            ],
+            inputs: &["later.csv", "model.toml", "robot.toml"],
+            outputs: &["--json", "--csv", "--parquet", "--md", "--html"],
+            needs: &[],
+            others: &[
+                &ROBOT,
+                &FRAMES,
+                &COMMON,
+                &[
+                    "--model",
+                    "--tolerance",
+                    "--sensor-uncertainty",
+                    "--tolerance-angle",
+                    "--sensor-uncertainty-angle",
+                    "--serial",
+                    "--points",
+                    "--points-within",
+                    "--points-ahead",
+                    "--sheet",
+                    "--allow-odd-units",
+                ],
+            ],
+        },
+        Verb {
+            base: &["identify", "data.csv", "--robot", "robot.toml"],
+            inputs: &["data.csv", "robot.toml"],
+            outputs: &["-o", "--json", "--csv", "--parquet", "--md", "--html", "--rrd"],
+            needs: &[],
+            others: &[
+                &ROBOT,
+                &DATA,
+                &FIT,
+                &FRAMES,
+                &COMMON,
+                &["--method", "--held-out", "--compare-methods", "--frame-sigma", "--allow-doubtful"],
+            ],
+        },
+        Verb {
+            base: &["diagnose", "data.csv", "--robot", "robot.toml", "--also", "other.csv"],
+            inputs: &["data.csv", "robot.toml", "other.csv"],
+            outputs: &["-o", "--json", "--csv", "--parquet", "--md", "--html", "--rrd"],
+            needs: &[],
+            others: &[
+                &ROBOT,
+                &DATA,
+                &FIT,
+                &FRAMES,
+                &COMMON,
+                &SHARES,
+                &["--alpha", "--most", "--blocks", "--smooth", "--also", "--frame-sigma", "--allow-doubtful"],
+            ],
+        },
+        Verb {
+            base: &[
+                "plan",
+                "--robot",
+                "robot.toml",
+                "--sensor",
+                "cable",
+                "--outlet",
+                "750,200,40",
+                "--for",
+                "why.json",
+            ],
+            inputs: &["robot.toml", "why.json"],
+            outputs: &["-o", "--json", "--csv", "--parquet", "--md", "--html", "--rrd"],
+            needs: &[],
+            others: &[
+                &ROBOT,
+                &FRAMES,
+                &COMMON,
+                &[
+                    "--sensor",
+                    "--poses",
+                    "--for",
+                    "--finding",
+                    "--index",
+                    "--sigma",
+                    "--sigma-angle",
+                    "--box",
+                    "--range",
+                    "--clearance",
+                    "--keep-out",
+                    "--floor",
+                    "--link-radius",
+                    "--margin",
+                    "--singularity",
+                    "--repeats",
+                    "--both-sides",
+                    "--warm-up",
+                    "--approach",
+                    "--settle",
+                    "--seconds-per-row",
+                    "--speed",
+                    "--decisive",
+                    "--candidates",
+                ],
+            ],
+        },
+        Verb {
+            base: &["compare", "data.csv", "--robot", "robot.toml", "--experiment", "mine.toml"],
+            inputs: &["data.csv", "robot.toml", "mine.toml"],
+            outputs: &["--times", "--json", "--csv", "--parquet", "--md", "--html", "--rrd"],
+            needs: &[],
+            others: &[
+                &ROBOT,
+                &COMMON,
+                &[
+                    "--experiment",
+                    "--list",
+                    "--rows",
+                    "--sheet",
+                    "--angles",
+                    "--allow-odd-units",
+                    "--timings",
+                ],
+            ],
+        },
+        Verb {
+            base: &["track", "data.csv", "--model", "model.toml", "--robot", "robot.toml"],
+            inputs: &["data.csv", "model.toml", "robot.toml"],
+            outputs: &["--state", "--json", "--csv", "--parquet", "--md", "--html", "--rrd"],
+            needs: &[],
+            others: &[
+                &ROBOT,
+                &COMMON,
+                &[
+                    "--model",
+                    "--output",
+                    "--follow",
+                    "--date",
+                    "--first-poses",
+                    "--sigma",
+                    "--drift",
+                    "--angles",
+                    "--allow-odd-units",
+                ],
+            ],
+        },
+        Verb {
+            base: &["track", "days", "--model", "model.toml", "-o", "made-tracks"],
+            inputs: &["days/one.csv", "days/two.csv"],
+            outputs: &["--state", "--json", "--csv", "--parquet", "--md", "--html", "--rrd"],
+            needs: &[],
+            others: &[],
+        },
+        Verb {
+            base: &["path", "plate.toml", "--robot", "robot.toml"],
+            inputs: &["plate.toml", "plate.stl", "robot.toml"],
+            outputs: &["-o"],
+            needs: &[],
+            others: &[&ROBOT, &["--inline"]],
+        },
+        Verb {
+            base: &[
+                "compensate",
+                "a.mod",
+                "--model",
+                "model.toml",
+                "--robot",
+                "robot.toml",
+                "--cell",
+                "cell.toml",
+                "--surface",
+                "plate.toml",
+            ],
+            inputs: &["a.mod", "model.toml", "robot.toml", "cell.toml", "plate.toml", "plate.stl"],
+            outputs: &["-o", "--diff", "--json", "--csv", "--parquet", "--md", "--html", "--rrd"],
+            needs: &["-o", "made.mod"],
+            others: &[
+                &ROBOT,
+                &COMMON,
+                &SHARES,
+                &PROGRAMS,
+                &[
+                    "--model",
+                    "--emit",
+                    "--circles",
+                    "--tolerance",
+                    "--max-correction",
+                    "--joint-targets",
+                    "--flag-open-starts",
+                    "--partial",
+                    "--placement",
+                    "--max-risk",
+                    "--dry-run",
+                    "--check",
+                    "--again",
+                    "--allow-doubtful",
+                    "--brief-records",
+                ],
+            ],
+        },
+        Verb {
+            base: &["cell", "a.mod", "--robot", "robot.toml"],
+            inputs: &["a.mod", "robot.toml"],
+            outputs: &["-o"],
+            needs: &[],
+            others: &[&ROBOT, &PROGRAMS],
+        },
+        Verb {
+            base: &["compensate", "task.pgf", "--model", "model.toml"],
+            inputs: &["task.pgf", "listed.mod", "other.mod", "model.toml"],
+            outputs: &["--diff", "--json", "--csv", "--md", "--html"],
+            needs: &["-o", "made-folder"],
+            others: &[],
+        },
+        Verb {
+            base: &["compensate", "days", "--model", "model.toml"],
+            inputs: &["days/b.mod", "days/c.mod", "model.toml"],
+            outputs: &["--diff", "--json", "--csv", "--md", "--html"],
+            needs: &["-o", "made-folder"],
+            others: &[],
+        },
+        Verb {
+            base: &["gather", "shared"],
+            inputs: &["a.mod"],
+            outputs: &["--diff", "--json", "--csv", "--parquet", "--md", "--html"],
+            needs: &[],
+            others: &[&["--threads"]],
+        },
+        Verb {
+            base: &[
+                "deviation",
+                "a.mod",
+                "--model",
+                "model.toml",
+                "--robot",
+                "robot.toml",
+                "--cell",
+                "cell.toml",
+                "--surface",
+                "plate.toml",
+                "--intended",
+                "a2.mod",
+                "--actual",
+                "actual.toml",
+            ],
+            inputs: &[
+                "a.mod",
+                "a2.mod",
+                "model.toml",
+                "robot.toml",
+                "cell.toml",
+                "plate.toml",
+                "plate.stl",
+                "actual.toml",
+            ],
+            outputs: &["--json", "--csv", "--parquet", "--md", "--html", "--rrd"],
+            needs: &[],
+            others: &[&ROBOT, &COMMON, &SHARES, &PROGRAMS, &["--model", "--intended", "--actual"]],
+        },
+    ]
+}
