@@ -131,33 +131,38 @@ pub fn select(subject: &Subject<'_>, options: &Options, progress: &(dyn Fn(&str)
         causes.push(cause.clone());
         let count = current.causes.len();
         current = Arc::new(warm_fit(subject, &causes, Freedom::All, Some(&current)));
-        for _ in 0..options.most {
-            let unsure: Vec<usize> = (0..current.causes.len())
-                .filter(|&k| contains_cause(&to_review, &current.causes[k]))
-                .collect();
-            if unsure.is_empty() {
-                break;
-            }
-            let scores = CandidateScores::of(&catalogue, subject, Arc::clone(&current));
-            match review(
-                &scores,
-                options,
-                &unsure,
-                &ReviewOptions { listed_only: true, margin: EXCHANGE_MARGIN },
-            ) {
-                Review::Changed(settled) => current = Arc::new(*settled),
-                Review::Settled(_) => {
-                    known = Some(scores);
-                    break;
-                }
-            }
-        }
+        (current, known) = reviewed(&catalogue, subject, current, options, &to_review);
         if current.causes.len() <= count && !contains_cause(&current.causes, &cause) {
             // The new cause did not survive the review: it is banned.
             banned.push(cause);
         }
     }
     final_selection(&catalogue, subject, geometric, current)
+}
+
+/// The fit after reviews of some causes until they settle, with the scores of the last review.
+fn reviewed<'a>(
+    catalogue: &'a Catalogue,
+    subject: &'a Subject<'a>,
+    mut current: Arc<Extended>,
+    options: &Options,
+    to_review: &[Cause],
+) -> (Arc<Extended>, Option<CandidateScores<'a>>) {
+    let listed = ReviewOptions { listed_only: true, margin: EXCHANGE_MARGIN };
+    for _ in 0..options.most {
+        let causes = current.causes.iter().enumerate();
+        let unsure: Vec<usize> =
+            causes.filter(|(_, cause)| contains_cause(to_review, cause)).map(|(k, _)| k).collect();
+        if unsure.is_empty() {
+            break;
+        }
+        let scores = CandidateScores::of(catalogue, subject, Arc::clone(&current));
+        match review(&scores, options, &unsure, &listed) {
+            Review::Changed(settled) => current = Arc::new(*settled),
+            Review::Settled(_) => return (current, Some(scores)),
+        }
+    }
+    (current, None)
 }
 
 /// The final result if the iteration limit is reached: the current state without further changes.

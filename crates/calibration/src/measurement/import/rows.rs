@@ -68,18 +68,15 @@ pub(super) fn dataset(
     let headed = reader.header.cells.iter().filter(|c| !c.is_empty()).count();
     let width = reader.header.cells.len().max(table.width);
     let nameless = (width - headed).max(unnamed) + table.blank_columns;
-    if nameless > 0 {
-        notes.push(format!("{nameless} column(s) without a header skipped"));
-    }
-    if blank > 0 {
-        notes.push(format!("{blank} blank row(s) skipped"));
-    }
-    if as_text > 0 {
-        notes.push(format!("{as_text} number(s) stored as text were read as numbers"));
-    }
-    if let Some(note) = number_anchors(&mut rows) {
-        notes.push(note);
-    }
+    let counted = [
+        (nameless, "column(s) without a header skipped"),
+        (blank, "blank row(s) skipped"),
+        (as_text, "number(s) stored as text were read as numbers"),
+    ];
+    notes.extend(
+        counted.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}")),
+    );
+    notes.extend(number_anchors(&mut rows));
     check_outlets(&reader, &rows)?;
     if !options.allow_odd_units {
         check_units(&reader, &rows, columns.sensor)?;
