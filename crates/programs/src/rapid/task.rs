@@ -28,7 +28,7 @@ use super::syntax::{RapidTree, Syntax};
 use crate::dataflow::Nesting;
 use crate::motion::load::{Load, Loads};
 use crate::motion::{Listing, OpaqueRegion, Place, Reason, Role};
-use literals::Literals;
+use literals::{Literals, NODES_PER_MOTION};
 
 /// The RAPID modules of one task, read together.
 #[derive(Debug)]
@@ -184,9 +184,6 @@ struct Literal {
     node: u32,
     joints: bool,
 }
-
-/// About as many nodes as a motion with its target written out has, or fewer.
-const NODES_PER_MOTION: usize = 14;
 
 /// Greatest call depth to which the exit states of routines are computed; beyond it they may be anything that the routine sets.
 const CALL_DEPTH: u32 = 12;

@@ -14,6 +14,9 @@ use crate::tree::Child;
 /// Nodes that one thread processes at a time.
 const PORTION: u32 = 1 << 14;
 
+/// About as many nodes as a motion with its target written out has, or fewer.
+pub(super) const NODES_PER_MOTION: usize = 14;
+
 /// The targets, by file and portion of the call, in the order of nodes.
 pub(super) struct Literals {
     read: Vec<Vec<Vec<Read>>>,
@@ -62,7 +65,7 @@ fn read(trees: &[RapidTree<'_>], symbols: &Symbols, file: u32, portion: u32) -> 
     let evaluator = Evaluator::new(trees, symbols);
     let first = portion * PORTION;
     let end = (first + PORTION).min(tree.nodes.len() as u32);
-    let mut out = Vec::new();
+    let mut out = Vec::with_capacity(PORTION as usize / NODES_PER_MOTION);
     for call in first..end {
         let found = tree.nodes[call as usize];
         if found.kind != Syntax::Call {
