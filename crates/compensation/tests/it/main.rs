@@ -330,11 +330,9 @@ fn the_quick_sigma_equals_the_covariance() {
         assert!((slow - quick).abs() < 1e-9 * slow, "{slow} {quick}");
     }
     // Relative to two frames at once, row by row or in lanes: the same bits.
-    let twists =
-        |random: &mut ChaCha8Rng| (0..n).map(|_| Vector6::from_fn(|_, _| random.random_range(-1.0..1.0)));
     let mut frame = || RegisteredFrame {
         origin_mm: Vector3::new(400.0, 20.0, 100.0),
-        twists: twists(&mut random).collect(),
+        twists: (0..n).map(|_| Vector6::from_fn(|_, _| random.random_range(-1.0..1.0))).collect(),
     };
     let frames = [frame(), frame()];
     let chosen = |k: usize| [None, Some(&frames[0]), Some(&frames[1])][k % 3];
