@@ -9,6 +9,11 @@
 //! The same machine at a load of 11 to 16, in memory, one thread, in turn: 3.41 + 0.17 s user and system before rounding, cuts, frames, typical joints,
 //! angles and decimals were worked out once or not at all, 3.23 + 0.13 s after it. On a busy disk, by the clock: 4.42 s, and 3.38 s with one thread
 //! more than processors, which computes while a file is synced.
+//! Since then, in turn with 498b129f, above the priority of all else, in memory: one thread 3.66 s by the clock (3.27 + 0.25 s) before and 3.39 s
+//! (2.97 + 0.21 s) after the posterior of the arm was worked out once for all programs, velocities once for both deviations of a target, and
+//! places, curves and states were no longer searched for and copied; two threads 1.81 and 1.70 s. A motion takes 3.2 µs, system included, and its
+//! file on a disk 0.3 to 0.5 more; 1.5 s on two threads allow 3.0. Flat: lexing 6 %, parsing 3, listing 9, original joints 5, targets 9,
+//! paths 9, edits 7, copying 5, memory 5.
 
 use std::fmt::Write as _;
 use std::fs;

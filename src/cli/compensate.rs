@@ -12,6 +12,7 @@ use anyhow::bail;
 use serde_json::Value;
 use truegrind::compensation::deviation::{After, PathReport};
 use truegrind::compensation::plan::Plan;
+use truegrind::compensation::risk::prepared_estimate::PreparedEstimate;
 use truegrind::programs::reading::{Language, Program};
 use truegrind::report::batch::Ended;
 use truegrind::report::compensation::{self as view, ProgramFile};
@@ -62,12 +63,16 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let stated = arguments.robot.named();
     refuse_compensating_controller(stated)?;
     let (robot, nominal) = inputs::nominal(&model, stated)?;
-    let corrector = match &model {
+    let prepared = match &model {
         NamedModel::Nominal => None,
-        NamedModel::Estimated { hash, arm, name } => {
+        NamedModel::Estimated { arm, .. } => Some(PreparedEstimate::of(arm)),
+    };
+    let corrector = match (&model, &prepared) {
+        (NamedModel::Estimated { hash, arm, name }, Some(prepared)) => {
             debug_assert_eq!(nominal, arm.nominal);
-            Some(Corrector { hash, model: name, arm })
+            Some(Corrector { hash, model: name, arm, prepared })
         }
+        _ => None,
     };
     if corrector.is_none() && arguments.outputs.rrd.is_some() {
         bail!("--rrd: the nominal arm has no deviation to show: give an estimated arm");

@@ -257,25 +257,47 @@ impl AnyWidth for Quadratic<'_> {
         let mut out = [0.0; WIDTH];
         for from in (0..WIDTH).step_by(R::ROWS) {
             let mut total = like.splat(0.0);
-            for (i, v) in self.velocities.iter().enumerate() {
-                let column = &self.matrix[i * n..i * n + i + 1];
-                let mut sum = [like.splat(0.0); 3];
-                for (c, w) in column.iter().zip(&self.velocities[..i]) {
+            // Two columns at once: the sums of one alone would wait for each other. Each is added up in the same order as alone.
+            for i in (0..n).step_by(2) {
+                let mut sums = [[like.splat(0.0); 3]; 2];
+                let next = (i + 1).min(n - 1);
+                let [first, second] =
+                    [&self.matrix[i * n..(i + 1) * n], &self.matrix[next * n..(next + 1) * n]];
+                for ((a, b), w) in first.iter().zip(second).zip(&self.velocities[..i]) {
                     let w = loaded(like, w, from);
-                    let twice = like.splat(2.0 * c);
-                    for k in 0..3 {
-                        sum[k] += twice * w[k];
-                    }
+                    add_twice(&mut sums[0], *a, &w);
+                    add_twice(&mut sums[1], *b, &w);
                 }
-                let v = loaded(like, v, from);
-                for k in 0..3 {
-                    total += v[k] * (sum[k] + like.splat(column[i]) * v[k]);
+                let v = loaded(like, &self.velocities[i], from);
+                total = with_square(total, &sums[0], first[i], &v);
+                if next > i {
+                    add_twice(&mut sums[1], second[i], &v);
+                    let v = loaded(like, &self.velocities[next], from);
+                    total = with_square(total, &sums[1], second[next], &v);
                 }
             }
             total.store(&mut out, from);
         }
         out
     }
+}
+
+/// Adds 2 c w.
+#[inline(always)]
+fn add_twice<R: Real>(sum: &mut [R; 3], c: f64, w: &[R; 3]) {
+    let twice = w[0].splat(2.0 * c);
+    for k in 0..3 {
+        sum[k] += twice * w[k];
+    }
+}
+
+/// `total` + v · (sum + c v).
+#[inline(always)]
+fn with_square<R: Real>(mut total: R, sum: &[R; 3], c: f64, v: &[R; 3]) -> R {
+    for k in 0..3 {
+        total += v[k] * (sum[k] + v[k].splat(c) * v[k]);
+    }
+    total
 }
 
 /// √v of a variance that rounding may have made negative; NaN for NaN.
@@ -313,19 +335,54 @@ impl Estimated {
 
     /// [`Estimated::position_sigma_mm`] of many points, eight in lanes.
     pub fn position_sigmas_mm(&self, arm: &PreparedModel<'_>, points: &[FlangePoint<'_>]) -> Vec<f64> {
+        self.position_sigmas_mm_in_two(arm, points, &[]).into_iter().map(|(sigma, _)| sigma).collect()
+    }
+
+    /// [`Estimated::position_sigmas_mm`], and for each point with `Some` in `others` the same relative to that frame instead: the
+    /// velocities are worked out once.
+    pub fn position_sigmas_mm_in_two(
+        &self,
+        arm: &PreparedModel<'_>,
+        points: &[FlangePoint<'_>],
+        others: &[Option<Option<&RegisteredFrame>>],
+    ) -> Vec<(f64, Option<f64>)> {
         let mut velocities = vec![[[0.0; WIDTH]; 3]; self.order.len()];
+        let mut relative = velocities.clone();
         let mut out = Vec::with_capacity(points.len());
-        for block in points.chunks(WIDTH) {
-            self.velocities(arm, block, &mut velocities);
-            let variance =
-                vectorised(Quadratic { matrix: self.covariance.as_slice(), velocities: &velocities });
-            out.extend(variance[..block.len()].iter().map(|v| root(*v)));
+        let variances = |velocities: &[[Eight; 3]]| {
+            vectorised(Quadratic { matrix: self.covariance.as_slice(), velocities })
+        };
+        for (block, first) in points.chunks(WIDTH).zip((0..).step_by(WIDTH)) {
+            let at = self.velocities_in_base(arm, block, &mut velocities);
+            let other = |k: usize| others.get(first + k).copied().flatten();
+            let second = (0..block.len()).any(|k| other(k).is_some()).then(|| {
+                relative.copy_from_slice(&velocities);
+                subtract_carried(&at, block.len(), |k| other(k).flatten(), &mut relative);
+                variances(&relative)
+            });
+            subtract_carried(&at, block.len(), |k| block[k].carried, &mut velocities);
+            let variance = variances(&velocities);
+            out.extend((0..block.len()).map(|k| {
+                let second = second.as_ref().filter(|_| other(k).is_some());
+                (root(variance[k]), second.map(|second| root(second[k])))
+            }));
         }
         out
     }
 
     /// Velocities of up to eight points (mm per unit of each of the arm's parameters), in the base.
     fn velocities(&self, arm: &PreparedModel<'_>, block: &[FlangePoint<'_>], velocities: &mut [[Eight; 3]]) {
+        let at = self.velocities_in_base(arm, block, velocities);
+        subtract_carried(&at, block.len(), |k| block[k].carried, velocities);
+    }
+
+    /// The same without the motion of registered frames; returns the points.
+    fn velocities_in_base(
+        &self,
+        arm: &PreparedModel<'_>,
+        block: &[FlangePoint<'_>],
+        velocities: &mut [[Eight; 3]],
+    ) -> [Eight; 3] {
         let growth: f64 = arm.model.effects.iter().map(|e| e.growth(&arm.condition)).sum();
         let row = |k: usize| &block[k.min(block.len() - 1)];
         let angles: [Eight; 6] = std::array::from_fn(|i| std::array::from_fn(|k| row(k).joints[i]));
@@ -340,8 +397,8 @@ impl Estimated {
             order: &self.order,
             velocities,
         });
-        let point = |k: usize| -> [f64; 3] { std::array::from_fn(|i| at[i][k]) };
         if !arm.model.effects.is_empty() {
+            let point = |k: usize| -> [f64; 3] { std::array::from_fn(|i| at[i][k]) };
             for k in 0..block.len() {
                 let frames = arm.frames(&row(k).joints);
                 for (parameter, velocity) in self.order.iter().zip(&mut *velocities) {
@@ -352,14 +409,7 @@ impl Estimated {
                 }
             }
         }
-        for (k, here) in block.iter().enumerate() {
-            let Some(carried) = here.carried else { continue };
-            let lever = Vector3::from(point(k)) - carried.origin_mm;
-            for (velocity, twist) in velocities.iter_mut().zip(&carried.twists) {
-                let moved = twist.fixed_rows::<3>(0) + twist.fixed_rows::<3>(3).cross(&lever);
-                (0..3).for_each(|i| velocity[i][k] -= moved[i]);
-            }
-        }
+        at
     }
 
     /// Derivatives of the positions of many points on the flange with respect to the arm's parameters, one below the other:
@@ -387,5 +437,22 @@ impl Estimated {
     ) -> DMatrix<f64> {
         let point = FlangePoint { joints: *q, flange_from_tool: *flange_from_tool, carried: None };
         self.position_jacobians(arm, &[point])
+    }
+}
+
+/// Subtracts from the velocities of the points `at` those that they have as points of the registered frames.
+fn subtract_carried<'f>(
+    at: &[Eight; 3],
+    count: usize,
+    carried: impl Fn(usize) -> Option<&'f RegisteredFrame>,
+    velocities: &mut [[Eight; 3]],
+) {
+    for k in 0..count {
+        let Some(carried) = carried(k) else { continue };
+        let lever = Vector3::new(at[0][k], at[1][k], at[2][k]) - carried.origin_mm;
+        for (velocity, twist) in velocities.iter_mut().zip(&carried.twists) {
+            let moved = twist.fixed_rows::<3>(0) + twist.fixed_rows::<3>(3).cross(&lever);
+            (0..3).for_each(|i| velocity[i][k] -= moved[i]);
+        }
     }
 }

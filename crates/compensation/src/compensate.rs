@@ -18,6 +18,7 @@ use crate::plan::Plan;
 use crate::plan::planner::SolvedProgram;
 use crate::plan::reason::OutcomeReason;
 use crate::plan::single_precision::single_precision;
+use crate::risk::prepared_estimate::PreparedEstimate;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::estimated::Estimated;
 use truegrind_programs::edit::EditError;
@@ -64,7 +65,21 @@ pub fn compensate(
     options: &Options,
     mark: Option<Mark>,
 ) -> Result<Compensated, CompensateError> {
-    let listing = program.listing();
+    compensate_prepared(program, &PreparedEstimate::of(arm), cell, options, mark)
+}
+
+/// [`compensate`] for many programs of one arm.
+///
+/// # Errors
+/// [`CompensateError`].
+pub fn compensate_prepared(
+    program: &Program<'_>,
+    prepared: &PreparedEstimate<'_>,
+    cell: &Cell,
+    options: &Options,
+    mark: Option<Mark>,
+) -> Result<Compensated, CompensateError> {
+    let (listing, arm) = (program.listing(), prepared.arm);
     let found = contradictions(listing, cell, &arm.nominal);
     if !found.is_empty() {
         return Err(CompensateError::Cell(found.join("; ")));
@@ -72,7 +87,7 @@ pub fn compensate(
     let partial = options.cuts == Cuts::Partial;
     let mark = mark.map(|mark| Mark { partial, ..mark });
     let rewrite = RewriteOptions { mark, ..RewriteOptions::default() };
-    let mut targets = SolvedProgram::of(listing, arm, cell, options);
+    let mut targets = SolvedProgram::of(listing, prepared, cell, options);
     let mut refused: BTreeMap<u32, OutcomeReason> = BTreeMap::new();
     let mut round = 0;
     let play =

@@ -4,6 +4,7 @@ pub(crate) mod assessment;
 pub mod cut_risk;
 pub(crate) mod measurement_information;
 pub mod placement;
+pub mod prepared_estimate;
 pub(crate) mod probability;
 pub(crate) mod registration;
 pub mod remedy;

@@ -70,8 +70,8 @@ impl<K: Hash + Eq + Clone, V: Clone> Map<K, V> {
 
     /// Looks up a key in a subtree that begins at bit `shift` of the hash.
     fn get_from(&self, key: &K, mut shift: u32) -> Option<&V> {
-        let hash = hash(key);
         let mut at = self.root.as_deref()?;
+        let hash = hash(key);
         loop {
             match at {
                 Node::Leaf(of, entries) if *of == hash => {

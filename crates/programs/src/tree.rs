@@ -183,6 +183,18 @@ impl<'s, T: Copy, N: Copy> Tree<'s, T, N> {
         (line as u32, (byte - self.lines[line - 1] as usize) as u32 + 1)
     }
 
+    /// [`Tree::line_column`] of a byte that is probably on the line `last` or soon after it, as places in file order are.
+    pub fn line_column_after(&self, byte: usize, last: u32) -> (u32, u32) {
+        const NEAR: usize = 4;
+        let from = last.saturating_sub(1) as usize;
+        let near = self.lines.get(from..).unwrap_or_default();
+        let begun = near.iter().take(NEAR).take_while(|&&start| start as usize <= byte).count();
+        if begun == 0 || begun == NEAR {
+            return self.line_column(byte);
+        }
+        ((from + begun) as u32, (byte - near[begun - 1] as usize) as u32 + 1)
+    }
+
     /// The children of a node, tokens and nodes in order.
     pub fn children(&self, node: u32) -> Children<'_, 's, T, N> {
         let Node { size, first, end, .. } = self.nodes[node as usize];

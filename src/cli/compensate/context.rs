@@ -3,6 +3,7 @@
 use truegrind::arm::estimated::Estimated;
 use truegrind::compensation::cell::Cell;
 use truegrind::compensation::options::Options;
+use truegrind::compensation::risk::prepared_estimate::PreparedEstimate;
 use truegrind::programs::nc::setup::Setup;
 use truegrind::surfaces::SurfaceFile;
 
@@ -34,4 +35,5 @@ pub(super) struct Corrector<'a> {
     pub(super) hash: &'a str,
     pub(super) model: &'a str,
     pub(super) arm: &'a Estimated,
+    pub(super) prepared: &'a PreparedEstimate<'a>,
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::bail;
 use truegrind::compensation::cell::Used;
 use truegrind::compensation::cell::robot_match::unreachable_motions;
-use truegrind::compensation::compensate::{Compensated, compensate};
+use truegrind::compensation::compensate::{Compensated, compensate_prepared};
 use truegrind::compensation::frames::surface_frames::surface_frame_contradictions;
 use truegrind::compensation::options::Options;
 use truegrind::compensation::plan::Plan;
@@ -200,7 +200,7 @@ fn compensated(
         model: corrector.hash.to_owned(),
         partial: false,
     };
-    Ok(compensate(program, corrector.arm, &context.cell, &options, Some(mark))?)
+    Ok(compensate_prepared(program, corrector.prepared, &context.cell, &options, Some(mark))?)
 }
 
 /// The bytes of the output files and the diff.

@@ -27,6 +27,7 @@ use crate::plan::reason::OutcomeReason;
 use crate::plan::{MotionOutcome, Plan};
 use crate::risk::assessment::{Assessment, AssessmentSample, EstimateContext, assess_program};
 use crate::risk::placement::PlacementChoice;
+use crate::risk::prepared_estimate::PreparedEstimate;
 use crate::search_budget;
 use crate::segment::corner::{CUT_MM, cut_of_lines};
 use crate::segment::joint_speed::{Pace, fastest};
@@ -35,7 +36,7 @@ use crate::segment::segment_plan::{SegmentPlan, corner};
 use crate::target::original_joints::{BranchGuess, OriginalProgram};
 use crate::target::solve::{reserve_memory, solve_targets};
 use crate::target::solved_target::{SolvedTarget, SolvedTargets, as_joints};
-use truegrind_arm::estimated::Estimated;
+use truegrind_arm::estimated::{Estimated, PosteriorComponent};
 use truegrind_arm::inverse::InverseError;
 use truegrind_arm::inverse::budget::{SearchBudget, with_budget};
 use truegrind_arm::region::Outside;
@@ -47,7 +48,7 @@ use truegrind_programs::rewrite::{Change, NewTarget};
 /// Motions are independent, except those with unmonitored configuration (ConfL\Off), which continue from the previous motion;
 /// the result does not depend on the number of threads.
 pub fn plan(listing: &Listing, estimated: &Estimated, cell: &Cell, options: &Options) -> Plan {
-    SolvedProgram::of(listing, estimated, cell, options).plan(&BTreeMap::new())
+    SolvedProgram::of(listing, &PreparedEstimate::of(estimated), cell, options).plan(&BTreeMap::new())
 }
 
 /// The solved targets of a program; they serve any number of plans.
@@ -68,15 +69,16 @@ pub(crate) struct SolvedProgram<'a> {
 impl<'a> SolvedProgram<'a> {
     pub(crate) fn of(
         listing: &'a Listing,
-        estimated: &'a Estimated,
+        estimate: &PreparedEstimate<'a>,
         cell: &Cell,
         options: &'a Options,
     ) -> Self {
-        let mut arms = Arms::of(estimated, &options.condition);
+        let mut arms = Arms::of(estimate.arm, &options.condition);
         let mut frame_table = FrameTable::of(listing, &arms, cell);
         let program = OriginalProgram::of(listing, &arms, &frame_table);
         let cuts = cut::of(listing);
-        let assessment = assess(listing, &cuts, &program, &mut arms, &mut frame_table, options);
+        let assessment =
+            assess(listing, &cuts, &program, &mut arms, &mut frame_table, options, &estimate.posterior);
         let solved_unchanged = assessment.risky();
         let solved = solve_targets(
             listing,
@@ -173,6 +175,7 @@ fn assess(
     arms: &mut Arms<'_>,
     frame_table: &mut FrameTable,
     options: &Options,
+    posterior: &[PosteriorComponent],
 ) -> Assessment {
     let Some(knowledge) = arms.knowledge else { return Assessment::default() };
     let chosen = AssessmentSample::of(listing, cuts, |motion| program.knows(motion));
@@ -184,7 +187,7 @@ fn assess(
     };
     let at = |motion: u32| program.commanded(motion, condition_indices[motion as usize]);
     let objects = frame_table.objects();
-    let with = EstimateContext { conditions: &arms.conditions, knowledge };
+    let with = EstimateContext { conditions: &arms.conditions, knowledge, posterior };
     // Experiments correct every motion regardless of risk.
     let max_risk = if options.cuts == Cuts::Single { 1.0 } else { options.max_risk };
     let wanted = PlacementChoice { placement: options.placement, max_risk, remedies: options.remedies };

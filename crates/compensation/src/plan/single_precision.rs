@@ -1,5 +1,6 @@
 //! Rounding error of targets that a controller stores in single precision, as RAPID's `num` does.
 
+use nalgebra::UnitQuaternion;
 use rayon::prelude::*;
 
 use truegrind_programs::motion::Frame;
@@ -25,13 +26,34 @@ pub fn single_precision(changes: &[Change]) -> Option<SinglePrecision> {
         let targets = changes
             .iter()
             .flat_map(|change| change.targets.iter().chain(change.before.iter().map(|extra| &extra.target)));
-        targets.filter_map(of).reduce(SinglePrecision::max)
+        let mut turn = LargestTurn::default();
+        targets.filter_map(|target| of(target, &mut turn)).reduce(SinglePrecision::max)
     });
     most.flatten().reduce_with(SinglePrecision::max)
 }
 
-/// Rounding error of one target.
-fn of(target: &NewTarget) -> Option<SinglePrecision> {
+/// The largest rotation so far.
+#[derive(Default)]
+struct LargestTurn {
+    /// tan² of half of it, a little less than that: rounding never hides a larger one.
+    tan_square: f64,
+}
+
+impl LargestTurn {
+    /// The angle between two rotations (°); zero, without its arctangent, where another was certainly larger.
+    fn angle_deg(&mut self, a: &UnitQuaternion<f64>, b: &UnitQuaternion<f64>) -> f64 {
+        let turn = a.rotation_to(b);
+        let (sine_square, cosine) = (turn.imag().norm_squared(), turn.scalar());
+        if sine_square < self.tan_square * (cosine * cosine) {
+            return 0.0;
+        }
+        self.tan_square = (1.0 - 1e-9) * sine_square / (cosine * cosine);
+        turn.angle().to_degrees()
+    }
+}
+
+/// Rounding error of one target; its rotation counts as zero where an earlier one is larger.
+fn of(target: &NewTarget, turn: &mut LargestTurn) -> Option<SinglePrecision> {
     let short = |value: f64| f64::from(value as f32);
     match *target {
         NewTarget::Keep | NewTarget::Drop => None,
@@ -41,7 +63,7 @@ fn of(target: &NewTarget) -> Option<SinglePrecision> {
             let held = Frame { position_mm, quaternion: quaternion.map(short) };
             Some(SinglePrecision {
                 position_mm: off.iter().map(|off| off * off).sum::<f64>().sqrt(),
-                orientation_deg: written.pose().rotation.angle_to(&held.pose().rotation).to_degrees(),
+                orientation_deg: turn.angle_deg(&written.pose().rotation, &held.pose().rotation),
                 joint_deg: 0.0,
             })
         }

@@ -87,6 +87,8 @@ impl Assessment {
 pub(crate) struct EstimateContext<'a, 'm> {
     pub(crate) conditions: &'a ArmConditions<'m>,
     pub(crate) knowledge: &'a Estimated,
+    /// Posterior of its parameters.
+    pub(crate) posterior: &'a [PosteriorComponent],
 }
 
 /// The sampled targets of each work object and of each cut, including the point where it begins.
@@ -141,9 +143,9 @@ pub(crate) fn assess_program(
     with: &EstimateContext<'_, '_>,
     choice: PlacementChoice,
 ) -> Assessment {
-    let EstimateContext { conditions, knowledge } = *with;
+    let EstimateContext { conditions, knowledge, posterior } = *with;
     let mut out = Assessment {
-        posterior: knowledge.posterior(),
+        posterior: posterior.to_vec(),
         cut_of: vec![None; listing.motions.len()],
         ..Assessment::default()
     };
@@ -151,7 +153,7 @@ pub(crate) fn assess_program(
     for (object, motions) in &chosen.objects {
         let targets: Vec<AssessedTarget> = motions.iter().filter_map(|m| at(*m)).collect();
         let name = &listing.work_objects[*object as usize].name;
-        let found = assess_placement(name, &targets, list, conditions, knowledge, &out.posterior, choice);
+        let found = assess_placement(name, &targets, list, conditions, knowledge, posterior, choice);
         let Some((mut placement, displaced)) = found else { continue };
         if placement.applied == Placement::Shape && choice.remedies {
             let max_risk = choice.max_risk;
@@ -182,7 +184,7 @@ pub(crate) fn assess_program(
             let carried = (!frames.real.holds_part)
                 .then(|| cut_risk::in_base(&judgement.registered, &frames.real.object));
             let points = targets.len();
-            let harm = probability_of_harm(judgement.square, &judgement.toward, &out.posterior, points);
+            let harm = probability_of_harm(judgement.square, &judgement.toward, posterior, points);
             Some((JudgedCut { placement, points, weight, carried }, judgement, harm))
         })
         .collect();

@@ -91,25 +91,25 @@ pub(crate) fn cut_of_lines(points: &[Vector3<f64>; 3], zone_mm: f64) -> f64 {
 }
 
 /// The segments into and out of a corner, as intended and as commanded.
-pub(crate) struct CornerSegments {
-    pub(crate) intended: [Curve; 2],
-    pub(crate) commanded: [Curve; 2],
+pub(crate) struct CornerSegments<'a> {
+    pub(crate) intended: [&'a Curve; 2],
+    pub(crate) commanded: [&'a Curve; 2],
 }
 
 /// Largest deviation of the tool from the intended corner at `point` (mm), under one condition before and another after it;
 /// `None` where the corner cuts off almost nothing, infinite where the arm cannot follow.
 pub(crate) fn corner_deviation(
     point: &SegmentEnd<'_>,
-    segments: &CornerSegments,
+    segments: &CornerSegments<'_>,
     zone_mm: f64,
     condition_indices: [usize; 2],
     arms: &Arms<'_>,
 ) -> Option<f64> {
-    let intended = Corner::of(&segments.intended[0], &segments.intended[1], zone_mm);
+    let intended = Corner::of(segments.intended[0], segments.intended[1], zone_mm);
     if !(intended.cut_mm() > CUT_MM) {
         return None;
     }
-    let commanded = Corner::of(&segments.commanded[0], &segments.commanded[1], zone_mm);
+    let commanded = Corner::of(segments.commanded[0], segments.commanded[1], zone_mm);
     let flange = |t: f64| point.frames.commanded.flange_for(&commanded.at(t));
     let motor = |t: f64| {
         let solution = arms.nominal.solve_near(&flange(t), &point.joints);

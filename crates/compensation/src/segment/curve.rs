@@ -136,13 +136,14 @@ enum Turning {
 }
 
 /// The path of the tool from one pose to another.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
     /// Start.
     pub from: Pose,
     /// End.
     pub to: Pose,
-    arc: Option<(Arc, Turning)>,
+    /// Elsewhere, because nearly every curve is a line and is copied a few times.
+    arc: Option<Box<(Arc, Turning)>>,
 }
 
 impl Curve {
@@ -164,12 +165,12 @@ impl Curve {
         } else {
             with_path(&arc, &from.rotation, &via.rotation, middle, &to.rotation)
         };
-        Some(Self { from, to, arc: Some((arc, turning)) })
+        Some(Self { from, to, arc: Some(Box::new((arc, turning))) })
     }
 
     /// The arc, where it is one.
     pub fn arc(&self) -> Option<&Arc> {
-        self.arc.as_ref().map(|(arc, _)| arc)
+        self.arc.as_deref().map(|(arc, _)| arc)
     }
 
     /// The share at which a point on the arc is passed; one half for a line.
@@ -180,7 +181,7 @@ impl Curve {
 
     /// The pose at a share of the path.
     pub fn at(&self, s: f64) -> Pose {
-        let Some((arc, turning)) = &self.arc else { return between(&self.from, &self.to, s) };
+        let Some((arc, turning)) = self.arc.as_deref() else { return between(&self.from, &self.to, s) };
         let rotation = match turning {
             Turning::Shortest => turned(&self.from.rotation, &self.to.rotation, s),
             Turning::WithPath(v) => {
@@ -194,8 +195,8 @@ impl Curve {
 
     /// Its length (mm).
     pub fn length_mm(&self) -> f64 {
-        match &self.arc {
-            Some((arc, _)) => arc.length_mm(),
+        match self.arc() {
+            Some(arc) => arc.length_mm(),
             None => (self.to.translation.vector - self.from.translation.vector).norm(),
         }
     }
@@ -211,8 +212,8 @@ impl Curve {
 
     /// Distance of a pose from the path (mm), close to this share.
     pub fn distance(&self, pose: &Pose, near: f64) -> f64 {
-        match &self.arc {
-            Some((arc, _)) => arc.distance(&Point3::from(pose.translation.vector), near),
+        match self.arc() {
+            Some(arc) => arc.distance(&Point3::from(pose.translation.vector), near),
             None => {
                 let along = self.to.translation.vector - self.from.translation.vector;
                 let on = self.from.translation.vector + along * near;

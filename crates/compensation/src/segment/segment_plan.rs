@@ -1,5 +1,7 @@
 //! Plan of one segment: its deviation from the intended path, and the targets inserted to reduce it.
 
+use std::borrow::Cow;
+
 use crate::arms::Arms;
 use crate::options::{Circles, Emit, Options};
 use crate::plan::reason::OutcomeReason;
@@ -58,13 +60,13 @@ impl SegmentPlan {
     }
 
     /// The last commanded piece of the segment, or the first.
-    fn piece(&self, last: bool) -> Option<Curve> {
+    fn piece(&self, last: bool) -> Option<Cow<'_, Curve>> {
         let [_, commanded] = self.curves.as_ref()?;
         let told_at = |extra: Option<&Extra>| extra.and_then(pose_of);
         Some(match (last, told_at(if last { self.before.last() } else { self.before.first() })) {
-            (true, Some(pose)) => Curve::line(pose, commanded.to),
-            (false, Some(pose)) => Curve::line(commanded.from, pose),
-            (_, None) => *commanded,
+            (true, Some(pose)) => Cow::Owned(Curve::line(pose, commanded.to)),
+            (false, Some(pose)) => Cow::Owned(Curve::line(commanded.from, pose)),
+            (_, None) => Cow::Borrowed(commanded),
         })
     }
 }
@@ -124,14 +126,20 @@ fn circle(
         };
         return SegmentPlan { flag: Some(flag), ..SegmentPlan::default() };
     };
-    let curves = Some([circle.intended, circle.commanded]);
+    let curves = || Some([circle.intended.clone(), circle.commanded.clone()]);
     // Straight segments need a known orientation along the path.
     let may = segments
         && motion.can_straighten
         && motion.modal.circle_point_orientation != Switch::Either
         && motion.modal.wrist_interpolation != Switch::On;
     if may && let Some((before, left)) = circle.pieces(path, arms, options) {
-        return SegmentPlan { path_deviation_mm: Some(left), before, straight: true, flag: None, curves };
+        return SegmentPlan {
+            path_deviation_mm: Some(left),
+            before,
+            straight: true,
+            flag: None,
+            curves: curves(),
+        };
     }
     let along = circle.deviation(path, arms);
     let open = if motion.by_radius { circle.open_centre_mm(options.position_decimals) } else { 0.0 };
@@ -143,7 +151,13 @@ fn circle(
     } else {
         segments.then_some(OutcomeReason::CircleKept)
     };
-    SegmentPlan { path_deviation_mm: Some(deviation), before: Vec::new(), straight: false, flag, curves }
+    SegmentPlan {
+        path_deviation_mm: Some(deviation),
+        before: Vec::new(),
+        straight: false,
+        flag,
+        curves: curves(),
+    }
 }
 
 /// Deviation from the intended corner between two segments; `None` where the corner has the shape of the segments themselves.
@@ -161,7 +175,8 @@ pub(crate) fn corner(
     if emit == Emit::Joints {
         return None;
     }
-    let intended = [segment_in.curves.as_ref()?[0], segment_out.curves.as_ref()?[0]];
-    let commanded = [segment_in.piece(true)?, segment_out.piece(false)?];
-    corner_deviation(point, &CornerSegments { intended, commanded }, zone_mm, condition_indices, arms)
+    let intended = [&segment_in.curves.as_ref()?[0], &segment_out.curves.as_ref()?[0]];
+    let [first, last] = [segment_in.piece(true)?, segment_out.piece(false)?];
+    let segments = CornerSegments { intended, commanded: [&*first, &*last] };
+    corner_deviation(point, &segments, zone_mm, condition_indices, arms)
 }

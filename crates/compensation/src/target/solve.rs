@@ -347,11 +347,10 @@ fn solve_portion(
     let reached_after = conditions.forward(&condition_indices, &last);
     let tools: Vec<Pose> = reachable.iter().map(|w| real(&w.start).flange_from_tool(&w.flange)).collect();
     let cut_of = |w: &ReachableTarget| target_refs[w.index].index;
-    let frames =
-        reachable.iter().map(|w| Some(frame_table.list[w.start.frames_index].carried.as_ref())).collect();
-    let absolute = sigmas(&reachable, &tools, frames, arms);
-    let registered = reachable.iter().map(|w| assessment.registered(cut_of(w)).map(Some)).collect();
-    let of_shape = sigmas(&reachable, &tools, registered, arms);
+    let against = |w: &ReachableTarget| {
+        (frame_table.list[w.start.frames_index].carried.as_ref(), assessment.registered(cut_of(w)))
+    };
+    let predicted = sigmas(&reachable, &tools, &against, arms);
     let mut near = NearestSample::default();
     for (k, w) in reachable.iter().enumerate() {
         if let Some(why) = failed[k] {
@@ -375,8 +374,9 @@ fn solve_portion(
             margins: [w.start.margins, margins],
             deviation_mm: reached.map(|pose| (pose.translation.vector - intended.translation.vector).norm()),
             deviations: options.points.then(|| Box::new(reached.map(deviation))),
-            sigma_mm: absolute[k].unwrap_or(0.0).hypot(play_uncertainty_mm),
-            shape_sigma_mm: of_shape[k]
+            sigma_mm: predicted[k].0.hypot(play_uncertainty_mm),
+            shape_sigma_mm: predicted[k]
+                .1
                 .or_else(|| assessment.sigma_of_cut_mm(cut_of(w)))
                 .map(|sigma| sigma.hypot(play_uncertainty_mm)),
             play_uncertainty_mm,
@@ -494,32 +494,33 @@ fn replay_controller(
     ControllerReplay { told_flanges, commanded, read_back, branches, last, failed }
 }
 
-/// Predicted standard deviation of each point (mm) relative to its reference frame; `None` where not required.
-fn sigmas(
+/// Predicted standard deviation of each point (mm) relative to its reference frame, and to the registration of its cut where there is
+/// one; zero without a covariance. `against`: both frames.
+fn sigmas<'f>(
     reachable: &[ReachableTarget],
     tools: &[Pose],
-    against: Vec<Option<Option<&RegisteredFrame>>>,
+    against: &dyn Fn(&ReachableTarget) -> (Option<&'f RegisteredFrame>, Option<&'f RegisteredFrame>),
     arms: &Arms<'_>,
-) -> Vec<Option<f64>> {
-    let Some(knowledge) = arms.knowledge else { return vec![None; reachable.len()] };
-    let (mut condition_indices, mut points) =
-        (Vec::with_capacity(reachable.len()), Vec::with_capacity(reachable.len()));
-    let mut at = Vec::with_capacity(reachable.len());
-    for ((k, w), carried) in reachable.iter().enumerate().zip(against) {
-        let Some(carried) = carried else { continue };
-        points.push(FlangePoint { joints: w.after, flange_from_tool: tools[k], carried });
-        condition_indices.push(w.condition_index);
-        at.push(k);
+) -> Vec<(f64, Option<f64>)> {
+    let Some(knowledge) = arms.knowledge else { return vec![(0.0, None); reachable.len()] };
+    let condition_indices: Vec<usize> = reachable.iter().map(|w| w.condition_index).collect();
+    let mut points = Vec::with_capacity(reachable.len());
+    let mut registered = Vec::with_capacity(reachable.len());
+    for (w, tool) in reachable.iter().zip(tools) {
+        let (carried, cut) = against(w);
+        points.push(FlangePoint { joints: w.after, flange_from_tool: *tool, carried });
+        registered.push(cut.map(Some));
     }
-    let found = arms.conditions.each(&condition_indices, |condition_index, items| match items {
-        None => knowledge.position_sigmas_mm(arms.conditions.arm(condition_index), &points),
-        Some(items) => {
-            knowledge.position_sigmas_mm(arms.conditions.arm(condition_index), &select(&points, items))
+    arms.conditions.each(&condition_indices, |condition_index, items| {
+        let arm = arms.conditions.arm(condition_index);
+        match items {
+            None => knowledge.position_sigmas_mm_in_two(arm, &points, &registered),
+            Some(items) => {
+                let (points, registered) = (select(&points, items), select(&registered, items));
+                knowledge.position_sigmas_mm_in_two(arm, &points, &registered)
+            }
         }
-    });
-    let mut out = vec![None; reachable.len()];
-    at.into_iter().zip(found).for_each(|(k, sigma)| out[k] = Some(sigma));
-    out
+    })
 }
 
 /// The target, where the controller may use its stated configuration.

@@ -17,11 +17,13 @@ mod remedy;
 mod singularity;
 mod taught;
 
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::{DMatrix, Vector3, Vector6};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use truegrind_arm::condition::Condition;
-use truegrind_arm::estimated::{Estimated, Judgement, Provenance, StageErrors, Verdict};
+use truegrind_arm::estimated::{
+    Estimated, FlangePoint, Judgement, Provenance, RegisteredFrame, StageErrors, Verdict,
+};
 use truegrind_arm::model::{Joints, Model};
 use truegrind_arm::parameter::link_parameters;
 use truegrind_arm::region::Region;
@@ -328,6 +330,22 @@ fn the_quick_sigma_equals_the_covariance() {
         let quick = known.position_sigma_mm(&posed, q, &tool, None);
         assert!((slow - quick).abs() < 1e-9 * slow, "{slow} {quick}");
     }
+    // Relative to two frames at once, row by row or in lanes: the same bits.
+    let mut frame = || RegisteredFrame {
+        origin_mm: Vector3::new(400.0, 20.0, 100.0),
+        twists: (0..n).map(|_| Vector6::from_fn(|_, _| random.random_range(-1.0..1.0))).collect(),
+    };
+    let frames = [frame(), frame()];
+    let chosen = |k: usize| [None, Some(&frames[0]), Some(&frames[1])][k % 3];
+    let at = |carried, q: &Joints| FlangePoint { joints: *q, flange_from_tool: tool, carried };
+    let rows: Vec<&Joints> = joints.iter().step_by(11).collect();
+    let points: Vec<FlangePoint<'_>> = rows.iter().enumerate().map(|(k, q)| at(chosen(k), q)).collect();
+    let others: Vec<_> = (0..rows.len()).map(|k| (k % 5 > 0).then(|| chosen(k / 2))).collect();
+    let both = known.position_sigmas_mm_in_two(&posed, &points, &others);
+    for (k, q) in rows.iter().enumerate() {
+        let alone = |carried| known.position_sigma_mm(&posed, q, &tool, carried);
+        assert_eq!(both[k], (alone(chosen(k)), others[k].map(alone)), "row {k}");
+    }
 }
 
 #[test]
@@ -349,4 +367,14 @@ fn single_precision_is_stated_at_its_known_spacing() {
     let joints = NewTarget::Joint { robot_deg: [90.0 + 2.0_f64.powi(-18), 0.0, 0.0, 0.0, 0.0, 0.0] };
     let off = single_precision(&[change(joints)]).unwrap();
     assert!((off.joint_deg - 2.0_f64.powi(-18)).abs() < 1e-12 && off.text().contains("per joint"), "{off:?}");
+    // Of many rotations the largest counts, to the bit.
+    let mut random = ChaCha8Rng::seed_from_u64(9);
+    let turned = |random: &mut ChaCha8Rng| NewTarget::Cartesian {
+        position_mm: [0.0; 3],
+        quaternion: std::array::from_fn(|_| random.random_range(-1.0..1.0)),
+        conf: None,
+    };
+    let all: Vec<Change> = (0..500).map(|_| change(turned(&mut random))).collect();
+    let alone = all.iter().map(|one| single_precision(std::slice::from_ref(one)).unwrap().orientation_deg);
+    assert_eq!(single_precision(&all).unwrap().orientation_deg, alone.fold(0.0, f64::max));
 }

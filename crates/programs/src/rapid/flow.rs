@@ -256,7 +256,7 @@ impl Transfer for Interpreter<'_, '_, '_> {
     fn transfer(&mut self, node: u32, nesting: Nesting) {
         let mut state = std::mem::take(&mut self.state);
         match self.kind(node) {
-            Syntax::Call | Syntax::LateCall => state = self.transfer_call(node, state, nesting),
+            Syntax::Call | Syntax::LateCall => self.transfer_call(node, &mut state, nesting),
             Syntax::Assignment => self.transfer_assignment(node, &mut state),
             Syntax::Return => {
                 self.invalidate_changed(node, &mut state);
@@ -475,22 +475,22 @@ impl Interpreter<'_, '_, '_> {
         out.substitute_entry(SwitchSet::EMPTY)
     }
 
-    fn transfer_call(&mut self, node: u32, mut state: AbstractState, nesting: Nesting) -> AbstractState {
+    fn transfer_call(&mut self, node: u32, state: &mut AbstractState, nesting: Nesting) {
         let tree = &self.evaluator.trees[self.unit.file as usize];
         let symbols = self.evaluator.symbols;
         let name = tree.text(tree.nodes[node as usize].first);
         let late = tree.nodes[node as usize].kind == Syntax::LateCall;
-        self.join_switches(self.handler_switches, &mut state);
+        self.join_switches(self.handler_switches, state);
         for inside in tree.child_nodes(node) {
-            self.invalidate_changed(inside, &mut state);
+            self.invalidate_changed(inside, state);
         }
-        let motion = self.visitor.visit_call(self.unit, node, &state, nesting);
+        let motion = self.visitor.visit_call(self.unit, node, state, nesting);
         let known = if late { None } else { instruction::find(name).map(|known| &INSTRUCTIONS[known]) };
         let hidden = symbols.hides_instruction && symbols.routine(self.unit.scope, name).is_some();
         let known = known.filter(|_| !hidden);
         if let Some(known) = known {
             if !known.only_moves() {
-                self.invalidate_written(node, &mut state);
+                self.invalidate_written(node, state);
             }
             if known.also == Also::Stiffens {
                 state.modal = state.modal.set(Switch::Soft, false);
@@ -500,38 +500,39 @@ impl Interpreter<'_, '_, '_> {
                 state.previous = motion.filter(|_| !known.ends_early() && !self.moved_between);
                 self.after_motion(motion, &mut state.reaching);
             }
-            return state;
+            return;
         }
-        let incremented = self.incremented(node, &state, name);
-        self.invalidate_written(node, &mut state);
+        let incremented = self.incremented(node, state, name);
+        self.invalidate_written(node, state);
         if !late && symbols.writes_unknown_data(tree, self.unit.scope, node, name) {
             state.known.retain(|&id, _| id == DISPLACEMENT);
         }
         if let Some((target, value)) = incremented {
-            self.store(target, value, &mut state);
+            self.store(target, value, state);
         }
         if predefined::waits(name) {
-            self.invalidate_shared(&mut state);
+            self.invalidate_shared(state);
         }
         let own = symbols.routine(self.unit.scope, name).is_some();
         if let Some(sets) = (!late && !own).then(|| switches_set_by(tree, node, name)).flatten() {
-            self.transfer_switch_instruction(node, name, sets, motion, &mut state);
-            return state;
+            self.transfer_switch_instruction(node, name, sets, motion, state);
+            return;
         }
         let called = if late { &[] } else { symbols.callees(self.unit.scope, name) };
         if late || called.is_empty() && predefined::calls_by_name(name) {
             if self.may_grip(node) {
                 state.gripped = Gripped::UNKNOWN;
             }
-            self.transfer_late_call(&mut state);
-            return state;
+            self.transfer_late_call(state);
+            return;
         }
         match called {
-            [_, ..] => self.transfer_routine_call(called, name, &mut state),
+            [_, ..] => self.transfer_routine_call(called, name, state),
             [] if predefined::effect(name).is_some() => {
                 if predefined::begins_cycle(name) {
                     self.visitor.record_cycle_restart(state.modal, state.gripped);
-                    return AbstractState { reachable: false, ..state };
+                    state.reachable = false;
+                    return;
                 }
                 if predefined::grips(name) {
                     let context = Context::new(self.unit.file, self.unit.scope, &state.known);
@@ -541,21 +542,20 @@ impl Interpreter<'_, '_, '_> {
                     state.previous = None;
                     self.after_motion(motion, &mut state.reaching);
                 }
-                return state;
+                return;
             }
             [] => {
                 self.visitor.record_external_call(state.modal);
-                self.invalidate_nonlocal(&mut state);
+                self.invalidate_nonlocal(state);
                 if motion.is_some() {
                     state.previous = motion;
                     self.after_motion(motion, &mut state.reaching);
-                    return state;
+                    return;
                 }
                 state.reaching = self.any_motion();
             }
         }
         state.previous = None;
-        state
     }
 
     /// An instruction that sets switches (ConfL, PDispOn).

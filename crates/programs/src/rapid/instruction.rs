@@ -78,13 +78,13 @@ pub struct Instruction {
 impl Instruction {
     /// Whether the end is a joint target.
     pub fn takes_joints(&self) -> bool {
-        self.pattern.contains('J')
+        self.pattern.as_bytes().contains(&b'J')
     }
 
     /// Meaning of the required argument at `index` of `count`; `None` where the count does not match.
     pub fn slot(&self, index: usize, count: usize) -> Option<Slot> {
         let pattern = self.pattern.as_bytes();
-        let letter = match self.pattern.find('*') {
+        let letter = match pattern.iter().position(|letter| *letter == b'*') {
             None => *pattern.get(index)?,
             Some(star) => {
                 let tail = pattern.len() - star - 1;
@@ -126,7 +126,7 @@ impl Instruction {
 
     /// Whether it ends where a signal comes.
     pub fn searches(&self) -> bool {
-        self.pattern.contains('O')
+        self.pattern.as_bytes().contains(&b'O')
     }
 
     /// Whether it may end before its target: on a signal or on contact.

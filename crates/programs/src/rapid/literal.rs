@@ -29,7 +29,8 @@ type Rest<'s, O> = IResult<&'s [u8], O, ()>;
 
 /// Reads an aggregate of aggregates of numbers with the given group lengths. Bytes after it are ignored.
 pub fn numbers(text: &[u8], shape: &[usize]) -> Option<Numbers> {
-    let (found, _, rest) = groups(text, shape, |number| signed(number).ok())?;
+    let mut found = Numbers::NONE;
+    let (_, rest) = groups(text, shape, |number| signed(number).ok(), &mut found)?;
     symbol(b']')(rest).ok()?;
     Some(found)
 }
@@ -47,19 +48,25 @@ pub fn places(text: &[u8], shape: &[usize], values: &[f64]) -> Option<Numbers> {
             }
         }
     };
-    let (mut found, count, _) = groups(text, shape, passed)?;
+    let mut found = Numbers::NONE;
+    let (count, _) = groups(text, shape, passed, &mut found)?;
     found.values.get_mut(..values.len())?.copy_from_slice(values);
     (count == values.len()).then_some(found)
 }
 
-/// The groups of an aggregate, each number taken by `read` with its decimals; how many there are, and the bytes after the last group.
+impl Numbers {
+    const NONE: Numbers = Numbers { values: [0.0; 17], decimals: [0; 17], spans: [(0, 0); 17] };
+}
+
+/// The groups of an aggregate, each number taken by `read` with its decimals, into `found`; how many there are, and the bytes after the
+/// last group.
 #[inline]
 fn groups<'s>(
     text: &'s [u8],
     shape: &[usize],
     read: impl Fn(&'s [u8]) -> Option<(&'s [u8], (f64, u8))>,
-) -> Option<(Numbers, usize, &'s [u8])> {
-    let mut found = Numbers { values: [0.0; 17], decimals: [0; 17], spans: [(0, 0); 17] };
+    found: &mut Numbers,
+) -> Option<(usize, &'s [u8])> {
     let mut count = 0;
     let mut rest = symbol(b'[')(text).ok()?.0;
     for (index, &length) in shape.iter().enumerate() {
@@ -80,7 +87,7 @@ fn groups<'s>(
         }
         rest = symbol(b']')(rest).ok()?.0;
     }
-    Some((found, count, rest))
+    Some((count, rest))
 }
 
 /// White space and comments.

@@ -9,6 +9,7 @@ mod literals;
 mod motions;
 mod uses;
 
+use std::cell::Cell;
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -27,7 +28,7 @@ use super::syntax::{RapidTree, Syntax};
 use crate::dataflow::Nesting;
 use crate::motion::load::{Load, Loads};
 use crate::motion::{Listing, OpaqueRegion, Place, Reason, Role};
-use literals::Literals;
+use literals::{Literals, NODES_PER_MOTION};
 
 /// The RAPID modules of one task, read together.
 #[derive(Debug)]
@@ -148,7 +149,10 @@ struct ListingBuilder<'a, 's> {
     /// an interrupt and an unknown caller do not.
     position_used_at_entry: Vec<u32>,
     names: Vec<Option<Arc<str>>>,
-    routines: HashMap<u32, u32>,
+    /// The line of the last place.
+    line: Cell<u32>,
+    /// The index in the listing of each routine.
+    routines: Vec<Option<u32>>,
     declarations: HashMap<u32, u32>,
     speeds: Cached<'s>,
     zones: Cached<'s>,
@@ -204,7 +208,8 @@ impl<'a, 's> ListingBuilder<'a, 's> {
             position_used: false,
             position_used_at_entry: Vec::new(),
             names: vec![None; INSTRUCTIONS.len()],
-            routines: HashMap::new(),
+            line: Cell::new(0),
+            routines: vec![None; symbols.routines.len()],
             declarations: HashMap::new(),
             speeds: Cached::default(),
             zones: Cached::default(),
@@ -221,12 +226,24 @@ impl<'a, 's> ListingBuilder<'a, 's> {
 
     fn place(&self, file: u32, token: u32) -> Place {
         let tree = &self.trees[file as usize];
-        let (line, column) = tree.line_column(tree.start(token));
+        let (line, column) = tree.line_column_after(tree.start(token), self.line.get());
+        self.line.set(line);
         Place { file, line, column }
+    }
+
+    /// Room for so many motions: what is not used is never touched, so it costs no memory.
+    fn reserve(&mut self, motions: usize) {
+        self.listing.motions.reserve(motions);
+        self.literals.reserve(motions);
+        self.guarded.reserve(motions);
+        self.modal.reserve(motions);
+        self.displaced.reserve(motions);
+        self.units.reserve(motions);
     }
 
     /// Interprets every unit.
     fn interpret_units(&mut self) {
+        self.reserve(self.trees.iter().map(|tree| tree.nodes.len()).sum::<usize>() / NODES_PER_MOTION);
         for (file, tree) in self.trees.iter().enumerate() {
             self.listing.marks.push(mark::find(tree));
             for opaque in &tree.opaque {

@@ -198,6 +198,21 @@ fn a_large_file_is_split_into_the_same_tokens_on_any_number_of_threads() {
     }
 }
 
+#[test]
+fn a_place_is_found_from_any_other_line() {
+    let source = b"MODULE M\n\n\n  PROC p()\n    ! a\n    p;\n\n\n\n\n\n    p;\n  ENDPROC\nENDMODULE";
+    let tree = lex(source);
+    for byte in 0..=source.len() {
+        for last in 0..20 {
+            assert_eq!(
+                tree.line_column_after(byte, last),
+                tree.line_column(byte),
+                "byte {byte} from line {last}"
+            );
+        }
+    }
+}
+
 /// Digits are read eight at a time: a number must end as in a byte-by-byte reader, whatever its length, the next
 /// byte, and the end of the text.
 #[test]

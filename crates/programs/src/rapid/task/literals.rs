@@ -14,8 +14,15 @@ use crate::tree::Child;
 /// Nodes that one thread processes at a time.
 const PORTION: u32 = 1 << 14;
 
+/// About as many nodes as a motion with its target written out has, or fewer.
+pub(super) const NODES_PER_MOTION: usize = 14;
+
 /// The targets, by file and portion of the call, in the order of nodes.
-pub(super) struct Literals(Vec<Vec<Vec<Read>>>);
+pub(super) struct Literals {
+    read: Vec<Vec<Vec<Read>>>,
+    /// Where in its portion the last one was taken: the next one usually follows it.
+    last: usize,
+}
 
 #[derive(Debug)]
 struct Read {
@@ -32,7 +39,7 @@ impl Literals {
             let portions = 0..(tree.nodes.len() as u32).div_ceil(PORTION);
             portions.into_par_iter().map(|portion| read(trees, symbols, file as u32, portion)).collect()
         });
-        Literals(files.collect())
+        Literals { read: files.collect(), last: 0 }
     }
 
     /// The target of the literal at `node` in the call at `call`; `None` where it was not read or has been taken.
@@ -43,8 +50,11 @@ impl Literals {
         node: u32,
         joints: bool,
     ) -> Option<Vec<MotionTarget>> {
-        let portion = self.0.get_mut(file as usize)?.get_mut((call / PORTION) as usize)?;
-        let at = portion.binary_search_by_key(&node, |read| read.node).ok()?;
+        let portion = self.read.get_mut(file as usize)?.get_mut((call / PORTION) as usize)?;
+        let next =
+            [self.last + 1, 0].into_iter().find(|at| portion.get(*at).is_some_and(|read| read.node == node));
+        let at = next.or_else(|| portion.binary_search_by_key(&node, |read| read.node).ok())?;
+        self.last = at;
         let read = Some(&mut portion[at]).filter(|read| read.joints == joints)?;
         Some(std::mem::take(&mut read.target)).filter(|target| !target.is_empty())
     }
@@ -55,7 +65,7 @@ fn read(trees: &[RapidTree<'_>], symbols: &Symbols, file: u32, portion: u32) -> 
     let evaluator = Evaluator::new(trees, symbols);
     let first = portion * PORTION;
     let end = (first + PORTION).min(tree.nodes.len() as u32);
-    let mut out = Vec::new();
+    let mut out = Vec::with_capacity(PORTION as usize / NODES_PER_MOTION);
     for call in first..end {
         let found = tree.nodes[call as usize];
         if found.kind != Syntax::Call {
@@ -90,13 +100,19 @@ pub(super) fn target(evaluator: &Evaluator<'_, '_>, file: u32, node: u32, joints
 pub(super) fn plain(tree: &RapidTree<'_>, argument: Child) -> Option<u32> {
     let Child::Node(node) = argument else { return None };
     let found = tree.nodes[node as usize];
-    let number = |kind: &Token| {
-        kind.is_trivia()
-            || matches!(
-                kind,
-                Token::Number | Token::Comma | Token::BracketOpen | Token::BracketClose | Token::Minus
-            )
+    if found.kind != Syntax::Aggregate {
+        return None;
+    }
+    // All sixty tokens of a target at once, without a branch for each: the compiler compares them sixteen at a time.
+    let number = |all: bool, kind: &Token| {
+        let part = kind.is_trivia()
+            | (*kind == Token::Number)
+            | (*kind == Token::Comma)
+            | (*kind == Token::BracketOpen)
+            | (*kind == Token::BracketClose)
+            | (*kind == Token::Minus);
+        all & part
     };
     let tokens = &tree.kinds()[found.first as usize..found.end as usize];
-    (found.kind == Syntax::Aggregate && tokens.iter().all(number)).then_some(node)
+    tokens.iter().fold(true, number).then_some(node)
 }

@@ -21,7 +21,7 @@ impl ListingBuilder<'_, '_> {
 
     fn routine_of(&mut self, unit: Unit) -> Option<u32> {
         let routine = unit.routine?;
-        if let Some(&index) = self.routines.get(&routine) {
+        if let Some(index) = self.routines[routine as usize] {
             return Some(index);
         }
         let scope = &self.symbols.routines[routine as usize];
@@ -32,7 +32,7 @@ impl ListingBuilder<'_, '_> {
             place: self.place(scope.file, scope.head.name),
         });
         let index = self.listing.routines.len() as u32 - 1;
-        self.routines.insert(routine, index);
+        self.routines[routine as usize] = Some(index);
         Some(index)
     }
 
