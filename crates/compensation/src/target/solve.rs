@@ -499,7 +499,7 @@ fn replay_controller(
 fn sigmas<'f>(
     reachable: &[ReachableTarget],
     tools: &[Pose],
-    against: &dyn Fn(&ReachableTarget) -> (Option<&'f RegisteredFrame>, Option<&'f RegisteredFrame>),
+    against: &dyn Fn(&ReachableTarget) -> TargetFrames<'f>,
     arms: &Arms<'_>,
 ) -> Vec<(f64, Option<f64>)> {
     let Some(knowledge) = arms.knowledge else { return vec![(0.0, None); reachable.len()] };
@@ -522,6 +522,9 @@ fn sigmas<'f>(
         }
     })
 }
+
+/// The frame that carries a target, and the registration of its cut.
+type TargetFrames<'f> = (Option<&'f RegisteredFrame>, Option<&'f RegisteredFrame>);
 
 /// The target, where the controller may use its stated configuration.
 fn stated<'a>(target_refs: &TargetRef<'a>) -> Option<&'a RobTarget> {
