@@ -58,6 +58,13 @@ pub struct Prior {
     pub sigma: f64,
 }
 
+impl Prior {
+    /// 1 / σ², 0 without a prior.
+    fn precision(&self) -> f64 {
+        1.0 / (self.sigma * self.sigma)
+    }
+}
+
 /// JᵀJ, Jᵀr and ½ rᵀr of a set of rows, priors not included.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NormalEquations {
@@ -85,13 +92,10 @@ impl NormalEquations {
 
     /// Adds the priors of the parameters at `x`: one for each, or none at all; one of infinite width has no effect.
     pub fn add_priors(&mut self, priors: &[Prior], x: &[f64]) {
-        for (k, (prior, x)) in priors.iter().zip(x).enumerate() {
-            if prior.sigma.is_finite() {
-                let weight = 1.0 / (prior.sigma * prior.sigma);
-                self.matrix[(k, k)] += weight;
-                self.gradient[k] += weight * (x - prior.mean);
-            }
+        for (k, prior) in priors.iter().enumerate() {
+            self.matrix[(k, k)] += prior.precision();
         }
+        add_prior_gradient(priors, x, &mut self.gradient);
         self.cost += prior_cost(priors, x);
     }
 
@@ -146,10 +150,7 @@ pub trait Problem: Sync {
     fn normal_equations(&self, x: &[f64]) -> NormalEquations {
         let p = self.parameters();
         let parts = map_chunks(self, |rows| {
-            let n = rows.len();
-            let (mut r, mut j) = (vec![0.0; n], vec![0.0; n * p]);
-            self.jacobian(x, rows, &mut r, &mut j);
-            let (j, r) = (DMatrix::from_vec(n, p, j), DVector::from_vec(r));
+            let (j, r) = linearised(self, x, rows);
             NormalEquations { matrix: j.tr_mul(&j), gradient: j.tr_mul(&r), cost: 0.5 * r.norm_squared() }
         });
         let mut total = NormalEquations::zeros(p);
@@ -161,21 +162,30 @@ pub trait Problem: Sync {
     fn gradient(&self, x: &[f64]) -> (f64, DVector<f64>) {
         let p = self.parameters();
         let parts = map_chunks(self, |rows| {
-            let n = rows.len();
-            let (mut r, mut j) = (vec![0.0; n], vec![0.0; n * p]);
-            self.jacobian(x, rows, &mut r, &mut j);
-            let (j, r) = (DMatrix::from_vec(n, p, j), DVector::from_vec(r));
+            let (j, r) = linearised(self, x, rows);
             (0.5 * r.norm_squared(), j.tr_mul(&r))
         });
         parts.into_iter().fold((0.0, DVector::zeros(p)), |sum, part| (sum.0 + part.0, sum.1 + part.1))
     }
 }
 
+/// Jacobian and residuals of some rows.
+fn linearised<P: Problem + ?Sized>(
+    problem: &P,
+    x: &[f64],
+    rows: Range<usize>,
+) -> (DMatrix<f64>, DVector<f64>) {
+    let (n, p) = (rows.len(), problem.parameters());
+    let (mut r, mut j) = (vec![0.0; n], vec![0.0; n * p]);
+    problem.jacobian(x, rows, &mut r, &mut j);
+    (DMatrix::from_vec(n, p, j), DVector::from_vec(r))
+}
+
 /// Adds the gradient of the priors at `x`.
 pub(crate) fn add_prior_gradient(priors: &[Prior], x: &[f64], gradient: &mut DVector<f64>) {
     for (k, (prior, x)) in priors.iter().zip(x).enumerate() {
         if prior.sigma.is_finite() {
-            gradient[k] += (x - prior.mean) / (prior.sigma * prior.sigma);
+            gradient[k] += prior.precision() * (x - prior.mean);
         }
     }
 }

@@ -1,7 +1,9 @@
 //! Gauss–Newton and the two methods that vary the step size.
 
 use truegrind_estimation::estimate::{Estimate, Termination};
+use truegrind_estimation::examples::Line;
 use truegrind_estimation::least_squares::{gauss_newton, lm, sslm, vslm};
+use truegrind_estimation::objective::Objective;
 use truegrind_estimation::problem::{Prior, Problem};
 
 use super::levenberg_marquardt::wide;
@@ -70,6 +72,19 @@ fn all_agree_with_levenberg_marquardt_on_a_calibration_sized_problem() {
         let (a, b) = (other.covariance.unwrap(), best.covariance.as_ref().unwrap());
         assert!((a - b).norm() < 1e-4 * b.norm());
     }
+}
+
+/// Priors included, in the same bits, whether one chunk of rows or several.
+#[test]
+fn cost_and_gradient_alone_are_those_of_the_normal_equations() {
+    let (problem, _) = wide(2000);
+    for (problem, x) in [(&problem as &dyn Problem, vec![1e-3; 28]), (&Line, vec![1.3, 0.4])] {
+        let mut objective = Objective::new(problem, &x, true);
+        let whole = objective.normal_equations(&x);
+        assert!(whole.gradient.norm() > 0.0);
+        assert_eq!(objective.gradient(&x), (whole.cost, whole.gradient));
+    }
+    assert!(!Line.priors().is_empty());
 }
 
 #[test]
