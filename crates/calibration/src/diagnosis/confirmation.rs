@@ -21,13 +21,14 @@ use super::candidates::Scored;
 use super::catalogue::Candidate;
 use super::cause::Cause;
 use super::cause_kind::CauseKind;
-use super::design::{Design, Linear, Projected, pure_all, side_by_side};
+use super::design::{Design, Linear, side_by_side};
 use super::discrepancy::{Discrepancy, Functions};
+use super::elimination::{Criteria, Eliminated, Significance, Tested, eliminate};
 use super::extension::{Extended, Subject};
 use super::halves::halves;
 use super::intervals::ShiftScan;
 use super::link_growth;
-use super::score::{Score, is_scattered, log_p_of_pure, score_columns, score_from, score_projected};
+use super::score::{Score, score_columns, score_from, score_projected};
 use super::selection::{Accepted, Options, contains_cause};
 use super::serial_correlation::prewhiten;
 use crate::identification::tolerance::GROWTH_SIGMA;
@@ -156,15 +157,6 @@ pub(super) struct ConfirmationContext<'a> {
     pub raw: &'a Design,
 }
 
-/// Significance of a cause with the discrepancy in the model.
-#[derive(Debug, Clone, Copy)]
-struct Significance {
-    merit: f64,
-    /// Natural logarithm of the p-value, corrected for trials.
-    log_p: f64,
-    is_significant: bool,
-}
-
 /// A candidate with its columns over all rows, whitened as in the fit.
 struct WithColumns {
     candidate: Arc<Candidate>,
@@ -185,7 +177,21 @@ impl ConfirmationContext<'_> {
                 WithColumns { columns: candidate.columns(self.raw), candidate: Arc::new(candidate) }
             })
             .collect();
-        let (mut confirmations, removed, discrepancy) = self.eliminate(&functions, &own, &numbers);
+        let tested: Vec<Tested<'_>> = own
+            .iter()
+            .zip(self.accepted)
+            .enumerate()
+            .map(|(k, (own, accepted))| Tested {
+                columns: &own.columns,
+                sizes: own.candidate.cause.sizes(),
+                tried: accepted.tried,
+                parameters: self.found.parameter_indices(k).to_vec(),
+            })
+            .collect();
+        let criteria = Criteria { families: self.families, alpha: self.options.alpha };
+        let eliminated = eliminate(self.linear, &functions, &tested, &numbers, criteria);
+        let mut confirmations = self.confirmations(&own, &eliminated, &numbers);
+        let Eliminated { removed, discrepancy, .. } = eliminated;
         if !own.is_empty() {
             let pool = self.pool(&discrepancy, &numbers);
             let halves = halves(&self.subject.observed.dataset, self.options.seed);
@@ -258,56 +264,32 @@ impl ConfirmationContext<'_> {
         causes.iter().flat_map(|&k| self.found.parameter_indices(k)).collect()
     }
 
-    /// Removes causes that are not significant with the discrepancy, one after the other (backward elimination).
-    fn eliminate(
+    /// The causes beside the discrepancy and beside their rivals there, not yet repeated in halves.
+    fn confirmations(
         &self,
-        functions: &Functions,
         own: &[WithColumns],
+        eliminated: &Eliminated,
         numbers: &[usize],
-    ) -> (Vec<Confirmation>, Vec<usize>, Discrepancy) {
-        let mut removed: Vec<usize> = Vec::new();
-        let mut discrepancy = Discrepancy::of(functions, self.linear, &[], numbers, None);
-        let mut confirmations = loop {
-            let (rho, noise) = (discrepancy.correlation, discrepancy.noise);
-            let whole = self
-                .linear
-                .with_random_effects(&discrepancy.columns)
-                .prewhitened(rho, numbers, noise)
-                .whole();
-            let whiten = |columns: &DMatrix<f64>| prewhiten(columns, rho, numbers, self.linear.per) / noise;
-            let columns: Vec<DMatrix<f64>> = own.par_iter().map(|own| whiten(&own.columns)).collect();
-            let projected = whole.design.project_all(&columns);
-            let beside = |k: usize| {
-                let mut dropped = removed.clone();
-                if !removed.contains(&k) {
-                    dropped.push(k);
-                }
-                whole.without(&self.parameter_indices(&dropped))
-            };
-            let judged = self.significance(own, &whole.design, (&columns, &projected), &beside);
-            let worst = (0..own.len())
-                .filter(|k| !removed.contains(k) && !judged[*k].is_significant)
-                .max_by(|&a, &b| judged[a].log_p.total_cmp(&judged[b].log_p).then(b.cmp(&a)));
-            let Some(worst) = worst else {
-                break judged
-                    .into_par_iter()
-                    .enumerate()
-                    .map(|(k, judged)| self.beside_rivals(k, &own[k], judged, &beside(k), &whiten))
-                    .collect::<Vec<Confirmation>>();
-            };
-            removed.push(worst);
-            discrepancy = Discrepancy::of(
-                functions,
-                self.linear,
-                &self.parameter_indices(&removed),
-                numbers,
-                Some(&discrepancy),
-            );
-        };
-        for k in &removed {
-            confirmations[*k].significant = false;
+    ) -> Vec<Confirmation> {
+        let Eliminated { significance, removed, discrepancy } = eliminated;
+        if own.is_empty() {
+            return Vec::new();
         }
-        (confirmations, removed, discrepancy)
+        let (rho, noise) = (discrepancy.correlation, discrepancy.noise);
+        let whole =
+            self.linear.with_random_effects(&discrepancy.columns).prewhitened(rho, numbers, noise).whole();
+        let whiten = |columns: &DMatrix<f64>| prewhiten(columns, rho, numbers, self.linear.per) / noise;
+        let mut out: Vec<Confirmation> = significance
+            .par_iter()
+            .enumerate()
+            .map(|(k, judged)| {
+                let dropped: Vec<usize> = removed.iter().copied().filter(|o| *o != k).chain([k]).collect();
+                let design = whole.without(&self.parameter_indices(&dropped));
+                self.beside_rivals(k, &own[k], *judged, &design, &whiten)
+            })
+            .collect();
+        removed.iter().for_each(|&k| out[k].significant = false);
+        out
     }
 
     /// The merit of growth of each link with the course of `cause`, if that is a drift of the sensor; else 0. Beside growth that the fit
@@ -328,48 +310,7 @@ impl ConfirmationContext<'_> {
         })
     }
 
-    /// Significance of each cause in its design of `beside`, which has it not, given the whitened columns and their projections on the
-    /// whole design.
-    fn significance(
-        &self,
-        own: &[WithColumns],
-        whole: &Design,
-        (columns, projected): (&[DMatrix<f64>], &[Projected]),
-        beside: &(dyn Fn(usize) -> Design + Sync),
-    ) -> Vec<Significance> {
-        let sizes = |k: usize| own[k].candidate.cause.sizes();
-        let scored: Vec<(Design, Projected, Score)> = (0..own.len())
-            .into_par_iter()
-            .map(|k| {
-                checkpoint();
-                let design = beside(k);
-                let projected = design.project_on(&projected[k]);
-                let score = score_projected(&projected, &sizes(k), self.accepted[k].tried);
-                (design, projected, score)
-            })
-            .collect();
-        let is_scattered = |k: &usize| is_scattered(&sizes(*k), &scored[*k].2);
-        let scattered: Vec<usize> = (0..own.len()).filter(is_scattered).collect();
-        let shown: Vec<_> = scattered.iter().map(|&k| (&columns[k], &scored[k].0, &scored[k].1)).collect();
-        let mut log_p: Vec<f64> = (0..own.len()).map(|k| scored[k].2.plain_log_p(&sizes(k))).collect();
-        let of_scattered: Vec<f64> = pure_all(whole, &shown)
-            .into_par_iter()
-            .zip(&scattered)
-            .map(|(pure, &k)| log_p_of_pure(&scored[k].0, pure, &scored[k].2, &sizes(k)))
-            .collect();
-        scattered.iter().zip(of_scattered).for_each(|(&k, found)| log_p[k] = found);
-        log_p
-            .into_iter()
-            .enumerate()
-            .map(|(k, log_p)| {
-                let merit = scored[k].2.merit;
-                let log_p = (log_p + (self.accepted[k].tried * self.families).ln()).min(0.0);
-                Significance { merit, log_p, is_significant: merit > 0.0 && log_p <= self.options.alpha.ln() }
-            })
-            .collect()
-    }
-
-    /// The same with the margin to its best rival there.
+    /// The confirmation of a cause with the margin to its best rival in `design`, which has it not.
     fn beside_rivals(
         &self,
         index: usize,

@@ -15,14 +15,14 @@ use rayon::prelude::*;
 
 use super::algebra::{finite, gram, lower_factor, outer, product, product_of_transposed, solved};
 use super::extension::{Extended, Subject, with_robust_weights};
-use super::serial_correlation::prewhiten;
+use super::serial_correlation::prewhiten_transposed;
 use crate::identification::calibration::CalibrationProblem;
 use crate::measurement::dataset::{Dataset, Reading, Sensor};
 use crate::measurement::sensor::disturbance::sag_mm;
 use crate::measurement::split;
 use truegrind_arm::parameter::{LinkCoordinate, Parameter};
 use truegrind_estimation::problem::Problem;
-use truegrind_math::axpy::add_scaled;
+use truegrind_math::axpy::{Entry, add_sparse_product};
 use truegrind_math::work::checkpoint;
 
 /// Derivatives of the whitened residual from which the columns of candidates are built, n each.
@@ -224,7 +224,7 @@ impl Linear {
     }
 
     /// Adds random effects: `columns`, n × m, with coefficients of variance 1.
-    pub(super) fn with_random_effects(&self, columns: &DMatrix<f64>) -> Self {
+    pub fn with_random_effects(&self, columns: &DMatrix<f64>) -> Self {
         let (p, m) = (self.rows.nrows(), columns.ncols());
         let mut rows = DMatrix::zeros(p + m, self.rows.ncols());
         rows.rows_mut(0, p).copy_from(&self.rows);
@@ -235,17 +235,20 @@ impl Linear {
 
     /// Prewhitens for a lag-one correlation `rho` and noise that is `noise` times the assumed one; `numbers` are the row numbers of the
     /// observations.
-    pub(super) fn prewhitened(&self, rho: f64, numbers: &[usize], noise: f64) -> Self {
+    pub fn prewhitened(&self, rho: f64, numbers: &[usize], noise: f64) -> Self {
         if rho == 0.0 && noise == 1.0 {
             return self.clone();
         }
         if rho == 0.0 {
             return self.with_rows(&self.rows / noise, &self.residual / noise);
         }
-        let whitened = |columns: &DMatrix<f64>| prewhiten(columns, rho, numbers, self.per) / noise;
-        let residual =
-            whitened(&DMatrix::from_columns(std::slice::from_ref(&self.residual))).column(0).into_owned();
-        self.with_rows(whitened(&self.rows.transpose()).transpose(), residual)
+        let (mut rows, mut residual) =
+            (self.rows.clone(), DMatrix::from_row_slice(1, self.residual.len(), self.residual.as_slice()));
+        for columns in [&mut rows, &mut residual] {
+            prewhiten_transposed(columns, rho, numbers, self.per);
+            *columns /= noise;
+        }
+        self.with_rows(rows, DVector::from_column_slice(residual.as_slice()))
     }
 
     fn with_rows(&self, rows: DMatrix<f64>, residual: DVector<f64>) -> Self {
@@ -373,19 +376,28 @@ impl FullDesign {
         if d == 0 {
             return out;
         }
-        let mut picked = DMatrix::zeros(p, d);
-        for (a, &k) in dropped.iter().enumerate() {
-            picked[(k, a)] = 1.0;
-        }
-        let z = solved(&self.lower, picked);
-        let m = lower_factor(gram(&z));
-        let directions = solved(&m, z.transpose()).transpose();
+        let z = solved(&self.lower, units(p, dropped));
         let taken = DVector::from_iterator(d, dropped.iter().map(|&k| self.x[k]));
-        let moved = m.solve_lower_triangular(&taken).unwrap_or_else(|| DVector::zeros(d));
+        let (directions, moved) = removed_directions(&z, &taken);
         out.residual.gemv_tr(-1.0, &*self.design.basis, &(&directions * &moved), 1.0);
         out.reduction = Some(Reduction { directions, removed: OnceLock::new(), moved });
         out
     }
+}
+
+/// Columns of the identity of `p` rows.
+pub(super) fn units(p: usize, places: &[usize]) -> DMatrix<f64> {
+    let mut out = DMatrix::zeros(p, places.len());
+    places.iter().enumerate().for_each(|(a, &k)| out[(k, a)] = 1.0);
+    out
+}
+
+/// U and the change of the residual along it, from Z and the dropped parameters; see [`FullDesign::without`].
+pub(super) fn removed_directions(z: &DMatrix<f64>, dropped: &DVector<f64>) -> (DMatrix<f64>, DVector<f64>) {
+    let m = lower_factor(gram(z));
+    let directions = solved(&m, z.transpose()).transpose();
+    let moved = m.solve_lower_triangular(dropped).unwrap_or_else(|| DVector::zeros(dropped.len()));
+    (directions, moved)
 }
 
 impl Design {
@@ -436,19 +448,14 @@ impl Design {
 
     /// QᵀC and CᵀC of sparse columns, such as knots of an error map, in time proportional to the nonzero entries.
     fn sparse_product(&self, columns: &DMatrix<f64>) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
-        let reached = sparse(columns)?;
+        let entries = sparse(columns)?;
         let mut shared = DMatrix::zeros(self.basis.nrows(), columns.ncols());
-        let mut by_row: Vec<Vec<(usize, f64)>> = vec![Vec::new(); columns.nrows()];
-        let mut terms: Vec<(usize, f64)> = Vec::new();
-        for (k, rows) in reached.iter().enumerate() {
-            terms.clear();
-            terms.extend(rows.iter().map(|&s| (s, columns[(s, k)])));
-            add_scaled(&terms, self.basis.as_slice(), shared.column_mut(k).as_mut_slice());
-            terms.iter().for_each(|&(s, value)| by_row[s].push((k, value)));
-        }
+        add_sparse_product(self.basis.nrows(), &entries, self.basis.as_slice(), shared.as_mut_slice());
         let mut square = DMatrix::zeros(columns.ncols(), columns.ncols());
-        for (a, x) in by_row.iter().flat_map(|row| row.iter().map(move |x| (row, x))) {
-            a.iter().for_each(|(k, y)| square[(*k, x.0)] += x.1 * y);
+        for row in entries.chunk_by(|a, b| a.from == b.from) {
+            for (x, y) in row.iter().flat_map(|x| row.iter().map(move |y| (x, y))) {
+                square[(y.to, x.to)] += x.factor * y.factor;
+            }
         }
         Some((shared, square))
     }
@@ -463,27 +470,15 @@ impl Design {
         Projected { gradient, information, shared, given_back }
     }
 
-    /// The same from the projection on the full design of which this is a reduction.
-    pub fn project_on(&self, whole: &Projected) -> Projected {
-        let (gradient, information, given_back) = self.reduced(whole);
-        Projected { gradient, information, shared: whole.shared.clone(), given_back }
-    }
-
-    /// Gradient (k) and information (k × k) of that, all that a score needs, without copying the rest.
+    /// Gradient (k) and information (k × k) of columns from their projection on the full design of which this is a reduction.
     pub fn gradient_and_information(&self, whole: &Projected) -> (DVector<f64>, DMatrix<f64>) {
-        let (gradient, information, _) = self.reduced(whole);
-        (gradient, information)
-    }
-
-    fn reduced(&self, whole: &Projected) -> (DVector<f64>, DMatrix<f64>, Option<DMatrix<f64>>) {
         let (mut gradient, mut information) = (whole.gradient.clone(), whole.information.clone());
-        let Some(reduction) = &self.reduction else {
-            return (gradient, information, whole.given_back.clone());
-        };
-        let back = product_of_transposed(&reduction.directions, &whole.shared);
-        information += gram(&back);
-        gradient.gemv_tr(-1.0, &back, &reduction.moved, 1.0);
-        (gradient, information, Some(back))
+        if let Some(reduction) = &self.reduction {
+            let back = product_of_transposed(&reduction.directions, &whole.shared);
+            information += gram(&back);
+            gradient.gemv_tr(-1.0, &back, &reduction.moved, 1.0);
+        }
+        (gradient, information)
     }
 
     /// The columns with everything free projected off, n × k.
@@ -524,21 +519,6 @@ impl Design {
     }
 }
 
-/// [`Design::pure`] of several columns, each of a reduction of `whole`, with one pass over its basis.
-pub(super) fn pure_all(whole: &Design, all: &[(&DMatrix<f64>, &Design, &Projected)]) -> Vec<DMatrix<f64>> {
-    let shared: Vec<DMatrix<f64>> =
-        all.iter().map(|(_, design, projected)| design.shared(projected)).collect();
-    let taken = product_of_transposed(&whole.basis, &side_by_side(&shared, whole.basis.nrows()));
-    let mut first = 0;
-    all.iter()
-        .map(|(columns, ..)| {
-            let own = taken.columns(first, columns.ncols());
-            first += columns.ncols();
-            *columns - own
-        })
-        .collect()
-}
-
 /// All columns of some matrices of `rows` rows.
 pub(super) fn side_by_side<'a>(
     columns: impl IntoIterator<Item = &'a DMatrix<f64>, IntoIter: Clone>,
@@ -568,16 +548,34 @@ pub(super) fn linearised(problem: &CalibrationProblem, x: &[f64]) -> (DVector<f6
 /// Columns count as sparse if at most one in this many entries is nonzero.
 const SPARSE: usize = 4;
 
-/// The nonzero rows of each column, if the columns are sparse.
-fn sparse(columns: &DMatrix<f64>) -> Option<Vec<Vec<usize>>> {
+/// The nonzero entries row by row, if the columns are sparse.
+fn sparse(columns: &DMatrix<f64>) -> Option<Vec<Entry>> {
     let most = columns.len() / SPARSE;
-    if columns.ncols() < 2 * SPARSE || columns.iter().filter(|c| **c != 0.0).count() > most {
+    if columns.ncols() < 2 * SPARSE {
         return None;
     }
-    let reached = |column: nalgebra::DVectorView<'_, f64>| {
-        column.iter().enumerate().filter(|(_, c)| **c != 0.0).map(|(s, _)| s).collect()
-    };
-    Some(columns.column_iter().map(reached).collect())
+    // Entries before each row, then the place of the next one of each row.
+    let (mut places, mut count) = (vec![0; columns.nrows() + 1], 0);
+    for column in columns.column_iter() {
+        for (place, value) in places[1..].iter_mut().zip(column.iter()) {
+            *place += usize::from(*value != 0.0);
+        }
+        count += column.iter().filter(|value| **value != 0.0).count();
+        if count > most {
+            return None;
+        }
+    }
+    for row in 1..places.len() {
+        places[row] += places[row - 1];
+    }
+    let mut entries = vec![Entry { from: 0, to: 0, factor: 0.0 }; count];
+    for (to, column) in columns.column_iter().enumerate() {
+        for (from, &factor) in column.iter().enumerate().filter(|(_, value)| **value != 0.0) {
+            entries[places[from]] = Entry { from, to, factor };
+            places[from] += 1;
+        }
+    }
+    Some(entries)
 }
 
 /// Derivatives by the sensor's scale and by a cable's sag.

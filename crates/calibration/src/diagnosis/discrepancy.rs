@@ -18,8 +18,9 @@ use rand_distr::{Distribution, StandardNormal};
 use super::design::{Linear, Slopes};
 use super::extension::Subject;
 use super::marginal::{self, Variances};
+use super::products::Whitening;
 use super::serial_correlation::{
-    NEGLIGIBLE as NEGLIGIBLE_CORRELATION, correlation_range, lag_one_correlation, prewhiten,
+    NEGLIGIBLE as NEGLIGIBLE_CORRELATION, correlation_range, lag_one_correlation,
 };
 use crate::identification::calibration::flange_torques;
 use crate::measurement::dataset::{Dataset, Sensor};
@@ -204,7 +205,9 @@ fn loads(dataset: &Dataset, nominal: &Model, slopes: &Slopes, per: usize) -> Vec
 pub struct Discrepancy {
     /// Standard deviation of the coefficients of each group of the functions.
     sizes: Vec<f64>,
-    /// The nonnegligible functions, each column in units of its standard deviation.
+    /// The nonnegligible functions, each with its standard deviation.
+    pub(super) terms: Vec<(usize, f64)>,
+    /// Their columns in units of it.
     pub columns: DMatrix<f64>,
     /// The group of each column.
     groups: Vec<Group>,
@@ -225,23 +228,22 @@ pub struct Discrepancy {
 }
 
 impl Discrepancy {
-    /// Estimates the variances with everything in `linear` free except the parameters at `dropped`. `before` is the result of a larger
+    /// Estimates the variances with everything in the fit free except the parameters at `dropped`. `before` is the result of a larger
     /// model as a start.
-    pub fn of(
+    pub(super) fn of(
         functions: &Functions,
-        linear: &Linear,
+        whitening: &mut Whitening<'_>,
         dropped: &[usize],
-        numbers: &[usize],
         before: Option<&Self>,
     ) -> Self {
         let rho = before.map_or(0.0, |b| b.correlation);
-        let mut out = Self::estimate(functions, linear, dropped, numbers, rho, before);
+        let mut out = Self::estimate(functions, whitening, dropped, rho, before);
         if let Some(before) = before.filter(|b| b.correlation != 0.0) {
             out.correlation_range = before.correlation_range;
         }
         if rho == 0.0 && out.correlation != 0.0 {
             let (rho, correlation_range) = (out.correlation, out.correlation_range);
-            let whitened = Self::estimate(functions, linear, dropped, numbers, rho, Some(&out));
+            let whitened = Self::estimate(functions, whitening, dropped, rho, Some(&out));
             out = Self { correlation_range, ..whitened };
         }
         if out.is_significant() { out } else { out.without_functions() }
@@ -252,6 +254,7 @@ impl Discrepancy {
         let columns = DMatrix::zeros(self.columns.nrows(), 0);
         let effect_mm = vec![0.0; self.effect_mm.len()];
         Self {
+            terms: Vec::new(),
             columns,
             groups: Vec::new(),
             contributions: Vec::new(),
@@ -266,66 +269,68 @@ impl Discrepancy {
     /// The estimate for a lag-one correlation of `rho`.
     fn estimate(
         functions: &Functions,
-        linear: &Linear,
+        whitening: &mut Whitening<'_>,
         dropped: &[usize],
-        numbers: &[usize],
         rho: f64,
         before: Option<&Self>,
     ) -> Self {
-        let filtered = linear.prewhitened(rho, numbers, 1.0);
-        let columns = prewhiten(&functions.columns, rho, numbers, linear.per);
-        let design = filtered.design(dropped);
-        let projected = design.project(&columns);
-        let freedom = design.rows() as f64 * linear.effective_share - filtered.spent(dropped);
-        let square = design.residual.norm_squared();
+        let (linear, numbers) = (whitening.linear, whitening.numbers);
+        let products = whitening.at(rho);
+        let beside = products.without(dropped);
+        let rows = beside.residual.len();
+        let freedom = rows as f64 * linear.effective_share - products.linear.spent(dropped);
+        let square = beside.residual.norm_squared();
         let Variances { sizes, noise, evidence, coefficients } = marginal::variances(
-            &projected.information,
-            &projected.gradient,
+            &beside.information,
+            &beside.gradient,
             &functions.groups.iter().map(|(_, range)| range.clone()).collect::<Vec<_>>(),
             (square, freedom),
             before.map(|b| b.sizes.as_slice()),
         );
-        let pure = design.pure(&columns, &projected);
-        let left = &design.residual + &pure * &coefficients;
         let mut contributions = Vec::new();
         let mut prior_mm = Vec::new();
         let mm = typical_mm(linear);
-        let (mut kept, mut groups) = (Vec::new(), Vec::new());
+        let mut terms = Vec::new();
+        let mut groups = Vec::new();
         let mut effect_mm = vec![0.0; linear.slopes.mm.len()];
         for ((group, range), size) in functions.groups.iter().zip(&sizes) {
             if size * size <= NEGLIGIBLE * noise * noise {
                 continue;
             }
             // Excludes the part that links and frames can absorb.
-            let own = if rho == 0.0 { &pure } else { &functions.columns };
-            let part = own.columns(range.start, range.len()) * coefficients.rows(range.start, range.len());
+            let part = if rho == 0.0 {
+                beside.readings(range.clone(), &coefficients)
+            } else {
+                functions.columns.columns(range.start, range.len())
+                    * coefficients.rows(range.start, range.len())
+            };
             let lengths: Vec<f64> = linear.slopes.mm.iter().zip(part.iter()).map(|(mm, v)| mm * v).collect();
             let square: f64 = lengths.iter().map(|l| l * l).sum();
             contributions.push((*group, (square / linear.observations.max(1) as f64).sqrt()));
             prior_mm.push((*group, size * mm));
             effect_mm.iter_mut().zip(&lengths).for_each(|(sum, l)| *sum += l);
-            kept.extend(range.clone().map(|k| (k, *size)));
+            terms.extend(range.clone().map(|k| (k, *size)));
             groups.extend(range.clone().map(|_| *group));
         }
         contributions.sort_by(|a, b| b.1.total_cmp(&a.1));
         let scaled: Vec<DVector<f64>> =
-            kept.iter().map(|&(k, size)| functions.columns.column(k) * size).collect();
+            terms.iter().map(|&(k, size)| functions.columns.column(k) * size).collect();
         let columns =
-            if scaled.is_empty() { DMatrix::zeros(design.rows(), 0) } else { DMatrix::from_columns(&scaled) };
-        let correlation = if rho == 0.0 {
-            lag_one_correlation(&left, linear.per, numbers, &linear.slopes.poses)
-        } else {
-            rho
-        };
-        let correlation_range = if rho == 0.0 && correlation != 0.0 {
-            correlation_range(&left, linear.per, &linear.slopes.poses)
-        } else {
-            0
-        };
+            if scaled.is_empty() { DMatrix::zeros(rows, 0) } else { DMatrix::from_columns(&scaled) };
+        let (mut correlation, mut range) = (rho, 0);
+        if rho == 0.0 {
+            let left = &beside.residual + beside.readings(0..coefficients.len(), &coefficients);
+            let poses = &linear.slopes.poses;
+            correlation = lag_one_correlation(&left, linear.per, numbers, poses);
+            if correlation != 0.0 {
+                range = correlation_range(&left, linear.per, poses);
+            }
+        }
         let effect_mm =
             effect_mm.chunks(linear.per).map(|row| row.iter().map(|l| l * l).sum::<f64>().sqrt()).collect();
         Self {
             sizes,
+            terms,
             columns,
             groups,
             contributions,
@@ -334,7 +339,7 @@ impl Discrepancy {
             evidence,
             noise,
             correlation,
-            correlation_range,
+            correlation_range: range,
         }
     }
 

@@ -134,18 +134,34 @@ pub fn log_p_of(
     let projected = design.project(&columns);
     let pure = design.pure(&columns, &projected);
     let (information, gradient) = (projected.information, projected.gradient);
-    log_p_of_pure(design, pure, &Score { information, gradient, ..score.clone() }, sizes)
+    let residuals = Residuals { values: &design.residual, poses: &design.slopes.poses, per: design.per };
+    log_p_of_pure(&residuals, pure, &Score { information, gradient, ..score.clone() }, sizes)
+}
+
+/// Residuals of a fit whose scatter by pose is looked at.
+pub(super) struct Residuals<'a> {
+    /// Whitened, n.
+    pub(super) values: &'a DVector<f64>,
+    /// Pose index of each observation.
+    pub(super) poses: &'a [usize],
+    /// Scalar rows of an observation.
+    pub(super) per: usize,
 }
 
 /// The same for columns off which everything free is projected already.
-pub fn log_p_of_pure(design: &Design, pure: DMatrix<f64>, score: &Score, sizes: &[f64]) -> f64 {
+pub(super) fn log_p_of_pure(
+    residuals: &Residuals<'_>,
+    pure: DMatrix<f64>,
+    score: &Score,
+    sizes: &[f64],
+) -> f64 {
     let (information, gradient) = in_sizes(&score.information, &score.gradient, sizes);
     let k = sizes.len();
     let Some(factor) = (&information + DMatrix::identity(k, k)).cholesky() else {
         return score.plain_log_p(sizes);
     };
     let step = factor.solve(&gradient);
-    let scattered = scatter_statistic(design, pure, sizes, &gradient, &step);
+    let scattered = scatter_statistic(residuals, pure, sizes, &gradient, &step);
     let (plain, freedom) = plain_statistic(&information, &gradient);
     log_chi_square_tail(plain.min(scattered), freedom.max(1))
 }
@@ -179,7 +195,7 @@ fn plain_statistic(information: &DMatrix<f64>, gradient: &DVector<f64>) -> (f64,
 /// since readings of one pose share its model error (clusters). For designs of all rows only: a design of a subset has the pose
 /// indices of all rows.
 fn scatter_statistic(
-    design: &Design,
+    residuals: &Residuals<'_>,
     mut pure: DMatrix<f64>,
     sizes: &[f64],
     gradient: &DVector<f64>,
@@ -187,13 +203,13 @@ fn scatter_statistic(
 ) -> f64 {
     let k = pure.ncols();
     pure.column_iter_mut().zip(sizes).for_each(|(mut column, size)| column *= *size);
-    let left = &design.residual - &pure * step;
-    let poses = &design.slopes.poses;
-    debug_assert_eq!(poses.len(), design.observations, "a design of a part of the rows");
+    let Residuals { values, poses, per } = *residuals;
+    let left = values - &pure * step;
+    debug_assert_eq!(poses.len() * per, values.len(), "a design of a part of the rows");
     let mut by_pose = DMatrix::zeros(k, poses.iter().max().map_or(0, |p| p + 1));
     for (i, &pose) in poses.iter().enumerate() {
         let mut g = by_pose.column_mut(pose);
-        for s in i * design.per..(i + 1) * design.per {
+        for s in i * per..(i + 1) * per {
             g.axpy(left[s], &pure.row(s).transpose(), 1.0);
         }
     }

@@ -55,18 +55,38 @@ pub(super) fn correlation_range(left: &DVector<f64>, per: usize, poses: &[usize]
 
 /// Prewhitened columns, for lag-one correlation ρ: (xᵢ − ρ^d xᵢ₋₁) / √(1 − ρ^2d), d the difference of row numbers.
 pub(super) fn prewhiten(columns: &DMatrix<f64>, rho: f64, numbers: &[usize], per: usize) -> DMatrix<f64> {
-    if rho == 0.0 {
-        return columns.clone();
-    }
     let mut out = columns.clone();
-    for i in 1..numbers.len() {
-        let power = rho.powi(numbers[i].abs_diff(numbers[i - 1]).clamp(1, 1000) as i32);
-        let scale = (1.0 - power * power).sqrt().recip();
-        for s in i * per..(i + 1) * per {
-            for k in 0..columns.ncols() {
-                out[(s, k)] = (columns[(s, k)] - power * columns[(s - per, k)]) * scale;
+    if rho != 0.0 {
+        let filter = filter(rho, numbers);
+        for mut column in out.column_iter_mut() {
+            // Backwards, so that the row before is still as it was.
+            for (i, (power, scale)) in filter.iter().enumerate().rev() {
+                for s in (i + 1) * per..(i + 2) * per {
+                    column[s] = (column[s] - power * column[s - per]) * scale;
+                }
             }
         }
     }
     out
+}
+
+/// The same for the transposed matrix, in place.
+pub(super) fn prewhiten_transposed(columns: &mut DMatrix<f64>, rho: f64, numbers: &[usize], per: usize) {
+    let (size, filter) = (columns.nrows() * per, filter(rho, numbers));
+    let all = columns.as_mut_slice();
+    for (i, (power, scale)) in filter.iter().enumerate().rev() {
+        let (before, own) = all[i * size..(i + 2) * size].split_at_mut(size);
+        own.iter_mut().zip(before).for_each(|(own, before)| *own = (*own - power * *before) * scale);
+    }
+}
+
+/// ρ^d and 1 / √(1 − ρ^2d) of every row but the first.
+fn filter(rho: f64, numbers: &[usize]) -> Vec<(f64, f64)> {
+    numbers
+        .windows(2)
+        .map(|pair| {
+            let power = rho.powi(pair[1].abs_diff(pair[0]).clamp(1, 1000) as i32);
+            (power, (1.0 - power * power).sqrt().recip())
+        })
+        .collect()
 }
