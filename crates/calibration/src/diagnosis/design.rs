@@ -13,7 +13,9 @@ use std::sync::{Arc, OnceLock};
 use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
 
-use super::algebra::{finite, gram, lower_factor, outer, product, product_of_transposed, solved};
+use super::algebra::{
+    back_and_forth, finite, gram, lower_factor, outer, product, product_of_transposed, solved,
+};
 use super::extension::{Extended, Subject, with_robust_weights};
 use super::serial_correlation::prewhiten_transposed;
 use crate::identification::calibration::CalibrationProblem;
@@ -305,6 +307,15 @@ impl Linear {
             residual.gemv_tr(1.0, &self.rows, &taken, 1.0);
         }
         residual
+    }
+
+    /// A change of the readings, n, without what a change of the parameters absorbs.
+    pub(super) fn unabsorbed(&self, change: &DVector<f64>) -> DVector<f64> {
+        let mut left = change.clone();
+        if let Some(absorbed) = back_and_forth(&lower_factor(self.normal().clone()), &(&self.rows * change)) {
+            left.gemv_tr(-1.0, &self.rows, &absorbed, 1.0);
+        }
+        left
     }
 
     /// The design with all parameters free, from which those of smaller models follow at little cost.

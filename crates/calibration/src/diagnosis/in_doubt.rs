@@ -92,15 +92,16 @@ pub(super) fn missing_errors(
         return Vec::new();
     }
     let linear = Linear::of(subject, handed);
-    let whole = linear.whole().design;
     let left = |cause: &Cause| {
-        let columns = Candidate::of(cause, subject).columns(&whole);
-        whole.pure(&columns, &whole.project(&columns)) * DVector::from_vec(cause.values())
+        let columns =
+            Candidate::of(cause, subject).columns_of(&linear.slopes, (linear.observations, linear.per));
+        linear.unabsorbed(&(columns * DVector::from_vec(cause.values())))
     };
     let left: Vec<DVector<f64>> = causes.iter().map(|(cause, _)| left(cause)).collect();
     // Several can be one error: what they add up to is shared out.
     let alone: f64 = left.iter().map(DVector::norm_squared).sum();
-    let together = left.iter().fold(DVector::zeros(whole.rows()), |sum, one| sum + one).norm_squared();
+    let together =
+        left.iter().fold(DVector::zeros(linear.residual.len()), |sum, one| sum + one).norm_squared();
     let of_the_arm: Vec<usize> =
         (0..handed.parameters.len()).filter(|&k| handed.parameters[k].is_of_arm()).collect();
     let frames = linear.design(&of_the_arm);

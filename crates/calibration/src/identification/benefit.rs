@@ -21,6 +21,8 @@
 //! models with normal priors: Bishop 2006, section 3.5.
 //! Checked against: simulated arms at fresh poses (tests, and the sweep in `benches/verdict.rs`).
 
+use std::ops::Range;
+
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt;
 use faer::{MatMut, MatRef, Par};
@@ -210,6 +212,17 @@ fn weighted_posteriors(
 const NEGLIGIBLE: f64 = -14.0;
 
 impl LinearisedReadings {
+    /// No readings of a model with `all` columns.
+    fn none(all: usize) -> Self {
+        Self { matrix: DMatrix::zeros(all, all), right: DVector::zeros(all), square: 0.0, count: 0 }
+    }
+
+    fn plus(mut self, more: Self) -> Self {
+        self.matrix += more.matrix;
+        self.right += more.right;
+        Self { square: self.square + more.square, count: self.count + more.count, ..self }
+    }
+
     /// Projects the scale column onto the columns of the fit's parameters. The orthogonal remainder would fit any
     /// non-geometric error of the arm, and thousands of rows would turn that into evidence of a scale; an actual scale error
     /// has almost no such remainder, since it is equivalent to a larger arm. The tolerances alone then decide between two
@@ -491,42 +504,47 @@ fn linearise_readings(fitted: &Fitted, dataset: &Dataset) -> LinearisedReadings 
     let rotation = fitted.frames.base_from_sensor.rotation;
     let centre = mean_reading(dataset);
     let all = p + 1;
-    let mut out = LinearisedReadings {
-        matrix: DMatrix::zeros(all, all),
-        right: DVector::zeros(all),
-        square: 0.0,
-        count: 0,
-    };
-    for from in (0..dataset.rows.len()).step_by(ROWS) {
-        checkpoint();
-        let to = (from + ROWS).min(dataset.rows.len());
-        let n = (to - from) * per;
-        let (mut residuals, mut jacobian) = (vec![0.0; n], vec![0.0; n * all]);
-        problem.jacobian(x, from * per..to * per, &mut residuals, &mut jacobian[..n * p]);
-        for (i, row) in dataset.rows.iter().skip(from).take(to - from).enumerate() {
-            let weight = problem.per_mm(from + i);
-            let offset = Vector3::from(coordinates(&row.reading)) - Vector3::from(centre);
-            match dataset.sensor {
-                Sensor::Cable => jacobian[n * p + i] = weight * offset.x,
-                Sensor::Position | Sensor::Pose => {
-                    let slope = -weight * (rotation * offset);
-                    let first = n * p + i * per;
-                    jacobian[first..first + 3].copy_from_slice(slope.as_slice());
+    let part = |rows: Range<usize>| {
+        let mut out = LinearisedReadings::none(all);
+        for from in rows.clone().step_by(ROWS) {
+            checkpoint();
+            let to = (from + ROWS).min(rows.end);
+            let n = (to - from) * per;
+            let (mut residuals, mut jacobian) = (vec![0.0; n], vec![0.0; n * all]);
+            problem.jacobian(x, from * per..to * per, &mut residuals, &mut jacobian[..n * p]);
+            for (i, row) in dataset.rows.iter().skip(from).take(to - from).enumerate() {
+                let weight = problem.per_mm(from + i);
+                let offset = Vector3::from(coordinates(&row.reading)) - Vector3::from(centre);
+                match dataset.sensor {
+                    Sensor::Cable => jacobian[n * p + i] = weight * offset.x,
+                    Sensor::Position | Sensor::Pose => {
+                        let slope = -weight * (rotation * offset);
+                        let first = n * p + i * per;
+                        jacobian[first..first + 3].copy_from_slice(slope.as_slice());
+                    }
                 }
             }
+            let jacobian = DMatrix::from_vec(n, all, jacobian);
+            let y = jacobian.columns(0, p) * DVector::from_column_slice(x) - DVector::from_vec(residuals);
+            out.matrix += gram(&jacobian);
+            out.right += jacobian.tr_mul(&y);
+            out.square += y.norm_squared();
+            out.count += n;
         }
-        let jacobian = DMatrix::from_vec(n, all, jacobian);
-        let y = jacobian.columns(0, p) * DVector::from_column_slice(x) - DVector::from_vec(residuals);
-        out.matrix += gram(&jacobian);
-        out.right += jacobian.tr_mul(&y);
-        out.square += y.norm_squared();
-        out.count += n;
-    }
-    out
+        out
+    };
+    let rows = dataset.rows.len();
+    let starts: Vec<usize> = (0..rows).step_by(PART).collect();
+    let parts: Vec<LinearisedReadings> =
+        starts.into_par_iter().map(|from| part(from..(from + PART).min(rows))).collect();
+    parts.into_iter().reduce(LinearisedReadings::plus).unwrap_or_else(|| LinearisedReadings::none(all))
 }
 
 /// Rows that are processed together.
 const ROWS: usize = 512;
+
+/// Rows of one thread's sum: the same for any number of threads.
+const PART: usize = 4 * ROWS;
 
 fn coordinates(reading: &Reading) -> [f64; 3] {
     match reading {
