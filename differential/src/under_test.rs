@@ -69,6 +69,8 @@ pub struct Row {
     pub sigma_mm: Option<f64>,
     /// Stated distance of the path from the intended one (mm); none where it is not checked.
     pub bend_mm: Option<f64>,
+    /// Whether the listing knows the motion that ends where this one starts.
+    pub start_known: bool,
     /// Whether it is flagged since it rests on a configuration that the controller does not check.
     pub guessed: bool,
 }
@@ -185,6 +187,7 @@ pub fn corrected_task(
             after_mm: outcome.after_mm,
             sigma_mm: outcome.sigma_mm,
             bend_mm: outcome.path_deviation_mm,
+            start_known: motion.previous.is_some(),
             guessed: outcome.reason == Some(OutcomeReason::UnknownStart),
         });
     }
@@ -202,6 +205,7 @@ fn refused(files: &[(&str, &[u8])], program: &Program<'_>, reason: &str) -> Corr
         after_mm: None,
         sigma_mm: None,
         bend_mm: None,
+        start_known: motion.previous.is_some(),
         guessed: false,
     });
     let same = |(_, bytes): &(&str, &[u8])| CorrectedFile { bytes: bytes.to_vec(), edits: Vec::new() };

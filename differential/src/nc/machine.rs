@@ -259,18 +259,19 @@ impl<'s> Machine<'s> {
         self.tip = on;
     }
 
-    /// Another length counts: the axes stay where they are, and those that turn the tool keep their values.
+    /// Another length counts: the axes stay where they are, and those that turn the tool keep their values. Of tools that are
+    /// turned against each other the text does not tell whether angles keep their values or the flange stays.
     pub fn measure(&mut self, tool: Option<String>) {
         if self.tool != tool {
             self.at = [None; 3];
-        }
-        self.tool = tool;
-    }
-
-    /// Another tool; where its tip is the text does not tell.
-    pub fn hold(&mut self, tool: Option<String>) {
-        if self.tool != tool {
-            self.lost();
+            let turn = |tool: &Option<String>| {
+                tool.as_ref()
+                    .and_then(|name| self.setting.tool(name))
+                    .map_or_else(UnitQuaternion::identity, |t| t.rotation)
+            };
+            if turn(&self.tool).angle_to(&turn(&tool)) > 1e-9 {
+                self.turn = Turn::Unknown;
+            }
         }
         self.tool = tool;
     }

@@ -111,7 +111,7 @@ pub fn compare(seed: u64, case: &Case, made: &Made) -> Shown {
         return out;
     }
     let mounted = Default::default();
-    let comparison = Comparison { seed, case, made, task: &task, tally: out.tally, mounted };
+    let comparison = Comparison { seed, case, made, task: &task, tally: out.tally, mounted, stopped: false };
     out.tally = comparison.run(&before, &after);
     out
 }
@@ -139,6 +139,8 @@ struct Comparison<'a> {
     tally: Tally,
     /// Tool and object of the motion before.
     mounted: (String, String),
+    /// Whether the corrected program ends at an arc that lay at the very border of what makes one.
+    stopped: bool,
 }
 
 /// One goal of one motion in both runs.
@@ -207,6 +209,9 @@ impl Comparison<'_> {
                         return self.tally;
                     }
                     let goes = self.motion(a, b, &mut courses);
+                    if self.stopped {
+                        return self.tally;
+                    }
                     // Where the original stops as well nothing is lost.
                     if let Some(text) = nowhere.filter(|_| goes) {
                         self.wrong(self.line(a.at), "inserted", text);
@@ -308,6 +313,12 @@ impl Comparison<'_> {
         let Some(joints) = now.joints else {
             if guessed {
                 self.tally.guessed += 1;
+                return true;
+            }
+            // Where an arc starts that is the first motion of a routine, only its callers know.
+            if now.no_arc && row.is_some_and(|row| !row.start_known) {
+                self.tally.open += usize::from(!self.stopped);
+                self.stopped = true;
                 return true;
             }
             let text =

@@ -43,6 +43,8 @@ pub struct Point {
     pub passing: Option<[f64; 6]>,
     /// Whether the tool is turned so far from what is told at a circle point that the joints there are those of the way.
     pub turned: bool,
+    /// Whether the controller stops here since the three points make no arc for it.
+    pub no_arc: bool,
     /// Whether the controller has stopped at a motion before that it cannot carry out: how the arm went on is not told.
     pub adrift: bool,
 }
@@ -97,6 +99,7 @@ impl<'a> Course<'a> {
                 along: None,
                 passing: None,
                 turned: false,
+                no_arc: false,
                 adrift,
             });
         }
@@ -104,7 +107,7 @@ impl<'a> Course<'a> {
             self.along(motion, &mut out);
         }
         if motion.way == Way::Arc && !self.makes_arc(motion, &out) {
-            out.iter_mut().for_each(|point| point.joints = None);
+            out.iter_mut().for_each(|point| (point.no_arc, point.joints) = (point.joints.is_some(), None));
         }
         if self.links.have_play() {
             self.follow(motion, &mut out);

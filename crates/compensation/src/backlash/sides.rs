@@ -9,15 +9,19 @@
 //!
 //! Lines and arcs are sampled between their ends; a parabola through neighbouring samples locates reversals. Where the text
 //! leaves the joint path open (rapid motions of NC; lines and arcs with separate wrist interpolation; lines written as joints
-//! or split by inserted targets), each possible path is followed, and a side is known where all agree.
+//! or split by inserted targets), each possible path is followed, and a side is known where all agree. Where the arm cannot follow a
+//! path to joints that no configuration states, it may end a whole turn of a joint away: from which side joints arrive from there
+//! is unknown until joints are stated again.
 
 pub(crate) use crate::backlash::motion_end::{BacklashSides, JointSides, MotionEnd, ReachedEnd};
 
 use crate::backlash::joint_samples::{by_wrist, sampled};
 use crate::backlash::motion_end::SampledJoints;
 use crate::backlash::play_track::{PlayTrack, agreed, arrive, passing};
+use crate::configuration;
 use crate::frames::frame_pair::FramePair;
 use truegrind_arm::inverse::Inverse;
+use truegrind_programs::motion::Switch;
 
 /// The sides along all motions. `before[m]`: the motion that ended where motion m starts. `unknown_sides[m]`: the joints whose side
 /// counts as unknown at the end of motion m; none where it is empty.
@@ -33,13 +37,18 @@ pub(crate) fn backlash_sides(
     let (paths, passes) = sampled(stops, before, nominal, &half, frames_of);
     let by_wrist = by_wrist(stops, before, nominal, &half, frames_of);
     let mut tracks: Vec<Option<[PlayTrack; 6]>> = Vec::with_capacity(stops.len());
+    // Whether the joints at the end of each motion may be others than those solved.
+    let mut unsettled = vec![false; stops.len()];
     let mut out = Vec::with_capacity(stops.len());
     for (m, stop) in stops.iter().enumerate() {
         let from = before[m].map(|b| b as usize).filter(|b| *b < m);
+        let from_unsettled = from.is_some_and(|b| unsettled[b]);
+        let from = from.filter(|_| !from_unsettled);
         let mut track = from.and_then(|b| tracks[b]);
         let mut course = BacklashSides { turns: Vec::new(), end: [0; 6], via: [0; 6] };
         match stop {
             MotionEnd::Unknown => track = None,
+            MotionEnd::Unmoved if from_unsettled => unsettled[m] = true,
             MotionEnd::Unmoved => course.end = track.map_or([0; 6], |track| track.map(|t| t.side)),
             MotionEnd::At(reached) => {
                 let start = from.and_then(|b| match &stops[b] {
@@ -58,7 +67,10 @@ pub(crate) fn backlash_sides(
                         samples.as_ref().map(|inner| begin.into_iter().chain(inner.clone()).collect()),
                     );
                 }
-                if along.len() < 1 + by_wrist[m].iter().count() {
+                let follows = along.len() == 1 + by_wrist[m].iter().count();
+                unsettled[m] =
+                    (from_unsettled || !follows) && configuration::monitored(reached.motion) != Switch::On;
+                if from_unsettled || !follows {
                     // The arm cannot follow the path, so how it arrives is unknown.
                     here = std::array::from_fn(|j| PlayTrack::unknown(reached.joints[j], half[j]));
                     along = vec![Vec::new()];

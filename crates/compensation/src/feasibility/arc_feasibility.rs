@@ -2,7 +2,8 @@
 //!
 //! An arc depends on its start. If the previous motion is corrected too, the arc moves as a whole; otherwise two of its three
 //! points move, and an arc that is small compared with the correction becomes a different one. Conversely, an unmodified arc
-//! becomes a different one where the motion before it is corrected.
+//! becomes a different one where the motion before it is corrected. The controller stops at an arc whose points lie too near to
+//! each other or to a line: none may become so short or so flat. Where the start is known only at run time, neither is checked.
 
 use std::collections::BTreeMap;
 
@@ -30,6 +31,11 @@ const UNKNOWN_SHARE: f64 = 0.25;
 /// Number of samples on an arc.
 const SAMPLES: u8 = 12;
 
+/// A controller takes three points for a circle if circle point and end are at least as far from the start (mm), and seen from it
+/// under at least this angle (rad). Source: ABB, Technical reference manual, RAPID instructions, MoveC, limitations.
+const SHORTEST_MM: f64 = 0.1;
+const NARROWEST_RAD: f64 = std::f64::consts::PI / 180.0;
+
 /// The motions that arcs forbid to correct, by index. `stays`: motions that remain unmodified for reasons other than their
 /// own targets.
 pub(crate) fn infeasible_arcs(
@@ -52,7 +58,8 @@ pub(crate) fn infeasible_arcs(
             && corrected(previous, &infeasible_arcs)
             && !corrected(index, &infeasible_arcs)
             && let Some(Ok(start)) = solved.of(previous as usize).last()
-            && changes_unmodified_arc(start, motion, frame_table)
+            && (changes_unmodified_arc(start, motion, frame_table)
+                || stops_unmodified_arc(start, motion, frame_table))
         {
             infeasible_arcs.insert(previous, OutcomeReason::StartOfUnchangedArc { line: motion.place.line });
         }
@@ -97,6 +104,20 @@ fn circles(
             && all_corrected(targets)
             && !infeasible_arcs.contains_key(&previous)
             && !unchanged_motions.contains_key(&previous);
+        let original = solved.original_end(previous as usize).map(|end| (end.frames_index, end.intended));
+        if let Some((frames_index, original)) = original.or_else(|| stated_end(before, frame_table)) {
+            let now = match targets.last() {
+                Some(Ok(end)) if corrected => end.commanded,
+                _ => original,
+            };
+            let [start, now] =
+                [original, now].map(|pose| seen_from(&pose, frames_index, to.frames_index, frame_table));
+            let told = [start, via.intended, to.intended];
+            if stops(motion, &told, &[now, via.commanded, to.commanded]) {
+                infeasible_arcs.insert(index, OutcomeReason::NoCircle);
+                continue;
+            }
+        }
         if corrected {
             continue;
         }
@@ -118,10 +139,47 @@ fn no_circle(from: &Pose, via: &SolvedTarget, to: &SolvedTarget, motion: &Motion
         && Curve::round(*from, &via.intended, to.intended, motion).is_none()
 }
 
+/// A pose that one pair of frames states, as another states it where the arm does not move.
+fn seen_from(pose: &Pose, stated: usize, wanted: usize, frame_table: &FrameTable) -> Pose {
+    if stated == wanted {
+        return *pose;
+    }
+    let [stated, wanted] = [stated, wanted].map(|index| &frame_table.list[index].commanded);
+    wanted.target_of(&stated.flange_for(pose))
+}
+
+/// Whether the controller stops at an arc through start, circle point and end as they are `after`, but not as they were `before`.
+/// An NC block states the arc itself and is subject to no such limits.
+fn stops(motion: &Motion, before: &[Pose; 3], after: &[Pose; 3]) -> bool {
+    motion.axis.is_none() && makes_circle(before) && !makes_circle(after)
+}
+
+/// Whether three points are far enough from each other and from a line for a controller.
+fn makes_circle([from, via, to]: &[Pose; 3]) -> bool {
+    let [via, to] = [via, to].map(|point| point.translation.vector - from.translation.vector);
+    via.norm() >= SHORTEST_MM && to.norm() >= SHORTEST_MM && via.angle(&to) >= NARROWEST_RAD
+}
+
+/// Whether the controller stops at an unmodified arc if only its start is corrected.
+fn stops_unmodified_arc(start: &SolvedTarget, motion: &Motion, frame_table: &FrameTable) -> bool {
+    let Ok(wanted) = frame_table.of_motion(motion) else { return false };
+    let pose = |target: &MotionTarget| target.value.as_ref().ok()?.cartesian().map(|target| target.pose());
+    let [Some(via), Some(to)] = [0, 1].map(|k| motion.targets.get(k).and_then(pose)) else {
+        return false;
+    };
+    let from = |pose: &Pose| seen_from(pose, start.frames_index, wanted, frame_table);
+    stops(motion, &[from(&start.intended), via, to], &[from(&start.commanded), via, to])
+}
+
 /// End of an unmodified motion, in the frames of the following one.
 fn stated(before: &Motion, frames_index: usize, frame_table: &FrameTable) -> Option<Pose> {
+    stated_end(before, frame_table).filter(|end| end.0 == frames_index).map(|end| end.1)
+}
+
+/// End of an unmodified motion, with its frames.
+fn stated_end(before: &Motion, frame_table: &FrameTable) -> Option<(usize, Pose)> {
     let Ok(TargetValue::Cartesian(target)) = before.to()?.value else { return None };
-    (frame_table.of_motion(before).ok()? == frames_index).then(|| target.pose())
+    Some((frame_table.of_motion(before).ok()?, target.pose()))
 }
 
 /// Whether two corrected points and an uncorrected start make a different arc than intended.

@@ -173,7 +173,7 @@ fn originals(
 }
 
 /// Where the configuration may or may not be checked, depending on the execution path, the branch counts as guessed as if
-/// unchecked: from an unknown start, or from one that is guessed itself.
+/// unchecked: from an unknown start, from one that is guessed itself, or where an unchecked motion ends at other joints.
 fn guess_if_possibly_unmonitored(
     listing: &Listing,
     monitors: &[Switch],
@@ -191,7 +191,18 @@ fn guess_if_possibly_unmonitored(
         let before = match motion.previous.map(|previous| previous as usize) {
             None => Some(BranchGuess::Guessed),
             Some(previous) => match out[first[previous]..first[previous + 1]].last() {
-                Some(Ok(start)) => (start.guess != BranchGuess::Known).then_some(BranchGuess::Inherited),
+                Some(Ok(start)) if start.guess != BranchGuess::Known => Some(BranchGuess::Inherited),
+                Some(Ok(start)) => {
+                    let here = first[index]..first[index + 1];
+                    let same = same_unchecked(
+                        &start.joints,
+                        &target_refs[here.clone()],
+                        &out[here],
+                        arms,
+                        frame_table,
+                    );
+                    (!same).then_some(BranchGuess::Guessed)
+                }
                 _ => Some(BranchGuess::Guessed),
             },
         };
@@ -209,6 +220,29 @@ fn guess_if_possibly_unmonitored(
         }
     }
 }
+
+/// Whether a controller that does not check configurations takes the same joints at all targets of a motion that starts at these.
+fn same_unchecked(
+    start: &Joints,
+    target_refs: &[TargetRef<'_>],
+    checked: &[Result<OriginalTarget, OutcomeReason>],
+    arms: &Arms<'_>,
+    frame_table: &FrameTable,
+) -> bool {
+    let mut near = *start;
+    target_refs.iter().zip(checked).all(|(target, checked)| {
+        let (Some(commanded), Ok(checked)) = (CommandedFlange::of(target, frame_table), checked) else {
+            return true;
+        };
+        let unchecked =
+            configured(&arms.nominal, &commanded.flange, commanded.target, Switch::Off, Some(&near));
+        near = checked.joints;
+        unchecked.is_ok_and(|joints| (joints - checked.joints).amax() < SAME_JOINTS_RAD)
+    })
+}
+
+/// Solutions of one target closer than this are the same (rad).
+const SAME_JOINTS_RAD: f64 = 1e-6;
 
 /// Shortest and longest run of targets solved together.
 const RUNS: [usize; 2] = [8, 64];

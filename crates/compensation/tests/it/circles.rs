@@ -18,7 +18,7 @@ use truegrind_programs::nc::setup::Setup;
 use truegrind_programs::rapid::Task;
 use truegrind_programs::rewrite::RewriteOptions;
 
-use super::segment::{down, gone, known, module, rewrite, start_joints, told};
+use super::segment::{down, gone, known, module, module_with, rewrite, start_joints, told};
 use super::{estimated, nominal, perturbed};
 
 /// Distance of a point from a circle about a vertical axis.
@@ -228,6 +228,60 @@ fn a_circle_that_stays_starts_where_it_did() {
         small += usize::from(stays(seed, &format!("{},{}", pose(374.5, 0.5), pose(375.0, 0.0))));
     }
     assert!(small > 3, "{small}");
+}
+
+/// Seen from the start, a controller wants circle point and end under at least 1° (ABB, RAPID instructions, MoveC): a program
+/// that it carries out must not become one at which it stops, whichever of the points move, and under whichever tools.
+#[test]
+fn an_arc_that_the_controller_accepts_remains_one() {
+    let tool = "PERS tooldata long := [TRUE,[[0,0,60],[1,0,0,0]],[1,[0,0,30],[1,0,0,0],0,0,0]];\n";
+    let pose = |x: f64, y: f64, z: f64| {
+        format!("[[{x:.4},{y:.4},{z:.4}],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]")
+    };
+    // The start is stated for the flange in one case, 60 mm above the tip of the other tool.
+    let points = |listing: &truegrind_programs::motion::Listing, above: f64| {
+        let place = |motion: usize, target: usize| {
+            let target = listing.motions[motion].targets[target].value.unwrap();
+            target.cartesian().unwrap().pose()
+        };
+        let start = place(0, 0) * Pose::translation(0.0, 0.0, above);
+        [start, place(1, 0), place(1, 1)].map(|pose| pose.translation.vector)
+    };
+    let angle = |[from, via, to]: [Vector3<f64>; 3]| (via - from).angle(&(to - from)).to_degrees();
+    let mut stopped = 0;
+    for (before, after, above) in [
+        ("tool0", "tool0", 0.0),
+        ("long", "long", 0.0),
+        ("tool0", "long", 60.0),
+        ("tool0 \\Corr", "tool0", 0.0),
+        ("tool0", "tool0 \\Corr", 0.0),
+    ] {
+        for seed in 11..27 {
+            let (sin, cos) = 1.002_f64.to_radians().sin_cos();
+            let source = module_with(
+                tool,
+                &format!(
+                    "  ConfL \\Off;\n  MoveL {},v50,fine,{before};\n  MoveC {},{},v50,fine,{after};\n",
+                    pose(374.0, -100.0, 300.0 + above),
+                    pose(374.0 + 100.0 * sin, -100.0 + 100.0 * cos, 300.0),
+                    pose(374.0, 100.0, 300.0)
+                ),
+            );
+            let task = Task::read(&[("p.mod", source.as_bytes())]);
+            assert!((angle(points(&task.listing, above)) - 1.002).abs() < 5e-4);
+            let options = Options { max_correction_mm: 50.0, tolerance_mm: 50.0, ..Options::default() };
+            let (planned, text) = rewrite(&source, &known(&perturbed(seed, 1.0)), &options);
+            let task = Task::read(&[("p.mod", text.as_bytes())]);
+            let seen = angle(points(&task.listing, above));
+            assert!(seen >= 1.0, "{before}, {after}, seed {seed}: {seen}°, {:?}", planned.outcomes);
+            let [start, arc] = [0, 1].map(|motion| planned.outcomes[motion].reason);
+            stopped += usize::from(
+                arc == Some(OutcomeReason::NoCircle)
+                    || matches!(start, Some(OutcomeReason::StartOfUnchangedArc { .. })),
+            );
+        }
+    }
+    assert!((20..70).contains(&stopped), "{stopped}");
 }
 
 #[test]

@@ -506,3 +506,48 @@ fn motions_that_rest_on_a_guess_are_flagged_one_by_one() {
         "{motions:#?}"
     );
 }
+
+/// A program whose configurations are checked in its first cycle alone: `ConfL \\Off` stays in force when main begins again. Where
+/// the controller then keeps to the branch in which it stands, a correction for the stated one is flagged.
+#[test]
+fn a_configuration_checked_in_the_first_cycle_alone_is_flagged_where_the_second_goes_otherwise() {
+    let robot = "abb-irb-120";
+    let sheet = sheet(robot);
+    let inverse = Inverse::new(&sheet, &Condition::default(), &sheet);
+    let joints = |deg: [f64; 6]| Joints::from_fn(|j, _| f64::to_radians(deg[j]));
+    let target = |deg: [f64; 6]| {
+        let q = joints(deg);
+        let (pose, conf) = (forward(&sheet, &q), inverse.configuration(&q));
+        let (p, r) = (pose.translation.vector, pose.rotation);
+        format!(
+            "[[{:.4},{:.4},{:.4}],[{:.8},{:.8},{:.8},{:.8}],[{},{},{},{}],[9E9,9E9,9E9,9E9,9E9,9E9]]",
+            p.x, p.y, p.z, r.w, r.i, r.j, r.k, conf.cf1, conf.cf4, conf.cf6, conf.cfx
+        )
+    };
+    let reasons = |places: [[f64; 6]; 2], last: &str| {
+        let source = format!(
+            "MODULE M\n PROC main()\n  MoveAbsJ [[5,10,5,40,30,20],[9E9,9E9,9E9,9E9,9E9,9E9]]\\NoEOffs,v50,fine,tool0;\n  MoveL \
+             {},v50,fine,tool0;\n  MoveL {},v50,fine,tool0;\n{last} ENDPROC\nENDMODULE\n",
+            target(places[0]),
+            target(places[1])
+        );
+        let task = Task::read(&[("p.mod", source.as_bytes())]);
+        let options = Options {
+            tolerance_mm: 50.0,
+            cuts: truegrind_compensation::cut::Cuts::Single,
+            flag_unknown_starts: true,
+            ..Options::default()
+        };
+        let planned = plan(&task.listing, &known(robot, 2), &Cell::default(), &options);
+        planned.outcomes.iter().map(|outcome| outcome.reason).collect::<Vec<_>>()
+    };
+    // The other solution of the wrist.
+    let flipped = |[a, b, c, d, e, f]: [f64; 6]| [a, b, c, d - 180.0, -e, f - 180.0];
+    let near = [[7.0, 12.0, 4.0, 42.0, 31.0, 22.0], [8.0, 13.0, 3.0, 43.0, 32.0, 23.0]];
+    let far = near.map(flipped);
+    let unknown = Some(OutcomeReason::UnknownStart);
+    assert_eq!(reasons(far, "")[2], None);
+    assert_eq!(reasons(far, "  ConfL \\Off;\n")[2], unknown);
+    assert_eq!(reasons(near, "")[1..], [None, None]);
+    assert_eq!(reasons(near, "  ConfL \\Off;\n")[1..], [None, None]);
+}

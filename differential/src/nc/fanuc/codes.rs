@@ -104,7 +104,7 @@ impl Fanuc<'_> {
                     let number = block.get('H').filter(|_| code != 490);
                     let tool = number.map_or(self.machine.tool.clone(), |number| Some(format!("T{number}")));
                     self.machine.follow_tip(code == 434);
-                    self.machine.hold(tool);
+                    self.machine.measure(tool);
                 }
                 680 => self.machine.bend("turned", true),
                 690 => self.machine.bend("turned", false),

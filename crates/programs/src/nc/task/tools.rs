@@ -1,9 +1,20 @@
 //! The active tool, its length offset and the TCP mode.
 
+use nalgebra::UnitQuaternion;
+
 use super::super::dialect::Dialect;
 use super::super::modal_group::{ModalGroup, TOOL_GROUPS, name_key};
 use super::super::modal_state::{ActiveTool, OrientationMode, ToolLength};
-use super::{Block, Interpreter};
+use super::{Block, Interpreter, START_TOOL};
+use crate::motion::Frame;
+
+fn turn_of(tool: &Frame) -> UnitQuaternion<f64> {
+    tool.pose().rotation
+}
+
+fn is_same_turn(a: &UnitQuaternion<f64>, b: &UnitQuaternion<f64>) -> bool {
+    a.angle_to(b) < 1e-9
+}
 
 impl Interpreter<'_, '_> {
     /// Switches the TCP mode. A change invalidates the stored position.
@@ -20,14 +31,43 @@ impl Interpreter<'_, '_> {
         }
     }
 
-    /// Changes the tool. The coordinates of the tool position change with its length.
+    /// Changes the tool. The coordinates of the tool position change with its length, and its orientation if the tools are, or
+    /// may be, turned against each other: whether a control then keeps the programmed angles or counts those of the new tool
+    /// where the flange stands, the text does not tell.
     fn change_tool_frame(&mut self, change: impl FnOnce(&mut ActiveTool)) {
         let before = self.state.tool.frame_name(self.dialect);
+        let turn_before = self.turn_of_tool();
         change(&mut self.state.tool);
         let after = self.state.tool.frame_name(self.dialect);
-        if before != after || self.state.unknown_reason(TOOL_GROUPS).is_some() {
-            self.invalidate_position();
+        let unknown = self.state.unknown_reason(TOOL_GROUPS).is_some();
+        if before == after && !unknown {
+            return;
         }
+        let alike = match (turn_before, self.turn_of_tool()) {
+            // Any of them may have been in use.
+            (_, Some(turn)) if unknown => self.tools.values().all(|tool| is_same_turn(&turn_of(tool), &turn)),
+            (Some(before), Some(after)) => is_same_turn(&before, &after),
+            _ => false,
+        };
+        if alike {
+            self.invalidate_position();
+        } else {
+            self.invalidate_pose();
+        }
+    }
+
+    /// How the active tool is turned on the flange; without its length as with it. A number of which nothing is stated is a
+    /// length, unless others are turned.
+    fn turn_of_tool(&self) -> Option<UnitQuaternion<f64>> {
+        let tool = &self.state.tool;
+        let cancelled = tool.length == ToolLength::None;
+        let name = if cancelled { tool.name.clone() } else { tool.frame_name(self.dialect) };
+        if let Ok(frame) = self.tool_value(&name) {
+            return Some(turn_of(&frame));
+        }
+        let none = UnitQuaternion::identity();
+        let lengths_alone = || self.tools.values().all(|tool| is_same_turn(&turn_of(tool), &none));
+        (name == START_TOOL || lengths_alone()).then_some(none)
     }
 
     /// Changes the length offset, whichever the tool.

@@ -179,3 +179,42 @@ fn an_offset_without_a_rotation_word_keeps_its_rotation() {
     let turned = "; truegrind frame G57 w [[500,0,0],[0,0,0,1]]\n";
     assert_eq!(value(turned, "X350 Y10 Z250", LinuxCnc), Ok([0.0, 0.0, 0.0, 1.0]));
 }
+
+/// Where another tool comes into use, words that are left out are taken from before only if no tool is turned: otherwise they may
+/// stay or follow the flange.
+#[test]
+fn angles_are_not_taken_from_a_tool_that_is_turned_otherwise() {
+    let turned = "(truegrind tool H3 c [[0,0,30],[0.9914449,0,0.1305262,0]])\n";
+    let also_turned = "(truegrind tool H4 d [[0,0,60],[0.9914449,0,0.1305262,0]])\n";
+    let straight = "(truegrind tool H2 b [[0,0,80],[1,0,0,0]])\n";
+    let part = "G1 X5. Y5. Z5. B1.";
+    let (open, unknown) = (left(OrientationUnknown), left(ToolUnknown));
+    check(
+        Fanuc,
+        &[
+            (&format!("{straight}G43.4 H2\n{part}"), &[None]),
+            (&format!("{turned}{straight}G43.4 H2\n{part}"), &[None]),
+            (
+                &format!("{turned}G43.4 H3\n{part}\n{F}\n{part}\nG43.4 H1\n{part}\n{F}"),
+                &[open, None, None, open, None],
+            ),
+            (&format!("{turned}{also_turned}G43.4 H3\n{F}\nG43.4 H4\n{part}"), &[None, None]),
+            // Without its length a tool is turned as with it.
+            (&format!("{turned}G49\nG43.4 H1\n{part}"), &[None]),
+            // A number of which nothing is stated is a length, unless others are turned.
+            (&format!("G43.4 H7\n{F}\nG43.4 H1\n{part}"), &[unknown, None]),
+            (&format!("{turned}G43.4 H7\n{F}\nG43.4 H1\n{part}\n{F}"), &[unknown, open, None]),
+        ],
+    );
+    let part = "G1 X5 Y5 Z5 B1";
+    check(LinuxCnc, &[(&format!("{turned}G43 H3\n{G}\nG43 H0\n{part}\n{G}"), &[None, open, None])]);
+    // Where ways meet, any tool may have been in use.
+    let part = "G1 X5. Y5. Z5. B1.";
+    let ways = |tools: &str, number: u8| {
+        format!(
+            "{tools}IF [#2 GT 1] GOTO 5\nG43.4 H{number}\nN5 G1 A180. B0. C0. X1. Y2. Z3.\nG43.4 H1\n{part}"
+        )
+    };
+    assert_eq!(reasons(Fanuc, &ways(straight, 2)).last(), Some(&None));
+    assert_eq!(reasons(Fanuc, &ways(turned, 3)).last(), Some(&open));
+}
