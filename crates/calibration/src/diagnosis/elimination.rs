@@ -2,7 +2,7 @@
 //! the variances of the discrepancy are estimated again, until all remaining causes are significant.
 //!
 //! Each round has the parameters of the fit and the functions of the discrepancy, in units of their standard deviations, as
-//! nuisance parameters. Their normal matrix follows from [`Products`], so that a round takes small matrices and one product over
+//! nuisance parameters. Their normal matrix follows from products that are computed once, so that a round takes small matrices and one product over
 //! the rows, for the scatter of the residuals.
 
 use nalgebra::{DMatrix, DVector};
