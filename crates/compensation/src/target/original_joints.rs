@@ -173,7 +173,8 @@ fn originals(
 }
 
 /// Where the configuration may or may not be checked, depending on the execution path, the branch counts as guessed as if
-/// unchecked: from an unknown start, from one that is guessed itself, or where an unchecked motion ends at other joints.
+/// unchecked: from an unknown start, from one that is guessed itself, or where an unchecked motion ends at other joints. What
+/// follows unchecked inherits the guess.
 fn guess_if_possibly_unmonitored(
     listing: &Listing,
     monitors: &[Switch],
@@ -185,26 +186,22 @@ fn guess_if_possibly_unmonitored(
 ) {
     for (index, monitored) in monitors.iter().enumerate() {
         let motion = &listing.motions[index];
-        if *monitored != Switch::Either || motion.own_reason.is_some() {
+        if *monitored == Switch::On || motion.own_reason.is_some() {
             continue;
         }
-        let before = match motion.previous.map(|previous| previous as usize) {
-            None => Some(BranchGuess::Guessed),
-            Some(previous) => match out[first[previous]..first[previous + 1]].last() {
-                Some(Ok(start)) if start.guess != BranchGuess::Known => Some(BranchGuess::Inherited),
-                Some(Ok(start)) => {
-                    let here = first[index]..first[index + 1];
-                    let same = same_unchecked(
-                        &start.joints,
-                        &target_refs[here.clone()],
-                        &out[here],
-                        arms,
-                        frame_table,
-                    );
-                    (!same).then_some(BranchGuess::Guessed)
-                }
-                _ => Some(BranchGuess::Guessed),
-            },
+        let previous = motion.previous.map(|previous| previous as usize);
+        let before = previous.map(|previous| out[first[previous]..first[previous + 1]].last());
+        let before = match (before, monitored) {
+            (Some(Some(Ok(start))), _) if start.guess != BranchGuess::Known => Some(BranchGuess::Inherited),
+            // Unchecked in any case: its own search has looked at its start, which was not yet known to be a guess.
+            (_, Switch::Off) => None,
+            (Some(Some(Ok(start))), _) => {
+                let here = first[index]..first[index + 1];
+                let same =
+                    same_unchecked(&start.joints, &target_refs[here.clone()], &out[here], arms, frame_table);
+                (!same).then_some(BranchGuess::Guessed)
+            }
+            _ => Some(BranchGuess::Guessed),
         };
         let Some(guess) = before else { continue };
         for at in first[index]..first[index + 1] {
@@ -212,10 +209,11 @@ fn guess_if_possibly_unmonitored(
                 CommandedFlange::of(&target_refs[at], frame_table)
                     .is_some_and(|commanded| arms.nominal.all(&commanded.flange).len() > 1)
             };
-            if let Ok(start) = &mut out[at]
+            if let Ok(here) = &mut out[at]
+                && (*monitored == Switch::Either || here.guess == BranchGuess::Known)
                 && several()
             {
-                start.guess = guess;
+                here.guess = guess;
             }
         }
     }
