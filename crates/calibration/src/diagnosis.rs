@@ -63,6 +63,7 @@ pub mod candidate_scores;
 pub mod order_spectrum;
 pub mod levels;
 pub mod selection;
+pub mod change_points;
 pub mod validation;
 pub mod transfer;
 pub mod residual_tests;

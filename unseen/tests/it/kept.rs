@@ -8,7 +8,11 @@ use truegrind_unseen::under_test::{Written, diagnosed};
 
 /// The marks of run `run` of a kind under the seed in which these were seen.
 fn marks(kind: Kind, run: u64) -> Marks {
-    outcome(&Case::draw(31, kind, run, Limits::default())).marks.unwrap()
+    marks_of(31, kind, run)
+}
+
+fn marks_of(seed: u64, kind: Kind, run: u64) -> Marks {
+    outcome(&Case::draw(seed, kind, run, Limits::default())).marks.unwrap()
 }
 
 fn false_names(marks: &Marks) -> Vec<&str> {
@@ -54,6 +58,22 @@ fn poses_that_are_read_again_prove_no_gear() {
     let marks = marks(Kind::TwoJointGear, 7);
     assert_eq!(false_names(&marks), Vec::<&str>::new());
     assert!(!marks.worse()[0], "{:?}", marks.distances);
+}
+
+/// Nine shifts that follow autocorrelated noise leave white noise: the set-up was told to have changed, and the held-out error was a third of
+/// what fresh rows showed.
+#[test]
+fn excursions_of_correlated_noise_are_no_shifts() {
+    let marks = marks_of(1103, Kind::Correlated, 0);
+    assert_eq!(false_names(&marks), Vec::<&str>::new());
+    assert!(marks.held_out_mm > 0.9 * marks.fresh_mm, "{} for {}", marks.held_out_mm, marks.fresh_mm);
+}
+
+/// Beside a drift that smooth functions follow well, the correlation of what they leave takes no shift away.
+#[test]
+fn steps_of_a_drift_are_no_excursions_of_noise() {
+    let marks = marks_of(1109, Kind::Drift, 6);
+    assert!(marks.told() && marks.false_names().count() == 0, "{:?}", marks.findings);
 }
 
 /// Readings taken before the arm was at rest are told, and yet too little speaks for a better arm beside them: it was 30 % worse.

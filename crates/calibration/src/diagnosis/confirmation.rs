@@ -21,7 +21,7 @@ use super::candidates::Scored;
 use super::catalogue::Candidate;
 use super::cause::Cause;
 use super::cause_kind::CauseKind;
-use super::design::{Design, Linear, side_by_side};
+use super::design::{Design, FullDesign, Linear, side_by_side};
 use super::discrepancy::{Discrepancy, Functions};
 use super::elimination::{Criteria, Eliminated, Significance, Tested, eliminate};
 use super::extension::{Extended, Subject};
@@ -157,6 +157,9 @@ pub(super) struct ConfirmationContext<'a> {
     pub raw: &'a Design,
 }
 
+/// Whitens columns of all rows as the fit beside the discrepancy.
+type Whiten<'a> = &'a (dyn Fn(&DMatrix<f64>) -> DMatrix<f64> + Sync);
+
 /// A candidate with its columns over all rows, whitened as in the fit.
 struct WithColumns {
     candidate: Arc<Candidate>,
@@ -186,18 +189,24 @@ impl ConfirmationContext<'_> {
                 sizes: own.candidate.cause.sizes(),
                 tried: accepted.tried,
                 parameters: self.found.parameter_indices(k).to_vec(),
+                is_shift: own.candidate.cause.rows().is_some(),
             })
             .collect();
         let criteria = Criteria { families: self.families, alpha: self.options.alpha };
         let eliminated = eliminate(self.linear, &functions, &tested, &numbers, criteria);
-        let mut confirmations = self.confirmations(&own, &eliminated, &numbers);
-        let Eliminated { removed, discrepancy, .. } = eliminated;
+        let mut confirmations = Vec::new();
         if !own.is_empty() {
-            let pool = self.pool(&discrepancy, &numbers);
+            let Discrepancy { correlation: rho, noise, .. } = eliminated.discrepancy;
+            let beside = self.linear.with_random_effects(&eliminated.discrepancy.columns);
+            let whole = beside.prewhitened(rho, &numbers, noise).whole();
+            let whiten = |columns: &DMatrix<f64>| prewhiten(columns, rho, &numbers, self.linear.per) / noise;
+            confirmations = self.confirmations(&own, &eliminated, &whole, &whiten);
+            let Eliminated { removed, discrepancy, .. } = &eliminated;
+            let pool = self.pool(&whole, &whiten);
             let halves = halves(&self.subject.observed.dataset, self.options.seed);
             let tested: Vec<Vec<Option<(bool, bool)>>> = halves
                 .par_iter()
-                .map(|half| Half::of(self, half, &discrepancy, &numbers).test(&own, &pool, &removed))
+                .map(|half| Half::of(self, half, discrepancy, &numbers).test(&own, &pool, removed))
                 .collect();
             for in_half in tested {
                 for (confirmation, tested) in confirmations.iter_mut().zip(in_half) {
@@ -209,11 +218,12 @@ impl ConfirmationContext<'_> {
                 }
             }
         }
-        Outcome { confirmations, discrepancy }
+        Outcome { confirmations, discrepancy: eliminated.discrepancy }
     }
 
-    /// Candidates for stability selection: those with enough gain relative to geometry alone.
-    fn pool(&self, discrepancy: &Discrepancy, numbers: &[usize]) -> Vec<WithColumns> {
+    /// Candidates for stability selection: those with enough gain relative to geometry alone. `whole` is the design of the fit beside
+    /// the discrepancy, `whiten` makes columns its own.
+    fn pool(&self, whole: &FullDesign, whiten: Whiten<'_>) -> Vec<WithColumns> {
         let all: Vec<WithColumns> = self
             .pool
             .par_iter()
@@ -223,12 +233,9 @@ impl ConfirmationContext<'_> {
                 candidate: Arc::clone(&s.candidate),
             })
             .collect();
-        let (rho, noise) = (discrepancy.correlation, discrepancy.noise);
         let every: Vec<usize> = (0..self.found.causes.len()).collect();
-        let linear = self.linear.with_random_effects(&discrepancy.columns).prewhitened(rho, numbers, noise);
-        let design = linear.design(&self.parameter_indices(&every));
-        let columns: Vec<DMatrix<f64>> =
-            all.par_iter().map(|t| prewhiten(&t.columns, rho, numbers, linear.per) / noise).collect();
+        let design = whole.without(&self.parameter_indices(&every));
+        let columns: Vec<DMatrix<f64>> = all.par_iter().map(|t| whiten(&t.columns)).collect();
         let projected = design.project_all(&columns);
         all.into_iter()
             .zip(projected)
@@ -269,23 +276,17 @@ impl ConfirmationContext<'_> {
         &self,
         own: &[WithColumns],
         eliminated: &Eliminated,
-        numbers: &[usize],
+        whole: &FullDesign,
+        whiten: Whiten<'_>,
     ) -> Vec<Confirmation> {
-        let Eliminated { significance, removed, discrepancy } = eliminated;
-        if own.is_empty() {
-            return Vec::new();
-        }
-        let (rho, noise) = (discrepancy.correlation, discrepancy.noise);
-        let whole =
-            self.linear.with_random_effects(&discrepancy.columns).prewhitened(rho, numbers, noise).whole();
-        let whiten = |columns: &DMatrix<f64>| prewhiten(columns, rho, numbers, self.linear.per) / noise;
+        let Eliminated { significance, removed, .. } = eliminated;
         let mut out: Vec<Confirmation> = significance
             .par_iter()
             .enumerate()
             .map(|(k, judged)| {
                 let dropped: Vec<usize> = removed.iter().copied().filter(|o| *o != k).chain([k]).collect();
                 let design = whole.without(&self.parameter_indices(&dropped));
-                self.beside_rivals(k, &own[k], *judged, &design, &whiten)
+                self.beside_rivals(k, &own[k], *judged, &design, whiten)
             })
             .collect();
         removed.iter().for_each(|&k| out[k].significant = false);
@@ -294,13 +295,7 @@ impl ConfirmationContext<'_> {
 
     /// The merit of growth of each link with the course of `cause`, if that is a drift of the sensor; else 0. Beside growth that the fit
     /// has already, `confounding` compares the two.
-    fn growth_of_links(
-        &self,
-        cause: &Cause,
-        tried: f64,
-        design: &Design,
-        whiten: &(dyn Fn(&DMatrix<f64>) -> DMatrix<f64> + Sync),
-    ) -> f64 {
+    fn growth_of_links(&self, cause: &Cause, tried: f64, design: &Design, whiten: Whiten<'_>) -> f64 {
         if self.found.causes.iter().any(Cause::is_growth_of_arm) {
             return 0.0;
         }
@@ -317,7 +312,7 @@ impl ConfirmationContext<'_> {
         own: &WithColumns,
         judged: Significance,
         design: &Design,
-        whiten: &(dyn Fn(&DMatrix<f64>) -> DMatrix<f64> + Sync),
+        whiten: Whiten<'_>,
     ) -> Confirmation {
         checkpoint();
         let accepted = &self.accepted[index];
@@ -382,8 +377,8 @@ impl<'a> Half<'a> {
         removed: &[usize],
     ) -> Vec<Option<(bool, bool)>> {
         let all: Vec<usize> = (0..own.len()).collect();
-        let selected = self.selected(own, pool, &self.confirming.parameter_indices(&all));
         let whole = self.linear.whole();
+        let selected = self.selected(own, pool, &whole.without(&self.confirming.parameter_indices(&all)));
         let columns: Vec<DMatrix<f64>> = own.iter().map(|tried| self.columns(&tried.columns)).collect();
         let projected = whole.design.project_all(&columns);
         own.iter()
@@ -448,9 +443,8 @@ impl<'a> Half<'a> {
         })
     }
 
-    /// Forward selection from scratch, each step to first order; best first.
-    fn selected(&self, own: &[WithColumns], pool: &[WithColumns], places: &[usize]) -> Vec<Cause> {
-        let design = self.linear.design(places);
+    /// Forward selection from scratch, each step to first order; best first. `design` has none of the causes.
+    fn selected(&self, own: &[WithColumns], pool: &[WithColumns], design: &Design) -> Vec<Cause> {
         let all: Vec<&WithColumns> = pool.iter().chain(own.iter().filter(|o| fresh(o, pool))).collect();
         let columns: Vec<DMatrix<f64>> = all.iter().map(|t| self.columns(&t.columns)).collect();
         let mut projected = design.project_all(&columns);

@@ -5,6 +5,7 @@ use super::candidates::Scored;
 use super::cause::Cause;
 use super::confirmation::{ConfirmationContext, Outcome};
 use super::design::{FullDesign, Linear};
+use super::elimination::CORRELATED_NOISE;
 use super::extension::{Extended, Freedom, Subject, fit};
 use super::findings::short_name;
 use super::options::Options;
@@ -202,6 +203,7 @@ impl<'a> Search<'a> {
             })
             .collect();
         let [before, geometry] = [&self.registered, &self.geometric].map(stage);
+        // Whatever the held-out error is: their rows were selected for it.
         let excursions = confirmed.outcome.discrepancy.correlation > CORRELATED_NOISE;
         let kept = || stage(&self.extended);
         let lasting = (!passing.is_empty()).then(|| {
@@ -254,10 +256,6 @@ impl<'a> Search<'a> {
 /// With serially correlated readings, unconfirmed shifts are fitted noise unless the purged held-out error rises by this factor
 /// without them.
 const SHIFT_GAIN: f64 = 1.1;
-
-/// Lag-one correlation, given smooth functions of time, from which the noise itself is correlated and unconfirmed shifts are its
-/// excursions, whatever the held-out error: their rows were selected for it.
-const CORRELATED_NOISE: f64 = 0.3;
 
 /// A fit without some of its causes.
 fn without(subject: &Subject<'_>, fitted: &Extended, dropped: &[usize]) -> Extended {

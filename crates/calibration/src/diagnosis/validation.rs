@@ -2,12 +2,14 @@
 //!
 //! With few rows and parameters the refit is complete. With many, the rows of a fold are subtracted from the normal equations
 //! of all rows at their optimum, and one Gauss–Newton step is the refit: links move by micrometres between folds, and the
-//! error of the step is of second order in that. Checked against complete refits.
+//! error of the step is of second order in that. Checked against complete refits. Change points of shifts stay where all rows put them;
+//! what they may be off by is added ([`change_points`](super::change_points)).
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::algebra::{back_and_forth, factored};
+use super::change_points::added_squares;
 use super::extension::{Extended, Freedom, SEARCH_STEPS, Subject};
 use super::held_out::neither;
 use super::newton;
@@ -103,6 +105,7 @@ impl Validation {
             .par_iter()
             .map(|split| rows_of(&split.test))
             .collect::<Option<Vec<NormalEquations>>>()?;
+        let added = added_squares(&self.rows, &fit.model, &fit.frames);
         let mut all = NormalEquations::zeros(p);
         parts.iter().for_each(|part| all.add(part));
         all.add_priors(&fit.priors, &fit.x);
@@ -113,7 +116,8 @@ impl Validation {
             let step = back_and_forth(&normal, &gradient)?;
             let x: Vec<f64> = fit.x.iter().zip(step.iter()).map(|(x, s)| x - s).collect();
             let (model, frames) = fit.problem.apply(&x);
-            Some(errors_on(&self.rows.subset(&split.test), &model, &frames))
+            let errors = errors_on(&self.rows.subset(&split.test), &model, &frames);
+            Some(with_uncertain_sides(errors, &split.test, &added))
         };
         let random = self
             .random
@@ -142,6 +146,7 @@ impl Validation {
     }
 
     fn held_out(&self, fit: &Extended, splits: &[Split]) -> ErrorSummary {
+        let added = added_squares(&self.rows, &fit.model, &fit.frames);
         let errors: Vec<Vec<f64>> = splits
             .par_iter()
             .map(|split| {
@@ -159,11 +164,22 @@ impl Validation {
                     x = lm::solve(&*problem, &x, &near).x;
                 }
                 let (model, frames) = fit.problem.apply(&x);
-                errors_on(&self.rows.subset(&split.test), &model, &frames)
+                let errors = errors_on(&self.rows.subset(&split.test), &model, &frames);
+                with_uncertain_sides(errors, &split.test, &added)
             })
             .collect();
         ErrorSummary::of(errors.concat())
     }
+}
+
+/// Held-out errors of some rows, with what uncertain change points add to the squares of all rows (none without shifts).
+fn with_uncertain_sides(mut errors: Vec<f64>, rows: &[usize], added: &[f64]) -> Vec<f64> {
+    if !added.is_empty() {
+        for (error, &row) in errors.iter_mut().zip(rows) {
+            *error = error.signum() * (*error * *error + added[row]).max(0.0).sqrt();
+        }
+    }
+    errors
 }
 
 /// The fit of frames alone, with the links of the data sheet: the stage `nominal` of a diagnosis.

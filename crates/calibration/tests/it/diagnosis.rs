@@ -9,6 +9,7 @@ pub(crate) mod scenarios;
 mod certain;
 mod decision;
 mod doubts;
+mod change_points;
 mod elimination;
 mod found;
 mod in_doubt;

@@ -70,6 +70,7 @@ fn compared(unknown: &[Hidden], correlated: bool) {
             sizes: cause.sizes(),
             tried: 3.0,
             parameters: fitted.parameter_indices(k),
+            is_shift: cause.rows().is_some(),
         })
         .collect();
     let numbers: Vec<usize> = (0..data.rows.len()).collect();
