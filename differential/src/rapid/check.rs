@@ -391,8 +391,8 @@ impl Comparison<'_> {
         }
         // Behind a motion at which the controller stops the program runs no further until somebody moves the arm.
         let beside = |flange: &Pose| difference(&(flange * tip), &(intended * tip));
-        let best = || meant_links(arm, joints, &at, &beside);
-        if told.adrift && within(best(), &stated) {
+        let best = |load| meant_links(arm, joints, &under(load, now.behind), &beside);
+        if told.adrift && (within(best(old.load), &stated) || within(best(old.tool_load), &stated)) {
             self.tally.open += 1;
             return;
         }

@@ -209,6 +209,9 @@ impl<'a> Course<'a> {
                 (points[0].behind, points[0].flanks) = (self.links.behind(&there), self.links.flanks(&there));
                 let gone = before.filter(|_| motion.tool.1).map(|(_, before)| tip(q) - tip(&before));
                 points[0].passing = between;
+                let turned =
+                    |q: &[f64; 6]| self.arm.nominal_forward(q).rotation.angle_to(&points[0].flange.rotation);
+                points[0].turned |= between.as_ref().is_some_and(|q| turned(q) > TURNED);
                 points[0].along = gone.and_then(|gone| Unit::try_new(gone, 1e-6));
             }
             self.links.go(q);
@@ -323,6 +326,9 @@ impl<'a> Course<'a> {
         ((at(&q) - place).norm() < 1e-6).then_some(q)
     }
 }
+
+/// Turn of the tool on its way (rad) beside what is told at a circle point from which its joints are those of the way.
+const TURNED: f64 = 1e-3;
 
 /// The joints at a share of the way, next to others.
 type Reach<'a> = dyn Fn(f64, &[f64; 6]) -> Option<[f64; 6]> + 'a;
