@@ -165,7 +165,13 @@ fn causes(diagnosis: &Diagnosis) -> Vec<String> {
         .iter()
         .filter(|f| !is_sure(f))
         .filter(named)
-        .map(|f| format!("{}, {}{}{}", f.effect.words(), place(f), worth(f), in_brief(f)))
+        .map(|f| {
+            if f.members.is_empty() {
+                return format!("{}{}", located(f.effect, f.joints.as_deref(), f.rows), worth(f));
+            }
+            let members: Vec<String> = f.members.iter().map(member).collect();
+            format!("an error {}{}: {}", family(f), worth(f), members.join(", "))
+        })
         .collect();
     if !possible.is_empty() {
         out.push(format!("Possible, but not certain: {}", possible.join("; ")));
@@ -176,29 +182,29 @@ fn causes(diagnosis: &Diagnosis) -> Vec<String> {
     out
 }
 
-/// The share of each family of an uncertain finding, for one line.
-fn in_brief(finding: &Finding) -> String {
-    let of: Vec<String> = finding.members.iter().map(member).collect();
-    if of.is_empty() { String::new() } else { format!(": {}: {}", family(finding), of.join(", ")) }
+/// A cause with its joints or rows, for a sentence.
+fn located(effect: CauseKind, joints: Option<&[usize]>, rows: Option<[usize; 2]>) -> String {
+    let words = effect.words();
+    // "gear two joints of joints 2 and 3" says it twice.
+    let name = words.strip_suffix(" two joints").unwrap_or(&words);
+    let place = match (joints, rows) {
+        (_, Some([from, to])) => format!(" in rows {from} to {to}"),
+        (Some([one, other]), _) => format!(" of joints {one} and {other}"),
+        (Some([joint]), _) => format!(" of joint {joint}"),
+        (Some(joints), _) if !joints.is_empty() => format!(" of joints {}", listed(joints)),
+        _ => String::new(),
+    };
+    format!("{name}{place}")
 }
 
 /// A cause that cannot be told apart from others, with its share.
 fn member(member: &Member) -> String {
-    let words = member.effect.words();
-    // "gear two joints of joints 2 and 3" says it twice.
-    let name = words.strip_suffix(" two joints").unwrap_or(&words);
-    let place = match (&member.joints, member.rows) {
-        (_, Some([from, to])) => format!(" in rows {from} to {to}"),
-        (Some(joints), _) if joints.len() == 2 => format!(" of joints {} and {}", joints[0], joints[1]),
-        (Some(joints), _) => format!(" of joint {}", listed(joints)),
-        _ => String::new(),
-    };
     let share =
         if member.share < 0.01 { "below 1".to_owned() } else { format!("{:.0}", 100.0 * member.share) };
-    format!("{name}{place} {share} %")
+    format!("{} {share} %", located(member.effect, member.joints.as_deref(), member.rows))
 }
 
-/// The families of the members of a finding: the only one, or each with its share, largest first.
+/// The families of the members of a finding: the only one, or each with its share, largest first; none of less than a hundredth.
 fn family(finding: &Finding) -> String {
     let mut shares: Vec<(Family, f64)> = Vec::new();
     for member in &finding.members {
@@ -208,12 +214,14 @@ fn family(finding: &Finding) -> String {
         }
     }
     shares.sort_by(|a, b| b.1.total_cmp(&a.1));
+    shares.retain(|(_, share)| *share >= 0.01);
     match shares[..] {
         [(family, _)] => format!("in the {}", family.words()),
         _ => {
-            let each =
-                shares.iter().map(|(family, share)| format!("{} {:.0} %", family.words(), 100.0 * share));
-            each.collect::<Vec<_>>().join(", ")
+            let each = shares
+                .iter()
+                .map(|(family, share)| format!("the {} ({:.0} %)", family.words(), 100.0 * share));
+            format!("in {}", each.collect::<Vec<_>>().join(" or "))
         }
     }
 }

@@ -216,7 +216,10 @@ fn verdict(found: &Identification) -> Verdict {
 /// The verdict on an estimated arm, the same for identification and diagnosis.
 pub fn judged(estimated: &Estimated) -> Verdict {
     let (before, after) = (estimated.registered.held_out.rmse, estimated.geometry.held_out.rmse);
-    let errors = format!("held-out error {after:.3} mm RMSE, {before:.3} mm with registered frames alone");
+    // A diagnosis has a second held-out error beside it: that of the fit with all causes.
+    let of = if estimated.provenance.method == "diagnose" { " of the written arm" } else { "" };
+    let errors =
+        format!("held-out error{of} {after:.3} mm RMSE, {before:.3} mm with registered frames alone");
     let (status, headline) = match estimated.verdict.status {
         Judgement::Pass => {
             (Status::Good, format!("The model may be used; it meets the stated limits: {errors}"))
