@@ -119,8 +119,10 @@ pub fn summary(found: &Diagnosed) -> Document {
     };
     let mut figures = super::identification::benefit_figures(found.benefit.as_ref());
     figures.extend([
-        KeyFigure::new("Held-out RMSE", fits.extended.cv_rmse_mm, 3, "mm")
-            .note(format!("geometry alone: {:.3} mm", fits.geometric.cv_rmse_mm)),
+        KeyFigure::new("Held-out RMSE", fits.extended.cv_rmse_mm, 3, "mm").note(format!(
+            "with all causes, written or not; geometry alone: {:.3} mm",
+            fits.geometric.cv_rmse_mm
+        )),
         KeyFigure::new("Held-out, blocks", fits.extended.cv_blocks_rmse_mm, 3, "mm")
             .note(format!("geometry alone: {:.3} mm", fits.geometric.cv_blocks_rmse_mm)),
         KeyFigure::new("Noise floor", diagnosis.noise_floor_mm, 3, "mm")

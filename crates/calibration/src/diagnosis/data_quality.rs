@@ -135,8 +135,12 @@ pub(super) fn outlier_finding(
     let mut list: Vec<usize> = outliers.iter().map(|(i, _)| dataset.rows[*i].number).collect();
     list.sort_unstable();
     let cause = format!(
-        "{} single readings deviate far more than all others, up to {:.0} times their scatter",
-        list.len(),
+        "{} far more than all others, up to {:.0} times their scatter",
+        if list.len() == 1 {
+            "1 reading deviates".to_owned()
+        } else {
+            format!("{} readings deviate", list.len())
+        },
         outliers[0].1
     );
     let confidence = if remainder { Confidence::Ambiguous } else { Confidence::Identified };

@@ -172,7 +172,8 @@ fn describe_disturbance(d: &Disturbance, rows: &str, parameters: &[FoundParamete
     match (&d.kind, &d.profile) {
         (Kind::Empirical(form), _) => describe_empirical_fault(*form, parameters),
         (Kind::Load { compliance: Some(_), .. }, _) => {
-            format!("{rows} the arm carried {value:.1} kg more than logged")
+            let side = if value < 0.0 { "less" } else { "more" };
+            format!("{rows} the arm carried {:.1} kg {side} than logged", value.abs())
         }
         (Kind::Load { .. }, _) => {
             format!("{rows} the arm carried a load that was not logged")
