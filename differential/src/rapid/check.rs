@@ -370,7 +370,8 @@ impl Comparison<'_> {
         };
         let (mm, rad) = off(joints, &at);
         let mut stated = Stated::of(row, arm, index + 1 < old.goals.len());
-        if now.turned {
+        // Of the path under another tool or work object than before nothing is said.
+        if now.turned || now.turned_on_way && pair.remounted {
             stated = stated.of_the_way(row);
         }
         let within = |(mm, rad): (f64, f64), stated: &Stated| {

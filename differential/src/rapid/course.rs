@@ -43,6 +43,8 @@ pub struct Point {
     pub passing: Option<[f64; 6]>,
     /// Whether the tool is turned so far from what is told at a circle point that the joints there are those of the way.
     pub turned: bool,
+    /// Whether the way turns the tool at a circle point otherwise than is told there.
+    pub turned_on_way: bool,
     /// Whether the controller stops here since the three points make no arc for it.
     pub no_arc: bool,
     /// Whether the controller has stopped at a motion before that it cannot carry out: how the arm went on is not told.
@@ -99,6 +101,7 @@ impl<'a> Course<'a> {
                 along: None,
                 passing: None,
                 turned: false,
+                turned_on_way: false,
                 no_arc: false,
                 adrift,
             });
@@ -211,7 +214,7 @@ impl<'a> Course<'a> {
                 points[0].passing = between;
                 let turned =
                     |q: &[f64; 6]| self.arm.nominal_forward(q).rotation.angle_to(&points[0].flange.rotation);
-                points[0].turned |= between.as_ref().is_some_and(|q| turned(q) > TURNED);
+                points[0].turned_on_way = between.as_ref().is_some_and(|q| turned(q) > TURNED);
                 points[0].along = gone.and_then(|gone| Unit::try_new(gone, 1e-6));
             }
             self.links.go(q);
