@@ -349,17 +349,7 @@ pub(crate) fn diagnose_(
             let other = other.of(&robot, angles)?;
             report_step(&format!("judging on {}", other.file));
             let frames = starting_frames(&other, nominal, &options.tolerance, options.fuse_readout)?;
-            let (geometric, extended) = (&found.geometric.model, &found.extended.model);
-            let judged = transfer(
-                &other,
-                &frames,
-                nominal,
-                geometric,
-                extended,
-                &options.tolerance,
-                options.fuse_readout,
-            );
-            found.diagnosis.transfers.push(judged);
+            found.test_on(&other, &frames, &options.tolerance, options.fuse_readout);
         }
         Ok(PyDiagnosis { found: Arc::new(found), rows: Arc::new(rows) })
     })

@@ -7,7 +7,6 @@ use clap::Args;
 use truegrind::ErrorSummary;
 use truegrind::arm::model::Model;
 use truegrind::calibration::diagnosis::diagnose::{Diagnosed, Options, diagnose};
-use truegrind::calibration::diagnosis::transfer::transfer;
 use truegrind::calibration::identification::calibration::Frames;
 use truegrind::calibration::identification::fit::summary_on;
 use truegrind::calibration::identification::identify::prepare_observations;
@@ -165,15 +164,7 @@ pub(super) fn diagnose_rows(
     for other in others {
         report_step(&format!("testing on {}", other.file));
         let frames = starting_frames(other, nominal, &options.tolerance, options.fuse_readout)?;
-        found.diagnosis.transfers.push(transfer(
-            other,
-            &frames,
-            nominal,
-            &found.geometric.model,
-            &found.extended.model,
-            &options.tolerance,
-            options.fuse_readout,
-        ));
+        found.test_on(other, &frames, &options.tolerance, options.fuse_readout);
     }
     Ok(found)
 }

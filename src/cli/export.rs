@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use truegrind::arm::effect::Effect;
 use truegrind::arm::estimated::Estimated;
 use truegrind::arm::model::Model;
-use truegrind::calibration::diagnosis::transfer::transfer;
+use truegrind::calibration::diagnosis::transfer::{Models, transfer};
 use truegrind::calibration::identification::register::starting_frames;
 use truegrind::calibration::identification::tolerance::Tolerance;
 use truegrind::robots::export::{Format, joint_matrix, lost_in_export, write};
@@ -127,7 +127,9 @@ fn measured_error(data: &DataArguments, arm: &Estimated, exported: &Model) -> an
     let (_, rows) = read(data)?;
     let tolerance = Tolerance::default();
     let frames = starting_frames(&rows, &arm.nominal, &tolerance, true)?;
-    let found = transfer(&rows, &frames, &arm.nominal, exported, &arm.model, &tolerance, true);
+    let models =
+        Models { nominal: &arm.nominal, geometric: exported, extended: &arm.model, written: &arm.model };
+    let found = transfer(&rows, &frames, &models, &tolerance, true);
     let relation = if rows.sha256 == arm.provenance.sha256 {
         "to which the model was fitted, so this is not a held-out error"
     } else {

@@ -54,6 +54,7 @@ pub mod newton;
 mod design_effect;
 pub mod extension;
 pub mod design;
+mod link_geometry;
 mod link_growth;
 pub mod held_out;
 pub mod score;

@@ -373,7 +373,9 @@ fn verdict(rows: &[Row]) -> Verdict {
         Status::Good => {
             format!("All programs were processed; {may_run} of {} are corrected and may run", rows.len())
         }
-        Status::Warning => format!("All programs were processed; {}", first(&format!("of {}", rows.len()))),
+        Status::Warning | Status::Found => {
+            format!("All programs were processed; {}", first(&format!("of {}", rows.len())))
+        }
         Status::Bad => {
             format!(
                 "{} of {} programs could not be processed; {}",

@@ -16,7 +16,7 @@ use truegrind_arm::estimated::{Estimated, EstimatedParameter, Judgement};
 use truegrind_calibration::identification::benefit::Benefit;
 use truegrind_calibration::identification::identifiability::Identifiability;
 use truegrind_calibration::identification::identify::Identification;
-use truegrind_calibration::identification::verdict::percent_of;
+use truegrind_calibration::identification::verdict::{CONVERGED, NO_LIMITS, percent_of};
 use truegrind_calibration::measurement::dataset::Dataset;
 
 pub use tables::{
@@ -228,12 +228,17 @@ pub fn judged(estimated: &Estimated) -> Verdict {
         Judgement::Doubtful => {
             (Status::Warning, format!("The model is doubtful and needs --allow-doubtful: {errors}"))
         }
-        Judgement::NotEvaluated => {
-            (Status::NotEvaluated, format!("The model may be used (no limits were stated): {errors}"))
-        }
+        Judgement::NotEvaluated => (
+            Status::NotEvaluated,
+            format!(
+                "No limits were stated (--limit-rmse, --limit-max); nothing else speaks against the model: {errors}"
+            ),
+        ),
     };
     let mut reasons = estimated.verdict.reasons.clone();
     if matches!(status, Status::Good | Status::NotEvaluated) {
+        // The headline says what limits were stated, and an arm that may be used has converged.
+        reasons.retain(|reason| !reason.ends_with(CONVERGED) && reason != NO_LIMITS);
         reasons.push(
             "what to do: correct programs with it (`truegrind compensate`), inside the measured region"
                 .to_owned(),

@@ -7,6 +7,8 @@ pub enum Status {
     Good,
     /// Usable with a stated reservation.
     Warning,
+    /// Something was found that someone should look at.
+    Found,
     /// Failed or refused; not to be used.
     Bad,
     /// Not judged: no limit was stated, or the data do not suffice.
@@ -14,11 +16,12 @@ pub enum Status {
 }
 
 impl Status {
-    /// `ok`, `warning`, `failed` or `not evaluated`.
+    /// `ok`, `warning`, `found`, `failed` or `not evaluated`.
     pub fn word(self) -> &'static str {
         match self {
             Status::Good => "ok",
             Status::Warning => "warning",
+            Status::Found => "found",
             Status::Bad => "failed",
             Status::NotEvaluated => "not evaluated",
         }
@@ -29,6 +32,7 @@ impl Status {
         match self {
             Status::Good => "✓",
             Status::Warning => "⚠\u{fe0e}",
+            Status::Found => "●",
             Status::Bad => "✗",
             Status::NotEvaluated => "○",
         }
@@ -39,6 +43,7 @@ impl Status {
         match self {
             Status::Good => "good",
             Status::Warning => "warning",
+            Status::Found => "found",
             Status::Bad => "bad",
             Status::NotEvaluated => "open",
         }

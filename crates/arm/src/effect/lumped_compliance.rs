@@ -65,6 +65,17 @@ pub struct LumpedCompliance {
     pub lump: Vec<Lump>,
 }
 
+/// Names of compliance times first moment, by frame and axis.
+const FIRST_MOMENTS: [[&str; 3]; 7] = [
+    ["compliance x base moment x", "compliance x base moment y", "compliance x base moment z"],
+    ["compliance x link 1 moment x", "compliance x link 1 moment y", "compliance x link 1 moment z"],
+    ["compliance x link 2 moment x", "compliance x link 2 moment y", "compliance x link 2 moment z"],
+    ["compliance x link 3 moment x", "compliance x link 3 moment y", "compliance x link 3 moment z"],
+    ["compliance x link 4 moment x", "compliance x link 4 moment y", "compliance x link 4 moment z"],
+    ["compliance x link 5 moment x", "compliance x link 5 moment y", "compliance x link 5 moment z"],
+    ["compliance x link 6 moment x", "compliance x link 6 moment y", "compliance x link 6 moment z"],
+];
+
 impl LumpedCompliance {
     pub(super) fn joint(&self) -> Option<usize> {
         Some(self.joint)
@@ -75,7 +86,7 @@ impl LumpedCompliance {
             .iter()
             .map(|l| EffectParameter {
                 name: match l.frame {
-                    _ if l.moment.is_some() => "compliance x first moment",
+                    frame if let Some(axis) = l.moment => FIRST_MOMENTS[frame.min(6)][axis.min(2)],
                     0..=2 => "compliance x elbow mass",
                     3 => "compliance x forearm mass",
                     4 | 5 => "compliance x wrist mass",

@@ -481,7 +481,9 @@ fn empirical_faults(subject: &Subject<'_>, columns: &LoggedColumns) -> Vec<(Empi
         |rate: bool| dataset.rows.iter().any(|r| r.motion().is_some_and(|m| !rate || m.rate_per_h.is_some()));
     if has(true) {
         out.push((latency(dataset), 1.0));
-    } else if has(false) {
+    }
+    // Also on a path with a clock: an arm that stops at every row of it has no speed there, but a last step.
+    if has(false) {
         out.extend([(EmpiricalFault::ArmUnsettled, 2.0), (EmpiricalFault::SensorUnsettled, 2.0)]);
     }
     let moves = |j: usize| columns.range_rad[j] > STILL_RAD;

@@ -6,7 +6,8 @@ use super::finding::Diagnosis;
 use crate::measurement::dataset::Dataset;
 
 impl Diagnosis {
-    /// The diagnosis with rows counted from 0 at the first data row of `dataset` in every key with rows. Sentences are unchanged.
+    /// The diagnosis with rows counted from 0 at the first data row of `dataset` in every key with rows but
+    /// `rows_in_file`. Sentences are unchanged.
     pub fn with_rows_from_0(mut self, dataset: &Dataset) -> Self {
         let index: BTreeMap<usize, usize> =
             dataset.rows.iter().enumerate().map(|(i, row)| (row.number, i)).collect();
@@ -15,6 +16,8 @@ impl Diagnosis {
         let first = |number: &usize| index.range(*number..).next().map_or_else(|| at(number), |(_, i)| *i);
         let ends = |rows: [usize; 2]| [first(&rows[0]), at(&rows[1])];
         for finding in &mut self.findings {
+            finding.rows_in_file =
+                finding.rows.map(|rows| rows.to_vec()).or_else(|| finding.row_list.clone());
             finding.rows = finding.rows.map(ends);
             finding.row_list = finding.row_list.take().map(|list| list.iter().map(at).collect());
             finding.sessions.iter_mut().for_each(|session| session.rows = ends(session.rows));

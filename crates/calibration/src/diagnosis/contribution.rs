@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::catalogue::Candidate;
 use super::cause::Cause;
-use super::design::FullDesign;
+use super::design::{FullDesign, Linear};
 use super::extension::{Extended, Subject};
 
 /// Contributions of the causes of a fit.
@@ -43,6 +43,14 @@ impl<'a> Contributions<'a> {
             [one] => self.unique[*one],
             many => self.unique_of(many),
         }
+    }
+
+    /// The same of the deviation of one parameter of the fit from its start.
+    pub(super) fn unique_of_parameter(&self, linear: &Linear, k: usize) -> f64 {
+        let effect = DMatrix::from_columns(&[linear.rows.row(k).transpose() * linear.x[k]]);
+        let without = self.whole.without(&[k]);
+        let projected = without.project(&effect);
+        self.in_mm(&without.pure(&effect, &projected).column(0).into_owned())
     }
 
     /// The causes are removed together before their effect is projected off the rest: they do not compete with each other.

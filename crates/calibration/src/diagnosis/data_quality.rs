@@ -12,7 +12,8 @@ use crate::identification::rounding::{NotFused, angle_shares};
 use crate::measurement::dataset::{Dataset, Sensor};
 use crate::measurement::split;
 
-/// Rounding is a finding when it causes more than this share of the geometric residual's variance.
+/// Rounding is a finding when it causes more than this share of the variance of the residual, that of geometry or of the extended
+/// model: a larger fault does not hide it.
 const ROUNDING_SHARE: f64 = 0.25;
 
 pub(super) fn rounding_finding(
@@ -30,7 +31,8 @@ pub(super) fn rounding_finding(
     let raw = Subject { observed: logged, ..*subject };
     let unsharpened = fit(&raw, &[], Freedom::All, Some(geometric));
     let before = Validation::of(&raw, &[], 0, BLOCKS).random_rmse(&unsharpened);
-    if share < ROUNDING_SHARE * before * before {
+    let left = before.min(stages[2].random.rmse);
+    if share < ROUNDING_SHARE * left * left {
         return None;
     }
     let (gain, evidence) = match &prepared.readout_fusion {
@@ -112,17 +114,38 @@ fn no_gain(after: &StageError) -> Gain {
 /// Ratio of the largest outlier to the RMS of an empirical fault above which the outlier is not a residue of that fault.
 const REMAINDER: f64 = 6.0;
 
-/// Outliers, the largest by `off_mm`. `empirical_mm` is the RMS of the largest empirical fault: where its expansion is worst, readings look
+/// How far some rows are off.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Deviation {
+    /// The farthest (mm).
+    largest_mm: f64,
+    /// Their share of the error (mm RMS over all rows).
+    rms_mm: f64,
+}
+
+impl Deviation {
+    pub(super) fn of(fit: &Extended, rows: &[(usize, f64)]) -> Self {
+        let errors = fit.problem.errors_mm(&fit.x);
+        let off = || rows.iter().filter_map(|(i, _)| errors.get(*i));
+        Self {
+            largest_mm: off().fold(0.0, |most, e| f64::max(most, e.abs())),
+            rms_mm: (off().map(|e| e * e).sum::<f64>() / errors.len().max(1) as f64).sqrt(),
+        }
+    }
+}
+
+/// Outliers, which deviate by `off`. `empirical_mm` is the RMS of the largest empirical fault: where its expansion is worst, readings look
 /// like outliers too.
 pub(super) fn outlier_finding(
     dataset: &Dataset,
     outliers: &[(usize, f64)],
-    (off_mm, empirical_mm): (f64, f64),
+    (off, empirical_mm): (Deviation, f64),
     after: &StageError,
 ) -> Option<Finding> {
     if outliers.is_empty() {
         return None;
     }
+    let off_mm = off.largest_mm;
     let remainder = off_mm < REMAINDER * empirical_mm;
     let doubts = if remainder {
         vec![format!(
@@ -135,7 +158,7 @@ pub(super) fn outlier_finding(
     let mut list: Vec<usize> = outliers.iter().map(|(i, _)| dataset.rows[*i].number).collect();
     list.sort_unstable();
     let cause = format!(
-        "{} far more than all others, up to {:.0} times their scatter",
+        "{} far more than all others, by up to {off_mm:.3} mm, {:.0} times their scatter",
         if list.len() == 1 {
             "1 reading deviates".to_owned()
         } else {
@@ -149,6 +172,7 @@ pub(super) fn outlier_finding(
     Some(Finding {
         row_list: Some(list),
         p_value: 1e-2,
+        worth_mm: Some(off.rms_mm),
         doubts,
         ..words::finding(CauseKind::Outliers, cause, confidence, evidence, no_gain(after))
     })

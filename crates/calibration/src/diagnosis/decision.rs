@@ -143,11 +143,23 @@ pub(super) struct Asking<'a> {
 impl Asking<'_> {
     /// Adds members and decisions to the findings, which are in their final order.
     pub(super) fn complete(&self, findings: &mut [Finding]) {
+        let identified: Vec<(CauseKind, Option<Vec<usize>>, Option<[usize; 2]>)> = findings
+            .iter()
+            .filter(|finding| finding.confidence == Confidence::Identified)
+            .map(|finding| (finding.effect, finding.joints.clone(), finding.rows))
+            .collect();
         for (k, finding) in findings.iter_mut().enumerate() {
             if finding.confidence == Confidence::Identified {
                 continue;
             }
-            finding.members = members(finding);
+            // What has a finding of its own is no other name for this one.
+            let mut open = finding.clone();
+            open.alternatives.retain(|rival| {
+                !identified.iter().any(|(effect, joints, rows)| {
+                    (*effect, joints, *rows) == (rival.effect, &rival.joints, rival.rows)
+                })
+            });
+            finding.members = members(&open);
             finding.decided_by = self.decision(finding, k + 1);
             if finding.effect == CauseKind::Unexplained
                 && let Some(decision) = &finding.decided_by
@@ -170,7 +182,7 @@ impl Asking<'_> {
         // Sums of small things and tables of sessions have no part to decide on.
         finding.family?;
         finding.non_centrality?;
-        let own = [finding.effect];
+        let own = [finding.likeliest().0];
         let named: Vec<CauseKind> = if finding.members.is_empty() {
             own.to_vec()
         } else {

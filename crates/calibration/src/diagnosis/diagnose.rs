@@ -8,6 +8,7 @@ use super::discrepancy::Discrepancy;
 use super::extension::{Extended, Subject};
 use super::finding::{DiagnoseError, Diagnosis, Fits, RangeNoise, SCHEMA, Source, Stage};
 use super::in_doubt::{self, MissingError};
+use super::link_geometry::LINK_Z;
 use super::merged;
 pub use super::options::Options;
 use super::picture::Picture;
@@ -28,7 +29,7 @@ use crate::identification::identify::{
     parameter_table, with_sigma_in_region,
 };
 use crate::identification::start::count_distinct_poses;
-use crate::identification::verdict::VerdictBuilder;
+use crate::identification::verdict::{CONVERGED, VerdictBuilder};
 use crate::measurement::dataset::{Dataset, Sensor};
 use crate::measurement::split;
 use nalgebra::DMatrix;
@@ -102,7 +103,8 @@ pub fn diagnose(
     let structure = residual_tests::structure(&subject, &search.extended, &search.set_aside);
     let smoothed = search.fit_smooth_correction(&structure);
     let summary = summary::summarise(&search, &confirmed, &structure, smoothed);
-    let mut notes: Vec<String> = needed.map(|needed| few_poses_note(dataset, needed)).into_iter().collect();
+    let few_poses = needed.map(|needed| few_poses_note(dataset, needed));
+    let mut notes: Vec<String> = few_poses.iter().cloned().collect();
     notes.append(&mut search.notes);
     let mut finding_of_cause = vec![0; search.found.causes.len()];
     for (index, merged) in summary.findings.iter().enumerate() {
@@ -129,7 +131,8 @@ pub fn diagnose(
             100.0 * sensor_causes::MOST_PROBABILITY
         )
     }));
-    let handing = Handing { search: &search, discrepancy: of_all, noise_floor_mm: diagnosis.noise_floor_mm };
+    let handing =
+        Handing { search: &search, discrepancy: of_all, noise_floor_mm: diagnosis.noise_floor_mm, few_poses };
     let handed = with_uncertain_causes(&search, &written, of_all);
     let with_causes =
         handing.estimated(robot, [&written, handed.as_ref().unwrap_or(&written)], &written_stage);
@@ -164,6 +167,8 @@ struct Handing<'a> {
     search: &'a Search<'a>,
     discrepancy: Option<&'a Discrepancy>,
     noise_floor_mm: Option<f64>,
+    /// Says that there are too few poses.
+    few_poses: Option<String>,
 }
 
 impl Handing<'_> {
@@ -179,7 +184,9 @@ impl Handing<'_> {
         let missing = in_doubt::missing_errors(&search.context.subject, &search.extended, handed);
         let [before, geometry, _] = search.stages;
         let fits = [written, handed].map(Fitted::from);
-        estimated(search, robot, (&fits, missing), &[before, geometry, *stage], self.noise_floor_mm)
+        let stages = [before, geometry, *stage];
+        let few_poses = self.few_poses.as_deref();
+        estimated(search, robot, (&fits, missing), &stages, (self.noise_floor_mm, few_poses))
     }
 
     /// The written arm with its benefit; where it is refused beside causes and geometry alone is not, that, with a note.
@@ -345,6 +352,13 @@ fn build_diagnosis(
         ));
     }
     notes.extend(single_angles(dataset));
+    if prepared.sides_from_order && search.found.causes.iter().any(|c| c.kind() == CauseKind::Backlash) {
+        notes.push(
+            "the sides of approach were not logged (columns approach1 to approach6): backlash was judged as if every row had been approached \
+             straight from the row before"
+                .to_owned(),
+        );
+    }
     let mut measure_again: Vec<usize> = set_aside
         .iter()
         .chain(prepared.mismatch.rows.iter().map(|(i, _)| i))
@@ -428,13 +442,14 @@ fn stage(errors: &StageError) -> Stage {
     }
 }
 
-/// The arm for compensation and its expected benefit, from the written fit and the same with uncertain causes, and what both lack.
+/// The arm for compensation and its expected benefit, from the written fit and the same with uncertain causes, and what both lack. Of too
+/// few poses no benefit is stated: it would be the priors'.
 fn estimated(
     search: &Search<'_>,
     robot: &str,
     ([fitted, handed], missing): (&[Fitted; 2], Vec<MissingError>),
     stages: &[StageError; 3],
-    noise_floor_mm: Option<f64>,
+    (noise_floor_mm, few_poses): (Option<f64>, Option<&str>),
 ) -> (Estimated, Option<Benefit>) {
     let SearchContext { dataset, prepared, subject, options, .. } = search.context;
     let set_aside = &search.set_aside;
@@ -472,24 +487,27 @@ fn estimated(
     let rows = &subject.observed.dataset;
     // Links and benefit are judged by the tolerances of arms, not by the wide priors of a diagnosis.
     let plausible = &options.arm_tolerance;
-    let benefit = benefit(fitted, rows, &estimated, plausible, variance_inflation(fitted, rows, &stages[2]));
+    let benefit =
+        || benefit(fitted, rows, &estimated, plausible, variance_inflation(fitted, rows, &stages[2]));
+    let benefit = few_poses.map_or_else(|| Ok(benefit()), Err);
     let parameters = parameter_table(fitted, nominal_arm);
-    estimated.verdict = judge(fitted, rows.sensor, benefit.as_ref(), &parameters, stages, options);
-    (estimated, benefit)
+    let judged = benefit.as_ref().map(Option::as_ref).map_err(|few| *few);
+    estimated.verdict = judge(fitted, rows.sensor, judged, &parameters, stages, options);
+    (estimated, benefit.ok().flatten())
 }
 
-/// The verdict of an identification, plus: findings must not raise the held-out error of geometry.
+/// The verdict of an identification, plus: findings must not raise the held-out error of geometry. `benefit` says why it is not stated.
 fn judge(
     fitted: &Fitted,
     sensor: Sensor,
-    benefit: Option<&Benefit>,
+    benefit: Result<Option<&Benefit>, &str>,
     parameters: &[EstimatedParameter],
     stages: &[StageError; 3],
     options: &Options,
 ) -> Verdict {
     let mut verdict = VerdictBuilder::default();
     if fitted.termination().is_converged() {
-        verdict.note("the fit converged");
+        verdict.note(CONVERGED);
     } else {
         verdict.fail(format!("the fit did not converge: {}", fitted.termination()));
     }
@@ -501,13 +519,13 @@ fn judge(
     }
     verdict.check_links(parameters, &options.arm_tolerance, LINK_Z);
     verdict.check_held_out(stages[0].random.rmse, stages[2].random.rmse);
-    verdict.check_benefit(benefit, sensor);
+    match benefit {
+        Ok(benefit) => verdict.check_benefit(benefit, sensor),
+        Err(few_poses) => verdict.doubt(few_poses),
+    }
     verdict.check_limits(&options.limits, &stages[2].random);
     verdict.build()
 }
-
-/// z-score from which a link counts as deviating, since the wide priors of a diagnosis hardly constrain weakly observed links.
-const LINK_Z: f64 = 2.0;
 
 /// Squared held-out error relative to its expectation: with k parameters determined by n readings it is (n + k) / (n − k) times that of
 /// the fit.

@@ -2,7 +2,8 @@
 //!
 //! Method: iteratively reweighted least squares with Huber's weight min(1, k/s), s the size of a row's whitened residual
 //! and k = 2. The influence is bounded, not redescending: a shifted block of rows still has influence, so that its cause can
-//! be found, while single outliers have no more influence than a bad normal row. Scale by the median, refined at the end so that
+//! be found, while single outliers have no more influence than a bad normal row; from twenty standard deviations on a row's share of χ² is
+//! bounded too. Scale by the median, refined at the end so that
 //! the weighted sum of squares has its degrees of freedom. Source: Huber, Robust Statistics, 1981, chapter 7.
 //!
 //! From a nearby fit the steps are Gauss–Newton (see `newton`) as long as they descend. Fits within a search stop there; all
@@ -82,6 +83,15 @@ pub struct Extended {
 
 /// Huber's k, in standard deviations.
 const HUBER_K: f64 = 2.0;
+
+/// Size from which a row counts less than Huber's weight allows, in standard deviations: its share of χ² stays that of this size, so that one
+/// wrong reading of metres does not decide between causes.
+const GROSS: f64 = 20.0;
+
+/// The robust weight of a row by the size of its whitened residual.
+fn robust_weight_of(size: f64) -> f64 {
+    (HUBER_K / size).min(1.0) * (GROSS / size).min(1.0)
+}
 
 /// Smallest standard deviation of a reading (mm, rad). With fewer rows than parameters the residual is 0; unbounded weights would then
 /// overwhelm the priors.
@@ -231,7 +241,7 @@ pub(super) fn warm_fit(
         let of_lengths = whitened.spread(0..lengths);
         let of_angles = if angles > 0 { whitened.spread(lengths..per) } else { 1.0 };
         let sizes = whitened.sizes([lengths, angles], [of_lengths, of_angles]);
-        let next: Vec<f64> = sizes.iter().map(|s| (HUBER_K / s).min(1.0)).collect();
+        let next: Vec<f64> = sizes.iter().map(|s| robust_weight_of(*s)).collect();
         let moved = next.iter().zip(&robust_weight).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         let settled = (of_lengths - 1.0).abs() < 1e-2 && (of_angles - 1.0).abs() < 1e-2 && moved < 5e-2;
         if (settled && round > 1) || round >= ROUNDS {

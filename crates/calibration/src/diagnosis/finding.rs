@@ -173,6 +173,9 @@ pub struct Finding {
     /// Single rows, of outliers and contradicting rows.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub row_list: Option<Vec<usize>>,
+    /// `rows` or `row_list` as the file numbers them and the sentences name them; only in the JSON that `diagnose` writes.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub rows_in_file: Option<Vec<usize>>,
     /// Joints, from 1 as on the teach pendant.
     pub joints: Option<Vec<usize>>,
     /// Its numbers.
@@ -185,7 +188,7 @@ pub struct Finding {
     pub non_centrality: Option<f64>,
     /// Held-out errors without and with it.
     pub gain: Gain,
-    /// Contribution to the readings (mm RMS over all rows), where applicable.
+    /// The part of the readings that nothing else in the model explains (mm RMS over all rows), where applicable.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub worth_mm: Option<f64>,
     /// Reasons why it is not identified, apart from the alternatives.
@@ -259,6 +262,9 @@ pub struct Transfer {
     pub geometric_rmse_mm: f64,
     /// Extended model of this diagnosis.
     pub extended_rmse_mm: f64,
+    /// The arm that this diagnosis writes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub written_rmse_mm: Option<f64>,
 }
 
 /// A diagnosis.
@@ -300,6 +306,16 @@ pub struct Diagnosis {
     pub transfers: Vec<Transfer>,
     /// Notes for the user.
     pub notes: Vec<String>,
+}
+
+impl Finding {
+    /// The likeliest of the causes that cannot be told apart, with its joints and rows; of a finding without others its own.
+    pub fn likeliest(&self) -> (CauseKind, Option<&[usize]>, Option<[usize; 2]>) {
+        match self.members.first() {
+            Some(member) => (member.effect, member.joints.as_deref(), member.rows),
+            None => (self.effect, self.joints.as_deref(), self.rows),
+        }
+    }
 }
 
 /// Errors of a diagnosis.

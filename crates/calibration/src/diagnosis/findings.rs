@@ -190,6 +190,7 @@ impl FindingBuilder<'_> {
             confidence: if clear { Confidence::Identified } else { Confidence::Ambiguous },
             rows: cause.rows(),
             row_list: None,
+            rows_in_file: None,
             joints: pendant(&cause.joints()),
             evidence: format!(
                 "{}: χ² falls by {:.0} for {} with everything else refitted; twice the log Bayes factor {:.0} with {} tried",

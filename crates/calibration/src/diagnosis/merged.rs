@@ -1,4 +1,5 @@
-//! Merges findings for the report, and ranks them by their contribution (mm RMS).
+//! Merges findings for the report, and ranks them by their contribution (mm RMS): what nothing else in the model explains, since links
+//! and frames absorb most of a movement that grows with the angles.
 //!
 //! Causes of one effect and joint share a finding already. Here three or more shifts are merged ("the set-up changed with
 //! time"), as are shifts that cannot be distinguished from a smooth drift; small contributions are merged without naming a
@@ -75,7 +76,7 @@ pub(super) fn merge_findings(
             let first = merged.causes.first();
             merged.finding.doubts.extend(first.map(|&k| confirmations[k].doubts()).unwrap_or_default());
         }
-        merged.finding.worth_mm = Some(contributions.rms_mm(&merged.causes));
+        merged.finding.worth_mm = Some(contributions.unique_rms_mm(&merged.causes));
         merged.finding.margin =
             merged.causes.iter().map(|&k| confirmations[k].margin).reduce(f64::max).filter(|m| m.is_finite());
     }
@@ -226,7 +227,7 @@ fn merge(
     let first = findings.iter().position(&of).unwrap_or(0);
     let (members, mut others): (Vec<MergedFinding>, Vec<MergedFinding>) = findings.drain(..).partition(of);
     let causes: Vec<usize> = members.iter().flat_map(|s| s.causes.iter().copied()).collect();
-    let finding = build(&members, contributions.rms_mm(&causes));
+    let finding = build(&members, contributions.unique_rms_mm(&causes));
     let size = |s: &MergedFinding| s.finding.worth_mm.unwrap_or(0.0);
     let largest = members.into_iter().max_by(|a, b| size(a).total_cmp(&size(b)));
     let picture = largest.and_then(|s| s.picture);

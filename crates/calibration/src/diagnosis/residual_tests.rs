@@ -1,7 +1,8 @@
 //! Tests of the extended model's residual: gross outliers, noise that grows with range, unexplained structure.
 //!
 //! - Outliers: Student's t is fitted to quantiles of the residual sizes, so that a heavy tail does not count as outliers; a row
-//!   is an outlier if its size, under that tail, occurs once in a hundred data sets of this length.
+//!   is an outlier if its size, under that tail, occurs once in a hundred data sets of this length, or if a gap as wide does that parts
+//!   it from the others.
 //! - Range: Spearman's rank correlation of size and distance; if significant, σ₀ and slope by least squares on the sizes.
 //! - Structure: correlation of residuals of neighbours in joint space and of consecutive rows, with the exact variance under
 //!   exchangeability (Moran 1950; von Neumann 1941).
@@ -91,11 +92,33 @@ pub fn outliers(fit: &Extended) -> Vec<(usize, f64)> {
     // Sizes of vectors: their tail is approximated by that of one coordinate with the same quantile ratio.
     let stretch = high / middle;
     // Two quantiles of a few hundred sizes cannot exclude five degrees of freedom, so the tail is never assumed lighter.
-    let limit = middle * reach(heaviness(stretch), n);
+    let nu = heaviness(stretch);
+    let limit = (middle * reach(nu, n)).min(beyond_gap(&sorted, middle, nu));
     let mut rows: Vec<(usize, f64)> =
         fit.sizes.iter().copied().enumerate().filter(|(_, s)| !(*s <= limit)).collect();
     rows.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
     rows
+}
+
+/// Sizes from this many medians on may lie beyond a gap.
+const GAP_FROM: f64 = 5.0;
+
+/// Largest share of rows beyond a gap.
+const BEYOND_GAP: f64 = 0.05;
+
+/// The size above which sizes lie apart from all others; infinite if none do.
+///
+/// In a tail that falls as the power ν, the ratio of the k-th largest size to the next exceeds r with probability r^(−kν) (Rényi 1953): several
+/// rows just as far off are no tail, even where one of them alone could be.
+fn beyond_gap(sorted: &[f64], middle: f64, nu: f64) -> f64 {
+    let n = sorted.len();
+    let most = ((BEYOND_GAP * n as f64) as usize).max(1);
+    let apart = |k: &usize| {
+        let (size, next) = (sorted[n - k], sorted[n - k - 1]);
+        size > GAP_FROM * middle && (size / next).powf(-(*k as f64) * nu) < 1e-2 / most as f64
+    };
+    let furthest = (1..=most.min(n - 1)).filter(apart).last();
+    furthest.map_or(f64::INFINITY, |k| sorted[n - k - 1])
 }
 
 /// Degrees of freedom of Student's t, 2 to 5, by the ratio of the 95 % quantile of |t| to its median.

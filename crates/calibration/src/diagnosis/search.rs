@@ -122,21 +122,35 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Drops causes while they raise the error on held-out blocks above that of geometry alone.
+    /// Drops causes while they raise the held-out error above that of geometry alone: on blocks, or, where geometry alone is so much worse
+    /// on blocks that these leave out whole parts of the workspace, in random folds. A cause is not false because a block asks it for what
+    /// no other row shows.
     pub(super) fn drop_unvalidated_causes(&mut self) {
-        while self.stages[2].blocks.rmse > self.stages[1].blocks.rmse
+        let [_, geometry, extended] = self.stages;
+        let extrapolates = geometry.blocks.rmse > EXTRAPOLATION * geometry.random.rmse;
+        let (of, which): (fn(&StageError) -> f64, _) = if extrapolates {
+            (|stage| stage.random.rmse, "in random folds")
+        } else {
+            (|stage| stage.blocks.rmse, "on held-out blocks")
+        };
+        let mut dropped = Vec::new();
+        while of(&self.stages[2]) > of(&geometry)
             && let Some(weakest) = self.weakest()
         {
-            self.notes.push(format!(
-                "{} was dropped: with it the error on held-out blocks was {:.4} mm, with geometry alone {:.4} mm",
-                short_name(&self.found.causes[weakest]),
-                self.stages[2].blocks.rmse,
-                self.stages[1].blocks.rmse
-            ));
+            dropped.push(short_name(&self.found.causes[weakest]));
             self.accepted.remove(weakest);
             let extended = self.without(&[weakest]);
             self.replace_fit(extended, &[weakest]);
             self.stages[2] = self.validation.stage(&self.extended);
+        }
+        if !dropped.is_empty() {
+            self.notes.push(format!(
+                "dropped, since with {} the error {which} was {:.4} mm, with geometry alone {:.4} mm: {}",
+                if dropped.len() == 1 { "it" } else { "them" },
+                of(&extended),
+                of(&geometry),
+                dropped.join(", ")
+            ));
         }
     }
 
@@ -252,6 +266,9 @@ impl<'a> Search<'a> {
         None
     }
 }
+
+/// Error of geometry alone on blocks, relative to random folds, from which blocks extrapolate.
+const EXTRAPOLATION: f64 = 1.5;
 
 /// With serially correlated readings, unconfirmed shifts are fitted noise unless the purged held-out error rises by this factor
 /// without them.

@@ -2,7 +2,7 @@
 
 use super::confounding::{Confounding, excess_over_noise_mm};
 use super::contribution::Contributions;
-use super::data_quality::{mismatch_finding, noise_floor, outlier_finding, rounding_finding};
+use super::data_quality::{Deviation, mismatch_finding, noise_floor, outlier_finding, rounding_finding};
 use super::extension::Extended;
 use super::finding::{Finding, Step};
 use super::findings::FindingBuilder;
@@ -47,8 +47,9 @@ pub(super) fn summarise(
         Step { added: "geometry".to_owned(), cv_rmse_mm: stages[1].random.rmse },
     ];
     let extended = search.extended.clone().whole(subject);
-    let (of_causes, finding_of_cause, pictures) = findings(search, confirmed, &extended, &mut steps);
     let contributions = Contributions::new(searched, &search.found, &confirmed.whole);
+    let ((of_causes, finding_of_cause, pictures), links) =
+        findings(search, confirmed, &extended, &contributions, &mut steps);
     let confounding = Confounding {
         causes: &search.found.causes,
         confirmations: &outcome.confirmations,
@@ -80,7 +81,7 @@ pub(super) fn summarise(
         smoothed,
         floor_mm: noise_floor.0,
     };
-    let off_mm = off_mm(&search.extended, &search.outliers);
+    let off = Deviation::of(&search.extended, &search.outliers);
     let empirical_mm = confounding.largest_empirical_rms_mm();
     let unexplained_finding = unexplained.finding();
     let something_else =
@@ -88,10 +89,10 @@ pub(super) fn summarise(
     let of_the_record = [
         rounding_finding(context.dataset, prepared, subject, &search.geometric, stages),
         mismatch_finding(context.dataset, prepared, &stages[2]),
-        outlier_finding(context.dataset, &search.outliers, (off_mm, empirical_mm), &stages[2]),
+        outlier_finding(context.dataset, &search.outliers, (off, empirical_mm), &stages[2]),
         unexplained_finding,
     ];
-    let without_causes = of_the_record.into_iter().flatten();
+    let without_causes = of_the_record.into_iter().flatten().chain(links);
     findings.extend(without_causes.map(|finding| MergedFinding {
         finding,
         picture: None,
@@ -102,19 +103,14 @@ pub(super) fn summarise(
     Summary { findings, steps, extended, noise_floor, remaining: unexplained.sentence(), something_else }
 }
 
-/// The largest error of some rows (mm).
-fn off_mm(fit: &Extended, rows: &[(usize, f64)]) -> f64 {
-    let errors = fit.problem.errors_mm(&fit.x);
-    rows.iter().filter_map(|(i, _)| errors.get(*i)).map(|e| e.abs()).fold(0.0, f64::max)
-}
-
-/// The findings of the accepted causes; adds the held-out error after each to `steps`.
+/// The findings of the accepted causes, and of implausible links; adds the held-out error after each to `steps`.
 fn findings(
     search: &Search<'_>,
     confirmed: &Confirmed,
     extended: &Extended,
+    contributions: &Contributions<'_>,
     steps: &mut Vec<Step>,
-) -> (Vec<Finding>, Vec<usize>, Vec<Picture>) {
+) -> ((Vec<Finding>, Vec<usize>, Vec<Picture>), Vec<Finding>) {
     let context = search.context;
     let rows = &context.searched.observed.dataset;
     let folds = split::purged(rows, 5, search.correlation_range, context.options.selection.seed);
@@ -127,5 +123,7 @@ fn findings(
         held: &FoldErrors::of(&confirmed.linear, &folds),
         set_aside: aside,
     };
-    builder.findings(&search.accepted, steps)
+    let tolerance = &context.options.arm_tolerance;
+    let links = builder.implausible_links(&confirmed.linear, contributions, tolerance);
+    (builder.findings(&search.accepted, steps), links)
 }

@@ -2,7 +2,7 @@
 //!
 //! Real effects of the arm persist on another day and in another mounting; overfitted ones do not.
 
-use super::cause::Cause;
+use super::diagnose::Diagnosed;
 use super::extension::{Freedom, Subject, fit};
 use super::finding::Transfer;
 use super::preparation::prepare;
@@ -10,32 +10,109 @@ use crate::identification::calibration::Frames;
 use crate::identification::fit::errors_on;
 use crate::identification::tolerance::Tolerance;
 use crate::measurement::dataset::Dataset;
+use truegrind_arm::estimated::Judgement;
 use truegrind_arm::model::Model;
 use truegrind_math::statistics::ErrorSummary;
 
-/// Root mean square errors (mm) of data sheet, geometry and extended model on `other`, with the frames refitted, links and effects
-/// unchanged. `fuse_readout` as for the models.
+/// Models of one series.
+#[derive(Debug, Clone, Copy)]
+pub struct Models<'a> {
+    /// Data sheet.
+    pub nominal: &'a Model,
+    /// Geometry.
+    pub geometric: &'a Model,
+    /// With all causes.
+    pub extended: &'a Model,
+    /// For compensation.
+    pub written: &'a Model,
+}
+
+/// Root mean square errors (mm) of models on `other`, with the frames refitted, links and effects unchanged. `fuse_readout` as for the
+/// models.
 pub fn transfer(
     other: &Dataset,
     frames: &Frames,
-    nominal: &Model,
-    geometric: &Model,
-    extended: &Model,
+    models: &Models<'_>,
     tolerance: &Tolerance,
     fuse_readout: bool,
 ) -> Transfer {
-    let prepared = prepare(other, nominal, fuse_readout);
-    let none: [Cause; 0] = [];
-    let rmse = |model: &Model| {
+    let errors = errors_of(other, frames, models, tolerance, fuse_readout);
+    of_errors(other, &errors)
+}
+
+fn errors_of(
+    other: &Dataset,
+    frames: &Frames,
+    models: &Models<'_>,
+    tolerance: &Tolerance,
+    fuse_readout: bool,
+) -> [Vec<f64>; 4] {
+    let prepared = prepare(other, models.nominal, fuse_readout);
+    [models.nominal, models.geometric, models.extended, models.written].map(|model| {
         let subject = Subject { observed: &prepared.observed, nominal: model, frames, tolerance };
-        let registered = fit(&subject, &none, Freedom::Frames, None);
-        ErrorSummary::of(errors_on(&prepared.observed, &registered.model, &registered.frames)).rmse
-    };
+        let registered = fit(&subject, &[], Freedom::Frames, None);
+        errors_on(&prepared.observed, &registered.model, &registered.frames)
+    })
+}
+
+fn of_errors(other: &Dataset, errors: &[Vec<f64>; 4]) -> Transfer {
+    let rmse = |errors: &Vec<f64>| ErrorSummary::of(errors.clone()).rmse;
+    let [nominal, geometric, extended, written] = errors;
     Transfer {
         file: other.file.clone(),
         rows: other.rows.len(),
         nominal_rmse_mm: rmse(nominal),
         geometric_rmse_mm: rmse(geometric),
         extended_rmse_mm: rmse(extended),
+        written_rmse_mm: Some(rmse(written)),
     }
+}
+
+/// Ratio of the written arm's error on another series to that of geometry from which it counts as worse.
+const WORSE: f64 = 1.05;
+
+/// The same in standard errors of the mean difference of the squared errors.
+const SURELY: f64 = 2.0;
+
+impl Diagnosed {
+    /// Tests the models on another series of the same arm. The verdict fails where the written arm is surely worse than geometry alone
+    /// there, and doubts it where it is perhaps.
+    pub fn test_on(&mut self, other: &Dataset, frames: &Frames, tolerance: &Tolerance, fuse_readout: bool) {
+        let models = Models {
+            nominal: &self.estimated.nominal,
+            geometric: &self.geometric.model,
+            extended: &self.extended.model,
+            written: &self.estimated.model,
+        };
+        let errors = errors_of(other, frames, &models, tolerance, fuse_readout);
+        let tested = of_errors(other, &errors);
+        let verdict = &mut self.estimated.verdict;
+        let (geometry, written) =
+            (tested.geometric_rmse_mm, tested.written_rmse_mm.unwrap_or(tested.geometric_rmse_mm));
+        let compared = format!(
+            "on {}, with only the sensor frames fitted, the written arm has an error of {written:.3} mm, geometry alone {geometry:.3} mm",
+            tested.file
+        );
+        if written > WORSE * geometry {
+            let surely = differ_by(&errors[3], &errors[1]) > SURELY;
+            let worst = if surely { Judgement::Fail } else { Judgement::Doubtful };
+            if !matches!((verdict.status, worst), (Judgement::Fail, _)) {
+                verdict.status = worst;
+            }
+            verdict.reasons.insert(0, format!("{compared}: `identify` writes geometry alone"));
+        } else {
+            verdict.reasons.push(compared);
+        }
+        self.diagnosis.verdict = Some(verdict.clone());
+        self.diagnosis.transfers.push(tested);
+    }
+}
+
+/// Mean difference of squares, in its standard errors.
+fn differ_by(one: &[f64], other: &[f64]) -> f64 {
+    let differences: Vec<f64> = one.iter().zip(other).map(|(a, b)| a * a - b * b).collect();
+    let n = differences.len().max(2) as f64;
+    let mean = differences.iter().sum::<f64>() / n;
+    let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    mean / (variance / n).sqrt().max(f64::MIN_POSITIVE)
 }

@@ -81,6 +81,7 @@ pub(super) fn finding(
         confidence,
         rows: None,
         row_list: None,
+        rows_in_file: None,
         joints: None,
         parameters: Vec::new(),
         evidence,
@@ -285,6 +286,10 @@ pub fn describe_pattern(cause: &Cause) -> String {
 pub fn remedy(effect: CauseKind) -> &'static str {
     use CauseKind::*;
     match effect {
+        LinkGeometry => {
+            "compare the type plate and the controller's kinematics with the data sheet before anything else; write the arm's own data sheet if it \
+             is a variant"
+        }
         JointCompliance => {
             "compensate with this model, which includes the compliance; check belts and reducer preload if it has grown"
         }

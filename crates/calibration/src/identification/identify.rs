@@ -17,7 +17,7 @@ use crate::identification::rounding::{
 use crate::identification::solver::{Family, SOLVERS, Solver};
 use crate::identification::start::count_distinct_poses;
 use crate::identification::tolerance::Tolerance;
-use crate::identification::verdict::{Limits, VerdictBuilder};
+use crate::identification::verdict::{CONVERGED, Limits, VerdictBuilder};
 use crate::measurement::dataset::{Dataset, Sensor};
 use crate::measurement::split::{self, NoiseFloor, Split};
 use truegrind_arm::condition::Condition;
@@ -577,7 +577,7 @@ fn judge(case: &VerdictInputs<'_>, options: &Options) -> Verdict {
         let filtered =
             options.solver.family == Family::Filter && fitted.termination() == Termination::DataProcessed;
         if fitted.termination().is_converged() {
-            verdict.note(format!("on {rows} the fit converged"));
+            verdict.note(format!("on {rows} {CONVERGED}"));
         } else if filtered {
             verdict.note(format!(
                 "on {rows} the filter processed every reading; it does not test for a minimum"

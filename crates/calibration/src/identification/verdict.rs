@@ -24,6 +24,12 @@ const SPOILT: f64 = 0.5;
 /// A parameter farther than this many tolerances from nominal makes the fit fail.
 const IMPLAUSIBLE_DEVIATION: f64 = 6.0;
 
+/// Note of a verdict without stated limits.
+pub const NO_LIMITS: &str = "held-out error not evaluated: no limits were stated (--limit-rmse, --limit-max)";
+
+/// End of the note on a fit that converged.
+pub const CONVERGED: &str = "the fit converged";
+
 /// Collects the reasons for and against a model, one sentence each.
 #[derive(Debug, Clone, Default)]
 pub struct VerdictBuilder {
@@ -61,17 +67,12 @@ impl VerdictBuilder {
     /// Fails for a link parameter too far from nominal. `margin` standard deviations of the estimate are subtracted first: with
     /// wide priors, weakly determined parameters scatter.
     pub fn check_links(&mut self, parameters: &[EstimatedParameter], tolerance: &Tolerance, margin: f64) {
-        for p in parameters.iter().filter(|p| p.is_of_link()) {
-            let one = if p.unit == "mm" { tolerance.length_mm } else { tolerance.angle_rad };
-            let off = (p.value - p.nominal).abs();
-            if !((off - margin * p.sigma) / one < IMPLAUSIBLE_DEVIATION) {
-                self.fail(format!(
-                    "{} is estimated {:.0} tolerances from nominal: wrong units, wrong robot, or an effect that link geometry \
-                     cannot represent",
-                    p.name,
-                    off / one
-                ));
-            }
+        for p in parameters.iter().filter(|p| p.is_of_link() && is_implausible(p, tolerance, margin)) {
+            self.fail(format!(
+                "{} is estimated {:.0} tolerances from nominal: wrong units, wrong robot, or an effect that link geometry cannot represent",
+                p.name,
+                (p.value - p.nominal).abs() / tolerance_of(p, tolerance)
+            ));
         }
     }
 
@@ -99,7 +100,7 @@ impl VerdictBuilder {
             }
         }
         if !self.limits_stated {
-            self.note("held-out error not evaluated: no limits were stated (--limit-rmse, --limit-max)");
+            self.note(NO_LIMITS);
         }
     }
 
@@ -147,6 +148,16 @@ impl VerdictBuilder {
         reasons.append(&mut self.others);
         Verdict { status, reasons }
     }
+}
+
+fn tolerance_of(parameter: &EstimatedParameter, tolerance: &Tolerance) -> f64 {
+    if parameter.unit == "mm" { tolerance.length_mm } else { tolerance.angle_rad }
+}
+
+/// Whether a link parameter is too far from nominal, less `margin` standard deviations.
+pub(crate) fn is_implausible(parameter: &EstimatedParameter, tolerance: &Tolerance, margin: f64) -> bool {
+    let off = (parameter.value - parameter.nominal).abs();
+    !((off - margin * parameter.sigma) / tolerance_of(parameter, tolerance) < IMPLAUSIBLE_DEVIATION)
 }
 
 /// Whether a scale error is detected and makes the model doubtful.

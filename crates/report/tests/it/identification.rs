@@ -204,7 +204,11 @@ fn a_verdict_is_one_sentence_with_its_reasons() {
     for (status, badge, sentence) in [
         (Judgement::Pass, "[ok]", "The model may be used; it meets the stated limits"),
         (Judgement::Fail, "[failed]", "The model must not be used"),
-        (Judgement::NotEvaluated, "[not evaluated]", "The model may be used (no limits were stated)"),
+        (
+            Judgement::NotEvaluated,
+            "[not evaluated]",
+            "No limits were stated (--limit-rmse, --limit-max); nothing else speaks against the model",
+        ),
     ] {
         found.estimated.verdict.status = status;
         let text = head(&found);

@@ -1,0 +1,137 @@
+//! The answer of a diagnosis, on one screen: what was found, where, how sure that is, and what to do.
+
+use super::words::{and, confidence, family, located, member, sentence};
+use crate::document::{Block, Verdict};
+use crate::status::Status;
+use crate::table::{Column, Table};
+use truegrind_calibration::diagnosis::cause_kind::CauseKind;
+use truegrind_calibration::diagnosis::decision::DIAGNOSIS_FILE;
+use truegrind_calibration::diagnosis::finding::{Confidence, Diagnosis, Finding};
+
+/// How many causes were found, and what they gain.
+pub(super) fn verdict(diagnosis: &Diagnosis) -> Verdict {
+    let sure = diagnosis.findings.iter().filter(|f| f.confidence == Confidence::Identified).count();
+    let further = diagnosis.findings.iter().filter(|f| is_possible(f)).count();
+    let causes = |n: usize| if n == 1 { "1 cause".to_owned() } else { format!("{n} causes") };
+    let found = match (sure, further) {
+        (0, 0) => "No cause beyond geometry was found".to_owned(),
+        (0, n) => format!("No cause beyond geometry is certain, {n} {} possible", be(n)),
+        (n, 0) => format!("{} identified", causes(n)),
+        (n, m) => format!("{} identified, {m} more possible", causes(n)),
+    };
+    // With so few rows an empty result proves nothing.
+    let (status, headline) = match diagnosis.poses_needed {
+        Some(needed) => (
+            Status::NotEvaluated,
+            format!(
+                "{} rows are too few to look for causes (at least {needed} different poses are needed); fitted geometry with its \
+                 priors",
+                diagnosis.dataset.rows
+            ),
+        ),
+        None if diagnosis.findings.is_empty() => (Status::Good, found),
+        None => (Status::Found, found),
+    };
+    let fits = &diagnosis.fits;
+    let floor = match diagnosis.noise_floor_mm {
+        Some(floor) => format!("noise floor {floor:.3}"),
+        None => format!("the noise floor is unknown, since {}", diagnosis.noise_floor_source),
+    };
+    Verdict::new(
+        status,
+        format!(
+            "{headline}: held-out error {:.3} mm with all of them, geometry alone {:.3}, data sheet {:.3}; {floor}",
+            fits.extended.cv_rmse_mm, fits.geometric.cv_rmse_mm, fits.nominal.cv_rmse_mm
+        ),
+        Vec::<String>::new(),
+    )
+}
+
+fn be(count: usize) -> &'static str {
+    if count == 1 { "is" } else { "are" }
+}
+
+/// Whether a finding names a part without being certain of it.
+fn is_possible(finding: &Finding) -> bool {
+    finding.confidence == Confidence::Ambiguous
+        && !matches!(finding.effect, CauseKind::Unexplained | CauseKind::SmallDisturbances)
+}
+
+/// One line per finding, and what to do about them.
+pub(super) fn blocks(diagnosis: &Diagnosis) -> Vec<Block> {
+    if diagnosis.findings.is_empty() {
+        return Vec::new();
+    }
+    let mut out = vec![Block::Table(findings(diagnosis))];
+    let actions = actions(diagnosis);
+    if !actions.is_empty() {
+        out.extend([Block::Heading(2, "What to do".to_owned()), Block::List(actions)]);
+    }
+    out
+}
+
+fn findings(diagnosis: &Diagnosis) -> Table {
+    let numbered: Vec<(usize, &Finding)> = (1..).zip(&diagnosis.findings).collect();
+    let mut table = Table::of(
+        "",
+        &numbered,
+        [
+            (Column::text("number", "no."), |(number, _)| number.to_string().into()),
+            (Column::text("cause", "cause"), |(_, finding)| in_short(finding).into()),
+            (Column::text("confidence", "how sure"), |(_, finding)| match finding.effect {
+                CauseKind::Unexplained | CauseKind::SmallDisturbances => "".into(),
+                _ => confidence(finding).into(),
+            }),
+            (Column::number("worth_mm", "explains", "mm", 3), |(_, finding)| finding.worth_mm.into()),
+        ],
+    );
+    table.notes.push(
+        "explains: the part of the readings that nothing else in the model explains, RMS over all rows. identified: better than its \
+         alternatives, and found again in halves of the rows."
+            .to_owned(),
+    );
+    table
+}
+
+/// A finding in one sentence.
+pub(super) fn in_short(finding: &Finding) -> String {
+    let joints = finding.joints.as_deref();
+    if !finding.members.is_empty() {
+        let members: Vec<String> = finding.members.iter().map(member).collect();
+        return sentence(&format!("an error {}: {}", family(finding), members.join(", ")));
+    }
+    let names_a_part = finding.non_centrality.is_some();
+    let several = joints.is_some_and(|joints| joints.len() > 1);
+    if names_a_part && (finding.confidence == Confidence::Ambiguous || several) {
+        return sentence(&located(finding.effect, joints, finding.rows));
+    }
+    let mut terms = finding.cause.split("; ");
+    let first = sentence(terms.next().unwrap_or_default());
+    match terms.count() {
+        n if n > 0 && names_a_part => {
+            format!("{first}; with {n} further {}", if n == 1 { "term" } else { "terms" })
+        }
+        _ => sentence(&finding.cause),
+    }
+}
+
+/// What to do, each once, with the numbers of its findings.
+fn actions(diagnosis: &Diagnosis) -> Vec<String> {
+    let asked = (1..).zip(&diagnosis.findings).filter(|(_, f)| f.effect != CauseKind::SmallDisturbances);
+    let mut out: Vec<(String, Vec<usize>)> = Vec::new();
+    for (number, finding) in asked {
+        // A command names the number of its finding.
+        let action = match &finding.decided_by {
+            Some(decision) => format!("to decide, {decision}"),
+            None => finding.remedy.clone(),
+        };
+        match out.iter_mut().find(|(same, _)| *same == action) {
+            Some((_, numbers)) => numbers.push(number),
+            None => out.push((action, vec![number])),
+        }
+    }
+    let names_file = out.iter().any(|(action, _)| action.contains(DIAGNOSIS_FILE));
+    let file =
+        names_file.then(|| format!("{DIAGNOSIS_FILE} is what `diagnose --json {DIAGNOSIS_FILE}` writes"));
+    out.into_iter().map(|(action, numbers)| format!("{}: {action}", and(&numbers))).chain(file).collect()
+}
