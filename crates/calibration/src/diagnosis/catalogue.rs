@@ -469,6 +469,15 @@ fn latency(dataset: &Dataset) -> EmpiricalFault {
     EmpiricalFault::Latency { middle_s: if middle_s.is_finite() { middle_s.round() as i64 } else { 0 } }
 }
 
+/// Time from row to row from which an arm may have stopped at each (h): stopping, settling and reading take some seconds.
+const STOP_H: f64 = 2.0 / 3600.0;
+
+fn median_interval_h(dataset: &Dataset) -> Option<f64> {
+    let times: Vec<f64> = dataset.rows.iter().filter_map(|row| row.condition.time_h).collect();
+    let intervals: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    truegrind_math::statistics::median(&intervals)
+}
+
 /// Prior odds of a cause with a physical law against an expansion for faults whose law is unknown: it can imitate many
 /// laws. Counted as that many variants.
 const EXPANSION_ODDS: f64 = 10.0;
@@ -482,8 +491,9 @@ fn empirical_faults(subject: &Subject<'_>, columns: &LoggedColumns) -> Vec<(Empi
     if has(true) {
         out.push((latency(dataset), 1.0));
     }
-    // Also on a path with a clock: an arm that stops at every row of it has no speed there, but a last step.
-    if has(false) {
+    // Also on a path with a clock, if rows are so far apart that the arm may have stopped at each: then it has no speed there, but a last
+    // step.
+    if has(false) && (!has(true) || median_interval_h(dataset).is_some_and(|hours| hours > STOP_H)) {
         out.extend([(EmpiricalFault::ArmUnsettled, 2.0), (EmpiricalFault::SensorUnsettled, 2.0)]);
     }
     let moves = |j: usize| columns.range_rad[j] > STILL_RAD;

@@ -16,8 +16,11 @@ use truegrind_arm::parameter::{LinkCoordinate, Parameter};
 /// z-score from which a link counts as deviating, since the wide priors of a diagnosis hardly constrain weakly observed links.
 pub(super) const LINK_Z: f64 = 2.0;
 
+/// The same from which it is a finding.
+const SURE_LINK_Z: f64 = 6.0;
+
 impl FindingBuilder<'_> {
-    /// Findings of links that deviate by more than the `tolerance` of making them allows.
+    /// Findings of links that surely deviate by more than the `tolerance` of making them allows.
     pub(super) fn implausible_links(
         &self,
         linear: &Linear,
@@ -31,7 +34,7 @@ impl FindingBuilder<'_> {
         };
         let links = (0..table.len()).filter_map(|k| Some((k, of(k)?)));
         links
-            .filter(|(k, _)| is_implausible(&table[*k], tolerance, LINK_Z))
+            .filter(|(k, _)| is_implausible(&table[*k], tolerance, SURE_LINK_Z))
             .map(|(k, (joint, coordinate))| {
                 let after = self.held.without(&[]).rmse_mm(None, self.set_aside);
                 let before = self.held.without(&[k]).rmse_mm(None, self.set_aside);

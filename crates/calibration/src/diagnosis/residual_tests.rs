@@ -103,8 +103,11 @@ pub fn outliers(fit: &Extended) -> Vec<(usize, f64)> {
 /// Sizes from this many medians on may lie beyond a gap.
 const GAP_FROM: f64 = 5.0;
 
-/// Largest share of rows beyond a gap.
-const BEYOND_GAP: f64 = 0.05;
+/// Largest share of rows beyond a gap, and their largest number: more are a pattern.
+const BEYOND_GAP: (f64, usize) = (0.05, 10);
+
+/// Smallest width of a gap, as a ratio.
+const GAP: f64 = 1.5;
 
 /// The size above which sizes lie apart from all others; infinite if none do.
 ///
@@ -112,10 +115,11 @@ const BEYOND_GAP: f64 = 0.05;
 /// rows just as far off are no tail, even where one of them alone could be.
 fn beyond_gap(sorted: &[f64], middle: f64, nu: f64) -> f64 {
     let n = sorted.len();
-    let most = ((BEYOND_GAP * n as f64) as usize).max(1);
+    let most = ((BEYOND_GAP.0 * n as f64) as usize).clamp(1, BEYOND_GAP.1);
     let apart = |k: &usize| {
         let (size, next) = (sorted[n - k], sorted[n - k - 1]);
-        size > GAP_FROM * middle && (size / next).powf(-(*k as f64) * nu) < 1e-2 / most as f64
+        let chance = (size / next).powf(-(*k as f64) * nu) * most as f64;
+        size > GAP_FROM * middle && size > GAP * next && chance < 1e-2
     };
     let furthest = (1..=most.min(n - 1)).filter(apart).last();
     furthest.map_or(f64::INFINITY, |k| sorted[n - k - 1])
