@@ -34,7 +34,7 @@ use thiserror::Error;
 use self::blank::blank_row;
 use self::candidate::{Candidate, RejectionCounts};
 use self::design::{Design, Index};
-use self::field::{FieldDesign, FieldUncertainty};
+use self::field::{FieldDesign, FieldUncertainty, TELLS};
 use self::keep_out::{CollisionChecker, KeepOut};
 use self::power::Detectability;
 use self::roadmap::Roadmap;
@@ -292,7 +292,9 @@ fn uncertainty(design: &FieldDesign, chosen: &[usize], candidates: usize, seed: 
         design.remaining_mm(&all[..chosen.len()])
     });
     let random_mm = drawn.sum::<f64>() / RANDOM_SETS as f64;
-    FieldUncertainty { before_mm: design.remaining_mm(&[]), after_mm: design.remaining_mm(chosen), random_mm }
+    let (before_mm, after_mm) = (design.remaining_mm(&[]), design.remaining_mm(chosen));
+    let needed = (after_mm > TELLS * before_mm).then(|| design.needed(chosen.len(), before_mm));
+    FieldUncertainty { before_mm, after_mm, random_mm, needed }
 }
 
 fn quality(jacobian: &ReadingJacobian, chosen: &[usize], options: &Options) -> Option<Quality> {

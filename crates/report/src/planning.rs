@@ -7,6 +7,7 @@ use super::status::Status;
 use super::table::{Cell, Column, Table};
 use truegrind_arm::parameter::Parameter;
 use truegrind_calibration::measurement::dataset::Reading;
+use truegrind_planning::poses::field::FieldUncertainty;
 use truegrind_planning::poses::power::Detectability;
 use truegrind_planning::poses::program::{checked, reading};
 use truegrind_planning::poses::schedule::{FIRST_ROW, Purpose};
@@ -165,6 +166,7 @@ fn verdict(plan: &Plan) -> Verdict {
              ones",
             field.before_mm, field.after_mm, field.random_mm
         ));
+        reasons.extend(tells_little(field, plan.poses.len()));
     }
     let undecided: Vec<&Detectability> = plan.detectability.iter().filter(|d| !d.is_decided()).collect();
     if !undecided.is_empty() {
@@ -190,6 +192,21 @@ fn verdict(plan: &Plan) -> Verdict {
         _ => (Status::Warning, "The program may run if the cable is unhooked between some poses"),
     };
     Verdict::new(status, headline, reasons)
+}
+
+/// Says that the poses tell little about an unexplained error, and how many would tell more.
+fn tells_little(field: &FieldUncertainty, poses: usize) -> Option<String> {
+    let (count, left_mm) = field.needed?;
+    Some(if left_mm > 0.5 * field.before_mm {
+        format!(
+            "these poses tell little, and so do more of them ({count}: {left_mm:.3} mm): the error changes within shorter distances than any plan \
+             of poses resolves. Measure along the programs to be corrected instead"
+        )
+    } else {
+        format!(
+            "these {poses} poses tell little: {count} poses would leave {left_mm:.3} mm (--poses {count})"
+        )
+    })
 }
 
 /// Summary for the terminal.
@@ -303,6 +320,7 @@ pub fn json(plan: &Plan, setup: &MeasurementSetup<'_>, robot: &str) -> Value {
             "before_mm": field.before_mm,
             "after_mm": field.after_mm,
             "random_mm": field.random_mm,
+            "poses_to_halve": field.needed.filter(|(_, mm)| *mm <= 0.5 * field.before_mm).map(|(count, _)| count),
         })),
         "quality": {
             "log_det": plan.quality.log_det,

@@ -385,6 +385,9 @@ fn drift_profiles(columns: &LoggedColumns) -> Vec<(f64, f64, f64)> {
     out
 }
 
+/// Prior odds of a stand that warms up against a target that creeps on the flange, which is rare.
+const CREEP_ODDS: f64 = 10.0;
+
 /// Candidate causes in the measurement that affect all rows.
 pub fn measurement_candidates(subject: &Subject<'_>) -> Vec<Candidate> {
     let dataset = &subject.observed.dataset;
@@ -396,6 +399,11 @@ pub fn measurement_candidates(subject: &Subject<'_>) -> Vec<Candidate> {
     let turning = dataset.sensor != Sensor::Cable;
     if let Some((mean, _)) = columns.temperature {
         list.push((Kind::Frame { turning }, Profile::Temperature { reference_c: mean }, 1.0));
+        list.push((Kind::Target, Profile::Temperature { reference_c: mean }, CREEP_ODDS));
+        if turning {
+            let air = Kind::Empirical(EmpiricalFault::Refraction);
+            list.push((air, Profile::Temperature { reference_c: mean }, EXPANSION_ODDS));
+        }
         if dataset.sensor == Sensor::Cable {
             list.push((Kind::Zero, Profile::Temperature { reference_c: mean }, 1.0));
         }
@@ -405,6 +413,7 @@ pub fn measurement_candidates(subject: &Subject<'_>) -> Vec<Candidate> {
         for share in TIME_CONSTANTS {
             let clock = Profile::Exponential { time_constant_h: share * hours };
             list.push((Kind::Frame { turning }, clock, tried));
+            list.push((Kind::Target, clock, CREEP_ODDS * tried));
             if dataset.sensor == Sensor::Cable {
                 list.push((Kind::Zero, clock, tried));
             }

@@ -60,10 +60,11 @@ impl Cause {
                     EmpiricalFault::TargetNest { .. } => CauseKind::TargetNest,
                 },
                 (Kind::Load { .. }, _) => CauseKind::PayloadChange,
+                // Glue and wax creep: what moves with the clock on the flange is the target.
+                (Kind::Target, _) => CauseKind::ToolShift,
                 (_, Profile::Exponential { .. } | Profile::Temperature { .. }) => CauseKind::ThermalDrift,
                 (Kind::Zero, _) => CauseKind::SensorZeroShift,
                 (Kind::Frame { .. }, _) => CauseKind::SensorFrameShift,
-                (Kind::Target, _) => CauseKind::ToolShift,
                 (Kind::Scale, _) => CauseKind::SensorScale,
                 (Kind::Sag, _) => CauseKind::CableSag,
             },
@@ -188,7 +189,8 @@ impl Cause {
         match self {
             Cause::Arm(effect) => matches!(effect, Effect::ThermalDrift(_)),
             Cause::Measurement(d) => {
-                matches!(d.profile, Profile::Exponential { .. } | Profile::Temperature { .. })
+                let by_clock = matches!(d.profile, Profile::Exponential { .. } | Profile::Temperature { .. });
+                by_clock && !matches!(d.kind, Kind::Empirical(_))
             }
         }
     }

@@ -107,7 +107,7 @@ const GAP_FROM: f64 = 5.0;
 const BEYOND_GAP: (f64, usize) = (0.05, 10);
 
 /// Smallest width of a gap, as a ratio.
-const GAP: f64 = 1.5;
+const GAP: f64 = 2.0;
 
 /// The size above which sizes lie apart from all others; infinite if none do.
 ///

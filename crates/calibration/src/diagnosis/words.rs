@@ -171,6 +171,10 @@ pub fn describe_cause(cause: &Cause, parameters: &[FoundParameter], last_row: us
 fn describe_disturbance(d: &Disturbance, rows: &str, parameters: &[FoundParameter]) -> String {
     let value = value_of(parameters, 0);
     match (&d.kind, &d.profile) {
+        (Kind::Empirical(EmpiricalFault::Refraction), Profile::Temperature { .. }) => format!(
+            "the tracker's beam is refracted more as the air warms up: {:.3} mm at 3 m per kelvin, growing with the square of the distance",
+            9e3 * value.abs()
+        ),
         (Kind::Empirical(form), _) => describe_empirical_fault(*form, parameters),
         (Kind::Load { compliance: Some(_), .. }, _) => {
             let side = if value < 0.0 { "less" } else { "more" };
@@ -179,6 +183,14 @@ fn describe_disturbance(d: &Disturbance, rows: &str, parameters: &[FoundParamete
         (Kind::Load { .. }, _) => {
             format!("{rows} the arm carried a load that was not logged")
         }
+        (Kind::Target, Profile::Exponential { time_constant_h }) => format!(
+            "the target creeps on the flange: {:.2} mm, time constant {time_constant_h:.2} h",
+            norm(parameters)
+        ),
+        (Kind::Target, Profile::Temperature { .. }) => format!(
+            "the target moves on the flange with temperature: {:.1} µm per kelvin",
+            norm(parameters) * 1e3
+        ),
         (_, Profile::Exponential { time_constant_h }) => format!(
             "the sensor drifts relative to the base during warm-up: {:.2} mm, time constant {time_constant_h:.2} h",
             norm(parameters)
@@ -267,6 +279,9 @@ pub fn describe_pattern(cause: &Cause) -> String {
         }
         SensorZeroShift => "the cable's residual steps by one amount in these rows".to_owned(),
         SensorFrameShift => "the residual steps by one vector in the base in these rows".to_owned(),
+        ToolShift if cause.is_thermal() => {
+            "the residual grows with time or temperature along one vector on the flange".to_owned()
+        }
         ToolShift => "the residual steps by one vector on the flange in these rows".to_owned(),
         Latency => "the residual follows the speed of the joints".to_owned(),
         Unsettled => "the residual points to the previous pose".to_owned(),

@@ -10,6 +10,7 @@ mod certain;
 mod decision;
 mod doubts;
 mod change_points;
+mod data_quality;
 mod elimination;
 mod found;
 mod in_doubt;

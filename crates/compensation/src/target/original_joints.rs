@@ -16,7 +16,7 @@ use truegrind_arm::inverse::budget::{SearchBudget, with_budget};
 use truegrind_arm::inverse::configuration::Configuration;
 use truegrind_arm::model::Joints;
 use truegrind_math::se3::Pose;
-use truegrind_programs::motion::{Listing, Motion, MotionTarget, RobTarget, Switch, TargetValue};
+use truegrind_programs::motion::{Listing, Motion, MotionKind, MotionTarget, RobTarget, Switch, TargetValue};
 
 /// Targets that are followed in one run: the first one has no seed and costs as much as hundreds of others.
 const STRETCH: usize = 4096;
@@ -173,8 +173,8 @@ fn originals(
 }
 
 /// Where the configuration may or may not be checked, depending on the execution path, the branch counts as guessed as if
-/// unchecked: from an unknown start, from one that is guessed itself, or where an unchecked motion ends at other joints. What
-/// follows unchecked inherits the guess.
+/// unchecked: from an unknown start, from one that is guessed itself, where an unchecked motion ends at other joints, or where its way
+/// passes a singularity. What follows unchecked inherits the guess.
 fn guess_if_possibly_unmonitored(
     listing: &Listing,
     monitors: &[Switch],
@@ -193,6 +193,11 @@ fn guess_if_possibly_unmonitored(
         let before = previous.map(|previous| out[first[previous]..first[previous + 1]].last());
         let before = match (before, monitored) {
             (Some(Some(Ok(start))), _) if start.guess != BranchGuess::Known => Some(BranchGuess::Inherited),
+            (Some(Some(Ok(start))), _)
+                if passes_singularity(motion, start, &out[first[index]..first[index + 1]]) =>
+            {
+                Some(BranchGuess::Guessed)
+            }
             // Unchecked in any case: its own search has looked at its start, which was not yet known to be a guess.
             (_, Switch::Off) => None,
             (Some(Some(Ok(start))), _) => {
@@ -217,6 +222,17 @@ fn guess_if_possibly_unmonitored(
             }
         }
     }
+}
+
+/// Whether a line or arc ends in another branch than it starts in: joints that follow the path pass a singularity there, and where no
+/// configuration is checked, on which side they leave it is open, whatever solution is nearest to the start.
+fn passes_singularity(
+    motion: &Motion,
+    start: &OriginalTarget,
+    here: &[Result<OriginalTarget, OutcomeReason>],
+) -> bool {
+    matches!(motion.kind, MotionKind::Linear | MotionKind::Circular)
+        && here.iter().flatten().any(|target| target.cfx != start.cfx)
 }
 
 /// Whether a controller that does not check configurations takes the same joints at all targets of a motion that starts at these.

@@ -550,4 +550,9 @@ fn a_configuration_checked_in_the_first_cycle_alone_is_flagged_where_the_second_
     assert_eq!(reasons(far, "  ConfL \\Off;\n")[2], unknown);
     assert_eq!(reasons(near, "")[1..], [None, None]);
     assert_eq!(reasons(near, "  ConfL \\Off;\n")[1..], [None, None]);
+    // The stated solution is the nearest one to the start, but a line to it turns the wrist over: where joints follow the line, they may
+    // arrive with the other.
+    let through = [[7.0, 12.0, 4.0, 42.0, -3.0, 22.0], [8.0, 13.0, 3.0, 43.0, -4.0, 23.0]];
+    assert_eq!(reasons(through, "  ConfL \\Off;\n")[2], unknown);
+    assert_ne!(reasons(through, "")[2], unknown);
 }

@@ -44,7 +44,16 @@ pub struct FieldUncertainty {
     pub after_mm: f64,
     /// With as many random ones, mean of ten draws.
     pub random_mm: f64,
+    /// Where the chosen poses tell little ([`TELLS`]): the number of poses that would halve it, and what remains with them; fewer do not
+    /// within [`MOST_POSES`].
+    pub needed: Option<(usize, f64)>,
 }
+
+/// Poses tell little if more than this share of the uncertainty remains with them.
+pub const TELLS: f64 = 0.9;
+
+/// Most poses that are suggested.
+pub const MOST_POSES: usize = 160;
 
 /// Covariances of the field between two lists of poses.
 fn covariances(unexplained: &SomethingElse, a: &[Joints], b: &[Joints]) -> DMatrix<f64> {
@@ -115,6 +124,20 @@ impl FieldDesign {
             chosen.push(best);
         }
         chosen
+    }
+
+    /// The fewest poses, in steps of a factor of two from `from`, with which at most half of `before_mm` remains, and what remains;
+    /// [`MOST_POSES`] if no fewer do.
+    pub fn needed(&self, from: usize, before_mm: f64) -> (usize, f64) {
+        let chosen = self.choose(MOST_POSES.min(self.weights.len()), &[]);
+        let mut count = from.max(1);
+        loop {
+            count = (2 * count).min(chosen.len());
+            let left = self.remaining_mm(&chosen[..count]);
+            if left <= 0.5 * before_mm || count == chosen.len() {
+                return (count, left);
+            }
+        }
     }
 
     /// Standard deviation of the field once some candidates are measured, root mean square over all candidates (mm).

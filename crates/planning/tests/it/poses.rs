@@ -541,6 +541,7 @@ fn ten_poses_for_what_no_cause_explains_tell_more_than_ten_random_ones() {
     assert_eq!((plan.poses.len(), plan.rows.len()), (10, 10));
     let told = plan.field.unwrap();
     assert!(told.after_mm < told.random_mm && told.random_mm < told.before_mm, "{told:?}");
+    assert_eq!(told.needed.is_some(), told.after_mm > 0.9 * told.before_mm, "{told:?}");
     // Measured: the error at poses that neither saw.
     let setup = MeasurementSetup { nominal: &nominal, sensor: Sensor::Position, frames: &frames };
     let places = |count: usize, seed: u64| -> Vec<Joints> {

@@ -5,6 +5,7 @@
 
 mod compensation;
 mod deviation;
+mod diagnosis;
 mod examples;
 mod fleet;
 mod formats;

@@ -298,3 +298,21 @@ fn the_written_arm_is_fitted_under_stated_tolerances() {
     assert!(!learned && (0.2..2.01).contains(&wide), "{wide}");
     assert!(sigma(None).1);
 }
+
+/// A target that creeps moves with the flange, a stand that warms up with the base: random poses tell them apart.
+#[test]
+fn a_target_that_creeps_and_a_stand_that_warms_up_are_told_apart() {
+    for (hidden, effect, words) in [
+        (Hidden::Creep { mm: [0.3, -0.2, 0.1], time_constant_h: 0.5 }, "tool-shift", "creeps on the flange"),
+        (
+            Hidden::Drift { mm: [0.3, -0.2, 0.1], time_constant_h: 0.5 },
+            "thermal-drift",
+            "relative to the base",
+        ),
+    ] {
+        let found = diagnosed(&run(&arm(), &[hidden], &setup(Sensor::Position, 300, 71)).dataset);
+        let first = &found.diagnosis.findings[0];
+        assert_eq!((first.effect.as_str(), first.confidence), (effect, Confidence::Identified));
+        assert!(first.cause.contains(words), "{}", first.cause);
+    }
+}

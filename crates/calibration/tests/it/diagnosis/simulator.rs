@@ -66,6 +66,11 @@ pub enum Hidden {
         mm: [f64; 3],
         time_constant_h: f64,
     },
+    /// The target creeps on the flange.
+    Creep {
+        mm: [f64; 3],
+        time_constant_h: f64,
+    },
     /// Links grow with the logged temperature.
     Warm {
         growth_per_k: f64,
@@ -105,7 +110,7 @@ impl Hidden {
             Hidden::Thermal { .. } => "thermal-drift",
             Hidden::Zero { .. } => "sensor-zero-shift",
             Hidden::Frame { .. } => "sensor-frame-shift",
-            Hidden::Tool { .. } => "tool-shift",
+            Hidden::Tool { .. } | Hidden::Creep { .. } => "tool-shift",
             Hidden::Outliers { .. } => "outliers",
             Hidden::Drift { .. } | Hidden::Warm { .. } => "thermal-drift",
             Hidden::Scale { .. } => "sensor-scale",
@@ -357,6 +362,10 @@ pub fn run(nominal: &Model, hidden: &[Hidden], setup: &Setup) -> Run {
                     }
                     Hidden::Drift { mm, time_constant_h } => {
                         moved += Vector3::from(*mm) * (1.0 - (-time / time_constant_h).exp());
+                    }
+                    Hidden::Creep { mm, time_constant_h } => {
+                        let share = 1.0 - (-time / time_constant_h).exp();
+                        slipped += Vector4::new(mm[0], mm[1], mm[2], 0.0) * share;
                     }
                     Hidden::Warm { growth_per_k } => scale += growth_per_k * kelvin,
                     Hidden::Warp { mm } => warp += mm,

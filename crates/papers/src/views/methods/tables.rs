@@ -9,7 +9,7 @@ use crate::views::study::{
 };
 use crate::views::words;
 use truegrind_calibration::measurement::dataset::Sensor;
-use truegrind_math::statistics::median;
+use truegrind_math::statistics::{ErrorSummary, median};
 use truegrind_report::document::Verdict;
 use truegrind_report::number::{Precision, handy};
 use truegrind_report::repeated::{self, spread};
@@ -78,12 +78,43 @@ fn of_named_causes(study: &Study) -> Option<String> {
     let mean = |of: &dyn Fn(&NamedCauses) -> f64| found.iter().map(|c| of(c)).sum::<f64>() / n;
     Some(format!(
         "NC, named causes: `truegrind diagnose` on the same rows of the fit, with all causes that it finds: {:.1} findings in the mean of \
-         the cases, {:.1} of them identified. Its own geometry alone reaches {:.3} mm RMSE. What lies below the best of the methods \
-         no optimiser of geometry can reach.",
+         the cases, {:.1} of them identified. Its own geometry alone reaches {:.3} mm RMSE. {}",
         mean(&|c| c.findings as f64),
         mean(&|c| c.identified as f64),
-        mean(&|c| c.geometry.rmse)
+        mean(&|c| c.geometry.rmse),
+        beside_the_best(study, &found).unwrap_or_default()
     ))
+}
+
+/// Standard errors of the mean difference over the cases from which it is no chance.
+const SURELY: f64 = 2.0;
+
+/// The diagnosis beside the best method, case by case.
+fn beside_the_best(study: &Study, found: &[&NamedCauses]) -> Option<String> {
+    let rmse = |errors: Vec<ErrorSummary>| errors.iter().map(|e| e.rmse).collect::<Vec<f64>>();
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
+    let of_methods = study.results.iter().filter_map(held_out).map(rmse);
+    let best = of_methods.min_by(|a, b| mean(a).total_cmp(&mean(b)))?;
+    if best.len() != found.len() {
+        return None;
+    }
+    let gains: Vec<f64> = best.iter().zip(found).map(|(best, named)| best - named.held_out.rmse).collect();
+    let (n, gain) = (gains.len() as f64, mean(&gains));
+    let error = (gains.iter().map(|g| (g - gain).powi(2)).sum::<f64>() / (n * (n - 1.0))).sqrt();
+    Some(if n > 1.0 && gain > SURELY * error {
+        format!(
+            "It is {gain:.3} ± {error:.3} mm below the best of the methods in the same cases (mean and its standard error): that part no \
+             optimiser of geometry can reach."
+        )
+    } else if n > 1.0 {
+        format!(
+            "Beside the best of the methods in the same cases it gains {gain:.3} ± {error:.3} mm (mean and its standard error): no more than \
+             chance may give."
+        )
+    } else {
+        "One case does not show whether the difference from the best of the methods is more than chance."
+            .to_owned()
+    })
 }
 
 pub(super) fn verdict_table(study: &Study) -> Table {

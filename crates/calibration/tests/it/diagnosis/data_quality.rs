@@ -1,0 +1,141 @@
+//! What is wrong with the rows or the data sheet is a finding, and hides no cause.
+
+use truegrind_arm::estimated::Judgement;
+use truegrind_arm::model::Model;
+use truegrind_arm::robots;
+use truegrind_calibration::diagnosis::diagnose::{Diagnosed, Options, diagnose};
+use truegrind_calibration::diagnosis::finding::{Confidence, Finding};
+use truegrind_calibration::identification::tolerance::Tolerance;
+use truegrind_calibration::measurement::dataset::{Dataset, Sensor};
+
+use super::scenarios::frames;
+use super::simulator::{Hidden, Log, Setup, run};
+
+fn arm() -> Model {
+    robots::load("abb-irb-120").unwrap().model
+}
+
+fn setup(rows: usize, seed: u64) -> Setup {
+    Setup { sensor: Sensor::Position, rows, sigma_mm: 0.03, dirty: false, seed, log: Log::default() }
+}
+
+fn diagnosed(dataset: &Dataset, nominal: &Model) -> Diagnosed {
+    let frames = frames(dataset, nominal);
+    diagnose(dataset, "abb-irb-120", nominal, &frames, &Options::default(), &|_| ()).unwrap()
+}
+
+fn finding<'a>(found: &'a Diagnosed, effect: &str) -> Option<&'a Finding> {
+    found.diagnosis.findings.iter().find(|f| f.effect == effect)
+}
+
+/// Four rows at eleven standard deviations are no tail, even where the heaviest tail that the others allow reaches twelve.
+#[test]
+fn a_few_readings_that_a_gap_parts_from_the_others_are_outliers() {
+    let wild = vec![23, 71, 119, 160];
+    for seed in [3, 4, 5] {
+        let hidden = [Hidden::Outliers { list: wild.clone(), mm: 0.33 }];
+        let found = diagnosed(&run(&arm(), &hidden, &setup(200, seed)).dataset, &arm());
+        let outliers = finding(&found, "outliers").unwrap();
+        assert_eq!(outliers.row_list.as_ref(), Some(&wild), "{seed}");
+        // RMS over all rows of 4 readings of 200 that are 0.33 mm off.
+        let worth = outliers.worth_mm.unwrap();
+        assert!((worth - 0.33 * (4.0_f64 / 200.0).sqrt()).abs() < 0.01, "{worth}");
+        assert!(outliers.cause.contains("by up to 0.3"), "{}", outliers.cause);
+    }
+}
+
+/// One reading that is metres off says nothing about causes.
+#[test]
+fn one_wild_reading_hides_no_cause() {
+    let gear = Hidden::Gear { joint: 3, order: 1.0, peak_rad: 0.0015, phase: 0.4 };
+    let names = |hidden: &[Hidden]| -> Vec<(String, Option<Vec<usize>>)> {
+        let found = diagnosed(&run(&arm(), hidden, &setup(200, 11)).dataset, &arm());
+        let sure = found.diagnosis.findings.into_iter().filter(|f| f.confidence == Confidence::Identified);
+        sure.filter(|f| f.effect != "outliers").map(|f| (f.effect.as_str().to_owned(), f.joints)).collect()
+    };
+    let alone = names(std::slice::from_ref(&gear));
+    assert_eq!(alone, [("gear-eccentricity".to_owned(), Some(vec![4]))]);
+    assert_eq!(names(&[gear, Hidden::Outliers { list: vec![50], mm: 2000.0 }]), alone);
+}
+
+#[test]
+fn rounded_angles_are_told_behind_a_larger_fault() {
+    let hidden = [Hidden::Frame { from: 90, to: 199, mm: [4.0, -3.0, 1.0] }];
+    let log = Log { angle_step_rad: Some(0.1_f64.to_radians()), ..Log::default() };
+    let mut dataset = run(&arm(), &hidden, &Setup { log, ..setup(200, 21) }).dataset;
+    // Without a read-out nothing makes up for the rounding.
+    for row in dataset.rows.iter_mut() {
+        row.extra_mut().readout_mm = None;
+    }
+    let found = diagnosed(&dataset, &arm());
+    let rounding = finding(&found, "angle-rounding").unwrap();
+    assert!(rounding.worth_mm.unwrap() > 0.2 && rounding.worth_mm.unwrap() < 0.8, "{rounding:?}");
+    assert!(finding(&found, "sensor-frame-shift").is_some());
+}
+
+/// `identify` refuses a link 20 mm off; here it has a name besides.
+#[test]
+fn a_link_of_another_length_is_told_and_the_arm_refused() {
+    let dataset = run(&arm(), &[], &setup(200, 31)).dataset;
+    let mut sheet = arm();
+    sheet.links[2].a_mm -= 20.0;
+    let found = diagnosed(&dataset, &sheet);
+    let link = finding(&found, "link-geometry").unwrap();
+    assert_eq!((link.joints.as_deref(), link.confidence), (Some(&[3][..]), Confidence::Identified));
+    let off = &link.parameters[0];
+    assert!((off.value - 20.0).abs() < 1.5 && off.unit == "mm", "{off:?}");
+    assert!(link.cause.contains("another variant of the arm"), "{}", link.cause);
+    assert!(link.worth_mm.unwrap() > 1.0);
+    assert_eq!(found.estimated.verdict.status, Judgement::Fail);
+    // And not where the sheet is the arm's.
+    assert!(finding(&diagnosed(&dataset, &arm()), "link-geometry").is_none());
+}
+
+/// The size of a finding is what nothing else explains, so no finding is larger than the error of geometry alone.
+#[test]
+fn no_finding_is_larger_than_what_geometry_leaves() {
+    let hidden = [
+        Hidden::Gear { joint: 1, order: 1.0, peak_rad: 0.0015, phase: 0.7 },
+        Hidden::Compliance { joint: 1, peak_rad: 0.002 },
+        Hidden::Ratio { joint: 0, error: 8e-4 },
+    ];
+    let found = diagnosed(&run(&arm(), &hidden, &setup(300, 41)).dataset, &arm());
+    let left = found.diagnosis.fits.geometric.rmse_mm;
+    assert!(!found.diagnosis.findings.is_empty());
+    for f in &found.diagnosis.findings {
+        assert!(f.worth_mm.is_none_or(|mm| mm < 1.02 * left), "{} {:?} of {left}", f.cause, f.worth_mm);
+    }
+}
+
+#[test]
+fn of_too_few_poses_no_benefit_is_stated() {
+    let mut dataset = run(&arm(), &[], &setup(200, 51)).dataset;
+    dataset.rows = dataset.rows.iter().take(6).cloned().collect::<Vec<_>>().into();
+    let found = diagnosed(&dataset, &arm());
+    assert!(found.diagnosis.poses_needed.is_some() && found.benefit.is_none());
+    let verdict = &found.estimated.verdict;
+    assert_eq!(verdict.status, Judgement::Doubtful, "{verdict:?}");
+    assert!(verdict.reasons[0].contains("too few"), "{verdict:?}");
+    assert!(!verdict.reasons.iter().any(|reason| reason.contains("expected RMS")), "{verdict:?}");
+}
+
+/// Another series of the same arm judges the arm that is written: here first as it is, then one that is worse than geometry there.
+#[test]
+fn another_series_judges_the_written_arm() {
+    let hidden = [Hidden::Gear { joint: 2, order: 1.0, peak_rad: 0.0015, phase: 0.7 }];
+    let all = run(&arm(), &hidden, &setup(400, 61)).dataset;
+    let (own, other): (Vec<usize>, Vec<usize>) = (0..400).partition(|i| i % 2 == 0);
+    let (own, other) = (all.subset(&own), all.subset(&other));
+    let tolerance = Tolerance::default();
+    let mut found = diagnosed(&own, &arm());
+    let mut worse = found.clone();
+    found.test_on(&other, &frames(&other, &arm()), &tolerance, true);
+    let tested = &found.diagnosis.transfers[0];
+    assert!(tested.written_rmse_mm.unwrap() < 0.5 * tested.geometric_rmse_mm, "{tested:?}");
+    assert_eq!(found.estimated.verdict.status, Judgement::NotEvaluated);
+    worse.estimated.model = arm();
+    worse.test_on(&other, &frames(&other, &arm()), &tolerance, true);
+    assert_eq!(worse.estimated.verdict.status, Judgement::Fail);
+    assert!(worse.estimated.verdict.reasons[0].contains("`identify`"), "{:?}", worse.estimated.verdict);
+    assert_eq!(worse.diagnosis.verdict.as_ref(), Some(&worse.estimated.verdict));
+}

@@ -1,0 +1,90 @@
+//! The answer of a diagnosis on one screen, and its page.
+
+use std::sync::OnceLock;
+
+use truegrind_arm::robots;
+use truegrind_calibration::diagnosis::diagnose::{Diagnosed, Options, diagnose};
+use truegrind_calibration::diagnosis::finding::Confidence;
+use truegrind_calibration::identification::start::candidate_frames;
+use truegrind_calibration::measurement::dataset::Dataset;
+use truegrind_calibration::measurement::import;
+use truegrind_report::diagnosis as view;
+use truegrind_report::document::Document;
+use truegrind_report::format::terminal;
+
+use super::examples::leave;
+
+const TRACKER: &[u8] = include_bytes!("../../../../tests/data/irb120-tracker.csv");
+
+/// What is found in the shipped rows of a tracker.
+fn diagnosed() -> (&'static Diagnosed, &'static Dataset) {
+    static FOUND: OnceLock<(Diagnosed, Dataset)> = OnceLock::new();
+    let (found, dataset) = FOUND.get_or_init(|| {
+        let arm = robots::load("abb-irb-120").unwrap().model;
+        let dataset = import::read("irb120-tracker.csv", TRACKER, &import::Options::default()).unwrap();
+        let frames = candidate_frames(&dataset, &arm).unwrap().remove(0);
+        let found = diagnose(&dataset, "abb-irb-120", &arm, &frames, &Options::default(), &|_| ()).unwrap();
+        (found, dataset)
+    });
+    (found, dataset)
+}
+
+fn on_a_terminal(page: &Document) -> String {
+    terminal::document(page, 100)
+}
+
+#[test]
+fn the_answer_fits_one_screen_and_says_what_to_do() {
+    let (found, _) = diagnosed();
+    let text = on_a_terminal(&view::summary(found));
+    assert!(text.lines().count() <= 40, "{}\n{text}", text.lines().count());
+    for word in
+        ["[found] 4 causes identified", "explains", "What to do", "1 and 3: compensate", "[not evaluated]"]
+    {
+        assert!(text.contains(word), "{word}:\n{text}");
+    }
+    assert!(!text.contains("held out without"), "statistics are behind a fold:\n{text}");
+}
+
+/// Every finding has its number, its sentence and an action; findings with one action share a line.
+#[test]
+fn every_finding_has_an_action() {
+    let (found, _) = diagnosed();
+    let text = on_a_terminal(&view::summary(found)).replace('\n', " ");
+    let (_, actions) = text.split_once("What to do").unwrap();
+    for (k, finding) in found.diagnosis.findings.iter().enumerate() {
+        let action = finding.decided_by.as_ref().unwrap_or(&finding.remedy);
+        let words: Vec<&str> = action.split_whitespace().collect();
+        let actions = actions.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(actions.contains(&words.join(" ")), "{}: {action}\n{actions}", k + 1);
+    }
+}
+
+/// A cause that cannot be told apart is titled by the likeliest of them, whichever was accepted first.
+#[test]
+fn an_ambiguous_finding_is_titled_by_its_likeliest_member() {
+    let (found, dataset) = diagnosed();
+    let mut found = found.clone();
+    let finding = &mut found.diagnosis.findings[0];
+    finding.confidence = Confidence::Ambiguous;
+    finding.members = serde_json::from_value(serde_json::json!([
+        {"effect": "gear-transmission", "joints": [1], "rows": null, "family": "drive", "share": 0.98},
+        {"effect": "joint-compliance", "joints": [2], "rows": null, "family": "arm", "share": 0.02},
+    ]))
+    .unwrap();
+    let text = on_a_terminal(&view::summary(&found));
+    let one_line = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(one_line.contains("An error in the drive (98 %) or the arm (2 %)"), "{one_line}");
+    let page = on_a_terminal(&view::document(&found, dataset));
+    assert!(page.contains("1. Gear transmission, joint 1"), "{page}");
+}
+
+#[test]
+fn the_page_folds_statistics_and_opens_with_the_answer() {
+    let (found, dataset) = diagnosed();
+    let html = leave("diagnosis.html", &view::document(found, dataset));
+    let at = |text: &str| html.find(text).unwrap_or_else(|| panic!("{text}"));
+    assert!(at("What to do") < at("Errors by stage"));
+    assert!(at("<details>") < at("Errors by stage"));
+    assert_eq!(html.matches("<summary>Statistics</summary>").count(), found.diagnosis.findings.len());
+}
