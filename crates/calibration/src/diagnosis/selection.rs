@@ -130,8 +130,10 @@ pub fn select(subject: &Subject<'_>, options: &Options, progress: &(dyn Fn(&str)
         let mut causes = current.causes.clone();
         causes.push(cause.clone());
         let count = current.causes.len();
-        current = Arc::new(warm_fit(subject, &causes, Freedom::All, Some(&current)));
-        (current, known) = reviewed(&catalogue, subject, current, options, &to_review);
+        let with = Arc::new(warm_fit(subject, &causes, Freedom::All, Some(&current)));
+        (current, known) = reviewed(&catalogue, subject, Arc::clone(&with), options, &to_review);
+        // Two causes that push each other out would otherwise return in turn until the last step.
+        ban_repeated_removals(&with, &current, &mut removed_once, &mut banned);
         if current.causes.len() <= count && !contains_cause(&current.causes, &cause) {
             // The new cause did not survive the review: it is banned.
             banned.push(cause);
