@@ -25,7 +25,7 @@ pub fn document(found: &Diagnosed, dataset: &Dataset) -> Document {
     page.figure(
         steps(diagnosis),
         "Held-out error (five random folds, everything refitted in each) from the data sheet to the extended model. All bars have \
-         fitted frames, so the gain of fitting them is not shown. Causes are numbered in the order of acceptance.",
+         fitted frames, so the gain of fitting them is not shown. S: data sheet; G: geometry; + 1, + 2: causes in the order of acceptance.",
     );
     page.push(Block::Details {
         summary: "Errors by stage, and statistics of the findings".to_owned(),

@@ -125,7 +125,7 @@ pub fn select(subject: &Subject<'_>, options: &Options, progress: &(dyn Fn(&str)
             }
         };
         let cause = best.candidate.cause.clone();
-        progress(&format!("{}. {}", current.causes.len() + 1, cause.kind()));
+        progress(&format!("searching for causes: {}. {}", current.causes.len() + 1, cause.kind().words()));
         let to_review = causes_to_review(best, &left, &mut close_calls);
         let mut causes = current.causes.clone();
         causes.push(cause.clone());

@@ -111,7 +111,11 @@ pub fn describe_cause(cause: &Cause, parameters: &[FoundParameter], last_row: us
     };
     match cause {
         Cause::Arm(Effect::JointCompliance(_)) => {
-            format!("joint {joint} is compliant: it deflects by {:.2e} rad per N m of gravity torque", value)
+            // A milliradian is a millimetre at one metre.
+            format!(
+                "joint {joint} is compliant: each N m of gravity torque moves what is 1 m away by {:.1} µm",
+                value * 1e6
+            )
         }
         Cause::Arm(Effect::LumpedCompliance(load)) if load.lump.iter().any(|l| l.axis.is_some()) => format!(
             "joint {joint} deflects under gravity that is not along the vertical axis of the base: the arm is mounted at a tilt"

@@ -177,8 +177,8 @@ pub fn not_testable_table(diagnosis: &Diagnosis) -> Table {
 /// Name of a bar: the first two stages, then causes by number.
 pub(super) fn step_name(index: usize) -> String {
     match index {
-        0 => "data sheet".to_owned(),
-        1 => "geometry".to_owned(),
+        0 => "S".to_owned(),
+        1 => "G".to_owned(),
         n => format!("+ {}", n - 1),
     }
 }
