@@ -143,11 +143,8 @@ pub(super) struct Asking<'a> {
 impl Asking<'_> {
     /// Adds members and decisions to the findings, which are in their final order.
     pub(super) fn complete(&self, findings: &mut [Finding]) {
-        let identified: Vec<(CauseKind, Option<Vec<usize>>, Option<[usize; 2]>)> = findings
-            .iter()
-            .filter(|finding| finding.confidence == Confidence::Identified)
-            .map(|finding| (finding.effect, finding.joints.clone(), finding.rows))
-            .collect();
+        let sure = findings.iter().filter(|finding| finding.confidence == Confidence::Identified);
+        let identified: Vec<_> = sure.map(|f| (f.effect, f.joints.clone(), f.rows)).collect();
         for (k, finding) in findings.iter_mut().enumerate() {
             if finding.confidence == Confidence::Identified {
                 continue;

@@ -121,7 +121,7 @@ fn beyond_gap(sorted: &[f64], middle: f64, nu: f64) -> f64 {
         let chance = (size / next).powf(-(*k as f64) * nu) * most as f64;
         size > GAP_FROM * middle && size > GAP * next && chance < 1e-2
     };
-    let furthest = (1..=most.min(n - 1)).filter(apart).last();
+    let furthest = (1..=most.min(n - 1)).rfind(apart);
     furthest.map_or(f64::INFINITY, |k| sorted[n - k - 1])
 }
 

@@ -48,7 +48,7 @@ pub(super) fn summarise(
     ];
     let extended = search.extended.clone().whole(subject);
     let contributions = Contributions::new(searched, &search.found, &confirmed.whole);
-    let ((of_causes, finding_of_cause, pictures), links) =
+    let Findings { of_causes, finding_of_cause, pictures, of_links } =
         findings(search, confirmed, &extended, &contributions, &mut steps);
     let confounding = Confounding {
         causes: &search.found.causes,
@@ -92,7 +92,7 @@ pub(super) fn summarise(
         outlier_finding(context.dataset, &search.outliers, (off, empirical_mm), &stages[2]),
         unexplained_finding,
     ];
-    let without_causes = of_the_record.into_iter().flatten().chain(links);
+    let without_causes = of_the_record.into_iter().flatten().chain(of_links);
     findings.extend(without_causes.map(|finding| MergedFinding {
         finding,
         picture: None,
@@ -103,6 +103,15 @@ pub(super) fn summarise(
     Summary { findings, steps, extended, noise_floor, remaining: unexplained.sentence(), something_else }
 }
 
+/// Findings, and the index of the finding of each cause.
+struct Findings {
+    of_causes: Vec<Finding>,
+    finding_of_cause: Vec<usize>,
+    pictures: Vec<Picture>,
+    /// Of implausible links.
+    of_links: Vec<Finding>,
+}
+
 /// The findings of the accepted causes, and of implausible links; adds the held-out error after each to `steps`.
 fn findings(
     search: &Search<'_>,
@@ -110,7 +119,7 @@ fn findings(
     extended: &Extended,
     contributions: &Contributions<'_>,
     steps: &mut Vec<Step>,
-) -> ((Vec<Finding>, Vec<usize>, Vec<Picture>), Vec<Finding>) {
+) -> Findings {
     let context = search.context;
     let rows = &context.searched.observed.dataset;
     let folds = split::purged(rows, 5, search.correlation_range, context.options.selection.seed);
@@ -124,6 +133,7 @@ fn findings(
         set_aside: aside,
     };
     let tolerance = &context.options.arm_tolerance;
-    let links = builder.implausible_links(&confirmed.linear, contributions, tolerance);
-    (builder.findings(&search.accepted, steps), links)
+    let of_links = builder.implausible_links(&confirmed.linear, contributions, tolerance);
+    let (of_causes, finding_of_cause, pictures) = builder.findings(&search.accepted, steps);
+    Findings { of_causes, finding_of_cause, pictures, of_links }
 }
