@@ -5,7 +5,6 @@ use std::sync::Arc;
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use truegrind::calibration::diagnosis::transfer::transfer;
 use truegrind::calibration::identification::verdict::Limits;
 use truegrind::math::work::report_step;
 use truegrind::report::{diagnosis, format, identification};

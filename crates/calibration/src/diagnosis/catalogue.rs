@@ -443,6 +443,25 @@ const NEIGHBOURS: [(usize, usize); 10] =
 /// Orders of two-joint gear errors: eccentric and elliptic parts, as for a gear of its own.
 const TWO_JOINT_ORDERS: [[u8; 2]; 4] = [[1, 1], [1, 2], [2, 1], [2, 2]];
 
+/// Play that its load closes, of joints that gravity loads, with the number of variants of each: where the centre of mass of what a joint
+/// carries is, is not known, so that it is put at elbow, wrist or flange.
+fn loaded_plays(nominal: &Model, moves: &dyn Fn(usize) -> bool) -> Vec<(EmpiricalFault, f64)> {
+    (1..5)
+        .filter(|&joint| moves(joint))
+        .flat_map(|joint| {
+            let lumps: &[u8] = match joint {
+                1 => &[2, 4, 6],
+                2 => &[4, 6],
+                _ => &[6],
+            };
+            let known = nominal.bodies.is_some().then_some(0);
+            let all: Vec<u8> = lumps.iter().copied().chain(known).collect();
+            let tried = all.len() as f64;
+            all.into_iter().map(move |at| (EmpiricalFault::LoadedPlay { joint, at }, tried))
+        })
+        .collect()
+}
+
 /// Two-joint gear errors of neighbours that move, with the number of variants of each. Only first orders where the axes are parallel:
 /// there the weight depends on both angles, so higher orders are also what a nonlinear spring, or backlash whose side follows the
 /// load, looks like.
@@ -508,6 +527,7 @@ fn empirical_faults(subject: &Subject<'_>, columns: &LoggedColumns) -> Vec<(Empi
     let moves = |j: usize| columns.range_rad[j] > STILL_RAD;
     let exact = out.len();
     out.extend((0..3).map(|joint| (EmpiricalFault::NonlinearStiffness { joint }, 1.0)));
+    out.extend(loaded_plays(subject.nominal, &moves));
     out.extend(two_joint_gears(subject.nominal, &moves));
     if dataset.sensor == Sensor::Cable {
         out.extend([(EmpiricalFault::Pulley, 1.0), (drum(dataset), 1.0)]);

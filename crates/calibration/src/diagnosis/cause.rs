@@ -53,6 +53,7 @@ impl Cause {
                     EmpiricalFault::Latency { .. } => CauseKind::Latency,
                     EmpiricalFault::ArmUnsettled | EmpiricalFault::SensorUnsettled => CauseKind::Unsettled,
                     EmpiricalFault::NonlinearStiffness { .. } => CauseKind::JointStiffness,
+                    EmpiricalFault::LoadedPlay { .. } => CauseKind::Backlash,
                     EmpiricalFault::TwoJointGear { .. } => CauseKind::GearTwoJoints,
                     EmpiricalFault::Refraction => CauseKind::AirRefraction,
                     EmpiricalFault::Pulley => CauseKind::CablePulley,
@@ -110,9 +111,11 @@ impl Cause {
         match self {
             Cause::Arm(Effect::JointCompliance(c)) => c.compliance_rad_per_nm >= 0.0,
             Cause::Arm(Effect::Backlash(b)) => b.play_rad >= 0.0,
-            Cause::Measurement(Disturbance { kind: Kind::Sag, values, .. }) => {
-                values.iter().all(|v| *v >= 0.0)
-            }
+            Cause::Measurement(Disturbance {
+                kind: Kind::Sag | Kind::Empirical(EmpiricalFault::LoadedPlay { .. }),
+                values,
+                ..
+            }) => values.iter().all(|v| *v >= 0.0),
             _ => true,
         }
     }
@@ -217,7 +220,11 @@ impl Cause {
         };
         let part = match self {
             Cause::Arm(Effect::JointCompliance(_) | Effect::LumpedCompliance(_)) => Part::Spring,
-            Cause::Arm(Effect::Backlash(_)) => Part::Backlash,
+            Cause::Arm(Effect::Backlash(_))
+            | Cause::Measurement(Disturbance {
+                kind: Kind::Empirical(EmpiricalFault::LoadedPlay { .. }),
+                ..
+            }) => Part::Backlash,
             Cause::Measurement(Disturbance {
                 kind: Kind::Empirical(EmpiricalFault::NonlinearStiffness { .. }),
                 ..

@@ -33,6 +33,7 @@ use crate::identification::verdict::{CONVERGED, VerdictBuilder};
 use crate::measurement::dataset::{Dataset, Sensor};
 use crate::measurement::split;
 use nalgebra::DMatrix;
+use truegrind_arm::effect::Effect;
 use truegrind_arm::estimated::{Estimated, EstimatedParameter, Judgement, Provenance, StageErrors, Verdict};
 use truegrind_arm::model::Model;
 use truegrind_arm::parameter::arm_parameters;
@@ -352,7 +353,9 @@ fn build_diagnosis(
         ));
     }
     notes.extend(single_angles(dataset));
-    if prepared.sides_from_order && search.found.causes.iter().any(|c| c.kind() == CauseKind::Backlash) {
+    if prepared.sides_from_order
+        && search.found.causes.iter().any(|c| matches!(c, Cause::Arm(Effect::Backlash(_))))
+    {
         notes.push(
             "the sides of approach were not logged (columns approach1 to approach6): backlash was judged as if every row had been approached \
              straight from the row before"

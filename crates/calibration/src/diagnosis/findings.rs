@@ -212,7 +212,7 @@ impl FindingBuilder<'_> {
             members: Vec::new(),
             decided_by: None,
             alternatives,
-            remedy: words::remedy(cause.kind()).to_owned(),
+            remedy: words::remedy_of(cause).to_owned(),
         };
         (finding, picture)
     }

@@ -9,6 +9,7 @@
 
 use nalgebra::Vector3;
 
+use super::cause::Cause;
 use super::extension::{Extended, Subject};
 use crate::measurement::dataset::{Reading, Sensor};
 use truegrind_math::statistics::median;
@@ -93,7 +94,10 @@ pub fn outliers(fit: &Extended) -> Vec<(usize, f64)> {
     let stretch = high / middle;
     // Two quantiles of a few hundred sizes cannot exclude five degrees of freedom, so the tail is never assumed lighter.
     let nu = heaviness(stretch);
-    let limit = (middle * reach(nu, n)).min(beyond_gap(&sorted, middle, nu));
+    // Where a fault's law is known by an expansion alone, readings where that is worst lie apart too.
+    let exact = !fit.causes.iter().any(Cause::is_empirical);
+    let gap = if exact { beyond_gap(&sorted, middle, nu) } else { f64::INFINITY };
+    let limit = (middle * reach(nu, n)).min(gap);
     let mut rows: Vec<(usize, f64)> =
         fit.sizes.iter().copied().enumerate().filter(|(_, s)| !(*s <= limit)).collect();
     rows.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));

@@ -243,6 +243,10 @@ fn describe_empirical_fault(form: EmpiricalFault, parameters: &[FoundParameter])
         EmpiricalFault::NonlinearStiffness { .. } => format!(
             "the deflection of joint {joint} is not proportional to its torque: its stiffness is nonlinear, or it has backlash"
         ),
+        EmpiricalFault::LoadedPlay { .. } => format!(
+            "joint {joint} has {:.4}° of play that its load closes: gravity decides which flank bears",
+            value.to_degrees()
+        ),
         EmpiricalFault::TwoJointGear { other, .. } => {
             format!(
                 "the error of joint {joint} depends on its own angle and on the angle of joint {}",
@@ -276,6 +280,9 @@ pub fn describe_pattern(cause: &Cause) -> String {
         GearTransmission => format!("the residual about joint {joint} is periodic in its angle"),
         GearRatio => format!("the residual about joint {joint} is proportional to its angle"),
         JointCoupling => format!("the residual about a joint grows with the angle of joint {joint}"),
+        Backlash if cause.is_empirical() => {
+            format!("the residual about joint {joint} changes sign with its static torque")
+        }
         Backlash => format!("the residual about joint {joint} changes sign with the approach side"),
         ThermalDrift => "the residual grows with time or temperature".to_owned(),
         PayloadChange => {
@@ -301,7 +308,17 @@ pub fn describe_pattern(cause: &Cause) -> String {
     }
 }
 
-/// The recommended action.
+/// The recommended action for a cause.
+pub(super) fn remedy_of(cause: &Cause) -> &'static str {
+    match cause.kind() {
+        CauseKind::Backlash if cause.is_empirical() => {
+            "adjust the gear mesh; the written model does not include it, so keep programs away from poses at which the load changes sides"
+        }
+        kind => remedy(kind),
+    }
+}
+
+/// The recommended action for a kind of cause.
 pub fn remedy(effect: CauseKind) -> &'static str {
     use CauseKind::*;
     match effect {

@@ -8,8 +8,9 @@ use super::frames::Frames;
 use crate::measurement::dataset::{Dataset, Reading, Row, Sensor};
 use crate::measurement::sensor::disturbance::Kind;
 use crate::measurement::sensor::empirical::{EmpiricalFault, second_degree};
+
 use truegrind_arm::condition::Condition;
-use truegrind_arm::model::Model;
+use truegrind_arm::model::{Body, Model};
 
 /// Shifts of the sensor (mm), one for each parameter, from the row and the vector from sensor to target.
 type ShiftFn<'a> = dyn Fn(&Row, Vector3<f64>) -> Vec<Vector3<f64>> + 'a;
@@ -50,6 +51,17 @@ fn fault_rotations(fault: EmpiricalFault, dataset: &Dataset, model: &Model) -> V
                 })
                 .to_vec()
         }
+        EmpiricalFault::LoadedPlay { joint, at } => {
+            let torques = match at {
+                0 => torques(dataset, model),
+                frame => torques_of_lump(dataset, model, usize::from(frame)),
+            };
+            let mut out = none();
+            // A joint yields along its torque, so a play of p puts its link p/2 from the middle on that side.
+            let flank = |t: f64| if t == 0.0 { 0.0 } else { 0.5 * t.signum() };
+            out[joint] = Some(torques.iter().map(|t| flank(t[joint])).collect());
+            vec![out]
+        }
         EmpiricalFault::TwoJointGear { joint, other, orders } => {
             let [own, others] = orders.map(f64::from);
             let angle = |r: &Row, sign: f64| {
@@ -77,6 +89,16 @@ fn torques(dataset: &Dataset, model: &Model) -> Vec<Vector6<f64>> {
     let statics = Model { effects: Vec::new(), ..model.clone() }.statics();
     let torque =
         |r: &Row| Vector6::from(statics.torques::<f64>(&model.mapped(&r.joints).into(), &r.condition));
+    dataset.rows.iter().map(torque).collect()
+}
+
+/// Static torques (N m) of 1 kg at the origin of frame 1 to 6 alone.
+fn torques_of_lump(dataset: &Dataset, model: &Model, frame: usize) -> Vec<Vector6<f64>> {
+    let lump = |link: usize| Body { mass_kg: f64::from(u8::from(link + 1 == frame)), centre_mm: [0.0; 3] };
+    let alone =
+        Model { bodies: Some(std::array::from_fn(lump)), effects: Vec::new(), ..model.clone() }.statics();
+    let unloaded = Condition::default();
+    let torque = |r: &Row| Vector6::from(alone.torques::<f64>(&model.mapped(&r.joints).into(), &unloaded));
     dataset.rows.iter().map(torque).collect()
 }
 

@@ -25,6 +25,14 @@ pub enum EmpiricalFault {
         /// The joint.
         joint: usize,
     },
+    /// A joint (0-based) whose play its load closes: the flank that bears changes where the static torque changes its sign.
+    LoadedPlay {
+        /// The joint.
+        joint: usize,
+        /// Frame (1 to 6) at whose origin the load counts as concentrated; 0 for the masses of the arm, or 1 kg at its flange where these
+        /// are not known.
+        at: u8,
+    },
     /// A joint error with harmonics of the sum and the difference of multiples of its angle and of another joint's.
     TwoJointGear {
         /// The joint (0-based).
@@ -66,7 +74,9 @@ impl EmpiricalFault {
     /// The joints concerned (0-based).
     pub fn joints(self) -> Vec<usize> {
         match self {
-            EmpiricalFault::NonlinearStiffness { joint } => vec![joint],
+            EmpiricalFault::NonlinearStiffness { joint } | EmpiricalFault::LoadedPlay { joint, .. } => {
+                vec![joint]
+            }
             EmpiricalFault::TwoJointGear { joint, other, .. } => vec![joint, other],
             _ => Vec::new(),
         }
@@ -74,7 +84,12 @@ impl EmpiricalFault {
 
     /// Whether it is a fault of the arm (which no model file can represent yet) and not of the measurement.
     pub fn is_in_arm(self) -> bool {
-        matches!(self, EmpiricalFault::NonlinearStiffness { .. } | EmpiricalFault::TwoJointGear { .. })
+        matches!(
+            self,
+            EmpiricalFault::NonlinearStiffness { .. }
+                | EmpiricalFault::LoadedPlay { .. }
+                | EmpiricalFault::TwoJointGear { .. }
+        )
     }
 
     /// Whether it rotates joints; the others shift the sensor.
@@ -84,6 +99,7 @@ impl EmpiricalFault {
             EmpiricalFault::Latency { .. }
                 | EmpiricalFault::ArmUnsettled
                 | EmpiricalFault::NonlinearStiffness { .. }
+                | EmpiricalFault::LoadedPlay { .. }
                 | EmpiricalFault::TwoJointGear { .. }
         )
     }
@@ -108,6 +124,7 @@ impl EmpiricalFault {
                 out.extend(listed(&["cube of the torque"], "rad/(N m)³"));
                 out
             }
+            EmpiricalFault::LoadedPlay { .. } => listed(&["play"], "rad"),
             EmpiricalFault::TwoJointGear { .. } => listed(
                 &[
                     "sine of the sum",
@@ -142,6 +159,7 @@ impl EmpiricalFault {
             EmpiricalFault::ArmUnsettled | EmpiricalFault::SensorUnsettled => 1e-3,
             // Relative to a compliance of 1e-5 rad/(N m): the same again at some 30 N m.
             EmpiricalFault::NonlinearStiffness { .. } => [1e-6, 1e-7][parameter.min(1)],
+            EmpiricalFault::LoadedPlay { .. } => 0.2_f64.to_radians(),
             EmpiricalFault::TwoJointGear { .. } => 3e-4,
             EmpiricalFault::Refraction => 5e-6,
             EmpiricalFault::Pulley | EmpiricalFault::Drum { .. } => 0.5,

@@ -316,3 +316,23 @@ fn a_target_that_creeps_and_a_stand_that_warms_up_are_told_apart() {
         assert!(first.cause.contains(words), "{}", first.cause);
     }
 }
+
+/// Play that gravity closes follows the sign of the torque, not the side of approach. No model file can carry it, so it is told and not
+/// written.
+#[test]
+fn play_that_its_load_closes_is_told_and_not_written() {
+    let hidden = [Hidden::LoadedPlay { joint: 2, play_rad: 0.0015 }];
+    let found = diagnosed(&run(&arm(), &hidden, &setup(Sensor::Position, 400, 81)).dataset);
+    let play = found.diagnosis.findings.iter().find(|f| f.effect == "backlash").unwrap();
+    assert_eq!((play.joints.as_deref(), play.confidence), (Some(&[3][..]), Confidence::Identified));
+    assert!(play.cause.contains("gravity decides which flank bears"), "{}", play.cause);
+    let size = &play.parameters[0];
+    assert!((size.value - 0.0015).abs() < 4e-4, "{size:?}");
+    assert!(
+        play.remedy.contains("gear mesh") && play.remedy.contains("does not include it"),
+        "{}",
+        play.remedy
+    );
+    let backlash = |effect: &Effect| matches!(effect, Effect::Backlash(_));
+    assert!(!found.estimated.model.effects.iter().any(backlash));
+}

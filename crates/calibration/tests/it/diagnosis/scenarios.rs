@@ -303,7 +303,9 @@ pub fn cause(hidden: &Hidden) -> Option<Cause> {
             Kind::Load { joints: vec![1, 2], compliance: None },
             rows(from, to),
         )),
-        Hidden::Outliers { .. } | Hidden::Warp { .. } | Hidden::Creep { .. } => return None,
+        Hidden::Outliers { .. } | Hidden::Warp { .. } | Hidden::Creep { .. } | Hidden::LoadedPlay { .. } => {
+            return None;
+        }
     })
 }
 

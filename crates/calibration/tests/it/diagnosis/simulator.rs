@@ -38,6 +38,11 @@ pub enum Hidden {
         joint: usize,
         play_rad: f64,
     },
+    /// Play that gravity closes, softly where the torque is small.
+    LoadedPlay {
+        joint: usize,
+        play_rad: f64,
+    },
     Thermal {
         growth: f64,
         time_constant_h: f64,
@@ -106,7 +111,7 @@ impl Hidden {
             Hidden::Gear { .. } => "gear-transmission",
             Hidden::Ratio { .. } => "gear-ratio",
             Hidden::Coupling { .. } => "joint-coupling",
-            Hidden::Backlash { .. } => "backlash",
+            Hidden::Backlash { .. } | Hidden::LoadedPlay { .. } => "backlash",
             Hidden::Thermal { .. } => "thermal-drift",
             Hidden::Zero { .. } => "sensor-zero-shift",
             Hidden::Frame { .. } => "sensor-frame-shift",
@@ -126,7 +131,8 @@ impl Hidden {
             Hidden::Compliance { joint, .. }
             | Hidden::Gear { joint, .. }
             | Hidden::Ratio { joint, .. }
-            | Hidden::Backlash { joint, .. } => Some(vec![joint + 1]),
+            | Hidden::Backlash { joint, .. }
+            | Hidden::LoadedPlay { joint, .. } => Some(vec![joint + 1]),
             Hidden::Coupling { driver, joint, .. } => Some(vec![driver + 1, joint + 1]),
             _ => None,
         }
@@ -349,6 +355,9 @@ pub fn run(nominal: &Model, hidden: &[Hidden], setup: &Setup) -> Run {
                     Hidden::Coupling { driver, joint, factor } => turned[*joint] += factor * u[*driver],
                     Hidden::Backlash { joint, play_rad } => {
                         turned[*joint] += 0.5 * play_rad * f64::from(approach[*joint]);
+                    }
+                    Hidden::LoadedPlay { joint, play_rad } => {
+                        turned[*joint] += 0.5 * play_rad * (arm.torque(&u, *joint, 0.0) / 0.3).tanh();
                     }
                     Hidden::Thermal { growth, time_constant_h } => {
                         scale += growth * (1.0 - (-time / time_constant_h).exp());

@@ -127,6 +127,7 @@ fn disturbances(sensor: Sensor, turn_rad: f64) -> Vec<Disturbance> {
     }
     let of_pose = [
         EmpiricalFault::NonlinearStiffness { joint: 1 },
+        EmpiricalFault::LoadedPlay { joint: 1, at: 4 },
         EmpiricalFault::TwoJointGear { joint: 2, other: 3, orders: [1, 1] },
         EmpiricalFault::TwoJointGear { joint: 4, other: 5, orders: [2, 1] },
     ];
