@@ -133,7 +133,13 @@ fn another_series_judges_the_written_arm() {
     let tested = &found.diagnosis.transfers[0];
     assert!(tested.written_rmse_mm.unwrap() < 0.5 * tested.geometric_rmse_mm, "{tested:?}");
     assert_eq!(found.estimated.verdict.status, Judgement::NotEvaluated);
-    worse.estimated.model = arm();
+    // A gear error of the other sign.
+    let mut wrong = worse.estimated.model.clone();
+    for effect in &mut wrong.effects {
+        let values: Vec<f64> = effect.parameters().iter().map(|p| p.value).collect();
+        values.iter().enumerate().for_each(|(k, value)| effect.set(k, -value));
+    }
+    worse.estimated.model = wrong;
     worse.test_on(&other, &frames(&other, &arm()), &tolerance, true);
     assert_eq!(worse.estimated.verdict.status, Judgement::Fail);
     assert!(worse.estimated.verdict.reasons[0].contains("`identify`"), "{:?}", worse.estimated.verdict);
