@@ -34,14 +34,19 @@ pub(super) fn verdict(diagnosis: &Diagnosis) -> Verdict {
     };
     let fits = &diagnosis.fits;
     let floor = match diagnosis.noise_floor_mm {
-        Some(floor) => format!("noise floor {floor:.3}"),
+        Some(floor) => format!("noise floor {floor:.3} mm"),
         None => format!("the noise floor is unknown, since {}", diagnosis.noise_floor_source),
+    };
+    let with_causes = if diagnosis.findings.is_empty() {
+        String::new()
+    } else {
+        format!("{:.3} mm with all of them, geometry alone ", fits.extended.cv_rmse_mm)
     };
     Verdict::new(
         status,
         format!(
-            "{headline}: held-out error {:.3} mm with all of them, geometry alone {:.3}, data sheet {:.3}; {floor}",
-            fits.extended.cv_rmse_mm, fits.geometric.cv_rmse_mm, fits.nominal.cv_rmse_mm
+            "{headline}: held-out error {with_causes}{:.3} mm, data sheet {:.3} mm; {floor}",
+            fits.geometric.cv_rmse_mm, fits.nominal.cv_rmse_mm
         ),
         Vec::<String>::new(),
     )
