@@ -47,17 +47,19 @@ impl<'a> Contributions<'a> {
 
     /// The same of the deviation of one parameter of the fit from its start.
     pub(super) fn unique_of_parameter(&self, linear: &Linear, k: usize) -> f64 {
-        let effect = DMatrix::from_columns(&[linear.rows.row(k).transpose() * linear.x[k]]);
-        let without = self.whole.without(&[k]);
-        let projected = without.project(&effect);
-        self.in_mm(&without.pure(&effect, &projected).column(0).into_owned())
+        self.beyond_others(&[k], linear.rows.row(k).transpose() * linear.x[k])
     }
 
     /// The causes are removed together before their effect is projected off the rest: they do not compete with each other.
     fn unique_of(&self, causes: &[usize]) -> f64 {
         let indices: Vec<usize> = causes.iter().flat_map(|&k| self.fit.parameter_indices(k)).collect();
-        let without = self.whole.without(&indices);
-        let effect = DMatrix::from_columns(&[self.sum(causes)]);
+        self.beyond_others(&indices, self.sum(causes))
+    }
+
+    /// The part of the effect of the parameters at `indices` that all others cannot absorb (mm RMS).
+    fn beyond_others(&self, indices: &[usize], effect: DVector<f64>) -> f64 {
+        let without = self.whole.without(indices);
+        let effect = DMatrix::from_columns(&[effect]);
         let projected = without.project(&effect);
         self.in_mm(&without.pure(&effect, &projected).column(0).into_owned())
     }

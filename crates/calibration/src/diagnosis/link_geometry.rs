@@ -28,24 +28,25 @@ impl FindingBuilder<'_> {
         tolerance: &Tolerance,
     ) -> Vec<Finding> {
         let table = parameter_table(&Fitted::from(self.extended), self.subject.nominal);
-        let of = |k: usize| match self.extended.parameters[k] {
-            Parameter::Link { joint, coordinate } => Some((joint, coordinate)),
-            _ => None,
-        };
-        let links = (0..table.len()).filter_map(|k| Some((k, of(k)?)));
+        let links = table.iter().zip(&self.extended.parameters).filter_map(|(link, parameter)| {
+            let Parameter::Link { joint, coordinate } = *parameter else { return None };
+            // The fit of all rows has parameters that the searched rows do not reach.
+            let k = self.found.parameters.iter().position(|p| p == parameter)?;
+            Some((link, k, joint, coordinate))
+        });
         links
-            .filter(|(k, _)| is_implausible(&table[*k], tolerance, SURE_LINK_Z))
-            .map(|(k, (joint, coordinate))| {
+            .filter(|(link, ..)| is_implausible(link, tolerance, SURE_LINK_Z))
+            .map(|(link, k, joint, coordinate)| {
                 let after = self.held.without(&[]).rmse_mm(None, self.set_aside);
                 let before = self.held.without(&[k]).rmse_mm(None, self.set_aside);
                 let gain = Gain { cv_rmse_before_mm: before, cv_rmse_after_mm: after };
                 Finding {
                     joints: Some(vec![joint + 1]),
-                    parameters: vec![deviation(&table[k])],
+                    parameters: vec![deviation(link)],
                     worth_mm: Some(contributions.unique_of_parameter(linear, k)),
                     ..words::finding(
                         CauseKind::LinkGeometry,
-                        describe(joint + 1, coordinate, &table[k]),
+                        describe(joint + 1, coordinate, link),
                         Confidence::Identified,
                         "no tolerance of making an arm is so wide".to_owned(),
                         gain,

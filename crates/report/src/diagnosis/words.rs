@@ -9,13 +9,11 @@ pub(super) fn located(effect: CauseKind, joints: Option<&[usize]>, rows: Option<
     let words = effect.words();
     // "gear two joints of joints 2 and 3" says it twice.
     let name = words.strip_suffix(" two joints").unwrap_or(&words);
-    let place = match (joints, rows) {
-        (_, Some([from, to])) => format!(" in rows {from} to {to}"),
-        (Some([joint]), _) => format!(" of joint {joint}"),
-        (Some(joints), _) if !joints.is_empty() => format!(" of joints {}", and(joints)),
-        _ => String::new(),
-    };
-    format!("{name}{place}")
+    match (joints, rows) {
+        (_, Some(_)) => format!("{name} in {}", place_of(joints, rows)),
+        (Some([_, ..]), _) => format!("{name} of {}", place_of(joints, rows)),
+        _ => name.to_owned(),
+    }
 }
 
 /// A cause that cannot be told apart from others, with its share.
