@@ -46,6 +46,7 @@ pub use truegrind_arm::arm_file::{ArmFile, LinkFile};
 pub use truegrind_arm::batch::{JointColumns, PoseColumns};
 pub use truegrind_arm::condition::Condition;
 pub use truegrind_arm::effect::backlash::Backlash;
+pub use truegrind_arm::effect::bending::Bending;
 pub use truegrind_arm::effect::compliance::Compliance;
 pub use truegrind_arm::effect::coupling::Coupling;
 pub use truegrind_arm::effect::error_map::ErrorMap;

@@ -14,6 +14,6 @@ pub struct Condition {
     pub payload_kg: Option<f64>,
     /// Centre of the payload in the last frame of the arm (mm).
     pub payload_centre_mm: [f64; 3],
-    /// Approach direction of each joint: −1 from below, +1 from above, 0 unknown.
+    /// Approach direction of each joint, in the sense of the controller's angle: −1 from below, +1 from above, 0 unknown.
     pub approach: [i8; 6],
 }

@@ -4,6 +4,7 @@
 //! set of regressors φ serves simulation, identification and compensation. Model selection is not
 //! part of this module.
 
+pub mod bending;
 pub mod compliance;
 pub mod lumped_compliance;
 pub mod harmonic;
@@ -21,6 +22,7 @@ use nalgebra::{Matrix6, Vector6};
 use serde::{Deserialize, Serialize};
 
 use self::backlash::Backlash;
+use self::bending::Bending;
 use self::compliance::Compliance;
 use self::coupling::Coupling;
 use self::error_map::ErrorMap;
@@ -45,6 +47,8 @@ pub enum Effect {
     /// The same where masses or gravity's direction are unknown.
     #[serde(rename = "joint-compliance-lumped")]
     LumpedCompliance(LumpedCompliance),
+    /// A link that bends between two parallel axes.
+    LinkBending(Bending),
     /// An eccentric gear: once or twice per joint turn.
     GearEccentricity(Harmonic),
     /// A line of the reducer at a higher order.
@@ -69,6 +73,7 @@ macro_rules! each {
         match $self {
             Effect::JointCompliance($e) => $body,
             Effect::LumpedCompliance($e) => $body,
+            Effect::LinkBending($e) => $body,
             Effect::GearMap($e) => $body,
             Effect::GearEccentricity($e) | Effect::GearTransmission($e) => $body,
             Effect::GearRatio($e) => $body,
@@ -85,6 +90,7 @@ impl Effect {
     pub fn name(&self) -> &'static str {
         match self {
             Effect::JointCompliance(_) | Effect::LumpedCompliance(_) => "joint-compliance",
+            Effect::LinkBending(_) => "link-bending",
             Effect::GearEccentricity(_) => "gear-eccentricity",
             Effect::GearTransmission(_) | Effect::GearMap(_) => "gear-transmission",
             Effect::GearRatio(_) => "gear-ratio",
@@ -142,6 +148,7 @@ impl Effect {
     ) {
         match self {
             Effect::LumpedCompliance(e) => e.add_offset(statics, u, out),
+            Effect::LinkBending(e) => e.add_offset(statics, u, torque, out),
             Effect::GearMap(e) => e.add_offset(u, out),
             Effect::JointCompliance(e) => e.add_offset(torque, out),
             Effect::GearEccentricity(e) | Effect::GearTransmission(e) => e.add_offset(u, out),
@@ -165,6 +172,7 @@ impl Effect {
             Effect::GearMap(e) => e.add_jacobian_product(u, step, out),
             Effect::JointCompliance(_)
             | Effect::LumpedCompliance(_)
+            | Effect::LinkBending(_)
             | Effect::Backlash(_)
             | Effect::ThermalDrift(_) => {}
         }
@@ -172,7 +180,11 @@ impl Effect {
 
     /// Whether the effect depends on the torques of gravity.
     pub fn needs_torque(&self) -> bool {
-        matches!(self, Effect::JointCompliance(_))
+        match self {
+            Effect::JointCompliance(_) => true,
+            Effect::LinkBending(bending) => bending.frame.is_none(),
+            _ => false,
+        }
     }
 
     /// Derivative of [`Effect::offset`] with respect to u.

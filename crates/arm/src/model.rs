@@ -37,6 +37,41 @@ impl Model {
         MappedJoints(self.joint_map * q)
     }
 
+    /// The condition with the sides of approach in the sense of the mapped angles, in which effects count. Where the joint map turns an
+    /// angle round, above is below; the gear of a joint that is mapped with others turns with those too, and its side is known where all
+    /// turn it the same way.
+    ///
+    /// ```
+    /// use truegrind_arm::condition::Condition;
+    /// use truegrind_arm::robots;
+    ///
+    /// // FANUC's J3 is stated against the horizontal, so the gear between the links turns by -(J2 + J3); J4 to J6 are turned round.
+    /// let arm = robots::load("fanuc-lr-mate-200id")?.model;
+    /// let gears = |approach| arm.gear_condition(&Condition { approach, ..Condition::default() }).approach;
+    /// assert_eq!(gears([1, 1, 1, 1, 0, -1]), [1, 1, -1, -1, 0, 1]);
+    /// assert_eq!(gears([1, 1, -1, 1, 0, -1]), [1, 1, 0, -1, 0, 1]);
+    /// # Ok::<(), robots::RobotError>(())
+    /// ```
+    pub fn gear_condition(&self, condition: &Condition) -> Condition {
+        if self.joint_map == Matrix6::identity() {
+            return *condition;
+        }
+        let turns = |gear: usize| {
+            let parts = (0..6).filter(move |&joint| self.joint_map[(gear, joint)] != 0.0);
+            parts.map(move |joint| self.joint_map[(gear, joint)].signum() as i8 * condition.approach[joint])
+        };
+        let side = |gear: usize| {
+            let first = turns(gear).next().unwrap_or(0);
+            if turns(gear).all(|turn| turn == first) { first } else { 0 }
+        };
+        Condition { approach: std::array::from_fn(side), ..*condition }
+    }
+
+    /// Whether the gear of a joint turns with other joints of the controller too.
+    pub fn is_coupled(&self, joint: usize) -> bool {
+        (0..6).any(|other| other != joint && self.joint_map[(joint, other)] != 0.0)
+    }
+
     /// Pose of the flange in the base. For many poses under one condition take [`Model::at_condition`] once.
     ///
     /// ```
@@ -77,6 +112,7 @@ impl Model {
         PreparedModel {
             model: self,
             condition: *condition,
+            of_effects: self.gear_condition(condition),
             tables: chain::tables(&self.links_at(condition)),
             statics: (!self.effects.is_empty()).then(|| self.statics()),
             loaded: self.effects.iter().any(Effect::needs_torque),
@@ -113,6 +149,8 @@ pub struct PreparedModel<'a> {
     pub condition: Condition,
     /// Link tables under the condition.
     pub tables: [LinkTable; 6],
+    /// The condition as effects count it ([`Model::gear_condition`]).
+    of_effects: Condition,
     statics: Option<Statics>,
     loaded: bool,
     /// Whether the joint map is the identity.
@@ -181,11 +219,11 @@ impl PreparedModel<'_> {
         let mut out = *mapped;
         if let Some(statics) = &self.statics {
             let torque = match self.loaded {
-                true => statics.torques(mapped, &self.condition),
+                true => statics.torques(mapped, &self.of_effects),
                 false => [mapped[0].splat(0.0); 6],
             };
             for effect in &self.model.effects {
-                effect.add_offset(statics, mapped, &torque, &self.condition, &mut out);
+                effect.add_offset(statics, mapped, &torque, &self.of_effects, &mut out);
             }
         }
         out
@@ -211,13 +249,13 @@ impl PreparedModel<'_> {
         let mut slope = Matrix6::identity();
         if let Some(statics) = &self.statics {
             let mapped = self.model.mapped(q);
-            let torque = self.loaded.then(|| statics.torques_and_jacobian(&mapped, &self.condition).1);
+            let torque = self.loaded.then(|| statics.torques_and_jacobian(&mapped, &self.of_effects).1);
             for effect in &self.model.effects {
                 match (effect, &torque) {
                     (Effect::JointCompliance(compliance), Some(torque)) => {
                         compliance.add_jacobian(torque, &mut slope)
                     }
-                    _ => slope += effect.jacobian(statics, &mapped, &self.condition),
+                    _ => slope += effect.jacobian(statics, &mapped, &self.of_effects),
                 }
             }
         }
@@ -228,7 +266,7 @@ impl PreparedModel<'_> {
     pub fn effect_regressors(&self, index: usize, q: &Joints) -> Vec<Vector6<f64>> {
         let mapped = self.model.mapped(q);
         match (&self.statics, self.model.effects.get(index)) {
-            (Some(statics), Some(effect)) => effect.regressors(statics, &mapped, &self.condition),
+            (Some(statics), Some(effect)) => effect.regressors(statics, &mapped, &self.of_effects),
             _ => Vec::new(),
         }
     }

@@ -1,6 +1,7 @@
 //! Which parameters an effect may have that comes from a file.
 
 use super::Effect;
+use super::bending::Bending;
 use super::error_map::ErrorMap;
 use super::lumped_compliance::LumpedCompliance;
 use super::smooth_correction::SmoothCorrection;
@@ -36,6 +37,7 @@ impl Effect {
                 COMPLIANCE.check(|| "compliance_rad_per_nm".to_owned(), e.compliance_rad_per_nm)
             }
             Effect::LumpedCompliance(e) => lumps(e),
+            Effect::LinkBending(e) => bending(e),
             Effect::GearEccentricity(e) | Effect::GearTransmission(e) => {
                 ORDER.check(|| "order".to_owned(), e.order)?;
                 OFFSET_RAD.check(|| "sine_rad".to_owned(), e.sine_rad)?;
@@ -93,6 +95,20 @@ fn lumps(load: &LumpedCompliance) -> Result<(), InvalidValue> {
         COMPLIANCE.check(|| "lump.factor".to_owned(), lump.factor)?;
     }
     Ok(())
+}
+
+fn bending(bending: &Bending) -> Result<(), InvalidValue> {
+    if bending.joint > 4 {
+        return Err(InvalidValue::new(
+            "joint",
+            bending.joint.to_string(),
+            "a joint from 0 to 4, which another follows",
+        ));
+    }
+    if let Some(frame) = bending.frame.filter(|frame| !(bending.joint + 1..=6).contains(frame)) {
+        return Err(InvalidValue::new("frame", frame.to_string(), "a frame from the end of the link to 6"));
+    }
+    COMPLIANCE.check(|| "compliance_rad_per_nm".to_owned(), bending.compliance_rad_per_nm)
 }
 
 fn knots(map: &ErrorMap) -> Result<(), InvalidValue> {

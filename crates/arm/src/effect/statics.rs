@@ -3,7 +3,7 @@
 use nalgebra::{Matrix6, Vector3, Vector6};
 
 use crate::body::Body;
-use crate::chain::{self, Chain, LinkTable, cross, dot};
+use crate::chain::{self, Chain, LinkTable, cross, dot, minus};
 use crate::condition::Condition;
 use crate::joints::MappedJoints;
 use crate::link::Link;
@@ -70,6 +70,21 @@ impl Statics {
             (sin[i], cos[i]) = sin_cos(u[i]);
         }
         chain::chain(&self.tables, &sin, &cos)
+    }
+
+    /// m (c − o) [kg mm] of the body between a joint and the next, about the joint's frame.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(super) fn own_lever<R: SinCos>(&self, frames: &Chain<R>, joint: usize) -> [R; 3] {
+        let body = &self.bodies[joint];
+        let (y, z) = (&frames.y[joint], &frames.z[joint + 1]);
+        let x = cross(y, z);
+        let mass = y[0].splat(body.mass_kg);
+        let c = splats(y[0], &body.centre_mm);
+        let mut out = minus(&frames.origin[joint + 1], &frames.origin[joint]);
+        for i in 0..3 {
+            out[i] = mass * (out[i] + c[0] * x[i] + c[1] * y[i] + c[2] * z[i]);
+        }
+        out
     }
 
     /// The frames, and for each joint Σ m (c − o) [kg mm] over everything beyond it.

@@ -6,6 +6,7 @@ use nalgebra::{Matrix6, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use truegrind_arm::effect::Effect;
+use truegrind_arm::effect::bending::Bending;
 use truegrind_arm::effect::compliance::Compliance;
 use truegrind_arm::effect::coupling::Coupling;
 use truegrind_arm::effect::error_map::ErrorMap;
@@ -419,6 +420,9 @@ pub(crate) fn with_effects(model: &Model, random: &mut ChaCha8Rng) -> Model {
     let lump = [(3, None, None), (6, Some(1), None), (2, None, Some(0)), (4, Some(0), Some(2))]
         .map(|(frame, axis, moment)| Lump { frame, axis, moment, factor: 3e-6 * even(random) });
     out.effects.push(Effect::LumpedCompliance(LumpedCompliance { joint: 1, lump: lump.to_vec() }));
+    for (joint, frame) in [(1, None), (1, Some(4)), (2, Some(6))] {
+        out.effects.push(Effect::LinkBending(Bending { joint, frame, compliance_rad_per_nm: 2e-6 }));
+    }
     out.effects.push(Effect::GearRatio(GearRatio { joint: 5, error: 2e-4 }));
     out.effects.push(Effect::JointCoupling(Coupling { joint: 5, driver: 4, factor: 1e-3 }));
     out.effects.push(Effect::ThermalDrift(Thermal {

@@ -5,6 +5,7 @@ use truegrind_arm::chain::tables;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::effect::backlash::Backlash;
+use truegrind_arm::effect::bending::Bending;
 use truegrind_arm::effect::thermal::Thermal;
 use truegrind_arm::model::{Joints, MappedJoints, Model, PreparedModel};
 use truegrind_math::difference::jacobian;
@@ -233,4 +234,66 @@ fn play_is_felt_between_the_two_sides() {
     let (above, below) =
         (model.at_condition(&from(1)).joint_rotations(&q), model.at_condition(&from(-1)).joint_rotations(&q));
     assert!(((above - below)[1] - 2e-3).abs() < 1e-18);
+}
+
+/// The elastic curve of a beam, summed step by step under the moments of all that hangs beyond each step: nothing of the closed form.
+#[test]
+fn a_link_bends_along_its_elastic_curve() {
+    let mut random = generator(47);
+    for (name, joint) in [("abb-irb-120", 1), ("universal-robots-ur10", 1), ("universal-robots-ur10", 2)] {
+        let mut arm = truegrind_arm::robots::load(name).unwrap().model;
+        let mut bodies = arm.bodies.unwrap();
+        // The formula spreads the link's own weight evenly.
+        bodies[joint].centre_mm = [-0.5 * arm.links[joint].a_mm, 0.0, 0.0];
+        arm.bodies = Some(bodies);
+        let condition = Condition {
+            payload_kg: Some(3.0),
+            payload_centre_mm: [20.0, 10.0, 70.0],
+            ..Condition::default()
+        };
+        let compliance_rad_per_nm = 1e-6;
+        let bending = Bending { joint, frame: None, compliance_rad_per_nm };
+        let bent = Model { effects: vec![Effect::LinkBending(bending)], ..arm.clone() };
+        for _ in 0..10 {
+            let q = joints_within(&arm, &mut random);
+            let frames = arm.at_condition(&condition).frames(&q);
+            let at = |k: usize| Vector3::from(frames.origin[k]) * 1e-3;
+            let end_of = |k: usize, c: [f64; 3]| {
+                let (y, z) = (Vector3::from(frames.y[k]), Vector3::from(frames.z[k + 1]));
+                at(k + 1) + (y.cross(&z) * c[0] + y * c[1] + z * c[2]) * 1e-3
+            };
+            // The link lies along its own x; the offset along its axis neither bends nor matters.
+            let across = Vector3::from(frames.z[joint]);
+            let whole = at(joint + 1) - at(joint);
+            let span = whole - across * across.dot(&whole);
+            let (length, along) = (span.norm(), span.normalize());
+            let weight = |kg: f64| arm.gravity * (9.806_65 * kg);
+            let (mut sag, mut turn) = (Vector3::zeros(), Vector3::zeros());
+            let steps = 2000;
+            for k in 0..steps {
+                let left = length * (1.0 - (k as f64 + 0.5) / steps as f64);
+                let here = at(joint + 1) - along * left;
+                let mut moment = (along * (0.5 * left)).cross(&weight(bodies[joint].mass_kg * left / length));
+                for (k, body) in bodies.iter().enumerate().skip(joint + 1) {
+                    moment += (end_of(k, body.centre_mm) - here).cross(&weight(body.mass_kg));
+                }
+                moment += (end_of(5, condition.payload_centre_mm) - here).cross(&weight(3.0));
+                // Gravity bends the link about the axes at its ends; EI = L / c.
+                let bend = across * (across.dot(&moment) * compliance_rad_per_nm / steps as f64);
+                turn += bend;
+                sag += bend.cross(&(along * left));
+            }
+            let (before, after) = (arm.forward(&q, &condition), bent.forward(&q, &condition));
+            let flange = before.translation.vector * 1e-3;
+            let expected = (sag + turn.cross(&(flange - at(joint + 1)))) * 1e3;
+            let moved = after.translation.vector - before.translation.vector;
+            assert!(
+                (moved - expected).norm() < 1e-4 + 1e-3 * expected.norm(),
+                "{name}: {moved} against {expected}"
+            );
+            assert!(
+                (turn.norm() - before.rotation.angle_to(&after.rotation)).abs() < 1e-6 + 1e-3 * turn.norm()
+            );
+        }
+    }
 }

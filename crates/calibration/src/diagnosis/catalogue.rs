@@ -18,6 +18,7 @@ use crate::measurement::sensor::empirical::EmpiricalFault;
 use crate::measurement::split;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::effect::backlash::Backlash;
+use truegrind_arm::effect::bending::Bending;
 use truegrind_arm::effect::compliance::Compliance;
 use truegrind_arm::effect::coupling::Coupling;
 use truegrind_arm::effect::error_map::ErrorMap;
@@ -94,7 +95,7 @@ impl Candidate {
         let mut growth = vec![Vec::new(); count];
         for (i, row) in dataset.rows.iter().enumerate() {
             let u = nominal.mapped(&row.joints);
-            for (k, turn) in effect.regressors(&statics, &u, &row.condition).iter().enumerate() {
+            for (k, turn) in effect.regressors(&statics, &u, &nominal.gear_condition(&row.condition)).iter().enumerate() {
                 for j in (0..6).filter(|&j| turn[j] != 0.0) {
                     rotation[k][j].get_or_insert_with(|| vec![0.0; n])[i] = turn[j];
                 }
@@ -326,6 +327,9 @@ pub fn arm_candidates(subject: &Subject<'_>) -> Vec<Candidate> {
             effects.push((Effect::LumpedCompliance(LumpedCompliance { joint, lump: all }), 1.0));
         }
     }
+    effects.extend(
+        bending_links(nominal).into_iter().map(|(bending, tried)| (Effect::LinkBending(bending), tried)),
+    );
     // Gravity that is not along the base's vertical axis: the same torques along the two other axes of the base.
     let down = nominal.gravity.iamax();
     let across: Vec<usize> = (0..3).filter(|&axis| axis != down).collect();
@@ -360,6 +364,25 @@ pub fn arm_candidates(subject: &Subject<'_>) -> Vec<Candidate> {
         .map(|(effect, tried)| {
             checkpoint();
             Candidate { tried, ..Candidate::arm(effect, dataset, nominal) }
+        })
+        .collect()
+}
+
+/// Prior odds of a joint that yields against the link between two joints that does: reducers are some ten times as soft as castings.
+const LINK_ODDS: f64 = 10.0;
+
+/// Links between parallel axes that can bend under gravity, with the number of variants of each: where masses are not known the load is put
+/// at elbow, wrist or flange.
+fn bending_links(nominal: &Model) -> Vec<(Bending, f64)> {
+    let parallel = (0..5).filter(|&joint| parallel_neighbours(nominal, joint, joint + 1).is_some());
+    parallel
+        .flat_map(|joint| {
+            let frames: Vec<Option<usize>> = match nominal.bodies {
+                Some(_) => vec![None],
+                None => (joint + 1..=6).step_by(2).map(Some).collect(),
+            };
+            let tried = LINK_ODDS * frames.len() as f64;
+            frames.into_iter().map(move |frame| (Bending { joint, frame, compliance_rad_per_nm: 0.0 }, tried))
         })
         .collect()
 }

@@ -110,6 +110,7 @@ impl Cause {
     pub fn has_plausible_sign(&self) -> bool {
         match self {
             Cause::Arm(Effect::JointCompliance(c)) => c.compliance_rad_per_nm >= 0.0,
+            Cause::Arm(Effect::LinkBending(b)) => b.compliance_rad_per_nm >= 0.0,
             Cause::Arm(Effect::Backlash(b)) => b.play_rad >= 0.0,
             Cause::Measurement(Disturbance {
                 kind: Kind::Sag | Kind::Empirical(EmpiricalFault::LoadedPlay { .. }),
@@ -219,7 +220,9 @@ impl Cause {
             _ => *self.joints().first()?,
         };
         let part = match self {
-            Cause::Arm(Effect::JointCompliance(_) | Effect::LumpedCompliance(_)) => Part::Spring,
+            Cause::Arm(Effect::JointCompliance(_) | Effect::LumpedCompliance(_) | Effect::LinkBending(_)) => {
+                Part::Spring
+            }
             Cause::Arm(Effect::Backlash(_))
             | Cause::Measurement(Disturbance {
                 kind: Kind::Empirical(EmpiricalFault::LoadedPlay { .. }),

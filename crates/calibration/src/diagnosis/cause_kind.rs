@@ -56,6 +56,8 @@ kinds! {
     JointStiffness = "joint-stiffness",
     /// Angles and reading of a row taken at different times.
     Latency = "latency",
+    /// A link that bends under what it carries.
+    LinkBending = "link-bending",
     /// Links other than those of the data sheet: a rival of findings, never a finding.
     LinkGeometry = "link-geometry",
     /// Single wrong rows.
@@ -99,6 +101,7 @@ impl From<&Effect> for CauseKind {
     fn from(effect: &Effect) -> Self {
         match effect {
             Effect::JointCompliance(_) | Effect::LumpedCompliance(_) => CauseKind::JointCompliance,
+            Effect::LinkBending(_) => CauseKind::LinkBending,
             Effect::GearEccentricity(_) => CauseKind::GearEccentricity,
             Effect::GearTransmission(_) | Effect::GearMap(_) => CauseKind::GearTransmission,
             Effect::GearRatio(_) => CauseKind::GearRatio,

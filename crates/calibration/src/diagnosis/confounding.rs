@@ -9,6 +9,7 @@ use super::cause::{Cause, Part};
 use super::confirmation::Confirmation;
 use super::contribution::Contributions;
 use truegrind_arm::model::Model;
+use truegrind_math::distribution::chi_square_quantile;
 
 /// The model's causes and unexplained errors, as possible confounders.
 pub(super) struct Confounding<'a> {
@@ -31,8 +32,8 @@ pub(super) struct Confounding<'a> {
 /// Ratio of residual to noise from which the residual exceeds the noise.
 const EXCESS_RATIO: f64 = 1.5;
 
-/// Fewest degrees of freedom for an estimate of the noise from repeated poses.
-const LEAST_FREEDOM: usize = 20;
+/// Probability with which the noise of few repeated poses is larger than its upper bound.
+const NOISE_ABOVE: f64 = 0.01;
 
 /// Share of another cause of its joint below which a smooth cause might be a residue of it.
 const RESIDUE_SHARE: f64 = 0.15;
@@ -43,10 +44,13 @@ const TWO_JOINT_SHARE: f64 = 0.5;
 /// Share of the drift of stand or zero from which growth of the arm explains both.
 const GROWTH_SHARE: f64 = 0.25;
 
-/// Residual in excess of the noise of repeated poses (mm RMS); 0 where insignificant.
+/// Residual in excess of the noise of repeated poses, estimated with so many degrees of freedom (mm RMS); 0 where it might be noise.
 pub(super) fn excess_over_noise_mm(left_mm: f64, noise_mm: f64, freedom: usize) -> f64 {
-    let beyond = freedom >= LEAST_FREEDOM && left_mm > EXCESS_RATIO * noise_mm;
-    if beyond { (left_mm * left_mm - noise_mm * noise_mm).sqrt() } else { 0.0 }
+    if freedom == 0 {
+        return 0.0;
+    }
+    let at_most = noise_mm * (freedom as f64 / chi_square_quantile(1.0 - NOISE_ABOVE, freedom)).sqrt();
+    if left_mm > at_most.max(EXCESS_RATIO * noise_mm) { (left_mm * left_mm - noise_mm * noise_mm).sqrt() } else { 0.0 }
 }
 
 impl Confounding<'_> {

@@ -19,8 +19,9 @@ pub const DIAGNOSIS_FILE: &str = "DIAGNOSIS.json";
 const LEAST_SHARE: f64 = 0.01;
 
 /// Effects that poses, repeats, both sides of approach or visits over time decide: those that `plan` has questions for.
-pub const DECIDED_BY_POSES: [CauseKind; 9] = [
+pub const DECIDED_BY_POSES: [CauseKind; 10] = [
     CauseKind::JointCompliance,
+    CauseKind::LinkBending,
     CauseKind::GearEccentricity,
     CauseKind::GearRatio,
     CauseKind::JointCoupling,
@@ -35,7 +36,9 @@ pub const DECIDED_BY_POSES: [CauseKind; 9] = [
 pub(super) fn family(effect: CauseKind) -> Option<Family> {
     use CauseKind::*;
     Some(match effect {
-        LinkGeometry | JointCompliance | JointStiffness | ThermalDrift | SmoothCorrection => Family::Arm,
+        LinkGeometry | LinkBending | JointCompliance | JointStiffness | ThermalDrift | SmoothCorrection => {
+            Family::Arm
+        }
         GearEccentricity | GearTransmission | GearRatio | GearTwoJoints | JointCoupling | Backlash => {
             Family::Drive
         }

@@ -298,12 +298,7 @@ impl Discrepancy {
                 continue;
             }
             // Excludes the part that links and frames can absorb.
-            let part = if rho == 0.0 {
-                beside.readings(range.clone(), &coefficients)
-            } else {
-                functions.columns.columns(range.start, range.len())
-                    * coefficients.rows(range.start, range.len())
-            };
+            let part = beside.readings((linear, &functions.columns), range.clone(), &coefficients);
             let lengths: Vec<f64> = linear.slopes.mm.iter().zip(part.iter()).map(|(mm, v)| mm * v).collect();
             let square: f64 = lengths.iter().map(|l| l * l).sum();
             contributions.push((*group, (square / linear.observations.max(1) as f64).sqrt()));
@@ -319,7 +314,7 @@ impl Discrepancy {
             if scaled.is_empty() { DMatrix::zeros(rows, 0) } else { DMatrix::from_columns(&scaled) };
         let (mut correlation, mut range) = (rho, 0);
         if rho == 0.0 {
-            let left = &beside.residual + beside.readings(0..coefficients.len(), &coefficients);
+            let left = &beside.residual + beside.readings((linear, &functions.columns), 0..coefficients.len(), &coefficients);
             let poses = &linear.slopes.poses;
             correlation = lag_one_correlation(&left, linear.per, numbers, poses);
             if correlation != 0.0 {

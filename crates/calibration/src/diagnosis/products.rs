@@ -108,7 +108,7 @@ impl Products {
     }
 
     /// The fit without the parameters at `dropped`, everything else at its optimum, with the functions projected.
-    pub(super) fn without(&self, dropped: &[usize]) -> Reduced<'_> {
+    pub(super) fn without(&self, dropped: &[usize]) -> Reduced {
         let linear = &self.linear;
         let kept: Vec<usize> = (0..linear.x.len()).filter(|k| !dropped.contains(k)).collect();
         let p = kept.len();
@@ -128,13 +128,12 @@ impl Products {
         let shared = solved(&lower, self.linear_functions.select_rows(&kept));
         let information = &self.functions_functions - gram(&shared);
         let gradient = &self.functions_residual + self.linear_functions.tr_mul(&change);
-        Reduced { products: self, kept, lower, residual, shared, information, gradient }
+        Reduced { kept, lower, residual, shared, information, gradient }
     }
 }
 
 /// A fit without some parameters, with the functions of the discrepancy projected.
-pub(super) struct Reduced<'a> {
-    products: &'a Products,
+pub(super) struct Reduced {
     kept: Vec<usize>,
     /// L.
     lower: DMatrix<f64>,
@@ -148,17 +147,23 @@ pub(super) struct Reduced<'a> {
     pub(super) gradient: DVector<f64>,
 }
 
-impl Reduced<'_> {
-    /// What the functions at `range` with these coefficients change in the readings and the fit cannot absorb, n.
-    pub(super) fn readings(&self, range: Range<usize>, coefficients: &DVector<f64>) -> DVector<f64> {
-        let Self { products, kept, lower, shared, .. } = self;
+impl Reduced {
+    /// What the functions at `range` with these coefficients change in the readings and the fit cannot absorb, n. `linear` and `functions`
+    /// are those that were whitened: what is absorbed follows from the whitened ones, and the readings are not whitened.
+    pub(super) fn readings(
+        &self,
+        (linear, functions): (&Linear, &DMatrix<f64>),
+        range: Range<usize>,
+        coefficients: &DVector<f64>,
+    ) -> DVector<f64> {
+        let Self { kept, lower, shared, .. } = self;
         let coefficients = coefficients.rows(range.start, range.len());
-        let mut out = products.functions.columns(range.start, range.len()) * coefficients;
+        let mut out = functions.columns(range.start, range.len()) * coefficients;
         let absorbed = shared.columns(range.start, range.len()) * coefficients;
         if let Some(absorbed) = lower.tr_solve_lower_triangular(&absorbed) {
-            let mut change = DVector::zeros(products.linear.x.len());
+            let mut change = DVector::zeros(linear.x.len());
             kept.iter().zip(absorbed.iter()).for_each(|(&k, absorbed)| change[k] = *absorbed);
-            out.gemv_tr(-1.0, &products.linear.rows, &change, 1.0);
+            out.gemv_tr(-1.0, &linear.rows, &change, 1.0);
         }
         out
     }

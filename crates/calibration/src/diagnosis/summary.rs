@@ -13,6 +13,7 @@ use super::residual_tests::Structure;
 use super::search::{Confirmed, Search};
 use super::something_else::SomethingElse;
 use super::unexplained::{Unexplained, something_else};
+use crate::measurement::dataset::Sensor;
 use crate::measurement::split;
 
 /// Summary of a search.
@@ -57,8 +58,10 @@ pub(super) fn summarise(
         nominal: subject.nominal,
         growth_mm: outcome.discrepancy.growth_mm(),
         field_mm: outcome.discrepancy.field_mm(),
-        excess_over_noise_mm: floor
-            .map_or(0.0, |floor| excess_over_noise_mm(stages[2].fitted.rmse, floor.sigma_mm, floor.freedom)),
+        excess_over_noise_mm: floor.map_or(0.0, |floor| {
+            let coordinates = if context.dataset.sensor == Sensor::Cable { 1 } else { 3 };
+            excess_over_noise_mm(stages[2].fitted.rmse, floor.sigma_mm, coordinates * floor.freedom)
+        }),
     };
     let mut findings = merged::merge_findings(
         merged::from_findings(of_causes, &finding_of_cause, pictures),

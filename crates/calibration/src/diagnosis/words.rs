@@ -123,6 +123,12 @@ pub fn describe_cause(cause: &Cause, parameters: &[FoundParameter], last_row: us
         Cause::Arm(Effect::LumpedCompliance(_)) => {
             format!("joint {joint} deflects under gravity with masses that differ from the data sheet")
         }
+        // c = L/EI turns the link's end by a third of it under a force whose torque at the root is 1 N m.
+        Cause::Arm(Effect::LinkBending(b)) if b.frame.is_none() => format!(
+            "link {joint} bends: each N m at its root moves what is 1 m away by {:.1} µm",
+            value * 1e6 / 3.0
+        ),
+        Cause::Arm(Effect::LinkBending(_)) => format!("link {joint} bends under what it carries"),
         Cause::Arm(Effect::GearEccentricity(h)) => format!(
             "the gear or encoder of joint {joint} is eccentric: ±{:.3}° {} per turn",
             h.amplitude_rad().to_degrees(),
@@ -195,12 +201,19 @@ fn describe_disturbance(d: &Disturbance, rows: &str, parameters: &[FoundParamete
             "the target moves on the flange with temperature: {:.1} µm per kelvin",
             norm(parameters) * 1e3
         ),
+        (Kind::Zero, Profile::Exponential { time_constant_h }) => {
+            format!("the cable's zero drifts by {:.2} mm, time constant {time_constant_h:.2} h", value.abs())
+        }
+        (Kind::Zero, Profile::Temperature { .. }) => {
+            format!("the cable's zero drifts with temperature: {:.1} µm per kelvin", value.abs() * 1e3)
+        }
         (_, Profile::Exponential { time_constant_h }) => format!(
-            "the sensor drifts relative to the base during warm-up: {:.2} mm, time constant {time_constant_h:.2} h",
+            "the sensor moves relative to the base by {:.2} mm, time constant {time_constant_h:.2} h: its stand or the base of the arm \
+             settles or warms up",
             norm(parameters)
         ),
         (_, Profile::Temperature { .. }) => format!(
-            "the sensor drifts relative to the base with temperature: {:.1} µm per kelvin",
+            "the sensor moves relative to the base with temperature, by {:.1} µm per kelvin",
             norm(parameters) * 1e3
         ),
         (Kind::Zero, _) => format!("the cable's zero jumped by {value:.3} mm {rows}"),
@@ -276,6 +289,9 @@ pub fn describe_pattern(cause: &Cause) -> String {
     let joint = cause.joints().first().map_or(0, |j| j + 1);
     match cause.kind() {
         JointCompliance => format!("the residual follows the static torque on joint {joint}"),
+        LinkBending => {
+            format!("the residual about joints {joint} and {} follows the static torques on both", joint + 1)
+        }
         GearEccentricity => format!("the residual about joint {joint} oscillates with its angle"),
         GearTransmission => format!("the residual about joint {joint} is periodic in its angle"),
         GearRatio => format!("the residual about joint {joint} is proportional to its angle"),
@@ -314,6 +330,15 @@ pub(super) fn remedy_of(cause: &Cause) -> &'static str {
         CauseKind::Backlash if cause.is_empirical() => {
             "adjust the gear mesh; the written model does not include it, so keep programs away from poses at which the load changes sides"
         }
+        CauseKind::ThermalDrift
+            if matches!(cause, Cause::Measurement(Disturbance { kind: Kind::Zero, .. })) =>
+        {
+            "switch the sensor on long before measuring; measure a reference point before and after each session"
+        }
+        CauseKind::ThermalDrift if !cause.is_in_arm() => {
+            "from the sensor's place measure one point on the floor and one on the base of the arm, before and after: if both move, it is the \
+             sensor's stand, if only the base, its bolts"
+        }
         kind => remedy(kind),
     }
 }
@@ -328,6 +353,9 @@ pub fn remedy(effect: CauseKind) -> &'static str {
         }
         JointCompliance => {
             "compensate with this model, which includes the compliance; check belts and reducer preload if it has grown"
+        }
+        LinkBending => {
+            "compensate with this model, which includes the bending; check the bolts of this link and keep the payload as measured"
         }
         GearEccentricity => {
             "compensate with this model; at the next repair, reseat or replace the eccentric gear or encoder ring"

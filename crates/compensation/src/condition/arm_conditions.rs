@@ -50,7 +50,9 @@ impl<'a> ArmConditions<'a> {
     /// Index of a condition. Sides of joints without backlash make no difference; without a payload that of the base
     /// condition applies.
     pub(crate) fn condition_index(&mut self, sides: JointSides, load: Option<&Load>) -> usize {
-        let sides: JointSides = std::array::from_fn(|j| if self.play_rad[j] == 0.0 { 0 } else { sides[j] });
+        // The gear of a coupled joint turns with others too: from its own angle alone its side is not known.
+        let matters = |j: usize| self.play_rad[j] != 0.0 && !self.nominal.is_coupled(j);
+        let sides: JointSides = std::array::from_fn(|j| if matters(j) { sides[j] } else { 0 });
         let [x, y, z] = load.map_or([0.0; 3], |load| load.centre_mm);
         let key = (sides, load.map(|load| [load.mass_kg, x, y, z].map(f64::to_bits)));
         if let Some(condition_index) = self.condition_indices.get(&key) {

@@ -109,11 +109,17 @@ fn lines_of(listing: &Listing, motions: &[u32]) -> Option<String> {
     Some(format!("{word} {}{more}", lines.join(", ")))
 }
 
+/// Whether an effect is a deflection under loads that a payload is not part of.
+fn is_lumped(effect: &Effect) -> bool {
+    matches!(effect, Effect::LumpedCompliance(_))
+        || matches!(effect, Effect::LinkBending(bending) if bending.frame.is_some())
+}
+
 /// Which payload was assumed.
 pub(crate) fn load_notes(listing: &Listing, arms: &Arms<'_>, options: &Options) -> Vec<String> {
     let model = arms.estimated.arm().model;
     let load_dependent = model.effects.iter().any(is_load_dependent);
-    let lumped = model.effects.iter().any(|e| matches!(e, Effect::LumpedCompliance(_)) && !e.is_zero());
+    let lumped = model.effects.iter().any(|e| is_lumped(e) && !e.is_zero());
     let Some(loads) = options.loads.as_ref().filter(|_| load_dependent || lumped) else {
         return Vec::new();
     };

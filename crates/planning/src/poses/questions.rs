@@ -9,6 +9,7 @@ use thiserror::Error;
 
 use truegrind_arm::effect::Effect;
 use truegrind_arm::effect::backlash::Backlash;
+use truegrind_arm::effect::bending::Bending;
 use truegrind_arm::effect::compliance::Compliance;
 use truegrind_arm::effect::coupling::Coupling;
 use truegrind_arm::effect::gear_ratio::GearRatio;
@@ -221,6 +222,9 @@ pub fn effects_of(cause: &CandidateCause) -> Vec<Effect> {
         CauseKind::JointCompliance => {
             each(|joint| Effect::JointCompliance(Compliance { joint, compliance_rad_per_nm: 0.0 }))
         }
+        CauseKind::LinkBending => each(|joint| {
+            Effect::LinkBending(Bending { joint: joint.min(4), frame: None, compliance_rad_per_nm: 0.0 })
+        }),
         CauseKind::GearEccentricity => {
             joints.iter().flat_map(|&j| [harmonic(j, 1.0), harmonic(j, 2.0)]).collect()
         }

@@ -89,7 +89,9 @@ pub(super) fn members(finding: &Finding) -> Table {
         [
             (Column::text("family", "family"), |member| member.family.words().into()),
             (Column::text("effect", "effect"), |member| member.effect.as_str().into()),
-            (Column::text("where", "where"), |member| place_of(member.joints.as_deref(), member.rows).into()),
+            (Column::text("where", "where"), |member| {
+                place_of(member.effect, member.joints.as_deref(), member.rows).into()
+            }),
             (Column::number("share", "share", "%", 0), |member| (100.0 * member.share).into()),
         ],
     );
@@ -151,7 +153,9 @@ pub(super) fn rivals(finding: &Finding) -> Table {
         &finding.alternatives,
         [
             (Column::text("effect", "effect"), |rival| rival.effect.as_str().into()),
-            (Column::text("where", "where"), |rival| place_of(rival.joints.as_deref(), rival.rows).into()),
+            (Column::text("where", "where"), |rival| {
+                place_of(rival.effect, rival.joints.as_deref(), rival.rows).into()
+            }),
             (Column::number("cv_rmse_mm", "held out", "mm", 4), |rival| rival.cv_rmse_mm.into()),
             (Column::number("beaten_by", "worse by", "2 ln Bayes factor", 1), |rival| rival.beaten_by.into()),
         ],
@@ -165,7 +169,9 @@ pub fn not_testable_table(diagnosis: &Diagnosis) -> Table {
         &diagnosis.not_testable,
         [
             (Column::text("effect", "effect"), |item| match &item.joints {
-                Some(joints) => format!("{}, {}", item.effect.words(), place_of(Some(joints), None)).into(),
+                Some(joints) => {
+                    format!("{}, {}", item.effect.words(), place_of(item.effect, Some(joints), None)).into()
+                }
                 None => item.effect.words().into(),
             }),
             (Column::text("reason", "why"), |item| item.reason.as_str().into()),

@@ -7,8 +7,9 @@ use truegrind_calibration::diagnosis::finding::{Confidence, Diagnosis, Family, F
 /// A cause with its joints or rows, for a sentence.
 pub(super) fn located(effect: CauseKind, joints: Option<&[usize]>, rows: Option<[usize; 2]>) -> String {
     let words = effect.words();
-    // "gear two joints of joints 2 and 3" says it twice.
-    let name = words.strip_suffix(" two joints").unwrap_or(&words);
+    // "gear two joints of joints 2 and 3" says it twice, and so does "link bending of link 2".
+    let name = words.strip_suffix(" two joints").or(words.strip_prefix("link ")).unwrap_or(&words);
+    let place_of = |joints, rows| place_of(effect, joints, rows);
     match (joints, rows) {
         (_, Some(_)) => format!("{name} in {}", place_of(joints, rows)),
         (Some([_, ..]), _) => format!("{name} of {}", place_of(joints, rows)),
@@ -68,15 +69,16 @@ pub(crate) fn place(finding: &Finding) -> String {
     if let Some(list) = &finding.row_list {
         return format!("rows {}", listed(list));
     }
-    place_of(finding.joints.as_deref(), finding.rows)
+    place_of(finding.effect, finding.joints.as_deref(), finding.rows)
 }
 
-/// Joints or rows, for a cell.
-pub(super) fn place_of(joints: Option<&[usize]>, rows: Option<[usize; 2]>) -> String {
+/// Links, joints or rows, for a cell.
+pub(super) fn place_of(effect: CauseKind, joints: Option<&[usize]>, rows: Option<[usize; 2]>) -> String {
+    let part = if effect == CauseKind::LinkBending { "link" } else { "joint" };
     match (joints, rows) {
         (_, Some([from, to])) => format!("rows {from} to {to}"),
-        (Some([joint]), _) => format!("joint {joint}"),
-        (Some(joints), _) if !joints.is_empty() => format!("joints {}", and(joints)),
+        (Some([one]), _) => format!("{part} {one}"),
+        (Some(several), _) if !several.is_empty() => format!("{part}s {}", and(several)),
         _ => "all rows".to_owned(),
     }
 }
@@ -89,7 +91,7 @@ pub(super) fn sentence(text: &str) -> String {
 /// The likeliest cause and its place.
 pub(super) fn title(finding: &Finding) -> String {
     let (effect, joints, rows) = finding.likeliest();
-    let place = if finding.row_list.is_some() { place(finding) } else { place_of(joints, rows) };
+    let place = if finding.row_list.is_some() { place(finding) } else { place_of(effect, joints, rows) };
     format!("{}, {place}", sentence(&effect.words()))
 }
 

@@ -24,19 +24,27 @@ fn fault_rotations(fault: EmpiricalFault, dataset: &Dataset, model: &Model) -> V
     let none = || -> [Option<Vec<f64>>; 6] { Default::default() };
     match fault {
         EmpiricalFault::Latency { middle_s } => {
-            let rate =
-                |r: &Row, j: usize| r.motion().and_then(|m| m.rate_per_h).map_or(0.0, |q| q[j] / HOUR_S);
+            let rates: Vec<Vector6<f64>> = rows
+                .iter()
+                .map(|r| {
+                    let rate = r.motion().and_then(|m| m.rate_per_h);
+                    rate.map_or_else(Vector6::zeros, |rate| model.joint_map * rate / HOUR_S)
+                })
+                .collect();
             let middle_h = middle_s as f64 / HOUR_S;
             let hours = |r: &Row| r.condition.time_h.map_or(0.0, |t| t - middle_h);
             let times = |by: &dyn Fn(&Row) -> f64| -> [Option<Vec<f64>>; 6] {
-                std::array::from_fn(|j| Some(rows.iter().map(|r| rate(r, j) * by(r)).collect()))
+                std::array::from_fn(|j| {
+                    Some(rows.iter().zip(&rates).map(|(r, rate)| rate[j] * by(r)).collect())
+                })
             };
             vec![times(&|_| 1.0), times(&hours)]
         }
         EmpiricalFault::ArmUnsettled => (0..6)
             .map(|joint| {
                 let mut out = none();
-                out[joint] = Some(rows.iter().map(|r| r.motion().map_or(0.0, |m| -m.step[joint])).collect());
+                let step = |r: &Row| r.motion().map_or(0.0, |m| -(model.joint_map * m.step)[joint]);
+                out[joint] = Some(rows.iter().map(step).collect());
                 out
             })
             .collect(),

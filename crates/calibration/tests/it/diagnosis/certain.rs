@@ -317,6 +317,29 @@ fn a_target_that_creeps_and_a_stand_that_warms_up_are_told_apart() {
     }
 }
 
+/// A slender link turns what it carries, and its first axis, by torques of both: two compliant joints cannot imitate that. The written arm
+/// contains it.
+#[test]
+fn a_link_that_bends_is_told_from_its_joints() {
+    let ur10 = robots::load("universal-robots-ur10").unwrap().model;
+    let hidden = [Hidden::Bending { joint: 1, mm: 1.0 }];
+    let dataset = run(&ur10, &hidden, &setup(Sensor::Position, 400, 82)).dataset;
+    let found = diagnose(
+        &dataset,
+        "universal-robots-ur10",
+        &ur10,
+        &frames(&dataset, &ur10),
+        &Options::default(),
+        &|_| {},
+    )
+    .unwrap();
+    let first = &found.diagnosis.findings[0];
+    assert_eq!((first.effect.as_str(), first.joints.as_deref()), ("link-bending", Some(&[2][..])));
+    assert_eq!(first.confidence, Confidence::Identified);
+    assert!(first.cause.starts_with("link 2 bends"), "{}", first.cause);
+    assert!(found.estimated.model.effects.iter().any(|effect| matches!(effect, Effect::LinkBending(_))));
+}
+
 /// Play that gravity closes follows the sign of the torque, not the side of approach. No model file can carry it, so it is told and not
 /// written.
 #[test]

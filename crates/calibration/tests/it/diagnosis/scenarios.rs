@@ -7,6 +7,7 @@ use rand_chacha::rand_core::SeedableRng;
 
 use truegrind_arm::effect::Effect;
 use truegrind_arm::effect::backlash::Backlash;
+use truegrind_arm::effect::bending::Bending;
 use truegrind_arm::effect::compliance::Compliance;
 use truegrind_arm::effect::coupling::Coupling;
 use truegrind_arm::effect::gear_ratio::GearRatio;
@@ -267,6 +268,9 @@ pub fn cause(hidden: &Hidden) -> Option<Cause> {
     Some(match *hidden {
         Hidden::Compliance { joint, .. } => {
             Cause::Arm(Effect::JointCompliance(Compliance { joint, compliance_rad_per_nm: 0.0 }))
+        }
+        Hidden::Bending { joint, .. } => {
+            Cause::Arm(Effect::LinkBending(Bending { joint, frame: None, compliance_rad_per_nm: 0.0 }))
         }
         Hidden::Gear { joint, order, .. } => {
             Cause::Arm(Effect::GearEccentricity(Harmonic { joint, order, sine_rad: 0.0, cosine_rad: 0.0 }))

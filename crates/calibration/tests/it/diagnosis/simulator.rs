@@ -43,6 +43,11 @@ pub enum Hidden {
         joint: usize,
         play_rad: f64,
     },
+    /// The link from this joint to the next bends like a beam; its end sags by this where it sags most.
+    Bending {
+        joint: usize,
+        mm: f64,
+    },
     Thermal {
         growth: f64,
         time_constant_h: f64,
@@ -107,6 +112,7 @@ impl Hidden {
     pub fn name(&self) -> &'static str {
         match self {
             Hidden::Compliance { .. } => "joint-compliance",
+            Hidden::Bending { .. } => "link-bending",
             Hidden::Gear { order, .. } if *order <= 2.0 => "gear-eccentricity",
             Hidden::Gear { .. } => "gear-transmission",
             Hidden::Ratio { .. } => "gear-ratio",
@@ -129,6 +135,7 @@ impl Hidden {
     pub fn joints(&self) -> Option<Vec<usize>> {
         match self {
             Hidden::Compliance { joint, .. }
+            | Hidden::Bending { joint, .. }
             | Hidden::Gear { joint, .. }
             | Hidden::Ratio { joint, .. }
             | Hidden::Backlash { joint, .. }
@@ -242,6 +249,34 @@ impl Arm {
         down[joint] -= h;
         -(self.energy(&up, flange_kg) - self.energy(&down, flange_kg)) / (2.0 * h)
     }
+
+    /// Sag (mm) and turn (rad) of the end of the link from a joint to the next, of bending stiffness 1 N m²: the elastic curve, step by
+    /// step along the link, under the moments of all that hangs beyond each step. The link's own mass lies evenly along it.
+    fn elastic_curve(&self, u: &[f64; 6], joint: usize) -> (Vector3<f64>, Vector3<f64>) {
+        let frames = self.frames(u);
+        let origin = |k: usize| frames[k].column(3).xyz() * 1e-3;
+        let (root, end) = (origin(joint), origin(joint + 1));
+        let along = (end - root).normalize();
+        let weight = |kg: f64| self.up * (-9.81 * kg);
+        const STEPS: usize = 50;
+        let length = (end - root).norm();
+        let step = length / STEPS as f64;
+        let (mut sag, mut turn) = (Vector3::zeros(), Vector3::zeros());
+        for k in 0..STEPS {
+            let left = length - (k as f64 + 0.5) * step;
+            let here = end - along * left;
+            let own = weight(self.masses[joint].0 * left / length);
+            let mut moment = (along * (0.5 * left)).cross(&own);
+            for (k, (mass, centre)) in self.masses.iter().enumerate().skip(joint + 1) {
+                let at = (frames[k + 1] * Vector4::new(centre.x, centre.y, centre.z, 1.0)).xyz() * 1e-3;
+                moment += (at - here).cross(&weight(*mass));
+            }
+            let bent = (moment - along * along.dot(&moment)) * step;
+            turn += bent;
+            sag += bent.cross(&(along * left)) * 1e3;
+        }
+        (sag, turn)
+    }
 }
 
 /// Masses of a small grinding arm where a data sheet states none.
@@ -324,6 +359,10 @@ pub fn run(nominal: &Model, hidden: &[Hidden], setup: &Setup) -> Run {
                 .iter()
                 .map(|q| arm.torque(&(arm.joint_map * q).into(), *joint, 0.0).abs())
                 .fold(1e-9, f64::max),
+            Hidden::Bending { joint, .. } => poses
+                .iter()
+                .map(|q| arm.elastic_curve(&(arm.joint_map * q).into(), *joint).0.norm())
+                .fold(1e-9, f64::max),
             _ => 1.0,
         })
         .collect();
@@ -354,7 +393,9 @@ pub fn run(nominal: &Model, hidden: &[Hidden], setup: &Setup) -> Run {
                     Hidden::Ratio { joint, error } => turned[*joint] += error * u[*joint],
                     Hidden::Coupling { driver, joint, factor } => turned[*joint] += factor * u[*driver],
                     Hidden::Backlash { joint, play_rad } => {
-                        turned[*joint] += 0.5 * play_rad * f64::from(approach[*joint]);
+                        // Where the controller counts an angle the other way round, above is below.
+                        let sense = arm.joint_map[(*joint, *joint)].signum();
+                        turned[*joint] += 0.5 * play_rad * sense * f64::from(approach[*joint]);
                     }
                     Hidden::LoadedPlay { joint, play_rad } => {
                         turned[*joint] += 0.5 * play_rad * (arm.torque(&u, *joint, 0.0) / 0.3).tanh();
@@ -399,7 +440,15 @@ pub fn run(nominal: &Model, hidden: &[Hidden], setup: &Setup) -> Run {
                 masses: Vec::new(),
                 up: arm.up,
             };
-            let mut at = (grown.frames(&turned)[6] * grown.flange * (touched + slipped)).xyz();
+            let frames = grown.frames(&turned);
+            let mut at = (frames[6] * grown.flange * (touched + slipped)).xyz();
+            for (k, h) in hidden.iter().enumerate().filter(|(k, _)| Some(*k) != skip) {
+                if let Hidden::Bending { joint, mm } = h {
+                    let (sag, turn) = arm.elastic_curve(&u, *joint);
+                    let beyond = at - frames[joint + 1].column(3).xyz();
+                    at += (sag + turn.cross(&beyond)) * (mm / peaks[k]);
+                }
+            }
             at.z += warp * (at.x / 180.0).sin() * (at.y / 220.0).cos();
             match setup.sensor {
                 Sensor::Cable => {
