@@ -127,8 +127,13 @@ fn measured_error(data: &DataArguments, arm: &Estimated, exported: &Model) -> an
     let (_, rows) = read(data)?;
     let tolerance = Tolerance::default();
     let frames = starting_frames(&rows, &arm.nominal, &tolerance, true)?;
-    let models =
-        Models { nominal: &arm.nominal, geometric: exported, extended: &arm.model, written: &arm.model };
+    let models = Models {
+        faults: &[],
+        nominal: &arm.nominal,
+        geometric: exported,
+        extended: &arm.model,
+        written: &arm.model,
+    };
     let found = transfer(&rows, &frames, &models, &tolerance, true);
     let relation = if rows.sha256 == arm.provenance.sha256 {
         "to which the model was fitted, so this is not a held-out error"

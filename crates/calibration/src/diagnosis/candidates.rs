@@ -56,6 +56,7 @@ impl Catalogue {
             kinds.push(Kind::Frame { turning: true });
         }
         kinds.push(Kind::Load { joints: vec![1, 2], compliance: None });
+        kinds.extend((0..6).map(|joint| Kind::JointZero { joint }));
         let shifts: Vec<Arc<Candidate>> = kinds
             .into_iter()
             .map(|kind| {

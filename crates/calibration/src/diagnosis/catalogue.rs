@@ -5,7 +5,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Point3};
 use rayon::prelude::*;
 
 use super::cause::{Cause, MAP_KNOTS, parallel_neighbours};
@@ -16,6 +16,7 @@ use crate::measurement::dataset::{Dataset, Reading, Sensor};
 use crate::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
 use crate::measurement::sensor::empirical::EmpiricalFault;
 use crate::measurement::split;
+use truegrind_arm::condition::Condition;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::effect::backlash::Backlash;
 use truegrind_arm::effect::bending::Bending;
@@ -95,7 +96,9 @@ impl Candidate {
         let mut growth = vec![Vec::new(); count];
         for (i, row) in dataset.rows.iter().enumerate() {
             let u = nominal.mapped(&row.joints);
-            for (k, turn) in effect.regressors(&statics, &u, &nominal.gear_condition(&row.condition)).iter().enumerate() {
+            for (k, turn) in
+                effect.regressors(&statics, &u, &nominal.gear_condition(&row.condition)).iter().enumerate()
+            {
                 for j in (0..6).filter(|&j| turn[j] != 0.0) {
                     rotation[k][j].get_or_insert_with(|| vec![0.0; n])[i] = turn[j];
                 }
@@ -160,9 +163,17 @@ impl Candidate {
         Self { cause: Cause::Measurement(disturbance), regressors, tried: 1.0 }
     }
 
-    /// A disturbance at all times, from row `from` to row `to` (by number) alone; `tried` as there.
+    /// A disturbance at all times, from row `from` to row `to` (by number) alone; `tried` as there. Of a joint's zero that changed for
+    /// good, the rows before: the arm is what it is at the end.
     pub fn over_rows(&self, dataset: &Dataset, [from, to]: [usize; 2]) -> Self {
         let Cause::Measurement(always) = &self.cause else { return self.clone() };
+        let numbers = || dataset.rows.iter().map(|row| row.number);
+        let is_last = numbers().next_back() == Some(to);
+        let before = numbers().take_while(|number| *number < from).last().filter(|_| is_last);
+        let [from, to] = match (&always.kind, before, numbers().next()) {
+            (Kind::JointZero { .. }, Some(before), Some(first)) => [first, before],
+            _ => [from, to],
+        };
         let profile = Profile::Rows { from, to };
         let inside: Vec<f64> = dataset.rows.iter().map(|row| profile.at(row)).collect();
         let part = |values: &Vec<f64>| values.iter().zip(&inside).map(|(v, c)| v * c).collect::<Vec<f64>>();
@@ -466,19 +477,23 @@ const NEIGHBOURS: [(usize, usize); 10] =
 /// Orders of two-joint gear errors: eccentric and elliptic parts, as for a gear of its own.
 const TWO_JOINT_ORDERS: [[u8; 2]; 4] = [[1, 1], [1, 2], [2, 1], [2, 2]];
 
+/// Frames at which what a joint carries counts as concentrated: elbow, wrist or flange.
+fn load_places(joint: usize) -> &'static [u8] {
+    match joint {
+        1 => &[2, 4, 6],
+        2 => &[4, 6],
+        _ => &[6],
+    }
+}
+
 /// Play that its load closes, of joints that gravity loads, with the number of variants of each: where the centre of mass of what a joint
 /// carries is, is not known, so that it is put at elbow, wrist or flange.
 fn loaded_plays(nominal: &Model, moves: &dyn Fn(usize) -> bool) -> Vec<(EmpiricalFault, f64)> {
     (1..5)
         .filter(|&joint| moves(joint))
         .flat_map(|joint| {
-            let lumps: &[u8] = match joint {
-                1 => &[2, 4, 6],
-                2 => &[4, 6],
-                _ => &[6],
-            };
             let known = nominal.bodies.is_some().then_some(0);
-            let all: Vec<u8> = lumps.iter().copied().chain(known).collect();
+            let all: Vec<u8> = load_places(joint).iter().copied().chain(known).collect();
             let tried = all.len() as f64;
             all.into_iter().map(move |at| (EmpiricalFault::LoadedPlay { joint, at }, tried))
         })
@@ -509,6 +524,20 @@ fn drum(dataset: &Dataset) -> EmpiricalFault {
     let (low, high) =
         lengths.fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), l| (low.min(l), high.max(l)));
     EmpiricalFault::Drum { from_mm: low.min(high).max(0.0).floor() as u32, to_mm: high.ceil() as u32 }
+}
+
+/// A range fault over the distances of the rows.
+fn range(subject: &Subject<'_>) -> EmpiricalFault {
+    let posed = subject.nominal.at_condition(&Condition::default());
+    let target = Point3::from(subject.frames.flange_from_target.translation.vector);
+    let sensor = subject.frames.base_from_sensor.translation.vector;
+    let rows = subject.observed.dataset.rows.iter();
+    let distances = rows.map(|row| ((posed.forward(&row.joints) * target).coords - sensor).norm());
+    let (low, high) =
+        distances.fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), d| (low.min(d), high.max(d)));
+    // To 10 mm: one row more must not change the fault.
+    let [from_mm, to_mm] = [(low / 10.0).floor(), (high / 10.0).ceil()].map(|d| 10 * d as u32);
+    EmpiricalFault::Range { from_mm, to_mm }
 }
 
 /// A latency, its drift relative to the middle of the logged times.
@@ -549,13 +578,20 @@ fn empirical_faults(subject: &Subject<'_>, columns: &LoggedColumns) -> Vec<(Empi
     }
     let moves = |j: usize| columns.range_rad[j] > STILL_RAD;
     let exact = out.len();
-    out.extend((0..3).map(|joint| (EmpiricalFault::NonlinearStiffness { joint }, 1.0)));
+    out.push((EmpiricalFault::NonlinearStiffness { joint: 0, at: 0 }, 1.0));
+    for joint in (1..5).filter(|&joint| moves(joint)) {
+        let known = subject.nominal.bodies.is_some();
+        let places: &[u8] = if known { &[0] } else { load_places(joint) };
+        let tried = places.len() as f64;
+        out.extend(places.iter().map(|&at| (EmpiricalFault::NonlinearStiffness { joint, at }, tried)));
+    }
     out.extend(loaded_plays(subject.nominal, &moves));
     out.extend(two_joint_gears(subject.nominal, &moves));
     if dataset.sensor == Sensor::Cable {
         out.extend([(EmpiricalFault::Pulley, 1.0), (drum(dataset), 1.0)]);
     } else {
         out.push((EmpiricalFault::Refraction, 1.0));
+        out.push((range(subject), 1.0));
         out.extend([false, true].map(|second| (EmpiricalFault::TargetNest { second }, 2.0)));
     }
     out[exact..].iter_mut().for_each(|(_, tried)| *tried *= EXPANSION_ODDS);

@@ -58,9 +58,11 @@ impl Cause {
                     EmpiricalFault::Refraction => CauseKind::AirRefraction,
                     EmpiricalFault::Pulley => CauseKind::CablePulley,
                     EmpiricalFault::Drum { .. } => CauseKind::CableDrum,
+                    EmpiricalFault::Range { .. } => CauseKind::SensorRange,
                     EmpiricalFault::TargetNest { .. } => CauseKind::TargetNest,
                 },
                 (Kind::Load { .. }, _) => CauseKind::PayloadChange,
+                (Kind::JointZero { .. }, _) => CauseKind::JointZeroShift,
                 // Glue and wax creep: what moves with the clock on the flange is the target.
                 (Kind::Target, _) => CauseKind::ToolShift,
                 (_, Profile::Exponential { .. } | Profile::Temperature { .. }) => CauseKind::ThermalDrift,
@@ -78,6 +80,7 @@ impl Cause {
             Cause::Arm(Effect::JointCoupling(c)) => vec![c.driver, c.joint],
             Cause::Arm(effect) => effect.joint().into_iter().collect(),
             Cause::Measurement(Disturbance { kind: Kind::Empirical(form), .. }) => form.joints(),
+            Cause::Measurement(Disturbance { kind: Kind::JointZero { joint }, .. }) => vec![*joint],
             Cause::Measurement(_) => Vec::new(),
         }
     }

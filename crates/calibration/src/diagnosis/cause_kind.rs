@@ -54,6 +54,8 @@ kinds! {
     JointCoupling = "joint-coupling",
     /// A joint whose stiffness is not linear.
     JointStiffness = "joint-stiffness",
+    /// A joint whose zero moved: lost counts, a slipped belt, another mastering.
+    JointZeroShift = "joint-zero-shift",
     /// Angles and reading of a row taken at different times.
     Latency = "latency",
     /// A link that bends under what it carries.
@@ -68,6 +70,8 @@ kinds! {
     ReadoutMismatch = "readout-mismatch",
     /// A sensor's frame, or a cable's outlet, that moved.
     SensorFrameShift = "sensor-frame-shift",
+    /// Distances that are off by an amount not proportional to them.
+    SensorRange = "sensor-range",
     /// An error of the sensor's scale.
     SensorScale = "sensor-scale",
     /// A cable whose zero moved.

@@ -50,7 +50,11 @@ pub(super) fn excess_over_noise_mm(left_mm: f64, noise_mm: f64, freedom: usize) 
         return 0.0;
     }
     let at_most = noise_mm * (freedom as f64 / chi_square_quantile(1.0 - NOISE_ABOVE, freedom)).sqrt();
-    if left_mm > at_most.max(EXCESS_RATIO * noise_mm) { (left_mm * left_mm - noise_mm * noise_mm).sqrt() } else { 0.0 }
+    if left_mm > at_most.max(EXCESS_RATIO * noise_mm) {
+        (left_mm * left_mm - noise_mm * noise_mm).sqrt()
+    } else {
+        0.0
+    }
 }
 
 impl Confounding<'_> {

@@ -39,10 +39,11 @@ pub(super) fn family(effect: CauseKind) -> Option<Family> {
         LinkGeometry | LinkBending | JointCompliance | JointStiffness | ThermalDrift | SmoothCorrection => {
             Family::Arm
         }
-        GearEccentricity | GearTransmission | GearRatio | GearTwoJoints | JointCoupling | Backlash => {
-            Family::Drive
+        GearEccentricity | GearTransmission | GearRatio | GearTwoJoints | JointCoupling | JointZeroShift
+        | Backlash => Family::Drive,
+        SensorScale | SensorRange | CableSag | CablePulley | CableDrum | AirRefraction | TargetNest => {
+            Family::Sensor
         }
-        SensorScale | CableSag | CablePulley | CableDrum | AirRefraction | TargetNest => Family::Sensor,
         SensorZeroShift | SensorFrameShift | ToolShift | PayloadChange | SetupChange => Family::SetUp,
         Latency | Unsettled | AngleRounding | ReadoutMismatch | Outliers => Family::Log,
         SmallDisturbances | Unexplained => return None,
@@ -110,6 +111,9 @@ fn in_words(effect: CauseKind) -> Option<&'static str> {
     Some(match effect {
         SensorScale => {
             "measure a known length with the sensor (a scale bar): if it is read wrong, the sensor's scale is the cause"
+        }
+        SensorRange => {
+            "measure known lengths with the sensor at its least and greatest distance: what they are off by is the sensor's"
         }
         CableSag | CablePulley | CableDrum => {
             "move the cable's outlet to another place and measure again (`diagnose --also`): what follows the cable and not the pose is the \

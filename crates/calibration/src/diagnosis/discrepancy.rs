@@ -314,7 +314,8 @@ impl Discrepancy {
             if scaled.is_empty() { DMatrix::zeros(rows, 0) } else { DMatrix::from_columns(&scaled) };
         let (mut correlation, mut range) = (rho, 0);
         if rho == 0.0 {
-            let left = &beside.residual + beside.readings((linear, &functions.columns), 0..coefficients.len(), &coefficients);
+            let left = &beside.residual
+                + beside.readings((linear, &functions.columns), 0..coefficients.len(), &coefficients);
             let poses = &linear.slopes.poses;
             correlation = lag_one_correlation(&left, linear.per, numbers, poses);
             if correlation != 0.0 {

@@ -2,6 +2,7 @@
 //!
 //! Real effects of the arm persist on another day and in another mounting; overfitted ones do not.
 
+use super::cause::Cause;
 use super::diagnose::Diagnosed;
 use super::extension::{Freedom, Subject, fit};
 use super::finding::Transfer;
@@ -10,6 +11,7 @@ use crate::identification::calibration::Frames;
 use crate::identification::fit::errors_on;
 use crate::identification::tolerance::Tolerance;
 use crate::measurement::dataset::Dataset;
+use crate::measurement::sensor::disturbance::Disturbance;
 use truegrind_arm::estimated::Judgement;
 use truegrind_arm::model::Model;
 use truegrind_math::statistics::ErrorSummary;
@@ -23,6 +25,8 @@ pub struct Models<'a> {
     pub geometric: &'a Model,
     /// With all causes.
     pub extended: &'a Model,
+    /// Faults of the arm that no model file can represent, part of the extended model.
+    pub faults: &'a [Disturbance],
     /// For compensation.
     pub written: &'a Model,
 }
@@ -48,7 +52,15 @@ fn errors_of(
     fuse_readout: bool,
 ) -> [Vec<f64>; 4] {
     let prepared = prepare(other, models.nominal, fuse_readout);
-    [models.nominal, models.geometric, models.extended, models.written].map(|model| {
+    let mut with_faults = frames.clone();
+    with_faults.disturbances.extend_from_slice(models.faults);
+    let all = [
+        (models.nominal, frames),
+        (models.geometric, frames),
+        (models.extended, &with_faults),
+        (models.written, frames),
+    ];
+    all.map(|(model, frames)| {
         let subject = Subject { observed: &prepared.observed, nominal: model, frames, tolerance };
         let registered = fit(&subject, &[], Freedom::Frames, None);
         errors_on(&prepared.observed, &registered.model, &registered.frames)
@@ -78,10 +90,20 @@ impl Diagnosed {
     /// Tests the models on another series of the same arm. The verdict fails where the written arm is surely worse than geometry alone
     /// there, and doubts it where it is perhaps.
     pub fn test_on(&mut self, other: &Dataset, frames: &Frames, tolerance: &Tolerance, fuse_readout: bool) {
+        let faults: Vec<Disturbance> = self
+            .extended
+            .causes
+            .iter()
+            .filter_map(|cause| match cause {
+                Cause::Measurement(disturbance) if cause.is_in_arm() => Some(disturbance.clone()),
+                _ => None,
+            })
+            .collect();
         let models = Models {
             nominal: &self.estimated.nominal,
             geometric: &self.geometric.model,
             extended: &self.extended.model,
+            faults: &faults,
             written: &self.estimated.model,
         };
         let errors = errors_of(other, frames, &models, tolerance, fuse_readout);

@@ -216,6 +216,12 @@ fn describe_disturbance(d: &Disturbance, rows: &str, parameters: &[FoundParamete
             "the sensor moves relative to the base with temperature, by {:.1} µm per kelvin",
             norm(parameters) * 1e3
         ),
+        (Kind::JointZero { joint }, _) => format!(
+            "{rows} the zero of joint {} was off by {:.4}° against all other rows: its encoder lost counts, a belt slipped, or it was \
+             mastered again",
+            joint + 1,
+            value.to_degrees().abs()
+        ),
         (Kind::Zero, _) => format!("the cable's zero jumped by {value:.3} mm {rows}"),
         (Kind::Frame { .. }, _) => {
             format!("the sensor was displaced by {:.3} mm {rows}: its stand moved", norm(parameters))
@@ -276,6 +282,10 @@ fn describe_empirical_fault(form: EmpiricalFault, parameters: &[FoundParameter])
         EmpiricalFault::Drum { .. } => {
             "the cable's reading is not proportional to its length, as from a drum wound in layers".to_owned()
         }
+        EmpiricalFault::Range { .. } => format!(
+            "the sensor's distances are off by {:.3} mm and an amount that is not proportional to them: wrong reflector constant, or lens",
+            value.abs()
+        ),
         EmpiricalFault::TargetNest { .. } => {
             "the target's apparent centre depends on the viewing direction: faulty nest or reflector"
                 .to_owned()
@@ -304,6 +314,7 @@ pub fn describe_pattern(cause: &Cause) -> String {
         PayloadChange => {
             "the residual follows the torque of a mass at the flange in these rows alone".to_owned()
         }
+        JointZeroShift => format!("the residual about joint {joint} steps by one angle in these rows"),
         SensorZeroShift => "the cable's residual steps by one amount in these rows".to_owned(),
         SensorFrameShift => "the residual steps by one vector in the base in these rows".to_owned(),
         ToolShift if cause.is_thermal() => {
@@ -318,6 +329,7 @@ pub fn describe_pattern(cause: &Cause) -> String {
         CablePulley => "the residual follows the direction of the cable".to_owned(),
         CableDrum => "the residual follows powers of the cable's length".to_owned(),
         TargetNest => "the residual follows the direction of the beam in the target's frame".to_owned(),
+        SensorRange => "the residual follows the distance along the beam".to_owned(),
         SensorScale => "the residual is proportional to the reading".to_owned(),
         CableSag => "the residual grows with the square of the cable's horizontal span".to_owned(),
         _ => "see the picture".to_owned(),
@@ -372,12 +384,18 @@ pub fn remedy(effect: CauseKind) -> &'static str {
         PayloadChange => {
             "log the payload of every row; measure these rows again with the payload of the program"
         }
+        JointZeroShift => {
+            "check encoder, belt and mastering of this joint; measure these rows again, since the written arm is that of the other rows"
+        }
         SensorZeroShift => {
             "check the cable's clamp and drum; measure a reference point before and after each session"
         }
         SensorFrameShift => "fix the sensor's stand; measure reference points before and after each session",
         ToolShift => "fasten the hook or reflector; measure the rows after the slip again",
         SensorScale => "check the sensor against a length standard",
+        SensorRange => {
+            "check the reflector's constant and the sensor against a length standard at several distances"
+        }
         Latency => "record angles and readings with the same clock, or measure at rest",
         Unsettled => "wait longer before each reading",
         JointStiffness => {

@@ -74,6 +74,7 @@ impl Tolerance {
             Kind::Zero | Kind::Target => 5.0,
             Kind::Frame { .. } if parameter >= 3 => 5e-3,
             Kind::Frame { .. } => 5.0,
+            Kind::JointZero { .. } => 0.2_f64.to_radians(),
             Kind::Scale => 3e-3,
             Kind::Sag => 3e-3,
             Kind::Load { compliance: Some(_), .. } => 10.0,

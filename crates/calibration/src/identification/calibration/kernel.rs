@@ -81,7 +81,7 @@ impl DisturbanceColumns {
                 Kind::Target => (0..3).for_each(|k| add(&mut out.tool[k], v[k], profile)),
                 Kind::Scale => add(&mut out.scale, v[0], profile),
                 Kind::Sag => add(&mut out.sag, v[0], profile),
-                Kind::Load { .. } | Kind::Empirical(_) => {}
+                Kind::Load { .. } | Kind::JointZero { .. } | Kind::Empirical(_) => {}
             }
         }
         Some(out)
@@ -397,7 +397,7 @@ fn cable_rows<R: SinCos>(
                         Kind::Empirical(_) => {
                             -dot(&load(like, &problem.columns.shifts[index][parameter], at), &u)
                         }
-                        Kind::Load { .. } => none,
+                        Kind::Load { .. } | Kind::JointZero { .. } => none,
                     }
             }
             Parameter::Effect { .. } | Parameter::Disturbance { .. } => {
@@ -642,7 +642,7 @@ fn spatial_rows<R: SinCos>(
                         ([-from_sensor[0] / gain, -from_sensor[1] / gain, -from_sensor[2] / gain], none)
                     }
                     Kind::Empirical(_) => (load(like, &columns.shifts[index][parameter], at), none),
-                    Kind::Zero | Kind::Sag | Kind::Load { .. } => (none, none),
+                    Kind::Zero | Kind::Sag | Kind::Load { .. } | Kind::JointZero { .. } => (none, none),
                 };
                 (scaled(amplitude, &v), scaled(amplitude, &w))
             }

@@ -48,8 +48,8 @@ fn fault_rotations(fault: EmpiricalFault, dataset: &Dataset, model: &Model) -> V
                 out
             })
             .collect(),
-        EmpiricalFault::NonlinearStiffness { joint } => {
-            let torques = torques(dataset, model);
+        EmpiricalFault::NonlinearStiffness { joint, at } => {
+            let torques = torques_at(dataset, model, at);
             [2, 3]
                 .map(|power: i32| {
                     let mut out = none();
@@ -60,10 +60,7 @@ fn fault_rotations(fault: EmpiricalFault, dataset: &Dataset, model: &Model) -> V
                 .to_vec()
         }
         EmpiricalFault::LoadedPlay { joint, at } => {
-            let torques = match at {
-                0 => torques(dataset, model),
-                frame => torques_of_lump(dataset, model, usize::from(frame)),
-            };
+            let torques = torques_at(dataset, model, at);
             let mut out = none();
             // A joint yields along its torque, so a play of p puts its link p/2 from the middle on that side.
             let flank = |t: f64| if t == 0.0 { 0.0 } else { 0.5 * t.signum() };
@@ -86,6 +83,14 @@ fn fault_rotations(fault: EmpiricalFault, dataset: &Dataset, model: &Model) -> V
                 .to_vec()
         }
         _ => Vec::new(),
+    }
+}
+
+/// Static torques (N m) of 1 kg at the origin of frame 1 to 6; at frame 0 of [`torques`].
+fn torques_at(dataset: &Dataset, model: &Model, frame: u8) -> Vec<Vector6<f64>> {
+    match frame {
+        0 => torques(dataset, model),
+        frame => torques_of_lump(dataset, model, usize::from(frame)),
     }
 }
 
@@ -161,6 +166,14 @@ pub fn sensor_shifts(
                 vec![u * (0.5 * (3.0 * t * t - 1.0)), u * (0.5 * (5.0 * t * t * t - 3.0 * t))]
             })
         }
+        EmpiricalFault::Range { from_mm, to_mm } => {
+            let (low, high) = (f64::from(from_mm), f64::from(to_mm));
+            shift_columns(&|_, away| {
+                let u = away.normalize();
+                let t = (2.0 * away.norm() - low - high) / (high - low).max(1.0);
+                vec![u, u * (0.5 * (3.0 * t * t - 1.0))]
+            })
+        }
         EmpiricalFault::TargetNest { second } => shift_columns(&|row, away| {
             let turn = posed.forward(&row.joints).rotation * frames.flange_from_target.rotation;
             let seen = turn.inverse() * away.normalize();
@@ -200,6 +213,11 @@ impl<'a> LoadedRows<'a> {
 pub fn joint_rotations(kind: &Kind, rows: &LoadedRows<'_>) -> Vec<[Option<Vec<f64>>; 6]> {
     match kind {
         Kind::Empirical(fault) => fault_rotations(*fault, rows.dataset, rows.model),
+        Kind::JointZero { joint } => {
+            let mut out: [Option<Vec<f64>>; 6] = Default::default();
+            out[*joint] = Some(vec![1.0; rows.dataset.rows.len()]);
+            vec![out]
+        }
         Kind::Load { joints, compliance } => {
             let torques = rows.flange_torques();
             let bent = |joint: usize, factor: f64| torques.iter().map(|t| factor * t[joint]).collect();

@@ -1,7 +1,7 @@
 //! Disturbances of a measurement: a *kind* of error times a *profile* over the rows.
 //!
 //! The kind states what is displaced (the cable's zero, the sensor's frame, the target, the scale, the cable's sag, the
-//! load on the arm), the profile in which rows and by what factor. Their product covers every measurement fault that a
+//! load on the arm, a joint's zero), the profile in which rows and by what factor. Their product covers every measurement fault that a
 //! calibration can fit: a zero that jumped between two rows, a tripod that was kicked, a hook that slipped, a base that
 //! drifts while the hall warms up.
 //!
@@ -39,6 +39,11 @@ pub enum Kind {
         /// compliance and mass for each joint.
         compliance: Option<Vec<f64>>,
     },
+    /// The zero of a joint (0-based): the angle (rad) by which it stood elsewhere than its encoder says.
+    JointZero {
+        /// The joint.
+        joint: usize,
+    },
     /// A fault that depends on the whole pose, on the reading, or on the previous row.
     Empirical(EmpiricalFault),
 }
@@ -48,7 +53,7 @@ impl Kind {
     #[inline]
     pub fn rotates_joints(&self) -> bool {
         match self {
-            Kind::Load { .. } => true,
+            Kind::Load { .. } | Kind::JointZero { .. } => true,
             Kind::Empirical(fault) => fault.rotates_joints(),
             _ => false,
         }
@@ -138,6 +143,7 @@ fn names(kind: &Kind) -> Vec<(String, &'static str)> {
         Kind::Scale => vec![("scale error".to_owned(), "1")],
         Kind::Sag => vec![("weight over tension squared".to_owned(), "1/m²")],
         Kind::Empirical(fault) => fault.names(),
+        Kind::JointZero { .. } => vec![("offset".to_owned(), "rad")],
         Kind::Load { compliance: Some(_), .. } => vec![("mass".to_owned(), "kg")],
         Kind::Load { joints, .. } => {
             joints.iter().map(|j| (format!("compliance x mass, joint {}", j + 1), "rad kg/(N m)")).collect()

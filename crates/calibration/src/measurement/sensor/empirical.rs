@@ -24,6 +24,9 @@ pub enum EmpiricalFault {
     NonlinearStiffness {
         /// The joint.
         joint: usize,
+        /// Frame (1 to 6) at whose origin the load counts as concentrated; 0 for the masses of the arm, or 1 kg at its flange where these
+        /// are not known.
+        at: u8,
     },
     /// A joint (0-based) whose play its load closes: the flank that bears changes where the static torque changes its sign.
     LoadedPlay {
@@ -55,6 +58,14 @@ pub enum EmpiricalFault {
         /// The longer length (mm).
         to_mm: u32,
     },
+    /// Distances of a tracker or camera that are off by an amount not proportional to them: a constant, and the second Legendre polynomial of
+    /// the distance between two distances. These are part of the fault, as with a drum.
+    Range {
+        /// The shorter distance (mm).
+        from_mm: u32,
+        /// The longer distance (mm).
+        to_mm: u32,
+    },
     /// A target whose apparent centre depends on the viewing direction: first or second degree in that direction.
     TargetNest {
         /// Whether the second degree is included.
@@ -74,7 +85,7 @@ impl EmpiricalFault {
     /// The joints concerned (0-based).
     pub fn joints(self) -> Vec<usize> {
         match self {
-            EmpiricalFault::NonlinearStiffness { joint } | EmpiricalFault::LoadedPlay { joint, .. } => {
+            EmpiricalFault::NonlinearStiffness { joint, .. } | EmpiricalFault::LoadedPlay { joint, .. } => {
                 vec![joint]
             }
             EmpiricalFault::TwoJointGear { joint, other, .. } => vec![joint, other],
@@ -141,6 +152,7 @@ impl EmpiricalFault {
             }
             EmpiricalFault::Pulley => listed(&["xy", "yz", "zx", "x² − y²", "3z² − 1"], "mm"),
             EmpiricalFault::Drum { .. } => listed(&["square of the length", "cube of the length"], "mm"),
+            EmpiricalFault::Range { .. } => listed(&["constant", "square of the distance"], "mm"),
             EmpiricalFault::TargetNest { second: false } => listed(&FIRST, "mm"),
             EmpiricalFault::TargetNest { second: true } => {
                 let products = ["xy", "yz", "zx", "x² − y²", "3z² − 1"];
@@ -157,12 +169,14 @@ impl EmpiricalFault {
             // Unsynchronised clocks are tenths of a second apart, and their rates differ by some 100 ppm (0.36 s/h).
             EmpiricalFault::Latency { .. } => 0.3,
             EmpiricalFault::ArmUnsettled | EmpiricalFault::SensorUnsettled => 1e-3,
-            // Relative to a compliance of 1e-5 rad/(N m): the same again at some 30 N m.
-            EmpiricalFault::NonlinearStiffness { .. } => [1e-6, 1e-7][parameter.min(1)],
+            // Relative to a compliance of 1e-5 rad/(N m): the same again at some 30 N m. Of 1 kg in place of some 10: per kg² and kg³.
+            EmpiricalFault::NonlinearStiffness { at: 0, .. } => [1e-6, 1e-7][parameter.min(1)],
+            EmpiricalFault::NonlinearStiffness { .. } => [1e-4, 1e-4][parameter.min(1)],
             EmpiricalFault::LoadedPlay { .. } => 0.2_f64.to_radians(),
             EmpiricalFault::TwoJointGear { .. } => 3e-4,
             EmpiricalFault::Refraction => 5e-6,
             EmpiricalFault::Pulley | EmpiricalFault::Drum { .. } => 0.5,
+            EmpiricalFault::Range { .. } => 0.2,
             EmpiricalFault::TargetNest { .. } => 0.05,
         }
     }

@@ -126,7 +126,8 @@ fn disturbances(sensor: Sensor, turn_rad: f64) -> Vec<Disturbance> {
         kinds.push((Kind::Sag, Profile::Constant));
     }
     let of_pose = [
-        EmpiricalFault::NonlinearStiffness { joint: 1 },
+        EmpiricalFault::NonlinearStiffness { joint: 1, at: 0 },
+        EmpiricalFault::Range { from_mm: 1000, to_mm: 3000 },
         EmpiricalFault::LoadedPlay { joint: 1, at: 4 },
         EmpiricalFault::TwoJointGear { joint: 2, other: 3, orders: [1, 1] },
         EmpiricalFault::TwoJointGear { joint: 4, other: 5, orders: [2, 1] },
