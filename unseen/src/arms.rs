@@ -1,6 +1,7 @@
-//! Three arms from the numbers of their data sheets, as they are built: every link off by tolerances.
+//! Four arms from the numbers of their data sheets, as they are built: every link off by tolerances.
 //!
-//! An arm is a chain of bodies. Body i turns about the z axis of body i − 1 by the logged angle and the zero of its joint;
+//! An arm is a chain of bodies. Body i turns about the z axis of body i − 1 by the logged angle, which some makers count the other way
+//! round, and the zero of its joint;
 //! what lies between two joints is one fixed pose, made from the standard DH numbers and then pushed and tilted at random in
 //! all six directions. Lengths are in mm, angles in rad, masses in kg, torques in N m.
 
@@ -25,6 +26,8 @@ pub struct Sheet {
     pub name: &'static str,
     /// a (mm), α (deg), d (mm) and θ at zero (deg) of each link, standard DH.
     pub links: [[f64; 4]; 6],
+    /// −1 where the maker counts an angle against that z axis.
+    pub sense: [f64; 6],
     /// Mass of each link (kg).
     pub kg: [f64; 6],
     /// Its centre in the DH frame at its far end (mm).
@@ -49,7 +52,7 @@ pub struct Beam {
 const UPPER_ARM: Beam = Beam { body: 1, joints: [2, 3], links: &[2] };
 
 /// The arms.
-pub const SHEETS: [Sheet; 3] = [
+pub const SHEETS: [Sheet; 4] = [
     Sheet {
         name: "abb-irb-120",
         links: [
@@ -60,6 +63,7 @@ pub const SHEETS: [Sheet; 3] = [
             [0.0, -90.0, 0.0, 0.0],
             [0.0, 0.0, 72.0, 180.0],
         ],
+        sense: [1.0; 6],
         kg: [3.067, 3.909, 2.944, 1.328, 0.546, 0.137],
         centre: [
             [0.0977, 51.59, -0.12],
@@ -89,6 +93,7 @@ pub const SHEETS: [Sheet; 3] = [
             [0.0, -90.0, 115.7, 0.0],
             [0.0, 0.0, 92.2, 0.0],
         ],
+        sense: [1.0; 6],
         kg: [7.1, 12.7, 4.27, 2.0, 2.0, 0.365],
         centre: [
             [21.0, 0.0, 27.0],
@@ -118,6 +123,7 @@ pub const SHEETS: [Sheet; 3] = [
             [0.0, 90.0, 0.0, 0.0],
             [0.0, 0.0, 70.0, 0.0],
         ],
+        sense: [1.0; 6],
         kg: [6.991_033_76, 4.291_77, 4.527_68, 2.169_76, 0.162_547_14, 0.0082],
         centre: [
             [0.0, 52.6593, 24.6768],
@@ -131,6 +137,37 @@ pub const SHEETS: [Sheet; 3] = [
             [-80.0, 80.0],
             [-60.0, 85.0],
             [-110.0, 125.0],
+            [-150.0, 150.0],
+            [-105.0, 105.0],
+            [-160.0, 160.0],
+        ],
+        beams: [UPPER_ARM, Beam { body: 3, joints: [3, 5], links: &[3, 4] }],
+    },
+    // The tool under test knows no masses of it; these are a guess from the 160 kg of its data sheet.
+    Sheet {
+        name: "kuka-kr10-r1420",
+        links: [
+            [150.0, -90.0, 450.0, 0.0],
+            [610.0, 0.0, 0.0, 0.0],
+            [20.0, -90.0, 0.0, -90.0],
+            [0.0, 90.0, 660.0, 0.0],
+            [0.0, -90.0, 0.0, 0.0],
+            [0.0, 0.0, 80.0, 180.0],
+        ],
+        sense: [-1.0, 1.0, 1.0, -1.0, 1.0, -1.0],
+        kg: [45.0, 32.0, 26.0, 12.0, 4.0, 1.5],
+        centre: [
+            [-75.0, 120.0, 0.0],
+            [-320.0, 0.0, 70.0],
+            [-15.0, 0.0, 40.0],
+            [0.0, -290.0, 0.0],
+            [0.0, 0.0, 12.0],
+            [0.0, 0.0, -25.0],
+        ],
+        room_deg: [
+            [-80.0, 80.0],
+            [-140.0, -20.0],
+            [10.0, 140.0],
             [-150.0, 150.0],
             [-105.0, 105.0],
             [-160.0, 160.0],
@@ -165,6 +202,7 @@ impl Sheet {
                 Pose::from_parts(Translation3::new(a, 0.0, d), twist)
             }),
             zero: self.links.map(|link| link[3].to_radians()),
+            sense: self.sense,
             kg: self.kg,
             centre: self.centre.map(Vector3::from),
         }
@@ -192,6 +230,8 @@ pub struct Arm {
     pub between: [Pose; 6],
     /// What each joint is turned by at logged angle zero (rad).
     pub zero: Angles,
+    /// −1 where angles are counted against the axis.
+    pub sense: [f64; 6],
     /// Masses (kg).
     pub kg: [f64; 6],
     /// Their centres, in the frame at the far end of the body (mm).
@@ -227,7 +267,7 @@ impl Arm {
     pub fn frames(&self, q: &Angles, strain: &Strain) -> [Pose; 7] {
         let mut out = [small(strain.base); 7];
         for i in 0..6 {
-            let angle = q[i] + self.zero[i] + strain.turn[i];
+            let angle = self.sense[i] * q[i] + self.zero[i] + strain.turn[i];
             let turned = out[i] * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle);
             let mut between = self.between[i];
             between.translation.vector *= 1.0 + strain.growth[i];

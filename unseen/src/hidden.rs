@@ -5,7 +5,7 @@ pub mod drift;
 pub mod sensor;
 pub mod warmth;
 
-use rand::Rng;
+use rand::{Rng, RngExt};
 
 use crate::arms::{Angles, Arm, Pose, Sheet, Strain};
 use crate::designs::{Visit, Walk};
@@ -28,6 +28,8 @@ pub enum Shape {
     /// Each joint still lacks a share of its last step, the less the further it went: shares, and the step (rad) at which they are
     /// halved.
     Unsettled([f64; 6], f64),
+    /// Until an hour of the run a joint (from 0) stood off by the size (rad); then it lost counts, and is where it is still.
+    LostCounts(usize, f64),
     /// Noise that remembers: the share that a reading keeps of the one before.
     Correlated(f64),
 }
@@ -43,6 +45,7 @@ impl Shape {
             // 10 ms to 1 s.
             Shape::Latency(_) => (0.01 / 3600.0, 1.0 / 3600.0),
             Shape::Unsettled(..) => (2e-4, 6e-3),
+            Shape::LostCounts(..) => (1e-4, 5e-3),
             Shape::Correlated(_) => crate::worth::WORTH,
         }
     }
@@ -87,7 +90,7 @@ impl Hidden {
                 let (shape, parts) = arm::Shape::draw(kind, scene, rng);
                 (Shape::Arm(shape), parts)
             }
-            Kind::Pulley | Kind::Drum | Kind::Catenary | Kind::Refraction | Kind::Nest => {
+            Kind::Pulley | Kind::Drum | Kind::Catenary | Kind::Refraction | Kind::Nest | Kind::Range => {
                 (Shape::Sensor(sensor::Shape::draw(kind, scene, rng)), Parts::default())
             }
             Kind::Drift => (Shape::Drift(drift::Shape::readings(scene, rng)), Parts::default()),
@@ -96,6 +99,14 @@ impl Hidden {
             Kind::Unsettled => {
                 let shares = std::array::from_fn(|_| crate::draw::between(rng, 0.0, 1.0).powi(2));
                 (Shape::Unsettled(shares, crate::draw::between(rng, 0.3, 1.5)), Parts::default())
+            }
+            Kind::LostCounts => {
+                let joint = rng.random_range(0..5);
+                // Between two rows: a fresh row belongs to the nearer one.
+                let visits = &scene.walk.visits;
+                let row = rng.random_range(visits.len() / 5..visits.len() * 4 / 5);
+                let hours = 0.5 * (visits[row].hours + visits[row + 1].hours);
+                (Shape::LostCounts(joint, hours), Parts::joint(joint))
             }
             Kind::Correlated => (Shape::Correlated(crate::draw::between(rng, 0.7, 0.97)), Parts::default()),
         };
@@ -126,6 +137,11 @@ impl Hidden {
         let mut strain = self.strain(scene.arm, &visit);
         if let Shape::Unsettled(shares, halved) = &self.shape {
             strain.turn = lacking(&visit, shares, *halved, self.size);
+        }
+        if let Shape::LostCounts(joint, hours) = self.shape
+            && visit.hours < hours
+        {
+            strain.turn[joint] = self.size;
         }
         if let Shape::Drift(shape) = &self.shape {
             strain.base = shape.base_at(self.size, visit.hours);

@@ -21,7 +21,9 @@ pub enum Family {
     Frame,
     /// The zero of a cable.
     Zero,
-    /// The scale of a sensor.
+    /// The zero of a joint.
+    JointZero,
+    /// The scale of a sensor, or its distances.
     Scale,
     /// The wire of a cable sensor and what leads it.
     Cable,
@@ -51,7 +53,7 @@ pub enum Meaning {
 /// The names of the diagnosis. One name stands for several families: see [`meanings`].
 ///
 /// A name that is added to the diagnosis is added here, by what its sentence sends a technician to.
-pub const NAMES: [(&str, Family); 41] = [
+pub const NAMES: [(&str, Family); 43] = [
     ("link-geometry", Family::Geometry),
     ("joint-compliance", Family::Compliance),
     ("joint-stiffness", Family::Compliance),
@@ -75,7 +77,9 @@ pub const NAMES: [(&str, Family); 41] = [
     ("base-settling", Family::Frame),
     ("sensor-zero-shift", Family::Zero),
     ("sensor-zero-drift", Family::Zero),
+    ("joint-zero-shift", Family::JointZero),
     ("sensor-scale", Family::Scale),
+    ("sensor-range", Family::Scale),
     ("sensor-scale-drift", Family::Scale),
     ("cable-sag", Family::Cable),
     ("cable-pulley", Family::Cable),
@@ -159,6 +163,10 @@ pub enum Kind {
     Unsettled,
     /// The arm's base settles.
     Settling,
+    /// A joint loses counts of its encoder, or its belt slips.
+    LostCounts,
+    /// A tracker whose distances are off.
+    Range,
 }
 
 /// Parts of an arm that have something, from 1.
@@ -203,7 +211,7 @@ pub enum Mark {
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Kind; 18] = [
+    pub const ALL: [Kind; 20] = [
         Kind::Clean,
         Kind::WarmLinks,
         Kind::Hardening,
@@ -222,6 +230,8 @@ impl Kind {
         Kind::Latency,
         Kind::Unsettled,
         Kind::Settling,
+        Kind::LostCounts,
+        Kind::Range,
     ];
 
     /// Name on the command line.
@@ -245,6 +255,8 @@ impl Kind {
             Kind::Latency => "latency",
             Kind::Unsettled => "unsettled",
             Kind::Settling => "settling",
+            Kind::LostCounts => "lost-counts",
+            Kind::Range => "range",
         }
     }
 
@@ -271,7 +283,7 @@ impl Kind {
     pub fn sensors(self) -> [bool; 2] {
         match self {
             Kind::Pulley | Kind::Drum | Kind::Catenary => [true, false],
-            Kind::Refraction | Kind::Nest => [false, true],
+            Kind::Refraction | Kind::Nest | Kind::Range => [false, true],
             _ => [true, true],
         }
     }
@@ -295,6 +307,8 @@ impl Kind {
             Kind::Drift if sensor == Sensor::Cable => vec![Family::Zero, Family::SetUp],
             Kind::Drift | Kind::Settling => vec![Family::Frame, Family::SetUp],
             Kind::Correlated => vec![Family::Noise],
+            Kind::LostCounts => vec![Family::JointZero],
+            Kind::Range => vec![Family::Scale],
             Kind::Latency | Kind::Unsettled => vec![Family::Log],
         }
     }

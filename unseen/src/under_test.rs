@@ -292,9 +292,10 @@ impl Reply {
     /// What the import would say.
     pub fn fresh(&self, text: &str, visits: &[Visit]) -> Result<Fresh, String> {
         let mut rows = dataset(&read(text)?, self.convention, &self.sheet)?;
-        // A fresh row stands in the measurement where its time does.
+        // A fresh row stands in the measurement where its time does. Rows are numbered as in the file, below its headings.
+        let first = rows.rows.iter().next().map_or(0, |row| row.number);
         for (row, visit) in rows.rows.iter_mut().zip(visits) {
-            row.number = visit.row;
+            row.number = first + visit.row;
         }
         let observed = prepare(&rows, &self.sheet, true).observed;
         let [geometry, extended] = [&self.found.geometric, &self.found.extended]

@@ -190,7 +190,7 @@ impl Shape {
             }
             Shape::LoadedPlay { joint, friction_nm } => {
                 let torque = arm.torques(q)[joint];
-                let step = q[joint] - visit.before[joint];
+                let step = arm.sense[joint] * (q[joint] - visit.before[joint]);
                 let flank = if torque.abs() > friction_nm {
                     torque.signum()
                 } else if step.abs() > 1e-6 {

@@ -24,6 +24,13 @@ pub enum Shape {
         /// By how much the tension grows for each metre.
         stiffens: f64,
     },
+    /// Distances read too long or too short, size in mm, the more the further away: 1 + bow · ln of the distance over the mean one.
+    Range {
+        /// How it grows.
+        bow: f64,
+        /// The mean distance (mm).
+        mean_mm: f64,
+    },
     /// size: gradient at the floor (K/m).
     Refraction {
         /// Height in which the gradient falls off (mm).
@@ -48,6 +55,10 @@ impl Shape {
             Kind::Pulley => Shape::Pulley,
             Kind::Drum => Shape::Drum { layer_mm: scene.sheet.reach_mm() * between(rng, 0.08, 0.35) },
             Kind::Catenary => Shape::Catenary { stiffens: between(rng, 0.5, 1.5) },
+            Kind::Range => {
+                let place = scene.sensor.place.translation.vector;
+                Shape::Range { bow: between(rng, -4.0, 4.0), mean_mm: place.norm() }
+            }
             Kind::Refraction => Shape::Refraction { layer_mm: between(rng, 250.0, 900.0) },
             _ => Shape::Nest {
                 axis: crate::draw::direction(rng),
@@ -63,6 +74,7 @@ impl Shape {
             Shape::Pulley => (2.0, 30.0),
             Shape::Drum { .. } => (2e-4, 2e-3),
             Shape::Catenary { .. } => (2e-3, 8e-2),
+            Shape::Range { .. } => (0.01, 1.0),
             Shape::Refraction { .. } => (3.0, 25.0),
             Shape::Nest { .. } => (0.02, 0.5),
         }
@@ -84,6 +96,9 @@ impl Shape {
             Shape::Pulley => cable(over_pulley(&away, size) - length),
             Shape::Drum { layer_mm } => cable(-on_drum(length, *layer_mm, size)),
             Shape::Catenary { stiffens } => cable(catenary(&away, size.abs().sqrt(), *stiffens)),
+            Shape::Range { bow, mean_mm } => {
+                seen(away * (size * (1.0 + bow * (length / mean_mm).ln()) / length))
+            }
             Shape::Refraction { layer_mm } => {
                 seen(Vector3::new(0.0, 0.0, refracted(&from, &at, size, *layer_mm)))
             }

@@ -143,8 +143,7 @@ impl FindingBuilder<'_> {
         let held = self.held.without(&places);
         let before_mm = held.rmse_mm(None, self.set_aside);
         let mut alternatives = self.rivals(own, &without, &held);
-        let beaten = |a: &Alternative| a.beaten_by >= CLEAR && !(a.cv_rmse_mm < BETTER * after_mm);
-        let mut clear = alternatives.iter().all(beaten);
+        let mut clear = alternatives.iter().all(|rival| is_beaten(rival, after_mm));
         // A finding that raises the held-out error is not confirmed, however well it fits the other rows.
         let unconfirmed = before_mm < BETTER * after_mm;
         if unconfirmed || own.information_beside_growth.is_some_and(|lambda| lambda < VISIBLE) {
@@ -216,6 +215,20 @@ impl FindingBuilder<'_> {
         };
         (finding, picture)
     }
+}
+
+/// Whether a finding clearly beats a rival; `after_mm` is the held-out error with the finding.
+fn is_beaten(rival: &Alternative, after_mm: f64) -> bool {
+    rival.beaten_by >= CLEAR && !(rival.cv_rmse_mm < BETTER * after_mm)
+}
+
+/// Whether a spring of the arm is certain and only its place is not: every rival that might be true is another spring, a link or a joint.
+/// The arm is nearer to the truth with it than without.
+pub(super) fn is_some_spring(finding: &Finding) -> bool {
+    let spring = |kind| matches!(kind, CauseKind::JointCompliance | CauseKind::LinkBending);
+    let after_mm = finding.gain.cv_rmse_after_mm;
+    let mut rivals = finding.alternatives.iter().filter(|rival| !is_beaten(rival, after_mm));
+    spring(finding.effect) && finding.doubts.is_empty() && rivals.all(|rival| spring(rival.effect))
 }
 
 fn counted(count: usize, what: &str) -> String {

@@ -12,6 +12,7 @@ use super::confounding::Confounding;
 use super::contribution::Contributions;
 use super::discrepancy::Discrepancy;
 use super::finding::{Confidence, Finding, FoundParameter, Gain, Session};
+use super::findings::is_some_spring;
 use super::picture::Picture;
 use super::words;
 
@@ -203,7 +204,7 @@ pub(super) fn certain_flags(
         }
     }
     for merged in findings.iter().filter(|s| s.finding.effect != CauseKind::SmallDisturbances) {
-        if merged.finding.confidence == Confidence::Ambiguous {
+        if merged.finding.confidence == Confidence::Ambiguous && !is_some_spring(&merged.finding) {
             merged.causes.iter().for_each(|&k| out[k] = false);
         }
     }

@@ -15,7 +15,8 @@
 //! Layers of a drum change the scale of a cable too, and its rows cannot tell that from the size of the arm: the catalogue has no linear
 //! term. With a radius that changes in proportion to what is wound, the error is a parabola of the length whose vertex is the empty
 //! drum. Between the lengths m − h and m + h its terms of first and second degree (Legendre) have the ratio 3 m/h. So scale is a random
-//! effect with standard deviation 3 m/h² |b|, b the found term of second degree: where the maker adjusted the scale is unknown.
+//! effect with standard deviation 3 m/h² |b|, b the found term of second degree: where the maker adjusted the scale is unknown. The same holds
+//! for a tracker or camera whose distances are off.
 //!
 //! Source: Kennedy and O'Hagan 2001; Brynjarsdóttir and O'Hagan 2014 (parameters are learned beside a discrepancy only under a
 //! realistic prior of it); random features of the process: Rahimi and Recht 2007.
@@ -88,30 +89,33 @@ impl Law {
 pub(super) fn columns(subject: &Subject<'_>, fit: &Extended, linear: &Linear) -> Vec<DMatrix<f64>> {
     let laws = Law::ALL.into_iter().filter(|law| fit.causes.iter().any(|c| Law::of(c) == Some(*law)));
     let rest = laws.filter_map(|law| columns_of(law, subject, fit, linear));
-    rest.chain(scale_of_drum(fit, linear)).collect()
+    rest.chain(scale_of_law(fit, linear)).collect()
 }
 
-/// The scale of a cable on a drum with layers, as a random effect.
-fn scale_of_drum(fit: &Extended, linear: &Linear) -> Option<DMatrix<f64>> {
-    let sigma = fit.causes.iter().find_map(|cause| match cause {
-        Cause::Measurement(Disturbance {
-            kind: Kind::Empirical(EmpiricalFault::Drum { from_mm, to_mm }),
-            values,
-            ..
-        }) => {
-            let (from, to) = (f64::from(*from_mm), f64::from(*to_mm));
-            let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
-            Some(3.0 * middle / (half * half) * values[0].abs())
-        }
+/// Of a fault of lengths between two of them (mm) the term of second degree (mm).
+fn second_degree(cause: &Cause) -> Option<([f64; 2], f64)> {
+    let Cause::Measurement(Disturbance { kind: Kind::Empirical(fault), values, .. }) = cause else {
+        return None;
+    };
+    match *fault {
+        EmpiricalFault::Drum { from_mm, to_mm } => Some(([from_mm, to_mm].map(f64::from), values[0])),
+        EmpiricalFault::Range { from_mm, to_mm } => Some(([from_mm, to_mm].map(f64::from), values[1])),
         _ => None,
-    })?;
+    }
+}
+
+/// The scale of a sensor whose lengths are off, as a random effect.
+fn scale_of_law(fit: &Extended, linear: &Linear) -> Option<DMatrix<f64>> {
+    let ([from, to], found) = fit.causes.iter().find_map(second_degree)?;
+    let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
+    let sigma = 3.0 * middle / (half * half) * found.abs();
     let column = &linear.slopes.by_scale * sigma;
     column.iter().all(|v| v.is_finite()).then(|| DMatrix::from_columns(&[column]))
 }
 
 /// Whether a fit has a fault for which [`columns`] are needed.
 pub(super) fn is_needed(fit: &Extended) -> bool {
-    fit.causes.iter().any(|cause| Law::of(cause).is_some())
+    fit.causes.iter().any(|cause| Law::of(cause).is_some() || second_degree(cause).is_some())
 }
 
 fn columns_of(law: Law, subject: &Subject<'_>, fit: &Extended, linear: &Linear) -> Option<DMatrix<f64>> {
