@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::cause::{Cause, MAP_KNOTS, parallel_neighbours};
 use super::design::{Design, Slopes};
 use super::extension::Subject;
-use crate::identification::calibration::{Frames, LoadedRows, joint_rotations, sensor_shifts};
+use crate::identification::calibration::{Frames, LoadedRows, joint_rotations, sensor_shifts, torques_at};
 use crate::measurement::dataset::{Dataset, Reading, Sensor};
 use crate::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
 use crate::measurement::sensor::empirical::EmpiricalFault;
@@ -486,6 +486,25 @@ fn load_places(joint: usize) -> &'static [u8] {
     }
 }
 
+/// Shares of the largest torque of the rows at which a joint that stiffens has yielded by half.
+const BENDS: [f64; 2] = [0.1, 0.3];
+
+/// Joints that stiffen under their load, with the number of variants.
+fn hardening(subject: &Subject<'_>, joint: usize, places: &[u8]) -> Vec<(EmpiricalFault, f64)> {
+    let tried = (BENDS.len() * places.len()) as f64;
+    let variants = places.iter().flat_map(|&at| {
+        let torques = torques_at(&subject.observed.dataset, subject.nominal, at);
+        let largest = torques.iter().map(|t| t[joint].abs()).fold(0.0, f64::max);
+        BENDS.map(|share| {
+            // To two digits: one row more must not change the fault.
+            let bend = (1e3 * share * largest).max(1.0);
+            let unit = 10_f64.powf(bend.log10().floor() - 1.0).max(1.0);
+            EmpiricalFault::Hardening { joint, at, bend_mnm: ((bend / unit).round() * unit) as u32 }
+        })
+    });
+    variants.map(|fault| (fault, tried)).collect()
+}
+
 /// Play that its load closes, of joints that gravity loads, with the number of variants of each: where the centre of mass of what a joint
 /// carries is, is not known, so that it is put at elbow, wrist or flange.
 fn loaded_plays(nominal: &Model, moves: &dyn Fn(usize) -> bool) -> Vec<(EmpiricalFault, f64)> {
@@ -584,6 +603,7 @@ fn empirical_faults(subject: &Subject<'_>, columns: &LoggedColumns) -> Vec<(Empi
         let places: &[u8] = if known { &[0] } else { load_places(joint) };
         let tried = places.len() as f64;
         out.extend(places.iter().map(|&at| (EmpiricalFault::NonlinearStiffness { joint, at }, tried)));
+        out.extend(hardening(subject, joint, places));
     }
     out.extend(loaded_plays(subject.nominal, &moves));
     out.extend(two_joint_gears(subject.nominal, &moves));

@@ -52,7 +52,9 @@ impl Cause {
                 (Kind::Empirical(fault), _) => match fault {
                     EmpiricalFault::Latency { .. } => CauseKind::Latency,
                     EmpiricalFault::ArmUnsettled | EmpiricalFault::SensorUnsettled => CauseKind::Unsettled,
-                    EmpiricalFault::NonlinearStiffness { .. } => CauseKind::JointStiffness,
+                    EmpiricalFault::NonlinearStiffness { .. } | EmpiricalFault::Hardening { .. } => {
+                        CauseKind::JointStiffness
+                    }
                     EmpiricalFault::LoadedPlay { .. } => CauseKind::Backlash,
                     EmpiricalFault::TwoJointGear { .. } => CauseKind::GearTwoJoints,
                     EmpiricalFault::Refraction => CauseKind::AirRefraction,
@@ -116,7 +118,9 @@ impl Cause {
             Cause::Arm(Effect::LinkBending(b)) => b.compliance_rad_per_nm >= 0.0,
             Cause::Arm(Effect::Backlash(b)) => b.play_rad >= 0.0,
             Cause::Measurement(Disturbance {
-                kind: Kind::Sag | Kind::Empirical(EmpiricalFault::LoadedPlay { .. }),
+                kind:
+                    Kind::Sag
+                    | Kind::Empirical(EmpiricalFault::LoadedPlay { .. } | EmpiricalFault::Hardening { .. }),
                 values,
                 ..
             }) => values.iter().all(|v| *v >= 0.0),
@@ -232,7 +236,8 @@ impl Cause {
                 ..
             }) => Part::Backlash,
             Cause::Measurement(Disturbance {
-                kind: Kind::Empirical(EmpiricalFault::NonlinearStiffness { .. }),
+                kind:
+                    Kind::Empirical(EmpiricalFault::NonlinearStiffness { .. } | EmpiricalFault::Hardening { .. }),
                 ..
             }) => Part::Spring,
             _ => Part::Gear,

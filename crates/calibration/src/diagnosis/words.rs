@@ -262,6 +262,10 @@ fn describe_empirical_fault(form: EmpiricalFault, parameters: &[FoundParameter])
         EmpiricalFault::NonlinearStiffness { .. } => format!(
             "the deflection of joint {joint} is not proportional to its torque: its stiffness is nonlinear, or it has backlash"
         ),
+        EmpiricalFault::Hardening { .. } => format!(
+            "joint {joint} stiffens under its load: most of its deflection, up to {:.4}°, comes with the first newton metres",
+            value.to_degrees()
+        ),
         EmpiricalFault::LoadedPlay { .. } => format!(
             "joint {joint} has {:.4}° of play that its load closes: gravity decides which flank bears",
             value.to_degrees()
@@ -323,7 +327,9 @@ pub fn describe_pattern(cause: &Cause) -> String {
         ToolShift => "the residual steps by one vector on the flange in these rows".to_owned(),
         Latency => "the residual follows the speed of the joints".to_owned(),
         Unsettled => "the residual points to the previous pose".to_owned(),
-        JointStiffness => format!("the residual about joint {joint} follows powers of its torque"),
+        JointStiffness => {
+            format!("the residual about joint {joint} follows its torque, but not in proportion")
+        }
         GearTwoJoints => format!("the residual about joint {joint} oscillates with the angles of two joints"),
         AirRefraction => "the vertical residual grows with the square of the distance".to_owned(),
         CablePulley => "the residual follows the direction of the cable".to_owned(),

@@ -59,6 +59,13 @@ fn fault_rotations(fault: EmpiricalFault, dataset: &Dataset, model: &Model) -> V
                 })
                 .to_vec()
         }
+        EmpiricalFault::Hardening { joint, at, bend_mnm } => {
+            let bend = f64::from(bend_mnm.max(1)) * 1e-3;
+            let mut out = none();
+            let yields = |t: f64| t / (t.abs() + bend);
+            out[joint] = Some(torques_at(dataset, model, at).iter().map(|t| yields(t[joint])).collect());
+            vec![out]
+        }
         EmpiricalFault::LoadedPlay { joint, at } => {
             let torques = torques_at(dataset, model, at);
             let mut out = none();
@@ -87,7 +94,7 @@ fn fault_rotations(fault: EmpiricalFault, dataset: &Dataset, model: &Model) -> V
 }
 
 /// Static torques (N m) of 1 kg at the origin of frame 1 to 6; at frame 0 of [`torques`].
-fn torques_at(dataset: &Dataset, model: &Model, frame: u8) -> Vec<Vector6<f64>> {
+pub fn torques_at(dataset: &Dataset, model: &Model, frame: u8) -> Vec<Vector6<f64>> {
     match frame {
         0 => torques(dataset, model),
         frame => torques_of_lump(dataset, model, usize::from(frame)),

@@ -28,6 +28,16 @@ pub enum EmpiricalFault {
         /// are not known.
         at: u8,
     },
+    /// A joint (0-based) that stiffens under its load: it has yielded by half of its parameter at the torque `bend_mnm`, and by all of it
+    /// at a torque without end. The torque is part of the fault, not of the rows: subsets of the rows must see the same regressors.
+    Hardening {
+        /// The joint.
+        joint: usize,
+        /// Frame at whose origin the load counts as concentrated, as for a nonlinear spring.
+        at: u8,
+        /// The torque (mN m), of 1 kg where the load is concentrated.
+        bend_mnm: u32,
+    },
     /// A joint (0-based) whose play its load closes: the flank that bears changes where the static torque changes its sign.
     LoadedPlay {
         /// The joint.
@@ -85,9 +95,9 @@ impl EmpiricalFault {
     /// The joints concerned (0-based).
     pub fn joints(self) -> Vec<usize> {
         match self {
-            EmpiricalFault::NonlinearStiffness { joint, .. } | EmpiricalFault::LoadedPlay { joint, .. } => {
-                vec![joint]
-            }
+            EmpiricalFault::NonlinearStiffness { joint, .. }
+            | EmpiricalFault::Hardening { joint, .. }
+            | EmpiricalFault::LoadedPlay { joint, .. } => vec![joint],
             EmpiricalFault::TwoJointGear { joint, other, .. } => vec![joint, other],
             _ => Vec::new(),
         }
@@ -98,6 +108,7 @@ impl EmpiricalFault {
         matches!(
             self,
             EmpiricalFault::NonlinearStiffness { .. }
+                | EmpiricalFault::Hardening { .. }
                 | EmpiricalFault::LoadedPlay { .. }
                 | EmpiricalFault::TwoJointGear { .. }
         )
@@ -110,6 +121,7 @@ impl EmpiricalFault {
             EmpiricalFault::Latency { .. }
                 | EmpiricalFault::ArmUnsettled
                 | EmpiricalFault::NonlinearStiffness { .. }
+                | EmpiricalFault::Hardening { .. }
                 | EmpiricalFault::LoadedPlay { .. }
                 | EmpiricalFault::TwoJointGear { .. }
         )
@@ -135,6 +147,7 @@ impl EmpiricalFault {
                 out.extend(listed(&["cube of the torque"], "rad/(N m)³"));
                 out
             }
+            EmpiricalFault::Hardening { .. } => listed(&["deflection"], "rad"),
             EmpiricalFault::LoadedPlay { .. } => listed(&["play"], "rad"),
             EmpiricalFault::TwoJointGear { .. } => listed(
                 &[
@@ -172,7 +185,7 @@ impl EmpiricalFault {
             // Relative to a compliance of 1e-5 rad/(N m): the same again at some 30 N m. Of 1 kg in place of some 10: per kg² and kg³.
             EmpiricalFault::NonlinearStiffness { at: 0, .. } => [1e-6, 1e-7][parameter.min(1)],
             EmpiricalFault::NonlinearStiffness { .. } => [1e-4, 1e-4][parameter.min(1)],
-            EmpiricalFault::LoadedPlay { .. } => 0.2_f64.to_radians(),
+            EmpiricalFault::Hardening { .. } | EmpiricalFault::LoadedPlay { .. } => 0.2_f64.to_radians(),
             EmpiricalFault::TwoJointGear { .. } => 3e-4,
             EmpiricalFault::Refraction => 5e-6,
             EmpiricalFault::Pulley | EmpiricalFault::Drum { .. } => 0.5,

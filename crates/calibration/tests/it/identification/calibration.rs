@@ -127,6 +127,7 @@ fn disturbances(sensor: Sensor, turn_rad: f64) -> Vec<Disturbance> {
     }
     let of_pose = [
         EmpiricalFault::NonlinearStiffness { joint: 1, at: 0 },
+        EmpiricalFault::Hardening { joint: 2, at: 4, bend_mnm: 300 },
         EmpiricalFault::Range { from_mm: 1000, to_mm: 3000 },
         EmpiricalFault::LoadedPlay { joint: 1, at: 4 },
         EmpiricalFault::TwoJointGear { joint: 2, other: 3, orders: [1, 1] },
