@@ -11,7 +11,9 @@ use rayon::prelude::*;
 use super::cause::{Cause, MAP_KNOTS, parallel_neighbours};
 use super::design::{Design, Slopes};
 use super::extension::Subject;
-use crate::identification::calibration::{Frames, LoadedRows, joint_rotations, sensor_shifts, torques_at};
+use crate::identification::calibration::{
+    Frames, LoadedRows, TYPICAL_LOAD, joint_rotations, sensor_shifts, torques_at,
+};
 use crate::measurement::dataset::{Dataset, Reading, Sensor};
 use crate::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
 use crate::measurement::sensor::empirical::EmpiricalFault;
@@ -477,10 +479,10 @@ const NEIGHBOURS: [(usize, usize); 10] =
 /// Orders of two-joint gear errors: eccentric and elliptic parts, as for a gear of its own.
 const TWO_JOINT_ORDERS: [[u8; 2]; 4] = [[1, 1], [1, 2], [2, 1], [2, 2]];
 
-/// Frames at which what a joint carries counts as concentrated: elbow, wrist or flange.
+/// Frames at which what a joint carries counts as concentrated: elbow, wrist or flange, and between elbow and wrist.
 fn load_places(joint: usize) -> &'static [u8] {
     match joint {
-        1 => &[2, 4, 6],
+        1 => &[2, 4, 6, TYPICAL_LOAD],
         2 => &[4, 6],
         _ => &[6],
     }

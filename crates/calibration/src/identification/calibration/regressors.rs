@@ -93,7 +93,7 @@ fn fault_rotations(fault: EmpiricalFault, dataset: &Dataset, model: &Model) -> V
     }
 }
 
-/// Static torques (N m) of 1 kg at the origin of frame 1 to 6; at frame 0 of [`torques`].
+/// Static torques (N m) of 1 kg at the origin of frame 1 to 6, or as [`TYPICAL_LOAD`]; at frame 0 of [`torques`].
 pub fn torques_at(dataset: &Dataset, model: &Model, frame: u8) -> Vec<Vector6<f64>> {
     match frame {
         0 => torques(dataset, model),
@@ -112,9 +112,21 @@ fn torques(dataset: &Dataset, model: &Model) -> Vec<Vector6<f64>> {
     dataset.rows.iter().map(torque).collect()
 }
 
-/// Static torques (N m) of 1 kg at the origin of frame 1 to 6 alone.
+/// Code of a load that is divided between elbow and wrist as on the arms of the catalogue whose masses are known.
+pub const TYPICAL_LOAD: u8 = 7;
+
+/// Its share at the wrist, the origin of frame 4; the others are at the elbow, that of frame 2. Of IRB 120, TX60 and UR10, each mass divided by
+/// the lever rule.
+const AT_WRIST: f64 = 0.2;
+
+/// Static torques (N m) of 1 kg at the origin of frame 1 to 6 alone, or divided as [`TYPICAL_LOAD`].
 fn torques_of_lump(dataset: &Dataset, model: &Model, frame: usize) -> Vec<Vector6<f64>> {
-    let lump = |link: usize| Body { mass_kg: f64::from(u8::from(link + 1 == frame)), centre_mm: [0.0; 3] };
+    let share = |link: usize| match link + 1 {
+        2 if frame == usize::from(TYPICAL_LOAD) => 1.0 - AT_WRIST,
+        4 if frame == usize::from(TYPICAL_LOAD) => AT_WRIST,
+        end => f64::from(u8::from(end == frame)),
+    };
+    let lump = |link: usize| Body { mass_kg: share(link), centre_mm: [0.0; 3] };
     let alone =
         Model { bodies: Some(std::array::from_fn(lump)), effects: Vec::new(), ..model.clone() }.statics();
     let unloaded = Condition::default();

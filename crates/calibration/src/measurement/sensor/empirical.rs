@@ -25,7 +25,7 @@ pub enum EmpiricalFault {
         /// The joint.
         joint: usize,
         /// Frame (1 to 6) at whose origin the load counts as concentrated; 0 for the masses of the arm, or 1 kg at its flange where these
-        /// are not known.
+        /// are not known; 7 for a load at elbow and wrist, divided as is usual.
         at: u8,
     },
     /// A joint (0-based) that stiffens under its load: it has yielded by half of its parameter at the torque `bend_mnm`, and by all of it
