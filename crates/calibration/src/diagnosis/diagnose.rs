@@ -431,7 +431,7 @@ fn thin_rows(observed: &Observations) -> Option<Observations> {
 fn poses_needed_at_least(dataset: &Dataset, nominal: &Model) -> Option<usize> {
     let per = dataset.sensor.scalars();
     let parameters = arm_parameters(nominal).len() + frame_parameters(dataset).len();
-    let needed = (3 * parameters).div_ceil(2 * per) + 10;
+    let needed = parameters.div_ceil(per) + 10;
     (count_distinct_poses(dataset, needed) < needed).then_some(needed)
 }
 
