@@ -6,6 +6,7 @@
 //! The same holds for a small cause next to a larger one of the same joint, since no model of a spring or a gear is exact.
 
 use super::cause::{Cause, Part};
+use super::cause_kind::CauseKind;
 use super::confirmation::Confirmation;
 use super::contribution::Contributions;
 use truegrind_arm::model::Model;
@@ -69,7 +70,11 @@ impl Confounding<'_> {
             return self.by_other_thermal_cause(causes, own).into_iter().collect();
         }
         if all(&|cause| cause.rows().is_some()) {
-            return self.by_empirical_fault(own).into_iter().collect();
+            return self
+                .by_empirical_fault(own)
+                .or_else(|| self.by_growth(causes, own))
+                .into_iter()
+                .collect();
         }
         if !all(&Cause::is_in_arm) {
             return if all(&Cause::is_empirical) {
@@ -123,6 +128,20 @@ impl Confounding<'_> {
             "beyond all other causes it explains {own:.4} mm, less than {}, whose exact law is unknown: it might be a residue of that",
             self.causes[larger].kind()
         ))
+    }
+
+    /// A joint's zero that moved in some rows, by less than the arm grew: links that warm up unequally turn joints too.
+    fn by_growth(&self, causes: &[usize], own: f64) -> Option<String> {
+        if causes.iter().any(|&k| self.causes[k].kind() != CauseKind::JointZeroShift) {
+            return None;
+        }
+        // It need not be identified to leave residues.
+        let grows = |k: &usize| self.causes[*k].is_growth_of_arm() && self.confirmations[*k].is_significant();
+        let growth: Vec<usize> = (0..self.causes.len()).filter(grows).collect();
+        let theirs = self.contributions.unique_rms_mm(&growth).hypot(self.growth_mm);
+        (own < theirs).then(|| {
+            format!("it explains {own:.4} mm, less than the growth of the arm, {theirs:.4} mm: links that warm up unequally look the same")
+        })
     }
 
     /// The largest contribution of an empirical fault (mm RMS).

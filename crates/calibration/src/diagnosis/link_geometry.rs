@@ -34,6 +34,18 @@ impl FindingBuilder<'_> {
             let k = self.found.parameters.iter().position(|p| p == parameter)?;
             Some((link, k, joint, coordinate))
         });
+        // Where the law of a sensor is not known, links explain a part of it.
+        let law = self.found.causes.iter().find(|cause| cause.is_empirical() && !cause.is_in_arm());
+        let confidence = if law.is_some() { Confidence::Ambiguous } else { Confidence::Identified };
+        let doubts: Vec<String> = law
+            .map(|cause| {
+                format!(
+                    "{} is in the rows, whose exact law is unknown: links explain a part of it",
+                    cause.kind().words()
+                )
+            })
+            .into_iter()
+            .collect();
         links
             .filter(|(link, ..)| is_implausible(link, tolerance, SURE_LINK_Z))
             .map(|(link, k, joint, coordinate)| {
@@ -44,10 +56,11 @@ impl FindingBuilder<'_> {
                     joints: Some(vec![joint + 1]),
                     parameters: vec![deviation(link)],
                     worth_mm: Some(contributions.unique_of_parameter(linear, k)),
+                    doubts: doubts.clone(),
                     ..words::finding(
                         CauseKind::LinkGeometry,
                         describe(joint + 1, coordinate, link),
-                        Confidence::Identified,
+                        confidence,
                         "no tolerance of making an arm is so wide".to_owned(),
                         gain,
                     )
