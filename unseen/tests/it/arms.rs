@@ -41,7 +41,7 @@ fn torques_are_slopes_of_the_potential_energy() {
             down[j] -= 1e-5;
             let slope = (energy(&up) - energy(&down)) / 2e-5;
             assert!(
-                (torques[j] + slope).abs() < 1e-6,
+                (torques[j] + arm.sense[j] * slope).abs() < 1e-6,
                 "{} joint {}: {} {slope}",
                 sheet.name,
                 j + 1,

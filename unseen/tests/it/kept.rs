@@ -126,7 +126,7 @@ fn a_stand_does_not_drift_for_sure_where_links_may_grow() {
 /// the verdict refused the arm. Then it is geometry alone, as `identify` fits it, and the diagnosis says so.
 #[test]
 fn an_arm_that_is_refused_beside_its_causes_is_geometry_alone() {
-    let case = Case::draw(811, Kind::WarmLinks, 6, Limits::default());
+    let case = Case::draw(811, Kind::WarmLinks, 14, Limits::default());
     let marks = outcome(&case).marks.unwrap();
     assert_eq!(marks.written, Written::Yes);
     assert!(marks.told());

@@ -29,15 +29,14 @@ use truegrind_math::lanes::{SinCos, splats};
 /// ```
 /// use truegrind_arm::condition::Condition;
 /// use truegrind_arm::effect::{Effect, bending::Bending};
-/// use truegrind_arm::model::Joints;
+/// use truegrind_arm::model::{Joints, Model};
 /// use truegrind_arm::robots;
 ///
 /// // 3 kg at the elbow of an arm whose upper link lies level: its end sinks by F L³/3EI = c F L²/3, and so does the load.
 /// let mut arm = robots::load("abb-irb-120")?.model;
 /// let bending = Bending { joint: 1, frame: Some(2), compliance_rad_per_nm: 3.0 * 1e-5 };
-/// let elbow = |arm: &truegrind_arm::model::Model| {
-///     arm.at_condition(&Condition::default()).frames(&Joints::from_degrees([0.0, 90.0, 0.0, 0.0, 0.0, 0.0])).origin[2]
-/// };
+/// let level = Joints::new(0.0, std::f64::consts::FRAC_PI_2, 0.0, 0.0, 0.0, 0.0);
+/// let elbow = |arm: &Model| arm.at_condition(&Condition::default()).frames(&level).origin[2];
 /// let straight = elbow(&arm);
 /// arm.effects.push(Effect::LinkBending(bending));
 /// let (force_n, length_m) = (3.0 * 9.80665, 0.27);
@@ -66,7 +65,7 @@ struct Load<R> {
 
 impl Bending {
     pub(super) fn joint(&self) -> Option<usize> {
-        Some(self.joint)
+        None
     }
 
     pub(super) fn parameters(&self) -> Vec<EffectParameter> {

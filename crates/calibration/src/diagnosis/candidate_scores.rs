@@ -117,6 +117,7 @@ impl<'a> CandidateScores<'a> {
                 let found = shift.strip.as_ref().map_or_else(Vec::new, |s| s.scan(design, 2));
                 found.into_iter().map(|interval| {
                     let rows = [interval.from, interval.to].map(|i| dataset.rows[i].number);
+                    let tried = tried * shift.always.tried;
                     Candidate { tried, ..shift.always.over_rows(dataset, rows) }
                 })
             })

@@ -11,6 +11,9 @@ use super::score::{Score, log_p};
 use crate::measurement::dataset::Sensor;
 use crate::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
 
+/// Prior odds of a stand, target or cable that was moved against a joint that lost counts of its encoder, which is rare, and there are six.
+const JOINT_ZERO_ODDS: f64 = 100.0;
+
 /// A candidate with its score against a fit.
 #[derive(Debug, Clone)]
 pub struct Scored {
@@ -60,8 +63,10 @@ impl Catalogue {
         let shifts: Vec<Arc<Candidate>> = kinds
             .into_iter()
             .map(|kind| {
+                let tried = if matches!(kind, Kind::JointZero { .. }) { JOINT_ZERO_ODDS } else { 1.0 };
                 let disturbance = Disturbance::new(kind, Profile::Constant);
-                Arc::new(Candidate::measurement(disturbance, dataset, subject.nominal, subject.frames))
+                let candidate = Candidate::measurement(disturbance, dataset, subject.nominal, subject.frames);
+                Arc::new(Candidate { tried, ..candidate })
             })
             .collect();
         let mut families: Vec<(CauseKind, Vec<usize>)> = listed

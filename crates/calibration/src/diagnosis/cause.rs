@@ -80,6 +80,7 @@ impl Cause {
     pub fn joints(&self) -> Vec<usize> {
         match self {
             Cause::Arm(Effect::JointCoupling(c)) => vec![c.driver, c.joint],
+            Cause::Arm(Effect::LinkBending(b)) => vec![b.joint],
             Cause::Arm(effect) => effect.joint().into_iter().collect(),
             Cause::Measurement(Disturbance { kind: Kind::Empirical(form), .. }) => form.joints(),
             Cause::Measurement(Disturbance { kind: Kind::JointZero { joint }, .. }) => vec![*joint],

@@ -66,7 +66,11 @@ fn correlate(dataset: &mut Dataset, rho: f64, sigma_mm: f64, seed: u64) {
 
 /// A smooth path of an arm like the data sheet's, read `delay_s` too late by a tracker at the base.
 fn path(delay_s: f64, rows: usize) -> Dataset {
-    let (arm, mut rng) = (arm(), ChaCha8Rng::seed_from_u64(5));
+    path_of(&arm(), delay_s, rows)
+}
+
+fn path_of(arm: &Model, delay_s: f64, rows: usize) -> Dataset {
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
     let target = nalgebra::Point3::new(20.0, -30.0, 80.0);
     let joints = |t: f64| {
         Joints::from_fn(|j, _| {
@@ -344,7 +348,7 @@ fn a_link_that_bends_is_told_from_its_joints() {
 /// written.
 #[test]
 fn play_that_its_load_closes_is_told_and_not_written() {
-    let hidden = [Hidden::LoadedPlay { joint: 2, play_rad: 0.0015 }];
+    let hidden = [Hidden::LoadedPlay { joint: 2, play_rad: 0.0015, closed_nm: 0.05 }];
     let found = diagnosed(&run(&arm(), &hidden, &setup(Sensor::Position, 400, 81)).dataset);
     let play = found.diagnosis.findings.iter().find(|f| f.effect == "backlash").unwrap();
     assert_eq!((play.joints.as_deref(), play.confidence), (Some(&[3][..]), Confidence::Identified));
@@ -358,4 +362,60 @@ fn play_that_its_load_closes_is_told_and_not_written() {
     );
     let backlash = |effect: &Effect| matches!(effect, Effect::Backlash(_));
     assert!(!found.estimated.model.effects.iter().any(backlash));
+}
+
+/// The same, closed by half a newton metre, is a spring that stiffens: neither a gear nor a flank.
+#[test]
+fn a_spring_that_stiffens_is_no_play() {
+    let hidden = [Hidden::LoadedPlay { joint: 2, play_rad: 0.0015, closed_nm: 0.5 }];
+    let found = diagnosed(&run(&arm(), &hidden, &setup(Sensor::Position, 400, 83)).dataset);
+    let spring = &identified(&found)[0];
+    assert_eq!((spring.effect.as_str(), spring.joints.as_deref()), ("joint-stiffness", Some(&[3][..])));
+    assert!(spring.cause.contains("stiffens under its load"), "{}", spring.cause);
+}
+
+/// A joint that lost counts stands off by one angle in all rows before. The written arm is the arm as it is: that of the rows after.
+#[test]
+fn a_joint_that_lost_counts_is_told_with_its_angle() {
+    let hidden = [Hidden::LostCounts { joint: 2, until: 149, rad: 8e-4 }];
+    let found = diagnosed(&run(&arm(), &hidden, &setup(Sensor::Position, 400, 84)).dataset);
+    let lost = &identified(&found)[0];
+    assert_eq!((lost.effect.as_str(), lost.joints.as_deref()), ("joint-zero-shift", Some(&[3][..])));
+    assert_eq!(lost.rows, Some([0, 149]));
+    let offset = &lost.parameters[0];
+    assert!((offset.value - 8e-4).abs() < 4.0 * offset.sigma.unwrap() + 1e-5, "{offset:?}");
+}
+
+/// A tracker with the constant of another reflector reads all distances too long by as much: no scale, and no link.
+#[test]
+fn a_wrong_reflector_constant_is_told_with_its_size() {
+    let hidden = [Hidden::Range { mm: 0.25 }];
+    let found = diagnosed(&run(&arm(), &hidden, &setup(Sensor::Position, 400, 85)).dataset);
+    let range = &identified(&found)[0];
+    assert_eq!(range.effect, "sensor-range");
+    let constant = &range.parameters[0];
+    assert!((constant.value.abs() - 0.25).abs() < 4.0 * constant.sigma.unwrap() + 0.01, "{constant:?}");
+}
+
+/// KUKA counts A1, A4 and A6 against the axes of its links, FANUC states J3 against the horizontal: play is play there too, and a delay
+/// moves every joint the way it turns.
+#[test]
+fn angles_that_are_counted_the_other_way_round_are_no_other_faults() {
+    let kuka = robots::load("kuka-kr10-r1420").unwrap().model;
+    let hidden = [Hidden::Backlash { joint: 0, play_rad: 8e-4 }];
+    let dataset = run(&kuka, &hidden, &setup(Sensor::Position, 300, 86)).dataset;
+    let start = frames(&dataset, &kuka);
+    let found = diagnose(&dataset, "arm", &kuka, &start, &Options::default(), &|_| {}).unwrap();
+    let play = &identified(&found)[0];
+    assert_eq!((play.effect.as_str(), play.joints.as_deref()), ("backlash", Some(&[1][..])));
+    assert!((play.parameters[0].value - 8e-4).abs() < 1e-4, "{:?}", play.parameters);
+
+    let fanuc = robots::load("fanuc-lr-mate-200id").unwrap().model;
+    let dataset = path_of(&fanuc, 0.02, 400);
+    let start = frames(&dataset, &fanuc);
+    let found = diagnose(&dataset, "arm", &fanuc, &start, &Options::default(), &|_| {}).unwrap();
+    let late = &identified(&found)[0];
+    assert_eq!(late.effect, "latency");
+    let delay = &late.parameters[0];
+    assert!((delay.value.abs() - 0.02).abs() < 4.0 * delay.sigma.unwrap() + 1e-4, "{delay:?}");
 }

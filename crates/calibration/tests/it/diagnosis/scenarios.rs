@@ -307,7 +307,12 @@ pub fn cause(hidden: &Hidden) -> Option<Cause> {
             Kind::Load { joints: vec![1, 2], compliance: None },
             rows(from, to),
         )),
-        Hidden::Outliers { .. } | Hidden::Warp { .. } | Hidden::Creep { .. } | Hidden::LoadedPlay { .. } => {
+        Hidden::Outliers { .. }
+        | Hidden::Warp { .. }
+        | Hidden::Creep { .. }
+        | Hidden::LostCounts { .. }
+        | Hidden::Range { .. }
+        | Hidden::LoadedPlay { .. } => {
             return None;
         }
     })

@@ -38,14 +38,25 @@ pub enum Hidden {
         joint: usize,
         play_rad: f64,
     },
-    /// Play that gravity closes, softly where the torque is small.
+    /// Play that gravity closes at about this torque: at almost none a flank, at much a spring that stiffens.
     LoadedPlay {
         joint: usize,
         play_rad: f64,
+        closed_nm: f64,
     },
     /// The link from this joint to the next bends like a beam; its end sags by this where it sags most.
     Bending {
         joint: usize,
+        mm: f64,
+    },
+    /// A joint stands off by this in all rows up to one.
+    LostCounts {
+        joint: usize,
+        until: usize,
+        rad: f64,
+    },
+    /// A tracker reads distances too long by this.
+    Range {
         mm: f64,
     },
     Thermal {
@@ -113,6 +124,8 @@ impl Hidden {
         match self {
             Hidden::Compliance { .. } => "joint-compliance",
             Hidden::Bending { .. } => "link-bending",
+            Hidden::LostCounts { .. } => "joint-zero-shift",
+            Hidden::Range { .. } => "sensor-range",
             Hidden::Gear { order, .. } if *order <= 2.0 => "gear-eccentricity",
             Hidden::Gear { .. } => "gear-transmission",
             Hidden::Ratio { .. } => "gear-ratio",
@@ -136,6 +149,7 @@ impl Hidden {
         match self {
             Hidden::Compliance { joint, .. }
             | Hidden::Bending { joint, .. }
+            | Hidden::LostCounts { joint, .. }
             | Hidden::Gear { joint, .. }
             | Hidden::Ratio { joint, .. }
             | Hidden::Backlash { joint, .. }
@@ -380,7 +394,7 @@ pub fn run(nominal: &Model, hidden: &[Hidden], setup: &Setup) -> Run {
         let read = |skip: Option<usize>| -> Reading {
             let mut turned = u;
             let (mut scale, mut zero) = (1.0, 0.0);
-            let (mut stretched, mut slack, mut load, mut warp) = (1.0, 0.0, 0.0, 0.0);
+            let (mut stretched, mut slack, mut load, mut warp, mut range) = (1.0, 0.0, 0.0, 0.0, 0.0);
             let (mut moved, mut slipped) = (Vector3::zeros(), Vector4::zeros());
             for (k, h) in hidden.iter().enumerate().filter(|(k, _)| Some(*k) != skip) {
                 match h {
@@ -397,9 +411,11 @@ pub fn run(nominal: &Model, hidden: &[Hidden], setup: &Setup) -> Run {
                         let sense = arm.joint_map[(*joint, *joint)].signum();
                         turned[*joint] += 0.5 * play_rad * sense * f64::from(approach[*joint]);
                     }
-                    Hidden::LoadedPlay { joint, play_rad } => {
-                        turned[*joint] += 0.5 * play_rad * (arm.torque(&u, *joint, 0.0) / 0.3).tanh();
+                    Hidden::LoadedPlay { joint, play_rad, closed_nm } => {
+                        turned[*joint] += 0.5 * play_rad * (arm.torque(&u, *joint, 0.0) / closed_nm).tanh();
                     }
+                    Hidden::LostCounts { joint, until, rad } if i <= *until => turned[*joint] += rad,
+                    Hidden::Range { mm } => range += mm,
                     Hidden::Thermal { growth, time_constant_h } => {
                         scale += growth * (1.0 - (-time / time_constant_h).exp());
                     }
@@ -459,6 +475,7 @@ pub fn run(nominal: &Model, hidden: &[Hidden], setup: &Setup) -> Run {
                 }
                 _ => {
                     let away = at - place - moved;
+                    let away = away * (1.0 + range / away.norm());
                     let (s, c) = f64::sin_cos(turn);
                     Reading::Position(
                         Vector3::new(c * away.x + s * away.y, c * away.y - s * away.x, away.z) * stretched,
