@@ -93,7 +93,7 @@ fn fault_rotations(fault: EmpiricalFault, dataset: &Dataset, model: &Model) -> V
     }
 }
 
-/// Static torques (N m) of 1 kg at the origin of frame 1 to 6, or as [`TYPICAL_LOAD`]; at frame 0 of [`torques`].
+/// Static torques (N m) of 1 kg at the origin of frame 1 to 6, or as [`TYPICAL_LOAD`]; at frame 0 of the arm's masses, or of 1 kg at its flange.
 pub fn torques_at(dataset: &Dataset, model: &Model, frame: u8) -> Vec<Vector6<f64>> {
     match frame {
         0 => torques(dataset, model),
