@@ -12,6 +12,7 @@
 use crate::backlash::sides::JointSides;
 use crate::condition::arm_conditions::ArmConditions;
 use crate::segment::condition_schedule::CHORD_MM;
+use nalgebra::Matrix6;
 use truegrind_arm::model::{Joints, PreparedModel};
 use truegrind_math::se3::Pose;
 
@@ -30,6 +31,7 @@ pub(crate) struct PlayOperator<'a> {
     /// The arm at mid-play, with its payload on this segment.
     arm: &'a PreparedModel<'a>,
     play_rad: [f64; 6],
+    joints_of_gears: &'a Matrix6<f64>,
     motor: Joints,
     /// θ − q of the play operator; where the estimated backlash is negative the arm shows its opposite.
     behind: Joints,
@@ -47,7 +49,8 @@ impl<'a> PlayOperator<'a> {
         let sides = conditions.arm(arrival).condition.approach;
         let play_rad = conditions.play_rad;
         let behind = Joints::from_fn(|j, _| 0.5 * play_rad[j].abs() * f64::from(sides[j]));
-        Self { arm: conditions.arm(conditions.middle(onward)), play_rad, motor: *motor, behind }
+        let arm = conditions.arm(conditions.middle(onward));
+        Self { arm, play_rad, joints_of_gears: &conditions.joints_of_gears, motor: *motor, behind }
     }
 
     /// Moves the motors.
@@ -63,7 +66,8 @@ impl<'a> PlayOperator<'a> {
     /// Moves the motors and returns the flange pose.
     fn go(&mut self, motor: &Joints) -> Pose {
         self.take(motor);
-        let link = Joints::from_fn(|j, _| motor[j] + self.behind[j] * self.play_rad[j].signum());
+        let behind = Joints::from_fn(|j, _| self.behind[j] * self.play_rad[j].signum());
+        let link = motor + self.joints_of_gears * behind;
         self.arm.forward(&link)
     }
 

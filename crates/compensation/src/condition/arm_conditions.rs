@@ -4,7 +4,7 @@
 
 use std::collections::HashMap;
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix6, Vector3};
 
 use crate::backlash::sides::JointSides;
 use truegrind_arm::condition::Condition;
@@ -24,6 +24,8 @@ pub(crate) struct ArmConditions<'a> {
     base: Condition,
     /// Backlash of each joint (rad); 0 without.
     pub(crate) play_rad: [f64; 6],
+    /// Angles of the controller for turns of the gears, each in the sense of its own joint: the identity but for an arm with coupled joints.
+    pub(crate) joints_of_gears: Matrix6<f64>,
     condition_indices: HashMap<(JointSides, LoadKey), usize>,
     list: Vec<Inverse<'a>>,
     /// For each condition the one with the same payload and every joint at mid-play.
@@ -38,8 +40,11 @@ impl<'a> ArmConditions<'a> {
                 play_rad[backlash.joint] += backlash.play_rad;
             }
         }
+        let sense = Matrix6::from_diagonal(&model.joint_map.diagonal().map(f64::signum));
+        let joints_of_gears = model.joint_map.try_inverse().map_or_else(Matrix6::identity, |map| map * sense);
         let (condition_indices, list, middles) = (HashMap::new(), Vec::new(), Vec::new());
-        Self { model, nominal, base: *base, play_rad, condition_indices, list, middles }
+        let base = *base;
+        Self { model, nominal, base, play_rad, joints_of_gears, condition_indices, list, middles }
     }
 
     /// Whether the side from which a joint arrives matters.
@@ -88,7 +93,7 @@ impl<'a> ArmConditions<'a> {
     /// Link angles under a condition with motor joints `joints`, without compliance.
     pub(crate) fn links(&self, condition_index: usize, joints: &Joints) -> Joints {
         let sides = self.arm(condition_index).condition.approach;
-        Joints::from_fn(|j, _| joints[j] + 0.5 * self.play_rad[j] * f64::from(sides[j]))
+        joints + self.joints_of_gears * Joints::from_fn(|j, _| 0.5 * self.play_rad[j] * f64::from(sides[j]))
     }
 
     /// Position uncertainty of a point on the flange from joints of unknown backlash side: half the backlash of each, as
