@@ -100,6 +100,11 @@ fn readings_that_resemble_the_one_before_are_no_cause() {
         let found = diagnosed(&dataset);
         let named: Vec<&str> = identified(&found).iter().map(|f| f.effect.as_str()).collect();
         assert!(named.is_empty(), "{sensor:?} {seed}: {named:?}");
+        // What links and frames absorb of a course is no part of what it does to the readings.
+        let left = found.diagnosis.fits.extended.rmse_mm;
+        if let Some(rest) = &found.diagnosis.something_else {
+            assert!(rest.in_time_mm < 2.0 * left && rest.over_poses_mm < 2.0 * left, "{rest:?} of {left} mm");
+        }
     }
 }
 
