@@ -11,8 +11,8 @@
 //! Two compliant joints give the diagonal terms alone: the mixed ones tell a link from its joints. Where the axes point in opposite
 //! directions the torques at the second one change their sign.
 //!
-//! Source: deflections of cantilevers (for instance Gere and Goodno, Mechanics of Materials, appendix of beam deflections, cases of an end
-//! load, an end moment and a uniform load); elastic links beside elastic joints: Klimchik et al. 2014 (doi 10.1016/j.rcim.2013.06.008).
+//! Source: deflections and slopes of cantilevers under an end load, an end moment and a uniform load, as any text on the mechanics of
+//! materials tabulates them (Gere and Goodno, Mechanics of Materials, the appendix on beams).
 
 use nalgebra::{Matrix6, Vector6};
 use serde::{Deserialize, Serialize};
