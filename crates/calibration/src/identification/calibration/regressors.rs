@@ -175,24 +175,17 @@ pub fn sensor_shifts(
             second_degree(&u).map(|v| u * v).to_vec()
         }),
         EmpiricalFault::Drum { from_mm, to_mm } => {
-            let (low, high) = (f64::from(from_mm), f64::from(to_mm));
             shift_columns(&|row, away| {
                 let u = away.normalize();
                 // The measured length: independent of the estimated outlet and zero.
                 let d = if let Reading::Cable(length) = row.reading { length } else { away.norm() };
-                // Scaled to [−1, 1] for Legendre polynomials.
-                let t = (2.0 * d - low - high) / (high - low).max(1.0);
-                vec![u * (0.5 * (3.0 * t * t - 1.0)), u * (0.5 * (5.0 * t * t * t - 3.0 * t))]
+                legendre(d, from_mm, to_mm).map(|p| u * p).to_vec()
             })
         }
-        EmpiricalFault::Range { from_mm, to_mm } => {
-            let (low, high) = (f64::from(from_mm), f64::from(to_mm));
-            shift_columns(&|_, away| {
-                let u = away.normalize();
-                let t = (2.0 * away.norm() - low - high) / (high - low).max(1.0);
-                vec![u, u * (0.5 * (3.0 * t * t - 1.0))]
-            })
-        }
+        EmpiricalFault::Range { from_mm, to_mm } => shift_columns(&|_, away| {
+            let u = away.normalize();
+            vec![u, u * legendre(away.norm(), from_mm, to_mm)[0]]
+        }),
         EmpiricalFault::TargetNest { second } => shift_columns(&|row, away| {
             let turn = posed.forward(&row.joints).rotation * frames.flange_from_target.rotation;
             let seen = turn.inverse() * away.normalize();
@@ -207,6 +200,13 @@ pub fn sensor_shifts(
         }),
         _ => Vec::new(),
     }
+}
+
+/// Second and third Legendre polynomials of a length (mm) between two lengths (mm).
+fn legendre(length_mm: f64, from_mm: u32, to_mm: u32) -> [f64; 2] {
+    let (low, high) = (f64::from(from_mm), f64::from(to_mm));
+    let t = (2.0 * length_mm - low - high) / (high - low).max(1.0);
+    [0.5 * (3.0 * t * t - 1.0), 0.5 * (5.0 * t * t * t - 3.0 * t)]
 }
 
 /// Rows of an arm with the torques of a load, which are computed once for all disturbances that need them.
