@@ -11,8 +11,8 @@ use crate::table::Line;
 use crate::truth::Kind;
 use crate::worth::{Sized, sized};
 
-/// Fresh rows by which a held-out error is judged.
-pub const FRESH: usize = 500;
+/// Fresh series by which a held-out error is judged.
+pub const FRESH_SERIES: usize = 8;
 
 /// Clean poses on which a model of the arm is judged.
 pub const CLEAN: usize = 300;
@@ -100,12 +100,20 @@ impl Case {
         self.read(&self.walk.visits, &mut self.generator(Purpose::Noise))
     }
 
-    /// Fresh visits of the same measurement, and their rows.
-    pub fn fresh(&self) -> (Vec<Visit>, Vec<Line>) {
+    /// [`FRESH_SERIES`] fresh series of the same measurement, each with as many rows as the file, and what leads to them.
+    pub fn fresh(&self) -> Vec<(Vec<Visit>, Vec<Line>)> {
         let mut rng = self.generator(Purpose::Fresh);
-        let visits = self.walk.fresh(self.sheet, FRESH, &mut rng);
-        let lines = self.read(&visits, &mut rng);
-        (visits, lines)
+        let series = (0..FRESH_SERIES).map(|_| {
+            let visits = self.walk.fresh(self.sheet, self.walk.visits.len(), &mut rng);
+            let lines = self.read(&visits, &mut rng);
+            // A cable has no way round its pulley to a target that is nearer than its rim.
+            visits
+                .into_iter()
+                .zip(lines)
+                .filter(|(_, line)| line.reading.lengths().iter().all(|l| l.is_finite()))
+                .unzip()
+        });
+        series.collect()
     }
 
     /// Fresh visits, without any sensor.
@@ -130,7 +138,10 @@ impl Case {
                 let mut noise = white(rng);
                 if let Shape::Correlated(keep) = self.hidden.shape {
                     for (noise, state) in noise.iter_mut().zip(&mut remembered) {
-                        *state = keep * *state + (1.0 - keep * keep).sqrt() * normal(rng);
+                        // From one counted row to the next, as in the file, whatever leads there.
+                        if visit.counted {
+                            *state = keep * *state + (1.0 - keep * keep).sqrt() * normal(rng);
+                        }
                         *noise += self.hidden.size * *state;
                     }
                 }

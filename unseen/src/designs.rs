@@ -128,17 +128,31 @@ impl Walk {
         Self { design, visits, pause, repeats }
     }
 
-    /// Where the arm is at a time: between two rows it goes straight in its joints.
+    /// Where the arm is at a time: between two rows it goes straight in its joints. On a curve it goes smoothly through them, since no speed
+    /// jumps because a sensor is read there (cubic Hermite, slopes by central differences).
     pub fn joints_at(&self, hours: f64) -> Angles {
-        let next = self.visits.partition_point(|v| v.hours < hours);
-        let (Some(a), Some(b)) = (self.visits.get(next.saturating_sub(1)), self.visits.get(next)) else {
-            return if next == 0 { self.visits[0].q } else { self.visits[self.visits.len() - 1].q };
-        };
-        if next == 0 {
-            return b.q;
+        let visits = &self.visits;
+        let next = visits.partition_point(|v| v.hours < hours);
+        let last = visits.len() - 1;
+        if next == 0 || next > last {
+            return visits[next.min(last)].q;
         }
+        let (a, b) = (&visits[next - 1], &visits[next]);
         let share = (hours - a.hours) / (b.hours - a.hours);
-        std::array::from_fn(|j| a.q[j] + share * (b.q[j] - a.q[j]))
+        if self.design != Design::Curve {
+            return std::array::from_fn(|j| a.q[j] + share * (b.q[j] - a.q[j]));
+        }
+        let slope = |k: usize, j: usize| {
+            let (before, after) = (&visits[k.saturating_sub(1)], &visits[(k + 1).min(last)]);
+            (after.q[j] - before.q[j]) / (after.hours - before.hours) * (b.hours - a.hours)
+        };
+        let (t, t2) = (share, share * share);
+        let t3 = t2 * t;
+        let [from, leaving, to, arriving] =
+            [2.0 * t3 - 3.0 * t2 + 1.0, t3 - 2.0 * t2 + t, 3.0 * t2 - 2.0 * t3, t3 - t2];
+        std::array::from_fn(|j| {
+            from * a.q[j] + leaving * slope(next - 1, j) + to * b.q[j] + arriving * slope(next, j)
+        })
     }
 
     /// Length of the measurement (h).

@@ -7,7 +7,7 @@ use crate::sensors::Kind as Measures;
 use crate::shape::{Distance, distance};
 use crate::table::text;
 use crate::truth::{Kind, Mark, Meaning, meanings};
-use crate::under_test::{Finding, Reply, Which, Written, diagnosed};
+use crate::under_test::{Finding, Fresh, Reply, Which, Written, diagnosed};
 
 /// A finding with its mark.
 #[derive(Debug, Clone, PartialEq)]
@@ -154,9 +154,9 @@ pub fn marks(case: &Case, reply: &Reply) -> Result<Marks, String> {
             Marked { finding: finding.clone(), says, mark }
         })
     });
-    let (visits, lines) = case.fresh();
-    let fresh = text(case.sensor.kind, &lines, None);
-    let fresh = reply.fresh(&fresh, &visits)?;
+    let series = case.fresh().into_iter();
+    let errors = series.map(|(visits, lines)| reply.errors(&text(case.sensor.kind, &lines, None), &visits));
+    let fresh = Fresh::of(&errors.collect::<Result<Vec<_>, _>>()?);
     let noise_mm = case.sensor.sigma_mm * (case.sensor.lengths() as f64).sqrt();
     Ok(Marks {
         findings: findings.collect(),
@@ -166,7 +166,7 @@ pub fn marks(case: &Case, reply: &Reply) -> Result<Marks, String> {
         held_out_mm: reply.held_out_mm,
         blocks_mm: reply.held_out_blocks_mm,
         fresh_mm: fresh.extended_mm,
-        near_by_chance: fresh.within_a_tenth(case.walk.visits.len()),
+        near_by_chance: fresh.near_by_chance(),
         fresh_over_noise: [fresh.geometry_mm, fresh.extended_mm].map(|error| error / noise_mm),
         seconds: reply.seconds,
     })

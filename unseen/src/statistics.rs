@@ -22,12 +22,3 @@ pub fn quantile(values: &[f64], share: f64) -> Option<f64> {
     let high = sorted[(low + 1).min(sorted.len() - 1)];
     Some(sorted[low] + rest * (high - sorted[low]))
 }
-
-/// Probability of a standard normal number below `value`, to 1.5e-7 (Abramowitz and Stegun, 7.1.26).
-pub fn normal_below(value: f64) -> f64 {
-    let x = value.abs() / std::f64::consts::SQRT_2;
-    let t = 1.0 / (1.0 + 0.327_591_1 * x);
-    let series = [0.254_829_592, -0.284_496_736, 1.421_413_741, -1.453_152_027, 1.061_405_429];
-    let tail = 0.5 * (-x * x).exp() * t * series.iter().rev().fold(0.0, |sum, a| sum * t + a);
-    if value < 0.0 { tail } else { 1.0 - tail }
-}

@@ -22,7 +22,6 @@ use truegrind_calibration::measurement::split;
 use crate::arms::{Angles, Pose};
 use crate::designs::Visit;
 use crate::shape::shape_sigma;
-use crate::statistics::normal_below;
 
 /// A finding, as the JSON has it.
 #[derive(Debug, Clone, PartialEq)]
@@ -87,62 +86,39 @@ pub struct Reply {
     convention: AngleConvention,
 }
 
-/// Errors on fresh rows.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// Errors on fresh series.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Fresh {
-    /// Geometry alone (RMS, mm).
+    /// Geometry alone (RMS of all series, mm).
     pub geometry_mm: f64,
-    /// The extended model (RMS, mm).
+    /// The extended model (RMS of all series, mm).
     pub extended_mm: f64,
-    /// Poses that are counted.
-    pub poses: usize,
-    /// Rows of a pose.
-    pub rows_of_a_pose: f64,
-    /// Variance over the poses of the extended model's mean square at a pose, in units of the squared mean.
-    pub dispersion: f64,
+    /// The extended model on each series (RMS, mm).
+    pub series_mm: Vec<f64>,
 }
 
 impl Fresh {
-    /// From the errors of rows (mm), those that are counted.
-    pub fn of(geometry: &[f64], extended: &[f64], visits: &[Visit]) -> Self {
-        let mut poses: Vec<(f64, f64)> = Vec::new();
-        let mut sums = [0.0; 2];
-        for ((visit, geometry), extended) in visits.iter().zip(geometry).zip(extended) {
-            if !visit.counted {
-                continue;
-            }
-            if visit.repeat == 0 || poses.is_empty() {
-                poses.push((0.0, 0.0));
-            }
-            sums[0] += geometry * geometry;
-            sums[1] += extended * extended;
-            if let Some((sum, rows)) = poses.last_mut() {
-                *sum += extended * extended;
-                *rows += 1.0;
-            }
-        }
-        let rows: f64 = poses.iter().map(|(_, rows)| rows).sum();
-        let mean = sums[1] / rows;
-        let count = poses.len() as f64;
-        let variance =
-            poses.iter().map(|(sum, rows)| (sum / rows - mean).powi(2)).sum::<f64>() / (count - 1.0);
+    /// From the errors (mm) of geometry and of the extended model on the counted rows of each series.
+    pub fn of(series: &[(Vec<f64>, Vec<f64>)]) -> Self {
+        let rms = |errors: &mut dyn Iterator<Item = &f64>| {
+            let (sum, count) = errors.fold((0.0, 0.0), |(sum, count), e| (sum + e * e, count + 1.0));
+            f64::sqrt(sum / count)
+        };
         Self {
-            geometry_mm: (sums[0] / rows).sqrt(),
-            extended_mm: mean.sqrt(),
-            poses: poses.len(),
-            rows_of_a_pose: rows / count,
-            dispersion: variance / (mean * mean),
+            geometry_mm: rms(&mut series.iter().flat_map(|(geometry, _)| geometry)),
+            extended_mm: rms(&mut series.iter().flat_map(|(_, extended)| extended)),
+            series_mm: series.iter().map(|(_, extended)| rms(&mut extended.iter())).collect(),
         }
     }
 
-    /// The probability that the errors of two independent samples of poses, these and others on `rows` rows, are within 10 % of each
-    /// other by chance alone: their mean squares are normal. Rows whose noise is correlated count as independent, so it is too large
-    /// there.
-    pub fn within_a_tenth(&self, rows: usize) -> f64 {
-        let others = rows as f64 / self.rows_of_a_pose;
-        // Half of the relative variance of a mean square is that of its root.
-        let sigma = 0.5 * (self.dispersion * (1.0 / self.poses as f64 + 1.0 / others)).sqrt();
-        normal_below(1.1_f64.ln() / sigma) - normal_below(0.9_f64.ln() / sigma)
+    /// The share of series whose error is within 10 % of that of all others together: what chance alone leaves of an error that is
+    /// estimated from as many rows, whatever their noise.
+    pub fn near_by_chance(&self) -> f64 {
+        let squares: Vec<f64> = self.series_mm.iter().map(|error| error * error).collect();
+        let (sum, count) = (squares.iter().sum::<f64>(), squares.len() as f64);
+        let near =
+            |square: &&f64| (0.9..=1.1).contains(&(**square / ((sum - **square) / (count - 1.0))).sqrt());
+        squares.iter().filter(near).count() as f64 / count
     }
 }
 
@@ -290,7 +266,7 @@ impl Reply {
     ///
     /// # Errors
     /// What the import would say.
-    pub fn fresh(&self, text: &str, visits: &[Visit]) -> Result<Fresh, String> {
+    pub fn errors(&self, text: &str, visits: &[Visit]) -> Result<(Vec<f64>, Vec<f64>), String> {
         let mut rows = dataset(&read(text)?, self.convention, &self.sheet)?;
         // A fresh row stands in the measurement where its time does. Rows are numbered as in the file, below its headings.
         let first = rows.rows.iter().next().map_or(0, |row| row.number);
@@ -300,7 +276,14 @@ impl Reply {
         let observed = prepare(&rows, &self.sheet, true).observed;
         let [geometry, extended] = [&self.found.geometric, &self.found.extended]
             .map(|fit| errors_on(&observed, &fit.model, &fit.frames));
-        Ok(Fresh::of(&geometry, &extended, visits))
+        let counted = |errors: Vec<f64>| -> Vec<f64> {
+            errors
+                .into_iter()
+                .zip(visits)
+                .filter_map(|(error, visit)| visit.counted.then_some(error))
+                .collect()
+        };
+        Ok((counted(geometry), counted(extended)))
     }
 }
 

@@ -75,6 +75,7 @@ pub mod finding;
 pub mod decision;
 pub mod words;
 pub mod picture;
+pub mod along_turn;
 mod findings;
 mod options;
 mod search;

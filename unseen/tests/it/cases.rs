@@ -1,7 +1,7 @@
 //! Cases are drawn as stated.
 
 use truegrind_unseen::arms::{Arm, Strain};
-use truegrind_unseen::case::{CLEAN, Case, FRESH, Limits};
+use truegrind_unseen::case::{CLEAN, Case, FRESH_SERIES, Limits};
 use truegrind_unseen::designs::Design;
 use truegrind_unseen::draw::Purpose;
 use truegrind_unseen::hidden::Shape;
@@ -71,8 +71,9 @@ fn geometry_itself_is_worth_nothing() {
 fn clean_rows_hold_nothing_but_noise() {
     for run in 0..4 {
         let case = Case::draw(7, Kind::Clean, run, SMALL);
-        let (visits, lines) = case.fresh();
-        for (visits, lines) in [(case.walk.visits.clone(), case.lines()), (visits, lines)] {
+        let mut series = case.fresh();
+        series.push((case.walk.visits.clone(), case.lines()));
+        for (visits, lines) in series {
             let errors: Vec<f64> = lines
                 .iter()
                 .zip(&visits)
@@ -141,19 +142,21 @@ fn designs_are_what_they_are_called() {
             assert!(steps.iter().all(|step| *step < 0.03 * way), "{design:?}");
             assert!(way > 100.0);
         }
-        let (visits, lines) = case.fresh();
-        assert_eq!(visits.len(), lines.len());
-        let counted = visits.iter().filter(|v| v.counted).count();
-        assert!((FRESH..FRESH + walk.repeats).contains(&counted));
-        assert_eq!(case.clean().len(), CLEAN);
-        assert!(visits.iter().all(|v| v.row < n && v.hours <= walk.length_h()));
-        // In the file every counted row follows the pose from which it came, so that its sides follow from the order of the rows.
-        for w in visits.windows(2).filter(|w| w[1].counted) {
-            let from = if w[1].repeat == 0 { w[0].q } else { w[0].before };
-            assert_eq!(w[1].before.map(|q| (q * 1e9).round()), from.map(|q| (q * 1e9).round()));
+        let series = case.fresh();
+        assert_eq!((series.len(), case.clean().len()), (FRESH_SERIES, CLEAN));
+        for (visits, lines) in series {
+            assert_eq!(visits.len(), lines.len());
+            let counted = visits.iter().filter(|v| v.counted).count();
+            assert!((n..n + walk.repeats).contains(&counted));
+            assert!(visits.iter().all(|v| v.row < n && v.hours <= walk.length_h()));
+            // In the file every counted row follows the pose from which it came, so that its sides follow from the order of the rows.
+            for w in visits.windows(2).filter(|w| w[1].counted) {
+                let from = if w[1].repeat == 0 { w[0].q } else { w[0].before };
+                assert_eq!(w[1].before.map(|q| (q * 1e9).round()), from.map(|q| (q * 1e9).round()));
+            }
+            let known = visits.iter().filter(|v| walk.visits.iter().any(|w| w.q == v.q)).count();
+            assert_eq!(known, 0, "a fresh pose was measured");
         }
-        let known = visits.iter().filter(|v| walk.visits.iter().any(|w| w.q == v.q)).count();
-        assert_eq!(known, 0, "a fresh pose was measured");
     }
 }
 

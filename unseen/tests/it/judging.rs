@@ -4,7 +4,6 @@ use std::collections::BTreeSet;
 
 use nalgebra::{UnitQuaternion, Vector3};
 use truegrind_unseen::arms::{Pose, SHEETS, Strain};
-use truegrind_unseen::designs::Visit;
 use truegrind_unseen::draw::{Purpose, between, generator, normal};
 use truegrind_unseen::sensors::Kind as Measures;
 use truegrind_unseen::shape::distance;
@@ -187,27 +186,32 @@ fn only_one_file_names_the_tool() {
     }
 }
 
-/// By chance alone the errors of two samples differ as their sizes allow: readings of one pose count once, and rows that are not counted
-/// not at all.
+/// What chance alone leaves within 10 % is counted among fresh series, so that noise that wanders counts as what it is.
 #[test]
-fn chance_allows_what_the_numbers_of_poses_allow() {
+fn chance_allows_what_fresh_series_show() {
     let mut rng = generator(1, 2, 3, 4, Purpose::Noise);
-    let visit = |k: usize| Visit {
-        q: [0.0; 6],
-        before: [0.0; 6],
-        repeat: k % 5,
-        hours: 0.0,
-        row: k,
-        counted: k < 2500,
+    let mut chance = |keep: f64, rows: usize| {
+        let mut state = normal(&mut rng);
+        let mut series = || {
+            let errors = (0..rows).map(|_| {
+                state = keep * state + (1.0 - keep * keep).sqrt() * normal(&mut rng);
+                state
+            });
+            let errors: Vec<f64> = errors.collect();
+            (errors.iter().map(|e| 2.0 * e).collect(), errors)
+        };
+        let all: Vec<(Vec<f64>, Vec<f64>)> = (0..400).map(|_| series()).collect();
+        let fresh = Fresh::of(&all);
+        assert!(
+            (fresh.extended_mm - 1.0).abs() < 0.05
+                && (fresh.geometry_mm - 2.0 * fresh.extended_mm).abs() < 1e-9
+        );
+        fresh.near_by_chance()
     };
-    let visits: Vec<Visit> = (0..3000).map(visit).collect();
-    let poses: Vec<f64> = (0..600).map(|_| normal(&mut rng)).collect();
-    let errors: Vec<f64> = (0..3000).map(|k| if k < 2500 { poses[k / 5] } else { 100.0 }).collect();
-    let fresh = Fresh::of(&errors, &errors, &visits);
-    assert_eq!((fresh.poses, fresh.rows_of_a_pose), (500, 5.0));
-    // The square of a normal error has twice the variance of its squared mean.
-    assert!((fresh.dispersion - 2.0).abs() < 0.5 && (fresh.extended_mm - 1.0).abs() < 0.1, "{fresh:?}");
-    let exact = Fresh { dispersion: 2.0, ..fresh };
-    // σ of the logarithm of the ratio is ½ √(2 (1/500 + 1/500)): Φ(2.131) − Φ(−2.356).
-    assert!((exact.within_a_tenth(2500) - 0.9742).abs() < 1e-3, "{}", exact.within_a_tenth(2500));
+    // σ of the logarithm of a root mean square is 1 / √(2 n), for n independent errors: Φ(1.348) − Φ(−1.490) and Φ(3.01) − Φ(−3.33).
+    let (few, many) = (chance(0.0, 100), chance(0.0, 500));
+    assert!((few - 0.843).abs() < 0.06 && (many - 0.998).abs() < 0.01, "{few} {many}");
+    // Squares of errors that correlate by ρ count as n (1 − ρ²) / (1 + ρ²) of them, here 20: Φ(0.603) − Φ(−0.666).
+    let wandering = chance(0.96, 500);
+    assert!((wandering - 0.475).abs() < 0.1, "{wandering}");
 }

@@ -11,12 +11,10 @@ use rayon::prelude::*;
 use super::cause::{Cause, MAP_KNOTS, parallel_neighbours};
 use super::design::{Design, Slopes};
 use super::extension::Subject;
-use crate::identification::calibration::{
-    Frames, LoadedRows, TYPICAL_LOAD, joint_rotations, sensor_shifts, torques_at,
-};
+use crate::identification::calibration::{Frames, LoadedRows, joint_rotations, sensor_shifts, torques_under};
 use crate::measurement::dataset::{Dataset, Reading, Sensor};
 use crate::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
-use crate::measurement::sensor::empirical::EmpiricalFault;
+use crate::measurement::sensor::empirical::{AssumedLoad, EmpiricalFault};
 use crate::measurement::split;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::effect::Effect;
@@ -479,12 +477,13 @@ const NEIGHBOURS: [(usize, usize); 10] =
 /// Orders of two-joint gear errors: eccentric and elliptic parts, as for a gear of its own.
 const TWO_JOINT_ORDERS: [[u8; 2]; 4] = [[1, 1], [1, 2], [2, 1], [2, 2]];
 
-/// Frames at which what a joint carries counts as concentrated: elbow, wrist or flange, and between elbow and wrist.
-fn load_places(joint: usize) -> &'static [u8] {
+/// Loads that are assumed of a joint where masses are not known: at elbow, wrist or flange, and between elbow and wrist.
+fn assumed_loads(joint: usize) -> &'static [AssumedLoad] {
+    use AssumedLoad::{ElbowAndWrist, Frame};
     match joint {
-        1 => &[2, 4, 6, TYPICAL_LOAD],
-        2 => &[4, 6],
-        _ => &[6],
+        1 => &[Frame(2), Frame(4), Frame(6), ElbowAndWrist],
+        2 => &[Frame(4), Frame(6)],
+        _ => &[Frame(6)],
     }
 }
 
@@ -492,16 +491,16 @@ fn load_places(joint: usize) -> &'static [u8] {
 const BENDS: [f64; 2] = [0.1, 0.3];
 
 /// Joints that stiffen under their load, with the number of variants.
-fn hardening(subject: &Subject<'_>, joint: usize, places: &[u8]) -> Vec<(EmpiricalFault, f64)> {
-    let tried = (BENDS.len() * places.len()) as f64;
-    let variants = places.iter().flat_map(|&at| {
-        let torques = torques_at(&subject.observed.dataset, subject.nominal, at);
+fn hardening(subject: &Subject<'_>, joint: usize, loads: &[AssumedLoad]) -> Vec<(EmpiricalFault, f64)> {
+    let tried = (BENDS.len() * loads.len()) as f64;
+    let variants = loads.iter().flat_map(|&load| {
+        let torques = torques_under(&subject.observed.dataset, subject.nominal, load);
         let largest = torques.iter().map(|t| t[joint].abs()).fold(0.0, f64::max);
         BENDS.map(|share| {
             // To two digits: one row more must not change the fault.
             let bend = (1e3 * share * largest).max(1.0);
             let unit = 10_f64.powf(bend.log10().floor() - 1.0).max(1.0);
-            EmpiricalFault::Hardening { joint, at, bend_mnm: ((bend / unit).round() * unit) as u32 }
+            EmpiricalFault::Hardening { joint, load, bend_mnm: ((bend / unit).round() * unit) as u32 }
         })
     });
     variants.map(|fault| (fault, tried)).collect()
@@ -513,10 +512,10 @@ fn loaded_plays(nominal: &Model, moves: &dyn Fn(usize) -> bool) -> Vec<(Empirica
     (1..5)
         .filter(|&joint| moves(joint))
         .flat_map(|joint| {
-            let known = nominal.bodies.is_some().then_some(0);
-            let all: Vec<u8> = load_places(joint).iter().copied().chain(known).collect();
+            let known = nominal.bodies.is_some().then_some(AssumedLoad::Masses);
+            let all: Vec<AssumedLoad> = assumed_loads(joint).iter().copied().chain(known).collect();
             let tried = all.len() as f64;
-            all.into_iter().map(move |at| (EmpiricalFault::LoadedPlay { joint, at }, tried))
+            all.into_iter().map(move |load| (EmpiricalFault::LoadedPlay { joint, load }, tried))
         })
         .collect()
 }
@@ -599,13 +598,13 @@ fn empirical_faults(subject: &Subject<'_>, columns: &LoggedColumns) -> Vec<(Empi
     }
     let moves = |j: usize| columns.range_rad[j] > STILL_RAD;
     let exact = out.len();
-    out.push((EmpiricalFault::NonlinearStiffness { joint: 0, at: 0 }, 1.0));
+    out.push((EmpiricalFault::NonlinearStiffness { joint: 0, load: AssumedLoad::Masses }, 1.0));
     for joint in (1..5).filter(|&joint| moves(joint)) {
         let known = subject.nominal.bodies.is_some();
-        let places: &[u8] = if known { &[0] } else { load_places(joint) };
-        let tried = places.len() as f64;
-        out.extend(places.iter().map(|&at| (EmpiricalFault::NonlinearStiffness { joint, at }, tried)));
-        out.extend(hardening(subject, joint, places));
+        let loads = if known { &[AssumedLoad::Masses] } else { assumed_loads(joint) };
+        let tried = loads.len() as f64;
+        out.extend(loads.iter().map(|&load| (EmpiricalFault::NonlinearStiffness { joint, load }, tried)));
+        out.extend(hardening(subject, joint, loads));
     }
     out.extend(loaded_plays(subject.nominal, &moves));
     out.extend(two_joint_gears(subject.nominal, &moves));

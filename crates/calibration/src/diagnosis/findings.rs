@@ -3,6 +3,7 @@
 use nalgebra::DVector;
 use rayon::prelude::*;
 
+use super::along_turn::{along_turn, in_words};
 use super::candidates::Scored;
 use super::catalogue::{Candidate, LoggedColumns};
 use super::cause::{Cause, MAP_KNOTS};
@@ -94,7 +95,22 @@ impl FindingBuilder<'_> {
             findings.push(finding);
             pictures.push(picture);
         }
+        for (place, finding) in findings.iter_mut().enumerate() {
+            self.tell_change_along_turn(finding, (0..places.len()).filter(|&index| places[index] == place));
+        }
         (findings, places, pictures)
+    }
+
+    /// Adds to a finding of a gear's transmission where along the turn it is largest, if it changes there.
+    fn tell_change_along_turn(&self, finding: &mut Finding, indices: impl Iterator<Item = usize>) {
+        let (CauseKind::GearTransmission, Some(&[joint])) = (finding.effect, finding.joints.as_deref())
+        else {
+            return;
+        };
+        let causes: Vec<&Cause> = indices.map(|index| &self.extended.causes[index]).collect();
+        if let Some(stretches) = along_turn(self.subject, joint - 1, &causes) {
+            finding.cause = format!("{}; {}", finding.cause, in_words(stretches));
+        }
     }
 
     /// Whether the joint moved through so small a part of a turn, or of a harmonic's period, that any smooth joint error fits.

@@ -24,4 +24,4 @@ mod problem;
 
 pub use frames::{Frames, Weight};
 pub use problem::CalibrationProblem;
-pub use regressors::{LoadedRows, TYPICAL_LOAD, flange_torques, joint_rotations, sensor_shifts, torques_at};
+pub use regressors::{LoadedRows, flange_torques, joint_rotations, sensor_shifts, torques_under};

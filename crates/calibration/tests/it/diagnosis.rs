@@ -6,6 +6,7 @@ mod simulator;
 #[path = "diagnosis/scenarios.rs"]
 #[allow(dead_code, unreachable_pub)]
 pub(crate) mod scenarios;
+mod along_turn;
 mod certain;
 mod decision;
 mod doubts;

@@ -7,7 +7,7 @@ use nalgebra::{Point3, Vector3, Vector6};
 use super::frames::Frames;
 use crate::measurement::dataset::{Dataset, Reading, Row, Sensor};
 use crate::measurement::sensor::disturbance::Kind;
-use crate::measurement::sensor::empirical::{EmpiricalFault, second_degree};
+use crate::measurement::sensor::empirical::{AssumedLoad, EmpiricalFault, second_degree};
 
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::{Body, Model};
@@ -48,8 +48,8 @@ fn fault_rotations(fault: EmpiricalFault, dataset: &Dataset, model: &Model) -> V
                 out
             })
             .collect(),
-        EmpiricalFault::NonlinearStiffness { joint, at } => {
-            let torques = torques_at(dataset, model, at);
+        EmpiricalFault::NonlinearStiffness { joint, load } => {
+            let torques = torques_under(dataset, model, load);
             [2, 3]
                 .map(|power: i32| {
                     let mut out = none();
@@ -59,15 +59,15 @@ fn fault_rotations(fault: EmpiricalFault, dataset: &Dataset, model: &Model) -> V
                 })
                 .to_vec()
         }
-        EmpiricalFault::Hardening { joint, at, bend_mnm } => {
+        EmpiricalFault::Hardening { joint, load, bend_mnm } => {
             let bend = f64::from(bend_mnm.max(1)) * 1e-3;
             let mut out = none();
             let yields = |t: f64| t / (t.abs() + bend);
-            out[joint] = Some(torques_at(dataset, model, at).iter().map(|t| yields(t[joint])).collect());
+            out[joint] = Some(torques_under(dataset, model, load).iter().map(|t| yields(t[joint])).collect());
             vec![out]
         }
-        EmpiricalFault::LoadedPlay { joint, at } => {
-            let torques = torques_at(dataset, model, at);
+        EmpiricalFault::LoadedPlay { joint, load } => {
+            let torques = torques_under(dataset, model, load);
             let mut out = none();
             // A joint yields along its torque, so a play of p puts its link p/2 from the middle on that side.
             let flank = |t: f64| if t == 0.0 { 0.0 } else { 0.5 * t.signum() };
@@ -93,11 +93,17 @@ fn fault_rotations(fault: EmpiricalFault, dataset: &Dataset, model: &Model) -> V
     }
 }
 
-/// Static torques (N m) of 1 kg at the origin of frame 1 to 6, or as [`TYPICAL_LOAD`]; at frame 0 of the arm's masses, or of 1 kg at its flange.
-pub fn torques_at(dataset: &Dataset, model: &Model, frame: u8) -> Vec<Vector6<f64>> {
-    match frame {
-        0 => torques(dataset, model),
-        frame => torques_of_lump(dataset, model, usize::from(frame)),
+/// Static torques (N m) of an assumed load.
+pub fn torques_under(dataset: &Dataset, model: &Model, load: AssumedLoad) -> Vec<Vector6<f64>> {
+    let end = |frame: usize| move |end: usize| f64::from(u8::from(end == frame));
+    match load {
+        AssumedLoad::Masses => torques(dataset, model),
+        AssumedLoad::Frame(frame) => torques_of_ends(dataset, model, end(usize::from(frame))),
+        AssumedLoad::ElbowAndWrist => torques_of_ends(dataset, model, |end| match end {
+            2 => 1.0 - AT_WRIST,
+            4 => AT_WRIST,
+            _ => 0.0,
+        }),
     }
 }
 
@@ -112,21 +118,13 @@ fn torques(dataset: &Dataset, model: &Model) -> Vec<Vector6<f64>> {
     dataset.rows.iter().map(torque).collect()
 }
 
-/// Code of a load that is divided between elbow and wrist as on the arms of the catalogue whose masses are known.
-pub const TYPICAL_LOAD: u8 = 7;
-
-/// Its share at the wrist, the origin of frame 4; the others are at the elbow, that of frame 2. Of IRB 120, TX60 and UR10, each mass divided by
-/// the lever rule.
+/// Share at the wrist, the origin of frame 4, of a load whose rest is at the elbow, that of frame 2. Of IRB 120, TX60 and UR10, each mass
+/// divided by the lever rule.
 const AT_WRIST: f64 = 0.2;
 
-/// Static torques (N m) of 1 kg at the origin of frame 1 to 6 alone, or divided as [`TYPICAL_LOAD`].
-fn torques_of_lump(dataset: &Dataset, model: &Model, frame: usize) -> Vec<Vector6<f64>> {
-    let share = |link: usize| match link + 1 {
-        2 if frame == usize::from(TYPICAL_LOAD) => 1.0 - AT_WRIST,
-        4 if frame == usize::from(TYPICAL_LOAD) => AT_WRIST,
-        end => f64::from(u8::from(end == frame)),
-    };
-    let lump = |link: usize| Body { mass_kg: share(link), centre_mm: [0.0; 3] };
+/// Static torques (N m) of masses (kg) at the origins of the frames 1 to 6 alone.
+fn torques_of_ends(dataset: &Dataset, model: &Model, mass_kg: impl Fn(usize) -> f64) -> Vec<Vector6<f64>> {
+    let lump = |link: usize| Body { mass_kg: mass_kg(link + 1), centre_mm: [0.0; 3] };
     let alone =
         Model { bodies: Some(std::array::from_fn(lump)), effects: Vec::new(), ..model.clone() }.statics();
     let unloaded = Condition::default();

@@ -6,6 +6,18 @@
 
 use nalgebra::Vector3;
 
+/// What loads a joint whose fault follows its static torque.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum AssumedLoad {
+    /// The masses of the arm, or 1 kg at its flange where these are not known.
+    Masses,
+    /// 1 kg at the origin of a frame, 1 to 6.
+    Frame(u8),
+    /// 1 kg divided between elbow and wrist, as on the arms of the catalogue whose masses are known.
+    ElbowAndWrist,
+}
+
 /// An empirical fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
@@ -24,27 +36,25 @@ pub enum EmpiricalFault {
     NonlinearStiffness {
         /// The joint.
         joint: usize,
-        /// Frame (1 to 6) at whose origin the load counts as concentrated; 0 for the masses of the arm, or 1 kg at its flange where these
-        /// are not known; 7 for a load at elbow and wrist, divided as is usual.
-        at: u8,
+        /// Its load.
+        load: AssumedLoad,
     },
     /// A joint (0-based) that stiffens under its load: it has yielded by half of its parameter at the torque `bend_mnm`, and by all of it
     /// at a torque without end. The torque is part of the fault, not of the rows: subsets of the rows must see the same regressors.
     Hardening {
         /// The joint.
         joint: usize,
-        /// Frame at whose origin the load counts as concentrated, as for a nonlinear spring.
-        at: u8,
-        /// The torque (mN m), of 1 kg where the load is concentrated.
+        /// Its load.
+        load: AssumedLoad,
+        /// The torque (mN m), of that load.
         bend_mnm: u32,
     },
     /// A joint (0-based) whose play its load closes: the flank that bears changes where the static torque changes its sign.
     LoadedPlay {
         /// The joint.
         joint: usize,
-        /// Frame (1 to 6) at whose origin the load counts as concentrated; 0 for the masses of the arm, or 1 kg at its flange where these
-        /// are not known.
-        at: u8,
+        /// Its load.
+        load: AssumedLoad,
     },
     /// A joint error with harmonics of the sum and the difference of multiples of its angle and of another joint's.
     TwoJointGear {
@@ -183,7 +193,9 @@ impl EmpiricalFault {
             EmpiricalFault::Latency { .. } => 0.3,
             EmpiricalFault::ArmUnsettled | EmpiricalFault::SensorUnsettled => 1e-3,
             // Relative to a compliance of 1e-5 rad/(N m): the same again at some 30 N m. Of 1 kg in place of some 10: per kg² and kg³.
-            EmpiricalFault::NonlinearStiffness { at: 0, .. } => [1e-6, 1e-7][parameter.min(1)],
+            EmpiricalFault::NonlinearStiffness { load: AssumedLoad::Masses, .. } => {
+                [1e-6, 1e-7][parameter.min(1)]
+            }
             EmpiricalFault::NonlinearStiffness { .. } => [1e-4, 1e-4][parameter.min(1)],
             EmpiricalFault::Hardening { .. } | EmpiricalFault::LoadedPlay { .. } => 0.2_f64.to_radians(),
             EmpiricalFault::TwoJointGear { .. } => 3e-4,

@@ -14,7 +14,7 @@ use truegrind_arm::parameter::{LinkCoordinate, Parameter, link_parameters};
 use truegrind_calibration::identification::calibration::{CalibrationProblem, Frames, Weight};
 use truegrind_calibration::measurement::dataset::{Dataset, Motion, Reading, Row, Sensor};
 use truegrind_calibration::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
-use truegrind_calibration::measurement::sensor::empirical::EmpiricalFault;
+use truegrind_calibration::measurement::sensor::empirical::{AssumedLoad, EmpiricalFault};
 use truegrind_estimation::problem::Problem;
 use truegrind_math::difference;
 use truegrind_math::lanes::{Instructions, with_instructions};
@@ -126,10 +126,10 @@ fn disturbances(sensor: Sensor, turn_rad: f64) -> Vec<Disturbance> {
         kinds.push((Kind::Sag, Profile::Constant));
     }
     let of_pose = [
-        EmpiricalFault::NonlinearStiffness { joint: 1, at: 0 },
-        EmpiricalFault::Hardening { joint: 2, at: 4, bend_mnm: 300 },
+        EmpiricalFault::NonlinearStiffness { joint: 1, load: AssumedLoad::Masses },
+        EmpiricalFault::Hardening { joint: 2, load: AssumedLoad::Frame(4), bend_mnm: 300 },
         EmpiricalFault::Range { from_mm: 1000, to_mm: 3000 },
-        EmpiricalFault::LoadedPlay { joint: 1, at: 4 },
+        EmpiricalFault::LoadedPlay { joint: 1, load: AssumedLoad::Frame(4) },
         EmpiricalFault::TwoJointGear { joint: 2, other: 3, orders: [1, 1] },
         EmpiricalFault::TwoJointGear { joint: 4, other: 5, orders: [2, 1] },
     ];

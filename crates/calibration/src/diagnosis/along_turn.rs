@@ -1,0 +1,83 @@
+//! Whether a joint's gear error changes along the turn: more in some angles than in others, as of worn teeth or a reducer that runs out.
+//!
+//! The error at the measured angles is compared between stretches of a quarter turn, each by half its range there.
+
+use std::f64::consts::FRAC_PI_2;
+
+use super::cause::Cause;
+use super::extension::Subject;
+use truegrind_arm::condition::Condition;
+use truegrind_arm::effect::Effect;
+use truegrind_arm::model::MappedJoints;
+
+/// Length of a stretch (rad): a whole period from order 4 on, and of order 3 more than half.
+const STRETCH_RAD: f64 = FRAC_PI_2;
+
+/// Fewest rows of a stretch.
+const ROWS: usize = 20;
+
+/// Ratio of the largest to the smallest stretch from which the error counts as one that changes.
+const CHANGES: f64 = 2.0;
+
+/// Half the range of a joint's error in a stretch.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stretch {
+    /// Its middle, as logged (rad).
+    pub at_rad: f64,
+    /// Half the range of the error (rad).
+    pub error_rad: f64,
+}
+
+/// The stretches with the largest and with the smallest error of a joint, where they differ by [`CHANGES`].
+///
+/// `causes` are all of its gear transmission; `joint` counts from 0. `None` where the joint moved through less than two stretches.
+pub fn along_turn(subject: &Subject<'_>, joint: usize, causes: &[&Cause]) -> Option<[Stretch; 2]> {
+    let nominal = subject.nominal;
+    let statics = nominal.statics();
+    let still = Condition::default();
+    let effects = || {
+        causes.iter().filter_map(|cause| match cause {
+            Cause::Arm(effect @ (Effect::GearTransmission(_) | Effect::GearMap(_))) => Some(effect),
+            _ => None,
+        })
+    };
+    let error = |mapped: &MappedJoints| {
+        effects().map(|effect| effect.offset(&statics, mapped, &still)[joint]).sum::<f64>()
+    };
+    let rows = subject.observed.dataset.rows.iter();
+    let mut curve: Vec<(f64, f64)> =
+        rows.map(|row| (row.joints[joint], error(&nominal.mapped(&row.joints)))).collect();
+    curve.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (low, high) = (curve.first()?.0, curve.last()?.0);
+    let stretch = |from: f64| {
+        let inside = curve.iter().filter(|(angle, _)| (from..=from + STRETCH_RAD).contains(angle));
+        let (count, least, most) = inside.fold(
+            (0, f64::INFINITY, f64::NEG_INFINITY),
+            |(count, least, most): (usize, f64, f64), (_, error)| {
+                (count + 1, least.min(*error), most.max(*error))
+            },
+        );
+        (count >= ROWS)
+            .then_some(Stretch { at_rad: from + 0.5 * STRETCH_RAD, error_rad: 0.5 * (most - least) })
+    };
+    let steps = ((high - low - STRETCH_RAD) / (STRETCH_RAD / 6.0)).floor();
+    if steps < 6.0 {
+        return None;
+    }
+    let stretches: Vec<Stretch> =
+        (0..=steps as usize).filter_map(|k| stretch(low + k as f64 * STRETCH_RAD / 6.0)).collect();
+    let by_error = |a: &&Stretch, b: &&Stretch| a.error_rad.total_cmp(&b.error_rad);
+    let both = [*stretches.iter().max_by(by_error)?, *stretches.iter().min_by(by_error)?];
+    (both[0].error_rad > CHANGES * both[1].error_rad).then_some(both)
+}
+
+/// The same as the end of a sentence.
+pub fn in_words([largest, smallest]: [Stretch; 2]) -> String {
+    format!(
+        "its size changes along the turn: ±{:.4}° near {:.0}°, ±{:.4}° near {:.0}°",
+        largest.error_rad.to_degrees(),
+        largest.at_rad.to_degrees(),
+        smallest.error_rad.to_degrees(),
+        smallest.at_rad.to_degrees()
+    )
+}

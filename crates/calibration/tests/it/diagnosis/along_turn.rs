@@ -1,0 +1,60 @@
+//! Where along the turn a gear's error is largest.
+
+use truegrind_arm::effect::Effect;
+use truegrind_arm::effect::harmonic::Harmonic;
+use truegrind_arm::robots;
+use truegrind_calibration::diagnosis::along_turn::along_turn;
+use truegrind_calibration::diagnosis::cause::Cause;
+use truegrind_calibration::diagnosis::diagnose::Options;
+use truegrind_calibration::diagnosis::extension::Subject;
+use truegrind_calibration::diagnosis::preparation::prepare;
+use truegrind_calibration::measurement::dataset::Sensor;
+
+use super::scenarios::frames;
+use super::simulator::{Log, Setup, run};
+
+fn line(joint: usize, order: f64, sine_rad: f64) -> Cause {
+    Cause::Arm(Effect::GearTransmission(Harmonic { joint, order, sine_rad, cosine_rad: 0.0 }))
+}
+
+/// sin 9u (1 + cos u) is sin 9u + ½ sin 8u + ½ sin 10u: twice a harmonic's size at 0°, nothing at 180°.
+#[test]
+fn neighbouring_orders_are_one_error_that_changes_along_the_turn() {
+    let nominal = robots::load("abb-irb-120").unwrap().model;
+    let setup = Setup {
+        sensor: Sensor::Position,
+        rows: 600,
+        sigma_mm: 0.05,
+        dirty: false,
+        seed: 12,
+        log: Log::default(),
+    };
+    let data = run(&nominal, &[], &setup).dataset;
+    let (options, prepared) = (Options::default(), prepare(&data, &nominal, true));
+    let frames = frames(&data, &nominal);
+    let subject = Subject {
+        observed: &prepared.observed,
+        nominal: &nominal,
+        frames: &frames,
+        tolerance: &options.tolerance,
+    };
+    // The joint with the widest range, whose angle the data sheet counts as the controller does.
+    let range = |joint: usize| {
+        let angles = data.rows.iter().map(|row| row.joints[joint]);
+        angles.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), a| (low.min(a), high.max(a)))
+    };
+    let (low, high) = range(3);
+    assert!(low < -2.0 && high > 2.0 && nominal.mapped(&data.rows[0].joints)[3] == data.rows[0].joints[3]);
+    let [one, below, above] = [line(3, 9.0, 1e-3), line(3, 8.0, 5e-4), line(3, 10.0, 5e-4)];
+    let [largest, smallest] = along_turn(&subject, 3, &[&one, &below, &above]).unwrap();
+    assert!(largest.at_rad.abs() < 0.4 && (largest.error_rad - 2e-3).abs() < 1e-4, "{largest:?}");
+    // The outermost stretch, over a quarter turn: the envelope is 1 + cos at its inner end.
+    let inner = smallest.at_rad.abs() - std::f64::consts::FRAC_PI_4;
+    assert!(
+        inner > 1.0 && (smallest.error_rad / (1e-3 * (1.0 + inner.cos())) - 1.0).abs() < 0.15,
+        "{smallest:?}"
+    );
+    // One harmonic is the same everywhere, and the part of another joint is not of this one.
+    assert_eq!(along_turn(&subject, 3, &[&one]), None);
+    assert_eq!(along_turn(&subject, 3, &[&one, &line(0, 8.0, 1e-3)]), None);
+}
