@@ -1,8 +1,9 @@
 //! Whether a joint's gear error changes along the turn: more in some angles than in others, as of worn teeth or a reducer that runs out.
 //!
-//! The error at the measured angles is compared between stretches of a quarter turn, each by half its range there.
+//! The error at the measured angles is compared between stretches, each by half its range there. A stretch is as long as a period of the
+//! largest harmonic, over which a single one has its whole range; a quarter turn where only a map is known.
 
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, TAU};
 
 use super::cause::Cause;
 use super::extension::Subject;
@@ -10,8 +11,8 @@ use truegrind_arm::condition::Condition;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::model::MappedJoints;
 
-/// Length of a stretch (rad): a whole period from order 4 on, and of order 3 more than half.
-const STRETCH_RAD: f64 = FRAC_PI_2;
+/// Shortest stretch (rad).
+const SHORTEST_RAD: f64 = TAU / 12.0;
 
 /// Fewest rows of a stretch.
 const ROWS: usize = 20;
@@ -49,23 +50,28 @@ pub fn along_turn(subject: &Subject<'_>, joint: usize, causes: &[&Cause]) -> Opt
         rows.map(|row| (row.joints[joint], error(&nominal.mapped(&row.joints)))).collect();
     curve.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (low, high) = (curve.first()?.0, curve.last()?.0);
+    let harmonics = effects().filter_map(|effect| match effect {
+        Effect::GearTransmission(harmonic) => Some(harmonic),
+        _ => None,
+    });
+    let strongest = harmonics.max_by(|a, b| a.amplitude_rad().total_cmp(&b.amplitude_rad()));
+    let length = strongest.map_or(FRAC_PI_2, |harmonic| (TAU / harmonic.order).max(SHORTEST_RAD));
     let stretch = |from: f64| {
-        let inside = curve.iter().filter(|(angle, _)| (from..=from + STRETCH_RAD).contains(angle));
+        let inside = curve.iter().filter(|(angle, _)| (from..=from + length).contains(angle));
         let (count, least, most) = inside.fold(
             (0, f64::INFINITY, f64::NEG_INFINITY),
             |(count, least, most): (usize, f64, f64), (_, error)| {
                 (count + 1, least.min(*error), most.max(*error))
             },
         );
-        (count >= ROWS)
-            .then_some(Stretch { at_rad: from + 0.5 * STRETCH_RAD, error_rad: 0.5 * (most - least) })
+        (count >= ROWS).then_some(Stretch { at_rad: from + 0.5 * length, error_rad: 0.5 * (most - least) })
     };
-    let steps = ((high - low - STRETCH_RAD) / (STRETCH_RAD / 6.0)).floor();
+    let steps = ((high - low - length) / (length / 6.0)).floor();
     if steps < 6.0 {
         return None;
     }
     let stretches: Vec<Stretch> =
-        (0..=steps as usize).filter_map(|k| stretch(low + k as f64 * STRETCH_RAD / 6.0)).collect();
+        (0..=steps as usize).filter_map(|k| stretch(low + k as f64 * length / 6.0)).collect();
     let by_error = |a: &&Stretch, b: &&Stretch| a.error_rad.total_cmp(&b.error_rad);
     let both = [*stretches.iter().max_by(by_error)?, *stretches.iter().min_by(by_error)?];
     (both[0].error_rad > CHANGES * both[1].error_rad).then_some(both)
