@@ -29,7 +29,7 @@ pub struct Stretch {
     pub error_rad: f64,
 }
 
-/// The stretches with the largest and with the smallest error of a joint, where they differ by [`CHANGES`].
+/// The stretches with the largest and with the smallest error of a joint, where they differ by a factor of two.
 ///
 /// `causes` are all of its gear transmission; `joint` counts from 0. `None` where the joint moved through less than two stretches.
 pub fn along_turn(subject: &Subject<'_>, joint: usize, causes: &[&Cause]) -> Option<[Stretch; 2]> {
