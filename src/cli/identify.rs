@@ -265,14 +265,15 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     write_model(&found.estimated, arguments.output.as_deref(), arguments.allow_doubtful, batch)
 }
 
-/// Why a model is not written; `None` if its verdict allows it.
+/// Why a model is not written, with the first reason of its verdict; `None` if that allows it.
 pub(super) fn reason_not_written(estimated: &Estimated, allow_doubtful: bool) -> Option<String> {
     let reason = match estimated.verdict.status {
         Judgement::Fail => "the fit failed",
         Judgement::Doubtful if !allow_doubtful => "the model is doubtful (--allow-doubtful writes it anyway)",
         _ => return None,
     };
-    Some(format!("was not written, because {reason}: {}", estimated.verdict.reasons.join("; ")))
+    let first = estimated.verdict.reasons.first().map_or("no reason is given", String::as_str);
+    Some(format!("was not written, because {reason}: {first}"))
 }
 
 /// Writes the reports, and the model if its verdict allows it.

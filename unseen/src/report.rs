@@ -9,7 +9,7 @@ use crate::case::{Case, Limits};
 use crate::file::Trials;
 use crate::score::{Marks, Outcome, WORSE, outcome};
 use crate::stability::{Change, Stability, stability};
-use crate::statistics::{quantile, wilson};
+use crate::statistics::{is_near, quantile, wilson};
 use crate::truth::{Family, Kind, Mark, Meaning};
 use crate::under_test::{Finding, Written};
 
@@ -235,9 +235,13 @@ fn row(name: &str, of: &[&Outcome]) -> String {
         number(middle(&|m| m.distances[3].shape), 4),
         percent(count(&|m| m.worse()[1]), marks.len()),
         [0.25, 0.5, 0.75].map(|q| number(quantile(&ratios, q), 2)).join(" "),
-        percent(ratios.iter().filter(|r| (0.9..=1.1).contains(*r)).count(), ratios.len()),
+        percent(near(&ratios), ratios.len()),
         number(middle(&|m| m.seconds), 1),
     )
+}
+
+fn near(ratios: &[f64]) -> usize {
+    ratios.iter().filter(|ratio| is_near(ratio)).count()
 }
 
 fn marks_in_words(of: &[&Outcome]) -> String {
@@ -258,7 +262,6 @@ fn marks_in_words(of: &[&Outcome]) -> String {
     let at_joint = jointed.iter().filter(|o| o.marks.as_ref().is_ok_and(Marks::told_with_joint)).count();
     let doubtful = marks.iter().map(|m| m.doubtful_names()).fold((0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
     let over = |k: usize| marks.iter().map(|m| m.fresh_over_noise[k]).collect::<Vec<f64>>();
-    let near = |ratios: &[f64]| ratios.iter().filter(|r| (0.9..=1.1).contains(*r)).count();
     let written = |m: &Marks| m.written == Written::Yes;
     let said = marks.iter().filter(|m| written(m));
     let said: Vec<f64> = said.filter_map(|m| Some(m.distances[3].shape / m.shape_sigma_mm?)).collect();

@@ -22,3 +22,8 @@ pub fn quantile(values: &[f64], share: f64) -> Option<f64> {
     let high = sorted[(low + 1).min(sorted.len() - 1)];
     Some(sorted[low] + rest * (high - sorted[low]))
 }
+
+/// Whether a ratio is 1 within 10 %.
+pub fn is_near(ratio: &f64) -> bool {
+    (0.9..=1.1).contains(ratio)
+}

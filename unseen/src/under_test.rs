@@ -22,6 +22,7 @@ use truegrind_calibration::measurement::split;
 use crate::arms::{Angles, Pose};
 use crate::designs::Visit;
 use crate::shape::shape_sigma;
+use crate::statistics::is_near;
 
 /// A finding, as the JSON has it.
 #[derive(Debug, Clone, PartialEq)]
@@ -116,8 +117,7 @@ impl Fresh {
     pub fn near_by_chance(&self) -> f64 {
         let squares: Vec<f64> = self.series_mm.iter().map(|error| error * error).collect();
         let (sum, count) = (squares.iter().sum::<f64>(), squares.len() as f64);
-        let near =
-            |square: &&f64| (0.9..=1.1).contains(&(**square / ((sum - **square) / (count - 1.0))).sqrt());
+        let near = |square: &&f64| is_near(&(**square / ((sum - **square) / (count - 1.0))).sqrt());
         squares.iter().filter(near).count() as f64 / count
     }
 }
@@ -179,7 +179,11 @@ fn answer(text: &str, robot: &str) -> Result<Reply, String> {
         Judgement::Doubtful => Written::Doubtful,
         _ => Written::Yes,
     };
-    let read = Estimated::from_toml(&file).map_err(|error| error.to_string())?;
+    // As a program reads it; a refused arm is in no file.
+    let model = match written {
+        Written::No => found.estimated.model.clone(),
+        _ => Estimated::from_toml(&file).map_err(|error| error.to_string())?.model,
+    };
     let json = serde_json::to_value(&found.diagnosis).map_err(|error| error.to_string())?;
     let error = |stage: &str, key: &str| {
         json["fits"][stage][key].as_f64().ok_or_else(|| format!("fits.{stage}.{key} is no number"))
@@ -193,7 +197,7 @@ fn answer(text: &str, robot: &str) -> Result<Reply, String> {
         written,
         seconds,
         sheet: robot.model,
-        model: read.model,
+        model,
         identified: identified.ok().map(|done| done.estimated.model),
         found,
         convention,
@@ -262,7 +266,7 @@ impl Reply {
     }
 
     /// What geometry alone and the extended model, each with its frames and causes of the measurement, get wrong on fresh rows of
-    /// the same measurement: on those rows of a file that are counted.
+    /// the same measurement (mm), on those rows of a file that are counted.
     ///
     /// # Errors
     /// What the import would say.

@@ -140,6 +140,10 @@ fn key_figures(found: &Diagnosed) -> Vec<KeyFigure> {
         )),
         KeyFigure::new("Held-out, blocks", fits.extended.cv_blocks_rmse_mm, 3, "mm")
             .note(format!("geometry alone: {:.3} mm", fits.geometric.cv_blocks_rmse_mm)),
+        KeyFigure::new("Held-out, regions", fits.extended.cv_regions_rmse_mm, 3, "mm").note(format!(
+            "far from measured poses; geometry alone: {:.3} mm",
+            fits.geometric.cv_regions_rmse_mm
+        )),
         KeyFigure::new("Noise floor", diagnosis.noise_floor_mm, 3, "mm")
             .note(diagnosis.noise_floor_source.clone()),
     ]);

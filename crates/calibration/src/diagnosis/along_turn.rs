@@ -1,15 +1,16 @@
-//! Whether a joint's gear error changes along the turn: more in some angles than in others, as of worn teeth or a reducer that runs out.
+//! Whether the harmonics of a joint's gear add up to an error that changes along the turn: larger at some angles than at others, as of worn
+//! teeth or a reducer that runs out.
 //!
 //! The error at the measured angles is compared between stretches, each by half its range there. A stretch is as long as a period of the
-//! largest harmonic, over which a single one has its whole range; a quarter turn where only a map is known.
+//! lowest order, so that it holds a whole period of every harmonic: a single one has the same range everywhere.
 
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::TAU;
 
 use super::cause::Cause;
 use super::extension::Subject;
+use crate::measurement::dataset::Row;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::effect::Effect;
-use truegrind_arm::model::MappedJoints;
 
 /// Shortest stretch (rad).
 const SHORTEST_RAD: f64 = TAU / 12.0;
@@ -31,31 +32,27 @@ pub struct Stretch {
 
 /// The stretches with the largest and with the smallest error of a joint, where they differ by a factor of two.
 ///
-/// `causes` are all of its gear transmission; `joint` counts from 0. `None` where the joint moved through less than two stretches.
+/// `causes` are all of its gear transmission; `joint` counts from 0. `None` where the joint moved through less than two stretches, and
+/// beside an error map, whose slow part has another range in every stretch.
 pub fn along_turn(subject: &Subject<'_>, joint: usize, causes: &[&Cause]) -> Option<[Stretch; 2]> {
-    let nominal = subject.nominal;
-    let statics = nominal.statics();
-    let still = Condition::default();
-    let effects = || {
-        causes.iter().filter_map(|cause| match cause {
-            Cause::Arm(effect @ (Effect::GearTransmission(_) | Effect::GearMap(_))) => Some(effect),
+    let harmonics = || {
+        causes.iter().map(|cause| match cause {
+            Cause::Arm(effect @ Effect::GearTransmission(harmonic)) => Some((effect, harmonic.order)),
             _ => None,
         })
     };
-    let error = |mapped: &MappedJoints| {
-        effects().map(|effect| effect.offset(&statics, mapped, &still)[joint]).sum::<f64>()
+    let orders = harmonics().map(|harmonic| Some(harmonic?.1)).collect::<Option<Vec<f64>>>()?;
+    let length = (TAU / orders.into_iter().min_by(f64::total_cmp)?).max(SHORTEST_RAD);
+    let (nominal, still) = (subject.nominal, Condition::default());
+    let statics = nominal.statics();
+    let error = |row: &Row| {
+        let u = nominal.mapped(&row.joints);
+        harmonics().flatten().map(|(effect, _)| effect.offset(&statics, &u, &still)[joint]).sum::<f64>()
     };
     let rows = subject.observed.dataset.rows.iter();
-    let mut curve: Vec<(f64, f64)> =
-        rows.map(|row| (row.joints[joint], error(&nominal.mapped(&row.joints)))).collect();
+    let mut curve: Vec<(f64, f64)> = rows.map(|row| (row.joints[joint], error(row))).collect();
     curve.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (low, high) = (curve.first()?.0, curve.last()?.0);
-    let harmonics = effects().filter_map(|effect| match effect {
-        Effect::GearTransmission(harmonic) => Some(harmonic),
-        _ => None,
-    });
-    let strongest = harmonics.max_by(|a, b| a.amplitude_rad().total_cmp(&b.amplitude_rad()));
-    let length = strongest.map_or(FRAC_PI_2, |harmonic| (TAU / harmonic.order).max(SHORTEST_RAD));
     let stretch = |from: f64| {
         let inside = curve.iter().filter(|(angle, _)| (from..=from + length).contains(angle));
         let (count, least, most) = inside.fold(

@@ -339,7 +339,7 @@ fn build_diagnosis(
     mut notes: Vec<String>,
 ) -> (Diagnosis, Vec<Option<Picture>>) {
     let SearchContext { dataset, prepared, subject, searched, .. } = search.context;
-    let (stages, set_aside) = (&search.stages, &search.set_aside);
+    let set_aside = &search.set_aside;
     let noise = residual_tests::noise_model(subject, &search.extended, set_aside);
     let kinds: Vec<CauseKind> = search.found.causes.iter().map(|c| c.kind()).collect();
     let rows = &searched.observed.dataset;
@@ -390,7 +390,7 @@ fn build_diagnosis(
         },
         noise_floor_mm: summary.noise_floor.0,
         noise_floor_source: summary.noise_floor.1,
-        fits: Fits { nominal: stage(&stages[0]), geometric: stage(&stages[1]), extended: stage(&stages[2]) },
+        fits: fits(search),
         steps: summary.steps,
         findings,
         not_testable,
@@ -435,13 +435,24 @@ fn poses_needed_at_least(dataset: &Dataset, nominal: &Model) -> Option<usize> {
     (count_distinct_poses(dataset, needed) < needed).then_some(needed)
 }
 
-fn stage(errors: &StageError) -> Stage {
-    Stage {
-        rmse_mm: errors.fitted.rmse,
-        mean_mm: errors.fitted.mean_absolute,
-        max_mm: errors.fitted.max,
-        cv_rmse_mm: errors.random.rmse,
-        cv_blocks_rmse_mm: errors.blocks.rmse,
+/// The errors of the three stages.
+fn fits(search: &Search<'_>) -> Fits {
+    (search.context.progress)("cross-validating over regions of joint space");
+    let stage = |k: usize, fit: &Extended| {
+        let errors = &search.stages[k];
+        Stage {
+            rmse_mm: errors.fitted.rmse,
+            mean_mm: errors.fitted.mean_absolute,
+            max_mm: errors.fitted.max,
+            cv_rmse_mm: errors.random.rmse,
+            cv_blocks_rmse_mm: errors.blocks.rmse,
+            cv_regions_rmse_mm: search.validation.over_regions(fit).rmse,
+        }
+    };
+    Fits {
+        nominal: stage(0, &search.registered),
+        geometric: stage(1, &search.geometric),
+        extended: stage(2, &search.extended),
     }
 }
 

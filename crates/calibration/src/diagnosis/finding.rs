@@ -40,6 +40,8 @@ pub struct Stage {
     pub cv_rmse_mm: f64,
     /// Held out, contiguous blocks.
     pub cv_blocks_rmse_mm: f64,
+    /// Held out, eight regions of joint space.
+    pub cv_regions_rmse_mm: f64,
 }
 
 /// The three stages.

@@ -46,7 +46,7 @@ impl SearchContext<'_> {
 /// The selected causes, with the fits and their errors.
 pub(super) struct Search<'a> {
     pub(super) context: &'a SearchContext<'a>,
-    registered: Extended,
+    pub(super) registered: Extended,
     pub(super) geometric: Extended,
     /// All causes, fitted to all rows.
     pub(super) extended: Extended,

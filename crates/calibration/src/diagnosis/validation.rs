@@ -33,6 +33,14 @@ pub struct StageError {
 /// Scalar rows times squared parameters from which a fold is refitted by one step.
 const MUCH_WORK: f64 = 1e9;
 
+/// Regions of joint space that are held out.
+const REGIONS: usize = 8;
+
+fn is_much_work(fit: &Extended) -> bool {
+    let p = fit.parameters.len() as f64;
+    fit.problem.rows() as f64 * p * p > MUCH_WORK
+}
+
 /// The folds of cross-validation.
 #[derive(Debug, Clone)]
 pub struct Validation {
@@ -72,8 +80,7 @@ impl Validation {
     /// Fitted and held-out errors of the model of a fit.
     pub fn stage(&self, fit: &Extended) -> StageError {
         let fitted = ErrorSummary::of(errors_on(&self.rows, &fit.model, &fit.frames));
-        let p = fit.parameters.len() as f64;
-        if fit.problem.rows() as f64 * p * p > MUCH_WORK
+        if is_much_work(fit)
             && let Some([random, blocks]) = self.by_steps(fit)
         {
             return StageError { fitted, random, blocks };
@@ -94,55 +101,26 @@ impl Validation {
 
     /// The same with every fold refitted by one step; `None` if a fold leaves parameters undetermined.
     pub fn by_steps(&self, fit: &Extended) -> Option<[ErrorSummary; 2]> {
-        let p = fit.parameters.len();
-        let rows_of = |rows: &[usize]| -> Option<NormalEquations> {
-            let observations: Vec<usize> = rows.iter().map(|&k| self.kept[k]).collect();
-            Some(fit.problem.subsample(&observations)?.normal_equations(&fit.x))
-        };
-        // The random folds partition all rows.
-        let parts = self
-            .random
-            .par_iter()
-            .map(|split| rows_of(&split.test))
-            .collect::<Option<Vec<NormalEquations>>>()?;
-        let added = added_squares(&self.rows, &fit.model, &fit.frames);
-        let mut all = NormalEquations::zeros(p);
-        parts.iter().for_each(|part| all.add(part));
-        all.add_priors(&fit.priors, &fit.x);
-        let refitted = |split: &Split, part: &NormalEquations| -> Option<Vec<f64>> {
-            let mut normal: DMatrix<f64> = &all.matrix - &part.matrix;
-            let gradient: DVector<f64> = &all.gradient - &part.gradient;
-            factored(&mut normal).then_some(())?;
-            let step = back_and_forth(&normal, &gradient)?;
-            let x: Vec<f64> = fit.x.iter().zip(step.iter()).map(|(x, s)| x - s).collect();
-            let (model, frames) = fit.problem.apply(&x);
-            let errors = errors_on(&self.rows.subset(&split.test), &model, &frames);
-            Some(with_uncertain_sides(errors, &split.test, &added))
-        };
-        let random = self
-            .random
-            .par_iter()
-            .zip(&parts)
-            .map(|(split, part)| {
-                let purged = neither(split, self.kept.len());
-                if purged.is_empty() {
-                    return refitted(split, part);
-                }
-                let mut out = rows_of(&purged)?;
-                out.add(part);
-                refitted(split, &out)
-            })
-            .collect::<Option<Vec<_>>>()?;
-        let blocks = self
-            .blocks
-            .par_iter()
-            .map(|split| {
-                let mut out = split.test.clone();
-                out.extend(neither(split, self.kept.len()));
-                refitted(split, &rows_of(&out)?)
-            })
-            .collect::<Option<Vec<_>>>()?;
-        Some([random, blocks].map(|errors| ErrorSummary::of(errors.concat())))
+        let steps = Steps::of(self, fit)?;
+        let random = self.random.par_iter().zip(&steps.parts);
+        let random = random.map(|(split, part)| steps.refitted(split, Some(part)));
+        Some([summary_of(random.collect())?, steps.held_out(&self.blocks)?])
+    }
+
+    /// Error over regions of joint space, each held out whole.
+    pub fn over_regions(&self, fit: &Extended) -> ErrorSummary {
+        let steps = if is_much_work(fit) { self.over_regions_by_steps(fit) } else { None };
+        steps.unwrap_or_else(|| self.over_regions_by_refits(fit))
+    }
+
+    /// The same with every region refitted in full.
+    pub fn over_regions_by_refits(&self, fit: &Extended) -> ErrorSummary {
+        self.held_out(fit, &split::regions(&self.rows.dataset, REGIONS))
+    }
+
+    /// The same with every region refitted by one step; `None` if a region leaves parameters undetermined.
+    pub fn over_regions_by_steps(&self, fit: &Extended) -> Option<ErrorSummary> {
+        Steps::of(self, fit)?.held_out(&split::regions(&self.rows.dataset, REGIONS))
     }
 
     fn held_out(&self, fit: &Extended, splits: &[Split]) -> ErrorSummary {
@@ -170,6 +148,66 @@ impl Validation {
             .collect();
         ErrorSummary::of(errors.concat())
     }
+}
+
+/// Refits of a fit without some of its rows, by one step from the normal equations of all.
+struct Steps<'a> {
+    validation: &'a Validation,
+    fit: &'a Extended,
+    all: NormalEquations,
+    /// Those of the random folds, which partition all rows.
+    parts: Vec<NormalEquations>,
+    added: Vec<f64>,
+}
+
+impl<'a> Steps<'a> {
+    fn of(validation: &'a Validation, fit: &'a Extended) -> Option<Self> {
+        let added = added_squares(&validation.rows, &fit.model, &fit.frames);
+        let all = NormalEquations::zeros(fit.parameters.len());
+        let mut steps = Self { validation, fit, all, parts: Vec::new(), added };
+        let tests = validation.random.par_iter().map(|split| steps.rows_of(&split.test));
+        steps.parts = tests.collect::<Option<Vec<_>>>()?;
+        steps.parts.iter().for_each(|part| steps.all.add(part));
+        steps.all.add_priors(&fit.priors, &fit.x);
+        Some(steps)
+    }
+
+    /// The normal equations of some validated rows.
+    fn rows_of(&self, rows: &[usize]) -> Option<NormalEquations> {
+        let observations: Vec<usize> = rows.iter().map(|&k| self.validation.kept[k]).collect();
+        Some(self.fit.problem.subsample(&observations)?.normal_equations(&self.fit.x))
+    }
+
+    fn held_out(&self, splits: &[Split]) -> Option<ErrorSummary> {
+        summary_of(splits.par_iter().map(|split| self.refitted(split, None)).collect())
+    }
+
+    /// Errors of the rows of a fold that its refit has not seen; `part` are the normal equations of these rows, where known.
+    fn refitted(&self, split: &Split, part: Option<&NormalEquations>) -> Option<Vec<f64>> {
+        let Validation { kept, rows, .. } = self.validation;
+        let purged = neither(split, kept.len());
+        let unseen = match part {
+            Some(part) if purged.is_empty() => part.clone(),
+            Some(part) => {
+                let mut unseen = self.rows_of(&purged)?;
+                unseen.add(part);
+                unseen
+            }
+            None => self.rows_of(&[split.test.as_slice(), &purged].concat())?,
+        };
+        let mut normal: DMatrix<f64> = &self.all.matrix - &unseen.matrix;
+        let gradient: DVector<f64> = &self.all.gradient - &unseen.gradient;
+        factored(&mut normal).then_some(())?;
+        let step = back_and_forth(&normal, &gradient)?;
+        let x: Vec<f64> = self.fit.x.iter().zip(step.iter()).map(|(x, s)| x - s).collect();
+        let (model, frames) = self.fit.problem.apply(&x);
+        let errors = errors_on(&rows.subset(&split.test), &model, &frames);
+        Some(with_uncertain_sides(errors, &split.test, &self.added))
+    }
+}
+
+fn summary_of(errors: Option<Vec<Vec<f64>>>) -> Option<ErrorSummary> {
+    Some(ErrorSummary::of(errors?.concat()))
 }
 
 /// Held-out errors of some rows, with what uncertain change points add to the squares of all rows (none without shifts).

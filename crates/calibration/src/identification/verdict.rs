@@ -24,6 +24,9 @@ const SPOILT: f64 = 0.5;
 /// A parameter farther than this many tolerances from nominal makes the fit fail.
 const IMPLAUSIBLE_DEVIATION: f64 = 6.0;
 
+/// Most of these parameters that the verdict names.
+const NAMED: usize = 4;
+
 /// Note of a verdict without stated limits.
 pub const NO_LIMITS: &str = "held-out error not evaluated: no limits were stated (--limit-rmse, --limit-max)";
 
@@ -67,13 +70,29 @@ impl VerdictBuilder {
     /// Fails for a link parameter too far from nominal. `margin` standard deviations of the estimate are subtracted first: with
     /// wide priors, weakly determined parameters scatter.
     pub fn check_links(&mut self, parameters: &[EstimatedParameter], tolerance: &Tolerance, margin: f64) {
-        for p in parameters.iter().filter(|p| p.is_of_link() && is_implausible(p, tolerance, margin)) {
-            self.fail(format!(
-                "{} is estimated {:.0} tolerances from nominal: wrong units, wrong robot, or an effect that link geometry cannot represent",
-                p.name,
-                (p.value - p.nominal).abs() / tolerance_of(p, tolerance)
-            ));
-        }
+        let implausible =
+            parameters.iter().filter(|p| p.is_of_link() && is_implausible(p, tolerance, margin));
+        let mut off: Vec<(&str, f64)> = implausible
+            .map(|p| (p.name.as_str(), (p.value - p.nominal).abs() / tolerance_of(p, tolerance)))
+            .collect();
+        off.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let subject = match off.as_slice() {
+            [] => return,
+            [(name, off)] => format!("{name} is estimated {off:.0} tolerances from nominal"),
+            [_, _, ..] => {
+                let farthest: Vec<String> =
+                    off.iter().take(NAMED).map(|(name, off)| format!("{name} by {off:.0}")).collect();
+                format!(
+                    "{} link parameters are estimated more than {IMPLAUSIBLE_DEVIATION} tolerances from nominal, {}{}",
+                    off.len(),
+                    if off.len() > NAMED { "the farthest " } else { "" },
+                    farthest.join(", ")
+                )
+            }
+        };
+        self.fail(format!(
+            "{subject}: wrong units, wrong robot, or an effect that link geometry cannot represent"
+        ));
     }
 
     /// Fails if the held-out error increased (RMSE in mm).

@@ -258,6 +258,42 @@ pub fn blocks(data: &Dataset, blocks: usize) -> Vec<Split> {
         .collect()
 }
 
+/// Cross-validation over regions of joint space, each held out whole: what a program may meet where nothing was measured nearby. In an
+/// order of rows that is random, blocks do not show this.
+///
+/// All poses are one region at first; the region with the most rows is halved at the median of the joint that spreads the most there,
+/// until there are `regions`.
+pub fn regions(data: &Dataset, regions: usize) -> Vec<Split> {
+    let mut parts = vec![poses(data)];
+    let rows = |part: &Vec<Vec<usize>>| part.iter().map(Vec::len).sum::<usize>();
+    while parts.len() < regions {
+        let divisible = (0..parts.len()).filter(|&k| parts[k].len() > 1);
+        let Some(largest) = divisible.max_by_key(|&k| rows(&parts[k])) else { break };
+        let upper = upper_half(data, &mut parts[largest]);
+        parts.push(upper);
+    }
+    complements(data.rows.len(), parts.into_iter().map(|part| part.concat()).collect())
+}
+
+/// Takes the upper half of some poses, along the joint that spreads the most.
+fn upper_half(data: &Dataset, poses: &mut Vec<Vec<usize>>) -> Vec<Vec<usize>> {
+    /// Poses that stand nearer along the joint are not separated, such as those of one step of a grid (rad).
+    const APART_RAD: f64 = 1e-3;
+    let angle = |pose: &[usize], joint: usize| data.rows[pose[0]].joints[joint];
+    let variance = |joint: usize| {
+        let mean = poses.iter().map(|pose| angle(pose, joint)).sum::<f64>() / poses.len() as f64;
+        poses.iter().map(|pose| (angle(pose, joint) - mean).powi(2)).sum::<f64>()
+    };
+    let spreads: [f64; 6] = std::array::from_fn(variance);
+    let widest = (0..6).max_by(|&a, &b| spreads[a].total_cmp(&spreads[b])).unwrap_or(0);
+    poses.sort_by(|a, b| angle(a, widest).total_cmp(&angle(b, widest)));
+    let half = poses.len() / 2;
+    let gaps =
+        (1..poses.len()).filter(|&k| angle(&poses[k], widest) - angle(&poses[k - 1], widest) > APART_RAD);
+    let at = gaps.min_by_key(|k| k.abs_diff(half)).unwrap_or(half);
+    poses.split_off(at)
+}
+
 fn shuffled<T>(mut groups: Vec<T>, seed: u64) -> Vec<T> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     // Fisher and Yates.

@@ -90,13 +90,14 @@ fn causes(text: &mut String, found: &Diagnosis) {
         };
         let _ = writeln!(text, "- {} ({sure})", line(&finding.cause));
     }
-    text.push_str("\n## Errors, held out [mm]\n\n| | random | blocks |\n|---|---:|---:|\n");
+    text.push_str("\n## Errors, held out [mm]\n\n| | random | blocks | regions |\n|---|---:|---:|---:|\n");
     let stages = &found.fits;
     for (name, stage) in
         [("data sheet", &stages.nominal), ("geometry", &stages.geometric), ("with causes", &stages.extended)]
     {
-        let [random, blocks] = [stage.cv_rmse_mm, stage.cv_blocks_rmse_mm].map(|v| number(Some(v)));
-        let _ = writeln!(text, "| {name} | {random} | {blocks} |");
+        let [random, blocks, regions] =
+            [stage.cv_rmse_mm, stage.cv_blocks_rmse_mm, stage.cv_regions_rmse_mm].map(|v| number(Some(v)));
+        let _ = writeln!(text, "| {name} | {random} | {blocks} | {regions} |");
     }
     let floor = number(found.noise_floor_mm);
     let _ = writeln!(text, "\nNoise floor {floor} mm; {} rows set aside.\n", found.dataset.set_aside);

@@ -1,6 +1,9 @@
 //! Where along the turn a gear's error is largest.
 
+use std::f64::consts::FRAC_PI_4;
+
 use truegrind_arm::effect::Effect;
+use truegrind_arm::effect::error_map::ErrorMap;
 use truegrind_arm::effect::harmonic::Harmonic;
 use truegrind_arm::robots;
 use truegrind_calibration::diagnosis::along_turn::along_turn;
@@ -46,13 +49,19 @@ fn neighbouring_orders_are_one_error_that_changes_along_the_turn() {
     let [one, below, above] = [line(3, 9.0, 1e-3), line(3, 8.0, 5e-4), line(3, 10.0, 5e-4)];
     let [largest, smallest] = along_turn(&subject, 3, &[&one, &below, &above]).unwrap();
     assert!(largest.at_rad.abs() < 0.4 && (largest.error_rad - 2e-3).abs() < 1e-4, "{largest:?}");
-    // The outermost stretch, of 40°, beside the envelope at its middle.
-    let envelope = 1e-3 * (1.0 + smallest.at_rad.cos());
+    // The outermost stretch, of 45°, has half the range of the function itself there.
+    let angles = (0..=1000).map(|k| smallest.at_rad + FRAC_PI_4 * (f64::from(k) / 1000.0 - 0.5));
+    let (low, high) = angles
+        .map(|u| 1e-3 * (9.0 * u).sin() * (1.0 + u.cos()))
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), e| (low.min(e), high.max(e)));
     assert!(
-        smallest.at_rad.abs() > 2.3 && (smallest.error_rad / envelope - 1.0).abs() < 0.15,
-        "{smallest:?}"
+        smallest.at_rad.abs() > 2.3 && (smallest.error_rad / (0.5 * (high - low)) - 1.0).abs() < 0.02,
+        "{smallest:?}, expected {}",
+        0.5 * (high - low)
     );
-    // One harmonic is the same everywhere, and the part of another joint is not of this one.
+    // One harmonic is the same everywhere, and so are two whose orders are far apart; a map has a range of its own in every stretch.
     assert_eq!(along_turn(&subject, 3, &[&one]), None);
-    assert_eq!(along_turn(&subject, 3, &[&one, &line(0, 8.0, 1e-3)]), None);
+    assert_eq!(along_turn(&subject, 3, &[&line(3, 3.0, 1e-3), &line(3, 80.0, 8e-4)]), None);
+    let map = ErrorMap { joint: 3, knots_rad: vec![1e-3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0] };
+    assert_eq!(along_turn(&subject, 3, &[&one, &Cause::Arm(Effect::GearMap(map))]), None);
 }

@@ -175,6 +175,10 @@ fn a_refit_by_one_step_is_a_refit() {
             let off = step.rmse / refit.rmse - 1.0;
             assert!(off.abs() < 1e-3, "{} against {}", step.rmse, refit.rmse);
         }
+        let regions =
+            [validation.over_regions_by_steps(fitted).unwrap(), validation.over_regions_by_refits(fitted)];
+        let off = regions[0].rmse / regions[1].rmse - 1.0;
+        assert!(off.abs() < 3e-3 && regions[1].rmse > steps[0].rmse, "{regions:?} beside {steps:?}");
         let dataset = &subject.observed.dataset;
         let linear = Linear::of(subject, fitted);
         let held = FoldErrors::of(&linear, &split::folds(dataset, 5, 0));

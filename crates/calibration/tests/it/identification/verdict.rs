@@ -2,9 +2,11 @@
 //! taken for a good model, whatever else makes readings agree with themselves (a scale, noise that was followed, links where
 //! no arm has them).
 
-use truegrind_arm::estimated::{Estimated, Judgement};
+use truegrind_arm::estimated::{Estimated, EstimatedParameter, Judgement};
 use truegrind_calibration::diagnosis;
 use truegrind_calibration::identification::start::candidate_frames;
+use truegrind_calibration::identification::tolerance::Tolerance;
+use truegrind_calibration::identification::verdict::VerdictBuilder;
 use truegrind_calibration::measurement::import;
 
 use super::promise::{Case, Outcome};
@@ -34,6 +36,46 @@ fn a_scale_of_the_sensor_is_named_and_its_model_is_not_written() {
         let found = outcome.found.unwrap().benefit.unwrap().scale.unwrap();
         assert!((found.value - scale).abs() < 4.0 * found.sigma + 5e-4, "{found:?}");
         assert!(found.sigma < 1e-3, "{found:?}");
+    }
+}
+
+/// A fit that ran away is one sentence with the farthest links, not one sentence for each of them.
+#[test]
+fn implausible_links_are_one_reason() {
+    let off = |millimetres: &[f64]| {
+        let parameters: Vec<EstimatedParameter> = millimetres
+            .iter()
+            .enumerate()
+            .map(|(k, off)| EstimatedParameter {
+                name: format!("link{}.a", k + 1),
+                unit: "mm".to_owned(),
+                nominal: 200.0,
+                value: 200.0 + off,
+                sigma: 0.1,
+                prior_sigma: Some(1.0),
+                determined: 0.99,
+            })
+            .collect();
+        let mut verdict = VerdictBuilder::default();
+        verdict.check_links(&parameters, &Tolerance { length_mm: 1.0, ..Tolerance::default() }, 0.0);
+        verdict.build()
+    };
+    assert!(off(&[5.0, -3.0]).reasons.is_empty());
+    let causes = "wrong units, wrong robot, or an effect that link geometry cannot represent";
+    for (millimetres, expected) in [
+        (&[1.0, -9.0][..], "link2.a is estimated 9 tolerances from nominal"),
+        (
+            &[7.0, 2.0, -20.0],
+            "2 link parameters are estimated more than 6 tolerances from nominal, link3.a by 20, link1.a by 7",
+        ),
+        (
+            &[7.0, 8.0, -20.0, 9.0, 30.0],
+            "5 link parameters are estimated more than 6 tolerances from nominal, the farthest link5.a by 30, link3.a by 20, link4.a by 9, link2.a by 8",
+        ),
+    ] {
+        let verdict = off(millimetres);
+        assert_eq!(verdict.status, Judgement::Fail);
+        assert_eq!(verdict.reasons, [format!("{expected}: {causes}")]);
     }
 }
 

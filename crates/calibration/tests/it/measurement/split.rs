@@ -49,6 +49,53 @@ fn folds_cover_every_row_once() {
     assert_eq!(split::folds(&data, 1000, 1).len(), 100, "no more folds than poses");
 }
 
+/// Every region is a box of joint space that no row of another shares, whatever the order of the rows.
+#[test]
+fn regions_cover_every_row_once_and_lie_apart() {
+    let data = repeated();
+    let regions = split::regions(&data, 8);
+    assert_eq!(regions.len(), 8);
+    regions.iter().for_each(|region| check(region, 200));
+    assert!(regions.iter().all(|r| (24..=26).contains(&r.test.len())), "{regions:?}");
+    let range = |rows: &[usize], joint: usize| {
+        let angles = rows.iter().map(|&i| data.rows[i].joints[joint]);
+        angles.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), q| (low.min(q), high.max(q)))
+    };
+    for (k, a) in regions.iter().enumerate() {
+        for b in &regions[k + 1..] {
+            let is_apart = |joint: usize| {
+                let (a, b) = (range(&a.test, joint), range(&b.test, joint));
+                a.1 < b.0 || b.1 < a.0
+            };
+            assert!((0..6).any(is_apart), "{a:?} {b:?}");
+        }
+    }
+    let turned = data.subset(&(0..200).rev().collect::<Vec<usize>>());
+    let mirrored = |split: &Split| {
+        let mut test: Vec<usize> = split.test.iter().map(|i| 199 - i).collect();
+        test.sort_unstable();
+        test
+    };
+    let mut same: Vec<Vec<usize>> = split::regions(&turned, 8).iter().map(mirrored).collect();
+    let mut expected: Vec<Vec<usize>> = regions.into_iter().map(|r| r.test).collect();
+    same.sort();
+    expected.sort();
+    assert_eq!(same, expected);
+}
+
+/// Poses of one step of a grid are not separated, and two poses make no more than two regions.
+#[test]
+fn regions_of_a_grid_are_whole_steps() {
+    let mut data = repeated();
+    for (i, row) in data.rows.iter_mut().enumerate() {
+        row.joints = Joints::zeros();
+        row.joints[0] = f64::from(u8::from(i % 100 >= 40)) + 1e-4 * (i % 100) as f64;
+    }
+    let [low, high] = <[Split; 2]>::try_from(split::regions(&data, 2)).unwrap();
+    assert_eq!((low.test.len(), high.test.len()), (80, 120));
+    assert_eq!(split::regions(&data.subset(&[0, 1]), 8).len(), 2);
+}
+
 /// What belongs together in two splits of the same rows, one of which was left out of the second.
 fn moved(before: &[Split], after: &[Split], gone: usize) -> usize {
     let same = |i: usize| i - usize::from(i > gone);
