@@ -13,7 +13,7 @@ use truegrind::calibration::identification::register::starting_frames;
 use truegrind::calibration::identification::solver::{SOLVERS, by_name};
 use truegrind::calibration::identification::study::study;
 use truegrind::calibration::identification::tolerance::Tolerance;
-use truegrind::calibration::identification::verdict::Limits;
+use truegrind::calibration::identification::verdict::{CONVERGED, Limits, NO_LIMITS};
 use truegrind::calibration::measurement::convention::AngleConvention;
 use truegrind::calibration::measurement::dataset::Dataset;
 use truegrind::calibration::measurement::import::{self, TimeMatching};
@@ -265,15 +265,17 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     write_model(&found.estimated, arguments.output.as_deref(), arguments.allow_doubtful, batch)
 }
 
-/// Why a model is not written, with the first reason of its verdict; `None` if that allows it.
+/// Why a model is not written, with what its verdict has against it; `None` if that allows it.
 pub(super) fn reason_not_written(estimated: &Estimated, allow_doubtful: bool) -> Option<String> {
     let reason = match estimated.verdict.status {
         Judgement::Fail => "the fit failed",
         Judgement::Doubtful if !allow_doubtful => "the model is doubtful (--allow-doubtful writes it anyway)",
         _ => return None,
     };
-    let first = estimated.verdict.reasons.first().map_or("no reason is given", String::as_str);
-    Some(format!("was not written, because {reason}: {first}"))
+    let against = estimated.verdict.reasons.iter().map(String::as_str);
+    let against: Vec<&str> =
+        against.filter(|reason| !reason.ends_with(CONVERGED) && *reason != NO_LIMITS).collect();
+    Some(format!("was not written, because {reason}: {}", against.join("; ")))
 }
 
 /// Writes the reports, and the model if its verdict allows it.

@@ -23,8 +23,8 @@
 //! carries = "base"               # base | other
 //! ```
 //!
-//! Before the first table may stand `robot = "abb-irb-120"`, the robot of the programs, which a model must be of, and
-//! `angles = "wpr"`, what A, B and C of NC programs mean. A value may be `"?"`: it is still to
+//! Before the first table may stand `robot = "abb-irb-120"`, the robot of the programs, which a model must be of, for NC programs
+//! `angles = "wpr"`, what A, B and C mean, and `start_deg = [0, 0, 0, 0, 90, 0]`, the joints in which the arm starts, roughly. A value may be `"?"`: it is still to
 //! be filled in, and nothing is corrected before it is ([`Cell::open`]).
 
 pub mod nc_setup;
@@ -39,6 +39,7 @@ use nalgebra::{Quaternion, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use truegrind_arm::model::Joints;
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{FARTHEST_MM, Listing, Tool, WorkObject};
 use truegrind_programs::nc::orientation::Angles;
@@ -158,6 +159,12 @@ pub enum CellError {
         points: usize,
         /// Sum of the squares.
         work: usize,
+    },
+    /// Joints at the start that are no angles in degrees.
+    #[error("start_deg = {found}: expected six joint angles in degrees")]
+    Start {
+        /// The numbers found.
+        found: String,
     },
     /// An unknown angle convention.
     #[error("angles = \"{found}\": expected one of {}", Angles::words())]
@@ -334,6 +341,10 @@ pub struct Cell {
     /// the programs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub angles: Option<String>,
+    /// Joints as the controller shows them (°), roughly, in which the arm stands where a program begins: NC words state no
+    /// configuration, and of all ways to reach a place whose previous position is unknown the one nearest to these is taken.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub start_deg: Option<[f64; 6]>,
     /// Tools.
     #[serde(default)]
     pub tool: Vec<CellFrame>,
@@ -370,6 +381,9 @@ impl Cell {
         let cell = Cell { open, ..cell };
         if let Some(found) = cell.angles.as_ref().filter(|word| Angles::of(word).is_none()) {
             return Err(CellError::Angles { found: found.clone() });
+        }
+        if let Some(found) = cell.start_deg.filter(|start| !start.iter().all(|q| q.abs() <= MOST_DEG)) {
+            return Err(CellError::Start { found: format!("{found:?}") });
         }
         for (kind, frames) in [(FrameKind::Tool, &cell.tool), (FrameKind::Wobj, &cell.wobj)] {
             let mut stated: HashMap<String, &CellFrame> = HashMap::new();
@@ -432,6 +446,11 @@ impl Cell {
     /// Convention of A, B and C in NC programs, where the file states it.
     pub fn angles(&self) -> Option<Angles> {
         self.angles.as_deref().and_then(Angles::of)
+    }
+
+    /// Joints where a program begins (rad), where the file states them.
+    pub(crate) fn start(&self) -> Option<Joints> {
+        self.start_deg.map(|start| Joints::from(start.map(f64::to_radians)))
     }
 
     /// What an external axis carries, by its index in a target.

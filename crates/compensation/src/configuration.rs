@@ -1,5 +1,7 @@
 //! The joints that the controller selects for a pose and its stated configuration.
 
+use std::cmp::Ordering;
+
 use crate::plan::reason::OutcomeReason;
 use truegrind_arm::inverse::configuration::Configuration;
 use truegrind_arm::inverse::{Inverse, InverseError};
@@ -48,6 +50,41 @@ pub(crate) fn configured(
         }
         Err(error) => Err(OutcomeReason::of_inverse(error)),
     }
+}
+
+/// The joints of a flange pose that states no configuration (NC), where nothing tells how the arm came there: the solution nearest to
+/// where the cell file says that it starts, or the most usual one.
+///
+/// Usual are a wrist in front of axis 1, an elbow that is not turned back, and an axis 4 near zero, whichever way the maker counts
+/// axis 5: a tool that points down stands at +90° on an ABB and at −90° on a FANUC.
+pub(crate) fn unstated(
+    nominal: &Inverse<'_>,
+    flange: &Pose,
+    start: Option<&Joints>,
+) -> Result<Joints, OutcomeReason> {
+    if let Some(start) = start {
+        return nominal.solve_near(flange, start).map(|s| s.joints).map_err(OutcomeReason::of_inverse);
+    }
+    const WRIST: i32 = 1;
+    let unusual = |joints: &Joints| {
+        let back = nominal.configuration(joints).cfx & !WRIST;
+        [f64::from(back), joints[3].abs(), joints[5].abs(), joints[0].abs()]
+    };
+    let all = nominal.all(flange).into_iter().map(|solution| (unusual(&solution.joints), solution.joints));
+    let compare = |a: &[f64; 4], b: &[f64; 4]| a.partial_cmp(b).unwrap_or(Ordering::Equal);
+    if let Some((_, joints)) = all.min_by(|a, b| compare(&a.0, &b.0)) {
+        return Ok(joints);
+    }
+    // Where no configuration reaches the pose, what prevents the nearest one.
+    let wanted = Configuration { cf1: 0, cf4: 0, cf6: 0, cfx: 0 };
+    match nominal.solve_configured(flange, &wanted, None) {
+        Err(InverseError::OtherConfiguration { nearest, .. }) => {
+            nominal.solve_configured(flange, &nearest, None)
+        }
+        other => other,
+    }
+    .map(|s| s.joints)
+    .map_err(OutcomeReason::of_inverse)
 }
 
 /// Whether the controller checks the configuration of a motion.

@@ -8,7 +8,6 @@ use nalgebra::{Point3, Vector3};
 use crate::arms::Arms;
 use crate::backlash::sides::{MotionEnd, ReachedEnd, backlash_sides};
 use crate::cell::Cell;
-use crate::configuration::{configured, monitored};
 use crate::deviation::{After, Deviation, ON_SURFACE_MM, PathPoint, PathReport, Status};
 use crate::frames::frame_table::FrameTable;
 use crate::plan::reason::OutcomeReason;
@@ -240,7 +239,7 @@ fn commanded_end(
             }
             let commanded = t.pose();
             let flange = mounting.flange_for(&commanded);
-            (commanded, configured(&arms.nominal, &flange, &t, monitored(motion), near)?)
+            (commanded, frame_table.joints(motion, &t, &flange, &arms.nominal, near)?)
         }
         TargetValue::Joint(t) => {
             let joints = Joints::from_fn(|i, _| t.robot_deg[i].to_radians());

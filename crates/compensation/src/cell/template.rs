@@ -170,6 +170,12 @@ impl Writer {
             }
             None => self.line("# robot = \"abb-irb-120\"", "with it a model of another robot is refused"),
         }
+        if programs.iter().any(|program| program.language == Language::Nc) {
+            self.line(
+                "# start_deg = [0, 0, 0, 0, 90, 0]",
+                "joints (°), roughly, in which the arm starts: NC states none",
+            );
+        }
         if convention {
             let words = Angles::words().replace(", ", " | ");
             self.ask("angles", &format!("what A, B and C mean: {words}"));

@@ -5,11 +5,12 @@ use std::collections::{HashMap, HashSet};
 
 use crate::arms::Arms;
 use crate::cell::{Carries, Cell};
-use crate::configuration::configured;
+use crate::configuration::{configured, monitored, unstated};
 use crate::frames::frame_pair::{FramePair, ResolveContext, ResolvedFrames, resolve_frames};
 use crate::frames::taught::Teaching;
 use crate::plan::reason::OutcomeReason;
 use crate::search_budget;
+use truegrind_arm::inverse::Inverse;
 use truegrind_arm::inverse::budget::{SearchBudget, with_budget};
 use truegrind_arm::model::Joints;
 use truegrind_math::se3::Pose;
@@ -26,6 +27,8 @@ pub(crate) struct FrameTable {
     base: [bool; 6],
     /// Assumptions about external axes, and contradictions with the cell file.
     assumed: Vec<String>,
+    /// Joints where the program begins, as the cell file states them.
+    start: Option<Joints>,
 }
 
 impl FrameTable {
@@ -36,6 +39,7 @@ impl FrameTable {
             objects: Vec::new(),
             base: [false; 6],
             assumed: Vec::new(),
+            start: cell.start(),
         };
         let teaching = Teaching::of(arms.nominal.arm(), arms.estimated.arm(), cell, listing);
         let first_motions = first_motions(listing);
@@ -54,7 +58,7 @@ impl FrameTable {
             };
             let here = first_motions.get(&(tool, object)).map_or(&[][..], Vec::as_slice);
             let found = with_budget(&mut budget, || {
-                let typical = || typical_joints(here, tv.frame.pose(), ov, arms);
+                let typical = || typical_joints(here, tv.frame.pose(), ov, arms, out.start.as_ref());
                 let typical_at = LazyCell::new(Box::new(typical) as Box<dyn Fn() -> Joints + '_>);
                 let (teaching, inverse) = (&teaching, &arms.nominal);
                 resolve_frames(
@@ -78,6 +82,26 @@ impl FrameTable {
         }
         out.external_axes(listing, arms, cell);
         out
+    }
+
+    /// The joints that the controller selects for a target of a motion.
+    pub(crate) fn joints(
+        &self,
+        motion: &Motion,
+        target: &RobTarget,
+        flange: &Pose,
+        nominal: &Inverse<'_>,
+        near: Option<&Joints>,
+    ) -> Result<Joints, OutcomeReason> {
+        if near.is_none() && !motion.accepts_configuration {
+            return unstated(nominal, flange, self.start.as_ref());
+        }
+        configured(nominal, flange, target, monitored(motion), near)
+    }
+
+    /// Whether the cell file says where a motion begins of which the program does not tell it.
+    pub(crate) fn knows_start(&self, motion: &Motion) -> bool {
+        self.start.is_some() && !motion.accepts_configuration
     }
 
     /// Which external axes carry the base: those that the cell file declares so and, where it is silent, those of targets
@@ -161,7 +185,13 @@ fn first_motions(listing: &Listing) -> HashMap<(u32, u32), Vec<&Motion>> {
 }
 
 /// Joints of the first reachable target of these motions, at which the effect of unknown origins is estimated.
-fn typical_joints(motions: &[&Motion], tool: Pose, object: &WorkObjectValue, arms: &Arms<'_>) -> Joints {
+fn typical_joints(
+    motions: &[&Motion],
+    tool: Pose,
+    object: &WorkObjectValue,
+    arms: &Arms<'_>,
+    start: Option<&Joints>,
+) -> Joints {
     let mounting = FramePair {
         tool,
         object: object.user_frame.pose() * object.object_frame.pose(),
@@ -173,11 +203,14 @@ fn typical_joints(motions: &[&Motion], tool: Pose, object: &WorkObjectValue, arm
     });
     motions
         .iter()
-        .filter_map(|m| m.to())
-        .filter_map(|t| t.value.ok().and_then(|v| v.cartesian().copied()))
-        .find_map(|t| {
-            let flange = mounting.flange_for(&t.pose());
-            configured(&arms.nominal, &flange, &t, Switch::Off, None).ok()
+        .filter_map(|motion| Some((motion, *motion.to()?.value.ok()?.cartesian()?)))
+        .find_map(|(motion, target)| {
+            let flange = mounting.flange_for(&target.pose());
+            if motion.accepts_configuration {
+                configured(&arms.nominal, &flange, &target, Switch::Off, None).ok()
+            } else {
+                unstated(&arms.nominal, &flange, start).ok()
+            }
         })
         .unwrap_or(middle)
 }

@@ -83,6 +83,15 @@ pub fn contradictions(listing: &Listing, cell: &Cell, nominal: &Model) -> Vec<St
     if !unusable.is_empty() {
         return unusable;
     }
+    if let Some(joint) = cell.start().and_then(|start| nominal.limits.violated(&start)) {
+        return vec![format!(
+            "cell file: start_deg: joint {} is outside its range of {:.1}° to {:.1}°: state the joints as the controller shows them, \
+             in degrees",
+            joint + 1,
+            nominal.limits.min_rad[joint].to_degrees(),
+            nominal.limits.max_rad[joint].to_degrees()
+        )];
+    }
     let condition = Condition::default();
     let arm = nominal.at_condition(&condition);
     let teaching = Teaching::of(&arm, &arm, cell, listing);

@@ -386,10 +386,12 @@ fn start(
             let intended = t.pose();
             let flange = commanded.flange_for(&intended);
             let monitored = monitored(target_refs.motion);
-            let joints = configured(&arms.nominal, &flange, &t, monitored, near.map(|near| &near.joints))?;
+            let from = near.map(|near| &near.joints);
+            let joints = frame_table.joints(target_refs.motion, &t, &flange, &arms.nominal, from)?;
             let cfx = arms.nominal.configuration(&joints).cfx;
             let guess = match near {
                 Some(near) => near.guess(monitored),
+                None if frame_table.knows_start(target_refs.motion) => BranchGuess::Known,
                 None if monitored == Switch::Off && arms.nominal.all(&flange).len() > 1 => {
                     BranchGuess::Guessed
                 }

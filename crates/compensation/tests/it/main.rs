@@ -15,6 +15,7 @@ mod joint_limits;
 mod reasons;
 mod remedy;
 mod singularity;
+mod start;
 mod taught;
 
 use nalgebra::{DMatrix, Vector3, Vector6};
