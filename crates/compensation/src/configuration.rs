@@ -1,7 +1,5 @@
 //! The joints that the controller selects for a pose and its stated configuration.
 
-use std::cmp::Ordering;
-
 use crate::plan::reason::OutcomeReason;
 use truegrind_arm::inverse::configuration::Configuration;
 use truegrind_arm::inverse::{Inverse, InverseError};
@@ -55,8 +53,9 @@ pub(crate) fn configured(
 /// The joints of a flange pose that states no configuration (NC), where nothing tells how the arm came there: the solution nearest to
 /// where the cell file says that it starts, or the most usual one.
 ///
-/// Usual are a wrist in front of axis 1, an elbow that is not turned back, and an axis 4 near zero, whichever way the maker counts
-/// axis 5: a tool that points down stands at +90° on an ABB and at −90° on a FANUC.
+/// Usual are a wrist in front of axis 1, an elbow that is not turned back, and of what is left the joints nearest to zero, by the sum
+/// of their sizes, whichever way the maker counts them: a tool that points down has axis 5 at +90° on an ABB and at −90° on a FANUC,
+/// and axis 4 at 0° on both.
 pub(crate) fn unstated(
     nominal: &Inverse<'_>,
     flange: &Pose,
@@ -68,11 +67,10 @@ pub(crate) fn unstated(
     const WRIST: i32 = 1;
     let unusual = |joints: &Joints| {
         let back = nominal.configuration(joints).cfx & !WRIST;
-        [f64::from(back), joints[3].abs(), joints[5].abs(), joints[0].abs()]
+        (back, joints.abs().sum())
     };
     let all = nominal.all(flange).into_iter().map(|solution| (unusual(&solution.joints), solution.joints));
-    let compare = |a: &[f64; 4], b: &[f64; 4]| a.partial_cmp(b).unwrap_or(Ordering::Equal);
-    if let Some((_, joints)) = all.min_by(|a, b| compare(&a.0, &b.0)) {
+    if let Some((_, joints)) = all.min_by(|(a, _), (b, _)| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))) {
         return Ok(joints);
     }
     // Where no configuration reaches the pose, what prevents the nearest one.

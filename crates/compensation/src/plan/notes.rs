@@ -79,8 +79,8 @@ pub(crate) fn unchecked_notes(listing: &Listing, solved: &SolvedTargets, uncheck
         out.push(if listing.numbered {
             format!(
                 "before {count} of the motions the position of the arm is unknown, and no NC word states the \
-                 configuration: in front, elbow not back, axis 4 near zero is assumed, unchecked ({lines}); state in the \
-                 cell file where the arm starts (start_deg)"
+                 configuration: wrist in front, elbow not turned back, joints nearest to zero are assumed, unchecked \
+                 ({lines}); state in the cell file where the arm starts (start_deg)"
             )
         } else {
             format!(

@@ -53,6 +53,14 @@ fn joints_deg(plan: &Plan) -> Vec<[f64; 6]> {
     joints.map(|q| std::array::from_fn(|j| q[j].to_degrees())).collect()
 }
 
+/// A UR arm turns every joint by a whole turn either way; its elbow is up.
+#[test]
+fn a_ur_arm_begins_without_whole_turns() {
+    let plan = planned(&arm("universal-robots-ur10"), &listing(500.0, 200.0), &Cell::default());
+    let q = joints_deg(&plan)[0];
+    assert!(q[1] < 0.0 && q[2] > 0.0 && q.iter().all(|q| q.abs() < 180.0), "{q:?}");
+}
+
 /// A robot, where its tool points down before it (mm), the sign of axis 1 and of axis 5 as its maker counts them.
 const ARMS: [(&str, [f64; 2], f64, f64); 6] = [
     ("abb-irb-120", [350.0, 250.0], 1.0, 1.0),
