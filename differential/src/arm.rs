@@ -7,6 +7,8 @@
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
+use crate::joint_map::JointMap;
+
 /// A pose (mm).
 pub type Pose = Isometry3<f64>;
 
@@ -58,10 +60,14 @@ pub struct Arm {
     pub nominal: [Link; 6],
     /// Links as they are.
     pub actual: [Link; 6],
+    /// How the controller counts the joints; everything but the axes' own angles is as counted.
+    pub map: JointMap,
     /// Lowest joint angles (rad).
     pub min: [f64; 6],
     /// Highest joint angles (rad).
     pub max: [f64; 6],
+    /// How far the third axis itself turns, whatever is counted (rad).
+    pub elbow: [f64; 2],
     /// Masses of the links; none where the maker does not say.
     pub masses: Option<[Mass; 6]>,
     /// What each joint yields (rad per N m).
@@ -88,20 +94,22 @@ fn frames(links: &[Link; 6], angles: &[f64; 6]) -> [Pose; 7] {
 impl Arm {
     /// The flange as the controller computes it.
     pub fn nominal_forward(&self, q: &[f64; 6]) -> Pose {
-        frames(&self.nominal, q)[6]
+        frames(&self.nominal, &self.map.axes(q))[6]
     }
 
     /// The flange as it stands.
     pub fn actual_forward(&self, q: &[f64; 6], circumstance: &Circumstance) -> Pose {
         let yields = self.compliance.iter().any(|c| *c != 0.0);
         let torque = if yields { self.torques(q, circumstance) } else { [0.0; 6] };
-        let angles = std::array::from_fn(|j| q[j] + self.compliance[j] * torque[j] + circumstance.behind[j]);
+        let axes = self.map.axes(q);
+        let angles =
+            std::array::from_fn(|j| axes[j] + self.compliance[j] * torque[j] + circumstance.behind[j]);
         frames(&self.actual, &angles)[6]
     }
 
     /// Torque of gravity about each axis (N m).
     pub fn torques(&self, q: &[f64; 6], circumstance: &Circumstance) -> [f64; 6] {
-        let at = frames(&self.actual, q);
+        let at = frames(&self.actual, &self.map.axes(q));
         let mut weights: Vec<(usize, f64, Point3<f64>)> = Vec::new();
         for (j, mass) in self.masses.iter().flatten().enumerate() {
             weights.push((j, mass.kg, at[j + 1] * Point3::from(mass.centre)));
@@ -137,8 +145,8 @@ impl Arm {
     pub fn nominal_nearest(&self, flange: &Pose, near: &[f64; 6]) -> Option<[f64; 6]> {
         let mut best: Option<(f64, [f64; 6])> = None;
         for branch in self.branches(flange) {
-            let nearest = |j: usize| {
-                let fits = |angle: &f64| *angle >= self.min[j] - 1e-9 && *angle <= self.max[j] + 1e-9;
+            let nearest = |j: usize, q: &[f64; 6]| {
+                let fits = |angle: &f64| self.is_within(j, *angle, q[1]);
                 let all = (-2..=2).map(|turn| branch[j] + TAU * f64::from(turn)).filter(fits);
                 all.min_by(|a, b| (a - near[j]).abs().total_cmp(&(b - near[j]).abs()))
             };
@@ -146,7 +154,7 @@ impl Arm {
             let mut far = 0.0_f64;
             let mut reached = true;
             for j in 0..6 {
-                match nearest(j) {
+                match nearest(j, &q) {
                     Some(angle) => (q[j], far) = (angle, far.max((angle - near[j]).abs())),
                     None => reached = false,
                 }
@@ -158,20 +166,28 @@ impl Arm {
         best.map(|best| best.1)
     }
 
+    /// Whether a joint goes to an angle while the second one stands at `second`.
+    fn is_within(&self, joint: usize, angle: f64, second: f64) -> bool {
+        let counted = [self.min[joint], self.max[joint]];
+        let within = |angle: f64, [low, high]: [f64; 2]| angle >= low - 1e-9 && angle <= high + 1e-9;
+        let axis = self.map.sign[2] * angle + self.map.coupling * second;
+        within(angle, counted) && (joint != 2 || within(axis, self.elbow))
+    }
+
     fn turns(&self, branch: &[f64; 6], joint: usize, here: &mut [f64; 6], out: &mut Vec<[f64; 6]>) {
         if joint == 6 {
             return out.push(*here);
         }
         for turn in -2..=2 {
             let angle = branch[joint] + TAU * f64::from(turn);
-            if angle >= self.min[joint] - 1e-9 && angle <= self.max[joint] + 1e-9 {
+            if self.is_within(joint, angle, here[1]) {
                 here[joint] = angle;
                 self.turns(branch, joint + 1, here, out);
             }
         }
     }
 
-    /// The branches of the closed form, each angle within half a turn.
+    /// The branches of the closed form, the angles about the axes within half a turn, as counted.
     fn branches(&self, flange: &Pose) -> Vec<[f64; 6]> {
         let l = &self.nominal;
         let wrist = flange * Point3::new(0.0, 0.0, -l[5].d);
@@ -194,6 +210,7 @@ impl Arm {
                 self.wrist(flange, wrapped(q1), q2, q3, &mut out);
             }
         }
+        out.iter_mut().for_each(|axes| *axes = self.map.counted(axes));
         out
     }
 
@@ -222,14 +239,17 @@ impl Arm {
     }
 
     /// How far the arm stands from its three singularities: wrist centre over axis 1 (share of the reach), arm stretched
-    /// (sine), axes 4 and 6 in line (sine). The signs tell the branches apart.
+    /// (sine), axes 4 and 6 in line (sine). The signs tell the branches apart: the arm leans forward and axis 5 is positive as
+    /// counted.
     pub fn borders(&self, q: &[f64; 6]) -> [f64; 3] {
         let l = &self.nominal;
+        let [_, forward, _, _, fifth, _] = self.map.sign;
+        let q = self.map.axes(q);
         let bend = l[3].d.atan2(l[2].a);
         let (upper, lower) = (l[1].a, l[2].a.hypot(l[3].d));
         let (first, second) = (q[1] + l[1].theta, q[1] + l[1].theta + q[2] + bend);
         let reach = l[0].a + upper * first.cos() + lower * second.cos();
-        [reach / (upper + lower), (second - first).sin(), q[4].sin()]
+        [forward * reach / (upper + lower), forward * (second - first).sin(), fifth * q[4].sin()]
     }
 
     /// Joints at which the *actual* arm has its flange at a pose, from a start (Newton's method).

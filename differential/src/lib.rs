@@ -13,6 +13,7 @@
 //! Only [`under_test`] names truegrind. Lengths are in mm, angles in rad.
 
 pub mod arm;
+pub mod joint_map;
 pub mod model;
 pub mod nc;
 pub mod outcome;

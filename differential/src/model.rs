@@ -8,6 +8,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::arm::{Arm, Link, Mass};
+use crate::joint_map::JointMap;
 
 /// A robot of the test.
 struct Sheet {
@@ -54,6 +55,9 @@ fn sheets() -> [Sheet; 3] {
     ]
 }
 
+/// Where NC programs begin, about the axes (rad).
+pub const START: [f64; 6] = [0.8, 0.3, 0.2, 0.0, 1.0, 0.8];
+
 /// An arm with its model file.
 #[derive(Debug, Clone)]
 pub struct Case {
@@ -63,6 +67,8 @@ pub struct Case {
     pub model_toml: String,
     /// The name of the arm in truegrind's catalogue.
     pub robot: &'static str,
+    /// What a cell file says of where the arm starts; nothing for an arm whose joints are counted plainly.
+    pub start_toml: String,
     /// Whether joints have play.
     pub play: bool,
     /// Whether joints yield under load.
@@ -77,17 +83,30 @@ pub fn random(seed: u64) -> Case {
     let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x61726d);
     let play = rng.random_bool(0.4);
     let load = rng.random_bool(0.4);
-    made(&mut rng, play, load)
+    made(&mut rng, play, load, JointMap::PLAIN)
+}
+
+/// The same arm with a controller that counts some joints the other way round, and half of the time the third from the horizontal.
+pub fn mapped(seed: u64) -> Case {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x6d_6170);
+    let sign = std::array::from_fn(|_| if rng.random_bool(0.5) { 1.0 } else { -1.0 });
+    let coupling = [0.0, 0.0, -1.0, 1.0][rng.random_range(0..4)];
+    let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x61726d);
+    let play = rng.random_bool(0.4);
+    let load = rng.random_bool(0.4);
+    made(&mut rng, play, load, JointMap { sign, coupling })
 }
 
 /// A random arm, with or without play and load.
 pub fn with(seed: u64, play: bool, load: bool) -> Case {
-    made(&mut ChaCha8Rng::seed_from_u64(seed ^ 0x61726d), play, load)
+    made(&mut ChaCha8Rng::seed_from_u64(seed ^ 0x61726d), play, load, JointMap::PLAIN)
 }
 
-fn made(rng: &mut ChaCha8Rng, play: bool, load: bool) -> Case {
+fn made(rng: &mut ChaCha8Rng, play: bool, load: bool, map: JointMap) -> Case {
     let mut all = sheets();
     let sheet = &mut all[rng.random_range(0..3)];
+    let elbow = [sheet.min_deg[2], sheet.max_deg[2]].map(f64::to_radians);
+    [sheet.min_deg, sheet.max_deg] = map.counted_range(&sheet.min_deg, &sheet.max_deg);
     let [a1, d1, a2, a3, d4, d6] = sheet.lengths;
     let link = |a, d, alpha, theta| Link { a, d, alpha, theta, beta: 0.0 };
     let nominal = [
@@ -123,14 +142,21 @@ fn made(rng: &mut ChaCha8Rng, play: bool, load: bool) -> Case {
     let arm = Arm {
         nominal,
         actual,
+        map,
         min: sheet.min_deg.map(f64::to_radians),
         max: sheet.max_deg.map(f64::to_radians),
+        elbow,
         masses: sheet.masses.take(),
         compliance: joints(load, 1e-4 / stiff),
         play: joints(play, 8e-4),
     };
     let model_toml = toml(&arm, sheet);
-    Case { arm, model_toml, robot: sheet.name, play, load, whole_cuts: rng.random_bool(0.25) }
+    let whole_cuts = rng.random_bool(0.25);
+    let start_toml = match map == JointMap::PLAIN {
+        true => String::new(),
+        false => format!("start_deg = {:?}\n", map.counted(&START).map(f64::to_degrees)),
+    };
+    Case { arm, model_toml, robot: sheet.name, start_toml, play, load, whole_cuts }
 }
 
 /// The model file.
@@ -186,9 +212,7 @@ fn toml(arm: &Arm, sheet: &Sheet) -> String {
 }
 
 fn chain(out: &mut String, name: &str, links: &[Link; 6], arm: &Arm, sheet: &Sheet) {
-    let rows: Vec<String> = (0..6)
-        .map(|i| format!("{:?}", std::array::from_fn::<f64, 6, _>(|j| if i == j { 1.0 } else { 0.0 })))
-        .collect();
+    let rows = arm.map.rows().map(|row| format!("{row:?}"));
     let _ = write!(
         out,
         "\n[{name}]\njoint_map = [{}]\nmin_deg = {:?}\nmax_deg = {:?}\ngravity = [0.0, 0.0, -1.0]\nflange_mm = [0.0, 0.0, \
@@ -224,9 +248,12 @@ mod tests {
     #[test]
     fn inverse_finds_the_joints_again() {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
-        for seed in 0..300 {
-            let arm = random(seed).arm;
+        for seed in 0..600 {
+            let arm = if seed < 300 { random(seed) } else { mapped(seed) }.arm;
             let q: [f64; 6] = std::array::from_fn(|j| rng.random_range(arm.min[j]..arm.max[j]));
+            let mut axes = arm.map.axes(&q);
+            axes[2] = rng.random_range(arm.elbow[0]..arm.elbow[1]);
+            let q = arm.map.counted(&axes);
             let flange = arm.nominal_forward(&q);
             let all = arm.nominal_inverse(&flange, Some(&q));
             assert!(all.iter().all(|q| difference(&arm.nominal_forward(q), &flange).0 < 1e-8));

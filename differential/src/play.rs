@@ -1,6 +1,7 @@
 //! Joints with play as gears have it: a link stays where it is until one of its flanks takes it along.
 
 use crate::arm::{Arm, Circumstance, Pose, difference};
+use crate::joint_map::JointMap;
 
 /// A joint that comes to rest on a flank again to within this has not left it (rad).
 const TOUCHING: f64 = 1e-12;
@@ -8,6 +9,8 @@ const TOUCHING: f64 = 1e-12;
 /// Where the links of an arm are while its motors move.
 #[derive(Debug, Clone)]
 pub struct Links {
+    /// What turns the gears, of the angles that the controller counts.
+    map: JointMap,
     /// Half of the play of each joint (rad).
     half: [f64; 6],
     /// The angles of the links; none where nothing is known of the way on which the motors came.
@@ -18,8 +21,8 @@ pub struct Links {
 
 impl Links {
     /// Links of which nothing is known yet.
-    pub fn new(play: &[f64; 6], rest: [f64; 6]) -> Self {
-        Self { half: play.map(|play| 0.5 * play), at: None, rest }
+    pub fn new(arm: &Arm, rest: [f64; 6]) -> Self {
+        Self { map: arm.map, half: arm.play.map(|play| 0.5 * play), at: None, rest }
     }
 
     /// Whether any joint has play.
@@ -35,15 +38,17 @@ impl Links {
         self.rest[0] = -self.rest[0];
     }
 
-    /// The motors go on, each in one direction.
-    pub fn go(&mut self, motor: &[f64; 6]) {
+    /// The motors go on, each in one direction, to where the controller counts `joints`.
+    pub fn go(&mut self, joints: &[f64; 6]) {
+        let motor = self.map.axes(joints);
         let (half, rest) = (self.half, self.rest);
         let before = self.at.unwrap_or_else(|| std::array::from_fn(|j| motor[j] + rest[j] * half[j]));
         self.at = Some(std::array::from_fn(|j| before[j].clamp(motor[j] - half[j], motor[j] + half[j])));
     }
 
-    /// How far the links are before their motors (rad), which stand at these angles; nothing has been lost since.
-    pub fn behind(&self, motor: &[f64; 6]) -> [f64; 6] {
+    /// How far the links are before their motors (rad), which stand where the controller counts `joints`; nothing has been lost since.
+    pub fn behind(&self, joints: &[f64; 6]) -> [f64; 6] {
+        let motor = self.map.axes(joints);
         match self.at {
             Some(at) if self.have_play() => std::array::from_fn(|j| at[j] - motor[j]),
             _ => [0.0; 6],
@@ -51,8 +56,8 @@ impl Links {
     }
 
     /// The flank on which each link lies: −1 where its motor pushed it from below, 1 from above, 0 for neither, in words.
-    pub fn flanks(&self, motor: &[f64; 6]) -> String {
-        let behind = self.behind(motor);
+    pub fn flanks(&self, joints: &[f64; 6]) -> String {
+        let behind = self.behind(joints);
         (0..6)
             .map(|j| match (self.half[j], behind[j]) {
                 (0.0, _) => '.',
@@ -124,7 +129,9 @@ mod tests {
 
     #[test]
     fn a_link_waits_until_the_play_is_taken_up() {
-        let mut links = Links::new(&[0.2, 0.0, 0.0, 0.0, 0.0, 0.0], [0.0; 6]);
+        let mut arm = crate::model::with(1, false, false).arm;
+        arm.play = [0.2, 0.0, 0.0, 0.0, 0.0, 0.0];
+        let mut links = Links::new(&arm, [0.0; 6]);
         let mut at = |angle: f64| {
             let motor = [angle, 0.0, 0.0, 0.0, 0.0, 0.0];
             links.go(&motor);

@@ -42,7 +42,7 @@ pub fn many(
 pub fn run(dialect: Dialect, seed: u64, features: Features) -> Tally {
     match dialect {
         Dialect::Rapid => rapid::run(seed, features),
-        other => crate::nc::run(other, seed, &crate::model::random(seed)),
+        other => crate::nc::run(other, seed, &features.arm(seed)),
     }
 }
 
@@ -70,7 +70,7 @@ pub fn one(dialect: Dialect, seed: u64, features: Features) -> String {
         }
     }
     if dialect != Dialect::Rapid {
-        let shown = crate::nc::shown(dialect, seed, &crate::model::random(seed), Default::default());
+        let shown = crate::nc::shown(dialect, seed, &features.arm(seed), Default::default());
         let corrected = shown.corrected.unwrap_or_else(|error| error);
         let _ = writeln!(out, "---- original\n{}\n---- corrected\n{corrected}", shown.original);
         let _ = writeln!(out, "{}", line(dialect.name(), &shown.tally, 0.0));

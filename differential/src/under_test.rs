@@ -73,6 +73,8 @@ pub struct Row {
     pub start_known: bool,
     /// Whether it is flagged since it rests on a configuration that the controller does not check.
     pub guessed: bool,
+    /// Whether it keeps its numbers since the correction of it comes out as the same ones.
+    pub right: bool,
 }
 
 /// Bytes that were replaced.
@@ -189,6 +191,7 @@ pub fn corrected_task(
             bend_mm: outcome.path_deviation_mm,
             start_known: motion.previous.is_some(),
             guessed: outcome.reason == Some(OutcomeReason::UnknownStart),
+            right: outcome.reason == Some(OutcomeReason::NoChange),
         });
     }
     Ok(out)
@@ -207,6 +210,7 @@ fn refused(files: &[(&str, &[u8])], program: &Program<'_>, reason: &str) -> Corr
         bend_mm: None,
         start_known: motion.previous.is_some(),
         guessed: false,
+        right: false,
     });
     let same = |(_, bytes): &(&str, &[u8])| CorrectedFile { bytes: bytes.to_vec(), edits: Vec::new() };
     CorrectedTask { files: files.iter().map(same).collect(), rows: rows.collect() }

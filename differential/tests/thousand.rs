@@ -25,6 +25,20 @@ fn displacements_from_where_the_robot_stands_agree() {
     assert!(wrong.is_empty(), "{} wrong:\n{}", wrong.len(), wrong.join("\n"));
 }
 
+/// The class: makers count joints the other way round, or the third from the horizontal. Where an NC program begins is in the cell file;
+/// only what no text tells, as the way behind a probe, stays open.
+#[test]
+fn joints_that_are_counted_otherwise_agree() {
+    let mapped = Features { mapped: true, ..Features::ALL };
+    for (dialect, tally, _) in report::many(&Dialect::ALL, 9_100_000, 400 * Dialect::ALL.len(), mapped) {
+        println!("{}", report::line(dialect.name(), &tally, 0.0));
+        assert!(tally.corrected >= 400, "{}: {} corrected", dialect.name(), tally.corrected);
+        assert!(tally.open <= tally.corrected / 20, "{}: {} open", dialect.name(), tally.open);
+        let wrong: Vec<String> = tally.disagreements.iter().map(ToString::to_string).collect();
+        assert!(wrong.is_empty(), "{} wrong:\n{}", wrong.len(), wrong.join("\n"));
+    }
+}
+
 /// Programs in which original and correction once disagreed: units, shifts, tools and increments in doubt where ways meet; a
 /// shift of G92 under radius compensation; a whole circle with play; a joint that seemed to turn near the end of a line; a
 /// tool taught at poses whose least squares came out wrong; joints with play that turn where the wrist goes by itself, or on
@@ -36,8 +50,16 @@ fn displacements_from_where_the_robot_stands_agree() {
 /// a turn about the tool that a block states which is left; a work offset that a called program has set; sides of play told from
 /// guessed joints; a way so near to a singularity that joints are fast, or past it on the other side by a whole turn; an arc at the
 /// border of what a controller takes for one; angles left out under a tool that is turned otherwise; a configuration that is
-/// checked in the first cycle alone.
-const ONCE_WRONG: [(Dialect, u64); 60] = [
+/// checked in the first cycle alone; a motion that is left behind a flagged guess with which the arm came elsewhere; a shift of
+/// which one axis is not told; a block whose numbers stand since G92 makes a corrected place the zero.
+const ONCE_WRONG: [(Dialect, u64); 67] = [
+    (Dialect::Fanuc, 229_300_743),
+    (Dialect::Fanuc, 219_800_282),
+    (Dialect::LinuxCnc, 227_700_167),
+    (Dialect::LinuxCnc, 217_900_257),
+    (Dialect::Rapid, 227_600_055),
+    (Dialect::Rapid, 226_300_653),
+    (Dialect::Rapid, 220_300_740),
     (Dialect::Rapid, 221_000_520),
     (Dialect::Rapid, 212_200_116),
     (Dialect::Rapid, 212_200_043),

@@ -68,7 +68,7 @@ pub(super) fn judge(
     let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x6f70_7469);
     let tolerance_mm = if rng.random_bool(0.3) { 0.05 } else { 20.0 };
     let options = Options { tolerance_mm, ..Options::default() };
-    let done = match corrected(name, text.as_bytes(), case, "", &options) {
+    let done = match corrected(name, text.as_bytes(), case, &case.start_toml, &options) {
         Ok(done) => done,
         Err(error) => {
             tally.disagreements.push(wrong(0, "no-result", error.clone()));

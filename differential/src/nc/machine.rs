@@ -212,6 +212,15 @@ impl<'s> Machine<'s> {
         self.turn = Turn::Unknown;
     }
 
+    /// The zero of the coordinates moves along their own axes, by so much; `None` where that is not told. Nothing turns, so
+    /// what is not told of one axis takes nothing from the others.
+    pub fn move_zero(&mut self, by: [Option<f64>; 3], chain: Option<Pose>) {
+        self.chain = chain;
+        for (at, by) in self.at.iter_mut().zip(by) {
+            *at = at.zip(by).map(|(at, by)| at - by);
+        }
+    }
+
     /// Where the tool stands is not known any more.
     pub fn lost(&mut self) {
         self.at = [None; 3];

@@ -78,7 +78,7 @@ fn reached(case: &Case) -> [f64; 3] {
         [-60.0, 60.0].iter().all(|by| {
             let [out, side] = beside(x + by);
             let at = Pose::from_parts(nalgebra::Translation3::new(out, side, z + 60.0 + by), down);
-            case.arm.nominal_inverse(&at, None).iter().any(|q| q[4] > 0.1)
+            case.arm.nominal_inverse(&at, None).iter().any(|q| case.arm.map.axes(q)[4] > 0.1)
         })
     };
     for (out, up) in [(0.7, 0.44), (0.65, 0.4), (0.6, 0.4), (0.6, 0.5), (0.75, 0.3)] {

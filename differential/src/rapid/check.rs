@@ -24,13 +24,21 @@ pub struct Features {
     pub borders: bool,
     /// Displacements that count from where the robot stands, whichever way it came.
     pub placed: bool,
+    /// Controllers that count joints the other way round or from the horizontal.
+    pub mapped: bool,
 }
 
 impl Features {
     /// Everything but what came later: a seed stands for the same program as ever.
-    pub const ALL: Features = Features { effects: true, taught: true, borders: true, placed: false };
-    /// Everything.
+    pub const ALL: Features =
+        Features { effects: true, taught: true, borders: true, placed: false, mapped: false };
+    /// The same with displacements from where the robot stands.
     pub const MORE: Features = Features { placed: true, ..Features::ALL };
+
+    /// The arm of a seed.
+    pub fn arm(&self, seed: u64) -> Case {
+        if self.mapped { model::mapped(seed) } else { model::random(seed) }
+    }
 }
 
 /// Both programs of a seed, as they are given to the interpreter, with what was seen.
@@ -63,7 +71,7 @@ fn drawn(seed: u64, features: Features) -> (ChaCha8Rng, Case, bool) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     // Frames that were taught are worked out for an arm that stands where it is told to, play and load apart.
     let taught = features.taught && rng.random_bool(0.12);
-    let case = if taught { model::with(seed, false, false) } else { model::random(seed) };
+    let case = if taught { model::with(seed, false, false) } else { features.arm(seed) };
     (rng, case, taught)
 }
 
@@ -111,7 +119,9 @@ pub fn compare(seed: u64, case: &Case, made: &Made) -> Shown {
         return out;
     }
     let mounted = Default::default();
-    let comparison = Comparison { seed, case, made, task: &task, tally: out.tally, mounted, stopped: false };
+    let tally = out.tally;
+    let comparison =
+        Comparison { seed, case, made, task: &task, tally, mounted, stopped: false, parted: false };
     out.tally = comparison.run(&before, &after);
     out
 }
@@ -141,6 +151,9 @@ struct Comparison<'a> {
     mounted: (String, String),
     /// Whether the corrected program ends at an arc that lay at the very border of what makes one.
     stopped: bool,
+    /// Whether the arms of the two runs have parted at a motion that is flagged as a guess: the corrected one stands in
+    /// other joints, or the controller has stopped there.
+    parted: bool,
 }
 
 /// One goal of one motion in both runs.
@@ -275,6 +288,7 @@ impl Comparison<'_> {
             let row = row.as_ref();
             changed |= self.goal(&Pair { line, old, new, goal, told: point, now, index: k, row, remounted });
         }
+        self.part(told.last(), now.last(), row.as_ref());
         if self.tally.guessed > guessed {
             // Counted apart.
             self.tally.guessed = guessed + 1;
@@ -286,6 +300,18 @@ impl Comparison<'_> {
             self.tally.left += 1;
         }
         true
+    }
+
+    /// Whether the two arms stand apart behind a motion: they part where the corrected one comes elsewhere and the motion is
+    /// flagged as a guess, and meet where both come to the same joints again.
+    fn part(&mut self, told: Option<&Point>, now: Option<&Point>, row: Option<&Row>) {
+        let joints = |point: Option<&Point>| point.and_then(|point| point.joints);
+        let apart = |(a, b): ([f64; 6], [f64; 6])| farthest(&a, &b) > MOST_JUMP;
+        if !joints(told).zip(joints(now)).is_none_or(apart) {
+            self.parted = false;
+        } else if row.is_some_and(|row| row.guessed) {
+            self.parted = true;
+        }
     }
 
     /// Compares one goal; whether it was changed.
@@ -306,7 +332,15 @@ impl Comparison<'_> {
         };
         let as_written = matches!(goal, Goal::Pose { .. })
             == matches!(&new.goals[index.min(new.goals.len() - 1)], Goal::Pose { .. });
-        if as_written && same(&told.flange, &now.flange) && now.joints.is_some() {
+        let kept = as_written && same(&told.flange, &now.flange);
+        if kept && now.joints.is_some() {
+            return false;
+        }
+        // Where the arm goes on from a guess that was flagged, along a way on which no configuration is checked, only that
+        // guess decides whether it gets there: the motion itself stays as it was.
+        if kept && self.parted && !old.monitored && now.joints.is_none() {
+            // A motion counts once, not each of its points.
+            self.tally.open += usize::from(index + 1 == old.goals.len());
             return false;
         }
         let guessed = row.is_some_and(|row| row.guessed);
@@ -328,7 +362,7 @@ impl Comparison<'_> {
         };
         self.reaches(pair, &joints, &intended);
         if let Some(before) = told.joints {
-            let jump = (0..6).map(|j| (joints[j] - before[j]).abs()).fold(0.0, f64::max);
+            let jump = farthest(&joints, &before);
             if jump > MOST_JUMP && guessed {
                 self.tally.guessed += 1;
             } else if jump > MOST_JUMP {
@@ -436,6 +470,11 @@ impl Comparison<'_> {
         }
         flange(&real, in_object, displaced)
     }
+}
+
+/// How far apart the joints are that are farthest apart (rad).
+fn farthest(a: &[f64; 6], b: &[f64; 6]) -> f64 {
+    (0..6).map(|j| (a[j] - b[j]).abs()).fold(0.0, f64::max)
 }
 
 /// Where a flange holds the tool in the object, as told.

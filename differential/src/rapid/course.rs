@@ -76,7 +76,7 @@ pub struct Course<'a> {
 impl<'a> Course<'a> {
     /// A start of which nothing is known. `rest`: where in its play each link lies then, from −1 to 1.
     pub fn new(arm: &'a Arm, rest: [f64; 6]) -> Self {
-        Self { arm, joints: None, last: None, links: Links::new(&arm.play, rest), adrift: false }
+        Self { arm, joints: None, last: None, links: Links::new(arm, rest), adrift: false }
     }
 
     /// Goes through one motion; a point for each goal.

@@ -129,25 +129,29 @@ fn base(rng: &mut ChaCha8Rng, arm: &Arm, borders: bool) -> ([f64; 6], f64) {
     let (q1, q4, q6) = (quarter(-1, 0), quarter(-1, 0), quarter(-2, 1));
     let q5 = rng.random_range(35.0..85.0) * if rng.random_bool(0.5) { 1.0 } else { -1.0 };
     let mut deg = [q1, rng.random_range(-15.0..35.0), rng.random_range(-25.0..15.0), q4, q5, q6];
-    let mut spread = 1.0;
-    if borders && rng.random_bool(0.3) {
-        spread = 0.4;
-        match rng.random_range(0..5) {
-            0 => deg[4] = rng.random_range(-4.0..4.0),
-            1 => deg[2] = -(270.0f64 / 3.5) + rng.random_range(-4.0..4.0),
-            2 => deg[rng.random_range(0..6)] += 90.0,
-            3 => {
-                let joint = rng.random_range(0..5);
-                let (low, high) = (arm.min[joint].to_degrees(), arm.max[joint].to_degrees());
-                let inside = rng.random_range(0.0..4.0);
-                deg[joint] = if rng.random_bool(0.5) { low + inside } else { high - inside };
-            }
-            _ => {
-                // A quarter of axis 1, 4 or 6 ends here.
-                let joint = [0, 3, 5][rng.random_range(0..3)];
-                deg[joint] = 90.0 * (deg[joint] / 90.0).floor() + rng.random_range(-2.0..2.0);
-            }
+    let border = borders && rng.random_bool(0.3);
+    let spread = if border { 0.4 } else { 1.0 };
+    let kind = if border { rng.random_range(0..5) } else { 5 };
+    match kind {
+        0 => deg[4] = rng.random_range(-4.0..4.0),
+        1 => deg[2] = -(270.0f64 / 3.5) + rng.random_range(-4.0..4.0),
+        _ => {}
+    }
+    let mut deg = arm.map.counted(&deg);
+    match kind {
+        2 => deg[rng.random_range(0..6)] += 90.0,
+        3 => {
+            let joint = rng.random_range(0..5);
+            let (low, high) = (arm.min[joint].to_degrees(), arm.max[joint].to_degrees());
+            let inside = rng.random_range(0.0..4.0);
+            deg[joint] = if rng.random_bool(0.5) { low + inside } else { high - inside };
         }
+        4 => {
+            // A quarter of axis 1, 4 or 6 ends here.
+            let joint = [0, 3, 5][rng.random_range(0..3)];
+            deg[joint] = 90.0 * (deg[joint] / 90.0).floor() + rng.random_range(-2.0..2.0);
+        }
+        _ => {}
     }
     let clamp = |j: usize| deg[j].to_radians().clamp(arm.min[j] + 0.01, arm.max[j] - 0.01);
     (std::array::from_fn(clamp), spread)

@@ -115,10 +115,16 @@ impl Judge<'_> {
             return self.wrong(line, "state", text);
         }
         let rows: Vec<Row> = self.rows(old.line).into_iter().cloned().collect();
-        let changed = rows.iter().find(|row| matches!(row.status, Status::Changed | Status::Flagged));
         self.arm_before.go(old);
         let real = self.arm.go(new);
         let told = old.pose().zip(new.pose()).zip(old.tool);
+        // Numbers that are said to be right as they stand are as good as changed: behind a G92 at a corrected place they mean
+        // another place than before.
+        let corrected = |row: &&Row| match row.status {
+            Status::Changed | Status::Flagged => true,
+            Status::Left | Status::Refused => row.right && told.is_some(),
+        };
+        let changed = rows.iter().find(corrected);
         let Some(row) = changed else {
             if rows.iter().any(|row| row.status == Status::Refused) {
                 self.tally.refused += 1;

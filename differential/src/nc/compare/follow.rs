@@ -5,7 +5,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::arm::{Circumstance, Pose, difference};
-use crate::model::Case;
+use crate::model::{Case, START};
 use crate::nc::machine::{Mode, Move};
 use crate::play::{Links, meant_flanks, meant_links};
 
@@ -35,8 +35,8 @@ impl<'c> Follower<'c> {
         Follower {
             case,
             joints: None,
-            links: Links::new(&case.arm.play, rest),
-            last: [0.8, 0.3, 0.2, 0.0, 1.0, 0.8],
+            links: Links::new(&case.arm, rest),
+            last: case.arm.map.counted(&START),
             straight_rapids: rng.random_bool(0.5),
             tips: Vec::new(),
         }

@@ -11,13 +11,31 @@ const TURNS: [char; 3] = ['A', 'B', 'C'];
 impl Fanuc<'_> {
     /// Where the coordinates of the program are, from the offset in use and the shifts in it.
     pub fn recount(&mut self) {
-        let frame = self.frames.get(&self.frame).copied();
-        let known = self.preset.iter().all(Option::is_some);
-        let chain = frame.filter(|_| known).map(|frame| {
-            let at = |axis: usize| self.preset[axis].unwrap_or(0.0) + self.local[axis];
-            frame * Pose::translation(at(0), at(1), at(2))
-        });
+        let chain = self.chain();
         self.machine.recount(chain);
+    }
+
+    fn chain(&self) -> Option<Pose> {
+        let frame = self.frames.get(&self.frame).copied()?;
+        let [x, y, z] = self.zero();
+        Some(frame * Pose::translation(x?, y?, z?))
+    }
+
+    /// What G92 and G52 shift together.
+    fn zero(&self) -> [Option<f64>; 3] {
+        std::array::from_fn(|axis| self.preset[axis].map(|preset| preset + self.local[axis]))
+    }
+
+    /// G92 or G52 has shifted the named axes, from where `before` tells; the others keep zero and value, whether it is told
+    /// where that zero lies or not.
+    fn shifted(&mut self, before: [Option<f64>; 3], named: [bool; 3]) {
+        let zero = self.zero();
+        let by = std::array::from_fn(|axis| match named[axis] {
+            true => zero[axis].zip(before[axis]).map(|(new, old)| new - old),
+            false => Some(0.0),
+        });
+        let chain = self.chain();
+        self.machine.move_zero(by, chain);
     }
 
     /// The length that a word means: without a point it may count thousandths.
@@ -123,6 +141,7 @@ impl Fanuc<'_> {
     /// G92, G52 and G10; true where the block does nothing else.
     fn shifts(&mut self, block: &Block) -> bool {
         let places = self.lengths(block, AXES);
+        let (before, named) = (self.zero(), places.map(|place| place.is_some()));
         if block.has(920) {
             for (axis, place) in places.iter().enumerate() {
                 if let Some(place) = place {
@@ -131,7 +150,13 @@ impl Fanuc<'_> {
                     self.preset[axis] = zero.map(|(zero, at)| zero + at - place);
                 }
             }
-            self.unturned(|this| this.recount_after_preset(places));
+            self.shifted(before, named);
+            // The named axes stand where it says, even where nothing else is known.
+            for (axis, place) in places.iter().enumerate() {
+                if place.is_some() && self.machine.at[axis].is_none() {
+                    self.machine.at[axis] = *place;
+                }
+            }
             return true;
         }
         if block.has(921) {
@@ -142,7 +167,7 @@ impl Fanuc<'_> {
                     (self.preset[axis], self.local[axis]) = (Some(0.0), 0.0);
                 }
             }
-            self.unturned(Self::recount);
+            self.shifted(before, named);
             return true;
         }
         if block.has(520) {
@@ -151,7 +176,7 @@ impl Fanuc<'_> {
                     self.local[axis] = *place;
                 }
             }
-            self.unturned(Self::recount);
+            self.shifted(before, named);
             return true;
         }
         if block.has(100) {
@@ -173,23 +198,6 @@ impl Fanuc<'_> {
             return true;
         }
         false
-    }
-
-    /// After G92 the named axes stand where it says, even where nothing else is known.
-    /// A shift, known or not, does not turn: how the tool is turned is told as before.
-    fn unturned(&mut self, shift: impl FnOnce(&mut Self)) {
-        let turn = self.machine.turn;
-        shift(self);
-        self.machine.turn = turn;
-    }
-
-    fn recount_after_preset(&mut self, places: [Option<f64>; 3]) {
-        self.recount();
-        for (axis, place) in places.iter().enumerate() {
-            if place.is_some() && self.machine.at[axis].is_none() {
-                self.machine.at[axis] = *place;
-            }
-        }
     }
 
     /// G53, G28, G30 and cycles; true where the block does nothing else.

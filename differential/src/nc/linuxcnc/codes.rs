@@ -10,19 +10,29 @@ const AXES: [char; 3] = ['X', 'Y', 'Z'];
 
 impl LinuxCnc<'_> {
     pub fn recount(&mut self) {
-        // How offsets of rotary axes turn A, B and C is not followed.
-        let straight = self.rotary.get(&self.frame).is_none_or(|angles| *angles == [0.0; 3]);
-        let frame = self.frames.get(&self.frame).copied().filter(|_| straight);
-        let [x, y, z] = self.shift;
-        let chain = frame.zip(x).zip(y).zip(z).map(|(((frame, x), y), z)| frame * Pose::translation(x, y, z));
+        let chain = self.chain();
         self.machine.recount(chain);
     }
 
-    /// The same of a shift, known or not: it does not turn, so how the tool is turned is told as before.
-    fn unturned(&mut self) {
-        let turn = self.machine.turn;
-        self.recount();
-        self.machine.turn = turn;
+    /// Where the coordinates of the program are, from the offset in use and the zero of G92 and G52 in it.
+    fn chain(&self) -> Option<Pose> {
+        // How offsets of rotary axes turn A, B and C is not followed.
+        let straight = self.rotary.get(&self.frame).is_none_or(|angles| *angles == [0.0; 3]);
+        let frame = self.frames.get(&self.frame).copied().filter(|_| straight)?;
+        let [x, y, z] = self.shift;
+        Some(frame * Pose::translation(x?, y?, z?))
+    }
+
+    /// The zero of G92 and G52 becomes another for the named axes. An axis that is not named keeps its zero and its value,
+    /// whether it is told where that zero lies or not (LinuxCNC, coordinate systems, "local and global offsets").
+    fn shift_to(&mut self, shift: [Option<f64>; 3], named: [bool; 3]) {
+        let by = std::array::from_fn(|axis| match named[axis] {
+            true => shift[axis].zip(self.shift[axis]).map(|(new, old)| new - old),
+            false => Some(0.0),
+        });
+        self.shift = shift;
+        let chain = self.chain();
+        self.machine.move_zero(by, chain);
     }
 
     pub(super) fn act(&mut self, block: &Block) -> Result<(), String> {
@@ -131,8 +141,11 @@ impl LinuxCnc<'_> {
             if (540..=593).contains(&code) && (code % 10 == 0 || code > 590) {
                 let name =
                     if code % 10 == 0 { format!("G{}", code / 10) } else { format!("G59.{}", code % 10) };
-                self.frame = name;
-                self.recount();
+                // The offset in use, selected again, changes nothing.
+                if name != self.frame {
+                    self.frame = name;
+                    self.recount();
+                }
             }
         }
         Ok(())
@@ -149,15 +162,17 @@ impl LinuxCnc<'_> {
             self.set_offset(block, places);
             return Ok(true);
         }
+        let named = places.map(|place| place.is_some());
         if block.has(920) {
+            let mut shift = self.shift;
             for (axis, place) in places.iter().enumerate() {
                 if let Some(place) = place {
-                    let zero = self.shift[axis].zip(self.machine.at[axis]);
-                    self.shift[axis] = zero.map(|(zero, at)| zero + at - place);
+                    let zero = shift[axis].zip(self.machine.at[axis]);
+                    shift[axis] = zero.map(|(zero, at)| zero + at - place);
                 }
             }
-            self.kept_shift = self.shift;
-            self.unturned();
+            self.shift_to(shift, named);
+            self.kept_shift = shift;
             for (axis, place) in places.iter().enumerate() {
                 if place.is_some() && self.machine.at[axis].is_none() {
                     self.machine.at[axis] = *place;
@@ -166,26 +181,16 @@ impl LinuxCnc<'_> {
             return Ok(true);
         }
         if block.has(520) {
-            for (axis, place) in places.iter().enumerate() {
-                if place.is_some() {
-                    self.shift[axis] = *place;
-                }
-            }
-            self.unturned();
+            let shift = std::array::from_fn(|axis| places[axis].or(self.shift[axis]));
+            self.shift_to(shift, named);
             return Ok(true);
         }
         if block.has(921) || block.has(922) {
-            if block.has(921) {
-                self.kept_shift = [Some(0.0); 3];
-            } else {
-                self.kept_shift = self.shift;
-            }
-            self.shift = [Some(0.0); 3];
-            self.unturned();
+            self.kept_shift = if block.has(921) { [Some(0.0); 3] } else { self.shift };
+            self.shift_to([Some(0.0); 3], [true; 3]);
         }
         if block.has(923) {
-            self.shift = self.kept_shift;
-            self.unturned();
+            self.shift_to(self.kept_shift, [true; 3]);
         }
         for (code, begins) in [(280, false), (300, false), (530, false), (382, true), (383, true)] {
             if block.has(code) {

@@ -80,6 +80,7 @@ fn coordinates_are_counted_from_offsets_and_shifts() {
             ("G56\nX5.", None),
             ("G92 X10.\nX11.", Some([502.0, 2.0, 3.0])),
             ("G92 X10. Y0.\nG92.1 X0. Y0.\nX11. Y5.", Some([511.0, 5.0, 3.0])),
+            ("G28 Z0.\nG92 X0. Y0. Z0.\nG92.1 X0. Y0. Z0.\nX10. Z0.", Some([510.0, 2.0, 0.0])),
             ("G52 X10.\nX1.", Some([511.0, 2.0, 3.0])),
             ("G52 X10.\nG52 X0.\nX1.", Some([501.0, 2.0, 3.0])),
             ("G10 L2 P1 X510. Y0. Z0.\nX1. Y2. Z3.", Some([511.0, 2.0, 3.0])),

@@ -91,6 +91,27 @@ fn coordinates_are_counted_from_offsets_and_shifts() {
 }
 
 #[test]
+fn a_zero_of_which_one_axis_is_not_told_keeps_the_others() {
+    let shifted = "G28 Z0\nG92 X0 Y0 Z0\nG54";
+    goes(
+        LinuxCnc,
+        &[
+            (&format!("{shifted}\nX4"), &[[4.0, 0.0, 0.0]]),
+            (&format!("{shifted}\nG52 X-5 Z0\nG91 X1"), &[[7.0, 0.0, NAN]]),
+            (&format!("{shifted}\nG92.1 X1"), &[[1.0, 2.0, NAN]]),
+        ],
+    );
+    stands(
+        LinuxCnc,
+        &[
+            (&format!("{shifted}\nX4"), None),
+            (&format!("{shifted}\nG52 X-5\nX10"), None),
+            (&format!("{shifted}\nG52 X-5 Z0\nX10 Z0"), Some([505.0, 2.0, 0.0])),
+        ],
+    );
+}
+
+#[test]
 fn arcs_turn_the_right_way() {
     let half = 10.0 * std::f64::consts::FRAC_1_SQRT_2;
     bows(
