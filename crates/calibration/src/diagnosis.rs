@@ -44,6 +44,7 @@ mod confirmation;
 pub mod contribution;
 mod confounding;
 mod merged;
+mod joint_scatter;
 mod unexplained;
 mod written_model;
 mod in_doubt;

@@ -176,6 +176,14 @@ impl Asking<'_> {
     fn decision(&self, finding: &Finding, number: usize) -> Option<String> {
         let plan = || self.command(number);
         if finding.effect == CauseKind::Unexplained {
+            if let Some([joint]) = finding.joints.as_deref() {
+                return Some(format!(
+                    "read ten poses four times each, joint {0} coming twice from below and twice from above: if a pose differs by the \
+                     side, it is play (log the sides in the column approach{0}); if it differs from time to time, the joint does not \
+                     come to rest in one place",
+                    joint + 1
+                ));
+            }
             let something = self.something_else?;
             return Some(if something.is_in_time() {
                 format!("measure one pose ten times, spread over as long a time as before: `{}`", plan())

@@ -8,6 +8,7 @@ use super::discrepancy::Discrepancy;
 use super::extension::{Extended, Subject};
 use super::finding::{DiagnoseError, Diagnosis, Fits, RangeNoise, SCHEMA, Source, Stage};
 use super::in_doubt::{self, MissingError};
+use super::joint_scatter::JointScatter;
 use super::link_geometry::LINK_Z;
 use super::merged;
 pub use super::options::Options;
@@ -113,7 +114,7 @@ pub fn diagnose(
     }
     let certain =
         merged::certain_flags(&summary.findings, &confirmed.outcome.confirmations, &search.extended.causes);
-    let extended = summary.extended.clone();
+    let (extended, scatter) = (summary.extended.clone(), summary.joint_scatter.clone());
     let (mut diagnosis, pictures) = build_diagnosis(&search, &confirmed, summary, robot, notes);
     diagnosis.poses_needed = needed;
     let of_all = thin_rows.is_none().then_some(&confirmed.outcome.discrepancy);
@@ -132,8 +133,13 @@ pub fn diagnose(
             100.0 * sensor_causes::MOST_PROBABILITY
         )
     }));
-    let handing =
-        Handing { search: &search, discrepancy: of_all, noise_floor_mm: diagnosis.noise_floor_mm, few_poses };
+    let handing = Handing {
+        search: &search,
+        discrepancy: of_all,
+        scatter,
+        noise_floor_mm: diagnosis.noise_floor_mm,
+        few_poses,
+    };
     let handed = with_uncertain_causes(&search, &written, of_all);
     let with_causes =
         handing.estimated(robot, [&written, handed.as_ref().unwrap_or(&written)], &written_stage);
@@ -167,6 +173,7 @@ fn few_poses_note(dataset: &Dataset, needed: usize) -> String {
 struct Handing<'a> {
     search: &'a Search<'a>,
     discrepancy: Option<&'a Discrepancy>,
+    scatter: Option<JointScatter>,
     noise_floor_mm: Option<f64>,
     /// Says that there are too few poses.
     few_poses: Option<String>,
@@ -182,12 +189,17 @@ impl Handing<'_> {
         stage: &StageError,
     ) -> (Estimated, Option<Benefit>) {
         let search = self.search;
-        let missing = in_doubt::missing_errors(&search.context.subject, &search.extended, handed);
+        let mut missing = in_doubt::missing_errors(&search.context.subject, &search.extended, handed);
+        // What a fault of the joint without a file leaves is known better than its scatter.
+        let scatter = self.scatter.as_ref().map(MissingError::scatter);
+        missing
+            .extend(scatter.filter(|scatter| !missing.iter().any(|other| other.joint() == scatter.joint())));
         let [before, geometry, _] = search.stages;
         let fits = [written, handed].map(Fitted::from);
         let stages = [before, geometry, *stage];
         let few_poses = self.few_poses.as_deref();
-        estimated(search, robot, (&fits, missing), &stages, (self.noise_floor_mm, few_poses))
+        let scatter_mm = self.scatter.as_ref().map_or(0.0, JointScatter::rms_mm);
+        estimated(search, robot, (&fits, missing, scatter_mm), &stages, (self.noise_floor_mm, few_poses))
     }
 
     /// The written arm with its benefit; where it is refused beside causes and geometry alone is not, that, with a note.
@@ -456,12 +468,13 @@ fn fits(search: &Search<'_>) -> Fits {
     }
 }
 
-/// The arm for compensation and its expected benefit, from the written fit and the same with uncertain causes, and what both lack. Of too
-/// few poses no benefit is stated: it would be the priors'.
+/// The arm for compensation and its expected benefit, from the written fit and the same with uncertain causes, what both lack, and the
+/// size of a scatter about a joint (mm RMS), which remains with and without correction. Of too few poses no benefit is stated: it would be
+/// the priors'.
 fn estimated(
     search: &Search<'_>,
     robot: &str,
-    ([fitted, handed], missing): (&[Fitted; 2], Vec<MissingError>),
+    ([fitted, handed], missing, scatter_mm): (&[Fitted; 2], Vec<MissingError>, f64),
     stages: &[StageError; 3],
     (noise_floor_mm, few_poses): (Option<f64>, Option<&str>),
 ) -> (Estimated, Option<Benefit>) {
@@ -503,7 +516,12 @@ fn estimated(
     let plausible = &options.arm_tolerance;
     let benefit =
         || benefit(fitted, rows, &estimated, plausible, variance_inflation(fitted, rows, &stages[2]));
-    let benefit = few_poses.map_or_else(|| Ok(benefit()), Err);
+    let with_scatter = |benefit: Benefit| Benefit {
+        nominal_mm: benefit.nominal_mm.hypot(scatter_mm),
+        estimated_mm: benefit.estimated_mm.hypot(scatter_mm),
+        ..benefit
+    };
+    let benefit = few_poses.map_or_else(|| Ok(benefit().map(with_scatter)), Err);
     let parameters = parameter_table(fitted, nominal_arm);
     let judged = benefit.as_ref().map(Option::as_ref).map_err(|few| *few);
     estimated.verdict = judge(fitted, rows.sensor, judged, &parameters, stages, options);

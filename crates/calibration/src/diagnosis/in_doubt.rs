@@ -18,6 +18,8 @@
 //! that the joint is off by s at every pose. s is such that, beside the frames, the readings of the rows differ by as much as they do by
 //! the missing part, root mean square.
 //!
+//! A joint about which the residual scatters (`joint_scatter`) is off by that much in programs too, and stands there in the same way.
+//!
 //! Source: Hoeting, Madigan, Raftery and Volinsky 1999, Bayesian model averaging: a tutorial (variance of a mixture of models).
 
 use nalgebra::{DMatrix, DVector};
@@ -26,6 +28,7 @@ use super::catalogue::Candidate;
 use super::cause::Cause;
 use super::design::Linear;
 use super::extension::{Extended, Subject, filled};
+use super::joint_scatter::JointScatter;
 use super::selection::{Accepted, contains_cause};
 use super::written_model::has_no_model_representation;
 use truegrind_arm::effect::Effect;
@@ -78,6 +81,19 @@ pub(super) fn with_zero_causes(written: &Extended, with: Extended) -> Extended {
 pub(super) struct MissingError {
     harmonic: Harmonic,
     sigma: f64,
+}
+
+impl MissingError {
+    /// Of a joint about which the residual scatters.
+    pub(super) fn scatter(scatter: &JointScatter) -> Self {
+        let harmonic = Harmonic { joint: scatter.joint, order: 1.0, sine_rad: 0.0, cosine_rad: 0.0 };
+        Self { harmonic, sigma: scatter.sigma_rad }
+    }
+
+    /// The joint (0-based).
+    pub(super) fn joint(&self) -> usize {
+        self.harmonic.joint
+    }
 }
 
 /// The joint errors of `extended` that the arm of `handed` lacks and its covariance does not contain yet.

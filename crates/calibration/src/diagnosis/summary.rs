@@ -7,9 +7,10 @@ use super::extension::Extended;
 use super::finding::{Finding, Step};
 use super::findings::FindingBuilder;
 use super::held_out::FoldErrors;
+use super::joint_scatter::JointScatter;
 use super::merged::{self, MergedFinding};
 use super::picture::Picture;
-use super::residual_tests::Structure;
+use super::residual_tests::{self, Structure};
 use super::search::{Confirmed, Search};
 use super::something_else::SomethingElse;
 use super::unexplained::{Unexplained, something_else};
@@ -30,6 +31,8 @@ pub(super) struct Summary {
     pub(super) remaining: Option<String>,
     /// The same for a planner, where it is a finding.
     pub(super) something_else: Option<SomethingElse>,
+    /// The joint about which the residual scatters, where that is large.
+    pub(super) joint_scatter: Option<JointScatter>,
 }
 
 /// Summarises a search. `smoothed` is the held-out error without the smooth correction (mm), if there is one.
@@ -76,9 +79,12 @@ pub(super) fn summarise(
     }
     (context.progress)("analysing the residual");
     let noise_floor = noise_floor(&floor, subject, &search.extended);
+    let aside: Vec<usize> = residual_tests::outliers(&search.found).into_iter().map(|(row, _)| row).collect();
+    let scatter = JointScatter::of(&confirmed.linear, &search.found.robust_weight, &aside);
     let unexplained = Unexplained {
         dataset: &searched.observed.dataset,
         discrepancy: &outcome.discrepancy,
+        scatter: scatter.as_ref(),
         structure,
         after: &stages[2],
         smoothed,
@@ -103,7 +109,15 @@ pub(super) fn summarise(
         doubted: Vec::new(),
     }));
     merged::rank(&mut findings);
-    Summary { findings, steps, extended, noise_floor, remaining: unexplained.sentence(), something_else }
+    Summary {
+        findings,
+        steps,
+        extended,
+        noise_floor,
+        remaining: unexplained.sentence(),
+        something_else,
+        joint_scatter: unexplained.scatter().cloned(),
+    }
 }
 
 /// Findings, and the index of the finding of each cause.

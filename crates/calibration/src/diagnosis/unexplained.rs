@@ -3,6 +3,7 @@
 use super::cause_kind::CauseKind;
 use super::discrepancy::{Discrepancy, typical_mm};
 use super::finding::{Confidence, Finding, Gain};
+use super::joint_scatter::JointScatter;
 use super::residual_tests::{Structure, is_structure};
 use super::search::Confirmed;
 use super::something_else::{Field, RemainingAt, SomethingElse};
@@ -25,6 +26,8 @@ pub(super) struct Unexplained<'a> {
     pub(super) dataset: &'a Dataset,
     /// The model discrepancy.
     pub(super) discrepancy: &'a Discrepancy,
+    /// The joint about which the residual scatters, if there is one.
+    pub(super) scatter: Option<&'a JointScatter>,
     /// Correlations of neighbouring residuals.
     pub(super) structure: &'a Structure,
     /// Errors of the extended model.
@@ -38,7 +41,39 @@ pub(super) struct Unexplained<'a> {
 impl Unexplained<'_> {
     /// Whether the residual has a significant part that is not noise.
     fn is_significant(&self) -> bool {
-        self.discrepancy.is_significant() && self.discrepancy.rms_mm() > LEAST_SHARE * self.after.fitted.rmse
+        self.has_discrepancy() || self.scatter().is_some()
+    }
+
+    fn has_discrepancy(&self) -> bool {
+        self.discrepancy.is_significant() && self.is_large(self.discrepancy.rms_mm())
+    }
+
+    /// The scatter about a joint, where it is a large part of the residual.
+    pub(super) fn scatter(&self) -> Option<&JointScatter> {
+        self.scatter.filter(|scatter| self.is_large(scatter.rms_mm()))
+    }
+
+    fn is_large(&self, mm: f64) -> bool {
+        mm > LEAST_SHARE * self.after.fitted.rmse
+    }
+
+    /// What is not noise (mm), for each row: the discrepancy and the scatter about a joint.
+    fn effect_mm(&self) -> Vec<f64> {
+        let mut out = match self.has_discrepancy() {
+            true => self.discrepancy.effect_mm.clone(),
+            false => vec![0.0; self.discrepancy.effect_mm.len()],
+        };
+        if let Some(scatter) = self.scatter() {
+            out.iter_mut().zip(&scatter.effect_mm).for_each(|(sum, mm)| *sum = sum.hypot(*mm));
+        }
+        out
+    }
+
+    /// Its size (mm RMS), no more than the residual.
+    fn rms_mm(&self) -> f64 {
+        let effect = self.effect_mm();
+        let square: f64 = effect.iter().map(|mm| mm * mm).sum();
+        (square / effect.len().max(1) as f64).sqrt().min(self.after.fitted.rmse)
     }
 
     /// One sentence; `None` for a residual at the noise floor.
@@ -47,7 +82,7 @@ impl Unexplained<'_> {
         if self.is_significant() {
             return Some(format!(
                 "{rmse:.3} mm RMS, of which {:.3} mm is not noise: {}",
-                self.discrepancy.rms_mm(),
+                self.rms_mm(),
                 self.description()
             ));
         }
@@ -59,23 +94,29 @@ impl Unexplained<'_> {
 
     /// The largest parts of the discrepancy.
     fn description(&self) -> String {
-        let parts: Vec<String> = self
-            .discrepancy
-            .contributions
-            .iter()
-            .take(2)
-            .map(|(group, mm)| format!("{mm:.3} mm as if {}", group.words()))
-            .collect();
+        let mut parts: Vec<(f64, String)> = match self.has_discrepancy() {
+            true => self
+                .discrepancy
+                .contributions
+                .iter()
+                .take(2)
+                .map(|(group, mm)| (*mm, group.words().to_owned()))
+                .collect(),
+            false => Vec::new(),
+        };
+        parts.extend(self.scatter().map(|scatter| (scatter.rms_mm(), scatter.words())));
+        parts.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let parts = parts.into_iter().map(|(mm, words)| format!("{mm:.3} mm as if {words}"));
         let correlated = (self.discrepancy.correlation != 0.0)
             .then(|| format!("consecutive readings are correlated ({:.2})", self.discrepancy.correlation));
-        parts.into_iter().chain(correlated).collect::<Vec<_>>().join("; ")
+        parts.chain(correlated).collect::<Vec<_>>().join("; ")
     }
 
     /// The finding.
     pub(super) fn finding(&self) -> Option<Finding> {
         self.is_significant().then(|| {
-            let mut order: Vec<usize> = (0..self.discrepancy.effect_mm.len()).collect();
-            let effect = &self.discrepancy.effect_mm;
+            let effect = self.effect_mm();
+            let mut order: Vec<usize> = (0..effect.len()).collect();
             order.sort_by(|&a, &b| effect[b].total_cmp(&effect[a]).then(a.cmp(&b)));
             let mut rows: Vec<usize> =
                 order.iter().take(MOST_ROWS).map(|&i| self.dataset.rows[i].number).collect();
@@ -93,10 +134,16 @@ impl Unexplained<'_> {
                 cv_rmse_before_mm: self.smoothed.unwrap_or(self.after.random.rmse),
                 cv_rmse_after_mm: self.after.random.rmse,
             };
+            let evidence =
+                self.discrepancy.evidence.max(self.scatter().map_or(0.0, |scatter| scatter.evidence));
+            // The larger part says where.
+            let mostly =
+                self.scatter().filter(|s| !self.has_discrepancy() || s.rms_mm() > self.discrepancy.rms_mm());
             Finding {
                 row_list: Some(rows),
-                p_value: (-0.5 * self.discrepancy.evidence.max(0.0)).exp().min(1.0),
-                worth_mm: Some(self.discrepancy.rms_mm()),
+                joints: mostly.map(|scatter| vec![scatter.joint]),
+                p_value: (-0.5 * evidence.max(0.0)).exp().min(1.0),
+                worth_mm: Some(self.rms_mm()),
                 ..words::finding(CauseKind::Unexplained, cause, Confidence::Ambiguous, self.evidence(), gain)
             }
         })
@@ -108,6 +155,13 @@ impl Unexplained<'_> {
             "random functions of time and pose in addition to the causes: twice the log Bayes factor {:.0}",
             self.discrepancy.evidence
         );
+        if let Some(scatter) = self.scatter() {
+            out.push_str(&format!(
+                "; scatter about joint {}: twice the log likelihood ratio {:.0}",
+                scatter.joint + 1,
+                scatter.evidence
+            ));
+        }
         for (r, z, what) in
             [(s.neighbours, s.neighbours_z, "nearest poses"), (s.order, s.order_z, "consecutive rows")]
         {

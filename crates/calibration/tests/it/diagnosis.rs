@@ -15,5 +15,6 @@ mod data_quality;
 mod elimination;
 mod found;
 mod in_doubt;
+mod joint_scatter;
 mod parts;
 mod rules;
