@@ -55,6 +55,8 @@ pub(crate) fn run<T: Send>(
                         fault = Some(error);
                     }
                 }
+                // Only with nothing left to tell: work that panicked says no end, and work that was quick has steps waiting.
+                Err(RecvTimeoutError::Timeout) if worker.is_finished() => break,
                 Err(RecvTimeoutError::Timeout) => {}
             }
             if fault.is_none()
@@ -64,9 +66,6 @@ pub(crate) fn run<T: Send>(
             }
             if fault.is_some() {
                 watch.cancel();
-            }
-            if worker.is_finished() {
-                break;
             }
         }
         (fault, py.detach(|| worker.join()))

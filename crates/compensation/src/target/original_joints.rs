@@ -174,7 +174,8 @@ fn originals(
 
 /// Where the configuration may or may not be checked, depending on the execution path, the branch counts as guessed as if
 /// unchecked: from an unknown start, from one that is guessed itself, where an unchecked motion ends at other joints, or where its way
-/// passes a singularity. What follows unchecked inherits the guess.
+/// passes a singularity; and where a joint motion that is not checked keeps its branch though another one is nearer. What follows
+/// unchecked inherits the guess.
 fn guess_if_possibly_unmonitored(
     listing: &Listing,
     monitors: &[Switch],
@@ -195,6 +196,17 @@ fn guess_if_possibly_unmonitored(
             (Some(Some(Ok(start))), _) if start.guess != BranchGuess::Known => Some(BranchGuess::Inherited),
             (Some(Some(Ok(start))), _)
                 if passes_singularity(motion, start, &out[first[index]..first[index + 1]]) =>
+            {
+                Some(BranchGuess::Guessed)
+            }
+            (Some(Some(Ok(start))), Switch::Off)
+                if motion.kind == MotionKind::Joint
+                    && (first[index]..first[index + 1]).any(|at| {
+                        let target = &target_refs[at];
+                        out[at]
+                            .as_ref()
+                            .is_ok_and(|here| is_other_branch_nearer(start, here, target, arms, frame_table))
+                    }) =>
             {
                 Some(BranchGuess::Guessed)
             }
@@ -222,6 +234,26 @@ fn guess_if_possibly_unmonitored(
             }
         }
     }
+}
+
+/// Shortest joint motion for which another branch can be nearer (rad): the wrist that is turned over stands half a turn away.
+const OTHER_BRANCH_RAD: f64 = 1.2;
+
+/// Whether another solution is nearer to the start of a joint motion, by the joint that goes farthest, than the one in the branch of the
+/// start, with which the original joints go on. Makers say that the nearest one is taken, and not how near is measured.
+fn is_other_branch_nearer(
+    start: &OriginalTarget,
+    here: &OriginalTarget,
+    target: &TargetRef<'_>,
+    arms: &Arms<'_>,
+    frame_table: &FrameTable,
+) -> bool {
+    let farthest = (here.joints - start.joints).amax();
+    let nearer = |joints: &Joints| (joints - start.joints).amax() < farthest - SAME_JOINTS_RAD;
+    farthest > OTHER_BRANCH_RAD
+        && CommandedFlange::of(target, frame_table).is_some_and(|commanded| {
+            arms.nominal.all(&commanded.flange).iter().any(|solution| nearer(&solution.joints))
+        })
 }
 
 /// Whether a line or arc ends in another branch than it starts in: joints that follow the path pass a singularity there, and where no

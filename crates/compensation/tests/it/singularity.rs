@@ -556,3 +556,35 @@ fn a_configuration_checked_in_the_first_cycle_alone_is_flagged_where_the_second_
     assert_eq!(reasons(through, "  ConfL \\Off;\n")[2], unknown);
     assert_ne!(reasons(through, "")[2], unknown);
 }
+
+/// A joint motion whose configuration is not checked ends with the wrist turned over if that is nearer: which of the two the controller
+/// takes is a guess, and said to be one also where the correction is written as joints.
+#[test]
+fn an_unchecked_joint_motion_to_which_another_branch_is_nearer_is_a_guess() {
+    let over = Joints::from([5.0, 10.0, 10.0, -30.0, 10.3, -205.0].map(f64::to_radians));
+    let pose = nominal().forward(&over, &Condition::default());
+    let [x, y, z] = pose.translation.vector.into();
+    let q = pose.rotation;
+    let source = |fourth: f64| {
+        format!(
+            "MODULE M\nPROC main()\nConfJ\\Off;\nMoveAbsJ [[0,0,0,{fourth},-7,-120],[9E9,9E9,9E9,9E9,9E9,9E9]]\\NoEOffs,v100,fine,tool0;\n\
+             MoveJ [[{x:.6},{y:.6},{z:.6}],[{:.9},{:.9},{:.9},{:.9}],[0,-1,-3,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;\n\
+             ENDPROC\nENDMODULE\n",
+            q.w, q.i, q.j, q.k
+        )
+    };
+    let known = estimated(perturbed(3, 1.0), &[over]);
+    let planned = |fourth: f64, emit: Emit| {
+        let text = source(fourth);
+        let task = Task::read(&[("p.mod", text.as_bytes())]);
+        let options = Options { flag_unknown_starts: true, emit, ..Options::default() };
+        plan(&task.listing, &known, &Cell::default(), &options)
+    };
+    // From 50° it is 80° to -30° and 100° to 150° with the wrist as it is; from 100° it is 130° and 50°.
+    let reason = |plan: &Plan| plan.outcomes[1].reason;
+    assert_eq!(reason(&planned(50.0, Emit::Targets)), Some(OutcomeReason::AmbiguousBranch));
+    assert_eq!(reason(&planned(50.0, Emit::Joints)), Some(OutcomeReason::UnknownStart));
+    let plain = planned(100.0, Emit::Joints);
+    assert_ne!(reason(&plain), Some(OutcomeReason::UnknownStart), "{:?}", plain.outcomes);
+    assert!((plain.points.last().unwrap().joints_before.unwrap()[3].to_degrees() - 150.0).abs() < 1e-3);
+}
