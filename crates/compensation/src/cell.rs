@@ -342,7 +342,7 @@ pub struct Cell {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub angles: Option<String>,
     /// Joints as the controller shows them (°), roughly, in which the arm stands where a program begins: NC words state no
-    /// configuration, and of all ways to reach a place whose previous position is unknown the one nearest to these is taken.
+    /// configuration, and a place whose previous position is unknown is reached in the branch of these, by the nearest turns.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub start_deg: Option<[f64; 6]>,
     /// Tools.
