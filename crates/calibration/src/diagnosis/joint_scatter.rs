@@ -54,7 +54,7 @@ impl JointScatter {
         let (joint, rows, found) = joints
             .enumerate()
             .map(|(joint, rows)| {
-                let found = rows.best(|_| true);
+                let found = rows.best();
                 (joint, rows, found)
             })
             .max_by(|a, b| a.2.evidence.total_cmp(&b.2.evidence))?;
@@ -64,12 +64,12 @@ impl JointScatter {
         }
         let frames = slopes.by_target.column_iter().chain(slopes.by_frame.column_iter());
         let rivals = frames.map(|column| along(column.as_slice())).chain([along(slopes.by_scale.as_slice())]);
-        let strongest = rivals.map(|rows| rows.best(|_| true).evidence).fold(0.0, f64::max);
+        let strongest = rivals.map(|rows| rows.best().evidence).fold(0.0, f64::max);
         if found.evidence < CLEAR * strongest {
             return None;
         }
         let length = |row: usize| {
-            // Neither is weighted.
+            // The weights of the two cancel.
             let slope = &slopes.by_joint[joint].as_slice()[row * per..(row + 1) * per];
             let mm = &slopes.mm[row * per..(row + 1) * per];
             slope.iter().zip(mm).map(|(g, mm)| (g * mm).powi(2)).sum::<f64>().sqrt()
@@ -126,7 +126,7 @@ struct Rows {
     per: usize,
 }
 
-/// The most likely ratio.
+/// A ratio, the noise beside it, and how much likelier it is than 0.
 struct Found {
     ratio: f64,
     noise_variance: f64,
@@ -168,7 +168,8 @@ impl Rows {
         self.at(ratio, is_in).0
     }
 
-    fn best(&self, is_in: impl Fn(usize) -> bool) -> Found {
+    /// The most likely ratio, for all rows.
+    fn best(&self) -> Found {
         let mean = self.list.iter().map(|row| row.square).sum::<f64>() / self.list.len().max(1) as f64;
         if !(mean > 0.0) {
             return Found { ratio: 0.0, noise_variance: 0.0, evidence: 0.0 };
@@ -176,7 +177,7 @@ impl Rows {
         // A ratio at which the scatter is from a thirtieth to a thousand times the noise, in steps of a tenth.
         let ratios = (0..110).map(|k| (f64::from(k) * 0.1 - 3.4).exp().powi(2) / mean);
         let found = ratios.map(|ratio| {
-            let (evidence, noise_variance) = self.at(ratio, &is_in);
+            let (evidence, noise_variance) = self.at(ratio, |_| true);
             Found { ratio, noise_variance, evidence }
         });
         found.max_by(|a, b| a.evidence.total_cmp(&b.evidence)).unwrap_or(Found {
