@@ -23,8 +23,9 @@
 //! carries = "base"               # base | other
 //! ```
 //!
-//! Before the first table may stand `robot = "abb-irb-120"`, the robot of the programs, which a model must be of, for NC programs
-//! `angles = "wpr"`, what A, B and C mean, and `start_deg = [0, 0, 0, 0, 90, 0]`, the joints in which the arm starts, roughly. A value may be `"?"`: it is still to
+//! Before the first table may stand `robot = "abb-irb-120"`, the robot of the programs, which a model must be of, and for NC programs
+//! `angles = "wpr"`, what A, B and C mean, and `start_deg = [0, 0, 0, 0, 90, 0]`, the joints in which the arm starts, roughly.
+//! A value may be `"?"`: it is still to
 //! be filled in, and nothing is corrected before it is ([`Cell::open`]).
 
 pub mod nc_setup;

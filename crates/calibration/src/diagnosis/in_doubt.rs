@@ -18,7 +18,7 @@
 //! that the joint is off by s at every pose. s is such that, beside the frames, the readings of the rows differ by as much as they do by
 //! the missing part, root mean square.
 //!
-//! A joint about which the residual scatters (`joint_scatter`) is off by that much in programs too, and stands there in the same way.
+//! A joint about which the residual scatters (`joint_scatter`) is off by as much in programs; the same harmonic stands for it.
 //!
 //! Source: Hoeting, Madigan, Raftery and Volinsky 1999, Bayesian model averaging: a tutorial (variance of a mixture of models).
 

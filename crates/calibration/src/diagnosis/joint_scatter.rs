@@ -7,7 +7,7 @@
 //! cov r = s² 1 + v g gᵀ,  −2 ln L = N ln s² + Σ ln(1 + ρ|g|²) + const,  ρ = v / s²,
 //! N s² = Σ [ |r|² − a² + a² / (1 + ρ|g|²) ],  a = g·r / |g|.
 //!
-//! Rows count in full, whatever the robust fit makes of them: where an eighth of them lies on the other flank of a play, it follows the
+//! Rows count in full, whatever the robust fit makes of them: where one in twelve lies on the other flank of a play, it follows the
 //! others and all but ignores these.
 //!
 //! The likelihood ratio against ρ = 0 is compared with that of the same along the line of sight (a sensor whose distances scatter) and
