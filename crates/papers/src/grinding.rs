@@ -12,6 +12,7 @@
 use rayon::prelude::*;
 
 use crate::experiment::{ExperimentError, Grinding, GrindingMethod, PaperPoints};
+use crate::named_causes::{NamedCauses, Record};
 use crate::protocol::{Options as CaseOptions, drawn};
 use crate::verdict::{Test, paired};
 use truegrind_arm::condition::Condition;
@@ -70,6 +71,9 @@ pub struct GrindingResult {
     /// Every method against the reference, by the mean absolute deviation; absent for the reference itself and for a
     /// method without a complete result in every case.
     pub against: Vec<Option<Test>>,
+    /// The diagnosis of the measured rows of each case, `None` for one that it refused; absent for simulated rows. It has no deviations on
+    /// the part: the estimate that replaces the actual arm knows geometry alone.
+    pub named_causes: Option<Vec<Option<NamedCauses>>>,
     /// The paths of the first case, one for each method, with deviations before and after.
     pub reports: Vec<PathReport>,
 }
@@ -218,6 +222,15 @@ pub fn run(
         })
         .collect();
     let (rows, reports) = by_method(settings, &solvers, cases);
+    let named_causes = matches!(actual, Actual::Estimated).then(|| {
+        let record = Record::of(dataset, nominal, false);
+        let diagnosed = |k| {
+            let rows = drawn(all, measured, seed + k);
+            let split = split::random(&dataset.subset(&rows), settings.held_out, seed + k);
+            record.diagnosed(&split.of_whole(&rows), robot, nominal)
+        };
+        (0..settings.cases as u64).into_par_iter().map(diagnosed).collect()
+    });
     let against = against_reference(settings, &rows);
     Ok(GrindingResult {
         settings: settings.clone(),
@@ -231,6 +244,7 @@ pub fn run(
         before: reports.first().and_then(|r| r.block(|p| p.before)),
         rows,
         against,
+        named_causes,
         reports,
     })
 }

@@ -16,6 +16,7 @@ pub mod statistics;
 pub mod experiment;
 pub mod rescaled;
 pub mod simulated;
+pub mod named_causes;
 pub mod protocol;
 pub mod parameters;
 pub mod verdict;

@@ -18,7 +18,6 @@
 //! "STD" of the papers is the mean absolute error (ltlm-2024 eq. 20, ukf-vslm-2023 eq. 28), and is called so here.
 //! Results do not depend on the number of threads; measured times do and are stored separately.
 
-pub(crate) mod named_causes;
 pub(crate) mod outcome;
 
 use std::time::Instant;
@@ -29,8 +28,8 @@ use rand_chacha::rand_core::SeedableRng;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use self::named_causes::{Division, Record};
 use crate::experiment::{Experiment, ExperimentError, Method, Methods, ReadingUsed, Treatment, Units};
+use crate::named_causes::{NamedCauses, Record};
 use crate::parameters::{ParameterTable, parameter_table};
 use crate::rescaled::Rescaled;
 use crate::verdict::{Judgement, judge};
@@ -46,13 +45,12 @@ use truegrind_calibration::identification::rounding;
 use truegrind_calibration::identification::solver::{Family, Run, SOLVERS, Scope, Solver, SolverError};
 use truegrind_calibration::identification::tolerance::Tolerance;
 use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row, Sensor};
-use truegrind_calibration::measurement::split;
+use truegrind_calibration::measurement::split::{self, Split};
 use truegrind_estimation::estimate::Estimate;
 use truegrind_estimation::least_squares::{Factorisation, lm};
 use truegrind_estimation::problem::Problem;
 use truegrind_math::statistics::ErrorSummary;
 
-pub use self::named_causes::NamedCauses;
 pub use self::outcome::{CurvePoint, MethodResult, Outcome};
 
 /// Options of a run.
@@ -123,7 +121,7 @@ pub struct Case {
 
 /// A case with the data that all methods start from.
 pub(super) struct Prepared {
-    division: Division,
+    division: Split,
     train: Observations,
     test: Observations,
     registered: Fitted,
@@ -366,8 +364,7 @@ fn prepare(
     let chosen = observed.subset(&drawn);
     let split = split::random(&chosen.dataset, held_out, seed);
     let (train, test) = (chosen.subset(&split.train), chosen.subset(&split.test));
-    let of_file = |rows: &[usize]| rows.iter().map(|&i| drawn[i]).collect();
-    let division = Division { train: of_file(&split.train), test: of_file(&split.test) };
+    let division = split.of_whole(&drawn);
     let Registered { start: frames, fitted: registered } = register(&train, nominal, &Tolerance::default())?;
     let sound = sound.then(|| {
         // Residual spread of a fit of links and frames; the same for every method.

@@ -3,6 +3,7 @@
 //! Only measured times differ between runs. They have a separate table ([`times`]), and a page shows them on request
 //! ([`Origin::timings`]).
 
+mod named_causes;
 mod study;
 mod words;
 mod methods;

@@ -21,6 +21,14 @@ pub struct Split {
     pub test: Vec<usize>,
 }
 
+impl Split {
+    /// The same split of a subset, as indices of the set from which its rows were picked.
+    pub fn of_whole(&self, picked: &[usize]) -> Self {
+        let of_whole = |rows: &[usize]| rows.iter().map(|&row| picked[row]).collect();
+        Self { train: of_whole(&self.train), test: of_whole(&self.test) }
+    }
+}
+
 impl From<Split> for (Vec<usize>, Vec<usize>) {
     fn from(split: Split) -> Self {
         (split.train, split.test)

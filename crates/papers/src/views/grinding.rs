@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::words;
+use super::{named_causes, words};
 use crate::experiment::PaperPoints;
 use crate::grinding::{GrindingCase, GrindingResult, GrindingRow};
 use crate::verdict::LEVEL;
@@ -285,6 +285,18 @@ pub(super) fn table(result: &GrindingResult) -> Table {
             note.into(),
         ]);
     }
+    if let Some(cases) = &result.named_causes {
+        let (id, name) = named_causes::LABEL;
+        let (held_out, note) = match named_causes::complete(cases) {
+            Some(found) => {
+                let errors: Vec<f64> = found.iter().map(|case| case.held_out.rmse).collect();
+                (repeated::cell(&errors), "measurements only")
+            }
+            None => (Cell::Missing, "refused"),
+        };
+        let unknown = [const { Cell::Missing }; 4];
+        table.push([id.into(), name.into()].into_iter().chain(unknown).chain([held_out, note.into()]));
+    }
     table.notes = vec![
         format!(
             "{} points of the cut; SD is that of signed values with n - 1. ± is the standard deviation over the cases. \
@@ -295,6 +307,14 @@ pub(super) fn table(result: &GrindingResult) -> Table {
          10 mm or 2°."
             .to_owned(),
     ];
+    if let Some(cases) = &result.named_causes {
+        table.notes.extend(named_causes::note(cases, result.rows.iter().map(held_out)));
+        table.notes.push(
+            "NC is not judged on the part: the estimate that replaces the actual arm knows geometry alone, so a model with causes would \
+             seem worse the more of them it has."
+                .to_owned(),
+        );
+    }
     table
 }
 
@@ -365,5 +385,6 @@ pub(super) fn json(result: &GrindingResult) -> Value {
         "points": result.points,
         "before": { "block": result.before, "paper": result.settings.before },
         "methods": rows,
+        "named_causes": result.named_causes,
     })
 }

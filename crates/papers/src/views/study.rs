@@ -1,7 +1,7 @@
 //! Figures of a study that tables, plots and sentences share.
 
 use crate::experiment::{Treatment, Units};
-use crate::protocol::{MethodResult, NamedCauses, Outcome, Study};
+use crate::protocol::{MethodResult, Outcome, Study};
 use truegrind_calibration::measurement::dataset::Sensor;
 use truegrind_estimation::estimate::Termination;
 use truegrind_math::statistics::{ErrorSummary, median};
@@ -15,14 +15,6 @@ pub(super) fn held_out(result: &MethodResult) -> Option<Vec<ErrorSummary>> {
 /// Held-out errors of all cases with registered frames and nominal links.
 pub(super) fn registered(study: &Study) -> Vec<ErrorSummary> {
     study.cases.iter().map(|c| c.registered).collect()
-}
-
-/// Id and name of the diagnosis among the methods.
-pub(super) const NAMED_CAUSES: (&str, &str) = ("NC", "named causes");
-
-/// The diagnoses of all cases; `None` if one refused its rows.
-pub(super) fn named_causes(cases: &[Option<NamedCauses>]) -> Option<Vec<&NamedCauses>> {
-    cases.iter().map(Option::as_ref).collect()
 }
 
 pub(super) fn name_of(study: &Study, id: &str) -> String {

@@ -7,6 +7,7 @@ use truegrind_papers::protocol::Options;
 use truegrind_papers::views as view;
 use truegrind_papers::{Results, simulated};
 use truegrind_report::format;
+use truegrind_report::table::Cell;
 
 use super::experiment::nominal;
 
@@ -61,4 +62,35 @@ fn an_nc_program_is_ground_before_and_after_and_priors_decide() {
     {
         assert!(page.contains(word) || page.contains(&word.replace("&#39;", "'")), "{word}");
     }
+}
+
+/// Where measured rows stand for the actual arm, the diagnosis is judged on what was measured, never on the part.
+#[test]
+fn measured_rows_are_also_diagnosed() {
+    let (experiment, settings) = small();
+    let (dataset, simulation, robot) = simulated::measure(&experiment, nominal).unwrap();
+    let settings = Grinding { cases: 1, ..settings };
+    let result = run(
+        &settings,
+        &experiment.name,
+        &dataset,
+        &robot,
+        &simulation.nominal,
+        Actual::Estimated,
+        &Options::default(),
+    )
+    .unwrap();
+    let [Some(found)] = result.named_causes.as_deref().unwrap() else { panic!("one case, not refused") };
+    let sound = result.rows.iter().find(|row| row.id == "S1").unwrap();
+    let beside = sound.cases[0].held_out.rmse;
+    // Causes beyond geometry are in the recipe.
+    assert!(found.held_out.rmse < 1.05 * beside, "{} beside {beside} mm", found.held_out.rmse);
+    let results = Results::Grinding(Box::new(result));
+    let page = format::html::document(&view::document(&experiment, &results, &view::Origin::default()));
+    for words in ["named causes", "NC is not judged on the part"] {
+        assert!(page.contains(words), "{words}");
+    }
+    let table = view::table(&results);
+    let last = table.rows.last().unwrap();
+    assert!(last[0] == Cell::from("NC") && last[2] == Cell::Missing && last[6] != Cell::Missing, "{last:?}");
 }

@@ -3,9 +3,10 @@
 use serde_json::{Value, json};
 
 use crate::experiment::PaperFigures;
-use crate::protocol::{NamedCauses, Outcome, Study};
-use crate::views::study::{NAMED_CAUSES, title, treatment};
-use crate::views::words;
+use crate::named_causes::NamedCauses;
+use crate::protocol::{Outcome, Study};
+use crate::views::study::{title, treatment};
+use crate::views::{named_causes, words};
 use truegrind_arm::parameter::Parameter;
 use truegrind_report::table::{Cell, Column, Table};
 
@@ -84,9 +85,10 @@ pub(crate) fn table(study: &Study) -> Table {
     }
     let diagnosed = study.named_causes.iter().flatten().zip(&study.cases);
     for (k, (found, case)) in diagnosed.enumerate() {
+        let (id, name) = named_causes::LABEL;
         let mut row: Vec<Cell> = vec![
-            NAMED_CAUSES.0.into(),
-            NAMED_CAUSES.1.into(),
+            id.into(),
+            name.into(),
             "diagnose".into(),
             Cell::Missing,
             protocol.into(),

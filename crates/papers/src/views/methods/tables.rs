@@ -2,14 +2,12 @@
 
 use crate::experiment::PaperFigures;
 use crate::parameters::ParameterTable;
-use crate::protocol::{NamedCauses, Outcome, Study};
+use crate::protocol::{Outcome, Study};
 use crate::verdict::Conclusion;
-use crate::views::study::{
-    NAMED_CAUSES, ended, held_out, iterations, named_causes, passes, registered, seconds, title, treatment,
-};
-use crate::views::words;
+use crate::views::study::{ended, held_out, iterations, passes, registered, seconds, title, treatment};
+use crate::views::{named_causes, words};
 use truegrind_calibration::measurement::dataset::Sensor;
-use truegrind_math::statistics::{ErrorSummary, median};
+use truegrind_math::statistics::median;
 use truegrind_report::document::Verdict;
 use truegrind_report::number::{Precision, handy};
 use truegrind_report::repeated::{self, spread};
@@ -43,14 +41,15 @@ pub(super) fn errors(study: &Study) -> Table {
         add(&result.method.id, &result.method.name, ours, result.method.paper);
     }
     if let Some(cases) = &study.named_causes {
-        let ours = match named_causes(cases) {
+        let ours = match named_causes::complete(cases) {
             Some(found) => repeated::cells(&found.iter().map(|c| c.held_out).collect::<Vec<_>>()),
             None => {
                 let n = cases.iter().filter(|case| case.is_none()).count();
                 [format!("refused {n}/{}", cases.len()).into(), Cell::Missing, Cell::Missing]
             }
         };
-        add(NAMED_CAUSES.0, NAMED_CAUSES.1, ours, None);
+        let (id, name) = named_causes::LABEL;
+        add(id, name, ours, None);
     }
     table.notes = vec![
         "± is the standard deviation over the cases. The papers print mean |e| as STD, SD or Mean (ltlm-2024 eq. 20, \
@@ -63,58 +62,14 @@ pub(super) fn errors(study: &Study) -> Table {
     if study.sensor != Sensor::Cable {
         table.notes.push("Errors are distances between positions.".to_owned());
     }
-    table.notes.extend(of_named_causes(study));
+    let errors =
+        study.results.iter().filter_map(held_out).map(|errors| errors.iter().map(|e| e.rmse).collect());
+    table.notes.extend(study.named_causes.as_ref().and_then(|cases| named_causes::note(cases, errors)));
     if let Some(floor) = study.noise_floor_mm {
         let floor = Precision::Significant(2).format(floor);
         table.notes.push(format!("Noise floor {floor} mm: errors cannot be reduced below it."));
     }
     table
-}
-
-/// What the row of the diagnosis means, with its cost in findings: absent for simulated rows.
-fn of_named_causes(study: &Study) -> Option<String> {
-    let found = named_causes(study.named_causes.as_deref()?)?;
-    let n = found.len().max(1) as f64;
-    let mean = |of: &dyn Fn(&NamedCauses) -> f64| found.iter().map(|c| of(c)).sum::<f64>() / n;
-    Some(format!(
-        "NC, named causes: `truegrind diagnose` on the same rows of the fit, with all causes that it finds: {:.1} findings in the mean of \
-         the cases, {:.1} of them identified. Its own geometry alone reaches {:.3} mm RMSE. {}",
-        mean(&|c| c.findings as f64),
-        mean(&|c| c.identified as f64),
-        mean(&|c| c.geometry.rmse),
-        beside_the_best(study, &found).unwrap_or_default()
-    ))
-}
-
-/// Standard errors of the mean difference over the cases from which it is no chance.
-const SURELY: f64 = 2.0;
-
-/// The diagnosis beside the best method, case by case.
-fn beside_the_best(study: &Study, found: &[&NamedCauses]) -> Option<String> {
-    let rmse = |errors: Vec<ErrorSummary>| errors.iter().map(|e| e.rmse).collect::<Vec<f64>>();
-    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
-    let of_methods = study.results.iter().filter_map(held_out).map(rmse);
-    let best = of_methods.min_by(|a, b| mean(a).total_cmp(&mean(b)))?;
-    if best.len() != found.len() {
-        return None;
-    }
-    let gains: Vec<f64> = best.iter().zip(found).map(|(best, named)| best - named.held_out.rmse).collect();
-    let (n, gain) = (gains.len() as f64, mean(&gains));
-    let error = (gains.iter().map(|g| (g - gain).powi(2)).sum::<f64>() / (n * (n - 1.0))).sqrt();
-    Some(if n > 1.0 && gain > SURELY * error {
-        format!(
-            "It is {gain:.3} ± {error:.3} mm below the best of the methods in the same cases (mean and its standard error): that part no \
-             optimiser of geometry can reach."
-        )
-    } else if n > 1.0 {
-        format!(
-            "Beside the best of the methods in the same cases it gains {gain:.3} ± {error:.3} mm (mean and its standard error): no more than \
-             chance may give."
-        )
-    } else {
-        "One case does not show whether the difference from the best of the methods is more than chance."
-            .to_owned()
-    })
 }
 
 pub(super) fn verdict_table(study: &Study) -> Table {
@@ -267,14 +222,11 @@ pub(crate) fn times(study: &Study) -> Table {
             paper.iterations.into(),
         ]);
     }
-    if let Some(found) = study.named_causes.as_deref().and_then(named_causes) {
+    if let Some(found) = study.named_causes.as_deref().and_then(named_causes::complete) {
         let seconds = median(&found.iter().map(|c| c.seconds).collect::<Vec<_>>());
+        let (id, name) = named_causes::LABEL;
         let time_ms: Cell = seconds.map(|seconds| 1e3 * seconds).into();
-        table.push(
-            [NAMED_CAUSES.0.into(), NAMED_CAUSES.1.into(), time_ms]
-                .into_iter()
-                .chain([const { Cell::Missing }; 3]),
-        );
+        table.push([id.into(), name.into(), time_ms].into_iter().chain([const { Cell::Missing }; 3]));
     }
     table.notes = vec![
         "Wall-clock time while other cases ran on other cores, median over the cases, without the continuation to convergence."

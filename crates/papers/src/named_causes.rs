@@ -15,6 +15,7 @@ use truegrind_calibration::diagnosis::preparation::prepare;
 use truegrind_calibration::identification::fit::{Observations, errors_on, summary_on};
 use truegrind_calibration::identification::register::starting_frames;
 use truegrind_calibration::measurement::dataset::Dataset;
+use truegrind_calibration::measurement::split::Split;
 use truegrind_math::statistics::ErrorSummary;
 
 /// The diagnosis of one case.
@@ -35,29 +36,21 @@ pub struct NamedCauses {
     pub seconds: f64,
 }
 
-/// The rows of a case, as indices of the file.
-pub(super) struct Division {
-    /// Of the fit.
-    pub(super) train: Vec<usize>,
-    /// Held out.
-    pub(super) test: Vec<usize>,
-}
-
 /// Rows with the approach sides and steps of the whole file: the rows that were left out of a case were visited all the same.
-pub(super) struct Record {
+pub(crate) struct Record {
     logged: Dataset,
     observed: Observations,
     fuse_readout: bool,
 }
 
 impl Record {
-    pub(super) fn of(dataset: &Dataset, nominal: &Model, fuse_readout: bool) -> Self {
+    pub(crate) fn of(dataset: &Dataset, nominal: &Model, fuse_readout: bool) -> Self {
         let prepared = prepare(dataset, nominal, fuse_readout);
         Self { logged: prepared.logged.dataset, observed: prepared.observed, fuse_readout }
     }
 
-    /// Diagnoses one case; `None` if its rows determine no frames or are not of this arm.
-    pub(super) fn diagnosed(&self, case: &Division, robot: &str, nominal: &Model) -> Option<NamedCauses> {
+    /// Diagnoses one case, whose rows are indices of the file; `None` if its rows determine no frames or are not of this arm.
+    pub(crate) fn diagnosed(&self, case: &Split, robot: &str, nominal: &Model) -> Option<NamedCauses> {
         let begun = Instant::now();
         let rows = self.logged.subset(&case.train);
         let options = Options { fuse_readout: self.fuse_readout, ..Options::default() };
