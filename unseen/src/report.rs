@@ -107,7 +107,7 @@ pub fn line(index: usize, outcome: &Outcome) -> String {
             let [_, geometry, identified, model] = marks.distances;
             let _ = write!(
                 out,
-                ": {:.1} s, arm {:.4} (identify {:.4}) → {:.4} mm ± {:.4}{}, held out/fresh {:.2}{}",
+                ": {:.1} s, arm {:.4} (identify {:.4}) → {:.4} mm ± {:.4}{}, held out/fresh {:.2} (blocks {:.2}, regions {:.2}){}",
                 marks.seconds,
                 geometry.shape,
                 identified.shape,
@@ -115,6 +115,8 @@ pub fn line(index: usize, outcome: &Outcome) -> String {
                 marks.shape_sigma_mm.unwrap_or(f64::NAN),
                 if marks.worse()[0] { " WORSE" } else { "" },
                 marks.held_out_mm / marks.fresh_mm,
+                marks.blocks_mm / marks.fresh_mm,
+                marks.regions_mm / marks.fresh_mm,
                 match marks.written {
                     Written::Yes => "",
                     Written::Doubtful => ", doubtful",
@@ -254,6 +256,7 @@ fn marks_in_words(of: &[&Outcome]) -> String {
     let parts = of.iter().filter(|o| o.setting.kind.has_a_part());
     let told = parts.clone().filter(|o| o.marks.as_ref().is_ok_and(Marks::told)).count();
     let on_blocks: Vec<f64> = marks.iter().map(|m| m.blocks_mm / m.fresh_mm).collect();
+    let in_regions: Vec<f64> = marks.iter().map(|m| m.regions_mm / m.fresh_mm).collect();
     let held: Vec<f64> = marks.iter().map(|m| m.held_out_mm / m.fresh_mm).collect();
     let by_chance: Vec<f64> = marks.iter().map(|m| m.near_by_chance).collect();
     let seconds: Vec<f64> = marks.iter().map(|m| m.seconds).collect();
@@ -284,6 +287,7 @@ fn marks_in_words(of: &[&Outcome]) -> String {
         format!("held-out error over that of fresh rows, quartiles: random folds {} (within 10 %: {})", quartiles(&held), bounded(near(&held), n)),
         format!("  within 10 % as chance alone would have it: {}", percent_of(&by_chance)),
         format!("  blocks {} (within 10 %: {})", quartiles(&on_blocks), bounded(near(&on_blocks), n)),
+        format!("  regions {} (within 10 %: {})", quartiles(&in_regions), bounded(near(&in_regions), n)),
         format!("fresh rows over the noise, quartiles: geometry alone {}; with causes {}", quartiles(&over(0)), quartiles(&over(1))),
         format!("time: median {} s, nine in ten below {} s, longest {} s", number(quantile(&seconds, 0.5), 1), number(quantile(&seconds, 0.9), 1), number(quantile(&seconds, 1.0), 1)),
         format!("refused: {}", bounded(of.len() - n, of.len())),

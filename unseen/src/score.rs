@@ -58,6 +58,8 @@ pub struct Marks {
     pub held_out_mm: f64,
     /// Held-out error of the report, blocks (mm).
     pub blocks_mm: f64,
+    /// Held-out error of the report, regions of joint space (mm).
+    pub regions_mm: f64,
     /// What fresh rows show of the extended model (mm).
     pub fresh_mm: f64,
     /// The probability that chance alone leaves the held-out error within 10 % of that.
@@ -165,6 +167,7 @@ pub fn marks(case: &Case, reply: &Reply) -> Result<Marks, String> {
         shape_sigma_mm: reply.shape_sigma_mm(&case.clean(), &case.sensor.target.translation.vector),
         held_out_mm: reply.held_out_mm,
         blocks_mm: reply.held_out_blocks_mm,
+        regions_mm: reply.held_out_regions_mm,
         fresh_mm: fresh.extended_mm,
         near_by_chance: fresh.near_by_chance(),
         fresh_over_noise: [fresh.geometry_mm, fresh.extended_mm].map(|error| error / noise_mm),

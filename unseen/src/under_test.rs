@@ -72,6 +72,8 @@ pub struct Reply {
     pub held_out_mm: f64,
     /// Held-out error, contiguous blocks (mm).
     pub held_out_blocks_mm: f64,
+    /// Held-out error, regions of joint space (mm).
+    pub held_out_regions_mm: f64,
     /// Held-out error of geometry alone, random folds (mm).
     pub geometry_held_out_mm: f64,
     /// Held-out error of geometry alone, contiguous blocks (mm).
@@ -192,6 +194,7 @@ fn answer(text: &str, robot: &str) -> Result<Reply, String> {
         findings: findings(&json)?,
         held_out_mm: error("extended", "cv_rmse_mm")?,
         held_out_blocks_mm: error("extended", "cv_blocks_rmse_mm")?,
+        held_out_regions_mm: error("extended", "cv_regions_rmse_mm")?,
         geometry_held_out_mm: error("geometric", "cv_rmse_mm")?,
         geometry_held_out_blocks_mm: error("geometric", "cv_blocks_rmse_mm")?,
         written,
