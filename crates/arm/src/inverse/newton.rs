@@ -8,7 +8,7 @@
 //! Termination: below [`TOLERANCE_MM`] and [`TOLERANCE_RAD`]; after 80 evaluations; where λ no longer helps.
 //! Checked against: the forward map on thousands of poses of perturbed arms.
 
-use nalgebra::{Matrix3, Matrix6, Rotation3, Vector3, Vector6};
+use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
 use super::budget;
 
@@ -17,7 +17,7 @@ use crate::jacobian::{joint_jacobian, link_twist};
 use crate::joints::Joints;
 use crate::model::PreparedModel;
 use crate::parameter::LinkCoordinate;
-use truegrind_math::se3::Pose;
+use truegrind_math::se3::{Pose, rotation_from_matrix};
 
 /// A solution misses its target by less (mm).
 pub const TOLERANCE_MM: f64 = 5e-10;
@@ -114,7 +114,8 @@ fn rotation_vector(m: &Matrix3<f64>) -> Vector3<f64> {
     if cosine > 0.0 {
         return if sine > 1e-8 { half * (sine.atan2(cosine) / sine) } else { half };
     }
-    Rotation3::from_matrix_unchecked(*m).scaled_axis()
+    // By a quaternion: of half a turn the antisymmetric part vanishes, and with it the axis.
+    rotation_from_matrix(m).scaled_axis()
 }
 
 /// Iterates from `start`. NaN ends it at once without convergence, and so does an exhausted budget.

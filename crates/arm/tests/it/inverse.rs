@@ -327,6 +327,36 @@ fn not_a_number_is_an_error_of_its_own() {
     assert!(inverse.all(&broken).is_empty());
 }
 
+/// The antisymmetric part of half a turn is zero, as that of none: a flange that is to turn by half a turn is not there yet.
+#[test]
+fn a_flange_half_a_turn_from_the_seed_is_turned() {
+    let condition = Condition::default();
+    let seed = Joints::from_row_slice(&[0.0, 0.2, 0.3, 0.0, 0.9, 0.0]);
+    for sheet in SHEETS {
+        let model = sheet.model();
+        let inverse = Inverse::new(&model, &condition, &model);
+        let here = model.forward(&seed, &condition);
+        let mut solved = 0;
+        for axis in [Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()] {
+            for shift in [Vector3::zeros(), Vector3::new(-20.0, 30.0, 10.0)] {
+                let half = UnitQuaternion::from_axis_angle(&axis, std::f64::consts::PI);
+                for turned in [half * here.rotation, here.rotation * half] {
+                    let target = Pose::from_parts((here.translation.vector + shift).into(), turned);
+                    let Ok(solution) = inverse.solve_near(&target, &seed) else { continue };
+                    let (mm, rad) = misses(&model, &condition, &target, &solution.joints);
+                    assert!(
+                        mm <= 1e-9 && rad <= 1e-12,
+                        "{}: misses by {mm:e} mm and {rad:e} rad",
+                        sheet.name
+                    );
+                    solved += 1;
+                }
+            }
+        }
+        assert!(solved > 0, "{}: no target is in reach", sheet.name);
+    }
+}
+
 #[test]
 fn singular_poses_are_solved_and_named() {
     for sheet in SHEETS.iter().filter(|s| !s.name.starts_with("universal") && !s.name.starts_with("hsr")) {
