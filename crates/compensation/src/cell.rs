@@ -226,9 +226,6 @@ pub enum CellError {
     },
 }
 
-/// Largest plausible joint angle (°).
-const MOST_DEG: f64 = 3600.0;
-
 /// Limit of the sum of squared numbers of teaching points of tools: 500 of one tool, ten of each of 2,500.
 const MOST_TEACHING: usize = 250_000;
 
@@ -272,7 +269,7 @@ impl CellFrame {
             }
         }
         let found = self.teaching_deg.len();
-        if !self.teaching_deg.iter().flatten().all(|angle| angle.abs() <= MOST_DEG) {
+        if !self.teaching_deg.iter().flatten().all(|angle| angle.abs() <= setup::MOST_DEG) {
             return wrong("teaching_deg: expected joint angles in degrees");
         }
         if self.origin == FrameOrigin::Metrology && found > 0 {
@@ -383,7 +380,8 @@ impl Cell {
         if let Some(found) = cell.angles.as_ref().filter(|word| Angles::of(word).is_none()) {
             return Err(CellError::Angles { found: found.clone() });
         }
-        if let Some(found) = cell.start_deg.filter(|start| !start.iter().all(|q| q.abs() <= MOST_DEG)) {
+        if let Some(found) = cell.start_deg.filter(|start| !start.iter().all(|q| q.abs() <= setup::MOST_DEG))
+        {
             return Err(CellError::Start { found: format!("{found:?}") });
         }
         for (kind, frames) in [(FrameKind::Tool, &cell.tool), (FrameKind::Wobj, &cell.wobj)] {
@@ -449,9 +447,9 @@ impl Cell {
         self.angles.as_deref().and_then(Angles::of)
     }
 
-    /// Joints where a program begins (rad), where the file states them.
-    pub(crate) fn start(&self) -> Option<Joints> {
-        self.start_deg.map(|start| Joints::from(start.map(f64::to_radians)))
+    /// Joints where a program begins (rad), if this file states them, or the program itself.
+    pub(crate) fn start(&self, listing: &Listing) -> Option<Joints> {
+        self.start_deg.or(listing.start_deg).map(|start| Joints::from(start.map(f64::to_radians)))
     }
 
     /// What an external axis carries, by its index in a target.

@@ -51,7 +51,7 @@ pub(crate) fn configured(
 }
 
 /// The joints of a flange pose that states no configuration (NC), where nothing tells how the arm came there: the solution in
-/// the branch in which the cell file says that it starts, or the most usual one.
+/// the branch in which it is stated to start, or the most usual one.
 ///
 /// Usual are a wrist in front of axis 1, an elbow that is not turned back, and of what is left the joints nearest to zero, by the sum
 /// of their sizes, whichever way the maker counts them: a tool that points down has axis 5 at +90° on an ABB and at −90° on a FANUC,

@@ -84,8 +84,11 @@ pub struct VerificationTask<'a> {
 pub fn verify(task: &VerificationTask<'_>, acting_arm: &ActingArm<'_>) -> PathReport {
     let mut arms = Arms::simulated(acting_arm.nominal, acting_arm.model, &acting_arm.condition);
     arms.knowledge = acting_arm.knowledge;
-    let before = run(task.original, task.loads[0], &mut arms, task.cell);
-    let after = task.rewritten.map(|listing| (listing, run(listing, task.loads[1], &mut arms, task.cell)));
+    let before = run(task.original, task.loads[0], None, &mut arms, task.cell);
+    // Where no word states the configuration, the arm starts both in the same one.
+    let start = before.first().map(|end| end.joints);
+    let after =
+        task.rewritten.map(|listing| (listing, run(listing, task.loads[1], start, &mut arms, task.cell)));
     let partners = after.as_ref().map(|(_, runs)| align(&before, runs));
     let points = before
         .iter()
@@ -143,8 +146,15 @@ pub fn verify(task: &VerificationTask<'_>, acting_arm: &ActingArm<'_>) -> PathRe
     }
 }
 
-fn run(listing: &Listing, loads: Option<&Loads>, arms: &mut Arms<'_>, cell: &Cell) -> Vec<ExecutedEnd> {
-    let frame_table = FrameTable::of(listing, arms, cell);
+/// Runs a program. `start` are the joints where it begins, unless cell file or program state them.
+fn run(
+    listing: &Listing,
+    loads: Option<&Loads>,
+    start: Option<Joints>,
+    arms: &mut Arms<'_>,
+    cell: &Cell,
+) -> Vec<ExecutedEnd> {
+    let frame_table = FrameTable::of(listing, arms, cell).starting_at(start);
     let mut sent: Vec<CommandedEnd> = Vec::new();
     let mut near: Option<Joints> = None;
     for (index, motion) in listing.motions.iter().enumerate() {

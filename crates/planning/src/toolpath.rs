@@ -245,6 +245,7 @@ fn draft(
         ),
         named_targets: true,
         monitor_configuration: true,
+        start_deg: joints.first().map(|joints| std::array::from_fn(|i| joints[i].to_degrees())),
         steps,
     }
 }

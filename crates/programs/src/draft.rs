@@ -17,6 +17,8 @@ pub struct Draft {
     pub named_targets: bool,
     /// Whether the controller monitors the programmed configuration (ConfL, ConfJ).
     pub monitor_configuration: bool,
+    /// The joints at the end of the first motion (°), for languages that state no configuration.
+    pub start_deg: Option<[f64; 6]>,
     /// The motions.
     pub steps: Vec<Step>,
 }

@@ -460,6 +460,8 @@ pub struct Listing {
     pub declared_tools: Vec<Tool>,
     /// Names in comments of an NC program for its numbered tools and work offsets: number (`T1`, `G54`), name.
     pub labels: Vec<(String, String)>,
+    /// The joints in which the arm starts (°), if a comment of an NC program states them.
+    pub start_deg: Option<[f64; 6]>,
     /// Work objects that motions use.
     pub work_objects: Vec<WorkObject>,
     /// Speeds that motions use.

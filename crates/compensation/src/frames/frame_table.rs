@@ -27,7 +27,7 @@ pub(crate) struct FrameTable {
     base: [bool; 6],
     /// Assumptions about external axes, and contradictions with the cell file.
     assumed: Vec<String>,
-    /// Joints where the program begins, as the cell file states them.
+    /// Joints where the program begins, as the cell file or the program states them.
     start: Option<Joints>,
 }
 
@@ -39,7 +39,7 @@ impl FrameTable {
             objects: Vec::new(),
             base: [false; 6],
             assumed: Vec::new(),
-            start: cell.start(),
+            start: cell.start(listing),
         };
         let teaching = Teaching::of(arms.nominal.arm(), arms.estimated.arm(), cell, listing);
         let first_motions = first_motions(listing);
@@ -84,6 +84,11 @@ impl FrameTable {
         out
     }
 
+    /// The same with joints where the program begins, unless they are stated.
+    pub(crate) fn starting_at(self, start: Option<Joints>) -> Self {
+        Self { start: self.start.or(start), ..self }
+    }
+
     /// The joints that the controller selects for a target of a motion.
     pub(crate) fn joints(
         &self,
@@ -99,7 +104,7 @@ impl FrameTable {
         configured(nominal, flange, target, monitored(motion), near)
     }
 
-    /// Whether the cell file says where a motion begins of which the program does not tell it.
+    /// Whether the start is stated for a motion that begins where the program's words do not tell.
     pub(crate) fn knows_start(&self, motion: &Motion) -> bool {
         self.start.is_some() && !motion.accepts_configuration
     }

@@ -83,9 +83,14 @@ pub fn contradictions(listing: &Listing, cell: &Cell, nominal: &Model) -> Vec<St
     if !unusable.is_empty() {
         return unusable;
     }
-    if let Some(joint) = cell.start().and_then(|start| nominal.limits.violated(&start)) {
+    if let Some(joint) = cell.start(listing).and_then(|start| nominal.limits.violated(&start)) {
+        let said = if cell.start_deg.is_some() {
+            "cell file: start_deg"
+        } else {
+            "`truegrind start` of the program"
+        };
         return vec![format!(
-            "cell file: start_deg: joint {} is outside its range of {:.1}° to {:.1}°: state the joints as the controller shows them, \
+            "{said}: joint {} is outside its range of {:.1}° to {:.1}°: state the joints as the controller shows them, \
              in degrees",
             joint + 1,
             nominal.limits.min_rad[joint].to_degrees(),

@@ -80,7 +80,7 @@ pub(crate) fn unchecked_notes(listing: &Listing, solved: &SolvedTargets, uncheck
             format!(
                 "before {count} of the motions the position of the arm is unknown, and no NC word states the \
                  configuration: wrist in front, elbow not turned back, joints nearest to zero are assumed, unchecked \
-                 ({lines}); state in the cell file where the arm starts (start_deg)"
+                 ({lines}); state where the arm starts, in the cell file (start_deg) or in a comment (truegrind start [q1,…,q6])"
             )
         } else {
             format!(

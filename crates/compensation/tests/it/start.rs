@@ -1,15 +1,18 @@
 //! Where an NC program begins: no word states the configuration.
 
 use nalgebra::DMatrix;
+use truegrind_arm::condition::Condition;
 use truegrind_arm::estimated::Estimated;
 use truegrind_arm::model::Joints;
 use truegrind_arm::parameter::link_parameters;
 use truegrind_arm::robots;
 use truegrind_compensation::cell::{Cell, CellError};
+use truegrind_compensation::deviation::After;
 use truegrind_compensation::frames::taught::contradictions;
 use truegrind_compensation::options::Options;
 use truegrind_compensation::plan::Plan;
 use truegrind_compensation::plan::planner::plan;
+use truegrind_compensation::verify::{ActingArm, VerificationTask, verify};
 use truegrind_programs::motion::{Frame, Listing};
 use truegrind_programs::nc::Task;
 use truegrind_programs::nc::setup::Setup;
@@ -109,6 +112,61 @@ fn the_cell_file_says_where_the_arm_starts() {
         let corrected = |cell: &Cell| planned(&arm, &listing, cell).points[0].joints_after.unwrap();
         let [a, b] = [corrected(&Cell::default()), corrected(&started(near))];
         assert!((a - b).amax() > 1.0, "{robot} {a} {b}");
+    }
+}
+
+/// The program says it as the cell file does, which overrides it.
+#[test]
+fn a_comment_says_where_the_arm_starts() {
+    let arm = arm("staubli-tx60");
+    let usual = listing(380.0, 0.0);
+    let mut over = joints_deg(&planned(&arm, &usual, &Cell::default()))[0];
+    over[3] += 180.0;
+    over[4] *= -1.0;
+    over[5] += 180.0;
+    let said = Listing { start_deg: Some(over), ..usual.clone() };
+    let plan = planned(&arm, &said, &Cell::default());
+    let q = joints_deg(&plan)[0];
+    assert!((0..6).all(|j| (q[j] - over[j]).abs() < 1e-6), "{q:?} {over:?}");
+    assert!(!plan.notes.iter().any(|note| note.contains("no NC word states")), "{:?}", plan.notes);
+    let begins = |plan: &Plan| joints_deg(plan)[0];
+    let with_both = planned(&arm, &said, &started([0.0, 0.0, 90.0, 0.0, 90.0, 0.0]));
+    let [a, b] = [begins(&with_both), begins(&planned(&arm, &usual, &Cell::default()))];
+    assert!((0..6).all(|j| (a[j] - b[j]).abs() < 1e-6), "{a:?} {b:?}");
+    let far = Listing { start_deg: Some([0.0, 0.0, 400.0, 0.0, 90.0, 0.0]), ..usual };
+    let found = contradictions(&far, &Cell::default(), &arm.nominal);
+    assert!(
+        found.len() == 1 && found[0].starts_with("`truegrind start` of the program: joint 3"),
+        "{found:?}"
+    );
+}
+
+/// Between two places the branch nearest to zero changes; a corrected program must not be run in another one than the original.
+#[test]
+fn a_corrected_program_starts_in_the_branch_of_the_original() {
+    let nominal = robots::load("universal-robots-ur5").unwrap().model;
+    let acting =
+        ActingArm { nominal: &nominal, model: &nominal, knowledge: None, condition: Condition::default() };
+    let ran = |original: &Listing, rewritten: &Listing| {
+        let cell = Cell::default();
+        let judged = VerificationTask {
+            original,
+            rewritten: Some(rewritten),
+            cell: &cell,
+            surface: None,
+            program: "p.nc",
+            name: "test",
+            after: After::Achieved,
+            loads: [None, None],
+        };
+        verify(&judged, &acting).points.remove(0)
+    };
+    for z in [0.0, 40.0, 80.0] {
+        let [here, beside] = [200.0, 225.0].map(|x| listing(x, z));
+        let [alone, other] = [&here, &beside].map(|alone| ran(alone, alone).joints_before.unwrap());
+        assert!((alone - other).amax() > 1.0, "another branch is assumed");
+        let moved = (ran(&here, &beside).joints_after.unwrap() - alone).amax();
+        assert!(moved < 0.6, "{z}: {moved}");
     }
 }
 

@@ -96,6 +96,7 @@ pub fn draft(plan: &Plan, setup: &MeasurementSetup<'_>, drive: &ProgramSettings)
                 object_frame: Frame::IDENTITY,
             },
         ),
+        start_deg: None,
         named_targets: false,
         monitor_configuration: false,
         steps,

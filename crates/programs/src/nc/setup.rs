@@ -1,4 +1,4 @@
-//! What an NC file does not hold: the convention of A, B and C, work offsets, and tools.
+//! What an NC file does not hold: the convention of A, B and C, work offsets, tools, and the joints in which the arm starts.
 //!
 //! A cell or robot file may state it, or comment lines of the program, which the control ignores:
 //!
@@ -6,6 +6,7 @@
 //! ; truegrind angles wpr
 //! ; truegrind tool T1 tGrind [[0,0,150],[1,0,0,0]]
 //! ; truegrind frame G54 wPart [[500,0,300],[1,0,0,0]]
+//! ; truegrind start [0,10,-5,0,85,0]
 //! ```
 
 use super::dialect::Dialect;
@@ -59,6 +60,8 @@ pub(super) enum Statement {
     Tool(StatedFrame),
     /// `frame G54 name [[…],[…]]`
     Frame(StatedFrame),
+    /// `start [q1,…,q6]` (°)
+    Start([f64; 6]),
 }
 
 /// A tool or work offset that a comment states.
@@ -71,7 +74,10 @@ pub(super) struct StatedFrame {
     pub(super) frame: Frame,
 }
 
-/// Parses a comment as a statement of a frame, tool or convention; the error is what was expected.
+/// Largest plausible joint angle (°).
+pub const MOST_DEG: f64 = 3600.0;
+
+/// Parses a comment as a statement of a frame, tool, convention or start; the error is what was expected.
 pub(super) fn statement(comment: &[u8]) -> Result<Option<Statement>, String> {
     // Fast exit for nearly every comment.
     let text = comment.trim_ascii();
@@ -90,10 +96,18 @@ pub(super) fn statement(comment: &[u8]) -> Result<Option<Statement>, String> {
         let [_, angles] = words[..] else { return Err(expected()) };
         return Angles::of(angles).map(|angles| Some(Statement::Angles(angles))).ok_or_else(expected);
     }
+    if what == "start" {
+        let (_, list) = text.split_at(text.find('[').unwrap_or(text.len()));
+        let near = |joints: &[f64; 6]| joints.iter().all(|angle| angle.abs() <= MOST_DEG);
+        return numbers(list).filter(near).map(|joints| Some(Statement::Start(joints))).ok_or_else(|| {
+            "`truegrind start [q1,q2,q3,q4,q5,q6]`: the joints in which the arm starts, in degrees".to_owned()
+        });
+    }
     if !matches!(&*what, "tool" | "frame") {
         // A misspelt statement must not be ignored like any comment.
-        let misspelt = ["angles", "tool", "frame"].into_iter().find(|word| what.starts_with(&word[..3]));
-        let known = "`truegrind angles …`, `truegrind tool …` or `truegrind frame …`";
+        let words = ["angles", "tool", "frame", "start"];
+        let misspelt = words.into_iter().find(|word| what.starts_with(&word[..3]));
+        let known = "`truegrind angles …`, `truegrind tool …`, `truegrind frame …` or `truegrind start …`";
         return misspelt.map_or(Ok(None), |_| Err(known.to_owned()));
     }
     let expected = || {
@@ -113,15 +127,20 @@ pub(super) fn statement(comment: &[u8]) -> Result<Option<Statement>, String> {
 
 /// `[[x,y,z],[q1,q2,q3,q4]]`
 fn frame(text: &str) -> Option<Frame> {
-    let mut numbers = [0.0_f64; 7];
-    let mut found = 0;
-    for part in text.split(['[', ']', ',', ' ']).filter(|part| !part.is_empty()) {
-        *numbers.get_mut(found)? = part.parse().ok()?;
-        found += 1;
-    }
-    let [x, y, z, w, i, j, k] = numbers;
+    let [x, y, z, w, i, j, k] = numbers(text)?;
     let square = w * w + i * i + j * j + k * k;
     let near = [x, y, z].iter().all(|coordinate| coordinate.abs() <= FARTHEST_MM);
-    (found == 7 && near && (square - 1.0).abs() < 1e-3)
+    (near && (square - 1.0).abs() < 1e-3)
         .then_some(Frame { position_mm: [x, y, z], quaternion: [w, i, j, k] })
+}
+
+/// As many finite numbers, in brackets and between commas.
+fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
+    let mut numbers = [0.0_f64; N];
+    let mut found = 0;
+    for part in text.split(['[', ']', ',', ' ']).filter(|part| !part.is_empty()) {
+        *numbers.get_mut(found)? = part.parse().ok().filter(|number: &f64| number.is_finite())?;
+        found += 1;
+    }
+    (found == N).then_some(numbers)
 }

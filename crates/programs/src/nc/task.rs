@@ -319,7 +319,7 @@ impl<'t, 's> Interpreter<'t, 's> {
         self.frame_index = None;
     }
 
-    /// Reads frames, tools and conventions that comments state.
+    /// Reads frames, tools, conventions and the start that comments state.
     fn comments(&mut self) {
         let (mut tools, mut frames) = (Vec::new(), Vec::new());
         for token in 0..self.tree.len() as u32 {
@@ -330,6 +330,14 @@ impl<'t, 's> Interpreter<'t, 's> {
                 Ok(Some(Statement::Angles(angles))) => self.angles = self.setup.angles.or(Some(angles)),
                 Ok(Some(Statement::Tool(stated))) => tools.push((token, stated)),
                 Ok(Some(Statement::Frame(stated))) => frames.push((token, stated)),
+                Ok(Some(Statement::Start(stated))) => {
+                    let first = *self.listing.start_deg.get_or_insert(stated);
+                    if first != stated {
+                        let expected = format!("{first:?}, as stated before: the arm starts once");
+                        self.list_unusable_comment(token);
+                        self.list_invalid_statement(token, expected);
+                    }
+                }
                 Ok(None) => {}
                 Err(expected) => {
                     self.list_unusable_comment(token);

@@ -76,6 +76,7 @@ pub enum WriteError {
 ///     work_object: ("G54".into(), object),
 ///     named_targets: false,
 ///     monitor_configuration: true,
+///     start_deg: None,
 ///     steps: vec![step],
 /// };
 /// // Both dialects express the same position.
@@ -175,6 +176,12 @@ impl Writer {
             draft.work_object.0,
             frame(&Frame::from_pose(&base))
         ));
+        if let Some(start) = draft.start_deg {
+            self.comment(&format!(
+                "truegrind start [{}]",
+                start.map(|angle| format!("{angle:.1}")).join(",")
+            ));
+        }
         match self.dialect {
             Dialect::Fanuc => {
                 self.block("G90 G21 G17 G40 G94 G64");

@@ -85,6 +85,7 @@ pub enum WriteError {
 ///     work_object: ("wPart".into(), object),
 ///     named_targets: true,
 ///     monitor_configuration: true,
+///     start_deg: None,
 ///     steps: vec![step],
 /// };
 /// // The module reads back with the same target.

@@ -582,3 +582,33 @@ fn computed_words_become_literals() {
     assert_eq!(rewritten.outcomes, [Outcome::Inlined]);
     assert_eq!(text, source.replace("X[#1*2]", "X4.5000"));
 }
+
+#[test]
+fn a_comment_states_the_start_once() {
+    let read = |comments: &str| {
+        let source = format!("O1\n{comments}G90 G21 G17 G54\nG1 X0. Y0. Z0. F600.\nM30\n");
+        Task::read(&[("p.nc", source.as_bytes())], &Setup::default()).listing
+    };
+    let stated = Some([0.0, 10.5, -5.0, 0.0, 85.0, 180.0]);
+    for comments in [
+        "(truegrind start [0,10.5,-5,0,85,180])\n",
+        "; truegrind START [ 0, 10.5, -5, 0, 85, 180 ]\n",
+        "(truegrind start [0,10.5,-5,0,85,180])\n(truegrind start [0,10.5,-5.0,0,85,180])\n",
+    ] {
+        let listing = read(comments);
+        assert_eq!((listing.start_deg, &listing.invalid_statements[..]), (stated, &[][..]), "{comments}");
+    }
+    assert_eq!(read("(start [0,0,0,0,0,0])\n").start_deg, None);
+    for (comment, expected) in [
+        ("(truegrind start [0,10.5,-5,0,85])", "in degrees"),
+        ("(truegrind start [0,10.5,-5,0,85,nan])", "in degrees"),
+        ("(truegrind start [0,10.5,-5,0,85,3601])", "in degrees"),
+        ("(truegrind start)", "in degrees"),
+        ("(truegrind stat [0,10.5,-5,0,85,180])", "`truegrind start …`"),
+        ("(truegrind start [0,0,0,0,0,0])\n(truegrind start [0,0,0,0,90,0])", "the arm starts once"),
+    ] {
+        let listing = read(&format!("{comment}\n"));
+        let [found] = &listing.invalid_statements[..] else { panic!("{comment}: {listing:?}") };
+        assert!(found.to_string().contains(expected), "{found}");
+    }
+}

@@ -60,6 +60,7 @@ fn draft(named_targets: bool) -> Draft {
             },
         ),
         named_targets,
+        start_deg: None,
         monitor_configuration: true,
         steps,
     }
