@@ -6,6 +6,9 @@ use truegrind_programs::rapid::lexer::{self, lex};
 use truegrind_programs::rapid::parser::parse;
 use truegrind_programs::rapid::token::keyword;
 
+mod nodes;
+mod starts;
+
 pub(crate) const PROGRAM: &str = r#"%%%
   VERSION:1
   LANGUAGE:ENGLISH
@@ -58,8 +61,8 @@ ENDMODULE
 fn check(source: &[u8]) {
     let tree = parse(source);
     assert_eq!(tree.print(), source);
-    assert_eq!(tree.nodes[0].size as usize, tree.nodes.len());
-    assert_eq!(tree.nodes[0].end as usize, tree.len());
+    assert_eq!(tree.nodes.behind(0), tree.nodes.len());
+    assert_eq!(tree.nodes.get(0).end as usize, tree.len());
     // Every node lies inside its parent and siblings do not overlap.
     let mut open: Vec<(usize, u32, u32)> = vec![];
     for (index, node) in tree.nodes.iter().enumerate() {

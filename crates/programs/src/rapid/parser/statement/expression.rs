@@ -106,7 +106,7 @@ impl Parser<'_, '_> {
     }
 
     /// A flat chain of operators of one priority after its first operand, which began at `node` and `first`.
-    pub(super) fn operators(&mut self, level: u8, node: usize, first: u32) -> Parsed {
+    pub(super) fn operators(&mut self, level: u8, node: u32, first: u32) -> Parsed {
         if self.peek().operator_level() != Some(level) {
             return Ok(());
         }
