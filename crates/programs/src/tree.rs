@@ -104,6 +104,13 @@ impl<'s, T: Copy, N: Copy> Tree<'s, T, N> {
         self.starts.push(start as u32);
     }
 
+    /// Appends tokens with their starts.
+    #[inline]
+    pub fn extend(&mut self, kinds: &[T], starts: &[u32]) {
+        self.kinds.extend_from_slice(kinds);
+        self.starts.extend(starts);
+    }
+
     /// Records that a line begins at `start`.
     #[inline]
     pub fn line_starts(&mut self, start: usize) {

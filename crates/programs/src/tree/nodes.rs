@@ -142,6 +142,7 @@ impl<N: Copy> Nodes<N> {
     }
 
     /// Appends a node without nodes inside.
+    #[inline]
     pub fn push(&mut self, kind: N, first: u32, end: u32) {
         let node = self.open(kind, first);
         self.close(node, first, end);

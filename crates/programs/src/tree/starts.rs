@@ -38,6 +38,17 @@ impl Starts {
         self.low.push(start as u16);
     }
 
+    /// Appends the starts of the next tokens.
+    #[inline]
+    pub fn extend(&mut self, starts: &[u32]) {
+        match starts.last() {
+            Some(&last) if (last >> 16) as usize > self.passed.len() => {
+                starts.iter().for_each(|&start| self.push(start));
+            }
+            _ => self.low.extend(starts.iter().map(|&start| start as u16)),
+        }
+    }
+
     /// Appends the starts of a later part of the same file.
     pub fn append(&mut self, part: &Self) {
         let tokens = self.low.len();

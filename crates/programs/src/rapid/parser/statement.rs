@@ -50,7 +50,7 @@ impl<'t, 's> Parser<'t, 's> {
             at: 0,
             last: 0,
             depth: 0,
-            nodes: Nodes::with_capacity(kinds.len() / 4),
+            nodes: Nodes::with_capacity(kinds.len() / 3),
             opaque: Vec::new(),
             blocks: Vec::new(),
         };
@@ -88,6 +88,13 @@ impl<'t, 's> Parser<'t, 's> {
             self.last = self.at;
             self.skip_trivia();
         }
+    }
+
+    /// Consumes so many tokens, of which none is trivia and behind which there is none.
+    #[inline]
+    fn advance(&mut self, tokens: u32) {
+        self.at += tokens;
+        self.last = self.at;
     }
 
     #[inline]
