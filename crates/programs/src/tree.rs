@@ -8,10 +8,16 @@
 //!
 //! Offsets are 32 bits. A file of 4 GiB or more becomes a single token (the dialect marks it as opaque).
 
+pub mod nodes;
+pub mod starts;
+
 use std::ops::Range;
 
 use rayon::prelude::*;
 
+pub use self::nodes::Node;
+use self::nodes::Nodes;
+use self::starts::Starts;
 use crate::motion::{OpaqueReason, Span};
 
 /// A range extended to its whole line, with blanks and line end, if nothing else is on the line.
@@ -23,19 +29,6 @@ pub(crate) fn whole_line(source: &[u8], range: Range<usize>) -> Range<usize> {
         Some(at) if begins && source[at] == b'\n' => before.map_or(0, |at| at + 1)..at + 1,
         _ => range,
     }
-}
-
-/// A node: its kind, the size of its subtree, and its tokens.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Node<N> {
-    /// Its kind.
-    pub kind: N,
-    /// The number of nodes in the subtree, itself included.
-    pub size: u32,
-    /// Its first token.
-    pub first: u32,
-    /// One past its last token.
-    pub end: u32,
 }
 
 /// A region that the parser could not read.
@@ -56,10 +49,10 @@ pub struct Opaque {
 pub struct Tree<'s, T, N> {
     source: &'s [u8],
     kinds: Vec<T>,
-    starts: Vec<u32>,
+    starts: Starts,
     lines: Vec<u32>,
     /// The nodes in preorder.
-    pub nodes: Vec<Node<N>>,
+    pub nodes: Nodes<N>,
     /// The regions that could not be parsed, in file order.
     pub opaque: Vec<Opaque>,
 }
@@ -79,9 +72,9 @@ impl<'s, T: Copy, N: Copy> Tree<'s, T, N> {
         Tree {
             source,
             kinds: Vec::with_capacity(estimate),
-            starts: Vec::with_capacity(estimate + 1),
+            starts: Starts::with_capacity(estimate),
             lines: vec![0],
-            nodes: Vec::new(),
+            nodes: Nodes::default(),
             opaque: Vec::new(),
         }
     }
@@ -98,7 +91,7 @@ impl<'s, T: Copy, N: Copy> Tree<'s, T, N> {
     {
         const AT_ONCE: usize = 1 << 16;
         for part in parts {
-            self.starts.par_extend(part.starts.par_iter().with_min_len(AT_ONCE).copied());
+            self.starts.append(&part.starts);
             self.kinds.par_extend(part.kinds.par_iter().with_min_len(AT_ONCE).copied());
             self.lines.extend_from_slice(&part.lines);
         }
@@ -109,6 +102,13 @@ impl<'s, T: Copy, N: Copy> Tree<'s, T, N> {
     pub fn push(&mut self, kind: T, start: usize) {
         self.kinds.push(kind);
         self.starts.push(start as u32);
+    }
+
+    /// Appends tokens with their starts.
+    #[inline]
+    pub fn extend(&mut self, kinds: &[T], starts: &[u32]) {
+        self.kinds.extend_from_slice(kinds);
+        self.starts.extend(starts);
     }
 
     /// Records that a line begins at `start`.
@@ -146,34 +146,38 @@ impl<'s, T: Copy, N: Copy> Tree<'s, T, N> {
     /// Where a token begins; the length of the file past the end.
     #[inline]
     pub fn start(&self, token: u32) -> usize {
-        self.starts.get(token as usize).map_or(self.source.len(), |&start| start as usize)
+        self.starts.get(token).map_or(self.source.len(), |start| start as usize)
     }
 
     /// The bytes of a token.
     #[inline]
     pub fn text(&self, token: u32) -> &'s [u8] {
-        &self.source[self.start(token)..self.start(token + 1)]
+        &self.source[self.range(token, token + 1)]
     }
 
     /// The byte range of tokens `first..end`.
+    #[inline]
     pub fn range(&self, first: u32, end: u32) -> Range<usize> {
-        self.start(first)..self.start(end)
+        let (start, end) = self.starts.pair(first, end);
+        let length = self.source.len();
+        start.map_or(length, |start| start as usize)..end.map_or(length, |end| end as usize)
     }
 
     /// The same as a [`Span`].
     pub fn span(&self, first: u32, end: u32) -> Span {
-        Span { start: self.start(first) as u32, end: self.start(end) as u32 }
+        let Range { start, end } = self.range(first, end);
+        Span { start: start as u32, end: end as u32 }
     }
 
     /// The bytes of a node.
     pub fn node_text(&self, node: u32) -> &'s [u8] {
-        let node = self.nodes[node as usize];
+        let node = self.nodes.get(node);
         &self.source[self.range(node.first, node.end)]
     }
 
     /// The span of a node.
     pub fn node_span(&self, node: u32) -> Span {
-        let node = self.nodes[node as usize];
+        let node = self.nodes.get(node);
         self.span(node.first, node.end)
     }
 
@@ -197,18 +201,18 @@ impl<'s, T: Copy, N: Copy> Tree<'s, T, N> {
 
     /// The children of a node, tokens and nodes in order.
     pub fn children(&self, node: u32) -> Children<'_, 's, T, N> {
-        let Node { size, first, end, .. } = self.nodes[node as usize];
+        let Node { size, first, end, .. } = self.nodes.get(node);
         Children { tree: self, token: first, end, node: node + 1, end_node: node + size }
     }
 
     /// The child nodes of a node.
     pub fn child_nodes(&self, node: u32) -> impl Iterator<Item = u32> + '_ {
-        let end = node + self.nodes[node as usize].size;
+        let end = self.nodes.behind(node);
         let mut next = node + 1;
         std::iter::from_fn(move || {
             (next < end).then(|| {
                 let this = next;
-                next += self.nodes[this as usize].size;
+                next = self.nodes.behind(this);
                 this
             })
         })
@@ -235,7 +239,7 @@ impl<T: Copy, N: Copy> Iterator for Children<'_, '_, T, N> {
 
     fn next(&mut self) -> Option<Child> {
         if self.node < self.end_node {
-            let node = self.tree.nodes[self.node as usize];
+            let node = self.tree.nodes.get(self.node);
             if node.first <= self.token {
                 let child = Child::Node(self.node);
                 self.node += node.size;

@@ -218,7 +218,8 @@ fn planned(job: &Planner<'_>) -> Plan {
     notes.extend(load_notes(listing, arms, options));
     let unchecked: Vec<u32> = portions.iter().flat_map(|portion| portion.unchecked.iter().copied()).collect();
     notes.extend(unchecked_notes(listing, solved, &unchecked));
-    let changes = changes.into_iter().flatten().collect();
+    #[expect(clippy::filter_map_identity, reason = "works in place, unlike `flatten`: memory is at its peak")]
+    let changes = changes.into_iter().filter_map(|change| change).collect();
     let mut plan = Plan { notes, changes, outcomes, ..Plan::default() };
     plan.points.reserve_exact(portions.iter().map(|p| p.points.len()).sum());
     for mut portion in portions {

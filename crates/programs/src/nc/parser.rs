@@ -7,6 +7,7 @@ use super::lexer::lex;
 use super::syntax::{NcTree, Syntax, Word, WordValue};
 use super::token::Token;
 use crate::motion::{OpaqueReason, Reason};
+use crate::tree::nodes::Nodes;
 use crate::tree::{Node, Opaque};
 
 /// Parses one file.
@@ -14,7 +15,7 @@ pub fn parse(source: &[u8], dialect: Dialect) -> NcTree<'_> {
     let mut tree = lex(source, dialect);
     let (nodes, opaque) = {
         let mut parser =
-            Parser { tree: &tree, dialect, at: 0, nodes: Vec::new(), opaque: Vec::new(), free: false };
+            Parser { tree: &tree, dialect, at: 0, nodes: Nodes::default(), opaque: Vec::new(), free: false };
         parser.file();
         (parser.nodes, parser.opaque)
     };
@@ -26,7 +27,7 @@ struct Parser<'t, 's> {
     tree: &'t NcTree<'s>,
     dialect: Dialect,
     at: u32,
-    nodes: Vec<Node<Syntax>>,
+    nodes: Nodes<Syntax>,
     opaque: Vec<Opaque>,
     /// Whether the block has names, beside which numbers and brackets may stand alone.
     free: bool,
@@ -67,9 +68,9 @@ impl Parser<'_, '_> {
     }
 
     fn file(&mut self) {
-        self.nodes.push(Node { kind: Syntax::File, size: 0, first: 0, end: self.tree.len() as u32 });
+        let file = self.nodes.open(Syntax::File, 0);
         if self.tree.kinds() == [Token::Unknown] {
-            self.nodes.push(Node { kind: Syntax::Opaque, size: 1, first: 0, end: 1 });
+            self.nodes.push(Syntax::Opaque, 0, 1);
             self.opaque.push(Opaque { first: 0, end: 1, reason: OpaqueReason::Binary, at: 0 });
         } else {
             while self.peek() != Token::End {
@@ -79,14 +80,14 @@ impl Parser<'_, '_> {
                 }
             }
         }
-        self.nodes[0].size = self.nodes.len() as u32;
+        self.nodes.close(file, 0, self.tree.len() as u32);
     }
 
     fn block(&mut self) {
-        let (node, first) = (self.nodes.len(), self.at);
-        self.nodes.push(Node { kind: Syntax::Block, size: 0, first, end: first });
+        let first = self.at;
+        let node = self.nodes.open(Syntax::Block, first);
         if self.peek() == Token::Slash {
-            self.nodes[node].kind = Syntax::Skippable;
+            self.nodes.set_kind(node, Syntax::Skippable);
             self.bump();
             // The skip level.
             if self.peek() == Token::Number {
@@ -99,7 +100,7 @@ impl Parser<'_, '_> {
             }
             // `5 /L X+60`: the skip mark may follow the block number.
             if self.peek() == Token::Slash {
-                self.nodes[node].kind = Syntax::Skippable;
+                self.nodes.set_kind(node, Syntax::Skippable);
                 self.bump();
             }
         }
@@ -109,7 +110,7 @@ impl Parser<'_, '_> {
         while !matches!(self.peek(), Token::LineEnd | Token::End) {
             if self.peek() == Token::Slash && self.at > begins && self.dialect != Dialect::Heidenhain {
                 // `N10 /X5`: the rest of the block may be skipped.
-                self.nodes[node].kind = Syntax::Skippable;
+                self.nodes.set_kind(node, Syntax::Skippable);
                 let slash = self.at;
                 self.bump();
                 if self.peek() == Token::Number && self.touches(slash + 1) {
@@ -117,16 +118,16 @@ impl Parser<'_, '_> {
                 }
                 continue;
             }
-            let (word, at) = (self.nodes.len(), self.at);
+            let at = self.at;
             // Numbers, strings and brackets stand alone only beside names: IF, CASE, DEF, o100 call.
             free |= self.peek() == Token::Name
                 || self.peek() == Token::Address && self.at == begins && self.is_o()
                 || self.peek() == Token::Hash && self.dialect == Dialect::Siemens;
             self.free = free;
-            self.nodes.push(Node { kind: Syntax::Word, size: 1, first: at, end: at });
+            let word = self.nodes.open(Syntax::Word, at);
             match self.word(at == begins) {
                 Some(end) => {
-                    self.nodes[word].end = end;
+                    self.nodes.close(word, at, end);
                     last = end;
                 }
                 None => {
@@ -139,15 +140,14 @@ impl Parser<'_, '_> {
                     {
                         end -= 1;
                     }
-                    self.nodes[word] = Node { kind: Syntax::Opaque, size: 1, first: at, end };
+                    self.nodes.set_kind(word, Syntax::Opaque);
+                    self.nodes.close(word, at, end);
                     self.opaque.push(Opaque { first: at, end, reason: OpaqueReason::Unexpected, at });
                     last = end;
                 }
             }
         }
-        let size = (self.nodes.len() - node) as u32;
-        let block = &mut self.nodes[node];
-        (block.size, block.end) = (size, last.max(first + 1));
+        self.nodes.close(node, first, last.max(first + 1));
     }
 
     /// Parses one word; returns one past its last token.
@@ -386,7 +386,7 @@ impl Parser<'_, '_> {
 
 /// The typed view of a word node.
 pub fn word<'s>(tree: &NcTree<'s>, node: u32) -> Word<'s> {
-    let Node { first, end, .. } = tree.nodes[node as usize];
+    let Node { first, end, .. } = tree.nodes.get(node);
     let mut at = first;
     let next = |at: &mut u32| {
         *at += 1;

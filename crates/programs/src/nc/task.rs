@@ -181,11 +181,11 @@ impl Transfer for Interpreter<'_, '_> {
     }
 
     fn size(&self, node: u32) -> u32 {
-        self.tree.nodes[node as usize].size
+        self.tree.nodes.get(node).size
     }
 
     fn control(&self, block: u32) -> Control {
-        match self.tree.nodes[block as usize].kind {
+        match self.tree.nodes.kind(block) {
             Syntax::Skippable => Control::Skippable,
             _ => Control::Simple,
         }

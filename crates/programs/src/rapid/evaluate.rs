@@ -135,7 +135,7 @@ impl<'a, 's> Evaluator<'a, 's> {
         let tree = self.tree(context.file);
         self.may_raise.set(false);
         match argument {
-            Child::Node(node) if tree.nodes[node as usize].kind == Syntax::Aggregate => {
+            Child::Node(node) if tree.nodes.kind(node) == Syntax::Aggregate => {
                 if let Some(value) = literal_target(tree.node_text(node), joints) {
                     let source = if value.is_ok() { Source::Inline } else { Source::Unknown };
                     return (value, source);
@@ -148,7 +148,7 @@ impl<'a, 's> Evaluator<'a, 's> {
                 }
                 _ => {}
             },
-            Child::Node(node) if tree.nodes[node as usize].kind == Syntax::Place => {
+            Child::Node(node) if tree.nodes.kind(node) == Syntax::Place => {
                 if let Some(found) = self.element_target(context, node, joints) {
                     return found;
                 }
@@ -250,7 +250,7 @@ impl<'a, 's> Evaluator<'a, 's> {
                 return Err(Reason::RunTimeIndex);
             };
             let Child::Node(list) = at else { return Err(Reason::WrongShape) };
-            if tree.nodes[list as usize].kind != Syntax::Aggregate {
+            if tree.nodes.kind(list) != Syntax::Aggregate {
                 return Err(Reason::WrongShape);
             }
             let mut cache = self.elements.borrow_mut();
@@ -357,7 +357,7 @@ impl<'a, 's> Evaluator<'a, 's> {
         let tree = self.tree(context.file);
         match expression {
             Child::Token(token) => self.operand(context, tree, token),
-            Child::Node(node) => match tree.nodes[node as usize].kind {
+            Child::Node(node) => match tree.nodes.kind(node) {
                 Syntax::Aggregate => self.aggregate(context, tree, node),
                 Syntax::Paren => match expressions(tree, node).next() {
                     Some(inner) => self.value(context, inner),
@@ -484,7 +484,7 @@ impl<'a, 's> Evaluator<'a, 's> {
         };
         for part in rest.by_ref() {
             match part {
-                Child::Node(index) if tree.nodes[index as usize].kind == Syntax::Index => {
+                Child::Node(index) if tree.nodes.kind(index) == Syntax::Index => {
                     for position in expressions(tree, index) {
                         let Ok(position) = self.value(context, position).number() else {
                             return Value::Unknown(Reason::RunTimeIndex);
@@ -519,7 +519,7 @@ impl<'a, 's> Evaluator<'a, 's> {
     }
 
     fn function(&self, context: Context<'_>, tree: &RapidTree<'s>, node: u32) -> Value {
-        let name = folded(tree.text(tree.nodes[node as usize].first));
+        let name = folded(tree.text(tree.nodes.first(node)));
         if let Some(id) = self.symbols.find(context.scope, &name) {
             let symbol = &self.symbols.symbols[id as usize];
             return match symbol.kind {
@@ -635,7 +635,7 @@ fn is_plain_place(tree: &RapidTree<'_>, expression: Child) -> bool {
     match expression {
         Child::Token(_) => true,
         Child::Node(node) => {
-            tree.nodes[node as usize].kind == Syntax::Place
+            tree.nodes.kind(node) == Syntax::Place
                 && parts(tree, node).all(|part| matches!(part, Child::Token(_)))
         }
     }
@@ -643,15 +643,14 @@ fn is_plain_place(tree: &RapidTree<'_>, expression: Child) -> bool {
 
 /// The returned expression of a function whose only statement is RETURN and which declares nothing.
 fn single_return(tree: &RapidTree<'_>, function: u32) -> Option<Child> {
-    let mut inside =
-        tree.child_nodes(function).filter(|&node| tree.nodes[node as usize].kind != Syntax::Parameters);
+    let mut inside = tree.child_nodes(function).filter(|&node| tree.nodes.kind(node) != Syntax::Parameters);
     let (mut only, None) = (inside.next()?, inside.next()) else { return None };
-    if tree.nodes[only as usize].kind == Syntax::Body {
+    if tree.nodes.kind(only) == Syntax::Body {
         let mut statements = tree.child_nodes(only);
         let (Some(first), None) = (statements.next(), statements.next()) else { return None };
         only = first;
     }
-    (tree.nodes[only as usize].kind == Syntax::Return).then(|| expressions(tree, only).next()).flatten()
+    (tree.nodes.kind(only) == Syntax::Return).then(|| expressions(tree, only).next()).flatten()
 }
 
 /// The target of a literal of plain numbers; `None` for anything else.

@@ -149,7 +149,7 @@ pub(super) fn interpret_unit(evaluator: &Evaluator<'_, '_>, unit: Unit, visitor:
     interpreter.any =
         interpreter.switches_set_under(unit.node).join(interpreter.handler_switches).join(SwitchSet::ENTRY);
     if let Some(routine) = unit.routine
-        && tree.child_nodes(unit.node).any(|clause| is_exception_clause(tree.nodes[clause as usize].kind))
+        && tree.child_nodes(unit.node).any(|clause| is_exception_clause(tree.nodes.kind(clause)))
     {
         // An error may leave a callee at any point.
         interpreter.any = interpreter.any.join(symbols.effects_of(routine).switches);
@@ -221,7 +221,7 @@ struct Interpreter<'w, 'a, 's> {
 
 /// What a node of a unit is for the flow of control.
 pub(super) fn control(tree: &RapidTree<'_>, unit: Unit, node: u32) -> Control {
-    match tree.nodes[node as usize].kind {
+    match tree.nodes.kind(node) {
         kind if unit.routine.is_none() && (kind.is_routine() || kind == Syntax::Module) => Control::Apart,
         Syntax::Body => Control::Sequence,
         Syntax::CompactIf => Control::Optional,
@@ -246,7 +246,7 @@ impl Transfer for Interpreter<'_, '_, '_> {
     }
 
     fn size(&self, node: u32) -> u32 {
-        self.evaluator.trees[self.unit.file as usize].nodes[node as usize].size
+        self.evaluator.trees[self.unit.file as usize].nodes.get(node).size
     }
 
     fn control(&self, node: u32) -> Control {
@@ -335,7 +335,7 @@ impl Transfer for Interpreter<'_, '_, '_> {
 
 impl Interpreter<'_, '_, '_> {
     fn kind(&self, node: u32) -> Syntax {
-        self.evaluator.trees[self.unit.file as usize].nodes[node as usize].kind
+        self.evaluator.trees[self.unit.file as usize].nodes.kind(node)
     }
 
     /// The routine ends in a state.
@@ -432,7 +432,7 @@ impl Interpreter<'_, '_, '_> {
         let tree = &self.evaluator.trees[self.unit.file as usize];
         let clauses = tree.child_nodes(self.unit.node);
         let clauses: Vec<u32> =
-            clauses.filter(|&clause| tree.nodes[clause as usize].kind == Syntax::ErrorClause).collect();
+            clauses.filter(|&clause| tree.nodes.kind(clause) == Syntax::ErrorClause).collect();
         let handler_switches = clauses
             .into_iter()
             .fold(SwitchSet::EMPTY, |all, clause| all.join(self.switches_set_under(clause)));
@@ -450,12 +450,12 @@ impl Interpreter<'_, '_, '_> {
     /// The switches that statements under a node may set.
     fn switches_set_under(&mut self, node: u32) -> SwitchSet {
         let tree = &self.evaluator.trees[self.unit.file as usize];
-        let end = node + tree.nodes[node as usize].size;
+        let end = tree.nodes.behind(node);
         let symbols = self.evaluator.symbols;
         let mut out = SwitchSet::EMPTY;
         for &node in symbols.switch_calls_in(self.unit, node..end) {
-            let name = tree.text(tree.nodes[node as usize].first);
-            let late = tree.nodes[node as usize].kind == Syntax::LateCall;
+            let name = tree.text(tree.nodes.first(node));
+            let late = tree.nodes.kind(node) == Syntax::LateCall;
             let called = if late { &[] } else { symbols.callees(self.unit.scope, name) };
             if let Some(sets) =
                 (!late && called.is_empty()).then(|| switches_set_by(tree, node, name)).flatten()
@@ -466,7 +466,7 @@ impl Interpreter<'_, '_, '_> {
             }
             for &routine in called {
                 out = out.join(self.visitor.exit_of(routine).modal);
-                if self.resumes || tree.nodes[node as usize].kind == Syntax::Function {
+                if self.resumes || tree.nodes.kind(node) == Syntax::Function {
                     out = out.join(symbols.effects_of(routine).switches);
                 }
             }
@@ -478,8 +478,8 @@ impl Interpreter<'_, '_, '_> {
     fn transfer_call(&mut self, node: u32, state: &mut AbstractState, nesting: Nesting) {
         let tree = &self.evaluator.trees[self.unit.file as usize];
         let symbols = self.evaluator.symbols;
-        let name = tree.text(tree.nodes[node as usize].first);
-        let late = tree.nodes[node as usize].kind == Syntax::LateCall;
+        let name = tree.text(tree.nodes.first(node));
+        let late = tree.nodes.kind(node) == Syntax::LateCall;
         self.join_switches(self.handler_switches, state);
         for inside in tree.child_nodes(node) {
             self.invalidate_changed(inside, state);

@@ -28,6 +28,46 @@ const HEADER_LIMIT: usize = 1024;
 /// Larger files are lexed on all threads (bytes).
 const LARGE: usize = 1 << 20;
 
+/// The bytes that are a token whatever follows.
+const ALONE: [Option<Token>; 256] = {
+    const BYTES: [(u8, Token); 16] = [
+        (b',', Token::Comma),
+        (b'[', Token::BracketOpen),
+        (b']', Token::BracketClose),
+        (b'-', Token::Minus),
+        (b';', Token::Semicolon),
+        (b'\\', Token::Backslash),
+        (b'(', Token::ParenOpen),
+        (b')', Token::ParenClose),
+        (b'{', Token::BraceOpen),
+        (b'}', Token::BraceClose),
+        (b'+', Token::Plus),
+        (b'*', Token::Star),
+        (b'/', Token::Slash),
+        (b'=', Token::Equal),
+        (b'?', Token::Question),
+        (b'|', Token::Pipe),
+    ];
+    let mut alone = [None; 256];
+    let mut k = 0;
+    while k < BYTES.len() {
+        alone[BYTES[k].0 as usize] = Some(BYTES[k].1);
+        k += 1;
+    }
+    alone
+};
+
+/// The bytes of names and reserved words.
+const IN_NAMES: [bool; 256] = {
+    let mut inside = [false; 256];
+    let mut byte = 0;
+    while byte < inside.len() {
+        inside[byte] = byte >= 0x80 || byte as u8 == b'_' || (byte as u8).is_ascii_alphanumeric();
+        byte += 1;
+    }
+    inside
+};
+
 /// Splits a file into tokens.
 ///
 /// A large file is cut where a line begins with something other than white space: only white space and the
@@ -97,28 +137,33 @@ fn is_space(byte: u8) -> bool {
 
 /// The tokens of a part of a file that begins and ends between tokens.
 fn tokens(source: &[u8], range: std::ops::Range<usize>, tree: &mut Tree<'_, Token, Syntax>) {
-    let mut rest = &source[range.clone()];
-    while !rest.is_empty() {
-        let at = range.end - rest.len();
-        let (after, kind) = if is_space(rest[0]) {
-            (space(rest, at, tree), Token::Space)
-        } else {
-            token(rest).unwrap_or((&rest[1..], Token::Unknown))
-        };
-        if kind == Token::Header {
-            let header = &rest[..rest.len() - after.len()];
-            for (index, _) in header.iter().enumerate().filter(|&(_, &byte)| byte == b'\n') {
-                tree.line_starts(at + index + 1);
-            }
+    let text = &source[..range.end];
+    let mut at = range.start;
+    // Some tokens at once: one by one, the room for each would be looked at in two lists.
+    let (mut kinds, mut starts) = ([Token::End; 64], [0; 64]);
+    while at < text.len() {
+        let mut count = 0;
+        while count < kinds.len()
+            && let Some(&first) = text.get(at)
+        {
+            let rest = &text[at..];
+            let (kind, length) = match ALONE[usize::from(first)] {
+                Some(kind) => (kind, 1),
+                None if first.is_ascii_digit() => (Token::Number, number_length(rest)),
+                None if is_space(first) => (Token::Space, space(rest, at, tree)),
+                None => token(rest, at, tree),
+            };
+            (kinds[count], starts[count]) = (kind, at as u32);
+            count += 1;
+            at += length;
         }
-        tree.push(kind, at);
-        rest = after;
+        tree.extend(&kinds[..count], &starts[..count]);
     }
 }
 
-/// White space; records the beginnings of lines.
+/// The length of white space; records the beginnings of lines.
 #[inline]
-fn space<'s>(input: Bytes<'s>, at: usize, tree: &mut Tree<'_, Token, Syntax>) -> Bytes<'s> {
+fn space(input: Bytes<'_>, at: usize, tree: &mut Tree<'_, Token, Syntax>) -> usize {
     let mut index = 0;
     while let Some(&byte) = input.get(index) {
         match byte {
@@ -128,43 +173,39 @@ fn space<'s>(input: Bytes<'s>, at: usize, tree: &mut Tree<'_, Token, Syntax>) ->
         }
         index += 1;
     }
-    &input[index..]
+    index
 }
 
-/// One token that is not plain white space.
+/// One token that is neither white space nor [`ALONE`] nor begins with a digit, and its length.
+fn token(input: Bytes<'_>, at: usize, tree: &mut Tree<'_, Token, Syntax>) -> (Token, usize) {
+    let Ok((rest, kind)) = other(input) else { return (Token::Unknown, 1) };
+    let length = input.len() - rest.len();
+    if kind == Token::Header {
+        for (index, _) in input[..length].iter().enumerate().filter(|&(_, &byte)| byte == b'\n') {
+            tree.line_starts(at + index + 1);
+        }
+    }
+    (kind, length)
+}
+
 #[inline]
-fn token(input: Bytes<'_>) -> Lexed<'_, Token> {
+fn other(input: Bytes<'_>) -> Lexed<'_, Token> {
     let one = |kind| Ok((&input[1..], kind));
     let two = |second: u8, both, single| match input.get(1) {
         Some(&byte) if byte == second => Ok((&input[2..], both)),
         _ => Ok((&input[1..], single)),
     };
     match input[0] {
-        b'0'..=b'9' => number(input).map(|(rest, _)| (rest, Token::Number)),
-        b',' => one(Token::Comma),
-        b'[' => one(Token::BracketOpen),
-        b']' => one(Token::BracketClose),
-        b'-' => one(Token::Minus),
         b'a'..=b'z' | b'A'..=b'Z' | b'_' | 0xC0.. => word(input),
         b'.' if input.get(1).is_some_and(u8::is_ascii_digit) => {
             number(input).map(|(rest, _)| (rest, Token::Number))
         }
         b'.' => one(Token::Dot),
-        b';' => one(Token::Semicolon),
-        b'\\' => one(Token::Backslash),
         b':' => two(b'=', Token::Assign, Token::Colon),
         b'!' => {
             take_while(|byte| byte != b'\n' && byte != b'\r').parse(input).map(|(r, _)| (r, Token::Comment))
         }
         b'"' => string(input),
-        b'(' => one(Token::ParenOpen),
-        b')' => one(Token::ParenClose),
-        b'{' => one(Token::BraceOpen),
-        b'}' => one(Token::BraceClose),
-        b'+' => one(Token::Plus),
-        b'*' => one(Token::Star),
-        b'/' => one(Token::Slash),
-        b'=' => one(Token::Equal),
         b'>' => two(b'=', Token::GreaterEqual, Token::Greater),
         b'<' => match placeholder(input) {
             Ok(found) => Ok(found),
@@ -175,8 +216,6 @@ fn token(input: Bytes<'_>) -> Lexed<'_, Token> {
             },
         },
         b'%' => header(input).or_else(|_| one(Token::Percent)),
-        b'?' => one(Token::Question),
-        b'|' => one(Token::Pipe),
         _ => one(Token::Unknown),
     }
 }
@@ -185,60 +224,87 @@ fn token(input: Bytes<'_>) -> Lexed<'_, Token> {
 /// The sign is no part of it.
 #[inline]
 pub fn number(input: Bytes<'_>) -> Lexed<'_> {
-    if input.first() == Some(&b'0') && input.get(1).is_some_and(u8::is_ascii_alphabetic) {
-        let prefixed = alt((
-            recognize((tag_no_case("0x"), take_while1(|byte: u8| byte.is_ascii_hexdigit()))),
-            recognize((tag_no_case("0b"), take_while1(|byte| matches!(byte, b'0' | b'1')))),
-            recognize((tag_no_case("0o"), take_while1(|byte| matches!(byte, b'0'..=b'7')))),
-            recognize((tag_no_case("0d"), digit1)),
-        ))
-        .parse(input);
-        if prefixed.is_ok() {
-            return prefixed;
+    match number_length(input) {
+        0 => Err(nom::Err::Error(())),
+        length => take(length).parse(input),
+    }
+}
+
+/// The length of a number; 0 where there is none.
+#[inline]
+fn number_length(input: Bytes<'_>) -> usize {
+    let second = input.get(1);
+    match input.first() {
+        Some(b'0') if second.is_some_and(u8::is_ascii_alphabetic) => {
+            if let Ok((rest, _)) = prefixed(input) {
+                return input.len() - rest.len();
+            }
         }
+        Some(b'0'..=b'9') => {}
+        Some(b'.') if second.is_some_and(u8::is_ascii_digit) => {}
+        _ => return 0,
     }
-    let whole = digits(input, 0);
-    let mut end = whole;
+    input.first_chunk().and_then(short_decimal).unwrap_or_else(|| decimal(input))
+}
+
+/// A number with the prefix of its base.
+fn prefixed(input: Bytes<'_>) -> Lexed<'_> {
+    alt((
+        recognize((tag_no_case("0x"), take_while1(|byte: u8| byte.is_ascii_hexdigit()))),
+        recognize((tag_no_case("0b"), take_while1(|byte| matches!(byte, b'0' | b'1')))),
+        recognize((tag_no_case("0o"), take_while1(|byte| matches!(byte, b'0'..=b'7')))),
+        recognize((tag_no_case("0d"), digit1)),
+    ))
+    .parse(input)
+}
+
+/// The length of a decimal number that begins with a digit, or with a point and a digit.
+#[cold]
+fn decimal(input: Bytes<'_>) -> usize {
+    let digits = |at: usize| at + input[at..].iter().take_while(|byte| byte.is_ascii_digit()).count();
+    let mut end = digits(0);
     if input.get(end) == Some(&b'.') {
-        end = digits(input, end + 1);
-    }
-    if end - usize::from(end > whole) == 0 {
-        return Err(nom::Err::Error(()));
+        end = digits(end + 1);
     }
     if matches!(input.get(end), Some(b'e' | b'E')) {
-        let sign = usize::from(matches!(input.get(end + 1), Some(b'+' | b'-')));
-        let exponent = digits(input, end + 1 + sign);
-        if exponent > end + 1 + sign {
+        let from = end + 1 + usize::from(matches!(input.get(end + 1), Some(b'+' | b'-')));
+        let exponent = input.get(from..).map_or(from, |_| digits(from));
+        if exponent > from {
             end = exponent;
         }
     }
-    take(end).parse(input)
+    end
 }
 
-/// Where the digits from `at` end. Eight bytes at a time: the lengths of numbers are unpredictable, and a loop over single digits
-/// would end with a mispredicted branch.
+/// The same, if it ends before the last of sixteen bytes, all at once: the lengths of numbers are unpredictable, and a loop over
+/// single digits would end with a mispredicted branch.
 #[inline]
-fn digits(input: Bytes<'_>, mut at: usize) -> usize {
-    while let Some(eight) = input.get(at..).and_then(<[u8]>::first_chunk::<8>) {
-        let others = no_digits(u64::from_le_bytes(*eight));
-        at += others.trailing_zeros() as usize / 8;
-        if others != 0 {
-            return at;
+fn short_decimal(sixteen: &[u8; 16]) -> Option<usize> {
+    let mut others = no_digits(u128::from_le_bytes(*sixteen));
+    let first = |others: u128| others.trailing_zeros() as usize / 8;
+    let mut end = first(others);
+    if *sixteen.get(end)? == b'.' {
+        others &= others - 1;
+        end = first(others);
+    }
+    if matches!(*sixteen.get(end)?, b'e' | b'E') {
+        let from = end + 1 + usize::from(matches!(sixteen.get(end + 1)?, b'+' | b'-'));
+        let digits = first(others.checked_shr(8 * from as u32)?);
+        if digits > 0 {
+            end = from + digits;
         }
     }
-    while input.get(at).is_some_and(u8::is_ascii_digit) {
-        at += 1;
-    }
-    at
+    (end < sixteen.len()).then_some(end)
 }
 
-/// The highest bit of each of eight bytes that is no digit.
+/// The highest bit of each of sixteen bytes that is no digit.
 #[inline]
-fn no_digits(eight: u64) -> u64 {
-    const LOW: u64 = 0x7F7F_7F7F_7F7F_7F7F;
+fn no_digits(sixteen: u128) -> u128 {
+    const ONES: u128 = u128::MAX / 0xFF;
+    const LOW: u128 = 0x7F * ONES;
     // Digits become 0 to 9, and with 0x76 more the highest bit is set from 10 on.
-    let value = eight ^ 0x3030_3030_3030_3030;
-    (((value & LOW) + 0x7676_7676_7676_7676) | value) & !LOW
+    let value = sixteen ^ (0x30 * ONES);
+    (((value & LOW) + 0x76 * ONES) | value) & !LOW
 }
 
 /// An identifier or reserved word. Bytes from 0x80 belong to it: Latin-1 letters, and the pieces of letters of other
@@ -252,8 +318,8 @@ fn word(input: Bytes<'_>) -> Lexed<'_, Token> {
         }
         _ => {}
     }
-    let (rest, text) =
-        take_while(|byte: u8| byte.is_ascii_alphanumeric() || byte == b'_' || byte >= 0x80).parse(input)?;
+    let length = input.iter().take_while(|byte| IN_NAMES[usize::from(**byte)]).count();
+    let (text, rest) = input.split_at(length);
     Ok((rest, keyword(text).unwrap_or(Token::Ident)))
 }
 

@@ -39,7 +39,7 @@ impl Places {
         let alone = modules.len() == 1;
         let range = |token: u32| tree.range(token, token + 1);
         let module = |module: u32| {
-            let node = tree.nodes[module as usize];
+            let node = tree.nodes.get(module);
             let tokens = if alone { whole.clone() } else { node.first..node.end };
             Module {
                 bytes: tree.range(node.first, node.end),
@@ -147,13 +147,13 @@ pub fn text(mark: &Mark) -> String {
 
 /// The modules of a file; a fragment has none.
 fn modules(tree: &RapidTree<'_>) -> Vec<u32> {
-    tree.child_nodes(0).filter(|&node| tree.nodes[node as usize].kind == Syntax::Module).collect()
+    tree.child_nodes(0).filter(|&node| tree.nodes.kind(node) == Syntax::Module).collect()
 }
 
 /// Where the mark of a module goes, and whether a line begins there: after the line on which its head ends, or, where it
 /// has no other line, behind its head.
 fn place(tree: &RapidTree<'_>, module: u32) -> (usize, bool) {
-    let node = tree.nodes[module as usize];
+    let node = tree.nodes.get(module);
     let mut head = node.first + 1;
     for part in parts(tree, module).skip(1) {
         match (node_kind(tree, part), token_kind(tree, part)) {

@@ -350,7 +350,7 @@ impl Symbols {
         let outside = self.new_scope(0);
         let mut loose = false;
         for node in tree.child_nodes(0) {
-            if tree.nodes[node as usize].kind == Syntax::Module {
+            if tree.nodes.kind(node) == Syntax::Module {
                 let scope = self.new_scope(0);
                 let name = parts(tree, node).find(|&part| token_kind(tree, part) == Some(Token::Ident));
                 let name = name.map(|part| display(text_of(tree, part))).unwrap_or_default();
@@ -374,7 +374,7 @@ impl Symbols {
 
     /// A declaration or routine; false for a statement.
     fn item(&mut self, tree: &RapidTree<'_>, file: u32, scope: u32, node: u32, module: &str) -> bool {
-        let kind = tree.nodes[node as usize].kind;
+        let kind = tree.nodes.kind(node);
         match kind {
             Syntax::Data => self.declare_data(tree, file, scope, node, true),
             Syntax::Record | Syntax::Alias => self.declare_type(tree, file, scope, node),
@@ -404,7 +404,7 @@ impl Symbols {
                 .collect()
         };
         let own = names(node);
-        let (name, type_name, kind) = if tree.nodes[node as usize].kind == Syntax::Alias {
+        let (name, type_name, kind) = if tree.nodes.kind(node) == Syntax::Alias {
             let [type_name, name] = own[..] else { return };
             (name, folded(tree.text(type_name)), SymbolKind::Alias)
         } else {
@@ -432,8 +432,8 @@ impl Symbols {
             let symbol = Symbol::new((file, inner), parameter.name, SymbolKind::Parameter, type_name);
             self.declare(tree.text(parameter.name), symbol.varying(), false);
         }
-        for inside in node + 1..node + tree.nodes[node as usize].size {
-            match tree.nodes[inside as usize].kind {
+        for inside in node + 1..tree.nodes.behind(node) {
+            match tree.nodes.kind(inside) {
                 Syntax::Data => self.declare_data(tree, file, inner, inside, false),
                 Syntax::For => {
                     self.loop_names.extend(loop_name(tree, inside).map(|name| (file, inner, name)))
@@ -459,11 +459,11 @@ impl Symbols {
 
     /// The variables of the loops of a fragment, outside routines.
     fn collect_loop_variables(&mut self, tree: &RapidTree<'_>, file: u32, scope: u32, node: u32) {
-        let (mut at, end) = (node + 1, node + tree.nodes[node as usize].size);
+        let (mut at, end) = (node + 1, tree.nodes.behind(node));
         while at < end {
-            let kind = tree.nodes[at as usize].kind;
+            let kind = tree.nodes.kind(at);
             if kind.is_routine() || kind == Syntax::Module {
-                at += tree.nodes[at as usize].size;
+                at = tree.nodes.behind(at);
                 continue;
             }
             if kind == Syntax::For {
@@ -506,9 +506,7 @@ impl Symbols {
     pub fn root(&self, tree: &RapidTree<'_>, scope: u32, place: Child) -> Option<u32> {
         let token = match place {
             Child::Token(token) => token,
-            Child::Node(node) if tree.nodes[node as usize].kind == Syntax::Place => {
-                tree.nodes[node as usize].first
-            }
+            Child::Node(node) if tree.nodes.kind(node) == Syntax::Place => tree.nodes.first(node),
             Child::Node(_) => return None,
         };
         if tree.kind(token) != Some(Token::Ident) {

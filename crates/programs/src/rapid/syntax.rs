@@ -184,7 +184,7 @@ pub fn token_kind(tree: &RapidTree<'_>, child: Child) -> Option<Token> {
 pub fn node_kind(tree: &RapidTree<'_>, child: Child) -> Option<Syntax> {
     match child {
         Child::Token(_) => None,
-        Child::Node(node) => Some(tree.nodes[node as usize].kind),
+        Child::Node(node) => Some(tree.nodes.kind(node)),
     }
 }
 
@@ -193,7 +193,7 @@ pub fn tokens_of(tree: &RapidTree<'_>, child: Child) -> (u32, u32) {
     match child {
         Child::Token(token) => (token, token + 1),
         Child::Node(node) => {
-            let node = tree.nodes[node as usize];
+            let node = tree.nodes.get(node);
             (node.first, node.end)
         }
     }
@@ -241,7 +241,7 @@ pub struct Argument {
 /// The arguments of a call, late call or function.
 pub fn arguments<'t>(tree: &'t RapidTree<'_>, call: u32) -> impl Iterator<Item = Argument> + 't {
     tree.child_nodes(call).filter_map(move |node| {
-        let kind = tree.nodes[node as usize].kind;
+        let kind = tree.nodes.kind(node);
         match kind {
             Syntax::Argument => {
                 Some(Argument { name: None, optional: false, value: expressions(tree, node).next() })
@@ -357,7 +357,7 @@ pub struct RoutineHead {
 
 /// Reads the head of a routine.
 pub fn routine_head(tree: &RapidTree<'_>, node: u32) -> Option<RoutineHead> {
-    let kind = tree.nodes[node as usize].kind;
+    let kind = tree.nodes.kind(node);
     let mut head = RoutineHead { node, kind, local: false, name: 0, parameters: Vec::new() };
     let mut named = false;
     for part in parts(tree, node) {
@@ -366,7 +366,7 @@ pub fn routine_head(tree: &RapidTree<'_>, node: u32) -> Option<RoutineHead> {
             (Child::Token(token), Some(Token::Ident | Token::Placeholder)) => {
                 (head.name, named) = (token, true);
             }
-            (Child::Node(list), _) => match tree.nodes[list as usize].kind {
+            (Child::Node(list), _) => match tree.nodes.kind(list) {
                 Syntax::Parameters => {
                     head.parameters = parameters(tree, list);
                 }

@@ -243,7 +243,9 @@ impl<'a, 's> ListingBuilder<'a, 's> {
 
     /// Interprets every unit.
     fn interpret_units(&mut self) {
-        self.reserve(self.trees.iter().map(|tree| tree.nodes.len()).sum::<usize>() / NODES_PER_MOTION);
+        self.reserve(
+            self.trees.iter().map(|tree| tree.nodes.len() as usize).sum::<usize>() / NODES_PER_MOTION,
+        );
         for (file, tree) in self.trees.iter().enumerate() {
             self.listing.marks.push(mark::find(tree));
             for opaque in &tree.opaque {
@@ -312,8 +314,8 @@ impl Visitor for ListingBuilder<'_, '_> {
             return None;
         }
         let tree = &self.trees[unit.file as usize];
-        let late = tree.nodes[node as usize].kind == Syntax::LateCall;
-        let name = tree.text(tree.nodes[node as usize].first);
+        let late = tree.nodes.kind(node) == Syntax::LateCall;
+        let name = tree.text(tree.nodes.first(node));
         let hidden = self.symbols.hides_instruction && self.symbols.routine(unit.scope, name).is_some();
         let known = if late || hidden { None } else { instruction::find(name) };
         let motion = match known {

@@ -6,6 +6,9 @@ use truegrind_programs::rapid::lexer::{self, lex};
 use truegrind_programs::rapid::parser::parse;
 use truegrind_programs::rapid::token::keyword;
 
+mod nodes;
+mod starts;
+
 pub(crate) const PROGRAM: &str = r#"%%%
   VERSION:1
   LANGUAGE:ENGLISH
@@ -58,8 +61,8 @@ ENDMODULE
 fn check(source: &[u8]) {
     let tree = parse(source);
     assert_eq!(tree.print(), source);
-    assert_eq!(tree.nodes[0].size as usize, tree.nodes.len());
-    assert_eq!(tree.nodes[0].end as usize, tree.len());
+    assert_eq!(tree.nodes.behind(0), tree.nodes.len());
+    assert_eq!(tree.nodes.get(0).end as usize, tree.len());
     // Every node lies inside its parent and siblings do not overlap.
     let mut open: Vec<(usize, u32, u32)> = vec![];
     for (index, node) in tree.nodes.iter().enumerate() {
@@ -213,7 +216,7 @@ fn a_place_is_found_from_any_other_line() {
     }
 }
 
-/// Digits are read eight at a time: a number must end as in a byte-by-byte reader, whatever its length, the next
+/// Sixteen bytes are looked at at once: a number must end as in a byte-by-byte reader, whatever its length, the next
 /// byte, and the end of the text.
 #[test]
 fn a_number_ends_at_its_last_digit_whatever_follows() {
@@ -232,6 +235,51 @@ fn a_number_ends_at_its_last_digit_whatever_follows() {
         }
         let text = [&digits[..], b".", &digits, b"E-", &digits, b","].concat();
         assert_eq!(lexer::number(&text).unwrap().0, b",");
+    }
+}
+
+/// As above, for whatever may stand in a number, and wherever the sixteen bytes end.
+#[test]
+fn a_number_is_what_a_byte_by_byte_reader_finds() {
+    fn digits(text: &[u8], at: usize) -> usize {
+        at + text[at..].iter().take_while(|byte| byte.is_ascii_digit()).count()
+    }
+    fn plainly(text: &[u8]) -> usize {
+        let whole = digits(text, 0);
+        let point = text.get(whole) == Some(&b'.');
+        let end = if point { digits(text, whole + 1) } else { whole };
+        if end == usize::from(point) {
+            return 0;
+        }
+        if !matches!(text.get(end), Some(b'e' | b'E')) {
+            return end;
+        }
+        let from = end + 1 + usize::from(matches!(text.get(end + 1), Some(b'+' | b'-')));
+        if text.get(from).is_some_and(u8::is_ascii_digit) { digits(text, from) } else { end }
+    }
+    let mut state = 11_u32;
+    let mut random = |below: u32| {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (state >> 16) % below
+    };
+    for _ in 0..200_000 {
+        let rare = 2 + random(20);
+        let text: Vec<u8> =
+            (0..random(40))
+                .map(|_| {
+                    if random(rare) > 0 {
+                        b'1' + random(9) as u8
+                    } else {
+                        b"0..eE+-,] x"[random(11) as usize]
+                    }
+                })
+                .collect();
+        // A leading zero may begin a number of another base.
+        if text.starts_with(b"0x") {
+            continue;
+        }
+        let found = lexer::number(&text).map_or(0, |(rest, _)| text.len() - rest.len());
+        assert_eq!(found, plainly(&text), "{}", String::from_utf8_lossy(&text));
     }
 }
 

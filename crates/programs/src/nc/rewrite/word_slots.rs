@@ -116,7 +116,7 @@ impl<'s> Task<'s> {
 /// Sorts the words of a block into slots.
 fn slots<'s>(tree: &NcTree<'s>, dialect: Dialect, context: &BlockContext) -> WordSlots<'s> {
     let mut slots = WordSlots::default();
-    let node = tree.nodes[context.node as usize];
+    let node = tree.nodes.get(context.node);
     if !matches!(node.kind, Syntax::Block | Syntax::Skippable) {
         return slots;
     }

@@ -27,7 +27,7 @@ impl Interpreter<'_, '_> {
     }
 
     fn new_motion(&mut self, block: &Block<'_>, name: &str, kind: MotionKind) -> Motion {
-        let first = block.words.first().map_or(self.tree.nodes[block.node as usize].first, |word| word.first);
+        let first = block.words.first().map_or(self.tree.nodes.first(block.node), |word| word.first);
         let (place, statement) = (self.place(first), self.tree.node_span(block.node));
         let modal = Modal { conf_linear: Switch::Off, conf_joint: Switch::Off, ..Modal::START };
         Motion {

@@ -12,8 +12,8 @@ impl Interpreter<'_, '_> {
     pub(super) fn prescan(&mut self) {
         self.prescan_tape();
         let mut prescan = Prescan::default();
-        for node in 0..self.tree.nodes.len() as u32 {
-            match self.tree.nodes[node as usize].kind {
+        for node in 0..self.tree.nodes.len() {
+            match self.tree.nodes.kind(node) {
                 kind @ (Syntax::Block | Syntax::Skippable) => {
                     self.prescan_block(&mut prescan);
                     prescan.block.skippable = kind == Syntax::Skippable;

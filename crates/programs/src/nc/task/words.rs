@@ -26,16 +26,16 @@ impl<'s> Interpreter<'_, 's> {
         g.clear();
         m.clear();
         *block = Block { node, words, g, m, ..Block::default() };
-        let kind = self.tree.nodes[node as usize].kind;
+        let kind = self.tree.nodes.kind(node);
         block.skippable = kind == Syntax::Skippable;
         block.opaque = kind == Syntax::Opaque;
-        if self.tree.nodes[node as usize].size > BLOCK_WORDS {
+        if self.tree.nodes.get(node).size > BLOCK_WORDS {
             (block.opaque, block.opaque_may_set) = (true, true);
             return;
         }
         for child in self.tree.child_nodes(node) {
-            if self.tree.nodes[child as usize].kind == Syntax::Opaque {
-                let Node { first, end, .. } = self.tree.nodes[child as usize];
+            if self.tree.nodes.kind(child) == Syntax::Opaque {
+                let Node { first, end, .. } = self.tree.nodes.get(child);
                 block.opaque = true;
                 block.opaque_may_set |= self.may_set(first, end);
                 continue;

@@ -19,10 +19,10 @@ impl<'a, 's> Evaluator<'a, 's> {
             Child::Node(node) => node,
         };
         let inner = || expressions(tree, node).next();
-        match tree.nodes[node as usize].kind {
+        match tree.nodes.kind(node) {
             Syntax::Paren => self.type_of((file, scope), inner()?),
             Syntax::Function => {
-                let name = tree.text(tree.nodes[node as usize].first);
+                let name = tree.text(tree.nodes.first(node));
                 let Some(id) = self.symbols.find(scope, name) else {
                     return functions::result_type(&folded(name)).map(<[u8]>::to_vec);
                 };

@@ -16,13 +16,13 @@ impl Interpreter<'_, '_, '_> {
     pub(super) fn invalidate_changed(&mut self, node: u32, state: &mut AbstractState) {
         let tree = &self.evaluator.trees[self.unit.file as usize];
         let symbols = self.evaluator.symbols;
-        for node in node..node + tree.nodes[node as usize].size {
-            let kind = tree.nodes[node as usize].kind;
+        for node in node..tree.nodes.behind(node) {
+            let kind = tree.nodes.kind(node);
             if !kind.may_change() {
                 continue;
             }
             self.invalidate_written(node, state);
-            let name = tree.text(tree.nodes[node as usize].first);
+            let name = tree.text(tree.nodes.first(node));
             match kind {
                 Syntax::LateCall => self.invalidate_nonlocal(state),
                 Syntax::Call => self.invalidate_called(name, kind, state),
@@ -59,7 +59,7 @@ impl Interpreter<'_, '_, '_> {
         let tree = &self.evaluator.trees[self.unit.file as usize];
         let symbols = self.evaluator.symbols;
         let any_grips = |routines: &[u32]| routines.iter().any(|routine| symbols.effects_of(*routine).grips);
-        let found = tree.nodes[node as usize];
+        let found = tree.nodes.get(node);
         match found.kind {
             Syntax::LateCall | Syntax::Opaque => true,
             Syntax::Call | Syntax::Function => {

@@ -9,7 +9,8 @@ mod keywords;
 use crate::motion::OpaqueReason;
 use crate::rapid::syntax::Syntax;
 use crate::rapid::token::{Token, same_name};
-use crate::tree::{Node, Opaque, Tree};
+use crate::tree::nodes::Nodes;
+use crate::tree::{Opaque, Tree};
 
 /// Greatest nesting depth of blocks.
 const BLOCK_DEPTH: usize = 100;
@@ -21,7 +22,7 @@ type Parsed = Result<(), Fail>;
 #[derive(Clone, Copy)]
 struct Block {
     kind: Syntax,
-    node: usize,
+    node: u32,
     /// The token that opened it.
     opener: u32,
 }
@@ -35,7 +36,7 @@ pub(crate) struct Parser<'t, 's> {
     /// One past the last consumed token that is no trivia.
     last: u32,
     depth: u32,
-    pub(super) nodes: Vec<Node<Syntax>>,
+    pub(super) nodes: Nodes<Syntax>,
     pub(super) opaque: Vec<Opaque>,
     blocks: Vec<Block>,
 }
@@ -49,7 +50,7 @@ impl<'t, 's> Parser<'t, 's> {
             at: 0,
             last: 0,
             depth: 0,
-            nodes: Vec::with_capacity(kinds.len() / 4),
+            nodes: Nodes::with_capacity(kinds.len() / 3),
             opaque: Vec::new(),
             blocks: Vec::new(),
         };
@@ -89,6 +90,13 @@ impl<'t, 's> Parser<'t, 's> {
         }
     }
 
+    /// Consumes so many tokens, of which none is trivia and behind which there is none.
+    #[inline]
+    fn advance(&mut self, tokens: u32) {
+        self.at += tokens;
+        self.last = self.at;
+    }
+
     #[inline]
     fn eat(&mut self, kind: Token) -> bool {
         let found = self.peek() == kind;
@@ -125,24 +133,20 @@ impl<'t, 's> Parser<'t, 's> {
     // ---- nodes ----
 
     #[inline]
-    fn open(&mut self, kind: Syntax) -> usize {
-        self.nodes.push(Node { kind, size: 0, first: self.at, end: self.at });
-        self.nodes.len() - 1
+    fn open(&mut self, kind: Syntax) -> u32 {
+        self.nodes.open(kind, self.at)
     }
 
     #[inline]
-    fn close(&mut self, node: usize) {
-        let size = (self.nodes.len() - node) as u32;
-        let node = &mut self.nodes[node];
-        node.size = size;
+    fn close(&mut self, node: u32) {
         // An empty node stands where the last token ended, inside its parent.
-        node.first = node.first.min(self.last);
-        node.end = self.last;
+        let first = self.nodes.first(node).min(self.last);
+        self.nodes.close(node, first, self.last);
     }
 
     /// Opens a node around everything since `node`, which began with token `first`.
-    fn wrap(&mut self, kind: Syntax, node: usize, first: u32) {
-        self.nodes.insert(node, Node { kind, size: 0, first, end: first });
+    fn wrap(&mut self, kind: Syntax, node: u32, first: u32) {
+        self.nodes.open_before(node, kind, first);
     }
 
     fn open_block(&mut self, kind: Syntax) {
@@ -180,7 +184,7 @@ impl<'t, 's> Parser<'t, 's> {
     }
 
     /// Turns everything since token `first`, whose nodes begin at `node`, into an opaque region.
-    fn recover(&mut self, node: usize, first: u32, reason: OpaqueReason) {
+    fn recover(&mut self, node: u32, first: u32, reason: OpaqueReason) {
         let reason = if self.peek() == Token::OpenString { OpaqueReason::UnclosedString } else { reason };
         let (at, fresh) = (self.at, self.at == first);
         self.nodes.truncate(node);
@@ -202,7 +206,7 @@ impl<'t, 's> Parser<'t, 's> {
             line |= self.peek() == Token::OpenString;
             self.bump();
         }
-        self.nodes.push(Node { kind: Syntax::Opaque, size: 1, first, end: self.last.max(first) });
+        self.nodes.push(Syntax::Opaque, first, self.last.max(first));
         self.opaque.push(Opaque { first, end: self.last.max(first), reason, at });
     }
 
@@ -227,7 +231,8 @@ impl<'t, 's> Parser<'t, 's> {
     pub(super) fn finish(&mut self) {
         self.close_above(0);
         self.close_block();
-        self.nodes[0].end = self.kinds.len() as u32;
+        // What follows the last statement belongs to the file.
+        self.nodes.close(0, 0, self.kinds.len() as u32);
         self.opaque.sort_by_key(|opaque| opaque.first);
     }
 
@@ -239,7 +244,7 @@ impl<'t, 's> Parser<'t, 's> {
                 self.bump();
                 self.eat(Token::Semicolon);
                 self.nodes.truncate(node);
-                self.nodes.push(Node { kind: Syntax::Opaque, size: 1, first, end: self.last });
+                self.nodes.push(Syntax::Opaque, first, self.last);
                 self.opaque.push(Opaque { first, end: self.last, reason, at: first });
             } else if reason == OpaqueReason::TooDeep && blocks >= BLOCK_DEPTH {
                 self.skip_routine(first);
@@ -259,7 +264,7 @@ impl<'t, 's> Parser<'t, 's> {
         ) {
             self.bump();
         }
-        self.nodes.push(Node { kind: Syntax::Opaque, size: 1, first, end: self.last });
+        self.nodes.push(Syntax::Opaque, first, self.last);
         self.opaque.push(Opaque { first, end: self.last, reason: OpaqueReason::TooDeep, at: first });
         // The blocks inside the routine end here without a further message.
         while self.blocks.last().is_some_and(|block| block.kind.is_statement_block()) {
@@ -343,7 +348,7 @@ impl<'t, 's> Parser<'t, 's> {
     }
 
     /// A broken header of a block is opaque to the end of its line; the block stays open.
-    fn header_done(&mut self, (node, first): (usize, u32), result: Parsed) {
+    fn header_done(&mut self, (node, first): (u32, u32), result: Parsed) {
         if let Err(Fail(reason)) = result {
             let at = self.at;
             self.nodes.truncate(node);
@@ -433,7 +438,7 @@ impl<'t, 's> Parser<'t, 's> {
                 Token::Colon => {
                     self.bump();
                     self.bump();
-                    self.nodes[node].kind = Syntax::Label;
+                    self.nodes.set_kind(node, Syntax::Label);
                     self.close(node);
                     return Ok(());
                 }
@@ -460,7 +465,7 @@ impl<'t, 's> Parser<'t, 's> {
             Token::Placeholder => {
                 self.bump();
                 self.eat(Token::Semicolon);
-                self.nodes[node].kind = Syntax::Unwritten;
+                self.nodes.set_kind(node, Syntax::Unwritten);
                 self.close(node);
                 return Ok(());
             }
@@ -496,7 +501,7 @@ impl<'t, 's> Parser<'t, 's> {
             }
             _ => return Err(Fail(OpaqueReason::Unexpected)),
         };
-        self.nodes[node].kind = kind;
+        self.nodes.set_kind(node, kind);
         self.expect(Token::Semicolon, OpaqueReason::MissingSemicolon)?;
         self.close(node);
         Ok(())

@@ -126,8 +126,8 @@ struct Parts {
 impl Parts {
     fn of(tree: &RapidTree<'_>, instruction: &Instruction) -> Parts {
         let mut parts = Parts::default();
-        let mut nodes = (0_u32..).zip(&tree.nodes);
-        let Some((node, _)) = nodes.find(|(_, node)| node.kind == Syntax::Call) else { return parts };
+        let mut nodes = 0..tree.nodes.len();
+        let Some(node) = nodes.find(|&node| tree.nodes.kind(node) == Syntax::Call) else { return parts };
         let count = arguments(tree, node).filter(|argument| !argument.optional).count();
         let span = |child: Child| {
             let (first, end) = tokens_of(tree, child);

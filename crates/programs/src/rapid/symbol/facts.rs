@@ -65,7 +65,7 @@ impl Symbols {
     /// The facts of every unit.
     pub(super) fn collect_facts(&self, trees: &[RapidTree<'_>]) -> Vec<UnitFacts> {
         let facts = |&unit: &Unit| {
-            let nodes = unit.node + 1..unit.node + trees[unit.file as usize].nodes[unit.node as usize].size;
+            let nodes = unit.node + 1..trees[unit.file as usize].nodes.behind(unit.node);
             // The parts of a long routine in parallel; a fragment skips whole routines, so it stays in one piece.
             let parts =
                 if unit.routine.is_some() { nodes.len().div_ceil(PORTION as usize).max(1) } else { 1 };
@@ -89,9 +89,9 @@ impl Symbols {
         let mut facts = UnitFacts::default();
         let mut node = nodes.start;
         while node < nodes.end {
-            let kind = tree.nodes[node as usize].kind;
+            let kind = tree.nodes.kind(node);
             if unit.routine.is_none() && (kind.is_routine() || kind == Syntax::Module) {
-                node += tree.nodes[node as usize].size;
+                node = tree.nodes.behind(node);
                 continue;
             }
             if kind == Syntax::Call && self.is_plain_motion(tree, unit.scope, node) {
@@ -120,7 +120,7 @@ impl Symbols {
 
     /// A call or function, other than an instruction that only moves the robot.
     fn add_call(&self, tree: &RapidTree<'_>, unit: Unit, (node, kind): (u32, Syntax), facts: &mut UnitFacts) {
-        let name = tree.text(tree.nodes[node as usize].first);
+        let name = tree.text(tree.nodes.first(node));
         let is_call = kind == Syntax::Call;
         let callees = self.callees(unit.scope, name);
         if is_call
@@ -184,8 +184,8 @@ impl Symbols {
         }
         let tree = &trees[unit.file as usize];
         let moves = |node: u32| {
-            let name = tree.text(tree.nodes[node as usize].first);
-            match tree.nodes[node as usize].kind {
+            let name = tree.text(tree.nodes.first(node));
+            match tree.nodes.kind(node) {
                 Syntax::LateCall => true,
                 Syntax::Call if self.is_motion(unit.scope, name) => true,
                 Syntax::Call | Syntax::Function => match self.callees(unit.scope, name) {
@@ -196,15 +196,15 @@ impl Symbols {
             }
         };
         let mut clauses = tree.child_nodes(unit.node).filter(|&clause| is_resuming_handler(tree, clause));
-        clauses.any(|clause| (clause..clause + tree.nodes[clause as usize].size).any(moves))
+        clauses.any(|clause| (clause..tree.nodes.behind(clause)).any(moves))
     }
 
     /// Whether an interrupt routine moves the robot without storing the path.
     pub(super) fn find_moving_interrupts(&self, trees: &[RapidTree<'_>]) -> bool {
         let stores_path = |unit: Unit| {
             let tree = &trees[unit.file as usize];
-            (unit.node..unit.node + tree.nodes[unit.node as usize].size).any(|node| {
-                let node = tree.nodes[node as usize];
+            (unit.node..tree.nodes.behind(unit.node)).any(|node| {
+                let node = tree.nodes.get(node);
                 node.kind == Syntax::Call && same_name(tree.text(node.first), b"StorePath")
             })
         };
@@ -221,7 +221,7 @@ impl Symbols {
 
     /// Whether a call is a motion instruction that writes no argument, as nearly every statement of a long program is.
     pub fn is_plain_motion(&self, tree: &RapidTree<'_>, scope: u32, node: u32) -> bool {
-        let name = tree.text(tree.nodes[node as usize].first);
+        let name = tree.text(tree.nodes.first(node));
         instruction::find(name).is_some_and(|known| INSTRUCTIONS[known].only_moves())
             && !(self.hides_instruction && self.routine(scope, name).is_some())
     }
@@ -232,7 +232,7 @@ fn add_late_call(tree: &RapidTree<'_>, (node, name): (u32, Option<Child>), facts
     (facts.effects.writes_anything, facts.effects.moves) = (true, true);
     facts.add_switch_call(node);
     // CallByVar appends a number to the name that it is given.
-    let numbered = tree.nodes[node as usize].kind == Syntax::Call;
+    let numbered = tree.nodes.kind(node) == Syntax::Call;
     let given = arguments(tree, node).filter(|argument| !argument.optional).count();
     let given = if numbered { 0 } else { given };
     facts.late_calls.insert(NamePattern::of(tree, (name, given, numbered)));
@@ -247,15 +247,15 @@ pub(crate) fn counts_from_position(tree: &RapidTree<'_>, call: u32, name: &[u8])
 /// Whether a clause is an error handler that resumes the statements (RETRY, TRYNEXT, StartMoveRetry).
 pub(crate) fn is_resuming_handler(tree: &RapidTree<'_>, clause: u32) -> bool {
     let resumes = |node: u32| {
-        let first = tree.nodes[node as usize].first;
-        match tree.nodes[node as usize].kind {
+        let first = tree.nodes.first(node);
+        match tree.nodes.kind(node) {
             Syntax::Leave => matches!(tree.kind(first), Some(Token::Retry | Token::TryNext)),
             Syntax::Call => predefined::retries(tree.text(first)),
             _ => false,
         }
     };
-    let end = clause + tree.nodes[clause as usize].size;
-    tree.nodes[clause as usize].kind == Syntax::ErrorClause && (clause..end).any(resumes)
+    let end = tree.nodes.behind(clause);
+    tree.nodes.kind(clause) == Syntax::ErrorClause && (clause..end).any(resumes)
 }
 
 /// Whether anything in the files has the name of GripLoad or of the option TLoad.

@@ -39,7 +39,7 @@ impl NamePattern {
         };
         let (mut prefix, mut suffix, mut whole) = (None, None, false);
         match name {
-            Some(Child::Node(node)) if tree.nodes[node as usize].kind == Syntax::Binary => {
+            Some(Child::Node(node)) if tree.nodes.kind(node) == Syntax::Binary => {
                 prefix = parts(tree, node).next().and_then(text);
                 suffix = parts(tree, node).last().and_then(text).filter(|_| !numbered);
             }

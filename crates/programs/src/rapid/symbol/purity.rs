@@ -14,9 +14,9 @@ impl Symbols {
     /// unknown one.
     pub fn is_impure(&self, tree: &RapidTree<'_>, scope: u32, expression: Child) -> bool {
         let Child::Node(node) = expression else { return false };
-        (node..node + tree.nodes[node as usize].size).any(|node| {
-            tree.nodes[node as usize].kind == Syntax::Function
-                && match self.callees(scope, tree.text(tree.nodes[node as usize].first)) {
+        (node..tree.nodes.behind(node)).any(|node| {
+            tree.nodes.kind(node) == Syntax::Function
+                && match self.callees(scope, tree.text(tree.nodes.first(node))) {
                     callees @ [_, ..] => callees.iter().any(|routine| self.effects_of(*routine).impure),
                     [] => self.is_node_impure(tree, scope, node),
                 }
@@ -25,7 +25,7 @@ impl Symbols {
 
     /// Whether a node is impure, the routines of the program that it calls not counted.
     pub(super) fn is_node_impure(&self, tree: &RapidTree<'_>, scope: u32, node: u32) -> bool {
-        let found = tree.nodes[node as usize];
+        let found = tree.nodes.get(node);
         match found.kind {
             Syntax::LateCall
             | Syntax::Raise

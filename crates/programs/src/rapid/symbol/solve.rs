@@ -138,8 +138,8 @@ impl Symbols {
                 Some(firsts[routine as usize] + at)
             };
             let tree = &trees[unit.file as usize];
-            for node in unit.node + 1..unit.node + tree.nodes[unit.node as usize].size {
-                let found = tree.nodes[node as usize];
+            for node in unit.node + 1..tree.nodes.behind(unit.node) {
+                let found = tree.nodes.get(node);
                 if !found.kind.may_change() {
                     continue;
                 }
@@ -228,7 +228,7 @@ impl Symbols {
             }
             let tree = &trees[unit.file as usize];
             for clause in tree.child_nodes(unit.node).filter(|&clause| is_resuming_handler(tree, clause)) {
-                let end = clause + tree.nodes[clause as usize].size;
+                let end = tree.nodes.behind(clause);
                 let facts = self.facts_of(trees, *unit, clause + 1..end);
                 let writes = facts.writes.iter().map(|write| write.symbol).collect();
                 add(&SideEffects { writes, ..facts.effects });

@@ -21,7 +21,7 @@ impl Symbols {
                 report(Write { symbol, kind });
             }
         };
-        match tree.nodes[node as usize].kind {
+        match tree.nodes.kind(node) {
             Syntax::Assignment => {
                 if let Some(place) = parts(tree, node).next() {
                     add(self.root(tree, scope, place), assignment_kind(tree, place));
@@ -36,7 +36,7 @@ impl Symbols {
                 add(name.and_then(|name| self.root(tree, scope, name)), WriteKind::Whole);
             }
             Syntax::Call | Syntax::Function => {
-                let name = tree.text(tree.nodes[node as usize].first);
+                let name = tree.text(tree.nodes.first(node));
                 self.writes_of_call(tree, scope, (node, name), &mut add);
             }
             Syntax::LateCall => {
@@ -58,7 +58,7 @@ impl Symbols {
         (node, name): (u32, &[u8]),
         add: &mut dyn FnMut(Option<u32>, WriteKind),
     ) {
-        let is_call = tree.nodes[node as usize].kind == Syntax::Call;
+        let is_call = tree.nodes.kind(node) == Syntax::Call;
         let known = if is_call { instruction::find(name).map(|known| &INSTRUCTIONS[known]) } else { None };
         // Nearly all motions write nothing.
         if !self.hides_instruction && known.is_some_and(Instruction::only_moves) {

@@ -36,7 +36,7 @@ impl Literals {
     /// Reads the literals in motion instructions.
     pub(super) fn of(trees: &[RapidTree<'_>], symbols: &Symbols) -> Self {
         let files = trees.par_iter().enumerate().map(|(file, tree)| {
-            let portions = 0..(tree.nodes.len() as u32).div_ceil(PORTION);
+            let portions = 0..tree.nodes.len().div_ceil(PORTION);
             portions.into_par_iter().map(|portion| read(trees, symbols, file as u32, portion)).collect()
         });
         Literals { read: files.collect(), last: 0 }
@@ -64,10 +64,10 @@ fn read(trees: &[RapidTree<'_>], symbols: &Symbols, file: u32, portion: u32) -> 
     let tree = &trees[file as usize];
     let evaluator = Evaluator::new(trees, symbols);
     let first = portion * PORTION;
-    let end = (first + PORTION).min(tree.nodes.len() as u32);
+    let end = (first + PORTION).min(tree.nodes.len());
     let mut out = Vec::with_capacity(PORTION as usize / NODES_PER_MOTION);
     for call in first..end {
-        let found = tree.nodes[call as usize];
+        let found = tree.nodes.get(call);
         if found.kind != Syntax::Call {
             continue;
         }
@@ -99,7 +99,7 @@ pub(super) fn target(evaluator: &Evaluator<'_, '_>, file: u32, node: u32, joints
 /// The node of an argument that is an aggregate of numbers alone.
 pub(super) fn plain(tree: &RapidTree<'_>, argument: Child) -> Option<u32> {
     let Child::Node(node) = argument else { return None };
-    let found = tree.nodes[node as usize];
+    let found = tree.nodes.get(node);
     if found.kind != Syntax::Aggregate {
         return None;
     }

@@ -38,8 +38,7 @@ impl ListingBuilder<'_, '_> {
 
     fn motion(&mut self, unit: Unit, node: u32, state: &AbstractState, nesting: Nesting) -> Motion {
         let tree = &self.trees[unit.file as usize];
-        let (place, statement) =
-            (self.place(unit.file, tree.nodes[node as usize].first), tree.node_span(node));
+        let (place, statement) = (self.place(unit.file, tree.nodes.first(node)), tree.node_span(node));
         Motion {
             accepts_configuration: true,
             in_loop: nesting.in_loop,
@@ -246,10 +245,10 @@ impl ListingBuilder<'_, '_> {
     /// Whether an argument calls a function of the program or an impure one: each inserted target would evaluate it again.
     fn has_impure_argument(&self, unit: Unit, node: u32) -> bool {
         let tree = &self.trees[unit.file as usize];
-        let nodes = node..node + tree.nodes[node as usize].size;
-        let mut functions = nodes.filter(|&node| tree.nodes[node as usize].kind == Syntax::Function);
+        let nodes = node..tree.nodes.behind(node);
+        let mut functions = nodes.filter(|&node| tree.nodes.kind(node) == Syntax::Function);
         functions.any(|function| {
-            let name = tree.text(tree.nodes[function as usize].first);
+            let name = tree.text(tree.nodes.first(function));
             self.symbols.routine(unit.scope, name).is_some() || !predefined::is_pure(name)
         })
     }
@@ -263,10 +262,10 @@ impl ListingBuilder<'_, '_> {
         nesting: Nesting,
     ) -> Option<Motion> {
         let tree = &self.trees[unit.file as usize];
-        let late = tree.nodes[node as usize].kind == Syntax::LateCall;
+        let late = tree.nodes.kind(node) == Syntax::LateCall;
         let name = match parts(tree, node).nth(1).filter(|_| late) {
             Some(expression) => text_of(tree, expression),
-            None => tree.text(tree.nodes[node as usize].first),
+            None => tree.text(tree.nodes.first(node)),
         };
         let routine = if late { None } else { self.symbols.routine(unit.scope, name) };
         let mut found: Vec<(Child, bool)> = Vec::new();
@@ -333,7 +332,7 @@ impl ListingBuilder<'_, '_> {
         let tree = &self.trees[unit.file as usize];
         if let Child::Node(node) = value {
             let mut inside = expressions(tree, node);
-            match tree.nodes[node as usize].kind {
+            match tree.nodes.kind(node) {
                 Syntax::Paren => return self.looks_like_target(unit, inside.next()?),
                 Syntax::Aggregate => {
                     let parts: Vec<Child> = inside.collect();
@@ -359,7 +358,7 @@ impl ListingBuilder<'_, '_> {
     fn fits(&self, unit: Unit, value: Child, (type_name, count): (&[u8], usize)) -> bool {
         let tree = &self.trees[unit.file as usize];
         match value {
-            Child::Node(node) if tree.nodes[node as usize].kind == Syntax::Aggregate => {
+            Child::Node(node) if tree.nodes.kind(node) == Syntax::Aggregate => {
                 expressions(tree, node).count() == count
             }
             _ => self.evaluator.type_of((unit.file, unit.scope), value).is_some_and(|t| t == type_name),

@@ -47,7 +47,7 @@ impl<'s> ListingBuilder<'_, 's> {
     fn uses_by_name(&mut self) {
         for (file, tree) in (0..).zip(self.trees) {
             let reads = |node: &u32| {
-                let node = tree.nodes[*node as usize];
+                let node = tree.nodes.get(*node);
                 node.kind == Syntax::Call && same_name(tree.text(node.first), b"GetDataVal")
             };
             let computed = |node: &u32| {
@@ -56,8 +56,8 @@ impl<'s> ListingBuilder<'_, 's> {
                     != Some(Token::String)
             };
             // One per file suffices.
-            if let Some(node) = (0..tree.nodes.len() as u32).filter(reads).find(computed) {
-                let place = self.place(file, tree.nodes[node as usize].first);
+            if let Some(node) = (0..tree.nodes.len()).filter(reads).find(computed) {
+                let place = self.place(file, tree.nodes.first(node));
                 for declaration in &mut self.listing.declarations {
                     declaration.other_uses.push(OtherUse { motion: None, place });
                 }
@@ -73,7 +73,7 @@ impl<'s> ListingBuilder<'_, 's> {
         likely: &[bool],
         hash: &dyn Fn(&[u8]) -> usize,
     ) {
-        let node = tree.nodes[unit.node as usize];
+        let node = tree.nodes.get(unit.node);
         let mut next = 0;
         for token in node.first..node.end {
             // A string may be the name that GetDataVal reads.

@@ -4,12 +4,11 @@
 //! ahead is what it would read there; anywhere else it reads the part itself. What is read ahead ends before the first
 //! thing that is no whole statement without fault.
 
-use rayon::prelude::*;
-
 use super::{Block, Parser};
 use crate::rapid::syntax::Syntax;
 use crate::rapid::token::Token;
-use crate::tree::{Node, Tree};
+use crate::tree::Tree;
+use crate::tree::nodes::Nodes;
 
 /// The blocks around what is read ahead.
 const AROUND: [Syntax; 4] = [Syntax::File, Syntax::Module, Syntax::Proc, Syntax::Body];
@@ -21,7 +20,7 @@ const FAR: usize = 1 << 16;
 pub(crate) struct Ahead {
     /// Their first token.
     pub(crate) from: u32,
-    nodes: Vec<Node<Syntax>>,
+    nodes: Nodes<Syntax>,
     at: u32,
     last: u32,
 }
@@ -79,7 +78,7 @@ impl Parser<'_, '_> {
                 block.kind == around || around == Syntax::Proc && block.kind.is_routine()
             });
         if here && ahead.nodes.len() > 1 {
-            self.nodes.par_extend(ahead.nodes[1..].par_iter().with_min_len(FAR).copied());
+            self.nodes.append(&ahead.nodes, 1);
             (self.at, self.last) = (ahead.at, ahead.last);
         }
     }

@@ -24,7 +24,7 @@ impl Parser<'_, '_> {
             Ok(()) => {
                 // No THEN: the compact form guards one statement.
                 let node = self.blocks[block].node;
-                self.nodes[node].kind = Syntax::CompactIf;
+                self.nodes.set_kind(node, Syntax::CompactIf);
                 self.blocks[block].kind = Syntax::CompactIf;
                 if self.peek().ends_block() || self.peek() == Token::End {
                     self.close_block();

@@ -9,11 +9,10 @@ const EXPRESSION_DEPTH: u32 = 100;
 impl Parser<'_, '_> {
     pub(super) fn expression_list(&mut self, open: Token, close: Token) -> Parsed {
         self.expect(open, OpaqueReason::Unexpected)?;
-        if self.peek() != close {
+        let mut more = self.peek() != close;
+        while more {
             self.expression()?;
-            while self.eat(Token::Comma) {
-                self.expression()?;
-            }
+            more = self.eat(Token::Comma);
         }
         self.expect(close, OpaqueReason::Unclosed)
     }
@@ -69,22 +68,38 @@ impl Parser<'_, '_> {
     #[inline]
     pub(super) fn expression(&mut self) -> Parsed {
         // Most expressions are one token, most of these a number in an aggregate.
-        if matches!(self.peek(), Token::Number | Token::Ident | Token::String)
-            && matches!(
-                self.kinds.get(self.at as usize + 1),
-                Some(
-                    Token::Comma
-                        | Token::BracketClose
-                        | Token::Semicolon
-                        | Token::Backslash
-                        | Token::ParenClose
-                )
-            )
+        if matches!(self.peek(), Token::Number | Token::Ident | Token::String) && self.ends_after(self.at) {
+            self.advance(1);
+            return Ok(());
+        }
+        self.compound()
+    }
+
+    /// An expression of more than one token; apart, so that the short way is copied to where it is used.
+    #[inline(never)]
+    fn compound(&mut self) -> Parsed {
+        // Most of these are a number with its sign.
+        let number = self.at + 1;
+        if self.peek() == Token::Minus
+            && self.kinds.get(number as usize) == Some(&Token::Number)
+            && self.ends_after(number)
         {
-            self.bump();
+            self.nodes.push(Syntax::Unary, self.at, number + 1);
+            self.advance(2);
             return Ok(());
         }
         self.nested(|parser| parser.chain(0))
+    }
+
+    /// Whether a token that ends an expression follows another at once.
+    #[inline]
+    fn ends_after(&self, token: u32) -> bool {
+        matches!(
+            self.kinds.get(token as usize + 1),
+            Some(
+                Token::Comma | Token::BracketClose | Token::Semicolon | Token::Backslash | Token::ParenClose
+            )
+        )
     }
 
     /// Operators of this priority and all above: 0 OR XOR, 1 AND, 2 relations, 3 sums, 4 products.
@@ -106,7 +121,7 @@ impl Parser<'_, '_> {
     }
 
     /// A flat chain of operators of one priority after its first operand, which began at `node` and `first`.
-    pub(super) fn operators(&mut self, level: u8, node: usize, first: u32) -> Parsed {
+    pub(super) fn operators(&mut self, level: u8, node: u32, first: u32) -> Parsed {
         if self.peek().operator_level() != Some(level) {
             return Ok(());
         }
