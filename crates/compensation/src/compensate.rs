@@ -13,11 +13,12 @@ use crate::cut::Cuts;
 use crate::deviation::Status;
 use crate::frames::taught::contradictions;
 use crate::frames::undeclared;
-use crate::options::Options;
+use crate::options::{Emit, Options};
 use crate::plan::Plan;
 use crate::plan::planner::SolvedProgram;
 use crate::plan::reason::OutcomeReason;
 use crate::plan::single_precision::single_precision;
+use crate::plan::steps_to_left::StepsToLeft;
 use crate::risk::prepared_estimate::PreparedEstimate;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::estimated::Estimated;
@@ -98,14 +99,15 @@ pub fn compensate_prepared(
             // Frees the solved targets while the edits are made; no second plan is needed.
             let ((), rewritten) =
                 rayon::join(|| drop(targets), || program.rewrite(&planned.changes, &rewrite));
-            return Ok(agreed(planned, rewritten?, &BTreeMap::new(), program));
+            return Ok(agreed(planned, rewritten?, &BTreeMap::new(), program, options));
         }
         let rewritten = program.rewrite(&planned.changes, &rewrite)?;
         let found = refusals(&planned, &rewritten, listing);
         // Motions judged one by one need no second plan, unless an unmodified motion changes the backlash
-        // sides of later ones.
-        if found.is_empty() || options.cuts == Cuts::Single && !play {
-            return Ok(agreed(planned, rewritten, &found, program));
+        // sides of later ones, or the start of a line that is written as joints.
+        let alone = options.cuts == Cuts::Single && !play && options.emit == Emit::Targets;
+        if found.is_empty() || alone {
+            return Ok(agreed(planned, rewritten, &found, program, options));
         }
         for (motion, reason) in found {
             refused.entry(motion).or_insert(reason);
@@ -134,8 +136,14 @@ fn agreed(
     rewritten: Rewritten,
     refused: &BTreeMap<u32, OutcomeReason>,
     program: &Program<'_>,
+    options: &Options,
 ) -> Compensated {
     reconcile(&mut planned, &rewritten, refused);
+    let outcome = |motion: usize| {
+        let outcome = &planned.outcomes[motion];
+        (outcome.status, outcome.reason, outcome.before_mm)
+    };
+    planned.steps = StepsToLeft::of(program.listing(), &planned.changes, &outcome, options.tolerance_mm);
     planned.notes.extend(undeclared::notes(program.listing(), program.language()));
     if program.language() == Language::Rapid
         && let Some(off) = single_precision(&planned.changes)

@@ -5,10 +5,12 @@ pub(crate) mod notes;
 pub mod planner;
 pub mod reason;
 pub mod single_precision;
+pub mod steps_to_left;
 mod surface_normals;
 
 use crate::deviation::{PathPoint, Status};
 use crate::plan::reason::OutcomeReason;
+use crate::plan::steps_to_left::StepsToLeft;
 use crate::risk::cut_risk::CutRisk;
 use crate::risk::placement::ObjectPlacement;
 use truegrind_programs::rewrite::Change;
@@ -64,6 +66,8 @@ pub struct Plan {
     pub points: Vec<PathPoint>,
     /// Assumptions about tools, work objects, payload, backlash and configurations.
     pub notes: Vec<String>,
+    /// Steps between corrected motions and neighbours that are left; known once the program is rewritten.
+    pub steps: Option<StepsToLeft>,
     /// How the position of each work object was treated.
     pub placements: Vec<ObjectPlacement>,
     /// Risk assessment of each cut.

@@ -68,7 +68,7 @@ pub(crate) fn infeasible_arcs(
 }
 
 /// Whether all targets of a motion can be corrected.
-fn all_corrected(targets: &[Result<SolvedTarget, OutcomeReason>]) -> bool {
+pub(super) fn all_corrected(targets: &[Result<SolvedTarget, OutcomeReason>]) -> bool {
     let can =
         |target: &Result<SolvedTarget, _>| target.as_ref().is_ok_and(|solved| solved.forbidden.is_none());
     !targets.is_empty() && targets.iter().all(can)

@@ -6,6 +6,7 @@ use crate::arms::Arms;
 use crate::cut::{self, Cuts, CutsOf};
 use crate::deviation::Status;
 use crate::feasibility::arc_feasibility::infeasible_arcs;
+use crate::feasibility::joint_lines::lines_without_start;
 use crate::feasibility::singularity::forbid_segments;
 use crate::frames::frame_table::FrameTable;
 use crate::options::Options;
@@ -17,7 +18,7 @@ use truegrind_arm::inverse::budget::SearchBudget;
 use truegrind_programs::motion::{Listing, MotionKind, Reason};
 
 /// The motions that remain unmodified although their targets could be corrected, with reasons: refused by the writer, arcs
-/// that would change, and the rest of a cut with an unmodified motion; segments near a singularity are forbidden among the
+/// that would change, lines that would become none, and the rest of a cut with an unmodified motion; segments near a singularity are forbidden among the
 /// targets. An unmodified motion moves the start of the next one, so this repeats until no motion is added.
 pub(crate) fn unchanged_motions(
     listing: &Listing,
@@ -36,6 +37,7 @@ pub(crate) fn unchanged_motions(
     loop {
         let before = out.len();
         out.extend(infeasible_arcs(listing, solved, frame_table, options, &out));
+        out.extend(lines_without_start(listing, solved, options, &out));
         let solved_so_far = &*solved;
         let kept = |motion: u32| blocking_reason(motion, listing, solved_so_far, options, &out);
         let more = match options.cuts {

@@ -94,7 +94,7 @@ pub(crate) fn unchecked_notes(listing: &Listing, solved: &SolvedTargets, uncheck
 }
 
 /// Line numbers of motions, the first few; `None` without any.
-fn lines_of(listing: &Listing, motions: &[u32]) -> Option<String> {
+pub(crate) fn lines_of(listing: &Listing, motions: &[u32]) -> Option<String> {
     /// How many lines are listed.
     const NAMED: usize = 8;
     let mut lines: Vec<String> =

@@ -94,6 +94,8 @@ pub enum OutcomeReason {
     },
     /// Straight segments were requested, but the circle was kept.
     CircleKept,
+    /// Joints were requested, but they would make no line from where it starts.
+    LineWithoutStart,
     /// At the programmed speed a joint would exceed its speed limit.
     TooFast {
         /// Joint, 0-based.
@@ -220,6 +222,9 @@ impl OutcomeReason {
                 "the radius of a half circle leaves its centre ambiguous"
             }
             OutcomeReason::CircleKept => "the circle was kept",
+            OutcomeReason::LineWithoutStart => {
+                "a line with an unknown or uncorrected start cannot be written as joints"
+            }
             OutcomeReason::TooFast { .. } => "a joint exceeds its speed limit",
             OutcomeReason::NoCircle => "no circle through its points follows the intended path",
             OutcomeReason::StartOfUnchangedArc { .. } => "an unmodified circular motion starts where it ends",
@@ -274,6 +279,10 @@ impl OutcomeReason {
             OutcomeReason::CircleKept => {
                 "the circle was kept: its start is unknown or not corrected, the instruction cannot be split, or no straight \
                  segments follow it"
+            }
+            OutcomeReason::LineWithoutStart => {
+                "its start is unknown or not corrected, so joints would make another path than this line: begin with a joint motion, rewrite \
+                 joint targets too (--joint-targets), or write targets (without --emit joints)"
             }
             OutcomeReason::NoCircle => {
                 "its three points make no circle, or none that follows the intended path"

@@ -108,6 +108,21 @@ fn a_loop_or_a_branch_is_part_of_the_cut_around_it() {
     }
 }
 
+/// With a stop at every target each line is a cut of its own: what is left stands beside what is corrected.
+#[test]
+fn steps_beside_what_is_left_are_counted() {
+    let late = "MoveL Offs(seen,0,0,0),v20,fine,tool0;\n".to_owned();
+    let body =
+        [line(380.0, "fine"), line(385.0, "fine"), late, line(390.0, "fine"), line(395.0, "fine")].concat();
+    let (done, _) = done(&module(&body), Cuts::Whole, 0.05);
+    assert_eq!(statuses(&done), [Changed, Changed, Left, Changed, Changed]);
+    let steps = done.plan.steps.unwrap();
+    assert_eq!(steps.motions, [1, 3]);
+    assert!(steps.largest_mm > 0.05 && steps.largest_mm < 10.0, "{steps:?}");
+    let even = [line(380.0, "fine"), line(385.0, "fine")].concat();
+    assert_eq!(self::done(&module(&even), Cuts::Whole, 0.05).0.plan.steps, None);
+}
+
 #[test]
 fn another_tool_or_work_object_begins_another_cut() {
     let other = "MoveL [[385,0,300],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v20,z1,long;\n";
@@ -124,17 +139,21 @@ fn another_tool_or_work_object_begins_another_cut() {
 fn what_the_writer_refuses_keeps_its_cut_too() {
     // Force control has no form with joint targets, which only the writer detects.
     let pressed = format!("FCPressL {},v20,5,z1,tool0;\n", target(390.0, 0.0));
-    let body = [line(380.0, "z1"), pressed, line(400.0, "fine"), line(405.0, "z1")].concat();
+    let [begin, end] = [370.0, 405.0].map(|x| line(x, "fine").replace("MoveL", "MoveJ"));
+    let body = [begin, line(380.0, "z1"), pressed, line(400.0, "fine"), end].concat();
     let source = module(&body);
     let program = Program::Rapid(Task::read(&[("p.mod", source.as_bytes())]));
     let plan = |cuts: Cuts| {
         let options = Options { cuts, emit: Emit::Joints, ..Options::default() };
         compensate(&program, &known(), &Cell::default(), &options, None).unwrap()
     };
-    assert_eq!(statuses(&plan(Cuts::Single)), [Changed, Refused, Changed, Changed]);
+    // The line behind it would start where the uncorrected one ends.
+    assert_eq!(statuses(&plan(Cuts::Single)), [Changed, Changed, Refused, Refused, Changed]);
     let whole = plan(Cuts::Whole);
-    assert_eq!(statuses(&whole), [Refused, Refused, Refused, Changed]);
-    assert!(matches!(whole.plan.outcomes[2].reason, Some(OutcomeReason::PartOfCut { line: 5, .. })));
+    assert_eq!(statuses(&whole), [Changed, Refused, Refused, Refused, Changed]);
+    let reasons: Vec<_> = whole.plan.outcomes.iter().map(|outcome| outcome.reason).collect();
+    assert!(matches!(reasons[1], Some(OutcomeReason::PartOfCut { line: 6, .. })), "{reasons:?}");
+    assert_eq!(reasons[3], Some(OutcomeReason::LineWithoutStart));
     let text = whole.rewritten.files[0].edits.apply(source.as_bytes()).unwrap();
     assert!(String::from_utf8(text).unwrap().contains(&line(400.0, "fine")));
 }

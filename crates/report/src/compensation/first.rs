@@ -37,6 +37,10 @@ pub fn verdict(plan: &Plan, listing: &Listing) -> Verdict {
             Status::Warning,
             "Corrected, except for cuts where the model is too uncertain: these are unchanged",
         ),
+        (_, 0) if plan.steps.is_some() => (
+            Status::Warning,
+            "Corrected, but the path has steps beside motions that are left: check them before running the program",
+        ),
         (_, 0) => (Status::Good, "All correctable motions are corrected: the program may run"),
         _ => (
             Status::Warning,
@@ -58,6 +62,7 @@ pub fn verdict(plan: &Plan, listing: &Listing) -> Verdict {
                 .to_owned(),
         );
     }
+    reasons.extend(plan.steps.as_ref().map(|steps| steps.sentence(listing)));
     let steps = count_reason(plan, |reason| {
         matches!(reason, OutcomeReason::PartOfCut { .. } | OutcomeReason::Step { .. })
     });

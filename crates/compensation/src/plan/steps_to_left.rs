@@ -1,0 +1,86 @@
+//! Steps of the path between motions that are corrected and their neighbours that are left.
+
+use super::notes::lines_of;
+use super::reason::OutcomeReason;
+use crate::deviation::Status;
+use truegrind_programs::motion::{Listing, Motion, MotionKind, TargetValue};
+use truegrind_programs::rewrite::{Change, NewTarget};
+
+/// Corrected lines and arcs beside lines and arcs that are left, in the order of the file, with the same tool and work object.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StepsToLeft {
+    /// The corrected motions.
+    pub motions: Vec<u32>,
+    /// The largest of the steps (mm): how far the correction moves the end.
+    pub largest_mm: f64,
+}
+
+impl StepsToLeft {
+    /// The steps above a tolerance; `None` without any. `outcome` is the status of a motion, its reason, and its deviation before (mm).
+    pub(crate) fn of(
+        listing: &Listing,
+        changes: &[Change],
+        outcome: &dyn Fn(usize) -> (Status, Option<OutcomeReason>, Option<f64>),
+        tolerance_mm: f64,
+    ) -> Option<Self> {
+        let left = |index: usize| {
+            let (status, reason, _) = outcome(index);
+            status == Status::Left
+                && reason != Some(OutcomeReason::NoChange)
+                && is_path(&listing.motions[index])
+        };
+        let beside_left = |index: usize| {
+            let this = &listing.motions[index];
+            let before = index.checked_sub(1);
+            let behind = Some(index + 1).filter(|behind| *behind < listing.motions.len());
+            let mut neighbours = before.into_iter().chain(behind);
+            neighbours.any(|other| is_continued(this, &listing.motions[other]) && left(other))
+        };
+        let mut found = Self { motions: Vec::new(), largest_mm: tolerance_mm };
+        for change in changes {
+            let motion = &listing.motions[change.motion as usize];
+            let (status, _, before_mm) = outcome(change.motion as usize);
+            if !is_path(motion) || !matches!(status, Status::Changed | Status::Flagged) {
+                continue;
+            }
+            let moved_mm = moved_mm(motion, change).or(before_mm).unwrap_or(0.0);
+            if moved_mm > tolerance_mm && beside_left(change.motion as usize) {
+                found.motions.push(change.motion);
+                found.largest_mm = found.largest_mm.max(moved_mm);
+            }
+        }
+        (!found.motions.is_empty()).then_some(found)
+    }
+
+    /// What a report says of them.
+    pub fn sentence(&self, listing: &Listing) -> String {
+        format!(
+            "motions that are left stand beside corrected ones: between them the path has a step of up to {:.2} mm, the size of the \
+             correction ({})",
+            self.largest_mm,
+            lines_of(listing, &self.motions).unwrap_or_default()
+        )
+    }
+}
+
+/// Whether the tool may work on the way of a motion.
+fn is_path(motion: &Motion) -> bool {
+    matches!(motion.kind, MotionKind::Linear | MotionKind::Circular) && !motion.rapid
+}
+
+/// Whether two motions stand in one routine, with the same tool and work object.
+fn is_continued(a: &Motion, b: &Motion) -> bool {
+    a.place.file == b.place.file && a.routine == b.routine && a.same_frames(b)
+}
+
+/// How far a change moves the end of its motion (mm); `None` where it is written in another form.
+fn moved_mm(motion: &Motion, change: &Change) -> Option<f64> {
+    let old = motion.to().and_then(|target| target.value.as_ref().ok()).and_then(TargetValue::cartesian);
+    match (old, change.targets.last()) {
+        (Some(old), Some(NewTarget::Cartesian { position_mm, .. })) => {
+            let moved = |axis: usize| (position_mm[axis] - old.position_mm[axis]).powi(2);
+            Some((0..3).map(moved).sum::<f64>().sqrt())
+        }
+        _ => None,
+    }
+}
