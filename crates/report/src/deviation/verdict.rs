@@ -35,7 +35,14 @@ pub(super) fn verdict(reports: &[&PathReport]) -> Verdict {
         .filter_map(|report| Some((*report, largest(report, BEFORE)?, largest(report, AFTER)?)))
         .collect();
     for (report, before, after) in &judged {
-        if after > before {
+        let only_shape = only_shape(report);
+        if let Some(OnlyShape { shape_mm: [before, after], place_mm }) = only_shape {
+            reasons.push(format!(
+                "{} corrects the shape of the path, from {before:.3} to {after:.3} mm RMS after the best rigid registration, and not where \
+                 it lies as a whole: {place_mm:.3} mm RMS (`compensate --placement` decides that)",
+                report.model
+            ));
+        } else if after > before {
             status = if judged.iter().all(|(_, before, after)| after > before) {
                 Status::Bad
             } else {
@@ -49,8 +56,9 @@ pub(super) fn verdict(reports: &[&PathReport]) -> Verdict {
             let because = report.cut().find_map(|p| p.reason.as_ref());
             let because = because.map_or_else(String::new, |reason| format!(": {reason}"));
             reasons.push(format!("{} corrects no cut{because}", report.model));
-        } else if let (Some(sigma), Some(rms)) = (report.sigma_rms_mm(), before_rms(report))
+        } else if let (Some(sigma), Some(rms)) = (report.sigma_rms_mm(), rms(report, BEFORE))
             && sigma > rms
+            && only_shape.is_none()
         {
             if status == Status::Good {
                 status = Status::Warning;
@@ -80,6 +88,16 @@ fn headline(reports: &[&PathReport], judged: &[Judged<'_>]) -> String {
         [] => {
             let worst = reports.iter().filter_map(|report| largest(report, BEFORE)).reduce(f64::max);
             format!("The uncorrected path deviates by up to {}; there is no corrected path", known(worst))
+        }
+        [(report, ..)]
+            if let Some(OnlyShape { shape_mm: [before, after], place_mm }) = only_shape(report) =>
+        {
+            format!(
+                "Shape of the path {before:.3} mm RMS before, {after:.3} mm after ({}); as a whole it lies {place_mm:.3} mm off, which is not \
+                 corrected; held-out error of the model {}",
+                meaning(report.after),
+                known(report.held_out_mm),
+            )
         }
         [(report, ..)] if report.expected_mm().is_some() => {
             // Both unsigned, since the expected deviation has no sign.
@@ -129,8 +147,28 @@ fn known(mm: Option<f64>) -> String {
 }
 
 /// RMS of the uncorrected deviations of the cut (mm).
-fn before_rms(report: &PathReport) -> Option<f64> {
+/// A path whose shape is corrected, but not where it lies.
+#[derive(Clone, Copy)]
+struct OnlyShape {
+    /// Deviation before and after, after the best rigid registration (RMS, mm).
+    shape_mm: [f64; 2],
+    /// Deviation after, without registration (RMS, mm).
+    place_mm: f64,
+}
+
+/// Deviation after over that after registration from which it is one of the place.
+const PLACE: f64 = 4.0;
+
+fn only_shape(report: &PathReport) -> Option<OnlyShape> {
+    let shape_mm = [report.registered_rms_mm(BEFORE)?, report.registered_rms_mm(AFTER)?];
+    let [before_mm, place_mm] = [rms(report, BEFORE)?, rms(report, AFTER)?];
+    let stays = place_mm > PLACE * shape_mm[1] && 2.0 * place_mm > before_mm;
+    (shape_mm[1] < shape_mm[0] && stays).then_some(OnlyShape { shape_mm, place_mm })
+}
+
+/// RMS of the deviation of the cut (mm).
+fn rms(report: &PathReport, side: Side) -> Option<f64> {
     let squares: Vec<f64> =
-        report.cut().filter_map(|p| p.before.map(|d| d.vector_mm.norm_squared())).collect();
+        report.cut().filter_map(|p| side(p).map(|d| d.vector_mm.norm_squared())).collect();
     (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
 }

@@ -376,3 +376,27 @@ fn a_correction_that_makes_it_worse_is_called_so() {
     let text = terminal::document(&view::document(&[worse]), 200);
     assert!(text.contains("[failed] Largest deviation 1.200 mm before, 3.000 mm after (achieved)"), "{text}");
 }
+
+/// `compensate` corrects the shape alone where the placement is not known: the path as a whole stays where it was, and is not worse.
+#[test]
+fn a_corrected_shape_at_an_uncorrected_place_is_no_failure() {
+    let place = [2.0, 1.0, -0.5];
+    let bent = |k: usize| [place[0], place[1] + 0.3 * [1.0, -1.0, -1.0, 1.0][k], place[2]];
+    let at = |k: usize| [[0.0, 0.0, 0.0], [50.0, 0.0, 0.0], [50.0, 40.0, 0.0], [0.0, 40.0, 5.0]][k];
+    let points = (0..4).map(|k| {
+        // Farther off than before in one place, with the shape right.
+        let after = place.map(|v| 1.2 * v);
+        point(k, at(k), Some(bent(k)), Some(after), false)
+    });
+    let moved = report("arm", points.collect());
+    let page = terminal::document(&view::summary("blade.mod", std::slice::from_ref(&moved)), 100);
+    for words in ["Shape of the path", "as a whole it lies 2.750 mm off, which is not corrected"] {
+        assert!(page.split_whitespace().collect::<Vec<_>>().join(" ").contains(words), "{words}: {page}");
+    }
+    assert!(!page.contains("worse"), "{page}");
+    // A path that is bent more than before is.
+    let worse = (0..4).map(|k| point(k, at(k), Some(place), Some(bent(k).map(|v| 1.2 * v)), false));
+    let bent_more = report("arm", worse.collect());
+    let page = terminal::document(&view::summary("blade.mod", std::slice::from_ref(&bent_more)), 100);
+    assert!(page.contains("worse"), "{page}");
+}
