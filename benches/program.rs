@@ -39,7 +39,8 @@
 //! Jacobians and one product of their columns left 0.14 s. Of the 7.4 µs of a motion targets and checks between them have 39 %, edits and the file 12 %, reading
 //! 9 %, and no function more than 4 %. For 0.3 s on two cores a motion may take 6 µs, page faults included, which take 1.7.
 //! Memory: 68,000 pages of 4 KiB are touched at a peak of 40,000; the system clears each. With malloc keeping what is freed (trim and
-//! mmap thresholds of glibc) system time falls from 0.18 to 0.10 s; mimalloc 2.0 gains nothing.
+//! mmap thresholds of glibc) system time falls from 0.18 to 0.10 s; mimalloc 2.0 gains nothing. On a Xeon neither these thresholds, nor huge pages
+//! (glibc's tunable, jemalloc's and mimalloc's options), nor jemalloc gain anything from file to file, in four rounds in turn.
 
 use std::fs;
 use std::hint::black_box;
