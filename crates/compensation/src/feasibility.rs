@@ -3,6 +3,7 @@
 pub(crate) mod arc_feasibility;
 pub(crate) mod correction_bounds;
 pub(crate) mod joint_limits;
+pub(crate) mod half_turns;
 pub(crate) mod joint_lines;
 pub(crate) mod singularity;
 pub(crate) mod unchanged;

@@ -6,6 +6,7 @@ use crate::arms::Arms;
 use crate::cut::{self, Cuts, CutsOf};
 use crate::deviation::Status;
 use crate::feasibility::arc_feasibility::infeasible_arcs;
+use crate::feasibility::half_turns::half_turns;
 use crate::feasibility::joint_lines::lines_without_start;
 use crate::feasibility::singularity::forbid_segments;
 use crate::frames::frame_table::FrameTable;
@@ -37,6 +38,7 @@ pub(crate) fn unchanged_motions(
     loop {
         let before = out.len();
         out.extend(infeasible_arcs(listing, solved, frame_table, options, &out));
+        out.extend(half_turns(listing, solved, options, &out));
         out.extend(lines_without_start(listing, solved, options, &out));
         let solved_so_far = &*solved;
         let kept = |motion: u32| blocking_reason(motion, listing, solved_so_far, options, &out);

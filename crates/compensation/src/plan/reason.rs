@@ -94,6 +94,11 @@ pub enum OutcomeReason {
     },
     /// Straight segments were requested, but the circle was kept.
     CircleKept,
+    /// The tool turns by about half a turn along a line, so that the controller might turn it the other way.
+    HalfTurn {
+        /// Line of the motion along which it turns.
+        line: u32,
+    },
     /// Joints were requested, but they would make no line from where it starts.
     LineWithoutStart,
     /// At the programmed speed a joint would exceed its speed limit.
@@ -176,6 +181,11 @@ impl OutcomeReason {
     /// Text of the reasons that pin an endpoint because a later unmodified motion starts there.
     fn before_one_that_stays(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            OutcomeReason::HalfTurn { line } => write!(
+                f,
+                "on line {line} the tool turns by about half a turn: after the correction the controller might turn it the other way; put \
+                 a target between"
+            ),
             OutcomeReason::StartOfUnchangedArc { line } => write!(
                 f,
                 "the circular motion of line {line} remains unmodified and starts here: from a corrected start it would be a \
@@ -222,6 +232,7 @@ impl OutcomeReason {
                 "the radius of a half circle leaves its centre ambiguous"
             }
             OutcomeReason::CircleKept => "the circle was kept",
+            OutcomeReason::HalfTurn { .. } => "the tool turns by about half a turn along a line",
             OutcomeReason::LineWithoutStart => {
                 "a line with an unknown or uncorrected start cannot be written as joints"
             }

@@ -14,6 +14,7 @@ mod backlash;
 mod joint_limits;
 mod reasons;
 mod remedy;
+mod half_turns;
 mod joint_lines;
 mod singularity;
 mod start;

@@ -45,6 +45,8 @@ fn name(why: &OutcomeReason) -> &'static str {
         // tests/it/segment.rs.
         OutcomeReason::AmbiguousCentre { .. } => "open centre",
         OutcomeReason::CircleKept => "circle kept",
+        // tests/it/half_turns.rs.
+        OutcomeReason::HalfTurn { .. } => "half a turn",
         // tests/it/joint_lines.rs.
         OutcomeReason::LineWithoutStart => "line without start",
         OutcomeReason::TooFast { .. } => "too fast",
