@@ -308,6 +308,15 @@ impl DeviationContext<'_> {
             }
             _ => programs.name(),
         };
+        if let Some(original) = &original {
+            let [moves, intended] = [&task, original].map(|program| program.listing().motions.len());
+            // Rewriting inserts motions and removes none.
+            if moves < intended {
+                bail!(
+                    "{name}: it has {moves} motions, and the program of --intended {intended}: give the program from which it was rewritten"
+                );
+            }
+        }
         // The original defines the intended path.
         let cell = self.arguments;
         let loads = [original.as_ref().unwrap_or(&task), &task].map(|program| cell.loads(program));

@@ -307,3 +307,18 @@ fn a_plan_keeps_above_the_floor_and_out_of_boxes() {
         assert!(!at.join("none.mod").exists());
     }
 }
+
+#[test]
+fn a_program_with_fewer_motions_was_not_rewritten_from_the_intended_one() {
+    let dir = shop();
+    let at = dir.path();
+    let whole = fs::read_to_string(at.join("blade.mod")).unwrap();
+    let mut shorter: Vec<&str> = whole.lines().collect();
+    let last = shorter.iter().rposition(|line| line.trim_start().starts_with("MoveL")).unwrap();
+    shorter.remove(last);
+    fs::write(at.join("shorter.mod"), shorter.join("\n")).unwrap();
+    let arguments = ["deviation", "shorter.mod", "--intended", "blade.mod", "--model", "model.toml"];
+    let (code, out, err) = truegrind(at, &arguments);
+    assert_eq!(code, 2, "{out}");
+    assert!(err.contains("447 motions") && err.contains("--intended 448"), "{err}");
+}
