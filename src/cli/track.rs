@@ -241,7 +241,6 @@ impl TrackContext<'_> {
         let model_path = self.folder.join(format!("{}-{date}-{:06}.toml", self.stem, tracker.state().poses));
         let text = tracker.model().to_toml()?;
         let path = model_path.display().to_string();
-        arguments.outputs.print(&view::summary(tracker, fresh, alarms, &path))?;
         if arguments.output.is_some() {
             files::make_folder(self.folder)?;
         }
@@ -269,7 +268,9 @@ impl TrackContext<'_> {
         #[cfg(not(feature = "visual"))]
         let _ = datasets;
         batch.add(self.state_path, tracker.state().to_toml()?);
-        batch.write()
+        batch.write()?;
+        // Only now is the model written, as the summary says.
+        arguments.outputs.print(&view::summary(tracker, fresh, alarms, &path))
     }
 
     /// The data sets, and whether a file of a folder failed; the others are still used. With `--follow`, files that cannot be read
