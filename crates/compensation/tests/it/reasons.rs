@@ -342,3 +342,13 @@ fn a_called_program_that_is_not_read_is_named() {
     assert!(note.starts_with("2 of the blocks") && note.ends_with("(lines 7, 9)"), "{note}");
     assert!(!notes(go).iter().any(|note| note.contains("in their file")));
 }
+
+/// A work object that is declared, and computed where the program runs, is not called undeclared.
+#[test]
+fn a_declared_work_object_without_a_known_value_is_not_called_undeclared() {
+    let source = sample("frames.mod");
+    let task = truegrind_programs::rapid::Task::read(&[("frames.mod", &source)]);
+    let found = truegrind_compensation::frames::undeclared::undeclared(&task.listing);
+    let names: Vec<&str> = found.iter().map(|one| one.name.as_str()).collect();
+    assert_eq!(names, ["elsewhere", "nowhere"]);
+}
