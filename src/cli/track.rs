@@ -20,7 +20,7 @@ use super::computation::{Common, on_threads};
 use super::defect::catch_panic;
 use super::exit_status::ExitStatus;
 use super::files::{self, Batch};
-use super::identify::Angles;
+use super::identify::{Angles, refuse_implausible_payload};
 use super::inputs::{self, NamedModel, StatedRobot};
 use super::outputs::Outputs;
 use super::terminal::print_message;
@@ -357,10 +357,13 @@ fn read(
     let allow_odd_units = arguments.allow_odd_units;
     let options = import::Options { allow_odd_units, ..import::Options::default() };
     let dataset = import::read(&files::name(path), &bytes, &options)?;
+    let robot = inputs::robot(arguments.robot.named().unwrap_or(arm.robot.as_str().into()));
+    if let (true, false, Ok(robot)) = (is_new, allow_odd_units, &robot) {
+        refuse_implausible_payload(&dataset, robot)?;
+    }
     let dh = match arguments.angles {
         Some(angles) => angles == Angles::Dh,
-        None => inputs::robot(arguments.robot.named().unwrap_or(arm.robot.as_str().into()))
-            .is_ok_and(|r| r.sheet.joints.angles == sheet::Angles::Dh),
+        None => robot.is_ok_and(|r| r.sheet.joints.angles == sheet::Angles::Dh),
     };
     let convention = if dh { AngleConvention::Dh } else { AngleConvention::Logged };
     if is_new && !allow_odd_units && dataset.rows.len() >= ROWS_TO_TELL_UNITS {
