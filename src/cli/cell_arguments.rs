@@ -14,6 +14,7 @@ use truegrind::compensation::frames::taught::contradictions;
 use truegrind::programs::motion::Listing;
 use truegrind::programs::motion::load::Loads;
 use truegrind::programs::reading::Program;
+use truegrind::robots;
 use truegrind::surfaces::SurfaceFile;
 
 use super::files;
@@ -56,6 +57,7 @@ impl CellArguments {
         {
             bail!("--payload {kg}: expected a mass in kg, from 0 to {LARGEST_PAYLOAD_KG}");
         }
+        self.note_overload(model);
         let cell = self.read_cell()?;
         let surface = self.surface.as_deref().map(super::path::surface).transpose()?;
         let cell = match &surface {
@@ -70,6 +72,19 @@ impl CellArguments {
             condition.payload_centre_mm = in_last_link.coords.into();
         }
         Ok((cell, surface, condition))
+    }
+
+    /// Notes a payload above the rated one of the catalogue: perhaps it is in another unit.
+    fn note_overload(&self, model: Option<&Estimated>) {
+        let sheet = model.and_then(|arm| Some(robots::load(&arm.robot).ok()?.sheet));
+        let rated = sheet.and_then(|sheet| Some((sheet.payload_kg?, sheet.name)));
+        if let (Some(kg), Some((rated, name))) = (self.payload, rated)
+            && kg > rated
+        {
+            print_message(format_args!(
+                "note: --payload {kg}: {name} is rated for {rated} kg; check that the mass is right and in kg"
+            ));
+        }
     }
 
     fn read_cell(&self) -> anyhow::Result<Cell> {

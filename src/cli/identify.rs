@@ -18,6 +18,7 @@ use truegrind::calibration::measurement::convention::AngleConvention;
 use truegrind::calibration::measurement::dataset::Dataset;
 use truegrind::calibration::measurement::import::{self, TimeMatching};
 use truegrind::calibration::measurement::matching::{Mismatch, match_to_arm};
+use truegrind::calibration::measurement::plausibility::implausible_payload;
 use truegrind::calibration::measurement::split::{self, Split};
 use truegrind::report::format;
 use truegrind::report::{identification as view, study as study_view};
@@ -351,12 +352,23 @@ fn imported(arguments: &DataArguments, bytes: &[u8]) -> anyhow::Result<Dataset> 
 fn measured(arguments: &DataArguments, robot: &Robot, dataset: Dataset) -> anyhow::Result<Dataset> {
     let convention = arguments.angles.map_or_else(|| robot.sheet.joints.angles.into(), AngleConvention::from);
     let (name, odd) = (&robot.sheet.name, arguments.allow_odd_units);
+    if !odd {
+        refuse_implausible_payload(&dataset, robot)?;
+    }
     let dataset =
         match_to_arm(dataset, name, &robot.model, convention, odd).map_err(|mismatch| match mismatch {
             Mismatch::Units(_) => anyhow!("{mismatch} (--allow-odd-units accepts the file anyway)"),
             _ => anyhow!("{mismatch}"),
         })?;
     Ok(dataset)
+}
+
+/// Refuses a payload that is far above the rated one, where that is known.
+pub(super) fn refuse_implausible_payload(dataset: &Dataset, robot: &Robot) -> anyhow::Result<()> {
+    match robot.sheet.payload_kg.and_then(|rated| implausible_payload(dataset, rated)) {
+        Some(suspicion) => bail!("{suspicion} (--allow-odd-units accepts the file anyway)"),
+        None => Ok(()),
+    }
 }
 
 /// Rows to fit and rows to hold out; repeats of a pose stay together.

@@ -20,7 +20,7 @@ use super::computation::{Common, on_threads};
 use super::defect::catch_panic;
 use super::exit_status::ExitStatus;
 use super::files::{self, Batch};
-use super::identify::Angles;
+use super::identify::{Angles, refuse_implausible_payload};
 use super::inputs::{self, NamedModel, StatedRobot};
 use super::outputs::Outputs;
 use super::terminal::print_message;
@@ -241,7 +241,6 @@ impl TrackContext<'_> {
         let model_path = self.folder.join(format!("{}-{date}-{:06}.toml", self.stem, tracker.state().poses));
         let text = tracker.model().to_toml()?;
         let path = model_path.display().to_string();
-        arguments.outputs.print(&view::summary(tracker, fresh, alarms, &path))?;
         if arguments.output.is_some() {
             files::make_folder(self.folder)?;
         }
@@ -269,7 +268,9 @@ impl TrackContext<'_> {
         #[cfg(not(feature = "visual"))]
         let _ = datasets;
         batch.add(self.state_path, tracker.state().to_toml()?);
-        batch.write()
+        batch.write()?;
+        // Only now is the model written, as the summary says.
+        arguments.outputs.print(&view::summary(tracker, fresh, alarms, &path))
     }
 
     /// The data sets, and whether a file of a folder failed; the others are still used. With `--follow`, files that cannot be read
@@ -356,10 +357,13 @@ fn read(
     let allow_odd_units = arguments.allow_odd_units;
     let options = import::Options { allow_odd_units, ..import::Options::default() };
     let dataset = import::read(&files::name(path), &bytes, &options)?;
+    let robot = inputs::robot(arguments.robot.named().unwrap_or(arm.robot.as_str().into()));
+    if let (true, false, Ok(robot)) = (is_new, allow_odd_units, &robot) {
+        refuse_implausible_payload(&dataset, robot)?;
+    }
     let dh = match arguments.angles {
         Some(angles) => angles == Angles::Dh,
-        None => inputs::robot(arguments.robot.named().unwrap_or(arm.robot.as_str().into()))
-            .is_ok_and(|r| r.sheet.joints.angles == sheet::Angles::Dh),
+        None => robot.is_ok_and(|r| r.sheet.joints.angles == sheet::Angles::Dh),
     };
     let convention = if dh { AngleConvention::Dh } else { AngleConvention::Logged };
     if is_new && !allow_odd_units && dataset.rows.len() >= ROWS_TO_TELL_UNITS {

@@ -53,6 +53,7 @@ mod sensor_law;
 mod contract;
 pub mod newton;
 mod design_effect;
+mod drift;
 pub mod extension;
 pub mod design;
 mod link_geometry;

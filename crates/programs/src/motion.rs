@@ -476,6 +476,8 @@ pub struct Listing {
     pub numbered: bool,
     /// Motions that call a program outside their file (NC).
     pub external_calls: Vec<u32>,
+    /// Calls of routines that no file declares (RAPID).
+    pub outside_calls: Vec<OutsideCall>,
     /// Regions that could not be parsed.
     pub opaque: Vec<OpaqueRegion>,
     /// The marks of earlier compensations, per file.
@@ -483,6 +485,15 @@ pub struct Listing {
     /// Unusable comments that state something for the correction (`truegrind angles …`); nothing may be corrected
     /// before they are fixed.
     pub invalid_statements: Vec<InvalidStatement>,
+}
+
+/// A call of a routine that no file declares and that takes no target.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct OutsideCall {
+    /// The routine as the program writes it.
+    pub name: String,
+    /// The call.
+    pub place: Place,
 }
 
 /// A comment that states something for the correction and cannot be used.

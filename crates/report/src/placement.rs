@@ -1,5 +1,7 @@
 //! Place and shape of paths, and the risk that corrected cuts get worse.
 
+use std::collections::BTreeSet;
+
 use serde_json::{Value, json};
 
 use super::table::{Column, Table};
@@ -24,7 +26,27 @@ fn word(placement: Placement) -> &'static str {
 /// One sentence per work object: what was corrected and why, and which measurement would determine its placement.
 pub fn sentences(plan: &Plan, listing: &Listing) -> Vec<String> {
     let what = object_word(listing);
-    plan.placements.iter().map(|placement| sentence(placement, what)).collect()
+    let corrected: BTreeSet<&str> = rewritten(plan)
+        .filter_map(|outcome| listing.work_object(listing.motions.get(outcome.motion as usize)?))
+        .map(|object| object.name.as_str())
+        .collect();
+    let of = |placement: &ObjectPlacement| match corrected.contains(placement.work_object.as_str()) {
+        true => sentence(placement, what),
+        false => format!(
+            "{what} {}: no motion with it is corrected; {}",
+            placement.work_object,
+            displacement(placement)
+        ),
+    };
+    plan.placements.iter().map(of).collect()
+}
+
+/// How far the path as a whole is displaced.
+fn displacement(placement: &ObjectPlacement) -> String {
+    format!(
+        "the path as a whole is displaced by {:.3} mm (known to ± {:.3} mm, 1σ)",
+        placement.deviation_mm, placement.sigma_mm
+    )
 }
 
 /// Term of the program language for a work object.
@@ -33,18 +55,8 @@ fn object_word(listing: &Listing) -> &'static str {
 }
 
 fn sentence(placement: &ObjectPlacement, what: &str) -> String {
-    let ObjectPlacement {
-        work_object,
-        applied,
-        deviation_mm,
-        sigma_mm,
-        probability_of_harm,
-        remedy,
-        unlocated,
-        ..
-    } = placement;
-    let known =
-        format!("the path as a whole is displaced by {deviation_mm:.3} mm (known to ± {sigma_mm:.3} mm, 1σ)");
+    let ObjectPlacement { work_object, applied, probability_of_harm, remedy, unlocated, .. } = placement;
+    let known = displacement(placement);
     if *applied == Placement::Absolute {
         return format!("{what} {work_object}: shape and placement are corrected; {known}");
     }

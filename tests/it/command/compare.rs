@@ -160,6 +160,10 @@ fn track_takes_in_a_growing_file_writes_dated_models_and_goes_on_where_it_was_st
     let model = "out/model-20260505-000110.toml";
     let (code, _, err) = truegrind(at, &["track", "day.csv", "--model", model, "-o", "next"]);
     assert!(code == 0, "{err}");
+    // Where nothing can be written, nothing is said to be.
+    fs::write(at.join("taken"), "a file").unwrap();
+    let (code, out, err) = truegrind(at, &["track", "day.csv", "--model", "model.toml", "-o", "taken"]);
+    assert!(code == 2 && err.contains("taken") && !out.contains("written"), "{out}{err}");
     // Another model with this track, a bad date, a parameter that there is none of.
     let (code, _, err) =
         truegrind(at, &["track", "day.csv", "--model", model, "--state", "out/model.track.toml"]);

@@ -3,7 +3,7 @@
 
 use super::cause_kind::CauseKind;
 use super::extension::{Extended, Freedom, Subject, fit};
-use super::finding::{Confidence, Finding, FoundParameter, Gain};
+use super::finding::{Confidence, Finding, FoundParameter, Gain, ROUNDING_ALONE};
 use super::preparation::Prepared;
 use super::selection::BLOCKS;
 use super::validation::{StageError, Validation};
@@ -233,7 +233,7 @@ pub(super) fn noise_floor(
     let coordinates = if observed.dataset.sensor == Sensor::Cable { 1.0 } else { 3.0 };
     let mean = shares.iter().map(|s| s.0).sum::<f64>() * coordinates / shares.len().max(1) as f64;
     if mean > 0.0 {
-        (Some(mean.sqrt()), "rounding of the angles alone; no pose was repeated".to_owned())
+        (Some(mean.sqrt()), ROUNDING_ALONE.to_owned())
     } else {
         (None, "no pose was repeated and nothing is rounded".to_owned())
     }

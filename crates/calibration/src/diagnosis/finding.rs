@@ -327,5 +327,35 @@ impl Diagnosis {
     /// Whether part of the residual has no cause in the catalogue.
     pub fn is_partly_unexplained(&self) -> bool {
         self.findings.iter().any(|finding| finding.effect == CauseKind::Unexplained)
+            || self.times_the_noise().is_some()
     }
+
+    /// How many times the noise floor the error of the extended model is, where that is too much for noise.
+    pub fn times_the_noise(&self) -> Option<f64> {
+        let fits = &self.fits.extended;
+        // Of few rows the held-out error is large because the parameters are uncertain, not the readings.
+        let error_mm = fits.cv_rmse_mm.min(fits.rmse_mm);
+        let floor_mm = self.noise_floor_mm.filter(|_| self.poses_needed.is_none())?;
+        too_much_for_noise(error_mm, floor_mm, self.is_noise_measured()).then(|| fits.cv_rmse_mm / floor_mm)
+    }
+
+    /// Whether poses were repeated, so that the noise floor is that of the sensor and not of rounding alone.
+    pub fn is_noise_measured(&self) -> bool {
+        self.noise_floor_source != ROUNDING_ALONE
+    }
+}
+
+/// Source of a noise floor without repeated poses.
+pub(super) const ROUNDING_ALONE: &str = "rounding of the angles alone; no pose was repeated";
+
+/// Multiple of the noise floor from which an error is not taken for noise.
+const NOT_NOISE: f64 = 3.0;
+
+/// Where only rounding is known, the error (mm) that is still taken for noise of the sensor: several times that of a laser tracker or a
+/// camera.
+const NOISE_OF_A_SENSOR_MM: f64 = 0.15;
+
+/// Whether an error is too large for noise of sensor and arm; `measured`: by repeated poses.
+pub(super) fn too_much_for_noise(error_mm: f64, floor_mm: f64, measured: bool) -> bool {
+    error_mm > NOT_NOISE * floor_mm && (measured || error_mm > NOISE_OF_A_SENSOR_MM)
 }

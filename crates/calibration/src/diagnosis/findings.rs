@@ -11,6 +11,7 @@ use super::cause_kind::CauseKind;
 use super::confirmation::CLEAR;
 use super::decision;
 use super::design::{Design, FullDesign};
+use super::drift;
 use super::extension::{Extended, Subject};
 use super::finding::{Alternative, Confidence, Family, Finding, Gain, Step};
 use super::held_out::{FoldErrors, Reduced};
@@ -58,7 +59,6 @@ impl FindingBuilder<'_> {
         let mut pictures = Vec::new();
         let mut findings: Vec<Finding> = Vec::new();
         let mut places = Vec::new();
-        let last = self.subject.observed.dataset.rows.last().map_or(0, |r| r.number);
         let after_mm = self.held.without(&[]).rmse_mm(None, self.set_aside);
         let judged: Vec<(f64, Finding, Picture)> = accepted
             .par_iter()
@@ -67,7 +67,7 @@ impl FindingBuilder<'_> {
                 let later: Vec<usize> =
                     (index + 1..accepted.len()).flat_map(|k| self.found.parameter_indices(k)).collect();
                 let step = self.held.without(&later).rmse_mm(None, self.set_aside);
-                let (finding, picture) = self.finding(index, own, after_mm, last);
+                let (finding, picture) = self.finding(index, own, after_mm);
                 (step, finding, picture)
             })
             .collect();
@@ -96,7 +96,9 @@ impl FindingBuilder<'_> {
             pictures.push(picture);
         }
         for (place, finding) in findings.iter_mut().enumerate() {
-            self.tell_change_along_turn(finding, (0..places.len()).filter(|&index| places[index] == place));
+            let of_finding = || (0..places.len()).filter(|&index| places[index] == place);
+            self.tell_change_along_turn(finding, of_finding());
+            self.tell_sum_of_drifts(finding, of_finding());
         }
         (findings, places, pictures)
     }
@@ -111,6 +113,28 @@ impl FindingBuilder<'_> {
         if let Some(stretches) = along_turn(self.subject, joint - 1, &causes) {
             finding.cause = format!("{}; {}", finding.cause, in_words(stretches));
         }
+    }
+
+    /// States several drifts of one quantity as the movement of their sum.
+    fn tell_sum_of_drifts(&self, finding: &mut Finding, indices: impl Iterator<Item = usize>) {
+        let in_time = |index: &usize| match &self.extended.causes[*index] {
+            Cause::Measurement(disturbance) => Some(disturbance).filter(|d| drift::is_in_time(d)),
+            Cause::Arm(_) => None,
+        };
+        let (of_clock, others): (Vec<usize>, Vec<usize>) =
+            indices.partition(|index| in_time(index).is_some());
+        if of_clock.len() < 2 {
+            return;
+        }
+        let dataset = &self.subject.observed.dataset;
+        let drifts: Vec<_> = of_clock.iter().filter_map(in_time).collect();
+        let other = |index: usize| {
+            let parameters = words::found_parameters(self.extended, index);
+            words::describe_cause(&self.extended.causes[index], &parameters, dataset)
+        };
+        let mut terms = vec![drift::describe(&drifts, dataset)];
+        terms.extend(others.into_iter().map(other));
+        finding.cause = terms.join("; ");
     }
 
     /// Whether the joint moved through so small a part of a turn, or of a harmonic's period, that any smooth joint error fits.
@@ -151,7 +175,7 @@ impl FindingBuilder<'_> {
         own.rivals.iter().take(3).map(alternative).collect()
     }
 
-    fn finding(&self, index: usize, own: &Accepted, after_mm: f64, last: usize) -> (Finding, Picture) {
+    fn finding(&self, index: usize, own: &Accepted, after_mm: f64) -> (Finding, Picture) {
         let cause = &self.extended.causes[index];
         let parameters = words::found_parameters(self.extended, index);
         let places = self.found.parameter_indices(index);
@@ -201,7 +225,7 @@ impl FindingBuilder<'_> {
         let picture = picture(self.subject, cause, &without, &self.whole.design);
         let finding = Finding {
             effect: cause.kind(),
-            cause: words::describe_cause(cause, &parameters, last),
+            cause: words::describe_cause(cause, &parameters, &self.subject.observed.dataset),
             confidence: if clear { Confidence::Identified } else { Confidence::Ambiguous },
             rows: cause.rows(),
             row_list: None,

@@ -89,6 +89,7 @@ pub(super) fn summarise(
         after: &stages[2],
         smoothed,
         floor_mm: noise_floor.0,
+        noise_measured: floor.is_some(),
     };
     let off = Deviation::of(&search.extended, &search.outliers);
     let empirical_mm = confounding.largest_empirical_rms_mm();

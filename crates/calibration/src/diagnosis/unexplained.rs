@@ -2,7 +2,7 @@
 
 use super::cause_kind::CauseKind;
 use super::discrepancy::{Discrepancy, typical_mm};
-use super::finding::{Confidence, Finding, Gain};
+use super::finding::{Confidence, Finding, Gain, too_much_for_noise};
 use super::joint_scatter::JointScatter;
 use super::residual_tests::{Structure, is_structure};
 use super::search::Confirmed;
@@ -36,6 +36,8 @@ pub(super) struct Unexplained<'a> {
     pub(super) smoothed: Option<f64>,
     /// The noise floor (mm).
     pub(super) floor_mm: Option<f64>,
+    /// Whether it was measured by repeated poses.
+    pub(super) noise_measured: bool,
 }
 
 impl Unexplained<'_> {
@@ -87,9 +89,18 @@ impl Unexplained<'_> {
             ));
         }
         let floor = self.floor_mm.filter(|floor| rmse > FLOOR_RATIO * floor)?;
-        Some(format!(
-            "{rmse:.3} mm RMS compared with a noise floor of {floor:.3} mm, without a pattern: noise of sensor or arm"
-        ))
+        let compared = format!("{rmse:.3} mm RMS compared with a noise floor of {floor:.3} mm");
+        Some(match (too_much_for_noise(rmse, floor, self.noise_measured), self.noise_measured) {
+            (true, _) => format!(
+                "{compared}, {:.0} times as much: too much for noise, and without a pattern that a cause in the catalogue explains",
+                rmse / floor
+            ),
+            (false, true) => format!("{compared}, without a pattern: noise of sensor or arm"),
+            (false, false) => format!(
+                "{compared} (rounding of the angles alone), without a pattern: probably noise of sensor or arm; repeated poses would \
+                 show how large that is"
+            ),
+        })
     }
 
     /// The largest parts of the discrepancy.

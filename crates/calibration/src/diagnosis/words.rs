@@ -3,8 +3,10 @@
 use super::cause::Cause;
 use super::cause_kind::CauseKind;
 use super::decision;
+use super::drift;
 use super::extension::Extended;
 use super::finding::{Confidence, Finding, FoundParameter, Gain};
+use crate::measurement::dataset::Dataset;
 use crate::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
 use crate::measurement::sensor::empirical::EmpiricalFault;
 use truegrind_arm::effect::Effect;
@@ -100,8 +102,9 @@ pub(super) fn finding(
     }
 }
 
-/// One sentence that states the part and the size of a cause.
-pub fn describe_cause(cause: &Cause, parameters: &[FoundParameter], last_row: usize) -> String {
+/// One sentence that states the part and the size of a cause, found in `dataset`.
+pub fn describe_cause(cause: &Cause, parameters: &[FoundParameter], dataset: &Dataset) -> String {
+    let last_row = dataset.rows.last().map_or(0, |row| row.number);
     let joint = cause.joints().first().map_or(0, |j| j + 1);
     let value = value_of(parameters, 0);
     let when = |rows: Option<[usize; 2]>| match rows {
@@ -173,12 +176,17 @@ pub fn describe_cause(cause: &Cause, parameters: &[FoundParameter], last_row: us
                 )
             }
         }
-        Cause::Measurement(d) => describe_disturbance(d, &when(cause.rows()), parameters),
+        Cause::Measurement(d) => describe_disturbance(d, &when(cause.rows()), parameters, dataset),
     }
 }
 
 /// One sentence for a disturbance of the measurement; `rows` states when.
-fn describe_disturbance(d: &Disturbance, rows: &str, parameters: &[FoundParameter]) -> String {
+fn describe_disturbance(
+    d: &Disturbance,
+    rows: &str,
+    parameters: &[FoundParameter],
+    dataset: &Dataset,
+) -> String {
     let value = value_of(parameters, 0);
     match (&d.kind, &d.profile) {
         (Kind::Empirical(EmpiricalFault::Refraction), Profile::Temperature { .. }) => format!(
@@ -193,25 +201,14 @@ fn describe_disturbance(d: &Disturbance, rows: &str, parameters: &[FoundParamete
         (Kind::Load { .. }, _) => {
             format!("{rows} the arm carried a load that was not logged")
         }
-        (Kind::Target, Profile::Exponential { time_constant_h }) => format!(
-            "the target creeps on the flange: {:.2} mm, time constant {time_constant_h:.2} h",
-            norm(parameters)
-        ),
+        _ if drift::is_in_time(d) => drift::describe(&[d], dataset),
         (Kind::Target, Profile::Temperature { .. }) => format!(
             "the target moves on the flange with temperature: {:.1} µm per kelvin",
             norm(parameters) * 1e3
         ),
-        (Kind::Zero, Profile::Exponential { time_constant_h }) => {
-            format!("the cable's zero drifts by {:.2} mm, time constant {time_constant_h:.2} h", value.abs())
-        }
         (Kind::Zero, Profile::Temperature { .. }) => {
             format!("the cable's zero drifts with temperature: {:.1} µm per kelvin", value.abs() * 1e3)
         }
-        (_, Profile::Exponential { time_constant_h }) => format!(
-            "the sensor moves relative to the base by {:.2} mm, time constant {time_constant_h:.2} h: its stand or the base of the arm \
-             settles or warms up",
-            norm(parameters)
-        ),
         (_, Profile::Temperature { .. }) => format!(
             "the sensor moves relative to the base with temperature, by {:.1} µm per kelvin",
             norm(parameters) * 1e3

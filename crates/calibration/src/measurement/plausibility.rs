@@ -285,6 +285,45 @@ fn interpretation_error(
     if count == 0 { None } else { of((square / count as f64).sqrt()) }
 }
 
+/// Multiple of the rated payload that no arm carries while it is measured.
+const IMPLAUSIBLE_LOAD: f64 = 10.0;
+
+/// A logged payload that the arm cannot carry.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PayloadSuspicion {
+    /// The file.
+    pub file: String,
+    /// Its first such row, as the data set numbers them.
+    pub row: usize,
+    /// The payload there (kg, as the format says).
+    pub payload_kg: f64,
+    /// The rated payload of the arm (kg).
+    pub rated_kg: f64,
+}
+
+/// The first payload far above the rated one: the column is in another unit.
+pub fn implausible_payload(data: &Dataset, rated_kg: f64) -> Option<PayloadSuspicion> {
+    data.rows.iter().find_map(|row| {
+        let payload_kg = row.condition.payload_kg.filter(|kg| *kg > IMPLAUSIBLE_LOAD * rated_kg)?;
+        Some(PayloadSuspicion { file: data.file.clone(), row: row.number, payload_kg, rated_kg })
+    })
+}
+
+impl fmt::Display for PayloadSuspicion {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { file, row, payload_kg, rated_kg } = self;
+        write!(
+            f,
+            "{file}: row {row}: a payload of {payload_kg} kg, but the arm is rated for {rated_kg} kg; "
+        )?;
+        if payload_kg / 1000.0 <= IMPLAUSIBLE_LOAD * rated_kg {
+            write!(f, "the column looks like grams: divide it by 1000")
+        } else {
+            write!(f, "state the mass at the flange in kg")
+        }
+    }
+}
+
 impl Orientation {
     /// The pose under this quaternion order, from one that was read scalar first.
     fn of(self, pose: &Pose, scale: f64) -> Pose {

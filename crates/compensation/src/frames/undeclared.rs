@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use truegrind_programs::motion::{Listing, Motion, Reason};
+use truegrind_programs::motion::{Listing, Motion, Place, Reason};
 use truegrind_programs::reading::Language;
 
 /// A tool or work object without a value.
@@ -21,8 +21,9 @@ pub struct Undeclared {
 /// The undeclared tools and work objects of a listing, in order of first use.
 pub fn undeclared(listing: &Listing) -> Vec<Undeclared> {
     let mut found: BTreeMap<(bool, &str), Undeclared> = BTreeMap::new();
-    let tools = listing.tools.iter().any(|tool| nowhere(tool.value.as_ref().err()));
-    if !tools && !listing.work_objects.iter().any(|object| nowhere(object.value.as_ref().err())) {
+    let tools = listing.tools.iter().any(|tool| nowhere(tool.value.as_ref().err(), tool.place));
+    let mut objects = listing.work_objects.iter();
+    if !tools && !objects.any(|object| nowhere(object.value.as_ref().err(), object.place)) {
         return Vec::new();
     }
     for motion in &listing.motions {
@@ -39,15 +40,18 @@ pub fn undeclared(listing: &Listing) -> Vec<Undeclared> {
 
 /// Undeclared frames of a motion, and whether each is a tool.
 fn names<'a>(listing: &'a Listing, motion: &Motion) -> impl Iterator<Item = (bool, &'a str)> {
-    let tool = listing.tool(motion).filter(|tool| nowhere(tool.value.as_ref().err()));
-    let object = listing.work_object(motion).filter(|object| nowhere(object.value.as_ref().err()));
+    let tool = listing.tool(motion).filter(|tool| nowhere(tool.value.as_ref().err(), tool.place));
+    let object =
+        listing.work_object(motion).filter(|object| nowhere(object.value.as_ref().err(), object.place));
     let tool = tool.map(|tool| (true, tool.name.as_str()));
     tool.into_iter().chain(object.map(|object| (false, object.name.as_str())))
 }
 
-/// Whether a frame has no value for this reason because no file declares it.
-fn nowhere(reason: Option<&Reason>) -> bool {
-    matches!(reason, Some(Reason::Undeclared | Reason::ToolUnknown | Reason::WorkObjectUnknown))
+/// Whether a frame has no value for this reason because no file declares it. A declared one may have no value either: where the program
+/// computes it from what is known only at run time.
+fn nowhere(reason: Option<&Reason>, declared: Option<Place>) -> bool {
+    declared.is_none()
+        && matches!(reason, Some(Reason::Undeclared | Reason::ToolUnknown | Reason::WorkObjectUnknown))
 }
 
 /// One sentence for each, with the remedy.

@@ -59,6 +59,7 @@ pub(crate) fn unchecked_notes(listing: &Listing, solved: &SolvedTargets, uncheck
             listing.external_calls.len()
         ));
     }
+    out.extend(outside_calls_note(listing));
     let curve = |m: &u32| {
         let motion = &listing.motions[*m as usize];
         motion.own_reason.is_none()
@@ -93,20 +94,56 @@ pub(crate) fn unchecked_notes(listing: &Listing, solved: &SolvedTargets, uncheck
     out
 }
 
+/// Calls of routines that are in none of the files, and what is assumed of them.
+fn outside_calls_note(listing: &Listing) -> Option<String> {
+    /// How many routines are named.
+    const NAMED: usize = 5;
+    let mut routines: Vec<(&str, Vec<u32>)> = Vec::new();
+    for call in &listing.outside_calls {
+        let name = call.name.as_str();
+        match routines.iter_mut().find(|(other, _)| other.eq_ignore_ascii_case(name)) {
+            Some((_, lines)) => lines.push(call.place.line),
+            None => routines.push((name, vec![call.place.line])),
+        }
+    }
+    let named = routines
+        .iter()
+        .take(NAMED)
+        .filter_map(|(name, lines)| Some(format!("{name} ({})", numbered(lines)?)));
+    let named: Vec<String> = named.collect();
+    let more = routines.len().saturating_sub(NAMED);
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    (!named.is_empty()).then(|| {
+        format!(
+            "routines that are in none of the files are called: {}{more}; they are assumed to leave unchanged the tools, work objects and \
+             targets that the files declare, the program displacement, the switches (ConfL, SingArea, SoftAct and so on) and the load; \
+             give the modules that declare them too (--together)",
+            named.join(", ")
+        )
+    })
+}
+
 /// Line numbers of motions, the first few; `None` without any.
 pub(crate) fn lines_of(listing: &Listing, motions: &[u32]) -> Option<String> {
-    /// How many lines are listed.
-    const NAMED: usize = 8;
-    let mut lines: Vec<String> =
-        motions.iter().map(|m| listing.motions[*m as usize].place.line.to_string()).take(4 * NAMED).collect();
+    let lines: Vec<u32> =
+        motions.iter().map(|m| listing.motions[*m as usize].place.line).take(4 * NAMED_LINES).collect();
+    numbered(&lines)
+}
+
+/// How many lines are listed.
+const NAMED_LINES: usize = 8;
+
+/// Line numbers, the first few; `None` without any.
+fn numbered(lines: &[u32]) -> Option<String> {
+    let mut lines: Vec<String> = lines.iter().take(4 * NAMED_LINES).map(u32::to_string).collect();
     lines.dedup();
     let word = match lines.as_slice() {
         [] => return None,
         [_] => "line",
         _ => "lines",
     };
-    let more = if lines.len() > NAMED { " and more" } else { "" };
-    lines.truncate(NAMED);
+    let more = if lines.len() > NAMED_LINES { " and more" } else { "" };
+    lines.truncate(NAMED_LINES);
     Some(format!("{word} {}{more}", lines.join(", ")))
 }
 

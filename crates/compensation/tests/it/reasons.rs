@@ -346,3 +346,28 @@ fn a_called_program_that_is_not_read_is_named() {
     assert!(note.starts_with("2 of the blocks") && note.ends_with("(lines 7, 9)"), "{note}");
     assert!(!notes(go).iter().any(|note| note.contains("in their file")));
 }
+
+/// A work object that is declared, and computed where the program runs, is not called undeclared.
+#[test]
+fn a_declared_work_object_without_a_known_value_is_not_called_undeclared() {
+    let source = sample("frames.mod");
+    let task = truegrind_programs::rapid::Task::read(&[("frames.mod", &source)]);
+    let found = truegrind_compensation::frames::undeclared::undeclared(&task.listing);
+    let names: Vec<&str> = found.iter().map(|one| one.name.as_str()).collect();
+    assert_eq!(names, ["elsewhere", "nowhere"]);
+}
+
+#[test]
+fn calls_of_routines_in_no_file_are_noted_with_what_is_assumed_of_them() {
+    let target = "[[400,0,300],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]";
+    let source = format!(
+        "MODULE A\n PROC main()\n  SetDO valve,1;\n  SetShift;\n  MoveJ {target},v100,fine,tool0;\n  SetShift;\n ENDPROC\nENDMODULE\n"
+    );
+    let plan = planned(source.as_bytes(), &known(), &Cell::default(), &fine());
+    let notes = plan.notes.join("\n");
+    assert!(
+        notes.contains("in none of the files are called: SetShift (lines 4, 6); they are assumed"),
+        "{notes}"
+    );
+    assert!(!notes.contains("SetDO"), "{notes}");
+}

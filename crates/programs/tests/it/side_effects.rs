@@ -204,3 +204,14 @@ fn a_displacement_from_the_robot_position_pins_the_motions_of_every_path() {
     let still = "PROC still()\nn:=n+1;\nENDPROC";
     assert_eq!(left(&format!("{GO}{GO}still;\nn:=2;\n{HERE}{GO}"), still), [false, true, false]);
 }
+
+/// What no file declares and RobotWare does not have is listed with its lines; own routines, instructions and functions are not.
+#[test]
+fn calls_of_routines_that_no_file_declares_are_listed() {
+    let text = b"MODULE A\n PROC main()\n  SetDO valve,1;\n  SetShift;\n  own;\n  WaitTime 1;\n  setshift;\n  TPWrite \"a\";\n  \
+                 ConfL\\Off;\n  Elsewhere 4,2;\n  a:=Offs(b,1,2,3);\n ENDPROC\n PROC own()\n ENDPROC\nENDMODULE\n";
+    let task = truegrind_programs::rapid::Task::read(&[("a.mod", text)]);
+    let calls: Vec<_> =
+        task.listing.outside_calls.iter().map(|call| (call.name.as_str(), call.place.line)).collect();
+    assert_eq!(calls, [("SetShift", 4), ("setshift", 7), ("Elsewhere", 10)]);
+}

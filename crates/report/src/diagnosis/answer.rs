@@ -29,8 +29,9 @@ pub(super) fn verdict(diagnosis: &Diagnosis) -> Verdict {
                 diagnosis.dataset.rows
             ),
         ),
-        None if diagnosis.findings.is_empty() => (Status::Good, found),
-        None => (Status::Found, found),
+        None if !diagnosis.findings.is_empty() => (Status::Found, found),
+        None if diagnosis.times_the_noise().is_some() => (Status::Warning, found),
+        None => (Status::Good, found),
     };
     let fits = &diagnosis.fits;
     let floor = match diagnosis.noise_floor_mm {
@@ -48,8 +49,35 @@ pub(super) fn verdict(diagnosis: &Diagnosis) -> Verdict {
             "{headline}: held-out error {with_causes}{:.3} mm, data sheet {:.3} mm; {floor}",
             fits.geometric.cv_rmse_mm, fits.nominal.cv_rmse_mm
         ),
-        Vec::<String>::new(),
+        too_much_for_noise(diagnosis),
     )
+}
+
+/// What an error that is too large for noise may come from, and what to check.
+fn too_much_for_noise(diagnosis: &Diagnosis) -> Vec<String> {
+    let (Some(times), Some(floor)) = (diagnosis.times_the_noise(), diagnosis.noise_floor_mm) else {
+        return Vec::new();
+    };
+    let left = if diagnosis.findings.is_empty() { "" } else { " that is left" };
+    let source =
+        if diagnosis.is_noise_measured() { "" } else { ", which is that of rounding the angles alone" };
+    let mut out = vec![
+        format!(
+            "the held-out error{left} ({:.3} mm) is {times:.0} times the noise floor ({floor:.3} mm{source}): too much for noise; its cause is \
+             outside the catalogue or in the measurement",
+            diagnosis.fits.extended.cv_rmse_mm
+        ),
+        "what to check: whether the tracker read in both faces, whether two targets or nests were read in turn, whether the rows come \
+         from sessions with different sensor frames, and the sensor itself against a known length"
+            .to_owned(),
+    ];
+    if !diagnosis.is_noise_measured() {
+        out.push(
+            "what would help: measure a few poses several times, which shows the noise of the sensor"
+                .to_owned(),
+        );
+    }
+    out
 }
 
 fn be(count: usize) -> &'static str {

@@ -7,10 +7,12 @@ use truegrind_arm::inverse::InverseError;
 use truegrind_compensation::deviation::Status;
 use truegrind_compensation::plan::reason::OutcomeReason;
 use truegrind_compensation::plan::{MotionOutcome, Plan};
+use truegrind_compensation::risk::placement::{ObjectPlacement, Placement};
 use truegrind_programs::motion::{Listing, Reason};
 use truegrind_programs::rapid::Task;
 use truegrind_report::compensation::{self as view, ProgramFile};
 use truegrind_report::format::{csv, markdown, terminal};
+use truegrind_report::placement::sentences;
 
 use super::examples::leave;
 
@@ -251,4 +253,28 @@ fn verdict_and_page_tell_what_to_look_at() {
         let text = terminal::document(&view::summary(&plan, &listing, &files), 200);
         assert!(text.contains(sentence), "{text}");
     }
+}
+
+/// A work object is said to be corrected only where a motion with it is.
+#[test]
+fn a_work_object_without_a_corrected_motion_is_not_called_corrected() {
+    let (mut plan, listing, _) = example();
+    plan.placements = vec![ObjectPlacement {
+        work_object: "wobj0".to_owned(),
+        applied: Placement::Absolute,
+        deviation_mm: 2.131,
+        sigma_mm: 0.2,
+        probability_of_harm: 0.01,
+        taught: false,
+        unlocated: false,
+        remedy: None,
+    }];
+    let said = |plan: &Plan| sentences(plan, &listing).join("\n");
+    assert!(said(&plan).contains("wobj0: shape and placement are corrected; the path as a whole"));
+    plan.outcomes.iter_mut().for_each(|outcome| outcome.status = Status::Left);
+    let text = said(&plan);
+    assert!(
+        text.contains("wobj0: no motion with it is corrected; the path as a whole is displaced by 2.131 mm"),
+        "{text}"
+    );
 }

@@ -88,3 +88,34 @@ fn the_page_folds_statistics_and_opens_with_the_answer() {
     assert!(at("<details>") < at("Errors by stage"));
     assert_eq!(html.matches("<summary>Statistics</summary>").count(), found.diagnosis.findings.len());
 }
+
+/// An error far above the noise floor is no success, whether or not a cause was found.
+#[test]
+fn a_remainder_far_above_the_noise_floor_is_a_warning() {
+    let (found, dataset) = diagnosed();
+    let mut found = found.clone();
+    let mut summary = |error_mm: f64, floor_mm: f64, source: &str| {
+        let diagnosis = &mut found.diagnosis;
+        diagnosis.findings.clear();
+        diagnosis.fits.geometric.cv_rmse_mm = error_mm;
+        diagnosis.fits.extended.cv_rmse_mm = error_mm;
+        diagnosis.fits.extended.rmse_mm = 0.95 * error_mm;
+        diagnosis.noise_floor_mm = Some(floor_mm);
+        diagnosis.noise_floor_source = source.to_owned();
+        let text = on_a_terminal(&view::document(&found, dataset));
+        (text.split_whitespace().collect::<Vec<_>>().join(" "), found.diagnosis.is_partly_unexplained())
+    };
+    let rounding = "rounding of the angles alone; no pose was repeated";
+    let (text, flagged) = summary(1.045, 0.004, rounding);
+    assert!(flagged && text.contains("[warning] No cause beyond geometry was found"), "{text}");
+    assert!(text.contains("is 261 times the noise floor (0.004 mm, which is that of rounding"), "{text}");
+    assert!(text.contains("two targets or nests") && text.contains("several times"), "{text}");
+    // Rounding says nothing of the sensor, whose usual noise explains this.
+    let (text, flagged) = summary(0.03, 0.004, rounding);
+    assert!(!flagged && text.contains("[ok] No cause beyond geometry was found"), "{text}");
+    let repeated = "20 repeated poses, 40 degrees of freedom";
+    let (text, flagged) = summary(0.1, 0.02, repeated);
+    assert!(flagged && text.contains("is 5 times the noise floor (0.020 mm)"), "{text}");
+    let (text, flagged) = summary(0.05, 0.02, repeated);
+    assert!(!flagged && text.contains("[ok]"), "{text}");
+}

@@ -326,6 +326,25 @@ fn a_target_that_creeps_and_a_stand_that_warms_up_are_told_apart() {
     }
 }
 
+/// A slow drift is stated as the movement within the log, of which its asymptote is an extrapolation.
+#[test]
+fn a_slow_drift_is_stated_as_far_as_it_was_seen() {
+    let (mm, time_constant_h) = ([8.0, -4.0, 2.0], 12.0);
+    let dataset =
+        run(&arm(), &[Hidden::Drift { mm, time_constant_h }], &setup(Sensor::Position, 300, 71)).dataset;
+    let hours = dataset.rows.iter().filter_map(|row| row.condition.time_h).fold(0.0, f64::max);
+    assert!((0.5..6.0).contains(&hours), "{hours}");
+    let truth = 84.0_f64.sqrt() * (1.0 - (-hours / time_constant_h).exp());
+    let found = diagnosed(&dataset);
+    let first = &found.diagnosis.findings[0];
+    let (_, size) = first.cause.split_once("moved relative to the base by ").expect(&first.cause);
+    let (size, span) = size.split_once(" mm during the ").expect(&first.cause);
+    let size: f64 = size.parse().unwrap();
+    assert!((size / truth - 1.0).abs() < 0.15, "{truth}: {}", first.cause);
+    assert!(span.starts_with(&format!("{hours:.1} h of the measurement")), "{hours}: {}", first.cause);
+    assert!(!first.cause.contains("time constant"), "{}", first.cause);
+}
+
 /// A slender link turns what it carries, and its first axis, by torques of both: two compliant joints cannot imitate that. The written arm
 /// contains it.
 #[test]

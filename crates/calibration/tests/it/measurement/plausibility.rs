@@ -5,7 +5,7 @@ use truegrind_arm::model::{Joints, Model};
 use truegrind_calibration::measurement::convention::AngleConvention;
 use truegrind_calibration::measurement::dataset::{Dataset, Reading};
 use truegrind_calibration::measurement::plausibility::{
-    AngleUnit, ComparedReading, LengthUnit, Orientation, UnitSuspicion, plausibility,
+    AngleUnit, ComparedReading, LengthUnit, Orientation, UnitSuspicion, implausible_payload, plausibility,
 };
 
 use super::simulation::{CABLE, SIX, TRACKER, measure, random};
@@ -134,4 +134,21 @@ fn quaternions_in_another_order_are_named() {
 fn too_few_rows_are_not_judged() {
     let (_, data) = measure(&random(5, CABLE));
     assert_eq!(plausibility(&scaled(&data, 1e-3), &arm(), AngleConvention::Logged), []);
+}
+
+/// A payload in grams is far above what the arm carries; one that is only somewhat too heavy is the user's matter.
+#[test]
+fn a_payload_in_grams_is_named() {
+    let mut data = sensors().remove(1);
+    let mut logged = |kg: f64| {
+        for row in &mut data.rows {
+            std::sync::Arc::make_mut(&mut row.condition).payload_kg = Some(kg);
+        }
+        implausible_payload(&data, 3.0).map(|suspicion| suspicion.to_string())
+    };
+    assert_eq!(logged(1.5), None);
+    assert_eq!(logged(4.5), None);
+    let grams = logged(1500.0).unwrap();
+    assert!(grams.contains("a payload of 1500 kg, but the arm is rated for 3 kg"), "{grams}");
+    assert!(grams.contains("row 1:") && grams.contains("looks like grams: divide it by 1000"), "{grams}");
 }

@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use super::{ListingBuilder, Literal, literals};
 use crate::dataflow::Nesting;
-use crate::motion::{Declaration, Modal, Motion, MotionKind, MotionTarget, Origin, Reason, Role, Routine};
+use crate::motion::{
+    Declaration, Modal, Motion, MotionKind, MotionTarget, Origin, OutsideCall, Reason, Role, Routine,
+};
 use crate::rapid::evaluate::{Context, Source};
 use crate::rapid::flow::AbstractState;
 use crate::rapid::instruction::{INSTRUCTIONS, Instruction, Slot};
@@ -307,6 +309,11 @@ impl ListingBuilder<'_, '_> {
             }
         }
         if found.is_empty() {
+            let is_outside = !late && predefined::effect(name).is_none();
+            if is_outside && self.symbols.callees(unit.scope, name).is_empty() {
+                let place = self.place(unit.file, tree.nodes.first(node));
+                self.listing.outside_calls.push(OutsideCall { name: display(name), place });
+            }
             return None;
         }
         let mut motion = self.motion(unit, node, state, nesting);
