@@ -150,5 +150,5 @@ fn a_payload_in_grams_is_named() {
     assert_eq!(logged(4.5), None);
     let grams = logged(1500.0).unwrap();
     assert!(grams.contains("a payload of 1500 kg, but the arm is rated for 3 kg"), "{grams}");
-    assert!(grams.contains("row 1:") && grams.contains("looks like grams: divide it by 1000"), "{grams}");
+    assert!(grams.contains("row 2:") && grams.contains("looks like grams: divide it by 1000"), "{grams}");
 }
