@@ -47,9 +47,7 @@ pub(crate) fn infeasible_arcs(
 ) -> BTreeMap<u32, OutcomeReason> {
     let mut infeasible_arcs = circles(listing, solved, frame_table, options, unchanged_motions);
     let corrected = |index: u32, infeasible_arcs: &BTreeMap<u32, OutcomeReason>| {
-        is_rewritable(&listing.motions[index as usize], options)
-            && all_corrected(solved.of(index as usize))
-            && !unchanged_motions.contains_key(&index)
+        is_corrected(index, listing, solved, options, unchanged_motions)
             && !infeasible_arcs.contains_key(&index)
     };
     for (index, motion) in (0_u32..).zip(&listing.motions) {
@@ -67,8 +65,21 @@ pub(crate) fn infeasible_arcs(
     infeasible_arcs
 }
 
+/// Whether a motion is corrected, as far as is known.
+pub(super) fn is_corrected(
+    index: u32,
+    listing: &Listing,
+    solved: &SolvedTargets,
+    options: &Options,
+    unchanged_motions: &BTreeMap<u32, OutcomeReason>,
+) -> bool {
+    is_rewritable(&listing.motions[index as usize], options)
+        && all_corrected(solved.of(index as usize))
+        && !unchanged_motions.contains_key(&index)
+}
+
 /// Whether all targets of a motion can be corrected.
-pub(super) fn all_corrected(targets: &[Result<SolvedTarget, OutcomeReason>]) -> bool {
+fn all_corrected(targets: &[Result<SolvedTarget, OutcomeReason>]) -> bool {
     let can =
         |target: &Result<SolvedTarget, _>| target.as_ref().is_ok_and(|solved| solved.forbidden.is_none());
     !targets.is_empty() && targets.iter().all(can)

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 
 use nalgebra::UnitQuaternion;
 
-use super::arc_feasibility::all_corrected;
-use crate::options::{Options, is_rewritable};
+use super::arc_feasibility::is_corrected;
+use crate::options::Options;
 use crate::plan::reason::OutcomeReason;
 use crate::target::solved_target::SolvedTargets;
 use truegrind_programs::motion::{Listing, MotionKind, Switch};
@@ -45,11 +45,8 @@ pub(crate) fn half_turns(
         if from.frames_index != to.frames_index {
             continue;
         }
-        let corrected = [previous, index].map(|end| {
-            is_rewritable(&listing.motions[end as usize], options)
-                && all_corrected(solved.of(end as usize))
-                && !unchanged_motions.contains_key(&end)
-        });
+        let corrected =
+            [previous, index].map(|end| is_corrected(end, listing, solved, options, unchanged_motions));
         let commanded = |k: usize, original: &UnitQuaternion<f64>| match ends[k] {
             Some(end) if corrected[k] => end.commanded.rotation,
             _ => *original,

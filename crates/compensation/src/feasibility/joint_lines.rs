@@ -3,8 +3,8 @@
 
 use std::collections::BTreeMap;
 
-use super::arc_feasibility::all_corrected;
-use crate::options::{Emit, Options, is_rewritable};
+use super::arc_feasibility::is_corrected;
+use crate::options::{Emit, Options};
 use crate::plan::reason::OutcomeReason;
 use crate::target::solved_target::SolvedTargets;
 use truegrind_programs::motion::{Listing, MotionKind};
@@ -20,11 +20,7 @@ pub(crate) fn lines_without_start(
     if options.emit != Emit::Joints {
         return BTreeMap::new();
     }
-    let corrected = |index: u32| {
-        is_rewritable(&listing.motions[index as usize], options)
-            && all_corrected(solved.of(index as usize))
-            && !unchanged_motions.contains_key(&index)
-    };
+    let corrected = |index: u32| is_corrected(index, listing, solved, options, unchanged_motions);
     (0_u32..)
         .zip(&listing.motions)
         .filter(|(index, motion)| {
