@@ -69,9 +69,9 @@ fn over(row: &GrindingRow, figure: fn(&Deviations) -> f64) -> Cell {
     row.over_cases(figure).map_or(Cell::Missing, |values| repeated::cell(&values))
 }
 
-/// RMSE of held-out measurements in every case.
-fn held_out(row: &GrindingRow) -> Vec<f64> {
-    row.cases.iter().map(|c| c.held_out.rmse).collect()
+/// RMSE of held-out measurements in every case; `None` if a case has no model.
+fn held_out(row: &GrindingRow) -> Option<Vec<f64>> {
+    row.cases.iter().map(|c| (c.held_out.count > 0).then_some(c.held_out.rmse)).collect()
 }
 
 /// Verdict from one part and several draws of measurements.
@@ -128,7 +128,7 @@ fn verdict(result: &GrindingResult) -> Verdict {
         ));
     }
     reasons.extend(against(result));
-    let fits = || order.iter().map(|(r, _)| mean_and_deviation(&held_out(r)).0);
+    let fits = || order.iter().filter_map(|(r, _)| Some(mean_and_deviation(&held_out(r)?).0));
     if let (Some(most), Some(least)) = (fits().reduce(f64::max), fits().reduce(f64::min)) {
         reasons.push(format!(
             "On held-out measurements the methods' errors are between {} and {} mm: a good fit there does not guarantee a good part.",
@@ -281,7 +281,7 @@ pub(super) fn table(result: &GrindingResult) -> Table {
             over(row, |b| b.all.mean_absolute),
             over(row, |b| b.all.standard_deviation),
             over(row, |b| b.all.max),
-            repeated::cell(&held_out(row)),
+            held_out(row).map_or(Cell::Missing, |errors| repeated::cell(&errors)),
             note.into(),
         ]);
     }
@@ -308,7 +308,7 @@ pub(super) fn table(result: &GrindingResult) -> Table {
             .to_owned(),
     ];
     if let Some(cases) = &result.named_causes {
-        table.notes.extend(named_causes::note(cases, result.rows.iter().map(held_out)));
+        table.notes.extend(named_causes::note(cases, result.rows.iter().filter_map(held_out)));
         table.notes.push(
             "NC is not judged on the part: the estimate that replaces the actual arm knows geometry alone, so a model with causes would \
              seem worse the more of them it has."
