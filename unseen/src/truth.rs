@@ -80,6 +80,7 @@ pub const NAMES: [(&str, Family); 43] = [
     ("joint-zero-shift", Family::JointZero),
     ("sensor-scale", Family::Scale),
     ("sensor-range", Family::Scale),
+    ("sensor-axes", Family::Scale),
     ("sensor-scale-drift", Family::Scale),
     ("cable-sag", Family::Cable),
     ("cable-pulley", Family::Cable),

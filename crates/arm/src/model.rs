@@ -99,7 +99,7 @@ impl Model {
     /// use truegrind_arm::robots;
     ///
     /// let mut arm = robots::load("abb-irb-120")?.model;
-    /// let thermal = Thermal { growth: 0.0, time_constant_h: 1.0, growth_per_k: 1.2e-5, reference_c: 20.0 };
+    /// let thermal = Thermal { growth: 0.0, time_constant_h: 1.0, start_h: 0.0, growth_per_k: 1.2e-5, reference_c: 20.0 };
     /// arm.effects.push(Effect::ThermalDrift(thermal));
     ///
     /// // Ten kelvin above its reference every length of the arm is 0.12 ‰ longer.

@@ -3,7 +3,7 @@
 //! Method. The sensor's frame is fitted to four fifths of the poses, and each pose is judged with a frame fitted without it
 //! (five folds); or the frame is stated and nothing is fitted. The decision follows ISO 14253-1 for an expanded uncertainty
 //! U (k = 2): accepted if largest error plus U is within the tolerance, refused if the largest error exceeds the tolerance by
-//! more than U, undecided otherwise. Pose accuracy and repeatability (ISO 9283: thirty cycles at five poses) are computed
+//! more than U, undecided otherwise. Where U is unknown, nothing is accepted. Pose accuracy and repeatability (ISO 9283: thirty cycles at five poses) are computed
 //! only if enough cycles were measured; path accuracy and repeatability (ten cycles) only from rows with a position on a
 //! path. Those rows are used for nothing else, because the arm was moving.
 
@@ -150,7 +150,8 @@ pub fn accept(
         let model = ErrorSummary::of(found_rad.iter().copied());
         let (uncertainty_rad, uncertainty) =
             Uncertainty::of(options.uncertainty_rad, noise_floor_rad(dataset));
-        let decided = |tolerance| Decision::of(groups.len(), model.max, uncertainty_rad, tolerance);
+        let decided =
+            |tolerance| Decision::of(groups.len(), model.max, (uncertainty_rad, uncertainty), tolerance);
         Orientation {
             nominal: ErrorSummary::of(nominal_rad),
             errors_rad: numbered(found_rad),
@@ -169,7 +170,7 @@ pub fn accept(
         uncertainty_mm,
         uncertainty,
         tolerance_mm: options.tolerance_mm,
-        decision: Decision::of(groups.len(), model.max, uncertainty_mm, options.tolerance_mm),
+        decision: Decision::of(groups.len(), model.max, (uncertainty_mm, uncertainty), options.tolerance_mm),
         orientation,
         orientation_asked: options.tolerance_rad.is_some(),
         cycles: cycles(&observed, &groups, &estimated.model, options)?,

@@ -83,7 +83,7 @@ fn verdict(found: &Acceptance, sensor: Sensor) -> Verdict {
     let mut reasons = Vec::new();
     match found.uncertainty {
         Uncertainty::Unknown => reasons.push(
-            "the sensor uncertainty is unknown and not taken into account: state it (--sensor-uncertainty), or repeat some poses"
+            "the sensor uncertainty is unknown, so nothing can be accepted: state it (--sensor-uncertainty), or repeat some poses"
                 .to_owned(),
         ),
         Uncertainty::Repeats => reasons.push(
@@ -120,6 +120,12 @@ fn headline(found: &Acceptance) -> (Status, String) {
         Decision::Refused => {
             (Status::Bad, format!("Not accepted: largest error {max:.3} mm, tolerance {limit:.3} mm"))
         }
+        Decision::Open if found.uncertainty == Uncertainty::Unknown => (
+            Status::Warning,
+            format!(
+                "Not decided: largest error {max:.3} mm, tolerance {limit:.3} mm, but the sensor uncertainty is unknown"
+            ),
+        ),
         Decision::Open => (
             Status::Warning,
             format!(
@@ -147,6 +153,12 @@ fn orientation_headline(found: &Acceptance) -> (Status, String) {
         Decision::Refused => {
             (Status::Bad, format!("Not accepted: largest orientation error {max:.4}°, tolerance {limit:.4}°"))
         }
+        _ if turns.uncertainty == Uncertainty::Unknown => (
+            Status::Warning,
+            format!(
+                "Not decided: largest orientation error {max:.4}°, tolerance {limit:.4}°, but the sensor uncertainty of orientations is unknown"
+            ),
+        ),
         _ => (
             Status::Warning,
             format!(
@@ -167,7 +179,7 @@ fn orientation_reason(found: &Acceptance) -> Option<String> {
                 .to_owned(),
         ),
         Uncertainty::Unknown => Some(
-            "the orientation uncertainty is unknown and not taken into account: state it (--sensor-uncertainty-angle), or repeat some poses"
+            "the orientation uncertainty is unknown, so nothing can be accepted: state it (--sensor-uncertainty-angle), or repeat some poses"
                 .to_owned(),
         ),
     }
@@ -387,7 +399,7 @@ fn method(found: &Acceptance, statement: &Statement) -> Vec<String> {
             .to_owned()
     };
     let uncertainty = match found.uncertainty {
-        Uncertainty::Unknown => "unknown, not taken into account".to_owned(),
+        Uncertainty::Unknown => "unknown, so nothing is accepted".to_owned(),
         _ => format!("{:.3} mm", found.uncertainty_mm),
     };
     let rule = format!(

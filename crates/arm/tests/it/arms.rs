@@ -426,6 +426,7 @@ pub(crate) fn with_effects(model: &Model, random: &mut ChaCha8Rng) -> Model {
     out.effects.push(Effect::GearRatio(GearRatio { joint: 5, error: 2e-4 }));
     out.effects.push(Effect::JointCoupling(Coupling { joint: 5, driver: 4, factor: 1e-3 }));
     out.effects.push(Effect::ThermalDrift(Thermal {
+        start_h: 0.0,
         growth: 2e-4,
         time_constant_h: 1.5,
         growth_per_k: 1e-5,

@@ -194,6 +194,7 @@ fn an_effect_whose_circumstance_is_unknown_stands_still() {
     let nominal = SHEETS[0].model();
     let mut warm = nominal.clone();
     warm.effects.push(Effect::ThermalDrift(Thermal {
+        start_h: 0.0,
         growth: 1e-3,
         time_constant_h: 1.0,
         growth_per_k: 1e-4,
@@ -210,6 +211,7 @@ fn a_warm_arm_is_the_cold_arm_with_longer_links() {
     let nominal = SHEETS[0].model();
     let mut warm = nominal.clone();
     warm.effects.push(Effect::ThermalDrift(Thermal {
+        start_h: 0.0,
         growth: 1e-3,
         time_constant_h: 2.0,
         growth_per_k: 1e-5,

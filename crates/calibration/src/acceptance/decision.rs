@@ -10,7 +10,7 @@ pub enum Decision {
     Accepted,
     /// The largest error exceeds the tolerance by more than the uncertainty.
     Refused,
-    /// Undecided because of the uncertainty.
+    /// Undecided because of the uncertainty, or because that is unknown.
     Open,
     /// Too few poses, nothing measured, or no tolerance.
     NotEvaluated,
@@ -23,17 +23,23 @@ pub enum Uncertainty {
     Stated,
     /// Twice the scatter of repeated poses.
     Repeats,
-    /// Unknown; taken as 0.
+    /// Unknown: nothing can be accepted.
     Unknown,
 }
 
 impl Decision {
-    /// Decides on a largest error with its expanded uncertainty and a tolerance, all in one unit (ISO 14253-1).
-    pub(super) fn of(poses: usize, largest: f64, uncertainty: f64, tolerance: f64) -> Self {
+    /// Decides on a largest error with its expanded uncertainty and a tolerance, all in one unit (ISO 14253-1). With an unknown
+    /// uncertainty nothing is accepted.
+    pub(super) fn of(
+        poses: usize,
+        largest: f64,
+        (uncertainty, source): (f64, Uncertainty),
+        tolerance: f64,
+    ) -> Self {
         if poses < FEWEST_POSES || !largest.is_finite() {
             Self::NotEvaluated
         } else if largest + uncertainty <= tolerance {
-            Self::Accepted
+            if source == Uncertainty::Unknown { Self::Open } else { Self::Accepted }
         } else if largest - uncertainty > tolerance {
             Self::Refused
         } else {

@@ -238,8 +238,8 @@ impl Candidate {
 pub struct LoggedColumns {
     /// For each joint, whether both approach sides occur.
     pub approach: [bool; 6],
-    /// Duration of the run, where times are logged (h).
-    pub hours: Option<f64>,
+    /// First time and duration of the run, where times are logged (h).
+    pub clock: Option<[f64; 2]>,
     /// Mean and range of the temperature, where logged [°C].
     pub temperature: Option<(f64, f64)>,
     /// Range of each joint (rad).
@@ -262,7 +262,7 @@ impl LoggedColumns {
                 let has = |side: i8| dataset.rows.iter().any(|r| r.condition.approach[j] == side);
                 has(-1) && has(1)
             }),
-            hours: (times.1 - times.0 > 0.0 && times.0.is_finite()).then_some(times.1 - times.0),
+            clock: (times.1 - times.0 > 0.0 && times.0.is_finite()).then_some([times.0, times.1 - times.0]),
             temperature: (heat.1 - heat.0 > 0.0 && heat.0.is_finite())
                 .then(|| (warm.iter().sum::<f64>() / warm.len() as f64, heat.1 - heat.0)),
             range_rad: std::array::from_fn(|j| {
@@ -366,8 +366,7 @@ pub fn arm_candidates(subject: &Subject<'_>) -> Vec<Candidate> {
     for joint in (0..6).filter(|&j| columns.approach[j]) {
         effects.push((Effect::Backlash(Backlash { joint, play_rad: 0.0 }), 1.0));
     }
-    for (time_constant_h, reference_c, tried) in drift_profiles(&columns) {
-        let thermal = Thermal { growth: 0.0, time_constant_h, growth_per_k: 0.0, reference_c };
+    for (thermal, tried) in growth_profiles(&columns) {
         effects.push((Effect::ThermalDrift(thermal), tried));
     }
     effects
@@ -404,17 +403,20 @@ const TIME_CONSTANTS: [f64; 5] = [0.05, 0.12, 0.3, 0.8, 3.0];
 /// A time constant that makes the profile in time constant (h).
 const NEVER_H: f64 = 1e12;
 
-/// Drift profiles for the logged columns: time constant (h), reference [°C], variants tried.
-fn drift_profiles(columns: &LoggedColumns) -> Vec<(f64, f64, f64)> {
+/// Growth of the links by the thermometer and by the clock, as far as they were logged, with the variants tried.
+fn growth_profiles(columns: &LoggedColumns) -> Vec<(Thermal, f64)> {
+    let still =
+        Thermal { growth: 0.0, time_constant_h: NEVER_H, start_h: 0.0, growth_per_k: 0.0, reference_c: 20.0 };
+    let reference_c = columns.temperature.map_or(still.reference_c, |(mean, _)| mean);
+    let still = Thermal { reference_c, ..still };
     let mut out = Vec::new();
-    if let Some((mean, _)) = columns.temperature {
-        out.push((NEVER_H, mean, 1.0));
+    if columns.temperature.is_some() {
+        out.push((still.clone(), 1.0));
     }
-    if let Some(hours) = columns.hours {
-        let reference = columns.temperature.map_or(20.0, |t| t.0);
-        out.extend(
-            TIME_CONSTANTS.iter().map(|share| (share * hours, reference, TIME_CONSTANTS.len() as f64)),
-        );
+    if let Some([start_h, hours]) = columns.clock {
+        let tried = TIME_CONSTANTS.len() as f64;
+        let by_clock = |share: &f64| Thermal { time_constant_h: share * hours, start_h, ..still.clone() };
+        out.extend(TIME_CONSTANTS.iter().map(|share| (by_clock(share), tried)));
     }
     out
 }
@@ -442,10 +444,10 @@ pub fn measurement_candidates(subject: &Subject<'_>) -> Vec<Candidate> {
             list.push((Kind::Zero, Profile::Temperature { reference_c: mean }, 1.0));
         }
     }
-    if let Some(hours) = columns.hours {
+    if let Some([start_h, hours]) = columns.clock {
         let tried = TIME_CONSTANTS.len() as f64;
         for share in TIME_CONSTANTS {
-            let clock = Profile::Exponential { time_constant_h: share * hours };
+            let clock = Profile::Exponential { start_h, time_constant_h: share * hours };
             list.push((Kind::Frame { turning }, clock, tried));
             list.push((Kind::Target, clock, CREEP_ODDS * tried));
             if dataset.sensor == Sensor::Cable {
@@ -612,7 +614,7 @@ fn empirical_faults(subject: &Subject<'_>, columns: &LoggedColumns) -> Vec<(Empi
         out.extend([(EmpiricalFault::Pulley, 1.0), (drum(dataset), 1.0)]);
     } else {
         out.push((EmpiricalFault::Refraction, 1.0));
-        out.push((range(subject), 1.0));
+        out.extend([(range(subject), 1.0), (EmpiricalFault::SensorAxes, 1.0)]);
         out.extend([false, true].map(|second| (EmpiricalFault::TargetNest { second }, 2.0)));
     }
     out[exact..].iter_mut().for_each(|(_, tried)| *tried *= EXPANSION_ODDS);

@@ -61,6 +61,7 @@ impl Cause {
                     EmpiricalFault::Pulley => CauseKind::CablePulley,
                     EmpiricalFault::Drum { .. } => CauseKind::CableDrum,
                     EmpiricalFault::Range { .. } => CauseKind::SensorRange,
+                    EmpiricalFault::SensorAxes => CauseKind::SensorAxes,
                     EmpiricalFault::TargetNest { .. } => CauseKind::TargetNest,
                 },
                 (Kind::Load { .. }, _) => CauseKind::PayloadChange,

@@ -68,6 +68,8 @@ kinds! {
     PayloadChange = "payload-change",
     /// Angles and Cartesian read-out that contradict each other.
     ReadoutMismatch = "readout-mismatch",
+    /// Axes of a sensor that are of different scales, or not perpendicular.
+    SensorAxes = "sensor-axes",
     /// A sensor's frame, or a cable's outlet, that moved.
     SensorFrameShift = "sensor-frame-shift",
     /// Distances that are off by an amount not proportional to them.

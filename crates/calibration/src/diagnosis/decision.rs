@@ -41,9 +41,8 @@ pub(super) fn family(effect: CauseKind) -> Option<Family> {
         }
         GearEccentricity | GearTransmission | GearRatio | GearTwoJoints | JointCoupling | JointZeroShift
         | Backlash => Family::Drive,
-        SensorScale | SensorRange | CableSag | CablePulley | CableDrum | AirRefraction | TargetNest => {
-            Family::Sensor
-        }
+        SensorScale | SensorAxes | SensorRange | CableSag | CablePulley | CableDrum | AirRefraction
+        | TargetNest => Family::Sensor,
         SensorZeroShift | SensorFrameShift | ToolShift | PayloadChange | SetupChange => Family::SetUp,
         Latency | Unsettled | AngleRounding | ReadoutMismatch | Outliers => Family::Log,
         SmallDisturbances | Unexplained => return None,
@@ -111,6 +110,9 @@ fn in_words(effect: CauseKind) -> Option<&'static str> {
     Some(match effect {
         SensorScale => {
             "measure a known length with the sensor (a scale bar): if it is read wrong, the sensor's scale is the cause"
+        }
+        SensorAxes => {
+            "measure a known length (a scale bar) along each axis of the sensor: if the readings differ, its axes are not alike"
         }
         SensorRange => {
             "measure known lengths with the sensor at its least and greatest distance: what they are off by is the sensor's"

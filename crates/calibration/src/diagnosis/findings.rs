@@ -115,26 +115,26 @@ impl FindingBuilder<'_> {
         }
     }
 
-    /// States several drifts of one quantity as the movement of their sum.
+    /// States several drifts of one quantity as the movement of their sum, and several terms of growth as their growth.
     fn tell_sum_of_drifts(&self, finding: &mut Finding, indices: impl Iterator<Item = usize>) {
-        let in_time = |index: &usize| match &self.extended.causes[*index] {
-            Cause::Measurement(disturbance) => Some(disturbance).filter(|d| drift::is_in_time(d)),
-            Cause::Arm(_) => None,
-        };
-        let (of_clock, others): (Vec<usize>, Vec<usize>) =
-            indices.partition(|index| in_time(index).is_some());
-        if of_clock.len() < 2 {
+        let dataset = &self.subject.observed.dataset;
+        let (mut drifts, mut growth, mut others) = (Vec::new(), Vec::new(), Vec::new());
+        for index in indices {
+            match &self.extended.causes[index] {
+                Cause::Measurement(disturbance) if drift::is_in_time(disturbance) => drifts.push(disturbance),
+                Cause::Arm(effect) if drift::is_growth_in_time(effect) => growth.push(effect),
+                other => {
+                    let parameters = words::found_parameters(self.extended, index);
+                    others.push(words::describe_cause(other, &parameters, dataset));
+                }
+            }
+        }
+        if drifts.len() < 2 && growth.len() < 2 {
             return;
         }
-        let dataset = &self.subject.observed.dataset;
-        let drifts: Vec<_> = of_clock.iter().filter_map(in_time).collect();
-        let other = |index: usize| {
-            let parameters = words::found_parameters(self.extended, index);
-            words::describe_cause(&self.extended.causes[index], &parameters, dataset)
-        };
-        let mut terms = vec![drift::describe(&drifts, dataset)];
-        terms.extend(others.into_iter().map(other));
-        finding.cause = terms.join("; ");
+        let moved = (!drifts.is_empty()).then(|| drift::describe(&drifts, dataset));
+        let grown = (!growth.is_empty()).then(|| drift::describe_growth(&growth, dataset));
+        finding.cause = moved.into_iter().chain(grown).chain(others).collect::<Vec<_>>().join("; ");
     }
 
     /// Whether the joint moved through so small a part of a turn, or of a harmonic's period, that any smooth joint error fits.

@@ -51,7 +51,7 @@ pub(super) fn not_testable(
             "measure each pose from both sides and log approach1 to approach6",
         );
     }
-    if columns.hours.is_none() && columns.temperature.is_none() {
+    if columns.clock.is_none() && columns.temperature.is_none() {
         add(
             CauseKind::ThermalDrift,
             None,

@@ -165,17 +165,10 @@ pub fn describe_cause(cause: &Cause, parameters: &[FoundParameter], dataset: &Da
             "joint {joint} has {:.4}° of backlash between approaches from below and from above",
             value.to_degrees()
         ),
-        Cause::Arm(Effect::ThermalDrift(t)) => {
-            if t.growth_per_k != 0.0 && t.growth == 0.0 {
-                format!("the links grow by {:.1} µm per metre and kelvin", t.growth_per_k * 1e6)
-            } else {
-                format!(
-                    "the links grow by {:.0} µm per metre as the arm warms up, with a time constant of {:.2} h",
-                    t.growth * 1e6,
-                    t.time_constant_h
-                )
-            }
+        Cause::Arm(Effect::ThermalDrift(t)) if t.growth_per_k != 0.0 && t.growth == 0.0 => {
+            format!("the links grow by {:.1} µm per metre and kelvin", t.growth_per_k * 1e6)
         }
+        Cause::Arm(growth @ Effect::ThermalDrift(_)) => drift::describe_growth(&[growth], dataset),
         Cause::Measurement(d) => describe_disturbance(d, &when(cause.rows()), parameters, dataset),
     }
 }
@@ -287,6 +280,20 @@ fn describe_empirical_fault(form: EmpiricalFault, parameters: &[FoundParameter])
             "the sensor's distances are off by {:.3} mm and an amount that is not proportional to them: wrong reflector constant, or lens",
             value.abs()
         ),
+        EmpiricalFault::SensorAxes => {
+            let over_z = |k: usize| {
+                let percent = 100.0 * value_of(parameters, k);
+                let longer = if percent < 0.0 { "shorter" } else { "longer" };
+                format!("{:.3} % {longer}", percent.abs())
+            };
+            let shear = (2..5).map(|k| value_of(parameters, k).abs()).fold(0.0, f64::max);
+            format!(
+                "the axes of the sensor are not alike: along x it reads {}, along y {} than along z, and the axes are up to {:.3}° from perpendicular",
+                over_z(0),
+                over_z(1),
+                2.0 * shear.to_degrees()
+            )
+        }
         EmpiricalFault::TargetNest { .. } => {
             "the target's apparent centre depends on the viewing direction: faulty nest or reflector"
                 .to_owned()
@@ -332,6 +339,9 @@ pub fn describe_pattern(cause: &Cause) -> String {
         CablePulley => "the residual follows the direction of the cable".to_owned(),
         CableDrum => "the residual follows powers of the cable's length".to_owned(),
         TargetNest => "the residual follows the direction of the beam in the target's frame".to_owned(),
+        SensorAxes => {
+            "the residual is proportional to the reading, but not alike along the sensor's axes".to_owned()
+        }
         SensorRange => "the residual follows the distance along the beam".to_owned(),
         SensorScale => "the residual is proportional to the reading".to_owned(),
         CableSag => "the residual grows with the square of the cable's horizontal span".to_owned(),
@@ -396,6 +406,9 @@ pub fn remedy(effect: CauseKind) -> &'static str {
         SensorFrameShift => "fix the sensor's stand; measure reference points before and after each session",
         ToolShift => "fasten the hook or reflector; measure the rows after the slip again",
         SensorScale => "check the sensor against a length standard",
+        SensorAxes => {
+            "calibrate the sensor anew, and check it against a length standard along each of its axes"
+        }
         SensorRange => {
             "check the reflector's constant and the sensor against a length standard at several distances"
         }

@@ -1,10 +1,13 @@
-//! Checks a measurement file against the arm that was measured, and converts its angles to the controller's.
+//! Checks a measurement file against the arm that was measured, converts its angles to the controller's, leaves out copied rows and brings
+//! the others into the order of measuring.
 
 use thiserror::Error;
 
 use super::convention::AngleConvention;
+use super::copies::without_copies;
 use super::dataset::Dataset;
-use super::plausibility::{ComparedReading, UnitSuspicion, plausibility};
+use super::measuring_order::in_order_of_measuring;
+use super::plausibility::{ComparedReading, UnitSuspicion, implausible_time, plausibility};
 use truegrind_arm::model::Model;
 
 /// Why a measurement file does not match an arm.
@@ -22,8 +25,8 @@ pub enum Mismatch {
     },
 }
 
-/// The rows with the controller's angles. `convention` states what the file's angles are; `allow_odd_units` skips the check of
-/// units. An implausible read-out of the controller is only noted, since no fit needs it.
+/// The rows with the controller's angles, in the order of measuring and without copies. `convention` states what the file's angles are;
+/// `allow_odd_units` skips the check of units. An implausible read-out of the controller or clock is only noted, since no fit needs it.
 ///
 /// # Errors
 /// [`Mismatch`].
@@ -42,5 +45,9 @@ pub fn match_to_arm(
             }
         }
     }
+    if !allow_odd_units {
+        dataset.notes.extend(implausible_time(&dataset));
+    }
+    let dataset = in_order_of_measuring(without_copies(dataset));
     convention.apply(dataset, nominal).ok_or_else(|| Mismatch::JointMap { robot: robot.to_owned() })
 }

@@ -20,6 +20,7 @@ use super::registration;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Model;
 use truegrind_math::se3::Pose;
+use truegrind_math::statistics::median;
 
 /// Factor by which another interpretation must fit better.
 const MARGIN: f64 = 10.0;
@@ -283,6 +284,21 @@ fn interpretation_error(
         count += read.len();
     }
     if count == 0 { None } else { of((square / count as f64).sqrt()) }
+}
+
+/// Median time between rows above which column `t` is probably not in hours (h).
+const LONG_INTERVAL_H: f64 = 1.0;
+
+/// A note on a clock that is probably in another unit than hours; `None` for a plausible one.
+pub fn implausible_time(data: &Dataset) -> Option<String> {
+    let mut times: Vec<f64> = data.rows.iter().filter_map(|row| row.condition.time_h).collect();
+    times.sort_by(f64::total_cmp);
+    let intervals: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let usual = median(&intervals).filter(|hours| *hours > LONG_INTERVAL_H)?;
+    Some(format!(
+        "column t is in hours, so half of the rows were measured more than {usual:.1} h apart; if it is in seconds, divide it by 3600, and if it \
+         is in minutes, by 60"
+    ))
 }
 
 /// Multiple of the rated payload that no arm carries while it is measured.

@@ -355,11 +355,16 @@ pub struct NoiseFloor {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn noise_floor(data: &Dataset) -> Option<NoiseFloor> {
-    pooled_scatter(data, |row| match &row.reading {
-        Reading::Cable(l) => Some(Vector3::new(*l, 0.0, 0.0)),
-        Reading::Position(p) => Some(*p),
-        Reading::Pose(pose) => Some(pose.translation.vector),
-    })
+    pooled_scatter_by(data, |row, _| Some(place(row)))
+}
+
+/// A reading's length along x, or its position (mm).
+fn place(row: &Row) -> Vector3<f64> {
+    match &row.reading {
+        Reading::Cable(l) => Vector3::new(*l, 0.0, 0.0),
+        Reading::Position(p) => *p,
+        Reading::Pose(pose) => pose.translation.vector,
+    }
 }
 
 /// The noise floor of orientations (rad), from rotation vectors relative to the first reading of each pose, as the root of the
@@ -375,42 +380,63 @@ pub fn noise_floor_rad(data: &Dataset) -> Option<f64> {
     pooled_scatter_by(data, against).map(|floor| floor.sigma_mm)
 }
 
-/// Pooled scatter of repeated readings without copies.
-fn pooled_scatter(data: &Dataset, quantity: impl Fn(&Row) -> Option<Vector3<f64>>) -> Option<NoiseFloor> {
-    pooled_scatter_by(data, |row, _| quantity(row))
-}
-
-/// [`pooled_scatter`] of a quantity relative to the first row of its pose, outlet and approach (flagged by `true`).
+/// Pooled scatter of repeated readings without copies, of a quantity relative to the first row of its pose, outlet and approach (flagged by `true`).
 fn pooled_scatter_by(
     data: &Dataset,
-    mut quantity: impl FnMut(&Row, bool) -> Option<Vector3<f64>>,
+    quantity: impl FnMut(&Row, bool) -> Option<Vector3<f64>>,
 ) -> Option<NoiseFloor> {
-    with_poses(data, |poses| {
-        let (mut all, mut own, mut finest) = (Scatter::default(), Scatter::default(), f64::INFINITY);
-        for pose in poses.filter(|pose| pose.len() > 1) {
-            let mut alike: BTreeMap<(usize, [i8; 6]), Vec<usize>> = BTreeMap::new();
-            for &i in pose {
-                let row = &data.rows[i];
-                alike.entry((row.anchor, row.condition.approach)).or_default().push(i);
+    let repeats = Repeats::of(data, quantity);
+    let all = repeats.all.pooled()?;
+    if repeats.are_copied() { repeats.own.pooled() } else { Some(all) }
+}
+
+/// Whether repeated readings that are equal to the last digit may be so by chance: the sensor's steps are coarse for its scatter.
+pub(super) fn repeats_agree_by_chance(data: &Dataset) -> bool {
+    !Repeats::of(data, |row, _| Some(place(row))).are_copied()
+}
+
+/// Readings of poses that were measured more than once with the same outlet and approach.
+struct Repeats {
+    /// All readings.
+    all: Scatter,
+    /// Without those that equal an earlier one to the last digit.
+    own: Scatter,
+    /// The finest step between two of them (mm).
+    finest_mm: f64,
+}
+
+impl Repeats {
+    fn of(data: &Dataset, mut quantity: impl FnMut(&Row, bool) -> Option<Vector3<f64>>) -> Self {
+        with_poses(data, |poses| {
+            let mut out = Self { all: Scatter::default(), own: Scatter::default(), finest_mm: f64::INFINITY };
+            for pose in poses.filter(|pose| pose.len() > 1) {
+                let mut alike: BTreeMap<(usize, [i8; 6]), Vec<usize>> = BTreeMap::new();
+                for &i in pose {
+                    let row = &data.rows[i];
+                    alike.entry((row.anchor, row.condition.approach)).or_default().push(i);
+                }
+                for rows in alike.into_values().filter(|rows| rows.len() > 1) {
+                    let of = |(k, &i): (usize, &usize)| quantity(&data.rows[i], k == 0);
+                    let readings: Vec<Vector3<f64>> = rows.iter().enumerate().filter_map(of).collect();
+                    out.all.add(&readings);
+                    out.own.add(&distinct(&readings));
+                    out.finest_mm = out.finest_mm.min(finest_step_mm(&readings));
+                }
             }
-            for rows in alike.into_values().filter(|rows| rows.len() > 1) {
-                let of = |(k, &i): (usize, &usize)| quantity(&data.rows[i], k == 0);
-                let readings: Vec<Vector3<f64>> = rows.iter().enumerate().filter_map(of).collect();
-                all.add(&readings);
-                own.add(&distinct(&readings));
-                finest = finest.min(finest_step_mm(&readings));
-            }
-        }
-        let (all, own) = (all.pooled()?, own.pooled());
-        let copied = own.is_none_or(|own| own.sigma_mm > COPY_RATIO * finest);
-        if copied { own } else { Some(all) }
-    })
+            out
+        })
+    }
+
+    /// Whether equal readings are copies: the others scatter too widely for that to be chance, or there are no others.
+    fn are_copied(&self) -> bool {
+        self.own.pooled().is_none_or(|own| own.sigma_mm > COPY_RATIO * self.finest_mm)
+    }
 }
 
 /// Ratio of scatter to the finest step of readings above which readings equal to the last digit are copies, not chance.
 const COPY_RATIO: f64 = 10.0;
 
-/// Pooled pooled_scatter of readings of the same pose.
+/// Pooled scatter of readings of the same pose.
 #[derive(Default)]
 struct Scatter {
     square: f64,

@@ -83,6 +83,19 @@ fn the_decision_leaves_room_for_the_uncertainty() {
     assert!(matches!(accept(&other, &model, &options(-1.0)), Err(AcceptError::Length { .. })));
 }
 
+/// Without an uncertainty nothing is accepted, but an error beyond the tolerance is refused whatever the uncertainty.
+#[test]
+fn an_unknown_uncertainty_accepts_nothing() {
+    let model = model(&dataset(rows(0.1, 120)));
+    let other = dataset(rows(0.7, 110));
+    let of = |tolerance_mm: f64| {
+        accept(&other, &model, &Options { uncertainty_mm: None, ..options(tolerance_mm) }).unwrap()
+    };
+    let found = of(1.0);
+    assert_eq!((found.uncertainty, found.decision), (Uncertainty::Unknown, Decision::Open));
+    assert_eq!(of(0.5 * found.model.max).decision, Decision::Refused);
+}
+
 /// An error that is stated of rows of the fit is none: whatever the file is called, and if rows are left out.
 #[test]
 fn rows_of_the_fit_are_noticed() {

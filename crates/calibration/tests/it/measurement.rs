@@ -2,6 +2,7 @@
 
 mod import;
 mod join_by_time;
+mod matching;
 mod plausibility;
 mod foreign;
 mod registration;

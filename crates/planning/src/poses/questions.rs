@@ -252,7 +252,13 @@ pub(super) fn coupling(joint: usize, driver: usize) -> Effect {
 
 /// Thermal drift over time, of size zero; half an hour is a typical time constant.
 pub(super) fn thermal() -> Effect {
-    Effect::ThermalDrift(Thermal { growth: 0.0, time_constant_h: 0.5, growth_per_k: 0.0, reference_c: 20.0 })
+    Effect::ThermalDrift(Thermal {
+        growth: 0.0,
+        time_constant_h: 0.5,
+        start_h: 0.0,
+        growth_per_k: 0.0,
+        reference_c: 20.0,
+    })
 }
 
 /// The frame parameters of a sensor effect that poses can determine.

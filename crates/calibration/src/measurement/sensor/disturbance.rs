@@ -73,8 +73,10 @@ pub enum Profile {
         /// Last data row.
         to: usize,
     },
-    /// 1 − e^(−t/T) with the row's time.
+    /// 1 − e^(−(t − t₀)/T) with the row's time t.
     Exponential {
+        /// t₀, the time of the first row (h).
+        start_h: f64,
         /// T (h).
         time_constant_h: f64,
     },
@@ -91,8 +93,8 @@ impl Profile {
         match *self {
             Profile::Constant => 1.0,
             Profile::Rows { from, to } => f64::from(u8::from((from..=to).contains(&row.number))),
-            Profile::Exponential { time_constant_h } => {
-                row.condition.time_h.map_or(0.0, |t| 1.0 - (-t / time_constant_h).exp())
+            Profile::Exponential { start_h, time_constant_h } => {
+                row.condition.time_h.map_or(0.0, |t| 1.0 - (-(t - start_h).max(0.0) / time_constant_h).exp())
             }
             Profile::Temperature { reference_c } => {
                 row.condition.temperature_c.map_or(0.0, |t| t - reference_c)

@@ -421,6 +421,38 @@ fn a_wrong_reflector_constant_is_told_with_its_size() {
     assert!((constant.value.abs() - 0.25).abs() < 4.0 * constant.sigma.unwrap() + 0.01, "{constant:?}");
 }
 
+/// A camera that reads depth by another scale than across: no link, no spring and no air.
+#[test]
+fn an_axis_of_the_sensor_with_a_scale_of_its_own_is_told() {
+    let hidden = [Hidden::Depth { share: 1e-3 }];
+    let found = diagnosed(&run(&arm(), &hidden, &setup(Sensor::Position, 300, 87)).dataset);
+    let names: Vec<&str> = identified(&found).iter().map(|f| f.effect.as_str()).collect();
+    assert_eq!(names, ["sensor-axes"]);
+    // The third axis reads longer, so the others read shorter than it.
+    for short in &identified(&found)[0].parameters[..2] {
+        assert!((short.value + 1e-3).abs() < 4.0 * short.sigma.unwrap(), "{short:?}");
+    }
+}
+
+/// A clock that shows the time of day, or the hours of a year: the arm warms up from the first row on, whatever the clock says.
+#[test]
+fn where_a_clock_begins_does_not_matter() {
+    let hidden = [Hidden::Thermal { growth: 4e-4, time_constant_h: 0.6 }];
+    let with_clock = setup(Sensor::Position, 300, 88);
+    let mut dataset = run(&arm(), &hidden, &with_clock).dataset;
+    let told = |dataset: &Dataset| {
+        let found = diagnosed(dataset);
+        identified(&found).iter().map(|f| f.cause.clone()).collect::<Vec<_>>()
+    };
+    let from_zero = told(&dataset);
+    assert!(from_zero[0].starts_with("the links grew by"), "{from_zero:?}");
+    for row in dataset.rows.iter_mut() {
+        let condition = Arc::make_mut(&mut row.condition);
+        condition.time_h = condition.time_h.map(|hours| hours + 7000.25);
+    }
+    assert_eq!(told(&dataset), from_zero);
+}
+
 /// KUKA counts A1, A4 and A6 against the axes of its links, FANUC states J3 against the horizontal: play is play there too, and a delay
 /// moves every joint the way it turns.
 #[test]

@@ -281,6 +281,7 @@ pub fn cause(hidden: &Hidden) -> Option<Cause> {
         }
         Hidden::Backlash { joint, .. } => Cause::Arm(Effect::Backlash(Backlash { joint, play_rad: 0.0 })),
         Hidden::Thermal { time_constant_h, .. } => Cause::Arm(Effect::ThermalDrift(Thermal {
+            start_h: 0.0,
             growth: 0.0,
             time_constant_h,
             growth_per_k: 0.0,
@@ -293,9 +294,10 @@ pub fn cause(hidden: &Hidden) -> Option<Cause> {
         Hidden::Tool { from, to, .. } => Cause::Measurement(Disturbance::new(Kind::Target, rows(from, to))),
         Hidden::Drift { time_constant_h, .. } => Cause::Measurement(Disturbance::new(
             Kind::Frame { turning: false },
-            Profile::Exponential { time_constant_h },
+            Profile::Exponential { time_constant_h, start_h: 0.0 },
         )),
         Hidden::Warm { .. } => Cause::Arm(Effect::ThermalDrift(Thermal {
+            start_h: 0.0,
             growth: 0.0,
             time_constant_h: 1e12,
             growth_per_k: 0.0,
@@ -312,6 +314,7 @@ pub fn cause(hidden: &Hidden) -> Option<Cause> {
         | Hidden::Creep { .. }
         | Hidden::LostCounts { .. }
         | Hidden::Range { .. }
+        | Hidden::Depth { .. }
         | Hidden::LoadedPlay { .. } => {
             return None;
         }

@@ -55,6 +55,10 @@ pub enum Hidden {
         until: usize,
         rad: f64,
     },
+    /// The third axis of the sensor reads too long by this share.
+    Depth {
+        share: f64,
+    },
     /// A tracker reads distances too long by this.
     Range {
         mm: f64,
@@ -126,6 +130,7 @@ impl Hidden {
             Hidden::Bending { .. } => "link-bending",
             Hidden::LostCounts { .. } => "joint-zero-shift",
             Hidden::Range { .. } => "sensor-range",
+            Hidden::Depth { .. } => "sensor-axes",
             Hidden::Gear { order, .. } if *order <= 2.0 => "gear-eccentricity",
             Hidden::Gear { .. } => "gear-transmission",
             Hidden::Ratio { .. } => "gear-ratio",
@@ -394,7 +399,8 @@ pub fn run(nominal: &Model, hidden: &[Hidden], setup: &Setup) -> Run {
         let read = |skip: Option<usize>| -> Reading {
             let mut turned = u;
             let (mut scale, mut zero) = (1.0, 0.0);
-            let (mut stretched, mut slack, mut load, mut warp, mut range) = (1.0, 0.0, 0.0, 0.0, 0.0);
+            let (mut stretched, mut slack, mut load, mut warp) = (1.0, 0.0, 0.0, 0.0);
+            let (mut range, mut depth) = (0.0, 0.0);
             let (mut moved, mut slipped) = (Vector3::zeros(), Vector4::zeros());
             for (k, h) in hidden.iter().enumerate().filter(|(k, _)| Some(*k) != skip) {
                 match h {
@@ -416,6 +422,7 @@ pub fn run(nominal: &Model, hidden: &[Hidden], setup: &Setup) -> Run {
                     }
                     Hidden::LostCounts { joint, until, rad } if i <= *until => turned[*joint] += rad,
                     Hidden::Range { mm } => range += mm,
+                    Hidden::Depth { share } => depth += share,
                     Hidden::Thermal { growth, time_constant_h } => {
                         scale += growth * (1.0 - (-time / time_constant_h).exp());
                     }
@@ -478,7 +485,11 @@ pub fn run(nominal: &Model, hidden: &[Hidden], setup: &Setup) -> Run {
                     let away = away * (1.0 + range / away.norm());
                     let (s, c) = f64::sin_cos(turn);
                     Reading::Position(
-                        Vector3::new(c * away.x + s * away.y, c * away.y - s * away.x, away.z) * stretched,
+                        Vector3::new(
+                            c * away.x + s * away.y,
+                            c * away.y - s * away.x,
+                            away.z * (1.0 + depth),
+                        ) * stretched,
                     )
                 }
             }

@@ -54,6 +54,7 @@ fn arm() -> Model {
             Effect::JointCompliance(Compliance { joint: 1, compliance_rad_per_nm: 2e-5 }),
             Effect::GearEccentricity(Harmonic { joint: 3, order: 2.0, sine_rad: 3e-4, cosine_rad: 1e-4 }),
             Effect::ThermalDrift(Thermal {
+                start_h: 0.0,
                 growth: 2e-4,
                 time_constant_h: 1.5,
                 growth_per_k: 1.2e-5,
@@ -118,7 +119,7 @@ fn disturbances(sensor: Sensor, turn_rad: f64) -> Vec<Disturbance> {
         (Kind::Load { joints: vec![1, 2], compliance: None }, rows),
         (
             Kind::Load { joints: vec![1, 4], compliance: Some(vec![1e-5, 2e-5]) },
-            Profile::Exponential { time_constant_h: 0.5 },
+            Profile::Exponential { time_constant_h: 0.5, start_h: 0.0 },
         ),
     ];
     if sensor == Sensor::Cable {
@@ -129,13 +130,14 @@ fn disturbances(sensor: Sensor, turn_rad: f64) -> Vec<Disturbance> {
         EmpiricalFault::NonlinearStiffness { joint: 1, load: AssumedLoad::Masses },
         EmpiricalFault::Hardening { joint: 2, load: AssumedLoad::Frame(4), bend_mnm: 300 },
         EmpiricalFault::Range { from_mm: 1000, to_mm: 3000 },
+        EmpiricalFault::Refraction,
         EmpiricalFault::LoadedPlay { joint: 1, load: AssumedLoad::Frame(4) },
         EmpiricalFault::TwoJointGear { joint: 2, other: 3, orders: [1, 1] },
         EmpiricalFault::TwoJointGear { joint: 4, other: 5, orders: [2, 1] },
     ];
     let of_sensor = match sensor {
         Sensor::Cable => [EmpiricalFault::Pulley, EmpiricalFault::Drum { from_mm: 500, to_mm: 1200 }],
-        _ => [EmpiricalFault::Refraction, EmpiricalFault::TargetNest { second: true }],
+        _ => [EmpiricalFault::SensorAxes, EmpiricalFault::TargetNest { second: true }],
     };
     let of_motion = [
         EmpiricalFault::Latency { middle_s: 900 },
@@ -146,7 +148,9 @@ fn disturbances(sensor: Sensor, turn_rad: f64) -> Vec<Disturbance> {
     kinds.extend(forms.map(|form| (Kind::Empirical(form), Profile::Constant)));
     // A form that does not go as far in each row.
     kinds
-        .extend(of_sensor.map(|form| (Kind::Empirical(form), Profile::Exponential { time_constant_h: 0.5 })));
+        .extend(of_sensor.map(|form| {
+            (Kind::Empirical(form), Profile::Exponential { time_constant_h: 0.5, start_h: 0.0 })
+        }));
     kinds
         .into_iter()
         .map(|(kind, course)| {

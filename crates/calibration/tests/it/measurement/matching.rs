@@ -1,0 +1,114 @@
+//! Copied rows count once; rows are brought into the order of measuring; a clock in another unit is noticed.
+
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+use truegrind_arm::model::Joints;
+use truegrind_calibration::measurement::convention::AngleConvention;
+use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row, Sensor};
+use truegrind_calibration::measurement::matching::match_to_arm;
+
+/// Rows at poses of their own, read to 0.1 µm.
+fn rows(count: usize) -> Vec<Row> {
+    let of = |i: usize| {
+        let at = i as f64;
+        let joints = Joints::from_fn(|j, _| (0.37 * at + j as f64).sin());
+        let place = Vector3::new(1000.0 + at, 20.0 - 0.1237 * at, (at * 1.7).cos());
+        Row::new(i, joints, Reading::Position(place))
+    };
+    (0..count).map(of).collect()
+}
+
+fn matched(rows: Vec<Row>) -> Dataset {
+    let nominal = truegrind_arm::robots::load("abb-irb-120").unwrap().model;
+    let dataset = Dataset::new("rows.csv", Sensor::Position, rows);
+    // The readings are of no arm, so units cannot be told.
+    match_to_arm(dataset, "abb-irb-120", &nominal, AngleConvention::Logged, true).unwrap()
+}
+
+fn numbers(dataset: &Dataset) -> Vec<usize> {
+    dataset.rows.iter().map(|row| row.number).collect()
+}
+
+fn timed(mut rows: Vec<Row>, hours: impl Fn(usize) -> f64) -> Vec<Row> {
+    for (i, row) in rows.iter_mut().enumerate() {
+        Arc::make_mut(&mut row.condition).time_h = Some(hours(i));
+    }
+    rows
+}
+
+fn named(mut rows: Vec<Row>, session: impl Fn(usize) -> &'static str) -> Vec<Row> {
+    for (i, row) in rows.iter_mut().enumerate() {
+        row.extra_mut().session = Some(session(i).to_owned());
+    }
+    rows
+}
+
+#[test]
+fn copied_rows_count_once() {
+    let mut all = rows(5);
+    for (number, of) in [(5, 2), (6, 2), (7, 4)] {
+        all.push(Row { number, ..all[of].clone() });
+    }
+    let found = matched(all);
+    assert_eq!(numbers(&found), [0, 1, 2, 3, 4]);
+    assert!(found.notes[0].starts_with("rows 5, 6 and 7 are copies"), "{:?}", found.notes);
+}
+
+/// Another reading, session or time is another measurement, and so is an equal reading of a coarse sensor.
+#[test]
+fn repeated_readings_are_no_copies() {
+    let mut all = rows(5);
+    let mut again = Row { number: 5, ..all[2].clone() };
+    again.reading = Reading::Position(Vector3::new(1002.0, 20.0, 0.5));
+    all.push(again);
+    assert_eq!(matched(all).rows.len(), 6);
+    let two = timed([rows(3), rows(3)].concat(), |i| i as f64 / 60.0);
+    assert_eq!(matched(two).rows.len(), 6);
+    // Five readings of a pose in steps of 0.1 mm, which scatter by as much.
+    let coarse = |steps: i32| Reading::Position(Vector3::new(1000.0 + 0.1 * f64::from(steps), 0.0, 0.0));
+    let mut pose = vec![rows(1)[0].clone(); 5];
+    pose.iter_mut().zip([0, 1, 0, 1, 2]).for_each(|(row, steps)| row.reading = coarse(steps));
+    assert_eq!(matched(pose).rows.len(), 5);
+}
+
+#[test]
+fn rows_are_brought_into_the_order_of_the_clock() {
+    let mixed = timed(rows(6), |i| [0.3, 0.1, 0.5, 0.2, 0.6, 0.4][i]);
+    let found = matched(mixed);
+    assert_eq!(numbers(&found), [1, 3, 0, 5, 2, 4]);
+    assert!(found.notes[0].contains("sorted by t"), "{:?}", found.notes);
+    let in_order = matched(timed(rows(6), |i| i as f64 / 60.0));
+    assert_eq!((numbers(&in_order), in_order.notes.len()), (vec![0, 1, 2, 3, 4, 5], 0));
+}
+
+/// Such a clock says nothing of the time between the two parts.
+#[test]
+fn a_clock_that_was_restarted_is_not_used() {
+    let found = matched(timed(rows(6), |i| (i % 3) as f64 / 60.0));
+    assert_eq!(numbers(&found), [0, 1, 2, 3, 4, 5]);
+    assert!(found.rows.iter().all(|row| row.condition.time_h.is_none()));
+    assert!(found.notes[0].contains("starts again at row 3"), "{:?}", found.notes);
+}
+
+#[test]
+fn rows_of_mixed_sessions_are_brought_together() {
+    let found = matched(named(rows(8), |i| ["monday", "tuesday"][i % 2]));
+    assert_eq!(numbers(&found), [0, 2, 4, 6, 1, 3, 5, 7]);
+    assert!(found.notes[0].contains("2 sessions are mixed"), "{:?}", found.notes);
+    // A session that is continued once is in the order of measuring.
+    let continued = named(rows(6), |i| ["monday", "monday", "tuesday"][i % 3]);
+    assert_eq!(numbers(&matched(continued)), [0, 1, 2, 3, 4, 5]);
+}
+
+#[test]
+fn a_clock_in_seconds_is_noticed() {
+    let nominal = truegrind_arm::robots::load("abb-irb-120").unwrap().model;
+    let of = |seconds: f64| {
+        let rows = timed(rows(5), |i| i as f64 * seconds);
+        let dataset = Dataset::new("rows.csv", Sensor::Position, rows);
+        match_to_arm(dataset, "abb-irb-120", &nominal, AngleConvention::Logged, false).unwrap().notes
+    };
+    assert!(of(20.0).iter().any(|note| note.contains("divide it by 3600")), "{:?}", of(20.0));
+    assert!(of(20.0 / 3600.0).iter().all(|note| !note.contains("divide")));
+}
