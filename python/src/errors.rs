@@ -271,6 +271,9 @@ impl From<IdentifyError> for Refusal {
             IdentifyError::WrongArm { file, robot, rmse_mm } => told
                 .of_file(&file)
                 .with(format!("{rmse_mm:.1} mm RMS"), format!("the measurements of {robot}")),
+            IdentifyError::WrongOrientation { file, robot, deg } => {
+                told.of_file(&file).with(format!("{deg:.0}°"), format!("the orientations of {robot}"))
+            }
             _ => told,
         }
     }

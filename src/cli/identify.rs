@@ -104,6 +104,9 @@ impl PointsArguments {
     }
 }
 
+/// Largest `--sensor-scale-sigma` (%): a sensor that is off by more measures nothing.
+const LARGEST_SCALE_PERCENT: f64 = 10.0;
+
 /// Largest `--points-within` (s).
 const LONGEST_S: f64 = 3600.0;
 
@@ -150,6 +153,10 @@ pub(super) struct FitArguments {
     /// Manufacturing tolerance of link angles and joint offsets (°), used as prior σ.
     #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
     tolerance_angle: Option<f64>,
+    /// Standard uncertainty of the sensor's scale (%), such as 0.001 for a tracker whose scale bar was met. Default: an error of 0.1 to 1 %
+    /// is taken for possible in a fifth of the cases.
+    #[arg(long, value_name = "PERCENT", allow_negative_numbers = true)]
+    sensor_scale_sigma: Option<f64>,
 }
 
 impl FitArguments {
@@ -176,6 +183,14 @@ impl FitArguments {
                 }
                 *target = value * scale;
             }
+        }
+        if let Some(percent) = self.sensor_scale_sigma {
+            if !(0.0..=LARGEST_SCALE_PERCENT).contains(&percent) {
+                bail!(
+                    "--sensor-scale-sigma {percent}: expected a percentage from 0 to {LARGEST_SCALE_PERCENT}"
+                );
+            }
+            tolerance.scale = Some(percent / 100.0);
         }
         tolerance.zero_rad = tolerance.angle_rad;
         tolerance.learn_widths = self.tolerance_length.is_none() && self.tolerance_angle.is_none();
@@ -231,7 +246,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let found = watching(arguments.common.threads, &work, || {
         let frames = starting_frames(&dataset, &robot.model, &options.tolerance, options.fuse_readout)?;
         let stated = options.stated_frames.as_ref();
-        let (tolerance, frames) = arguments.prior.prior(&options.tolerance, stated, frames)?;
+        let (tolerance, frames) =
+            arguments.prior.prior(&options.tolerance, stated, frames, (&dataset, &robot.model))?;
         let options = Options { tolerance, ..options.clone() };
         from_frames(&dataset, &name, &robot.model, &frames, &options)
     })??;

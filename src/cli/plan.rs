@@ -1,9 +1,10 @@
 //! `truegrind plan --robot R --sensor S --poses N -o POSES.mod`: chooses the poses to measure.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{anyhow, bail};
 use clap::{Args, ValueEnum};
+use serde_json::Value;
 use truegrind::calibration::measurement::dataset::Sensor;
 use truegrind::planning::poses::candidate::Bounds;
 use truegrind::planning::poses::design::Index;
@@ -156,7 +157,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     };
     let frames = arguments.stated.planned(sensor)?;
     let reach: f64 = robot.model.links[1..].iter().map(|l| l.a_mm.abs() + l.d_mm.abs()).sum();
-    let options = options(arguments, sensor, reach)?;
+    let options = options(arguments, &robot.sheet.name, sensor, reach)?;
     let setup = MeasurementSetup { nominal: &robot.model, sensor, frames: &frames };
     let work = Spinner::start(format!("choosing among {} poses", arguments.candidates));
     let planned = on_threads(arguments.common.threads, || plan(&setup, &options))?
@@ -268,13 +269,29 @@ fn check_numbers(arguments: &Arguments, sigma: f64) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// Refuses the diagnosis of another robot. That of another sensor may be decided by this one.
+fn refuse_other_diagnosis(path: &Path, text: &str, robot: &str) -> anyhow::Result<()> {
+    let diagnosis: Value = serde_json::from_str(text)?;
+    match diagnosis["dataset"]["robot"].as_str() {
+        Some(found) if found != robot => {
+            bail!(
+                "{}: the diagnosis is of robot {found}, but the plan is for {robot}: state --robot {found}",
+                path.display()
+            )
+        }
+        _ => Ok(()),
+    }
+}
+
 /// What a diagnosis left open.
-fn left_open(arguments: &Arguments) -> anyhow::Result<questions::Open> {
+fn left_open(arguments: &Arguments, robot: &str) -> anyhow::Result<questions::Open> {
     Ok(match &arguments.diagnosis {
         None => questions::Open::default(),
         Some(path) => {
-            let found = questions::open(&files::read_text(path)?, arguments.finding)
-                .map_err(|e| anyhow!("{}: {e}", path.display()))?;
+            let text = files::read_text(path)?;
+            let found =
+                questions::open(&text, arguments.finding).map_err(|e| anyhow!("{}: {e}", path.display()))?;
+            refuse_other_diagnosis(path, &text, robot)?;
             if found == questions::Open::default() {
                 print_message(format_args!(
                     "note: {}: the diagnosis left nothing ambiguous or untested; the poses are chosen for the geometry",
@@ -286,7 +303,7 @@ fn left_open(arguments: &Arguments) -> anyhow::Result<questions::Open> {
     })
 }
 
-fn options(arguments: &Arguments, sensor: Sensor, reach_mm: f64) -> anyhow::Result<Options> {
+fn options(arguments: &Arguments, robot: &str, sensor: Sensor, reach_mm: f64) -> anyhow::Result<Options> {
     let sigma = arguments.sigma.unwrap_or(if sensor == Sensor::Cable { 0.05 } else { 0.03 });
     check_numbers(arguments, sigma)?;
     let box_mm = match &arguments.box_mm {
@@ -314,7 +331,7 @@ fn options(arguments: &Arguments, sensor: Sensor, reach_mm: f64) -> anyhow::Resu
         (_, None) => None,
     };
     let space = space(arguments, reach_mm)?;
-    let questions::Open { questions, something_else } = left_open(arguments)?;
+    let questions::Open { questions, something_else } = left_open(arguments, robot)?;
     let approach_rad = arguments.approach.to_radians();
     let poses = arguments.poses.unwrap_or(POSES);
     let options = Options {

@@ -3,7 +3,9 @@
 use anyhow::{anyhow, bail};
 use clap::Args;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use truegrind::arm::model::Model;
 use truegrind::calibration::identification::calibration::Frames;
+use truegrind::calibration::identification::stated_frame::contradiction;
 use truegrind::calibration::identification::tolerance::Tolerance;
 use truegrind::calibration::measurement::dataset::{Dataset, Sensor};
 use truegrind::math::se3::Pose;
@@ -43,8 +45,16 @@ impl FramePriorArguments {
         tolerance: &Tolerance,
         stated: Option<&Frames>,
         found: Frames,
+        (dataset, nominal): (&Dataset, &Model),
     ) -> anyhow::Result<(Tolerance, Frames)> {
-        let Some(text) = &self.frame_sigma else { return Ok((*tolerance, found)) };
+        let Some(text) = &self.frame_sigma else {
+            if let Some(contradiction) =
+                stated.and_then(|stated| contradiction(dataset, nominal, stated, &found, 0.0))
+            {
+                bail!("{contradiction}");
+            }
+            return Ok((*tolerance, found));
+        };
         let Some(stated) = stated else {
             bail!("--frame-sigma needs --sensor-frame, or --outlet and --cable-zero");
         };
@@ -55,6 +65,9 @@ impl FramePriorArguments {
         };
         if !(mm > 0.0 && deg > 0.0) {
             bail!("--frame-sigma {text}: expected numbers above 0");
+        }
+        if let Some(contradiction) = contradiction(dataset, nominal, stated, &found, mm) {
+            bail!("{contradiction}");
         }
         let flange_from_target = if stated.flange_from_target == Pose::identity() {
             found.flange_from_target

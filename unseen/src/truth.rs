@@ -53,7 +53,7 @@ pub enum Meaning {
 /// The names of the diagnosis. One name stands for several families: see [`meanings`].
 ///
 /// A name that is added to the diagnosis is added here, by what its sentence sends a technician to.
-pub const NAMES: [(&str, Family); 43] = [
+pub const NAMES: [(&str, Family); 44] = [
     ("link-geometry", Family::Geometry),
     ("joint-compliance", Family::Compliance),
     ("joint-stiffness", Family::Compliance),

@@ -144,6 +144,8 @@ pub struct Estimated {
     pub geometry: StageErrors,
     /// Noise floor from sensor and rounding (mm); absent where it is unknown.
     pub noise_floor_mm: Option<f64>,
+    /// RMS error of a position that the model leaves beyond the noise (mm); absent where the noise is unknown.
+    pub beyond_noise_mm: Option<f64>,
     /// The judgement.
     pub verdict: Verdict,
     /// Where the arm was measured.

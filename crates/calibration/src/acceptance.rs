@@ -22,7 +22,7 @@ use truegrind_math::work::report_step;
 use self::orientation::Orientation;
 use self::path::{PathFound, seen};
 use crate::identification::calibration::Frames;
-use crate::identification::fit::{Observations, errors_on};
+use crate::identification::fit::{Observations, errors_on, orientation_errors};
 use crate::identification::identify::prepare_observations;
 use crate::identification::register::register;
 use crate::identification::start::StartError;
@@ -39,8 +39,12 @@ pub const ISO_POSES: usize = 5;
 pub const ISO_CYCLES: usize = 30;
 
 const FOLDS: usize = 5;
-/// Joint differences below this count as the same pose as one of the fit (°).
-const SAME_DEG: f64 = 0.003;
+/// Joint differences below this count as the same pose as one of the fit (°): also where one file has two decimals only.
+const SAME_DEG: f64 = 0.006;
+/// Ratio of the model's error to that of the data sheet above which the model is not of this arm.
+const WORSE: f64 = 1.05;
+/// Range of a joint in the fit from which its coverage counts (°).
+const MOVED_DEG: f64 = 10.0;
 
 /// Tolerances and uncertainties of an acceptance test.
 #[derive(Debug, Clone)]
@@ -70,6 +74,37 @@ pub struct Cycles {
     pub accuracy_mm: f64,
     /// Repeatability: mean distance from the barycentre and three standard deviations of it.
     pub repeatability_mm: f64,
+}
+
+/// The joint through whose range in the fit the poses turn least.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Coverage {
+    /// The joint (0-based).
+    pub joint: usize,
+    /// Its range over the poses of the test (°).
+    pub tested_deg: f64,
+    /// Its range in the fit (°).
+    pub fitted_deg: f64,
+}
+
+impl Coverage {
+    fn of(dataset: &Dataset, estimated: &Estimated) -> Option<Self> {
+        let range = |joint: usize| {
+            let angles = dataset.rows.iter().map(|row| row.joints[joint].to_degrees());
+            let (low, high) =
+                angles.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), q| (low.min(q), high.max(q)));
+            let region = &estimated.region;
+            let fitted_deg = region.max_deg[joint] - region.min_deg[joint];
+            Self { joint, tested_deg: high - low, fitted_deg }
+        };
+        let all = (0..6).map(range).filter(|range| range.fitted_deg > MOVED_DEG);
+        all.min_by(|a, b| a.share().total_cmp(&b.share()))
+    }
+
+    /// Tested share of the range in the fit.
+    pub fn share(&self) -> f64 {
+        self.tested_deg / self.fitted_deg
+    }
 }
 
 /// Result of an acceptance test.
@@ -103,15 +138,27 @@ pub struct Acceptance {
     pub most_cycles: usize,
     /// The measured paths; none for a cable, which measures no position.
     pub paths: Vec<PathFound>,
+    /// How much of the measured region the poses cover.
+    pub coverage: Option<Coverage>,
     /// Smallest and largest of time (h), temperature (°C) and payload (kg), where logged.
     pub conditions: [Option<[f64; 2]>; 3],
 }
 
 impl Acceptance {
-    /// The decision over all stated tolerances: not evaluated if an orientation tolerance is stated but no orientation was measured.
+    /// Whether the data sheet is nearer to the readings than the model, by more than the sensor's uncertainty: then the model is of another arm, or the arm has changed.
+    pub fn is_worse_than_data_sheet(&self) -> bool {
+        let further_mm = (self.model.rmse.powi(2) - self.nominal.rmse.powi(2)).max(0.0).sqrt();
+        self.model.rmse > WORSE * self.nominal.rmse && further_mm > self.uncertainty_mm
+    }
+
+    /// The decision over all stated tolerances. A model that is worse than the data sheet is not accepted; not evaluated if an orientation tolerance is stated but no orientation was measured.
     pub fn overall(&self) -> Decision {
         let orientation = self.orientation.as_ref().map_or(Decision::NotEvaluated, |found| found.decision);
-        if self.orientation_asked { self.decision.and(orientation) } else { self.decision }
+        let decision = if self.orientation_asked { self.decision.and(orientation) } else { self.decision };
+        match decision {
+            Decision::Accepted if self.is_worse_than_data_sheet() => Decision::Open,
+            decision => decision,
+        }
     }
 }
 
@@ -176,6 +223,7 @@ pub fn accept(
         cycles: cycles(&observed, &groups, &estimated.model, options)?,
         most_cycles: groups.iter().map(Vec::len).max().unwrap_or(0),
         paths,
+        coverage: Coverage::of(dataset, estimated),
         conditions: [
             range(dataset, |condition| condition.time_h),
             range(dataset, |condition| condition.temperature_c),
@@ -215,14 +263,14 @@ fn errors(observed: &Observations, model: &Model, options: &Options) -> Result<[
     let count = observed.dataset.rows.len();
     if let Some(frames) = &options.frames {
         let rows: Vec<usize> = (0..count).collect();
-        let turns = orientation::errors(observed, &rows, model, frames).unwrap_or_default();
+        let turns = orientation_errors(observed, &rows, model, frames).unwrap_or_default();
         return Ok([errors_on(observed, model, frames), turns]);
     }
     let (mut position_errors, mut turns) = (vec![f64::NAN; count], vec![f64::NAN; count]);
     let mut oriented = true;
     for Split { train, test } in folds(&observed.dataset, FOLDS, options.seed) {
         let frames = register(&observed.subset(&train), model, &Tolerance::default())?.fitted.frames;
-        match orientation::errors(observed, &test, model, &frames) {
+        match orientation_errors(observed, &test, model, &frames) {
             Some(errors) => test.iter().zip(errors).for_each(|(row, error)| turns[*row] = error),
             None => oriented = false,
         }

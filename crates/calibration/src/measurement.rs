@@ -15,6 +15,7 @@ pub mod plausibility;
 pub mod matching;
 mod copies;
 mod measuring_order;
+mod reach;
 mod row_list;
 pub mod sensor;
 pub mod registration;

@@ -50,6 +50,8 @@ pub fn ln_gamma(x: f64) -> f64 {
 /// let bound = chi_square_quantile(0.05, 3);
 /// assert!((bound - 7.8147).abs() < 1e-4);
 /// assert!((chi_square_tail(bound, 3) - 0.05).abs() < 1e-12);
+/// // Of very many degrees of freedom it is nearly normal.
+/// assert!((chi_square_quantile(0.5, 30_000) - 29_999.333).abs() < 1e-2);
 /// ```
 pub fn chi_square_quantile(above: f64, freedom: usize) -> f64 {
     let (mut low, mut high) = (0.0, freedom as f64 + 1.0);

@@ -41,13 +41,22 @@ pub fn log_chi_square_tail(value: f64, freedom: usize) -> f64 {
     let (mut a, mut sum) = if freedom % 2 == 1 { (0.5, scaled_erfc(y.sqrt())) } else { (1.0, 1.0) };
     // yᵃ / Γ(a + 1)
     let mut term = if freedom % 2 == 1 { 2.0 * (y / PI).sqrt() } else { y };
+    let mut log_scale = 0.0;
     while a + 0.25 < 0.5 * freedom as f64 {
         sum += term;
         a += 1.0;
         term *= y / a;
+        // e^y overflows for values above 1400.
+        if sum > LARGE {
+            (sum, term) = (sum / LARGE, term / LARGE);
+            log_scale += LARGE.ln();
+        }
     }
-    (sum.ln() - y).min(0.0)
+    (sum.ln() + log_scale - y).min(0.0)
 }
+
+/// Sum from which it is scaled down.
+const LARGE: f64 = 1e200;
 
 /// Probability that χ² with `freedom` degrees of freedom exceeds `value`.
 pub fn chi_square_tail(value: f64, freedom: usize) -> f64 {

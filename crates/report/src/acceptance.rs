@@ -78,6 +78,12 @@ pub fn is_accepted(found: &Acceptance) -> bool {
     found.overall() == Decision::Accepted
 }
 
+/// RMS error of a model above which the readings are of another arm (mm).
+const OTHER_ARM_MM: f64 = 25.0;
+
+/// Share of a joint's range in the fit below which the verdict says how little was tested.
+const LEAST_COVERAGE: f64 = 0.5;
+
 fn verdict(found: &Acceptance, sensor: Sensor) -> Verdict {
     let (status, headline) = headline(found);
     let mut reasons = Vec::new();
@@ -93,6 +99,27 @@ fn verdict(found: &Acceptance, sensor: Sensor) -> Verdict {
         Uncertainty::Stated => {}
     }
     reasons.extend(orientation_reason(found));
+    if found.model.rmse > OTHER_ARM_MM {
+        reasons.push(
+            "no calibrated arm is so far off: check that these readings are of this arm, and their units"
+                .to_owned(),
+        );
+    }
+    if found.is_worse_than_data_sheet() {
+        reasons.push(format!(
+            "the data sheet is nearer to these readings than the model ({:.3} against {:.3} mm RMS): the model is of another arm, or the arm \
+             has changed since it was measured",
+            found.nominal.rmse, found.model.rmse
+        ));
+    }
+    if let Some(coverage) = found.coverage.filter(|coverage| coverage.share() < LEAST_COVERAGE) {
+        reasons.push(format!(
+            "the poses turn joint {} through {:.0}° of the {:.0}° over which the arm was measured: nothing was tested beyond",
+            coverage.joint + 1,
+            coverage.tested_deg,
+            coverage.fitted_deg
+        ));
+    }
     if sensor == Sensor::Cable {
         reasons.push("a cable measures errors only along itself; errors across it are not judged".to_owned());
     }
@@ -102,7 +129,8 @@ fn verdict(found: &Acceptance, sensor: Sensor) -> Verdict {
 /// The decision, stated for the quantity that decides, or for both if both pass.
 fn headline(found: &Acceptance) -> (Status, String) {
     let overall = found.overall();
-    if found.orientation_asked && overall != Decision::Accepted && overall != found.decision {
+    let by_orientation = found.orientation.as_ref().map_or(Decision::NotEvaluated, |turns| turns.decision);
+    if found.orientation_asked && overall == by_orientation && overall != found.decision {
         return orientation_headline(found);
     }
     let (max, limit, u) = (found.model.max, found.tolerance_mm, found.uncertainty_mm);
@@ -120,6 +148,12 @@ fn headline(found: &Acceptance) -> (Status, String) {
         Decision::Refused => {
             (Status::Bad, format!("Not accepted: largest error {max:.3} mm, tolerance {limit:.3} mm"))
         }
+        Decision::Open if found.decision == Decision::Accepted => (
+            Status::Warning,
+            format!(
+                "Not decided: largest error {max:.3} mm, tolerance {limit:.3} mm, but the model is worse than the data sheet"
+            ),
+        ),
         Decision::Open if found.uncertainty == Uncertainty::Unknown => (
             Status::Warning,
             format!(
@@ -519,6 +553,9 @@ pub fn json(found: &Acceptance, dataset: &Dataset, estimated: &Estimated, statem
         "tolerance_mm": found.tolerance_mm,
         "uncertainty": { "expanded_mm": (found.uncertainty != Uncertainty::Unknown).then_some(found.uncertainty_mm), "from": uncertainty },
         "poses": found.poses,
+        "coverage": found.coverage.map(|c| json!({
+            "joint": c.joint + 1, "tested_deg": c.tested_deg, "fitted_deg": c.fitted_deg,
+        })),
         "rows": found.rows,
         "nominal": found.nominal,
         "model": found.model,

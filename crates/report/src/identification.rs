@@ -275,10 +275,19 @@ fn key_figures(found: &Identification) -> Vec<KeyFigure> {
             .note("held-out RMSE, from registered frames to geometry"),
         KeyFigure::new("Largest held-out error", after.max, 3, "mm")
             .note(format!("registered: {:.3} mm", before.max)),
-        match estimated.noise_floor_mm {
-            Some(_) => floor.note("scatter of repeated poses, or else effect of rounding"),
-            None => floor.note("unknown: no repeated pose and no rounding"),
+        match (estimated.noise_floor_mm, estimated.beyond_noise_mm) {
+            (Some(_), Some(_)) => floor.note("scatter of repeated poses"),
+            (Some(_), None) => floor.note(
+                "of rounding alone; that of the sensor is not known, since too few poses were repeated",
+            ),
+            (None, _) => floor.note("unknown: too few poses were repeated and nothing is rounded"),
         },
+    ]);
+    figures.extend(found.held_out_orientation.as_ref().map(|turns| {
+        KeyFigure::new("Held-out orientation", turns.rmse.to_degrees(), 4, "°")
+            .note(format!("RMS; largest {:.4}°", turns.max.to_degrees()))
+    }));
+    figures.extend([
         KeyFigure::new("Rows used", used, 0, "").note(format!(
             "{} fitted and {} held out to state errors; the final model is fitted to all",
             used - found.held_out.len().min(used),
@@ -287,7 +296,9 @@ fn key_figures(found: &Identification) -> Vec<KeyFigure> {
         KeyFigure::new("Set aside", estimated.provenance.set_aside.len(), 0, "").note("gross outliers"),
         KeyFigure::new("Rank", rank.map(|r| format!("{} of {}", r.rank, r.parameters)), 0, "").note(
             match rank {
-                Some(report) => format!("{} combinations determined mainly by priors", report.held_by_priors),
+                Some(report) => {
+                    format!("{} combinations known mainly from tolerances", report.held_by_priors)
+                }
                 None => String::new(),
             },
         ),

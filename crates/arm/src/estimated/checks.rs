@@ -39,6 +39,9 @@ pub(super) fn check(model: &Estimated) -> Result<(), InvalidValue> {
     for (key, errors) in [("registered", &model.registered), ("geometry", &model.geometry)] {
         stage(errors).map_err(|invalid| invalid.within(key))?;
     }
+    if let Some(beyond) = model.beyond_noise_mm {
+        ERROR_MM.check(|| "beyond_noise_mm".to_owned(), beyond)?;
+    }
     if let Some(floor) = model.noise_floor_mm {
         ERROR_MM.check(|| "noise_floor_mm".to_owned(), floor)?;
     }

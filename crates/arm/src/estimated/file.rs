@@ -26,6 +26,7 @@ impl Estimated {
             registered: self.registered,
             geometry: self.geometry,
             noise_floor_mm: self.noise_floor_mm,
+            beyond_noise_mm: self.beyond_noise_mm,
             region: self.region.clone(),
             condition: self.condition,
             nominal: ArmFile::from(&self.nominal),
@@ -67,6 +68,7 @@ impl Estimated {
     /// #     registered: stage,
     /// #     geometry: stage,
     /// #     noise_floor_mm: None,
+    /// #     beyond_noise_mm: None,
     /// #     verdict: Verdict { status: Judgement::NotEvaluated, reasons: Vec::new() },
     /// #     region: Region::of(&[Joints::zeros(), Joints::repeat(0.5)], 0.1),
     /// #     condition: Condition::default(),
@@ -123,6 +125,7 @@ impl Estimated {
             registered: file.registered,
             geometry: file.geometry,
             noise_floor_mm: file.noise_floor_mm,
+            beyond_noise_mm: file.beyond_noise_mm,
             verdict: file.verdict,
             region: file.region,
             condition: file.condition,
@@ -161,6 +164,8 @@ struct ModelFile {
     robot: String,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     noise_floor_mm: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    beyond_noise_mm: Option<f64>,
     provenance: Provenance,
     verdict: Verdict,
     condition: Condition,

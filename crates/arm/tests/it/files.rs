@@ -126,6 +126,7 @@ fn complete() -> Estimated {
         registered: stage,
         geometry: stage,
         noise_floor_mm: Some(0.02),
+        beyond_noise_mm: None,
         verdict: Verdict { status: Judgement::NotEvaluated, reasons: Vec::new() },
         region: Region::of(&joints, 1.0),
         condition: Condition {

@@ -400,15 +400,13 @@ fn bending_links(nominal: &Model) -> Vec<(Bending, f64)> {
 /// Time constants that are tried, as shares of the run.
 const TIME_CONSTANTS: [f64; 5] = [0.05, 0.12, 0.3, 0.8, 3.0];
 
-/// A time constant that makes the profile in time constant (h).
-const NEVER_H: f64 = 1e12;
-
 /// Growth of the links by the thermometer and by the clock, as far as they were logged, with the variants tried.
 fn growth_profiles(columns: &LoggedColumns) -> Vec<(Thermal, f64)> {
+    // Growth by the clock that begins after the last row: there is none.
+    let last_h = columns.clock.map_or(0.0, |[start_h, hours]| start_h + hours);
+    let reference_c = columns.temperature.map_or(20.0, |(mean, _)| mean);
     let still =
-        Thermal { growth: 0.0, time_constant_h: NEVER_H, start_h: 0.0, growth_per_k: 0.0, reference_c: 20.0 };
-    let reference_c = columns.temperature.map_or(still.reference_c, |(mean, _)| mean);
-    let still = Thermal { reference_c, ..still };
+        Thermal { growth: 0.0, time_constant_h: 1.0, start_h: last_h, growth_per_k: 0.0, reference_c };
     let mut out = Vec::new();
     if columns.temperature.is_some() {
         out.push((still.clone(), 1.0));

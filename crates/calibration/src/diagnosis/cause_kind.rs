@@ -68,7 +68,7 @@ kinds! {
     PayloadChange = "payload-change",
     /// Angles and Cartesian read-out that contradict each other.
     ReadoutMismatch = "readout-mismatch",
-    /// Axes of a sensor that are of different scales, or not perpendicular.
+    /// Axes of a sensor whose scales differ.
     SensorAxes = "sensor-axes",
     /// A sensor's frame, or a cable's outlet, that moved.
     SensorFrameShift = "sensor-frame-shift",

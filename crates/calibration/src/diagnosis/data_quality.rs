@@ -8,7 +8,8 @@ use super::preparation::Prepared;
 use super::selection::BLOCKS;
 use super::validation::{StageError, Validation};
 use super::words;
-use crate::identification::rounding::{NotFused, angle_shares};
+use crate::identification::fit::Observations;
+use crate::identification::rounding::{NotFused, angle_shares, rounding_floor_mm};
 use crate::measurement::dataset::{Dataset, Sensor};
 use crate::measurement::split;
 
@@ -228,13 +229,9 @@ pub(super) fn noise_floor(
             format!("{} repeated poses, {} degrees of freedom", floor.poses, floor.freedom),
         );
     }
-    let observed = subject.observed;
-    let shares = angle_shares(&observed.dataset, &extended.model, &extended.frames, &observed.angles);
-    let coordinates = if observed.dataset.sensor == Sensor::Cable { 1.0 } else { 3.0 };
-    let mean = shares.iter().map(|s| s.0).sum::<f64>() * coordinates / shares.len().max(1) as f64;
-    if mean > 0.0 {
-        (Some(mean.sqrt()), ROUNDING_ALONE.to_owned())
-    } else {
-        (None, "no pose was repeated and nothing is rounded".to_owned())
+    let Observations { dataset, angles } = subject.observed;
+    match rounding_floor_mm(dataset, &extended.model, &extended.frames, angles) {
+        Some(floor) => (Some(floor), ROUNDING_ALONE.to_owned()),
+        None => (None, "too few poses were repeated and nothing is rounded".to_owned()),
     }
 }

@@ -22,9 +22,12 @@ use super::summary::{self, Summary};
 use super::testability::not_testable;
 use super::validation::{StageError, nominal};
 use super::written_model::{certain_causes, fit_written, time_discrepancy, under_correlated_noise};
-use crate::identification::benefit::{Benefit, benefit};
+use crate::identification::benefit::{Benefit, benefit, widen_by_scale};
+use crate::identification::beyond_noise::BeyondNoise;
 use crate::identification::calibration::Frames;
-use crate::identification::fit::{Fitted, Observations, frame_parameters};
+use crate::identification::fit::{
+    Fitted, Observations, WRONG_ORIENTATION_RAD, frame_parameters, median_orientation_error,
+};
 use crate::identification::identify::{
     self, Identification, arm_covariance, arm_parameters_of, learned_width_uncertainty, mean_condition,
     parameter_table, with_sigma_in_region,
@@ -92,6 +95,11 @@ pub fn diagnose(
             rmse_mm: typical,
         });
     }
+    let turned = median_orientation_error(&prepared.observed, &registered.model, &registered.frames);
+    if let Some(rad) = turned.filter(|rad| *rad > WRONG_ORIENTATION_RAD) {
+        let (file, robot) = (dataset.file.clone(), robot.to_owned());
+        return Err(DiagnoseError::WrongOrientation { file, robot, deg: rad.to_degrees() });
+    }
     let needed = poses_needed_at_least(dataset, nominal_arm);
     let thin_rows = thin_rows(&prepared.observed);
     let searched = Subject { observed: thin_rows.as_ref().unwrap_or(&prepared.observed), ..subject };
@@ -115,6 +123,9 @@ pub fn diagnose(
     let certain =
         merged::certain_flags(&summary.findings, &confirmed.outcome.confirmations, &search.extended.causes);
     let (extended, scatter) = (summary.extended.clone(), summary.joint_scatter.clone());
+    let all_causes = &search.stages[2];
+    let all_causes = StageErrors { fitted: all_causes.fitted, held_out: all_causes.random };
+    let beyond = BeyondNoise::of(&all_causes, dataset.sensor, summary.repeats.as_ref());
     let (mut diagnosis, pictures) = build_diagnosis(&search, &confirmed, summary, robot, notes);
     diagnosis.poses_needed = needed;
     let of_all = thin_rows.is_none().then_some(&confirmed.outcome.discrepancy);
@@ -137,7 +148,7 @@ pub fn diagnose(
         search: &search,
         discrepancy: of_all,
         scatter,
-        noise_floor_mm: diagnosis.noise_floor_mm,
+        noise: Noise { floor_mm: diagnosis.noise_floor_mm, beyond },
         few_poses,
     };
     let handed = with_uncertain_causes(&search, &written, of_all);
@@ -174,9 +185,18 @@ struct Handing<'a> {
     search: &'a Search<'a>,
     discrepancy: Option<&'a Discrepancy>,
     scatter: Option<JointScatter>,
-    noise_floor_mm: Option<f64>,
+    noise: Noise,
     /// Says that there are too few poses.
     few_poses: Option<String>,
+}
+
+/// What is known of the noise.
+#[derive(Clone, Copy)]
+struct Noise {
+    /// The noise floor of sensor and rounding (mm).
+    floor_mm: Option<f64>,
+    /// What all causes leave beyond the scatter of repeated poses.
+    beyond: BeyondNoise,
 }
 
 impl Handing<'_> {
@@ -195,11 +215,15 @@ impl Handing<'_> {
         missing
             .extend(scatter.filter(|scatter| !missing.iter().any(|other| other.joint() == scatter.joint())));
         let [before, geometry, _] = search.stages;
-        let fits = [written, handed].map(Fitted::from);
+        let mut fits = [written, handed].map(Fitted::from);
+        if let Some(sigma) = search.context.options.arm_tolerance.scale {
+            let rows = &search.context.subject.observed.dataset;
+            fits.iter_mut().for_each(|fit| widen_by_scale(fit, rows, sigma));
+        }
         let stages = [before, geometry, *stage];
         let few_poses = self.few_poses.as_deref();
         let scatter_mm = self.scatter.as_ref().map_or(0.0, JointScatter::rms_mm);
-        estimated(search, robot, (&fits, missing, scatter_mm), &stages, (self.noise_floor_mm, few_poses))
+        estimated(search, robot, (&fits, missing, scatter_mm), &stages, (self.noise, few_poses))
     }
 
     /// The written arm with its benefit; where it is refused beside causes and geometry alone is not, that, with a note.
@@ -469,14 +493,14 @@ fn fits(search: &Search<'_>) -> Fits {
 }
 
 /// The arm for compensation and its expected benefit, from the written fit and the same with uncertain causes, what both lack, and the
-/// size of a scatter about a joint (mm RMS), which remains with and without correction. Of too few poses no benefit is stated: it would be
+/// size of a scatter about a joint (mm RMS), which remains with and without correction, as what all causes leave beyond the noise does. Of too few poses no benefit is stated: it would be
 /// the priors'.
 fn estimated(
     search: &Search<'_>,
     robot: &str,
     ([fitted, handed], missing, scatter_mm): (&[Fitted; 2], Vec<MissingError>, f64),
     stages: &[StageError; 3],
-    (noise_floor_mm, few_poses): (Option<f64>, Option<&str>),
+    (noise, few_poses): (Noise, Option<&str>),
 ) -> (Estimated, Option<Benefit>) {
     let SearchContext { dataset, prepared, subject, options, .. } = search.context;
     let set_aside = &search.set_aside;
@@ -504,7 +528,8 @@ fn estimated(
         parameters: parameter_table(handed, nominal_arm).into_iter().filter(|p| p.is_of_arm()).collect(),
         registered: StageErrors { fitted: stages[0].fitted, held_out: stages[0].random },
         geometry: StageErrors { fitted: stages[2].fitted, held_out: stages[2].random },
-        noise_floor_mm,
+        noise_floor_mm: noise.floor_mm,
+        beyond_noise_mm: noise.beyond.known_mm(),
         verdict: Verdict { status: Judgement::NotEvaluated, reasons: Vec::new() },
         region: Region::of(subject.observed.dataset.rows.iter().map(|row| &row.joints), 0.0),
         condition: mean_condition(dataset),
@@ -516,12 +541,9 @@ fn estimated(
     let plausible = &options.arm_tolerance;
     let benefit =
         || benefit(fitted, rows, &estimated, plausible, variance_inflation(fitted, rows, &stages[2]));
-    let with_scatter = |benefit: Benefit| Benefit {
-        nominal_mm: benefit.nominal_mm.hypot(scatter_mm),
-        estimated_mm: benefit.estimated_mm.hypot(scatter_mm),
-        ..benefit
-    };
-    let benefit = few_poses.map_or_else(|| Ok(benefit().map(with_scatter)), Err);
+    let beyond_noise = noise.beyond.or_scatter(scatter_mm);
+    let benefit =
+        few_poses.map_or_else(|| Ok(benefit().map(|benefit: Benefit| benefit.with(beyond_noise))), Err);
     let parameters = parameter_table(fitted, nominal_arm);
     let judged = benefit.as_ref().map(Option::as_ref).map_err(|few| *few);
     estimated.verdict = judge(fitted, rows.sensor, judged, &parameters, stages, options);

@@ -24,9 +24,9 @@ pub(super) fn describe(drifts: &[&Disturbance], dataset: &Dataset) -> String {
     }
 }
 
-/// Whether the links grow by the clock alone.
+/// Whether the links grow by the clock.
 pub(super) fn is_growth_in_time(effect: &Effect) -> bool {
-    matches!(effect, Effect::ThermalDrift(thermal) if thermal.growth_per_k == 0.0)
+    matches!(effect, Effect::ThermalDrift(thermal) if thermal.growth != 0.0)
 }
 
 /// One sentence for links that grow by the clock, as the sum of several terms.

@@ -20,6 +20,7 @@ use super::score::VISIBLE;
 use super::score::{non_centrality, score};
 use super::selection::Accepted;
 use super::words;
+use crate::measurement::sensor::disturbance::{Disturbance, Kind};
 use truegrind_arm::effect::Effect;
 use truegrind_arm::effect::error_map::ErrorMap;
 
@@ -201,6 +202,21 @@ impl FindingBuilder<'_> {
             );
         }
         let mut doubts = Vec::new();
+        if let Some(effect) = same_readings(cause) {
+            clear = false;
+            alternatives.retain(|other| other.effect != effect);
+            alternatives.insert(
+                0,
+                Alternative {
+                    effect,
+                    joints: None,
+                    rows: cause.rows(),
+                    family: Family::SetUp,
+                    cv_rmse_mm: after_mm,
+                    beaten_by: 0.0,
+                },
+            );
+        }
         if self.is_any_curve(cause) {
             clear = false;
             doubts.push(
@@ -254,6 +270,20 @@ impl FindingBuilder<'_> {
             remedy: words::remedy_of(cause).to_owned(),
         };
         (finding, picture)
+    }
+}
+
+/// The disturbance that changes every reading as `cause` does: a base that turned about the axis of joint 1 moves the sensor against the
+/// arm, a target that turned about the axis of joint 6 moves on the flange. That they have more parameters says nothing against them.
+fn same_readings(cause: &Cause) -> Option<CauseKind> {
+    match cause {
+        Cause::Measurement(Disturbance { kind: Kind::JointZero { joint: 0 }, .. }) => {
+            Some(CauseKind::SensorFrameShift)
+        }
+        Cause::Measurement(Disturbance { kind: Kind::JointZero { joint: 5 }, .. }) => {
+            Some(CauseKind::ToolShift)
+        }
+        _ => None,
     }
 }
 

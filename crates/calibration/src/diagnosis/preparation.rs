@@ -111,7 +111,8 @@ pub fn prepare(dataset: &Dataset, nominal: &Model, fuse: bool) -> Prepared {
     Prepared { observed, logged, readout_fusion, mismatch, sides_from_order: silent }
 }
 
-/// Fills in the motion from the previous row; the first row has none. Rows that know it keep it: they are part of a longer record.
+/// Fills in the motion from the previous row; the first row has none, since a path may begin there or before. Rows that know it keep it:
+/// they are part of a longer record.
 fn fill_motion(dataset: &mut Dataset) {
     let path = is_path(dataset);
     let rows: Vec<(Joints, Option<f64>)> =

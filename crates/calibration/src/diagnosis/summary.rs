@@ -1,5 +1,6 @@
 //! Summarises a search: findings of causes, data quality, and the unexplained residual.
 
+use super::cause_kind::CauseKind;
 use super::confounding::{Confounding, excess_over_noise_mm};
 use super::contribution::Contributions;
 use super::data_quality::{Deviation, mismatch_finding, noise_floor, outlier_finding, rounding_finding};
@@ -14,8 +15,8 @@ use super::residual_tests::{self, Structure};
 use super::search::{Confirmed, Search};
 use super::something_else::SomethingElse;
 use super::unexplained::{Unexplained, something_else};
-use crate::measurement::dataset::Sensor;
-use crate::measurement::split;
+use crate::measurement::dataset::{Dataset, Sensor};
+use crate::measurement::split::{self, NoiseFloor};
 
 /// Summary of a search.
 pub(super) struct Summary {
@@ -27,6 +28,8 @@ pub(super) struct Summary {
     pub(super) extended: Extended,
     /// The noise floor (mm) and its source.
     pub(super) noise_floor: (Option<f64>, String),
+    /// The scatter of repeated poses, where enough were repeated.
+    pub(super) repeats: Option<NoiseFloor>,
     /// The unexplained residual, in a sentence.
     pub(super) remaining: Option<String>,
     /// The same for a planner, where it is a finding.
@@ -45,7 +48,7 @@ pub(super) fn summarise(
     let context = search.context;
     let (subject, searched, prepared) = (&context.subject, &context.searched, context.prepared);
     let (stages, outcome) = (&search.stages, &confirmed.outcome);
-    let floor = split::noise_floor(context.dataset);
+    let floor = split::noise_floor(&without_outliers(search)).filter(NoiseFloor::is_known);
     let mut steps = vec![
         Step { added: "data sheet, frames fitted".to_owned(), cv_rmse_mm: stages[0].random.rmse },
         Step { added: "geometry".to_owned(), cv_rmse_mm: stages[1].random.rmse },
@@ -91,7 +94,8 @@ pub(super) fn summarise(
         floor_mm: noise_floor.0,
         noise_measured: floor.is_some(),
     };
-    let off = Deviation::of(&search.extended, &search.outliers);
+    let outliers = unexpected_outliers(search);
+    let off = Deviation::of(&search.extended, &outliers);
     let empirical_mm = confounding.largest_empirical_rms_mm();
     let unexplained_finding = unexplained.finding();
     let something_else =
@@ -99,7 +103,7 @@ pub(super) fn summarise(
     let of_the_record = [
         rounding_finding(context.dataset, prepared, subject, &search.geometric, stages),
         mismatch_finding(context.dataset, prepared, &stages[2]),
-        outlier_finding(context.dataset, &search.outliers, (off, empirical_mm), &stages[2]),
+        outlier_finding(context.dataset, &outliers, (off, empirical_mm), &stages[2]),
         unexplained_finding,
     ];
     let without_causes = of_the_record.into_iter().flatten().chain(of_links);
@@ -115,10 +119,30 @@ pub(super) fn summarise(
         steps,
         extended,
         noise_floor,
+        repeats: floor,
         remaining: unexplained.sentence(),
         something_else,
         joint_scatter: unexplained.scatter().cloned(),
     }
+}
+
+/// The outliers, without those that a fault found from the motion cannot explain because nothing is known of theirs: the first row.
+fn unexpected_outliers(search: &Search<'_>) -> Vec<(usize, f64)> {
+    let kinds = || search.found.causes.iter().map(|cause| cause.kind());
+    let rows = &search.context.subject.observed.dataset.rows;
+    let follows_motion = kinds().any(|kind| matches!(kind, CauseKind::Latency | CauseKind::Unsettled));
+    let is_expected = |row: usize| follows_motion && rows[row].motion().is_none();
+    search.outliers.iter().filter(|(row, _)| !is_expected(*row)).copied().collect()
+}
+
+/// The rows that no reading contradicts.
+fn without_outliers(search: &Search<'_>) -> Dataset {
+    let dataset = search.context.dataset;
+    let mut kept = vec![true; dataset.rows.len()];
+    let outliers = search.outliers.iter().map(|(row, _)| row);
+    outliers.chain(&search.set_aside).for_each(|&row| kept[row] = false);
+    let indices: Vec<usize> = (0..kept.len()).filter(|&row| kept[row]).collect();
+    dataset.subset(&indices)
 }
 
 /// Findings, and the index of the finding of each cause.

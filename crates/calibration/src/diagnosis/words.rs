@@ -6,7 +6,7 @@ use super::decision;
 use super::drift;
 use super::extension::Extended;
 use super::finding::{Confidence, Finding, FoundParameter, Gain};
-use crate::measurement::dataset::Dataset;
+use crate::measurement::dataset::{Dataset, Sensor};
 use crate::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
 use crate::measurement::sensor::empirical::EmpiricalFault;
 use truegrind_arm::effect::Effect;
@@ -158,14 +158,15 @@ pub fn describe_cause(cause: &Cause, parameters: &[FoundParameter], dataset: &Da
             value * 100.0
         ),
         Cause::Arm(Effect::Backlash(_)) if value < 0.0 => format!(
-            "joint {joint} overshoots at reversals: approached from below it stops {:.4}° higher than from above",
+            "joint {joint} stops {:.4}° higher when approached from below than from above: it overshoots, or the signs in column approach{joint} \
+             are exchanged (-1 is from below)",
             -value.to_degrees()
         ),
         Cause::Arm(Effect::Backlash(_)) => format!(
             "joint {joint} has {:.4}° of backlash between approaches from below and from above",
             value.to_degrees()
         ),
-        Cause::Arm(Effect::ThermalDrift(t)) if t.growth_per_k != 0.0 && t.growth == 0.0 => {
+        Cause::Arm(Effect::ThermalDrift(t)) if t.growth == 0.0 => {
             format!("the links grow by {:.1} µm per metre and kelvin", t.growth_per_k * 1e6)
         }
         Cause::Arm(growth @ Effect::ThermalDrift(_)) => drift::describe_growth(&[growth], dataset),
@@ -214,7 +215,11 @@ fn describe_disturbance(
         ),
         (Kind::Zero, _) => format!("the cable's zero jumped by {value:.3} mm {rows}"),
         (Kind::Frame { .. }, _) => {
-            format!("the sensor was displaced by {:.3} mm {rows}: its stand moved", norm(parameters))
+            let moved = if dataset.sensor == Sensor::Cable { "its outlet" } else { "its stand" };
+            format!(
+                "the sensor was displaced by {:.3} mm against the arm {rows}: {moved} or the base of the arm moved",
+                norm(parameters)
+            )
         }
         (Kind::Target, _) => format!(
             "the target was displaced on the flange by {:.3} mm {rows}: the hook or reflector slipped",
@@ -286,12 +291,10 @@ fn describe_empirical_fault(form: EmpiricalFault, parameters: &[FoundParameter])
                 let longer = if percent < 0.0 { "shorter" } else { "longer" };
                 format!("{:.3} % {longer}", percent.abs())
             };
-            let shear = (2..5).map(|k| value_of(parameters, k).abs()).fold(0.0, f64::max);
             format!(
-                "the axes of the sensor are not alike: along x it reads {}, along y {} than along z, and the axes are up to {:.3}° from perpendicular",
+                "the sensor's axes have different scales: along x it reads {} and along y {} than along z",
                 over_z(0),
-                over_z(1),
-                2.0 * shear.to_degrees()
+                over_z(1)
             )
         }
         EmpiricalFault::TargetNest { .. } => {
@@ -403,7 +406,9 @@ pub fn remedy(effect: CauseKind) -> &'static str {
         SensorZeroShift => {
             "check the cable's clamp and drum; measure a reference point before and after each session"
         }
-        SensorFrameShift => "fix the sensor's stand; measure reference points before and after each session",
+        SensorFrameShift => {
+            "fix the sensor's stand, check the bolts of the arm's base; measure reference points before and after each session"
+        }
         ToolShift => "fasten the hook or reflector; measure the rows after the slip again",
         SensorScale => "check the sensor against a length standard",
         SensorAxes => {

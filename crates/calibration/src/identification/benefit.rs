@@ -30,6 +30,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector3};
 use rayon::prelude::*;
 use serde::Serialize;
 
+use crate::identification::beyond_noise::BeyondNoise;
 use crate::identification::calibration::CalibrationProblem;
 use crate::identification::fit::{Fitted, Observations};
 use crate::identification::rounding;
@@ -53,6 +54,10 @@ pub struct Benefit {
     pub nominal_mm: f64,
     /// Expected RMS position error of the estimated arm (mm).
     pub estimated_mm: f64,
+    /// The same if the sensor has no scale error (mm).
+    pub estimated_without_scale_mm: f64,
+    /// Whether the uncertainty of the sensor's scale was stated; otherwise it is assumed.
+    pub scale_stated: bool,
     /// Probability that the estimated arm is the better one.
     #[serde(rename = "chance")]
     pub probability: f64,
@@ -67,6 +72,23 @@ pub struct Benefit {
     pub determined: f64,
     /// Parameters of the fit.
     pub parameters: usize,
+    /// The error that the model leaves beyond the noise, where known part of `nominal_mm` and `estimated_mm`; absent for a fit that has
+    /// not been compared with the noise.
+    pub beyond_noise: Option<BeyondNoise>,
+}
+
+impl Benefit {
+    /// The benefit of an arm that has a further error, corrected or not.
+    pub fn with(self, beyond_noise: BeyondNoise) -> Self {
+        let further_mm = beyond_noise.known_mm().unwrap_or(0.0);
+        Self {
+            nominal_mm: self.nominal_mm.hypot(further_mm),
+            estimated_mm: self.estimated_mm.hypot(further_mm),
+            estimated_without_scale_mm: self.estimated_without_scale_mm.hypot(further_mm),
+            beyond_noise: Some(beyond_noise),
+            ..self
+        }
+    }
 }
 
 /// A scale error of the sensor as an alternative explanation of the readings.
@@ -95,9 +117,9 @@ const NOISE_FACTORS: [f64; 4] = [0.71, 1.0, 1.41, 2.0];
 /// Above this number of parameters every second width is skipped and products run in blocks.
 const MANY: usize = 90;
 
-/// Prior over the sensor's scale error. A good instrument is accurate to parts in a million; these are faults (atmosphere
+/// Prior over the sensor's scale error where nothing is stated. A good instrument is accurate to parts in a million; these are faults (atmosphere
 /// and drift, a wrong measuring wheel or calibration, a wrong unit), assumed in a fifth of the cases.
-const SCALE_PRIORS: [ScalePrior; 4] = [
+const UNSTATED_SCALE: [ScalePrior; 4] = [
     ScalePrior { sigma: None, probability: 0.8 },
     ScalePrior { sigma: Some(1e-3), probability: 0.05 },
     ScalePrior { sigma: Some(4e-3), probability: 0.1 },
@@ -109,6 +131,16 @@ struct ScalePrior {
     /// Standard deviation of the sensor's relative scale error; `None` for no scale error.
     sigma: Option<f64>,
     probability: f64,
+}
+
+/// Prior over the scale error: as stated, or none beside a scale that the fit has itself.
+fn scale_priors(fitted: &Fitted, tolerance: &Tolerance) -> Vec<ScalePrior> {
+    let certain = |sigma: Option<f64>| vec![ScalePrior { sigma, probability: 1.0 }];
+    match tolerance.scale {
+        _ if fits_scale(fitted) => certain(None),
+        Some(stated) => certain(Some(stated).filter(|sigma| *sigma > 0.0)),
+        None => UNSTATED_SCALE.to_vec(),
+    }
 }
 
 /// Normal equations of the readings in the parameters of the fit and a scale error of the sensor.
@@ -140,7 +172,9 @@ pub fn benefit(
     let gradient = &metric * &x;
     let square = x.dot(&gradient);
     let correction = Correction { metric: &metric, x: &x, gradient: &gradient, square, variance_inflation };
-    let posteriors = weighted_posteriors(&hypotheses(fitted, tolerance), &readings, &correction)?;
+    let scale_priors = scale_priors(fitted, tolerance);
+    let hypotheses = hypotheses(fitted, tolerance, &scale_priors);
+    let posteriors = weighted_posteriors(&hypotheses, &scale_priors, &readings, &correction)?;
     let total: f64 = posteriors.iter().map(|(w, _)| w).sum();
     let mean = |of: &dyn Fn(&Posterior) -> f64, only: &dyn Fn(&Posterior) -> bool| {
         let (mut sum, mut weight) = (0.0, 0.0);
@@ -169,23 +203,41 @@ pub fn benefit(
     Some(Benefit {
         nominal_mm: mean(&|v| v.nominal, any).max(0.0).sqrt(),
         estimated_mm: mean(&|v| v.estimated, any).max(0.0).sqrt(),
+        estimated_without_scale_mm: known_or(
+            mean(&|v| v.estimated, without_scale),
+            mean(&|v| v.estimated, any),
+        )
+        .max(0.0)
+        .sqrt(),
         probability: mean(&|v| v.probability, any),
-        probability_without_scale: mean(&|v| v.probability, without_scale),
+        probability_without_scale: known_or(
+            mean(&|v| v.probability, without_scale),
+            mean(&|v| v.probability, any),
+        ),
+        scale_stated: tolerance.scale.is_some(),
         scale: scale.filter(|s| s.value.is_finite()),
         readings: readings.count,
         determined: shares.map(|(s, p)| (1.0 - (s / p.sigma).powi(2)).clamp(0.0, 1.0)).sum(),
         parameters: x.len(),
+        beyond_noise: None,
     })
+}
+
+/// A mean, or another where there was nothing to average: all models have the stated scale error.
+fn known_or(mean: f64, other: f64) -> f64 {
+    if mean.is_nan() { other } else { mean }
 }
 
 /// Posteriors of all hypotheses of non-negligible evidence, with their weights relative to the largest.
 fn weighted_posteriors(
     hypotheses: &[Hypothesis],
+    scale_priors: &[ScalePrior],
     readings: &LinearisedReadings,
     correction: &Correction<'_>,
 ) -> Option<Vec<(f64, Posterior)>> {
     let arm = correction.x.len();
-    let equations = SCALE_PRIORS.map(|prior| prior.normal_equations(readings, arm));
+    let equations: Vec<Equations> =
+        scale_priors.iter().map(|prior| prior.normal_equations(readings, arm)).collect();
     let equations_of = |hypothesis: &Hypothesis| &equations[hypothesis.scale_prior];
     let evidences: Vec<Option<f64>> = hypotheses
         .par_iter()
@@ -262,22 +314,20 @@ fn fits_scale(fitted: &Fitted) -> bool {
 
 /// A point of the grid: scale prior, prior widths and noise.
 struct Hypothesis {
-    /// Index into [`SCALE_PRIORS`].
+    /// Index of the scale prior.
     scale_prior: usize,
+    /// Logarithm of its probability.
+    log_probability: f64,
     /// Prior precision 1/σ² of each parameter, the scale error last.
     precision: Vec<f64>,
     /// The sensor's σ as a multiple of the fit's.
     noise: f64,
 }
 
-fn hypotheses(fitted: &Fitted, tolerance: &Tolerance) -> Vec<Hypothesis> {
+fn hypotheses(fitted: &Fitted, tolerance: &Tolerance, scale_priors: &[ScalePrior]) -> Vec<Hypothesis> {
     let step = if fitted.parameters.len() > MANY { 2 } else { 1 };
-    let fits_scale = fits_scale(fitted);
     let mut out = Vec::new();
-    for (scale_prior, ScalePrior { sigma, .. }) in SCALE_PRIORS.iter().enumerate() {
-        if sigma.is_some() && fits_scale {
-            continue;
-        }
+    for (scale_prior, ScalePrior { sigma, probability }) in scale_priors.iter().enumerate() {
         for length in LENGTH_WIDTHS.iter().step_by(step) {
             for angle in ANGLE_WIDTHS.iter().step_by(step) {
                 let links =
@@ -291,6 +341,7 @@ fn hypotheses(fitted: &Fitted, tolerance: &Tolerance) -> Vec<Hypothesis> {
                 let precision: Vec<f64> = links.chain(*sigma).map(|s| 1.0 / (s * s)).collect();
                 out.extend(NOISE_FACTORS.map(|noise| Hypothesis {
                     scale_prior,
+                    log_probability: probability.ln(),
                     precision: precision.clone(),
                     noise,
                 }));
@@ -364,8 +415,7 @@ impl Hypothesis {
         let misfit = (readings.square - equations.right.dot(&mean)) / (self.noise * self.noise);
         let log_prior: f64 = self.precision.iter().map(|p| p.ln()).sum();
         let log_noise = 2.0 * readings.count as f64 * self.noise.ln();
-        let log = SCALE_PRIORS[self.scale_prior].probability.ln()
-            - 0.5 * (log_noise + log_determinant - log_prior + misfit);
+        let log = self.log_probability - 0.5 * (log_noise + log_determinant - log_prior + misfit);
         log.is_finite().then_some(log)
     }
 
@@ -494,6 +544,20 @@ pub fn variance_inflation(training: &Fitted, held: &Observations) -> f64 {
     }
     let mean = sum / residuals.len() as f64;
     if mean.is_finite() { mean.max(1.0) } else { 1.0 }
+}
+
+/// Adds to the covariance of a fit what an unknown scale error of the sensor, of standard deviation `sigma`, makes of its parameters: all
+/// readings that are too long by one share look like a larger arm. A fit that has a scale itself is left as it is.
+pub(crate) fn widen_by_scale(fitted: &mut Fitted, dataset: &Dataset, sigma: f64) {
+    if fits_scale(fitted) {
+        return;
+    }
+    let readings = linearise_readings(fitted, dataset);
+    let Some(covariance) = &mut fitted.estimate.covariance else { return };
+    let arm = covariance.nrows();
+    let scale = readings.matrix.view((0, arm), (arm, 1)).into_owned();
+    let moved = &*covariance * scale * sigma;
+    *covariance += &moved * moved.transpose();
 }
 
 /// Normal equations of the linear model J x = y, y = J x̂ − r, in one pass over the rows at the estimate x̂.

@@ -18,7 +18,7 @@ use crate::identification::prior_width::learn_tolerance;
 use crate::identification::rounding::{self, AngleCovariance};
 use crate::identification::solver::Solver;
 use crate::identification::tolerance::Tolerance;
-use crate::measurement::dataset::{Dataset, Sensor};
+use crate::measurement::dataset::{Dataset, Reading, Sensor};
 use truegrind_arm::model::Model;
 use truegrind_arm::parameter::{Parameter, arm_parameters};
 use truegrind_estimation::estimate::{Estimate, Evaluations, Iteration, Termination};
@@ -374,6 +374,33 @@ pub fn errors_on(observed: &Observations, model: &Model, frames: &Frames) -> Vec
     let weights = vec![Weight { per_mm: 1.0, per_rad: 1.0 }; observed.dataset.rows.len()];
     CalibrationProblem::new(&observed.dataset, model, frames, &[], &[], &weights).errors_mm(&[])
 }
+
+/// Angle between the measured orientation of the target and that under a model, for each of these rows (rad); `None` if a reading has no
+/// orientation.
+pub fn orientation_errors(
+    observed: &Observations,
+    rows: &[usize],
+    model: &Model,
+    frames: &Frames,
+) -> Option<Vec<f64>> {
+    let error = |&row: &usize| {
+        let row = &observed.dataset.rows[row];
+        let Reading::Pose(seen) = &row.reading else { return None };
+        let flange = model.at_condition(&row.condition).forward(&row.joints);
+        let target = flange.rotation * frames.flange_from_target.rotation;
+        Some((frames.base_from_sensor.rotation * seen.rotation).angle_to(&target))
+    };
+    rows.iter().map(error).collect()
+}
+
+/// Median of [`orientation_errors`] over all rows (rad).
+pub fn median_orientation_error(observed: &Observations, model: &Model, frames: &Frames) -> Option<f64> {
+    let rows: Vec<usize> = (0..observed.dataset.rows.len()).collect();
+    median(&orientation_errors(observed, &rows, model, frames)?)
+}
+
+/// Median orientation error with only the frames fitted above which orientations are wrong (rad): an arm is off by tenths of a degree.
+pub const WRONG_ORIENTATION_RAD: f64 = 3.0 * std::f64::consts::PI / 180.0;
 
 /// Summary of [`errors_on`].
 pub fn summary_on(observed: &Observations, model: &Model, frames: &Frames) -> ErrorSummary {

@@ -4,15 +4,17 @@ use thiserror::Error;
 
 use rayon::prelude::*;
 
-use crate::identification::benefit::{Benefit, benefit, variance_inflation};
+use crate::identification::benefit::{Benefit, benefit, variance_inflation, widen_by_scale};
+use crate::identification::beyond_noise::BeyondNoise;
 use crate::identification::calibration::{CalibrationProblem, Frames, Weight};
 use crate::identification::fit::{
-    Fitted, Observations, Outliers, Start, errors_on, fit, frame_parameters, outliers, summary_on,
+    Fitted, Observations, Outliers, Start, WRONG_ORIENTATION_RAD, errors_on, fit, frame_parameters,
+    median_orientation_error, orientation_errors, outliers, summary_on,
 };
 use crate::identification::identifiability::Identifiability;
 use crate::identification::prior_width::width_uncertainty;
 use crate::identification::rounding::{
-    AngleCovariance, NotFused, ReadoutFusion, fuse_readout, logged_covariance,
+    AngleCovariance, NotFused, ReadoutFusion, fuse_readout, logged_covariance, rounding_floor_mm,
 };
 use crate::identification::solver::{Family, SOLVERS, Solver};
 use crate::identification::start::count_distinct_poses;
@@ -108,6 +110,20 @@ pub enum IdentifyError {
         /// RMS (mm).
         rmse_mm: f64,
     },
+    /// The orientations with fitted frames are not those of the arm.
+    #[error(
+        "{file}: with fitted frames, the orientations differ from those of robot {robot} by {deg:.0}° in half of the rows, more than any arm \
+         differs from its data sheet: check the order of measured_qw to measured_qz and that they belong to these rows, or delete these \
+         columns to use the positions alone"
+    )]
+    WrongOrientation {
+        /// File.
+        file: String,
+        /// Robot.
+        robot: String,
+        /// Median angle (°).
+        deg: f64,
+    },
 }
 
 /// Result of an identification.
@@ -133,6 +149,8 @@ pub struct Identification {
     pub outliers: Outliers,
     /// Held-out rows by their number in the file, with the error before (registered) and after (geometry) (mm).
     pub held_out: Vec<(usize, f64, f64)>,
+    /// Orientation errors of the held-out rows with geometry (rad), where the sensor measures orientations.
+    pub held_out_orientation: Option<ErrorSummary>,
     /// Names and values ± σ of all free parameters, those of the measurement included.
     pub parameters: Vec<EstimatedParameter>,
 }
@@ -158,7 +176,7 @@ pub fn identify(
     let prepared = options.solver.prepare_model(nominal, dataset);
     let nominal = &prepared;
     // Before the fits, to limit peak memory.
-    let repeats = split::noise_floor(&observed.dataset);
+    let repeats = split::noise_floor(&observed.dataset).filter(NoiseFloor::is_known);
     let region = Region::of(observed.dataset.rows.iter().map(|row| &row.joints), 0.0);
     let (fitted_rows, held_rows) = {
         let Split { train, test } = split(&observed.dataset);
@@ -167,8 +185,15 @@ pub fn identify(
     let sensing = frame_parameters(&observed.dataset);
     let everything = options.solver.parameters(nominal, &sensing);
     let stages = Stages { nominal, frames, sensing: &sensing, everything: &everything, options };
-    let wrong_arm =
-        |rmse_mm| IdentifyError::WrongArm { file: dataset.file.clone(), robot: robot.to_owned(), rmse_mm };
+    let wrong_arm = |found| {
+        let (file, robot) = (dataset.file.clone(), robot.to_owned());
+        match found {
+            WrongArm::Position { rmse_mm } => IdentifyError::WrongArm { file, robot, rmse_mm },
+            WrongArm::Orientation { rad } => {
+                IdentifyError::WrongOrientation { file, robot, deg: rad.to_degrees() }
+            }
+        }
+    };
     let trained = fit_training_rows(&stages, &fitted_rows, &held_rows).map_err(wrong_arm)?;
     let variance_inflation =
         (!options.solver.as_printed).then(|| variance_inflation(&trained.training, &held_rows));
@@ -176,7 +201,10 @@ pub fn identify(
     // The final model, from all rows.
     report_step("fitting all rows");
     let registered = stages.registered(&observed);
-    let geometry = stages.geometry(&observed, &registered);
+    let mut geometry = stages.geometry(&observed, &registered);
+    if let Some(sigma) = options.tolerance.scale {
+        widen_by_scale(&mut geometry, &observed.dataset, sigma);
+    }
     let raw = options.stated_frames.as_ref().map(|f| summary_on(&observed, nominal, f));
     let identifiability = geometry.identifiability();
     let parameters = parameter_table(&geometry, nominal);
@@ -192,16 +220,21 @@ pub fn identify(
         parameters: select_arm_parameters(&parameters),
         registered: trained.registered,
         geometry: trained.geometry,
-        noise_floor_mm: noise_floor(repeats, &observed, &geometry),
+        noise_floor_mm: noise_floor(repeats.as_ref(), &observed, &geometry),
+        beyond_noise_mm: None,
         verdict: Verdict { status: Judgement::NotEvaluated, reasons: Vec::new() },
         region,
         condition: mean_condition(dataset),
     };
     report_step("estimating the benefit for programs");
     let mut estimated = with_sigma_in_region(estimated, &geometry);
-    let benefit = variance_inflation.and_then(|variance_inflation| {
-        benefit(&geometry, &observed.dataset, &estimated, &options.tolerance, variance_inflation)
-    });
+    let beyond_noise = BeyondNoise::of(&trained.geometry, observed.dataset.sensor, repeats.as_ref());
+    estimated.beyond_noise_mm = beyond_noise.known_mm();
+    let benefit = variance_inflation
+        .and_then(|variance_inflation| {
+            benefit(&geometry, &observed.dataset, &estimated, &options.tolerance, variance_inflation)
+        })
+        .map(|benefit| benefit.with(beyond_noise));
     let case = VerdictInputs {
         trained: &trained,
         geometry: &geometry,
@@ -209,6 +242,7 @@ pub fn identify(
         outliers: &outliers,
         benefit: benefit.as_ref(),
         sensor: dataset.sensor,
+        still: still_joints(&estimated.region),
     };
     estimated.verdict = judge(&case, options);
     Ok(Identification {
@@ -222,6 +256,7 @@ pub fn identify(
         readout_fusion,
         outliers,
         held_out: trained.held_out,
+        held_out_orientation: trained.orientation,
         parameters,
     })
 }
@@ -260,18 +295,33 @@ struct Trained {
     geometry: StageErrors,
     /// Held-out rows by their number in the file, with their errors before and after (mm).
     held_out: Vec<(usize, f64, f64)>,
+    /// Their orientation errors (rad), where the sensor measures them.
+    orientation: Option<ErrorSummary>,
+}
+
+/// Readings that are not of the arm.
+enum WrongArm {
+    /// RMS error with frames alone, above [`WRONG_ARM_MM`].
+    Position { rmse_mm: f64 },
+    /// Median orientation error with frames alone, above [`WRONG_ORIENTATION_RAD`].
+    Orientation { rad: f64 },
 }
 
 /// Fits the training rows and evaluates the held-out ones.
-///
-/// # Errors
-/// The RMS error with frames alone (mm), if above [`WRONG_ARM_MM`].
-fn fit_training_rows(stages: &Stages<'_>, rows: &Observations, held: &Observations) -> Result<Trained, f64> {
+fn fit_training_rows(
+    stages: &Stages<'_>,
+    rows: &Observations,
+    held: &Observations,
+) -> Result<Trained, WrongArm> {
     report_step("fitting the training rows");
     let registered = stages.registered(rows);
     let rmse_mm = summary_on(rows, &registered.model, &registered.frames).rmse;
     if !(rmse_mm < WRONG_ARM_MM) {
-        return Err(rmse_mm);
+        return Err(WrongArm::Position { rmse_mm });
+    }
+    let turned = median_orientation_error(rows, &registered.model, &registered.frames);
+    if let Some(rad) = turned.filter(|rad| *rad > WRONG_ORIENTATION_RAD) {
+        return Err(WrongArm::Orientation { rad });
     }
     let on = |fitted: &Fitted| {
         let held = errors_on(held, &fitted.model, &fitted.frames);
@@ -283,11 +333,13 @@ fn fit_training_rows(stages: &Stages<'_>, rows: &Observations, held: &Observatio
     };
     let mut training = stages.geometry(rows, &registered);
     training.problem.drop_rows();
+    let all: Vec<usize> = (0..held.dataset.rows.len()).collect();
+    let orientation = orientation_errors(held, &all, &training.model, &training.frames).map(ErrorSummary::of);
     let ((registered, before), (geometry, after)) = (on(&registered), on(&training));
     let numbers = held.dataset.rows.iter().map(|row| row.number);
     let held_out =
         numbers.zip(before).zip(after).map(|((number, before), after)| (number, before, after)).collect();
-    Ok(Trained { training, registered, geometry, held_out })
+    Ok(Trained { training, registered, geometry, held_out, orientation })
 }
 
 /// Provenance of a model: file, rows, method.
@@ -519,14 +571,9 @@ pub(crate) fn arm_covariance(fitted: &Fitted) -> nalgebra::DMatrix<f64> {
 }
 
 /// Scatter of repeated poses (mm), otherwise the RMS effect of rounded angles; `None` if neither is known.
-fn noise_floor(repeats: Option<NoiseFloor>, observed: &Observations, fitted: &Fitted) -> Option<f64> {
-    if let Some(floor) = repeats {
-        return Some(floor.sigma_mm);
-    }
-    let shares =
-        super::rounding::angle_shares(&observed.dataset, &fitted.model, &fitted.frames, &observed.angles);
-    let mean = shares.iter().map(|s| s.0).sum::<f64>() / shares.len().max(1) as f64;
-    (mean > 0.0).then(|| mean.sqrt())
+fn noise_floor(repeats: Option<&NoiseFloor>, observed: &Observations, fitted: &Fitted) -> Option<f64> {
+    let scatter = repeats.map(|floor| floor.sigma_mm);
+    scatter.or_else(|| rounding_floor_mm(&observed.dataset, &fitted.model, &fitted.frames, &observed.angles))
 }
 
 pub(crate) fn mean_condition(dataset: &Dataset) -> Condition {
@@ -569,6 +616,16 @@ struct VerdictInputs<'a> {
     outliers: &'a Outliers,
     benefit: Option<&'a Benefit>,
     sensor: Sensor,
+    /// Joints that hardly moved (from 1).
+    still: Vec<usize>,
+}
+
+/// Range below which a joint hardly moved (°).
+const STILL_DEG: f64 = 5.0;
+
+/// Joints that hardly moved (from 1).
+fn still_joints(region: &Region) -> Vec<usize> {
+    (1..=6).filter(|joint| region.max_deg[joint - 1] - region.min_deg[joint - 1] < STILL_DEG).collect()
 }
 
 fn judge(case: &VerdictInputs<'_>, options: &Options) -> Verdict {
@@ -593,6 +650,19 @@ fn judge(case: &VerdictInputs<'_>, options: &Options) -> Verdict {
         ));
     }
     verdict.check_links(case.parameters, &options.tolerance, 0.0);
+    if !case.still.is_empty() {
+        verdict.note(format!(
+            "{} of less than {:.0}°: what these rows do not show of {} stays as the data sheet has it",
+            if case.still.len() == 1 {
+                format!("joint {} moved through a range", case.still[0])
+            } else {
+                let joints: Vec<String> = case.still.iter().map(usize::to_string).collect();
+                format!("joints {} moved through ranges", joints.join(", "))
+            },
+            STILL_DEG,
+            if case.still.len() == 1 { "it" } else { "them" }
+        ));
+    }
     if case.outliers.too_many > 0 {
         verdict.note(format!(
             "{} rows lie beyond ten robust standard deviations, too many to be outliers: none was rejected",

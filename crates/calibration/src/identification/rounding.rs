@@ -236,3 +236,16 @@ pub fn angle_shares(
         })
         .collect()
 }
+
+/// RMS effect of rounded angles on a reading (mm), of a position over all three coordinates; `None` where nothing is rounded.
+pub fn rounding_floor_mm(
+    dataset: &Dataset,
+    model: &Model,
+    frames: &Frames,
+    angles: &AngleCovariance,
+) -> Option<f64> {
+    let shares = angle_shares(dataset, model, frames, angles);
+    let coordinates = if dataset.sensor == Sensor::Cable { 1.0 } else { 3.0 };
+    let mean = shares.iter().map(|share| share.0).sum::<f64>() * coordinates / shares.len().max(1) as f64;
+    (mean > 0.0).then(|| mean.sqrt())
+}

@@ -26,6 +26,8 @@ pub struct Tolerance {
     pub frame_mm: f64,
     /// Orientation of the sensor frame about its starting value (rad); wide.
     pub frame_rad: f64,
+    /// Relative error of the sensor's scale, where it is stated. Otherwise a fault of the scale is assumed possible (`benefit`).
+    pub scale: Option<f64>,
     /// Whether to estimate the prior widths of links from the rows, with the ones stated here as hyperprior (`prior_width`).
     pub learn_widths: bool,
 }
@@ -42,6 +44,7 @@ impl Default for Tolerance {
             target_rad: 1.0,
             frame_mm: 2000.0,
             frame_rad: 3.0,
+            scale: None,
             learn_widths: false,
         }
     }

@@ -6,6 +6,7 @@
 //! request, and every use of it says so.
 
 use crate::identification::benefit::{Benefit, ScaleError};
+use crate::identification::beyond_noise::BeyondNoise;
 use crate::identification::tolerance::Tolerance;
 use crate::measurement::dataset::Sensor;
 use truegrind_arm::estimated::{EstimatedParameter, Judgement, Verdict};
@@ -209,12 +210,43 @@ fn benefit_sentence(found: &Benefit) -> String {
     let probability = percent_of(found.probability);
     format!(
         "inside the measured region, apart from the placement of base and flange, the expected RMS error is {:.3} mm for the \
-         nominal arm and {:.3} mm for the estimated one: it improves programs with a probability of {probability} (at least \
+         nominal arm and {:.3} mm for the estimated one{}: it improves programs with a probability of {probability} (at least \
          {:.0} % is required)",
         found.nominal_mm,
         found.estimated_mm,
+        scale_clause(found) + &beyond_noise_clause(found),
         100.0 * MIN_PROBABILITY
     )
+}
+
+/// What an unstated scale error of the sensor makes of the expected error, where that is most of it.
+fn scale_clause(found: &Benefit) -> String {
+    if found.scale_stated || found.estimated_mm < ASSUMED * found.estimated_without_scale_mm {
+        return String::new();
+    }
+    format!(
+        " ({:.3} mm if the scale of the sensor is exact; that was not stated, --sensor-scale-sigma)",
+        found.estimated_without_scale_mm
+    )
+}
+
+/// Ratio of expected errors from which the assumption on the scale is stated.
+const ASSUMED: f64 = 1.5;
+
+/// What the model leaves beyond the noise, where that counts beside the uncertainty of its parameters.
+fn beyond_noise_clause(found: &Benefit) -> String {
+    match found.beyond_noise {
+        Some(BeyondNoise::Known(mm)) if mm > 0.5 * found.estimated_mm => {
+            format!(
+                ", {mm:.3} mm of it from effects that the model does not contain, as the readings show beyond their noise"
+            )
+        }
+        Some(BeyondNoise::AtMost(mm)) if mm > found.estimated_mm => format!(
+            ", or up to {:.3} mm if what the readings still deviate is the arm's and not noise, which repeated poses would tell",
+            mm.hypot(found.estimated_mm)
+        ),
+        _ => String::new(),
+    }
 }
 
 fn percent(scale: &ScaleError) -> String {
@@ -238,11 +270,12 @@ fn scale_sentence(scale: &ScaleError, sensor: Sensor) -> String {
 fn remedy(sensor: Sensor) -> &'static str {
     match sensor {
         Sensor::Cable => {
-            "check millimetres per count of the draw-wire, measure a known length with it, correct the readings and identify again"
+            "check millimetres per count of the draw-wire and measure a known length with it; correct the readings, or state how well the length \
+             was met (--sensor-scale-sigma), and identify again"
         }
         Sensor::Position | Sensor::Pose => {
-            "check unit, scale and atmosphere of the tracker, measure a known length (a scale bar) with it, correct the readings \
-             and identify again"
+            "check unit, scale and atmosphere of the tracker and measure a known length (a scale bar) with it; correct the readings, or state how \
+             well the length was met (--sensor-scale-sigma), and identify again"
         }
     }
 }

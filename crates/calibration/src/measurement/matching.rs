@@ -7,7 +7,10 @@ use super::convention::AngleConvention;
 use super::copies::without_copies;
 use super::dataset::Dataset;
 use super::measuring_order::in_order_of_measuring;
-use super::plausibility::{ComparedReading, UnitSuspicion, implausible_time, plausibility};
+use super::plausibility::{
+    ComparedReading, UnitSuspicion, implausible_temperature, implausible_time, plausibility,
+};
+use super::reach::without_impossible_readings;
 use truegrind_arm::model::Model;
 
 /// Why a measurement file does not match an arm.
@@ -17,6 +20,9 @@ pub enum Mismatch {
     /// Another interpretation of the file's units fits the arm far better than the stated one.
     #[error("{0}")]
     Units(Box<UnitSuspicion>),
+    /// The clock or the thermometer is in another unit.
+    #[error("{0}")]
+    Condition(String),
     /// DH angles of an arm whose joint map is singular.
     #[error("{robot}: its joint map cannot be inverted, so DH angles cannot be read")]
     JointMap {
@@ -26,7 +32,7 @@ pub enum Mismatch {
 }
 
 /// The rows with the controller's angles, in the order of measuring and without copies. `convention` states what the file's angles are;
-/// `allow_odd_units` skips the check of units. An implausible read-out of the controller or clock is only noted, since no fit needs it.
+/// `allow_odd_units` skips the check of units. An implausible read-out of the controller is only noted, since no fit needs it.
 ///
 /// # Errors
 /// [`Mismatch`].
@@ -38,15 +44,16 @@ pub fn match_to_arm(
     allow_odd_units: bool,
 ) -> Result<Dataset, Mismatch> {
     if !allow_odd_units {
+        if let Some(why) = implausible_time(&dataset).or_else(|| implausible_temperature(&dataset)) {
+            return Err(Mismatch::Condition(why));
+        }
+        without_impossible_readings(&mut dataset, nominal);
         for suspicion in plausibility(&dataset, nominal, convention) {
             match suspicion.compared {
                 ComparedReading::Sensor => return Err(Mismatch::Units(Box::new(suspicion))),
                 ComparedReading::Readout => dataset.notes.push(suspicion.to_string()),
             }
         }
-    }
-    if !allow_odd_units {
-        dataset.notes.extend(implausible_time(&dataset));
     }
     let dataset = in_order_of_measuring(without_copies(dataset));
     convention.apply(dataset, nominal).ok_or_else(|| Mismatch::JointMap { robot: robot.to_owned() })

@@ -286,18 +286,39 @@ fn interpretation_error(
     if count == 0 { None } else { of((square / count as f64).sqrt()) }
 }
 
-/// Median time between rows above which column `t` is probably not in hours (h).
+/// Median time between rows above which column `t` is not in hours (h).
 const LONG_INTERVAL_H: f64 = 1.0;
 
-/// A note on a clock that is probably in another unit than hours; `None` for a plausible one.
+/// Why column `t` is probably in another unit than hours; `None` for a plausible clock.
 pub fn implausible_time(data: &Dataset) -> Option<String> {
     let mut times: Vec<f64> = data.rows.iter().filter_map(|row| row.condition.time_h).collect();
     times.sort_by(f64::total_cmp);
     let intervals: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let usual = median(&intervals).filter(|hours| *hours > LONG_INTERVAL_H)?;
     Some(format!(
-        "column t is in hours, so half of the rows were measured more than {usual:.1} h apart; if it is in seconds, divide it by 3600, and if it \
-         is in minutes, by 60"
+        "{}: column t is in hours, so half of the rows were measured more than {usual:.1} h after the one before: if it is in seconds, divide \
+         it by 3600, and if it is in minutes, by 60",
+        data.file
+    ))
+}
+
+/// Warmest plausible arm [°C].
+const WARMEST_C: f64 = 60.0;
+/// Mean above which a temperature is not in °F either.
+const HOTTEST_F: f64 = 140.0;
+
+/// Why column `temperature` is probably in another unit than °C; `None` for a plausible one.
+pub fn implausible_temperature(data: &Dataset) -> Option<String> {
+    let known: Vec<f64> = data.rows.iter().filter_map(|row| row.condition.temperature_c).collect();
+    let usual = median(&known).filter(|temperature| *temperature > WARMEST_C)?;
+    let likely = if usual > HOTTEST_F {
+        "kelvin: subtract 273.15"
+    } else {
+        "degrees Fahrenheit: subtract 32 and divide by 1.8"
+    };
+    Some(format!(
+        "{}: the arm is at {usual:.1} °C in half of the rows: column temperature looks like {likely}",
+        data.file
     ))
 }
 

@@ -339,6 +339,16 @@ pub struct NoiseFloor {
     pub freedom: usize,
 }
 
+/// Fewest degrees of freedom of a known noise floor: of one repeated pose the scatter is right to a factor of ten or so.
+const FEWEST_FREEDOM: usize = 4;
+
+impl NoiseFloor {
+    /// Whether enough poses were repeated for the scatter to be that of the sensor.
+    pub fn is_known(&self) -> bool {
+        self.freedom >= FEWEST_FREEDOM
+    }
+}
+
 /// The noise floor from repeated poses: √(Σ |r − r̄|² / Σ (n − 1)) over poses with the same outlet and approach.
 /// `None` where no pose was repeated. Drift between the repetitions counts as noise. Copied rows show no noise: readings equal
 /// to the last digit count once if the others scatter too widely for that to be chance, or if there are no others.

@@ -26,9 +26,9 @@ pub enum TrackError {
     Placing(#[from] StartError),
     /// The first poses do not fit the model.
     #[error(
-        "{file}: the residual of the first {poses} poses is {left_mm:.3} mm under this model, whose held-out error was \
-         {held_out_mm:.3} mm: the arm has changed since, or these are not its measurements; identify it again, or start \
-         anyway with --sigma {left_mm:.3}"
+        "{file}: under this model the first {poses} poses leave {left_mm:.3} mm RMS along each axis, where its held-out error was \
+         {held_out_mm:.3} mm along each: {}",
+        what_to_do(*left_mm)
     )]
     Foreign {
         /// File.
@@ -84,4 +84,16 @@ pub enum StateError {
         /// Expected values.
         expected: &'static str,
     },
+}
+
+/// Error along each axis above which readings are of another arm (mm).
+const OTHER_ARM_MM: f64 = 25.0;
+
+fn what_to_do(left_mm: f64) -> String {
+    if left_mm > OTHER_ARM_MM {
+        return "these are not measurements of this arm, or their units or columns are wrong".to_owned();
+    }
+    format!(
+        "the arm has changed since, or these are not its measurements; identify it again, or start anyway with --sigma {left_mm:.3}"
+    )
 }

@@ -181,14 +181,15 @@ impl Tracker {
             sigma: together.covariance[(a, a)].max(0.0).sqrt(),
         };
         alarm.parts = group.members.iter().enumerate().map(part).collect();
-        (alarm.shift, alarm.sigma) = self.mean_displacement(group, together);
+        (alarm.shift, alarm.sigma) = self.displacement(group, together);
         (alarm.parameter, alarm.unit, alarm.course) = (group.name.clone(), "mm".to_owned(), Course::Jump);
         alarm.alternatives.clear();
     }
 
-    /// Mean displacement of the changed poses' readings (mm), and its standard deviation. The displacement of a frame's origin
-    /// would be meaningless: the frame can rotate far from the measured points.
-    fn mean_displacement(&self, group: &Group, together: &GroupChange) -> (f64, f64) {
+    /// RMS displacement of the changed poses' readings (mm), and its standard deviation. The displacement of a frame's origin would be
+    /// meaningless: the frame can rotate far from the measured points. A mean would be too small: what moves on the flange moves each
+    /// reading in another direction.
+    fn displacement(&self, group: &Group, together: &GroupChange) -> (f64, f64) {
         let poses = &self.state.history;
         let (per, p) = (self.state.sensor.scalars(), self.parameters.len());
         let rows = poses.len() * per;
@@ -197,14 +198,19 @@ impl Tracker {
         // Position rows only; a pose has three more.
         let axes = per.min(3);
         let changed = (poses.len() - together.since).max(1) as f64;
-        let mean = DMatrix::from_fn(axes, group.members.len(), |axis, a| {
-            let column = &j[group.members[a].0 * rows..][..rows];
-            let of = |pose: usize| column[pose * per + axis] / poses[pose].per_mm;
-            (together.since..poses.len()).map(of).sum::<f64>() / changed
-        });
-        let displacement = &mean * DVector::from_column_slice(&together.shifts);
-        let length = displacement.norm();
-        let along = mean.tr_mul(&(displacement / length.max(f64::MIN_POSITIVE)));
+        let members = group.members.len();
+        let mut square = DMatrix::<f64>::zeros(members, members);
+        for pose in together.since..poses.len() {
+            let of = |axis: usize, a: usize| {
+                j[group.members[a].0 * rows..][pose * per + axis] / poses[pose].per_mm
+            };
+            let moved = DMatrix::from_fn(axes, members, of);
+            square += moved.tr_mul(&moved) / changed;
+        }
+        let shifts = DVector::from_column_slice(&together.shifts);
+        let along = &square * &shifts;
+        let length = shifts.dot(&along).max(0.0).sqrt();
+        let along = along / length.max(f64::MIN_POSITIVE);
         (length, (&together.covariance * &along).dot(&along).max(0.0).sqrt())
     }
 

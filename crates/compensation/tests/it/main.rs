@@ -79,6 +79,7 @@ fn estimated(model: Model, joints: &[Joints]) -> Estimated {
         registered: zero,
         geometry: zero,
         noise_floor_mm: None,
+        beyond_noise_mm: None,
         verdict: Verdict { status: Judgement::NotEvaluated, reasons: Vec::new() },
         region: Region::of(joints, 1.0),
         condition: Condition::default(),

@@ -7,6 +7,7 @@ use crate::table::{Column, Table};
 use truegrind_calibration::diagnosis::cause_kind::CauseKind;
 use truegrind_calibration::diagnosis::decision::DIAGNOSIS_FILE;
 use truegrind_calibration::diagnosis::finding::{Confidence, Diagnosis, Finding};
+use truegrind_calibration::measurement::dataset::Sensor;
 
 /// How many causes were found, and what they gain.
 pub(super) fn verdict(diagnosis: &Diagnosis) -> Verdict {
@@ -67,9 +68,7 @@ fn too_much_for_noise(diagnosis: &Diagnosis) -> Vec<String> {
              outside the catalogue or in the measurement",
             diagnosis.fits.extended.cv_rmse_mm
         ),
-        "what to check: whether the tracker read in both faces, whether two targets or nests were read in turn, whether the rows come \
-         from sessions with different sensor frames, and the sensor itself against a known length"
-            .to_owned(),
+        format!("what to check: {}", what_to_check(diagnosis.dataset.sensor)),
     ];
     if !diagnosis.is_noise_measured() {
         out.push(
@@ -78,6 +77,20 @@ fn too_much_for_noise(diagnosis: &Diagnosis) -> Vec<String> {
         );
     }
     out
+}
+
+/// What leaves large errors that no cause of the catalogue explains.
+fn what_to_check(sensor: Sensor) -> &'static str {
+    match sensor {
+        Sensor::Cable => {
+            "whether the cable runs free and its hook does not slip, whether it was wound in layers or over a pulley, whether the rows come \
+             from sessions with the outlet at different places, and the sensor itself against a known length"
+        }
+        Sensor::Position | Sensor::Pose => {
+            "whether the tracker read in both faces, whether two targets or nests were read in turn, whether the rows come from sessions with \
+             different sensor frames, and the sensor itself against a known length"
+        }
+    }
 }
 
 fn be(count: usize) -> &'static str {

@@ -188,15 +188,7 @@ pub fn sensor_shifts(
             // A reading that is too long is a sensor that stands back.
             let turn = frames.base_from_sensor.rotation;
             let [x, y, z]: [f64; 3] = (turn.inverse() * away).into();
-            [
-                [2.0 * x / 3.0, -y / 3.0, -z / 3.0],
-                [-x / 3.0, 2.0 * y / 3.0, -z / 3.0],
-                [y, x, 0.0],
-                [0.0, z, y],
-                [z, 0.0, x],
-            ]
-            .map(|longer| -(turn * Vector3::from(longer)))
-            .to_vec()
+            [[2.0 * x, -y, -z], [-x, 2.0 * y, -z]].map(|longer| turn * Vector3::from(longer) / -3.0).to_vec()
         }),
         EmpiricalFault::TargetNest { second } => shift_columns(&|row, away| {
             let turn = posed.forward(&row.joints).rotation * frames.flange_from_target.rotation;

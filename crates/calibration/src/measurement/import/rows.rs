@@ -189,9 +189,16 @@ impl Reader<'_> {
         const EXPECTED: &str = "a finite number";
         match line.cells.get(column) {
             Some(Cell::Number { value, .. }) if value.is_finite() => Ok(*value),
+            Some(Cell::Text(text)) if text.contains(':') => {
+                let remedy = "t is the time since the start in hours: write 0.0033 for 12 s";
+                Err(self.wrong(line, column, EXPECTED, remedy))
+            }
             Some(Cell::Text(text)) if text.contains(',') => {
-                let remedy =
-                    "write it with a decimal point (a decimal comma needs columns separated by semicolons)";
+                let remedy = if self.sheet.is_some() {
+                    "this cell holds text: turn it into a number"
+                } else {
+                    "write it with a decimal point (a decimal comma needs columns separated by semicolons)"
+                };
                 Err(self.wrong(line, column, EXPECTED, remedy))
             }
             _ => Err(self.wrong(line, column, EXPECTED, "correct the cell, or delete the row")),

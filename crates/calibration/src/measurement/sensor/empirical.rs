@@ -86,9 +86,9 @@ pub enum EmpiricalFault {
         /// The longer distance (mm).
         to_mm: u32,
     },
-    /// Axes of a sensor of positions that are not alike: of different scales, or not perpendicular. A camera measures depth otherwise than
-    /// across, a measuring machine each axis by its own scale. The reading is (1 + S) times the position in the sensor's frame, with a
-    /// symmetric S without trace: a common scale is a fault of its own, a rotation belongs to the frame.
+    /// Axes of a sensor of positions whose scales differ. A camera measures depth otherwise than across, a measuring machine each axis by
+    /// its own scale. The reading is (1 + S) times the position in the sensor's frame, with a diagonal S without trace: a common scale is a
+    /// fault of its own. Axes that are not perpendicular are left out: such a shear imitates errors of the arm that bend its space.
     SensorAxes,
     /// A target whose apparent centre depends on the viewing direction: first or second degree in that direction.
     TargetNest {
@@ -180,9 +180,7 @@ impl EmpiricalFault {
             EmpiricalFault::Pulley => listed(&["xy", "yz", "zx", "x² − y²", "3z² − 1"], "mm"),
             EmpiricalFault::Drum { .. } => listed(&["square of the length", "cube of the length"], "mm"),
             EmpiricalFault::Range { .. } => listed(&["constant", "square of the distance"], "mm"),
-            EmpiricalFault::SensorAxes => {
-                listed(&["scale of x over z", "scale of y over z", "shear xy", "shear yz", "shear zx"], "1")
-            }
+            EmpiricalFault::SensorAxes => listed(&["scale of x over z", "scale of y over z"], "1"),
             EmpiricalFault::TargetNest { second: false } => listed(&FIRST, "mm"),
             EmpiricalFault::TargetNest { second: true } => {
                 let products = ["xy", "yz", "zx", "x² − y²", "3z² − 1"];

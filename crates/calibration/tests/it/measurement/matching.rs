@@ -101,14 +101,44 @@ fn rows_of_mixed_sessions_are_brought_together() {
     assert_eq!(numbers(&matched(continued)), [0, 1, 2, 3, 4, 5]);
 }
 
-#[test]
-fn a_clock_in_seconds_is_noticed() {
+fn refused(rows: Vec<Row>) -> Option<String> {
     let nominal = truegrind_arm::robots::load("abb-irb-120").unwrap().model;
-    let of = |seconds: f64| {
-        let rows = timed(rows(5), |i| i as f64 * seconds);
-        let dataset = Dataset::new("rows.csv", Sensor::Position, rows);
-        match_to_arm(dataset, "abb-irb-120", &nominal, AngleConvention::Logged, false).unwrap().notes
+    let dataset = Dataset::new("rows.csv", Sensor::Position, rows);
+    match_to_arm(dataset, "abb-irb-120", &nominal, AngleConvention::Logged, false)
+        .err()
+        .map(|error| error.to_string())
+}
+
+#[test]
+fn a_clock_in_seconds_is_refused() {
+    let of = |seconds: f64| refused(timed(rows(5), |i| i as f64 * seconds));
+    assert!(of(20.0).is_some_and(|why| why.contains("divide it by 3600")));
+    assert_eq!(of(20.0 / 3600.0), None);
+}
+
+#[test]
+fn kelvin_and_fahrenheit_are_refused() {
+    let of = |temperature: f64| {
+        let mut rows = rows(5);
+        rows.iter_mut().for_each(|row| Arc::make_mut(&mut row.condition).temperature_c = Some(temperature));
+        refused(rows)
     };
-    assert!(of(20.0).iter().any(|note| note.contains("divide it by 3600")), "{:?}", of(20.0));
-    assert!(of(20.0 / 3600.0).iter().all(|note| !note.contains("divide")));
+    assert!(of(294.2).is_some_and(|why| why.contains("273.15")));
+    assert!(of(70.5).is_some_and(|why| why.contains("Fahrenheit")));
+    assert_eq!(of(21.3), None);
+}
+
+#[test]
+fn a_reading_beyond_all_reach_is_left_out() {
+    let nominal = truegrind_arm::robots::load("abb-irb-120").unwrap().model;
+    let of = |rows: Vec<Row>| {
+        let dataset = Dataset::new("rows.csv", Sensor::Position, rows);
+        match_to_arm(dataset, "abb-irb-120", &nominal, AngleConvention::Logged, false).unwrap()
+    };
+    let mut wrong = rows(20);
+    wrong[7].reading = Reading::Position(Vector3::new(1007.0, 65535.0, 0.0));
+    let found = of(wrong);
+    assert_eq!(found.rows.len(), 19);
+    assert!(found.notes[0].starts_with("row 7 left out"), "{:?}", found.notes);
+    assert_eq!(of(rows(20)).rows.len(), 20);
 }

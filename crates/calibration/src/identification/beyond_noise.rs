@@ -1,0 +1,59 @@
+//! The error that a model leaves beyond the noise of the sensor: effects of arm or sensor that it does not contain. The uncertainty of its
+//! parameters says nothing of it, but programs will have it.
+
+use serde::Serialize;
+
+use crate::measurement::dataset::Sensor;
+use crate::measurement::split::NoiseFloor;
+use truegrind_arm::estimated::StageErrors;
+use truegrind_math::distribution::chi_square_quantile;
+
+/// Error of a position (mm RMS) that a model leaves.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum BeyondNoise {
+    /// Beyond the scatter of repeated poses; 0 where that explains it.
+    Known(f64),
+    /// No poses were repeated, so all that is left may be noise, or all of it the arm's.
+    AtMost(f64),
+}
+
+/// Probability with which the noise is below what repeated poses say of it at most.
+const CERTAIN: f64 = 0.99;
+
+impl BeyondNoise {
+    /// From the errors of a model and the scatter of repeated poses.
+    ///
+    /// A cable sees one coordinate of the error, taken as alike in all three. Of few rows the held-out error is large because the
+    /// parameters are uncertain, which is stated elsewhere: the smaller of held-out and fitted error counts.
+    pub fn of(errors: &StageErrors, sensor: Sensor, repeats: Option<&NoiseFloor>) -> Self {
+        let coordinates: usize = if sensor == Sensor::Cable { 1 } else { 3 };
+        let seen_mm = errors.held_out.rmse.min(errors.fitted.rmse);
+        let of_position = (3.0 / coordinates as f64).sqrt();
+        let Some(floor) = repeats else { return Self::AtMost(of_position * seen_mm) };
+        let freedom = coordinates * floor.freedom;
+        let noise_mm = floor.sigma_mm * (freedom as f64 / chi_square_quantile(CERTAIN, freedom)).sqrt();
+        Self::Known(if seen_mm > noise_mm {
+            of_position * (seen_mm.powi(2) - floor.sigma_mm.powi(2)).max(0.0).sqrt()
+        } else {
+            0.0
+        })
+    }
+
+    /// At least a scatter of the arm (mm), which is seen without repeated poses too.
+    pub fn or_scatter(self, scatter_mm: f64) -> Self {
+        match self {
+            Self::Known(mm) => Self::Known(mm.max(scatter_mm)),
+            Self::AtMost(_) if scatter_mm > 0.0 => Self::Known(scatter_mm),
+            Self::AtMost(_) => self,
+        }
+    }
+
+    /// The error beyond the noise (mm), if that is known.
+    pub fn known_mm(self) -> Option<f64> {
+        match self {
+            Self::Known(mm) => Some(mm),
+            Self::AtMost(_) => None,
+        }
+    }
+}
