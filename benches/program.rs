@@ -63,6 +63,7 @@ use truegrind::compensation::options::Options;
 use truegrind::compensation::plan::planner::plan;
 use truegrind::math::statistics::ErrorSummary;
 use truegrind::planning::toolpath::toolpath;
+use truegrind::programs::few::Few;
 use truegrind::programs::motion::MotionKind;
 use truegrind::programs::rapid::Task;
 use truegrind::programs::rapid::lexer::lex;
@@ -106,7 +107,7 @@ fn moved(task: &Task<'_>) -> Rewritten {
                 quaternion: [w + 0.001, x, y, z],
                 conf: Some(target.conf),
             };
-            Some(Change { motion, targets: vec![new], before: Vec::new() })
+            Some(Change { motion, targets: Few::one(new), before: Vec::new() })
         })
         .collect();
     task.rewrite(&changes, &RewriteOptions::default()).expect("edits do not overlap")

@@ -33,7 +33,7 @@ pub enum Cuts {
 pub(crate) struct CutsOf {
     /// By motion; `None` outside cuts.
     of: Vec<Option<u32>>,
-    /// Consecutive motions of one cut: the second starts where the first ends.
+    /// Consecutive motions of one cut: the second starts where the first ends. Only for [`Cuts::Partial`].
     runs_into: Vec<(u32, u32)>,
 }
 
@@ -45,7 +45,7 @@ impl CutsOf {
 }
 
 /// The cuts of a listing.
-pub(crate) fn of(listing: &Listing) -> CutsOf {
+pub(crate) fn of(listing: &Listing, treatment: Cuts) -> CutsOf {
     let motions = &listing.motions;
     let may_cut: Vec<bool> = motions.iter().map(may_cut).collect();
     let mut root: Vec<u32> = (0..motions.len() as u32).collect();
@@ -61,7 +61,9 @@ pub(crate) fn of(listing: &Listing) -> CutsOf {
             && may_cut[index as usize]
             && goes_on(&motions[start as usize], motion, listing)
         {
-            runs_into.push((start, index));
+            if treatment == Cuts::Partial {
+                runs_into.push((start, index));
+            }
             let (a, b) = (find(&mut root, start), find(&mut root, index));
             root[a.max(b) as usize] = a.min(b);
         }

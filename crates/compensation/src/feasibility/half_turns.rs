@@ -21,7 +21,7 @@ const LARGE_TURN: f64 = 0.174;
 /// `unchanged_motions`: motions that remain unmodified.
 pub(crate) fn half_turns(
     listing: &Listing,
-    solved: &SolvedTargets,
+    solved: &SolvedTargets<'_>,
     options: &Options,
     unchanged_motions: &BTreeMap<u32, OutcomeReason>,
 ) -> BTreeMap<u32, OutcomeReason> {
@@ -36,7 +36,8 @@ pub(crate) fn half_turns(
             [previous, index].map(|end| solved.of(end as usize).last().and_then(|to| to.as_ref().ok()));
         if let [Some(from), Some(to)] = ends
             && from.frames_index == to.frames_index
-            && from.intended.rotation.coords.dot(&to.intended.rotation.coords).abs() > LARGE_TURN
+            && from.intended.pose().rotation.coords.dot(&to.intended.pose().rotation.coords).abs()
+                > LARGE_TURN
         {
             continue;
         }
@@ -51,7 +52,7 @@ pub(crate) fn half_turns(
             Some(end) if corrected[k] => end.commanded.rotation,
             _ => *original,
         };
-        let intended = [from.intended.rotation, to.intended.rotation];
+        let intended = [from.intended.pose().rotation, to.intended.pose().rotation];
         let written = [commanded(0, &intended[0]), commanded(1, &intended[1])];
         if corrected.contains(&true) && turns_the_other_way(&intended, &written) {
             let ends = [previous, index].into_iter().zip(corrected).filter(|(_, corrected)| *corrected);

@@ -13,6 +13,7 @@ use crate::search_budget;
 use truegrind_arm::inverse::Inverse;
 use truegrind_arm::inverse::budget::{SearchBudget, with_budget};
 use truegrind_arm::model::Joints;
+use truegrind_math::option_f64::OptionF64;
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{Listing, Motion, Reason, RobTarget, Switch, TargetValue, WorkObjectValue};
 
@@ -119,7 +120,7 @@ impl FrameTable {
         for motion in &listing.motions {
             let values = motion.targets.iter().filter_map(|target| target.value.as_ref().ok());
             for target in values.filter_map(TargetValue::cartesian) {
-                if target.external == [None; 6] {
+                if target.external == [OptionF64::NONE; 6] {
                     continue;
                 }
                 let far = self.of_motion(motion).is_ok_and(|frames_index| {
@@ -127,8 +128,8 @@ impl FrameTable {
                     !(flange.translation.vector.norm() <= longest)
                 });
                 for (axis, value) in target.external.iter().enumerate() {
-                    let Some(value) = value else { continue };
-                    moves[axis] |= *first[axis].get_or_insert(*value) != *value;
+                    let Some(value) = value.get() else { continue };
+                    moves[axis] |= *first[axis].get_or_insert(value) != value;
                     self.base[axis] |= far && cell.carries(axis).is_none();
                 }
             }

@@ -293,17 +293,9 @@ impl<'a, 's> ListingBuilder<'a, 's> {
             let Literal { motion, target, role, file, call, node, joints } = literal;
             let mut found = read
                 .take(file, call, node, joints)
-                .unwrap_or_else(|| vec![literals::target(&evaluator, file, node, joints)]);
-            found.iter_mut().for_each(|target| target.role = role);
-            let targets = &mut self.listing.motions[motion as usize].targets;
-            if targets.is_empty() {
-                *targets = found;
-            } else {
-                // Of a hundred thousand motions none needs spare capacity.
-                targets.reserve_exact(1);
-                let target = target as usize;
-                targets.splice(target..target, found);
-            }
+                .unwrap_or_else(|| literals::target(&evaluator, file, node, joints));
+            found.role = role;
+            self.listing.motions[motion as usize].targets.insert(target as usize, found);
         }
     }
 }

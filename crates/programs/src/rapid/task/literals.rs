@@ -28,8 +28,8 @@ pub(super) struct Literals {
 struct Read {
     node: u32,
     joints: bool,
-    /// One target, as the list that a motion takes over: a million of them are not copied.
-    target: Vec<MotionTarget>,
+    /// Until the motion takes it.
+    target: Option<MotionTarget>,
 }
 
 impl Literals {
@@ -43,20 +43,13 @@ impl Literals {
     }
 
     /// The target of the literal at `node` in the call at `call`; `None` where it was not read or has been taken.
-    pub(super) fn take(
-        &mut self,
-        file: u32,
-        call: u32,
-        node: u32,
-        joints: bool,
-    ) -> Option<Vec<MotionTarget>> {
+    pub(super) fn take(&mut self, file: u32, call: u32, node: u32, joints: bool) -> Option<MotionTarget> {
         let portion = self.read.get_mut(file as usize)?.get_mut((call / PORTION) as usize)?;
         let next =
             [self.last + 1, 0].into_iter().find(|at| portion.get(*at).is_some_and(|read| read.node == node));
         let at = next.or_else(|| portion.binary_search_by_key(&node, |read| read.node).ok())?;
         self.last = at;
-        let read = Some(&mut portion[at]).filter(|read| read.joints == joints)?;
-        Some(std::mem::take(&mut read.target)).filter(|target| !target.is_empty())
+        Some(&mut portion[at]).filter(|read| read.joints == joints)?.target.take()
     }
 }
 
@@ -75,7 +68,7 @@ fn read(trees: &[RapidTree<'_>], symbols: &Symbols, file: u32, portion: u32) -> 
         let joints = INSTRUCTIONS[known].takes_joints();
         for argument in arguments(tree, call).filter(|argument| !argument.optional) {
             if let Some(node) = argument.value.and_then(|value| plain(tree, value)) {
-                out.push(Read { node, joints, target: vec![target(&evaluator, file, node, joints)] });
+                out.push(Read { node, joints, target: Some(target(&evaluator, file, node, joints)) });
             }
         }
     }
