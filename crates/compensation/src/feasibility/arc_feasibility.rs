@@ -7,9 +7,12 @@
 
 use std::collections::BTreeMap;
 
+use rayon::prelude::*;
+
 use crate::frames::frame_table::FrameTable;
 use crate::options::{Options, is_rewritable};
 use crate::plan::reason::OutcomeReason;
+use crate::search_budget::MANY;
 use crate::segment::curve::{CLOSED_MM, Curve};
 use crate::segment::line::distance;
 use crate::target::solved_target::{SolvedTarget, SolvedTargets};
@@ -45,14 +48,15 @@ pub(crate) fn infeasible_arcs(
     options: &Options,
     unchanged_motions: &BTreeMap<u32, OutcomeReason>,
 ) -> BTreeMap<u32, OutcomeReason> {
-    let mut infeasible_arcs = circles(listing, solved, frame_table, options, unchanged_motions);
+    let circular = circular(listing);
+    let mut infeasible_arcs = circles(&circular, listing, solved, frame_table, options, unchanged_motions);
     let corrected = |index: u32, infeasible_arcs: &BTreeMap<u32, OutcomeReason>| {
         is_corrected(index, listing, solved, options, unchanged_motions)
             && !infeasible_arcs.contains_key(&index)
     };
-    for (index, motion) in (0_u32..).zip(&listing.motions) {
-        if motion.kind == MotionKind::Circular
-            && let Some(previous) = motion.previous
+    for index in circular {
+        let motion = &listing.motions[index as usize];
+        if let Some(previous) = motion.previous
             && corrected(previous, &infeasible_arcs)
             && !corrected(index, &infeasible_arcs)
             && let Some(Ok(start)) = solved.of(previous as usize).last()
@@ -63,6 +67,12 @@ pub(crate) fn infeasible_arcs(
         }
     }
     infeasible_arcs
+}
+
+/// The circular motions, by index: few of many.
+fn circular(listing: &Listing) -> Vec<u32> {
+    let motions = listing.motions.par_iter().with_min_len(MANY).enumerate();
+    motions.filter(|(_, motion)| motion.kind == MotionKind::Circular).map(|(index, _)| index as u32).collect()
 }
 
 /// Whether a motion is corrected, as far as is known.
@@ -87,6 +97,7 @@ fn all_corrected(targets: &[Result<SolvedTarget<'_>, OutcomeReason>]) -> bool {
 
 /// The arcs themselves that must remain unmodified.
 fn circles(
+    circular: &[u32],
     listing: &Listing,
     solved: &SolvedTargets<'_>,
     frame_table: &FrameTable,
@@ -94,11 +105,9 @@ fn circles(
     unchanged_motions: &BTreeMap<u32, OutcomeReason>,
 ) -> BTreeMap<u32, OutcomeReason> {
     let mut infeasible_arcs = BTreeMap::new();
-    for (index, motion) in (0_u32..).zip(&listing.motions) {
-        if motion.kind != MotionKind::Circular
-            || !is_rewritable(motion, options)
-            || unchanged_motions.contains_key(&index)
-        {
+    for &index in circular {
+        let motion = &listing.motions[index as usize];
+        if !is_rewritable(motion, options) || unchanged_motions.contains_key(&index) {
             continue;
         }
         let ([Ok(via), Ok(to)], Some(previous)) = (solved.of(index as usize), motion.previous) else {

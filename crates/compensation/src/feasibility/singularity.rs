@@ -256,7 +256,12 @@ impl SegmentChecker<'_, '_> {
         let samples = self.samples(unchanged_motions.len());
         let mut found = false;
         let mut open = HashSet::new();
+        let quiet = self.quiet();
         for motion in 0..self.listing.motions.len() {
+            // Nearly every motion; where one was forbidden, its neighbours may no longer be quiet.
+            if quiet[motion] && stay.is_empty() {
+                continue;
+            }
             if self.leaves_branch_ambiguous(motion, &open) {
                 open.insert(motion);
                 if self.corrected(motion).is_some() && !self.unchanged.contains_key(&(motion as u32)) {
@@ -291,6 +296,18 @@ impl SegmentChecker<'_, '_> {
             }
         }
         found
+    }
+
+    /// For each motion, whether nothing can be wrong with it as long as every motion before it is corrected: its configuration is
+    /// checked, and it is corrected itself.
+    fn quiet(&self) -> Vec<bool> {
+        let motions = self.listing.motions.par_iter().with_min_len(search_budget::MANY).enumerate();
+        let quiet = |(index, motion): (usize, &Motion)| {
+            monitored(motion) == Switch::On
+                && self.corrected(index).is_some()
+                && !self.unchanged.contains_key(&(index as u32))
+        };
+        motions.map(quiet).collect()
     }
 
     /// Whether the program leaves open which of several solutions a motion reaches: no configuration is certainly checked

@@ -3,6 +3,8 @@
 use std::cell::LazyCell;
 use std::collections::{HashMap, HashSet};
 
+use rayon::prelude::*;
+
 use crate::arms::Arms;
 use crate::cell::{Carries, Cell};
 use crate::configuration::{configured, monitored, unstated};
@@ -117,7 +119,13 @@ impl FrameTable {
         let flange = arms.nominal.arm().model.flange.translation.vector.norm();
         let longest = flange + links.iter().map(|link| link.a_mm.abs() + link.d_mm.abs()).sum::<f64>();
         let (mut first, mut moves) = ([None; 6], [false; 6]);
-        for motion in &listing.motions {
+        let stated = |motion: &Motion| {
+            let mut values = motion.targets.iter().filter_map(|target| target.value.as_ref().ok());
+            values.any(|value| *value.external() != [OptionF64::NONE; 6])
+        };
+        // Hardly any program has external axes.
+        let any = listing.motions.par_iter().with_min_len(search_budget::MANY).any(stated);
+        for motion in listing.motions.iter().filter(|_| any) {
             let values = motion.targets.iter().filter_map(|target| target.value.as_ref().ok());
             for target in values.filter_map(TargetValue::cartesian) {
                 if target.external == [OptionF64::NONE; 6] {

@@ -387,8 +387,8 @@ impl<'a> Planner<'a> {
         if before.kind == MotionKind::Linear && motion.kind == MotionKind::Linear {
             // Nearly all lines continue almost straight; three points show that.
             let first = self.solved.of(before.previous? as usize).last()?.as_ref().ok()?;
-            let points =
-                [&first.intended.pose(), &point.intended, &to.intended].map(|pose| pose.translation.vector);
+            let [from, to] = [point, to].map(|end| end.intended.translation.vector);
+            let points = [first.intended.position_mm(), from, to];
             if !(cut_of_lines(&points, zone_mm) > CUT_MM) {
                 return None;
             }

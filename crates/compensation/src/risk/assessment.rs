@@ -19,6 +19,7 @@ use crate::risk::placement::{
 };
 use crate::risk::probability::probability_of_harm;
 use crate::risk::remedy_search::{self, UnknownPlacement};
+use crate::search_budget::MANY;
 use truegrind_arm::estimated::{CarriedFrame, Estimated, PosteriorComponent};
 use truegrind_programs::motion::Listing;
 
@@ -109,13 +110,16 @@ pub(crate) struct AssessmentSample {
 
 impl AssessmentSample {
     /// From those motions for which `reached` holds.
-    pub(crate) fn of(listing: &Listing, cuts: &CutsOf, reached: impl Fn(usize) -> bool) -> Self {
+    pub(crate) fn of(listing: &Listing, cuts: &CutsOf, reached: impl Fn(usize) -> bool + Sync) -> Self {
+        let motions = listing.motions.par_iter().with_min_len(MANY).enumerate();
+        let objects: Vec<Option<u32>> =
+            motions.map(|(index, motion)| motion.work_object.filter(|_| reached(index))).collect();
         let mut of_object: BTreeMap<u32, [Vec<u32>; 2]> = BTreeMap::new();
         let mut in_cuts: Vec<(u32, u32)> = Vec::with_capacity(listing.motions.len());
-        for (index, motion) in (0_u32..).zip(&listing.motions) {
+        for (index, object) in (0_u32..).zip(objects) {
             let cut = cuts.root(index);
             in_cuts.extend(cut.map(|root| (root, index)));
-            if let Some(object) = motion.work_object.filter(|_| reached(index as usize)) {
+            if let Some(object) = object {
                 of_object.entry(object).or_default()[usize::from(cut.is_none())].push(index);
             }
         }

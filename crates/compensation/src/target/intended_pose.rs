@@ -1,5 +1,7 @@
 //! The intended pose of a target in its work object.
 
+use nalgebra::Vector3;
+
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::RobTarget;
 
@@ -13,6 +15,14 @@ pub(crate) enum IntendedPose<'a> {
 }
 
 impl IntendedPose<'_> {
+    /// Its position (mm).
+    pub(crate) fn position_mm(&self) -> Vector3<f64> {
+        match self {
+            IntendedPose::Stated(target) => target.position_mm.into(),
+            IntendedPose::Computed(pose) => pose.translation.vector,
+        }
+    }
+
     /// The pose, with the quaternion normalised.
     pub(crate) fn pose(&self) -> Pose {
         match self {

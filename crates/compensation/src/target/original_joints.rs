@@ -84,14 +84,16 @@ pub(crate) struct OriginalProgram<'a> {
 
 impl<'a> OriginalProgram<'a> {
     pub(crate) fn of(listing: &'a Listing, arms: &Arms<'_>, frame_table: &FrameTable) -> Self {
-        let taken = |motion: &Motion| if motion.own_reason.is_none() { motion.targets.len() } else { 0 };
-        let ranges = TargetRanges::of(listing.motions.iter().map(taken));
+        let mut first: Vec<u32> = Vec::with_capacity(listing.motions.len() + 1);
         let mut target_refs: Vec<TargetRef<'_>> = Vec::with_capacity(listing.motions.len());
         for (index, motion) in (0..).zip(&listing.motions) {
+            first.push(target_refs.len() as u32);
             if motion.own_reason.is_none() {
                 target_refs.extend(motion.targets.iter().map(|target| TargetRef { index, motion, target }));
             }
         }
+        first.push(target_refs.len() as u32);
+        let ranges = TargetRanges::of(first);
         let originals = originals(listing, &ranges, &target_refs, arms, frame_table);
         Self { ranges, target_refs, originals }
     }

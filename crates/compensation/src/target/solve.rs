@@ -347,7 +347,7 @@ fn solve_portion<'t>(
     let real = |start: &OriginalTarget<'_>| &frame_table.list[start.frames_index].real;
     let condition_indices: Vec<usize> = reachable.iter().map(|w| w.condition_index).collect();
     let reached_after = conditions.forward(&condition_indices, &last);
-    let tools: Vec<Pose> = reachable.iter().map(|w| real(&w.start).flange_from_tool(&w.flange)).collect();
+    let tools: Vec<Pose> = reachable.iter().map(|w| real(w.start).flange_from_tool(&w.flange)).collect();
     let cut_of = |w: &ReachableTarget<'_, '_>| target_refs[w.index].index;
     let against = |w: &ReachableTarget<'_, '_>| {
         (
@@ -362,8 +362,8 @@ fn solve_portion<'t>(
             out[w.index] = Err(why);
             continue;
         }
-        let real = real(&w.start);
-        let intended = w.start.intended.pose();
+        let real = real(w.start);
+        let intended = w.intended;
         let reached = [w.reached_before, real.target_of(&reached_after[k])];
         let deviation = |reached: Pose| Deviation::between(&intended, &reached, &Pose::identity(), None);
         let play_uncertainty_mm = conditions.play_uncertainty_mm(w.condition_index, &w.after, &tools[k]);
@@ -419,7 +419,9 @@ fn reachable_targets<'o, 't>(
         .collect();
     let before: Vec<Joints> = open.iter().map(|(_, s)| s.joints).collect();
     let real = |start: &OriginalTarget<'_>| &frame_table.list[start.frames_index].real;
-    let flanges: Vec<Pose> = open.iter().map(|(_, s)| real(s).flange_for(&s.intended.pose())).collect();
+    let intended: Vec<Pose> = open.iter().map(|(_, s)| s.intended.pose()).collect();
+    let flanges: Vec<Pose> =
+        open.iter().zip(&intended).map(|((_, s), intended)| real(s).flange_for(intended)).collect();
     let [places_before, condition_indices] =
         condition_indices.map(|all| open.iter().map(|(k, _)| all[*k]).collect::<Vec<usize>>());
     let reached_before = conditions.forward(&places_before, &before);
@@ -435,6 +437,7 @@ fn reachable_targets<'o, 't>(
             Ok(solution) => reachable.push(ReachableTarget {
                 index: *index,
                 start,
+                intended: intended[k],
                 condition_index: condition_indices[k],
                 flange: flanges[k],
                 after: solution.joints,
@@ -544,6 +547,7 @@ fn stated<'a>(target_refs: &TargetRef<'a>) -> Option<&'a RobTarget> {
 struct ReachableTarget<'o, 't> {
     index: usize,
     start: &'o OriginalTarget<'t>,
+    intended: Pose,
     condition_index: usize,
     flange: Pose,
     after: Joints,

@@ -50,7 +50,7 @@ pub(crate) struct SolvedTarget<'a> {
 impl<'a> SolvedTarget<'a> {
     /// Distance of the commanded from the intended position (mm): the change of the program's numbers.
     pub(crate) fn shift_mm(&self) -> f64 {
-        (self.commanded.translation.vector - self.intended.pose().translation.vector).norm()
+        (self.commanded.translation.vector - self.intended.position_mm()).norm()
     }
 
     /// The target of the original program.

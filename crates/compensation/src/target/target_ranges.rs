@@ -11,15 +11,8 @@ pub(crate) struct TargetRanges {
 }
 
 impl TargetRanges {
-    /// From the number of targets of each motion.
-    pub(crate) fn of(counts: impl Iterator<Item = usize>) -> Self {
-        let mut total = 0;
-        let mut first: Vec<u32> = Vec::with_capacity(counts.size_hint().0 + 1);
-        first.push(0);
-        first.extend(counts.map(|count| {
-            total += count as u32;
-            total
-        }));
+    /// From the index of the first target of each motion, and the total count.
+    pub(crate) fn of(first: Vec<u32>) -> Self {
         Self { first: first.into() }
     }
 
