@@ -43,7 +43,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let done = compensate(&program, &arm, &Cell::default(), &CompensateOptions::default(), Some(mark))?;
     for (motion, outcome) in program.listing().motions.iter().zip(&done.plan.outcomes) {
         print!("line {}: {:?}", motion.place.line, outcome.status);
-        match (&outcome.reason, outcome.before_mm) {
+        match (&outcome.reason(), outcome.before_mm.get()) {
             (Some(why), _) => println!(", {why}"),
             (None, Some(before)) => println!(", {before:.3} mm before"),
             (None, None) => println!(),

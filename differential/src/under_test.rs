@@ -185,13 +185,13 @@ pub fn corrected_task(
                 Became::Refused => Status::Refused,
                 Became::Flagged => Status::Flagged,
             },
-            reason: outcome.reason.map(|why| why.to_string()),
-            after_mm: outcome.after_mm,
-            sigma_mm: outcome.sigma_mm,
-            bend_mm: outcome.path_deviation_mm,
+            reason: outcome.reason().map(|why| why.to_string()),
+            after_mm: outcome.after_mm.get(),
+            sigma_mm: outcome.sigma_mm.get(),
+            bend_mm: outcome.path_deviation_mm.get(),
             start_known: motion.previous.is_some(),
-            guessed: outcome.reason == Some(OutcomeReason::UnknownStart),
-            right: outcome.reason == Some(OutcomeReason::NoChange),
+            guessed: outcome.reason() == Some(OutcomeReason::UnknownStart),
+            right: outcome.reason() == Some(OutcomeReason::NoChange),
         });
     }
     Ok(out)

@@ -143,7 +143,13 @@ fn job(program: &Program<'_>, sources: &[&[u8]], cell: &Cell, arm: &Estimated) {
             }
         }
         let written = matches!(outcome.status, Status::Changed | Status::Flagged);
-        assert!(!written || [outcome.after_mm, outcome.sigma_mm].iter().flatten().all(|mm| mm.is_finite()));
+        assert!(
+            !written
+                || [outcome.after_mm, outcome.sigma_mm]
+                    .iter()
+                    .filter_map(|mm| mm.get())
+                    .all(|mm| mm.is_finite())
+        );
     }
     for (file, source) in done.rewritten.files.iter().zip(sources) {
         file.edits.apply(source).expect("edits are within the file");

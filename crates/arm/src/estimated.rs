@@ -163,6 +163,22 @@ pub struct RegisteredFrame {
     pub twists: Vec<Vector6<f64>>,
 }
 
+impl RegisteredFrame {
+    /// The frame with its twists borrowed.
+    pub fn carried(&self) -> CarriedFrame<'_> {
+        CarriedFrame { origin_mm: self.origin_mm, twists: &self.twists }
+    }
+}
+
+/// A [`RegisteredFrame`] whose twists are stored elsewhere, perhaps in one list with those of many others.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CarriedFrame<'a> {
+    /// See [`RegisteredFrame::origin_mm`].
+    pub origin_mm: Vector3<f64>,
+    /// See [`RegisteredFrame::twists`].
+    pub twists: &'a [Vector6<f64>],
+}
+
 /// A point on the flange whose predicted σ is computed.
 #[derive(Debug, Clone, Copy)]
 pub struct FlangePoint<'a> {
@@ -171,7 +187,7 @@ pub struct FlangePoint<'a> {
     /// The point on the flange: its translation counts.
     pub flange_from_tool: Pose,
     /// The registered frame relative to which σ is computed.
-    pub carried: Option<&'a RegisteredFrame>,
+    pub carried: Option<CarriedFrame<'a>>,
 }
 
 /// Eight points' numbers side by side.
@@ -329,7 +345,7 @@ impl Estimated {
         arm: &PreparedModel<'_>,
         q: &Joints,
         flange_from_tool: &Pose,
-        carried: Option<&RegisteredFrame>,
+        carried: Option<CarriedFrame<'_>>,
     ) -> f64 {
         let point = FlangePoint { joints: *q, flange_from_tool: *flange_from_tool, carried };
         self.position_sigmas_mm(arm, &[point])[0]
@@ -346,7 +362,7 @@ impl Estimated {
         &self,
         arm: &PreparedModel<'_>,
         points: &[FlangePoint<'_>],
-        others: &[Option<Option<&RegisteredFrame>>],
+        others: &[Option<Option<CarriedFrame<'_>>>],
     ) -> Vec<(f64, Option<f64>)> {
         let mut velocities = vec![[[0.0; WIDTH]; 3]; self.order.len()];
         let mut relative = velocities.clone();
@@ -446,13 +462,13 @@ impl Estimated {
 fn subtract_carried<'f>(
     at: &[Eight; 3],
     count: usize,
-    carried: impl Fn(usize) -> Option<&'f RegisteredFrame>,
+    carried: impl Fn(usize) -> Option<CarriedFrame<'f>>,
     velocities: &mut [[Eight; 3]],
 ) {
     for k in 0..count {
         let Some(carried) = carried(k) else { continue };
         let lever = Vector3::new(at[0][k], at[1][k], at[2][k]) - carried.origin_mm;
-        for (velocity, twist) in velocities.iter_mut().zip(&carried.twists) {
+        for (velocity, twist) in velocities.iter_mut().zip(carried.twists) {
             let moved = twist.fixed_rows::<3>(0) + twist.fixed_rows::<3>(3).cross(&lever);
             (0..3).for_each(|i| velocity[i][k] -= moved[i]);
         }

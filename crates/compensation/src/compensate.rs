@@ -141,7 +141,7 @@ fn agreed(
     reconcile(&mut planned, &rewritten, refused);
     let outcome = |motion: usize| {
         let outcome = &planned.outcomes[motion];
-        (outcome.status, outcome.reason, outcome.before_mm)
+        (outcome.status, outcome.reason(), outcome.before_mm.get())
     };
     planned.steps = StepsToLeft::of(program.listing(), &planned.changes, &outcome, options.tolerance_mm);
     planned.notes.extend(undeclared::notes(program.listing(), program.language()));
@@ -175,11 +175,11 @@ fn reconcile(planned: &mut Plan, rewritten: &Rewritten, refused: &BTreeMap<u32, 
         let row = &mut planned.outcomes[change.motion as usize];
         if *outcome == Outcome::Unchanged && row.status == Status::Changed {
             row.status = Status::Left;
-            row.reason = Some(OutcomeReason::NoChange);
+            row.reason = Some(Box::new(OutcomeReason::NoChange));
         }
         if let Some(reason) = refused.get(&change.motion) {
             row.status = Status::Refused;
-            row.reason = Some(*reason);
+            row.reason = Some(Box::new(*reason));
             row.after_mm = row.before_mm;
         }
     }

@@ -33,7 +33,7 @@ pub enum Cuts {
 pub(crate) struct CutsOf {
     /// By motion; `None` outside cuts.
     of: Vec<Option<u32>>,
-    /// Consecutive motions of one cut: the second starts where the first ends.
+    /// Consecutive motions of one cut: the second starts where the first ends. Only for [`Cuts::Partial`].
     runs_into: Vec<(u32, u32)>,
 }
 
@@ -45,26 +45,36 @@ impl CutsOf {
 }
 
 /// The cuts of a listing.
-pub(crate) fn of(listing: &Listing) -> CutsOf {
+pub(crate) fn of(listing: &Listing, treatment: Cuts) -> CutsOf {
     let motions = &listing.motions;
-    let may_cut: Vec<bool> = motions.iter().map(may_cut).collect();
+    let may_cut: Vec<bool> = motions.par_iter().with_min_len(MANY).map(may_cut).collect();
+    // The motion that each one goes on from, if they belong to one cut.
+    let starts: Vec<Option<u32>> = motions
+        .par_iter()
+        .with_min_len(MANY)
+        .enumerate()
+        .map(|(index, motion)| {
+            let stands_before = || {
+                let before = &motions[index.checked_sub(1)?];
+                let same_text = before.place.file == motion.place.file && before.routine == motion.routine;
+                same_text.then_some(index as u32 - 1)
+            };
+            let start = motion.previous.or_else(stands_before)?;
+            let one_cut = may_cut[start as usize]
+                && may_cut[index]
+                && goes_on(&motions[start as usize], motion, listing);
+            one_cut.then_some(start)
+        })
+        .collect();
     let mut root: Vec<u32> = (0..motions.len() as u32).collect();
     let mut runs_into = Vec::new();
-    for (index, motion) in (0_u32..).zip(motions) {
-        let stands_before = || {
-            let before = &motions[index.checked_sub(1)? as usize];
-            let same_text = before.place.file == motion.place.file && before.routine == motion.routine;
-            same_text.then_some(index - 1)
-        };
-        let Some(start) = motion.previous.or_else(stands_before) else { continue };
-        if may_cut[start as usize]
-            && may_cut[index as usize]
-            && goes_on(&motions[start as usize], motion, listing)
-        {
+    for (index, start) in (0_u32..).zip(starts) {
+        let Some(start) = start else { continue };
+        if treatment == Cuts::Partial {
             runs_into.push((start, index));
-            let (a, b) = (find(&mut root, start), find(&mut root, index));
-            root[a.max(b) as usize] = a.min(b);
         }
+        let (a, b) = (find(&mut root, start), find(&mut root, index));
+        root[a.max(b) as usize] = a.min(b);
     }
     let of = (0_u32..).zip(may_cut).map(|(index, may_cut)| may_cut.then(|| find(&mut root, index))).collect();
     CutsOf { of, runs_into }

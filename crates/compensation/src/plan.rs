@@ -13,43 +13,49 @@ use crate::plan::reason::OutcomeReason;
 use crate::plan::steps_to_left::StepsToLeft;
 use crate::risk::cut_risk::CutRisk;
 use crate::risk::placement::ObjectPlacement;
+use truegrind_math::option_f64::OptionF64;
 use truegrind_programs::rewrite::Change;
 
-/// Outcome of one motion; feeds the JSON contract and the table.
+/// Outcome of one motion; feeds the JSON contract and the table. Small, because a program may have a million motions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MotionOutcome {
     /// Index into the listing.
     pub motion: u32,
     /// Changed, flagged, refused or left.
     pub status: Status,
-    /// Reason for that status.
-    pub reason: Option<OutcomeReason>,
+    /// Reason for that status; most motions have none.
+    pub reason: Option<Box<OutcomeReason>>,
     /// Deviation of its end before and after (mm).
-    pub before_mm: Option<f64>,
+    pub before_mm: OptionF64,
     /// See `before_mm`; predicted.
-    pub after_mm: Option<f64>,
+    pub after_mm: OptionF64,
     /// Predicted standard deviation of the end position (mm).
-    pub sigma_mm: Option<f64>,
+    pub sigma_mm: OptionF64,
     /// Predicted standard deviation of the shape of its cut, after the best rigid registration (mm); absent outside cuts.
-    pub shape_sigma_mm: Option<f64>,
+    pub shape_sigma_mm: OptionF64,
     /// Largest deviation from the intended path on the segment to this end that remains (mm).
-    pub path_deviation_mm: Option<f64>,
+    pub path_deviation_mm: OptionF64,
     /// Targets inserted before it.
-    pub inserted: usize,
+    pub inserted: u32,
 }
 
 impl MotionOutcome {
+    /// Reason for its status.
+    pub fn reason(&self) -> Option<OutcomeReason> {
+        self.reason.as_deref().copied()
+    }
+
     /// A motion that nothing is computed for.
     pub(crate) fn left(motion: u32) -> Self {
         Self {
             motion,
             status: Status::Left,
             reason: None,
-            before_mm: None,
-            after_mm: None,
-            sigma_mm: None,
-            shape_sigma_mm: None,
-            path_deviation_mm: None,
+            before_mm: OptionF64::NONE,
+            after_mm: OptionF64::NONE,
+            sigma_mm: OptionF64::NONE,
+            shape_sigma_mm: OptionF64::NONE,
+            path_deviation_mm: OptionF64::NONE,
             inserted: 0,
         }
     }

@@ -126,6 +126,7 @@ pub fn verify(task: &VerificationTask<'_>, acting_arm: &ActingArm<'_>) -> PathRe
                 after: second.map(|s| deviation(&s.reached)),
                 sigma_mm: acting_arm.knowledge.map(|k| {
                     let (tool, carried) = (&first.flange_from_tool, first.carried.as_ref());
+                    let carried = carried.map(RegisteredFrame::carried);
                     let known =
                         k.position_sigma_mm(arms.conditions.arm(condition_index), &joints, tool, carried);
                     known.hypot(arms.conditions.play_uncertainty_mm(condition_index, &joints, tool))

@@ -11,4 +11,5 @@ pub mod tail;
 pub mod radial;
 pub mod rounding;
 pub mod spectral;
+pub mod option_f64;
 pub mod work;

@@ -9,6 +9,7 @@ use thiserror::Error;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::inverse::{Inverse, InverseError};
 use truegrind_arm::model::{Joints, Model};
+use truegrind_math::option_f64::OptionF64;
 use truegrind_math::se3::Pose;
 use truegrind_programs::draft::{Draft, Step, heading};
 use truegrind_programs::motion::{
@@ -201,7 +202,7 @@ fn draft(
                 position_mm: frame.position_mm,
                 quaternion: frame.quaternion,
                 conf: [conf.cf1, conf.cf4, conf.cf6, conf.cfx],
-                external: [None; 6],
+                external: [OptionF64::NONE; 6],
             };
             let cutting = point.kind == PointKind::Cut;
             let next = points.get(i + 1).map(|p| (p.kind, p.pass));

@@ -15,6 +15,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
 
+use crate::few::Few;
 pub use reason::{OpaqueReason, Reason};
 pub use target::{FARTHEST_MM, Frame, JointTarget, RobTarget, TargetValue};
 
@@ -290,7 +291,7 @@ pub struct Motion {
     /// The kind of path.
     pub kind: MotionKind,
     /// The targets in the order of the arguments (the circle point before the end).
-    pub targets: Vec<MotionTarget>,
+    pub targets: Few<MotionTarget>,
     /// Index into [`Listing::speeds`].
     pub speed: Option<u32>,
     /// Index into [`Listing::zones`].
@@ -311,7 +312,7 @@ pub struct Motion {
     pub rapid: bool,
     /// The axis of positive rotation of a circular motion, in the axes of its targets; `None` if only its three
     /// points determine it (RAPID).
-    pub axis: Option<[f64; 3]>,
+    pub axis: Option<Box<[f64; 3]>>,
     /// Whether a circular motion is programmed by its radius, so that the centre is ill-conditioned near half a turn.
     pub by_radius: bool,
     /// The modal state.
@@ -342,7 +343,7 @@ impl Motion {
             statement,
             instruction,
             kind,
-            targets: Vec::new(),
+            targets: Few::default(),
             speed: None,
             zone: None,
             tool: None,

@@ -5,7 +5,9 @@
 //! new value and nothing else reads it, and split otherwise. A computed target is replaced in its instruction.
 
 use crate::edit::Edits;
+use crate::few::Few;
 use crate::motion::{Mark, MotionKind, Reason};
+use truegrind_math::option_f64::OptionF64;
 
 /// A new value for one target.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -67,7 +69,7 @@ pub struct Extra {
     /// The target; `conf: None` takes that of the instruction.
     pub target: NewTarget,
     /// External axes; `None` takes those of the instruction.
-    pub external: Option<[Option<f64>; 6]>,
+    pub external: Option<[OptionF64; 6]>,
 }
 
 /// The change of one motion.
@@ -76,7 +78,7 @@ pub struct Change {
     /// Index into [`crate::motion::Listing::motions`].
     pub motion: u32,
     /// One per target of the motion, in the same order; empty keeps all.
-    pub targets: Vec<NewTarget>,
+    pub targets: Few<NewTarget>,
     /// Motions to insert before it, in the order of execution.
     pub before: Vec<Extra>,
 }

@@ -79,8 +79,8 @@ impl Row {
         let written = |motion_status: MotionStatus| {
             matches!(motion_status, MotionStatus::Changed | MotionStatus::Flagged)
         };
-        let before = plan.outcomes.iter().filter_map(|outcome| outcome.before_mm);
-        let after = plan.outcomes.iter().filter(|o| written(o.status)).filter_map(|o| o.after_mm);
+        let before = plan.outcomes.iter().filter_map(|outcome| outcome.before_mm.get());
+        let after = plan.outcomes.iter().filter(|o| written(o.status)).filter_map(|o| o.after_mm.get());
         Row {
             file,
             output,
@@ -165,7 +165,7 @@ fn most_frequent_reason(plan: &Plan) -> Option<String> {
                 .outcomes
                 .iter()
                 .filter(|outcome| outcome.status == motion_status)
-                .filter_map(|outcome| outcome.reason);
+                .filter_map(|outcome| outcome.reason());
             let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
             reasons
                 .filter(|why| *why != OutcomeReason::NoChange)

@@ -62,13 +62,13 @@ pub fn table(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Table {
             Cell::Count(u64::from(place.line)),
             instruction.into(),
             status_cell(outcome.status),
-            outcome.before_mm.into(),
-            outcome.after_mm.into(),
-            outcome.shape_sigma_mm.into(),
-            outcome.sigma_mm.into(),
-            outcome.path_deviation_mm.into(),
-            if outcome.inserted > 0 { outcome.inserted.into() } else { Cell::Missing },
-            outcome.reason.map(|reason| reason.to_string()).into(),
+            outcome.before_mm.get().into(),
+            outcome.after_mm.get().into(),
+            outcome.shape_sigma_mm.get().into(),
+            outcome.sigma_mm.get().into(),
+            outcome.path_deviation_mm.get().into(),
+            if outcome.inserted > 0 { Cell::Count(u64::from(outcome.inserted)) } else { Cell::Missing },
+            outcome.reason().map(|reason| reason.to_string()).into(),
         ];
         if several {
             row.insert(0, file_name(files, place).into());
@@ -97,7 +97,7 @@ fn page_table(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Table {
 /// The motions with the largest uncorrected deviations; `None` if no deviation is known.
 fn largest_deviations(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Option<Table> {
     let mut known: Vec<(f64, &MotionOutcome)> =
-        plan.outcomes.iter().filter_map(|outcome| Some((outcome.before_mm?, outcome))).collect();
+        plan.outcomes.iter().filter_map(|outcome| Some((outcome.before_mm.get()?, outcome))).collect();
     known.sort_by(|a, b| b.0.total_cmp(&a.0));
     known.truncate(LARGEST);
     let only =
@@ -161,11 +161,11 @@ pub fn json(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Value {
                         "line": place.line,
                         "instruction": instruction,
                         "status": status_word(outcome.status),
-                        "reason": outcome.reason.map(|reason| reason.to_string()),
-                        "before_mm": outcome.before_mm,
-                        "after_mm": outcome.after_mm,
-                        "sigma_mm": outcome.sigma_mm,
-                        "shape_sigma_mm": outcome.shape_sigma_mm,
+                        "reason": outcome.reason().map(|reason| reason.to_string()),
+                        "before_mm": outcome.before_mm.get(),
+                        "after_mm": outcome.after_mm.get(),
+                        "sigma_mm": outcome.sigma_mm.get(),
+                        "shape_sigma_mm": outcome.shape_sigma_mm.get(),
                     })
                 })
                 .collect();
@@ -321,7 +321,7 @@ fn with_causes(group: &Group<'_>) -> String {
 
 /// Line of the motion because of which another one is not corrected.
 fn cause(outcome: &MotionOutcome) -> Option<u32> {
-    match outcome.reason? {
+    match outcome.reason()? {
         OutcomeReason::PartOfCut { line, .. } | OutcomeReason::Step { line, .. } => Some(line),
         _ => None,
     }
@@ -330,7 +330,7 @@ fn cause(outcome: &MotionOutcome) -> Option<u32> {
 fn grouped(plan: &Plan) -> Vec<Group<'_>> {
     let mut groups: Vec<Group<'_>> = Vec::new();
     for outcome in plan.outcomes.iter().filter(|outcome| outcome.status != MotionStatus::Changed) {
-        let (reason, figure) = match &outcome.reason {
+        let (reason, figure) = match &outcome.reason() {
             Some(why) => split_reason(why),
             None => ("nothing to change".to_owned(), None),
         };

@@ -163,19 +163,21 @@ fn rewritten(plan: &Plan) -> impl Iterator<Item = &MotionOutcome> {
 /// Largest uncorrected deviation of the rewritten motions (mm), of the shape if only that is corrected; `None` if nothing is
 /// rewritten.
 pub fn before_mm(plan: &Plan) -> Option<f64> {
-    rewritten(plan).filter_map(|outcome| outcome.before_mm).reduce(f64::max)
+    rewritten(plan).filter_map(|outcome| outcome.before_mm.get()).reduce(f64::max)
 }
 
 /// Largest uncorrected deviation of all motions (mm).
 pub fn largest_mm(plan: &Plan) -> Option<f64> {
-    plan.outcomes.iter().filter_map(|outcome| outcome.before_mm).reduce(f64::max)
+    plan.outcomes.iter().filter_map(|outcome| outcome.before_mm.get()).reduce(f64::max)
 }
 
 /// Largest expected deviation of the rewritten motions (mm): remainder of the solver and predicted 1σ.
 pub fn expected_mm(plan: &Plan) -> Option<f64> {
     let shape = corrects_shape_only(plan);
     let sigma = |outcome: &MotionOutcome| if shape { outcome.shape_sigma_mm } else { outcome.sigma_mm };
-    rewritten(plan).filter_map(|outcome| Some(outcome.after_mm?.hypot(sigma(outcome)?))).reduce(f64::max)
+    rewritten(plan)
+        .filter_map(|outcome| Some(outcome.after_mm.get()?.hypot(sigma(outcome).get()?)))
+        .reduce(f64::max)
 }
 
 /// The probability that the corrected cuts get worse, as a sentence; `None` if unknown.

@@ -97,8 +97,11 @@ pub(super) fn rewrite_program(
     result.row = Row::of(names.join(", "), output, ended, &plan, listing);
     let undeclared =
         [Reason::Undeclared, Reason::ToolUnknown, Reason::WorkObjectUnknown].map(OutcomeReason::Program);
-    result.undeclared =
-        plan.outcomes.iter().filter(|o| o.reason.is_some_and(|reason| undeclared.contains(&reason))).count();
+    result.undeclared = plan
+        .outcomes
+        .iter()
+        .filter(|o| o.reason().is_some_and(|reason| undeclared.contains(&reason)))
+        .count();
     result.clean = is_clean(context, &plan, listing, result.changed);
     result.used = used;
     report(&mut plan, &program, &files)?;
@@ -238,7 +241,7 @@ fn is_clean(context: &CompensateContext<'_>, plan: &Plan, listing: &Listing, cha
         return listing.opaque.is_empty();
     }
     if context.arguments.check && !changed {
-        return plan.outcomes.iter().all(|o| o.reason == Some(OutcomeReason::NoChange));
+        return plan.outcomes.iter().all(|o| o.reason() == Some(OutcomeReason::NoChange));
     }
     view::verdict(plan, listing).status == Judged::Good
 }

@@ -50,9 +50,9 @@ pub fn unreachable_motions(plan: &Plan) -> Option<usize> {
     let unreached = |reason: &OutcomeReason| {
         matches!(reason, OutcomeReason::Inverse(_) | OutcomeReason::OutsideLimits { .. })
     };
-    let judged = || plan.outcomes.iter().filter(|outcome| !outcome.reason.as_ref().is_some_and(untold));
+    let judged = || plan.outcomes.iter().filter(|outcome| !outcome.reason.as_deref().is_some_and(untold));
     let all = judged().count();
-    let without = judged().filter(|outcome| outcome.reason.as_ref().is_some_and(unreached)).count();
+    let without = judged().filter(|outcome| outcome.reason.as_deref().is_some_and(unreached)).count();
     // One target in fifty can be reachable by chance.
     (all >= FEWEST && 50 * without >= 49 * all).then_some(without)
 }

@@ -122,8 +122,8 @@ fn moved_axes(listing: &Listing, axes: &mut [bool; 6]) {
     for target in listing.motions.iter().flat_map(|motion| &motion.targets) {
         let Ok(value) = &target.value else { continue };
         for (axis, value) in value.external().iter().enumerate() {
-            let Some(value) = value else { continue };
-            axes[axis] |= *first[axis].get_or_insert(*value) != *value;
+            let Some(value) = value.get() else { continue };
+            axes[axis] |= *first[axis].get_or_insert(value) != value;
         }
     }
 }

@@ -7,9 +7,12 @@
 
 use std::collections::BTreeMap;
 
+use rayon::prelude::*;
+
 use crate::frames::frame_table::FrameTable;
 use crate::options::{Options, is_rewritable};
 use crate::plan::reason::OutcomeReason;
+use crate::search_budget::MANY;
 use crate::segment::curve::{CLOSED_MM, Curve};
 use crate::segment::line::distance;
 use crate::target::solved_target::{SolvedTarget, SolvedTargets};
@@ -40,19 +43,20 @@ const NARROWEST_RAD: f64 = std::f64::consts::PI / 180.0;
 /// own targets.
 pub(crate) fn infeasible_arcs(
     listing: &Listing,
-    solved: &SolvedTargets,
+    solved: &SolvedTargets<'_>,
     frame_table: &FrameTable,
     options: &Options,
     unchanged_motions: &BTreeMap<u32, OutcomeReason>,
 ) -> BTreeMap<u32, OutcomeReason> {
-    let mut infeasible_arcs = circles(listing, solved, frame_table, options, unchanged_motions);
+    let circular = circular(listing);
+    let mut infeasible_arcs = circles(&circular, listing, solved, frame_table, options, unchanged_motions);
     let corrected = |index: u32, infeasible_arcs: &BTreeMap<u32, OutcomeReason>| {
         is_corrected(index, listing, solved, options, unchanged_motions)
             && !infeasible_arcs.contains_key(&index)
     };
-    for (index, motion) in (0_u32..).zip(&listing.motions) {
-        if motion.kind == MotionKind::Circular
-            && let Some(previous) = motion.previous
+    for index in circular {
+        let motion = &listing.motions[index as usize];
+        if let Some(previous) = motion.previous
             && corrected(previous, &infeasible_arcs)
             && !corrected(index, &infeasible_arcs)
             && let Some(Ok(start)) = solved.of(previous as usize).last()
@@ -65,11 +69,17 @@ pub(crate) fn infeasible_arcs(
     infeasible_arcs
 }
 
+/// The circular motions, by index: few of many.
+fn circular(listing: &Listing) -> Vec<u32> {
+    let motions = listing.motions.par_iter().with_min_len(MANY).enumerate();
+    motions.filter(|(_, motion)| motion.kind == MotionKind::Circular).map(|(index, _)| index as u32).collect()
+}
+
 /// Whether a motion is corrected, as far as is known.
 pub(super) fn is_corrected(
     index: u32,
     listing: &Listing,
-    solved: &SolvedTargets,
+    solved: &SolvedTargets<'_>,
     options: &Options,
     unchanged_motions: &BTreeMap<u32, OutcomeReason>,
 ) -> bool {
@@ -79,26 +89,25 @@ pub(super) fn is_corrected(
 }
 
 /// Whether all targets of a motion can be corrected.
-fn all_corrected(targets: &[Result<SolvedTarget, OutcomeReason>]) -> bool {
+fn all_corrected(targets: &[Result<SolvedTarget<'_>, OutcomeReason>]) -> bool {
     let can =
-        |target: &Result<SolvedTarget, _>| target.as_ref().is_ok_and(|solved| solved.forbidden.is_none());
+        |target: &Result<SolvedTarget<'_>, _>| target.as_ref().is_ok_and(|solved| solved.forbidden.is_none());
     !targets.is_empty() && targets.iter().all(can)
 }
 
 /// The arcs themselves that must remain unmodified.
 fn circles(
+    circular: &[u32],
     listing: &Listing,
-    solved: &SolvedTargets,
+    solved: &SolvedTargets<'_>,
     frame_table: &FrameTable,
     options: &Options,
     unchanged_motions: &BTreeMap<u32, OutcomeReason>,
 ) -> BTreeMap<u32, OutcomeReason> {
     let mut infeasible_arcs = BTreeMap::new();
-    for (index, motion) in (0_u32..).zip(&listing.motions) {
-        if motion.kind != MotionKind::Circular
-            || !is_rewritable(motion, options)
-            || unchanged_motions.contains_key(&index)
-        {
+    for &index in circular {
+        let motion = &listing.motions[index as usize];
+        if !is_rewritable(motion, options) || unchanged_motions.contains_key(&index) {
             continue;
         }
         let ([Ok(via), Ok(to)], Some(previous)) = (solved.of(index as usize), motion.previous) else {
@@ -107,7 +116,7 @@ fn circles(
         let before = &listing.motions[previous as usize];
         let targets = solved.of(previous as usize);
         let from = solved.original_end(previous as usize).filter(|from| from.frames_index == to.frames_index);
-        if from.is_some_and(|from| no_circle(&from.intended, via, to, motion)) {
+        if from.as_ref().is_some_and(|from| no_circle(&from.intended.pose(), via, to, motion)) {
             infeasible_arcs.insert(index, OutcomeReason::NoCircle);
             continue;
         }
@@ -115,7 +124,8 @@ fn circles(
             && all_corrected(targets)
             && !infeasible_arcs.contains_key(&previous)
             && !unchanged_motions.contains_key(&previous);
-        let original = solved.original_end(previous as usize).map(|end| (end.frames_index, end.intended));
+        let original =
+            solved.original_end(previous as usize).map(|end| (end.frames_index, end.intended.pose()));
         if let Some((frames_index, original)) = original.or_else(|| stated_end(before, frame_table)) {
             let now = match targets.last() {
                 Some(Ok(end)) if corrected => end.commanded,
@@ -123,7 +133,7 @@ fn circles(
             };
             let [start, now] =
                 [original, now].map(|pose| seen_from(&pose, frames_index, to.frames_index, frame_table));
-            let told = [start, via.intended, to.intended];
+            let told = [start, via.intended.pose(), to.intended.pose()];
             if stops(motion, &told, &[now, via.commanded, to.commanded]) {
                 infeasible_arcs.insert(index, OutcomeReason::NoCircle);
                 continue;
@@ -133,7 +143,7 @@ fn circles(
             continue;
         }
         let start = match from {
-            Some(from) => Some(from.intended),
+            Some(from) => Some(from.intended.pose()),
             None => stated(before, to.frames_index, frame_table),
         };
         if changes_arc(start, via, to, motion) {
@@ -145,9 +155,9 @@ fn circles(
 
 /// Whether the points of an arc with known start make no circle. Full circles are a separate case: their coincident ends do
 /// not determine their plane.
-fn no_circle(from: &Pose, via: &SolvedTarget, to: &SolvedTarget, motion: &Motion) -> bool {
-    distance(&from.translation.vector, &to.intended.translation.vector) >= CLOSED_MM
-        && Curve::round(*from, &via.intended, to.intended, motion).is_none()
+fn no_circle(from: &Pose, via: &SolvedTarget<'_>, to: &SolvedTarget<'_>, motion: &Motion) -> bool {
+    distance(&from.translation.vector, &to.intended.pose().translation.vector) >= CLOSED_MM
+        && Curve::round(*from, &via.intended.pose(), to.intended.pose(), motion).is_none()
 }
 
 /// A pose that one pair of frames states, as another states it where the arm does not move.
@@ -172,14 +182,14 @@ fn makes_circle([from, via, to]: &[Pose; 3]) -> bool {
 }
 
 /// Whether the controller stops at an unmodified arc if only its start is corrected.
-fn stops_unmodified_arc(start: &SolvedTarget, motion: &Motion, frame_table: &FrameTable) -> bool {
+fn stops_unmodified_arc(start: &SolvedTarget<'_>, motion: &Motion, frame_table: &FrameTable) -> bool {
     let Ok(wanted) = frame_table.of_motion(motion) else { return false };
     let pose = |target: &MotionTarget| target.value.as_ref().ok()?.cartesian().map(|target| target.pose());
     let [Some(via), Some(to)] = [0, 1].map(|k| motion.targets.get(k).and_then(pose)) else {
         return false;
     };
     let from = |pose: &Pose| seen_from(pose, start.frames_index, wanted, frame_table);
-    stops(motion, &[from(&start.intended), via, to], &[from(&start.commanded), via, to])
+    stops(motion, &[from(&start.intended.pose()), via, to], &[from(&start.commanded), via, to])
 }
 
 /// End of an unmodified motion, in the frames of the following one.
@@ -194,24 +204,25 @@ fn stated_end(before: &Motion, frame_table: &FrameTable) -> Option<(usize, Pose)
 }
 
 /// Whether two corrected points and an uncorrected start make a different arc than intended.
-fn changes_arc(start: Option<Pose>, via: &SolvedTarget, to: &SolvedTarget, motion: &Motion) -> bool {
+fn changes_arc(start: Option<Pose>, via: &SolvedTarget<'_>, to: &SolvedTarget<'_>, motion: &Motion) -> bool {
     let shift = via.shift_mm().max(to.shift_mm());
     let Some(start) = start else {
         return shift
-            > UNKNOWN_SHARE * distance(&via.intended.translation.vector, &to.intended.translation.vector);
+            > UNKNOWN_SHARE
+                * distance(&via.intended.pose().translation.vector, &to.intended.pose().translation.vector);
     };
-    if distance(&start.translation.vector, &to.intended.translation.vector) < CLOSED_MM {
+    if distance(&start.translation.vector, &to.intended.pose().translation.vector) < CLOSED_MM {
         // Full circles need coincident ends.
         return shift > CLOSED_MM;
     }
-    let intended = Curve::round(start, &via.intended, to.intended, motion);
+    let intended = Curve::round(start, &via.intended.pose(), to.intended.pose(), motion);
     let commanded = Curve::round(start, &via.commanded, to.commanded, motion);
     is_another_arc(intended, commanded, shift)
 }
 
 /// Whether an unmodified arc becomes a different one if only its start is corrected; also where the program does not
 /// determine its points.
-fn changes_unmodified_arc(start: &SolvedTarget, motion: &Motion, frame_table: &FrameTable) -> bool {
+fn changes_unmodified_arc(start: &SolvedTarget<'_>, motion: &Motion, frame_table: &FrameTable) -> bool {
     let shift = start.shift_mm();
     let pose = |target: &MotionTarget| match target.value {
         Ok(TargetValue::Cartesian(target)) => Some(target.pose()),
@@ -223,10 +234,10 @@ fn changes_unmodified_arc(start: &SolvedTarget, motion: &Motion, frame_table: &F
     if !frame_table.of_motion(motion).is_ok_and(|frames_index| frames_index == start.frames_index) {
         return shift > UNKNOWN_SHARE * distance(&via.translation.vector, &to.translation.vector);
     }
-    if distance(&start.intended.translation.vector, &to.translation.vector) < CLOSED_MM {
+    if distance(&start.intended.pose().translation.vector, &to.translation.vector) < CLOSED_MM {
         return shift > CLOSED_MM;
     }
-    let intended = Curve::round(start.intended, &via, to, motion);
+    let intended = Curve::round(start.intended.pose(), &via, to, motion);
     // Points that make no circle already stop the controller in the original program.
     intended.is_some() && is_another_arc(intended, Curve::round(start.commanded, &via, to, motion), shift)
 }

@@ -7,7 +7,7 @@ use crate::target::solved_target::SolvedTarget;
 
 /// Why a corrected target must not be written. `singularity`: distance of its joints from a singularity.
 pub(crate) fn forbidden(
-    solved: &SolvedTarget,
+    solved: &SolvedTarget<'_>,
     singularity: f64,
     arms: &Arms<'_>,
     options: &Options,
@@ -16,7 +16,7 @@ pub(crate) fn forbidden(
     if !(shift <= options.max_correction_mm) {
         return Some(OutcomeReason::CorrectionTooLarge { mm: shift });
     }
-    let turn = solved.commanded.rotation.angle_to(&solved.intended.rotation);
+    let turn = solved.commanded.rotation.angle_to(&solved.intended.pose().rotation);
     if !(turn <= options.max_rotation_rad) {
         return Some(OutcomeReason::RotationTooLarge { deg: turn.to_degrees() });
     }

@@ -4,10 +4,12 @@
 use std::collections::BTreeMap;
 
 use nalgebra::UnitQuaternion;
+use rayon::prelude::*;
 
 use super::arc_feasibility::is_corrected;
 use crate::options::Options;
 use crate::plan::reason::OutcomeReason;
+use crate::search_budget::MANY;
 use crate::target::solved_target::SolvedTargets;
 use truegrind_programs::motion::{Listing, MotionKind, Switch};
 
@@ -21,44 +23,66 @@ const LARGE_TURN: f64 = 0.174;
 /// `unchanged_motions`: motions that remain unmodified.
 pub(crate) fn half_turns(
     listing: &Listing,
-    solved: &SolvedTargets,
+    solved: &SolvedTargets<'_>,
     options: &Options,
     unchanged_motions: &BTreeMap<u32, OutcomeReason>,
 ) -> BTreeMap<u32, OutcomeReason> {
+    let turned: Vec<(u32, Vec<u32>)> = (0..listing.motions.len() as u32)
+        .into_par_iter()
+        .with_min_len(MANY)
+        .map(|index| (index, turned_ends(index, listing, solved, options, unchanged_motions)))
+        .filter(|(_, ends)| !ends.is_empty())
+        .collect();
     let mut out = BTreeMap::new();
-    for (index, motion) in (0_u32..).zip(&listing.motions) {
-        let (MotionKind::Linear, Some(previous)) = (motion.kind, motion.previous) else { continue };
-        if motion.modal.wrist_interpolation == Switch::On {
-            continue;
-        }
-        // Nearly every motion turns the tool by little.
-        let ends =
-            [previous, index].map(|end| solved.of(end as usize).last().and_then(|to| to.as_ref().ok()));
-        if let [Some(from), Some(to)] = ends
-            && from.frames_index == to.frames_index
-            && from.intended.rotation.coords.dot(&to.intended.rotation.coords).abs() > LARGE_TURN
-        {
-            continue;
-        }
-        let originals = [previous, index].map(|end| solved.original_end(end as usize));
-        let [Some(from), Some(to)] = originals else { continue };
-        if from.frames_index != to.frames_index {
-            continue;
-        }
-        let corrected =
-            [previous, index].map(|end| is_corrected(end, listing, solved, options, unchanged_motions));
-        let commanded = |k: usize, original: &UnitQuaternion<f64>| match ends[k] {
-            Some(end) if corrected[k] => end.commanded.rotation,
-            _ => *original,
-        };
-        let intended = [from.intended.rotation, to.intended.rotation];
-        let written = [commanded(0, &intended[0]), commanded(1, &intended[1])];
-        if corrected.contains(&true) && turns_the_other_way(&intended, &written) {
-            let ends = [previous, index].into_iter().zip(corrected).filter(|(_, corrected)| *corrected);
-            out.extend(ends.map(|(end, _)| (end, OutcomeReason::HalfTurn { line: motion.place.line })));
-        }
+    for (index, ends) in turned {
+        let line = listing.motions[index as usize].place.line;
+        out.extend(ends.into_iter().map(|end| (end, OutcomeReason::HalfTurn { line })));
     }
     out
+}
+
+/// The corrected ends of one such line, empty for any other motion.
+fn turned_ends(
+    index: u32,
+    listing: &Listing,
+    solved: &SolvedTargets<'_>,
+    options: &Options,
+    unchanged_motions: &BTreeMap<u32, OutcomeReason>,
+) -> Vec<u32> {
+    let motion = &listing.motions[index as usize];
+    let (MotionKind::Linear, Some(previous)) = (motion.kind, motion.previous) else { return Vec::new() };
+    if motion.modal.wrist_interpolation == Switch::On {
+        return Vec::new();
+    }
+    // Nearly every motion turns the tool by little.
+    let ends = [previous, index].map(|end| solved.of(end as usize).last().and_then(|to| to.as_ref().ok()));
+    if let [Some(from), Some(to)] = ends
+        && from.frames_index == to.frames_index
+        && from.intended.pose().rotation.coords.dot(&to.intended.pose().rotation.coords).abs() > LARGE_TURN
+    {
+        return Vec::new();
+    }
+    let originals = [previous, index].map(|end| solved.original_end(end as usize));
+    let [Some(from), Some(to)] = originals else { return Vec::new() };
+    if from.frames_index != to.frames_index {
+        return Vec::new();
+    }
+    let corrected =
+        [previous, index].map(|end| is_corrected(end, listing, solved, options, unchanged_motions));
+    let commanded = |k: usize, original: &UnitQuaternion<f64>| match ends[k] {
+        Some(end) if corrected[k] => end.commanded.rotation,
+        _ => *original,
+    };
+    let intended = [from.intended.pose().rotation, to.intended.pose().rotation];
+    let written = [commanded(0, &intended[0]), commanded(1, &intended[1])];
+    if !corrected.contains(&true) || !turns_the_other_way(&intended, &written) {
+        return Vec::new();
+    }
+    [previous, index]
+        .into_iter()
+        .zip(corrected)
+        .filter_map(|(end, corrected)| corrected.then_some(end))
+        .collect()
 }
 
 /// Whether the shortest turn between two orientations has, or may have, the opposite sense of that between two others.

@@ -13,7 +13,7 @@ use truegrind_programs::motion::{Listing, MotionKind};
 /// remain unmodified.
 pub(crate) fn lines_without_start(
     listing: &Listing,
-    solved: &SolvedTargets,
+    solved: &SolvedTargets<'_>,
     options: &Options,
     unchanged_motions: &BTreeMap<u32, OutcomeReason>,
 ) -> BTreeMap<u32, OutcomeReason> {

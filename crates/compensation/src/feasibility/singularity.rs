@@ -77,13 +77,13 @@ pub(crate) struct WrittenTarget<'a> {
 /// Why a target must not be corrected, because of its joint motion or because the controller selects other joints.
 /// `singularity`: singularity distance of the corrected joints.
 pub(crate) fn target_fault(
-    solved: &SolvedTarget,
+    solved: &SolvedTarget<'_>,
     singularity: f64,
     replay: &WrittenTarget<'_>,
     arms: &Arms<'_>,
     options: &Options,
 ) -> Option<OutcomeReason> {
-    let flanges = || [replay.frames.flange_for(&solved.intended), *replay.flange];
+    let flanges = || [replay.frames.flange_for(&solved.intended.pose()), *replay.flange];
     let joints = [&solved.before, replay.joints];
     if let Some(joint_jump) = joint_jump(flanges, joints, &arms.nominal, options) {
         return Some(joint_jump);
@@ -119,7 +119,7 @@ fn joint_jump(
     let [from, to] = flanges();
     let most = (options.joint_gain * flange_travel(&from, &to, nominal)).max(options.free_joint_change_rad);
     (!(turned <= most)).then(|| OutcomeReason::JointJump {
-        joint,
+        joint: joint as u8,
         deg: turned.to_degrees(),
         most_deg: most.to_degrees(),
         on_the_way: false,
@@ -160,7 +160,7 @@ fn travel_bound(from: &Pose, to: &Pose, nominal: &Inverse<'_>) -> f64 {
 /// unmodified motion, in program order.
 pub(crate) fn forbid_segments(
     listing: &Listing,
-    solved: &mut SolvedTargets,
+    solved: &mut SolvedTargets<'_>,
     frame_table: &FrameTable,
     arms: &Arms<'_>,
     options: &Options,
@@ -183,9 +183,9 @@ const SAMPLES: usize = 300_000;
 const SAMPLES_EACH: usize = 2;
 
 /// The segments between the targets of a program.
-struct SegmentChecker<'a> {
+struct SegmentChecker<'a, 't> {
     listing: &'a Listing,
-    solved: &'a mut SolvedTargets,
+    solved: &'a mut SolvedTargets<'t>,
     /// Motions that remain unmodified although their targets could be corrected.
     unchanged: &'a BTreeMap<u32, OutcomeReason>,
     frame_table: &'a FrameTable,
@@ -212,7 +212,7 @@ fn margins(branches: [f64; 3], joints: &Joints, nominal: &Inverse<'_>) -> [f64; 
     if branches == [1.0; 3] { [nominal.singularity(joints) * WITHOUT_BRANCHES; 3] } else { branches }
 }
 
-impl SegmentChecker<'_> {
+impl SegmentChecker<'_, '_> {
     /// Checks all motions in parallel; returns those that are forbidden.
     fn forbid_each(&mut self) -> HashSet<usize> {
         let count = self.listing.motions.len();
@@ -256,7 +256,12 @@ impl SegmentChecker<'_> {
         let samples = self.samples(unchanged_motions.len());
         let mut found = false;
         let mut open = HashSet::new();
+        let quiet = self.quiet();
         for motion in 0..self.listing.motions.len() {
+            // Nearly every motion; where one was forbidden, its neighbours may no longer be quiet.
+            if quiet[motion] && stay.is_empty() {
+                continue;
+            }
             if self.leaves_branch_ambiguous(motion, &open) {
                 open.insert(motion);
                 if self.corrected(motion).is_some() && !self.unchanged.contains_key(&(motion as u32)) {
@@ -293,6 +298,18 @@ impl SegmentChecker<'_> {
         found
     }
 
+    /// For each motion, whether nothing can be wrong with it as long as every motion before it is corrected: its configuration is
+    /// checked, and it is corrected itself.
+    fn quiet(&self) -> Vec<bool> {
+        let motions = self.listing.motions.par_iter().with_min_len(search_budget::MANY).enumerate();
+        let quiet = |(index, motion): (usize, &Motion)| {
+            monitored(motion) == Switch::On
+                && self.corrected(index).is_some()
+                && !self.unchanged.contains_key(&(index as u32))
+        };
+        motions.map(quiet).collect()
+    }
+
     /// Whether the program leaves open which of several solutions a motion reaches: no configuration is certainly checked
     /// there, and it continues from a motion in `open` or is ambiguous itself.
     fn leaves_branch_ambiguous(&self, index: usize, open: &HashSet<usize>) -> bool {
@@ -302,8 +319,8 @@ impl SegmentChecker<'_> {
             return false;
         }
         let goes_on = motion.previous.is_some_and(|previous| open.contains(&(previous as usize)));
-        let forbidden = self.solved.of(index).last().and_then(|to| to.as_ref().ok()?.forbidden);
-        if goes_on || forbidden == Some(OutcomeReason::AmbiguousBranch) {
+        let forbidden = self.solved.of(index).last().and_then(|to| to.as_ref().ok()?.forbidden.as_deref());
+        if goes_on || forbidden == Some(&OutcomeReason::AmbiguousBranch) {
             return true;
         }
         // A motion that remains unmodified for another reason has not been checked yet.
@@ -315,7 +332,12 @@ impl SegmentChecker<'_> {
             (Some(end), None) => end.margins.iter().any(|margin| margin.abs() < BORDER_MARGIN),
             (Some(end), Some(from)) => {
                 motion.kind == MotionKind::Joint
-                    && self.is_not_nearest(&from.joints[1], end.frames_index, &end.intended, &end.joints)
+                    && self.is_not_nearest(
+                        &from.joints[1],
+                        end.frames_index,
+                        &end.intended.pose(),
+                        &end.joints,
+                    )
             }
         }
     }
@@ -345,7 +367,7 @@ impl SegmentChecker<'_> {
         let nominal = &self.arms.nominal;
         let commanded = self.frame_table.list[to.frames_index].commanded;
         let start = from.joints.map(|joints| commanded.target_of(&nominal.arm().forward(&joints)));
-        let far = flange_travel(&start[1], &to.intended, nominal) * LEVER;
+        let far = flange_travel(&start[1], &to.intended.pose(), nominal) * LEVER;
         let end = margins(to.margins, &to.joints, nominal);
         if motion.kind == MotionKind::Linear
             && self.is_clear([&from.joints[1], &to.joints], [&from.margins, &end], far)
@@ -353,9 +375,9 @@ impl SegmentChecker<'_> {
             return None;
         }
         let curves = match (motion.kind, targets.as_slice()) {
-            (MotionKind::Linear, _) => start.map(|start| Curve::line(start, to.intended)),
+            (MotionKind::Linear, _) => start.map(|start| Curve::line(start, to.intended.pose())),
             (_, [via, _]) => {
-                let round = |start| Curve::round(start, &via.intended, to.intended, motion);
+                let round = |start| Curve::round(start, &via.intended.pose(), to.intended.pose(), motion);
                 [round(start[0])?, round(start[1])?]
             }
             _ => return None,
@@ -366,9 +388,9 @@ impl SegmentChecker<'_> {
     }
 
     /// The motion with its last target, if it is corrected.
-    fn corrected(&self, index: usize) -> Option<(&Motion, &SolvedTarget)> {
+    fn corrected(&self, index: usize) -> Option<(&Motion, &SolvedTarget<'_>)> {
         let motion = &self.listing.motions[index];
-        let all = |solved: &Result<SolvedTarget, OutcomeReason>| {
+        let all = |solved: &Result<SolvedTarget<'_>, OutcomeReason>| {
             solved.as_ref().is_ok_and(|s| s.forbidden.is_none())
         };
         let targets = self.solved.of(index);
@@ -397,7 +419,7 @@ impl SegmentChecker<'_> {
         let margins = margins(end.margins, &end.joints, nominal);
         Some(SegmentStart {
             frames_index: end.frames_index,
-            commanded: end.intended,
+            commanded: end.intended.pose(),
             joints: [end.joints; 2],
             margins,
             corrected: false,
@@ -483,10 +505,10 @@ impl SegmentChecker<'_> {
         let start = from.joints.map(|joints| commanded.target_of(&self.arms.nominal.arm().forward(&joints)));
         let curves = match (motion.kind, self.solved.of(index)) {
             (MotionKind::Linear, _) => {
-                [Curve::line(start[0], to.intended), Curve::line(start[1], to.commanded)]
+                [Curve::line(start[0], to.intended.pose()), Curve::line(start[1], to.commanded)]
             }
             (_, [Ok(via), _]) => [
-                Curve::round(start[0], &via.intended, to.intended, motion)?,
+                Curve::round(start[0], &via.intended.pose(), to.intended.pose(), motion)?,
                 Curve::round(start[1], &via.commanded, to.commanded, motion)?,
             ],
             _ => return None,

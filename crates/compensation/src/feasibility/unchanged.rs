@@ -23,7 +23,7 @@ use truegrind_programs::motion::{Listing, MotionKind, Reason};
 /// targets. An unmodified motion moves the start of the next one, so this repeats until no motion is added.
 pub(crate) fn unchanged_motions(
     listing: &Listing,
-    solved: &mut SolvedTargets,
+    solved: &mut SolvedTargets<'_>,
     frame_table: &FrameTable,
     arms: &Arms<'_>,
     options: &Options,
@@ -81,7 +81,7 @@ const ABANDONED: OutcomeReason = OutcomeReason::Inverse(InverseError::Abandoned)
 pub(crate) fn blocking_reason(
     index: u32,
     listing: &Listing,
-    solved: &SolvedTargets,
+    solved: &SolvedTargets<'_>,
     options: &Options,
     unchanged_motions: &BTreeMap<u32, OutcomeReason>,
 ) -> Option<(Status, OutcomeReason)> {
@@ -101,7 +101,7 @@ pub(crate) fn blocking_reason(
     if motion.kind == MotionKind::AbsoluteJoint && !options.joint_targets {
         return Some((Status::Left, OutcomeReason::JointTarget));
     }
-    let forbidden = targets.iter().find_map(|target| target.as_ref().ok().and_then(|s| s.forbidden));
+    let forbidden = targets.iter().find_map(|target| target.as_ref().ok()?.forbidden.as_deref().copied());
     let reason = forbidden.or_else(|| unchanged_motions.get(&index).copied())?;
     Some((if matches!(reason, OutcomeReason::Risk { .. }) { Status::Left } else { Status::Refused }, reason))
 }

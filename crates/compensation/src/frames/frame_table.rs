@@ -3,6 +3,8 @@
 use std::cell::LazyCell;
 use std::collections::{HashMap, HashSet};
 
+use rayon::prelude::*;
+
 use crate::arms::Arms;
 use crate::cell::{Carries, Cell};
 use crate::configuration::{configured, monitored, unstated};
@@ -13,6 +15,7 @@ use crate::search_budget;
 use truegrind_arm::inverse::Inverse;
 use truegrind_arm::inverse::budget::{SearchBudget, with_budget};
 use truegrind_arm::model::Joints;
+use truegrind_math::option_f64::OptionF64;
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{Listing, Motion, Reason, RobTarget, Switch, TargetValue, WorkObjectValue};
 
@@ -116,10 +119,16 @@ impl FrameTable {
         let flange = arms.nominal.arm().model.flange.translation.vector.norm();
         let longest = flange + links.iter().map(|link| link.a_mm.abs() + link.d_mm.abs()).sum::<f64>();
         let (mut first, mut moves) = ([None; 6], [false; 6]);
-        for motion in &listing.motions {
+        let stated = |motion: &Motion| {
+            let mut values = motion.targets.iter().filter_map(|target| target.value.as_ref().ok());
+            values.any(|value| *value.external() != [OptionF64::NONE; 6])
+        };
+        // Hardly any program has external axes.
+        let any = listing.motions.par_iter().with_min_len(search_budget::MANY).any(stated);
+        for motion in listing.motions.iter().filter(|_| any) {
             let values = motion.targets.iter().filter_map(|target| target.value.as_ref().ok());
             for target in values.filter_map(TargetValue::cartesian) {
-                if target.external == [None; 6] {
+                if target.external == [OptionF64::NONE; 6] {
                     continue;
                 }
                 let far = self.of_motion(motion).is_ok_and(|frames_index| {
@@ -127,8 +136,8 @@ impl FrameTable {
                     !(flange.translation.vector.norm() <= longest)
                 });
                 for (axis, value) in target.external.iter().enumerate() {
-                    let Some(value) = value else { continue };
-                    moves[axis] |= *first[axis].get_or_insert(*value) != *value;
+                    let Some(value) = value.get() else { continue };
+                    moves[axis] |= *first[axis].get_or_insert(value) != value;
                     self.base[axis] |= far && cell.carries(axis).is_none();
                 }
             }

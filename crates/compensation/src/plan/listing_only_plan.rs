@@ -9,7 +9,7 @@ use truegrind_programs::motion::{Listing, Motion, Reason};
 /// the reason that it would also have with a model.
 pub fn listing_only_plan(listing: &Listing, options: &Options) -> Plan {
     let outcomes = (0..).zip(&listing.motions).map(|(index, motion)| MotionOutcome {
-        reason: Some(unmodified_reason(listing, motion, options)),
+        reason: Some(Box::new(unmodified_reason(listing, motion, options))),
         ..MotionOutcome::left(index)
     });
     Plan { outcomes: outcomes.collect(), ..Plan::default() }

@@ -8,7 +8,7 @@ use truegrind_arm::effect::Effect;
 use truegrind_programs::motion::{Listing, Motion, MotionKind, Switch};
 
 /// How backlash enters this program.
-pub(crate) fn backlash_note(arms: &Arms<'_>, solved: &SolvedTargets) -> Option<String> {
+pub(crate) fn backlash_note(arms: &Arms<'_>, solved: &SolvedTargets<'_>) -> Option<String> {
     let plays = arms.conditions.play_rad.iter().enumerate().filter(|(_, play)| **play != 0.0);
     let plays: Vec<String> =
         plays.map(|(j, play)| format!("joint {}: {:.4}°", j + 1, play.abs().to_degrees())).collect();
@@ -43,7 +43,11 @@ pub(crate) fn doubtful_effects_note(arms: &Arms<'_>) -> Option<String> {
 }
 
 /// What was not checked or was assumed, with line numbers.
-pub(crate) fn unchecked_notes(listing: &Listing, solved: &SolvedTargets, unchecked: &[u32]) -> Vec<String> {
+pub(crate) fn unchecked_notes(
+    listing: &Listing,
+    solved: &SolvedTargets<'_>,
+    unchecked: &[u32],
+) -> Vec<String> {
     let mut out = Vec::new();
     if let Some(lines) = lines_of(listing, unchecked) {
         out.push(format!(

@@ -61,7 +61,7 @@ pub(crate) struct SolvedProgram<'a> {
     program: Option<OriginalProgram<'a>>,
     cuts: CutsOf,
     assessment: Assessment,
-    solved: SolvedTargets,
+    solved: SolvedTargets<'a>,
     /// The unmodified motions that `solved` was computed with.
     solved_unchanged: BTreeMap<u32, OutcomeReason>,
 }
@@ -76,8 +76,8 @@ impl<'a> SolvedProgram<'a> {
         let mut arms = Arms::of(estimate.arm, &options.condition);
         let mut frame_table = FrameTable::of(listing, &arms, cell);
         let program = OriginalProgram::of(listing, &arms, &frame_table);
-        let cuts = cut::of(listing);
-        let assessment =
+        let cuts = cut::of(listing, options.cuts);
+        let mut assessment =
             assess(listing, &cuts, &program, &mut arms, &mut frame_table, options, &estimate.posterior);
         let solved_unchanged = assessment.risky();
         let solved = solve_targets(
@@ -90,6 +90,9 @@ impl<'a> SolvedProgram<'a> {
             &solved_unchanged,
         );
         let program = arms.conditions.has_play().then_some(program);
+        if program.is_none() {
+            assessment.free_registrations();
+        }
         Self { listing, options, arms, frame_table, program, cuts, assessment, solved, solved_unchanged }
     }
 
@@ -191,7 +194,7 @@ fn assess(
     // Experiments correct every motion regardless of risk.
     let max_risk = if options.cuts == Cuts::Single { 1.0 } else { options.max_risk };
     let wanted = PlacementChoice { placement: options.placement, max_risk, remedies: options.remedies };
-    assess_program(listing, &chosen, &at, &mut frame_table.list, &objects, &with, wanted)
+    assess_program(listing, chosen, &at, &mut frame_table.list, &objects, &with, wanted)
 }
 
 /// Largest number of rounds in which unmodified motions change the backlash sides of later ones.
@@ -232,7 +235,7 @@ fn planned(job: &Planner<'_>) -> Plan {
 /// Inputs of the plan.
 struct Planner<'a> {
     listing: &'a Listing,
-    solved: &'a SolvedTargets,
+    solved: &'a SolvedTargets<'a>,
     /// Motions that remain unmodified although their targets could be corrected.
     unchanged: &'a BTreeMap<u32, OutcomeReason>,
     frame_table: &'a FrameTable,
@@ -254,7 +257,7 @@ struct PortionResult {
 /// The corrected end of a motion; `None` where its last target was not solved.
 fn segment_end<'a>(
     motion: &'a Motion,
-    targets: &[Result<SolvedTarget, OutcomeReason>],
+    targets: &[Result<SolvedTarget<'_>, OutcomeReason>],
     frame_table: &'a FrameTable,
 ) -> Option<SegmentEnd<'a>> {
     let Some(Ok(to)) = targets.last() else { return None };
@@ -263,7 +266,7 @@ fn segment_end<'a>(
     Some(SegmentEnd {
         frames: &frame_table.list[to.frames_index],
         index: to.frames_index,
-        intended: to.intended,
+        intended: to.intended.pose(),
         commanded: to.commanded,
         joints: to.after,
         condition_index: to.condition_index,
@@ -284,7 +287,7 @@ struct PlannedMotion {
 impl PlannedMotion {
     /// Flags a motion that is written.
     fn flag(&mut self, why: OutcomeReason) {
-        (self.outcome.status, self.outcome.reason) = (Status::Flagged, Some(why));
+        (self.outcome.status, self.outcome.reason) = (Status::Flagged, Some(Box::new(why)));
         if let Some(point) = &mut self.point {
             (point.status, point.reason) = (Status::Flagged, Some(why.to_string()));
         }
@@ -347,7 +350,7 @@ impl<'a> Planner<'a> {
         let previous = motion.previous? as usize;
         let before = &self.listing.motions[previous];
         let targets = self.solved.of(previous);
-        let changes = |target: &Result<SolvedTarget, OutcomeReason>| {
+        let changes = |target: &Result<SolvedTarget<'_>, OutcomeReason>| {
             target.as_ref().is_ok_and(|solved| solved.forbidden.is_none())
         };
         if !is_rewritable(before, self.options)
@@ -384,7 +387,8 @@ impl<'a> Planner<'a> {
         if before.kind == MotionKind::Linear && motion.kind == MotionKind::Linear {
             // Nearly all lines continue almost straight; three points show that.
             let first = self.solved.of(before.previous? as usize).last()?.as_ref().ok()?;
-            let points = [&first.intended, &point.intended, &to.intended].map(|pose| pose.translation.vector);
+            let [from, to] = [point, to].map(|end| end.intended.translation.vector);
+            let points = [first.intended.position_mm(), from, to];
             if !(cut_of_lines(&points, zone_mm) > CUT_MM) {
                 return None;
             }
@@ -417,9 +421,13 @@ fn plan_motion<'a>(
     let Planner { listing, solved, arms, options, .. } = *job;
     let motion = &listing.motions[index];
     let mut outcome = MotionOutcome::left(index as u32);
-    let finish = |mut outcome: MotionOutcome, status, reason, change, point: Option<Box<PathPoint>>| {
+    let finish = |mut outcome: MotionOutcome,
+                  status,
+                  reason: Option<OutcomeReason>,
+                  change,
+                  point: Option<Box<PathPoint>>| {
         outcome.status = status;
-        outcome.reason = reason;
+        outcome.reason = reason.map(Box::new);
         let point = point.map(|mut p| {
             p.status = status;
             p.reason = reason.map(|r| r.to_string());
@@ -433,9 +441,9 @@ fn plan_motion<'a>(
     let targets = solved.of(index);
     let point = match targets.last() {
         Some(Ok(to)) => {
-            outcome.before_mm = Some(to.deviation_mm[0]);
+            outcome.before_mm = to.deviation_mm[0].into();
             outcome.after_mm = outcome.before_mm;
-            outcome.sigma_mm = Some(to.sigma_mm);
+            outcome.sigma_mm = to.sigma_mm.into();
             outcome.shape_sigma_mm = to.shape_sigma_mm;
             options.points.then(|| {
                 let real = &job.frame_table.list[to.frames_index].real;
@@ -451,15 +459,15 @@ fn plan_motion<'a>(
     // The segment from the previous motion.
     let segment_plan = SegmentPlan::of(motion, path, circle_point(targets), middle_mm, arms, options);
     (outcome.path_deviation_mm, outcome.inserted) =
-        (segment_plan.path_deviation_mm, segment_plan.before.len());
+        (segment_plan.path_deviation_mm.into(), segment_plan.before.len() as u32);
     // All other flags hold only for the guessed configuration, so this one takes precedence.
     let guessed = options.flag_unknown_starts
         && motion.accepts_configuration
         && solved_targets().any(|s| s.guess != BranchGuess::Known);
     let mut flag = if guessed { Some(OutcomeReason::UnknownStart) } else { segment_plan.flag };
     if let Some(corner) = job.corner(motion, path, &segment_plan, last) {
-        outcome.path_deviation_mm =
-            Some(outcome.path_deviation_mm.map_or(corner, |deviation| deviation.max(corner)));
+        let deviation = outcome.path_deviation_mm.get();
+        outcome.path_deviation_mm = deviation.map_or(corner, |deviation| deviation.max(corner)).into();
         if !(corner <= options.tolerance_mm) {
             flag = flag.or(Some(OutcomeReason::CornerDeviation { mm: corner }));
         }
@@ -467,21 +475,21 @@ fn plan_motion<'a>(
     let flag =
         flag.or_else(|| path.and_then(|path| too_fast(index, motion, listing, path, &segment_plan, arms)));
     let flag = flag.or_else(|| solved_targets().find_map(|s| uncertainty_flag(s, arms)));
-    let new = |(target, solved): (&MotionTarget, &SolvedTarget)| match target.role {
+    let new = |(target, solved): (&MotionTarget, &SolvedTarget<'_>)| match target.role {
         Role::Via if segment_plan.straight => NewTarget::Drop,
         _ => new_target(target, solved, motion, options),
     };
-    // Not collected: without a known length that takes room for four.
-    let mut new_targets = Vec::with_capacity(targets.len());
-    new_targets.extend(motion.targets.iter().zip(solved_targets()).map(new));
-    outcome.after_mm = solved_targets().last().map(|s| s.deviation_mm[1]);
+    let new_targets = motion.targets.iter().zip(solved_targets()).map(new).collect();
+    outcome.after_mm = solved_targets().last().map(|s| s.deviation_mm[1]).into();
     let change = Change { motion: index as u32, targets: new_targets, before: segment_plan.before.clone() };
     let status = if flag.is_some() { Status::Flagged } else { Status::Changed };
     PlannedMotion { segment_plan: Some(segment_plan), ..finish(outcome, status, flag, Some(change), point) }
 }
 
 /// The circle point of a motion with one.
-fn circle_point(targets: &[Result<SolvedTarget, OutcomeReason>]) -> Option<&SolvedTarget> {
+fn circle_point<'s, 'a>(
+    targets: &'s [Result<SolvedTarget<'a>, OutcomeReason>],
+) -> Option<&'s SolvedTarget<'a>> {
     let [Ok(via), Ok(_)] = targets else { return None };
     Some(via)
 }
@@ -505,8 +513,8 @@ fn too_fast(
     (ratio > 1.0).then_some(OutcomeReason::TooFast { joint, ratio })
 }
 
-fn uncertainty_flag(solved: &SolvedTarget, arms: &Arms<'_>) -> Option<OutcomeReason> {
-    match solved.outside {
+fn uncertainty_flag(solved: &SolvedTarget<'_>, arms: &Arms<'_>) -> Option<OutcomeReason> {
+    match solved.outside.as_deref().copied() {
         Some(Outside::Joint { joint, by_deg }) => {
             return Some(OutcomeReason::JointNotMeasured { joint, by_deg });
         }
@@ -521,7 +529,12 @@ fn uncertainty_flag(solved: &SolvedTarget, arms: &Arms<'_>) -> Option<OutcomeRea
 /// A pose whose predicted σ exceeds the worst measured pose's by this factor is flagged.
 const SIGMA_GROWTH: f64 = 2.0;
 
-fn new_target(target: &MotionTarget, solved: &SolvedTarget, motion: &Motion, options: &Options) -> NewTarget {
+fn new_target(
+    target: &MotionTarget,
+    solved: &SolvedTarget<'_>,
+    motion: &Motion,
+    options: &Options,
+) -> NewTarget {
     if as_joints(motion, target, options.emit) {
         return NewTarget::Joint { robot_deg: std::array::from_fn(|i| solved.after[i].to_degrees()) };
     }
@@ -543,9 +556,11 @@ fn new_target(target: &MotionTarget, solved: &SolvedTarget, motion: &Motion, opt
     }
 }
 
-fn path_point(motion: &Motion, solved: &SolvedTarget, real: &FramePair, shape_alone: bool) -> PathPoint {
-    let of_shape = solved.shape_sigma_mm.filter(|_| shape_alone);
-    let flange = real.flange_for(&solved.intended);
+fn path_point(motion: &Motion, solved: &SolvedTarget<'_>, real: &FramePair, shape_alone: bool) -> PathPoint {
+    let shape_sigma_mm = solved.shape_sigma_mm.get();
+    let of_shape = shape_sigma_mm.filter(|_| shape_alone);
+    let intended = solved.intended.pose();
+    let flange = real.flange_for(&intended);
     let base_from_object = real.base_from_object(&flange);
     PathPoint {
         index: 0,
@@ -555,15 +570,15 @@ fn path_point(motion: &Motion, solved: &SolvedTarget, real: &FramePair, shape_al
         cutting: matches!(motion.kind, MotionKind::Linear | MotionKind::Circular),
         base_from_object,
         flange_from_tool: real.flange_from_tool(&flange),
-        intended: base_from_object * solved.intended,
+        intended: base_from_object * intended,
         normal: None,
         joints_before: Some(solved.before),
         joints_after: Some(solved.after),
         before: solved.deviations.as_ref().map(|deviations| deviations[0]),
         after: solved.deviations.as_ref().map(|deviations| deviations[1]),
         sigma_mm: Some(of_shape.unwrap_or(solved.sigma_mm)),
-        shape_sigma_mm: solved.shape_sigma_mm,
-        outside: solved.outside,
+        shape_sigma_mm,
+        outside: solved.outside.as_deref().copied(),
         status: Status::Changed,
         reason: None,
     }

@@ -59,8 +59,8 @@ pub enum OutcomeReason {
     /// The correction turns a joint far more than the same correction would elsewhere in the workspace: at the target or on
     /// the segment.
     JointJump {
-        /// Joint, 0-based.
-        joint: usize,
+        /// Joint, 0-based; a byte keeps all reasons short.
+        joint: u8,
         /// Joint change caused by the correction (°).
         deg: f64,
         /// Largest joint change allowed for a correction of this size (°).

@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::DVector;
+use nalgebra::{DVector, Vector3, Vector6};
 use rayon::prelude::*;
 
 use crate::condition::arm_conditions::ArmConditions;
@@ -19,7 +19,8 @@ use crate::risk::placement::{
 };
 use crate::risk::probability::probability_of_harm;
 use crate::risk::remedy_search::{self, UnknownPlacement};
-use truegrind_arm::estimated::{Estimated, PosteriorComponent, RegisteredFrame};
+use crate::search_budget::MANY;
+use truegrind_arm::estimated::{CarriedFrame, Estimated, PosteriorComponent};
 use truegrind_programs::motion::Listing;
 
 /// Assessment of a program.
@@ -35,8 +36,11 @@ pub(crate) struct Assessment {
     posterior: Vec<PosteriorComponent>,
     /// The cut of each motion, as an index into `cuts`; empty without cuts.
     cut_of: Vec<Option<u32>>,
-    /// The best registration of each cut, in the base; absent where the robot holds the part.
-    registered: Vec<Option<RegisteredFrame>>,
+    /// The best registration of each cut, in the base; absent where the robot holds the part. Its origin (mm), and the index of
+    /// its first twist.
+    registered: Vec<Option<(Vector3<f64>, usize)>>,
+    /// The twists of all registrations in one list, so that its memory is returned to the system as a whole.
+    twists: Vec<Vector6<f64>>,
 }
 
 impl Assessment {
@@ -52,8 +56,15 @@ impl Assessment {
     }
 
     /// The reference frame of the shape of a motion's cut: it moves with the arm's parameters as the cut does.
-    pub(crate) fn registered(&self, motion: u32) -> Option<&RegisteredFrame> {
-        self.registered[self.cut_index(motion)?].as_ref()
+    pub(crate) fn registered(&self, motion: u32) -> Option<CarriedFrame<'_>> {
+        let (origin_mm, first) = self.registered[self.cut_index(motion)?]?;
+        let twists = self.twists.get(first..)?.get(..self.shares.first()?.toward.len())?;
+        Some(CarriedFrame { origin_mm, twists })
+    }
+
+    /// Frees the registrations, which only solving targets needs.
+    pub(crate) fn free_registrations(&mut self) {
+        self.twists = Vec::new();
     }
 
     /// Sigma of the shape of a motion's cut (RMS, mm), for parts that the robot holds.
@@ -99,13 +110,16 @@ pub(crate) struct AssessmentSample {
 
 impl AssessmentSample {
     /// From those motions for which `reached` holds.
-    pub(crate) fn of(listing: &Listing, cuts: &CutsOf, reached: impl Fn(usize) -> bool) -> Self {
+    pub(crate) fn of(listing: &Listing, cuts: &CutsOf, reached: impl Fn(usize) -> bool + Sync) -> Self {
+        let motions = listing.motions.par_iter().with_min_len(MANY).enumerate();
+        let objects: Vec<Option<u32>> =
+            motions.map(|(index, motion)| motion.work_object.filter(|_| reached(index))).collect();
         let mut of_object: BTreeMap<u32, [Vec<u32>; 2]> = BTreeMap::new();
         let mut in_cuts: Vec<(u32, u32)> = Vec::with_capacity(listing.motions.len());
-        for (index, motion) in (0_u32..).zip(&listing.motions) {
+        for (index, object) in (0_u32..).zip(objects) {
             let cut = cuts.root(index);
             in_cuts.extend(cut.map(|root| (root, index)));
-            if let Some(object) = motion.work_object.filter(|_| reached(index as usize)) {
+            if let Some(object) = object {
                 of_object.entry(object).or_default()[usize::from(cut.is_none())].push(index);
             }
         }
@@ -136,7 +150,7 @@ impl AssessmentSample {
 /// corrected are displaced in `list` to where the path really lies.
 pub(crate) fn assess_program(
     listing: &Listing,
-    chosen: &AssessmentSample,
+    chosen: AssessmentSample,
     at: &(dyn Fn(u32) -> Option<AssessedTarget> + Sync),
     list: &mut [ResolvedFrames],
     objects: &[u32],
@@ -170,31 +184,38 @@ pub(crate) fn assess_program(
         }
     }
     let list: &[ResolvedFrames] = list;
+    // A cut at a time: lists of its own, kept among those that only its assessment needs, would hold the memory of both.
+    let room = knowledge.order.len().max(1);
+    out.twists = vec![Vector6::zeros(); room * chosen.cuts.len()];
     let judged: Vec<Option<(JudgedCut, Judgement, f64)>> = chosen
         .cuts
         .par_iter()
-        .map(|(motions, commanded)| {
+        .zip(out.twists.par_chunks_mut(room))
+        .map(|((motions, commanded), twists)| {
             let targets: Vec<AssessedTarget> = commanded.iter().filter_map(|m| at(*m)).collect();
             let frames = &list[targets.first()?.frames_index];
             let object = listing.motions[motions[0] as usize].work_object?;
             let placement = *taken.get(&object)?;
             let off = PathDeviation::of(&targets, list, conditions, knowledge);
-            let judgement = cut_risk::assess_cut(&off, knowledge, placement)?;
+            let (judgement, registered) = cut_risk::assess_cut(&off, knowledge, placement)?;
             let weight = motions.len() as f64 / targets.len() as f64;
-            let carried = (!frames.real.holds_part)
-                .then(|| cut_risk::in_base(&judgement.registered, &frames.real.object));
+            let origin_mm = (!frames.real.holds_part).then(|| {
+                let registered = cut_risk::in_base(registered, &frames.real.object);
+                twists.iter_mut().zip(&registered.twists).for_each(|(twist, of_cut)| *twist = *of_cut);
+                registered.origin_mm
+            });
             let points = targets.len();
             let harm = probability_of_harm(judgement.square, &judgement.toward, posterior, points);
-            Some((JudgedCut { placement, points, weight, carried }, judgement, harm))
+            Some((JudgedCut { placement, points, weight, origin_mm }, judgement, harm))
         })
         .collect();
-    for ((motions, _), judged) in chosen.cuts.iter().zip(judged) {
+    for (((motions, _), judged), first) in chosen.cuts.into_iter().zip(judged).zip((0..).step_by(room)) {
         let Some((judged, judgement, probability_of_harm)) = judged else { continue };
         let left_for_risk = !(probability_of_harm <= choice.max_risk);
         let cut_index = out.cuts.len() as u32;
         motions.iter().for_each(|m| out.cut_of[*m as usize] = Some(cut_index));
         out.cuts.push(CutRisk {
-            motions: motions.clone(),
+            motions,
             assessed: judged.placement,
             deviation_mm: judgement.deviation_mm,
             sigma_mm: judgement.sigma_mm,
@@ -203,7 +224,7 @@ pub(crate) fn assess_program(
             left_for_risk,
             corrected: false,
         });
-        out.registered.push(judged.carried);
+        out.registered.push(judged.origin_mm.map(|origin_mm| (origin_mm, first)));
         out.shares.push(CutContribution {
             points: judged.weight * judged.points as f64,
             square: judged.weight * judgement.square,
@@ -219,7 +240,8 @@ struct JudgedCut {
     points: usize,
     /// Motions per sampled point.
     weight: f64,
-    carried: Option<RegisteredFrame>,
+    /// Origin of its registration (mm).
+    origin_mm: Option<Vector3<f64>>,
 }
 
 /// Contribution of a cut: points, |d|² (mm²), and Jᵀ d.

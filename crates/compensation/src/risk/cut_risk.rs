@@ -42,19 +42,18 @@ pub(crate) struct Judgement {
     /// |d|² (mm²), and Jᵀ d: summed over cuts they assess the program.
     pub(crate) square: f64,
     pub(crate) toward: DVector<f64>,
-    /// Twists of the best registration per unit of each parameter, in the work object, and their reference point.
-    pub(crate) registered: RegisteredFrame,
 }
 
 /// Most points by which a cut is assessed.
 pub(crate) const MOST_POINTS: usize = 32;
 
-/// Assesses the points of a cut.
+/// Assesses the points of a cut; with the twists of its best registration per unit of each parameter, in the work object, and
+/// their reference point.
 pub(crate) fn assess_cut(
     off: &PathDeviation,
     knowledge: &Estimated,
     placement: Placement,
-) -> Option<Judgement> {
+) -> Option<(Judgement, RegisteredFrame)> {
     let registration = Registration::of(&off.intended)?;
     let count = off.shifts.len();
     let twists = registration.twists(&off.jacobian);
@@ -85,14 +84,14 @@ pub(crate) fn assess_cut(
         origin_mm: registration.centre.coords,
         twists: twists.column_iter().map(|twist| twist.into_owned()).collect(),
     };
-    Some(Judgement {
+    let judgement = Judgement {
         deviation_mm: rms(square),
         sigma_mm: rms(variance),
         shape_sigma_mm: rms(of_shape),
         square,
         toward,
-        registered,
-    })
+    };
+    Some((judgement, registered))
 }
 
 /// Σ tr(J C Jᵀ) over the points, whose Jacobians J are stacked (3 n × p), C the covariance of the parameters (p × p):
@@ -125,18 +124,13 @@ fn total_variance(jacobian: &DMatrix<f64>, covariance: &DMatrix<f64>) -> f64 {
 }
 
 /// The registration of a cut expressed in the base, for a stationary work object.
-pub(crate) fn in_base(registered: &RegisteredFrame, base_from_object: &Pose) -> RegisteredFrame {
+pub(crate) fn in_base(mut registered: RegisteredFrame, base_from_object: &Pose) -> RegisteredFrame {
     let turn = base_from_object.rotation;
-    RegisteredFrame {
-        origin_mm: base_from_object.transform_point(&registered.origin_mm.into()).coords,
-        twists: registered
-            .twists
-            .iter()
-            .map(|t| {
-                let v: Vector3<f64> = turn * t.fixed_rows::<3>(0);
-                let w: Vector3<f64> = turn * t.fixed_rows::<3>(3);
-                Vector6::new(v.x, v.y, v.z, w.x, w.y, w.z)
-            })
-            .collect(),
+    registered.origin_mm = base_from_object.transform_point(&registered.origin_mm.into()).coords;
+    for t in &mut registered.twists {
+        let v: Vector3<f64> = turn * t.fixed_rows::<3>(0);
+        let w: Vector3<f64> = turn * t.fixed_rows::<3>(3);
+        *t = Vector6::new(v.x, v.y, v.z, w.x, w.y, w.z);
     }
+    registered
 }

@@ -14,7 +14,7 @@ use crate::frames::frame_pair::ResolvedFrames;
 use crate::risk::probability::probability_of_harm;
 use crate::risk::registration::Registration;
 use crate::risk::remedy::Remedy;
-use truegrind_arm::estimated::{Estimated, FlangePoint, PosteriorComponent};
+use truegrind_arm::estimated::{Estimated, FlangePoint, PosteriorComponent, RegisteredFrame};
 use truegrind_arm::model::Joints;
 use truegrind_math::se3::Pose;
 
@@ -117,7 +117,7 @@ impl PathDeviation {
                 points.push(FlangePoint {
                     joints: target.joints,
                     flange_from_tool: real.flange_from_tool(&flange),
-                    carried: carried.as_ref(),
+                    carried: carried.as_ref().map(RegisteredFrame::carried),
                 });
             }
             let in_base = knowledge.position_jacobians(arm, &points);

@@ -155,7 +155,7 @@ impl Curve {
     /// The arc of a circular motion; `None` where its points make none.
     pub fn round(from: Pose, via: &Pose, to: Pose, motion: &Motion) -> Option<Self> {
         let point = |p: &Pose| Point3::from(p.translation.vector);
-        let axis = motion.axis.and_then(|axis| Unit::try_new(Vector3::from(axis), 1e-9));
+        let axis = motion.axis.as_deref().and_then(|axis| Unit::try_new(Vector3::from(*axis), 1e-9));
         let arc = Arc::through(&point(&from), &point(via), &point(&to), axis.as_ref())?;
         let middle = arc.share(&point(via), 0.5).clamp(0.0, 1.0);
         let turning = if axis.is_some() {

@@ -12,6 +12,7 @@ use crate::options::{Emit, Options};
 use crate::segment::condition_schedule::{CHORD_MM, ConditionSchedule};
 use crate::segment::curve::{between, lateral_offset};
 use truegrind_arm::model::Joints;
+use truegrind_math::option_f64::OptionF64;
 use truegrind_math::se3::{Pose, angle_bound_rad};
 use truegrind_programs::motion::MotionKind;
 use truegrind_programs::rewrite::{Extra, NewTarget};
@@ -34,7 +35,7 @@ pub(crate) struct SegmentEnd<'a> {
     /// Stated configuration, where the controller checks it.
     pub(crate) conf: Option<[i32; 4]>,
     /// External axes of the target, where known.
-    pub(crate) external: Option<&'a [Option<f64>; 6]>,
+    pub(crate) external: Option<&'a [OptionF64; 6]>,
 }
 
 impl<'a> SegmentEnd<'a> {
@@ -85,12 +86,12 @@ pub(crate) struct Segment<'a> {
 impl Segment<'_> {
     /// The external axes at a share of the segment, interpolated as the controller does; `None` where none moves, so that
     /// those of the end apply.
-    fn external_at(&self, share: f64) -> Option<[Option<f64>; 6]> {
+    fn external_at(&self, share: f64) -> Option<[OptionF64; 6]> {
         let (from, to) = (self.from.external?, self.to.external?);
         (from != to).then(|| {
-            std::array::from_fn(|axis| match (from[axis], to[axis]) {
-                (Some(from), Some(to)) => Some(from + (to - from) * share),
-                (_, to) => to,
+            std::array::from_fn(|axis| match (from[axis].get(), to[axis].get()) {
+                (Some(from), Some(to)) => (from + (to - from) * share).into(),
+                _ => to[axis],
             })
         })
     }

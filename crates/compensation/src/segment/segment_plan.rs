@@ -36,7 +36,7 @@ impl SegmentPlan {
     pub(crate) fn of(
         motion: &Motion,
         path: Option<&Segment<'_>>,
-        via: Option<&SolvedTarget>,
+        via: Option<&SolvedTarget<'_>>,
         middle_mm: f64,
         arms: &Arms<'_>,
         options: &Options,
@@ -111,13 +111,13 @@ fn line(
 fn circle(
     motion: &Motion,
     path: &Segment<'_>,
-    via: &SolvedTarget,
+    via: &SolvedTarget<'_>,
     segments: bool,
     arms: &Arms<'_>,
     options: &Options,
 ) -> SegmentPlan {
     let Segment { from, to, .. } = path;
-    let Some(circle) = Circle::of(from, &via.intended, &via.commanded, to, motion) else {
+    let Some(circle) = Circle::of(from, &via.intended.pose(), &via.commanded, to, motion) else {
         let closed = distance(&from.intended.translation.vector, &to.intended.translation.vector) < CLOSED_MM;
         let flag = if closed {
             OutcomeReason::FullCircle

@@ -12,6 +12,8 @@ use crate::frames::frame_table::FrameTable;
 use crate::plan::reason::OutcomeReason;
 use crate::risk::placement::AssessedTarget;
 use crate::search_budget;
+use crate::target::intended_pose::IntendedPose;
+use crate::target::target_ranges::TargetRanges;
 use truegrind_arm::inverse::budget::{SearchBudget, with_budget};
 use truegrind_arm::inverse::configuration::Configuration;
 use truegrind_arm::model::Joints;
@@ -30,10 +32,10 @@ pub(crate) struct TargetRef<'a> {
 }
 
 /// Intended pose of a target, and the joints of the original program.
-#[derive(Clone, Copy)]
-pub(crate) struct OriginalTarget {
+#[derive(Clone)]
+pub(crate) struct OriginalTarget<'a> {
     pub(crate) frames_index: usize,
-    pub(crate) intended: Pose,
+    pub(crate) intended: IntendedPose<'a>,
     pub(crate) joints: Joints,
     /// Branch of the arm.
     pub(crate) cfx: i32,
@@ -63,7 +65,7 @@ struct ReferenceJoints {
 }
 
 impl ReferenceJoints {
-    fn of(start: &OriginalTarget) -> Self {
+    fn of(start: &OriginalTarget<'_>) -> Self {
         ReferenceJoints { joints: start.joints, guessed: start.guess != BranchGuess::Known }
     }
 
@@ -75,25 +77,25 @@ impl ReferenceJoints {
 
 /// The original program: the joints at each target.
 pub(crate) struct OriginalProgram<'a> {
-    /// Index of the first target of each motion, and the total count.
-    pub(crate) first: Vec<usize>,
+    pub(crate) ranges: TargetRanges,
     pub(crate) target_refs: Vec<TargetRef<'a>>,
-    pub(crate) originals: Originals,
+    pub(crate) originals: Originals<'a>,
 }
 
 impl<'a> OriginalProgram<'a> {
     pub(crate) fn of(listing: &'a Listing, arms: &Arms<'_>, frame_table: &FrameTable) -> Self {
-        let mut first = Vec::with_capacity(listing.motions.len() + 1);
+        let mut first: Vec<u32> = Vec::with_capacity(listing.motions.len() + 1);
         let mut target_refs: Vec<TargetRef<'_>> = Vec::with_capacity(listing.motions.len());
         for (index, motion) in (0..).zip(&listing.motions) {
-            first.push(target_refs.len());
+            first.push(target_refs.len() as u32);
             if motion.own_reason.is_none() {
                 target_refs.extend(motion.targets.iter().map(|target| TargetRef { index, motion, target }));
             }
         }
-        first.push(target_refs.len());
-        let originals = originals(listing, &first, &target_refs, arms, frame_table);
-        Self { first, target_refs, originals }
+        first.push(target_refs.len() as u32);
+        let ranges = TargetRanges::of(first);
+        let originals = originals(listing, &ranges, &target_refs, arms, frame_table);
+        Self { ranges, target_refs, originals }
     }
 
     /// Whether the end of a motion is known.
@@ -103,29 +105,30 @@ impl<'a> OriginalProgram<'a> {
 
     /// The end of a motion under a condition.
     pub(crate) fn commanded(&self, motion: u32, condition_index: usize) -> Option<AssessedTarget> {
-        let OriginalTarget { frames_index, intended, joints, .. } = *self.end(motion as usize)?;
+        let OriginalTarget { frames_index, intended, joints, .. } = self.end(motion as usize)?;
+        let (frames_index, intended, joints) = (*frames_index, intended.pose(), *joints);
         Some(AssessedTarget { frames_index, intended, joints, condition_index })
     }
 
-    fn end(&self, motion: usize) -> Option<&OriginalTarget> {
-        self.originals[self.first[motion]..self.first[motion + 1]].last()?.as_ref().ok()
+    fn end(&self, motion: usize) -> Option<&OriginalTarget<'a>> {
+        self.originals[self.ranges.of_motion(motion)].last()?.as_ref().ok()
     }
 }
 
-pub(crate) type Originals = Vec<Result<OriginalTarget, OutcomeReason>>;
+pub(crate) type Originals<'a> = Vec<Result<OriginalTarget<'a>, OutcomeReason>>;
 
 /// The joints of the original program: first the targets with a checked configuration, then those that are reached from the
 /// previous motion.
-fn originals(
+fn originals<'a>(
     listing: &Listing,
-    first: &[usize],
-    target_refs: &[TargetRef<'_>],
+    ranges: &TargetRanges,
+    target_refs: &[TargetRef<'a>],
     arms: &Arms<'_>,
     frame_table: &FrameTable,
-) -> Originals {
+) -> Originals<'a> {
     let depends = |target_refs: &TargetRef<'_>| monitored(target_refs.motion) == Switch::Off;
     // Placeholder for targets that depend on the previous motion.
-    let mut out: Originals = target_refs.par_iter().map(|_| Err(OutcomeReason::JointTarget)).collect();
+    let mut out: Originals<'a> = target_refs.par_iter().map(|_| Err(OutcomeReason::JointTarget)).collect();
     let stretches = target_refs.len().div_ceil(STRETCH);
     let each = out.par_chunks_mut(STRETCH).zip(target_refs.par_chunks(STRETCH)).enumerate();
     each.for_each(|(stretch, (mut out, target_refs))| {
@@ -161,14 +164,14 @@ fn originals(
         }
         let previous = listing.motions[motion].previous.map(|p| p as usize);
         let mut near = previous.and_then(|p| {
-            let reached = &out[first[p]..first[p + 1]];
+            let reached = &out[ranges.of_motion(p)];
             reached.last().and_then(|start| start.as_ref().ok().map(ReferenceJoints::of))
         });
-        let run = first[motion]..first[end];
+        let run = ranges.of_motions(motion..end);
         solve_run(&target_refs[run.clone()], &mut near, arms, frame_table, &mut budget, &mut out[run]);
         motion = end;
     }
-    guess_if_possibly_unmonitored(listing, &monitors, target_refs, first, arms, frame_table, &mut out);
+    guess_if_possibly_unmonitored(listing, &monitors, target_refs, ranges, arms, frame_table, &mut out);
     out
 }
 
@@ -180,10 +183,10 @@ fn guess_if_possibly_unmonitored(
     listing: &Listing,
     monitors: &[Switch],
     target_refs: &[TargetRef<'_>],
-    first: &[usize],
+    ranges: &TargetRanges,
     arms: &Arms<'_>,
     frame_table: &FrameTable,
-    out: &mut Originals,
+    out: &mut Originals<'_>,
 ) {
     for (index, monitored) in monitors.iter().enumerate() {
         let motion = &listing.motions[index];
@@ -191,17 +194,17 @@ fn guess_if_possibly_unmonitored(
             continue;
         }
         let previous = motion.previous.map(|previous| previous as usize);
-        let before = previous.map(|previous| out[first[previous]..first[previous + 1]].last());
+        let before = previous.map(|previous| out[ranges.of_motion(previous)].last());
         let before = match (before, monitored) {
             (Some(Some(Ok(start))), _) if start.guess != BranchGuess::Known => Some(BranchGuess::Inherited),
             (Some(Some(Ok(start))), _)
-                if passes_singularity(motion, start, &out[first[index]..first[index + 1]]) =>
+                if passes_singularity(motion, start, &out[ranges.of_motion(index)]) =>
             {
                 Some(BranchGuess::Guessed)
             }
             (Some(Some(Ok(start))), Switch::Off)
                 if motion.kind == MotionKind::Joint
-                    && (first[index]..first[index + 1]).any(|at| {
+                    && ranges.of_motion(index).any(|at| {
                         let target = &target_refs[at];
                         out[at]
                             .as_ref()
@@ -213,7 +216,7 @@ fn guess_if_possibly_unmonitored(
             // Unchecked in any case: its own search has looked at its start, which was not yet known to be a guess.
             (_, Switch::Off) => None,
             (Some(Some(Ok(start))), _) => {
-                let here = first[index]..first[index + 1];
+                let here = ranges.of_motion(index);
                 let same =
                     same_unchecked(&start.joints, &target_refs[here.clone()], &out[here], arms, frame_table);
                 (!same).then_some(BranchGuess::Guessed)
@@ -221,7 +224,7 @@ fn guess_if_possibly_unmonitored(
             _ => Some(BranchGuess::Guessed),
         };
         let Some(guess) = before else { continue };
-        for at in first[index]..first[index + 1] {
+        for at in ranges.of_motion(index) {
             let several = || {
                 CommandedFlange::of(&target_refs[at], frame_table)
                     .is_some_and(|commanded| arms.nominal.all(&commanded.flange).len() > 1)
@@ -242,8 +245,8 @@ const OTHER_BRANCH_RAD: f64 = 1.2;
 /// Whether another solution is nearer to the start of a joint motion, by the joint that goes farthest, than the one in the branch of the
 /// start, with which the original joints go on. Makers say that the nearest one is taken, and not how near is measured.
 fn is_other_branch_nearer(
-    start: &OriginalTarget,
-    here: &OriginalTarget,
+    start: &OriginalTarget<'_>,
+    here: &OriginalTarget<'_>,
     target: &TargetRef<'_>,
     arms: &Arms<'_>,
     frame_table: &FrameTable,
@@ -260,8 +263,8 @@ fn is_other_branch_nearer(
 /// configuration is checked, on which side they leave it is open, whatever solution is nearest to the start.
 fn passes_singularity(
     motion: &Motion,
-    start: &OriginalTarget,
-    here: &[Result<OriginalTarget, OutcomeReason>],
+    start: &OriginalTarget<'_>,
+    here: &[Result<OriginalTarget<'_>, OutcomeReason>],
 ) -> bool {
     matches!(motion.kind, MotionKind::Linear | MotionKind::Circular)
         && here.iter().flatten().any(|target| target.cfx != start.cfx)
@@ -271,7 +274,7 @@ fn passes_singularity(
 fn same_unchecked(
     start: &Joints,
     target_refs: &[TargetRef<'_>],
-    checked: &[Result<OriginalTarget, OutcomeReason>],
+    checked: &[Result<OriginalTarget<'_>, OutcomeReason>],
     arms: &Arms<'_>,
     frame_table: &FrameTable,
 ) -> bool {
@@ -295,13 +298,13 @@ const RUNS: [usize; 2] = [8, 64];
 
 /// Original joints of consecutive targets. `near`: the joints from which the first one is reached, if known; updated to those
 /// of the last. `budget`: for targets that need a search.
-fn solve_run(
-    target_refs: &[TargetRef<'_>],
+fn solve_run<'a>(
+    target_refs: &[TargetRef<'a>],
     near: &mut Option<ReferenceJoints>,
     arms: &Arms<'_>,
     frame_table: &FrameTable,
     budget: &mut SearchBudget,
-    out: &mut [Result<OriginalTarget, OutcomeReason>],
+    out: &mut [Result<OriginalTarget<'a>, OutcomeReason>],
 ) {
     let mut at = 0;
     let mut run = RUNS[0];
@@ -309,7 +312,7 @@ fn solve_run(
         let here = &target_refs[at..(at + run).min(target_refs.len())];
         let whole = match near {
             Some(last) => {
-                let cartesian: Vec<CommandedFlange<'_>> = here
+                let cartesian: Vec<CommandedFlange<'a>> = here
                     .iter()
                     .map_while(|target_refs| CommandedFlange::of(target_refs, frame_table))
                     .collect();
@@ -343,7 +346,6 @@ struct CommandedFlange<'a> {
     target: &'a RobTarget,
     monitored: Switch,
     frames_index: usize,
-    intended: Pose,
     flange: Pose,
 }
 
@@ -354,9 +356,8 @@ impl<'a> CommandedFlange<'a> {
         if frame_table.moving_base(target).is_some() {
             return None;
         }
-        let intended = target.pose();
-        let flange = frame_table.list[frames_index].commanded.flange_for(&intended);
-        Some(Self { target, monitored: monitored(target_refs.motion), frames_index, intended, flange })
+        let flange = frame_table.list[frames_index].commanded.flange_for(&target.pose());
+        Some(Self { target, monitored: monitored(target_refs.motion), frames_index, flange })
     }
 }
 
@@ -367,11 +368,11 @@ fn wanted(target: &RobTarget) -> Configuration {
 
 /// Follows targets from `last` as far as each is reached in its stated configuration; returns their number and leaves `last`
 /// at the last of them.
-fn follow_seed(
-    commanded: &[CommandedFlange<'_>],
+fn follow_seed<'a>(
+    commanded: &[CommandedFlange<'a>],
     last: &mut ReferenceJoints,
     arms: &Arms<'_>,
-    out: &mut [Result<OriginalTarget, OutcomeReason>],
+    out: &mut [Result<OriginalTarget<'a>, OutcomeReason>],
 ) -> usize {
     if commanded.is_empty() {
         return 0;
@@ -387,7 +388,7 @@ fn follow_seed(
         let guess = last.guess(commanded.monitored);
         let start = OriginalTarget {
             frames_index: commanded.frames_index,
-            intended: commanded.intended,
+            intended: IntendedPose::Stated(commanded.target),
             joints,
             cfx,
             margins,
@@ -401,25 +402,24 @@ fn follow_seed(
 }
 
 /// Solves one target on its own.
-fn start(
-    target_refs: &TargetRef<'_>,
+fn start<'a>(
+    target_refs: &TargetRef<'a>,
     near: Option<&ReferenceJoints>,
     arms: &Arms<'_>,
     frame_table: &FrameTable,
-) -> Result<OriginalTarget, OutcomeReason> {
-    let value = target_refs.target.value.map_err(OutcomeReason::Program)?;
+) -> Result<OriginalTarget<'a>, OutcomeReason> {
+    let value = target_refs.target.value.as_ref().map_err(|reason| OutcomeReason::Program(*reason))?;
     let frames_index = frame_table.of_motion(target_refs.motion)?;
     let commanded = &frame_table.list[frames_index].commanded;
     match value {
         TargetValue::Cartesian(t) => {
-            if let Some(why) = frame_table.moving_base(&t) {
+            if let Some(why) = frame_table.moving_base(t) {
                 return Err(why);
             }
-            let intended = t.pose();
-            let flange = commanded.flange_for(&intended);
+            let flange = commanded.flange_for(&t.pose());
             let monitored = monitored(target_refs.motion);
             let from = near.map(|near| &near.joints);
-            let joints = frame_table.joints(target_refs.motion, &t, &flange, &arms.nominal, from)?;
+            let joints = frame_table.joints(target_refs.motion, t, &flange, &arms.nominal, from)?;
             let cfx = arms.nominal.configuration(&joints).cfx;
             let guess = match near {
                 Some(near) => near.guess(monitored),
@@ -430,6 +430,7 @@ fn start(
                 None => BranchGuess::Known,
             };
             let margins = arms.nominal.branch_margins(&joints);
+            let intended = IntendedPose::Stated(t);
             Ok(OriginalTarget { frames_index, intended, joints, cfx, margins, guess })
         }
         TargetValue::Joint(t) => {
@@ -438,7 +439,7 @@ fn start(
             if let Some(joint) = nominal.model.limits.violated(&joints) {
                 return Err(OutcomeReason::OutsideLimits { joint });
             }
-            let intended = commanded.target_of(&nominal.forward(&joints));
+            let intended = IntendedPose::Computed(Box::new(commanded.target_of(&nominal.forward(&joints))));
             let cfx = arms.nominal.configuration(&joints).cfx;
             let margins = arms.nominal.branch_margins(&joints);
             Ok(OriginalTarget { frames_index, intended, joints, cfx, margins, guess: BranchGuess::Known })

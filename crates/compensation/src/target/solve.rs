@@ -27,7 +27,8 @@ use crate::search_budget;
 use crate::segment::condition_schedule::ConditionSchedule;
 use crate::target::original_joints::{BranchGuess, OriginalProgram, OriginalTarget, TargetRef};
 use crate::target::solved_target::{SolvedTarget, SolvedTargets, as_joints};
-use truegrind_arm::estimated::{FlangePoint, RegisteredFrame};
+use crate::target::target_ranges::TargetRanges;
+use truegrind_arm::estimated::{CarriedFrame, FlangePoint, RegisteredFrame};
 use truegrind_arm::inverse::budget::{SearchBudget, with_budget};
 use truegrind_arm::inverse::configuration::Configuration;
 use truegrind_arm::model::Joints;
@@ -47,26 +48,26 @@ pub(crate) fn reserve_memory() {
 }
 
 /// Solves all targets. `stays`: motions that remain unmodified although their targets could be corrected.
-pub(crate) fn solve_targets(
+pub(crate) fn solve_targets<'a>(
     listing: &Listing,
-    program: &OriginalProgram<'_>,
+    program: &OriginalProgram<'a>,
     arms: &mut Arms<'_>,
     frame_table: &FrameTable,
     assessment: &Assessment,
     options: &Options,
     stays: &BTreeMap<u32, OutcomeReason>,
-) -> SolvedTargets {
-    let OriginalProgram { first, target_refs, originals } = program;
-    TargetSolver { listing, first, target_refs, originals, frame_table, assessment, options, stays }
+) -> SolvedTargets<'a> {
+    let OriginalProgram { ranges, target_refs, originals } = program;
+    TargetSolver { listing, ranges, target_refs, originals, frame_table, assessment, options, stays }
         .solve(arms)
 }
 
-/// Inputs of the solver.
-struct TargetSolver<'a> {
+/// Inputs of the solver. `'t`: the listing's targets.
+struct TargetSolver<'a, 't> {
     listing: &'a Listing,
-    first: &'a [usize],
-    target_refs: &'a [TargetRef<'a>],
-    originals: &'a [Result<OriginalTarget, OutcomeReason>],
+    ranges: &'a TargetRanges,
+    target_refs: &'a [TargetRef<'t>],
+    originals: &'a [Result<OriginalTarget<'t>, OutcomeReason>],
     frame_table: &'a FrameTable,
     assessment: &'a Assessment,
     options: &'a Options,
@@ -79,8 +80,8 @@ const ROUNDS: usize = 4;
 /// Largest number of iterations.
 const MOST_ROUNDS: usize = 24;
 
-impl TargetSolver<'_> {
-    fn solve(self, arms: &mut Arms<'_>) -> SolvedTargets {
+impl<'t> TargetSolver<'_, 't> {
+    fn solve(self, arms: &mut Arms<'_>) -> SolvedTargets<'t> {
         let count = self.listing.motions.len();
         let loads = arms.loads(self.listing, self.options.loads.as_ref());
         let load = |motion: usize| loads.get(motion).and_then(Option::as_ref);
@@ -89,7 +90,7 @@ impl TargetSolver<'_> {
                 let only = arms.conditions.condition_index([0; 6], None);
                 vec![only; self.target_refs.len()]
             } else {
-                let motions = (0..count).flat_map(|m| (self.first[m]..self.first[m + 1]).map(move |_| m));
+                let motions = (0..count).flat_map(|m| self.ranges.of_motion(m).map(move |_| m));
                 motions.map(|m| arms.conditions.condition_index([0; 6], load(m))).collect()
             };
             let mut targets = self.unsolved();
@@ -144,14 +145,14 @@ impl TargetSolver<'_> {
 
     fn solved(
         &self,
-        targets: Vec<Result<SolvedTarget, OutcomeReason>>,
+        targets: Vec<Result<SolvedTarget<'t>, OutcomeReason>>,
         schedules: Vec<ConditionSchedule>,
-    ) -> SolvedTargets {
+    ) -> SolvedTargets<'t> {
         let unreached = self.unreached(&targets);
         let guessed = self.guessed();
         SolvedTargets {
             forbade: Vec::new(),
-            first: self.first.to_vec(),
+            ranges: self.ranges.clone(),
             targets,
             schedules,
             unreached,
@@ -162,10 +163,10 @@ impl TargetSolver<'_> {
     /// Original targets of the motions of which a target failed although all original joints are known.
     fn unreached(
         &self,
-        solved: &[Result<SolvedTarget, OutcomeReason>],
-    ) -> BTreeMap<u32, Vec<OriginalTarget>> {
+        solved: &[Result<SolvedTarget<'t>, OutcomeReason>],
+    ) -> BTreeMap<u32, Vec<OriginalTarget<'t>>> {
         let originals = |motion: usize| {
-            let targets = self.first[motion]..self.first[motion + 1];
+            let targets = self.ranges.of_motion(motion);
             let failed = solved[targets.clone()].iter().any(Result::is_err);
             let originals = || self.originals[targets].iter().cloned().collect::<Result<_, _>>().ok();
             Some((motion as u32, failed.then(originals)??))
@@ -180,7 +181,7 @@ impl TargetSolver<'_> {
     /// Motions of which a target has a guessed branch.
     fn guessed(&self) -> Vec<u32> {
         let guessed = |m: &usize| {
-            self.originals[self.first[*m]..self.first[m + 1]]
+            self.originals[self.ranges.of_motion(*m)]
                 .iter()
                 .flatten()
                 .any(|start| start.guess == BranchGuess::Guessed)
@@ -191,25 +192,25 @@ impl TargetSolver<'_> {
 
     /// The targets of the portion that begins with a motion.
     fn targets(&self, begin: usize) -> std::ops::Range<usize> {
-        self.first[begin]..self.first[(begin + search_budget::PORTION).min(self.listing.motions.len())]
+        self.ranges.of_motions(begin..(begin + search_budget::PORTION).min(self.listing.motions.len()))
     }
 
     /// One slot per target.
-    fn unsolved(&self) -> Vec<Result<SolvedTarget, OutcomeReason>> {
+    fn unsolved(&self) -> Vec<Result<SolvedTarget<'t>, OutcomeReason>> {
         self.target_refs.par_iter().map(|_| Err(OutcomeReason::JointTarget)).collect()
     }
 
     /// Solves all targets, or only the `stale` portions; `before`: the conditions of the original program.
     fn fill(
         &self,
-        solved: &mut [Result<SolvedTarget, OutcomeReason>],
+        solved: &mut [Result<SolvedTarget<'t>, OutcomeReason>],
         arms: &Arms<'_>,
         before: &[usize],
         condition_indices: &[usize],
         stale: Option<&[bool]>,
     ) {
         let mut rest = solved;
-        let mut portions: Vec<&mut [Result<SolvedTarget, OutcomeReason>]> = Vec::new();
+        let mut portions: Vec<&mut [Result<SolvedTarget<'t>, OutcomeReason>]> = Vec::new();
         for begin in (0..self.listing.motions.len()).step_by(search_budget::PORTION) {
             let (here, after) = rest.split_at_mut(self.targets(begin).len());
             portions.push(here);
@@ -234,7 +235,7 @@ impl TargetSolver<'_> {
     fn sides(
         &self,
         arms: &Arms<'_>,
-        solved: Option<&[Result<SolvedTarget, OutcomeReason>]>,
+        solved: Option<&[Result<SolvedTarget<'t>, OutcomeReason>]>,
         unknown_sides: &[[bool; 6]],
     ) -> Vec<BacklashSides> {
         let motions = &self.listing.motions;
@@ -245,7 +246,7 @@ impl TargetSolver<'_> {
             }
             let stays = self.stays.contains_key(&(m as u32));
             let rewritten = solved.filter(|_| is_rewritable(motion, self.options) && !stays);
-            let targets = self.first[m]..self.first[m + 1];
+            let targets = self.ranges.of_motion(m);
             let solved = |target: usize| match &rewritten?[target] {
                 Ok(solved) if solved.forbidden.is_none() => Some(solved),
                 _ => None,
@@ -258,9 +259,10 @@ impl TargetSolver<'_> {
                     let links = arms.conditions.links(solved.condition_index, &solved.after);
                     Some((solved.frames_index, solved.commanded, solved.after, Some(links)))
                 }
-                None => {
-                    self.originals[target].as_ref().ok().map(|s| (s.frames_index, s.intended, s.joints, None))
-                }
+                None => self.originals[target]
+                    .as_ref()
+                    .ok()
+                    .map(|s| (s.frames_index, s.intended.pose(), s.joints, None)),
             };
             let role = |target: &usize| self.target_refs[*target].target.role;
             let Some((frames_index, commanded, joints, links)) =
@@ -287,7 +289,7 @@ impl TargetSolver<'_> {
         // Guessed joints may be whole turns off, so the direction from which a joint arrives from them is
         // unknown.
         let guessed = |m: usize| {
-            let targets = self.first[m]..self.first[m + 1];
+            let targets = self.ranges.of_motion(m);
             targets
                 .rev()
                 .find_map(|t| self.originals[t].as_ref().ok())
@@ -308,7 +310,7 @@ impl TargetSolver<'_> {
     ) -> Vec<usize> {
         let mut out = Vec::with_capacity(self.target_refs.len());
         for (m, course) in sides.iter().enumerate() {
-            for target in self.first[m]..self.first[m + 1] {
+            for target in self.ranges.of_motion(m) {
                 let sides: JointSides = match self.target_refs[target].target.role {
                     Role::Via => course.via,
                     Role::To => course.end,
@@ -321,34 +323,37 @@ impl TargetSolver<'_> {
 }
 
 /// Solves one portion of targets into `out`.
-fn solve_portion(
-    target_refs: &[TargetRef<'_>],
-    originals: &[Result<OriginalTarget, OutcomeReason>],
+fn solve_portion<'t>(
+    target_refs: &[TargetRef<'t>],
+    originals: &[Result<OriginalTarget<'t>, OutcomeReason>],
     condition_indices: [&[usize]; 2],
     arms: &Arms<'_>,
-    work: &TargetSolver<'_>,
-    out: &mut [Result<SolvedTarget, OutcomeReason>],
+    work: &TargetSolver<'_, 't>,
+    out: &mut [Result<SolvedTarget<'t>, OutcomeReason>],
 ) {
     let TargetSolver { frame_table, assessment, options, .. } = *work;
     let conditions = &arms.conditions;
     // Placeholder for targets that are being solved.
-    let waiting = |start: &Result<OriginalTarget, OutcomeReason>| {
+    let waiting = |start: &Result<OriginalTarget<'_>, OutcomeReason>| {
         Err(start.as_ref().err().copied().unwrap_or(OutcomeReason::JointTarget))
     };
     out.iter_mut().zip(originals).for_each(|(out, start)| *out = waiting(start));
     let reachable = reachable_targets(originals, condition_indices, arms, frame_table, out);
-    let joint_form = |w: &ReachableTarget| {
+    let joint_form = |w: &ReachableTarget<'_, '_>| {
         as_joints(target_refs[w.index].motion, target_refs[w.index].target, options.emit)
     };
     let ControllerReplay { told_flanges, commanded, read_back, branches, last, failed } =
         replay_controller(&reachable, &joint_form, arms, frame_table, options);
-    let real = |start: &OriginalTarget| &frame_table.list[start.frames_index].real;
+    let real = |start: &OriginalTarget<'_>| &frame_table.list[start.frames_index].real;
     let condition_indices: Vec<usize> = reachable.iter().map(|w| w.condition_index).collect();
     let reached_after = conditions.forward(&condition_indices, &last);
-    let tools: Vec<Pose> = reachable.iter().map(|w| real(&w.start).flange_from_tool(&w.flange)).collect();
-    let cut_of = |w: &ReachableTarget| target_refs[w.index].index;
-    let against = |w: &ReachableTarget| {
-        (frame_table.list[w.start.frames_index].carried.as_ref(), assessment.registered(cut_of(w)))
+    let tools: Vec<Pose> = reachable.iter().map(|w| real(w.start).flange_from_tool(&w.flange)).collect();
+    let cut_of = |w: &ReachableTarget<'_, '_>| target_refs[w.index].index;
+    let against = |w: &ReachableTarget<'_, '_>| {
+        (
+            frame_table.list[w.start.frames_index].carried.as_ref().map(RegisteredFrame::carried),
+            assessment.registered(cut_of(w)),
+        )
     };
     let predicted = sigmas(&reachable, &tools, &against, arms);
     let mut near = NearestSample::default();
@@ -357,15 +362,15 @@ fn solve_portion(
             out[w.index] = Err(why);
             continue;
         }
-        let real = real(&w.start);
-        let intended = w.start.intended;
+        let real = real(w.start);
+        let intended = w.intended;
         let reached = [w.reached_before, real.target_of(&reached_after[k])];
         let deviation = |reached: Pose| Deviation::between(&intended, &reached, &Pose::identity(), None);
         let play_uncertainty_mm = conditions.play_uncertainty_mm(w.condition_index, &w.after, &tools[k]);
         let (conf, margins) = branches[k];
         let mut solved = SolvedTarget {
             frames_index: w.start.frames_index,
-            intended,
+            intended: w.start.intended.clone(),
             before: w.start.joints,
             after: w.after,
             commanded: commanded[k],
@@ -378,41 +383,45 @@ fn solve_portion(
             shape_sigma_mm: predicted[k]
                 .1
                 .or_else(|| assessment.sigma_of_cut_mm(cut_of(w)))
-                .map(|sigma| sigma.hypot(play_uncertainty_mm)),
+                .map(|sigma| sigma.hypot(play_uncertainty_mm))
+                .into(),
             play_uncertainty_mm,
             condition_index: w.condition_index,
             guess: w.start.guess,
-            outside: arms.knowledge.and_then(|k| k.region.outside_along(&w.after, &mut near)),
+            outside: arms.knowledge.and_then(|k| k.region.outside_along(&w.after, &mut near)).map(Box::new),
             forbidden: None,
         };
-        solved.forbidden = forbidden(&solved, w.singularity, arms, options).or_else(|| {
+        let forbidden = forbidden(&solved, w.singularity, arms, options).or_else(|| {
             let frames = &frame_table.list[solved.frames_index].commanded;
             let stated = if joint_form(w) { None } else { stated(&target_refs[w.index]) };
             let (flange, read_back, joints) = (&told_flanges[k], &read_back[k], &last[k]);
             let replay = WrittenTarget { frames, flange, read_back, joints, stated };
             target_fault(&solved, w.singularity, &replay, arms, options)
         });
+        solved.forbidden = forbidden.map(Box::new);
         out[w.index] = Ok(solved);
     }
 }
 
 /// Solves the joints that reach the intended poses; the reason of each failure goes to `out`.
-fn reachable_targets(
-    originals: &[Result<OriginalTarget, OutcomeReason>],
+fn reachable_targets<'o, 't>(
+    originals: &'o [Result<OriginalTarget<'t>, OutcomeReason>],
     condition_indices: [&[usize]; 2],
     arms: &Arms<'_>,
     frame_table: &FrameTable,
-    out: &mut [Result<SolvedTarget, OutcomeReason>],
-) -> Vec<ReachableTarget> {
+    out: &mut [Result<SolvedTarget<'t>, OutcomeReason>],
+) -> Vec<ReachableTarget<'o, 't>> {
     let conditions = &arms.conditions;
-    let open: Vec<(usize, OriginalTarget)> = originals
+    let open: Vec<(usize, &OriginalTarget<'t>)> = originals
         .iter()
         .enumerate()
-        .filter_map(|(index, start)| Some((index, *start.as_ref().ok()?)))
+        .filter_map(|(index, start)| Some((index, start.as_ref().ok()?)))
         .collect();
     let before: Vec<Joints> = open.iter().map(|(_, s)| s.joints).collect();
-    let real = |start: &OriginalTarget| &frame_table.list[start.frames_index].real;
-    let flanges: Vec<Pose> = open.iter().map(|(_, s)| real(s).flange_for(&s.intended)).collect();
+    let real = |start: &OriginalTarget<'_>| &frame_table.list[start.frames_index].real;
+    let intended: Vec<Pose> = open.iter().map(|(_, s)| s.intended.pose()).collect();
+    let flanges: Vec<Pose> =
+        open.iter().zip(&intended).map(|((_, s), intended)| real(s).flange_for(intended)).collect();
     let [places_before, condition_indices] =
         condition_indices.map(|all| open.iter().map(|(k, _)| all[*k]).collect::<Vec<usize>>());
     let reached_before = conditions.forward(&places_before, &before);
@@ -422,12 +431,13 @@ fn reachable_targets(
             .inverse(condition_index)
             .solve_offset_seeded(&select(&flanges, items), &select(&before, items)),
     });
-    let mut reachable: Vec<ReachableTarget> = Vec::with_capacity(open.len());
+    let mut reachable: Vec<ReachableTarget<'o, 't>> = Vec::with_capacity(open.len());
     for (k, ((index, start), solution)) in open.iter().zip(solutions).enumerate() {
         match solution {
             Ok(solution) => reachable.push(ReachableTarget {
                 index: *index,
-                start: *start,
+                start,
+                intended: intended[k],
                 condition_index: condition_indices[k],
                 flange: flanges[k],
                 after: solution.joints,
@@ -454,20 +464,21 @@ struct ControllerReplay {
 }
 
 fn replay_controller(
-    reachable: &[ReachableTarget],
-    joint_form: &dyn Fn(&ReachableTarget) -> bool,
+    reachable: &[ReachableTarget<'_, '_>],
+    joint_form: &dyn Fn(&ReachableTarget<'_, '_>) -> bool,
     arms: &Arms<'_>,
     frame_table: &FrameTable,
     options: &Options,
 ) -> ControllerReplay {
     let after: Vec<Joints> = reachable.iter().map(|w| w.after).collect();
     let told_flanges = arms.nominal.arm().forward_many(&after);
-    let mounting = |w: &ReachableTarget| &frame_table.list[w.start.frames_index].commanded;
+    let mounting = |w: &ReachableTarget<'_, '_>| &frame_table.list[w.start.frames_index].commanded;
     let commanded: Vec<Pose> =
         reachable.iter().zip(&told_flanges).map(|(w, flange)| mounting(w).target_of(flange)).collect();
     let scale = 10f64.powi(i32::from(options.position_decimals));
-    let hears =
-        |(w, commanded): (&ReachableTarget, &Pose)| mounting(w).flange_for(&rounded(commanded, scale));
+    let hears = |(w, commanded): (&ReachableTarget<'_, '_>, &Pose)| {
+        mounting(w).flange_for(&rounded(commanded, scale))
+    };
     let read_back: Vec<Pose> = reachable.iter().zip(&commanded).map(hears).collect();
     let reached = if reachable.iter().all(joint_form) {
         Vec::new()
@@ -497,9 +508,9 @@ fn replay_controller(
 /// Predicted standard deviation of each point (mm) relative to its reference frame, and to the registration of its cut where there is
 /// one; zero without a covariance. `against`: both frames.
 fn sigmas<'f>(
-    reachable: &[ReachableTarget],
+    reachable: &[ReachableTarget<'_, '_>],
     tools: &[Pose],
-    against: &dyn Fn(&ReachableTarget) -> TargetFrames<'f>,
+    against: &dyn Fn(&ReachableTarget<'_, '_>) -> TargetFrames<'f>,
     arms: &Arms<'_>,
 ) -> Vec<(f64, Option<f64>)> {
     let Some(knowledge) = arms.knowledge else { return vec![(0.0, None); reachable.len()] };
@@ -524,7 +535,7 @@ fn sigmas<'f>(
 }
 
 /// The frame that carries a target, and the registration of its cut.
-type TargetFrames<'f> = (Option<&'f RegisteredFrame>, Option<&'f RegisteredFrame>);
+type TargetFrames<'f> = (Option<CarriedFrame<'f>>, Option<CarriedFrame<'f>>);
 
 /// The target, where the controller may use its stated configuration.
 fn stated<'a>(target_refs: &TargetRef<'a>) -> Option<&'a RobTarget> {
@@ -533,9 +544,10 @@ fn stated<'a>(target_refs: &TargetRef<'a>) -> Option<&'a RobTarget> {
 }
 
 /// A target whose corrected joints are known.
-struct ReachableTarget {
+struct ReachableTarget<'o, 't> {
     index: usize,
-    start: OriginalTarget,
+    start: &'o OriginalTarget<'t>,
+    intended: Pose,
     condition_index: usize,
     flange: Pose,
     after: Joints,

@@ -6,18 +6,21 @@ use crate::deviation::Deviation;
 use crate::options::Emit;
 use crate::plan::reason::OutcomeReason;
 use crate::segment::condition_schedule::ConditionSchedule;
+use crate::target::intended_pose::IntendedPose;
 use crate::target::original_joints::{BranchGuess, OriginalTarget};
+use crate::target::target_ranges::TargetRanges;
 use truegrind_arm::inverse::configuration::Configuration;
 use truegrind_arm::model::Joints;
 use truegrind_arm::region::Outside;
+use truegrind_math::option_f64::OptionF64;
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{Motion, MotionKind, MotionTarget, Role, TargetValue};
 
-/// One solved target.
+/// One solved target. A program may have a million: what is rare has memory of its own.
 #[derive(Debug, Clone)]
-pub(crate) struct SolvedTarget {
+pub(crate) struct SolvedTarget<'a> {
     pub(crate) frames_index: usize,
-    pub(crate) intended: Pose,
+    pub(crate) intended: IntendedPose<'a>,
     pub(crate) before: Joints,
     pub(crate) after: Joints,
     pub(crate) commanded: Pose,
@@ -30,31 +33,31 @@ pub(crate) struct SolvedTarget {
     pub(crate) deviations: Option<Box<[Deviation; 2]>>,
     pub(crate) sigma_mm: f64,
     /// Predicted standard deviation of the shape of its cut, after the best rigid registration; absent outside cuts.
-    pub(crate) shape_sigma_mm: Option<f64>,
+    pub(crate) shape_sigma_mm: OptionF64,
     /// Contribution to either from joints of unknown backlash side (mm).
     pub(crate) play_uncertainty_mm: f64,
-    pub(crate) outside: Option<Outside>,
+    pub(crate) outside: Option<Box<Outside>>,
     /// [`Inverse::branch_margins`](truegrind_arm::inverse::Inverse::branch_margins) of the nominal arm, before and after.
     pub(crate) margins: [[f64; 3]; 2],
     /// Why it must not be written.
-    pub(crate) forbidden: Option<OutcomeReason>,
+    pub(crate) forbidden: Option<Box<OutcomeReason>>,
     /// Condition under which the arm arrives.
     pub(crate) condition_index: usize,
     /// Whether the original joints are guessed.
     pub(crate) guess: BranchGuess,
 }
 
-impl SolvedTarget {
+impl<'a> SolvedTarget<'a> {
     /// Distance of the commanded from the intended position (mm): the change of the program's numbers.
     pub(crate) fn shift_mm(&self) -> f64 {
-        (self.commanded.translation.vector - self.intended.translation.vector).norm()
+        (self.commanded.translation.vector - self.intended.position_mm()).norm()
     }
 
     /// The target of the original program.
-    fn original_targets(&self) -> OriginalTarget {
+    fn original_targets(&self) -> OriginalTarget<'a> {
         OriginalTarget {
             frames_index: self.frames_index,
-            intended: self.intended,
+            intended: self.intended.clone(),
             joints: self.before,
             cfx: self.cfx_before,
             margins: self.margins[0],
@@ -64,30 +67,28 @@ impl SolvedTarget {
 }
 
 /// The targets of all motions.
-pub(crate) struct SolvedTargets {
+pub(crate) struct SolvedTargets<'a> {
     /// Undo log of [`SolvedTargets::forbid`]: target, and its previous reason.
-    pub(crate) forbade: Vec<(usize, Option<OutcomeReason>)>,
-    /// Index of the first target of each motion, and the total count.
-    pub(crate) first: Vec<usize>,
+    pub(crate) forbade: Vec<(usize, Option<Box<OutcomeReason>>)>,
+    pub(crate) ranges: TargetRanges,
     /// All targets in one list, so that its memory is returned to the system as a whole.
-    pub(crate) targets: Vec<Result<SolvedTarget, OutcomeReason>>,
+    pub(crate) targets: Vec<Result<SolvedTarget<'a>, OutcomeReason>>,
     /// Conditions along the segment to each motion's end; empty without backlash.
     pub(crate) schedules: Vec<ConditionSchedule>,
     /// Original targets of motions of which the estimated arm does not reach a target.
-    pub(crate) unreached: BTreeMap<u32, Vec<OriginalTarget>>,
+    pub(crate) unreached: BTreeMap<u32, Vec<OriginalTarget<'a>>>,
     /// Motions with unchecked configuration and unknown start, without those that continue from them.
     pub(crate) guessed: Vec<u32>,
 }
 
-impl SolvedTargets {
+impl<'a> SolvedTargets<'a> {
     /// Forbids a change of a motion; without effect where its last target was not solved.
     pub(crate) fn forbid(&mut self, motion: usize, reason: OutcomeReason) {
-        let targets = self.first[motion]..self.first[motion + 1];
-        if let Some(last) = targets.last()
+        let mut targets = self.ranges.of_motion(motion);
+        if let Some(last) = targets.next_back()
             && let Ok(solved) = &mut self.targets[last]
         {
-            self.forbade.push((last, solved.forbidden));
-            solved.forbidden = Some(reason);
+            self.forbade.push((last, solved.forbidden.replace(Box::new(reason))));
         }
     }
 
@@ -101,23 +102,23 @@ impl SolvedTargets {
     }
 
     /// The targets of one motion; empty where the motion must be left.
-    pub(crate) fn of(&self, motion: usize) -> &[Result<SolvedTarget, OutcomeReason>] {
-        &self.targets[self.first[motion]..self.first[motion + 1]]
+    pub(crate) fn of(&self, motion: usize) -> &[Result<SolvedTarget<'a>, OutcomeReason>] {
+        &self.targets[self.ranges.of_motion(motion)]
     }
 
     /// The targets of a motion in the original program; empty where unknown.
-    pub(crate) fn original_targets(&self, motion: usize) -> Vec<OriginalTarget> {
-        let known = |targets: &[Result<SolvedTarget, OutcomeReason>]| {
+    pub(crate) fn original_targets(&self, motion: usize) -> Vec<OriginalTarget<'a>> {
+        let known = |targets: &[Result<SolvedTarget<'a>, OutcomeReason>]| {
             targets.iter().map(|target| Some(target.as_ref().ok()?.original_targets())).collect::<Option<_>>()
         };
         known(self.of(motion)).or_else(|| self.unreached.get(&(motion as u32)).cloned()).unwrap_or_default()
     }
 
     /// The end of a motion in the original program, if known.
-    pub(crate) fn original_end(&self, motion: usize) -> Option<OriginalTarget> {
+    pub(crate) fn original_end(&self, motion: usize) -> Option<OriginalTarget<'a>> {
         match self.of(motion).last()? {
             Ok(solved) => Some(solved.original_targets()),
-            Err(_) => self.unreached.get(&(motion as u32))?.last().copied(),
+            Err(_) => self.unreached.get(&(motion as u32))?.last().cloned(),
         }
     }
 

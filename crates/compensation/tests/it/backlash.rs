@@ -200,8 +200,8 @@ fn the_path_between_targets_takes_up_the_play_where_joints_turn() {
     let off_path = |program: &[u8], planned: &Plan| {
         let changed = Task::read(&[("p.mod", program)]);
         // The first motion with the part: the sixth of the original ones.
-        let part_from = 6 + planned.outcomes[..6].iter().map(|o| o.inserted).sum::<usize>();
-        let begin = 3 + planned.outcomes[..3].iter().map(|o| o.inserted).sum::<usize>();
+        let part_from = 6 + planned.outcomes[..6].iter().map(|o| o.inserted as usize).sum::<usize>();
+        let begin = 3 + planned.outcomes[..3].iter().map(|o| o.inserted as usize).sum::<usize>();
         let distance = |p: &Point3<f64>| {
             meant
                 .windows(2)
@@ -224,7 +224,7 @@ fn the_path_between_targets_takes_up_the_play_where_joints_turn() {
     // A link does not jump from flank to flank, it rests, and the stated deviation accounts for that.
     let stated = |planned: &Plan| {
         let without_part = planned.outcomes.iter().enumerate().filter(|(k, _)| *k > 3 && *k != 6);
-        without_part.filter_map(|(_, o)| o.path_deviation_mm).fold(0.0, f64::max)
+        without_part.filter_map(|(_, o)| o.path_deviation_mm.get()).fold(0.0, f64::max)
     };
     assert!(loose > 0.05, "play bends the path: {loose}");
     assert!((stated(&planned) - loose).abs() < CHORD_MM, "stated {}, found {loose}", stated(&planned));
@@ -236,7 +236,7 @@ fn the_path_between_targets_takes_up_the_play_where_joints_turn() {
     assert!((stated(&planned) - left).abs() < CHORD_MM, "stated {}, found {left}", stated(&planned));
     // Where the part is taken, the deviation exceeds the tolerance for a moment, and the outcome states it.
     for (k, outcome) in planned.outcomes.iter().enumerate() {
-        let bent = matches!(outcome.reason, Some(OutcomeReason::PathDeviation { mm }) if mm > tolerance);
+        let bent = matches!(outcome.reason(), Some(OutcomeReason::PathDeviation { mm }) if mm > tolerance);
         assert_eq!(bent, k == 6, "{outcome:?}");
     }
 }
@@ -254,9 +254,9 @@ fn the_judge_sees_what_the_simulation_sees_and_a_start_without_sides_is_said() {
     let note = planned.notes.iter().find(|note| note.contains("backlash")).expect("a note on backlash");
     assert!(note.contains("joint 1: 0.0200°") && note.contains("is unknown (it has not moved yet"), "{note}");
     // Half the backlash of each joint is in σ at the start and no longer once all joints have moved.
-    let sigma = |k: usize| planned.outcomes[k].sigma_mm.unwrap();
+    let sigma = |k: usize| planned.outcomes[k].sigma_mm.get().unwrap();
     assert!(sigma(0) > 0.09, "σ at the start {}", sigma(0));
-    let settled = planned.outcomes[3..].iter().filter_map(|o| o.sigma_mm).fold(0.0, f64::max);
+    let settled = planned.outcomes[3..].iter().filter_map(|o| o.sigma_mm.get()).fold(0.0, f64::max);
     assert!(settled < 0.2 * sigma(0), "σ later {settled}");
 }
 
@@ -295,7 +295,7 @@ fn less_than_the_play_tells_no_side() {
     text.extend_from_slice(&lines[first + 1..]);
     let text = text.join("\n");
     let (planned, _) = rewrite(&text, &arm, &options(5.0, None));
-    let sigma = |k: usize| planned.outcomes[k].sigma_mm.unwrap();
+    let sigma = |k: usize| planned.outcomes[k].sigma_mm.get().unwrap();
     assert!(sigma(0) > 0.09 && sigma(1) > 0.05, "{} {}", sigma(0), sigma(1));
     assert!(sigma(3) < 0.2 * sigma(0), "{}", sigma(3));
 }
@@ -307,7 +307,7 @@ fn guessed_joints_tell_no_side() {
     let arm = worn(3);
     let sigma = |text: &str, k: usize| {
         let (planned, _) = rewrite(text, &arm, &options(5.0, None));
-        planned.outcomes[k].sigma_mm.unwrap()
+        planned.outcomes[k].sigma_mm.get().unwrap()
     };
     let checked = source();
     let unchecked =

@@ -70,7 +70,7 @@ fn a_target_that_cannot_be_reached_keeps_its_cut_and_no_other() {
     .concat();
     let (done, bytes) = done(&module(&body), Cuts::Whole, 0.05);
     assert_eq!(statuses(&done), [Refused, Refused, Refused, Refused, Changed, Changed, Changed]);
-    let because = |index: usize| done.plan.outcomes[index].reason.unwrap().to_string();
+    let because = |index: usize| done.plan.outcomes[index].reason().unwrap().to_string();
     assert!(because(0).contains("line 6 remains unmodified: out of reach"), "{}", because(0));
     assert!(because(2).contains("reach"), "{}", because(2));
     let text = String::from_utf8(bytes).unwrap();
@@ -88,7 +88,7 @@ fn a_target_known_only_at_run_time_keeps_its_cut() {
     let body = [line(380.0, "z1"), late.to_owned(), line(390.0, "z1")].concat();
     let (partly, _) = done(&module(&body), Cuts::Whole, 0.05);
     assert_eq!(statuses(&partly), [Refused, Left, Refused]);
-    assert!(matches!(partly.plan.outcomes[0].reason, Some(OutcomeReason::PartOfCut { line: 6, .. })));
+    assert!(matches!(partly.plan.outcomes[0].reason(), Some(OutcomeReason::PartOfCut { line: 6, .. })));
     // A whole cut for one reason: nothing is refused that could have been corrected.
     let (all_left, _) = done(&module(&late.repeat(2)), Cuts::Whole, 0.05);
     assert_eq!(statuses(&all_left), [Left, Left]);
@@ -151,7 +151,7 @@ fn what_the_writer_refuses_keeps_its_cut_too() {
     assert_eq!(statuses(&plan(Cuts::Single)), [Changed, Changed, Refused, Refused, Changed]);
     let whole = plan(Cuts::Whole);
     assert_eq!(statuses(&whole), [Changed, Refused, Refused, Refused, Changed]);
-    let reasons: Vec<_> = whole.plan.outcomes.iter().map(|outcome| outcome.reason).collect();
+    let reasons: Vec<_> = whole.plan.outcomes.iter().map(|outcome| outcome.reason()).collect();
     assert!(matches!(reasons[1], Some(OutcomeReason::PartOfCut { line: 6, .. })), "{reasons:?}");
     assert_eq!(reasons[3], Some(OutcomeReason::LineWithoutStart));
     let text = whole.rewritten.files[0].edits.apply(source.as_bytes()).unwrap();
@@ -184,7 +184,9 @@ fn in_part_a_step_between_neighbours_stays_below_the_tolerance() {
     // The correction is some tenths of a millimetre: no part of the cut may be moved alone.
     let (tight, bytes) = done(&source, Cuts::Partial, 0.01);
     assert!(statuses(&tight).iter().all(|status| *status == Refused));
-    assert!(matches!(tight.plan.outcomes[3].reason, Some(OutcomeReason::Step { line: 8, mm }) if mm > 0.01));
+    assert!(
+        matches!(tight.plan.outcomes[3].reason(), Some(OutcomeReason::Step { line: 8, mm }) if mm > 0.01)
+    );
     assert_eq!(bytes, source.as_bytes());
     let (loose, bytes) = done(&source, Cuts::Partial, 5.0);
     let changed = statuses(&loose).iter().filter(|status| **status == Changed).count();

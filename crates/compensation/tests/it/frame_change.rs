@@ -84,6 +84,7 @@ fn a_line_that_begins_under_another_tool_is_checked_and_straightened() {
     let outcome = &planned.outcomes[1];
     let stated = outcome
         .path_deviation_mm
+        .get()
         .unwrap_or_else(|| panic!("it is not checked: {outcome:?}\n{:?}", planned.notes));
     let found = off_line(&source, &text, &known, 0);
     assert!(found > 0.05 && (found - stated).abs() < 4e-3, "{found} mm, stated {stated}");
@@ -94,6 +95,6 @@ fn a_line_that_begins_under_another_tool_is_checked_and_straightened() {
     let (planned, text) = rewrite(&source, &known, &tight);
     let outcome = &planned.outcomes[1];
     assert!(outcome.inserted > 0, "{outcome:?}");
-    let left = off_line(&source, &text, &known, outcome.inserted);
+    let left = off_line(&source, &text, &known, outcome.inserted as usize);
     assert!(left <= tight.tolerance_mm + 2e-3, "{left} mm, {} asked", tight.tolerance_mm);
 }

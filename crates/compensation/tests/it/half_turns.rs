@@ -31,7 +31,7 @@ fn reasons(turn_deg: f64) -> Vec<Option<OutcomeReason>> {
     plan(&task.listing, &estimated, &Cell::default(), &options)
         .outcomes
         .iter()
-        .map(|outcome| outcome.reason.filter(|reason| matches!(reason, OutcomeReason::HalfTurn { .. })))
+        .map(|outcome| outcome.reason().filter(|reason| matches!(reason, OutcomeReason::HalfTurn { .. })))
         .collect()
 }
 

@@ -86,7 +86,7 @@ fn no_joint_leaves_its_range_on_a_corrected_way() {
         lines += 1;
         assert!(goes(&program, &arm.nominal, &near), "{round}: {:?}", plan.outcomes);
         written += usize::from(plan.outcomes.iter().all(corrected));
-        let ways = plan.outcomes.iter().filter(|outcome| match outcome.reason {
+        let ways = plan.outcomes.iter().filter(|outcome| match outcome.reason() {
             Some(
                 OutcomeReason::PathOutsideLimits { joint: named }
                 | OutcomeReason::StartOfLimitedPath { joint: named, .. },

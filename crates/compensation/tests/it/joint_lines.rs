@@ -18,7 +18,10 @@ fn planned_as(source: &[u8], emit: Emit) -> Vec<(Status, Option<OutcomeReason>, 
     let options = Options { emit, ..Options::default() };
     let task = Task::read(&[("p.mod", source)]);
     let plan = plan(&task.listing, &estimated, &Cell::default(), &options);
-    plan.outcomes.iter().map(|outcome| (outcome.status, outcome.reason, outcome.inserted)).collect()
+    plan.outcomes
+        .iter()
+        .map(|outcome| (outcome.status, outcome.reason(), outcome.inserted as usize))
+        .collect()
 }
 
 #[test]

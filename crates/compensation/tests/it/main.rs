@@ -194,7 +194,7 @@ fn a_large_correction_is_refused_and_named() {
         planned
             .outcomes
             .iter()
-            .all(|o| matches!(o.reason, Some(OutcomeReason::CorrectionTooLarge { mm }) if mm > 0.01))
+            .all(|o| matches!(o.reason(), Some(OutcomeReason::CorrectionTooLarge { mm }) if mm > 0.01))
     );
 }
 
@@ -219,7 +219,7 @@ fn a_joint_outside_its_measured_range_is_flagged() {
     assert!(!flagged.is_empty());
     let by = flagged
         .iter()
-        .filter_map(|o| match o.reason {
+        .filter_map(|o| match o.reason() {
             Some(OutcomeReason::JointNotMeasured { joint: 4, by_deg }) => Some(by_deg),
             _ => None,
         })
@@ -236,16 +236,16 @@ fn a_long_line_gets_targets_only_where_the_tolerance_would_be_broken() {
     let loose =
         plan(&task.listing, &known, &Cell::default(), &Options { tolerance_mm: 5.0, ..Options::default() });
     assert_eq!(loose.outcomes[1].inserted, 0, "{:?}", loose.outcomes);
-    let bend = loose.outcomes[1].path_deviation_mm.unwrap();
+    let bend = loose.outcomes[1].path_deviation_mm.get().unwrap();
     assert!(bend > 0.02, "the line bends by {bend} mm");
     let options = Options { tolerance_mm: bend / 3.0, ..Options::default() };
     let tight = plan(&task.listing, &known, &Cell::default(), &options);
     assert!(tight.outcomes[1].inserted > 0);
-    assert!(tight.outcomes[1].path_deviation_mm.unwrap() <= options.tolerance_mm);
+    assert!(tight.outcomes[1].path_deviation_mm.get().unwrap() <= options.tolerance_mm);
     let edits = task.rewrite(&tight.changes, &RewriteOptions::default()).unwrap();
     let text = edits.files[0].edits.apply(source).unwrap();
     let again = Task::read(&[("p.mod", text.as_slice())]);
-    assert_eq!(again.listing.motions.len(), 2 + tight.outcomes[1].inserted);
+    assert_eq!(again.listing.motions.len(), 2 + tight.outcomes[1].inserted as usize);
     // The verification matches original targets with those among inserted ones.
     let report = run_on(&actual, source, &text, &Cell::default());
     assert_eq!(report.points.len(), 2);
@@ -340,7 +340,7 @@ fn the_quick_sigma_equals_the_covariance() {
         twists: (0..n).map(|_| Vector6::from_fn(|_, _| random.random_range(-1.0..1.0))).collect(),
     };
     let frames = [frame(), frame()];
-    let chosen = |k: usize| [None, Some(&frames[0]), Some(&frames[1])][k % 3];
+    let chosen = |k: usize| [None, Some(frames[0].carried()), Some(frames[1].carried())][k % 3];
     let at = |carried, q: &Joints| FlangePoint { joints: *q, flange_from_tool: tool, carried };
     let rows: Vec<&Joints> = joints.iter().step_by(11).collect();
     let points: Vec<FlangePoint<'_>> = rows.iter().enumerate().map(|(k, q)| at(chosen(k), q)).collect();
@@ -355,6 +355,7 @@ fn the_quick_sigma_equals_the_covariance() {
 #[test]
 fn single_precision_is_stated_at_its_known_spacing() {
     use truegrind_compensation::plan::single_precision::single_precision;
+    use truegrind_programs::few::Few;
     use truegrind_programs::rewrite::{Change, NewTarget};
     assert_eq!(single_precision(&[]), None);
     // Between 1024 and 2048 single precision has a spacing of 2^-13 mm: half of it is the most a number is off.
@@ -364,7 +365,7 @@ fn single_precision_is_stated_at_its_known_spacing() {
         conf: None,
     };
     let half = 0.5 * 2.0_f64.powi(-13);
-    let change = |target| Change { motion: 0, targets: vec![target], before: vec![] };
+    let change = |target| Change { motion: 0, targets: Few::one(target), before: vec![] };
     let off = single_precision(&[change(at(1500.0)), change(at(1500.0 + half))]).unwrap();
     assert!((off.position_mm - half).abs() < 1e-12, "{off:?}");
     assert_eq!(off.orientation_deg, 0.0);

@@ -193,7 +193,7 @@ fn the_sigma_of_the_shape_is_the_scatter_of_arms_that_are_drawn() {
         let found = (squares.sum() / arms.len() as f64 / places.len() as f64).sqrt();
         assert!((found / cut.shape_sigma_mm - 1.0).abs() < 0.12, "{found} against {}", cut.shape_sigma_mm);
         for (k, motion) in cut.motions.iter().enumerate().step_by(7) {
-            let said = plan.outcomes[*motion as usize].shape_sigma_mm.unwrap();
+            let said = plan.outcomes[*motion as usize].shape_sigma_mm.get().unwrap();
             let found = (squares.rows(3 * k, 3).sum() / arms.len() as f64).sqrt();
             assert!((found / said - 1.0).abs() < 0.25, "motion {motion}: {found} against {said}");
         }
@@ -251,7 +251,7 @@ fn a_cut_that_would_too_likely_get_worse_is_left_whole_with_that_reason() {
         for motion in &cut.motions {
             let outcome = &plan.outcomes[*motion as usize];
             assert_eq!(
-                (outcome.status, outcome.reason),
+                (outcome.status, outcome.reason()),
                 (Status::Left, Some(OutcomeReason::Risk { chance: cut.probability_of_harm }))
             );
             let line = &before[task.listing.motions[*motion as usize].place.line as usize - 1];
@@ -262,6 +262,8 @@ fn a_cut_that_would_too_likely_get_worse_is_left_whole_with_that_reason() {
     let largest = left.iter().map(|cut| cut.probability_of_harm).fold(0.0, f64::max);
     let options = Options { max_risk: largest + 0.01, ..with(Placement::Shape) };
     let (taken, _) = rewritten(&source, &drawn.known, &Cell::default(), &options);
-    assert!(taken.outcomes.iter().all(|outcome| !matches!(outcome.reason, Some(OutcomeReason::Risk { .. }))));
+    assert!(
+        taken.outcomes.iter().all(|outcome| !matches!(outcome.reason(), Some(OutcomeReason::Risk { .. })))
+    );
     assert!(taken.probability_of_harm.unwrap() < 0.5);
 }

@@ -130,7 +130,7 @@ fn each_motion_of_the_sample_states_the_reason_beside_it() {
     for (motion, outcome) in task.listing.motions.iter().zip(&plan.outcomes) {
         let line = lines[motion.place.line as usize - 1];
         let expected = line.split("! expect: ").nth(1).unwrap();
-        let found = outcome.reason.map_or("nothing".to_owned(), |why| why.to_string());
+        let found = outcome.reason().map_or("nothing".to_owned(), |why| why.to_string());
         if !found.contains(expected) {
             wrong.push(format!("{}: {expected}: {found} ({outcome:?})", motion.place.line));
         }
@@ -176,7 +176,7 @@ fn each_motion_of_the_sample_states_the_reason_of_its_scene() {
         for expected in expected.split(" | ") {
             let (name, expected) = expected.split_once(": ").unwrap();
             scenes.insert(name);
-            let reasons = scene(name, &source).into_iter().map(|plan| plan.outcomes[index].reason);
+            let reasons = scene(name, &source).into_iter().map(|plan| plan.outcomes[index].reason());
             let found: Vec<String> =
                 reasons.map(|why| why.map_or("nothing".to_owned(), |why| why.to_string())).collect();
             if !found.iter().any(|found| found.contains(expected)) {
@@ -193,7 +193,7 @@ fn every_reason_there_is_shows_in_a_program() {
     let mut seen: BTreeSet<&str> = BTreeSet::new();
     let mut look = |plan: &Plan| {
         for outcome in &plan.outcomes {
-            if let Some(why) = &outcome.reason {
+            if let Some(why) = &outcome.reason() {
                 assert_ne!(outcome.status, Status::Changed);
                 assert!(!why.to_string().is_empty());
                 seen.insert(name(why));
@@ -291,7 +291,7 @@ fn singular() -> String {
 fn an_axis_that_carries_the_base_refuses_its_motions() {
     let source = sample("track.mod");
     let reasons = |cell: &Cell| -> Vec<Option<OutcomeReason>> {
-        planned(&source, &known(), cell, &Options::default()).outcomes.iter().map(|o| o.reason).collect()
+        planned(&source, &known(), cell, &Options::default()).outcomes.iter().map(|o| o.reason()).collect()
     };
     let base = Some(OutcomeReason::MovingBase { axis: 0 });
     // Farther away than the arm is long: the axis must carry the base, also where it is at 0.
@@ -325,9 +325,9 @@ fn where_no_configuration_reaches_a_target_the_reason_is_what_forbids_the_neares
         let outcome = &planned.outcomes[0];
         assert_eq!(outcome.status, Status::Refused);
         assert!(
-            matches!(outcome.reason, Some(OutcomeReason::OutsideLimits { .. })),
+            matches!(outcome.reason(), Some(OutcomeReason::OutsideLimits { .. })),
             "{conf} {:?}",
-            outcome.reason
+            outcome.reason()
         );
     }
 }

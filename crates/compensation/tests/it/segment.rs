@@ -16,6 +16,7 @@ use truegrind_compensation::plan::planner::plan;
 use truegrind_compensation::plan::reason::OutcomeReason;
 use truegrind_compensation::segment::corner::Corner;
 use truegrind_compensation::segment::curve::Curve;
+use truegrind_math::option_f64::OptionF64;
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::Listing;
 use truegrind_programs::rapid::Task;
@@ -162,8 +163,8 @@ fn a_rounded_corner_is_checked_along_its_parabola() {
         let near = |point: &Vector3<f64>| (point - pose.translation.vector).norm();
         most = most.max(dense.iter().map(near).fold(f64::INFINITY, f64::min));
     }
-    let stated = planned.outcomes[2].path_deviation_mm.unwrap();
-    let line = stop.outcomes[2].path_deviation_mm.unwrap();
+    let stated = planned.outcomes[2].path_deviation_mm.get().unwrap();
+    let line = stop.outcomes[2].path_deviation_mm.get().unwrap();
     // The dense corner has only points of the corner to be near to, spaced by 0.004 mm.
     assert!(
         most > 1e-3 && stated >= line && (most.max(line) - stated).abs() < 5e-3,
@@ -181,11 +182,14 @@ fn a_zone_that_inserted_targets_cut_short_is_flagged() {
         down(420.0, 230.0, 320.0)
     ));
     let (planned, _) = rewrite(&source, &known, &Options { tolerance_mm: 5.0, ..Options::default() });
-    assert_eq!(planned.outcomes[2].reason, None, "{:?}", planned.outcomes);
+    assert_eq!(planned.outcomes[2].reason(), None, "{:?}", planned.outcomes);
     let (planned, _) = rewrite(&source, &known, &Options { tolerance_mm: 0.005, ..Options::default() });
     let outcome = &planned.outcomes[2];
     assert!(outcome.inserted > 0, "{outcome:?}");
-    assert!(matches!(outcome.reason, Some(OutcomeReason::CornerDeviation { mm }) if mm > 1.0), "{outcome:?}");
+    assert!(
+        matches!(outcome.reason(), Some(OutcomeReason::CornerDeviation { mm }) if mm > 1.0),
+        "{outcome:?}"
+    );
     assert_eq!(outcome.status, Status::Flagged);
 }
 
@@ -220,7 +224,7 @@ fn a_joint_that_cannot_follow_is_named_with_its_ratio() {
             at(40.0)
         ));
         let (planned, _) = rewrite(&source, &known(&nominal()), &Options::default());
-        let reason = planned.outcomes[1].reason;
+        let reason = planned.outcomes[1].reason();
         if flagged {
             let Some(OutcomeReason::TooFast { joint, ratio }) = reason else {
                 panic!("{:?}", planned.outcomes)
@@ -241,7 +245,7 @@ fn a_joint_that_cannot_follow_is_named_with_its_ratio() {
     };
     let ratio = |x: f64| {
         let (planned, _) = rewrite(&far(x), &known(&nominal()), &Options::default());
-        match planned.outcomes[1].reason {
+        match planned.outcomes[1].reason() {
             Some(OutcomeReason::TooFast { joint: 0, ratio }) => Some(ratio),
             _ => None,
         }
@@ -263,7 +267,7 @@ fn the_speed_that_an_option_states_counts() {
         ));
         let source = source.replace("MODULE M\n", "MODULE M\n CONST num slow:=100;\n");
         let (planned, _) = rewrite(&source, &known(&nominal()), &Options::default());
-        match planned.outcomes[1].reason {
+        match planned.outcomes[1].reason() {
             Some(OutcomeReason::TooFast { joint: 0, ratio }) => Some(ratio),
             None => None,
             other => panic!("{speed}: {other:?}"),
@@ -303,9 +307,9 @@ fn a_joint_motion_states_how_far_it_is_from_that_of_the_sheet() {
             (posed.1.forward(&a[0].lerp(&a[1], s)).translation.vector - meant).norm()
         })
         .fold(0.0, f64::max);
-    let stated = planned.outcomes[1].path_deviation_mm.unwrap();
+    let stated = planned.outcomes[1].path_deviation_mm.get().unwrap();
     assert!(most > 1e-3 && (most - stated).abs() < 4e-3, "{most} stated as {stated}");
-    assert_eq!(planned.outcomes[1].reason, None);
+    assert_eq!(planned.outcomes[1].reason(), None);
 }
 
 #[test]
@@ -327,9 +331,9 @@ fn external_axes_of_what_is_put_in_go_in_proportion_to_the_way() {
         let targets = task.listing.motions.iter().map(|m| m.to().unwrap().value.unwrap());
         let places: Vec<(Vector3<f64>, [Option<f64>; 6])> = targets
             .map(|value| value.cartesian().copied().unwrap())
-            .map(|target| (Vector3::from(target.position_mm), target.external))
+            .map(|target| (Vector3::from(target.position_mm), target.external.map(OptionF64::get)))
             .collect();
-        (planned.outcomes[1].inserted, planned.outcomes[2].inserted, places, text)
+        (planned.outcomes[1].inserted as usize, planned.outcomes[2].inserted as usize, places, text)
     };
     let (line, _, places, _) = run(0.001, &source);
     assert!(line >= 1, "{line}");
@@ -369,7 +373,7 @@ fn nothing_is_put_in_where_the_wrist_is_interpolated_by_itself() {
     let (wrist, text) = rewrite(&body("\\Wrist"), &known(&actual), &options);
     assert_eq!(wrist.outcomes[1].inserted, 0);
     assert_eq!(text.matches("MoveL").count(), 2);
-    assert!(matches!(wrist.outcomes[1].reason, Some(OutcomeReason::PathDeviation { mm }) if mm > 0.001));
+    assert!(matches!(wrist.outcomes[1].reason(), Some(OutcomeReason::PathDeviation { mm }) if mm > 0.001));
     let note = wrist.notes.iter().find(|note| note.contains("SingArea")).unwrap();
     assert!(note.starts_with("on 2 of the lines and arcs") && note.ends_with("(lines 4, 5)"), "{note}");
 }

@@ -251,7 +251,7 @@ fn near_each_singularity_the_controller_takes_the_joints_that_were_meant_or_noth
                 for (k, q) in places.iter().enumerate() {
                     let outcome = &plan.outcomes[k];
                     count += 1;
-                    jumps += usize::from(matches!(outcome.reason, Some(OutcomeReason::JointJump { .. })));
+                    jumps += usize::from(matches!(outcome.reason(), Some(OutcomeReason::JointJump { .. })));
                     let margins = inverse.branch_margins(q);
                     if (0..3).all(|k| margins[k].abs() > FAR[k]) {
                         far += 1;
@@ -273,7 +273,7 @@ fn near_each_singularity_the_controller_takes_the_joints_that_were_meant_or_noth
                     let turned = (takes[0] - was[0]).amax();
                     assert!(turned <= most, "{}", say(&format!("turns {turned} of {most}")));
                     let off = twist(&meant, &forward(&known.model, &takes[0])).fixed_rows::<3>(0).norm();
-                    let claimed = outcome.after_mm.unwrap();
+                    let claimed = outcome.after_mm.get().unwrap();
                     assert!((off - claimed).abs() < 1e-3, "{}", say(&format!("is off {off}")));
                 }
             }
@@ -377,11 +377,11 @@ fn lines_past_a_singularity_keep_their_joints_or_stay() {
             let (plan, program) = rewritten(source.as_bytes(), &known, &Cell::default(), &options);
             count += 1;
             on_the_way += usize::from(matches!(
-                plan.outcomes[1].reason,
+                plan.outcomes[1].reason(),
                 Some(OutcomeReason::SingularPath | OutcomeReason::JointJump { on_the_way: true, .. })
             ));
             before_one += usize::from(matches!(
-                plan.outcomes[0].reason,
+                plan.outcomes[0].reason(),
                 Some(OutcomeReason::StartOfSingularPath { .. })
             ));
             if !corrected(&plan.outcomes[0]) || plan.outcomes[1].inserted > 0 {
@@ -409,7 +409,7 @@ fn lines_past_a_singularity_keep_their_joints_or_stay() {
             }
             let reached = forward(&known.model, &after[STEPS]);
             let off = twist(&was[1].1, &reached).fixed_rows::<3>(0).norm();
-            assert!((off - plan.outcomes[1].after_mm.unwrap()).abs() < 1e-3, "{say}: off {off}");
+            assert!((off - plan.outcomes[1].after_mm.get().unwrap()).abs() < 1e-3, "{say}: off {off}");
         }
         println!(
             "{robot}: {count} lines, {written} written, {on_the_way} stay for their way, {alone} behind a corrected end, {before_one} \
@@ -448,7 +448,7 @@ fn without_a_stated_configuration_the_nearest_solution_is_the_one_that_was_meant
             let known = known(robot, round as u64);
             let (plan, program) = rewritten(source.as_bytes(), &known, &Cell::default(), &absolute);
             count += 1;
-            open += usize::from(plan.outcomes[1].reason == Some(OutcomeReason::AmbiguousBranch));
+            open += usize::from(plan.outcomes[1].reason() == Some(OutcomeReason::AmbiguousBranch));
             if !corrected(&plan.outcomes[1]) {
                 continue;
             }
@@ -458,7 +458,7 @@ fn without_a_stated_configuration_the_nearest_solution_is_the_one_that_was_meant
             assert_eq!(begin.len(), 1);
             let takes = controller.nearest(&new[1].1, &begin[0]);
             let off = twist(&was[1].1, &forward(&known.model, &takes)).fixed_rows::<3>(0).norm();
-            let claimed = plan.outcomes[1].after_mm.unwrap();
+            let claimed = plan.outcomes[1].after_mm.get().unwrap();
             assert!((off - claimed).abs() < 1e-3, "{robot} {m} {q:?} {start:?}: {off} {:?}", plan.outcomes);
         }
         println!("{robot}: {count} without configuration, {written} written, {open} open");
@@ -496,13 +496,13 @@ fn motions_that_rest_on_a_guess_are_flagged_one_by_one() {
     let options = Options { flag_unknown_starts: true, ..Options::default() };
     let (plan, _) = rewritten(text.as_bytes(), &known(robot, 1), &Cell::default(), &options);
     let motions = &plan.outcomes;
-    let open: Vec<bool> = motions.iter().map(|o| o.reason == Some(OutcomeReason::UnknownStart)).collect();
+    let open: Vec<bool> = motions.iter().map(|o| o.reason() == Some(OutcomeReason::UnknownStart)).collect();
     assert_eq!(open[..4], [true, true, false, false], "{motions:#?}");
     let targets: Vec<_> = motions.iter().filter(|o| o.before_mm.is_some()).collect();
     assert_eq!(targets.len(), 6, "{motions:#?}");
     assert!(targets.iter().all(|o| corrected(o)), "{motions:#?}");
     assert!(
-        targets[4].reason == Some(OutcomeReason::UnknownStart) && targets[5].reason.is_none(),
+        targets[4].reason() == Some(OutcomeReason::UnknownStart) && targets[5].reason.is_none(),
         "{motions:#?}"
     );
 }
@@ -539,7 +539,7 @@ fn a_configuration_checked_in_the_first_cycle_alone_is_flagged_where_the_second_
             ..Options::default()
         };
         let planned = plan(&task.listing, &known(robot, 2), &Cell::default(), &options);
-        planned.outcomes.iter().map(|outcome| outcome.reason).collect::<Vec<_>>()
+        planned.outcomes.iter().map(|outcome| outcome.reason()).collect::<Vec<_>>()
     };
     // The other solution of the wrist.
     let flipped = |[a, b, c, d, e, f]: [f64; 6]| [a, b, c, d - 180.0, -e, f - 180.0];
@@ -581,7 +581,7 @@ fn an_unchecked_joint_motion_to_which_another_branch_is_nearer_is_a_guess() {
         plan(&task.listing, &known, &Cell::default(), &options)
     };
     // From 50° it is 80° to -30° and 100° to 150° with the wrist as it is; from 100° it is 130° and 50°.
-    let reason = |plan: &Plan| plan.outcomes[1].reason;
+    let reason = |plan: &Plan| plan.outcomes[1].reason();
     assert_eq!(reason(&planned(50.0, Emit::Targets)), Some(OutcomeReason::AmbiguousBranch));
     assert_eq!(reason(&planned(50.0, Emit::Joints)), Some(OutcomeReason::UnknownStart));
     let plain = planned(100.0, Emit::Joints);

@@ -371,7 +371,7 @@ fn the_tool_that_touched_must_be_known_and_fit() {
         // A plan without the check refuses every motion.
         let (plan, told) = planned(source, &cell, &scene.actual);
         assert!(
-            plan.outcomes.iter().all(|o| o.reason == Some(OutcomeReason::CellContradiction)),
+            plan.outcomes.iter().all(|o| o.reason() == Some(OutcomeReason::CellContradiction)),
             "{:?}",
             plan.outcomes
         );
@@ -486,7 +486,7 @@ fn immense_numbers_are_refused_by_line() {
         let refused = plan
             .outcomes
             .iter()
-            .filter(|o| o.status == Status::Refused && beyond.contains(&o.reason))
+            .filter(|o| o.status == Status::Refused && beyond.contains(&o.reason()))
             .count();
         assert_eq!(refused, 5, "{size}: {:?}", plan.outcomes);
         let setup = Setup::default();

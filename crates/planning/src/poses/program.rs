@@ -7,6 +7,7 @@ use super::{MeasurementSetup, Plan, rows};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Joints;
 use truegrind_calibration::measurement::dataset::Reading;
+use truegrind_math::option_f64::OptionF64;
 use truegrind_programs::draft::{Draft, Step};
 use truegrind_programs::motion::{Frame, JointTarget, MotionKind, TargetValue, ToolValue, WorkObjectValue};
 
@@ -42,7 +43,7 @@ pub fn draft(plan: &Plan, setup: &MeasurementSetup<'_>, drive: &ProgramSettings)
     let target = |joints: &Joints| {
         TargetValue::Joint(JointTarget {
             robot_deg: std::array::from_fn(|i| joints[i].to_degrees()),
-            external: [None; 6],
+            external: [OptionF64::NONE; 6],
         })
     };
     let step = |joints: &Joints, speed_mm_s: f64, comment: Option<String>, wait_s: Option<f64>| Step {

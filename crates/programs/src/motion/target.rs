@@ -3,6 +3,7 @@
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 
 use super::reason::Reason;
+use truegrind_math::option_f64::OptionF64;
 use truegrind_math::se3::Pose;
 
 /// The largest plausible coordinate of a frame or target (mm), and joint angle (°).
@@ -66,8 +67,8 @@ pub struct RobTarget {
     pub quaternion: [f64; 4],
     /// Configuration cf1, cf4, cf6, cfx.
     pub conf: [i32; 4],
-    /// External axes [mm or degrees]; `None` where the program says "not connected" (9E9).
-    pub external: [Option<f64>; 6],
+    /// External axes [mm or degrees]; nothing where the program says "not connected" (9E9).
+    pub external: [OptionF64; 6],
 }
 
 impl RobTarget {
@@ -87,8 +88,8 @@ impl RobTarget {
 pub struct JointTarget {
     /// Robot axes (degrees).
     pub robot_deg: [f64; 6],
-    /// External axes [mm or degrees]; `None` where not connected.
-    pub external: [Option<f64>; 6],
+    /// External axes [mm or degrees]; nothing where not connected.
+    pub external: [OptionF64; 6],
 }
 
 /// The value of a target.
@@ -110,7 +111,7 @@ impl TargetValue {
     }
 
     /// The external axes (mm or degrees).
-    pub fn external(&self) -> &[Option<f64>; 6] {
+    pub fn external(&self) -> &[OptionF64; 6] {
         match self {
             TargetValue::Cartesian(target) => &target.external,
             TargetValue::Joint(target) => &target.external,

@@ -44,6 +44,7 @@ pub enum WriteError {
 /// Writes a program. `angles` is the convention of A, B and C; Siemens programs use a tool vector instead.
 ///
 /// ```
+/// use truegrind_math::option_f64::OptionF64;
 /// use truegrind_programs::draft::{Draft, Step};
 /// use truegrind_programs::motion::{Frame, MotionKind, RobTarget, TargetValue, ToolValue, WorkObjectValue};
 /// use truegrind_programs::nc::{dialect::Dialect, orientation::Angles, setup::Setup, writer};
@@ -59,7 +60,7 @@ pub enum WriteError {
 /// # };
 ///
 /// let quaternion = [0.0, 0.0, 1.0, 0.0];
-/// let to = RobTarget { position_mm: [380.0, -60.5, 250.0], quaternion, conf: [0; 4], external: [None; 6] };
+/// let to = RobTarget { position_mm: [380.0, -60.5, 250.0], quaternion, conf: [0; 4], external: [OptionF64::NONE; 6] };
 /// let step = Step {
 ///     kind: MotionKind::Linear,
 ///     to: TargetValue::Cartesian(to),

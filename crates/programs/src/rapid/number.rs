@@ -1,5 +1,6 @@
 //! Numbers: their value, their decimals, and writing them.
 
+use truegrind_math::option_f64::OptionF64;
 use truegrind_math::rounding::round;
 
 /// Powers of ten that are exact in double precision.
@@ -193,8 +194,8 @@ pub fn write_short(out: &mut Vec<u8>, value: f64, decimals: u8) {
 }
 
 /// Writes an external axis: the number, or 9E+09 where none is connected.
-pub fn write_external(out: &mut Vec<u8>, value: Option<f64>) {
-    match value {
+pub fn write_external(out: &mut Vec<u8>, value: OptionF64) {
+    match value.get() {
         Some(value) => write_short(out, value, 6),
         None => out.extend_from_slice(b"9E+09"),
     }

@@ -27,7 +27,7 @@ use super::symbol::{Symbols, Unit};
 use super::syntax::{RapidTree, Syntax};
 use crate::dataflow::Nesting;
 use crate::motion::load::{Load, Loads};
-use crate::motion::{Listing, OpaqueRegion, Place, Reason, Role};
+use crate::motion::{Listing, MotionTarget, OpaqueRegion, Place, Reason, Role};
 use literals::{Literals, NODES_PER_MOTION};
 
 /// The RAPID modules of one task, read together.
@@ -85,7 +85,7 @@ fn listing(trees: &[RapidTree<'_>], symbols: &Symbols) -> (Listing, Loads, Vec<b
         },
         || Literals::of(trees, symbols),
     );
-    builder.insert_literals(literals);
+    builder.insert_literals(&literals);
     builder.resolve_entry_switches();
     builder.refuse_motions_before_displacement();
     builder.other_uses();
@@ -184,6 +184,9 @@ struct Literal {
     node: u32,
     joints: bool,
 }
+
+/// Motions into which one thread inserts literals at a time.
+const PORTION: usize = 4096;
 
 /// Greatest call depth to which the exit states of routines are computed; beyond it they may be anything that the routine sets.
 const CALL_DEPTH: u32 = 12;
@@ -287,24 +290,23 @@ impl<'a, 's> ListingBuilder<'a, 's> {
     }
 
     /// Inserts the targets that are written in the instructions as numbers.
-    fn insert_literals(&mut self, mut read: Literals) {
-        let evaluator = Evaluator::new(self.trees, self.symbols);
-        for literal in std::mem::take(&mut self.literals) {
-            let Literal { motion, target, role, file, call, node, joints } = literal;
-            let mut found = read
-                .take(file, call, node, joints)
-                .unwrap_or_else(|| vec![literals::target(&evaluator, file, node, joints)]);
-            found.iter_mut().for_each(|target| target.role = role);
-            let targets = &mut self.listing.motions[motion as usize].targets;
-            if targets.is_empty() {
-                *targets = found;
-            } else {
-                // Of a hundred thousand motions none needs spare capacity.
-                targets.reserve_exact(1);
-                let target = target as usize;
-                targets.splice(target..target, found);
+    fn insert_literals(&mut self, read: &Literals) {
+        let (literals, trees, symbols) = (std::mem::take(&mut self.literals), self.trees, self.symbols);
+        let portions = self.listing.motions.par_chunks_mut(PORTION).enumerate();
+        portions.for_each(|(portion, motions)| {
+            let evaluator = Evaluator::new(trees, symbols);
+            // They are in the order of motions.
+            let begin = portion * PORTION;
+            let from = literals.partition_point(|literal| (literal.motion as usize) < begin);
+            let mut last = 0;
+            for literal in &literals[from..] {
+                let Literal { motion, target, role, file, call, node, joints } = *literal;
+                let Some(motion) = motions.get_mut(motion as usize - begin) else { break };
+                let found = read.target(file, call, node, joints, &mut last);
+                let found = found.unwrap_or_else(|| literals::target(&evaluator, file, node, joints));
+                motion.targets.insert(target as usize, MotionTarget { role, ..found });
             }
-        }
+        });
     }
 }
 

@@ -1,5 +1,6 @@
 //! Abstract values of RAPID expressions, and the components of the predefined types.
 
+use truegrind_math::option_f64::OptionF64;
 use truegrind_math::rounding::round;
 
 use crate::motion::{
@@ -184,8 +185,8 @@ pub fn within_reach(numbers: &[f64]) -> Result<(), Reason> {
     if numbers.iter().all(|number| number.abs() <= FARTHEST_MM) { Ok(()) } else { Err(Reason::BeyondReach) }
 }
 
-fn external(values: [f64; 6]) -> [Option<f64>; 6] {
-    values.map(|value| (value.abs() < NOT_CONNECTED).then_some(value))
+fn external(values: [f64; 6]) -> [OptionF64; 6] {
+    values.map(|value| (value.abs() < NOT_CONNECTED).then_some(value).into())
 }
 
 /// A robtarget of its numbers.

@@ -50,6 +50,7 @@ pub enum WriteError {
 /// Writes a module. Line ends are LF, characters outside Latin-1 become `?`.
 ///
 /// ```
+/// use truegrind_math::option_f64::OptionF64;
 /// use truegrind_programs::draft::{Draft, Step};
 /// use truegrind_programs::motion::{Frame, MotionKind, RobTarget, TargetValue, ToolValue, WorkObjectValue};
 /// use truegrind_programs::rapid::{Task, writer};
@@ -67,7 +68,7 @@ pub enum WriteError {
 ///     position_mm: [380.0, -60.5, 250.0],
 ///     quaternion: [0.0, 0.0, 1.0, 0.0],
 ///     conf: [-1, -1, 0, 0],
-///     external: [None; 6],
+///     external: [OptionF64::NONE; 6],
 /// };
 /// let step = Step {
 ///     kind: MotionKind::Linear,

@@ -1,5 +1,6 @@
 //! Rewriting: new values are written and read back.
 
+use truegrind_programs::few::Few;
 use truegrind_programs::motion::{Mark, MotionKind, Reason, TargetValue};
 use truegrind_programs::rapid::Task;
 use truegrind_programs::rewrite::{Change, Extra, NewTarget, Outcome, RewriteOptions, Rewritten};
@@ -17,7 +18,7 @@ fn at(x: f64, y: f64, z: f64) -> NewTarget {
 }
 
 fn change(motion: u32, target: NewTarget) -> Change {
-    Change { motion, targets: vec![target], before: vec![] }
+    Change { motion, targets: Few::one(target), before: vec![] }
 }
 
 fn rewrite(source: &str, changes: &[Change]) -> (String, Rewritten) {
@@ -225,7 +226,7 @@ fn extra_motions_take_over_speed_tool_and_process() {
     for (line, inserted) in cases {
         let line = line.replace("EXT", EXT);
         let source = module(data, &format!("    {line} ! end\n"));
-        let change = Change { motion: 0, targets: vec![], before: vec![extra.clone()] };
+        let change = Change { motion: 0, targets: Few::default(), before: vec![extra.clone()] };
         let (text, rewritten) = rewrite(&source, &[change]);
         assert_eq!(rewritten.outcomes, [Outcome::InPlace]);
         let inserted = inserted.replace("TARGET", target);
@@ -253,7 +254,7 @@ fn impossible_changes_are_refused_with_their_reason() {
     ];
     for (line, targets, before, reason) in cases {
         let source = module("", &format!("  {line}\n"));
-        let (text, rewritten) = rewrite(&source, &[Change { motion: 0, targets, before }]);
+        let (text, rewritten) = rewrite(&source, &[Change { motion: 0, targets: targets.into(), before }]);
         assert_eq!(rewritten.outcomes, [Outcome::Refused(reason)], "{line}");
         assert_eq!(text, source);
     }

@@ -1,5 +1,6 @@
 //! A new module reads back as the draft that it was written from.
 
+use truegrind_math::option_f64::OptionF64;
 use truegrind_programs::draft::{Draft, Step};
 use truegrind_programs::motion::{
     Frame, JointTarget, MotionKind, RobTarget, TargetValue, ToolValue, WorkObjectValue,
@@ -12,7 +13,7 @@ fn pose(x: f64) -> RobTarget {
         position_mm: [x, -0.25, 120.0625],
         quaternion: [0.0, 0.6, 0.8, 0.0],
         conf: [0, -1, 1, 0],
-        external: [None, Some(12.5), None, None, None, None],
+        external: [None, Some(12.5), None, None, None, None].map(OptionF64::from),
     }
 }
 
@@ -27,7 +28,8 @@ fn draft(named_targets: bool) -> Draft {
         comment: None,
         wait_s: None,
     };
-    let joints = JointTarget { robot_deg: [0.0, -30.0, 30.5, 0.0, 90.0, 180.25], external: [None; 6] };
+    let joints =
+        JointTarget { robot_deg: [0.0, -30.0, 30.5, 0.0, 90.0, 180.25], external: [OptionF64::NONE; 6] };
     let cartesian = |x| TargetValue::Cartesian(pose(x));
     let mut steps = vec![
         step(MotionKind::AbsoluteJoint, TargetValue::Joint(joints), None, 200.0, None),

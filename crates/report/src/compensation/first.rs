@@ -18,8 +18,8 @@ pub fn verdict(plan: &Plan, listing: &Listing) -> Verdict {
     let (refused, flagged) = (count(plan, MotionStatus::Refused), count(plan, MotionStatus::Flagged));
     let written = count(plan, MotionStatus::Changed) + flagged;
     let (left, cuts) = placement::left_at_risk(plan);
-    let same =
-        !plan.outcomes.is_empty() && plan.outcomes.iter().all(|o| o.reason == Some(OutcomeReason::NoChange));
+    let same = !plan.outcomes.is_empty()
+        && plan.outcomes.iter().all(|o| o.reason() == Some(OutcomeReason::NoChange));
     let (status, headline) = match (written, refused + flagged) {
         (0, 0) if same => {
             (Status::NotEvaluated, "Nothing to correct: every number is already right to its last decimal")
@@ -82,7 +82,7 @@ pub fn verdict(plan: &Plan, listing: &Listing) -> Verdict {
             }
         });
     }
-    let inserted: usize = plan.outcomes.iter().map(|outcome| outcome.inserted).sum();
+    let inserted: usize = plan.outcomes.iter().map(|outcome| outcome.inserted as usize).sum();
     if inserted > 0 {
         reasons.push(format!(
             "{inserted} targets inserted, to keep the path within the tolerance between targets"
@@ -92,7 +92,7 @@ pub fn verdict(plan: &Plan, listing: &Listing) -> Verdict {
 }
 
 fn count_reason(plan: &Plan, is: impl Fn(&OutcomeReason) -> bool) -> usize {
-    plan.outcomes.iter().filter(|outcome| outcome.reason.as_ref().is_some_and(&is)).count()
+    plan.outcomes.iter().filter(|outcome| outcome.reason.as_deref().is_some_and(&is)).count()
 }
 
 /// Whether the program has cuts and all of them are unchanged.

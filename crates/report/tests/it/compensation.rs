@@ -8,6 +8,7 @@ use truegrind_compensation::deviation::Status;
 use truegrind_compensation::plan::reason::OutcomeReason;
 use truegrind_compensation::plan::{MotionOutcome, Plan};
 use truegrind_compensation::risk::placement::{ObjectPlacement, Placement};
+use truegrind_math::option_f64::OptionF64;
 use truegrind_programs::motion::{Listing, Reason};
 use truegrind_programs::rapid::Task;
 use truegrind_report::compensation::{self as view, ProgramFile};
@@ -42,12 +43,12 @@ fn outcome(motion: u32, status: Status, reason: Option<OutcomeReason>) -> Motion
     MotionOutcome {
         motion,
         status,
-        reason,
-        before_mm: Some(1.5),
-        after_mm: Some(if status == Status::Changed { 0.0004 } else { 1.5 }),
-        sigma_mm: Some(0.12),
-        shape_sigma_mm: None,
-        path_deviation_mm: None,
+        reason: reason.map(Box::new),
+        before_mm: 1.5.into(),
+        after_mm: if status == Status::Changed { 0.0004 } else { 1.5 }.into(),
+        sigma_mm: 0.12.into(),
+        shape_sigma_mm: OptionF64::NONE,
+        path_deviation_mm: OptionF64::NONE,
         inserted: 0,
     }
 }
@@ -68,9 +69,9 @@ fn example() -> (Plan, Listing, Vec<ProgramFile>) {
         ),
         outcome(6, Status::Left, Some(OutcomeReason::Program(Reason::Displacement))),
     ];
-    outcomes[0].before_mm = None;
-    outcomes[0].after_mm = None;
-    outcomes[0].sigma_mm = None;
+    outcomes[0].before_mm = OptionF64::NONE;
+    outcomes[0].after_mm = OptionF64::NONE;
+    outcomes[0].sigma_mm = OptionF64::NONE;
     outcomes[1].inserted = 2;
     let plan = Plan {
         outcomes,

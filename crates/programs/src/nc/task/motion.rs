@@ -15,6 +15,7 @@ use crate::motion::{
     FARTHEST_MM, Modal, Motion, MotionKind, MotionTarget, Origin, Reason, RobTarget, Role, Span, Speed,
     SpeedValue, Switch, TargetValue, Zone, ZoneValue,
 };
+use truegrind_math::option_f64::OptionF64;
 
 impl Interpreter<'_, '_> {
     fn instruction(&mut self, name: &str) -> Shared<str> {
@@ -224,7 +225,7 @@ impl Interpreter<'_, '_> {
         let splits = !motion.timed && self.can_split(block, &before);
         motion.insertable = splits && kind == MotionKind::Linear && !block.other_axes;
         motion.can_straighten = splits && arc.is_some() && !block.opaque;
-        motion.axis = arc.map(|block_arc| block_arc.arc.plane.axis(block_arc.positive));
+        motion.axis = arc.map(|block_arc| Box::new(block_arc.arc.plane.axis(block_arc.positive)));
         motion.by_radius = arc.is_some() && block.radius.is_some();
         let after = self.block_context(block, arc);
         let context = BlockContext {
@@ -629,7 +630,12 @@ fn target(position: [Evaluated; 3], rotation: Rotation) -> Result<TargetValue, R
     }
     let q = rotation?;
     let quaternion = [q.w, q.i, q.j, q.k];
-    Ok(TargetValue::Cartesian(RobTarget { position_mm, quaternion, conf: [0; 4], external: [None; 6] }))
+    Ok(TargetValue::Cartesian(RobTarget {
+        position_mm,
+        quaternion,
+        conf: [0; 4],
+        external: [OptionF64::NONE; 6],
+    }))
 }
 
 /// The pose half way along an arc.

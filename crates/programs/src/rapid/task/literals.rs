@@ -20,16 +20,13 @@ pub(super) const NODES_PER_MOTION: usize = 14;
 /// The targets, by file and portion of the call, in the order of nodes.
 pub(super) struct Literals {
     read: Vec<Vec<Vec<Read>>>,
-    /// Where in its portion the last one was taken: the next one usually follows it.
-    last: usize,
 }
 
 #[derive(Debug)]
 struct Read {
     node: u32,
     joints: bool,
-    /// One target, as the list that a motion takes over: a million of them are not copied.
-    target: Vec<MotionTarget>,
+    target: MotionTarget,
 }
 
 impl Literals {
@@ -39,24 +36,25 @@ impl Literals {
             let portions = 0..tree.nodes.len().div_ceil(PORTION);
             portions.into_par_iter().map(|portion| read(trees, symbols, file as u32, portion)).collect()
         });
-        Literals { read: files.collect(), last: 0 }
+        Literals { read: files.collect() }
     }
 
-    /// The target of the literal at `node` in the call at `call`; `None` where it was not read or has been taken.
-    pub(super) fn take(
-        &mut self,
+    /// The target of the literal at `node` in the call at `call`; `None` where it was not read. `last`: where in its portion the
+    /// last one was found: the next one usually follows it.
+    pub(super) fn target(
+        &self,
         file: u32,
         call: u32,
         node: u32,
         joints: bool,
-    ) -> Option<Vec<MotionTarget>> {
-        let portion = self.read.get_mut(file as usize)?.get_mut((call / PORTION) as usize)?;
+        last: &mut usize,
+    ) -> Option<MotionTarget> {
+        let portion = self.read.get(file as usize)?.get((call / PORTION) as usize)?;
         let next =
-            [self.last + 1, 0].into_iter().find(|at| portion.get(*at).is_some_and(|read| read.node == node));
+            [*last + 1, 0].into_iter().find(|at| portion.get(*at).is_some_and(|read| read.node == node));
         let at = next.or_else(|| portion.binary_search_by_key(&node, |read| read.node).ok())?;
-        self.last = at;
-        let read = Some(&mut portion[at]).filter(|read| read.joints == joints)?;
-        Some(std::mem::take(&mut read.target)).filter(|target| !target.is_empty())
+        *last = at;
+        Some(&portion[at]).filter(|read| read.joints == joints).map(|read| read.target)
     }
 }
 
@@ -75,7 +73,7 @@ fn read(trees: &[RapidTree<'_>], symbols: &Symbols, file: u32, portion: u32) -> 
         let joints = INSTRUCTIONS[known].takes_joints();
         for argument in arguments(tree, call).filter(|argument| !argument.optional) {
             if let Some(node) = argument.value.and_then(|value| plain(tree, value)) {
-                out.push(Read { node, joints, target: vec![target(&evaluator, file, node, joints)] });
+                out.push(Read { node, joints, target: target(&evaluator, file, node, joints) });
             }
         }
     }

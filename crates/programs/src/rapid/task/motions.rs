@@ -94,7 +94,6 @@ impl ListingBuilder<'_, '_> {
                 self.literals.push(Literal { motion, target: before, role, file, call, node, joints });
             }
             None => {
-                motion.targets.reserve_exact(1);
                 motion.targets.push(self.target(unit, state, argument, joints, role));
             }
         }
