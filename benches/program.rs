@@ -70,7 +70,6 @@ use truegrind::compensation::options::Options;
 use truegrind::compensation::plan::planner::plan;
 use truegrind::math::statistics::ErrorSummary;
 use truegrind::planning::toolpath::toolpath;
-use truegrind::programs::few::Few;
 use truegrind::programs::motion::MotionKind;
 use truegrind::programs::rapid::Task;
 use truegrind::programs::rapid::lexer::lex;
@@ -114,7 +113,7 @@ fn moved(task: &Task<'_>) -> Rewritten {
                 quaternion: [w + 0.001, x, y, z],
                 conf: Some(target.conf),
             };
-            Some(Change { motion, targets: Few::one(new), before: Vec::new() })
+            Some(Change { motion, targets: [new].into(), before: Vec::new() })
         })
         .collect();
     task.rewrite(&changes, &RewriteOptions::default()).expect("edits do not overlap")

@@ -539,7 +539,7 @@ fn lines_whose_path_nobody_checked_are_named() {
     let (code, text, err) = truegrind(at, &["compensate", "a.mod", "--model", "model.toml", "--dry-run"]);
     assert_eq!(code, 0, "{err}");
     let words: String = text.split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(words.contains("3 of the lines and arcs have an unknown or uncorrected start"), "{text}");
+    assert!(words.contains("3 lines or arcs start at a place that is unknown or not corrected"), "{text}");
     assert!(words.contains("the path between is not checked (lines 4, 6, 8)"), "{text}");
 }
 

@@ -2,7 +2,6 @@
 //!
 //! - [`tree`]: lossless syntax trees over bytes in flat arrays; parsing never fails.
 //! - [`edit`]: sorted, disjoint edits; bytes outside them never change; [`diff`] prints them.
-//! - [`few`]: lists of mostly one item.
 //! - [`motion`]: the motions of a program in any language, as a [`motion::Listing`].
 //! - [`rewrite`]: changes to motions in any language, and their outcomes.
 //! - `dataflow`: program analysis for every language: joins, fixpoints, the walk over statements.
@@ -13,7 +12,6 @@
 //! - [`reading`]: detects the language of a program.
 //!
 //! ```
-//! use truegrind_programs::few::Few;
 //! use truegrind_programs::motion::TargetValue;
 //! use truegrind_programs::rapid::Task;
 //! use truegrind_programs::rewrite::{Change, NewTarget, RewriteOptions};
@@ -25,7 +23,7 @@
 //! let Ok(TargetValue::Cartesian(target)) = motion.targets[0].value else { panic!() };
 //!
 //! let moved = NewTarget::Cartesian { position_mm: [500.25, 0.0, 300.0], quaternion: target.quaternion, conf: None };
-//! let change = Change { motion: 0, targets: Few::one(moved), before: vec![] };
+//! let change = Change { motion: 0, targets: [moved].into(), before: vec![] };
 //! let rewritten = task.rewrite(&[change], &RewriteOptions::default()).unwrap();
 //! let text = rewritten.files[0].edits.apply(source).unwrap();
 //! assert!(text.starts_with(b"MODULE M\nPROC main()\n  MoveL [[500.2500,0,300],[0,0,1,0]"));
@@ -37,7 +35,6 @@ pub mod shared;
 pub mod edit;
 pub mod label;
 pub mod diff;
-pub mod few;
 pub mod motion;
 pub mod rewrite;
 pub mod draft;

@@ -15,8 +15,8 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
 
-use crate::few::Few;
 pub use reason::{OpaqueReason, Reason};
+use smallvec::SmallVec;
 pub use target::{FARTHEST_MM, Frame, JointTarget, RobTarget, TargetValue};
 
 /// A range of bytes of one file, end excluded.
@@ -291,7 +291,7 @@ pub struct Motion {
     /// The kind of path.
     pub kind: MotionKind,
     /// The targets in the order of the arguments (the circle point before the end).
-    pub targets: Few<MotionTarget>,
+    pub targets: SmallVec<[MotionTarget; 1]>,
     /// Index into [`Listing::speeds`].
     pub speed: Option<u32>,
     /// Index into [`Listing::zones`].
@@ -343,7 +343,7 @@ impl Motion {
             statement,
             instruction,
             kind,
-            targets: Few::default(),
+            targets: SmallVec::new(),
             speed: None,
             zone: None,
             tool: None,

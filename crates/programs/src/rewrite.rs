@@ -5,8 +5,8 @@
 //! new value and nothing else reads it, and split otherwise. A computed target is replaced in its instruction.
 
 use crate::edit::Edits;
-use crate::few::Few;
 use crate::motion::{Mark, MotionKind, Reason};
+use smallvec::SmallVec;
 use truegrind_math::option_f64::OptionF64;
 
 /// A new value for one target.
@@ -78,7 +78,7 @@ pub struct Change {
     /// Index into [`crate::motion::Listing::motions`].
     pub motion: u32,
     /// One per target of the motion, in the same order; empty keeps all.
-    pub targets: Few<NewTarget>,
+    pub targets: SmallVec<[NewTarget; 1]>,
     /// Motions to insert before it, in the order of execution.
     pub before: Vec<Extra>,
 }

@@ -3,9 +3,10 @@
 use crate::arms::{Arms, is_load_dependent};
 use crate::condition::payload::payload_at;
 use crate::options::Options;
+use crate::plan::MotionOutcome;
 use crate::target::solved_target::SolvedTargets;
 use truegrind_arm::effect::Effect;
-use truegrind_programs::motion::{Listing, Motion, MotionKind, Switch};
+use truegrind_programs::motion::{Listing, Motion, MotionKind, Place, Switch};
 
 /// How backlash enters this program.
 pub(crate) fn backlash_note(arms: &Arms<'_>, solved: &SolvedTargets<'_>) -> Option<String> {
@@ -42,6 +43,20 @@ pub(crate) fn doubtful_effects_note(arms: &Arms<'_>) -> Option<String> {
         .then(|| format!("doubtful, therefore not corrected, but included in every σ: {}", named.join(", ")))
 }
 
+/// How many times the largest σ an error beyond the noise is from which it is stated.
+const BEYOND_SIGMA: f64 = 2.0;
+
+/// What the measurement of the arm deviates from its model beyond the noise, where that is more than every σ of the program.
+pub(crate) fn beyond_noise_note(arms: &Arms<'_>, outcomes: &[MotionOutcome]) -> Option<String> {
+    let sigmas = outcomes.iter().filter_map(|outcome| outcome.shape_sigma_mm.get());
+    let largest = sigmas.reduce(f64::max)?;
+    let beyond = arms.knowledge?.beyond_noise_mm.filter(|mm| *mm > BEYOND_SIGMA * largest)?;
+    Some(format!(
+        "the readings deviate from this model by {beyond:.3} mm RMS beyond their noise, from effects that it does not contain: programs may be \
+         off by as much, which no σ here contains; `truegrind diagnose` looks for the causes"
+    ))
+}
+
 /// What was not checked or was assumed, with line numbers.
 pub(crate) fn unchecked_notes(
     listing: &Listing,
@@ -51,16 +66,15 @@ pub(crate) fn unchecked_notes(
     let mut out = Vec::new();
     if let Some(lines) = lines_of(listing, unchecked) {
         out.push(format!(
-            "{} of the lines and arcs have an unknown or uncorrected start: their ends are correct, the path \
-             between is not checked ({lines})",
-            unchecked.len()
+            "{} at a place that is unknown or not corrected: the end is correct, the path to it is not checked ({lines})",
+            counted(unchecked.len(), "line or arc starts", "lines or arcs start")
         ));
     }
     if let Some(lines) = lines_of(listing, &listing.external_calls) {
         out.push(format!(
-            "{} of the blocks call programs that are not in their file: these are assumed to leave work \
-             offset, shifts, tool, units and tool centre point control unchanged ({lines})",
-            listing.external_calls.len()
+            "{} not in the same file: it is assumed to leave work offset, shifts, tool, units and tool centre point control \
+             unchanged ({lines})",
+            counted(listing.external_calls.len(), "block calls a program that is", "blocks call a program that is")
         ));
     }
     out.extend(outside_calls_note(listing));
@@ -73,25 +87,24 @@ pub(crate) fn unchecked_notes(
     let wrist: Vec<u32> = (0..listing.motions.len() as u32).filter(curve).collect();
     if let Some(lines) = lines_of(listing, &wrist) {
         out.push(format!(
-            "on {} of the lines and arcs the controller turns the wrist joint by joint (SingArea \\Wrist): \
-             their paths are checked as if the orientation were interpolated evenly, and no targets are \
-             inserted ({lines})",
-            wrist.len()
+            "on {} the controller turns the wrist joint by joint (SingArea \\Wrist): the path is checked as if the orientation \
+             were interpolated evenly, and no targets are inserted ({lines})",
+            counted(wrist.len(), "line or arc", "lines or arcs")
         ));
     }
     if let Some(lines) = lines_of(listing, &solved.guessed) {
         let count = solved.guessed.len();
         out.push(if listing.numbered {
             format!(
-                "before {count} of the motions the position of the arm is unknown, and no NC word states the \
-                 configuration: wrist in front, elbow not turned back, joints nearest to zero are assumed, unchecked \
-                 ({lines}); state where the arm starts, in the cell file (start_deg) or in a comment (truegrind start [q1,…,q6])"
+                "before {} the position of the arm is unknown, and no NC word states the configuration: wrist in front, elbow not turned back, joints nearest to zero are assumed, unchecked \
+                 ({lines}); state where the arm starts, in the cell file (start_deg) or in a comment (truegrind start [q1,…,q6])",
+                counted(count, "motion", "motions")
             )
         } else {
             format!(
-                "{count} of the motions go, unchecked, to the configuration next to where the arm stands \
-                 (ConfL \\Off, ConfJ \\Off), which is unknown there: the one that matches the stated quarter \
-                 turns best is assumed ({lines})"
+                "{}, unchecked, to the configuration next to where the arm stands (ConfL \\Off, ConfJ \\Off), which is unknown \
+                 there: the one that matches the stated quarter turns best is assumed ({lines})",
+                counted(count, "motion goes", "motions go")
             )
         });
     }
@@ -102,18 +115,18 @@ pub(crate) fn unchecked_notes(
 fn outside_calls_note(listing: &Listing) -> Option<String> {
     /// How many routines are named.
     const NAMED: usize = 5;
-    let mut routines: Vec<(&str, Vec<u32>)> = Vec::new();
+    let mut routines: Vec<(&str, Vec<Place>)> = Vec::new();
     for call in &listing.outside_calls {
         let name = call.name.as_str();
         match routines.iter_mut().find(|(other, _)| other.eq_ignore_ascii_case(name)) {
-            Some((_, lines)) => lines.push(call.place.line),
-            None => routines.push((name, vec![call.place.line])),
+            Some((_, places)) => places.push(call.place),
+            None => routines.push((name, vec![call.place])),
         }
     }
     let named = routines
         .iter()
         .take(NAMED)
-        .filter_map(|(name, lines)| Some(format!("{name} ({})", numbered(lines)?)));
+        .filter_map(|(name, places)| Some(format!("{name} ({})", numbered(places.iter().copied())?)));
     let named: Vec<String> = named.collect();
     let more = routines.len().saturating_sub(NAMED);
     let more = if more > 0 { format!(" and {more} more") } else { String::new() };
@@ -129,26 +142,44 @@ fn outside_calls_note(listing: &Listing) -> Option<String> {
 
 /// Line numbers of motions, the first few; `None` without any.
 pub(crate) fn lines_of(listing: &Listing, motions: &[u32]) -> Option<String> {
-    let lines: Vec<u32> =
-        motions.iter().map(|m| listing.motions[*m as usize].place.line).take(4 * NAMED_LINES).collect();
-    numbered(&lines)
+    numbered(motions.iter().map(|motion| listing.motions[*motion as usize].place))
 }
 
 /// How many lines are listed.
 const NAMED_LINES: usize = 8;
 
-/// Line numbers, the first few; `None` without any.
-fn numbered(lines: &[u32]) -> Option<String> {
-    let mut lines: Vec<String> = lines.iter().take(4 * NAMED_LINES).map(u32::to_string).collect();
-    lines.dedup();
-    let word = match lines.as_slice() {
-        [] => return None,
-        [_] => "line",
-        _ => "lines",
+/// Line numbers, the first few, by file where there are several; `None` without any.
+fn numbered(places: impl Iterator<Item = Place>) -> Option<String> {
+    let mut files: Vec<(u32, Vec<String>)> = Vec::new();
+    let (mut last, mut listed, mut more) = (None, 0, "");
+    for place in places {
+        if last.replace((place.file, place.line)) == Some((place.file, place.line)) {
+            continue;
+        }
+        if listed == NAMED_LINES {
+            more = " and more";
+            break;
+        }
+        listed += 1;
+        let line = place.line.to_string();
+        match files.last_mut() {
+            Some((file, lines)) if *file == place.file => lines.push(line),
+            _ => files.push((place.file, vec![line])),
+        }
+    }
+    let is_one_file = files.iter().all(|(file, _)| *file == 0);
+    let of_file = |(file, lines): &(u32, Vec<String>)| {
+        let word = if lines.len() == 1 { "line" } else { "lines" };
+        let place = if is_one_file { String::new() } else { format!(" of file {}", file + 1) };
+        format!("{word} {}{place}", lines.join(", "))
     };
-    let more = if lines.len() > NAMED_LINES { " and more" } else { "" };
-    lines.truncate(NAMED_LINES);
-    Some(format!("{word} {}{more}", lines.join(", ")))
+    let named: Vec<String> = files.iter().map(of_file).collect();
+    (!named.is_empty()).then(|| format!("{}{more}", named.join("; ")))
+}
+
+/// A number of things, in the singular for one.
+fn counted(count: usize, one: &str, several: &str) -> String {
+    if count == 1 { format!("1 {one}") } else { format!("{count} {several}") }
 }
 
 /// Whether an effect is a deflection under loads that a payload is not part of.

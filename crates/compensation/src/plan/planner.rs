@@ -22,7 +22,9 @@ use crate::feasibility::unchanged::{blocking_reason, unchanged_motions};
 use crate::frames::frame_pair::FramePair;
 use crate::frames::frame_table::FrameTable;
 use crate::options::{Options, is_rewritable};
-use crate::plan::notes::{backlash_note, doubtful_effects_note, load_notes, unchecked_notes};
+use crate::plan::notes::{
+    backlash_note, beyond_noise_note, doubtful_effects_note, load_notes, unchecked_notes,
+};
 use crate::plan::reason::OutcomeReason;
 use crate::plan::{MotionOutcome, Plan};
 use crate::risk::assessment::{Assessment, AssessmentSample, EstimateContext, assess_program};
@@ -221,6 +223,7 @@ fn planned(job: &Planner<'_>) -> Plan {
     notes.extend(load_notes(listing, arms, options));
     let unchecked: Vec<u32> = portions.iter().flat_map(|portion| portion.unchecked.iter().copied()).collect();
     notes.extend(unchecked_notes(listing, solved, &unchecked));
+    notes.extend(beyond_noise_note(arms, &outcomes));
     #[expect(clippy::filter_map_identity, reason = "works in place, unlike `flatten`: memory is at its peak")]
     let changes = changes.into_iter().filter_map(|change| change).collect();
     let mut plan = Plan { notes, changes, outcomes, ..Plan::default() };

@@ -355,7 +355,6 @@ fn the_quick_sigma_equals_the_covariance() {
 #[test]
 fn single_precision_is_stated_at_its_known_spacing() {
     use truegrind_compensation::plan::single_precision::single_precision;
-    use truegrind_programs::few::Few;
     use truegrind_programs::rewrite::{Change, NewTarget};
     assert_eq!(single_precision(&[]), None);
     // Between 1024 and 2048 single precision has a spacing of 2^-13 mm: half of it is the most a number is off.
@@ -365,7 +364,7 @@ fn single_precision_is_stated_at_its_known_spacing() {
         conf: None,
     };
     let half = 0.5 * 2.0_f64.powi(-13);
-    let change = |target| Change { motion: 0, targets: Few::one(target), before: vec![] };
+    let change = |target| Change { motion: 0, targets: [target].into(), before: vec![] };
     let off = single_precision(&[change(at(1500.0)), change(at(1500.0 + half))]).unwrap();
     assert!((off.position_mm - half).abs() < 1e-12, "{off:?}");
     assert_eq!(off.orientation_deg, 0.0);

@@ -343,7 +343,7 @@ fn a_called_program_that_is_not_read_is_named() {
     };
     let found = notes(&format!("{go}\nM98 P2000\n{go}\nM98 P3000\n{go}"));
     let note = found.iter().find(|note| note.contains("are not in their file")).unwrap();
-    assert!(note.starts_with("2 of the blocks") && note.ends_with("(lines 7, 9)"), "{note}");
+    assert!(note.starts_with("2 blocks call") && note.ends_with("(lines 7, 9)"), "{note}");
     assert!(!notes(go).iter().any(|note| note.contains("in their file")));
 }
 

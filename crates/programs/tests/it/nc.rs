@@ -3,7 +3,6 @@
 use std::path::Path;
 
 use proptest::prelude::*;
-use truegrind_programs::few::Few;
 use truegrind_programs::motion::{Listing, Mark, MotionKind, Origin, Reason, RobTarget, Role, TargetValue};
 use truegrind_programs::nc::dialect::Dialect;
 use truegrind_programs::nc::orientation::{Angles, spun, vector_and_spin};
@@ -560,7 +559,7 @@ fn blocks_are_inserted_before_a_motion_and_a_mark_after_the_head() {
         },
         external: None,
     };
-    let change = Change { motion: 1, targets: Few::one(NewTarget::Keep), before: vec![extra] };
+    let change = Change { motion: 1, targets: [NewTarget::Keep].into(), before: vec![extra] };
     let mark_of = Mark { version: "9.9.9".into(), model: "0123456789ab".into(), partial: false };
     let options = RewriteOptions { mark: Some(mark_of.clone()), ..RewriteOptions::default() };
     let rewritten = task.rewrite(&[change], &options).unwrap();

@@ -1,7 +1,6 @@
 //! The class: a motion has, or would get, a number that no controller can hold. Such a motion is left with a reason
 //! of its own, and no written number has an exponent or is infinite or NaN.
 
-use truegrind_programs::few::Few;
 use truegrind_programs::motion::Reason;
 use truegrind_programs::nc;
 use truegrind_programs::nc::dialect::Dialect;
@@ -62,7 +61,7 @@ fn no_number_beyond_the_range_of_a_control_is_written() {
     {
         let new =
             NewTarget::Cartesian { position_mm: [x, 0.0, 0.0], quaternion: [0.0, 0.0, q, 0.0], conf: None };
-        let change = Change { motion: 0, targets: Few::one(new), before: vec![] };
+        let change = Change { motion: 0, targets: [new].into(), before: vec![] };
         let rewritten = task.rewrite(&[change], &RewriteOptions::default()).unwrap();
         assert_eq!(rewritten.outcomes, [Outcome::Refused(Reason::NumberRange)], "{x} {q}");
         assert!(rewritten.files[0].edits.is_empty());

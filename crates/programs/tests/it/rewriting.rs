@@ -1,6 +1,5 @@
 //! Rewriting: new values are written and read back.
 
-use truegrind_programs::few::Few;
 use truegrind_programs::motion::{Mark, MotionKind, Reason, TargetValue};
 use truegrind_programs::rapid::Task;
 use truegrind_programs::rewrite::{Change, Extra, NewTarget, Outcome, RewriteOptions, Rewritten};
@@ -18,7 +17,7 @@ fn at(x: f64, y: f64, z: f64) -> NewTarget {
 }
 
 fn change(motion: u32, target: NewTarget) -> Change {
-    Change { motion, targets: Few::one(target), before: vec![] }
+    Change { motion, targets: [target].into(), before: vec![] }
 }
 
 fn rewrite(source: &str, changes: &[Change]) -> (String, Rewritten) {
@@ -226,7 +225,7 @@ fn extra_motions_take_over_speed_tool_and_process() {
     for (line, inserted) in cases {
         let line = line.replace("EXT", EXT);
         let source = module(data, &format!("    {line} ! end\n"));
-        let change = Change { motion: 0, targets: Few::default(), before: vec![extra.clone()] };
+        let change = Change { motion: 0, targets: Default::default(), before: vec![extra.clone()] };
         let (text, rewritten) = rewrite(&source, &[change]);
         assert_eq!(rewritten.outcomes, [Outcome::InPlace]);
         let inserted = inserted.replace("TARGET", target);

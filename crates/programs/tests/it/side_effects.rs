@@ -1,7 +1,6 @@
 //! The class: an expression with side effects is replaced by its value, or evaluated twice. It must neither be
 //! removed from a program nor repeated.
 
-use truegrind_programs::few::Few;
 use truegrind_programs::motion::{Listing, MotionKind, Reason};
 use truegrind_programs::rapid::Task;
 use truegrind_programs::rapid::predefined;
@@ -137,7 +136,7 @@ fn an_argument_with_side_effects_is_evaluated_once() {
         conf: None,
     };
     let before = vec![Extra { kind: MotionKind::Linear, target: between, external: None }];
-    let change = Change { motion: 1, targets: Few::one(NewTarget::Keep), before };
+    let change = Change { motion: 1, targets: [NewTarget::Keep].into(), before };
     let rewritten = task.rewrite(&[change], &RewriteOptions::default()).unwrap();
     let text = String::from_utf8(rewritten.files[0].edits.apply(source.as_bytes()).unwrap()).unwrap();
     assert_eq!(text.matches("Abs(-50)").count(), 2, "{text}");
