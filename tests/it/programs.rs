@@ -540,7 +540,7 @@ fn lines_whose_path_nobody_checked_are_named() {
     assert_eq!(code, 0, "{err}");
     let words: String = text.split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(words.contains("3 lines or arcs start at a place that is unknown or not corrected"), "{text}");
-    assert!(words.contains("the path between is not checked (lines 4, 6, 8)"), "{text}");
+    assert!(words.contains("the path to it is not checked (lines 4, 6, 8)"), "{text}");
 }
 
 #[test]

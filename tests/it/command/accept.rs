@@ -29,7 +29,17 @@ fn a_model_is_accepted_by_poses_of_its_own() {
     let accept = |data: &str, more: &[&str]| {
         truegrind(at, &[&["accept", data, "--model", "model.toml", "--tolerance"], more].concat())
     };
-    let page = ["1", "--serial", "arm=120-503211", "--html", "page.html", "--json", "page.json"];
+    let page = [
+        "1",
+        "--sensor-uncertainty",
+        "0.02",
+        "--serial",
+        "arm=120-503211",
+        "--html",
+        "page.html",
+        "--json",
+        "page.json",
+    ];
     let (code, out, err) = accept("later.csv", &page);
     assert!(code == 0 && out.contains("[ok] Accepted: largest error 0."), "{out}{err}");
     let html = fs::read_to_string(at.join("page.html")).unwrap();
@@ -97,7 +107,23 @@ fn the_orientation_is_told_and_judged_where_that_is_asked_for() {
     let (code, _, err) = truegrind(at, &identify);
     assert!(code < 2, "{err}");
     let accept = |data: &str, more: &[&str]| {
-        truegrind(at, &[&["accept", data, "--model", "model.toml", "--tolerance", "5"], more].concat())
+        truegrind(
+            at,
+            &[
+                &[
+                    "accept",
+                    data,
+                    "--model",
+                    "model.toml",
+                    "--tolerance",
+                    "5",
+                    "--sensor-uncertainty",
+                    "0.02",
+                ],
+                more,
+            ]
+            .concat(),
+        )
     };
     let (code, out, err) =
         accept("later.csv", &["--html", "page.html", "--json", "page.json", "--csv", "rows.csv"]);
@@ -178,8 +204,18 @@ fn a_measured_path_is_evaluated() {
         fs::write(at.join("cycles.csv"), text).unwrap();
     };
     let accept = || {
-        let arguments =
-            ["accept", "cycles.csv", "--model", "model.toml", "--tolerance", "1", "--json", "page.json"];
+        let arguments = [
+            "accept",
+            "cycles.csv",
+            "--model",
+            "model.toml",
+            "--tolerance",
+            "1",
+            "--sensor-uncertainty",
+            "0.02",
+            "--json",
+            "page.json",
+        ];
         let (code, out, err) = truegrind(at, &arguments);
         let json = fs::read(at.join("page.json")).unwrap_or_default();
         let found: serde_json::Value = serde_json::from_slice(&json).unwrap_or_default();

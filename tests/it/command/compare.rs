@@ -275,7 +275,7 @@ fn track_refuses_wrong_units_and_leaves_nothing_behind() {
     assert!(code == 2 && err.contains("these look like metres"), "{err}");
     // Whoever insists is told that the readings are not of this arm.
     let (code, _, err) = track(&["--allow-odd-units"]);
-    assert!(code == 2 && err.contains("these are not its measurements"), "{err}");
+    assert!(code == 2 && err.contains("these are not measurements of this arm"), "{err}");
     assert_eq!(names(at), ["first.csv", "metres.csv", "model.toml"], "nothing is written, no folder made");
 }
 

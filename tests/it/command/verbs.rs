@@ -4,8 +4,14 @@
 const ROBOT: [&str; 3] = ["--robot", "--base", "--tip"];
 const DATA: [&str; 6] =
     ["--points", "--points-within", "--points-ahead", "--sheet", "--angles", "--allow-odd-units"];
-const FIT: [&str; 5] =
-    ["--raw-columns", "--limit-rmse", "--limit-max", "--tolerance-length", "--tolerance-angle"];
+const FIT: [&str; 6] = [
+    "--raw-columns",
+    "--limit-rmse",
+    "--limit-max",
+    "--tolerance-length",
+    "--tolerance-angle",
+    "--sensor-scale-sigma",
+];
 const FRAMES: [&str; 4] = ["--sensor-frame", "--outlet", "--cable-zero", "--touched-point"];
 const COMMON: [&str; 2] = ["--seed", "--threads"];
 const SHARES: [&str; 5] = ["--shard", "--resume", "--work", "--units", "--list-units"];

@@ -138,8 +138,8 @@ pub fn diagnose(
     };
     diagnosis.notes.extend(chance.map(|chance| {
         format!(
-            "the written arm is fitted without the causes of the measurement: with them it would be worse with a probability of {:.0} %, \
-             where {:.0} % is allowed",
+            "the written arm leaves the causes in the measurement out of its fit, since with them its links might be worse (probability {:.0} %, \
+             at most {:.0} % are allowed)",
             100.0 * chance,
             100.0 * sensor_causes::MOST_PROBABILITY
         )

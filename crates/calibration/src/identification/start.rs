@@ -15,8 +15,9 @@ use truegrind_math::se3::Pose;
 /// The rows do not determine the sensor's frame.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[error(
-    "{file}: the {rows} rows, at {poses} different poses of the arm, do not determine the {what}: measure at least {needed} \
-     poses that are not collinear, with different wrist orientations"
+    "{file}: rows at {poses} different {}, where copies of a row count once, do not determine the {what}: measure at least {needed} poses that \
+     are not collinear, with different wrist orientations",
+    if *poses == 1 { "pose" } else { "poses" }
 )]
 pub struct StartError {
     /// File.

@@ -3,7 +3,6 @@
 use crate::arms::{Arms, is_load_dependent};
 use crate::condition::payload::payload_at;
 use crate::options::Options;
-use crate::plan::MotionOutcome;
 use crate::target::solved_target::SolvedTargets;
 use truegrind_arm::effect::Effect;
 use truegrind_programs::motion::{Listing, Motion, MotionKind, Place, Switch};
@@ -47,9 +46,8 @@ pub(crate) fn doubtful_effects_note(arms: &Arms<'_>) -> Option<String> {
 const BEYOND_SIGMA: f64 = 2.0;
 
 /// What the measurement of the arm deviates from its model beyond the noise, where that is more than every σ of the program.
-pub(crate) fn beyond_noise_note(arms: &Arms<'_>, outcomes: &[MotionOutcome]) -> Option<String> {
-    let sigmas = outcomes.iter().filter_map(|outcome| outcome.shape_sigma_mm.get());
-    let largest = sigmas.reduce(f64::max)?;
+pub(crate) fn beyond_noise_note(arms: &Arms<'_>, sigmas_mm: impl Iterator<Item = f64>) -> Option<String> {
+    let largest = sigmas_mm.reduce(f64::max)?;
     let beyond = arms.knowledge?.beyond_noise_mm.filter(|mm| *mm > BEYOND_SIGMA * largest)?;
     Some(format!(
         "the readings deviate from this model by {beyond:.3} mm RMS beyond their noise, from effects that it does not contain: programs may be \

@@ -223,7 +223,7 @@ fn planned(job: &Planner<'_>) -> Plan {
     notes.extend(load_notes(listing, arms, options));
     let unchecked: Vec<u32> = portions.iter().flat_map(|portion| portion.unchecked.iter().copied()).collect();
     notes.extend(unchecked_notes(listing, solved, &unchecked));
-    notes.extend(beyond_noise_note(arms, &outcomes));
+    notes.extend(beyond_noise_note(arms, outcomes.iter().filter_map(|outcome| outcome.shape_sigma_mm.get())));
     #[expect(clippy::filter_map_identity, reason = "works in place, unlike `flatten`: memory is at its peak")]
     let changes = changes.into_iter().filter_map(|change| change).collect();
     let mut plan = Plan { notes, changes, outcomes, ..Plan::default() };

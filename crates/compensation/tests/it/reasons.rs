@@ -342,9 +342,9 @@ fn a_called_program_that_is_not_read_is_named() {
         plan(&task.listing, &known(), &Cell::default(), &Options::default()).notes
     };
     let found = notes(&format!("{go}\nM98 P2000\n{go}\nM98 P3000\n{go}"));
-    let note = found.iter().find(|note| note.contains("are not in their file")).unwrap();
+    let note = found.iter().find(|note| note.contains("is not in the same file")).unwrap();
     assert!(note.starts_with("2 blocks call") && note.ends_with("(lines 7, 9)"), "{note}");
-    assert!(!notes(go).iter().any(|note| note.contains("in their file")));
+    assert!(!notes(go).iter().any(|note| note.contains("in the same file")));
 }
 
 /// A work object that is declared, and computed where the program runs, is not called undeclared.
