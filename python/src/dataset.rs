@@ -9,6 +9,7 @@ use pyo3::types::{PyBytes, PyDict, PyList};
 use truegrind::calibration::measurement::convention::AngleConvention;
 use truegrind::calibration::measurement::import::{self, cell::Cell};
 use truegrind::calibration::measurement::matching::match_to_arm;
+use truegrind::calibration::measurement::plausibility::implausible_payload;
 use truegrind::{Dataset, ImportOptions, Reading, Robot, Sensor, read_measurements};
 
 use crate::arrays::{Numbers, numbers};
@@ -321,6 +322,10 @@ impl PyDataset {
             }
         };
         let name = &robot.sheet.name;
+        let rated = robot.sheet.payload_kg.filter(|_| !self.odd_units);
+        if let Some(suspicion) = rated.and_then(|rated| implausible_payload(&self.rows, rated)) {
+            return Err(suspicion.into());
+        }
         Ok(match_to_arm((*self.rows).clone(), name, &robot.model, convention, self.odd_units)?)
     }
 }

@@ -5,6 +5,7 @@ use pyo3::types::PyDict;
 use truegrind::arm::estimated;
 use truegrind::calibration::identification::start::StartError;
 use truegrind::calibration::measurement::matching::Mismatch;
+use truegrind::calibration::measurement::plausibility::PayloadSuspicion;
 use truegrind::compensation::cell::CellError;
 use truegrind::{
     CompensateError, IdentifyError, ImportError, ModelFileError, NominalMismatch, PlanError, RecipeError,
@@ -222,8 +223,19 @@ impl From<Mismatch> for Refusal {
                 let expected = "degrees, millimetres and unit quaternions, scalar first";
                 told.saying(message).of_file(&suspicion.file).with(found.join("; "), expected)
             }
+            Mismatch::Condition(_) => {
+                let message = format!("{} (allow_odd_units=True takes the rows at their word)", told.message);
+                told.saying(message)
+            }
             _ => told,
         }
+    }
+}
+
+impl From<PayloadSuspicion> for Refusal {
+    fn from(suspicion: PayloadSuspicion) -> Self {
+        let message = format!("{suspicion} (allow_odd_units=True takes the rows at their word)");
+        Self::new(Kind::Dataset, &message).of_file(&suspicion.file)
     }
 }
 

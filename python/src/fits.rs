@@ -115,14 +115,16 @@ impl PyIdentification {
 }
 
 /// Fits an arm to measured poses. ``robot``: a Robot, a name from ``truegrind.robots()`` or a robot file. ``held_out``: share of rows
-/// held out to estimate the error. Tolerances (mm, °): prior σ of the links. ``angles``: ``"logged"`` or ``"dh"``, by default that of
+/// held out to estimate the error. Tolerances (mm, °): prior σ of the links. ``sensor_scale_sigma_percent``: standard uncertainty of the
+/// sensor's scale (%); by default a fault of the scale is taken for possible. ``angles``: ``"logged"`` or ``"dh"``, by default that of
 /// the robot file. ``progress`` is called with each step. The result does not depend on the number of threads.
 #[pyfunction]
 #[pyo3(
     name = "identify",
     signature = (
         dataset, robot, *, method = "lm", held_out = 0.2, seed = 0, fuse_readout = true, limit_rmse_mm = None,
-        limit_max_mm = None, tolerance_length_mm = None, tolerance_angle_deg = None, angles: "Literal['logged', 'dh'] | None" = None, threads = None,
+        limit_max_mm = None, tolerance_length_mm = None, tolerance_angle_deg = None, sensor_scale_sigma_percent = None,
+        angles: "Literal['logged', 'dh'] | None" = None, threads = None,
         progress = None
     )
 )]
@@ -139,6 +141,7 @@ pub(crate) fn identify_(
     limit_max_mm: Option<f64>,
     tolerance_length_mm: Option<f64>,
     tolerance_angle_deg: Option<f64>,
+    sensor_scale_sigma_percent: Option<f64>,
     angles: Option<&str>,
     threads: Option<i64>,
     progress: Option<Object<'_, Progress>>,
@@ -159,6 +162,17 @@ pub(crate) fn identify_(
     // As in the command line, stated tolerances are not estimated from the data.
     tolerance.zero_rad = tolerance.angle_rad;
     tolerance.learn_widths = tolerance_length_mm.is_none() && tolerance_angle_deg.is_none();
+    if let Some(percent) = sensor_scale_sigma_percent {
+        if !(0.0..=10.0).contains(&percent) {
+            return Err(Refusal::argument(
+                "sensor_scale_sigma_percent",
+                percent,
+                "a percentage from 0 to 10",
+            )
+            .into());
+        }
+        tolerance.scale = Some(percent / 100.0);
+    }
     for (name, limit) in [("limit_rmse_mm", limit_rmse_mm), ("limit_max_mm", limit_max_mm)] {
         limit.map(|limit| positive(name, limit)).transpose()?;
     }

@@ -582,10 +582,11 @@ def forward(arm: Robot | Model | Arm, q_deg: ArrayLike, *, payload_kg: SupportsF
     Poses of the flange of an arm (``Robot``, ``Model`` or ``Arm``), as its method ``forward``.
     """
 
-def identify(dataset: Dataset, robot: Robot | str | PathLike[str], *, method: str = "lm", held_out: SupportsFloat | SupportsIndex = 0.2, seed: SupportsIndex = 0, fuse_readout: bool = True, limit_rmse_mm: SupportsFloat | SupportsIndex | None = None, limit_max_mm: SupportsFloat | SupportsIndex | None = None, tolerance_length_mm: SupportsFloat | SupportsIndex | None = None, tolerance_angle_deg: SupportsFloat | SupportsIndex | None = None, angles: "Literal['logged', 'dh'] | None" = None, threads: SupportsIndex | None = None, progress: Callable[[str], object] | None = None) -> Identification:
+def identify(dataset: Dataset, robot: Robot | str | PathLike[str], *, method: str = "lm", held_out: SupportsFloat | SupportsIndex = 0.2, seed: SupportsIndex = 0, fuse_readout: bool = True, limit_rmse_mm: SupportsFloat | SupportsIndex | None = None, limit_max_mm: SupportsFloat | SupportsIndex | None = None, tolerance_length_mm: SupportsFloat | SupportsIndex | None = None, tolerance_angle_deg: SupportsFloat | SupportsIndex | None = None, sensor_scale_sigma_percent: SupportsFloat | SupportsIndex | None = None, angles: "Literal['logged', 'dh'] | None" = None, threads: SupportsIndex | None = None, progress: Callable[[str], object] | None = None) -> Identification:
     """
     Fits an arm to measured poses. ``robot``: a Robot, a name from ``truegrind.robots()`` or a robot file. ``held_out``: share of rows
-    held out to estimate the error. Tolerances (mm, °): prior σ of the links. ``angles``: ``"logged"`` or ``"dh"``, by default that of
+    held out to estimate the error. Tolerances (mm, °): prior σ of the links. ``sensor_scale_sigma_percent``: standard uncertainty of the
+    sensor's scale (%); by default a fault of the scale is taken for possible. ``angles``: ``"logged"`` or ``"dh"``, by default that of
     the robot file. ``progress`` is called with each step. The result does not depend on the number of threads.
     """
 

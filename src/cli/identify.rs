@@ -373,7 +373,9 @@ fn measured(arguments: &DataArguments, robot: &Robot, dataset: Dataset) -> anyho
     }
     let dataset =
         match_to_arm(dataset, name, &robot.model, convention, odd).map_err(|mismatch| match mismatch {
-            Mismatch::Units(_) => anyhow!("{mismatch} (--allow-odd-units accepts the file anyway)"),
+            Mismatch::Units(_) | Mismatch::Condition(_) => {
+                anyhow!("{mismatch} (--allow-odd-units accepts the file anyway)")
+            }
             _ => anyhow!("{mismatch}"),
         })?;
     Ok(dataset)
