@@ -67,6 +67,23 @@ def test_every_result_has_a_page_and_json(identified, model, cable):
         assert type(result).__name__ in repr(result)
 
 
+def test_the_scale_of_the_sensor_may_be_stated(identified, cable):
+    """Its uncertainty is part of what the model promises; a percentage that no sensor has is refused."""
+    exact, coarse = (
+        tg.identify(cable, "abb-irb-120", sensor_scale_sigma_percent=percent).to_json() for percent in (0.0, 1.0)
+    )
+    expected = [json.loads(text)["benefit"]["estimated_mm"] for text in (exact, identified.to_json(), coarse)]
+    assert expected == sorted(expected) and expected[0] < expected[2]
+    with pytest.raises(tg.ArgumentError, match="sensor_scale_sigma_percent"):
+        tg.identify(cable, "abb-irb-120", sensor_scale_sigma_percent=50.0)
+
+
+def test_a_payload_in_grams_is_refused():
+    rows = dict(q_deg=np.zeros((3, 6)), position_mm=np.zeros((3, 3)), payload_kg=np.full(3, 1200.0))
+    with pytest.raises(tg.DatasetError, match="grams"):
+        tg.identify(tg.Dataset.from_numpy(**rows), "abb-irb-120")
+
+
 def test_what_was_found_is_at_hand(identified, model):
     assert identified.held_out_rmse_mm < identified.held_out_rmse_before_mm
     assert identified.held_out_max_mm >= identified.held_out_rmse_mm
