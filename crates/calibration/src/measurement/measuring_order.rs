@@ -1,5 +1,6 @@
 //! The order of measuring. Steps of the set-up, drifts and approach directions are read from the order of the rows, but a file may be
-//! sorted otherwise, by pose or by name: then the clock tells the order, or the session labels do.
+//! sorted otherwise, by pose or by name: then the clock tells the order, or the session labels do. Rows are numbered as in a file that is
+//! sorted so, since steps of the set-up are told as ranges of row numbers.
 
 use std::collections::HashMap;
 
@@ -52,9 +53,9 @@ fn by_clock(mut dataset: Dataset, times: &[f64]) -> Dataset {
     let mut order: Vec<usize> = (0..times.len()).collect();
     order.sort_by(|&a, &b| times[a].total_cmp(&times[b]));
     let numbers: Vec<usize> = back.iter().map(|&i| dataset.rows[i].number).collect();
-    let mut out = dataset.subset(&order);
+    let mut out = sorted(&dataset, &order);
     out.notes.push(format!(
-        "the rows are not in the order of column t, which goes back at {}: they were sorted by t",
+        "the rows are not in the order of column t, which goes back at {}: they were sorted by t, and row numbers are those of the sorted file",
         row_list(&numbers)
     ));
     out
@@ -75,9 +76,20 @@ fn by_session(dataset: Dataset) -> Dataset {
     }
     let mut order: Vec<usize> = (0..labels.len()).collect();
     order.sort_by_key(|&i| labels[i]);
-    let mut out = dataset.subset(&order);
+    let mut out = sorted(&dataset, &order);
     out.notes.push(format!(
-        "the rows of {sessions} sessions are mixed: they were sorted by column session, in the order of the sessions' first rows"
+        "the rows of {sessions} sessions are mixed: they were sorted by column session, in the order of the sessions' first rows, and row numbers \
+         are those of the sorted file"
     ));
+    out
+}
+
+/// The rows in another order, with the numbers that stand there in a file sorted so.
+fn sorted(dataset: &Dataset, order: &[usize]) -> Dataset {
+    let mut out = dataset.subset(order);
+    let numbers: Vec<usize> = dataset.rows.iter().map(|row| row.number).collect();
+    for (row, number) in out.rows.iter_mut().zip(numbers) {
+        row.number = number;
+    }
     out
 }
