@@ -3,7 +3,8 @@
 //! Method. The sensor's frame is fitted to four fifths of the poses, and each pose is judged with a frame fitted without it
 //! (five folds); or the frame is stated and nothing is fitted. The decision follows ISO 14253-1 for an expanded uncertainty
 //! U (k = 2): accepted if largest error plus U is within the tolerance, refused if the largest error exceeds the tolerance by
-//! more than U, undecided otherwise. Where U is unknown, nothing is accepted. Pose accuracy and repeatability (ISO 9283: thirty cycles at five poses) are computed
+//! more than U, undecided otherwise. Where U is unknown, nothing is accepted.
+//! Pose accuracy and repeatability (ISO 9283: thirty cycles at five poses) are computed
 //! only if enough cycles were measured; path accuracy and repeatability (ten cycles) only from rows with a position on a
 //! path. Those rows are used for nothing else, because the arm was moving.
 
@@ -145,13 +146,15 @@ pub struct Acceptance {
 }
 
 impl Acceptance {
-    /// Whether the data sheet is nearer to the readings than the model, by more than the sensor's uncertainty: then the model is of another arm, or the arm has changed.
+    /// Whether the data sheet is nearer to the readings than the model, by more than the sensor's uncertainty: then the model is of another
+    /// arm, or the arm has changed.
     pub fn is_worse_than_data_sheet(&self) -> bool {
         let further_mm = (self.model.rmse.powi(2) - self.nominal.rmse.powi(2)).max(0.0).sqrt();
         self.model.rmse > WORSE * self.nominal.rmse && further_mm > self.uncertainty_mm
     }
 
-    /// The decision over all stated tolerances. A model that is worse than the data sheet is not accepted; not evaluated if an orientation tolerance is stated but no orientation was measured.
+    /// The decision over all stated tolerances. A model that is worse than the data sheet is not accepted; not evaluated if an orientation
+    /// tolerance is stated but no orientation was measured.
     pub fn overall(&self) -> Decision {
         let orientation = self.orientation.as_ref().map_or(Decision::NotEvaluated, |found| found.decision);
         let decision = if self.orientation_asked { self.decision.and(orientation) } else { self.decision };

@@ -493,8 +493,8 @@ fn fits(search: &Search<'_>) -> Fits {
 }
 
 /// The arm for compensation and its expected benefit, from the written fit and the same with uncertain causes, what both lack, and the
-/// size of a scatter about a joint (mm RMS), which remains with and without correction, as what all causes leave beyond the noise does. Of too few poses no benefit is stated: it would be
-/// the priors'.
+/// size of a scatter about a joint (mm RMS), which remains with and without correction, as what all causes leave beyond the noise does. Of too
+/// few poses no benefit is stated: it would be the priors'.
 fn estimated(
     search: &Search<'_>,
     robot: &str,

@@ -35,7 +35,7 @@ use crate::identification::calibration::CalibrationProblem;
 use crate::identification::fit::{Fitted, Observations};
 use crate::identification::rounding;
 use crate::identification::tolerance::Tolerance;
-use crate::measurement::dataset::{Dataset, Reading, Sensor};
+use crate::measurement::dataset::{Dataset, Sensor};
 use crate::measurement::sensor::disturbance::{Kind, Profile};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::estimated::Estimated;
@@ -578,7 +578,7 @@ fn linearise_readings(fitted: &Fitted, dataset: &Dataset) -> LinearisedReadings 
             problem.jacobian(x, from * per..to * per, &mut residuals, &mut jacobian[..n * p]);
             for (i, row) in dataset.rows.iter().skip(from).take(to - from).enumerate() {
                 let weight = problem.per_mm(from + i);
-                let offset = Vector3::from(coordinates(&row.reading)) - Vector3::from(centre);
+                let offset = row.reading.place_mm() - centre;
                 match dataset.sensor {
                     Sensor::Cable => jacobian[n * p + i] = weight * offset.x,
                     Sensor::Position | Sensor::Pose => {
@@ -610,23 +610,10 @@ const ROWS: usize = 512;
 /// Rows of one thread's sum: the same for any number of threads.
 const PART: usize = 4 * ROWS;
 
-fn coordinates(reading: &Reading) -> [f64; 3] {
-    match reading {
-        Reading::Cable(length) => [*length, 0.0, 0.0],
-        Reading::Position(v) => (*v).into(),
-        Reading::Pose(pose) => pose.translation.vector.into(),
-    }
-}
-
 /// Mean reading: a scale about it does not move the sensor frame.
-fn mean_reading(dataset: &Dataset) -> [f64; 3] {
+fn mean_reading(dataset: &Dataset) -> Vector3<f64> {
     let n = dataset.rows.len().max(1) as f64;
-    let mut sum = [0.0; 3];
-    for row in &dataset.rows {
-        let at = coordinates(&row.reading);
-        (0..3).for_each(|k| sum[k] += at[k] / n);
-    }
-    sum
+    dataset.rows.iter().map(|row| row.reading.place_mm() / n).sum()
 }
 
 /// M at `condition` over the region spanned by the poses `samples_deg` (°). δᵀ M δ is the mean square displacement (mm²) of the

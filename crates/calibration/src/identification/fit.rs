@@ -19,6 +19,7 @@ use crate::identification::rounding::{self, AngleCovariance};
 use crate::identification::solver::Solver;
 use crate::identification::tolerance::Tolerance;
 use crate::measurement::dataset::{Dataset, Reading, Sensor};
+use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Model;
 use truegrind_arm::parameter::{Parameter, arm_parameters};
 use truegrind_estimation::estimate::{Estimate, Evaluations, Iteration, Termination};
@@ -383,10 +384,15 @@ pub fn orientation_errors(
     model: &Model,
     frames: &Frames,
 ) -> Option<Vec<f64>> {
+    // Rows of one condition follow each other, and preparing the arm costs more than one pose.
+    let mut prepared = model.at_condition(&Condition::default());
     let error = |&row: &usize| {
         let row = &observed.dataset.rows[row];
         let Reading::Pose(seen) = &row.reading else { return None };
-        let flange = model.at_condition(&row.condition).forward(&row.joints);
+        if prepared.condition != *row.condition {
+            prepared = model.at_condition(&row.condition);
+        }
+        let flange = prepared.forward(&row.joints);
         let target = flange.rotation * frames.flange_from_target.rotation;
         Some((frames.base_from_sensor.rotation * seen.rotation).angle_to(&target))
     };

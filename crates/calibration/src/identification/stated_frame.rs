@@ -8,7 +8,7 @@ use nalgebra::{Point3, Vector3};
 use super::calibration::Frames;
 use super::fit::{Observations, errors_on};
 use super::rounding::logged_covariance;
-use crate::measurement::dataset::{Dataset, Reading, Sensor};
+use crate::measurement::dataset::{Dataset, Sensor};
 use truegrind_arm::model::Model;
 use truegrind_math::se3::Pose;
 use truegrind_math::statistics::median;
@@ -58,15 +58,10 @@ pub fn contradiction(
 
 /// RMS distance of the readings in the base under two frames (mm).
 fn rms_distance_mm(dataset: &Dataset, one: &Pose, other: &Pose) -> f64 {
-    let place = |reading: &Reading| match reading {
-        Reading::Cable(_) => Point3::origin(),
-        Reading::Position(at) => Point3::from(*at),
-        Reading::Pose(pose) => Point3::from(pose.translation.vector),
-    };
     let square: f64 = dataset
         .rows
         .iter()
-        .map(|row| place(&row.reading))
+        .map(|row| Point3::from(row.reading.place_mm()))
         .map(|at| (one * at - other * at).norm_squared())
         .sum();
     (square / dataset.rows.len().max(1) as f64).sqrt()

@@ -3,9 +3,9 @@
 //! A copy says nothing new, but counts as a further measurement: it pulls the fit towards its pose. Without a clock, two readings
 //! of one pose can also be equal by chance, where the sensor's steps are coarse; see [`split::repeats_agree_by_chance`].
 
-use std::collections::HashMap;
+use std::hash::{DefaultHasher, Hash, Hasher};
 
-use super::dataset::{Dataset, Reading, Row};
+use super::dataset::{Dataset, Row};
 use super::row_list::row_list;
 use super::split;
 
@@ -35,29 +35,27 @@ pub(super) fn without_copies(dataset: Dataset) -> Dataset {
     out
 }
 
-/// Indices of the rows that equal an earlier one.
+/// Indices of the rows that equal an earlier one. Rows are sorted by a hash, sixteen bytes each: a file can hold a million.
 fn copies(dataset: &Dataset) -> Vec<usize> {
-    let mut seen: HashMap<[u64; 7], Vec<usize>> = HashMap::new();
+    let hashed = |(i, row)| (hash(row), i as u32);
+    let mut hashes: Vec<(u64, u32)> = dataset.rows.iter().enumerate().map(hashed).collect();
+    hashes.sort_unstable();
+    let row = |(_, index): &(u64, u32)| &dataset.rows[*index as usize];
     let mut out = Vec::new();
-    for (i, row) in dataset.rows.iter().enumerate() {
-        let like = seen.entry(key(row)).or_default();
-        if like.iter().any(|&earlier| is_same(&dataset.rows[earlier], row)) {
-            out.push(i);
-        } else {
-            like.push(i);
-        }
+    for alike in hashes.chunk_by(|a, b| a.0 == b.0).filter(|alike| alike.len() > 1) {
+        let is_copy = |k: &usize| alike[..*k].iter().any(|earlier| is_same(row(earlier), row(&alike[*k])));
+        out.extend((1..alike.len()).filter(is_copy).map(|k| alike[k].1 as usize));
     }
+    out.sort_unstable();
     out
 }
 
-/// Angles and the first number of the reading.
-fn key(row: &Row) -> [u64; 7] {
-    let first = match &row.reading {
-        Reading::Cable(length) => *length,
-        Reading::Position(at) => at.x,
-        Reading::Pose(pose) => pose.translation.x,
-    };
-    std::array::from_fn(|k| if k < 6 { row.joints[k] } else { first }.to_bits())
+/// Hash of angles and reading.
+fn hash(row: &Row) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    let place = row.reading.place_mm();
+    row.joints.iter().chain(&place).for_each(|number| number.to_bits().hash(&mut hasher));
+    hasher.finish()
 }
 
 fn is_same(a: &Row, b: &Row) -> bool {

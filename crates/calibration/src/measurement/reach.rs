@@ -5,7 +5,7 @@
 
 use nalgebra::Vector3;
 
-use super::dataset::{Dataset, Reading, Row};
+use super::dataset::Dataset;
 use super::row_list::row_list;
 use truegrind_arm::model::Model;
 use truegrind_math::statistics::median;
@@ -20,7 +20,7 @@ const MOST: f64 = 0.1;
 pub(super) fn without_impossible_readings(dataset: &mut Dataset, nominal: &Model) {
     let length: f64 = nominal.links.iter().map(|link| link.a_mm.hypot(link.d_mm)).sum();
     let diameter_mm = 2.0 * (length + nominal.flange.translation.vector.norm() + TOOL_MM);
-    let places: Vec<Vector3<f64>> = dataset.rows.iter().map(place).collect();
+    let places: Vec<Vector3<f64>> = dataset.rows.iter().map(|row| row.reading.place_mm()).collect();
     let middle = Vector3::from_fn(|axis, _| {
         median(&places.iter().map(|place| place[axis]).collect::<Vec<_>>()).unwrap_or_default()
     });
@@ -38,13 +38,4 @@ pub(super) fn without_impossible_readings(dataset: &mut Dataset, nominal: &Model
         row_list(&numbers),
         if numbers.len() == 1 { "its reading is" } else { "their readings are up to" }
     ));
-}
-
-/// A length along x, or a position (mm).
-fn place(row: &Row) -> Vector3<f64> {
-    match &row.reading {
-        Reading::Cable(length) => Vector3::new(*length, 0.0, 0.0),
-        Reading::Position(at) => *at,
-        Reading::Pose(pose) => pose.translation.vector,
-    }
 }

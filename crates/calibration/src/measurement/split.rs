@@ -365,16 +365,7 @@ impl NoiseFloor {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn noise_floor(data: &Dataset) -> Option<NoiseFloor> {
-    pooled_scatter_by(data, |row, _| Some(place(row)))
-}
-
-/// A reading's length along x, or its position (mm).
-fn place(row: &Row) -> Vector3<f64> {
-    match &row.reading {
-        Reading::Cable(l) => Vector3::new(*l, 0.0, 0.0),
-        Reading::Position(p) => *p,
-        Reading::Pose(pose) => pose.translation.vector,
-    }
+    pooled_scatter_by(data, |row, _| Some(row.reading.place_mm()))
 }
 
 /// The noise floor of orientations (rad), from rotation vectors relative to the first reading of each pose, as the root of the
@@ -402,7 +393,7 @@ fn pooled_scatter_by(
 
 /// Whether repeated readings that are equal to the last digit may be so by chance: the sensor's steps are coarse for its scatter.
 pub(super) fn repeats_agree_by_chance(data: &Dataset) -> bool {
-    !Repeats::of(data, |row, _| Some(place(row))).are_copied()
+    !Repeats::of(data, |row, _| Some(row.reading.place_mm())).are_copied()
 }
 
 /// Readings of poses that were measured more than once with the same outlet and approach.

@@ -19,6 +19,17 @@ pub enum Reading {
     Pose(Box<Pose>),
 }
 
+impl Reading {
+    /// The measured position in the sensor's frame, or a cable's length along x (mm).
+    pub fn place_mm(&self) -> Vector3<f64> {
+        match self {
+            Reading::Cable(length) => Vector3::new(*length, 0.0, 0.0),
+            Reading::Position(position) => *position,
+            Reading::Pose(pose) => pose.translation.vector,
+        }
+    }
+}
+
 /// How the arm came to a pose, from the rows around it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion {

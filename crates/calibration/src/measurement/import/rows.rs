@@ -118,7 +118,7 @@ fn check_outlets(reader: &Reader<'_>, rows: &[Row]) -> Result<(), ImportError> {
 fn reading_step(rows: &[Row], sensor: Sensor) -> Option<f64> {
     let count = if sensor == Sensor::Cable { 1 } else { 3 };
     rounding::step(rows.iter().flat_map(|r| {
-        let at: [f64; 3] = coordinates(&r.reading).into();
+        let at: [f64; 3] = r.reading.place_mm().into();
         at.into_iter().take(count)
     }))
 }
@@ -453,7 +453,7 @@ fn spread(rows: &[Row]) -> Option<f64> {
     let mut low = [f64::MAX; 3];
     let mut high = [f64::MIN; 3];
     for row in rows {
-        let values = coordinates(&row.reading);
+        let values = row.reading.place_mm();
         for k in 0..3 {
             low[k] = low[k].min(values[k]);
             high[k] = high[k].max(values[k]);
@@ -463,13 +463,5 @@ fn spread(rows: &[Row]) -> Option<f64> {
 }
 
 fn magnitude(rows: &[Row]) -> f64 {
-    rows.iter().map(|r| coordinates(&r.reading).amax()).fold(0.0, f64::max)
-}
-
-fn coordinates(reading: &Reading) -> Vector3<f64> {
-    match reading {
-        Reading::Cable(l) => Vector3::new(*l, 0.0, 0.0),
-        Reading::Position(v) => *v,
-        Reading::Pose(p) => p.translation.vector,
-    }
+    rows.iter().map(|r| r.reading.place_mm().amax()).fold(0.0, f64::max)
 }
