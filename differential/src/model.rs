@@ -221,6 +221,14 @@ fn chain(out: &mut String, name: &str, links: &[Link; 6], arm: &Arm, sheet: &She
         sheet.min_deg,
         sheet.max_deg
     );
+    if arm.map.coupling != 0.0 {
+        let (sign, elbow) = (arm.map.sign[2], arm.elbow.map(f64::to_degrees));
+        let _ = writeln!(
+            out,
+            "sum = [{{ of = [0.0, {:?}, {sign:?}, 0.0, 0.0, 0.0], min_deg = {:?}, max_deg = {:?} }}]",
+            arm.map.coupling, elbow[0], elbow[1]
+        );
+    }
     for (j, link) in links.iter().enumerate() {
         let _ = write!(
             out,

@@ -9,7 +9,7 @@ use super::effect::bounds::effects;
 use super::link::{Link, LinkModel};
 use super::model::Model;
 use crate::body::Body;
-use crate::joints::Limits;
+use crate::limits::{Limits, SumLimit};
 use truegrind_math::se3::Pose;
 
 /// One link in a file.
@@ -44,6 +44,9 @@ pub struct ArmFile {
     /// Highest joint speeds [°/s].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub speed_deg_s: Option<[f64; 6]>,
+    /// Ranges of sums of joints.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sum: Vec<SumLimit>,
     /// Direction of gravity in the base.
     pub gravity: [f64; 3],
     /// Position of the flange in the last DH frame (mm).
@@ -68,6 +71,7 @@ impl From<&Model> for ArmFile {
             min_deg: model.limits.min_rad.map(f64::to_degrees),
             max_deg: model.limits.max_rad.map(f64::to_degrees),
             speed_deg_s: model.limits.speed_rad_s.map(|s| s.map(f64::to_degrees)),
+            sum: model.limits.sums.clone(),
             gravity: model.gravity.into(),
             flange_mm: model.flange.translation.vector.into(),
             flange_wxyz: [q.w, q.i, q.j, q.k],
@@ -141,6 +145,7 @@ impl ArmFile {
                 min_rad: self.min_deg.map(f64::to_radians),
                 max_rad: self.max_deg.map(f64::to_radians),
                 speed_rad_s: self.speed_deg_s.map(|s| s.map(f64::to_radians)),
+                sums: self.sum.clone(),
             },
             flange: Pose::from_parts(
                 Translation3::from(Vector3::from(self.flange_mm)),
@@ -156,6 +161,7 @@ impl ArmFile {
     fn check(&self) -> Result<(), InvalidValue> {
         bounds::joint_map(&self.joint_map)?;
         bounds::joint_ranges(&self.min_deg, &self.max_deg)?;
+        self.sum.iter().try_for_each(|sum| sum.check("sum"))?;
         SPEED_DEG_S.check_all("speed_deg_s", self.speed_deg_s.iter().flatten())?;
         LENGTH_MM.check_all("flange_mm", &self.flange_mm)?;
         for (key, values) in [("gravity", &self.gravity[..]), ("flange_wxyz", &self.flange_wxyz[..])] {

@@ -96,8 +96,8 @@ pub const SPEED_DEG_S: Bound = Bound::new(1e-3, 1e5, "a speed above 0 in degrees
 pub const MASS_KG: Bound = Bound::new(0.0, 1e4, "a mass in kg, 0 to 10,000");
 /// Components of a direction.
 pub const DIRECTION: Bound = Bound::new(-1e6, 1e6, "a finite component of a direction");
-/// Entries of a joint map.
-const COUPLING: Bound = Bound::new(-10.0, 10.0, "turns of a link for a turn of a joint, within ±10");
+/// Entries of a joint map, factors of a sum of joints.
+pub const COUPLING: Bound = Bound::new(-10.0, 10.0, "turns of a link for a turn of a joint, within ±10");
 
 /// Six joint ranges (°).
 ///

@@ -33,7 +33,7 @@ use super::chain::FrameColumns;
 use super::condition::Condition;
 use super::link::Link;
 use super::model::{Model, PreparedModel};
-use crate::joints::{self, Joints, Limits, MappedJoints};
+use crate::joints::{self, Joints, MappedJoints};
 use truegrind_math::se3::Pose;
 use truegrind_math::spectral;
 
@@ -285,26 +285,15 @@ impl<'a> Inverse<'a> {
 
     #[inline(always)]
     fn within_limits(&self, joints: &Joints) -> bool {
-        let Limits { min_rad, max_rad, .. } = &self.arm.model.limits;
-        let mut inside = true;
-        for joint in 0..6 {
-            let angle_rad = joints[joint];
-            let outside =
-                angle_rad < min_rad[joint] - LIMIT_SLACK_RAD || angle_rad > max_rad[joint] + LIMIT_SLACK_RAD;
-            inside &= !outside;
-        }
-        inside
+        self.arm.model.limits.violated_beyond(joints, LIMIT_SLACK_RAD).is_none()
     }
 
     fn check_limits(&self, joints: &Joints) -> Result<(), InverseError> {
-        let Limits { min_rad, max_rad, .. } = &self.arm.model.limits;
-        for joint in 0..6 {
-            let (angle_rad, min_rad, max_rad) = (joints[joint], min_rad[joint], max_rad[joint]);
-            if angle_rad < min_rad - LIMIT_SLACK_RAD || angle_rad > max_rad + LIMIT_SLACK_RAD {
-                return Err(InverseError::OutsideLimits { joint, angle_rad, min_rad, max_rad });
-            }
-        }
-        Ok(())
+        let limits = &self.arm.model.limits;
+        limits.violated_beyond(joints, LIMIT_SLACK_RAD).map_or(Ok(()), |what| {
+            let [angle_rad, min_rad, max_rad] = limits.angle_and_range(what, joints);
+            Err(InverseError::OutsideLimits { what, angle_rad, min_rad, max_rad })
+        })
     }
 
     fn solution(&self, outcome: &Outcome) -> Solution {

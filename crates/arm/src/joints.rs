@@ -1,4 +1,4 @@
-//! Joint angles and their ranges.
+//! Joint angles.
 
 use std::ops::Index;
 
@@ -23,35 +23,6 @@ impl Index<usize> for MappedJoints {
 impl From<MappedJoints> for [f64; 6] {
     fn from(mapped: MappedJoints) -> [f64; 6] {
         mapped.0.into()
-    }
-}
-
-/// Range and speed of the joints, in the controller's angles.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Limits {
-    /// Lowest angle (rad).
-    pub min_rad: [f64; 6],
-    /// Highest angle (rad).
-    pub max_rad: [f64; 6],
-    /// Highest speed [rad/s], where published.
-    pub speed_rad_s: Option<[f64; 6]>,
-}
-
-impl Limits {
-    /// The first joint (0-based) outside its range, if any.
-    ///
-    /// ```
-    /// use truegrind_arm::model::Joints;
-    /// use truegrind_arm::robots;
-    ///
-    /// // Axis 5 of an IRB 120 turns by 120° either way.
-    /// let limits = robots::load("abb-irb-120")?.model.limits;
-    /// assert_eq!(limits.violated(&Joints::zeros()), None);
-    /// assert_eq!(limits.violated(&Joints::new(0.0, 0.0, 0.0, 0.0, 2.2, 0.0)), Some(4));
-    /// # Ok::<(), robots::RobotError>(())
-    /// ```
-    pub fn violated(&self, q: &Joints) -> Option<usize> {
-        (0..6).find(|&i| !(self.min_rad[i]..=self.max_rad[i]).contains(&q[i]))
     }
 }
 

@@ -14,6 +14,7 @@ pub mod bounds;
 pub mod link;
 pub mod condition;
 mod joints;
+mod limits;
 mod body;
 pub mod effect;
 pub mod model;

@@ -10,7 +10,8 @@ use truegrind_math::lanes::{Real, SinCos, sin_cos};
 use truegrind_math::se3::Pose;
 
 pub use super::body::Body;
-pub use super::joints::{Joints, Limits, MappedJoints};
+pub use super::joints::{Joints, MappedJoints};
+pub use super::limits::{Limited, Limits, SumLimit};
 
 /// A six-axis arm. See the chapter page for the order of the parts.
 #[derive(Debug, Clone, PartialEq)]

@@ -13,6 +13,7 @@ pub mod import;
 pub mod convention;
 pub mod plausibility;
 pub mod matching;
+mod axis_range;
 mod copies;
 mod measuring_order;
 mod reach;

@@ -101,6 +101,14 @@ pub fn joint_table(robot: &Robot) -> Table {
         }
         Angles::Dh => table.notes.push("Logged angles are DH angles, including the offsets θ.".to_owned()),
     }
+    for sum in &joints.sum {
+        table.notes.push(format!(
+            "The sum {} has a range of its own: {:.1}° to {:.1}°.",
+            sum_of_joints(&sum.factors),
+            sum.min_rad.to_degrees(),
+            sum.max_rad.to_degrees()
+        ));
+    }
     for (joint, sum) in couplings(joints.map) {
         table.notes.push(format!("The rotation of joint {joint} is {sum} in controller angles."));
     }
@@ -393,21 +401,24 @@ fn couplings(map: Option<[[f64; 6]; 6]>) -> Vec<(usize, String)> {
     map.iter()
         .enumerate()
         .filter(|(joint, row)| (0..6).any(|k| row[k] != f64::from(u8::from(k == *joint))))
-        .map(|(joint, row)| {
-            let mut sum = String::new();
-            for (k, factor) in row.iter().enumerate().filter(|(_, factor)| **factor != 0.0) {
-                let sign = if *factor < 0.0 {
-                    "−"
-                } else if sum.is_empty() {
-                    ""
-                } else {
-                    "+"
-                };
-                let gap = if sum.is_empty() { "" } else { " " };
-                let size = if factor.abs() == 1.0 { String::new() } else { format!("{} · ", factor.abs()) };
-                sum.push_str(&format!("{gap}{sign}{gap}{size}q{}", k + 1));
-            }
-            (joint + 1, sum)
-        })
+        .map(|(joint, row)| (joint + 1, sum_of_joints(row)))
         .collect()
+}
+
+/// A sum of joints in words, such as `q2 + q3`.
+fn sum_of_joints(factors: &[f64; 6]) -> String {
+    let mut sum = String::new();
+    for (k, factor) in factors.iter().enumerate().filter(|(_, factor)| **factor != 0.0) {
+        let sign = if *factor < 0.0 {
+            "−"
+        } else if sum.is_empty() {
+            ""
+        } else {
+            "+"
+        };
+        let gap = if sum.is_empty() { "" } else { " " };
+        let size = if factor.abs() == 1.0 { String::new() } else { format!("{} · ", factor.abs()) };
+        sum.push_str(&format!("{gap}{sign}{gap}{size}q{}", k + 1));
+    }
+    sum
 }

@@ -8,7 +8,8 @@ use super::budget;
 use super::configuration::{BRANCH_TOLERANCE, Configuration, QUARTER_AXES};
 use super::newton::{self, Goal, Outcome};
 use super::{Inverse, InverseError, Solution, same_branch};
-use crate::joints::{Joints, Limits};
+use crate::joints::Joints;
+use crate::limits::Limits;
 use truegrind_math::se3::Pose;
 use truegrind_math::spectral;
 

@@ -251,6 +251,7 @@ impl Inverse<'_> {
         block.len() == WIDTH
             && self.map_inverse.is_some()
             && self.arm.map_is_identity()
+            && self.arm.model.limits.sums.is_empty()
             && vectorised(Steady { limits: &self.arm.model.limits, targets, solved, last, margins })
     }
 

@@ -2,6 +2,7 @@
 
 use super::configuration::Configuration;
 use crate::joints::Joints;
+use crate::limits::Limited;
 
 /// Joints that reach a target.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -92,14 +93,14 @@ pub enum InverseError {
         /// How far the target's wrist centre lies outside the nominal arm's reach, on the nearest branch (mm).
         beyond_mm: f64,
     },
-    /// The target requires an angle outside a joint's range.
+    /// The target requires an angle outside the range of a joint or a sum of joints.
     #[error(
-        "joint {} would need {:.3}°, its range is {:.3}° to {:.3}°",
-        joint + 1, angle_rad.to_degrees(), min_rad.to_degrees(), max_rad.to_degrees()
+        "{what} would need {:.3}°, its range is {:.3}° to {:.3}°",
+        angle_rad.to_degrees(), min_rad.to_degrees(), max_rad.to_degrees()
     )]
     OutsideLimits {
-        /// Joint, 0-based.
-        joint: usize,
+        /// What has that range.
+        what: Limited,
         /// The angle it would need (rad).
         angle_rad: f64,
         /// Lower limit (rad).

@@ -49,6 +49,10 @@ pub fn lost_in_export(model: &Model, format: Format) -> Vec<String> {
     if format == Format::UrYaml && model.limits.speed_rad_s.is_some() {
         out.push("ranges and speeds of joints are left out".to_owned());
     }
+    if format != Format::Urdf {
+        let sums = model.limits.sums.iter().map(|sum| format!("the range of {} is left out", sum.name()));
+        out.extend(sums);
+    }
     out
 }
 
@@ -198,7 +202,8 @@ fn urdf(model: &Model, name: &str, notes: &[String]) -> String {
     out
 }
 
-/// Ranges and speeds of the joints of a URDF. The range of a sum is the sum of the ranges of the controller's joints.
+/// Ranges and speeds of the joints of a URDF. The range of a sum is its own where the robot has one, else the sum of the ranges of the
+/// controller's joints.
 struct Ranges {
     low_rad: [f64; 6],
     high_rad: [f64; 6],
@@ -219,9 +224,14 @@ impl Ranges {
             true => limits.min_rad[j],
             false => -limits.max_rad[j],
         };
+        let own = |i: usize| limits.sums.iter().find_map(|sum| sum.range_of(&angles.row(i).transpose()));
         Self {
-            low_rad: std::array::from_fn(|i| sum(i, &|j, turn| end(j, turn > 0.0))),
-            high_rad: std::array::from_fn(|i| sum(i, &|j, turn| -end(j, turn < 0.0))),
+            low_rad: std::array::from_fn(|i| {
+                own(i).map_or_else(|| sum(i, &|j, turn| end(j, turn > 0.0)), |[low, _]| low)
+            }),
+            high_rad: std::array::from_fn(|i| {
+                own(i).map_or_else(|| sum(i, &|j, turn| -end(j, turn < 0.0)), |[_, high]| high)
+            }),
             speed_rad_s: std::array::from_fn(|i| {
                 limits.speed_rad_s.map_or(0.0, |speed| sum(i, &|j, _| speed[j]))
             }),

@@ -18,6 +18,7 @@ use super::sheet::{Angles, Convention, DataSheet, FlangeSheet, JointSheet, Masse
 use super::{Robot, load, parse};
 use crate::condition::Condition;
 use crate::joints::Joints;
+use crate::limits::SumLimit;
 use chain::ForeignArm;
 pub use common::ImportOptions;
 use common::{foreign_error, zero_if_tiny};
@@ -161,12 +162,28 @@ fn robot(
     if let Some(couplings) = &foreign.joint_map {
         map *= couplings;
     }
+    let mut limits_deg = foreign.limits_deg;
+    let mut sum = Vec::new();
     if ground_joint_3 {
         // The link's own angle is the angle against the ground minus the rotation by joint 2.
-        map[(2, 1)] -= fitted.parallel_2_3(file)?;
+        let along = fitted.parallel_2_3(file)?;
+        map[(2, 1)] -= along;
         notes.push(
             "joint 3 is counted against the ground: link 3 turns by J3 and by what J2 takes back".to_owned(),
         );
+        if let Some(limits) = &mut limits_deg {
+            let own = limits[2];
+            sum.push(SumLimit {
+                factors: [0.0, -along, 1.0, 0.0, 0.0, 0.0],
+                min_rad: own[0].to_radians(),
+                max_rad: own[1].to_radians(),
+            });
+            // As far as the sum allows.
+            let [low, high] = limits[1].map(|angle| along * angle);
+            limits[2] = [own[0] + low.min(high), own[1] + low.max(high)];
+            let name = if along < 0.0 { "J2 + J3" } else { "J3 − J2" };
+            notes.push(format!("the file's range of joint 3 is taken as that of {name}"));
+        }
     }
     let inside = fitted.base.inverse();
     let gravity = inside.rotation * Vector3::new(0.0, 0.0, -1.0);
@@ -187,9 +204,10 @@ fn robot(
         joints: JointSheet {
             angles: Angles::Logged,
             map: (!plain).then(|| std::array::from_fn(|i| std::array::from_fn(|j| map[(i, j)]))),
-            min_deg: foreign.limits_deg.map(|limits| limits.map(|[low, _]| low)),
-            max_deg: foreign.limits_deg.map(|limits| limits.map(|[_, high]| high)),
+            min_deg: limits_deg.map(|limits| limits.map(|[low, _]| low)),
+            max_deg: limits_deg.map(|limits| limits.map(|[_, high]| high)),
             speed_deg_s: foreign.speed_deg_s,
+            sum,
         },
         flange: (fitted.flange != Pose::identity()).then(|| FlangeSheet {
             position_mm: fitted.flange.translation.vector.into(),

@@ -20,6 +20,7 @@
 //! min_deg = [-165.0, …]         # range and speed in the controller's angles; left out where not published
 //! max_deg = [165.0, …]
 //! speed_deg_s = [250.0, …]
+//! sum = [{ of = [0, 1, 1, 0, 0, 0], min_deg = -70.0, max_deg = 205.0 }] # range of J2 + J3, where there is one
 //!
 //! [robot.mounting]
 //! gravity = [0.0, 0.0, -1.0]   # in the base frame; (0, 0, 1) for an arm that hangs
@@ -32,7 +33,7 @@ use nalgebra::{Matrix6, Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::body::Body;
-use crate::joints::Limits;
+use crate::limits::{Limits, SumLimit};
 use crate::link::{Link, LinkModel};
 use crate::model::Model;
 use truegrind_math::se3::Pose;
@@ -179,6 +180,9 @@ pub struct JointSheet {
     pub max_deg: Option<[f64; 6]>,
     /// Highest speeds (°/s).
     pub speed_deg_s: Option<[f64; 6]>,
+    /// Ranges of sums of joints.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sum: Vec<SumLimit>,
 }
 
 /// What the angles of a log are.
@@ -348,6 +352,7 @@ impl JointSheet {
             min_rad: self.min_deg.map_or([-ONE_TURN_RAD; 6], radians),
             max_rad: self.max_deg.map_or([ONE_TURN_RAD; 6], radians),
             speed_rad_s: self.speed_deg_s.map(radians),
+            sums: self.sum.clone(),
         }
     }
 }

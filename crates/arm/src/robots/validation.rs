@@ -8,7 +8,7 @@ use nalgebra::{Matrix6, Vector6};
 use super::error::RobotError;
 use super::sheet::{DataSheet, LinkSheet, Point, Published, unit_quaternion};
 use crate::bounds::{
-    self, Bound, DIRECTION, InvalidValue, JOINT_DEG, LENGTH_MM, MASS_KG, POSITION_MM, SPEED_DEG_S,
+    self, Bound, COUPLING, DIRECTION, InvalidValue, JOINT_DEG, LENGTH_MM, MASS_KG, POSITION_MM, SPEED_DEG_S,
 };
 use crate::link::LinkModel;
 use crate::model::Model;
@@ -87,6 +87,7 @@ fn bounded(sheet: &DataSheet) -> Result<(), InvalidValue> {
     JOINT_DEG.check_all("joints.min_deg", joints.min_deg.iter().flatten())?;
     JOINT_DEG.check_all("joints.max_deg", joints.max_deg.iter().flatten())?;
     COUPLING.check_all("joints.map", joints.map.iter().flatten().flatten())?;
+    joints.sum.iter().try_for_each(|sum| sum.check("joints.sum"))?;
     DIRECTION.check_all("mounting.gravity", &sheet.mounting.gravity)?;
     LENGTH_MM.check_all("mounting.plate_mm", &sheet.mounting.plate_mm)?;
     if let Some(masses) = &sheet.masses {
@@ -119,7 +120,6 @@ fn performance(sheet: &DataSheet) -> Result<(), InvalidValue> {
     MASS_KG.check_all("masses.mass_kg", sheet.masses.iter().flat_map(|masses| &masses.mass_kg))
 }
 
-const COUPLING: Bound = Bound::new(-10.0, 10.0, "turns of a link for a turn of a joint, within ±10");
 const LOAD_KG: Bound = Bound::new(f64::MIN_POSITIVE, 1e4, "more than 0, up to 10,000 kg");
 const REACH_MM: Bound = Bound::new(f64::MIN_POSITIVE, 2e4, "more than 0, up to 20,000 mm");
 const POSE_TOLERANCE_MM: Bound = Bound::new(0.0, 100.0, "a length from 0 to 100 mm");

@@ -361,6 +361,7 @@ impl Sheet {
             links: std::array::from_fn(link),
             joint_map: Matrix6::from_fn(|i, j| self.map[i][j]),
             limits: Limits {
+                sums: Vec::new(),
                 min_rad: self.min_deg.map(f64::to_radians),
                 max_rad: self.max_deg.map(f64::to_radians),
                 speed_rad_s: None,

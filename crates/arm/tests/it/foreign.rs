@@ -482,6 +482,14 @@ fn joint_3_may_be_counted_against_the_ground() {
     for text in &against {
         let arm = read(text, "fanuc.urdf", &ground).robot.model;
         assert!(turn(&arm, 0.0).angle_to(&turn(&arm, 0.7)) < 1e-12);
+        // The file's range is that of the link against the one before it.
+        let [sum] = arm.limits.sums[..] else { panic!("{:?}", arm.limits.sums) };
+        let alone = read(text, "fanuc.urdf", &ImportOptions::default()).robot.model.limits;
+        for q in JOINTS.map(Joints::from) {
+            assert!((sum.of(&q) - (arm.joint_map.row(2) * q)[0]).abs() < 1e-12);
+        }
+        let ranges = [[sum.min_rad, sum.max_rad], [alone.min_rad[2], alone.max_rad[2]]];
+        assert!((0..2).all(|end| (ranges[0][end] - ranges[1][end]).abs() < 1e-12), "{ranges:?}");
         let plain = read(text, "fanuc.urdf", &ImportOptions::default());
         assert!((turn(&plain.robot.model, 0.0).angle_to(&turn(&plain.robot.model, 0.7)) - 0.7).abs() < 1e-9);
         assert!(plain.summary.iter().any(|line| line.contains("--ground-joint-3")), "{:?}", plain.summary);
@@ -554,11 +562,18 @@ fn what_is_exported_comes_back() {
             match (name, format) {
                 ("fanuc-lr-mate-200id", Format::Urdf) => {
                     assert!(told.contains("out: joint 3 = J2 + J3; their ranges"), "{told}");
-                    // The forearm against the ground: either joint may be anywhere in its range.
+                    // J2 + J3 has a range of its own.
                     let [ours, theirs] = [&arm, &again].map(|arm| (arm.limits.min_rad, arm.limits.max_rad));
-                    assert!((theirs.0[2] - (ours.0[1] + ours.0[2])).abs() < 1e-12);
-                    assert!((theirs.1[2] - (ours.1[1] + ours.1[2])).abs() < 1e-12);
+                    assert!((theirs.0[2].to_degrees() + 70.0).abs() < 1e-9);
+                    assert!((theirs.1[2].to_degrees() - 205.0).abs() < 1e-9);
                     assert!((theirs.0[3] - ours.0[3]).abs() < 1e-12);
+                    // Without it either joint may be anywhere in its range.
+                    let mut alone = arm.clone();
+                    alone.limits.sums.clear();
+                    let written = write(&alone, name, format, &[]);
+                    let theirs = read(&written, file, &ImportOptions::default()).robot.model.limits;
+                    assert!((theirs.min_rad[2] - (ours.0[1] + ours.0[2])).abs() < 1e-12);
+                    assert!((theirs.max_rad[2] - (ours.1[1] + ours.1[2])).abs() < 1e-12);
                 }
                 ("fanuc-lr-mate-200id", Format::UrYaml) => {
                     assert!(told.contains("joint 3 = −J2 − J3, joint 4 = −J4"), "{told}");

@@ -4,7 +4,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::inverse::configuration::{Configuration, configuration};
 use truegrind_arm::inverse::{Inverse, InverseError, Singularity, Solution};
-use truegrind_arm::model::{Joints, Model};
+use truegrind_arm::model::{Joints, Limited, Model};
 use truegrind_math::se3::{Pose, difference};
 
 use super::arms::{SHEETS, Sheet, even, generator, joints_within, perturbed, with_effects};
@@ -108,7 +108,17 @@ fn thousands_of_perturbed_arms_poses_with_effects_are_all_solved() {
             let solution = match inverse.solve_near(&target, &seed) {
                 Ok(solution) => solution,
                 // Near a singularity the other solution may be the near one, and lie outside.
-                Err(InverseError::OutsideLimits { joint, angle_rad, .. }) => {
+                Err(InverseError::OutsideLimits {
+                    what: Limited::Sum { .. },
+                    angle_rad,
+                    min_rad,
+                    max_rad,
+                }) => {
+                    assert!((min_rad - angle_rad).max(angle_rad - max_rad) < 0.2, "{angle_rad}");
+                    continue;
+                }
+                Err(InverseError::OutsideLimits { what: Limited::Joint(joint), angle_rad, .. }) => {
+                    let joint = usize::from(joint);
                     let edge = arm.limits.max_rad[joint] - joints[joint];
                     assert!(edge.min(joints[joint] - arm.limits.min_rad[joint]) < 0.2, "{joint} {angle_rad}");
                     continue;
@@ -279,6 +289,31 @@ fn a_target_at_the_edge_of_reach_is_solved_and_one_beyond_is_not() {
     }
 }
 
+/// The forearm of an LR Mate does not fold onto its upper arm though joint 3, which counts from the horizontal, is within its range.
+#[test]
+fn a_sum_of_joints_outside_its_range_is_named() {
+    let model = truegrind_arm::robots::load("fanuc-lr-mate-200id").unwrap().model;
+    let inverse = Inverse::new(&model, &Condition::default(), &model);
+    let reached = |degrees: [f64; 6]| {
+        let joints = Joints::from(degrees.map(f64::to_radians));
+        inverse.solve_near(&model.forward(&joints, &Condition::default()), &joints)
+    };
+    assert!(reached([10.0, 30.0, -99.0, 5.0, 40.0, 20.0]).is_ok());
+    let message = reached([10.0, 30.0, -101.0, 5.0, 40.0, 20.0]).unwrap_err().to_string();
+    assert_eq!(message, "the sum of joints 2 and 3 would need -71.000°, its range is -70.000° to 205.000°");
+    assert!(reached([10.0, -40.0, -101.0, 5.0, 40.0, 20.0]).is_err());
+    // A path ends where the sum leaves its range, row by row as in lanes.
+    let path: Vec<Joints> = (0..40)
+        .map(|i| Joints::from([10.0, 30.0, -80.0 - f64::from(i), 5.0, 40.0, 20.0].map(f64::to_radians)))
+        .collect();
+    let flanges: Vec<_> = path.iter().map(|q| model.forward(q, &Condition::default())).collect();
+    let along = inverse.solve_path(&flanges, &path[0]);
+    assert_eq!(along.iter().position(Result::is_err), Some(21));
+    for solution in inverse.all(&flanges[30]) {
+        assert_eq!(model.limits.violated(&solution.joints), None);
+    }
+}
+
 #[test]
 fn a_joint_outside_its_range_is_named() {
     let model = Sheet::named("abb-irb-120");
@@ -286,7 +321,7 @@ fn a_joint_outside_its_range_is_named() {
     let joints = Joints::from([3.0, 0.3, 0.1, 0.5, 0.7, 0.2]);
     let target = model.forward(&joints, &Condition::default());
     match inverse.solve_near(&target, &joints) {
-        Err(InverseError::OutsideLimits { joint: 0, angle_rad, max_rad, .. }) => {
+        Err(InverseError::OutsideLimits { what: Limited::Joint(0), angle_rad, max_rad, .. }) => {
             assert!((angle_rad - 3.0).abs() < 1e-9 && angle_rad > max_rad);
         }
         other => panic!("{other:?}"),

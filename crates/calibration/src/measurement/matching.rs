@@ -3,6 +3,7 @@
 
 use thiserror::Error;
 
+use super::axis_range::note_joints_out_of_range;
 use super::convention::AngleConvention;
 use super::copies::without_copies;
 use super::dataset::Dataset;
@@ -56,5 +57,8 @@ pub fn match_to_arm(
         }
     }
     let dataset = in_order_of_measuring(without_copies(dataset));
-    convention.apply(dataset, nominal).ok_or_else(|| Mismatch::JointMap { robot: robot.to_owned() })
+    let mut dataset =
+        convention.apply(dataset, nominal).ok_or_else(|| Mismatch::JointMap { robot: robot.to_owned() })?;
+    note_joints_out_of_range(&mut dataset, &nominal.limits);
+    Ok(dataset)
 }

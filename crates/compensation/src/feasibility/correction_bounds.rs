@@ -20,8 +20,8 @@ pub(crate) fn forbidden(
     if !(turn <= options.max_rotation_rad) {
         return Some(OutcomeReason::RotationTooLarge { deg: turn.to_degrees() });
     }
-    if let Some(joint) = arms.nominal.arm().model.limits.violated(&solved.after) {
-        return Some(OutcomeReason::OutsideLimits { joint });
+    if let Some(what) = arms.nominal.arm().model.limits.violated(&solved.after) {
+        return Some(OutcomeReason::OutsideLimits { what });
     }
     if singularity < options.min_singularity {
         return Some(OutcomeReason::NearSingularity);

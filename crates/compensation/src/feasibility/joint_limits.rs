@@ -26,21 +26,28 @@ pub(crate) fn within_limits(
     flange_travel: f64,
 ) -> bool {
     let least = margins.iter().flat_map(|m| m.iter()).fold(f64::INFINITY, |least, m| least.min(m.abs()));
-    let [a, b] = joints;
-    (0..6).all(|j| {
-        let beyond = 0.5 * (RATE * flange_travel / least - (a[j] - b[j]).abs()).max(0.0);
-        a[j].min(b[j]) - beyond >= limits.min_rad[j] && a[j].max(b[j]) + beyond <= limits.max_rad[j]
-    })
+    let stays = |ends: [f64; 2], turns: f64, [min, max]: [f64; 2]| {
+        let [a, b] = ends;
+        let beyond = 0.5 * (turns * RATE * flange_travel / least - (a - b).abs()).max(0.0);
+        a.min(b) - beyond >= min && a.max(b) + beyond <= max
+    };
+    (0..6).all(|j| stays(joints.map(|q| q[j]), 1.0, [limits.min_rad[j], limits.max_rad[j]]))
+        && limits.sums.iter().all(|sum| {
+            let turns = sum.factors.iter().map(|factor| factor.abs()).sum();
+            stays(joints.map(|q| sum.of(q)), turns, [sum.min_rad, sum.max_rad])
+        })
 }
 
 /// The same for a short piece with a known midpoint.
-pub(crate) fn within_limits_curved(limits: &Limits, [a, middle, b]: [&Joints; 3]) -> bool {
-    (0..6).all(|j| {
-        let bent = (a[j] - 2.0 * middle[j] + b[j]).abs();
-        let short = (a[j] - middle[j]).abs().max((b[j] - middle[j]).abs()) < SHORT_RAD;
+pub(crate) fn within_limits_curved(limits: &Limits, joints: [&Joints; 3]) -> bool {
+    let stays = |[a, middle, b]: [f64; 3], [min, max]: [f64; 2]| {
+        let bent = (a - 2.0 * middle + b).abs();
+        let short = (a - middle).abs().max((b - middle).abs()) < SHORT_RAD;
         // At most a quarter of the piece from one of the three: half the second derivative times its square.
         let beyond = CARE * bent / 8.0;
-        let (low, high) = (a[j].min(middle[j]).min(b[j]), a[j].max(middle[j]).max(b[j]));
-        short && low - beyond >= limits.min_rad[j] && high + beyond <= limits.max_rad[j]
-    })
+        let (low, high) = (a.min(middle).min(b), a.max(middle).max(b));
+        short && low - beyond >= min && high + beyond <= max
+    };
+    (0..6).all(|j| stays(joints.map(|q| q[j]), [limits.min_rad[j], limits.max_rad[j]]))
+        && limits.sums.iter().all(|sum| stays(joints.map(|q| sum.of(q)), [sum.min_rad, sum.max_rad]))
 }

@@ -285,8 +285,8 @@ impl SegmentChecker<'_, '_> {
             if let Some(why) = self.endangers_unchanged(motion, samples, budget) {
                 let line = self.listing.motions[motion].place.line;
                 let why = match why {
-                    OutcomeReason::PathOutsideLimits { joint } => {
-                        OutcomeReason::StartOfLimitedPath { line, joint }
+                    OutcomeReason::PathOutsideLimits { what } => {
+                        OutcomeReason::StartOfLimitedPath { line, what }
                     }
                     _ => OutcomeReason::StartOfSingularPath { line },
                 };
@@ -587,7 +587,7 @@ struct PathCheck<'a> {
 /// Reason where a segment has no solution.
 fn unreachable_reason(error: InverseError) -> OutcomeReason {
     match error {
-        InverseError::OutsideLimits { joint, .. } => OutcomeReason::PathOutsideLimits { joint },
+        InverseError::OutsideLimits { what, .. } => OutcomeReason::PathOutsideLimits { what },
         _ => OutcomeReason::SingularPath,
     }
 }

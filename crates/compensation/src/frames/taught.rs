@@ -83,18 +83,21 @@ pub fn contradictions(listing: &Listing, cell: &Cell, nominal: &Model) -> Vec<St
     if !unusable.is_empty() {
         return unusable;
     }
-    if let Some(joint) = cell.start(listing).and_then(|start| nominal.limits.violated(&start)) {
+    let beyond = |start| {
+        nominal.limits.violated(&start).map(|what| (what, nominal.limits.angle_and_range(what, &start)))
+    };
+    if let Some((what, [angle_rad, min_rad, max_rad])) = cell.start(listing).and_then(beyond) {
         let said = if cell.start_deg.is_some() {
             "cell file: start_deg"
         } else {
             "`truegrind start` of the program"
         };
         return vec![format!(
-            "{said}: joint {} is outside its range of {:.1}° to {:.1}°: state the joints as the controller shows them, \
+            "{said}: {what} is {:.1}°, outside its range of {:.1}° to {:.1}°: state the joints as the controller shows them, \
              in degrees",
-            joint + 1,
-            nominal.limits.min_rad[joint].to_degrees(),
-            nominal.limits.max_rad[joint].to_degrees()
+            angle_rad.to_degrees(),
+            min_rad.to_degrees(),
+            max_rad.to_degrees()
         )];
     }
     let condition = Condition::default();

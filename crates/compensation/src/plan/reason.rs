@@ -3,14 +3,16 @@
 use std::fmt;
 
 use truegrind_arm::inverse::InverseError;
+use truegrind_arm::model::Limited;
 use truegrind_programs::motion::Reason;
 
 /// Reason for the status of a motion.
 ///
 /// ```
+/// use truegrind_arm::model::Limited;
 /// use truegrind_compensation::plan::reason::OutcomeReason;
 ///
-/// assert_eq!(OutcomeReason::OutsideLimits { joint: 4 }.to_string(), "joint 5 would exceed its limits");
+/// assert_eq!(OutcomeReason::OutsideLimits { what: Limited::Joint(4) }.to_string(), "joint 5 would exceed its limits");
 /// let far = OutcomeReason::CorrectionTooLarge { mm: 3.25 };
 /// assert_eq!(far.to_string(), "correction of 3.250 mm exceeds the bound (--max-correction)");
 /// // In a summary, motions are counted by the reason without its figures.
@@ -34,15 +36,15 @@ pub enum OutcomeReason {
     NoChange,
     /// No joints reach the target.
     Inverse(InverseError),
-    /// A joint would exceed its limits.
+    /// A joint or a sum of joints would exceed its limits.
     OutsideLimits {
-        /// Joint, 0-based.
-        joint: usize,
+        /// Which.
+        what: Limited,
     },
-    /// A joint would exceed its limits on the corrected segment to this target, but not on the original one.
+    /// A joint or a sum of joints would exceed its limits on the corrected segment to this target, but not on the original one.
     PathOutsideLimits {
-        /// Joint, 0-based.
-        joint: usize,
+        /// Which.
+        what: Limited,
     },
     /// The position correction exceeds the stated bound.
     CorrectionTooLarge {
@@ -125,8 +127,8 @@ pub enum OutcomeReason {
     StartOfLimitedPath {
         /// Line of that motion, 1-based.
         line: u32,
-        /// Joint, 0-based.
-        joint: usize,
+        /// What would exceed its limits.
+        what: Limited,
     },
     /// A full circle: its coincident ends do not determine its plane, so its path is not checked.
     FullCircle,
@@ -172,7 +174,7 @@ impl OutcomeReason {
     /// Reason for a failed inverse solution.
     pub fn of_inverse(error: InverseError) -> Self {
         match error {
-            InverseError::OutsideLimits { joint, .. } => OutcomeReason::OutsideLimits { joint },
+            InverseError::OutsideLimits { what, .. } => OutcomeReason::OutsideLimits { what },
             InverseError::NearSingularity { .. } => OutcomeReason::NearSingularity,
             other => OutcomeReason::Inverse(other),
         }
@@ -196,11 +198,10 @@ impl OutcomeReason {
                 "the motion of line {line} remains unmodified and starts here: from a corrected start it would pass too close to \
                  a singularity"
             ),
-            OutcomeReason::StartOfLimitedPath { line, joint } => write!(
+            OutcomeReason::StartOfLimitedPath { line, what } => write!(
                 f,
-                "the motion of line {line} remains unmodified and starts here: from a corrected start joint {} would exceed its \
-                 limits on the way",
-                joint + 1
+                "the motion of line {line} remains unmodified and starts here: from a corrected start {what} would exceed its \
+                 limits on the way"
             ),
             _ => Ok(()),
         }
@@ -317,11 +318,9 @@ impl fmt::Display for OutcomeReason {
                 char::from(b'a' + *axis as u8)
             ),
             OutcomeReason::Inverse(error) => error.fmt(f),
-            OutcomeReason::OutsideLimits { joint } => {
-                write!(f, "joint {} would exceed its limits", joint + 1)
-            }
-            OutcomeReason::PathOutsideLimits { joint } => {
-                write!(f, "joint {} would exceed its limits on the corrected path to it", joint + 1)
+            OutcomeReason::OutsideLimits { what } => write!(f, "{what} would exceed its limits"),
+            OutcomeReason::PathOutsideLimits { what } => {
+                write!(f, "{what} would exceed its limits on the corrected path to it")
             }
             OutcomeReason::CorrectionTooLarge { mm } => {
                 write!(f, "correction of {mm:.3} mm exceeds the bound (--max-correction)")

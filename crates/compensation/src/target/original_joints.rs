@@ -436,8 +436,8 @@ fn start<'a>(
         TargetValue::Joint(t) => {
             let joints = Joints::from_fn(|i, _| t.robot_deg[i].to_radians());
             let nominal = arms.nominal.arm();
-            if let Some(joint) = nominal.model.limits.violated(&joints) {
-                return Err(OutcomeReason::OutsideLimits { joint });
+            if let Some(what) = nominal.model.limits.violated(&joints) {
+                return Err(OutcomeReason::OutsideLimits { what });
             }
             let intended = IntendedPose::Computed(Box::new(commanded.target_of(&nominal.forward(&joints))));
             let cfx = arms.nominal.configuration(&joints).cfx;

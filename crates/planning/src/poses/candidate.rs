@@ -63,6 +63,8 @@ pub struct Candidate {
 pub struct RejectionCounts {
     /// Number of drawn poses.
     pub drawn: usize,
+    /// A sum of joints out of its range.
+    pub sum: usize,
     /// Too near to a singularity.
     pub singular: usize,
     /// Outside the box.
@@ -82,7 +84,11 @@ impl fmt::Display for RejectionCounts {
             "{} too close to a singularity, {} outside the box, {} too close to or too far from the sensor, {} with the \
             cable too close to a link, {} with the arm below the floor or in a box to keep out of",
             self.singular, self.outside, self.distance, self.hidden, self.blocked
-        )
+        )?;
+        match self.sum {
+            0 => Ok(()),
+            sum => write!(f, ", {sum} with a sum of joints out of its range"),
+        }
     }
 }
 
@@ -115,6 +121,10 @@ pub fn draw(
             let (low, high) = (low.max(-std::f64::consts::PI), high.min(std::f64::consts::PI));
             if low < high { random.random_range(low..high) } else { 0.5 * (low + high) }
         });
+        if !limits.sums.iter().all(|sum| sum.holds(&joints, -bounds.margin_rad)) {
+            rejections.sum += 1;
+            continue;
+        }
         let singularity = inverse.smallest_singular_value(&joints);
         if !(singularity >= bounds.min_singularity) {
             rejections.singular += 1;

@@ -108,7 +108,7 @@ fn distinct(recipe: &Recipe, nominal: &Model, rig: &Rig) -> Result<(Vec<Joints>,
             while poses.len() < *count && tries < most {
                 tries += 1;
                 let q = Joints::from_fn(|j, _| low[j] + (high[j] - low[j]) * rng.random::<f64>());
-                if seen(&q) {
+                if limits.sums.iter().all(|sum| sum.holds(&q, -margin)) && seen(&q) {
                     poses.push(q);
                 }
             }

@@ -1,4 +1,4 @@
-//! Copied rows count once; rows are brought into the order of measuring; a clock in another unit is noticed.
+//! Copied rows count once; rows are brought into the order of measuring; a clock in another unit and joints out of range are noticed.
 
 use std::sync::Arc;
 
@@ -153,4 +153,16 @@ fn a_reading_beyond_all_reach_is_left_out() {
     assert_eq!(found.rows.len(), 19);
     assert!(found.notes[0].starts_with("row 7 left out"), "{:?}", found.notes);
     assert_eq!(of(rows(20)).rows.len(), 20);
+}
+
+#[test]
+fn joints_out_of_their_range_are_noted() {
+    let mut all = rows(12);
+    for (number, degrees) in [(3, 131.0), (7, -140.0), (8, 120.5)] {
+        all[number].joints[4] = f64::to_radians(degrees);
+    }
+    let found = matched(all);
+    assert_eq!(found.rows.len(), 12);
+    let expected = "rows 3 and 7 (2 of 12): joint 5 is at up to -140.0°, its range in the data sheet is -120.0° to 120.0°";
+    assert!(found.notes.iter().any(|note| note.starts_with(expected)), "{:?}", found.notes);
 }
