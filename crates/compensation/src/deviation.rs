@@ -122,6 +122,11 @@ impl PathPoint {
         }
     }
 
+    /// Whether its σ is that of the shape alone.
+    pub fn is_sigma_of_shape(&self) -> bool {
+        self.shape_sigma_mm.is_some() && self.sigma_mm == self.shape_sigma_mm
+    }
+
     /// The reason without its measured figures (those with a decimal point; joint numbers remain), for grouping points.
     pub fn kind_of_reason(&self) -> Option<String> {
         let plain = |word: &&str| !(word.contains('.') && word.bytes().any(|b| b.is_ascii_digit()));

@@ -94,6 +94,7 @@ fn point_columns((word, key): (&str, &str), decimals: usize) -> Vec<Column> {
     }
     columns.extend([
         Column::number("sigma_mm", "predicted 1σ", "mm", 3),
+        Column::text("sigma_of", "1σ of"),
         Column::text("status", "Status"),
         Column::text("reason", "Reason"),
     ]);
@@ -114,7 +115,8 @@ fn point_cells(point: &PathPoint) -> Vec<Cell> {
             None => [const { Cell::Missing }; 5],
         });
     }
-    row.extend(outcome(point));
+    let [sigma, status, reason] = outcome(point);
+    row.extend([sigma, sigma_of(point).into(), status, reason]);
     row
 }
 
@@ -317,6 +319,7 @@ fn model_json(report: &PathReport) -> Value {
                 "before": point.before.map(deviation_json),
                 "after": point.after.map(deviation_json),
                 "sigma_mm": point.sigma_mm,
+                "sigma_of": sigma_of(point),
                 "outside": point.outside.map(|outside| match outside {
                     Outside::Joint { joint, by_deg } => json!({ "joint": joint + 1, "by_deg": by_deg }),
                     Outside::Coverage { ratio } => json!({ "coverage_ratio": ratio }),
@@ -381,6 +384,11 @@ fn place(point: &PathPoint) -> Vec<Cell> {
         at.y.into(),
         at.z.into(),
     ]
+}
+
+/// What the σ of a point is of: of its position, or of the shape of its cut alone where only that is corrected.
+fn sigma_of(point: &PathPoint) -> Option<String> {
+    point.sigma_mm.map(|_| if point.is_sigma_of_shape() { "shape" } else { "position" }.to_owned())
 }
 
 fn outcome(point: &PathPoint) -> [Cell; 3] {

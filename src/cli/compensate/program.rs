@@ -45,8 +45,10 @@ pub(super) fn rewrite_program(
     let mut notes = Vec::new();
     check_motions(context, programs, listing, &mut notes)?;
     let names = programs.files.iter().map(|(path, _)| path.display().to_string()).collect::<Vec<_>>();
-    let nothing_to_do = |notes: Vec<String>| {
-        ProgramResult::empty(Row::without(names.join(", "), Ended::Already, None), notes)
+    // Where nothing was to be written, that nothing is to be corrected is what was hoped for.
+    let nothing_to_do = |notes: Vec<String>| ProgramResult {
+        clean: context.arguments.check,
+        ..ProgramResult::empty(Row::without(names.join(", "), Ended::Already, None), notes)
     };
     let marked = already_corrected(context, &program, programs, &mut notes)?;
     if marked.iter().all(|marked| *marked) {

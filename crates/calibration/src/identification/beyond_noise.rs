@@ -16,6 +16,13 @@ pub enum BeyondNoise {
     Known(f64),
     /// No poses were repeated, so all that is left may be noise, or all of it the arm's.
     AtMost(f64),
+    /// No poses were repeated; a part that differs from pose to pose is seen all the same.
+    Between {
+        /// That part.
+        least_mm: f64,
+        /// All that is left.
+        most_mm: f64,
+    },
 }
 
 /// Probability with which the noise is below what repeated poses say of it at most.
@@ -44,16 +51,32 @@ impl BeyondNoise {
     pub fn or_scatter(self, scatter_mm: f64) -> Self {
         match self {
             Self::Known(mm) => Self::Known(mm.max(scatter_mm)),
-            Self::AtMost(_) if scatter_mm > 0.0 => Self::Known(scatter_mm),
-            Self::AtMost(_) => self,
+            Self::AtMost(most_mm) if scatter_mm > 0.0 => {
+                Self::Between { least_mm: scatter_mm, most_mm: most_mm.max(scatter_mm) }
+            }
+            Self::AtMost(_) | Self::Between { .. } => self,
         }
     }
 
-    /// The error beyond the noise (mm), if that is known.
+    /// The error beyond the noise (mm), as far as that is known.
     pub fn known_mm(self) -> Option<f64> {
         match self {
-            Self::Known(mm) => Some(mm),
+            Self::Known(mm) | Self::Between { least_mm: mm, .. } => Some(mm),
             Self::AtMost(_) => None,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_scatter_that_is_seen_does_not_hide_what_else_may_be_left() {
+        let left = BeyondNoise::AtMost(0.5).or_scatter(0.1);
+        assert_eq!(left, BeyondNoise::Between { least_mm: 0.1, most_mm: 0.5 });
+        assert_eq!(left.known_mm(), Some(0.1));
+        assert_eq!(BeyondNoise::AtMost(0.5).or_scatter(0.0), BeyondNoise::AtMost(0.5));
+        assert_eq!(BeyondNoise::Known(0.05).or_scatter(0.1), BeyondNoise::Known(0.1));
     }
 }

@@ -235,18 +235,26 @@ const ASSUMED: f64 = 1.5;
 
 /// What the model leaves beyond the noise, where that counts beside the uncertainty of its parameters.
 fn beyond_noise_clause(found: &Benefit) -> String {
-    match found.beyond_noise {
-        Some(BeyondNoise::Known(mm)) if mm > 0.5 * found.estimated_mm => {
+    let Some(beyond) = found.beyond_noise else { return String::new() };
+    let mut out = match beyond.known_mm() {
+        Some(mm) if mm > 0.5 * found.estimated_mm => {
             format!(
                 ", {mm:.3} mm of it from effects that the model does not contain, as the readings show beyond their noise"
             )
         }
-        Some(BeyondNoise::AtMost(mm)) if mm > found.estimated_mm => format!(
-            ", or up to {:.3} mm if what the readings still deviate is the arm's and not noise, which repeated poses would tell",
-            mm.hypot(found.estimated_mm)
-        ),
         _ => String::new(),
+    };
+    // With all that is left in place of what is known of it.
+    let (BeyondNoise::AtMost(most_mm) | BeyondNoise::Between { most_mm, .. }) = beyond else { return out };
+    let least_mm = beyond.known_mm().unwrap_or(0.0);
+    let further_mm = (most_mm.powi(2) - least_mm.powi(2)).max(0.0).sqrt();
+    if further_mm > found.estimated_mm {
+        out += &format!(
+            ", or up to {:.3} mm if what the readings still deviate is the arm's and not noise, which repeated poses would tell",
+            further_mm.hypot(found.estimated_mm)
+        );
     }
+    out
 }
 
 fn percent(scale: &ScaleError) -> String {

@@ -114,7 +114,7 @@ fn the_table_stands_in_the_work_object_with_every_column() {
         lines[0],
         "index,line,instruction,x_mm,y_mm,z_mm,before_dx_mm,before_dy_mm,before_dz_mm,before_norm_mm,before_normal_mm,\
          predicted_remainder_dx_mm,predicted_remainder_dy_mm,predicted_remainder_dz_mm,predicted_remainder_norm_mm,\
-         predicted_remainder_normal_mm,sigma_mm,status,reason"
+         predicted_remainder_normal_mm,sigma_mm,sigma_of,status,reason"
     );
     // Intended is turned back from the base into the work object.
     let number = |row: usize, column: usize| match table.rows[row][column] {
@@ -133,6 +133,19 @@ fn the_table_stands_in_the_work_object_with_every_column() {
     assert!(table.rows[2][6..17].iter().all(|cell| *cell == Cell::Missing));
     assert!(table.title.contains("held-out error 0.460 mm RMSE"), "{}", table.title);
     assert!(table.notes.join(" ").contains("does not predict the deviation of the real arm"));
+}
+
+/// Where only the shape of a cut is corrected its points have the σ of the shape; two numbers with one name are told apart.
+#[test]
+fn a_point_says_what_its_sigma_is_of() {
+    let mut judged = three(true);
+    judged.points[0].shape_sigma_mm = Some(0.04);
+    (judged.points[1].sigma_mm, judged.points[1].shape_sigma_mm) = (Some(0.04), Some(0.04));
+    judged.points[2].sigma_mm = None;
+    let table = view::table(&judged);
+    let of = table.columns.iter().position(|column| column.key == "sigma_of").unwrap();
+    let words: Vec<_> = table.rows.iter().map(|row| row[of].clone()).collect();
+    assert_eq!(words, [Cell::Text("position".into()), Cell::Text("shape".into()), Cell::Missing]);
 }
 
 #[test]
