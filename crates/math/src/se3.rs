@@ -95,13 +95,12 @@ pub fn angle_bound_rad(a: &UnitQuaternion<f64>, b: &UnitQuaternion<f64>) -> f64 
 /// `left_jacobian(φ) · dφ`, seen from the outer frame (Solà et al. 2018, eq. 145).
 ///
 /// ```
-/// use nalgebra::{Matrix3, UnitQuaternion, Vector3};
-/// use truegrind_math::se3::{left_jacobian, left_jacobian_inverse};
+/// use nalgebra::{UnitQuaternion, Vector3};
+/// use truegrind_math::se3::left_jacobian;
 ///
 /// let (phi, step) = (Vector3::new(0.3, -0.5, 0.2), Vector3::new(2e-6, 1e-6, -1e-6));
 /// let turned = UnitQuaternion::new(phi + step) * UnitQuaternion::new(phi).inverse();
 /// assert!((turned.scaled_axis() - left_jacobian(&phi) * step).norm() < 1e-11);
-/// assert!((left_jacobian(&phi) * left_jacobian_inverse(&phi) - Matrix3::identity()).norm() < 1e-12);
 /// ```
 pub fn left_jacobian(phi: &Vector3<f64>) -> Matrix3<f64> {
     let square = phi.norm_squared();
@@ -113,17 +112,4 @@ pub fn left_jacobian(phi: &Vector3<f64>) -> Matrix3<f64> {
         ((1.0 - angle.cos()) / square, (angle - angle.sin()) / (square * angle))
     };
     Matrix3::identity() + k * first + k * k * second
-}
-
-/// Inverse of [`left_jacobian`]; defined for rotations below a full turn (Solà et al. 2018, eq. 146).
-pub fn left_jacobian_inverse(phi: &Vector3<f64>) -> Matrix3<f64> {
-    let square = phi.norm_squared();
-    let k = skew(phi);
-    let second = if square < 1e-6 {
-        1.0 / 12.0 + square / 720.0
-    } else {
-        let angle = square.sqrt();
-        1.0 / square - (1.0 + angle.cos()) / (2.0 * angle * angle.sin())
-    };
-    Matrix3::identity() - k * 0.5 + k * k * second
 }

@@ -348,11 +348,6 @@ pub fn json(robot: &Robot) -> Value {
     })
 }
 
-/// JSON of the catalogue, schema `truegrind.robots/1`.
-pub fn catalogue_json(robots: &[Robot]) -> Value {
-    json!({ "schema": "truegrind.robots/1", "robots": super::format::json::Rows(&catalogue_table(robots)) })
-}
-
 /// A table without its title, for use below a heading.
 fn untitled(table: Table) -> Table {
     Table { title: String::new(), ..table }

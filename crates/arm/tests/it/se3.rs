@@ -1,10 +1,10 @@
 //! Tests of `math::se3`.
 
-use nalgebra::{Matrix3, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{UnitQuaternion, Vector3, Vector6};
 use truegrind_math::difference::jacobian;
 use truegrind_math::se3::{
-    Pose, angle_bound_rad, apply_twist, difference, left_jacobian, left_jacobian_inverse, pose_from_vector,
-    rotation_from_matrix, skew, vector_from_pose,
+    Pose, angle_bound_rad, apply_twist, difference, left_jacobian, pose_from_vector, rotation_from_matrix,
+    skew, vector_from_pose,
 };
 
 use super::arms::{even, generator};
@@ -84,8 +84,6 @@ fn left_jacobian_has_a_numerical_twin_and_its_inverse_undoes_it() {
                     );
                 }
             }
-            let identity = analytic * left_jacobian_inverse(&phi);
-            assert!((identity - Matrix3::identity()).amax() < 1e-11, "{phi}: {identity}");
         }
     }
 }

@@ -98,11 +98,6 @@ pub fn effect(name: &[u8]) -> Option<&'static Effect> {
     listed(name).map(|found| &found.effect)
 }
 
-/// Whether it is predefined, is no motion, and leaves its arguments as they are.
-pub fn only_reads(name: &[u8]) -> bool {
-    effect(name) == Some(&Effect::Reads)
-}
-
 /// Whether it is a pure function: it may be evaluated any number of times.
 pub fn is_pure(name: &[u8]) -> bool {
     listed(name).is_some_and(|found| found.answers)

@@ -146,7 +146,7 @@ fn an_argument_with_side_effects_is_evaluated_once() {
 fn pure_routines_are_listed_in_order_and_write_nothing() {
     for name in predefined::all().iter().filter(|one| one.answers).map(|one| one.name) {
         assert!(predefined::is_pure(name.as_bytes()));
-        assert!(predefined::only_reads(name.as_bytes()), "{name}");
+        assert_eq!(predefined::effect(name.as_bytes()), Some(&predefined::Effect::Reads), "{name}");
         assert!(
             !predefined::waits(name.as_bytes()) && predefined::displaces(name.as_bytes()).is_none(),
             "{name}"
