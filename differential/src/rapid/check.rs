@@ -174,6 +174,8 @@ struct Pair<'p> {
 /// What numbers as they are written leave (mm, rad).
 const ROUNDING_MM: f64 = 0.004;
 const ROUNDING_RAD: f64 = 1e-5;
+/// Joints that differ by less (rad) are the same.
+const SAME_JOINTS_RAD: f64 = 1e-6;
 /// The largest change of a joint (rad) by a correction of millimetres.
 const MOST_JUMP: f64 = 0.1;
 
@@ -303,10 +305,11 @@ impl Comparison<'_> {
     }
 
     /// Whether the two arms stand apart behind a motion: they part where the corrected one comes elsewhere and the motion is
-    /// flagged as a guess, and meet where both come to the same joints again.
+    /// flagged as a guess, and meet where both come to the same joints again. That the joints are near is not enough: a way beside a
+    /// singularity may lead to one wrist from the one and to the other from the other (seed 238001240).
     fn part(&mut self, told: Option<&Point>, now: Option<&Point>, row: Option<&Row>) {
         let joints = |point: Option<&Point>| point.and_then(|point| point.joints);
-        let apart = |(a, b): ([f64; 6], [f64; 6])| farthest(&a, &b) > MOST_JUMP;
+        let apart = |(a, b): ([f64; 6], [f64; 6])| farthest(&a, &b) > SAME_JOINTS_RAD;
         if !joints(told).zip(joints(now)).is_none_or(apart) {
             self.parted = false;
         } else if row.is_some_and(|row| row.guessed) {
