@@ -69,6 +69,7 @@ fn nominal() -> Model {
         }),
         joint_map: Matrix6::identity(),
         limits: Limits {
+            sums: Vec::new(),
             min_rad: [-165.0_f64, -110.0, -110.0, -160.0, -120.0, -400.0].map(f64::to_radians),
             max_rad: [165.0_f64, 110.0, 70.0, 160.0, 120.0, 400.0].map(f64::to_radians),
             speed_rad_s: None,

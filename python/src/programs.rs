@@ -8,6 +8,7 @@ use truegrind::compensation::cell::Used;
 use truegrind::compensation::cell::nc_setup::cell_setup;
 use truegrind::compensation::cell::robot_match::unreachable_motions;
 use truegrind::compensation::cell::robot_match::{cell_robot_mismatch, program_robot_mismatch};
+use truegrind::compensation::deviation::MissingMotions;
 use truegrind::compensation::frames::surface_frames::surface_frame_contradictions;
 use truegrind::compensation::frames::taught::contradictions;
 use truegrind::compensation::risk::placement::Placement;
@@ -431,7 +432,18 @@ fn corrected(
     let mark = Mark { version: env!("CARGO_PKG_VERSION").into(), model: model.hash.clone(), partial: false };
     report_step(&format!("rewriting {}", sources.name()));
     let Compensated { mut plan, rewritten } = compensate(&program, arm, &cell, &options, Some(mark))?;
-    if let Some(motions) = unreachable_motions(&plan) {
+    if let Some(found) = unreachable_motions(&plan) {
+        if let Some((_, error)) = found.example.filter(|_| 2 * found.other_configuration > found.count) {
+            let message = format!(
+                "{}: {} of the motions are in reach of {} only in other configurations than the program states ({error})",
+                sources.name(),
+                found.other_configuration,
+                arm.robot
+            );
+            let told = Refusal::new(Kind::Program, message).of_file(&sources.name());
+            return Err(told.with(error.to_string(), "the configurations of this robot"));
+        }
+        let motions = found.count;
         let message = format!(
             "{}: {motions} motions and hardly one in reach of {} ({}): the program is another robot's, or its tool and work \
              object are not where it is told (cell); give the model of the robot that runs it",
@@ -455,6 +467,9 @@ fn corrected(
         program: sources.name(),
         model: model.name.clone(),
         after: After::PredictedRemainder,
+        missing: MissingMotions::of(listing, |motion| {
+            plan.outcomes.get(motion as usize).is_some_and(|outcome| outcome.before_mm.get().is_some())
+        }),
         points: std::mem::take(&mut plan.points),
         held_out_mm: Some(arm.geometry.held_out.rmse),
     };

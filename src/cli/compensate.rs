@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use serde_json::Value;
-use truegrind::compensation::deviation::{After, PathReport};
+use truegrind::compensation::deviation::{After, MissingMotions, PathReport};
 use truegrind::compensation::plan::Plan;
 use truegrind::compensation::risk::prepared_estimate::PreparedEstimate;
 use truegrind::programs::reading::{Language, Program};
@@ -138,6 +138,9 @@ fn compensate_one(context: &CompensateContext<'_>, job: &Job) -> anyhow::Result<
             program: programs.name(),
             model: context.corrector.map_or("nominal", |c| c.model).to_owned(),
             after: After::PredictedRemainder,
+            missing: MissingMotions::of(listing, |motion| {
+                planned.outcomes.get(motion as usize).is_some_and(|outcome| outcome.before_mm.get().is_some())
+            }),
             points: std::mem::take(&mut planned.points),
             held_out_mm: context.corrector.map(|c| c.arm.geometry.held_out.rmse),
         };
@@ -176,7 +179,7 @@ fn compensate_one(context: &CompensateContext<'_>, job: &Job) -> anyhow::Result<
     note_unused_entries([&done.used], &context.cell, context.surface.as_ref());
     if done.row.ended == Ended::Already {
         print_result(format!("{}: already compensated with this model; nothing written\n", done.row.file))?;
-        return Ok(ExitStatus::Flagged);
+        return Ok(context.exit_criteria().exit_status(done.clean, done.changed));
     }
     if let Some(path) = &arguments.diff {
         batch.add(path, done.diff);

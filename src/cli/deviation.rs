@@ -317,6 +317,15 @@ impl DeviationContext<'_> {
                 );
             }
         }
+        if original.is_none()
+            && let Some(mark) = task.listing().marks.iter().flatten().next()
+        {
+            bail!(
+                "{name}: it was corrected with model {}, so its targets are not where the tool is meant to go: give the program from which \
+                 it was rewritten too (--intended)",
+                mark.model
+            );
+        }
         // The original defines the intended path.
         let cell = self.arguments;
         let loads = [original.as_ref().unwrap_or(&task), &task].map(|program| cell.loads(program));

@@ -261,6 +261,7 @@ fn model(arguments: &Arguments, file: &Path) -> anyhow::Result<Recording> {
         model: name.clone(),
         after: After::PredictedRemainder,
         points,
+        missing: None,
         held_out_mm: Some(arm.geometry.held_out.rmse),
     };
     let scene = PathScene {

@@ -613,7 +613,7 @@ fn nothing_rewritten_is_never_ok_and_names_what_is_missing() {
     fs::write(at.join("one.nc"), source).unwrap();
     let with_cell = ["compensate", "one.nc", "-o", "out.nc", "--cell", "cell.toml"];
     let (_, text, _) = truegrind(at, &[&with_cell, &nc[..]].concat());
-    assert!(text.contains("2 changed"), "{text}");
+    assert!(text.contains("2 corrected"), "{text}");
 }
 
 #[test]
@@ -636,7 +636,7 @@ fn a_cut_corrected_in_part_says_so_in_its_mark() {
         "{text}"
     );
     let (partial, text) = run(&["--partial", "--tolerance", "5"]);
-    assert!(text.contains("4 changed") || text.contains("4 flagged"), "{text}");
+    assert!(text.contains("4 corrected"), "{text}");
     assert!(partial.contains("! truegrind ") && partial.contains(" partial\n"), "{partial}");
 }
 
@@ -720,4 +720,64 @@ fn a_task_list_reads_no_device_and_nothing_outside_its_folder_unless_told() {
             assert!(code == 2 && err.contains("regular file"), "{module} {more:?}: {code} {err}");
         }
     }
+}
+
+/// What is left beside corrected motions shows alone, in a folder, and in a report of deviations.
+#[test]
+fn what_is_left_shows_everywhere() {
+    let dir = workshop();
+    let at = dir.path();
+    let place = |x: f64| format!("[[{x:.1},10,450],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]");
+    // The routine takes its target at run time.
+    let body = format!(
+        "    ConfL\\Off;\n    MoveJ {},v100,fine,tool0;\n    MoveL {},v100,fine,tool0;\n    along {},3;\n    MoveL {},v100,fine,tool0;\n",
+        place(340.0),
+        place(350.0),
+        place(352.0),
+        place(370.0)
+    );
+    let text = format!(
+        "MODULE L\n  PROC main()\n{body}  ENDPROC\n  PROC along(robtarget p,num d)\n    MoveL Offs(p,d,0,0),v100,fine,tool0;\n  \
+         ENDPROC\nENDMODULE\n"
+    );
+    fs::create_dir(at.join("in")).unwrap();
+    fs::write(at.join("in/left.mod"), &text).unwrap();
+    let run = |program: &str, more: &[&str]| {
+        let absolute =
+            ["--model", "model.toml", "--placement", "absolute", "--max-risk", "1", "--tolerance", "0.005"];
+        truegrind(at, &[&["compensate", program], &absolute[..], more].concat())
+    };
+    let (code, alone, err) = run("in/left.mod", &["-o", "left.mod"]);
+    assert_eq!(code, 1, "{alone}{err}");
+    assert!(alone.contains("[warning]") && alone.contains("steps beside motions that are left"), "{alone}");
+    assert!(alone.contains("1 line or arc on which the tool may cut is left"), "{alone}");
+    let (code, folder, err) = run("in", &["-o", "out"]);
+    assert_eq!(code, 1, "{folder}{err}");
+    assert!(folder.contains("[warning]") && !folder.contains("may run\n"), "{folder}");
+    // Of a corrected program its targets are not the intended path.
+    let (code, _, err) = truegrind(at, &["deviation", "left.mod", "--model", "model.toml"]);
+    assert_eq!(code, 2);
+    assert!(err.contains("--intended"), "{err}");
+    let (code, report, err) =
+        truegrind(at, &["deviation", "left.mod", "--model", "model.toml", "--intended", "in/left.mod"]);
+    assert_eq!(code, 0, "{err}");
+    assert!(report.contains("[warning]") && report.contains("2 motions are not in this report"), "{report}");
+    // Corrected with this model: nothing would change.
+    let (code, _, err) = truegrind(at, &["compensate", "left.mod", "--model", "model.toml", "--check"]);
+    assert_eq!(code, 0, "{err}");
+}
+
+#[test]
+fn configurations_of_another_robot_are_not_called_out_of_reach() {
+    let dir = workshop();
+    let at = dir.path();
+    let text = module("A", 12, 0.0).replace("ConfL\\Off;", "ConfL\\On;").replace("[0,0,0,0]", "[2,0,0,0]");
+    fs::write(at.join("a.mod"), text).unwrap();
+    let (code, _, err) = truegrind(at, &["compensate", "a.mod", "--model", "model.toml", "-o", "b.mod"]);
+    assert_eq!(code, 2, "{err}");
+    assert!(
+        err.contains("12 of the motions are in reach of abb-irb-120 only in other configurations"),
+        "{err}"
+    );
+    assert!(err.contains("line 4: target is not reachable in configuration [2,0,0,0]"), "{err}");
 }

@@ -1,19 +1,13 @@
 //! The nominal arm, which the controller computes with, and the estimated arm.
 
 use crate::condition::arm_conditions::ArmConditions;
-use crate::condition::payload::payload_at;
+use crate::condition::payload::{is_load_dependent, payload_at};
 use truegrind_arm::condition::Condition;
-use truegrind_arm::effect::Effect;
 use truegrind_arm::estimated::Estimated;
 use truegrind_arm::inverse::Inverse;
 use truegrind_arm::model::Model;
 use truegrind_programs::motion::Listing;
 use truegrind_programs::motion::load::{Load, Loads};
-
-/// Whether an effect depends on the payload.
-pub(crate) fn is_load_dependent(effect: &Effect) -> bool {
-    effect.needs_torque() && !effect.is_zero()
-}
 
 /// Both arms with their inverses, shared by all targets.
 pub(crate) struct Arms<'a> {

@@ -6,11 +6,12 @@
 use nalgebra::{Isometry3, Matrix3, Point3, SVD, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
+use crate::line_list::lines_of;
 use truegrind_arm::model::Joints;
 use truegrind_arm::region::Outside;
 use truegrind_math::se3::Pose;
 use truegrind_math::statistics::ErrorSummary;
-use truegrind_programs::motion::MotionKind;
+use truegrind_programs::motion::{Listing, MotionKind};
 
 /// Deviation of the tool at one point.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -155,8 +156,32 @@ pub struct PathReport {
     pub after: After,
     /// The points.
     pub points: Vec<PathPoint>,
+    /// Motions without a point, if any.
+    pub missing: Option<MissingMotions>,
     /// Held-out error of the model [mm RMSE], where it has one.
     pub held_out_mm: Option<f64>,
+}
+
+/// Motions of which a report has no point, since the program text does not tell where they lead.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct MissingMotions {
+    /// How many.
+    pub count: usize,
+    /// Their lines, the first few.
+    pub lines: String,
+}
+
+impl MissingMotions {
+    /// Motions of a listing; `None` without any. Waits and motions of external axes alone have no point either.
+    pub fn of(listing: &Listing, has_point: impl Fn(u32) -> bool) -> Option<Self> {
+        let without: Vec<u32> = (0..listing.motions.len() as u32)
+            .filter(|index| {
+                let motion = &listing.motions[*index as usize];
+                motion.kind != MotionKind::External && !motion.targets.is_empty() && !has_point(*index)
+            })
+            .collect();
+        Some(Self { count: without.len(), lines: lines_of(listing, &without)? })
+    }
 }
 
 /// The summary block of ltlm-2024 Table 8: five points, mean, SD. Trap of that table: its mean is signed.
@@ -173,6 +198,13 @@ impl PathReport {
     pub fn cut(&self) -> impl Iterator<Item = &PathPoint> {
         let any = self.points.iter().any(|point| point.cutting);
         self.points.iter().filter(move |point| point.cutting || !any)
+    }
+
+    /// The points by which the shape of a path is judged: those of the cut, without what is left or refused where anything is corrected.
+    pub fn shape_points(&self) -> impl Iterator<Item = &PathPoint> {
+        let is_corrected = |point: &PathPoint| matches!(point.status, Status::Changed | Status::Flagged);
+        let any = self.cut().any(is_corrected);
+        self.cut().filter(move |point| is_corrected(point) || !any)
     }
 
     /// Signed deviations of the cut points that have one, before or after.
@@ -209,8 +241,7 @@ impl PathReport {
     /// measured in the work object. `None` for fewer than three points.
     pub fn registered_rms_mm(&self, which: fn(&PathPoint) -> Option<Deviation>) -> Option<f64> {
         let pairs: Vec<Pair> = self
-            .points
-            .iter()
+            .shape_points()
             .filter_map(|p| {
                 let intended = p.base_from_object.inverse() * Point3::from(p.intended.translation.vector);
                 which(p).map(|d| (intended, intended + d.vector_mm))

@@ -25,6 +25,7 @@ pub mod compensate;
 pub mod condition;
 mod configuration;
 pub mod cut;
+mod line_list;
 pub mod deviation;
 mod feasibility;
 pub mod frames;

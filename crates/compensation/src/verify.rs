@@ -8,7 +8,7 @@ use nalgebra::{Point3, Vector3};
 use crate::arms::Arms;
 use crate::backlash::sides::{MotionEnd, ReachedEnd, backlash_sides};
 use crate::cell::Cell;
-use crate::deviation::{After, Deviation, ON_SURFACE_MM, PathPoint, PathReport, Status};
+use crate::deviation::{After, Deviation, MissingMotions, ON_SURFACE_MM, PathPoint, PathReport, Status};
 use crate::frames::frame_table::FrameTable;
 use crate::plan::reason::OutcomeReason;
 use truegrind_arm::condition::Condition;
@@ -143,6 +143,10 @@ pub fn verify(task: &VerificationTask<'_>, acting_arm: &ActingArm<'_>) -> PathRe
         model: task.name.to_owned(),
         after: task.after,
         points,
+        // The ends are in the order of the motions.
+        missing: MissingMotions::of(task.original, |motion| {
+            before.binary_search_by_key(&(motion as usize), |end| end.motion).is_ok()
+        }),
         held_out_mm: acting_arm.knowledge.map(|k| k.geometry.held_out.rmse),
     }
 }
@@ -155,7 +159,7 @@ fn run(
     arms: &mut Arms<'_>,
     cell: &Cell,
 ) -> Vec<ExecutedEnd> {
-    let frame_table = FrameTable::of(listing, arms, cell).starting_at(start);
+    let frame_table = FrameTable::of(listing, arms, cell, loads.is_some()).starting_at(start);
     let mut sent: Vec<CommandedEnd> = Vec::new();
     let mut near: Option<Joints> = None;
     for (index, motion) in listing.motions.iter().enumerate() {

@@ -89,6 +89,9 @@ pub enum Origin {
     },
     /// Computed (Offs, RelTool, assignments, arithmetic): a new value replaces the whole argument by a literal.
     Computed,
+    /// `Offs` or `RelTool` by persistent data, index into [`Listing::offsets`]: a new value replaces the first argument alone, so that
+    /// the data still act.
+    Offset(u32),
     /// Unknown.
     Unknown,
 }
@@ -454,6 +457,8 @@ pub struct Listing {
     pub motions: Vec<Motion>,
     /// Named targets that motions use.
     pub declarations: Vec<Declaration>,
+    /// Offsets of targets by persistent data.
+    pub offsets: Vec<PersistentOffset>,
     /// Tools that motions use.
     pub tools: Vec<Tool>,
     /// Tools that are declared in the files or stated beside them, used or not: a work object may have been taught
@@ -486,6 +491,42 @@ pub struct Listing {
     /// Unusable comments that state something for the correction (`truegrind angles …`); nothing may be corrected
     /// before they are fixed.
     pub invalid_statements: Vec<InvalidStatement>,
+}
+
+/// An offset of a target by persistent data, which stay on the controller when the program ends: an operator or another task may change
+/// them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PersistentOffset {
+    /// The bytes of the argument that is offset.
+    pub base: Span,
+    /// The offset with the values that the files state.
+    pub offset: Offset,
+}
+
+/// An offset of a target.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Offset {
+    /// Along the axes of the work object (mm).
+    OfObject([f64; 3]),
+    /// In the frame of the tool.
+    OfTool(truegrind_math::se3::Pose),
+}
+
+impl Offset {
+    /// The target from which the offset leads to position (mm) and orientation.
+    pub fn base_of(&self, position_mm: [f64; 3], quaternion: [f64; 4]) -> ([f64; 3], [f64; 4]) {
+        match self {
+            Self::OfObject(shift) => {
+                (std::array::from_fn(|axis| position_mm[axis] - shift[axis]), quaternion)
+            }
+            Self::OfTool(moved) => {
+                let there = Frame { position_mm, quaternion }.pose();
+                let base = there * moved.inverse();
+                let q = base.rotation;
+                (base.translation.vector.into(), [q.w, q.i, q.j, q.k])
+            }
+        }
+    }
 }
 
 /// A call of a routine that no file declares and that takes no target.

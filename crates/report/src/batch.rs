@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
+use super::compensation::verdict as verdict_of_program;
 use super::document::{Document, KeyFigure, Verdict};
 use super::kept;
 use super::placement;
@@ -66,6 +67,9 @@ pub struct Row {
     pub expected_mm: Option<f64>,
     /// The error, or a remark.
     pub note: Option<String>,
+    /// What makes the program doubtful although nothing in it was refused or flagged, such as steps beside motions that are left.
+    #[serde(default)]
+    pub doubt: Option<String>,
     /// The most frequent reason among refused, else flagged, else left motions, with its count.
     pub reason: Option<String>,
 }
@@ -97,6 +101,7 @@ impl Row {
             after_mm: after.reduce(f64::max),
             expected_mm: placement::expected_mm(plan),
             note: undeclared_note(listing),
+            doubt: doubt(plan, listing).filter(|_| ended == Ended::Changed),
             reason: most_frequent_reason(plan),
         }
     }
@@ -113,6 +118,7 @@ impl Row {
             after_mm: None,
             expected_mm: None,
             note,
+            doubt: None,
             reason: None,
         }
     }
@@ -120,16 +126,18 @@ impl Row {
     /// A program without corrections must not look done.
     fn judged(&self) -> Status {
         match self.ended {
-            Ended::Changed => Status::Good,
+            Ended::Changed if self.doubt.is_none() => Status::Good,
+            Ended::Changed => Status::Warning,
             Ended::Unchanged if self.motions[0] == 0 => Status::NotEvaluated,
             Ended::Unchanged | Ended::Already => Status::Warning,
             Ended::Failed => Status::Bad,
         }
     }
 
-    /// Note and most frequent reason.
+    /// Note, doubt and most frequent reason.
     fn remark(&self) -> Option<String> {
-        let both: Vec<&str> = [&self.note, &self.reason].into_iter().flatten().map(String::as_str).collect();
+        let both: Vec<&str> =
+            [&self.note, &self.doubt, &self.reason].into_iter().flatten().map(String::as_str).collect();
         (!both.is_empty()).then(|| both.join("; "))
     }
 
@@ -137,7 +145,7 @@ impl Row {
     fn is_clean(&self) -> bool {
         let [all, _, flagged, refused, _] = self.motions;
         let rewritten = matches!(self.ended, Ended::Changed) || all == 0 && self.ended == Ended::Unchanged;
-        rewritten && flagged + refused == 0
+        rewritten && flagged + refused == 0 && self.doubt.is_none()
     }
 
     /// Share of corrected motions (%).
@@ -145,6 +153,14 @@ impl Row {
         let [all, changed, flagged, ..] = self.motions;
         (all > 0).then(|| 100.0 * (changed + flagged) as f64 / all as f64)
     }
+}
+
+/// The headline of a verdict that is not good; `None` where refused and flagged motions say enough.
+fn doubt(plan: &Plan, listing: &Listing) -> Option<String> {
+    let is_doubtful = |status| matches!(status, MotionStatus::Refused | MotionStatus::Flagged);
+    let verdict = verdict_of_program(plan, listing, true);
+    (verdict.status == Status::Warning && !plan.outcomes.iter().any(|outcome| is_doubtful(outcome.status)))
+        .then_some(verdict.headline)
 }
 
 /// Note on undeclared names.
@@ -221,9 +237,10 @@ pub fn sum(rows: &[Row]) -> String {
     let [all, changed, flagged, refused, left] = totals(rows);
     let share = if all > 0 { 100.0 * (changed + flagged) as f64 / all as f64 } else { 0.0 };
     format!(
-        "{} programs: {} changed, {} unchanged, {} already compensated, {} failed; {all} motions: {changed} changed, \
+        "{} {}: {} changed, {} unchanged, {} already compensated, {} failed; {all} motions: {changed} changed, \
          {flagged} flagged, {refused} refused, {left} left ({share:.1} % corrected)",
         rows.len(),
+        if rows.len() == 1 { "program" } else { "programs" },
         with(Ended::Changed),
         with(Ended::Unchanged),
         with(Ended::Already),
@@ -354,24 +371,33 @@ fn verdict(rows: &[Row]) -> Verdict {
     let failed: Vec<&Row> = rows.iter().filter(|row| row.ended == Ended::Failed).collect();
     let [_, changed, flagged, refused, _] = totals(rows);
     let may_run = rows.iter().filter(|row| row.ended == Ended::Changed && row.is_clean()).count();
-    let status = match (failed.len(), flagged + refused) {
+    let doubtful = rows.iter().filter(|row| row.doubt.is_some()).count();
+    let status = match (failed.len(), flagged + refused + doubtful) {
         (0, _) if changed + flagged == 0 => Status::NotEvaluated,
         (0, 0) => Status::Good,
         (0, _) => Status::Warning,
         _ => Status::Bad,
     };
     let first = |of: &str| match may_run {
+        0 if doubtful > 0 => {
+            "check the motions that are refused, flagged or left before running any of them".to_owned()
+        }
         0 => "check the refused and flagged motions before running any of them".to_owned(),
         _ => {
-            format!(
-                "{may_run} {of} are corrected and may run; check the refused and flagged motions of the rest first"
-            )
+            let which = if doubtful > 0 {
+                "motions that are refused, flagged or left in"
+            } else {
+                "refused and flagged motions of"
+            };
+            let are = if may_run == 1 { "is" } else { "are" };
+            format!("{may_run} {of} {are} corrected and may run; check the {which} the rest first")
         }
     };
     let headline = match status {
         Status::NotEvaluated => "Nothing was corrected".to_owned(),
         Status::Good => {
-            format!("All programs were processed; {may_run} of {} are corrected and may run", rows.len())
+            let are = if may_run == 1 { "is" } else { "are" };
+            format!("All programs were processed; {may_run} of {} {are} corrected and may run", rows.len())
         }
         Status::Warning | Status::Found => {
             format!("All programs were processed; {}", first(&format!("of {}", rows.len())))

@@ -187,10 +187,15 @@ pub fn json(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Value {
     })
 }
 
+/// Whether the corrected program is written.
+fn is_written(files: &[ProgramFile]) -> bool {
+    files.iter().any(|file| file.output.is_some())
+}
+
 /// Summary for the terminal: verdict, reasons, unread regions, notes on tools and work objects.
 pub fn summary(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Document {
     let mut page = heading(plan, files);
-    page.push(verdict(plan, listing));
+    page.push(verdict(plan, listing, is_written(files)));
     let reasons = reason_table(plan, listing, files);
     if !reasons.rows.is_empty() {
         page.push(reasons);
@@ -208,8 +213,8 @@ pub fn summary(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Documen
 /// The page, including the deviation of the path if reports are given.
 pub fn document(plan: &Plan, listing: &Listing, files: &[ProgramFile], reports: &[PathReport]) -> Document {
     let mut page = heading(plan, files);
-    page.push(verdict(plan, listing));
-    page.push(key_figures(plan));
+    page.push(verdict(plan, listing, is_written(files)));
+    page.push(key_figures(plan, listing));
     let reasons = reason_table(plan, listing, files);
     if !reasons.rows.is_empty() {
         page.push(reasons);

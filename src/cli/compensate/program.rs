@@ -58,7 +58,19 @@ pub(super) fn rewrite_program(
     let used = Some(Used::by(listing, &context.cell));
     let Compensated { mut plan, rewritten } =
         compensated(context, &program, Options { loads, ..context.options.clone() })?;
-    if let (Some(motions), Some(corrector)) = (unreachable_motions(&plan), context.corrector) {
+    if let (Some(found), Some(corrector)) = (unreachable_motions(&plan), context.corrector) {
+        if let Some((motion, error)) = found.example.filter(|_| 2 * found.other_configuration > found.count) {
+            bail!(
+                "{}: {} of the motions are in reach of {} only in other configurations than the program states (line {}: {error}): \
+                 correct the configuration data, or use the model of the robot that runs it ({})",
+                programs.name(),
+                found.other_configuration,
+                corrector.arm.robot,
+                listing.motions[motion as usize].place.line,
+                corrector.model
+            );
+        }
+        let motions = found.count;
         bail!(
             "{}: hardly any of the {motions} motions is in reach of {} ({}): the program belongs to another robot, or its tool \
              and work object are somewhere else (--cell); use the model of the robot that runs it",
@@ -245,5 +257,5 @@ fn is_clean(context: &CompensateContext<'_>, plan: &Plan, listing: &Listing, cha
     if context.arguments.check && !changed {
         return plan.outcomes.iter().all(|o| o.reason() == Some(OutcomeReason::NoChange));
     }
-    view::verdict(plan, listing).status == Judged::Good
+    view::verdict(plan, listing, true).status == Judged::Good
 }

@@ -88,7 +88,7 @@ fn every_example_of_the_page_runs_as_it_stands_there() {
                 fs::write(at.join("cell.toml"), &filled_in).unwrap();
             }
             if words[1] == "compensate" {
-                assert!(out.contains("6 motions: 6 changed"), "{command}: {out}\n{err}");
+                assert!(out.contains("6 motions: 6 corrected"), "{command}: {out}\n{err}");
                 speaks_no_rapid(command, &format!("{out}{err}"));
                 let output = fs::read_to_string(at.join(words[words.len() - 1])).unwrap();
                 assert!(output.contains("truegrind 0."), "{command}: no mark in {output}");

@@ -35,9 +35,20 @@ pub fn program_robot_mismatch(name: &str, source: &[u8], robot: &str, nominal: &
 /// A smaller number of motions proves nothing: a single one can be a mistake.
 const FEWEST: usize = 5;
 
-/// Number of unreachable motions, where the arm reaches hardly any: the program belongs to another arm. A program with a few
-/// unreachable targets does not.
-pub fn unreachable_motions(plan: &Plan) -> Option<usize> {
+/// Motions that the arm does not reach, of a program of which it reaches hardly any.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct UnreachableMotions {
+    /// How many.
+    pub count: usize,
+    /// How many of them it reaches in another configuration than they state.
+    pub other_configuration: usize,
+    /// One of these: index of the motion, and why.
+    pub example: Option<(u32, InverseError)>,
+}
+
+/// Unreachable motions, where the arm reaches hardly any: the program belongs to another arm, or states other configurations. A program
+/// with a few unreachable targets does not.
+pub fn unreachable_motions(plan: &Plan) -> Option<UnreachableMotions> {
     let untold = |reason: &OutcomeReason| {
         matches!(
             reason,
@@ -52,7 +63,19 @@ pub fn unreachable_motions(plan: &Plan) -> Option<usize> {
     };
     let judged = || plan.outcomes.iter().filter(|outcome| !outcome.reason.as_deref().is_some_and(untold));
     let all = judged().count();
-    let without = judged().filter(|outcome| outcome.reason.as_deref().is_some_and(unreached)).count();
+    let count = judged().filter(|outcome| outcome.reason.as_deref().is_some_and(unreached)).count();
+    let configured = judged().filter_map(|outcome| match outcome.reason() {
+        Some(OutcomeReason::Inverse(error @ InverseError::OtherConfiguration { .. })) => {
+            Some((outcome.motion, error))
+        }
+        _ => None,
+    });
+    let mut configured = configured.peekable();
+    let example = configured.peek().copied();
     // One target in fifty can be reachable by chance.
-    (all >= FEWEST && 50 * without >= 49 * all).then_some(without)
+    (all >= FEWEST && 50 * count >= 49 * all).then(|| UnreachableMotions {
+        count,
+        other_configuration: configured.count(),
+        example,
+    })
 }

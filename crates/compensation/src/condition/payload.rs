@@ -2,6 +2,7 @@
 
 use nalgebra::Point3;
 
+use truegrind_arm::effect::Effect;
 use truegrind_arm::model::Model;
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::load::{Grip, Load, Loads};
@@ -40,4 +41,9 @@ fn together(a: &Load, b: &Load) -> Load {
         (a.mass_kg * a.centre_mm[k] + b.mass_kg * b.centre_mm[k]) / mass_kg.max(f64::MIN_POSITIVE)
     });
     Load { mass_kg, centre_mm }
+}
+
+/// Whether an effect depends on the payload.
+pub(crate) fn is_load_dependent(effect: &Effect) -> bool {
+    effect.needs_torque() && !effect.is_zero()
 }

@@ -35,7 +35,8 @@ pub(crate) struct FrameTable {
 }
 
 impl FrameTable {
-    pub(crate) fn of(listing: &Listing, arms: &Arms<'_>, cell: &Cell) -> Self {
+    /// `own_loads`: tools load the arm with their own mass, not with a stated payload.
+    pub(crate) fn of(listing: &Listing, arms: &Arms<'_>, cell: &Cell, own_loads: bool) -> Self {
         let mut out = Self {
             places: HashMap::new(),
             list: Vec::new(),
@@ -44,7 +45,7 @@ impl FrameTable {
             assumed: Vec::new(),
             start: cell.start(listing),
         };
-        let teaching = Teaching::of(arms.nominal.arm(), arms.estimated.arm(), cell, listing);
+        let teaching = Teaching::of(arms.nominal.arm(), arms.estimated.arm(), cell, listing, own_loads);
         let first_motions = first_motions(listing);
         let mut budget = SearchBudget::of(search_budget::FRAMES);
         for run in listing.motions.chunk_by(Motion::same_frames) {

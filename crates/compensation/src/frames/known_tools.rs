@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use crate::cell::{CellFrame, same_name};
 use truegrind_math::se3::Pose;
+use truegrind_programs::motion::load::Load;
 use truegrind_programs::nc::setup;
 
 /// A tool whose value is known.
@@ -14,6 +15,8 @@ pub(crate) struct KnownTool<'a> {
     pub(crate) in_text: bool,
     pub(crate) frame: Pose,
     pub(crate) held: bool,
+    /// Its own mass, with its centre in the flange frame.
+    pub(crate) load: Option<Load>,
     /// Names used in comments.
     pub(crate) labels: Vec<&'a str>,
     pub(crate) stated: Option<&'a CellFrame>,

@@ -3,7 +3,7 @@
 //! The controller computed a taught frame F from joints with the nominal arm N. Under N the teaching joints therefore
 //! reproduce the programmed frame up to rounding; if they do not, another tool touched the points, another frame was taught,
 //! or the joints belong to another arm, and the frame must not be moved ([`contradictions`]). If they do, the frame moves to
-//! what the estimated arm E makes of the same joints: F* = F_E F_N⁻¹ F. The rounding difference between F_N and F is
+//! what the estimated arm E makes of the same joints, under the load of the tool that touched: F* = F_E F_N⁻¹ F. The rounding difference between F_N and F is
 //! preserved, so angles with two decimals serve as well as those with ten.
 
 pub(crate) use crate::frames::teaching_geometry::{FrameDistance, WRITTEN_TOLERANCE, list};
@@ -15,6 +15,7 @@ use std::collections::HashSet;
 use nalgebra::{Point3, Vector3};
 
 use crate::cell::{Cell, CellFrame, CellLookup, FrameKind, FrameOrigin, Teaches};
+use crate::condition::payload::is_load_dependent;
 use crate::frames::known_tools::{KnownTool, KnownTools, MOST_NAMES};
 use crate::frames::teaching_geometry::{
     FixedPoint, explained, fixed_point, frame_of, half_step_rad, radians, rounded, touched,
@@ -22,6 +23,7 @@ use crate::frames::teaching_geometry::{
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::{Joints, Model, PreparedModel};
 use truegrind_math::se3::Pose;
+use truegrind_programs::motion::load::Load;
 use truegrind_programs::motion::{Listing, Motion, Tool, ToolValue, WorkObject, WorkObjectValue};
 
 /// A tool that touched teaching points.
@@ -34,6 +36,7 @@ pub(crate) struct TouchingTool {
     commanded: Vector3<f64>,
     /// Its real tip.
     pub(crate) real: Vector3<f64>,
+    load: Option<Load>,
 }
 
 /// A tool as it really is.
@@ -69,6 +72,8 @@ pub(crate) struct Teaching<'a> {
     pub(crate) estimated: &'a PreparedModel<'a>,
     pub(crate) stated: CellLookup<'a>,
     pub(crate) listing: &'a Listing,
+    /// Whether a tool loads the arm with its own mass, not with a stated payload.
+    own_loads: bool,
     /// Cache of [`Teaching::tools`].
     known: OnceCell<KnownTools<'a>>,
 }
@@ -102,7 +107,7 @@ pub fn contradictions(listing: &Listing, cell: &Cell, nominal: &Model) -> Vec<St
     }
     let condition = Condition::default();
     let arm = nominal.at_condition(&condition);
-    let teaching = Teaching::of(&arm, &arm, cell, listing);
+    let teaching = Teaching::of(&arm, &arm, cell, listing, false);
     let (mut seen, mut said) = (HashSet::new(), HashSet::new());
     let mut out: Vec<String> = Vec::new();
     for run in listing.motions.chunk_by(Motion::same_frames) {
@@ -151,8 +156,23 @@ impl<'a> Teaching<'a> {
         estimated: &'a PreparedModel<'a>,
         cell: &'a Cell,
         listing: &'a Listing,
+        own_loads: bool,
     ) -> Self {
-        Self { nominal, estimated, stated: CellLookup::of(cell, listing), listing, known: OnceCell::new() }
+        let stated = CellLookup::of(cell, listing);
+        Self { nominal, estimated, stated, listing, own_loads, known: OnceCell::new() }
+    }
+
+    /// The estimated arm under the load of the tool that touched; `None` where that is the load of all.
+    fn loaded_with(&self, load: Option<Load>) -> Option<PreparedModel<'a>> {
+        let load = load.filter(|_| self.own_loads)?;
+        let model = self.estimated.model;
+        let centre = model.flange * Point3::from(load.centre_mm);
+        let condition = Condition {
+            payload_kg: Some(load.mass_kg),
+            payload_centre_mm: centre.coords.into(),
+            ..self.estimated.condition
+        };
+        model.effects.iter().any(is_load_dependent).then(|| model.at_condition(&condition))
     }
 
     /// Resolves a tool.
@@ -166,11 +186,16 @@ impl<'a> Teaching<'a> {
         if tool.place.is_some() {
             agrees(FrameKind::Tool, stated, &commanded)?;
         }
-        self.commanded_tool(stated, &commanded, value.robhold)
+        self.commanded_tool(stated, &commanded, (value.robhold, own_load(value)))
     }
 
     /// Resolves a tool of the cell file that the controller holds as `commanded`.
-    fn commanded_tool(&self, stated: &CellFrame, commanded: &Pose, held: bool) -> Result<RealTool, String> {
+    fn commanded_tool(
+        &self,
+        stated: &CellFrame,
+        commanded: &Pose,
+        (held, load): (bool, Option<Load>),
+    ) -> Result<RealTool, String> {
         if stated.origin == FrameOrigin::Metrology || stated.teaching_deg.is_empty() {
             return Ok(RealTool { pose: *commanded, moved_mm: None });
         }
@@ -199,7 +224,9 @@ impl<'a> Teaching<'a> {
                 };
                 let scatter = 3.0 * joints.iter().map(off).sum::<f64>().sqrt() / joints.len() as f64;
                 let round = rounded(&joints, half, |q| Some(at(&tip(self.nominal, q, &pointer.commanded))));
-                (nominal, tip(self.estimated, &joints, &pointer.real), explained(round, scatter))
+                let loaded = self.loaded_with(pointer.load);
+                let estimated = loaded.as_ref().unwrap_or(self.estimated);
+                (nominal, tip(estimated, &joints, &pointer.real), explained(round, scatter))
             }
             (None, _) => {
                 let pick = |found: FixedPoint| if held { found.on_flange } else { found.in_base };
@@ -218,7 +245,9 @@ impl<'a> Teaching<'a> {
                     ));
                 }
                 let nominal = fixed_point(self.nominal, &joints).ok_or_else(alike)?;
-                let estimated = fixed_point(self.estimated, &joints).ok_or_else(alike)?;
+                let loaded = self.loaded_with(load.filter(|_| held));
+                let estimated =
+                    fixed_point(loaded.as_ref().unwrap_or(self.estimated), &joints).ok_or_else(alike)?;
                 let round =
                     rounded(&joints, half, |q| fixed_point(self.nominal, q).map(|found| at(&pick(found))));
                 let scatter = 3.0 * nominal.sigma_mm[usize::from(!held)];
@@ -301,7 +330,8 @@ impl<'a> Teaching<'a> {
                 &pointer,
             ));
         }
-        let points = touched(self.estimated, &joints, &pointer.real, part);
+        let loaded = self.loaded_with(pointer.load);
+        let points = touched(loaded.as_ref().unwrap_or(self.estimated), &joints, &pointer.real, part);
         let frame = taught_frame(&points).ok_or_else(in_line)?;
         let pose = frame * nominal.inverse() * commanded * on_top;
         Ok(RealObject { pose, taught: Some(TaughtFrame { pointer, joints, points, frame }) })
@@ -417,7 +447,7 @@ impl<'a> Teaching<'a> {
             }
         };
         let real = match found.stated {
-            Some(stated) => self.commanded_tool(stated, &found.frame, found.held)?.pose,
+            Some(stated) => self.commanded_tool(stated, &found.frame, (found.held, found.load))?.pose,
             None => found.frame,
         };
         Ok(TouchingTool {
@@ -425,6 +455,7 @@ impl<'a> Teaching<'a> {
             held,
             commanded: found.frame.translation.vector,
             real: real.translation.vector,
+            load: found.load.filter(|_| held),
         })
     }
 
@@ -446,7 +477,8 @@ impl<'a> Teaching<'a> {
             if seen.insert((tool.name.as_str(), in_text, held, bits)) {
                 let labels = self.stated.labels_of(&tool.name).to_vec();
                 let stated = self.stated.tool(tool);
-                out.push(KnownTool { name: tool.name.clone(), in_text, frame, held, labels, stated });
+                let (name, load) = (tool.name.clone(), own_load(value));
+                out.push(KnownTool { name, in_text, frame, held, load, labels, stated });
             }
         }
         let declared = KnownTools::of(std::mem::take(&mut out));
@@ -460,6 +492,7 @@ impl<'a> Teaching<'a> {
                     in_text: false,
                     frame,
                     held: true,
+                    load: None,
                     labels: Vec::new(),
                     stated: Some(stated),
                 });
@@ -468,11 +501,18 @@ impl<'a> Teaching<'a> {
         out.splice(..0, declared.list);
         if !out.iter().any(|known| known.is("tool0")) {
             let (name, frame) = ("tool0".to_owned(), Pose::identity());
-            out.push(KnownTool { name, in_text: true, frame, held: true, labels: Vec::new(), stated: None });
+            let (load, labels) = (None, Vec::new());
+            out.push(KnownTool { name, in_text: true, frame, held: true, load, labels, stated: None });
         }
         out.sort_by_key(|known| known.name.to_ascii_lowercase());
         out
     }
+}
+
+/// Mass of a tool with its centre in the flange frame, where the program states it.
+fn own_load(tool: &ToolValue) -> Option<Load> {
+    let load = Load { mass_kg: tool.mass_kg, centre_mm: tool.centre_of_gravity_mm };
+    (tool.mass_kg > 0.0).then_some(load)
 }
 
 /// Whether the cell file agrees with the program about the position of a frame, if it states one.

@@ -40,7 +40,11 @@ pub fn undeclared(listing: &Listing) -> Vec<Undeclared> {
 
 /// Undeclared frames of a motion, and whether each is a tool.
 fn names<'a>(listing: &'a Listing, motion: &Motion) -> impl Iterator<Item = (bool, &'a str)> {
-    let tool = listing.tool(motion).filter(|tool| nowhere(tool.value.as_ref().err(), tool.place));
+    // A cancelled tool length is no tool that could be declared.
+    let is_tool = |name: &str| !(listing.numbered && name == "G49");
+    let tool = listing
+        .tool(motion)
+        .filter(|tool| is_tool(&tool.name) && nowhere(tool.value.as_ref().err(), tool.place));
     let object =
         listing.work_object(motion).filter(|object| nowhere(object.value.as_ref().err(), object.place));
     let tool = tool.map(|tool| (true, tool.name.as_str()));

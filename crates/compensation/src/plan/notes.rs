@@ -1,11 +1,12 @@
 //! Notes of a plan: what was not checked, what was assumed, and how backlash and payload enter.
 
-use crate::arms::{Arms, is_load_dependent};
-use crate::condition::payload::payload_at;
+use crate::arms::Arms;
+use crate::condition::payload::{is_load_dependent, payload_at};
+use crate::line_list::{lines_of, numbered};
 use crate::options::Options;
 use crate::target::solved_target::SolvedTargets;
 use truegrind_arm::effect::Effect;
-use truegrind_programs::motion::{Listing, Motion, MotionKind, Place, Switch};
+use truegrind_programs::motion::{Listing, Motion, MotionKind, Origin, Place, Switch};
 
 /// How backlash enters this program.
 pub(crate) fn backlash_note(arms: &Arms<'_>, solved: &SolvedTargets<'_>) -> Option<String> {
@@ -66,6 +67,19 @@ pub(crate) fn unchecked_notes(
         out.push(format!(
             "{} at a place that is unknown or not corrected: the end is correct, the path to it is not checked ({lines})",
             counted(unchecked.len(), "line or arc starts", "lines or arcs start")
+        ));
+    }
+    let by_persistent: Vec<u32> = (0..listing.motions.len() as u32)
+        .filter(|motion| {
+            let targets = &listing.motions[*motion as usize].targets;
+            targets.iter().any(|target| matches!(target.origin, Origin::Offset(_)))
+        })
+        .collect();
+    if let Some(lines) = lines_of(listing, &by_persistent) {
+        out.push(format!(
+            "{} offset by persistent data (PERS), which the program keeps: the correction is that for the values in the files, and nothing is \
+             inserted beside ({lines})",
+            counted(by_persistent.len(), "motion is", "motions are")
         ));
     }
     if let Some(lines) = lines_of(listing, &listing.external_calls) {
@@ -131,48 +145,11 @@ fn outside_calls_note(listing: &Listing) -> Option<String> {
     (!named.is_empty()).then(|| {
         format!(
             "routines that are in none of the files are called: {}{more}; they are assumed to leave unchanged the tools, work objects and \
-             targets that the files declare, the program displacement, the switches (ConfL, SingArea, SoftAct and so on) and the load; \
+             targets that the files declare, the numbers that compute these, the program displacement, the switches (ConfL, SingArea, SoftAct and so on) and the load; \
              give the modules that declare them too (--together)",
             named.join(", ")
         )
     })
-}
-
-/// Line numbers of motions, the first few; `None` without any.
-pub(crate) fn lines_of(listing: &Listing, motions: &[u32]) -> Option<String> {
-    numbered(motions.iter().map(|motion| listing.motions[*motion as usize].place))
-}
-
-/// How many lines are listed.
-const NAMED_LINES: usize = 8;
-
-/// Line numbers, the first few, by file where there are several; `None` without any.
-fn numbered(places: impl Iterator<Item = Place>) -> Option<String> {
-    let mut files: Vec<(u32, Vec<String>)> = Vec::new();
-    let (mut last, mut listed, mut more) = (None, 0, "");
-    for place in places {
-        if last.replace((place.file, place.line)) == Some((place.file, place.line)) {
-            continue;
-        }
-        if listed == NAMED_LINES {
-            more = " and more";
-            break;
-        }
-        listed += 1;
-        let line = place.line.to_string();
-        match files.last_mut() {
-            Some((file, lines)) if *file == place.file => lines.push(line),
-            _ => files.push((place.file, vec![line])),
-        }
-    }
-    let is_one_file = files.iter().all(|(file, _)| *file == 0);
-    let of_file = |(file, lines): &(u32, Vec<String>)| {
-        let word = if lines.len() == 1 { "line" } else { "lines" };
-        let place = if is_one_file { String::new() } else { format!(" of file {}", file + 1) };
-        format!("{word} {}{place}", lines.join(", "))
-    };
-    let named: Vec<String> = files.iter().map(of_file).collect();
-    (!named.is_empty()).then(|| format!("{}{more}", named.join("; ")))
 }
 
 /// A number of things, in the singular for one.

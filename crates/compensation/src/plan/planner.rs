@@ -76,7 +76,7 @@ impl<'a> SolvedProgram<'a> {
         options: &'a Options,
     ) -> Self {
         let mut arms = Arms::of(estimate.arm, &options.condition);
-        let mut frame_table = FrameTable::of(listing, &arms, cell);
+        let mut frame_table = FrameTable::of(listing, &arms, cell, options.loads.is_some());
         let program = OriginalProgram::of(listing, &arms, &frame_table);
         let cuts = cut::of(listing, options.cuts);
         let mut assessment =
@@ -444,7 +444,8 @@ fn plan_motion<'a>(
     let targets = solved.of(index);
     let point = match targets.last() {
         Some(Ok(to)) => {
-            outcome.before_mm = to.deviation_mm[0].into();
+            // Of an arc the circle point counts as well.
+            outcome.before_mm = largest_mm(targets, 0).into();
             outcome.after_mm = outcome.before_mm;
             outcome.sigma_mm = to.sigma_mm.into();
             outcome.shape_sigma_mm = to.shape_sigma_mm;
@@ -483,10 +484,15 @@ fn plan_motion<'a>(
         _ => new_target(target, solved, motion, options),
     };
     let new_targets = motion.targets.iter().zip(solved_targets()).map(new).collect();
-    outcome.after_mm = solved_targets().last().map(|s| s.deviation_mm[1]).into();
+    outcome.after_mm = largest_mm(targets, 1).into();
     let change = Change { motion: index as u32, targets: new_targets, before: segment_plan.before.clone() };
     let status = if flag.is_some() { Status::Flagged } else { Status::Changed };
     PlannedMotion { segment_plan: Some(segment_plan), ..finish(outcome, status, flag, Some(change), point) }
+}
+
+/// The largest deviation of the targets of a motion, before (0) or after (1) the correction (mm).
+fn largest_mm(targets: &[Result<SolvedTarget<'_>, OutcomeReason>], side: usize) -> Option<f64> {
+    targets.iter().flatten().map(|target| target.deviation_mm[side]).reduce(f64::max)
 }
 
 /// The circle point of a motion with one.

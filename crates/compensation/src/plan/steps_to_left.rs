@@ -1,9 +1,9 @@
 //! Steps of the path between motions that are corrected and their neighbours that are left.
 
-use super::notes::lines_of;
 use super::reason::OutcomeReason;
 use crate::deviation::Status;
-use truegrind_programs::motion::{Listing, Motion, MotionKind, TargetValue};
+use crate::line_list::lines_of;
+use truegrind_programs::motion::{Listing, Motion, MotionKind, Reason, TargetValue};
 use truegrind_programs::rewrite::{Change, NewTarget};
 
 /// Corrected lines and arcs beside lines and arcs that are left, in the order of the file, with the same tool and work object.
@@ -25,9 +25,10 @@ impl StepsToLeft {
     ) -> Option<Self> {
         let left = |index: usize| {
             let (status, reason, _) = outcome(index);
+            let motion = &listing.motions[index];
             status == Status::Left
                 && reason != Some(OutcomeReason::NoChange)
-                && is_path(&listing.motions[index])
+                && (is_path(motion) || is_call(motion))
         };
         let beside_left = |index: usize| {
             let this = &listing.motions[index];
@@ -64,13 +65,19 @@ impl StepsToLeft {
 }
 
 /// Whether the tool may work on the way of a motion.
-fn is_path(motion: &Motion) -> bool {
+pub fn is_path(motion: &Motion) -> bool {
     matches!(motion.kind, MotionKind::Linear | MotionKind::Circular) && !motion.rapid
 }
 
-/// Whether two motions stand in one routine, with the same tool and work object.
-fn is_continued(a: &Motion, b: &Motion) -> bool {
-    a.place.file == b.place.file && a.routine == b.routine && a.same_frames(b)
+/// Whether it is a call of a routine that takes the target, so that the motions of the routine are left.
+fn is_call(motion: &Motion) -> bool {
+    motion.own_reason == Some(Reason::OwnRoutine)
+}
+
+/// Whether a motion stands in one routine with another, which has the same tool and work object or is a call.
+fn is_continued(this: &Motion, other: &Motion) -> bool {
+    let near = this.place.file == other.place.file && this.routine == other.routine;
+    near && (is_call(other) || this.same_frames(other))
 }
 
 /// How far a change moves the end of its motion (mm); `None` where it is written in another form.

@@ -118,6 +118,5 @@ fn corrected_ways_stay_in_range(sums: bool) {
         });
         refused += usize::from(ways.count() > 0);
     }
-    println!("{lines} lines, {written} written, {refused} refused for their way");
     assert!(lines > 40 && 3 * written > lines && 4 * refused > lines, "{lines} {written} {refused}");
 }

@@ -176,7 +176,10 @@ fn joints_that_the_arm_cannot_have_are_refused() {
     let nominal = arm("abb-irb-120").nominal;
     let found = contradictions(&listing, &started([0.0, 0.0, 150.0, 0.0, 90.0, 0.0]), &nominal);
     assert_eq!(found.len(), 1);
-    assert!(found[0].contains("start_deg: joint 3 is outside its range of -110.0° to 70.0°"), "{found:?}");
+    assert!(
+        found[0].contains("start_deg: joint 3 is 150.0°, outside its range of -110.0° to 70.0°"),
+        "{found:?}"
+    );
     assert!(contradictions(&listing, &started([0.0, 0.0, 50.0, 0.0, 90.0, 0.0]), &nominal).is_empty());
     let wrong = Cell::from_toml("start_deg = [0, 0, inf, 0, 90, 0]\n").unwrap_err();
     assert!(matches!(wrong, CellError::Start { .. }), "{wrong}");

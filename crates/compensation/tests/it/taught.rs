@@ -7,6 +7,8 @@
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use truegrind_arm::condition::Condition;
+use truegrind_arm::effect::Effect;
+use truegrind_arm::effect::compliance::Compliance;
 use truegrind_arm::inverse::Inverse;
 use truegrind_arm::model::{Joints, Model};
 use truegrind_compensation::cell::Cell;
@@ -699,4 +701,58 @@ fn the_tcp_of_teaching_poses_is_that_of_least_squares() {
             flanges.iter().zip(&tips).map(|(flange, tip)| flange.rotation.inverse() * (tip - middle)).sum();
         assert!(slope.norm() < 1e-8 * tips.iter().map(|tip| (tip - middle).norm()).sum::<f64>(), "{slope}");
     }
+}
+
+/// The arm gives way under the tool that touches, not under the load of the measurement.
+#[test]
+fn a_frame_is_re_evaluated_under_the_load_of_the_tool_that_touched() {
+    let mut scene = scene(31);
+    let spring = |joint| Effect::JointCompliance(Compliance { joint, compliance_rad_per_nm: 4e-5 });
+    scene.actual.effects = vec![spring(1), spring(2)];
+    let measured = Condition { payload_kg: Some(1.0), ..Condition::default() };
+    // As the data of the two tools say: 12 kg, and 1 kg at 50 mm.
+    let under = |mass_kg: f64, z: f64| {
+        let centre = scene.actual.flange * Point3::new(0.0, 0.0, z);
+        Condition { payload_kg: Some(mass_kg), payload_centre_mm: centre.coords.into(), ..measured }
+    };
+    let sheet = nominal();
+    let touching: Vec<Joints> = [[-30.0, 0.0], [60.0, 0.0], [0.0, 70.0]]
+        .iter()
+        .map(|[x, y]| {
+            let down = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), std::f64::consts::PI);
+            let at = Pose::from_parts((scene.object[0] * Point3::new(*x, *y, 0.0)).coords.into(), down);
+            let flange = at * translation(&-scene.pointer);
+            let near = Joints::new(0.0, 0.4, 0.2, 0.0, 0.9, 0.0);
+            Inverse::new(&scene.actual, &under(12.0, 80.0), &sheet).solve_near(&flange, &near).unwrap().joints
+        })
+        .collect();
+    scene.told = made_of(&touching, &scene.pointer);
+    scene.touching = touching;
+    let data = scene.data().replacen("[1,[0,0,50]", "[12,[0,0,80]", 1);
+    let source = module(&data, &moves("tGrind", "wPart", &scene.turn()));
+    let cell = stated(&scene.cell("taught_with = \"tPointer\"\n", 10));
+    let task = Task::read(&[("p.mod", source.as_bytes())]);
+    let mut known = estimated(scene.actual.clone(), &[Joints::zeros()]);
+    (known.region.min_deg, known.region.max_deg) = ([-400.0; 6], [400.0; 6]);
+    known.region.spacing_deg = 1e6;
+    let off = |own_loads: bool| {
+        let loads = own_loads.then(|| task.loads());
+        let options = Options { condition: measured, loads, ..Options::default() };
+        let planned = plan(&task.listing, &known, &cell, &options);
+        let rewritten = task.rewrite(&planned.changes, &RewriteOptions::default()).unwrap();
+        let text = rewritten.files[0].edits.apply(source.as_bytes()).unwrap();
+        let again = Task::read(&[("p.mod", &text)]);
+        let truth = scene.object[0] * scene.object[1];
+        let far = again.listing.motions.iter().zip(&TARGETS).map(|(motion, meant)| {
+            let target = motion.to().unwrap().value.unwrap().cartesian().unwrap().pose();
+            let told = scene.told * scene.object[1] * target * scene.grinder.inverse();
+            let q = joints(&sheet, &told);
+            let reached = scene.actual.at_condition(&under(1.0, 50.0)).forward(&q) * scene.grinder;
+            (truth.inverse() * reached.translation.vector.into_point() - Point3::from(*meant)).norm()
+        });
+        far.fold(0.0, f64::max)
+    };
+    assert!(off(true) < RIGHT_MM, "{}", off(true));
+    // With one stated payload for all the frame lies where another load would have put it.
+    assert!(off(false) > 10.0 * RIGHT_MM, "{}", off(false));
 }

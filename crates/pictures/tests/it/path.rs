@@ -109,6 +109,7 @@ fn parts(count: usize) -> Parts {
         model: "ltlm".to_owned(),
         after: After::PredictedRemainder,
         points,
+        missing: None,
         held_out_mm: Some(0.08),
     };
     Parts { nominal, actual, reports: vec![report], triangles: surface.tessellate(20), base_from_object }

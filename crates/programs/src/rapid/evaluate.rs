@@ -27,7 +27,7 @@ use super::syntax::{
 };
 use super::token::{Token, fold, folded, same_name};
 use super::value::{Value, built_in, cartesian_target, joint_target};
-use crate::motion::{Reason, Span, TargetValue};
+use crate::motion::{Offset, Reason, Span, TargetValue};
 use crate::shared::Map;
 use crate::tree::Child;
 
@@ -73,6 +73,8 @@ pub enum Source {
     Element(u32, Span),
     /// Computed from the text.
     Computed,
+    /// Its first argument with an offset by persistent data.
+    Offset(Child, Offset),
     /// Not known.
     Unknown,
 }
@@ -81,6 +83,17 @@ pub enum Source {
 pub(super) fn index_of(position: f64) -> Option<usize> {
     let index = f64::from(position as f32).round();
     (index >= 1.0).then(|| index as usize - 1)
+}
+
+/// What is read of persistent numbers that the program does not assign: the controller may hold others than the files state.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Persistent {
+    /// They are unknown.
+    Unknown,
+    /// They are as stated; none has been read.
+    Stated,
+    /// They are as stated; some have been read.
+    Read,
 }
 
 /// Evaluates expressions of one task.
@@ -95,6 +108,8 @@ pub struct Evaluator<'a, 's> {
     initial: RefCell<HashMap<u32, Value>>,
     /// Functions of the program that the current expression has called.
     functions: Cell<u32>,
+    /// What is read of persistent numbers.
+    persistent: Cell<Persistent>,
     /// Whether a function of the program got an unknown argument, whose evaluation may raise an error even if it is not used.
     may_raise: Cell<bool>,
     /// Nothing is known at a declaration.
@@ -110,6 +125,7 @@ impl<'a, 's> Evaluator<'a, 's> {
             elements: RefCell::default(),
             initial: RefCell::default(),
             functions: Cell::new(0),
+            persistent: Cell::new(Persistent::Unknown),
             may_raise: Cell::new(false),
             nothing: Known::new(),
         }
@@ -153,11 +169,47 @@ impl<'a, 's> Evaluator<'a, 's> {
                     return found;
                 }
             }
-            Child::Node(_) => {}
+            Child::Node(node) => {
+                if let Some(found) = self.offset_target(context, tree, node) {
+                    return found;
+                }
+            }
         }
         let value = self.value(context, argument).target(joints);
         let source = if value.is_ok() { Source::Computed } else { Source::Unknown };
         (value, source)
+    }
+
+    /// `Offs` or `RelTool` of a known target, perhaps by persistent numbers; `None` for anything else.
+    fn offset_target(
+        &self,
+        context: Context<'_>,
+        tree: &RapidTree<'s>,
+        node: u32,
+    ) -> Option<(Result<TargetValue, Reason>, Source)> {
+        if tree.nodes.kind(node) != Syntax::Function {
+            return None;
+        }
+        let name = tree.text(tree.nodes.first(node));
+        let of_tool = same_name(name, b"RelTool");
+        if !(of_tool || same_name(name, b"Offs")) || self.symbols.find(context.scope, name).is_some() {
+            return None;
+        }
+        let base = arguments(tree, node).find(|argument| argument.name.is_none())?.value?;
+        let from = self.value(context, base).target(false).ok()?.cartesian()?.pose();
+        self.persistent.set(Persistent::Stated);
+        let value = self.function(context, tree, node).target(false);
+        let read = self.persistent.replace(Persistent::Unknown) == Persistent::Read;
+        let Some(to) = value.ok().filter(|_| read) else {
+            let source = if value.is_ok() { Source::Computed } else { Source::Unknown };
+            return Some((value, source));
+        };
+        let to = to.cartesian()?.pose();
+        let offset = match of_tool {
+            true => Offset::OfTool(from.inverse() * to),
+            false => Offset::OfObject((to.translation.vector - from.translation.vector).into()),
+        };
+        Some((value, Source::Offset(base, offset)))
     }
 
     fn named_target(
@@ -280,6 +332,11 @@ impl<'a, 's> Evaluator<'a, 's> {
             SymbolKind::Data(_) if symbol.assigned && symbol.written_whole => {
                 Value::Unknown(symbol.unknown_reason)
             }
+            SymbolKind::Data(data)
+                if data.storage == Token::Pers && self.is_number(symbol) && !self.reads_persistent() =>
+            {
+                Value::Unknown(Reason::Persistent)
+            }
             SymbolKind::Data(data) => match data.value {
                 Some(initial) if context.depth < REFERENCE_DEPTH => {
                     let mut value = self.declared_value(context, id, initial);
@@ -302,6 +359,21 @@ impl<'a, 's> Evaluator<'a, 's> {
             SymbolKind::Parameter => Value::Unknown(Reason::Parameter),
             _ => Value::Unknown(Reason::WrongShape),
         }
+    }
+
+    /// Whether data are numbers by which targets are computed, or arrays of them.
+    fn is_number(&self, symbol: &Symbol) -> bool {
+        let of = self.symbols.resolved_type(symbol.scope, &symbol.type_name);
+        matches!(of, b"num" | b"dnum" | b"pos" | b"orient")
+    }
+
+    /// Whether persistent numbers are taken as stated; notes that one is read.
+    fn reads_persistent(&self) -> bool {
+        let stated = self.persistent.get() != Persistent::Unknown;
+        if stated {
+            self.persistent.set(Persistent::Read);
+        }
+        stated
     }
 
     /// Whether uninitialised data is 0: a number declared in a routine, which no other file can write.

@@ -17,7 +17,7 @@ use super::print::{self, Fresh};
 use super::task::Task;
 use super::token::{Token, folded, keyword, same_name};
 use crate::edit::{EditError, Edits};
-use crate::motion::{Motion, MotionKind, Origin, Reason, Role, Span, TargetValue};
+use crate::motion::{Motion, MotionKind, Offset, Origin, Reason, Role, Span, TargetValue};
 use crate::rewrite::{Change, FileEdits, NewTarget, Outcome, RewriteOptions, Rewritten};
 
 /// Changes that one thread processes at a time.
@@ -76,6 +76,10 @@ impl Task<'_> {
                 {
                     return Some(Reason::NoJointForm);
                 }
+                // Joints would not follow the data.
+                (NewTarget::Joint { .. }, _) if matches!(target.origin, Origin::Offset(_)) => {
+                    return Some(Reason::Persistent);
+                }
                 _ => {}
             }
         }
@@ -84,6 +88,13 @@ impl Task<'_> {
         }
         if change.before.is_empty() {
             return None;
+        }
+        // Inserted targets would not follow the data.
+        let follows =
+            |motion: &Motion| motion.targets.iter().any(|target| matches!(target.origin, Origin::Offset(_)));
+        let previous = motion.previous.and_then(|index| self.listing.motions.get(index as usize));
+        if follows(motion) || previous.is_some_and(follows) {
+            return Some(Reason::NoInsertion);
         }
         let guarded = self.guarded[change.motion as usize];
         let written = instruction().and_then(|instruction| written_as(instruction, change));
@@ -272,7 +283,7 @@ impl<'r, 's> Rewriter<'r, 's> {
                 Origin::Element { declaration, literal } => {
                     updates.entry((declaration, literal.start)).or_default().push(update);
                 }
-                Origin::Computed => computed.push(update),
+                Origin::Computed | Origin::Offset(_) => computed.push(update),
                 Origin::Unknown => {}
             }
         }
@@ -497,10 +508,28 @@ impl<'r, 's> Rewriter<'r, 's> {
             {
                 continue;
             }
-            self.inline(motion, target.argument, &old, &update.fresh);
+            let (span, fresh) = match target.origin {
+                Origin::Offset(offset) => {
+                    let kept = &task.listing.offsets[offset as usize];
+                    (kept.base, before_offset(update.fresh, &kept.offset))
+                }
+                _ => (target.argument, update.fresh),
+            };
+            self.inline(motion, span, &old, &fresh);
             let was = std::mem::replace(&mut outcomes[update.change], Outcome::Unchanged);
             outcomes[update.change] = worse(was, Outcome::Inlined);
         }
+    }
+}
+
+/// The value from which an offset leads to a new one.
+fn before_offset(fresh: Fresh, offset: &Offset) -> Fresh {
+    match fresh {
+        Fresh::Cartesian { position_mm, quaternion, conf } => {
+            let (position_mm, quaternion) = offset.base_of(position_mm, quaternion);
+            Fresh::Cartesian { position_mm, quaternion, conf }
+        }
+        Fresh::Joint { .. } => fresh,
     }
 }
 

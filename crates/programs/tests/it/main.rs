@@ -14,6 +14,7 @@ mod evaluation;
 mod modal_state;
 mod error_handlers;
 mod known_data;
+mod persistent;
 mod writing;
 mod edits;
 mod nc;

@@ -7,14 +7,15 @@ use crate::status::Status;
 use truegrind_compensation::deviation::Status as MotionStatus;
 use truegrind_compensation::plan::Plan;
 use truegrind_compensation::plan::reason::OutcomeReason;
+use truegrind_compensation::plan::steps_to_left::is_path;
 use truegrind_programs::motion::Listing;
 
 /// All statuses in display order.
 const STATUSES: [MotionStatus; 4] =
     [MotionStatus::Changed, MotionStatus::Flagged, MotionStatus::Refused, MotionStatus::Left];
 
-/// Verdict on a compensation, the same on the terminal, on the page and in the exit code.
-pub fn verdict(plan: &Plan, listing: &Listing) -> Verdict {
+/// Verdict on a compensation, the same on the terminal, on the page and in the exit code. `is_written`: the corrected program is.
+pub fn verdict(plan: &Plan, listing: &Listing, is_written: bool) -> Verdict {
     let (refused, flagged) = (count(plan, MotionStatus::Refused), count(plan, MotionStatus::Flagged));
     let written = count(plan, MotionStatus::Changed) + flagged;
     let (left, cuts) = placement::left_at_risk(plan);
@@ -29,7 +30,7 @@ pub fn verdict(plan: &Plan, listing: &Listing) -> Verdict {
         }
         (0, 0) => (Status::NotEvaluated, "Nothing was corrected"),
         (0, _) => (Status::Bad, "Nothing could be corrected"),
-        _ if no_cut(plan) => (
+        _ if no_cut(plan, listing) => (
             Status::Warning,
             "No cut is corrected, only motions between cuts: the deviation of the workpiece stays",
         ),
@@ -41,14 +42,18 @@ pub fn verdict(plan: &Plan, listing: &Listing) -> Verdict {
             Status::Warning,
             "Corrected, but the path has steps beside motions that are left: check them before running the program",
         ),
+        (_, 0) if !is_written => {
+            (Status::Good, "All correctable motions would be corrected; nothing was written")
+        }
         (_, 0) => (Status::Good, "All correctable motions are corrected: the program may run"),
         _ => (
             Status::Warning,
             "Corrected, but check the refused and flagged motions before running the program",
         ),
     };
-    let mut reasons: Vec<String> = deviations(plan).into_iter().collect();
+    let mut reasons: Vec<String> = deviations(plan, listing).into_iter().collect();
     reasons.push(coverage(plan));
+    reasons.extend(left_paths(plan, listing).filter(|_| written > 0));
     if left > 0 {
         reasons.push(format!(
             "{left} of {cuts} cuts are unchanged, since their correction makes them worse with a probability above --max-risk; measuring \
@@ -67,8 +72,9 @@ pub fn verdict(plan: &Plan, listing: &Listing) -> Verdict {
         matches!(reason, OutcomeReason::PartOfCut { .. } | OutcomeReason::Step { .. })
     });
     if steps > 0 {
+        let (motions, own) = if steps == 1 { ("motion is", "its") } else { ("motions are", "their") };
         reasons.push(format!(
-            "{steps} correctable motions are unchanged, since another motion of their cut cannot be corrected: correcting a part of a cut \
+            "{steps} correctable {motions} unchanged, since another motion of {own} cut cannot be corrected: correcting a part of a cut \
              would leave a step in the workpiece"
         ));
     }
@@ -85,7 +91,8 @@ pub fn verdict(plan: &Plan, listing: &Listing) -> Verdict {
     let inserted: usize = plan.outcomes.iter().map(|outcome| outcome.inserted as usize).sum();
     if inserted > 0 {
         reasons.push(format!(
-            "{inserted} targets inserted, to keep the path within the tolerance between targets"
+            "{inserted} {} inserted, to keep the path within the tolerance between targets",
+            if inserted == 1 { "target" } else { "targets" }
         ));
     }
     Verdict::new(status, headline, reasons)
@@ -95,15 +102,47 @@ fn count_reason(plan: &Plan, is: impl Fn(&OutcomeReason) -> bool) -> usize {
     plan.outcomes.iter().filter(|outcome| outcome.reason.as_deref().is_some_and(&is)).count()
 }
 
+/// Lines and arcs on which the tool may cut: how many, how many of them are right or corrected, and how many are left.
+fn paths(plan: &Plan, listing: &Listing) -> [usize; 3] {
+    let mut found = [0; 3];
+    for outcome in &plan.outcomes {
+        if is_path(&listing.motions[outcome.motion as usize]) {
+            let right = outcome.reason() == Some(OutcomeReason::NoChange);
+            found[0] += 1;
+            found[1] += usize::from(right || is_written(outcome.status));
+            found[2] += usize::from(!right && outcome.status == MotionStatus::Left);
+        }
+    }
+    found
+}
+
+fn is_written(status: MotionStatus) -> bool {
+    matches!(status, MotionStatus::Changed | MotionStatus::Flagged)
+}
+
 /// Whether the program has cuts and all of them are unchanged.
-fn no_cut(plan: &Plan) -> bool {
-    !plan.cuts.is_empty() && plan.cuts.iter().all(|cut| !cut.corrected)
+fn no_cut(plan: &Plan, listing: &Listing) -> bool {
+    let [all, corrected, _] = paths(plan, listing);
+    all > 0 && corrected == 0 || !plan.cuts.is_empty() && plan.cuts.iter().all(|cut| !cut.corrected)
+}
+
+/// What is said of lines and arcs that are left beside corrected motions; `None` without any.
+fn left_paths(plan: &Plan, listing: &Listing) -> Option<String> {
+    match paths(plan, listing) {
+        [_, _, 0] => None,
+        [_, _, 1] => {
+            Some("1 line or arc on which the tool may cut is left: there the deviation stays".to_owned())
+        }
+        [_, _, left] => Some(format!(
+            "{left} lines or arcs on which the tool may cut are left: there the deviation stays"
+        )),
+    }
 }
 
 /// Deviation before and after, as a sentence; `None` if unknown.
-fn deviations(plan: &Plan) -> Option<String> {
+fn deviations(plan: &Plan, listing: &Listing) -> Option<String> {
     let uncorrected = |mm: f64| format!("the uncorrected program deviates by up to {mm:.3} mm");
-    let Some(before) = placement::before_mm(plan).filter(|_| !no_cut(plan)) else {
+    let Some(before) = placement::before_mm(plan).filter(|_| !no_cut(plan, listing)) else {
         return placement::largest_mm(plan).map(uncorrected);
     };
     let after = placement::expected_mm(plan)?;
@@ -113,10 +152,10 @@ fn deviations(plan: &Plan) -> Option<String> {
     ))
 }
 
-pub(super) fn key_figures(plan: &Plan) -> Vec<KeyFigure> {
+pub(super) fn key_figures(plan: &Plan, listing: &Listing) -> Vec<KeyFigure> {
     let all = plan.outcomes.len();
     let shape = if placement::corrects_shape_only(plan) { "of the shape" } else { "shape and placement" };
-    let corrected = !no_cut(plan);
+    let corrected = !no_cut(plan, listing);
     let mut figures = vec![match placement::before_mm(plan).filter(|_| corrected) {
         Some(mm) => KeyFigure::new("Largest before", mm, 3, "mm").note(format!("{shape}, corrected motions")),
         None => KeyFigure::new("Largest before", placement::largest_mm(plan), 3, "mm")
@@ -150,15 +189,24 @@ pub fn coverage(plan: &Plan) -> String {
     if all == 0 {
         return "the program contains no motion".to_owned();
     }
-    let parts: Vec<String> = STATUSES
-        .iter()
-        .map(|&status| {
-            let found = count(plan, status);
-            format!("{found} {} ({})", status_word(status), share(found, all))
-        })
-        .collect();
+    let of = |status: MotionStatus| {
+        let found = count(plan, status);
+        format!("{found} {} ({})", status_word(status), share(found, all))
+    };
+    let flagged = count(plan, MotionStatus::Flagged);
+    let written = count(plan, MotionStatus::Changed) + flagged;
+    let of_which = match flagged {
+        0 => String::new(),
+        1 => ", of which 1 is flagged".to_owned(),
+        _ => format!(", of which {flagged} are flagged"),
+    };
+    let parts = [
+        format!("{written} corrected ({}){of_which}", share(written, all)),
+        of(MotionStatus::Refused),
+        of(MotionStatus::Left),
+    ];
     let word = if all == 1 { "motion" } else { "motions" };
-    format!("{all} {word}: {}", parts.join(", "))
+    format!("{all} {word}: {}", parts.join("; "))
 }
 
 /// Share in per cent; 100 % only if complete, 0 % only if empty.

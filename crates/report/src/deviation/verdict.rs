@@ -70,7 +70,18 @@ pub(super) fn verdict(reports: &[&PathReport]) -> Verdict {
             ));
         }
     }
-    if judged.is_empty() && status == Status::Good {
+    if let Some(missing) = reports.iter().find_map(|report| report.missing.as_ref()) {
+        if status == Status::Good {
+            status = Status::Warning;
+        }
+        let (motions, lead) =
+            if missing.count == 1 { ("motion is", "it leads") } else { ("motions are", "they lead") };
+        reasons.push(format!(
+            "{} {motions} not in this report, since the program text does not tell where {lead} ({})",
+            missing.count, missing.lines
+        ));
+    }
+    if judged.is_empty() && matches!(status, Status::Good | Status::Warning) {
         status = Status::NotEvaluated;
     }
     if judged.is_empty() && !reports.is_empty() {

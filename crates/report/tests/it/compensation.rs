@@ -221,14 +221,14 @@ fn coverage_counts_and_never_rounds_to_all_or_nothing() {
     let (mut plan, ..) = example();
     assert_eq!(
         view::coverage(&plan),
-        "7 motions: 1 changed (14.3 %), 2 flagged (28.6 %), 2 refused (28.6 %), 2 left (28.6 %)"
+        "7 motions: 3 corrected (42.9 %), of which 2 are flagged; 2 refused (28.6 %); 2 left (28.6 %)"
     );
     plan.outcomes = (0..100_000)
         .map(|i| outcome(i, if i == 0 { Status::Refused } else { Status::Changed }, None))
         .collect();
     assert_eq!(
         view::coverage(&plan),
-        "100000 motions: 99999 changed (> 99.9 %), 0 flagged (0 %), 1 refused (< 0.1 %), 0 left (0 %)"
+        "100000 motions: 99999 corrected (> 99.9 %); 1 refused (< 0.1 %); 0 left (0 %)"
     );
     plan.outcomes.clear();
     assert_eq!(view::coverage(&plan), "the program contains no motion");

@@ -59,6 +59,7 @@ fn report(model: &str, points: Vec<PathPoint>) -> PathReport {
         model: model.to_owned(),
         after: After::PredictedRemainder,
         points,
+        missing: None,
         held_out_mm: Some(0.46),
     }
 }

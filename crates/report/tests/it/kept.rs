@@ -4,7 +4,7 @@ use nalgebra::{Quaternion, Translation3, UnitQuaternion, Vector3, Vector6};
 use proptest::prelude::*;
 use serde_json::json;
 use truegrind_arm::region::Outside;
-use truegrind_compensation::deviation::{After, Deviation, PathPoint, PathReport, Status};
+use truegrind_compensation::deviation::{After, Deviation, MissingMotions, PathPoint, PathReport, Status};
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::MotionKind;
 use truegrind_report::batch::{Ended, Row};
@@ -94,7 +94,8 @@ proptest! {
             rest.iter_mut().for_each(|point| point.base_from_object = first.base_from_object);
         }
         let after = if achieved { After::Achieved } else { After::PredictedRemainder };
-        let report = PathReport { program: "a.mod".into(), model: "arm".into(), after, points, held_out_mm };
+        let missing = Some(MissingMotions { count: 2, lines: "lines 3, 5".into() });
+        let report = PathReport { program: "a.mod".into(), model: "arm".into(), after, points, missing, held_out_mm };
         let text = serde_json::to_string(&kept(&report)).unwrap();
         let back = from_kept(&serde_json::from_str(&text).unwrap()).unwrap();
         // Signs of zeros too, which == does not tell.
@@ -116,6 +117,7 @@ proptest! {
             after_mm: numbers[1],
             expected_mm: numbers[2],
             note: Some(text.clone()),
+            doubt: Some(text.clone()),
             reason: None,
         };
         let back: Row = serde_json::from_str(&serde_json::to_string(&row).unwrap()).unwrap();

@@ -43,7 +43,7 @@ fn arm() -> Model {
     Model {
         links,
         joint_map: Matrix6::identity(),
-        limits: Limits { min_rad: [-3.0; 6], max_rad: [3.0; 6], speed_rad_s: None },
+        limits: Limits { min_rad: [-3.0; 6], max_rad: [3.0; 6], speed_rad_s: None, sums: Vec::new() },
         flange: pose_from_vector(&[0.0, 0.0, 0.0, 0.1, -0.2, 0.3]),
         bodies: Some(std::array::from_fn(|i| Body {
             mass_kg: 6.0 - i as f64,

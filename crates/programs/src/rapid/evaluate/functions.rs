@@ -70,7 +70,7 @@ fn euler_zyx(q: [f64; 4], axis: usize) -> Result<f64, Reason> {
 /// An offset: that it is unknown is another reason than an unknown base; a name that another file declares is named as such.
 fn offset(value: &Value) -> Result<f64, Reason> {
     value.number().map_err(|reason| match reason {
-        Reason::Undeclared | Reason::Ambiguous => reason,
+        Reason::Undeclared | Reason::Ambiguous | Reason::Persistent => reason,
         _ => Reason::RunTimeOffset,
     })
 }

@@ -5,7 +5,8 @@ use std::sync::Arc;
 use super::{ListingBuilder, Literal, literals};
 use crate::dataflow::Nesting;
 use crate::motion::{
-    Declaration, Modal, Motion, MotionKind, MotionTarget, Origin, OutsideCall, Reason, Role, Routine,
+    Declaration, Modal, Motion, MotionKind, MotionTarget, Origin, OutsideCall, PersistentOffset, Reason,
+    Role, Routine,
 };
 use crate::rapid::evaluate::{Context, Source};
 use crate::rapid::flow::AbstractState;
@@ -70,6 +71,11 @@ impl ListingBuilder<'_, '_> {
             Source::Inline => Origin::Inline,
             Source::Computed => Origin::Computed,
             Source::Unknown => Origin::Unknown,
+            Source::Offset(base, offset) => {
+                let (first, end) = tokens_of(tree, base);
+                self.listing.offsets.push(PersistentOffset { base: tree.span(first, end), offset });
+                Origin::Offset(self.listing.offsets.len() as u32 - 1)
+            }
             Source::Symbol(symbol) => Origin::Declared(self.declaration(symbol)),
             Source::Element(symbol, literal) => {
                 Origin::Element { declaration: self.declaration(symbol), literal }

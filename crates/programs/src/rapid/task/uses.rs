@@ -115,7 +115,14 @@ impl<'s> ListingBuilder<'_, 's> {
                 let computed = user.filter(|&(motion, target)| {
                     let motion = &self.listing.motions[motion as usize];
                     motion.kind != MotionKind::Unknown
-                        && motion.targets[target as usize].origin == Origin::Computed
+                        && match motion.targets[target as usize].origin {
+                            Origin::Computed => true,
+                            Origin::Offset(offset) => {
+                                let base = self.listing.offsets[offset as usize].base;
+                                (base.start..base.end).contains(&start)
+                            }
+                            _ => false,
+                        }
                 });
                 let place = self.place(unit.file, token);
                 let uses = &mut self.listing.declarations[declaration as usize].other_uses;
