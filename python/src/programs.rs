@@ -8,7 +8,6 @@ use truegrind::compensation::cell::Used;
 use truegrind::compensation::cell::nc_setup::cell_setup;
 use truegrind::compensation::cell::robot_match::unreachable_motions;
 use truegrind::compensation::cell::robot_match::{cell_robot_mismatch, program_robot_mismatch};
-use truegrind::compensation::deviation::MissingMotions;
 use truegrind::compensation::frames::surface_frames::surface_frame_contradictions;
 use truegrind::compensation::frames::taught::contradictions;
 use truegrind::compensation::risk::placement::Placement;
@@ -467,9 +466,7 @@ fn corrected(
         program: sources.name(),
         model: model.name.clone(),
         after: After::PredictedRemainder,
-        missing: MissingMotions::of(listing, |motion| {
-            plan.outcomes.get(motion as usize).is_some_and(|outcome| outcome.before_mm.get().is_some())
-        }),
+        missing: plan.missing_motions(listing),
         points: std::mem::take(&mut plan.points),
         held_out_mm: Some(arm.geometry.held_out.rmse),
     };

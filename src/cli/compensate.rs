@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use serde_json::Value;
-use truegrind::compensation::deviation::{After, MissingMotions, PathReport};
+use truegrind::compensation::deviation::{After, PathReport};
 use truegrind::compensation::plan::Plan;
 use truegrind::compensation::risk::prepared_estimate::PreparedEstimate;
 use truegrind::programs::reading::{Language, Program};
@@ -138,9 +138,7 @@ fn compensate_one(context: &CompensateContext<'_>, job: &Job) -> anyhow::Result<
             program: programs.name(),
             model: context.corrector.map_or("nominal", |c| c.model).to_owned(),
             after: After::PredictedRemainder,
-            missing: MissingMotions::of(listing, |motion| {
-                planned.outcomes.get(motion as usize).is_some_and(|outcome| outcome.before_mm.get().is_some())
-            }),
+            missing: planned.missing_motions(listing),
             points: std::mem::take(&mut planned.points),
             held_out_mm: context.corrector.map(|c| c.arm.geometry.held_out.rmse),
         };

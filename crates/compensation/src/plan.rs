@@ -8,12 +8,13 @@ pub mod single_precision;
 pub mod steps_to_left;
 mod surface_normals;
 
-use crate::deviation::{PathPoint, Status};
+use crate::deviation::{MissingMotions, PathPoint, Status};
 use crate::plan::reason::OutcomeReason;
 use crate::plan::steps_to_left::StepsToLeft;
 use crate::risk::cut_risk::CutRisk;
 use crate::risk::placement::ObjectPlacement;
 use truegrind_math::option_f64::OptionF64;
+use truegrind_programs::motion::Listing;
 use truegrind_programs::rewrite::Change;
 
 /// Outcome of one motion; feeds the JSON contract and the table. Small, because a program may have a million motions.
@@ -80,4 +81,13 @@ pub struct Plan {
     pub cuts: Vec<CutRisk>,
     /// Probability that the correction does harm, over all corrected cuts together; absent without an assessment.
     pub probability_of_harm: Option<f64>,
+}
+
+impl Plan {
+    /// Motions of which nothing is said, since the program text does not tell where they lead.
+    pub fn missing_motions(&self, listing: &Listing) -> Option<MissingMotions> {
+        MissingMotions::of(listing, |motion| {
+            self.outcomes.get(motion as usize).is_some_and(|outcome| outcome.before_mm.get().is_some())
+        })
+    }
 }
