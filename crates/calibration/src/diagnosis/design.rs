@@ -318,6 +318,36 @@ impl Linear {
         left
     }
 
+    /// The parameters after one Gauss–Newton step beside random effects, `columns`, n × m, with coefficients of variance 1, and noise that is
+    /// `noise` times the assumed one; and their covariance.
+    ///
+    /// The same follows from [`Linear::with_random_effects`], which copies J: of a long data set that is hundreds of megabytes, and
+    /// its basis as much again.
+    pub fn step_beside(&self, columns: &DMatrix<f64>, noise: f64) -> (Vec<f64>, DMatrix<f64>) {
+        let (p, m, square) = (self.x.len(), columns.ncols(), noise * noise);
+        let shared = product(&self.rows, columns) / square;
+        let mut all = DMatrix::zeros(p + m, p + m);
+        all.view_mut((0, 0), (p, p)).copy_from(&(self.normal() / square));
+        all.view_mut((p, 0), (m, p)).tr_copy_from(&shared);
+        all.view_mut((0, p), (p, m)).copy_from(&shared);
+        all.view_mut((p, p), (m, m)).copy_from(&(gram(columns) / square));
+        let mut gradient = DVector::zeros(p + m);
+        gradient.rows_mut(0, p).copy_from(&(&self.gradient / square));
+        gradient.rows_mut(p, m).copy_from(&(columns.tr_mul(&self.residual) / square));
+        // Priors do not become weaker with more noise.
+        for (k, precision) in self.precision.iter().enumerate() {
+            let prior = precision * (1.0 - 1.0 / square);
+            all[(k, k)] += prior;
+            gradient[k] += prior * self.x[k];
+        }
+        (p..p + m).for_each(|k| all[(k, k)] += 1.0);
+        let lower = lower_factor(all);
+        let step = back_and_forth(&lower, &gradient).unwrap_or_else(|| DVector::zeros(p + m));
+        let own: Vec<usize> = (0..p).collect();
+        let covariance = gram(&solved(&lower, units(p + m, &own)));
+        (self.x.iter().zip(step.iter()).map(|(x, step)| x - step).collect(), covariance)
+    }
+
     /// The design with all parameters free, from which those of smaller models follow at little cost.
     pub fn whole(&self) -> FullDesign {
         let lower = lower_factor(self.normal().clone());
@@ -369,14 +399,6 @@ impl Linear {
 }
 
 impl FullDesign {
-    /// The first `count` parameters after one Gauss–Newton step, and their covariance.
-    pub(super) fn estimate(&self, count: usize) -> (Vec<f64>, DMatrix<f64>) {
-        let p = self.x.len();
-        let mut picked = DMatrix::zeros(p, count);
-        (0..count).for_each(|k| picked[(k, k)] = 1.0);
-        (self.x.rows(0, count).iter().copied().collect(), gram(&solved(&self.lower, picked)))
-    }
-
     /// The design of the model without the parameters at `dropped`, by removing directions from the full basis.
     ///
     /// With Z = L⁻¹E for the dropped columns E of the identity and ZᵀZ = M Mᵀ, U = Z M⁻ᵀ is orthonormal, the smaller

@@ -127,7 +127,6 @@ fn with_random_functions(
     if time_discrepancy.is_none() && !sensor_law::is_needed(fit) && !link_growth::is_needed(fit) {
         return None;
     }
-    let numbers: Vec<usize> = subject.observed.dataset.rows.iter().map(|r| r.number).collect();
     let linear = Linear::of(subject, fit);
     let mut functions = sensor_law::columns(subject, fit, &linear);
     functions.extend(link_growth::random_effects(subject, fit, &linear));
@@ -139,11 +138,7 @@ fn with_random_functions(
         return None;
     }
     let noise = time_discrepancy.map_or(1.0, |discrepancy| discrepancy.noise);
-    let whole = linear
-        .with_random_effects(&DMatrix::from_columns(&columns))
-        .prewhitened(0.0, &numbers, noise)
-        .whole();
-    let (x, covariance) = whole.estimate(fit.x.len());
+    let (x, covariance) = linear.step_beside(&DMatrix::from_columns(&columns), noise);
     let is_implausible = |k: usize| {
         let is_link = matches!(fit.parameters[k], Parameter::Link { .. });
         is_link && !((x[k] - fit.priors[k].mean).abs() <= IMPLAUSIBLE * fit.priors[k].sigma)

@@ -299,6 +299,36 @@ fn part_of_the_whole(subject: &Subject<'_>, fitted: &Extended) {
 }
 
 #[test]
+fn a_step_beside_random_effects_solves_the_equations_of_all_rows() {
+    fitted(90, |subject, fitted| {
+        let columns = DMatrix::from_fn(270, 4, |i, k| ((i * (5 + k) + 3 * k) % 17) as f64 / 8.0 - 1.0);
+        let noise = 1.3;
+        let (x, covariance) = Linear::of(subject, fitted).step_beside(&columns, noise);
+        // The long way: readings and priors as rows of one system.
+        let (residual, transposed) = fitted.problem.linearise(&fitted.x);
+        let (p, n) = transposed.shape();
+        let mut rows = DMatrix::zeros(n, p + 4);
+        rows.columns_mut(0, p).tr_copy_from(&transposed);
+        rows.columns_mut(p, 4).copy_from(&columns);
+        rows /= noise;
+        let mut normal = rows.tr_mul(&rows);
+        let mut gradient = rows.tr_mul(&(residual / noise));
+        for (k, prior) in fitted.priors.iter().enumerate() {
+            normal[(k, k)] += prior.sigma.powi(-2);
+            gradient[k] += prior.sigma.powi(-2) * fitted.x[k];
+        }
+        (p..p + 4).for_each(|k| normal[(k, k)] += 1.0);
+        let all = normal.cholesky().unwrap();
+        let (step, inverse) = (all.solve(&gradient), all.inverse());
+        for k in 0..p {
+            let sigma = inverse[(k, k)].sqrt();
+            assert!((x[k] - fitted.x[k] + step[k]).abs() < 1e-6 * sigma, "{:?}", fitted.parameters[k]);
+            assert!((covariance[(k, k)].sqrt() / sigma - 1.0).abs() < 1e-6, "{:?}", fitted.parameters[k]);
+        }
+    });
+}
+
+#[test]
 fn overlapping_shifts_are_told_as_levels() {
     let zero = |from, to, mm| {
         let mut d = Disturbance::new(Kind::Zero, Profile::Rows { from, to });
