@@ -25,7 +25,7 @@
 //!     causes; `sensor_causes`: whether causes of the measurement are fitted with it.
 //! 11. [`finding`], `summary` and [`words`]: the result, as a contract for programs and as sentences for technicians.
 //!
-//! `algebra` has products and factors of large matrices.
+//! `algebra` has products and factors of large matrices, `products` and `pure_products` those of a linearised fit with many candidates.
 //!
 //! The prior of a candidate's size is part of its evidence, which penalises candidates with many parameters.
 
@@ -36,6 +36,7 @@ pub mod catalogue;
 mod algebra;
 mod serial_correlation;
 mod products;
+mod pure_products;
 pub mod discrepancy;
 pub mod elimination;
 pub mod halves;

@@ -16,18 +16,19 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::algebra::{lower_factor, picked_rows, product, solved};
+use super::algebra::{lower_factor, picked_rows};
 use super::candidates::Scored;
 use super::catalogue::Candidate;
 use super::cause::Cause;
 use super::cause_kind::CauseKind;
-use super::design::{Design, FullDesign, Linear, side_by_side};
+use super::design::{Design, FullDesign, Linear};
 use super::discrepancy::{Discrepancy, Functions};
 use super::elimination::{Criteria, Eliminated, Significance, Tested, eliminate};
 use super::extension::{Extended, Subject};
 use super::halves::{HALVES, halves};
 use super::intervals::ShiftScan;
 use super::link_growth;
+use super::pure_products::PureProducts;
 use super::score::{Score, score_columns, score_from, score_projected};
 use super::selection::{Accepted, Options, contains_cause};
 use super::serial_correlation::prewhiten;
@@ -452,9 +453,7 @@ impl<'a> Half<'a> {
         let all: Vec<&WithColumns> = pool.iter().chain(own.iter().filter(|o| fresh(o, pool))).collect();
         let columns: Vec<DMatrix<f64>> = all.iter().map(|t| self.columns(&t.columns)).collect();
         let mut projected = design.project_all(&columns);
-        let ranges = ranges(&columns);
-        let beside = side_by_side(&columns, design.rows());
-        let mut extra = DMatrix::zeros(0, design.rows());
+        let mut products = PureProducts::of(design, &columns, &projected);
         let mut chosen: Vec<usize> = Vec::new();
         let options = self.confirming.options;
         while chosen.len() < own.len() + 4 {
@@ -476,24 +475,18 @@ impl<'a> Half<'a> {
             let Some((j, _)) = best else { break };
             chosen.push(j);
             // Projects the selected cause off all candidates.
-            let mut pure = design.pure(&columns[j], &projected[j]);
-            pure -= extra.transpose() * product(&extra, &columns[j]);
             let mut normal = projected[j].information.clone();
             for (k, size) in all[j].candidate.cause.sizes().iter().enumerate() {
                 normal[(k, k)] += size.powi(-2);
             }
             let lower = lower_factor(normal);
-            let rows = solved(&lower, pure.transpose());
             let Some(pull) = lower.solve_lower_triangular(&projected[j].gradient) else { break };
-            let shared = product(&rows, &beside);
-            for (p, range) in projected.iter_mut().zip(&ranges) {
+            let shared = products.project_off(j, &columns[j], &lower);
+            for (p, range) in projected.iter_mut().zip(&products.ranges) {
                 let t = shared.columns(range.start, range.len());
                 p.information -= t.transpose() * t;
                 p.gradient -= t.tr_mul(&pull);
             }
-            let first = extra.nrows();
-            extra = extra.insert_rows(first, rows.nrows(), 0.0);
-            extra.rows_mut(first, rows.nrows()).copy_from(&rows);
         }
         chosen.into_iter().map(|j| all[j].candidate.cause.clone()).collect()
     }
@@ -504,15 +497,4 @@ fn fresh(own: &WithColumns, pool: &[WithColumns]) -> bool {
     let cause = &own.candidate.cause;
     cause.rows().is_some()
         || !pool.iter().any(|p| contains_cause(std::slice::from_ref(cause), &p.candidate.cause))
-}
-
-fn ranges(columns: &[DMatrix<f64>]) -> Vec<std::ops::Range<usize>> {
-    let mut first = 0;
-    columns
-        .iter()
-        .map(|c| {
-            first += c.ncols();
-            first - c.ncols()..first
-        })
-        .collect()
 }

@@ -482,8 +482,7 @@ impl Design {
     /// QᵀC and CᵀC of sparse columns, such as knots of an error map, in time proportional to the nonzero entries.
     fn sparse_product(&self, columns: &DMatrix<f64>) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
         let entries = sparse(columns)?;
-        let mut shared = DMatrix::zeros(self.basis.nrows(), columns.ncols());
-        add_sparse_product(self.basis.nrows(), &entries, self.basis.as_slice(), shared.as_mut_slice());
+        let shared = times_sparse(&self.basis, &entries, columns.ncols());
         let mut square = DMatrix::zeros(columns.ncols(), columns.ncols());
         for row in entries.chunk_by(|a, b| a.from == b.from) {
             for (x, y) in row.iter().flat_map(|x| row.iter().map(move |y| (x, y))) {
@@ -532,7 +531,7 @@ impl Design {
     }
 
     /// QᵀC of the columns, along what is free, p × k.
-    fn shared(&self, projected: &Projected) -> DMatrix<f64> {
+    pub(super) fn shared(&self, projected: &Projected) -> DMatrix<f64> {
         let mut shared = projected.shared.clone();
         if let (Some(reduction), Some(back)) = (&self.reduction, &projected.given_back) {
             shared -= product(&reduction.directions, back);
@@ -550,6 +549,18 @@ impl Design {
     pub fn rows(&self) -> usize {
         self.residual.len()
     }
+}
+
+/// A C, A m × n: where the columns are sparse, in time proportional to their nonzero entries.
+pub(super) fn times_columns(a: &DMatrix<f64>, columns: &DMatrix<f64>) -> DMatrix<f64> {
+    sparse(columns).map_or_else(|| product(a, columns), |entries| times_sparse(a, &entries, columns.ncols()))
+}
+
+/// A C of `count` columns with these entries.
+fn times_sparse(a: &DMatrix<f64>, entries: &[Entry], count: usize) -> DMatrix<f64> {
+    let mut out = DMatrix::zeros(a.nrows(), count);
+    add_sparse_product(a.nrows(), entries, a.as_slice(), out.as_mut_slice());
+    out
 }
 
 /// All columns of some matrices of `rows` rows.
