@@ -43,6 +43,8 @@ use truegrind_arm::jacobian::{BaseAndTool, parameter_jacobian};
 use truegrind_arm::model::Joints;
 use truegrind_arm::parameter::Parameter;
 use truegrind_estimation::problem::Problem;
+use truegrind_math::gram::add_products;
+use truegrind_math::lanes::WIDTH;
 use truegrind_math::se3::{Pose, vector_from_pose};
 use truegrind_math::tail::normal_two_sided;
 use truegrind_math::work::checkpoint;
@@ -467,6 +469,16 @@ fn gram(a: &DMatrix<f64>) -> DMatrix<f64> {
     if a.ncols() > MANY { a.transpose() * a } else { a.tr_mul(a) }
 }
 
+/// Adds AᵀA of readings to the lower triangle of `sum`. Many columns are mostly knots of error maps, of which a block of rows reaches few; the
+/// kernel skips the others, but takes whole groups of rows.
+fn add_gram(a: &DMatrix<f64>, sum: &mut DMatrix<f64>) {
+    if a.ncols() > MANY && a.nrows().is_multiple_of(WIDTH) {
+        add_products(a.as_slice(), a.nrows(), sum.as_mut_slice());
+    } else {
+        *sum += gram(a);
+    }
+}
+
 /// Cholesky factor of a large matrix, in blocks.
 fn blocked_cholesky(mut matrix: DMatrix<f64>) -> Option<Cholesky<f64, Dyn>> {
     let n = matrix.nrows();
@@ -590,11 +602,12 @@ fn linearise_readings(fitted: &Fitted, dataset: &Dataset) -> LinearisedReadings 
             }
             let jacobian = DMatrix::from_vec(n, all, jacobian);
             let y = jacobian.columns(0, p) * DVector::from_column_slice(x) - DVector::from_vec(residuals);
-            out.matrix += gram(&jacobian);
+            add_gram(&jacobian, &mut out.matrix);
             out.right += jacobian.tr_mul(&y);
             out.square += y.norm_squared();
             out.count += n;
         }
+        out.matrix.fill_upper_triangle_with_lower_triangle();
         out
     };
     let rows = dataset.rows.len();
