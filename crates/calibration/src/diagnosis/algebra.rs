@@ -22,6 +22,12 @@ pub(super) fn gram(a: &DMatrix<f64>) -> DMatrix<f64> {
     squared(shown(a).transpose())
 }
 
+/// B − AᵀA, of which only the lower triangle counts: the upper one is not kept up.
+pub(super) fn without_lower_gram(mut b: DMatrix<f64>, a: &DMatrix<f64>) -> DMatrix<f64> {
+    lower_product(shown(a).transpose(), &mut b, Accum::Add, -1.0);
+    b
+}
+
 /// A Aᵀ.
 pub(super) fn outer(a: &DMatrix<f64>) -> DMatrix<f64> {
     squared(shown(a))
@@ -79,16 +85,21 @@ fn multiplied(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> DMatrix<f64> {
 
 /// A Aᵀ: its lower triangle, mirrored.
 fn squared(a: MatRef<'_, f64>) -> DMatrix<f64> {
+    let mut out = DMatrix::zeros(a.nrows(), a.nrows());
+    lower_product(a, &mut out, Accum::Replace, 1.0);
+    out.fill_upper_triangle_with_lower_triangle();
+    out
+}
+
+/// Puts a multiple of A Aᵀ in the lower triangle of a matrix, or adds it.
+fn lower_product(a: MatRef<'_, f64>, out: &mut DMatrix<f64>, how: Accum, factor: f64) {
     let n = a.nrows();
-    let mut out = DMatrix::zeros(n, n);
-    in_parts(&mut out, PART, n * n * a.ncols() < 2 * SMALL, |first, place| {
+    in_parts(out, PART, n * n * a.ncols() < 2 * SMALL, |first, place| {
         let columns = place.ncols();
         let lower = place.subrows_mut(first, n - first);
         let (left, right) = (a.subrows(first, n - first), a.subrows(first, columns).transpose());
-        faer::linalg::matmul::matmul(lower, Accum::Replace, left, right, 1.0, Par::Seq);
+        faer::linalg::matmul::matmul(lower, how, left, right, factor, Par::Seq);
     });
-    out.fill_upper_triangle_with_lower_triangle();
-    out
 }
 
 /// Replaces a positive definite matrix by its lower Cholesky factor; `false` if it is not positive definite.

@@ -14,7 +14,7 @@ use std::ops::Range;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::algebra::gram;
+use super::algebra::{gram, without_lower_gram};
 use super::design::Design;
 use truegrind_math::axpy::add_scaled;
 use truegrind_math::lanes::{AnyWidth, Real, SinCos, WIDTH, vectorised};
@@ -87,6 +87,8 @@ pub struct ShiftScan {
     products: DMatrix<f64>,
     /// Prefix sums of squares at every observation, k × k each.
     square: Vec<f64>,
+    /// Those at the cuts, in the order of [`by_entry`].
+    square_at_cuts: Vec<f64>,
 }
 
 /// A scan against one design.
@@ -97,8 +99,10 @@ struct ScanSums<'a> {
     gradient: Vec<f64>,
     /// Prefix sums of the products with the removed directions at the cuts, d × (k · cuts).
     given_back: Option<DMatrix<f64>>,
-    /// Scalar products of the prefix sums at the cuts with each other.
+    /// Scalar products of the prefix sums at the cuts with each other: the lower triangle.
     products: Cow<'a, DMatrix<f64>>,
+    /// Those of each cut with itself, in the order of [`by_entry`].
+    own_products: Vec<f64>,
 }
 
 /// Adds the products of some scalar rows with the rows of `basis` to `out`, k × rows of the basis.
@@ -126,6 +130,18 @@ fn sums_at(cuts: &[usize], scaled: &DMatrix<f64>, basis: &DMatrix<f64>, per: usi
         }
         place.gemm(1.0, &basis, &scaled, 1.0);
         at = cut;
+    }
+    out
+}
+
+/// What the cuts have at each entry (a, b) of the lower triangle of a k × k matrix: of one entry all cuts, then of the next. A scan reads
+/// them thousands of times in this order, and in a matrix of all cuts they are pages apart.
+fn by_entry(k: usize, cuts: usize, of: impl Fn(usize, usize, usize) -> f64) -> Vec<f64> {
+    let mut out = Vec::with_capacity(k * (k + 1) / 2 * cuts);
+    for a in 0..k {
+        for b in 0..=a {
+            out.extend((0..cuts).map(|cut| of(cut, a, b)));
+        }
     }
     out
 }
@@ -231,7 +247,8 @@ impl ShiftScan {
         let cuts: Vec<usize> = (SHORTEST..n - 1).step_by(stride).chain([n]).collect();
         let shared = sums_at(&cuts, &scaled, &whole.basis, per);
         let products = gram(&shared);
-        Some(Self { n, k, scaled, cuts, stride, shared, products, square })
+        let square_at_cuts = by_entry(k, cuts.len(), |cut, a, b| square[(cuts[cut] * k + a) * k + b]);
+        Some(Self { n, k, scaled, cuts, stride, shared, products, square, square_at_cuts })
     }
 
     /// The best intervals, best first: at most `count`, none of which shares most of its rows with a better one. `design` is
@@ -289,37 +306,39 @@ impl<'a> ScanSums<'a> {
         }
         let given_back = design.removed().map(|removed| sums_at(&strip.cuts, &strip.scaled, removed, per));
         let products = match &given_back {
-            Some(back) => Cow::Owned(&strip.products - gram(back)),
+            Some(back) => Cow::Owned(without_lower_gram(strip.products.clone(), back)),
             None => Cow::Borrowed(&strip.products),
         };
-        Self { strip, design, gradient, given_back, products }
+        let own_products = by_entry(k, strip.cuts.len(), |cut, a, b| products[(cut * k + a, cut * k + b)]);
+        Self { strip, design, gradient, given_back, products, own_products }
     }
 
     /// Prefix sums at a cut: k Q-products, then k products with the removed directions.
-    fn at_cut(&self, cut: usize) -> Vec<f64> {
+    fn at_cut(&'a self, cut: usize) -> Vec<f64> {
         let k = self.strip.k;
-        let of = |m: &DMatrix<f64>| m.columns(cut * k, k).iter().copied().collect::<Vec<f64>>();
-        let mut out = of(&self.strip.shared);
-        out.extend(self.given_back.iter().flat_map(of));
-        out
+        let of = |m: &'a DMatrix<f64>| &m.as_slice()[cut * k * m.nrows()..][..k * m.nrows()];
+        [of(&self.strip.shared), self.given_back.as_ref().map_or(&[], of)].concat()
     }
 
     /// Evidence of the observations between the cut `first` and each later one, several in a register.
-    fn after_cut(&self, first: usize) -> Vec<f64> {
+    fn after_cut(&'a self, first: usize) -> Vec<f64> {
         let (k, cuts) = (self.strip.k, &self.strip.cuts);
         let lasts = first + 1..cuts.len();
         let count = lasts.len();
         let (g, low, from) = (&self.products, first * k, cuts[first]);
         let mut squares = Vec::with_capacity(k * (k + 1) / 2 * count);
+        let later = |all: &'a [f64], entry: usize| &all[entry * cuts.len()..][..cuts.len()][first + 1..];
         for a in 0..k {
             for b in 0..=a {
+                let entry = a * (a + 1) / 2 + b;
                 let (by_a, by_b) = (g.column(low + a), g.column(low + b));
-                let before = self.square_at(from, a, b);
-                squares.extend(lasts.clone().map(|last| {
-                    let high = last * k;
-                    let shared = g[(high + a, high + b)] - by_b[high + a] - by_a[high + b] + by_b[low + a];
-                    self.square_at(cuts[last], a, b) - before - shared
-                }));
+                let (own, square) =
+                    (later(&self.own_products, entry), later(&self.strip.square_at_cuts, entry));
+                let (before, own_before) = (self.square_at(from, a, b), by_b[low + a]);
+                let high = [&by_b.as_slice()[low + k + a..], &by_a.as_slice()[low + k + b..]];
+                let shared = own.iter().zip(high[0].iter().step_by(k)).zip(high[1].iter().step_by(k));
+                let shared = shared.map(|((own, x), y)| own - x - y + own_before);
+                squares.extend(square.iter().zip(shared).map(|(square, shared)| square - before - shared));
             }
         }
         let mut gradients = Vec::with_capacity(k * count);
@@ -358,13 +377,9 @@ impl<'a> ScanSums<'a> {
     fn at_row<'b>(&self, i: usize, known: &'b mut BTreeMap<usize, Vec<f64>>) -> &'b [f64] {
         if !known.contains_key(&i) {
             let cut = self.strip.cuts.partition_point(|&c| c <= i).saturating_sub(1);
-            let mut at = self.strip.cuts[cut];
-            let mut sum = self.at_cut(cut);
-            if let Some((&near, prefix)) = known.range(..i).next_back()
-                && near > at
-            {
-                (at, sum) = (near, prefix.clone());
-            }
+            let before = known.range(..i).next_back().filter(|(near, _)| **near > self.strip.cuts[cut]);
+            let (at, mut sum) = before
+                .map_or_else(|| (self.strip.cuts[cut], self.at_cut(cut)), |(&near, sum)| (near, sum.clone()));
             let (shared, back) = sum.split_at_mut(self.strip.k * self.strip.shared.nrows());
             let rows = at * self.design.per..i * self.design.per;
             add_products(&self.strip.scaled, &self.design.basis, rows.clone(), shared);
