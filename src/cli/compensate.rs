@@ -21,7 +21,8 @@ use truegrind::units::key::sha256;
 use self::batch::{BatchReports, ProgramResult};
 use self::context::{CompensateContext, Corrector};
 use self::outputs::{
-    MISSING_OUTPUT, add_programs, output_files, refuse_report_over_program, refuse_shared_output,
+    MISSING_OUTPUT, add_programs, output_files, refuse_file_for_folder, refuse_report_over_program,
+    refuse_shared_output,
 };
 use self::program::rewrite_program;
 use super::cell_arguments::note_unused_entries;
@@ -47,6 +48,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
         None => programs::jobs(&arguments.programs, arguments.grouping)?,
     };
     refuse_shared_output(&jobs)?;
+    refuse_file_for_folder(&jobs, arguments)?;
     let reports = arguments.report_files();
     let inputs_of: Vec<&Path> = jobs.iter().flat_map(|job| &job.paths).map(PathBuf::as_path).collect();
     Batch::check(&inputs_of, &reports)?;

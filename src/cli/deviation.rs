@@ -355,12 +355,33 @@ impl DeviationContext<'_> {
         if reports.iter().all(|report| report.points.is_empty()) {
             bail!("{name}: no motion has a target that the program text determines");
         }
+        if original.is_some() {
+            refuse_unrelated(&name, &reports)?;
+        }
         let mut used = Used::by(task.listing(), self.cell);
         if let Some(original) = &original {
             used.join(&Used::by(original.listing(), self.cell));
         }
         Ok(ProgramReports { name: job.name(), reports, used: Some(used), failed: None })
     }
+}
+
+/// No correction moves a target so far (mm).
+const OTHER_TARGET_MM: f64 = 100.0;
+
+/// Refuses a program that was not rewritten from that of `--intended`.
+fn refuse_unrelated(name: &str, reports: &[PathReport]) -> anyhow::Result<()> {
+    let ends = reports.iter().flat_map(|report| &report.points);
+    let farthest = ends
+        .filter_map(|point| Some((point.line, point.after?.norm_mm())))
+        .max_by(|(_, a), (_, b)| a.total_cmp(b));
+    if let Some((line, mm)) = farthest.filter(|(_, mm)| *mm > OTHER_TARGET_MM) {
+        bail!(
+            "{name}: it ends {mm:.0} mm from the target of line {line} of the program of --intended, further than any correction: give the \
+             program from which it was rewritten"
+        );
+    }
+    Ok(())
 }
 
 fn runners(arguments: &Arguments) -> anyhow::Result<Vec<Runner>> {

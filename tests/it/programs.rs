@@ -439,6 +439,14 @@ fn two_programs_never_end_in_one_file() {
         assert!(both && err.contains("both be written to a.mod"), "{err}");
         assert!(!at.join("out").exists(), "{arguments:?}");
     }
+    // Several programs go into a folder, and those of a shared run.
+    for arguments in [&["left/a.mod", "--resume"][..], &["left", "--each"]] {
+        let common = ["--model", "model.toml", "-o", "one.mod"];
+        let (code, _, err) = truegrind(at, &[&["compensate"], arguments, &common].concat());
+        assert_eq!(code, 2, "{arguments:?}");
+        assert!(err.contains("one.mod: named like one program"), "{arguments:?}: {err}");
+        assert!(!at.join("one.mod").exists(), "{arguments:?}");
+    }
     let (code, _, err) = run(&["left/a.mod", "left/a.mod"]);
     assert_eq!(code, 2);
     assert!(err.contains("left/a.mod is named twice"), "{err}");
@@ -762,6 +770,12 @@ fn what_is_left_shows_everywhere() {
         truegrind(at, &["deviation", "left.mod", "--model", "model.toml", "--intended", "in/left.mod"]);
     assert_eq!(code, 0, "{err}");
     assert!(report.contains("[warning]") && report.contains("2 motions are not in this report"), "{report}");
+    // As many motions, and one of them leads elsewhere.
+    fs::write(at.join("other.mod"), text.replace(&place(370.0), &place(240.0))).unwrap();
+    let other = ["deviation", "other.mod", "--model", "model.toml", "--intended", "in/left.mod"];
+    let (code, _, err) = truegrind(at, &other);
+    assert_eq!(code, 2);
+    assert!(err.contains(" mm from the target of line 7"), "{err}");
     // Corrected with this model: nothing would change.
     let (code, _, err) = truegrind(at, &["compensate", "left.mod", "--model", "model.toml", "--check"]);
     assert_eq!(code, 0, "{err}");

@@ -56,7 +56,7 @@ pub struct Row {
     pub motions: [usize; 5],
     /// Regions that could not be read.
     pub opaque: usize,
-    /// Largest deviation before (mm).
+    /// Largest deviation before of the corrected motions, or of all if none is corrected (mm).
     #[serde(with = "kept::optional")]
     pub before_mm: Option<f64>,
     /// Largest predicted remainder of the corrected motions (mm).
@@ -83,7 +83,6 @@ impl Row {
         let written = |motion_status: MotionStatus| {
             matches!(motion_status, MotionStatus::Changed | MotionStatus::Flagged)
         };
-        let before = plan.outcomes.iter().filter_map(|outcome| outcome.before_mm.get());
         let after = plan.outcomes.iter().filter(|o| written(o.status)).filter_map(|o| o.after_mm.get());
         Row {
             file,
@@ -97,7 +96,7 @@ impl Row {
                 count(MotionStatus::Left),
             ],
             opaque: listing.opaque.len(),
-            before_mm: before.reduce(f64::max),
+            before_mm: placement::before_mm(plan).or_else(|| placement::largest_mm(plan)),
             after_mm: after.reduce(f64::max),
             expected_mm: placement::expected_mm(plan),
             note: undeclared_note(listing),
@@ -345,7 +344,7 @@ pub fn document(rows: &[Row]) -> Document {
         KeyFigure::new("Corrected", changed + flagged, 0, "")
             .note(format!("of {motions} motions, {flagged} of them flagged")),
         KeyFigure::new("Largest before", largest(|row| row.before_mm), 3, "mm")
-            .note("uncorrected, all motions"),
+            .note("uncorrected; of programs with corrected motions, the largest of these"),
         KeyFigure::new("Expected after", largest(|row| row.expected_mm), 3, "mm")
             .note("1σ: largest of the corrected motions"),
         KeyFigure::new("To check", rows.iter().filter(|row| !row.is_clean()).count(), 0, "")

@@ -398,6 +398,19 @@ fn split_reason(reason: &OutcomeReason) -> (String, Option<(f64, &'static str)>)
         OutcomeReason::PathDeviation { mm } => {
             sized("path between the targets deviates from the intended one".to_owned(), mm, "mm")
         }
+        OutcomeReason::CornerDeviation { mm } => sized(
+            "the rounded corner before it deviates from the intended one: round it less (zone, path tolerance)"
+                .to_owned(),
+            mm,
+            "mm",
+        ),
+        OutcomeReason::AmbiguousCentre { mm } => sized(
+            "an arc of about half a turn programmed by its radius: the written decimals leave its centre ambiguous; state the centre \
+             instead (I, J, K; CC)"
+                .to_owned(),
+            mm,
+            "mm",
+        ),
         OutcomeReason::TooFast { joint, ratio } => sized(
             format!("joint {} would exceed its speed limit at the programmed speed", joint + 1),
             ratio,

@@ -14,7 +14,7 @@ mod verdict;
 use serde_json::{Value, json};
 
 use self::side::{AFTER, BEFORE, Side, by_program, has, intended};
-use self::verdict::verdict;
+use self::verdict::{size, verdict};
 use self::words::{decimals, meaning, named, notes, words};
 use super::document::{Block, Document, KeyFigure};
 use super::status::Status;
@@ -426,10 +426,10 @@ fn key_figures(reports: &[&PathReport]) -> Vec<KeyFigure> {
     };
     let max = |report: &PathReport, side: Side| block(report, side).map(|block| block.all.max);
     if let Some(first) = reports.first() {
+        // Along the normal only beside a deviation after that is so too: the expected one has no direction.
+        let before =
+            if has(first, AFTER) && first.expected_mm().is_none() { max(first, BEFORE) } else { size(first) };
         let note = format!("uncorrected{}", mean(first, BEFORE));
-        // The expected deviation has no sign, so the deviation before is then also stated as a size.
-        let sizes = || first.cut().filter_map(|p| p.before.map(|d| d.norm_mm())).reduce(f64::max);
-        let before = first.expected_mm().and_then(|_| sizes()).or_else(|| max(first, BEFORE));
         figures.push(KeyFigure::new("Largest before", before, 3, "mm").note(note));
     }
     for report in reports.iter().filter(|report| has(report, AFTER)).take(MODELS_IN_FIGURES) {
@@ -439,7 +439,8 @@ fn key_figures(reports: &[&PathReport]) -> Vec<KeyFigure> {
             }
             // The remainder of the solver does not predict the arm; the expected deviation does.
             After::PredictedRemainder => {
-                ("Expected after", report.expected_mm(), "1σ of the model, maximum over the cut".to_owned())
+                let note = "1σ of the model, largest of the cut with its uncorrected points";
+                ("Expected after", report.expected_mm(), note.to_owned())
             }
         };
         let label = if reports.len() > 1 { format!("{label}, {}", report.model) } else { label.to_owned() };

@@ -9,6 +9,7 @@ use super::arguments::Arguments;
 use crate::cli::files::{self, Batch};
 use crate::cli::output_extension;
 use crate::cli::programs::{Job, Programs};
+use truegrind::programs::reading::Language;
 
 /// The output file of each file of a program; `None` in a dry run.
 pub(super) fn output_files(
@@ -41,6 +42,23 @@ pub(super) fn output_files(
 
 pub(super) const MISSING_OUTPUT: &str =
     "-o OUT is missing: name a file for one program or a folder for several, or use --dry-run";
+
+/// Refuses the name of a program for what will be a folder.
+pub(super) fn refuse_file_for_folder(jobs: &[Job], arguments: &Arguments) -> anyhow::Result<()> {
+    let folder = match jobs {
+        [job] => arguments.shares.on() || job.under.is_some() || job.files().len() > 1,
+        _ => true,
+    };
+    match &arguments.output {
+        Some(output) if folder && !output.is_dir() && Language::by_name(&files::name(output)).is_some() => {
+            bail!(
+                "-o {}: named like one program, but several programs, and those of a shared run, are written to a folder: name a folder",
+                output.display()
+            )
+        }
+        _ => Ok(()),
+    }
+}
 
 /// Refuses two programs with the same output file.
 pub(super) fn refuse_shared_output(jobs: &[Job]) -> anyhow::Result<()> {

@@ -163,7 +163,8 @@ fn object_note(
         )),
         None if built_in(name) => None,
         None => Some(format!(
-            "{what} {name}: origin not stated, taken as metrology (exact in the robot's base); {}",
+            "{what} {name}: origin not stated, taken as metrology (exact {}); {}",
+            if commanded.holds_part { "on the flange" } else { "in the robot's base" },
             object_estimate(commanded, with)
         )),
     }

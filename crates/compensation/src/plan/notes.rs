@@ -13,15 +13,16 @@ pub(crate) fn backlash_note(arms: &Arms<'_>, solved: &SolvedTargets<'_>) -> Opti
     let plays = arms.conditions.play_rad.iter().enumerate().filter(|(_, play)| **play != 0.0);
     let plays: Vec<String> =
         plays.map(|(j, play)| format!("joint {}: {:.4}°", j + 1, play.abs().to_degrees())).collect();
-    if plays.is_empty() {
+    if plays.is_empty() || !solved.has_any() {
         return None;
     }
     let unknown = match solved.in_play() {
         (0, _) => String::new(),
         (count, most) => format!(
-            "; at {count} targets the backlash side of a joint is unknown (it has not moved yet, or the \
-             previous motion is unknown): mid-play is assumed, and half the backlash is included in their σ \
-             (up to {most:.3} mm)"
+            "; at {} the backlash side of a joint is unknown (it has not moved yet, or the \
+             previous motion is unknown): mid-play is assumed, and half the backlash is included in the σ there \
+             (up to {most:.3} mm)",
+            counted(count, "target", "targets")
         ),
     };
     Some(format!(
@@ -157,6 +158,11 @@ fn counted(count: usize, one: &str, several: &str) -> String {
     if count == 1 { format!("1 {one}") } else { format!("{count} {several}") }
 }
 
+/// A mass (kg) to the gram: a sum of tool and load has digits that nobody stated.
+fn grams(kg: f64) -> f64 {
+    (kg * 1e3).round() / 1e3
+}
+
 /// Whether an effect is a deflection under loads that a payload is not part of.
 fn is_lumped(effect: &Effect) -> bool {
     matches!(effect, Effect::LumpedCompliance(_))
@@ -177,9 +183,10 @@ pub(crate) fn load_notes(listing: &Listing, arms: &Arms<'_>, options: &Options) 
     let at = |(index, motion): (usize, &Motion)| payload_at(loads, index, motion, listing, model);
     let stated: Vec<f64> = motions().filter_map(at).map(|load| load.mass_kg).collect();
     let silent = motions().count() - stated.len();
-    let base = options.condition.payload_kg.map_or("no payload".to_owned(), |kg| format!("{kg} kg"));
+    let base = options.condition.payload_kg.map_or("no payload".to_owned(), |kg| format!("{} kg", grams(kg)));
     if load_dependent && let Some(&first) = stated.first() {
         let (low, high) = stated.iter().fold((first, first), |(a, b), kg| (a.min(*kg), b.max(*kg)));
+        let (low, high) = (grams(low), grams(high));
         let range = if low == high { format!("{low} kg") } else { format!("{low} to {high} kg") };
         out.push(format!(
             "payload: {range}, as stated by the program's tools and loads (--payload overrides it)"
@@ -187,14 +194,15 @@ pub(crate) fn load_notes(listing: &Listing, arms: &Arms<'_>, options: &Options) 
     }
     if load_dependent && silent > 0 {
         out.push(format!(
-            "payload: at {silent} motions the tool states no mass, so that of the measurement is assumed \
-             ({base}); --payload overrides it"
+            "payload: at {} the tool states no mass, so that of the measurement is assumed \
+             ({base}); --payload overrides it",
+            counted(silent, "motion", "motions")
         ));
     }
     if loads.unknown() > 0 {
         out.push(format!(
-            "payload: at {} motions the load set by GripLoad is unknown; only the tool is counted",
-            loads.unknown()
+            "payload: at {} the load set by GripLoad is unknown; only the tool is counted",
+            counted(loads.unknown(), "motion", "motions")
         ));
     }
     if lumped {

@@ -69,9 +69,10 @@ pub fn is_path(motion: &Motion) -> bool {
     matches!(motion.kind, MotionKind::Linear | MotionKind::Circular) && !motion.rapid
 }
 
-/// Whether it is a call of a routine that takes the target, so that the motions of the routine are left.
+/// Whether it calls something that takes the target and may move there: a routine whose motions are left, or an unknown one.
 fn is_call(motion: &Motion) -> bool {
-    motion.own_reason == Some(Reason::OwnRoutine)
+    let calls = [Reason::OwnRoutine, Reason::UnknownInstruction, Reason::LateBinding];
+    motion.own_reason.is_some_and(|reason| calls.contains(&reason))
 }
 
 /// Whether a motion stands in one routine with another, which has the same tool and work object or is a call.

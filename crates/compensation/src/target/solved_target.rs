@@ -130,6 +130,11 @@ impl<'a> SolvedTargets<'a> {
             .unwrap_or(ConditionSchedule { first: condition_index, later: Vec::new() })
     }
 
+    /// Whether the program has a target that is solved.
+    pub(crate) fn has_any(&self) -> bool {
+        self.targets.iter().any(Result::is_ok)
+    }
+
     /// Number of targets with a joint of unknown side, and the largest resulting deviation (mm).
     pub(crate) fn in_play(&self) -> (usize, f64) {
         let open = self.targets.iter().flatten().map(|s| s.play_uncertainty_mm).filter(|mm| *mm > 0.0);

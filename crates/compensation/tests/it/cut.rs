@@ -119,6 +119,11 @@ fn steps_beside_what_is_left_are_counted() {
     let steps = done.plan.steps.unwrap();
     assert_eq!(steps.motions, [1, 3]);
     assert!(steps.largest_mm > 0.05 && steps.largest_mm < 10.0, "{steps:?}");
+    // What an instruction of a module that is not given does there is unknown.
+    let elsewhere = "grind [[387,0,300],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\n".to_owned();
+    let body = [line(380.0, "fine"), line(385.0, "fine"), elsewhere, line(390.0, "fine")].concat();
+    let (done, _) = self::done(&module(&body), Cuts::Whole, 0.05);
+    assert_eq!(done.plan.steps.unwrap().motions, [1, 3]);
     let even = [line(380.0, "fine"), line(385.0, "fine")].concat();
     assert_eq!(self::done(&module(&even), Cuts::Whole, 0.05).0.plan.steps, None);
 }

@@ -44,7 +44,7 @@ reasons! {
         RunTimeIndex => "array element chosen at run time",
         IndexOutOfRange => "array index outside the declared array",
         WrongShape => "the value does not have the form that the instruction requires",
-        BadQuaternion => "the quaternion is not normalised (length off by more than 0.1)",
+        BadQuaternion => "the quaternion is not normalised (the squares of its numbers add up to less than 0.9 or more than 1.1)",
         BeyondReach => "physically implausible number (above 1,000,000 mm, degrees or kg)",
         UndefinedJoint => "a robot axis of the joint target is undefined (9E9)",
         Placeholder => "a placeholder instead of a value",

@@ -4,6 +4,7 @@ use crate::deviation::status_word;
 use crate::document::{KeyFigure, Verdict};
 use crate::placement;
 use crate::status::Status;
+use truegrind_calibration::identification::verdict::percent_of;
 use truegrind_compensation::deviation::Status as MotionStatus;
 use truegrind_compensation::plan::Plan;
 use truegrind_compensation::plan::reason::OutcomeReason;
@@ -169,7 +170,7 @@ pub(super) fn key_figures(plan: &Plan, listing: &Listing) -> Vec<KeyFigure> {
     }));
     if let Some(chance) = plan.probability_of_harm {
         figures.push(
-            KeyFigure::new("Probability of worse", 100.0 * chance, 1, "%")
+            KeyFigure::new("Probability of worse", percent_of(chance), 0, "")
                 .note("all corrected cuts together"),
         );
     }

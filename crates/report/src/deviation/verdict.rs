@@ -97,7 +97,7 @@ pub(super) fn verdict(reports: &[&PathReport]) -> Verdict {
 fn headline(reports: &[&PathReport], judged: &[Judged<'_>]) -> String {
     match judged {
         [] => {
-            let worst = reports.iter().filter_map(|report| largest(report, BEFORE)).reduce(f64::max);
+            let worst = reports.iter().filter_map(|report| size(report)).reduce(f64::max);
             format!("The uncorrected path deviates by up to {}; there is no corrected path", known(worst))
         }
         [(report, ..)]
@@ -112,7 +112,7 @@ fn headline(reports: &[&PathReport], judged: &[Judged<'_>]) -> String {
         }
         [(report, ..)] if report.expected_mm().is_some() => {
             // Both unsigned, since the expected deviation has no sign.
-            let before = report.cut().filter_map(|p| p.before.map(|d| d.norm_mm())).reduce(f64::max);
+            let before = size(report);
             format!(
                 "Largest deviation {} before, {} expected after (1σ); held-out error of the model {}",
                 known(before),
@@ -121,8 +121,9 @@ fn headline(reports: &[&PathReport], judged: &[Judged<'_>]) -> String {
             )
         }
         [(report, before, after)] => format!(
-            "Largest deviation {before:.3} mm before, {after:.*} mm after ({}); predicted 1σ {}, held-out error of the \
+            "Largest deviation{} {before:.3} mm before, {after:.*} mm after ({}); predicted 1σ {}, held-out error of the \
              model {}",
+            along_normal(report),
             decimals(report.after),
             meaning(report.after),
             known(report.sigma_rms_mm()),
@@ -139,7 +140,8 @@ fn headline(reports: &[&PathReport], judged: &[Judged<'_>]) -> String {
             };
             let before = judged.iter().map(|(_, before, _)| *before).fold(0.0, f64::max);
             format!(
-                "Largest deviation {before:.3} mm before; after: best {}, worst {} ({})",
+                "Largest deviation{} {before:.3} mm before; after: best {}, worst {} ({})",
+                along_normal(first),
                 under(of(|a, b| a.total_cmp(b))),
                 under(of(|a, b| b.total_cmp(a))),
                 meaning(first.after),
@@ -148,16 +150,25 @@ fn headline(reports: &[&PathReport], judged: &[Judged<'_>]) -> String {
     }
 }
 
-/// The largest deviation of a path (mm).
+/// The largest deviation of a cut before correction, in whatever direction (mm).
+pub(super) fn size(report: &PathReport) -> Option<f64> {
+    report.cut().filter_map(|point| point.before.map(|d| d.norm_mm())).reduce(f64::max)
+}
+
+/// The largest deviation of a cut, along the normal where the surface is known (mm).
 fn largest(report: &PathReport, side: Side) -> Option<f64> {
     report.block(side).map(|block| block.all.max)
+}
+
+/// Where the surface of a cut is known its deviations are judged along the normal.
+fn along_normal(report: &PathReport) -> &'static str {
+    if report.cut().any(|point| point.normal.is_some()) { " along the normal" } else { "" }
 }
 
 fn known(mm: Option<f64>) -> String {
     mm.map_or("unknown".to_owned(), |mm| format!("{mm:.3} mm"))
 }
 
-/// RMS of the uncorrected deviations of the cut (mm).
 /// A path whose shape is corrected, but not where it lies.
 #[derive(Clone, Copy)]
 struct OnlyShape {

@@ -388,7 +388,12 @@ fn a_correction_that_makes_it_worse_is_called_so() {
     worse.after = After::Achieved;
     worse.points[0].after = Some(deviation([0.0, 0.0, 3.0], true));
     let text = terminal::document(&view::document(&[worse]), 200);
-    assert!(text.contains("[failed] Largest deviation 1.200 mm before, 3.000 mm after (achieved)"), "{text}");
+    assert!(
+        text.contains(
+            "[failed] Largest deviation along the normal 1.200 mm before, 3.000 mm after (achieved)"
+        ),
+        "{text}"
+    );
 }
 
 /// `compensate` corrects the shape alone where the placement is not known: the path as a whole stays where it was, and is not worse.
