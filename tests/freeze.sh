@@ -94,11 +94,13 @@ shipped() {
   run blade-actual deviation "../blade-targets/new.mod" --intended "../path-blade/program.mod" --model "$model" \
     --actual "../simulate-irb120-tracker/arm.toml" --json result.json
   # Every sample program by itself, whole and in part, and all of them as one batch.
-  local program name
+  local program name new
   for program in "$work"/programs/*; do
     name="$(basename "$program")"
-    run "each-$name" compensate "../../programs/$name" "${ground[@]}" -o "new.${name##*.}" --json result.json
-    run "partial-$name" compensate "../../programs/$name" "${ground[@]}" --partial --circles segments -o "new.${name##*.}" --json result.json
+    # What a task list names goes into a folder.
+    case "$name" in *.pgf) new=new ;; *) new="new.${name##*.}" ;; esac
+    run "each-$name" compensate "../../programs/$name" "${ground[@]}" -o "$new" --json result.json
+    run "partial-$name" compensate "../../programs/$name" "${ground[@]}" --partial --circles segments -o "$new" --json result.json
   done
   run batch compensate ../../programs --each "${ground[@]}" -o new --json result.json --csv table.csv
   digest shipped.sha256

@@ -3,7 +3,8 @@
 
 use rayon::prelude::*;
 
-use super::super::evaluate::{Context, Evaluator, Known, Source};
+use super::super::evaluate::target::Source;
+use super::super::evaluate::{Context, Evaluator, Known};
 use super::super::instruction::{self, INSTRUCTIONS};
 use super::super::symbol::Symbols;
 use super::super::syntax::{RapidTree, Syntax, arguments};

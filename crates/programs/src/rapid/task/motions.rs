@@ -8,7 +8,8 @@ use crate::motion::{
     Declaration, Modal, Motion, MotionKind, MotionTarget, Origin, OutsideCall, PersistentOffset, Reason,
     Role, Routine,
 };
-use crate::rapid::evaluate::{Context, Source};
+use crate::rapid::evaluate::Context;
+use crate::rapid::evaluate::target::Source;
 use crate::rapid::flow::AbstractState;
 use crate::rapid::instruction::{INSTRUCTIONS, Instruction, Slot};
 use crate::rapid::predefined;
