@@ -55,12 +55,19 @@ pub struct Case {
     pub worth: f64,
 }
 
+/// Draws of a case until its effect shows; one of the first dozen does unless the design is given.
+const ATTEMPTS: u64 = 400;
+
 impl Case {
     /// Draws run `run` of a kind. What it is depends on nothing but seed, kind, run and limits.
+    ///
+    /// # Panics
+    ///
+    /// If the design that `limits` ask for does not show such an effect: a raster hardly turns a target nest.
     pub fn draw(seed: u64, kind: Kind, run: u64, limits: Limits) -> Self {
-        (0..)
+        (0..ATTEMPTS)
             .find_map(|attempt| Self::attempt(seed, kind, run, attempt, limits))
-            .unwrap_or_else(|| unreachable!("the search has no end"))
+            .unwrap_or_else(|| panic!("{kind:?}, run {run}: none of {ATTEMPTS} draws shows it with {limits:?}"))
     }
 
     fn attempt(seed: u64, kind: Kind, run: u64, attempt: u64, limits: Limits) -> Option<Self> {
