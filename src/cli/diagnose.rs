@@ -151,8 +151,12 @@ pub(super) fn diagnose_rows(
 ) -> anyhow::Result<Diagnosed> {
     let frames = starting_frames(dataset, nominal, &options.tolerance, options.fuse_readout)?;
     let stated = arguments.stated.frames(dataset)?;
-    let (tolerance, frames) =
-        arguments.prior.prior(&options.tolerance, stated.as_ref(), frames, (dataset, nominal))?;
+    let (tolerance, frames) = arguments.prior.prior(
+        [&options.tolerance, &options.arm_tolerance],
+        stated.as_ref(),
+        frames,
+        (dataset, nominal),
+    )?;
     let options = Options { tolerance, ..options.clone() };
     let mut found = diagnose(dataset, name, nominal, &frames, &options, &|step| report_step(step))?;
     if let Some(stated) = &stated {

@@ -247,7 +247,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
         let frames = starting_frames(&dataset, &robot.model, &options.tolerance, options.fuse_readout)?;
         let stated = options.stated_frames.as_ref();
         let (tolerance, frames) =
-            arguments.prior.prior(&options.tolerance, stated, frames, (&dataset, &robot.model))?;
+            arguments.prior.prior([&options.tolerance; 2], stated, frames, (&dataset, &robot.model))?;
         let options = Options { tolerance, ..options.clone() };
         from_frames(&dataset, &name, &robot.model, &frames, &options)
     })??;
@@ -371,15 +371,32 @@ fn measured(arguments: &DataArguments, robot: &Robot, dataset: Dataset) -> anyho
     if !odd {
         refuse_implausible_payload(&dataset, robot)?;
     }
-    let dataset =
+    let mut dataset =
         match_to_arm(dataset, name, &robot.model, convention, odd).map_err(|mismatch| match mismatch {
             Mismatch::Units(_) | Mismatch::Condition(_) => {
                 anyhow!("{mismatch} (--allow-odd-units accepts the file anyway)")
             }
             _ => anyhow!("{mismatch}"),
         })?;
+    note_overload(&mut dataset, robot);
     Ok(dataset)
 }
+
+/// Notes payloads above the rated one: perhaps they are in pounds or newtons.
+fn note_overload(dataset: &mut Dataset, robot: &Robot) {
+    let most_kg = dataset.rows.iter().filter_map(|row| row.condition.payload_kg).reduce(f64::max);
+    if let (Some(kg), Some(rated)) = (most_kg, robot.sheet.payload_kg)
+        && kg > OVERLOAD * rated
+    {
+        dataset.notes.push(format!(
+            "column payload: up to {kg} kg, and {} is rated for {rated} kg; check that it is in kg",
+            robot.sheet.name
+        ));
+    }
+}
+
+/// Payload over the rated one that is noted.
+const OVERLOAD: f64 = 1.2;
 
 /// Refuses a payload that is far above the rated one, where that is known.
 pub(super) fn refuse_implausible_payload(dataset: &Dataset, robot: &Robot) -> anyhow::Result<()> {

@@ -58,8 +58,8 @@ pub(super) struct Arguments {
     /// Sensor that will measure.
     #[arg(long, value_enum)]
     sensor: SensorArgument,
-    /// Number of different poses; repeats are added to these. Default: 60; for an unexplained error ten, or ten visits of one pose if it
-    /// follows time.
+    /// Number of different poses; repeats are added to these. Default: 60; for an unexplained error ten, each read three times from one side
+    /// and once from the other if a joint scatters, or ten visits of one pose if it follows time.
     #[arg(long)]
     poses: Option<usize>,
     /// RAPID module to write.
@@ -247,7 +247,12 @@ fn check_numbers(arguments: &Arguments, sigma: f64) -> anyhow::Result<()> {
             bail!("{name} {value}: expected 0 or more");
         }
     }
-    let poses = arguments.poses.unwrap_or(POSES);
+    let poses = arguments.poses.unwrap_or(if joint_scatters { FIELD_POSES } else { POSES });
+    // Whether it differs by the side or from time to time is asked at every pose.
+    let [repeats, both_sides, warm_up] = match joint_scatters {
+        true => [poses, poses, 0],
+        false => [arguments.repeats, arguments.both_sides, arguments.warm_up],
+    };
     if poses < 4 {
         bail!("--poses {poses}: expected at least 4; some 50 to 100 are usual");
     }
@@ -331,7 +336,7 @@ fn options(arguments: &Arguments, robot: &str, sensor: Sensor, reach_mm: f64) ->
         (_, None) => None,
     };
     let space = space(arguments, reach_mm)?;
-    let questions::Open { questions, something_else } = left_open(arguments, robot)?;
+    let questions::Open { questions, something_else, joint_scatters } = left_open(arguments, robot)?;
     let approach_rad = arguments.approach.to_radians();
     let poses = arguments.poses.unwrap_or(POSES);
     let options = Options {
@@ -351,9 +356,9 @@ fn options(arguments: &Arguments, robot: &str, sensor: Sensor, reach_mm: f64) ->
             space,
         },
         visits: Visits {
-            repeats: arguments.repeats,
-            both_sides: arguments.both_sides,
-            warm_up: arguments.warm_up,
+            repeats,
+            both_sides,
+            warm_up,
             approach_rad,
             seconds_per_row: arguments.seconds_per_row,
         },

@@ -4,9 +4,10 @@ use std::path::PathBuf;
 
 use clap::Args;
 use truegrind::arm::arm_file::ArmFile;
+use truegrind::arm::effect::Effect;
 use truegrind::arm::model::Model;
 use truegrind::calibration::measurement::simulation::Simulation;
-use truegrind::calibration::measurement::simulation::recipe::Recipe;
+use truegrind::calibration::measurement::simulation::recipe::{Approach, Recipe};
 
 use super::exit_status::ExitStatus;
 use super::files::{self, Batch};
@@ -35,7 +36,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     Batch::check(&[&arguments.recipe], &targets)?;
     let text = files::read_text(&arguments.recipe)?;
     let name = arguments.recipe.display().to_string();
-    let about = Recipe::parse(&text, &name)?.about;
+    let Recipe { about, conditions, .. } = Recipe::parse(&text, &name)?;
     let simulation = simulation(&text, &name, arguments.seed)?;
     let mut batch = Batch::sparing([&arguments.recipe]);
     let (rows, sensor) = (simulation.rows.len(), simulation.sensor());
@@ -49,6 +50,12 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
         sensor.name(),
         arguments.output.display()
     ));
+    let has_play = simulation.actual.effects.iter().any(|effect| matches!(effect, Effect::Backlash(_)));
+    if has_play && conditions.approach == Approach::Unknown {
+        print_message(
+            "note: the arm has backlash, but circumstances.approach is not stated: every reading is taken in the middle of the play",
+        );
+    }
     if !about.is_empty() {
         print_message(format_args!("{about}"));
     }

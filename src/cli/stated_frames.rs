@@ -5,9 +5,11 @@ use clap::Args;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use truegrind::arm::model::Model;
 use truegrind::calibration::identification::calibration::Frames;
-use truegrind::calibration::identification::stated_frame::contradiction;
+use truegrind::calibration::identification::identify::{Options, identify};
+use truegrind::calibration::identification::stated_frame::{contradiction, contradiction_beside_geometry};
 use truegrind::calibration::identification::tolerance::Tolerance;
 use truegrind::calibration::measurement::dataset::{Dataset, Sensor};
+use truegrind::calibration::measurement::split;
 use truegrind::math::se3::Pose;
 
 /// Pose of the sensor, if known. Without [`FramePriorArguments`] it serves for the raw error only, and the fit determines the
@@ -39,10 +41,11 @@ pub(super) struct FramePriorArguments {
 }
 
 impl FramePriorArguments {
-    /// Prior tolerance and starting frames of the fit. The measured point is that of `found` unless it was stated.
+    /// Prior tolerance and starting frames of the fit. The measured point is that of `found` unless it was stated. `of_arm`: the tolerances
+    /// of arms, beside which the stated frames are judged.
     pub(super) fn prior(
         &self,
-        tolerance: &Tolerance,
+        [tolerance, of_arm]: [&Tolerance; 2],
         stated: Option<&Frames>,
         found: Frames,
         (dataset, nominal): (&Dataset, &Model),
@@ -67,6 +70,21 @@ impl FramePriorArguments {
             bail!("--frame-sigma {text}: expected numbers above 0");
         }
         if let Some(contradiction) = contradiction(dataset, nominal, stated, &found, mm) {
+            bail!("{contradiction}");
+        }
+        // With other fits a poor one is told as what it is.
+        let free = Options { tolerance: *of_arm, ..Options::default() };
+        let split = |rows: &Dataset| split::random(rows, free.held_out, free.seed);
+        let geometry = identify(dataset, "", nominal, &found, &split, &free).map(|free| free.geometry);
+        if let Ok(geometry) = geometry
+            && let Some(contradiction) = contradiction_beside_geometry(
+                dataset,
+                &geometry,
+                stated,
+                [mm, deg.to_radians()],
+                of_arm.scale,
+            )
+        {
             bail!("{contradiction}");
         }
         let flange_from_target = if stated.flange_from_target == Pose::identity() {

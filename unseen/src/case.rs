@@ -65,9 +65,9 @@ impl Case {
     ///
     /// If the design that `limits` ask for does not show such an effect: a raster hardly turns a target nest.
     pub fn draw(seed: u64, kind: Kind, run: u64, limits: Limits) -> Self {
-        (0..ATTEMPTS)
-            .find_map(|attempt| Self::attempt(seed, kind, run, attempt, limits))
-            .unwrap_or_else(|| panic!("{kind:?}, run {run}: none of {ATTEMPTS} draws shows it with {limits:?}"))
+        (0..ATTEMPTS).find_map(|attempt| Self::attempt(seed, kind, run, attempt, limits)).unwrap_or_else(
+            || panic!("{kind:?}, run {run}: none of {ATTEMPTS} draws shows it with {limits:?}"),
+        )
     }
 
     fn attempt(seed: u64, kind: Kind, run: u64, attempt: u64, limits: Limits) -> Option<Self> {

@@ -10,6 +10,7 @@ pub mod network;
 pub mod solver;
 pub mod fit;
 pub mod start;
+mod sessions;
 pub mod stated_frame;
 pub mod benefit;
 pub mod beyond_noise;

@@ -174,3 +174,75 @@ fn a_robot_that_is_not_the_models_is_an_error_naming_both() {
     assert_eq!(code, 2);
     assert!(err.contains("abb-irb-120") && err.contains("kuka-kr6-r900-sixx"), "{err}");
 }
+
+/// The rows of the shipped tracker with every cell passed through `change`, and a further column.
+fn tracked(change: impl Fn(usize, &str, f64) -> f64, further: (&str, impl Fn(usize) -> String)) -> String {
+    let mut lines = include_str!("../../data/irb120-tracker.csv").lines();
+    let header: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let mut out = format!("{},{}\n", header.join(","), further.0);
+    for (row, line) in lines.enumerate() {
+        let cells = line.split(',').zip(&header);
+        let cells = cells.map(|(cell, name)| change(row, name, cell.parse().unwrap()).to_string());
+        out += &format!("{},{}\n", cells.collect::<Vec<_>>().join(","), further.1(row));
+    }
+    out
+}
+
+/// A frame that is off by more than its stated σ was taken up as a scale error of the sensor, or by the arm.
+#[test]
+fn a_stated_frame_that_the_readings_contradict_is_refused() {
+    let dir = folder();
+    let at = dir.path();
+    fs::write(at.join("data.csv"), include_str!("../../data/irb120-tracker.csv")).unwrap();
+    let recipe: toml::Table = include_str!("../../data/irb120-tracker.toml").parse().unwrap();
+    let list = |value: &toml::Value| -> Vec<f64> {
+        value.as_array().unwrap().iter().map(|v| v.as_float().unwrap()).collect()
+    };
+    let frame = &recipe["sensor"]["frame"];
+    let text = |values: &[f64]| values.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
+    let point = text(&list(&recipe["sensor"]["reflector_mm"]));
+    for verb in ["identify", "diagnose"] {
+        for off_mm in [0.0, 1.2] {
+            let mut stated = [list(&frame["position_mm"]), list(&frame["wxyz"])].concat();
+            stated[0] += off_mm;
+            let frame = text(&stated);
+            let stated = ["--sensor-frame", &frame, "--touched-point", &point, "--frame-sigma", "0.05"];
+            let data = [verb, "data.csv", "--robot", "abb-irb-120", "--sensor-scale-sigma", "0.001"];
+            let (code, out, err) = truegrind(at, &[&data[..], &stated].concat());
+            if off_mm == 0.0 {
+                assert!(code < 2, "{verb}: {out}{err}");
+            } else {
+                assert_eq!(code, 2, "{verb}: {out}");
+                assert!(err.contains("contradict it by") && err.contains("--frame-sigma"), "{verb}: {err}");
+            }
+        }
+    }
+}
+
+/// One fit has one frame: that the column says otherwise was ignored.
+#[test]
+fn sessions_with_frames_of_their_own_make_a_model_doubtful() {
+    let dir = folder();
+    let at = dir.path();
+    let session = |row: usize| if row < 120 { "monday" } else { "tuesday" }.to_owned();
+    for (name, moved_mm, code) in [("still.csv", 0.0, 0), ("moved.csv", 2.0, 1)] {
+        let shift = |row, name: &str, cell| {
+            if row >= 120 && name == "measured_y" { cell + moved_mm } else { cell }
+        };
+        fs::write(at.join(name), tracked(shift, ("session", session))).unwrap();
+        let (found, out, err) = truegrind(at, &["identify", name, "--robot", "abb-irb-120"]);
+        assert_eq!(found, code, "{out}{err}");
+        let told = out.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert_eq!(told.contains("readings of sessions monday and tuesday differ by"), code == 1, "{out}");
+    }
+}
+
+#[test]
+fn a_payload_above_the_rated_one_is_noted() {
+    let dir = folder();
+    let at = dir.path();
+    let pounds = |row: usize| ["0", "6.6"][row % 2].to_owned();
+    fs::write(at.join("data.csv"), tracked(|_, _, cell| cell, ("payload", pounds))).unwrap();
+    let (_, _, err) = truegrind(at, &["identify", "data.csv", "--robot", "abb-irb-120"]);
+    assert!(err.contains("up to 6.6 kg") && err.contains("rated for 3 kg"), "{err}");
+}

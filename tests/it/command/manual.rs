@@ -62,3 +62,21 @@ fn colour_obeys_no_color_and_pipes() {
         assert!(!run(&[("TERM", "dumb")], arguments).contains('\u{1b}'), "{arguments:?}: dumb");
     }
 }
+
+/// The recipe of docs/simulate.md, as it stands there.
+#[test]
+fn the_recipe_of_the_manual_is_simulated() {
+    let page = include_str!("../../../docs/simulate.md");
+    let recipe = page.split_once("```toml recipe\n").unwrap().1.split_once("```").unwrap().0;
+    let dir = folder();
+    let at = dir.path();
+    let still = recipe.replace("approach = \"sequence\"", "");
+    for (recipe, middle) in [(recipe, false), (still.as_str(), true)] {
+        fs::write(at.join("recipe.toml"), recipe).unwrap();
+        let (code, _, err) =
+            truegrind(at, &["simulate", "recipe.toml", "-o", "data.csv", "--arm", "arm.toml"]);
+        assert_eq!(code, 0, "{err}");
+        assert!(err.contains("200 rows"), "{err}");
+        assert_eq!(err.contains("in the middle of the play"), middle, "{err}");
+    }
+}

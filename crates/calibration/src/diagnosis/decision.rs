@@ -180,10 +180,10 @@ impl Asking<'_> {
         if finding.effect == CauseKind::Unexplained {
             if let Some([joint]) = finding.joints.as_deref() {
                 return Some(format!(
-                    "read ten poses four times each, joint {0} coming twice from below and twice from above: if a pose differs by the \
-                     side, it is play (log the sides in the column approach{0}); if it differs from time to time, the joint does not \
-                     come to rest in one place",
-                    joint + 1
+                    "read ten poses three times from one side and once from the other: `{}`; if a pose differs by the side from which joint \
+                     {joint} comes, it is play (log the sides in the column approach{joint}); if it differs from time to time, the joint \
+                     does not come to rest in one place",
+                    plan()
                 ));
             }
             let something = self.something_else?;

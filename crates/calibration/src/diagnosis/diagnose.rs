@@ -33,6 +33,7 @@ use crate::identification::identify::{
     parameter_table, with_sigma_in_region,
 };
 use crate::identification::start::count_distinct_poses;
+use crate::identification::tolerance::Tolerance;
 use crate::identification::verdict::{CONVERGED, VerdictBuilder};
 use crate::measurement::dataset::{Dataset, Sensor};
 use crate::measurement::split;
@@ -84,8 +85,9 @@ pub fn diagnose(
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<Diagnosed, DiagnoseError> {
     let prepared = prepare(dataset, nominal_arm, options.fuse_readout);
+    let tolerance = Tolerance { scale: options.arm_tolerance.scale, ..options.tolerance };
     let subject =
-        Subject { observed: &prepared.observed, nominal: nominal_arm, frames, tolerance: &options.tolerance };
+        Subject { observed: &prepared.observed, nominal: nominal_arm, frames, tolerance: &tolerance };
     let registered = nominal(&subject);
     let typical = residual_tests::median_error_mm(&registered);
     if !(typical < WRONG_ARM_MM) {
@@ -125,7 +127,8 @@ pub fn diagnose(
     let (extended, scatter) = (summary.extended.clone(), summary.joint_scatter.clone());
     let all_causes = &search.stages[2];
     let all_causes = StageErrors { fitted: all_causes.fitted, held_out: all_causes.random };
-    let beyond = BeyondNoise::of(&all_causes, dataset.sensor, summary.repeats.as_ref());
+    let beyond = BeyondNoise::of(&all_causes, dataset.sensor, summary.repeats.as_ref())
+        .beside_rounding(summary.noise_floor.0, dataset.sensor);
     let (mut diagnosis, pictures) = build_diagnosis(&search, &confirmed, summary, robot, notes);
     diagnosis.poses_needed = needed;
     let of_all = thin_rows.is_none().then_some(&confirmed.outcome.discrepancy);
@@ -222,8 +225,15 @@ impl Handing<'_> {
         }
         let stages = [before, geometry, *stage];
         let few_poses = self.few_poses.as_deref();
+        let of_the_sensor = |fit: &Extended| fit.causes.iter().filter(|cause| !cause.is_in_arm()).count();
+        let [all, own] =
+            [&search.stages[2], stage].map(|s| StageErrors { fitted: s.fitted, held_out: s.random });
+        let lacks_of_arm = of_the_sensor(written) == of_the_sensor(&search.extended);
+        let sensor = search.context.dataset.sensor;
+        let noise =
+            Noise { beyond: self.noise.beyond.of_part(&all, &own, sensor, lacks_of_arm), ..self.noise };
         let scatter_mm = self.scatter.as_ref().map_or(0.0, JointScatter::rms_mm);
-        estimated(search, robot, (&fits, missing, scatter_mm), &stages, (self.noise, few_poses))
+        estimated(search, robot, (&fits, missing, scatter_mm), &stages, (noise, few_poses))
     }
 
     /// The written arm with its benefit; where it is refused beside causes and geometry alone is not, that, with a note.

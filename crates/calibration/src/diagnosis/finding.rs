@@ -346,7 +346,7 @@ impl Diagnosis {
 }
 
 /// Source of a noise floor without repeated poses.
-pub(super) const ROUNDING_ALONE: &str = "rounding of the angles alone; too few poses were repeated";
+pub(super) const ROUNDING_ALONE: &str = "rounding alone; too few poses were repeated";
 
 /// Multiple of the noise floor from which an error is not taken for noise.
 const NOT_NOISE: f64 = 3.0;

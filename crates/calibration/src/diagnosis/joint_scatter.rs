@@ -21,6 +21,9 @@ const LEAST_EVIDENCE: f64 = 15.0;
 /// Least ratio of the joint's evidence to that of the strongest rival without a joint.
 const CLEAR: f64 = 1.2;
 
+/// How many times the rounding of the logged angles a scatter must be.
+const OF_ROUNDING: f64 = 1.5;
+
 /// Fewest scalar rows.
 const FEWEST: usize = 60;
 
@@ -39,8 +42,14 @@ pub(super) struct JointScatter {
 
 impl JointScatter {
     /// The joint that explains most of the residual in this way; `None` where none does so clearly. `robust_weight` is that of each row,
-    /// `aside` are outliers, which do not count.
-    pub(super) fn of(linear: &Linear, robust_weight: &[f64], aside: &[usize]) -> Option<Self> {
+    /// `aside` are outliers, which do not count. `logged_rad` is the standard deviation with which the angles are logged: no more than
+    /// their rounding is no scatter.
+    pub(super) fn of(
+        linear: &Linear,
+        robust_weight: &[f64],
+        aside: &[usize],
+        logged_rad: f64,
+    ) -> Option<Self> {
         let (slopes, per) = (&linear.slopes, linear.per);
         // The one coordinate of a cable has no direction.
         if per < 3 || linear.residual.len() < FEWEST {
@@ -58,6 +67,9 @@ impl JointScatter {
                 (joint, rows, found)
             })
             .max_by(|a, b| a.2.evidence.total_cmp(&b.2.evidence))?;
+        if found.ratio * found.noise_variance < (OF_ROUNDING * logged_rad).powi(2) {
+            return None;
+        }
         let halves = [0, 1].map(|half| rows.evidence(found.ratio, |row| row % 2 == half));
         if !halves.iter().all(|evidence| *evidence > LEAST_EVIDENCE) {
             return None;

@@ -5,13 +5,15 @@
 //! time"), as are shifts that cannot be distinguished from a smooth drift; small contributions are merged without naming a
 //! part. If that is still more than a person reads at once, one effect at several joints is one finding.
 
+use std::collections::BTreeSet;
+
 use super::cause::Cause;
 use super::cause_kind::CauseKind;
 use super::confirmation::Confirmation;
 use super::confounding::Confounding;
 use super::contribution::Contributions;
 use super::discrepancy::Discrepancy;
-use super::finding::{Confidence, Finding, FoundParameter, Gain, Session};
+use super::finding::{Confidence, Family, Finding, FoundParameter, Gain, Session};
 use super::findings::is_some_spring;
 use super::picture::Picture;
 use super::words;
@@ -265,17 +267,43 @@ fn setup_change(members: &[MergedFinding], worth_mm: f64, steps: bool, smooth: b
         } else {
             Confidence::Ambiguous
         };
+    // Where nothing but zeros of joints moved, it is the arm that changed.
+    let zeros = members.iter().all(|s| s.finding.effect == CauseKind::JointZeroShift);
+    let joints: BTreeSet<usize> =
+        members.iter().flat_map(|s| s.finding.joints.iter().flatten()).copied().collect();
+    let what = if zeros { zeros_of(&joints) } else { "the set-up".to_owned() };
     let cause = if steps {
-        format!("the set-up changed with time: {} shifts, see the table of sessions", sessions.len())
+        format!("{what} changed with time: {} shifts, see the table of sessions", sessions.len())
     } else {
-        "the set-up changed with time; steps and a gradual drift cannot be distinguished".to_owned()
+        format!("{what} changed with time; steps and a gradual drift cannot be distinguished")
     };
     let evidence = members.iter().map(|s| s.finding.evidence.as_str()).collect::<Vec<_>>().join("; ");
-    Finding {
+    let finding = Finding {
         p_value: least_p_value(members),
         worth_mm: Some(worth_mm),
         sessions,
         ..words::finding(CauseKind::SetupChange, cause, confidence, evidence, gain(members))
+    };
+    if !zeros {
+        return finding;
+    }
+    Finding {
+        joints: Some(joints.into_iter().collect()),
+        family: Some(Family::Drive),
+        remedy: "check encoder, battery, belt and mastering of these joints, and whether they had warmed up; measure the shifted rows again, since the written arm is that of the \
+                 other rows"
+            .to_owned(),
+        ..finding
+    }
+}
+
+/// "The zero of joint 2", "the zeros of joints 1, 2 and 3".
+fn zeros_of(joints: &BTreeSet<usize>) -> String {
+    let numbers: Vec<String> = joints.iter().map(usize::to_string).collect();
+    match numbers.as_slice() {
+        [one] => format!("the zero of joint {one}"),
+        [first @ .., last] => format!("the zeros of joints {} and {last}", first.join(", ")),
+        [] => "the zeros of joints".to_owned(),
     }
 }
 

@@ -83,7 +83,8 @@ pub(super) fn summarise(
     (context.progress)("analysing the residual");
     let noise_floor = noise_floor(&floor, subject, &search.extended);
     let aside: Vec<usize> = residual_tests::outliers(&search.found).into_iter().map(|(row, _)| row).collect();
-    let scatter = JointScatter::of(&confirmed.linear, &search.found.robust_weight, &aside);
+    let logged_rad = searched.observed.angles.typical_rad();
+    let scatter = JointScatter::of(&confirmed.linear, &search.found.robust_weight, &aside, logged_rad);
     let unexplained = Unexplained {
         dataset: &searched.observed.dataset,
         discrepancy: &outcome.discrepancy,

@@ -97,7 +97,7 @@ impl Unexplained<'_> {
             ),
             (false, true) => format!("{compared}, without a pattern: noise of sensor or arm"),
             (false, false) => format!(
-                "{compared} (rounding of the angles alone), without a pattern: probably noise of sensor or arm; repeated poses would \
+                "{compared} (rounding alone), without a pattern: probably noise of sensor or arm; repeated poses would \
                  show how large that is"
             ),
         })
@@ -152,7 +152,7 @@ impl Unexplained<'_> {
                 self.scatter().filter(|s| !self.has_discrepancy() || s.rms_mm() > self.discrepancy.rms_mm());
             Finding {
                 row_list: Some(rows),
-                joints: mostly.map(|scatter| vec![scatter.joint]),
+                joints: mostly.map(|scatter| vec![scatter.joint + 1]),
                 p_value: (-0.5 * evidence.max(0.0)).exp().min(1.0),
                 worth_mm: Some(self.rms_mm()),
                 ..words::finding(CauseKind::Unexplained, cause, Confidence::Ambiguous, self.evidence(), gain)

@@ -28,6 +28,14 @@ pub enum BeyondNoise {
 /// Probability with which the noise is below what repeated poses say of it at most.
 const CERTAIN: f64 = 0.99;
 
+/// Error of a model that lacks causes, over that with all of them, from which it lacks something.
+const LACKS: f64 = 1.02;
+
+/// The error of a position over what the sensor sees of it.
+fn of_position(sensor: Sensor) -> f64 {
+    if sensor == Sensor::Cable { 3_f64.sqrt() } else { 1.0 }
+}
+
 impl BeyondNoise {
     /// From the errors of a model and the scatter of repeated poses.
     ///
@@ -36,7 +44,7 @@ impl BeyondNoise {
     pub fn of(errors: &StageErrors, sensor: Sensor, repeats: Option<&NoiseFloor>) -> Self {
         let coordinates: usize = if sensor == Sensor::Cable { 1 } else { 3 };
         let seen_mm = errors.held_out.rmse.min(errors.fitted.rmse);
-        let of_position = (3.0 / coordinates as f64).sqrt();
+        let of_position = of_position(sensor);
         let Some(floor) = repeats else { return Self::AtMost(of_position * seen_mm) };
         let freedom = coordinates * floor.freedom;
         let noise_mm = floor.sigma_mm * (freedom as f64 / chi_square_quantile(CERTAIN, freedom)).sqrt();
@@ -47,6 +55,40 @@ impl BeyondNoise {
         })
     }
 
+    /// Beside rounding of the log, which is no error of the arm: its RMS in the readings (mm).
+    pub fn beside_rounding(self, rounding_mm: Option<f64>, sensor: Sensor) -> Self {
+        match (self, rounding_mm) {
+            (Self::AtMost(mm), Some(rounding_mm)) => {
+                Self::AtMost((mm.powi(2) - (of_position(sensor) * rounding_mm).powi(2)).max(0.0).sqrt())
+            }
+            _ => self,
+        }
+    }
+
+    /// Of a model that lacks some of the causes with which `self` was judged: `all` are the errors with them, `own` those of the model.
+    /// `of_arm`: what it lacks is the arm's, not the sensor's.
+    pub fn of_part(self, all: &StageErrors, own: &StageErrors, sensor: Sensor, of_arm: bool) -> Self {
+        let [all_mm, own_mm] = [all, own].map(|errors| errors.held_out.rmse.min(errors.fitted.rmse));
+        if !(own_mm > LACKS * all_mm) {
+            return self;
+        }
+        let lacking_mm = of_position(sensor) * (own_mm.powi(2) - all_mm.powi(2)).sqrt();
+        match self {
+            Self::Known(mm) if of_arm => Self::Known(mm.hypot(lacking_mm)),
+            Self::Known(_) => self,
+            Self::AtMost(most_mm) if of_arm => {
+                Self::Between { least_mm: lacking_mm, most_mm: most_mm.hypot(lacking_mm) }
+            }
+            Self::AtMost(most_mm) => Self::AtMost(most_mm.hypot(lacking_mm)),
+            Self::Between { least_mm, most_mm } if of_arm => {
+                Self::Between { least_mm: least_mm.hypot(lacking_mm), most_mm: most_mm.hypot(lacking_mm) }
+            }
+            Self::Between { least_mm, most_mm } => {
+                Self::Between { least_mm, most_mm: most_mm.hypot(lacking_mm) }
+            }
+        }
+    }
+
     /// At least a scatter of the arm (mm), which is seen without repeated poses too.
     pub fn or_scatter(self, scatter_mm: f64) -> Self {
         match self {
@@ -54,7 +96,10 @@ impl BeyondNoise {
             Self::AtMost(most_mm) if scatter_mm > 0.0 => {
                 Self::Between { least_mm: scatter_mm, most_mm: most_mm.max(scatter_mm) }
             }
-            Self::AtMost(_) | Self::Between { .. } => self,
+            Self::Between { least_mm, most_mm } => {
+                Self::Between { least_mm: least_mm.max(scatter_mm), most_mm: most_mm.max(scatter_mm) }
+            }
+            Self::AtMost(_) => self,
         }
     }
 

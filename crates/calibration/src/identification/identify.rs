@@ -16,6 +16,7 @@ use crate::identification::prior_width::width_uncertainty;
 use crate::identification::rounding::{
     AngleCovariance, NotFused, ReadoutFusion, fuse_readout, logged_covariance, rounding_floor_mm,
 };
+use crate::identification::sessions::set_up_anew;
 use crate::identification::solver::{Family, SOLVERS, Solver};
 use crate::identification::start::count_distinct_poses;
 use crate::identification::tolerance::Tolerance;
@@ -99,8 +100,8 @@ pub enum IdentifyError {
     /// The error with fitted frames exceeds any arm's tolerance.
     #[error(
         "{file}: with fitted frames, robot {robot} still differs from the readings by {rmse_mm:.1} mm RMS, more than any arm \
-         differs from its data sheet: check that --robot is the measured arm, that no two columns are swapped, that lengths \
-         are in mm and angles in degrees, and try --angles dh"
+         differs from its data sheet: check that --robot is the measured arm, that the sensor stayed where it was (each set-up is a file of its own), that no two \
+         columns are swapped, that lengths are in mm and angles in degrees, and try --angles dh"
     )]
     WrongArm {
         /// File.
@@ -228,7 +229,8 @@ pub fn identify(
     };
     report_step("estimating the benefit for programs");
     let mut estimated = with_sigma_in_region(estimated, &geometry);
-    let beyond_noise = BeyondNoise::of(&trained.geometry, observed.dataset.sensor, repeats.as_ref());
+    let beyond_noise = BeyondNoise::of(&trained.geometry, observed.dataset.sensor, repeats.as_ref())
+        .beside_rounding(estimated.noise_floor_mm, observed.dataset.sensor);
     estimated.beyond_noise_mm = beyond_noise.known_mm();
     let benefit = variance_inflation
         .and_then(|variance_inflation| {
@@ -243,6 +245,7 @@ pub fn identify(
         benefit: benefit.as_ref(),
         sensor: dataset.sensor,
         still: still_joints(&estimated.region),
+        set_up_anew: set_up_anew(&observed.dataset, &geometry),
     };
     estimated.verdict = judge(&case, options);
     Ok(Identification {
@@ -618,6 +621,8 @@ struct VerdictInputs<'a> {
     sensor: Sensor,
     /// Joints that hardly moved (from 1).
     still: Vec<usize>,
+    /// What speaks against one frame for all sessions.
+    set_up_anew: Option<String>,
 }
 
 /// Range below which a joint hardly moved (°).
@@ -668,6 +673,9 @@ fn judge(case: &VerdictInputs<'_>, options: &Options) -> Verdict {
             "{} rows lie beyond ten robust standard deviations, too many to be outliers: none was rejected",
             case.outliers.too_many
         ));
+    }
+    if let Some(set_up_anew) = &case.set_up_anew {
+        verdict.doubt(set_up_anew.as_str());
     }
     let (before, held) = (case.trained.registered.held_out.rmse, case.trained.geometry.held_out.rmse);
     verdict.check_held_out(before, held);

@@ -36,6 +36,15 @@ impl AngleCovariance {
         self.own.get(i).unwrap_or(&self.common)
     }
 
+    /// Standard deviation of an angle, root mean square of joints and rows (rad).
+    pub fn typical_rad(&self) -> f64 {
+        let trace = match self.own.len() {
+            0 => self.common.trace(),
+            rows => self.own.iter().map(Matrix6::trace).sum::<f64>() / rows as f64,
+        };
+        (trace / 6.0).sqrt()
+    }
+
     /// Gives row `i` a covariance of its own.
     pub fn set(&mut self, i: usize, covariance: Matrix6<f64>) {
         if self.own.is_empty() {
@@ -237,7 +246,11 @@ pub fn angle_shares(
         .collect()
 }
 
-/// RMS effect of rounded angles on a reading (mm), of a position over all three coordinates; `None` where nothing is rounded.
+/// Step of readings from which it counts (mm): finer ones are below the noise of any sensor.
+const COARSE_MM: f64 = 0.05;
+
+/// RMS effect of rounded angles and of the reading's own rounding on a reading (mm), of a position over all three coordinates; `None` where
+/// nothing is rounded.
 pub fn rounding_floor_mm(
     dataset: &Dataset,
     model: &Model,
@@ -246,6 +259,9 @@ pub fn rounding_floor_mm(
 ) -> Option<f64> {
     let shares = angle_shares(dataset, model, frames, angles);
     let coordinates = if dataset.sensor == Sensor::Cable { 1.0 } else { 3.0 };
-    let mean = shares.iter().map(|share| share.0).sum::<f64>() * coordinates / shares.len().max(1) as f64;
+    let of_angles = shares.iter().map(|share| share.0).sum::<f64>() / shares.len().max(1) as f64;
+    let of_reading =
+        dataset.reading_step_mm.filter(|step| *step >= COARSE_MM).map_or(0.0, |step| step * step / 12.0);
+    let mean = coordinates * (of_angles + of_reading);
     (mean > 0.0).then(|| mean.sqrt())
 }

@@ -1,16 +1,21 @@
-//! Whether a stated frame of a tracker or camera can be that of the readings.
+//! Whether a stated frame of a sensor can be that of the readings.
 //!
 //! The frame that fits the readings best is right to what the arm of the data sheet is off. A stated one that puts the readings elsewhere by
 //! far more is inverted, in metres, or of another set-up.
+//!
+//! What is left of the difference once geometry is fitted is judged in standard deviations. With Δ from the fitted to the stated frame,
+//! S the covariance of the fitted one and P that of the stated one, χ² = Δᵀ (S + P)⁻¹ Δ, and the stated one is off by
+//! P (S + P)⁻¹ Δ. What links or a scale error of the sensor take up is in S.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{DMatrix, DVector, Point3, Vector3, Vector6};
 
 use super::calibration::Frames;
-use super::fit::{Observations, errors_on};
+use super::fit::{Fitted, Observations, errors_on};
 use super::rounding::logged_covariance;
 use crate::measurement::dataset::{Dataset, Sensor};
 use truegrind_arm::model::Model;
-use truegrind_math::se3::Pose;
+use truegrind_arm::parameter::Parameter;
+use truegrind_math::se3::{Pose, apply_twist};
 use truegrind_math::statistics::median;
 
 /// Distance from the best frame that any arm may cause (mm), and as a multiple of the median error that is left with the best frame.
@@ -54,6 +59,93 @@ pub fn contradiction(
         "--sensor-frame: with it the readings are {off_mm:.1} mm from where the arm was; the readings put the sensor at {:.1},{:.1},{:.1}: {likely}",
         at.x, at.y, at.z
     ))
+}
+
+/// χ² of a stated frame from which it contradicts the readings: six standard deviations in six dimensions, by chance one in 10⁸.
+const CONTRADICTS: f64 = 50.0;
+/// How many times the error that geometry leaves the stated frame must be off: what else is wrong with an arm shifts the frame too.
+const OF_FIT: f64 = 3.0;
+/// Relative error of the sensor's scale, where none is stated.
+const UNSTATED_SCALE: f64 = 1e-2;
+
+/// What speaks against a stated frame, or a cable's outlet and zero, of standard deviation `sigma` (mm; rad), beside `geometry`, fitted
+/// with free frames to readings whose scale is right to `scale`; `None` if nothing does.
+pub fn contradiction_beside_geometry(
+    dataset: &Dataset,
+    geometry: &Fitted,
+    stated: &Frames,
+    sigma: [f64; 2],
+    scale: Option<f64>,
+) -> Option<String> {
+    let own: Vec<usize> =
+        (0..geometry.parameters.len()).filter(|&k| is_of_frame(&geometry.parameters[k])).collect();
+    let covariance = geometry.estimate.covariance.as_ref()?;
+    let (difference, by_scale) = own
+        .iter()
+        .map(|&k| difference(&geometry.parameters[k], stated, &geometry.frames, dataset))
+        .unzip::<f64, f64, Vec<f64>, Vec<f64>>();
+    let (difference, by_scale) =
+        (DVector::from_vec(difference), DVector::from_vec(by_scale) * scale.unwrap_or(UNSTATED_SCALE));
+    let of_stated = DMatrix::from_diagonal(&DVector::from_iterator(
+        own.len(),
+        own.iter().map(|&k| {
+            let turns = matches!(geometry.parameters[k], Parameter::SensorFrame(3..));
+            sigma[usize::from(turns)].powi(2)
+        }),
+    ));
+    let of_fit = covariance.select_rows(&own).select_columns(&own) + &by_scale * by_scale.transpose();
+    let weighted = (of_fit + &of_stated).cholesky()?.solve(&difference);
+    let square = difference.dot(&weighted);
+    let off = of_stated * weighted;
+    let error_mm = typical_error_mm(geometry, dataset);
+    let cable = dataset.sensor == Sensor::Cable;
+    let (off_mm, option) = if cable {
+        (off.amax(), "--outlet and --cable-zero")
+    } else {
+        let right = apply_twist(&stated.base_from_sensor, &-Vector6::from_column_slice(off.as_slice()));
+        (rms_distance_mm(dataset, &stated.base_from_sensor, &right), "--sensor-frame")
+    };
+    (square > CONTRADICTS && off_mm > OF_FIT * error_mm).then(|| {
+        format!(
+            "{option}: with the arm's geometry fitted the readings contradict it by {:.0} standard deviations, which is {off_mm:.2} mm \
+             at the arm: measure it again, state how uncertain it is (--frame-sigma), or leave it out",
+            square.sqrt(),
+        )
+    })
+}
+
+fn is_of_frame(parameter: &Parameter) -> bool {
+    matches!(parameter, Parameter::SensorFrame(_) | Parameter::Outlet { .. } | Parameter::Zero { .. })
+}
+
+/// A parameter of the stated frames minus that of the fitted ones, and what a sensor whose readings are all too long by their own length
+/// does to it.
+fn difference(parameter: &Parameter, stated: &Frames, fitted: &Frames, dataset: &Dataset) -> (f64, f64) {
+    let (to, from) = (&stated.base_from_sensor, &fitted.base_from_sensor);
+    let centre = mean_reading(dataset);
+    match *parameter {
+        Parameter::SensorFrame(k @ 0..3) => {
+            ((to.translation.vector - from.translation.vector)[k], (from.rotation * centre)[k])
+        }
+        Parameter::SensorFrame(k) => ((to.rotation * from.rotation.inverse()).scaled_axis()[k - 3], 0.0),
+        Parameter::Outlet { anchor, axis } => {
+            (stated.outlets_mm[anchor][axis] - fitted.outlets_mm[anchor][axis], 0.0)
+        }
+        Parameter::Zero { anchor } => (stated.zeros_mm[anchor] - fitted.zeros_mm[anchor], centre.x),
+        _ => (0.0, 0.0),
+    }
+}
+
+/// The mean reading, of a cable its length (mm).
+fn mean_reading(dataset: &Dataset) -> Vector3<f64> {
+    let count = dataset.rows.len().max(1) as f64;
+    dataset.rows.iter().map(|row| row.reading.place_mm() / count).sum()
+}
+
+/// Median error of the fitted arm, which outliers do not move (mm).
+fn typical_error_mm(geometry: &Fitted, dataset: &Dataset) -> f64 {
+    let observed = Observations { dataset: dataset.clone(), angles: logged_covariance(dataset) };
+    median(&errors_on(&observed, &geometry.model, &geometry.frames)).unwrap_or(0.0)
 }
 
 /// RMS distance of the readings in the base under two frames (mm).

@@ -393,8 +393,21 @@ fn pooled_scatter_by(
 
 /// Whether repeated readings that are equal to the last digit may be so by chance: the sensor's steps are coarse for its scatter.
 pub(super) fn repeats_agree_by_chance(data: &Dataset) -> bool {
-    !Repeats::of(data, |row, _| Some(row.reading.place_mm())).are_copied()
+    !repeats_of_readings(data).are_copied()
 }
+
+/// The same of readings at different times, which may all be equal where the steps are coarse.
+pub(super) fn repeats_may_all_agree(data: &Dataset) -> bool {
+    let is_coarse = data.reading_step_mm.is_some_and(|step| step > FINE_STEP_MM);
+    is_coarse && repeats_of_readings(data).own.pooled().is_none()
+}
+
+fn repeats_of_readings(data: &Dataset) -> Repeats {
+    Repeats::of(data, |row, _| Some(row.reading.place_mm()))
+}
+
+/// Step of readings above which they may all be equal at a pose (mm).
+const FINE_STEP_MM: f64 = 0.005;
 
 /// Readings of poses that were measured more than once with the same outlet and approach.
 struct Repeats {

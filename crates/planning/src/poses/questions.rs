@@ -129,6 +129,8 @@ pub struct Open {
     pub questions: Vec<Question>,
     /// What no cause explains.
     pub something_else: Option<SomethingElse>,
+    /// Whether it is a joint that stands elsewhere from reading to reading: repeated readings from either side tell why.
+    pub joint_scatters: bool,
 }
 
 /// What a diagnosis left open: everything, or only the finding with a number (from 1, as the report counts).
@@ -140,7 +142,7 @@ pub fn open(text: &str, number: Option<usize>) -> Result<Open, DiagnosisFileErro
     let unexplained =
         |finding: &Finding| finding.effect == CauseKind::Unexplained && something_else.is_some();
     let Some(number) = number else {
-        return Ok(Open { questions: questions(text)?, something_else });
+        return Ok(Open { questions: questions(text)?, something_else, joint_scatters: false });
     };
     let is_open = |finding: &Finding| finding.confidence == Confidence::Ambiguous;
     let Some(finding) = number.checked_sub(1).and_then(|k| findings.get(k)).filter(|f| is_open(f)) else {
@@ -152,10 +154,13 @@ pub fn open(text: &str, number: Option<usize>) -> Result<Open, DiagnosisFileErro
         let open = if open.is_empty() { "none is open".to_owned() } else { open.join(", ") };
         return Err(DiagnosisFileError::Finding { number, open });
     };
-    if unexplained(finding) {
-        return Ok(Open { questions: Vec::new(), something_else });
+    if finding.effect == CauseKind::Unexplained && finding.joints.is_some() {
+        return Ok(Open { joint_scatters: true, ..Open::default() });
     }
-    Ok(Open { questions: vec![finding.question()?], something_else: None })
+    if unexplained(finding) {
+        return Ok(Open { something_else, ..Open::default() });
+    }
+    Ok(Open { questions: vec![finding.question()?], ..Open::default() })
 }
 
 impl Finding {

@@ -60,8 +60,7 @@ fn too_much_for_noise(diagnosis: &Diagnosis) -> Vec<String> {
         return Vec::new();
     };
     let left = if diagnosis.findings.is_empty() { "" } else { " that is left" };
-    let source =
-        if diagnosis.is_noise_measured() { "" } else { ", which is that of rounding the angles alone" };
+    let source = if diagnosis.is_noise_measured() { "" } else { ", which is that of rounding alone" };
     let mut out = vec![
         format!(
             "the held-out error{left} ({:.3} mm) is {times:.0} times the noise floor ({floor:.3} mm{source}): too much for noise; its cause is \

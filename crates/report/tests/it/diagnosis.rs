@@ -105,7 +105,7 @@ fn a_remainder_far_above_the_noise_floor_is_a_warning() {
         let text = on_a_terminal(&view::document(&found, dataset));
         (text.split_whitespace().collect::<Vec<_>>().join(" "), found.diagnosis.is_partly_unexplained())
     };
-    let rounding = "rounding of the angles alone; too few poses were repeated";
+    let rounding = "rounding alone; too few poses were repeated";
     let (text, flagged) = summary(1.045, 0.004, rounding);
     assert!(flagged && text.contains("[warning] No cause beyond geometry was found"), "{text}");
     assert!(text.contains("is 261 times the noise floor (0.004 mm, which is that of rounding"), "{text}");

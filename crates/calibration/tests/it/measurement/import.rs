@@ -88,15 +88,19 @@ fn rounding_steps() {
     let file = |q: &str, l: &str| {
         read(&format!("{HEADER}\n{q},20,30,40,50,60,{l}\n11,21,31,41,51,61,500\n")).unwrap()
     };
-    let data = file("10.3", "500.004");
+    let data = file("10.3", "500.003");
     assert_eq!(data.angle_step_rad, Some(0.1f64.to_radians()));
     assert_eq!(data.reading_step_mm, Some(0.001));
     assert_eq!(data.readout_step_mm, None);
-    assert_eq!(file("10.25", "500.00001").angle_step_rad, Some(0.01f64.to_radians()));
+    assert_eq!(file("10.27", "500.00001").angle_step_rad, Some(0.01f64.to_radians()));
     assert_eq!(file("-10.123", "500.00001").angle_step_rad, Some(0.001f64.to_radians()));
     assert_eq!(file("10.123456", "500.00001").angle_step_rad, None);
     assert_eq!(file("10", "500.00001").angle_step_rad, None, "whole degrees were commanded, not rounded");
     assert_eq!(file("10", "500.000013").reading_step_mm, None);
+    assert_eq!(file("10.25", "512").reading_step_mm, Some(1.0), "no one commands a reading");
+    let steps =
+        read(&format!("{HEADER}\n10.35,20.05,30,40,50,60,500.1\n11,21,31,41.15,51,61,500\n")).unwrap();
+    assert_eq!(steps.angle_step_rad, Some(0.05_f64.to_radians()));
 }
 
 #[test]

@@ -64,7 +64,21 @@ fn copied_rows_count_once() {
     assert!(found.notes[0].starts_with("rows 5, 6 and 7 are copies"), "{:?}", found.notes);
 }
 
-/// Another reading, session or time is another measurement, and so is an equal reading of a coarse sensor.
+/// No tracker reads the same to 0.1 µm again: a row with another time or session is a copy too, where the sensor's steps are fine.
+#[test]
+fn rows_copied_to_another_time_count_once() {
+    let later = |rows: Vec<Row>| timed(rows, |i| i as f64 / 60.0);
+    let twice = [rows(3), rows(3)].concat();
+    assert_eq!(matched(later(twice.clone())).rows.len(), 3);
+    assert_eq!(matched(named(twice.clone(), |i| ["monday", "tuesday"][i / 3])).rows.len(), 3);
+    let nominal = truegrind_arm::robots::load("abb-irb-120").unwrap().model;
+    let mut coarse = Dataset::new("rows.csv", Sensor::Position, later(twice));
+    coarse.reading_step_mm = Some(0.1);
+    let coarse = match_to_arm(coarse, "abb-irb-120", &nominal, AngleConvention::Logged, true).unwrap();
+    assert_eq!(coarse.rows.len(), 6);
+}
+
+/// Another reading is another measurement, and so is an equal reading of a coarse sensor.
 #[test]
 fn repeated_readings_are_no_copies() {
     let mut all = rows(5);
@@ -72,8 +86,6 @@ fn repeated_readings_are_no_copies() {
     again.reading = Reading::Position(Vector3::new(1002.0, 20.0, 0.5));
     all.push(again);
     assert_eq!(matched(all).rows.len(), 6);
-    let two = timed([rows(3), rows(3)].concat(), |i| i as f64 / 60.0);
-    assert_eq!(matched(two).rows.len(), 6);
     // Five readings of a pose in steps of 0.1 mm, which scatter by as much.
     let coarse = |steps: i32| Reading::Position(Vector3::new(1000.0 + 0.1 * f64::from(steps), 0.0, 0.0));
     let mut pose = vec![rows(1)[0].clone(); 5];
