@@ -247,12 +247,7 @@ fn check_numbers(arguments: &Arguments, sigma: f64) -> anyhow::Result<()> {
             bail!("{name} {value}: expected 0 or more");
         }
     }
-    let poses = arguments.poses.unwrap_or(if joint_scatters { FIELD_POSES } else { POSES });
-    // Whether it differs by the side or from time to time is asked at every pose.
-    let [repeats, both_sides, warm_up] = match joint_scatters {
-        true => [poses, poses, 0],
-        false => [arguments.repeats, arguments.both_sides, arguments.warm_up],
-    };
+    let poses = arguments.poses.unwrap_or(POSES);
     if poses < 4 {
         bail!("--poses {poses}: expected at least 4; some 50 to 100 are usual");
     }
@@ -338,7 +333,12 @@ fn options(arguments: &Arguments, robot: &str, sensor: Sensor, reach_mm: f64) ->
     let space = space(arguments, reach_mm)?;
     let questions::Open { questions, something_else, joint_scatters } = left_open(arguments, robot)?;
     let approach_rad = arguments.approach.to_radians();
-    let poses = arguments.poses.unwrap_or(POSES);
+    let poses = arguments.poses.unwrap_or(if joint_scatters { FIELD_POSES } else { POSES });
+    // Whether it differs by the side or from time to time is asked at every pose.
+    let [repeats, both_sides, warm_up] = match joint_scatters {
+        true => [poses, poses, 0],
+        false => [arguments.repeats, arguments.both_sides, arguments.warm_up],
+    };
     let options = Options {
         poses,
         index: match arguments.index {

@@ -77,13 +77,8 @@ impl FramePriorArguments {
         let split = |rows: &Dataset| split::random(rows, free.held_out, free.seed);
         let geometry = identify(dataset, "", nominal, &found, &split, &free).map(|free| free.geometry);
         if let Ok(geometry) = geometry
-            && let Some(contradiction) = contradiction_beside_geometry(
-                dataset,
-                &geometry,
-                stated,
-                [mm, deg.to_radians()],
-                of_arm.scale,
-            )
+            && let Some(contradiction) =
+                contradiction_beside_geometry(dataset, geometry, stated, [mm, deg.to_radians()], of_arm.scale)
         {
             bail!("{contradiction}");
         }

@@ -578,7 +578,8 @@ fn linearise_readings(fitted: &Fitted, dataset: &Dataset) -> LinearisedReadings 
     let (p, per) = (problem.parameters(), problem.rows_per_observation());
     let x = &fitted.estimate.x;
     let rotation = fitted.frames.base_from_sensor.rotation;
-    let centre = mean_reading(dataset);
+    // Free frames take up where a scale error moves everything; stated ones do not.
+    let centre = if has_stated_frames(fitted) { Vector3::zeros() } else { mean_reading(dataset) };
     let all = p + 1;
     let part = |rows: Range<usize>| {
         let mut out = LinearisedReadings::none(all);
@@ -624,6 +625,17 @@ const ROWS: usize = 512;
 const PART: usize = 4 * ROWS;
 
 /// Mean reading: a scale about it does not move the sensor frame.
+/// Whether the prior of a frame is narrower than any free one's.
+fn has_stated_frames(fitted: &Fitted) -> bool {
+    let of_frames = |parameter: &Parameter| {
+        matches!(parameter, Parameter::SensorFrame(0..3) | Parameter::Outlet { .. } | Parameter::Zero { .. })
+    };
+    fitted.parameters.iter().zip(&fitted.priors).any(|(p, prior)| of_frames(p) && prior.sigma < STATED_MM)
+}
+
+/// Standard deviation of a frame below which it was stated (mm).
+const STATED_MM: f64 = 100.0;
+
 fn mean_reading(dataset: &Dataset) -> Vector3<f64> {
     let n = dataset.rows.len().max(1) as f64;
     dataset.rows.iter().map(|row| row.reading.place_mm() / n).sum()

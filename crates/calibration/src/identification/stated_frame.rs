@@ -9,6 +9,7 @@
 
 use nalgebra::{DMatrix, DVector, Point3, Vector3, Vector6};
 
+use super::benefit::widen_by_scale;
 use super::calibration::Frames;
 use super::fit::{Fitted, Observations, errors_on};
 use super::rounding::logged_covariance;
@@ -72,11 +73,15 @@ const UNSTATED_SCALE: f64 = 1e-2;
 /// with free frames to readings whose scale is right to `scale`; `None` if nothing does.
 pub fn contradiction_beside_geometry(
     dataset: &Dataset,
-    geometry: &Fitted,
+    mut geometry: Fitted,
     stated: &Frames,
     sigma: [f64; 2],
     scale: Option<f64>,
 ) -> Option<String> {
+    if scale.is_none() {
+        // What is stated is in the covariance.
+        widen_by_scale(&mut geometry, dataset, UNSTATED_SCALE);
+    }
     let own: Vec<usize> =
         (0..geometry.parameters.len()).filter(|&k| is_of_frame(&geometry.parameters[k])).collect();
     let covariance = geometry.estimate.covariance.as_ref()?;
@@ -97,7 +102,7 @@ pub fn contradiction_beside_geometry(
     let weighted = (of_fit + &of_stated).cholesky()?.solve(&difference);
     let square = difference.dot(&weighted);
     let off = of_stated * weighted;
-    let error_mm = typical_error_mm(geometry, dataset);
+    let error_mm = typical_error_mm(&geometry, dataset);
     let cable = dataset.sensor == Sensor::Cable;
     let (off_mm, option) = if cable {
         (off.amax(), "--outlet and --cable-zero")
