@@ -6,6 +6,7 @@ use anyhow::{anyhow, bail};
 use clap::Args;
 use nalgebra::Point3;
 use truegrind::arm::condition::Condition;
+use truegrind::arm::effect::Effect;
 use truegrind::arm::estimated::Estimated;
 use truegrind::arm::model::Model;
 use truegrind::compensation::cell::{Cell, Used};
@@ -41,6 +42,9 @@ pub(super) struct CellArguments {
     pub(super) payload_centre: Option<String>,
 }
 
+/// Share of the load within which another one is the same.
+const SAME_LOAD: f64 = 0.1;
+
 impl CellArguments {
     /// The loads that the program declares; `None` if `--payload` overrides them.
     pub(super) fn loads(&self, program: &Program<'_>) -> Option<Loads> {
@@ -57,6 +61,7 @@ impl CellArguments {
         {
             bail!("--payload {kg}: expected a mass in kg, from 0 to {LARGEST_PAYLOAD_KG}");
         }
+        self.refuse_other_load(model)?;
         self.note_overload(model);
         let cell = self.read_cell()?;
         let surface = self.surface.as_deref().map(super::path::surface).transpose()?;
@@ -72,6 +77,21 @@ impl CellArguments {
             condition.payload_centre_mm = in_last_link.coords.into();
         }
         Ok((cell, surface, condition))
+    }
+
+    /// Refuses a payload that the model cannot follow.
+    fn refuse_other_load(&self, model: Option<&Estimated>) -> anyhow::Result<()> {
+        let (Some(kg), Some(model)) = (self.payload, model) else { return Ok(()) };
+        let measured_kg = model.condition.payload_kg.unwrap_or(0.0);
+        let holds = |effect: &Effect| effect.holds_for_one_load() && !effect.is_zero();
+        if (kg - measured_kg).abs() <= SAME_LOAD * measured_kg || !model.model.effects.iter().any(holds) {
+            return Ok(());
+        }
+        bail!(
+            "--payload {kg}: the masses of {} are not known, so its deflection was identified for the load of the measurement ({measured_kg} kg) and \
+             follows no other: measure with {kg} kg on the flange, or leave --payload out and count on what the difference of the loads makes",
+            model.robot
+        )
     }
 
     /// Notes a payload above the rated one of the catalogue: perhaps it is in another unit.

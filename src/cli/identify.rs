@@ -378,13 +378,21 @@ fn measured(arguments: &DataArguments, robot: &Robot, dataset: Dataset) -> anyho
             }
             _ => anyhow!("{mismatch}"),
         })?;
-    note_overload(&mut dataset, robot);
+    note_payloads(&mut dataset, robot);
     Ok(dataset)
 }
 
-/// Notes payloads above the rated one: perhaps they are in pounds or newtons.
-fn note_overload(dataset: &mut Dataset, robot: &Robot) {
-    let most_kg = dataset.rows.iter().filter_map(|row| row.condition.payload_kg).reduce(f64::max);
+/// Notes payloads that are not used, and those above the rated one: perhaps they are in pounds or newtons.
+fn note_payloads(dataset: &mut Dataset, robot: &Robot) {
+    let loads_kg = || dataset.rows.iter().filter_map(|row| row.condition.payload_kg);
+    let most_kg = loads_kg().reduce(f64::max);
+    if robot.model.bodies.is_none() && most_kg != loads_kg().reduce(f64::min) {
+        dataset.notes.push(format!(
+            "column payload: {} has no masses here, and deflections follow a load only beside them, so the loads are not used; measure each load \
+             alone, or state the masses in a robot file",
+            robot.sheet.name
+        ));
+    }
     if let (Some(kg), Some(rated)) = (most_kg, robot.sheet.payload_kg)
         && kg > OVERLOAD * rated
     {

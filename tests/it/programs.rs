@@ -261,8 +261,10 @@ fn lines_whose_path_nobody_checked_are_named() {
     let text = text.replacen("    IF di1=1 Stop;\n", "    IF di1=1 MoveL CRobT(),v100,fine,tool0;\n", 2);
     fs::write(at.join("a.mod"), text).unwrap();
     let (code, text, err) = truegrind(at, &["compensate", "a.mod", "--model", "model.toml", "--dry-run"]);
-    assert_eq!(code, 0, "{err}");
+    // Two lines to where the robot stands are left beside cuts.
+    assert_eq!(code, 1, "{err}");
     let words: String = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(words.contains("except for lines or arcs that are left"), "{text}");
     assert!(words.contains("3 lines or arcs start at a place that is unknown or not corrected"), "{text}");
     assert!(words.contains("the path to it is not checked (lines 4, 6, 8)"), "{text}");
 }
@@ -435,6 +437,12 @@ fn what_is_left_shows_everywhere() {
     let (code, _, err) = truegrind(at, &other);
     assert_eq!(code, 2);
     assert!(err.contains(" mm from the target of line 7"), "{err}");
+    // What is as it was is not called corrected.
+    let same = ["deviation", "in/left.mod", "--model", "model.toml", "--intended", "in/left.mod", "--json"];
+    let (code, report, err) = truegrind(at, &same);
+    assert_eq!(code, 0, "{err}");
+    let points = json(&report)["programs"][0]["models"][0]["points"].as_array().unwrap().clone();
+    assert!(!points.is_empty() && points.iter().all(|point| point["status"] == "left"), "{points:?}");
     // Corrected with this model: nothing would change.
     let (code, _, err) = truegrind(at, &["compensate", "left.mod", "--model", "model.toml", "--check"]);
     assert_eq!(code, 0, "{err}");

@@ -111,6 +111,12 @@ impl Effect {
         each!(self, e => e.parameters())
     }
 
+    /// Whether it is a deflection that was identified without the masses of the arm: it holds for the load of the measurement alone.
+    pub fn holds_for_one_load(&self) -> bool {
+        matches!(self, Effect::LumpedCompliance(_))
+            || matches!(self, Effect::LinkBending(bending) if bending.frame.is_some())
+    }
+
     /// Whether all its parameters are 0: it changes nothing and is listed for the covariance alone.
     pub fn is_zero(&self) -> bool {
         self.parameters().iter().all(|parameter| parameter.value == 0.0)

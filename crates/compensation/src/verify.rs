@@ -107,6 +107,7 @@ pub fn verify(task: &VerificationTask<'_>, acting_arm: &ActingArm<'_>) -> PathRe
                 (Some((_, runs)), Some(partners)) => partners[index].map(|k| &runs[k]),
                 _ => None,
             };
+            let same = second.is_some_and(|second| is_same_target(first, second));
             let (joints, condition_index) =
                 second.map_or((first.joints, first.condition_index), |s| (s.joints, s.condition_index));
             let linear = matches!(motion.kind, MotionKind::Linear | MotionKind::Circular);
@@ -133,8 +134,8 @@ pub fn verify(task: &VerificationTask<'_>, acting_arm: &ActingArm<'_>) -> PathRe
                 }),
                 shape_sigma_mm: None,
                 outside: acting_arm.knowledge.and_then(|k| k.region.outside(&joints)),
-                status: if second.is_some() { Status::Changed } else { Status::Left },
-                reason: None,
+                status: if second.is_some() && !same { Status::Changed } else { Status::Left },
+                reason: same.then(|| "the rewritten program has it as the original".to_owned()),
             }
         })
         .collect();
@@ -149,6 +150,13 @@ pub fn verify(task: &VerificationTask<'_>, acting_arm: &ActingArm<'_>) -> PathRe
         }),
         held_out_mm: acting_arm.knowledge.map(|k| k.geometry.held_out.rmse),
     }
+}
+
+/// Whether the rewritten program sends the arm where the original does.
+fn is_same_target(first: &ExecutedEnd, second: &ExecutedEnd) -> bool {
+    let moved = (first.commanded.translation.vector - second.commanded.translation.vector).norm();
+    let turned = first.commanded.rotation.angle_to(&second.commanded.rotation);
+    moved < 1e-9 && turned < 1e-9 && (first.joints - second.joints).amax() < 1e-9
 }
 
 /// Runs a program. `start` are the joints where it begins, unless cell file or program state them.

@@ -125,9 +125,9 @@ impl Row {
     /// A program without corrections must not look done.
     fn judged(&self) -> Status {
         match self.ended {
-            Ended::Changed if self.doubt.is_none() => Status::Good,
+            Ended::Changed if self.is_clean() => Status::Good,
             Ended::Changed => Status::Warning,
-            Ended::Unchanged if self.motions[0] == 0 => Status::NotEvaluated,
+            Ended::Unchanged if self.motions[0] == 0 && self.opaque == 0 => Status::NotEvaluated,
             Ended::Unchanged | Ended::Already => Status::Warning,
             Ended::Failed => Status::Bad,
         }

@@ -235,7 +235,7 @@ pub fn document(robot: &Robot) -> Document {
     ));
     match mass_table(robot) {
         Some(table) => page.push(untitled(table)),
-        None => page.paragraph("No masses are stated, so only the payload counts for gravity loads."),
+        None => page.paragraph("No masses are stated: deflections are identified for the load of the measurement and follow no other."),
     }
     page.heading(2, "Published poses");
     push_published(&mut page, robot);

@@ -5,7 +5,6 @@ use crate::condition::payload::{is_load_dependent, payload_at};
 use crate::line_list::{lines_of, numbered};
 use crate::options::Options;
 use crate::target::solved_target::SolvedTargets;
-use truegrind_arm::effect::Effect;
 use truegrind_programs::motion::{Listing, Motion, MotionKind, Origin, Place, Switch};
 
 /// How backlash enters this program.
@@ -163,17 +162,11 @@ fn grams(kg: f64) -> f64 {
     (kg * 1e3).round() / 1e3
 }
 
-/// Whether an effect is a deflection under loads that a payload is not part of.
-fn is_lumped(effect: &Effect) -> bool {
-    matches!(effect, Effect::LumpedCompliance(_))
-        || matches!(effect, Effect::LinkBending(bending) if bending.frame.is_some())
-}
-
 /// Which payload was assumed.
 pub(crate) fn load_notes(listing: &Listing, arms: &Arms<'_>, options: &Options) -> Vec<String> {
     let model = arms.estimated.arm().model;
     let load_dependent = model.effects.iter().any(is_load_dependent);
-    let lumped = model.effects.iter().any(|e| is_lumped(e) && !e.is_zero());
+    let lumped = model.effects.iter().any(|e| e.holds_for_one_load() && !e.is_zero());
     let Some(loads) = options.loads.as_ref().filter(|_| load_dependent || lumped) else {
         return Vec::new();
     };

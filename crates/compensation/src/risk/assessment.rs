@@ -21,7 +21,7 @@ use crate::risk::probability::probability_of_harm;
 use crate::risk::remedy_search::{self, UnknownPlacement};
 use crate::search_budget::MANY;
 use truegrind_arm::estimated::{CarriedFrame, Estimated, PosteriorComponent};
-use truegrind_programs::motion::Listing;
+use truegrind_programs::motion::{Listing, WorkObject};
 
 /// Assessment of a program.
 #[derive(Debug, Clone, Default)]
@@ -104,6 +104,8 @@ pub(crate) struct EstimateContext<'a, 'm> {
 
 /// The sampled targets of each work object and of each cut, including the point where it begins.
 pub(crate) struct AssessmentSample {
+    /// The work object of each entry of the listing: the first of those of one name, which a program displacement sets apart.
+    part_of: Vec<u32>,
     objects: Vec<(u32, Vec<u32>)>,
     cuts: Vec<(Vec<u32>, Vec<u32>)>,
 }
@@ -111,6 +113,7 @@ pub(crate) struct AssessmentSample {
 impl AssessmentSample {
     /// From those motions for which `reached` holds.
     pub(crate) fn of(listing: &Listing, cuts: &CutsOf, reached: impl Fn(usize) -> bool + Sync) -> Self {
+        let part_of = parts(listing);
         let motions = listing.motions.par_iter().with_min_len(MANY).enumerate();
         let objects: Vec<Option<u32>> =
             motions.map(|(index, motion)| motion.work_object.filter(|_| reached(index))).collect();
@@ -120,7 +123,8 @@ impl AssessmentSample {
             let cut = cuts.root(index);
             in_cuts.extend(cut.map(|root| (root, index)));
             if let Some(object) = object {
-                of_object.entry(object).or_default()[usize::from(cut.is_none())].push(index);
+                of_object.entry(part_of[object as usize]).or_default()[usize::from(cut.is_none())]
+                    .push(index);
             }
         }
         // Air moves do not count where there are cuts.
@@ -142,8 +146,19 @@ impl AssessmentSample {
                 begins.chain(all.iter().copied()).filter(|m| reached(*m as usize)).collect();
             (!commanded.is_empty()).then(|| (all, evenly_spaced(&commanded, cut_risk::MOST_POINTS)))
         });
-        Self { objects: objects.collect(), cuts: cuts.collect() }
+        Self { objects: objects.collect(), cuts: cuts.collect(), part_of }
     }
+}
+
+/// For each work object of a listing the first that has its name and is held as it is: where a part lies is one question, however the
+/// program displaces its targets on it.
+fn parts(listing: &Listing) -> Vec<u32> {
+    let mut first: BTreeMap<(String, bool), u32> = BTreeMap::new();
+    let part = |(index, object): (u32, &WorkObject)| {
+        let held = object.value.as_ref().is_ok_and(|value| value.robhold);
+        *first.entry((object.name.to_ascii_lowercase(), held)).or_insert(index)
+    };
+    (0..).zip(&listing.work_objects).map(part).collect()
 }
 
 /// Assesses a program. `at`: the target at the end of a sampled motion. Work objects whose shape alone is
@@ -177,9 +192,17 @@ pub(crate) fn assess_program(
         }
         taken.insert(*object, placement.applied);
         out.placements.push(placement);
-        if let Some(motion) = displaced {
-            for (frames, _) in list.iter_mut().zip(objects).filter(|(_, of)| **of == *object) {
-                frames.real.object *= motion;
+        if let (Some(motion), Some(first)) = (displaced, targets.first()) {
+            let reference = list[first.frames_index].real.object;
+            let of_part =
+                list.iter_mut().zip(objects).filter(|(_, of)| chosen.part_of[**of as usize] == *object);
+            for (frames, _) in of_part {
+                let object = &mut frames.real.object;
+                *object = if *object == reference {
+                    reference * motion
+                } else {
+                    reference * motion * reference.inverse() * *object
+                };
             }
         }
     }
@@ -195,7 +218,7 @@ pub(crate) fn assess_program(
             let targets: Vec<AssessedTarget> = commanded.iter().filter_map(|m| at(*m)).collect();
             let frames = &list[targets.first()?.frames_index];
             let object = listing.motions[motions[0] as usize].work_object?;
-            let placement = *taken.get(&object)?;
+            let placement = *taken.get(&chosen.part_of[object as usize])?;
             let off = PathDeviation::of(&targets, list, conditions, knowledge);
             let (judgement, registered) = cut_risk::assess_cut(&off, knowledge, placement)?;
             let weight = motions.len() as f64 / targets.len() as f64;

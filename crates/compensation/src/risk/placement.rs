@@ -123,12 +123,43 @@ impl PathDeviation {
             let in_base = knowledge.position_jacobians(arm, &points);
             out.jacobian.rows_mut(3 * first, 3 * run.len()).copy_from(&in_base);
         }
-        for mut column in out.jacobian.column_iter_mut() {
-            for (turn, velocity) in into_object.iter().zip(column.as_mut_slice().as_chunks_mut().0) {
+        out.turn_velocities(&into_object);
+        out
+    }
+
+    /// The same of targets on one part, all in the work object of the first: a program displacement moves the frame in which they are
+    /// programmed, not the part.
+    pub(crate) fn of_part(
+        targets: &[AssessedTarget],
+        list: &[ResolvedFrames],
+        conditions: &ArmConditions<'_>,
+        knowledge: &Estimated,
+    ) -> Self {
+        let mut out = Self::of(targets, list, conditions, knowledge);
+        let object = |target: &AssessedTarget| list[target.frames_index].real.object;
+        let Some(reference) = targets.first().map(object) else { return out };
+        if targets.iter().all(|target| object(target) == reference) {
+            return out;
+        }
+        let into_first: Vec<Pose> =
+            targets.iter().map(|target| reference.inverse() * object(target)).collect();
+        for ((into, intended), shift) in into_first.iter().zip(&mut out.intended).zip(&mut out.shifts) {
+            *intended = into * *intended;
+            *shift = into * *shift;
+        }
+        let turns: Vec<Matrix3<f64>> =
+            into_first.iter().map(|into| into.rotation.to_rotation_matrix().into_inner()).collect();
+        out.turn_velocities(&turns);
+        out
+    }
+
+    /// Turns the derivatives of each point.
+    fn turn_velocities(&mut self, turns: &[Matrix3<f64>]) {
+        for mut column in self.jacobian.column_iter_mut() {
+            for (turn, velocity) in turns.iter().zip(column.as_mut_slice().as_chunks_mut().0) {
                 *velocity = (turn * Vector3::from(*velocity)).into();
             }
         }
-        out
     }
 }
 
@@ -160,7 +191,7 @@ pub(crate) fn evenly_spaced<T: Copy>(items: &[T], most: usize) -> Vec<T> {
 }
 
 /// Position of the path over one work object, from sampled targets, and the displacement of the work object that realises the
-/// requested placement (`None`: no displacement).
+/// requested placement, in the frame of the first target (`None`: no displacement).
 pub(crate) fn assess_placement(
     name: &str,
     targets: &[AssessedTarget],
@@ -171,7 +202,7 @@ pub(crate) fn assess_placement(
     choice: PlacementChoice,
 ) -> Option<(ObjectPlacement, Option<Pose>)> {
     let taught = targets.iter().any(|target| list[target.frames_index].carried.is_some());
-    let off = PathDeviation::of(targets, list, conditions, knowledge);
+    let off = PathDeviation::of_part(targets, list, conditions, knowledge);
     let count = targets.len();
     let registration = Registration::of(&off.intended)?;
     let twist = registration.twist(off.shifts.iter().copied());

@@ -245,7 +245,7 @@ impl UnknownPlacement<'_, '_> {
             None => frames.clone(),
         };
         let list: Vec<ResolvedFrames> = self.list.iter().map(against).collect();
-        PathDeviation::of(self.targets, &list, self.conditions, self.knowledge)
+        PathDeviation::of_part(self.targets, &list, self.conditions, self.knowledge)
     }
 
     /// `count` of the measured poses.

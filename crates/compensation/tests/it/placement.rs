@@ -79,6 +79,38 @@ fn a_place_that_is_not_known_stays_and_the_shape_is_corrected() {
     }
 }
 
+/// A pattern and the same one displaced by the program lie on one part: each had a place of its own, and the distance between them kept
+/// its error, or got a worse one where one of the two was corrected.
+#[test]
+fn patterns_that_the_program_displaces_keep_their_distance() {
+    let (_, joints) = blade();
+    let pattern: String = [[380.0, -120.0], [420.0, -120.0], [420.0, -80.0], [380.0, -80.0]]
+        .map(|[x, y]| {
+            format!("MoveL [[{x},{y},300],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v20,fine,tool0;\n")
+        })
+        .concat();
+    let displaced = format!("PDispSet [[0,200,0],[1,0,0,0]];\n{pattern}PDispOff;\n");
+    let source = format!("MODULE M\nPROC main()\nConfL\\Off;\n{pattern}{displaced}ENDPROC\nENDMODULE\n");
+    for seed in 0..3 {
+        let mut known = placed_somewhere(seed, &joints);
+        (known.region.min_deg, known.region.max_deg) = ([-400.0; 6], [400.0; 6]);
+        known.region.spacing_deg = 1e6;
+        let options = Options { max_risk: 1.0, ..with(Placement::Shape) };
+        let (plan, program) = rewritten(source.as_bytes(), &known, &Cell::default(), &options);
+        let [placement] = plan.placements.as_slice() else { panic!("{:?}", plan.placements) };
+        assert_eq!(placement.applied, Placement::Shape);
+        let report = run_on(&known.model, source.as_bytes(), &program, &Cell::default());
+        let points = cut_points(&report);
+        assert_eq!(points.len(), 8);
+        let places: Vec<Vector3<f64>> = points.iter().map(|p| p.intended.translation.vector).collect();
+        let projector = rigid(&places);
+        let shape = |d: &DVector<f64>| (d - &projector * d).amax();
+        let (before, after) = (deviations(&points, false), deviations(&points, true));
+        assert!(shape(&before) > 0.02, "{}", shape(&before));
+        assert!(shape(&after) < 2e-3, "{}", shape(&after));
+    }
+}
+
 #[test]
 fn a_place_that_is_known_is_corrected_and_can_be_asked_for() {
     let (source, joints) = blade();

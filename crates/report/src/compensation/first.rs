@@ -43,6 +43,10 @@ pub fn verdict(plan: &Plan, listing: &Listing, is_written: bool) -> Verdict {
             Status::Warning,
             "Corrected, but the path has steps beside motions that are left: check them before running the program",
         ),
+        (_, 0) if paths(plan, listing)[2] > 0 => (
+            Status::Warning,
+            "Corrected, except for lines or arcs that are left: there the workpiece deviates as before",
+        ),
         (_, 0) if !is_written => {
             (Status::Good, "All correctable motions would be corrected; nothing was written")
         }
