@@ -303,6 +303,14 @@ impl Arm {
         })
     }
 
+    /// Moment of gravity that overturns what the arm stands on, with a mass (kg) more at the elbow (N m).
+    pub fn overturning(&self, q: &Angles, at_elbow_kg: f64) -> Vector3<f64> {
+        let frames = self.frames(q, &Strain::default());
+        let mut weights = self.weights(&frames, 0);
+        weights.push((WEIGHT * at_elbow_kg, frames[2].translation.vector));
+        weights.into_iter().map(|(weight, at)| at.cross(&Vector3::new(0.0, 0.0, -weight))).sum()
+    }
+
     /// How the far end of body `beam` moves where the body bends as a beam of constant section, clamped at its joint, under its
     /// own weight spread along it and under everything beyond (Euler and Bernoulli): displacement (mm) and rotation
     /// vector (rad) in the frame at the far end, per 1/(E I) in 1/(N m²).

@@ -86,13 +86,18 @@ impl Hidden {
             | Kind::Bending
             | Kind::TwoJointGear
             | Kind::ModulatedGear
-            | Kind::LoadedPlay => {
+            | Kind::LoadedPlay
+            | Kind::Tilt => {
                 let (shape, parts) = arm::Shape::draw(kind, scene, rng);
                 (Shape::Arm(shape), parts)
             }
-            Kind::Pulley | Kind::Drum | Kind::Catenary | Kind::Refraction | Kind::Nest | Kind::Range => {
-                (Shape::Sensor(sensor::Shape::draw(kind, scene, rng)), Parts::default())
-            }
+            Kind::Pulley
+            | Kind::Drum
+            | Kind::Catenary
+            | Kind::Refraction
+            | Kind::Nest
+            | Kind::Range
+            | Kind::Droop => (Shape::Sensor(sensor::Shape::draw(kind, scene, rng)), Parts::default()),
             Kind::Drift => (Shape::Drift(drift::Shape::readings(scene, rng)), Parts::default()),
             Kind::Settling => (Shape::Drift(drift::Shape::base(scene, rng)), Parts::default()),
             Kind::Latency => (Shape::Latency(crate::draw::between(rng, 0.0, 0.5)), Parts::default()),

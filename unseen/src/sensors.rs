@@ -192,6 +192,21 @@ pub fn catenary(away: &Vector3<f64>, weight: f64, stiffens: f64) -> f64 {
     1e3 * more / ((chord * chord + more).sqrt() + chord)
 }
 
+/// What the end of a pole does under its own load: displacement (mm) and rotation vector (rad), where `down` is a unit vector. A beam with
+/// its load at the end turns there by one and a half times its sag over its length (Euler and Bernoulli). `level` is the sag of the level
+/// pole (mm), which is softer by the share `softens` than where it is nearly upright.
+pub fn drooped(
+    down: &Vector3<f64>,
+    pole: &Vector3<f64>,
+    level: f64,
+    softens: f64,
+) -> (Vector3<f64>, Vector3<f64>) {
+    let along = pole.normalize();
+    let across = along.cross(&down.cross(&along));
+    let sag = across * (level * (1.0 - softens * (1.0 - across.norm())));
+    (sag, along.cross(&sag) * (1.5 / pole.norm()))
+}
+
 /// By how much a beam through layered air arrives higher than a straight one (mm), in the plane of the vertical. `from` station
 /// to `to` target in the room (mm); `gradient` K/m at the floor, falling off within `layer_mm` of height.
 pub fn refracted(from: &Vector3<f64>, to: &Vector3<f64>, gradient: f64, layer_mm: f64) -> f64 {

@@ -53,7 +53,7 @@ pub enum Meaning {
 /// The names of the diagnosis. One name stands for several families: see [`meanings`].
 ///
 /// A name that is added to the diagnosis is added here, by what its sentence sends a technician to.
-pub const NAMES: [(&str, Family); 44] = [
+pub const NAMES: [(&str, Family); 46] = [
     ("link-geometry", Family::Geometry),
     ("joint-compliance", Family::Compliance),
     ("joint-stiffness", Family::Compliance),
@@ -75,6 +75,7 @@ pub const NAMES: [(&str, Family); 44] = [
     ("sensor-frame-shift", Family::Frame),
     ("sensor-frame-drift", Family::Frame),
     ("base-settling", Family::Frame),
+    ("base-tilt", Family::Frame),
     ("sensor-zero-shift", Family::Zero),
     ("sensor-zero-drift", Family::Zero),
     ("joint-zero-shift", Family::JointZero),
@@ -90,6 +91,7 @@ pub const NAMES: [(&str, Family); 44] = [
     ("tool-shift", Family::Target),
     ("tool-drift", Family::Target),
     ("target-nest", Family::Target),
+    ("target-droop", Family::Target),
     ("outliers", Family::Noise),
     ("correlated-noise", Family::Noise),
     ("setup-change", Family::SetUp),
@@ -168,6 +170,10 @@ pub enum Kind {
     LostCounts,
     /// A tracker whose distances are off.
     Range,
+    /// A target on a pole that droops.
+    Droop,
+    /// A pedestal that tilts under the arm.
+    Tilt,
 }
 
 /// Parts of an arm that have something, from 1.
@@ -212,7 +218,7 @@ pub enum Mark {
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Kind; 20] = [
+    pub const ALL: [Kind; 22] = [
         Kind::Clean,
         Kind::WarmLinks,
         Kind::Hardening,
@@ -233,6 +239,8 @@ impl Kind {
         Kind::Settling,
         Kind::LostCounts,
         Kind::Range,
+        Kind::Droop,
+        Kind::Tilt,
     ];
 
     /// Name on the command line.
@@ -258,6 +266,8 @@ impl Kind {
             Kind::Settling => "settling",
             Kind::LostCounts => "lost-counts",
             Kind::Range => "range",
+            Kind::Droop => "droop",
+            Kind::Tilt => "tilt",
         }
     }
 
@@ -272,6 +282,7 @@ impl Kind {
                 | Kind::TwoJointGear
                 | Kind::ModulatedGear
                 | Kind::LoadedPlay
+                | Kind::Tilt
         )
     }
 
@@ -304,7 +315,8 @@ impl Kind {
             Kind::Pulley | Kind::Catenary => vec![Family::Cable],
             Kind::Drum => vec![Family::Cable, Family::Scale],
             Kind::Refraction => vec![Family::Air],
-            Kind::Nest => vec![Family::Target],
+            Kind::Nest | Kind::Droop => vec![Family::Target],
+            Kind::Tilt => vec![Family::Frame],
             Kind::Drift if sensor == Sensor::Cable => vec![Family::Zero, Family::SetUp],
             Kind::Drift | Kind::Settling => vec![Family::Frame, Family::SetUp],
             Kind::Correlated => vec![Family::Noise],

@@ -1,5 +1,6 @@
 //! Effects of the arm itself.
 
+use nalgebra::Vector3;
 use rand::{Rng, RngExt};
 
 use super::Scene;
@@ -75,6 +76,19 @@ pub enum Shape {
         /// Load that decides (N m).
         friction_nm: f64,
     },
+    /// A pedestal that tilts about a place below the arm; size: how far under the largest moment of the walk (rad).
+    Tilt {
+        /// Heading of the horizontal axis about which it is softest (rad).
+        heading: f64,
+        /// How much stiffer it is about the other: the share of the tilt that is left.
+        stiffer: f64,
+        /// How deep below the base it turns (mm).
+        deep_mm: f64,
+        /// Of cables and a gripper at the elbow (kg), which the data sheet does not list.
+        dress_kg: f64,
+        /// The largest moment of the walk (N m).
+        most_nm: f64,
+    },
 }
 
 impl Shape {
@@ -122,6 +136,19 @@ impl Shape {
                 };
                 (shape, Parts::joint(joint))
             }
+            Kind::Tilt => {
+                let weight: f64 = scene.sheet.kg.iter().sum();
+                let dress_kg = between(rng, 0.0, 0.05) * weight;
+                let most = |visit: &Visit| scene.arm.overturning(&visit.q, dress_kg).norm();
+                let shape = Shape::Tilt {
+                    heading: between(rng, 0.0, std::f64::consts::PI),
+                    stiffer: between(rng, 0.4, 1.0),
+                    deep_mm: between(rng, 0.0, 400.0),
+                    dress_kg,
+                    most_nm: scene.walk.visits.iter().map(most).fold(1e-6, f64::max),
+                };
+                (shape, Parts::default())
+            }
             _ => {
                 let joint = one(rng, &[1, 2, 2, 3, 4]);
                 let friction_nm = between(rng, 0.1, 0.35) * most_torque(scene, joint);
@@ -158,6 +185,7 @@ impl Shape {
             Shape::Bending { .. } => (0.03, 0.8),
             Shape::TwoJointGear { .. } | Shape::ModulatedGear { .. } => (5e-5, 1.5e-3),
             Shape::LoadedPlay { .. } => (1e-4, 2e-3),
+            Shape::Tilt { .. } => (5e-5, 1.5e-3),
         }
     }
 
@@ -200,6 +228,12 @@ impl Shape {
                     0.0
                 };
                 out.turn[joint] = 0.5 * size * flank;
+            }
+            Shape::Tilt { heading, stiffer, deep_mm, dress_kg, most_nm } => {
+                let moment = arm.overturning(q, dress_kg) / most_nm;
+                let soft = Vector3::new(heading.cos(), heading.sin(), 0.0);
+                let turn = size * (stiffer * moment + soft * ((1.0 - stiffer) * soft.dot(&moment)));
+                out.base = (turn.cross(&Vector3::new(0.0, 0.0, deep_mm)), turn);
             }
         }
         out

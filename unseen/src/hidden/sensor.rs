@@ -1,12 +1,12 @@
 //! Effects of the sensor and its target.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use rand::Rng;
 
 use super::Scene;
 use crate::arms::Pose;
 use crate::draw::{between, normal};
-use crate::sensors::{Kind as Measures, Reading, Sensor, catenary, on_drum, over_pulley, refracted};
+use crate::sensors::{Kind as Measures, Reading, Sensor, catenary, drooped, on_drum, over_pulley, refracted};
 use crate::truth::Kind;
 
 /// The shape of an effect of the sensor.
@@ -46,6 +46,13 @@ pub enum Shape {
         /// Sideways.
         skew: Matrix3<f64>,
     },
+    /// The target's pole bends under its weight, size in mm where the pole is level.
+    Droop {
+        /// From the foot of the pole to the target, on the flange (mm).
+        pole: Vector3<f64>,
+        /// By what share it is softer where it is level than where it is nearly upright.
+        softens: f64,
+    },
 }
 
 impl Shape {
@@ -58,6 +65,12 @@ impl Shape {
             Kind::Range => {
                 let place = scene.sensor.place.translation.vector;
                 Shape::Range { bow: between(rng, -4.0, 4.0), mean_mm: place.norm() }
+            }
+            Kind::Droop => {
+                // Its foot is somewhere on the flange, not in its middle.
+                let foot = Vector3::new(12.0 * normal(rng), 12.0 * normal(rng), between(rng, 0.0, 15.0));
+                let pole = scene.sensor.target.translation.vector - foot;
+                Shape::Droop { pole, softens: between(rng, -0.15, 0.3) }
             }
             Kind::Refraction => Shape::Refraction { layer_mm: between(rng, 250.0, 900.0) },
             _ => Shape::Nest {
@@ -76,7 +89,7 @@ impl Shape {
             Shape::Catenary { .. } => (2e-3, 8e-2),
             Shape::Range { .. } => (0.01, 1.0),
             Shape::Refraction { .. } => (3.0, 25.0),
-            Shape::Nest { .. } => (0.02, 0.5),
+            Shape::Nest { .. } | Shape::Droop { .. } => (0.02, 0.5),
         }
     }
 
@@ -101,6 +114,13 @@ impl Shape {
             }
             Shape::Refraction { layer_mm } => {
                 seen(Vector3::new(0.0, 0.0, refracted(&from, &at, size, *layer_mm)))
+            }
+            Shape::Droop { pole, softens } => {
+                let (sag, turn) = drooped(&(flange.rotation.inverse() * -Vector3::z()), pole, size, *softens);
+                let mut moved = *target;
+                moved.translation.vector += flange.rotation * sag;
+                moved.rotation = UnitQuaternion::from_scaled_axis(flange.rotation * turn) * moved.rotation;
+                sensor.ideal(&moved)
             }
             Shape::Nest { axis, deep, skew } => {
                 debug_assert!(sensor.kind != Measures::Cable, "a hook has no incidence");

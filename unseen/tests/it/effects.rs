@@ -1,8 +1,9 @@
 //! The effects are what they are said to be.
 
 use nalgebra::Vector3;
+use truegrind_unseen::arms::{SHEETS, Strain};
 use truegrind_unseen::hidden::warmth::Warmth;
-use truegrind_unseen::sensors::{catenary, on_drum, over_pulley, refracted};
+use truegrind_unseen::sensors::{catenary, drooped, on_drum, over_pulley, refracted};
 
 /// Two exponentials that rise, fall in the pause and rise again, without a jump.
 #[test]
@@ -79,4 +80,32 @@ fn a_beam_in_evenly_layered_air_is_a_circle() {
     let to = Vector3::new(5000.0, 0.0, 0.0);
     let strayed = refracted(&Vector3::zeros(), &to, 2.0, 1e12);
     assert!((strayed - 1e3 * 0.5 * 0.93e-6 * 2.0 * 25.0).abs() < 1e-9, "{strayed}");
+}
+
+/// The end of a pole sags across it, most where it is level, and turns downwards.
+#[test]
+fn a_pole_sags_across_and_its_end_turns_downwards() {
+    let down = -Vector3::z();
+    let pole = Vector3::new(80.0, 0.0, 0.0);
+    let (sag, turn) = drooped(&down, &pole, 0.2, 0.3);
+    assert!((sag - down * 0.2).norm() < 1e-12 && (turn.y - 1.5 * 0.2 / 80.0).abs() < 1e-12);
+    assert!((turn.cross(&pole).normalize() - down).norm() < 1e-12);
+    assert!(drooped(&down, &Vector3::z(), 0.2, 0.3).0.norm() < 1e-12);
+    let (sag, _) = drooped(&down, &Vector3::new(60.0, 0.0, 60.0), 0.2, 0.0);
+    assert!(sag.dot(&Vector3::new(1.0, 0.0, 1.0)).abs() < 1e-12 && sag.z < 0.0);
+}
+
+/// What overturns an arm is about its second axis what the torque of that joint is, but for what does not move with it.
+#[test]
+fn an_arm_overturns_as_its_second_joint_bears() {
+    for sheet in &SHEETS {
+        let arm = sheet.nominal();
+        let beside = |q2: f64, q3: f64| {
+            let q = [0.4, q2, q3, 0.3, 0.5, 0.2];
+            let axis = arm.frames(&q, &Strain::default())[1].rotation * Vector3::z();
+            axis.dot(&arm.overturning(&q, 0.0)) - arm.torques(&q)[1]
+        };
+        assert!((beside(0.3, 0.8) - beside(-0.7, 0.1)).abs() < 1e-9, "{}", sheet.name);
+        assert!(arm.overturning(&[0.4, 0.3, 0.8, 0.3, 0.5, 0.2], 1.0).z.abs() < 1e-12);
+    }
 }
