@@ -55,6 +55,12 @@ impl Statics {
         out
     }
 
+    /// Moment of gravity on everything that moves about the origin of the base (N m): what overturns the arm's pedestal.
+    pub fn overturning_moment(&self, u: &MappedJoints, condition: &Condition) -> Vector3<f64> {
+        let (_, levers) = self.levers::<f64>(&(*u).into(), condition);
+        cross(&levers[0], &self.gravity_newton()).into()
+    }
+
     /// Weight of a kilogram, with metres for the millimetres of the levers.
     #[inline(always)]
     pub(super) fn gravity_newton(&self) -> [f64; 3] {

@@ -5,16 +5,18 @@
 
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, Point3};
+use nalgebra::{DMatrix, Point3, Vector3};
 use rayon::prelude::*;
 
 use super::cause::{Cause, MAP_KNOTS, parallel_neighbours};
 use super::design::{Design, Slopes};
 use super::extension::Subject;
-use crate::identification::calibration::{Frames, LoadedRows, joint_rotations, sensor_shifts, torques_under};
+use crate::identification::calibration::{
+    Frames, LoadedRows, joint_rotations, sensor_shifts, sensor_turns, torques_under,
+};
 use crate::measurement::dataset::{Dataset, Reading, Sensor};
 use crate::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
-use crate::measurement::sensor::empirical::{AssumedLoad, EmpiricalFault};
+use crate::measurement::sensor::empirical::{AssumedLoad, EmpiricalFault, Overturning, Pole};
 use crate::measurement::split;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::effect::Effect;
@@ -58,8 +60,8 @@ pub enum Regressor {
         /// Factor in each row.
         profile: Vec<f64>,
     },
-    /// Shifts the sensor in the base.
-    Shift([Vec<f64>; 3]),
+    /// Shifts the sensor in the base: three coordinates, and where it turns too three of a rotation vector about the sensor.
+    Shift(Vec<Vec<f64>>),
 }
 
 /// A coordinate in which a measurement can be displaced.
@@ -144,10 +146,17 @@ impl Candidate {
             Kind::Target => (0..3).map(|k| push(Coordinate::Target(k))).collect(),
             Kind::Scale => vec![push(Coordinate::Scale)],
             Kind::Sag => vec![push(Coordinate::Sag)],
-            Kind::Empirical(form) if !form.rotates_joints() => sensor_shifts(*form, dataset, nominal, frames)
-                .into_iter()
-                .map(|v| Regressor::Shift(std::array::from_fn(|k| v.iter().map(|v| v[k]).collect())))
-                .collect(),
+            Kind::Empirical(form) if !form.rotates_joints() => {
+                let axes =
+                    |v: &Vec<Vector3<f64>>| [0, 1, 2].map(|k| v.iter().map(|v| v[k]).collect::<Vec<f64>>());
+                let turns = sensor_turns(*form, dataset, nominal, frames);
+                let shifts = sensor_shifts(*form, dataset, nominal, frames);
+                let both = shifts.iter().enumerate().map(|(k, shift)| {
+                    let turn = turns.get(k).into_iter().flat_map(axes);
+                    Regressor::Shift(axes(shift).into_iter().chain(turn).collect())
+                });
+                both.collect()
+            }
             kind => joint_rotations(kind, &LoadedRows::new(dataset, nominal))
                 .into_iter()
                 .map(|rotation| Regressor::Arm {
@@ -185,7 +194,7 @@ impl Candidate {
             Regressor::Disturbance { coordinate, profile } => {
                 Regressor::Disturbance { coordinate: *coordinate, profile: part(profile) }
             }
-            Regressor::Shift(vectors) => Regressor::Shift([0, 1, 2].map(|axis| part(&vectors[axis]))),
+            Regressor::Shift(vectors) => Regressor::Shift(vectors.iter().map(part).collect()),
         });
         let cause = Cause::Measurement(Disturbance::new(always.kind.clone(), profile));
         Self { cause, regressors: regressors.collect(), tried: self.tried }
@@ -476,6 +485,33 @@ pub fn measurement_candidates(subject: &Subject<'_>) -> Vec<Candidate> {
         .collect()
 }
 
+/// Poles of a target that may droop, with the number of variants.
+fn target_droops(dataset: &Dataset) -> Vec<(EmpiricalFault, f64)> {
+    let turning = dataset.sensor == Sensor::Pose;
+    let poles = [Pole::Axis, Pole::Offset, Pole::Bracket];
+    let tried = poles.len() as f64;
+    poles.map(|pole| (EmpiricalFault::TargetDroop { pole, turning }, tried)).to_vec()
+}
+
+/// Bases that may tilt, about their origin or below it, as stiff about one horizontal axis as about the other or not, with the number of
+/// variants.
+fn base_tilts(nominal: &Model) -> Vec<(EmpiricalFault, f64)> {
+    let across = match nominal.gravity.iamax() {
+        0 => [1, 2],
+        1 => [0, 2],
+        _ => [0, 1],
+    };
+    let (load, forms) = match nominal.bodies {
+        Some(_) => (
+            Overturning::Masses,
+            &[(None, false), (None, true), (Some(across), false), (Some(across), true)][..],
+        ),
+        None => (Overturning::Lumps, &[(None, false), (None, true), (Some(across), false)][..]),
+    };
+    let tried = forms.len() as f64;
+    forms.iter().map(|&(axes, deep)| (EmpiricalFault::BaseTilt { load, axes, deep }, tried)).collect()
+}
+
 /// Pairs of joints for two-joint gear errors.
 const NEIGHBOURS: [(usize, usize); 10] =
     [(0, 1), (1, 0), (1, 2), (2, 1), (2, 3), (3, 2), (3, 4), (4, 3), (4, 5), (5, 4)];
@@ -621,6 +657,8 @@ fn empirical_faults(subject: &Subject<'_>, columns: &LoggedColumns) -> Vec<(Empi
         out.extend([(range(subject), 1.0), (EmpiricalFault::SensorAxes, 1.0)]);
         out.extend([false, true].map(|second| (EmpiricalFault::TargetNest { second }, 2.0)));
     }
+    out.extend(target_droops(dataset));
+    out.extend(base_tilts(subject.nominal));
     out[exact..].iter_mut().for_each(|(_, tried)| *tried *= EXPANSION_ODDS);
     out
 }

@@ -3,8 +3,10 @@
 use super::cause_kind::CauseKind;
 use crate::identification::tolerance::{Tolerance, effect_sigma};
 use crate::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
-use crate::measurement::sensor::empirical::EmpiricalFault;
+use crate::measurement::sensor::empirical::{EmpiricalFault, Overturning, Pole};
 use truegrind_arm::effect::Effect;
+use truegrind_arm::effect::compliance::Compliance;
+use truegrind_arm::effect::lumped_compliance::{Lump, LumpedCompliance};
 use truegrind_arm::model::Model;
 
 /// A possible cause of errors.
@@ -63,6 +65,8 @@ impl Cause {
                     EmpiricalFault::Range { .. } => CauseKind::SensorRange,
                     EmpiricalFault::SensorAxes => CauseKind::SensorAxes,
                     EmpiricalFault::TargetNest { .. } => CauseKind::TargetNest,
+                    EmpiricalFault::TargetDroop { .. } => CauseKind::TargetDroop,
+                    EmpiricalFault::BaseTilt { .. } => CauseKind::BaseTilt,
                 },
                 (Kind::Load { .. }, _) => CauseKind::PayloadChange,
                 (Kind::JointZero { .. }, _) => CauseKind::JointZeroShift,
@@ -122,12 +126,46 @@ impl Cause {
             Cause::Measurement(Disturbance {
                 kind:
                     Kind::Sag
-                    | Kind::Empirical(EmpiricalFault::LoadedPlay { .. } | EmpiricalFault::Hardening { .. }),
+                    | Kind::Empirical(
+                        EmpiricalFault::LoadedPlay { .. }
+                        | EmpiricalFault::Hardening { .. }
+                        | EmpiricalFault::TargetDroop { pole: Pole::Axis | Pole::Offset, .. }
+                        | EmpiricalFault::BaseTilt { load: Overturning::Masses, axes: None, .. },
+                    ),
                 values,
                 ..
             }) => values.iter().all(|v| *v >= 0.0),
+            // A compliance about each axis, and one that couples them.
+            Cause::Measurement(Disturbance {
+                kind:
+                    Kind::Empirical(EmpiricalFault::BaseTilt { load: Overturning::Masses, axes: Some(_), .. }),
+                values,
+                ..
+            }) => values.chunks(3).all(|of| of.iter().take(2).all(|v| *v >= 0.0)),
             _ => true,
         }
+    }
+
+    /// What of it a model file can carry where it is in the arm and no file has a place for it, at size 0: of a base that tilts what a
+    /// second joint that yields does, since its axis is horizontal and its torque differs from the overturning moment by a constant.
+    pub fn stand_in(&self) -> Option<Self> {
+        let Cause::Measurement(Disturbance {
+            kind: Kind::Empirical(EmpiricalFault::BaseTilt { load, .. }),
+            ..
+        }) = self
+        else {
+            return None;
+        };
+        let effect = match load {
+            Overturning::Masses => {
+                Effect::JointCompliance(Compliance { joint: 1, compliance_rad_per_nm: 0.0 })
+            }
+            Overturning::Lumps => {
+                let lump = |frame| Lump { frame, axis: None, moment: None, factor: 0.0 };
+                Effect::LumpedCompliance(LumpedCompliance { joint: 1, lump: [2, 4, 6].map(lump).to_vec() })
+            }
+        };
+        Some(Cause::Arm(effect))
     }
 
     /// Whether it varies slowly with the joint angles, like the residue of an unknown fault.

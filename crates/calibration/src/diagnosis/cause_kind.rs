@@ -34,6 +34,8 @@ kinds! {
     AngleRounding = "angle-rounding",
     /// Lost motion where a joint reverses.
     Backlash = "backlash",
+    /// A base that tilts under the overturning moment of the arm.
+    BaseTilt = "base-tilt",
     /// A drum wound in layers.
     CableDrum = "cable-drum",
     /// A pulley or a worn outlet.
@@ -84,6 +86,8 @@ kinds! {
     SmallDisturbances = "small-disturbances",
     /// A correction without a physical cause.
     SmoothCorrection = "smooth-correction",
+    /// A target that droops on its pole or adapter.
+    TargetDroop = "target-droop",
     /// A target whose apparent centre depends on the viewing direction.
     TargetNest = "target-nest",
     /// Growth with time or temperature, of the arm or of the sensor's stand.

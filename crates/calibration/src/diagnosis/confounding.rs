@@ -22,6 +22,8 @@ pub(super) struct Confounding<'a> {
     pub(super) contributions: &'a Contributions<'a>,
     /// The data sheet's arm.
     pub(super) nominal: &'a Model,
+    /// Whether one cable measures: its length shows of a motion what is along the cable alone.
+    pub(super) by_one_cable: bool,
     /// Unexplained growth of the arm over time (mm RMS).
     pub(super) growth_mm: f64,
     /// Unexplained dependence on the pose (mm RMS).
@@ -85,6 +87,12 @@ impl Confounding<'_> {
         }
         let smooth = all(&Cause::is_smooth);
         let mut out = Vec::new();
+        if self.by_one_cable && all(&|cause| cause.kind() == CauseKind::BaseTilt) {
+            out.push(
+                "by one cable a base that tilts looks like a cable that sags or whose pulley is worn"
+                    .to_owned(),
+            );
+        }
         let rough = self.empirical_rms_mm(causes, smooth);
         let (whole, sensor) = (self.contributions.rms_mm(causes), self.sensor_fault_rms_mm());
         if own < rough {

@@ -42,8 +42,10 @@ pub(super) fn family(effect: CauseKind) -> Option<Family> {
         GearEccentricity | GearTransmission | GearRatio | GearTwoJoints | JointCoupling | JointZeroShift
         | Backlash => Family::Drive,
         SensorScale | SensorAxes | SensorRange | CableSag | CablePulley | CableDrum | AirRefraction
-        | TargetNest => Family::Sensor,
-        SensorZeroShift | SensorFrameShift | ToolShift | PayloadChange | SetupChange => Family::SetUp,
+        | TargetNest | TargetDroop => Family::Sensor,
+        SensorZeroShift | SensorFrameShift | ToolShift | BaseTilt | PayloadChange | SetupChange => {
+            Family::SetUp
+        }
         Latency | Unsettled | AngleRounding | ReadoutMismatch | Outliers => Family::Log,
         SmallDisturbances | Unexplained => return None,
     })
@@ -126,6 +128,12 @@ fn in_words(effect: CauseKind) -> Option<&'static str> {
         }
         TargetNest => {
             "measure the same ten poses with the reflector turned by 90° in its nest: what changes is the target"
+        }
+        TargetDroop => {
+            "measure the same ten poses with the target on a shorter or stiffer pole, or straight on the flange: what changes is the pole"
+        }
+        BaseTilt => {
+            "put a level or a dial gauge on the base and read it with the arm stretched out and folded: what changes is the pedestal"
         }
         JointStiffness => "measure the same ten poses with and without a load: what changes is the stiffness",
         PayloadChange => "weigh the tool, and measure the same ten poses with and without it",

@@ -326,6 +326,7 @@ fn certain_model(
     };
     let (fit, errors) = of(certain);
     let of_the_arm = |cause: &Cause| matches!(cause, Cause::Arm(_));
+    let is_carried = |cause: &Cause| of_the_arm(cause) || cause.stand_in().is_some();
     let better =
         |than: &StageError| errors.random.rmse < than.random.rmse && errors.blocks.rmse < than.blocks.rmse;
     let arm_alone = fit.causes.iter().all(of_the_arm);
@@ -334,7 +335,7 @@ fn certain_model(
     }
     let causes = &search.extended.causes;
     let without: Vec<bool> =
-        certain.iter().zip(causes).map(|(sure, cause)| *sure && !of_the_arm(cause)).collect();
+        certain.iter().zip(causes).map(|(sure, cause)| *sure && !is_carried(cause)).collect();
     let plain = of(&without);
     if better(&plain.1) { (fit, errors) } else { plain }
 }

@@ -45,6 +45,10 @@ pub(super) fn representable_causes(causes: &[Cause], accepted: &[Accepted]) -> V
         if !has_no_model_representation(cause) {
             continue;
         }
+        if let Some(stand_in) = cause.stand_in() {
+            out.extend(Some(stand_in).filter(|stand_in| !contains_cause(&out, stand_in)));
+            continue;
+        }
         let rivals = judged.rivals.iter().filter(|rival| rival.score.merit > 0.0);
         let mut carried = rivals.map(|rival| &rival.candidate.cause).filter(|c| matches!(c, Cause::Arm(_)));
         out.extend(carried.find(|rival| !contains_cause(&out, rival)).cloned());
@@ -139,9 +143,13 @@ pub(super) fn missing_errors(
 /// Orders of a harmonic that stands for a missing error: the orders of the errors themselves.
 const ORDERS: [f64; 2] = [1.0, 2.0];
 
-/// The joint (0-based) of a cause of the arm that no model file can represent.
+/// The joint (0-based) of a cause of the arm that no model file can represent, or of what stands in for it.
 fn joint_without_file(cause: &Cause) -> Option<usize> {
-    has_no_model_representation(cause).then(|| cause.joints().first().copied()).flatten()
+    let carried_by = || match cause.stand_in() {
+        Some(stand_in) => stand_in.joints().first().copied(),
+        None => cause.joints().first().copied(),
+    };
+    has_no_model_representation(cause).then(carried_by).flatten()
 }
 
 /// Adds missing joint errors to an arm, for its covariance alone.

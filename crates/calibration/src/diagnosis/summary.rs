@@ -62,6 +62,7 @@ pub(super) fn summarise(
         confirmations: &outcome.confirmations,
         contributions: &contributions,
         nominal: subject.nominal,
+        by_one_cable: context.dataset.sensor == Sensor::Cable && subject.frames.outlets_mm.len() == 1,
         growth_mm: outcome.discrepancy.growth_mm(),
         field_mm: outcome.discrepancy.field_mm(),
         excess_over_noise_mm: floor.map_or(0.0, |floor| {

@@ -8,7 +8,7 @@ use super::extension::Extended;
 use super::finding::{Confidence, Finding, FoundParameter, Gain};
 use crate::measurement::dataset::{Dataset, Sensor};
 use crate::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
-use crate::measurement::sensor::empirical::EmpiricalFault;
+use crate::measurement::sensor::empirical::{EmpiricalFault, Overturning, Pole};
 use truegrind_arm::effect::Effect;
 
 /// Values and standard deviations of the parameters of cause `index`.
@@ -301,6 +301,39 @@ fn describe_empirical_fault(form: EmpiricalFault, parameters: &[FoundParameter])
             "the target's apparent centre depends on the viewing direction: faulty nest or reflector"
                 .to_owned()
         }
+        EmpiricalFault::TargetDroop { pole: Pole::Bracket, .. } => {
+            let most = parameters.iter().take(5).map(|p| p.value.abs()).fold(0.0, f64::max);
+            format!(
+                "the target droops on its adapter by some {most:.3} mm under gravity, as the flange turns"
+            )
+        }
+        EmpiricalFault::TargetDroop { pole, .. } => format!(
+            "the target droops by {value:.3} mm under gravity across its pole, {}",
+            if pole == Pole::Axis {
+                "which is along the flange's axis"
+            } else {
+                "which points to it from the flange"
+            }
+        ),
+        EmpiricalFault::BaseTilt { load: Overturning::Masses, axes: None, .. } => format!(
+            "the base tilts under the arm: each N m of overturning moment turns it by {:.1} µrad",
+            value * 1e6
+        ),
+        EmpiricalFault::BaseTilt { load: Overturning::Masses, axes: Some(axes), .. } => {
+            let about = |k: usize| {
+                let axis = ["x", "y", "z"][usize::from(axes[k].min(2))];
+                format!("{:.1} µrad about its {axis}", value_of(parameters, k) * 1e6)
+            };
+            format!(
+                "the base tilts under the arm: each N m of overturning moment turns it by {}, or {}",
+                about(0),
+                about(1)
+            )
+        }
+        EmpiricalFault::BaseTilt { .. } => {
+            "the base tilts under the overturning moment of the arm, with masses that no data sheet states"
+                .to_owned()
+        }
     }
 }
 
@@ -342,6 +375,8 @@ pub fn describe_pattern(cause: &Cause) -> String {
         CablePulley => "the residual follows the direction of the cable".to_owned(),
         CableDrum => "the residual follows powers of the cable's length".to_owned(),
         TargetNest => "the residual follows the direction of the beam in the target's frame".to_owned(),
+        TargetDroop => "the residual follows the direction of gravity in the flange's frame".to_owned(),
+        BaseTilt => "the residual turns about the base with the overturning moment of the arm".to_owned(),
         SensorAxes => {
             "the residual is proportional to the reading, but not alike along the sensor's axes".to_owned()
         }
@@ -433,6 +468,14 @@ pub fn remedy(effect: CauseKind) -> &'static str {
         }
         CableDrum => "check the cable sensor against a length standard over its whole range",
         TargetNest => "turn the target towards the sensor; check its nest and replace the reflector",
+        TargetDroop => {
+            "stiffen the target's pole or adapter, or measure with the target near the flange; the written model does not include it, since no \
+             tool droops so"
+        }
+        BaseTilt => {
+            "bolt or grout the pedestal, and read a level on it with the arm stretched out and folded; the written model includes of it \
+             what a yielding joint 2 does as well, so measure again then"
+        }
         CableSag => "increase the cable's tension or shorten the distance",
         AngleRounding => "log angles with more digits",
         ReadoutMismatch => "record angles and read-out at the same time, at rest; measure these rows again",

@@ -11,6 +11,7 @@ use super::design::{Linear, linearised};
 use super::discrepancy::Discrepancy;
 use super::extension::{Extended, Freedom, Subject, filled, fit};
 use super::link_growth;
+use super::selection::contains_cause;
 use super::sensor_law;
 use crate::identification::calibration::CalibrationProblem;
 use crate::identification::prior_width::learn_tolerance;
@@ -19,14 +20,22 @@ use crate::measurement::sensor::disturbance::Kind;
 use truegrind_arm::parameter::Parameter;
 use truegrind_estimation::problem::Problem;
 
-/// The causes of a fit for the written model: all causes of the measurement, and those effects of the arm that are `certain`.
+/// The causes of a fit for the written model: all causes of the measurement, and those effects of the arm that are `certain`;
+/// for those without a place in a model file what stands in for them.
 pub(super) fn certain_causes(extended: &Extended, certain: &[bool]) -> Vec<Cause> {
+    let is_certain = |k: usize| certain.get(k) != Some(&false);
     let causes = extended.causes.iter().enumerate();
-    let kept = causes.filter(|&(k, cause)| match cause {
+    let kept = causes.clone().filter(|&(k, cause)| match cause {
         Cause::Measurement(_) => !has_no_model_representation(cause),
-        Cause::Arm(_) => certain.get(k) != Some(&false),
+        Cause::Arm(_) => is_certain(k),
     });
-    kept.map(|(_, cause)| cause.clone()).collect()
+    let mut out: Vec<Cause> = kept.map(|(_, cause)| cause.clone()).collect();
+    for stand_in in causes.filter(|&(k, _)| is_certain(k)).filter_map(|(_, cause)| cause.stand_in()) {
+        if !contains_cause(&out, &stand_in) {
+            out.push(stand_in);
+        }
+    }
+    out
 }
 
 /// Whether a cause is in the arm but has no representation in a model file.

@@ -17,6 +17,7 @@
 
 mod columns;
 mod regressors;
+mod sensor_motion;
 mod frames;
 mod kernel;
 mod passes;
@@ -24,4 +25,6 @@ mod problem;
 
 pub use frames::{Frames, Weight};
 pub use problem::CalibrationProblem;
-pub use regressors::{LoadedRows, flange_torques, joint_rotations, sensor_shifts, torques_under};
+pub use regressors::{
+    LoadedRows, flange_torques, joint_rotations, sensor_shifts, sensor_turns, torques_under,
+};

@@ -3,12 +3,14 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::frames::{Frames, Weight};
 use super::regressors::{self, LoadedRows, joint_rotations};
 use crate::measurement::dataset::{Dataset, Reading, Sensor};
 use crate::measurement::sensor::disturbance::Kind;
+use crate::measurement::sensor::empirical::EmpiricalFault;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Model;
 use truegrind_arm::parameter::Parameter;
@@ -93,6 +95,8 @@ pub(super) struct Columns {
     pub(super) profiles: Vec<Vec<f64>>,
     /// For each disturbance and each of its parameters the shift of the sensor in each row; none for those along an axis.
     pub(super) shifts: Vec<Vec<[Vec<f64>; 3]>>,
+    /// Likewise its turns, of disturbances that turn the target of a sensor that reads orientations.
+    pub(super) turns: Vec<Vec<[Vec<f64>; 3]>>,
 }
 
 impl Columns {
@@ -119,6 +123,10 @@ impl Columns {
         let row = |i: usize| rows[i.min(n.saturating_sub(1))];
         let picked = |all: &[f64]| -> Vec<f64> {
             if all.is_empty() || n == 0 { Vec::new() } else { (0..padded).map(|i| all[row(i)]).collect() }
+        };
+        let vectors = |all: &[Vec<[Vec<f64>; 3]>]| -> Vec<Vec<[Vec<f64>; 3]>> {
+            let of = |v: &[Vec<f64>; 3]| std::array::from_fn(|k| picked(&v[k]));
+            all.iter().map(|parameters| parameters.iter().map(of).collect()).collect()
         };
         if n == 0 {
             return Self::default();
@@ -150,11 +158,8 @@ impl Columns {
                 .collect(),
             effect_at: self.effect_at.clone(),
             profiles: self.profiles.iter().map(|profile| picked(profile)).collect(),
-            shifts: self
-                .shifts
-                .iter()
-                .map(|of| of.iter().map(|v| std::array::from_fn(|k| picked(&v[k]))).collect())
-                .collect(),
+            shifts: vectors(&self.shifts),
+            turns: vectors(&self.turns),
         }
     }
 
@@ -220,19 +225,16 @@ impl Columns {
         if turned {
             out.add_joint_disturbances(dataset, start, frames, parameters, padded);
         }
-        out.shifts = frames
-            .disturbances
-            .iter()
-            .map(|d| match d.kind {
-                Kind::Empirical(form) if !form.rotates_joints() => {
-                    regressors::sensor_shifts(form, dataset, start, frames)
-                        .iter()
-                        .map(|v| std::array::from_fn(|k| column(&|i| v[i.min(n.saturating_sub(1))][k])))
-                        .collect()
-                }
+        let of_sensor = |by: &dyn Fn(EmpiricalFault) -> Vec<Vec<Vector3<f64>>>| {
+            let of = |v: &Vec<Vector3<f64>>| std::array::from_fn(|k| column(&|i| v[i.min(n - 1)][k]));
+            let all = frames.disturbances.iter().map(|d| match d.kind {
+                Kind::Empirical(form) if !form.rotates_joints() => by(form).iter().map(of).collect(),
                 _ => Vec::new(),
-            })
-            .collect();
+            });
+            all.collect()
+        };
+        out.shifts = of_sensor(&|form| regressors::sensor_shifts(form, dataset, start, frames));
+        out.turns = of_sensor(&|form| regressors::sensor_turns(form, dataset, start, frames));
         out.effect_at = vec![usize::MAX; parameters.len()];
         for (e, effect) in out.effects.iter().enumerate() {
             out.effect_at[effect.index] = e;

@@ -61,13 +61,17 @@ impl DisturbanceColumns {
         let add = |to: &mut [f64], value: f64, profile: &[f64]| {
             to.iter_mut().zip(profile).for_each(|(t, c)| *t += value * c);
         };
-        for ((disturbance, profile), shifts) in disturbances.iter().zip(profiles).zip(&columns.shifts) {
-            let v = &disturbance.values;
-            for (shift, value) in shifts.iter().zip(v) {
-                for (to, along) in out.frame.iter_mut().zip(shift) {
+        let add_motions = |to: &mut [Vec<f64>; 3], motions: &[[Vec<f64>; 3]], v: &[f64], profile: &[f64]| {
+            for (motion, value) in motions.iter().zip(v) {
+                for (to, along) in to.iter_mut().zip(motion) {
                     to.iter_mut().zip(along).zip(profile).for_each(|((t, s), c)| *t += value * s * c);
                 }
             }
+        };
+        for (index, (disturbance, profile)) in disturbances.iter().zip(profiles).enumerate() {
+            let v = &disturbance.values;
+            add_motions(&mut out.frame, &columns.shifts[index], v, profile);
+            add_motions(&mut out.turn, &columns.turns[index], v, profile);
             match &disturbance.kind {
                 Kind::Zero => add(&mut out.zero, v[0], profile),
                 Kind::Frame { turning } => {
@@ -641,7 +645,17 @@ fn spatial_rows<R: SinCos>(
                     Kind::Scale => {
                         ([-from_sensor[0] / gain, -from_sensor[1] / gain, -from_sensor[2] / gain], none)
                     }
-                    Kind::Empirical(_) => (load(like, &columns.shifts[index][parameter], at), none),
+                    Kind::Empirical(_) => {
+                        let v = load(like, &columns.shifts[index][parameter], at);
+                        match columns.turns[index].get(parameter) {
+                            Some(along) => {
+                                let w = load(like, along, at);
+                                let w = turn.map_or(w, |turn| angular_velocity(&turn, &w));
+                                (plus(&v, &cross(&w, &turned)), w)
+                            }
+                            None => (v, none),
+                        }
+                    }
                     Kind::Zero | Kind::Sag | Kind::Load { .. } | Kind::JointZero { .. } => (none, none),
                 };
                 (scaled(amplitude, &v), scaled(amplitude, &w))

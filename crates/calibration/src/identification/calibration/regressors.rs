@@ -5,6 +5,7 @@ use std::cell::OnceCell;
 use nalgebra::{Point3, Vector3, Vector6};
 
 use super::frames::Frames;
+use super::sensor_motion::sensor_motions;
 use crate::measurement::dataset::{Dataset, Reading, Row, Sensor};
 use crate::measurement::sensor::disturbance::Kind;
 use crate::measurement::sensor::empirical::{AssumedLoad, EmpiricalFault, second_degree};
@@ -202,8 +203,27 @@ pub fn sensor_shifts(
             }
             out
         }),
+        EmpiricalFault::TargetDroop { .. } | EmpiricalFault::BaseTilt { .. } => {
+            let motions = sensor_motions(fault, dataset, model, frames);
+            motions.iter().map(|rows| rows.iter().map(|[shift, _]| *shift).collect()).collect()
+        }
         _ => Vec::new(),
     }
+}
+
+/// Turn of the sensor in the base (rad) about its origin per unit of each parameter, row by row, of faults that turn the target of a
+/// sensor that reads orientations; none of others.
+pub fn sensor_turns(
+    fault: EmpiricalFault,
+    dataset: &Dataset,
+    model: &Model,
+    frames: &Frames,
+) -> Vec<Vec<Vector3<f64>>> {
+    if dataset.sensor != Sensor::Pose || !fault.turns_target() {
+        return Vec::new();
+    }
+    let motions = sensor_motions(fault, dataset, model, frames);
+    motions.iter().map(|rows| rows.iter().map(|[_, turn]| *turn).collect()).collect()
 }
 
 /// Second and third Legendre polynomials of a length (mm) between two lengths (mm).

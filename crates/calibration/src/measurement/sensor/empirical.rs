@@ -1,6 +1,6 @@
 //! Empirical faults: low-order expansions of faults whose exact law is unknown, in a measurement or an arm.
 //!
-//! Their effect on a row depends on the whole pose, on the reading, or on the previous row. A fault rotates joints or shifts the
+//! Their effect on a row depends on the whole pose, on the reading, or on the previous row. A fault rotates joints, or moves the
 //! sensor; [`calibration`](crate::identification::calibration) has the regressors. All are linear in their parameters and
 //! evaluated at the nominal arm. They are rivals of the arm's effects, and nuisance parameters that no model file contains.
 
@@ -16,6 +16,28 @@ pub enum AssumedLoad {
     Frame(u8),
     /// 1 kg divided between elbow and wrist, as on the arms of the catalogue whose masses are known.
     ElbowAndWrist,
+}
+
+/// The pole between flange and target.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Pole {
+    /// Along the axis of the flange.
+    Axis,
+    /// From the flange's origin to the target.
+    Offset,
+    /// Of any direction or shape: a compliance in all directions.
+    Bracket,
+}
+
+/// What overturns the base.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Overturning {
+    /// The masses of the arm and the logged payload.
+    Masses,
+    /// Free masses at elbow, wrist and flange, where the arm's are not known.
+    Lumps,
 }
 
 /// An empirical fault.
@@ -95,10 +117,36 @@ pub enum EmpiricalFault {
         /// Whether the second degree is included.
         second: bool,
     },
+    /// A target that droops on the flange: its pole, or adapter, yields under its weight, in proportion to gravity across the pole.
+    ///
+    /// Gravity g, a unit vector, displaces the target by C g, with a symmetric compliance C (Maxwell). What C yields alike in all
+    /// directions is a shift of the sensor, which is free; so C has five parameters without its trace. A pole along n that yields alike
+    /// across it has C = c (1 − n nᵀ) and shows as −c n nᵀ g: one parameter, c the droop of a level pole. n is known where the pole
+    /// stands on the flange's axis or points from it to the target.
+    TargetDroop {
+        /// The pole.
+        pole: Pole,
+        /// Whether the sensor sees it turn: by k n × g, k the slope of the level pole. Of a bracket k n is any vector.
+        turning: bool,
+    },
+    /// A base that tilts under the overturning moment of the arm: a rotation about the base's origin in proportion to the moment of
+    /// gravity about it.
+    BaseTilt {
+        /// What overturns it.
+        load: Overturning,
+        /// The two axes of the base (0, 1, 2) across gravity, where it is not as stiff about one as about the other: a compliance about
+        /// each, and one that couples them, since the softest axis may lie between (symmetric, Maxwell).
+        axes: Option<[u8; 2]>,
+        /// Whether it turns below its origin, as a pedestal does: it sways too, by the tilt times that depth.
+        deep: bool,
+    },
 }
 
 /// Entries of the matrix that maps the direction of the beam, in the target's frame, to a shift of the target's centre.
 const FIRST: [&str; 8] = ["xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy"];
+
+/// Coordinates of a symmetric matrix without trace.
+const BRACKET: [&str; 5] = ["xy", "yz", "zx", "xx − yy", "2zz − xx − yy"];
 
 /// x y, y z, z x, x² − y² and 3 z² − 1: the second-degree harmonics of a direction.
 pub fn second_degree(u: &Vector3<f64>) -> [f64; 5] {
@@ -125,10 +173,16 @@ impl EmpiricalFault {
                 | EmpiricalFault::Hardening { .. }
                 | EmpiricalFault::LoadedPlay { .. }
                 | EmpiricalFault::TwoJointGear { .. }
+                | EmpiricalFault::BaseTilt { .. }
         )
     }
 
-    /// Whether it rotates joints; the others shift the sensor.
+    /// Whether the sensor, if it reads orientations, sees it turn the target.
+    pub fn turns_target(self) -> bool {
+        matches!(self, EmpiricalFault::TargetDroop { turning: true, .. } | EmpiricalFault::BaseTilt { .. })
+    }
+
+    /// Whether it rotates joints; the others move the sensor.
     pub fn rotates_joints(self) -> bool {
         matches!(
             self,
@@ -147,6 +201,37 @@ impl EmpiricalFault {
             names.iter().map(|name| ((*name).to_owned(), unit)).collect::<Vec<_>>()
         };
         match self {
+            EmpiricalFault::TargetDroop { pole, turning } => {
+                let (droop, slope): (&[&str], &[&str]) = match pole {
+                    Pole::Bracket => (&BRACKET, &["slope x", "slope y", "slope z"]),
+                    _ => (&["droop"], &["slope"]),
+                };
+                let mut out = listed(droop, "mm");
+                out.extend(listed(if turning { slope } else { &[] }, "rad"));
+                out
+            }
+            EmpiricalFault::BaseTilt { load, axes, deep } => {
+                let (loads, units): (&[&str], _) = match load {
+                    Overturning::Masses => (&[""], ["rad/(N m)", "mm/(N m)"]),
+                    Overturning::Lumps => {
+                        let loads = &[" x elbow mass", " x wrist mass", " x flange mass"];
+                        (loads, ["rad kg/(N m)", "mm kg/(N m)"])
+                    }
+                };
+                let name = |axis: u8| ["x", "y", "z"][usize::from(axis.min(2))];
+                let abouts = axes.map_or_else(
+                    || vec![String::new()],
+                    |[a, b]| {
+                        [[a, a], [b, b], [a, b]].map(|pair| format!(" {}", pair.map(name).concat())).to_vec()
+                    },
+                );
+                let both = ["tilt", "sway"].into_iter().zip(units).take(if deep { 2 } else { 1 });
+                let named = both.flat_map(|(motion, unit)| {
+                    let all = abouts.iter().flat_map(|about| loads.iter().map(move |load| (about, load)));
+                    all.map(move |(about, load)| (format!("{motion}{about}{load}"), unit))
+                });
+                named.collect()
+            }
             EmpiricalFault::Latency { .. } => {
                 let mut out = listed(&["delay"], "s");
                 out.extend(listed(&["its change by the hour"], "s/h"));
@@ -209,6 +294,17 @@ impl EmpiricalFault {
             EmpiricalFault::Range { .. } => 0.2,
             EmpiricalFault::SensorAxes => 1e-3,
             EmpiricalFault::TargetNest { .. } => 0.05,
+            // A reflector of 0.2 kg on 100 mm of a thin rod, of aluminium or steel; the slope of its end over a length of some 100 mm.
+            EmpiricalFault::TargetDroop { pole, .. } => {
+                let droops = if pole == Pole::Bracket { BRACKET.len() } else { 1 };
+                if parameter < droops { 0.2 } else { 2e-3 }
+            }
+            // A joint of 1e-5 rad/(N m) on a pedestal as soft as itself, half a metre high; times some 30 kg.
+            EmpiricalFault::BaseTilt { load, deep, .. } => {
+                let sways = deep && 2 * parameter >= self.names().len();
+                let per_load = if load == Overturning::Masses { 1.0 } else { 30.0 };
+                1e-5 * per_load * if sways { 500.0 } else { 1.0 }
+            }
         }
     }
 }

@@ -410,6 +410,30 @@ fn a_joint_that_lost_counts_is_told_with_its_angle() {
     assert!((offset.value - 8e-4).abs() < 4.0 * offset.sigma.unwrap() + 1e-5, "{offset:?}");
 }
 
+/// A reflector on a pole that yields under its weight: no spring of the wrist.
+#[test]
+fn a_target_that_droops_is_told_with_its_size() {
+    let hidden = [Hidden::Droop { mm: 0.2 }];
+    let found = diagnosed(&run(&arm(), &hidden, &setup(Sensor::Position, 400, 89)).dataset);
+    let names: Vec<&str> = identified(&found).iter().map(|f| f.effect.as_str()).collect();
+    assert_eq!(names, ["target-droop"]);
+    let droop = &identified(&found)[0].parameters[0];
+    assert!((droop.value - 0.2).abs() < 4.0 * droop.sigma.unwrap() + 0.005, "{droop:?}");
+    assert!(found.estimated.model.effects.iter().all(Effect::is_zero), "it moves no program");
+}
+
+/// A pedestal that tilts under the arm: no air, no axis of the sensor, no joint.
+#[test]
+fn a_base_that_tilts_is_told_with_its_size() {
+    let hidden = [Hidden::Tilt { rad_per_nm: 1e-5 }];
+    let found = diagnosed(&run(&arm(), &hidden, &setup(Sensor::Position, 400, 90)).dataset);
+    let names: Vec<&str> = identified(&found).iter().map(|f| f.effect.as_str()).collect();
+    assert_eq!(names, ["base-tilt"]);
+    // Its masses are not quite those of the data sheet.
+    let tilt = &identified(&found)[0].parameters[0];
+    assert!((tilt.value - 1e-5).abs() < 4.0 * tilt.sigma.unwrap() + 2e-6, "{tilt:?}");
+}
+
 /// A tracker with the constant of another reflector reads all distances too long by as much: no scale, and no link.
 #[test]
 fn a_wrong_reflector_constant_is_told_with_its_size() {

@@ -59,6 +59,14 @@ pub enum Hidden {
     Depth {
         share: f64,
     },
+    /// The target hangs down from the end of its pole, which stands on the flange, by this where the pole is level.
+    Droop {
+        mm: f64,
+    },
+    /// The pedestal tilts by this for each N m that overturns it.
+    Tilt {
+        rad_per_nm: f64,
+    },
     /// A tracker reads distances too long by this.
     Range {
         mm: f64,
@@ -130,6 +138,8 @@ impl Hidden {
             Hidden::Bending { .. } => "link-bending",
             Hidden::LostCounts { .. } => "joint-zero-shift",
             Hidden::Range { .. } => "sensor-range",
+            Hidden::Droop { .. } => "target-droop",
+            Hidden::Tilt { .. } => "base-tilt",
             Hidden::Depth { .. } => "sensor-axes",
             Hidden::Gear { order, .. } if *order <= 2.0 => "gear-eccentricity",
             Hidden::Gear { .. } => "gear-transmission",
@@ -267,6 +277,17 @@ impl Arm {
         up[joint] += h;
         down[joint] -= h;
         -(self.energy(&up, flange_kg) - self.energy(&down, flange_kg)) / (2.0 * h)
+    }
+
+    /// What overturns the arm's pedestal (N m): by how much the energy falls while the whole arm turns about each axis of the base.
+    fn overturning(&self, u: &[f64; 6]) -> Vector3<f64> {
+        let h = 1e-5;
+        let turned = |axis: usize, angle: f64| {
+            let turn = nalgebra::Rotation3::from_scaled_axis(Vector3::ith(axis, -angle));
+            Arm { up: turn * self.up, links: self.links.clone(), masses: self.masses.clone(), ..*self }
+                .energy(u, 0.0)
+        };
+        Vector3::from_fn(|axis, _| -(turned(axis, h) - turned(axis, -h)) / (2.0 * h))
     }
 
     /// Sag (mm) and turn (rad) of the end of the link from a joint to the next, of bending stiffness 1 N m²: the elastic curve, step by
@@ -470,6 +491,18 @@ pub fn run(nominal: &Model, hidden: &[Hidden], setup: &Setup) -> Run {
                     let (sag, turn) = arm.elastic_curve(&u, *joint);
                     let beyond = at - frames[joint + 1].column(3).xyz();
                     at += (sag + turn.cross(&beyond)) * (mm / peaks[k]);
+                }
+            }
+            for (_, h) in hidden.iter().enumerate().filter(|(k, _)| Some(*k) != skip) {
+                match h {
+                    Hidden::Droop { mm } => {
+                        let pole = (frames[6] * grown.flange).column(2).xyz();
+                        at -= (arm.up - pole * pole.dot(&arm.up)) * *mm;
+                    }
+                    Hidden::Tilt { rad_per_nm } => {
+                        at = nalgebra::Rotation3::new(arm.overturning(&u) * *rad_per_nm) * at;
+                    }
+                    _ => {}
                 }
             }
             at.z += warp * (at.x / 180.0).sin() * (at.y / 220.0).cos();

@@ -14,7 +14,7 @@ use truegrind_arm::parameter::{LinkCoordinate, Parameter, link_parameters};
 use truegrind_calibration::identification::calibration::{CalibrationProblem, Frames, Weight};
 use truegrind_calibration::measurement::dataset::{Dataset, Motion, Reading, Row, Sensor};
 use truegrind_calibration::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
-use truegrind_calibration::measurement::sensor::empirical::{AssumedLoad, EmpiricalFault};
+use truegrind_calibration::measurement::sensor::empirical::{AssumedLoad, EmpiricalFault, Overturning, Pole};
 use truegrind_estimation::problem::Problem;
 use truegrind_math::difference;
 use truegrind_math::lanes::{Instructions, with_instructions};
@@ -134,6 +134,11 @@ fn disturbances(sensor: Sensor, turn_rad: f64) -> Vec<Disturbance> {
         EmpiricalFault::LoadedPlay { joint: 1, load: AssumedLoad::Frame(4) },
         EmpiricalFault::TwoJointGear { joint: 2, other: 3, orders: [1, 1] },
         EmpiricalFault::TwoJointGear { joint: 4, other: 5, orders: [2, 1] },
+        EmpiricalFault::TargetDroop { pole: Pole::Axis, turning: true },
+        EmpiricalFault::TargetDroop { pole: Pole::Offset, turning: false },
+        EmpiricalFault::TargetDroop { pole: Pole::Bracket, turning: true },
+        EmpiricalFault::BaseTilt { load: Overturning::Masses, axes: None, deep: false },
+        EmpiricalFault::BaseTilt { load: Overturning::Lumps, axes: Some([0, 1]), deep: true },
     ];
     let of_sensor = match sensor {
         Sensor::Cable => [EmpiricalFault::Pulley, EmpiricalFault::Drum { from_mm: 500, to_mm: 1200 }],
