@@ -432,6 +432,12 @@ fn a_base_that_tilts_is_told_with_its_size() {
     // Its masses are not quite those of the data sheet.
     let tilt = &identified(&found)[0].parameters[0];
     assert!((tilt.value - 1e-5).abs() < 4.0 * tilt.sigma.unwrap() + 2e-6, "{tilt:?}");
+    // Of it the written arm has what a yielding joint does.
+    let mut effects = found.estimated.model.effects.iter().filter(|effect| !effect.is_zero());
+    assert!(
+        matches!(effects.next(), Some(Effect::JointCompliance(c)) if c.joint == 1 && c.compliance_rad_per_nm > 5e-6)
+    );
+    assert!(effects.next().is_none());
 }
 
 /// A tracker with the constant of another reflector reads all distances too long by as much: no scale, and no link.

@@ -1,6 +1,6 @@
 //! The calibration problem: every Jacobian column has a numerical twin, lanes and padding change nothing.
 
-use nalgebra::{DMatrix, Matrix6, Vector3};
+use nalgebra::{DMatrix, Matrix6, UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use truegrind_arm::condition::Condition;
@@ -258,6 +258,85 @@ fn every_column_has_a_numerical_twin() {
             let gap = (analytic.column(k) - twin.column(k)).amax() / size;
             assert!(gap < loose(parameter), "{sensor:?} {disturbed:?} {parameter}: relative gap {gap:e}");
         }
+    }
+}
+
+/// What a target that droops and turns on its pole and a base that turns below its origin do to a reading, worked out without the
+/// regressors, leaves no residual but of second order.
+#[test]
+fn a_drooping_target_and_a_tilted_base_are_read_as_they_move() {
+    let arm = Model { effects: Vec::new(), ..arm() };
+    let sensor_at = pose_from_vector(&[1500.0, -700.0, 300.0, 0.2, -0.3, 0.4]);
+    let target_at = pose_from_vector(&[10.0, 20.0, 80.0, 0.1, -0.2, 0.05]);
+    let g = arm.gravity;
+    let size = 1e-6;
+    let turned = |turn: Vector3<f64>| {
+        Pose::from_parts(Vector3::zeros().into(), UnitQuaternion::from_scaled_axis(turn))
+    };
+    let on_pole = |flange: &Pose, along: Vector3<f64>| {
+        let n = flange.rotation * along;
+        let droop = (g - n * n.dot(&g)) * (size * 1e3);
+        (droop, n.cross(&g) * (size * 20.0))
+    };
+    let tilt = EmpiricalFault::BaseTilt { load: Overturning::Masses, axes: None, deep: true };
+    let forms = [Pole::Axis, Pole::Offset].map(|pole| EmpiricalFault::TargetDroop { pole, turning: true });
+    for (sensor, form) in
+        [Sensor::Position, Sensor::Pose].into_iter().flat_map(|s| [forms[0], forms[1], tilt].map(|f| (s, f)))
+    {
+        let mut data = dataset(sensor, 12, 8);
+        let (mut values, mut shifted) = (vec![size * 1e3, size * 20.0], sensor_at);
+        for row in &mut data.rows {
+            let flange = arm.forward(&row.joints, &Condition::default());
+            let mut seen = flange * target_at;
+            match form {
+                EmpiricalFault::TargetDroop { pole, .. } => {
+                    let along = if pole == Pole::Axis {
+                        Vector3::z()
+                    } else {
+                        target_at.translation.vector.normalize()
+                    };
+                    let (droop, turn) = on_pole(&flange, along);
+                    seen.translation.vector += droop;
+                    seen.rotation = UnitQuaternion::from_scaled_axis(turn) * seen.rotation;
+                }
+                _ => {
+                    let moment = arm.statics().overturning_moment(&arm.mapped(&row.joints), &row.condition);
+                    // About a place 400 mm below.
+                    let below = Pose::from_parts((g * 400.0).into(), UnitQuaternion::identity());
+                    seen = below * turned(moment * size) * below.inverse() * seen;
+                }
+            }
+            let reading = sensor_at.inv_mul(&seen);
+            row.reading = match sensor {
+                Sensor::Pose => Reading::Pose(Box::new(reading)),
+                _ => Reading::Position(reading.translation.vector),
+            };
+        }
+        match form {
+            // What a droop does alike in all directions, a shift of the sensor does.
+            EmpiricalFault::TargetDroop { .. } => shifted.translation.vector -= g * (size * 1e3),
+            _ => values = vec![size, size * 400.0],
+        }
+        let mut fault = Disturbance::new(Kind::Empirical(form), Profile::Constant);
+        fault.values.clone_from(&values);
+        let frames = Frames {
+            base_from_sensor: shifted,
+            flange_from_target: target_at,
+            disturbances: vec![fault],
+            ..Frames::at_origin(0)
+        };
+        let list: Vec<Parameter> =
+            (0..2).map(|parameter| Parameter::Disturbance { index: 0, parameter }).collect();
+        let weights = [Weight { per_mm: 1.0, per_rad: 100.0 }; 12];
+        let problem = CalibrationProblem::new(&data, &arm, &frames, &list, &[], &weights);
+        let largest = |x: &[f64]| {
+            let mut out = vec![0.0; problem.rows()];
+            problem.residuals(x, 0..out.len(), &mut out);
+            out.iter().fold(0.0_f64, |most, r| most.max(r.abs()))
+        };
+        // The values are those of the start, and x is what they deviate by.
+        let (with, without) = (largest(&[0.0; 2]), largest(&values.iter().map(|v| -v).collect::<Vec<_>>()));
+        assert!(with < 1e-3 * without && without > 1e-4, "{sensor:?} {form:?}: {with:e} of {without:e}");
     }
 }
 
