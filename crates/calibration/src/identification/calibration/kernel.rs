@@ -603,6 +603,8 @@ fn spatial_rows<R: SinCos>(
         let mut sensor_side = false;
         // Rotation of the axes, which the residual of an orientation does not follow.
         let mut turns_axes = false;
+        // Motion of the sensor to which the scale factor is applied here.
+        let mut turns_sensor = false;
         let twist: Twist<R> = match *parameter {
             Parameter::Link { joint, coordinate } if coordinate.is_length() => {
                 let (v, w) = link_twist(&frames, &p, joint, coordinate);
@@ -651,7 +653,8 @@ fn spatial_rows<R: SinCos>(
                             Some(along) => {
                                 let w = load(like, along, at);
                                 let w = turn.map_or(w, |turn| angular_velocity(&turn, &w));
-                                (plus(&v, &cross(&w, &turned)), w)
+                                turns_sensor = true;
+                                (plus(&scaled(gain, &v), &cross(&w, &turned)), w)
                             }
                             None => (v, none),
                         }
@@ -684,10 +687,12 @@ fn spatial_rows<R: SinCos>(
             Parameter::Outlet { .. } | Parameter::Zero { .. } => (none, none),
         };
         // The scale factor applies to the arm's prediction and to shifts of the sensor, not to its rotation.
-        let scaled_by_gain = !matches!(
-            *parameter,
-            Parameter::SensorFrame(3..) | Parameter::Disturbance { parameter: 3.., .. }
-        ) || !sensor_side;
+        let scaled_by_gain = !turns_sensor
+            && !matches!(
+                *parameter,
+                Parameter::SensorFrame(3..) | Parameter::Disturbance { parameter: 3.., .. }
+            )
+            || !sensor_side;
         let size = if scaled_by_gain { weight * gain } else { weight };
         let sign = if sensor_side { size } else { -size };
         for (i, v) in twist.0.into_iter().enumerate() {

@@ -315,6 +315,8 @@ pub fn cause(hidden: &Hidden) -> Option<Cause> {
         | Hidden::LostCounts { .. }
         | Hidden::Range { .. }
         | Hidden::Depth { .. }
+        | Hidden::Droop { .. }
+        | Hidden::Tilt { .. }
         | Hidden::LoadedPlay { .. } => {
             return None;
         }

@@ -231,12 +231,15 @@ fn every_column_has_a_numerical_twin() {
         let problem = task_with(sensor, 13, disturbed);
         let list = problem.free_parameters().to_vec();
         let mut random = ChaCha8Rng::seed_from_u64(3);
-        let scale = |p: &Parameter| match p.unit() {
-            "mm" => 1.0,
-            "rad" => 0.02,
+        let kinds: Vec<Kind> = disturbances(sensor, SMALL_TURN_RAD).into_iter().map(|d| d.kind).collect();
+        // What turns with a pose is small, as the series of its rotation is.
+        let turns = |index: usize| matches!(kinds[index], Kind::Empirical(form) if form.turns_target());
+        let scale = |p: &Parameter| match (p, p.unit()) {
+            (Parameter::Disturbance { index, .. }, _) if turns(*index) => 1e-5,
+            (_, "mm") => 1.0,
+            (_, "rad") => 0.02,
             _ => 1e-5,
         };
-        let kinds: Vec<Kind> = disturbances(sensor, SMALL_TURN_RAD).into_iter().map(|d| d.kind).collect();
         // The torque of a load and the forms of empirical faults are taken at the starting arm.
         let loose = |p: &Parameter| match p {
             Parameter::Disturbance { index, .. } if !matches!(kinds[*index], Kind::Frame { .. }) => 3e-3,
@@ -251,7 +254,7 @@ fn every_column_has_a_numerical_twin() {
         assert_eq!(r, alone, "residuals agree with and without the Jacobian");
         let analytic = DMatrix::from_vec(n, p, j);
         let steps: Vec<f64> =
-            list.iter().map(|p| if p.unit() == "mm" { 0.5 } else { 0.1 * scale(p) }).collect();
+            list.iter().map(|p| if scale(p) == 1.0 { 0.5 } else { 0.1 * scale(p) }).collect();
         let twin = difference::jacobian(|x, out| problem.residuals(x, 0..n, out), &x, n, &steps);
         for (k, parameter) in list.iter().enumerate() {
             let size = twin.column(k).amax().max(1e-3);
