@@ -16,6 +16,9 @@ use truegrind_arm::model::{Body, MappedJoints, Model};
 /// Displacement (mm) and rotation vector (rad), in the base.
 pub(super) type Motion = [Vector3<f64>; 2];
 
+/// Motions of the target per unit of each parameter, from the row, the target in the base and the flange's orientation.
+type MotionOfTarget<'a> = Box<dyn Fn(&Row, &Vector3<f64>, &Rotation3<f64>) -> Vec<Motion> + 'a>;
+
 /// Motions of the sensor per unit of each parameter of a fault, row by row; none of a fault without them. The turn is zero where the
 /// sensor reads no orientations.
 pub(super) fn sensor_motions(
@@ -26,7 +29,7 @@ pub(super) fn sensor_motions(
 ) -> Vec<Vec<Motion>> {
     let posed = model.at_condition(&Condition::default());
     let offset = frames.flange_from_target.translation.vector;
-    let of_target: Box<dyn Fn(&Row, &Vector3<f64>, &Rotation3<f64>) -> Vec<Motion>> = match fault {
+    let of_target: MotionOfTarget<'_> = match fault {
         EmpiricalFault::TargetDroop { pole, turning } => Box::new(move |_, _, flange| {
             let here = droops(pole, turning, &offset, &(flange.inverse() * model.gravity));
             here.into_iter().map(|motion| motion.map(|v| flange * v)).collect()
