@@ -8,26 +8,25 @@ use truegrind_arm::robots;
 use truegrind_calibration::diagnosis::cause_kind::CauseKind;
 use truegrind_calibration::diagnosis::diagnose::{Diagnosed, Options, diagnose};
 use truegrind_calibration::diagnosis::finding::Finding;
-use truegrind_calibration::measurement::dataset::Sensor;
+use truegrind_calibration::measurement::dataset::{Dataset, Sensor};
 
 use super::scenarios::frames;
 use super::simulator::{Log, Setup, run};
 
-/// The diagnosis of 300 positions whose joint 3 stands elsewhere than logged, by an angle of the row (rad).
-fn with_joint_3_off(seed: u64, mut off: impl FnMut(&mut ChaCha8Rng) -> f64) -> Diagnosed {
+/// The diagnosis of positions of an IRB 120 whose log is changed.
+fn diagnosed(rows: usize, seed: u64, change: impl FnOnce(&mut Dataset)) -> Diagnosed {
     let nominal = robots::load("abb-irb-120").unwrap().model;
-    let setup = Setup {
-        sensor: Sensor::Position,
-        rows: 300,
-        sigma_mm: 0.02,
-        dirty: false,
-        seed,
-        log: Log::default(),
-    };
+    let setup =
+        Setup { sensor: Sensor::Position, rows, sigma_mm: 0.02, dirty: false, seed, log: Log::default() };
     let mut data = run(&nominal, &[], &setup).dataset;
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    data.rows.iter_mut().for_each(|row| row.joints[2] -= off(&mut rng));
+    change(&mut data);
     diagnose(&data, "arm", &nominal, &frames(&data, &nominal), &Options::default(), &|_| {}).unwrap()
+}
+
+/// That of 300 positions whose joint 3 stands elsewhere than logged, by an angle of the row (rad).
+fn with_joint_3_off(seed: u64, mut off: impl FnMut(&mut ChaCha8Rng) -> f64) -> Diagnosed {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    diagnosed(300, seed, |data| data.rows.iter_mut().for_each(|row| row.joints[2] -= off(&mut rng)))
 }
 
 fn unexplained(found: &Diagnosed) -> Option<&Finding> {
@@ -94,21 +93,11 @@ fn a_joint_that_stands_where_it_is_logged_has_no_scatter() {
 /// Angles in steps of 0.1° scatter by 0.029° about every joint, most visibly about the one with the longest lever.
 #[test]
 fn rounding_of_the_log_is_no_scatter_of_a_joint() {
-    let nominal = robots::load("abb-irb-120").unwrap().model;
-    let setup = Setup {
-        sensor: Sensor::Position,
-        rows: 400,
-        sigma_mm: 0.02,
-        dirty: false,
-        seed: 5,
-        log: Log::default(),
-    };
-    let mut data = run(&nominal, &[], &setup).dataset;
     let step = 0.1_f64.to_radians();
-    data.rows.iter_mut().for_each(|row| row.joints.apply(|q| *q = (*q / step).round() * step));
-    data.angle_step_rad = Some(step);
-    let found =
-        diagnose(&data, "arm", &nominal, &frames(&data, &nominal), &Options::default(), &|_| {}).unwrap();
+    let found = diagnosed(400, 5, |data| {
+        data.rows.iter_mut().for_each(|row| row.joints.apply(|q| *q = (*q / step).round() * step));
+        data.angle_step_rad = Some(step);
+    });
     assert!(unexplained(&found).is_none(), "{:?}", unexplained(&found).map(|finding| &finding.cause));
     assert!(found.benefit.unwrap().estimated_without_scale_mm < 0.15, "{:?}", found.benefit);
 }
@@ -116,23 +105,11 @@ fn rounding_of_the_log_is_no_scatter_of_a_joint() {
 /// Zeros of joints that change in the course of a measurement are the arm's, not the set-up's.
 #[test]
 fn zeros_that_change_are_named_with_their_joints() {
-    let nominal = robots::load("abb-irb-120").unwrap().model;
-    let setup = Setup {
-        sensor: Sensor::Position,
-        rows: 300,
-        sigma_mm: 0.02,
-        dirty: false,
-        seed: 7,
-        log: Log::default(),
-    };
-    let mut data = run(&nominal, &[], &setup).dataset;
-    for (row, joints) in data.rows.iter_mut().map(|row| &mut row.joints).enumerate() {
-        if row >= 130 {
+    let found = diagnosed(300, 7, |data| {
+        for joints in data.rows.iter_mut().map(|row| &mut row.joints).skip(130) {
             (joints[1], joints[2], joints[4]) = (joints[1] - 2e-3, joints[2] + 2e-3, joints[4] + 4e-3);
         }
-    }
-    let found =
-        diagnose(&data, "arm", &nominal, &frames(&data, &nominal), &Options::default(), &|_| {}).unwrap();
+    });
     let first = &found.diagnosis.findings[0];
     assert_eq!(first.effect, CauseKind::SetupChange);
     assert!(first.cause.starts_with("the zeros of joints 2, 3 and 5 changed"), "{}", first.cause);
