@@ -72,7 +72,7 @@ impl FramePriorArguments {
         if let Some(contradiction) = contradiction(dataset, nominal, stated, &found, mm) {
             bail!("{contradiction}");
         }
-        // With other fits a poor one is told as what it is.
+        // Where this fit fails, the one that is asked for says why.
         let free = Options { tolerance: *of_arm, ..Options::default() };
         let split = |rows: &Dataset| split::random(rows, free.held_out, free.seed);
         let geometry = identify(dataset, "", nominal, &found, &split, &free).map(|free| free.geometry);

@@ -636,7 +636,8 @@ fn has_stated_frames(fitted: &Fitted) -> bool {
 /// Standard deviation of a frame below which it was stated (mm).
 const STATED_MM: f64 = 100.0;
 
-fn mean_reading(dataset: &Dataset) -> Vector3<f64> {
+/// The mean reading, of a cable its length along x (mm).
+pub(super) fn mean_reading(dataset: &Dataset) -> Vector3<f64> {
     let n = dataset.rows.len().max(1) as f64;
     dataset.rows.iter().map(|row| row.reading.place_mm() / n).sum()
 }

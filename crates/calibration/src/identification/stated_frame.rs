@@ -9,7 +9,7 @@
 
 use nalgebra::{DMatrix, DVector, Point3, Vector3, Vector6};
 
-use super::benefit::widen_by_scale;
+use super::benefit::{mean_reading, widen_by_scale};
 use super::calibration::Frames;
 use super::fit::{Fitted, Observations, errors_on};
 use super::rounding::logged_covariance;
@@ -85,9 +85,10 @@ pub fn contradiction_beside_geometry(
     let own: Vec<usize> =
         (0..geometry.parameters.len()).filter(|&k| is_of_frame(&geometry.parameters[k])).collect();
     let covariance = geometry.estimate.covariance.as_ref()?;
+    let centre = mean_reading(dataset);
     let (difference, by_scale) = own
         .iter()
-        .map(|&k| difference(&geometry.parameters[k], stated, &geometry.frames, dataset))
+        .map(|&k| difference(&geometry.parameters[k], stated, &geometry.frames, &centre))
         .unzip::<f64, f64, Vec<f64>, Vec<f64>>();
     let (difference, by_scale) =
         (DVector::from_vec(difference), DVector::from_vec(by_scale) * scale.unwrap_or(UNSTATED_SCALE));
@@ -123,11 +124,10 @@ fn is_of_frame(parameter: &Parameter) -> bool {
     matches!(parameter, Parameter::SensorFrame(_) | Parameter::Outlet { .. } | Parameter::Zero { .. })
 }
 
-/// A parameter of the stated frames minus that of the fitted ones, and what a sensor whose readings are all too long by their own length
-/// does to it.
-fn difference(parameter: &Parameter, stated: &Frames, fitted: &Frames, dataset: &Dataset) -> (f64, f64) {
+/// A parameter of the stated frames minus that of the fitted ones, and what a sensor whose readings, `centre` in the mean, are all too
+/// long by their own length does to it.
+fn difference(parameter: &Parameter, stated: &Frames, fitted: &Frames, centre: &Vector3<f64>) -> (f64, f64) {
     let (to, from) = (&stated.base_from_sensor, &fitted.base_from_sensor);
-    let centre = mean_reading(dataset);
     match *parameter {
         Parameter::SensorFrame(k @ 0..3) => {
             ((to.translation.vector - from.translation.vector)[k], (from.rotation * centre)[k])
@@ -139,12 +139,6 @@ fn difference(parameter: &Parameter, stated: &Frames, fitted: &Frames, dataset: 
         Parameter::Zero { anchor } => (stated.zeros_mm[anchor] - fitted.zeros_mm[anchor], centre.x),
         _ => (0.0, 0.0),
     }
-}
-
-/// The mean reading, of a cable its length (mm).
-fn mean_reading(dataset: &Dataset) -> Vector3<f64> {
-    let count = dataset.rows.len().max(1) as f64;
-    dataset.rows.iter().map(|row| row.reading.place_mm() / count).sum()
 }
 
 /// Median error of the fitted arm, which outliers do not move (mm).

@@ -124,7 +124,14 @@ fn what_nothing_explains_is_said_and_a_smooth_correction_follows_it_when_asked()
         assert!(found.diagnosis.remaining.is_some());
     }
     let (a, b) = (&without.diagnosis.fits.extended, &with.diagnosis.fits.extended);
-    // Causes that are in doubt describe a part of it in both.
+    // Causes that are in doubt describe a part of it in both, so the correction is measured against geometry alone.
+    let geometry = &without.diagnosis.fits.geometric;
+    assert!(
+        b.cv_rmse_mm < 0.9 * geometry.cv_rmse_mm,
+        "held out {} against {}",
+        b.cv_rmse_mm,
+        geometry.cv_rmse_mm
+    );
     assert!(b.cv_rmse_mm < 0.95 * a.cv_rmse_mm, "held out {} against {}", b.cv_rmse_mm, a.cv_rmse_mm);
     assert!(b.cv_blocks_rmse_mm < a.cv_blocks_rmse_mm);
     let smooth =
