@@ -6,8 +6,9 @@
 //!
 //! Predecessor of a motion: the one that the text executes before it ([`Motion::previous`]) and, where loops, branches and
 //! labels leave that open, the preceding one in the same routine. Mutually exclusive branches therefore form one cut, which
-//! refuses too much rather than too little. A call of a routine with several callers separates cuts; so do instructions whose
-//! path is not in the text (calls with targets, cycles), since the motions after them belong to other cuts.
+//! refuses too much rather than too little. A cut extends into a called routine and out of it ([`Listing::across_calls`]), so that the
+//! cuts of all callers may be one. Instructions whose path is not in the text (calls with targets, cycles) separate cuts, since the
+//! motions after them belong to other cuts.
 
 use rayon::prelude::*;
 
@@ -48,6 +49,10 @@ impl CutsOf {
 pub(crate) fn of(listing: &Listing, treatment: Cuts) -> CutsOf {
     let motions = &listing.motions;
     let may_cut: Vec<bool> = motions.par_iter().with_min_len(MANY).map(may_cut).collect();
+    let is_one_cut = |start: u32, index: u32| {
+        let [before, motion] = [start, index].map(|index| &motions[index as usize]);
+        may_cut[start as usize] && may_cut[index as usize] && goes_on(before, motion, listing)
+    };
     // The motion that each one goes on from, if they belong to one cut.
     let starts: Vec<Option<u32>> = motions
         .par_iter()
@@ -60,16 +65,14 @@ pub(crate) fn of(listing: &Listing, treatment: Cuts) -> CutsOf {
                 same_text.then_some(index as u32 - 1)
             };
             let start = motion.previous.or_else(stands_before)?;
-            let one_cut = may_cut[start as usize]
-                && may_cut[index]
-                && goes_on(&motions[start as usize], motion, listing);
-            one_cut.then_some(start)
+            is_one_cut(start, index as u32).then_some(start)
         })
         .collect();
     let mut root: Vec<u32> = (0..motions.len() as u32).collect();
     let mut runs_into = Vec::new();
-    for (index, start) in (0_u32..).zip(starts) {
-        let Some(start) = start else { continue };
+    let across_calls = listing.across_calls.iter().filter(|[start, index]| is_one_cut(*start, *index));
+    let in_text = (0_u32..).zip(starts).filter_map(|(index, start)| Some([start?, index]));
+    for [start, index] in in_text.chain(across_calls.copied()) {
         if treatment == Cuts::Partial {
             runs_into.push((start, index));
         }

@@ -1,5 +1,7 @@
 //! Steps of the path between motions that are corrected and their neighbours that are left.
 
+use std::collections::BTreeSet;
+
 use super::reason::OutcomeReason;
 use crate::deviation::Status;
 use crate::line_list::lines_of;
@@ -37,6 +39,15 @@ impl StepsToLeft {
             let mut neighbours = before.into_iter().chain(behind);
             neighbours.any(|other| is_continued(this, &listing.motions[other]) && left(other))
         };
+        let across = listing.across_calls.iter().flat_map(|&[a, b]| [[a, b], [b, a]]);
+        let beside_left_across: BTreeSet<u32> = across
+            .filter(|&[this, other]| {
+                let [this, other] = [this, other].map(|index| &listing.motions[index as usize]);
+                is_path(this) && this.same_frames(other)
+            })
+            .filter(|[_, other]| left(*other as usize))
+            .map(|[this, _]| this)
+            .collect();
         let mut found = Self { motions: Vec::new(), largest_mm: tolerance_mm };
         for change in changes {
             let motion = &listing.motions[change.motion as usize];
@@ -45,7 +56,9 @@ impl StepsToLeft {
                 continue;
             }
             let moved_mm = moved_mm(motion, change).or(before_mm).unwrap_or(0.0);
-            if moved_mm > tolerance_mm && beside_left(change.motion as usize) {
+            if moved_mm > tolerance_mm
+                && (beside_left_across.contains(&change.motion) || beside_left(change.motion as usize))
+            {
                 found.motions.push(change.motion);
                 found.largest_mm = found.largest_mm.max(moved_mm);
             }

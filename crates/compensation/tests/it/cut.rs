@@ -108,6 +108,37 @@ fn a_loop_or_a_branch_is_part_of_the_cut_around_it() {
     }
 }
 
+/// A module whose main calls a routine between lines.
+fn with_routine(before: &str, routine: &str, behind: &str) -> String {
+    module(&format!("{before}part;\n{behind}")).replace("ENDMODULE", &format!("PROC part()\n{routine}ENDPROC\nENDMODULE"))
+}
+
+#[test]
+fn a_cut_extends_into_a_called_routine_and_out_of_it() {
+    let late = "MoveL Offs(seen,0,0,0),v20,z1,tool0;\n".to_owned();
+    let [a, b, c, d] = [380.0, 385.0, 390.0, 395.0].map(|x| line(x, "z1"));
+    // In the order of the file: the lines of main, then those of the routine.
+    let inside = with_routine(&a, &[b.clone(), late.clone()].concat(), &d);
+    let (done, bytes) = done(&inside, Cuts::Whole, 0.05);
+    assert_eq!(statuses(&done), [Refused, Refused, Refused, Left]);
+    assert_eq!(bytes, inside.as_bytes());
+    let outside = with_routine(&[late.clone(), a.clone()].concat(), &b, &line(395.0, "fine"));
+    assert_eq!(statuses(&self::done(&outside, Cuts::Whole, 0.05).0), [Left, Refused, Refused, Refused]);
+    // Every caller of a routine that stays as it is, however deep the calls are, and none that stops before it.
+    let deep = with_routine(&a, "inner;\n", &[line(410.0, "fine"), "part;\n".to_owned(), c].concat())
+        .replace("ENDMODULE", &format!("PROC inner()\n{late}ENDPROC\nENDMODULE"));
+    assert_eq!(statuses(&self::done(&deep, Cuts::Whole, 0.05).0), [Refused, Refused, Refused, Left]);
+    let [stop, last] = [line(385.0, "fine"), late.replace("z1", "fine")];
+    let apart = with_routine(&stop, &last, &line(395.0, "fine"));
+    let (apart, _) = self::done(&apart, Cuts::Whole, 0.05);
+    assert_eq!(statuses(&apart), [Changed, Changed, Left]);
+    // The steps at the call and behind it are counted.
+    assert_eq!(apart.plan.steps.unwrap().motions, [0, 1]);
+    // Corrected on both sides: nothing is refused, and nothing steps.
+    let (whole, _) = self::done(&with_routine(&a, &b, &d), Cuts::Whole, 0.05);
+    assert_eq!((statuses(&whole), whole.plan.steps), (vec![Changed; 3], None));
+}
+
 /// With a stop at every target each line is a cut of its own: what is left stands beside what is corrected.
 #[test]
 fn steps_beside_what_is_left_are_counted() {

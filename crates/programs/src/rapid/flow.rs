@@ -43,7 +43,7 @@ pub(super) struct AbstractState {
     pub(super) gripped: Gripped,
     pub(super) previous: Option<u32>,
     /// The motions that may be the last executed; tracked only where the program depends on them.
-    reaching: ReachingMotions,
+    pub(super) reaching: ReachingMotions,
     /// Whether control flow can reach the statement.
     pub(super) reachable: bool,
 }
@@ -113,6 +113,10 @@ pub(super) trait Visitor {
     fn exit_of(&mut self, routine: u32) -> Exit;
     /// A call of a routine of the program.
     fn record_call(&mut self, site: CallSite);
+    /// A call of a routine that moves, after these motions; returns a number of the call.
+    fn record_moving_call(&mut self, routine: u32, before: &ReachingMotions) -> u32;
+    /// The unit may end after these motions.
+    fn record_end(&mut self, reaching: &ReachingMotions);
     /// A call by a computed name, with the switches at the call.
     fn record_late_call(&mut self, modal: SwitchSet);
     /// A call of a routine that no file declares; it may call those that are declared.
@@ -130,7 +134,7 @@ pub(super) fn interpret_unit(evaluator: &Evaluator<'_, '_>, unit: Unit, visitor:
     let resumes = tree.child_nodes(unit.node).any(|clause| is_resuming_handler(tree, clause));
     let aliases = aliases(evaluator, unit);
     let moved_between = symbols.may_move_between_statements(evaluator.trees, unit);
-    let tracks_motions = symbols.uses_position();
+    let tracks_motions = symbols.tracks_motions;
     let mut interpreter = Interpreter {
         evaluator,
         unit,
@@ -342,6 +346,9 @@ impl Interpreter<'_, '_, '_> {
     fn leave(&mut self, state: &AbstractState) {
         self.exit.modal = self.exit.modal.join(state.modal);
         self.exit.gripped.join(&state.reachable.then_some(state.gripped));
+        if self.tracks_motions {
+            self.visitor.record_end(&state.reaching);
+        }
     }
 
     /// Everything that a loop may change in any number of iterations is unknown.
@@ -590,7 +597,7 @@ impl Interpreter<'_, '_, '_> {
     /// A call by a name computed at run time.
     fn transfer_late_call(&mut self, state: &mut AbstractState) {
         let symbols = self.evaluator.symbols;
-        if self.tracks_motions {
+        if symbols.uses_position {
             self.visitor.record_position_use(&state.reaching);
         }
         if self.resumes {
@@ -619,8 +626,14 @@ impl Interpreter<'_, '_, '_> {
         if called.iter().any(|routine| symbols.effects_of(*routine).uses_position) {
             self.visitor.record_position_use(&state.reaching);
         }
-        if self.tracks_motions && called.iter().any(|routine| symbols.effects_of(*routine).moves) {
-            state.reaching.any = true;
+        if self.tracks_motions {
+            let moving = called.iter().filter(|routine| symbols.effects_of(**routine).moves);
+            let calls: Vec<u32> = moving
+                .map(|routine| self.visitor.record_moving_call(*routine, &state.reaching))
+                .collect();
+            if !calls.is_empty() {
+                state.reaching.or_in_calls(calls);
+            }
         }
         let mut exit = SwitchSet::EMPTY;
         let mut gripped = None;

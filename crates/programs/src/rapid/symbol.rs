@@ -176,6 +176,10 @@ pub struct Symbols {
     pub all_switches: SwitchSet,
     /// Whether anything in the files is named as what states a load (GripLoad, TLoad).
     pub states_loads: bool,
+    /// Whether any statement may depend on the robot's current position (PDispOn without \ExeP).
+    pub(super) uses_position: bool,
+    /// Whether anything depends on which motions may be the last executed: the robot's position, or a call of a routine that moves.
+    pub(super) tracks_motions: bool,
     /// Whether ExitCycle may restart main in the middle of a cycle.
     pub restarts_main: bool,
     /// The routines of each global name that several modules declare, in lower case.
@@ -196,6 +200,8 @@ impl Symbols {
         symbols.declare_loop_variables(trees);
         symbols.collect_namesakes(trees);
         symbols.solve_effects(trees);
+        symbols.uses_position = symbols.may_use_position();
+        symbols.tracks_motions = symbols.uses_position || symbols.calls_motions();
         symbols
     }
 
@@ -244,10 +250,14 @@ impl Symbols {
         std::slice::from_ref(routine)
     }
 
-    /// Whether any statement may depend on the robot's current position (PDispOn without \ExeP).
-    pub(super) fn uses_position(&self) -> bool {
+    fn may_use_position(&self) -> bool {
         self.units.iter().any(|unit| unit.routine.is_none())
             || self.routines.iter().any(|routine| routine.effects.uses_position)
+    }
+
+    /// Whether anything calls a routine that moves the robot.
+    fn calls_motions(&self) -> bool {
+        self.routines.iter().any(|routine| routine.effects.moves && self.called[routine.unit as usize])
     }
 
     /// Whether a routine is the entry of a program.

@@ -3,6 +3,7 @@
 //! [`ListingBuilder`] runs the abstract interpreter ([`super::flow`]) over every unit, lists the motions that it visits, and
 //! solves which switches each unit may be entered with.
 
+mod call_edges;
 mod entries;
 mod frames;
 mod literals;
@@ -28,6 +29,7 @@ use super::syntax::{RapidTree, Syntax};
 use crate::dataflow::Nesting;
 use crate::motion::load::{Load, Loads};
 use crate::motion::{Listing, MotionTarget, OpaqueRegion, Place, Reason, Role};
+use call_edges::CallEdges;
 use literals::{Literals, NODES_PER_MOTION};
 
 /// The RAPID modules of one task, read together.
@@ -90,6 +92,7 @@ fn listing(trees: &[RapidTree<'_>], symbols: &Symbols) -> (Listing, Loads, Vec<b
     builder.refuse_motions_before_displacement();
     builder.other_uses();
     builder.declared_tools();
+    builder.listing.across_calls = builder.call_edges.solve(symbols);
     let loads = if symbols.states_loads { builder.loads() } else { Loads::default() };
     (builder.listing, loads, builder.guarded)
 }
@@ -136,6 +139,7 @@ struct ListingBuilder<'a, 's> {
     units: Vec<u32>,
     unit: u32,
     sites: Vec<(u32, CallSite)>,
+    call_edges: CallEdges,
     /// What holds at the end of each routine.
     exits: Vec<Option<Exit>>,
     /// How deep the calls are whose ends alone are computed: nothing is listed in them.
@@ -204,6 +208,7 @@ impl<'a, 's> ListingBuilder<'a, 's> {
             units: Vec::new(),
             unit: 0,
             sites: Vec::new(),
+            call_edges: CallEdges::new(symbols.units.len()),
             exits: vec![None; symbols.routines.len()],
             depth: 0,
             grips: Vec::new(),
@@ -324,6 +329,7 @@ impl Visitor for ListingBuilder<'_, '_> {
             Some(known) => self.table_motion(unit, node, state, nesting, known),
             None => self.other_motion(unit, node, state, nesting)?,
         };
+        self.call_edges.arrive(self.unit, self.listing.motions.len() as u32, &state.reaching);
         self.listing.motions.push(motion);
         self.guarded.push(nesting.guarded);
         self.modal.push(state.modal);
@@ -364,6 +370,19 @@ impl Visitor for ListingBuilder<'_, '_> {
         }
     }
 
+    fn record_moving_call(&mut self, routine: u32, before: &ReachingMotions) -> u32 {
+        if self.depth > 0 {
+            return 0;
+        }
+        self.call_edges.call(self.unit, self.symbols.unit_of(routine), before)
+    }
+
+    fn record_end(&mut self, reaching: &ReachingMotions) {
+        if self.depth == 0 {
+            self.call_edges.end(self.unit, reaching);
+        }
+    }
+
     fn record_late_call(&mut self, modal: SwitchSet) {
         if self.depth == 0 {
             let late = &mut self.late[self.unit as usize];
@@ -385,7 +404,7 @@ impl Visitor for ListingBuilder<'_, '_> {
         match standing.motions() {
             Some(motions) => {
                 for motion in motions {
-                    self.listing.motions[*motion as usize]
+                    self.listing.motions[motion as usize]
                         .own_reason
                         .get_or_insert(Reason::BeforeDisplacement);
                 }

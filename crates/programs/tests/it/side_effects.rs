@@ -205,6 +205,30 @@ fn a_displacement_from_the_robot_position_pins_the_motions_of_every_path() {
     assert_eq!(left(&format!("{GO}{GO}still;\nn:=2;\n{HERE}{GO}"), still), [false, true, false]);
 }
 
+/// Motions that may follow each other across a call or a return, as pairs of lines.
+#[test]
+fn motions_follow_each_other_across_calls() {
+    const GO: &str = "MoveL p,v100,fine,tool0;\n";
+    let pairs = |main: &str, routines: &str| {
+        let text = format!("MODULE A\nPROC main()\n{main}ENDPROC\n{routines}ENDMODULE\n").replace("GO", GO);
+        let task = truegrind_programs::rapid::Task::read(&[("a.mod", text.as_bytes())]);
+        let line = |motion: u32| task.listing.motions[motion as usize].place.line;
+        task.listing.across_calls.iter().map(|pair| pair.map(line)).collect::<Vec<_>>()
+    };
+    assert!(pairs("GOGO", "PROC a()\nGOENDPROC\n").is_empty());
+    // Lines 3 and 5 of main, 8 and 9 of the routine.
+    assert_eq!(pairs("GOa;\nGO", "PROC a()\nGOGOENDPROC\n"), [[3, 8], [9, 5]]);
+    // A branch may pass, and what is behind it follows as well.
+    let branch = "PROC a()\nIF n=1 THEN\nGOENDIF\nGOENDPROC\n";
+    assert_eq!(pairs("GOa;\nGO", branch), [[3, 9], [3, 11], [11, 5]]);
+    // Through a routine that only calls, and from one call to the next.
+    let deep = "PROC a()\nb;\nENDPROC\nPROC b()\nGOENDPROC\n";
+    assert_eq!(pairs("GOa;\na;\nGO", deep), [[3, 12], [12, 6], [12, 12]]);
+    // A routine without motions is no call that counts; one that calls itself ends.
+    assert!(pairs("GOa;\nGO", "PROC a()\nn:=1;\nENDPROC\n").is_empty());
+    assert_eq!(pairs("GOa;\nGO", "PROC a()\nGOIF n=1 a;\nENDPROC\n"), [[3, 8], [8, 5], [8, 8]]);
+}
+
 /// What no file declares and RobotWare does not have is listed with its lines; own routines, instructions and functions are not.
 #[test]
 fn calls_of_routines_that_no_file_declares_are_listed() {
