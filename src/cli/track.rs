@@ -151,7 +151,17 @@ impl TrackContext<'_> {
         let (arguments, arm) = (self.arguments, self.arm);
         let mut tracker = self.state()?;
         let known = tracker.as_ref().map(|t| t.state().consumed.clone()).unwrap_or_default();
-        let (datasets, mut failed) = self.datasets(&known, printed)?;
+        let (mut datasets, mut failed) = self.datasets(&known, printed)?;
+        let fitted = &arm.provenance.sha256;
+        if let Some(at) = datasets.iter().position(|d| !fitted.is_empty() && d.sha256 == *fitted) {
+            let file = datasets.remove(at).file;
+            print_message_once(
+                printed,
+                format!(
+                    "note: {file} holds the rows to which the model was fitted: they say nothing new and are left out"
+                ),
+            );
+        }
         if tracker.is_none()
             && let Some(first) = first_poses(&datasets, self.options.first_poses)
         {
@@ -170,6 +180,14 @@ impl TrackContext<'_> {
         let mut taking = Duration::ZERO;
         if let Some(tracker) = &mut tracker {
             for dataset in &datasets {
+                if let Some(other) = tracker.copy_of(dataset) {
+                    let (file, other) = (&dataset.file, other.to_owned());
+                    print_message_once(
+                        printed,
+                        format!("note: {file} holds the same rows as {other}: they count once"),
+                    );
+                    continue;
+                }
                 let begun = Instant::now();
                 // After a panic on one file, continue with the state before that file.
                 let before = tracker.clone();
@@ -206,7 +224,8 @@ impl TrackContext<'_> {
             taking.as_secs_f64() * 1e6 / fresh as f64
         ));
         self.write(&tracker, fresh, &alarms, &datasets)?;
-        Ok(failed || !alarms.is_empty() || tracker.mostly_set_aside())
+        let departed = tracker.departure().is_some_and(|departure| departure.is_significant);
+        Ok(failed || !alarms.is_empty() || departed || tracker.mostly_set_aside())
     }
 
     /// The state of the last run.

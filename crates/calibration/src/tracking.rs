@@ -25,8 +25,13 @@
 //! (three times a jump; the process noise of a drift) and processes the history again, so that no reading is lost and the
 //! model follows within a few poses ([`alarm`]).
 //!
-//! **Wrong arm.** First poses with residuals far above the model's held-out error are refused: a filter that took them for
-//! noise would never detect a change.
+//! **Wrong arm.** First poses with residuals far above the model's held-out error are refused, and an arm that has changed before them
+//! is not taken for noise ([`first_noise`]): a filter that did would never detect a change.
+//!
+//! **Slow changes.** A drift may stay below every bound, since the filter follows it. What counts for programs is the whole way from the
+//! model that they were corrected with: the [`Departure`], which is judged at the end of every run.
+//!
+//! **What no reading tells** of arm and sensor together stays as it was ([`gauge`]).
 //!
 //! **Interruption.** [`state`] stores the filter exactly: a track that was interrupted and resumed gives the same bits as one
 //! that was not.
@@ -42,17 +47,21 @@
 //! bit-exact resumption, also of a killed process.
 
 pub mod alarm;
-mod mounting;
 mod bounds;
+mod departure;
 mod error;
+mod first_noise;
+mod gauge;
 pub mod locate;
 mod model;
+mod mounting;
 mod options;
 mod response;
 pub mod state;
 mod tracker;
 
 pub use alarm::{Alarm, Course};
+pub use departure::Departure;
 pub use error::{StateError, TrackError};
 pub use options::Options;
 pub use state::State;

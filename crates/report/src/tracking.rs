@@ -8,7 +8,7 @@ use super::plot::{Axis, Graph, Reference, Series};
 use super::status::Status;
 use super::table::{Cell, Column, Table};
 use truegrind_calibration::tracking::state::ConsumedFile;
-use truegrind_calibration::tracking::{Alarm, Tracker};
+use truegrind_calibration::tracking::{Alarm, Departure, Tracker};
 use truegrind_math::statistics::median;
 
 /// Summary for the terminal.
@@ -70,6 +70,25 @@ fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], 
         n => (Status::Warning, format!("{fresh} new poses processed, {n} changes detected")),
     };
     let mut reasons: Vec<String> = alarms.iter().map(ToString::to_string).collect();
+    let departure = tracker.departure();
+    let departed = departure.as_ref().filter(|departure| departure.is_significant);
+    let (status, headline) = match departed {
+        None => (status, headline),
+        Some(now) => (
+            Status::Warning,
+            match alarms.len() {
+                0 => format!(
+                    "{fresh} new poses processed, no sudden change, but the arm is {:.3} mm from the model that the track began with",
+                    now.rms_mm
+                ),
+                _ => format!(
+                    "{headline}; the arm is {:.3} mm from the model that the track began with",
+                    now.rms_mm
+                ),
+            },
+        ),
+    };
+    reasons.extend(departed.map(departure_sentence));
     let (status, headline) = if tracker.mostly_set_aside() {
         reasons.insert(
             0,
@@ -85,9 +104,16 @@ fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], 
     };
     if status == Status::Warning {
         reasons.push(
-            "what to do: if the arm changed, correct the original programs with the new model; if sensor or target moved, mount them \
-             firmly"
-                .to_owned(),
+            match departed {
+                Some(_) => {
+                    "what to do: correct the original programs with the new model, and begin a new track with it (--model, --state)"
+                }
+                None => {
+                    "what to do: if the arm changed, correct the original programs with the new model; if sensor or target moved, mount \
+                     them firmly"
+                }
+            }
+            .to_owned(),
         );
     }
     page.push(Verdict::new(status, headline, reasons));
@@ -101,10 +127,40 @@ fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], 
         KeyFigure::new("NIS of the latest poses", usual, 2, "").note(format!(
             "median of the normalised innovation squared; {expected:.1} expected if arm, sensor and noise match the model"
         )),
+        KeyFigure::new("Arm against the first model", departure.as_ref().map(|now| now.rms_mm), 3, "mm").note(
+            departure.as_ref().map_or_else(String::new, |now| {
+                format!(
+                    "RMS over the measured region, apart from the placement of base and target; {:.3} mm expected from the model's \
+                     uncertainty",
+                    now.expected_mm
+                )
+            }),
+        ),
         KeyFigure::new("Changes", state.alarms.len(), 0, "").note(format!("{} in the new poses", alarms.len())),
     ]);
     page.paragraph(format!("Model written: {model}"));
 }
+
+/// How far the arm has moved, and its parameters that moved most.
+fn departure_sentence(now: &Departure) -> String {
+    let mut out = format!(
+        "over the measured region, and apart from the placement of base and target, the arm is {:.3} mm RMS from the model that the track \
+         began with, where that model's uncertainty lets expect {:.3} mm: programs that were corrected with it are off by as much",
+        now.rms_mm, now.expected_mm
+    );
+    let moved = now.parameters.iter().take(LISTED).map(|(name, unit, by, sigma)| {
+        let (scale, unit) = handy(unit);
+        format!("{name} {:+.4} ± {:.4} {unit}", by * scale, sigma * scale)
+    });
+    let moved: Vec<String> = moved.collect();
+    if !moved.is_empty() {
+        out += &format!("; moved most: {}", moved.join(", "));
+    }
+    out
+}
+
+/// Parameters that are listed.
+const LISTED: usize = 3;
 
 /// Current parameters.
 pub fn table(tracker: &Tracker) -> Table {
@@ -148,6 +204,9 @@ pub fn json(tracker: &Tracker, fresh: usize, alarms: &[Alarm]) -> Value {
         "set_aside": state.accidents,
         "new_alarms": alarms,
         "alarms": state.alarms,
+        "departure": tracker.departure().map(|now| {
+            json!({ "rms_mm": now.rms_mm, "expected_mm": now.expected_mm, "significant": now.is_significant })
+        }),
         "parameters": parameters,
     })
 }

@@ -33,6 +33,8 @@ pub enum Course {
     Mounted,
     /// Outliers that no single change explains.
     Burst,
+    /// The readings scatter more than before: `shift` is the ratio.
+    Scatter,
 }
 
 /// A detected change.
@@ -95,6 +97,14 @@ impl fmt::Display for Alarm {
                 self.poses, self.since_row, self.since_file
             );
         }
+        if self.course == Course::Scatter {
+            return write!(
+                f,
+                "the readings scatter {:.1} times as much as before at row {} of {}, and no change of arm, sensor or target explains it: \
+                 check how the target is fastened, the line of sight, and whether the arm has settled when it is read",
+                self.shift, self.noticed_row, self.noticed_file
+            );
+        }
         if self.course == Course::Mounted {
             write!(
                 f,
@@ -116,7 +126,7 @@ impl fmt::Display for Alarm {
             );
         }
         let verb = match self.course {
-            Course::Open | Course::Mounted | Course::Burst => "moved",
+            Course::Open | Course::Mounted | Course::Burst | Course::Scatter => "moved",
             Course::Jump => "jumped",
             Course::Drift => "has drifted",
         };

@@ -28,7 +28,7 @@ pub enum TrackError {
     #[error(
         "{file}: under this model the first {poses} poses leave {left_mm:.3} mm RMS along each axis, where its held-out error was \
          {held_out_mm:.3} mm along each: {}",
-        what_to_do(*left_mm)
+        what_to_do(*left_mm, *changed_mm)
     )]
     Foreign {
         /// File.
@@ -39,6 +39,8 @@ pub enum TrackError {
         left_mm: f64,
         /// The model's held-out error, likewise (mm).
         held_out_mm: f64,
+        /// RMS residual that another geometry leaves, if it explains the poses (mm).
+        changed_mm: Option<f64>,
     },
     /// Another sensor than before.
     #[error(
@@ -89,11 +91,16 @@ pub enum StateError {
 /// Error along each axis above which readings are of another arm (mm).
 const OTHER_ARM_MM: f64 = 25.0;
 
-fn what_to_do(left_mm: f64) -> String {
+fn what_to_do(left_mm: f64, changed_mm: Option<f64>) -> String {
     if left_mm > OTHER_ARM_MM {
         return "these are not measurements of this arm, or their units or columns are wrong".to_owned();
     }
+    if let Some(changed_mm) = changed_mm {
+        return format!(
+            "the arm has changed since, as another geometry leaves {changed_mm:.3} mm: identify it again and correct the programs anew"
+        );
+    }
     format!(
-        "the arm has changed since, or these are not its measurements; identify it again, or start anyway with --sigma {left_mm:.3}"
+        "no other geometry explains them, so the readings scatter more, or they are not of this arm: check sensor, target and the load;          --sigma {left_mm:.3} starts anyway, and finds larger changes only"
     )
 }

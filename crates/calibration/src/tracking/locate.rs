@@ -59,6 +59,16 @@ pub struct Change {
     pub ratio: f64,
 }
 
+/// Ratios that differ by less than this share differ by rounding.
+const TIE: f64 = 1e-6;
+
+impl Change {
+    /// Whether two changes explain the history exactly alike.
+    pub fn is_tied_with(&self, other: &Change) -> bool {
+        (self.ratio - other.ratio).abs() <= TIE * self.ratio.max(other.ratio)
+    }
+}
+
 /// Parameters that can move together, each with its prior standard deviation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Group {
@@ -260,6 +270,11 @@ fn compare_changes(
     };
     let mut all: Vec<Change> = best.iter().filter_map(better).collect();
     all.sort_by(|a, b| b.ratio.total_cmp(&a.ratio).then(a.parameter.cmp(&b.parameter)));
+    // A mast of the sensor that sinks and a base that rises move the readings exactly alike: the last, which is not of the arm, is meant.
+    let tied = all.iter().take_while(|change| change.is_tied_with(&all[0])).enumerate();
+    if let Some((at, _)) = tied.max_by_key(|(_, change)| change.parameter) {
+        all[..=at].rotate_right(1);
+    }
     let first = *all.first()?;
     let near = |c: &Change| c.ratio > first.ratio - ALTERNATIVE_MARGIN;
     let gain =

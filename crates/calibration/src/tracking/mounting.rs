@@ -9,6 +9,7 @@ use nalgebra::{Point3, UnitQuaternion, Vector3};
 
 use super::alarm::{Alarm, Course, Part};
 use super::bounds::accident_bound;
+use super::gauge::Gauge;
 use super::state::{PoseRecord, Snapshot, extend_region};
 use super::tracker::Tracker;
 use crate::identification::calibration::Frames;
@@ -23,12 +24,19 @@ use truegrind_math::se3::{Pose, pose_from_vector, vector_from_pose};
 const FEWEST: usize = 6;
 /// Locations agree within this number of standard deviations of a reading.
 const AGREE: f64 = 6.0;
+/// The arm may have changed at the same time: they also agree within this length (mm), if it is no more than this share of how far the
+/// readings moved.
+const CHANGED_MM: f64 = 3.0;
+const CHANGED_SHARE: f64 = 0.05;
 /// A displacement below this is a knock, not a remount (mm, rad).
 const KNOCKED_MM: f64 = 10.0;
 const KNOCKED_RAD: f64 = 0.05;
 /// Standard deviation of the new location (mm, rad).
 const ROOM_MM: f64 = 1.0;
 const ROOM_RAD: f64 = 0.005;
+
+/// An arm's typical length, which turns a displacement into an angle (mm).
+const TYPICAL_ARM_MM: f64 = 300.0;
 
 /// The remounted part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,6 +53,8 @@ struct Remount {
     /// RMS distance of the single poses' locations from it (mm).
     scatter_mm: f64,
     poses: usize,
+    /// Whether that is more than the readings scatter, so that the arm changed too.
+    with_arm: bool,
 }
 
 impl Tracker {
@@ -75,9 +85,11 @@ impl Tracker {
             .iter()
             .map(|record| model.forward(&Joints::from(record.joints), &record.condition))
             .collect();
+        let of_noise_mm = AGREE * self.state.sigma_mm * 3f64.sqrt();
+        let of_arm_mm = CHANGED_MM.min(CHANGED_SHARE * misfit_mm(poses, &flanges, &frames));
         let agreement = Agreement {
-            mm: AGREE * self.state.sigma_mm * 3f64.sqrt(),
-            rad: AGREE * self.state.sigma_rad.max(1e-5) * 3f64.sqrt(),
+            mm: of_noise_mm.max(of_arm_mm),
+            rad: (AGREE * self.state.sigma_rad.max(1e-5) * 3f64.sqrt()).max(of_arm_mm / TYPICAL_ARM_MM),
         };
         let (target, sensor) = if self.state.sensor == Sensor::Pose {
             let readings: Vec<Pose> = poses.iter().filter_map(pose_of).collect();
@@ -103,7 +115,8 @@ impl Tracker {
         };
         let all = candidates.into_iter().filter_map(|(what, found, old)| {
             let (pose, scatter_mm, poses) = found?;
-            far(&pose, &old).then_some((Remount { what, pose, scatter_mm, poses }, old))
+            let with_arm = scatter_mm > of_noise_mm / 2.0;
+            far(&pose, &old).then_some((Remount { what, pose, scatter_mm, poses, with_arm }, old))
         });
         all.min_by(|(a, _), (b, _)| a.scatter_mm.total_cmp(&b.scatter_mm))
     }
@@ -138,16 +151,24 @@ impl Tracker {
         }
         self.filter = RecursiveLeastSquares::from_root(x, root);
         self.filter.predict(&widening);
+        self.gauge = Gauge::of(self.state.sensor, &self.initial.model, &self.frames, &self.parameters);
+        let before = Snapshot::of(&self.filter, 0);
         let problem = self.problem(&poses);
-        for (at, record) in poses.iter().enumerate() {
-            if !self.update(&problem, at).set_aside {
+        let mut again = poses;
+        for (at, record) in again.iter_mut().enumerate() {
+            let taken = self.update(&problem, at);
+            record.nis = taken.nis;
+            if !taken.set_aside {
                 self.state.accidents = self.state.accidents.saturating_sub(1);
                 extend_region(&mut self.state.region, &record.joints);
             }
         }
-        // Changes before this one are settled.
-        self.state.history.clear();
-        let snapshot = Snapshot::of(&self.filter, 0);
+        // Changes before this one are settled. A change of the arm at the same time is found in the poses since.
+        let (history, snapshot) = match found.with_arm {
+            true => (again, before),
+            false => (Vec::new(), Snapshot::of(&self.filter, 0)),
+        };
+        self.state.history = history;
         (self.state.reference, self.state.middle) = (snapshot.clone(), snapshot);
         (self.state.pending_since, self.state.burst_since) = (0, 0);
     }
@@ -186,6 +207,21 @@ fn alarm_of(found: &Remount, old: &Pose, poses: &[PoseRecord], per: usize) -> Al
             .into_iter()
             .collect(),
     }
+}
+
+/// RMS distance between the readings and where target and sensor were before (mm).
+fn misfit_mm(poses: &[PoseRecord], flanges: &[Pose], frames: &Frames) -> f64 {
+    let square: f64 = poses
+        .iter()
+        .zip(flanges)
+        .map(|(record, flange)| {
+            let read = record.reading.iter().take(3).copied();
+            let read = frames.base_from_sensor * Point3::from(Vector3::from_iterator(read));
+            let target = flange * Point3::from(frames.flange_from_target.translation.vector);
+            (read - target).norm_squared()
+        })
+        .sum();
+    (square / poses.len().max(1) as f64).sqrt()
 }
 
 fn pose_of(record: &PoseRecord) -> Option<Pose> {

@@ -4,11 +4,12 @@ use nalgebra::{DMatrix, DVector};
 
 use super::alarm::{Alarm, Course, Part};
 use super::bounds::{accident_bound, window_bound};
-use super::locate::{Explanation, Form, Group, GroupChange, locate};
-use super::state::Snapshot;
+use super::locate::{Change, Explanation, Form, Group, GroupChange, locate};
+use super::state::{Snapshot, extend_region};
 use super::tracker::Tracker;
 use truegrind_arm::parameter::Parameter;
 use truegrind_estimation::problem::Problem;
+use truegrind_math::statistics::median;
 
 /// Smallest likelihood ratio of a change that is reported: 1 in 10⁵ for one parameter and one pose, 1 in a hundred after the
 /// search over all of them. The change must also explain most of the window's excess.
@@ -16,6 +17,13 @@ const SURE: f64 = 20.0;
 
 /// Poses between exceeding the bound and localising the change: too few poses fit many explanations.
 const SETTLE: usize = 5;
+
+/// Scatter that is told: this many times what is expected, and what was told before.
+const MORE_SCATTER: f64 = 1.4;
+
+/// Largest change that the linearised search can state (rad, mm).
+const LINEAR_RAD: f64 = 0.2;
+const LINEAR_MM: f64 = 200.0;
 
 /// Prior standard deviation of a displacement of the sensor or target (mm, rad), for [`Group`].
 const REACH_MM: f64 = 10.0;
@@ -65,21 +73,55 @@ impl Tracker {
             _ => bound,
         };
         let all: f64 = (history.len() - window..history.len()).map(measured).sum();
-        if !(ratio >= SURE.max(0.7 * (all - (window * per) as f64))) {
+        let explains = ratio >= SURE.max(0.7 * (all - (window * per) as f64));
+        if !(explains && self.is_within_linear_range(&found, &groups)) {
             if self.trailing_accidents() > SETTLE {
                 let alarm =
                     self.unexplained_alarm(Course::Burst, self.trailing_accidents(), [sum, bound], ratio);
                 self.state.burst_since = self.state.poses;
                 return alarm;
             }
-            let alarm = self.unexplained_alarm(Course::Open, 0, [sum, bound], ratio)?;
             // These poses raise no further alarm.
             self.state.quiet_until = self.state.poses + window;
-            return Some(alarm);
+            let scatter = self.scatter(window)?;
+            if scatter < MORE_SCATTER {
+                return self.unexplained_alarm(Course::Open, 0, [sum, bound], ratio);
+            }
+            let told = self.state.alarms.last().filter(|last| last.course == Course::Scatter);
+            if told.is_some_and(|last| scatter < MORE_SCATTER * last.shift) {
+                return None;
+            }
+            let alarm = self.unexplained_alarm(Course::Scatter, 0, [sum, bound], ratio)?;
+            return Some(Alarm { shift: scatter, ..alarm });
         }
         let alarm = self.change_alarm(&found, &groups, [sum, bound], ratio)?;
         self.restart_from_change(&found, &groups);
         Some(alarm)
+    }
+
+    /// Whether a change is small enough for the linearisation that found it.
+    fn is_within_linear_range(&self, found: &Explanation, groups: &[Group]) -> bool {
+        let fits = |k: usize, shift: f64| match self.parameters[k].unit() {
+            "rad" => shift.abs() <= LINEAR_RAD,
+            "mm" => shift.abs() <= LINEAR_MM,
+            _ => true,
+        };
+        match &found.together {
+            Some(together) => {
+                let members = &groups[together.group].members;
+                members.iter().zip(&together.shifts).all(|((k, _), shift)| fits(*k, *shift))
+            }
+            None => fits(found.best.parameter, found.best.shift),
+        }
+    }
+
+    /// How many times as much as expected the latest poses scatter; by their median, which outliers do not move.
+    fn scatter(&self, poses: usize) -> Option<f64> {
+        let history = &self.state.history;
+        let latest: Vec<f64> = history[history.len().saturating_sub(poses)..].iter().map(|s| s.nis).collect();
+        let degrees = self.state.sensor.scalars() as f64;
+        let expected = degrees * (1.0 - 2.0 / (9.0 * degrees)).powi(3);
+        Some((median(&latest)? / expected).sqrt())
     }
 
     /// Alarm of an explained change.
@@ -268,7 +310,16 @@ impl Tracker {
         let poses = std::mem::take(&mut self.state.history);
         let problem = self.problem(&poses);
         let single = found.together.is_none();
-        let all = || std::iter::once(&found.best).chain(&found.alternatives).filter(|_| single);
+        let bound = accident_bound(self.state.sensor.scalars());
+        // What moves the readings exactly as the sensor does is the sensor: see `compare_changes`.
+        let is_same = |change: &Change| {
+            !self.parameters[found.best.parameter].is_of_arm()
+                && self.parameters[change.parameter].is_of_arm()
+                && found.best.is_tied_with(change)
+        };
+        let alternatives: Vec<&Change> =
+            found.alternatives.iter().filter(|change| !is_same(change)).collect();
+        let all = || std::iter::once(&found.best).chain(alternatives.iter().copied()).filter(|_| single);
         for at in 0..poses.len() {
             let mut widening = vec![0.0; self.parameters.len()];
             let mut any = false;
@@ -294,7 +345,11 @@ impl Tracker {
             if any {
                 self.filter.predict(&widening);
             }
-            self.update(&problem, at);
+            let taken = !self.update(&problem, at).set_aside;
+            if taken && !(poses[at].nis <= bound) {
+                self.state.accidents = self.state.accidents.saturating_sub(1);
+                extend_region(&mut self.state.region, &poses[at].joints);
+            }
         }
         // Changes before this one are settled.
         let snapshot = Snapshot::of(&self.filter, 0);

@@ -5,15 +5,16 @@ use nalgebra::{DMatrix, DVector};
 use super::alarm::{Alarm, Course};
 use super::bounds::accident_bound;
 use super::error::TrackError;
+use super::first_noise::FirstPoses;
+use super::gauge::Gauge;
 use super::options::Options;
 use super::state::{ConsumedFile, PoseRecord, SCHEMA, Snapshot, State, digest, extend_region};
 use crate::identification::calibration::{CalibrationProblem, Frames, Weight};
 use crate::identification::fit::{Observations, frame_parameters};
 use crate::identification::identify::prepare_observations;
-use crate::identification::register::register;
 use crate::identification::rounding;
 use crate::identification::tolerance::Tolerance;
-use crate::measurement::dataset::{Dataset, Reading, Row, Sensor};
+use crate::measurement::dataset::{Dataset, Reading, Row};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::estimated::Estimated;
 use truegrind_arm::model::Joints;
@@ -69,6 +70,7 @@ pub struct Tracker {
     pub(super) drift: Vec<f64>,
     pub(super) frames: Frames,
     pub(super) filter: RecursiveLeastSquares,
+    pub(super) gauge: Gauge,
     pub(super) state: State,
     pub(super) condition: Condition,
 }
@@ -102,26 +104,7 @@ impl Tracker {
         }
         let first = dataset.subset(&(0..options.first_poses).collect::<Vec<_>>());
         let (observed, _) = prepare_observations(&first, &model.nominal, false);
-        let fitted = register(&observed, &model.model, &Tolerance::default())?.fitted;
-        // Residuals of the few poses that registered the sensor underestimate the noise; the held-out error of the
-        // identification is its lower bound.
-        let axes: f64 = if dataset.sensor == Sensor::Cable { 1.0 } else { 3.0 };
-        let unexplained_mm = model.geometry.held_out.rmse / axes.sqrt();
-        let left_mm = fitted.sigma_mm;
-        if options.sigma_mm.is_none()
-            && unexplained_mm > 0.0
-            && left_mm > FOREIGN * unexplained_mm
-            && left_mm > FOREIGN_MM
-        {
-            return Err(TrackError::Foreign {
-                file: dataset.file.clone(),
-                poses: options.first_poses,
-                left_mm,
-                held_out_mm: unexplained_mm,
-            });
-        }
-        let sigma_mm = options.sigma_mm.unwrap_or(left_mm.max(unexplained_mm));
-        let frames = fitted.frames;
+        let FirstPoses { frames, sigma_mm, sigma_rad } = FirstPoses::of(model, &observed, options)?;
         let sensing = frame_parameters(dataset);
         let parameters: Vec<Parameter> = model.order.iter().copied().chain(sensing).collect();
         let covariance = first_covariance(model, &parameters);
@@ -144,7 +127,7 @@ impl Tracker {
             base_from_sensor: vector_from_pose(&frames.base_from_sensor),
             flange_from_target: vector_from_pose(&frames.flange_from_target),
             sigma_mm,
-            sigma_rad: fitted.sigma_rad,
+            sigma_rad,
             now: snapshot.clone(),
             reference: snapshot.clone(),
             middle: snapshot,
@@ -187,7 +170,8 @@ impl Tracker {
         let filter = state.now.filter().ok_or_else(|| wrong("the root of the covariance is damaged"))?;
         let drift = parameters.iter().map(|p| process_noise(p, &state.options)).collect();
         let condition = model.condition;
-        Ok(Self { initial: model.clone(), parameters, drift, frames, filter, state, condition })
+        let gauge = Gauge::of(state.sensor, &model.model, &frames, &parameters);
+        Ok(Self { initial: model.clone(), parameters, drift, frames, filter, gauge, state, condition })
     }
 
     /// Filters the new rows of a file and returns the alarms raised.
@@ -294,6 +278,7 @@ impl Tracker {
         let mut nis = 0.0;
         for i in 0..per {
             (0..p).for_each(|k| a[k] = j[k * per + i]);
+            self.gauge.project(&mut a);
             let e = r[i] + a.dot(&trial.x) - a.dot(&at);
             let variance = trial.update(&a, e, 1.0);
             nis += e * e / variance;
@@ -354,6 +339,14 @@ impl Tracker {
         }
     }
 
+    /// The file with the same rows that was processed before, under another name.
+    pub fn copy_of(&self, dataset: &Dataset) -> Option<&str> {
+        let own = self.state.consumed.iter().any(|consumed| consumed.file == dataset.file);
+        let rows = digest(dataset.rows.iter());
+        let same = |consumed: &&ConsumedFile| consumed.rows == dataset.rows.len() && consumed.digest == rows;
+        self.state.consumed.iter().find(same).filter(|_| !own).map(|consumed| consumed.file.as_str())
+    }
+
     /// Name of the robot.
     pub fn robot(&self) -> &str {
         &self.initial.robot
@@ -393,10 +386,6 @@ impl Tracker {
 
 /// Up to this number of outliers a track is reliable whatever their share.
 const FEW_ACCIDENTS: usize = 5;
-
-/// Residuals of the first poses above this multiple of the held-out error, and above this size, mean a wrong arm.
-const FOREIGN: f64 = 5.0;
-const FOREIGN_MM: f64 = 0.05;
 
 /// Added to the model's variances, as its covariance can be singular to rounding; negligible beside any tolerance (mm², rad²).
 const SMALLEST_VARIANCE: f64 = 1e-14;

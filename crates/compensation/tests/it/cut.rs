@@ -110,7 +110,8 @@ fn a_loop_or_a_branch_is_part_of_the_cut_around_it() {
 
 /// A module whose main calls a routine between lines.
 fn with_routine(before: &str, routine: &str, behind: &str) -> String {
-    module(&format!("{before}part;\n{behind}")).replace("ENDMODULE", &format!("PROC part()\n{routine}ENDPROC\nENDMODULE"))
+    module(&format!("{before}part;\n{behind}"))
+        .replace("ENDMODULE", &format!("PROC part()\n{routine}ENDPROC\nENDMODULE"))
 }
 
 #[test]

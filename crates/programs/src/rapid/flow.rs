@@ -628,9 +628,8 @@ impl Interpreter<'_, '_, '_> {
         }
         if self.tracks_motions {
             let moving = called.iter().filter(|routine| symbols.effects_of(**routine).moves);
-            let calls: Vec<u32> = moving
-                .map(|routine| self.visitor.record_moving_call(*routine, &state.reaching))
-                .collect();
+            let calls: Vec<u32> =
+                moving.map(|routine| self.visitor.record_moving_call(*routine, &state.reaching)).collect();
             if !calls.is_empty() {
                 state.reaching.or_in_calls(calls);
             }

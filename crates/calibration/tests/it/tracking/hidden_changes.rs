@@ -1,0 +1,158 @@
+//! Changes that no bound of the innovations shows: before the first pose, slower than the filter, beside a sensor that was set up anew, and
+//! what no reading tells at all.
+
+use super::{measured, measured_with, model, spliced, with_drift, with_jump, zero_of_joint_3};
+use truegrind_arm::estimated::Estimated;
+use truegrind_calibration::measurement::dataset::{Dataset, Reading};
+use truegrind_calibration::measurement::simulation::recipe::LinkDeviation;
+use truegrind_calibration::tracking::{Alarm, Course, Options, State, TrackError, Tracker};
+
+fn tracked(dataset: &Dataset) -> (Tracker, Vec<Alarm>) {
+    let mut tracker = Tracker::begin(model(), "hash", dataset, &Options::default()).unwrap();
+    let alarms = tracker.process_file(dataset).unwrap();
+    (tracker, alarms)
+}
+
+fn zero_of_joint_2(theta_deg: f64) -> LinkDeviation {
+    LinkDeviation { joint: 1, theta_deg, ..LinkDeviation::default() }
+}
+
+/// RMS distance of the targets of two arms over joint vectors of the region, without any placement: an upper bound.
+fn distance_mm(a: &Estimated, b: &Estimated) -> f64 {
+    let samples = &a.region.samples_deg;
+    let apart = |sample: &[f64; 6]| {
+        let joints = truegrind_arm::model::Joints::from(sample.map(f64::to_radians));
+        let at = |arm: &Estimated| arm.model.forward(&joints, &arm.condition).translation.vector;
+        (at(a) - at(b)).norm_squared()
+    };
+    (samples.iter().map(apart).sum::<f64>() / samples.len() as f64).sqrt()
+}
+
+#[test]
+fn an_arm_that_stays_has_not_departed_and_one_that_drifts_slowly_has() {
+    let (calm, alarms) = tracked(&measured(2, None));
+    assert!(alarms.is_empty(), "{alarms:?}");
+    let now = calm.departure().unwrap();
+    assert!(
+        !now.is_significant && now.rms_mm < 1.5 * now.expected_mm && now.parameters.is_empty(),
+        "{now:?}"
+    );
+    // File after file, each with another tenth of a degree: each is followed and need not alarm.
+    let dataset = with_drift(0, 0.001);
+    let (tracker, _) = tracked(&dataset);
+    let now = tracker.departure().unwrap();
+    assert!(now.is_significant, "{now:?}");
+    let whole_mm = distance_mm(&tracker.model(), model());
+    assert!(now.rms_mm > 0.4 * whole_mm && now.rms_mm <= whole_mm, "{now:?}, {whole_mm} mm");
+    let (name, unit, moved, sigma) = &now.parameters[0];
+    assert_eq!((name.as_str(), unit.as_str()), ("link3.theta", "rad"), "{now:?}");
+    assert!((moved.to_degrees() - 0.001 * 239.0).abs() < 0.02 && *sigma > 0.0, "{now:?}");
+    // It is known after a stop, and without new poses.
+    let text = tracker.state().to_toml().unwrap();
+    let resumed = Tracker::resume(model(), State::from_toml(&text).unwrap(), "state.toml").unwrap();
+    assert_eq!(resumed.departure(), Some(now));
+}
+
+#[test]
+fn an_arm_that_changed_before_the_first_pose_is_not_taken_for_noise() {
+    for theta_deg in [0.01, 0.02] {
+        let (tracker, alarms) = tracked(&measured(2, Some(zero_of_joint_2(theta_deg))));
+        assert!(tracker.departure().unwrap().is_significant, "{theta_deg}: {alarms:?}");
+        let named = |alarm: &Alarm| {
+            alarm.parameter == "link2.theta" || alarm.alternatives.contains(&"link2.theta".to_owned())
+        };
+        assert!(alarms.iter().any(named), "{theta_deg}: {alarms:?}");
+        let moved = tracker.model().model.links[1].theta_rad - model().model.links[1].theta_rad;
+        assert!((moved.to_degrees() - theta_deg).abs() < 0.002, "{theta_deg}: {}", moved.to_degrees());
+    }
+    // Much larger, it is refused, and the message does not ask for a noise under which nothing is found.
+    let far = measured(2, Some(zero_of_joint_2(0.3)));
+    let refused = Tracker::begin(model(), "hash", &far, &Options::default()).unwrap_err();
+    assert!(matches!(refused, TrackError::Foreign { changed_mm: Some(_), .. }), "{refused}");
+    assert!(refused.to_string().contains("identify it again") && !refused.to_string().contains("--sigma"));
+}
+
+#[test]
+fn gross_errors_among_the_first_poses_hide_no_later_change() {
+    for off_mm in [0.2, 0.8, 5.0] {
+        let mut dataset = with_jump(70, zero_of_joint_3());
+        let Reading::Position(p) = &mut dataset.rows[4].reading else { panic!("a position") };
+        p.x += off_mm;
+        let (tracker, alarms) = tracked(&dataset);
+        assert_eq!(tracker.state().accidents.min(1), 1, "{off_mm}");
+        let jump = alarms.iter().find(|alarm| alarm.course != Course::Drift).expect("the jump is found");
+        assert!(jump.since_row.abs_diff(72) <= 2, "{off_mm}: {jump}");
+        assert!((jump.shift.to_degrees() - 0.05).abs() < 0.01, "{off_mm}: {jump}");
+    }
+}
+
+#[test]
+fn what_no_reading_tells_stays_as_it_was() {
+    // Turns of joint 1 and of the sensor's frame, heights of the base and of the sensor.
+    let mut long = measured(2, None);
+    for seed in 20..28 {
+        long.rows.extend(measured(seed, None).rows);
+    }
+    let (tracker, _) = tracked(&long);
+    let first: Vec<f64> = model().covariance.diagonal().iter().map(|v| v.sqrt()).collect();
+    let (now, sigmas) = (tracker.deviations(), tracker.sigmas());
+    for name in ["link1.theta", "link1.d", "link6.theta", "link6.d"] {
+        let at = tracker.parameters().iter().position(|p| p.to_string() == name).unwrap();
+        assert!(now[at].abs() < 0.05 * first[at], "{name}: {} with {}", now[at], first[at]);
+        // The prior of the sensor's frame, some 20 mm in 2.4 m, takes 16 % off that of joint 1.
+        assert!(sigmas[at] > 0.8 * first[at], "{name}: {} with {}", sigmas[at], first[at]);
+    }
+}
+
+#[test]
+fn a_mast_that_sinks_is_no_arm_that_rises() {
+    const TILTED: &str = "wxyz = [0.12, 0.02, -0.03, 0.99]";
+    let mut dataset = measured_with(2, TILTED, "wxyz = [1.0, 0.0, 0.0, 0.0]");
+    for row in dataset.rows.iter_mut().skip(70) {
+        let Reading::Position(p) = &mut row.reading else { panic!("a position") };
+        p.z += 0.3;
+    }
+    let (tracker, alarms) = tracked(&dataset);
+    assert_eq!(alarms.len(), 1, "{alarms:?}");
+    assert_eq!(alarms[0].parameter, "sensor.z");
+    assert!(alarms[0].alternatives.contains(&"link1.d".to_owned()), "{}", alarms[0]);
+    assert!((tracker.model().model.links[0].d_mm - model().model.links[0].d_mm).abs() < 0.02);
+    assert!(!tracker.departure().unwrap().is_significant);
+}
+
+#[test]
+fn a_sensor_set_up_anew_hides_no_change_of_the_arm_at_the_same_time() {
+    const FRAME: &str = "position_mm = [2310.5, -640.2, 512.7], wxyz = [0.12, 0.02, -0.03, 0.99]";
+    const ELSEWHERE: &str = "position_mm = [-900.0, 1900.0, 300.0], wxyz = [0.8, 0.0, 0.1, 0.59]";
+    let changed = "[[arm.link]]\njoint = 2\ntheta_deg = 0.05\n[arm.random]";
+    for (to, is_changed) in [(ELSEWHERE.to_owned(), false), (ELSEWHERE.to_owned(), true)] {
+        let elsewhere = measured_with(2, FRAME, &to);
+        let second = match is_changed {
+            false => elsewhere.clone(),
+            true => {
+                let text = super::RECIPE.replace(FRAME, &to).replace("[arm.random]", changed);
+                super::simulated(&text, 2)
+            }
+        };
+        let dataset = spliced(&measured(2, None), &second, 60);
+        let (tracker, alarms) = tracked(&dataset);
+        assert_eq!(alarms[0].course, Course::Mounted, "{alarms:?}");
+        let moved =
+            (tracker.model().model.links[2].theta_rad - model().model.links[2].theta_rad).to_degrees();
+        let truth = if is_changed { 0.05 } else { 0.0 };
+        assert!((moved - truth).abs() < 0.005, "{moved}: {alarms:?}");
+        assert_eq!(tracker.departure().unwrap().is_significant, is_changed, "{alarms:?}");
+        assert!(!tracker.mostly_set_aside(), "{}", tracker.state().accidents);
+    }
+}
+
+#[test]
+fn copies_of_a_file_are_recognised() {
+    let day = measured(2, None);
+    let (tracker, _) = tracked(&day);
+    let copy = Dataset { file: "copy.csv".to_owned(), ..day.clone() };
+    assert_eq!(tracker.copy_of(&copy), Some("day.csv"));
+    // A file that was processed may grow, and part of it is no copy.
+    assert_eq!(tracker.copy_of(&day), None);
+    assert_eq!(tracker.copy_of(&Dataset { file: "copy.csv".to_owned(), ..day.subset(&[0, 1]) }), None);
+}
