@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use thiserror::Error;
 
 use crate::cell::Cell;
-use crate::cut::Cuts;
+use crate::cut::{Cuts, may_cut};
 use crate::deviation::Status;
 use crate::frames::taught::contradictions;
 use crate::frames::undeclared;
@@ -18,14 +18,14 @@ use crate::plan::Plan;
 use crate::plan::planner::SolvedProgram;
 use crate::plan::reason::OutcomeReason;
 use crate::plan::single_precision::single_precision;
-use crate::plan::steps_to_left::StepsToLeft;
+use crate::plan::steps_to_left::{StepsToLeft, is_path};
 use crate::risk::prepared_estimate::PreparedEstimate;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::estimated::Estimated;
 use truegrind_programs::edit::EditError;
 use truegrind_programs::motion::{Listing, Mark, MotionKind, Reason};
 use truegrind_programs::reading::{Language, Program};
-use truegrind_programs::rewrite::{Outcome, RewriteOptions, Rewritten};
+use truegrind_programs::rewrite::{Change, Outcome, RewriteOptions, Rewritten};
 
 /// A corrected program.
 #[derive(Debug, Clone, PartialEq)]
@@ -95,6 +95,12 @@ pub fn compensate_prepared(
         arm.model.effects.iter().any(|effect| matches!(effect, Effect::Backlash(_)) && !effect.is_zero());
     loop {
         let planned = targets.plan(&refused);
+        if listing.numbered && options.cuts != Cuts::Single && only_air_moves(listing, &planned) {
+            for change in &planned.changes {
+                refused.entry(change.motion).or_insert(OutcomeReason::AirMoveAlone);
+            }
+            continue;
+        }
         if program.accepts(&planned.changes) {
             // Frees the solved targets while the edits are made; no second plan is needed.
             let ((), rewritten) =
@@ -125,6 +131,14 @@ pub fn compensate_prepared(
             }
         }
     }
+}
+
+/// Whether air moves alone would be corrected though there are cuts.
+fn only_air_moves(listing: &Listing, planned: &Plan) -> bool {
+    let is_corrected = |change: &Change| is_path(&listing.motions[change.motion as usize]);
+    !planned.changes.is_empty()
+        && !planned.changes.iter().any(is_corrected)
+        && listing.motions.iter().any(may_cut)
 }
 
 /// Rounds of planning and writing before every remaining change is refused.

@@ -60,9 +60,16 @@ pub(crate) fn of(listing: &Listing, treatment: Cuts) -> CutsOf {
         .enumerate()
         .map(|(index, motion)| {
             let stands_before = || {
-                let before = &motions[index.checked_sub(1)?];
-                let same_text = before.place.file == motion.place.file && before.routine == motion.routine;
-                same_text.then_some(index as u32 - 1)
+                let in_text = |before: &usize| {
+                    let before = &motions[*before];
+                    before.place.file == motion.place.file && before.routine == motion.routine
+                };
+                let before = index.checked_sub(1).filter(in_text)?;
+                // A block of which not even the kind is known, behind a call, may go on from the motion before it.
+                let bridged = motion.own_reason == Some(Reason::UnknownFlow);
+                let is_call = |at: &usize| bridged && motions[*at].own_reason == Some(Reason::Subprogram);
+                let before = (0..=before).rev().take_while(in_text).find(|at| !is_call(at))?;
+                Some(before as u32)
             };
             let start = motion.previous.or_else(stands_before)?;
             is_one_cut(start, index as u32).then_some(start)
@@ -93,19 +100,21 @@ fn find(root: &mut [u32], mut index: u32) -> u32 {
 }
 
 /// Whether the tool may cut during a motion.
-fn may_cut(motion: &Motion) -> bool {
+pub(crate) fn may_cut(motion: &Motion) -> bool {
     let path = matches!(motion.kind, MotionKind::Linear | MotionKind::Circular)
         // A path that is given in the text but consists of neither lines nor arcs, or an unknown
         // instruction.
-        || matches!(motion.own_reason, Some(Reason::UnsupportedPath | Reason::UnknownInstruction | Reason::NoMotionCode));
+        || matches!(motion.own_reason, Some(Reason::UnsupportedPath | Reason::UnknownInstruction | Reason::NoMotionCode))
+        // Behind a jump, a call or a label a block without its own G0 or G1 may be either.
+        || motion.kind == MotionKind::Unknown && motion.own_reason == Some(Reason::UnknownFlow);
     // A search motion ends, and stops, at its signal.
     path && motion.own_reason != Some(Reason::Probe) && !motion.instruction.contains("Search")
 }
 
-/// Whether a motion goes on from the previous one without a stop, in the same frames.
+/// Whether a motion goes on from the previous one without a stop, in frames that may be the same.
 fn goes_on(before: &Motion, motion: &Motion, listing: &Listing) -> bool {
     let stops = listing.zone(before).is_some_and(|zone| zone.value.as_ref().is_ok_and(|zone| zone.fine));
-    !stops && before.same_frames(motion)
+    !stops && listing.may_share_frames(before, motion)
 }
 
 /// Why a motion remains unmodified, with its status.

@@ -576,6 +576,28 @@ impl Listing {
         motion.work_object.and_then(|index| self.work_objects.get(index as usize))
     }
 
+    /// Whether two motions have the same tool and work object, as far as is known before the program runs: a parameter or a value that is
+    /// assigned may be any, and a block whose modal state is unknown has none.
+    pub fn may_share_frames(&self, a: &Motion, b: &Motion) -> bool {
+        let may_be_any = |reason: Option<Reason>| match reason {
+            Some(Reason::Assigned | Reason::HandedOver | Reason::Parameter | Reason::UnknownFlow) => true,
+            // Frames of NC programs have numbers, and are stated elsewhere.
+            Some(_) => !self.numbered,
+            None => false,
+        };
+        let unread = |motion: &Motion| motion.own_reason == Some(Reason::UnknownFlow);
+        let unknown_tool = |motion: &Motion| match self.tool(motion) {
+            Some(tool) => may_be_any(tool.value.as_ref().err().copied()),
+            None => unread(motion),
+        };
+        let unknown_object = |motion: &Motion| match self.work_object(motion) {
+            Some(work_object) => may_be_any(work_object.value.as_ref().err().copied()),
+            None => unread(motion),
+        };
+        (a.tool == b.tool || unknown_tool(a) || unknown_tool(b))
+            && (a.work_object == b.work_object || unknown_object(a) || unknown_object(b))
+    }
+
     /// Why the tool and work object of a motion do not determine where its targets are.
     pub fn frame_reason(&self, motion: &Motion) -> Option<Reason> {
         let tool = match self.tool(motion).map(|tool| &tool.value) {

@@ -146,6 +146,8 @@ pub enum OutcomeReason {
         /// That reason, without figures.
         because: &'static str,
     },
+    /// No cut of the program is corrected: lines that remain unmodified would take their omitted axes from this one.
+    AirMoveAlone,
     /// An adjacent motion of the same cut remains unmodified, and the step to it would be too large.
     Step {
         /// Line of that motion, 1-based.
@@ -258,6 +260,7 @@ impl OutcomeReason {
             }
             OutcomeReason::PartOfCut { because, .. } => because,
             OutcomeReason::Step { .. } => "the step to its neighbour is too large",
+            OutcomeReason::AirMoveAlone => "an air move, and no cut of the program is corrected",
             OutcomeReason::Risk { .. } => "the correction is too likely to make the cut worse (--max-risk)",
             OutcomeReason::NotCovered { .. } => "no measured pose is nearby",
             OutcomeReason::Uncertain { .. } => "the model is uncertain here",
@@ -273,6 +276,10 @@ impl OutcomeReason {
             }
             OutcomeReason::CellContradiction => {
                 "cell file and program disagree about its tool or work object"
+            }
+            OutcomeReason::AirMoveAlone => {
+                "an air move, and no cut of the program is corrected: the lines behind it would begin elsewhere and take the axes that they \
+                 omit from it"
             }
             OutcomeReason::SingularPath => "the corrected path to it passes too close to a singularity",
             OutcomeReason::AmbiguousBranch => {

@@ -37,13 +37,13 @@ impl StepsToLeft {
             let before = index.checked_sub(1);
             let behind = Some(index + 1).filter(|behind| *behind < listing.motions.len());
             let mut neighbours = before.into_iter().chain(behind);
-            neighbours.any(|other| is_continued(this, &listing.motions[other]) && left(other))
+            neighbours.any(|other| is_continued(listing, this, &listing.motions[other]) && left(other))
         };
         let across = listing.across_calls.iter().flat_map(|&[a, b]| [[a, b], [b, a]]);
         let beside_left_across: BTreeSet<u32> = across
             .filter(|&[this, other]| {
                 let [this, other] = [this, other].map(|index| &listing.motions[index as usize]);
-                is_path(this) && this.same_frames(other)
+                is_path(this) && listing.may_share_frames(this, other)
             })
             .filter(|[_, other]| left(*other as usize))
             .map(|[this, _]| this)
@@ -88,10 +88,10 @@ fn is_call(motion: &Motion) -> bool {
     motion.own_reason.is_some_and(|reason| calls.contains(&reason))
 }
 
-/// Whether a motion stands in one routine with another, which has the same tool and work object or is a call.
-fn is_continued(this: &Motion, other: &Motion) -> bool {
+/// Whether a motion stands in one routine with another, which may have the same tool and work object or is a call.
+fn is_continued(listing: &Listing, this: &Motion, other: &Motion) -> bool {
     let near = this.place.file == other.place.file && this.routine == other.routine;
-    near && (is_call(other) || this.same_frames(other))
+    near && (is_call(other) || listing.may_share_frames(this, other))
 }
 
 /// How far a change moves the end of its motion (mm); `None` where it is written in another form.

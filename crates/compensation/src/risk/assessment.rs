@@ -223,7 +223,7 @@ pub(crate) fn assess_program(
             let (judgement, registered) = cut_risk::assess_cut(&off, knowledge, placement)?;
             let weight = motions.len() as f64 / targets.len() as f64;
             let origin_mm = (!frames.real.holds_part).then(|| {
-                let registered = cut_risk::in_base(registered, &frames.real.object);
+                let registered = cut_risk::in_base(registered, &frames.real.object, frames.carried.as_ref());
                 twists.iter_mut().zip(&registered.twists).for_each(|(twist, of_cut)| *twist = *of_cut);
                 registered.origin_mm
             });

@@ -123,14 +123,27 @@ fn total_variance(jacobian: &DMatrix<f64>, covariance: &DMatrix<f64>) -> f64 {
     sum
 }
 
-/// The registration of a cut expressed in the base, for a stationary work object.
-pub(crate) fn in_base(mut registered: RegisteredFrame, base_from_object: &Pose) -> RegisteredFrame {
+/// The registration of a cut expressed in the base, for a stationary work object. Where that was taught, the registration is relative to
+/// the taught frame, which moves with the arm's parameters itself.
+pub(crate) fn in_base(
+    mut registered: RegisteredFrame,
+    base_from_object: &Pose,
+    taught: Option<&RegisteredFrame>,
+) -> RegisteredFrame {
     let turn = base_from_object.rotation;
     registered.origin_mm = base_from_object.transform_point(&registered.origin_mm.into()).coords;
     for t in &mut registered.twists {
         let v: Vector3<f64> = turn * t.fixed_rows::<3>(0);
         let w: Vector3<f64> = turn * t.fixed_rows::<3>(3);
         *t = Vector6::new(v.x, v.y, v.z, w.x, w.y, w.z);
+    }
+    if let Some(taught) = taught {
+        let lever = registered.origin_mm - taught.origin_mm;
+        for (t, taught) in registered.twists.iter_mut().zip(&taught.twists) {
+            let turn: Vector3<f64> = taught.fixed_rows::<3>(3).into_owned();
+            let moved = turn.cross(&lever);
+            *t += taught + Vector6::new(moved.x, moved.y, moved.z, 0.0, 0.0, 0.0);
+        }
     }
     registered
 }

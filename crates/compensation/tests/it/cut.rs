@@ -213,6 +213,47 @@ fn a_block_that_may_be_skipped_keeps_the_cut_around_it() {
     assert_eq!(skipped[1..4], [Refused, Left, Refused], "{skipped:?}");
 }
 
+/// Behind a jump, a label or a call a block without its own G0 or G1 may be a cut: the whole of it stays, and with it the air moves.
+#[test]
+fn a_cut_whose_rest_is_reached_by_jumps_or_calls_stays_whole() {
+    let head = "O1\n(truegrind angles wpr)\n(truegrind tool T1 t [[0,0,50],[1,0,0,0]])\n(truegrind frame G54 w [[400,0,250],[1,0,0,0]])\n\
+                G90 G21 G17 G54\nT1 M6\nG43.4 H1\nG0 X-20. Y0. Z40. A180. B0. C0.\nG1 Z20. F600.\nX-10.\n";
+    let tail = "X10. Y0. Z20. A180. B0. C0.\nX20.\nG0 Z60.\nM30\n";
+    let statuses = |middle: &str, behind: &str| {
+        let source = [head, middle, tail, behind].concat();
+        let setup = Setup { angles: Some(Angles::Wpr), ..Setup::default() };
+        let program = Program::Nc(nc::Task::read(&[("p.nc", source.as_bytes())], &setup));
+        let done = compensate(&program, &known(), &Cell::default(), &Options::default(), None).unwrap();
+        let bytes = done.rewritten.files[0].edits.apply(source.as_bytes()).unwrap();
+        (statuses(&done), bytes == source.as_bytes(), done)
+    };
+    let (plain, ..) = statuses("X0.\n", "");
+    assert!(plain.iter().all(|status| *status == Changed), "{plain:?}");
+    for (middle, behind) in [
+        ("IF [#500 EQ 1] GOTO 90\nX0.\nN90 ", ""),
+        ("N90 X0.\nIF [#500 LT 3] GOTO 90\n", ""),
+        ("M98 P1000\n", "O1000\nM8\nM99\n"),
+        ("M98 P2000\n", ""),
+        ("G65 P2000 A1.\n", ""),
+    ] {
+        let (found, is_same, done) = statuses(middle, behind);
+        assert!(is_same && !done.changed(), "{middle}: {found:?}");
+        let alone = |reason: Option<OutcomeReason>| reason == Some(OutcomeReason::AirMoveAlone);
+        assert!(done.plan.outcomes.iter().any(|outcome| alone(outcome.reason())), "{middle}: {found:?}");
+    }
+}
+
+#[test]
+fn a_routine_whose_frame_is_a_parameter_belongs_to_the_cuts_around_its_calls() {
+    let [a, b] = [380.0, 395.0].map(|x| line(x, "z1"));
+    let given = "MoveL [[385,0,400],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v20,z1,tool0\\WObj:=given;\n";
+    let source = module(&[a.as_str(), "part wobj0;\n", b.as_str()].concat())
+        .replace("ENDMODULE", &format!("PROC part(PERS wobjdata given)\n{given}ENDPROC\nENDMODULE"));
+    let (done, bytes) = done(&source, Cuts::Whole, 0.05);
+    assert_eq!(statuses(&done), [Refused, Refused, Left]);
+    assert_eq!(bytes, source.as_bytes());
+}
+
 #[test]
 fn in_part_a_step_between_neighbours_stays_below_the_tolerance() {
     let body: String =

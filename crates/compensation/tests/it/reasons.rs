@@ -59,6 +59,7 @@ fn name(why: &OutcomeReason) -> &'static str {
         OutcomeReason::JointNotMeasured { .. } => "joint not measured",
         OutcomeReason::PartOfCut { .. } => "part of cut",
         OutcomeReason::Step { .. } => "step",
+        OutcomeReason::AirMoveAlone => "air-move-alone",
         // tests/it/placement.rs.
         OutcomeReason::Risk { .. } => "risk",
         OutcomeReason::NotCovered { .. } => "not covered",

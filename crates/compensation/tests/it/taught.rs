@@ -129,6 +129,13 @@ fn planned(source: &str, cell: &Cell, actual: &Model) -> (Plan, Vec<Pose>) {
     let task = Task::read(&[("p.mod", source.as_bytes())]);
     assert!(task.listing.opaque.is_empty(), "{:?}", task.listing.opaque);
     let planned = plan(&task.listing, &known, cell, &Options::default());
+    // The shape's uncertainty is that of the cut, point by point: a taught frame moves with the arm, and so does the cut.
+    for cut in &planned.cuts {
+        let of = |motion: &u32| planned.outcomes[*motion as usize].shape_sigma_mm.get();
+        let squares: Vec<f64> = cut.motions.iter().filter_map(of).map(|sigma| sigma * sigma).collect();
+        let rms = (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt();
+        assert!(squares.is_empty() || (rms - cut.shape_sigma_mm).abs() < 0.01 * cut.sigma_mm + 1e-9, "{rms} {cut:?}");
+    }
     let rewritten = task.rewrite(&planned.changes, &RewriteOptions::default()).unwrap();
     let text = rewritten.files[0].edits.apply(source.as_bytes()).unwrap();
     let again = Task::read(&[("p.mod", &text)]);
