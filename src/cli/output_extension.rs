@@ -62,13 +62,17 @@ pub(super) fn refuse_other_language(output: &Path, source: &Path, bytes: &[u8]) 
             if is == Language::Rapid { "RAPID" } else { "an NC program" }
         );
     }
-    if is == Language::Nc && known && Dialect::of_named(&from, bytes) != Dialect::of_named(&to, bytes) {
+    let original = Dialect::of_named(&from, bytes);
+    // A control reads the file by its extension, whatever it holds: Fanuc text in a file .mpf is no 840D program.
+    let by_extension = Some(Dialect::of_named(&to, b"")).filter(|dialect| *dialect != Dialect::Iso);
+    let written = by_extension.unwrap_or_else(|| Dialect::of_named(&to, bytes));
+    if is == Language::Nc && known && original != written {
         bail!(
             "{}: this extension stands for {}, but {} is for {}: use the extension of the original",
             output.display(),
-            Dialect::of_named(&to, bytes).text(),
+            written.text(),
             source.display(),
-            Dialect::of_named(&from, bytes).text()
+            original.text()
         );
     }
     Ok(())

@@ -87,8 +87,8 @@ pub(super) struct Arguments {
     /// Allowed cable length or distance to the sensor: min,max (mm).
     #[arg(long, value_name = "MIN,MAX")]
     range: Option<String>,
-    /// Smallest distance of the cable from the links, taken as lines between the joints (mm); 0 disables the check. Default: a
-    /// twelfth of the reach.
+    /// Smallest distance of the cable, or of the line of sight from --sensor-frame, from the links, taken as lines between the joints (mm);
+    /// 0 disables the check. Default: a twelfth of the reach.
     #[arg(long, value_name = "MM")]
     clearance: Option<f64>,
     /// Box that links and target must not enter, at the poses and between them: two corners in the base frame, x,y,z,x,y,z (mm). May
@@ -320,15 +320,15 @@ fn options(arguments: &Arguments, robot: &str, sensor: Sensor, reach_mm: f64) ->
             _ => bail!("--range {text}: expected min,max (mm)"),
         },
     };
-    let clearance_mm = match (sensor, arguments.clearance) {
-        (Sensor::Cable, None) => Some(reach_mm / 12.0),
-        (Sensor::Cable, Some(0.0)) => None,
-        (Sensor::Cable, Some(mm)) if mm > 0.0 && mm.is_finite() => Some(mm),
-        (Sensor::Cable, Some(mm)) => bail!("--clearance {mm}: expected 0 or more (mm)"),
-        (_, Some(_)) => {
-            bail!("--clearance applies to cables only; the line of sight of a tracker is not checked")
+    let sees = sensor == Sensor::Cable || arguments.stated.states_sensor_frame();
+    let clearance_mm = match arguments.clearance {
+        None => sees.then_some(reach_mm / 12.0),
+        Some(_) if !sees => {
+            bail!("--clearance: the line of sight is known with --sensor-frame alone: state it too")
         }
-        (_, None) => None,
+        Some(0.0) => None,
+        Some(mm) if mm > 0.0 && mm.is_finite() => Some(mm),
+        Some(mm) => bail!("--clearance {mm}: expected 0 or more (mm)"),
     };
     let space = space(arguments, reach_mm)?;
     let questions::Open { questions, something_else, joint_scatters } = left_open(arguments, robot)?;

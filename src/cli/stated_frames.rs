@@ -100,6 +100,11 @@ struct Measured<'a> {
 }
 
 impl StatedFrameArguments {
+    /// Whether the place of a tracker or camera is stated.
+    pub(super) fn states_sensor_frame(&self) -> bool {
+        self.sensor_frame.is_some()
+    }
+
     /// The stated frames, if any.
     ///
     /// # Errors

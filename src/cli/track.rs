@@ -151,14 +151,15 @@ impl TrackContext<'_> {
         let (arguments, arm) = (self.arguments, self.arm);
         let mut tracker = self.state()?;
         let known = tracker.as_ref().map(|t| t.state().consumed.clone()).unwrap_or_default();
-        let (mut datasets, mut failed) = self.datasets(&known, printed)?;
+        let (datasets, mut failed) = self.datasets(&known, printed)?;
         let fitted = &arm.provenance.sha256;
-        if let Some(at) = datasets.iter().position(|d| !fitted.is_empty() && d.sha256 == *fitted) {
-            let file = datasets.remove(at).file;
+        if let Some(of_the_fit) = datasets.iter().find(|d| !fitted.is_empty() && d.sha256 == *fitted) {
             print_message_once(
                 printed,
                 format!(
-                    "note: {file} holds the rows to which the model was fitted: they say nothing new and are left out"
+                    "note: {} holds the rows to which the model was fitted: they locate the sensor, but count twice, and the standard \
+                     deviations become too small by a quarter or more; track new measurements",
+                    of_the_fit.file
                 ),
             );
         }

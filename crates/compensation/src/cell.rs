@@ -247,6 +247,9 @@ impl fmt::Display for FrameKind {
     }
 }
 
+/// A tool tip nearer to the flange is stated in metres (mm): no tool is shorter, and none that a robot carries is longer than 2 m.
+const METRES_MM: f64 = 2.0;
+
 impl CellFrame {
     /// Checks that its keys are consistent and its numbers possible.
     fn check(&self, kind: FrameKind) -> Result<(), CellError> {
@@ -259,6 +262,17 @@ impl CellFrame {
             && !position.iter().all(|x| x.abs() <= FARTHEST_MM)
         {
             return wrong("position_mm: expected three numbers in mm, within 1,000,000 mm");
+        }
+        if kind == FrameKind::Tool
+            && let Some(position) = self.position_mm
+        {
+            let length_mm = position.iter().map(|x| x * x).sum::<f64>().sqrt();
+            if length_mm > 0.0 && length_mm < METRES_MM {
+                return wrong(&format!(
+                    "position_mm: the tool tip is {length_mm:.4} mm from the flange, so the numbers are probably metres: expected mm \
+                     (or exactly [0, 0, 0])"
+                ));
+            }
         }
         if let Some(q) = self.quaternion_wxyz {
             if !((q.iter().map(|q| q * q).sum::<f64>() - 1.0).abs() < 1e-3) {

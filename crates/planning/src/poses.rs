@@ -72,6 +72,8 @@ pub struct Plan {
     pub field: Option<FieldUncertainty>,
     /// The checked obstacles.
     pub space: KeepOut,
+    /// Checked distance of the cable or the line of sight from the links (mm).
+    pub clearance_mm: Option<f64>,
 }
 
 /// Quality of a set of poses.
@@ -217,6 +219,7 @@ pub fn plan(setup: &MeasurementSetup<'_>, options: &Options) -> Result<Plan, Pla
         rejections,
         detectability,
         field,
+        clearance_mm: options.bounds.clearance_mm,
         space,
         geometry: options.geometry,
     })

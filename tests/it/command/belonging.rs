@@ -176,6 +176,15 @@ fn an_output_is_called_what_it_is() {
         &["not translated", "RAPID", ".mod"],
     );
     refused(at, &["blade.nc", "--model", "model.toml", "-o", "out.mod"], &["not translated", "NC", ".nc"]);
+    // Text of one control in a file that another one reads.
+    for name in ["out.mpf", "out.h", "out.ngc"] {
+        refused(
+            at,
+            &["blade.nc", "--model", "model.toml", "-o", name],
+            &["this extension stands for", "Fanuc"],
+        );
+        assert!(!at.join(name).exists());
+    }
     let (code, _, err) = truegrind(at, &["path", "blade.toml", "--robot", "abb-irb-120", "-o", "out.gcode"]);
     assert!(code == 2 && err.contains(".mpf"), "{err}");
     // As its source, whatever that is called; and where nothing is said.

@@ -46,6 +46,14 @@ pub fn lost_in_export(model: &Model, format: Format) -> Vec<String> {
         ));
     }
     out.extend(angle_note(model, format));
+    out.extend(far_normals(model, format));
+    if format == Format::UrYaml {
+        out.push(
+            "the driver will report that `hash` differs from the controller's factory calibration, as it does: its own Cartesian moves know \
+             nothing of this arm"
+                .to_owned(),
+        );
+    }
     if format == Format::UrYaml && model.limits.speed_rad_s.is_some() {
         out.push("ranges and speeds of joints are left out".to_owned());
     }
@@ -55,6 +63,23 @@ pub fn lost_in_export(model: &Model, format: Format) -> Vec<String> {
     }
     out
 }
+
+/// What to keep in mind where nearly parallel axes put a common normal far away.
+fn far_normals(model: &Model, format: Format) -> Option<String> {
+    let farthest_mm = plain_dh(model).iter().map(|row| row[1].abs()).fold(0.0, f64::max);
+    let is_table = matches!(format, Format::Standard | Format::Modified);
+    (is_table && farthest_mm > FAR_MM).then(|| {
+        format!(
+            "nearly parallel axes: their common normal lies {:.0} m away, so that angles must keep all their digits (rounding one at the \
+             fourth decimal of a degree can move the flange by {:.1} mm); --to urdf has no such numbers",
+            farthest_mm / 1000.0,
+            farthest_mm * 0.5e-4_f64.to_radians()
+        )
+    })
+}
+
+/// A common normal farther than this makes a table ill-conditioned (mm).
+const FAR_MM: f64 = 10_000.0;
 
 /// The flange in the last frame of a format: a table ends before the flange; Craig's, and the file of UR drivers, also before
 /// length and twist of the last link.
@@ -261,7 +286,8 @@ fn ur_yaml(model: &Model, notes: &[String]) -> String {
     for note in comments(notes) {
         let _ = writeln!(out, "# {note}");
     }
-    out.push_str("kinematics:\n");
+    // The description package reads a hash; the driver compares it with that of the controller's factory calibration.
+    out.push_str("kinematics:\n  hash: truegrind\n");
     let mut poses = joint_frames(model);
     // The last frame turns about its own z, along which it may stand anywhere.
     poses[5] *= Pose::translation(0.0, 0.0, model.links[5].d_mm);

@@ -246,7 +246,8 @@ fn a_cut_whose_rest_is_reached_by_jumps_or_calls_stays_whole() {
 #[test]
 fn a_routine_whose_frame_is_a_parameter_belongs_to_the_cuts_around_its_calls() {
     let [a, b] = [380.0, 395.0].map(|x| line(x, "z1"));
-    let given = "MoveL [[385,0,400],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v20,z1,tool0\\WObj:=given;\n";
+    let given =
+        "MoveL [[385,0,400],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v20,z1,tool0\\WObj:=given;\n";
     let source = module(&[a.as_str(), "part wobj0;\n", b.as_str()].concat())
         .replace("ENDMODULE", &format!("PROC part(PERS wobjdata given)\n{given}ENDPROC\nENDMODULE"));
     let (done, bytes) = done(&source, Cuts::Whole, 0.05);

@@ -134,7 +134,10 @@ fn planned(source: &str, cell: &Cell, actual: &Model) -> (Plan, Vec<Pose>) {
         let of = |motion: &u32| planned.outcomes[*motion as usize].shape_sigma_mm.get();
         let squares: Vec<f64> = cut.motions.iter().filter_map(of).map(|sigma| sigma * sigma).collect();
         let rms = (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt();
-        assert!(squares.is_empty() || (rms - cut.shape_sigma_mm).abs() < 0.01 * cut.sigma_mm + 1e-9, "{rms} {cut:?}");
+        assert!(
+            squares.is_empty() || (rms - cut.shape_sigma_mm).abs() < 0.01 * cut.sigma_mm + 1e-9,
+            "{rms} {cut:?}"
+        );
     }
     let rewritten = task.rewrite(&planned.changes, &RewriteOptions::default()).unwrap();
     let text = rewritten.files[0].edits.apply(source.as_bytes()).unwrap();

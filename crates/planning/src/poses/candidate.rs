@@ -28,7 +28,7 @@ pub struct Bounds {
     pub box_mm: Option<[[f64; 3]; 2]>,
     /// Shortest and longest cable, or distance to the sensor (mm).
     pub distance_mm: Option<[f64; 2]>,
-    /// Distance of a cable from the segments between the joints (mm); `None` disables the check.
+    /// Distance of a cable, or of a tracker's line of sight, from the segments between the joints (mm); `None` disables the check.
     pub clearance_mm: Option<f64>,
     /// Obstacles.
     pub space: KeepOut,
@@ -71,7 +71,7 @@ pub struct RejectionCounts {
     pub outside: usize,
     /// The cable, or the line to the sensor, too short or too long.
     pub distance: usize,
-    /// The cable too near to a link.
+    /// The cable or the line of sight too near to a link.
     pub hidden: usize,
     /// A link or the touched point in collision, at the pose or on its approach.
     pub blocked: usize,
@@ -82,7 +82,7 @@ impl fmt::Display for RejectionCounts {
         write!(
             f,
             "{} too close to a singularity, {} outside the box, {} too close to or too far from the sensor, {} with the \
-            cable too close to a link, {} with the arm below the floor or in a box to keep out of",
+            cable or the line of sight too close to a link, {} with the arm below the floor or in a box to keep out of",
             self.singular, self.outside, self.distance, self.hidden, self.blocked
         )?;
         match self.sum {

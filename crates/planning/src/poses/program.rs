@@ -6,7 +6,7 @@ use super::schedule::{FIRST_ROW, Row};
 use super::{MeasurementSetup, Plan, rows};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Joints;
-use truegrind_calibration::measurement::dataset::Reading;
+use truegrind_calibration::measurement::dataset::{Reading, Sensor};
 use truegrind_math::option_f64::OptionF64;
 use truegrind_programs::draft::{Draft, Step};
 use truegrind_programs::motion::{Frame, JointTarget, MotionKind, TargetValue, ToolValue, WorkObjectValue};
@@ -73,8 +73,14 @@ pub fn draft(plan: &Plan, setup: &MeasurementSetup<'_>, drive: &ProgramSettings)
                 plan.poses.len(),
                 drive.robot
             ),
-            format!("Checked: joint limits, singularities, cable; {}.", checked(plan)),
-            "Not checked: the way to the first pose, and anything else in the cell.".to_owned(),
+            format!("Checked: joint limits, singularities{}; {}.", beside_links(plan, setup), checked(plan)),
+            match setup.sensor {
+                Sensor::Cable => "Not checked: the way to the first pose, and anything else in the cell.".to_owned(),
+                _ => format!(
+                    "Not checked: {}whether the target faces the sensor, the way to the first pose, and anything else in the cell.",
+                    if plan.clearance_mm.is_some() { "" } else { "the line of sight, " }
+                ),
+            },
             "Run it slowly first. Take one reading at each WaitTime, in this order; rows count as in a spreadsheet with its header."
                 .to_owned(),
         ],
@@ -139,6 +145,15 @@ pub fn checked(plan: &Plan) -> String {
         "links (as capsules of {:.0} mm radius) and target stay {floor}{and}{boxes} at every pose and on every way between them{stop_note}",
         space.radius_mm
     )
+}
+
+/// What was checked between the links and the sensor.
+fn beside_links(plan: &Plan, setup: &MeasurementSetup<'_>) -> &'static str {
+    match (setup.sensor, plan.clearance_mm) {
+        (Sensor::Cable, _) => ", cable",
+        (_, Some(_)) => ", line of sight past the links",
+        (_, None) => "",
+    }
 }
 
 /// Predicted reading with the nominal arm.

@@ -19,7 +19,8 @@ const QUATERNION: &str = "orientation of the target in the sensor's frame, a uni
 const TIME: &str = "hours since the start (may be empty)";
 const TEMPERATURE: &str = "temperature of the arm (°C, may be empty)";
 const PAYLOAD: &str = "load on the flange (kg, may be empty)";
-const SESSION: &str = "any name; another one where sensor or target were set up anew: whether they were is then checked (may be empty)";
+const SESSION: &str = "any name; another one where sensor or target may have moved in place: whether they did is then checked; measured from elsewhere, rows \
+                       belong in a file of their own (may be empty)";
 const OUTLET: &str =
     "number of the cable's outlet, from 1 (may be empty in all rows where there is only one)";
 const READOUT: &str =

@@ -120,6 +120,7 @@ fn a_cell_file_that_contradicts_itself_is_refused() {
         ("[[wobj]]\nname=\"w\"\norigin=\"taught\"\ntaught_with=\"t\"\n", "taught_with has no effect"),
         ("[[wobj]]\nname=\"w\"\norigin=\"taught\"\nteaches=\"oframe\"\n", "teaches has no effect"),
         ("[[wobj]]\nname=\"w\"\norigin=\"metrology\"\nquaternion_wxyz=[1,0,0,0]\n", "without position_mm"),
+        ("[[tool]]\nname=\"t\"\norigin=\"metrology\"\nposition_mm=[0,0,0.12]\n", "probably metres"),
         ("[[tool]]\nname=\"t\"\norigin=\"metrology\"\nposition_mm=[0,0,1e20]\n", "within 1,000,000 mm"),
         ("[[tool]]\nname=\"t\"\norigin=\"metrology\"\nposition_mm=[0,0,nan]\n", "within 1,000,000 mm"),
         (

@@ -2,7 +2,7 @@
 
 use super::super::dialect::Dialect;
 use super::super::modal_group::{ModalGroup, name_key};
-use super::super::modal_state::MotionMode;
+use super::super::modal_state::{MotionMode, ToolLength};
 use super::super::syntax::Word;
 use super::g_codes::{Action, action};
 use super::siemens_names::code_name;
@@ -21,9 +21,26 @@ impl Interpreter<'_, '_> {
         {
             self.state.starts_tangent = block.g.contains(&50);
         }
-        block.g.iter().any(|&code| {
+        let names_axes = block.g.iter().any(|&code| {
             action(code, self.dialect).is_some_and(|action| self.modal_action(block, code, action))
-        })
+        });
+        if self.is_length_offset_alone(block) {
+            self.length(block, 430);
+        }
+        names_axes
+    }
+
+    /// Whether H stands without its G code while an offset is in effect: it selects another one (Fanuc).
+    fn is_length_offset_alone(&self, block: &Block<'_>) -> bool {
+        let takes_h = |code: &u32| {
+            matches!(code, 100 | 150 | 160 | 370 | 650..=669)
+                || matches!(action(*code, self.dialect), Some(Action::ToolLength))
+        };
+        matches!(self.dialect, Dialect::Fanuc | Dialect::Iso)
+            && block.h.is_some()
+            && self.state.tool.length != ToolLength::None
+            && !block.g.iter().any(takes_h)
+            && !block.m.iter().any(|m| matches!(m, 96..=99 | 198))
     }
 
     /// Applies a modal G code. True if the axis words of its block are not a motion.

@@ -204,6 +204,9 @@ fn assigned_tools_and_offsets_override_the_setup() {
             (&format!("G10 L2 P1 A10.\nG10 L2 P1 X510. Y0. Z0. A0. B0. C0.\n{F}"), &[None]),
             (&format!("G10 L10 P1 R100.\n{F}"), &[t]),
             (&format!("G43.4 H2\n{F}"), &[left(ToolUnknown)]),
+            // Without its G code H selects another offset; in a call it is an argument.
+            (&format!("H2\n{F}"), &[left(ToolUnknown)]),
+            (&format!("H2 M8\n{F}\nH1\n{F}"), &[left(ToolUnknown), None]),
             (&format!("G10 L50\n{F}"), &[left(UnknownWord), left(UnknownWord)]),
         ],
     );
