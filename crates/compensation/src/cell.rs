@@ -247,8 +247,8 @@ impl fmt::Display for FrameKind {
     }
 }
 
-/// A tool tip nearer to the flange is stated in metres (mm): no tool is shorter, and none that a robot carries is longer than 2 m.
-const METRES_MM: f64 = 2.0;
+/// A tool tip nearer to the flange is stated in metres (mm): no tool is shorter, and few that a robot carries are longer than 1 m.
+const METRES_MM: f64 = 1.0;
 
 impl CellFrame {
     /// Checks that its keys are consistent and its numbers possible.

@@ -18,14 +18,14 @@ use crate::plan::Plan;
 use crate::plan::planner::SolvedProgram;
 use crate::plan::reason::OutcomeReason;
 use crate::plan::single_precision::single_precision;
-use crate::plan::steps_to_left::{StepsToLeft, is_path};
+use crate::plan::steps_to_left::StepsToLeft;
 use crate::risk::prepared_estimate::PreparedEstimate;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::estimated::Estimated;
 use truegrind_programs::edit::EditError;
 use truegrind_programs::motion::{Listing, Mark, MotionKind, Reason};
 use truegrind_programs::reading::{Language, Program};
-use truegrind_programs::rewrite::{Change, Outcome, RewriteOptions, Rewritten};
+use truegrind_programs::rewrite::{Outcome, RewriteOptions, Rewritten};
 
 /// A corrected program.
 #[derive(Debug, Clone, PartialEq)]
@@ -95,11 +95,12 @@ pub fn compensate_prepared(
         arm.model.effects.iter().any(|effect| matches!(effect, Effect::Backlash(_)) && !effect.is_zero());
     loop {
         let planned = targets.plan(&refused);
-        if listing.numbered && options.cuts != Cuts::Single && only_air_moves(listing, &planned) {
-            for change in &planned.changes {
-                refused.entry(change.motion).or_insert(OutcomeReason::AirMoveAlone);
+        if listing.numbered && options.cuts != Cuts::Single {
+            let alone = air_moves_alone(listing, &planned);
+            if !alone.is_empty() {
+                refused.extend(alone.into_iter().map(|motion| (motion, OutcomeReason::AirMoveAlone)));
+                continue;
             }
-            continue;
         }
         if program.accepts(&planned.changes) {
             // Frees the solved targets while the edits are made; no second plan is needed.
@@ -133,12 +134,37 @@ pub fn compensate_prepared(
     }
 }
 
-/// Whether air moves alone would be corrected though there are cuts.
-fn only_air_moves(listing: &Listing, planned: &Plan) -> bool {
-    let is_corrected = |change: &Change| is_path(&listing.motions[change.motion as usize]);
-    !planned.changes.is_empty()
-        && !planned.changes.iter().any(is_corrected)
-        && listing.motions.iter().any(may_cut)
+/// Air moves that would be corrected before a cut that is not, or behind it with no further cut in the file: the lines of the cut would
+/// begin elsewhere, and take the axes that they omit from them.
+fn air_moves_alone(listing: &Listing, planned: &Plan) -> Vec<u32> {
+    let motions = &listing.motions;
+    let mut is_corrected = vec![false; motions.len()];
+    planned.changes.iter().for_each(|change| is_corrected[change.motion as usize] = true);
+    let mut out = Vec::new();
+    // Whether the next cut of the file is corrected, or the last one where none follows.
+    let mut beside: Option<(u32, bool)> = None;
+    let mut waiting = Vec::new();
+    for at in (0..motions.len()).rev() {
+        let file = motions[at].place.file;
+        if beside.is_none_or(|(of, _)| of != file) {
+            beside = None;
+            waiting.clear();
+        }
+        if may_cut(&motions[at]) && !motions[at].rapid {
+            if beside.is_none() && !is_corrected[at] {
+                out.append(&mut waiting);
+            }
+            waiting.clear();
+            beside = Some((file, is_corrected[at]));
+        } else if is_corrected[at] {
+            match beside {
+                Some((_, false)) => out.push(at as u32),
+                Some((_, true)) => {}
+                None => waiting.push(at as u32),
+            }
+        }
+    }
+    out
 }
 
 /// Rounds of planning and writing before every remaining change is refused.

@@ -6,8 +6,8 @@
 //!
 //! Predecessor of a motion: the one that the text executes before it ([`Motion::previous`]) and, where loops, branches and
 //! labels leave that open, the preceding one in the same routine. Mutually exclusive branches therefore form one cut, which
-//! refuses too much rather than too little. A cut extends into a called routine and out of it ([`Listing::across_calls`]), so that the
-//! cuts of all callers may be one. Instructions whose path is not in the text (calls with targets, cycles) separate cuts, since the
+//! refuses too much rather than too little. A cut extends into a called routine of RAPID and out of it ([`Listing::across_calls`]), so
+//! that the cuts of all callers may be one. Instructions whose path is not in the text (calls with targets, cycles) separate cuts, since the
 //! motions after them belong to other cuts.
 
 use rayon::prelude::*;

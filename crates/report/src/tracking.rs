@@ -130,8 +130,8 @@ fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], 
         KeyFigure::new("Arm against the first model", departure.as_ref().map(|now| now.rms_mm), 3, "mm").note(
             departure.as_ref().map_or_else(String::new, |now| {
                 format!(
-                    "RMS over the measured region, apart from the placement of base and target; {:.3} mm expected from the model's \
-                     uncertainty",
+                    "RMS over the measured region, apart from the placement of base and target; {:.3} mm expected from the \
+                     uncertainties",
                     now.expected_mm
                 )
             }),
@@ -145,7 +145,7 @@ fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], 
 fn departure_sentence(now: &Departure) -> String {
     let mut out = format!(
         "over the measured region, and apart from the placement of base and target, the arm is {:.3} mm RMS from the model that the track \
-         began with, where that model's uncertainty lets expect {:.3} mm: programs that were corrected with it are off by as much",
+         began with, where the uncertainties let expect {:.3} mm: programs that were corrected with it are off by as much",
         now.rms_mm, now.expected_mm
     );
     let moved = now.parameters.iter().take(LISTED).map(|(name, unit, by, sigma)| {

@@ -100,7 +100,7 @@ impl fmt::Display for Alarm {
         if self.course == Course::Scatter {
             return write!(
                 f,
-                "the readings scatter {:.1} times as much as before at row {} of {}, and no change of arm, sensor or target explains it: \
+                "the readings scatter {:.1} times as much as before at row {} of {}, and no single change explains it: \
                  check how the target is fastened, the line of sight, and whether the arm has settled when it is read",
                 self.shift, self.noticed_row, self.noticed_file
             );

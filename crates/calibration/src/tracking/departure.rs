@@ -16,7 +16,7 @@ use truegrind_arm::model::{Joints, Model};
 pub struct Departure {
     /// RMS displacement of the target (mm).
     pub rms_mm: f64,
-    /// What the uncertainty of the first model alone makes of it (mm, 1σ).
+    /// What the uncertainties of the first model and of the track make of it (mm, 1σ).
     pub expected_mm: f64,
     /// Parameters that moved by more than four of the standard deviations that they began with: name, unit, by how much, and the present
     /// standard deviation; those that moved most first.
@@ -57,12 +57,10 @@ impl Tracker {
         let (first, now) = (placed(&self.initial.model), placed(&self.current().0));
         let arm = self.initial.order.len();
         let rows = 3 * poses.len();
-        // The displacement, and the columns of the arm's parameters in units of their first standard deviations.
-        let mut columns = DMatrix::zeros(rows, 1 + arm);
+        // The displacement, and what one standard deviation along each axis of the covariances makes of it: that of the model, and what the
+        // track adds to it.
+        let mut columns = DMatrix::zeros(rows, 1 + 2 * arm);
         fill(columns.column_mut(0).as_mut_slice(), &first, &now);
-        let root = self.initial.covariance.clone().symmetric_eigen();
-        let factor =
-            &root.eigenvectors * DMatrix::from_diagonal(&root.eigenvalues.map(|value| value.max(0.0).sqrt()));
         let problem = CalibrationProblem::new(
             &Dataset::new("track", Sensor::Position, Vec::new()),
             &self.initial.model,
@@ -72,14 +70,21 @@ impl Tracker {
             &[],
         );
         let mut x = vec![0.0; self.parameters.len()];
-        for k in 0..arm {
-            x[..arm].copy_from_slice(factor.column(k).as_slice());
-            fill(columns.column_mut(1 + k).as_mut_slice(), &first, &placed(&problem.apply(&x).0));
+        let tracked = self.filter.covariance().view((0, 0), (arm, arm)).into_owned();
+        let scale = self.scatter(self.state.history.len()).unwrap_or(1.0).max(1.0);
+        for (offset, covariance, scale) in [(1, &self.initial.covariance, 1.0), (1 + arm, &tracked, scale)] {
+            let axes = covariance.clone().symmetric_eigen();
+            for k in 0..arm {
+                let sigma = scale * axes.eigenvalues[k].max(0.0).sqrt();
+                x[..arm].copy_from_slice((axes.eigenvectors.column(k) * sigma).as_slice());
+                let moved = placed(&problem.apply(&x).0);
+                fill(columns.column_mut(offset + k).as_mut_slice(), &first, &moved);
+            }
         }
         place(&mut columns, &first);
         let rms = |square: f64| (square / poses.len() as f64).sqrt();
         let rms_mm = rms(columns.column(0).norm_squared());
-        let expected_mm = rms(columns.columns(1, arm).norm_squared());
+        let expected_mm = rms(columns.columns(1, 2 * arm).norm_squared());
         let sigmas = self.sigmas();
         let mut parameters: Vec<(f64, (String, String, f64, f64))> = self
             .initial

@@ -101,6 +101,6 @@ fn what_to_do(left_mm: f64, changed_mm: Option<f64>) -> String {
         );
     }
     format!(
-        "no other geometry explains them, so the readings scatter more, or they are not of this arm: check sensor, target and the load;          --sigma {left_mm:.3} starts anyway, and finds larger changes only"
+        "no other geometry explains them, so the readings scatter more, or they are not of this arm: check sensor, target and load; --sigma {left_mm:.3} starts anyway, and finds larger changes only"
     )
 }

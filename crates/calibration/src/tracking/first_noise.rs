@@ -15,6 +15,9 @@ use truegrind_arm::estimated::Estimated;
 use truegrind_arm::parameter::{Parameter, arm_parameters};
 use truegrind_math::statistics::median;
 
+/// Readings beyond the parameters from which another geometry is judged.
+const FREE: usize = 20;
+
 /// Where the sensor stands and what it scatters.
 pub(super) struct FirstPoses {
     pub(super) frames: Frames,
@@ -55,13 +58,15 @@ impl FirstPoses {
         // identification is its lower bound.
         let left_mm = fitted.sigma_mm;
         let mut sigma_mm = options.sigma_mm.unwrap_or(left_mm.max(unexplained_mm));
+        let mut sigma_rad = fitted.sigma_rad;
         if options.sigma_mm.is_none() && unexplained_mm > 0.0 && left_mm > CHANCE * unexplained_mm {
             let parameters: Vec<Parameter> =
                 arm_parameters(&model.model).into_iter().chain(frame_parameters(dataset)).collect();
             let start = Start { model: &model.model, frames: &fitted.frames };
             let another = fit(&kept, start, &parameters, &Tolerance::default(), &SOLVERS[0], 0);
+            let readings = kept.dataset.rows.len() * kept.dataset.sensor.scalars();
             let changed = if dataset.sensor == Sensor::Cable { CHANGED_CABLE } else { CHANGED };
-            let is_changed = changed * another.sigma_mm < left_mm;
+            let is_changed = readings >= parameters.len() + FREE && changed * another.sigma_mm < left_mm;
             if left_mm > FOREIGN * unexplained_mm && left_mm > FOREIGN_MM {
                 return Err(TrackError::Foreign {
                     file: dataset.file.clone(),
@@ -72,10 +77,10 @@ impl FirstPoses {
                 });
             }
             if is_changed {
-                sigma_mm = another.sigma_mm.max(unexplained_mm);
+                (sigma_mm, sigma_rad) = (another.sigma_mm.max(unexplained_mm), another.sigma_rad);
             }
         }
-        Ok(Self { frames: fitted.frames, sigma_mm, sigma_rad: fitted.sigma_rad })
+        Ok(Self { frames: fitted.frames, sigma_mm, sigma_rad })
     }
 }
 

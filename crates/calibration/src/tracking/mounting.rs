@@ -45,6 +45,15 @@ enum Mounted {
     Sensor,
 }
 
+/// What else the poses may show.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Beside {
+    /// Nothing but noise.
+    Noise,
+    /// A change of the arm, too.
+    ChangedArm,
+}
+
 /// A location that the poses agree on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Remount {
@@ -65,28 +74,31 @@ impl Tracker {
     }
 
     /// If the latest poses agree on a remounted target or sensor, continues the track there and returns the alarm.
-    pub(super) fn detect_remount(&mut self) -> Option<Alarm> {
+    pub(super) fn detect_remount(&mut self, beside: Beside) -> Option<Alarm> {
         let run = self.trailing_accidents();
         if run < FEWEST || self.state.sensor == Sensor::Cable {
             return None;
         }
         let history = &self.state.history;
         let poses: Vec<PoseRecord> = history[history.len() - run..].to_vec();
-        let (found, old) = self.find_remount(&poses)?;
+        let (found, old) = self.find_remount(&poses, beside)?;
         let alarm = alarm_of(&found, &old, &poses, self.state.sensor.scalars());
         self.apply_remount(&found, poses);
         Some(alarm)
     }
 
     /// The location that the poses agree on, and the old one.
-    fn find_remount(&self, poses: &[PoseRecord]) -> Option<(Remount, Pose)> {
+    fn find_remount(&self, poses: &[PoseRecord], beside: Beside) -> Option<(Remount, Pose)> {
         let (model, frames) = self.current();
         let flanges: Vec<Pose> = poses
             .iter()
             .map(|record| model.forward(&Joints::from(record.joints), &record.condition))
             .collect();
         let of_noise_mm = AGREE * self.state.sigma_mm * 3f64.sqrt();
-        let of_arm_mm = CHANGED_MM.min(CHANGED_SHARE * misfit_mm(poses, &flanges, &frames));
+        let of_arm_mm = match beside {
+            Beside::Noise => 0.0,
+            Beside::ChangedArm => CHANGED_MM.min(CHANGED_SHARE * misfit_mm(poses, &flanges, &frames)),
+        };
         let agreement = Agreement {
             mm: of_noise_mm.max(of_arm_mm),
             rad: (AGREE * self.state.sigma_rad.max(1e-5) * 3f64.sqrt()).max(of_arm_mm / TYPICAL_ARM_MM),
@@ -158,6 +170,7 @@ impl Tracker {
         for (at, record) in again.iter_mut().enumerate() {
             let taken = self.update(&problem, at);
             record.nis = taken.nis;
+            record.error_mm = self.error_mm(&problem, at, record.per_mm);
             if !taken.set_aside {
                 self.state.accidents = self.state.accidents.saturating_sub(1);
                 extend_region(&mut self.state.region, &record.joints);

@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::alarm::{Alarm, Course, Part};
 use super::bounds::{accident_bound, window_bound};
 use super::locate::{Change, Explanation, Form, Group, GroupChange, locate};
+use super::mounting::Beside;
 use super::state::{Snapshot, extend_region};
 use super::tracker::Tracker;
 use truegrind_arm::parameter::Parameter;
@@ -20,6 +21,9 @@ const SETTLE: usize = 5;
 
 /// Scatter that is told: this many times what is expected, and what was told before.
 const MORE_SCATTER: f64 = 1.4;
+
+/// Scatter that has not been seen for so many windows is told again.
+const RECOVERED: usize = 2;
 
 /// Largest change that the linearised search can state (rad, mm).
 const LINEAR_RAD: f64 = 0.2;
@@ -58,7 +62,7 @@ impl Tracker {
             return None;
         }
         self.state.pending_since = 0;
-        if let Some(alarm) = self.detect_remount() {
+        if let Some(alarm) = self.detect_remount(Beside::Noise) {
             return Some(alarm);
         }
         let history = &self.state.history;
@@ -75,6 +79,10 @@ impl Tracker {
         let all: f64 = (history.len() - window..history.len()).map(measured).sum();
         let explains = ratio >= SURE.max(0.7 * (all - (window * per) as f64));
         if !(explains && self.is_within_linear_range(&found, &groups)) {
+            // No change of one parameter explains it: sensor or target may have been mounted elsewhere, and the arm changed too.
+            if let Some(alarm) = self.detect_remount(Beside::ChangedArm) {
+                return Some(alarm);
+            }
             if self.trailing_accidents() > SETTLE {
                 let alarm =
                     self.unexplained_alarm(Course::Burst, self.trailing_accidents(), [sum, bound], ratio);
@@ -82,16 +90,19 @@ impl Tracker {
                 return alarm;
             }
             // These poses raise no further alarm.
+            let is_ongoing = self.state.poses <= self.state.quiet_until + RECOVERED * window;
             self.state.quiet_until = self.state.poses + window;
             let scatter = self.scatter(window)?;
             if scatter < MORE_SCATTER {
                 return self.unexplained_alarm(Course::Open, 0, [sum, bound], ratio);
             }
-            let told = self.state.alarms.last().filter(|last| last.course == Course::Scatter);
-            if told.is_some_and(|last| scatter < MORE_SCATTER * last.shift) {
+            let alarm = self.unexplained_alarm(Course::Scatter, 0, [sum, bound], ratio)?;
+            let same = |told: &&Alarm| {
+                told.course == Course::Scatter && is_ongoing && told.noticed_file == alarm.noticed_file
+            };
+            if self.state.alarms.last().filter(same).is_some_and(|told| scatter < MORE_SCATTER * told.shift) {
                 return None;
             }
-            let alarm = self.unexplained_alarm(Course::Scatter, 0, [sum, bound], ratio)?;
             return Some(Alarm { shift: scatter, ..alarm });
         }
         let alarm = self.change_alarm(&found, &groups, [sum, bound], ratio)?;
@@ -116,7 +127,7 @@ impl Tracker {
     }
 
     /// How many times as much as expected the latest poses scatter; by their median, which outliers do not move.
-    fn scatter(&self, poses: usize) -> Option<f64> {
+    pub(super) fn scatter(&self, poses: usize) -> Option<f64> {
         let history = &self.state.history;
         let latest: Vec<f64> = history[history.len().saturating_sub(poses)..].iter().map(|s| s.nis).collect();
         let degrees = self.state.sensor.scalars() as f64;
@@ -202,7 +213,7 @@ impl Tracker {
     fn continue_burst(&mut self) -> Option<Alarm> {
         let run = self.trailing_accidents();
         if run > 0 {
-            return run.is_multiple_of(SETTLE).then(|| self.detect_remount()).flatten();
+            return run.is_multiple_of(SETTLE).then(|| self.detect_remount(Beside::ChangedArm)).flatten();
         }
         let bound = accident_bound(self.state.sensor.scalars());
         let fitting = self.state.history.iter().rev().take_while(|record| record.nis <= bound).count();

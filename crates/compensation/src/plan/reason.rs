@@ -146,7 +146,7 @@ pub enum OutcomeReason {
         /// That reason, without figures.
         because: &'static str,
     },
-    /// No cut of the program is corrected: lines that remain unmodified would take their omitted axes from this one.
+    /// An air move beside a cut that remains unmodified, whose lines would take their omitted axes from it.
     AirMoveAlone,
     /// An adjacent motion of the same cut remains unmodified, and the step to it would be too large.
     Step {
@@ -260,7 +260,7 @@ impl OutcomeReason {
             }
             OutcomeReason::PartOfCut { because, .. } => because,
             OutcomeReason::Step { .. } => "the step to its neighbour is too large",
-            OutcomeReason::AirMoveAlone => "an air move, and no cut of the program is corrected",
+            OutcomeReason::AirMoveAlone => "an air move beside a cut that is not corrected",
             OutcomeReason::Risk { .. } => "the correction is too likely to make the cut worse (--max-risk)",
             OutcomeReason::NotCovered { .. } => "no measured pose is nearby",
             OutcomeReason::Uncertain { .. } => "the model is uncertain here",
@@ -278,7 +278,7 @@ impl OutcomeReason {
                 "cell file and program disagree about its tool or work object"
             }
             OutcomeReason::AirMoveAlone => {
-                "an air move, and no cut of the program is corrected: the lines behind it would begin elsewhere and take the axes that they \
+                "an air move beside a cut that is not corrected: the lines of the cut would begin elsewhere and take the axes that they \
                  omit from it"
             }
             OutcomeReason::SingularPath => "the corrected path to it passes too close to a singularity",

@@ -211,6 +211,11 @@ fn a_block_that_may_be_skipped_keeps_the_cut_around_it() {
     assert_eq!(cut(at("G1", 0.0)), [Changed; 5]);
     let skipped = cut(format!("/{}", at("G1", 0.0)));
     assert_eq!(skipped[1..4], [Refused, Left, Refused], "{skipped:?}");
+    // The air moves beside a cut that stays are not corrected; those to the next cut and behind it are.
+    let two = [format!("/{}", at("G1", 0.0)), at("G1", 5.0), at("G0", 10.0), at("G1", 12.0), at("G1", 15.0)]
+        .concat();
+    let found = cut(two);
+    assert_eq!(found, [Refused, Refused, Left, Refused, Changed, Changed, Changed, Changed, Changed]);
 }
 
 /// Behind a jump, a label or a call a block without its own G0 or G1 may be a cut: the whole of it stays, and with it the air moves.

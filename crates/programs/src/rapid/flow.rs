@@ -115,6 +115,12 @@ pub(super) trait Visitor {
     fn record_call(&mut self, site: CallSite);
     /// A call of a routine that moves, after these motions; returns a number of the call.
     fn record_moving_call(&mut self, routine: u32, before: &ReachingMotions) -> u32;
+    /// A call of any of the routines that a computed name may call, after these motions; returns a number of the call.
+    fn record_moving_late_call(&mut self, before: &ReachingMotions) -> u32;
+    /// A loop begins; returns its number.
+    fn record_loop(&mut self) -> u32;
+    /// An iteration of the loop may end after these motions.
+    fn record_loop_end(&mut self, iteration: u32, reaching: &ReachingMotions);
     /// The unit may end after these motions.
     fn record_end(&mut self, reaching: &ReachingMotions);
     /// A call by a computed name, with the switches at the call.
@@ -148,6 +154,7 @@ pub(super) fn interpret_unit(evaluator: &Evaluator<'_, '_>, unit: Unit, visitor:
         moved_between,
         tracks_motions,
         aliases,
+        loops: Vec::new(),
     };
     interpreter.handler_switches = interpreter.handler_switches();
     interpreter.any =
@@ -221,6 +228,8 @@ struct Interpreter<'w, 'a, 's> {
     tracks_motions: bool,
     /// The parameters that may alias outside data or each other.
     aliases: Vec<u32>,
+    /// The loops around the statement.
+    loops: Vec<u32>,
 }
 
 /// What a node of a unit is for the flow of control.
@@ -305,7 +314,10 @@ impl Transfer for Interpreter<'_, '_, '_> {
     }
 
     fn enter_loop(&mut self, node: u32) {
-        self.state.reaching = self.state.reaching.in_loop();
+        if self.tracks_motions {
+            self.loops.push(self.visitor.record_loop());
+        }
+        self.state.reaching = self.state.reaching.in_loop(self.loops.last().copied());
         self.invalidate_iterations(node);
         if self.may_grip_under(node) {
             self.state.gripped = Gripped::UNKNOWN;
@@ -318,6 +330,9 @@ impl Transfer for Interpreter<'_, '_, '_> {
         self.invalidate_iterations(node);
         self.state.gripped = gripped;
         self.conditions(node);
+        if let Some(iteration) = self.loops.pop() {
+            self.visitor.record_loop_end(iteration, &self.state.reaching);
+        }
         self.state.reaching.leave_loop(&before.reaching);
     }
 
@@ -380,7 +395,7 @@ impl Interpreter<'_, '_, '_> {
 
     /// Any motion may be the last executed.
     fn any_motion(&self) -> ReachingMotions {
-        if self.tracks_motions { ReachingMotions::any() } else { ReachingMotions::default() }
+        if self.tracks_motions { ReachingMotions::at_any_point() } else { ReachingMotions::default() }
     }
 
     /// Updates the reaching motions after a motion.
@@ -393,6 +408,28 @@ impl Interpreter<'_, '_, '_> {
         *before = ReachingMotions::after(motion);
         before.join(&also);
         before.any |= self.moved_between;
+    }
+
+    /// Updates the reaching motions after a call of one of some routines; `may_skip`: or of none.
+    fn after_calls(&mut self, called: &[u32], may_skip: bool, state: &mut AbstractState) {
+        if !self.tracks_motions {
+            return;
+        }
+        let symbols = self.evaluator.symbols;
+        let moving = called.iter().filter(|routine| symbols.effects_of(**routine).moves);
+        let calls: Vec<u32> =
+            moving.map(|routine| self.visitor.record_moving_call(*routine, &state.reaching)).collect();
+        if calls.is_empty() {
+            return;
+        }
+        // A handler may resume after a failed call.
+        let also = (may_skip || self.resumes).then(|| state.reaching.clone());
+        let in_loop = state.reaching.clone();
+        state.reaching = ReachingMotions::after_calls(&calls);
+        state.reaching.leave_loop(&in_loop);
+        if let Some(also) = also {
+            state.reaching.join(&also);
+        }
     }
 
     /// The displacement after PDispSet, PDispOn, PDispAdd or PDispOff.
@@ -559,7 +596,7 @@ impl Interpreter<'_, '_, '_> {
                     self.after_motion(motion, &mut state.reaching);
                     return;
                 }
-                state.reaching = self.any_motion();
+                state.reaching.any |= self.tracks_motions;
             }
         }
         state.previous = None;
@@ -611,7 +648,10 @@ impl Interpreter<'_, '_, '_> {
         self.join_switches(symbols.late_switches_of(self.unit), state);
         self.invalidate_nonlocal(state);
         state.previous = None;
-        state.reaching = self.any_motion();
+        if self.tracks_motions {
+            let call = self.visitor.record_moving_late_call(&state.reaching);
+            state.reaching.join(&ReachingMotions::after_calls(&[call]));
+        }
     }
 
     /// A call of a routine of the program; of any of `called` where several modules declare the name.
@@ -626,14 +666,8 @@ impl Interpreter<'_, '_, '_> {
         if called.iter().any(|routine| symbols.effects_of(*routine).uses_position) {
             self.visitor.record_position_use(&state.reaching);
         }
-        if self.tracks_motions {
-            let moving = called.iter().filter(|routine| symbols.effects_of(**routine).moves);
-            let calls: Vec<u32> =
-                moving.map(|routine| self.visitor.record_moving_call(*routine, &state.reaching)).collect();
-            if !calls.is_empty() {
-                state.reaching.or_in_calls(calls);
-            }
-        }
+        let all_move = called.iter().all(|routine| symbols.effects_of(*routine).moves);
+        self.after_calls(called, !all_move, state);
         let mut exit = SwitchSet::EMPTY;
         let mut gripped = None;
         for &routine in called {

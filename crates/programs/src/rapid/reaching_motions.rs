@@ -12,8 +12,10 @@ use crate::dataflow::Lattice;
 pub(super) enum Last {
     /// This motion of the routine.
     Motion(u32),
-    /// A motion in the routine called there.
+    /// A motion in the routine called there, or before the call if it makes none.
     Call(u32),
+    /// What is last in an iteration of this loop.
+    Iteration(u32),
 }
 
 /// A set of motions, one of which was executed last.
@@ -23,14 +25,22 @@ pub(super) struct ReachingMotions {
     last: SmallVec<[Last; 2]>,
     /// Or any motion of the program.
     pub(super) any: bool,
+    /// Or any motion or call of the routine, or what was last before it.
+    pub(super) anywhere: bool,
     /// Or any motion of an enclosing loop.
     any_in_loop: bool,
     /// Or the last motion before the routine was called.
     pub(super) entry: bool,
 }
 
-/// A larger set is widened to any motion.
+/// A larger set is any motion for what depends on the robot's position.
 const MAX_MOTIONS: usize = 256;
+
+/// A larger set is any motion of the routine.
+const MAX_KNOWN: usize = 1 << 16;
+
+/// So many elements are inserted one by one.
+const FEW: usize = 8;
 
 impl ReachingMotions {
     /// This motion.
@@ -38,24 +48,28 @@ impl ReachingMotions {
         Self { last: motion.map(Last::Motion).into_iter().collect(), ..Self::default() }
     }
 
+    /// A motion in one of the routines called there.
+    pub(super) fn after_calls(calls: &[u32]) -> Self {
+        Self { last: calls.iter().copied().map(Last::Call).collect(), any: true, ..Self::default() }
+    }
+
     /// The last motion before the routine was called.
     pub(super) fn routine_entry() -> Self {
         Self { entry: true, ..Self::default() }
     }
 
-    /// Any motion.
-    pub(super) fn any() -> Self {
-        Self { any: true, ..Self::default() }
-    }
-
-    /// Or a motion of the routines called there.
-    pub(super) fn or_in_calls(&mut self, calls: Vec<u32>) {
-        self.join(&Self { last: calls.into_iter().map(Last::Call).collect(), any: true, ..Self::default() });
+    /// Any motion, at a point that can be reached from anywhere in the routine.
+    pub(super) fn at_any_point() -> Self {
+        Self { any: true, anywhere: true, ..Self::default() }
     }
 
     /// At the head of a loop, after any number of iterations.
-    pub(super) fn in_loop(&self) -> Self {
-        Self { any_in_loop: true, ..self.clone() }
+    pub(super) fn in_loop(&self, iteration: Option<u32>) -> Self {
+        let mut out = Self { any_in_loop: true, ..self.clone() };
+        if let Some(iteration) = iteration {
+            out.insert(Last::Iteration(iteration));
+        }
+        out
     }
 
     /// Behind a loop that was entered with `outside`.
@@ -67,34 +81,48 @@ impl ReachingMotions {
     pub(super) fn motions(&self) -> Option<impl Iterator<Item = u32>> {
         let motion = |last: &Last| match last {
             Last::Motion(motion) => Some(*motion),
-            Last::Call(_) => None,
+            Last::Call(_) | Last::Iteration(_) => None,
         };
         (!self.any && !self.any_in_loop).then(|| self.last.iter().filter_map(motion))
     }
 
-    /// Those that are known, whether or not others may follow in a loop or a handler.
+    /// Those without what was last before the routine.
+    pub(super) fn within_routine(&self) -> Self {
+        Self { entry: false, ..self.clone() }
+    }
+
+    /// What is known of them.
     pub(super) fn known(&self) -> &[Last] {
         &self.last
     }
 
-    /// Whether the last motion may stand in another routine.
+    /// Whether the last motion may stand in another routine, or in an earlier iteration.
     pub(super) fn crosses_call(&self) -> bool {
-        self.entry || self.last.iter().any(|last| matches!(last, Last::Call(_)))
+        self.entry || self.anywhere || self.last.iter().any(|last| !matches!(last, Last::Motion(_)))
+    }
+
+    fn insert(&mut self, last: Last) {
+        if let Err(at) = self.last.binary_search(&last) {
+            self.last.insert(at, last);
+        }
     }
 }
 
 /// The union.
 impl Lattice for ReachingMotions {
     fn join(&mut self, other: &Self) {
-        if self.last != other.last {
+        if other.last.len() <= FEW {
+            other.last.iter().for_each(|last| self.insert(*last));
+        } else if self.last != other.last {
             self.last.extend_from_slice(&other.last);
             self.last.sort_unstable();
             self.last.dedup();
         }
-        if self.last.len() > MAX_MOTIONS {
-            (self.last, self.any) = (SmallVec::new(), true);
+        self.any |= other.any || self.last.len() > MAX_MOTIONS;
+        self.anywhere |= other.anywhere;
+        if self.last.len() > MAX_KNOWN {
+            (self.last, self.anywhere) = (SmallVec::new(), true);
         }
-        self.any |= other.any;
         self.any_in_loop |= other.any_in_loop;
         self.entry |= other.entry;
     }

@@ -257,7 +257,11 @@ impl Symbols {
 
     /// Whether anything calls a routine that moves the robot.
     fn calls_motions(&self) -> bool {
-        self.routines.iter().any(|routine| routine.effects.moves && self.called[routine.unit as usize])
+        let late = self.late_lists.iter().flatten().any(|routine| self.effects_of(*routine).moves);
+        late || self
+            .routines
+            .iter()
+            .any(|routine| routine.effects.moves && self.called[routine.unit as usize])
     }
 
     /// Whether a routine is the entry of a program.

@@ -92,7 +92,7 @@ fn listing(trees: &[RapidTree<'_>], symbols: &Symbols) -> (Listing, Loads, Vec<b
     builder.refuse_motions_before_displacement();
     builder.other_uses();
     builder.declared_tools();
-    builder.listing.across_calls = builder.call_edges.solve(symbols);
+    builder.listing.across_calls = builder.call_edges.solve(symbols, &builder.units);
     let loads = if symbols.states_loads { builder.loads() } else { Loads::default() };
     (builder.listing, loads, builder.guarded)
 }
@@ -208,7 +208,7 @@ impl<'a, 's> ListingBuilder<'a, 's> {
             units: Vec::new(),
             unit: 0,
             sites: Vec::new(),
-            call_edges: CallEdges::new(symbols.units.len()),
+            call_edges: CallEdges::new(symbols.units.len() + symbols.late_lists.len()),
             exits: vec![None; symbols.routines.len()],
             depth: 0,
             grips: Vec::new(),
@@ -375,6 +375,24 @@ impl Visitor for ListingBuilder<'_, '_> {
             return 0;
         }
         self.call_edges.call(self.unit, self.symbols.unit_of(routine), before)
+    }
+
+    fn record_moving_late_call(&mut self, before: &ReachingMotions) -> u32 {
+        if self.depth > 0 {
+            return 0;
+        }
+        let list = self.symbols.units.len() as u32 + self.symbols.late_list[self.unit as usize];
+        self.call_edges.call(self.unit, list, before)
+    }
+
+    fn record_loop(&mut self) -> u32 {
+        if self.depth > 0 { 0 } else { self.call_edges.begin_loop(self.unit) }
+    }
+
+    fn record_loop_end(&mut self, iteration: u32, reaching: &ReachingMotions) {
+        if self.depth == 0 {
+            self.call_edges.end_loop(iteration, reaching);
+        }
     }
 
     fn record_end(&mut self, reaching: &ReachingMotions) {

@@ -224,6 +224,27 @@ fn motions_follow_each_other_across_calls() {
     // Through a routine that only calls, and from one call to the next.
     let deep = "PROC a()\nb;\nENDPROC\nPROC b()\nGOENDPROC\n";
     assert_eq!(pairs("GOa;\na;\nGO", deep), [[3, 12], [12, 6], [12, 12]]);
+    // A routine that moves ends what came before it; one that may pass does not.
+    let two = "PROC a()\nGOGOENDPROC\nPROC b()\nGOENDPROC\n";
+    assert_eq!(pairs("GOa;\nb;\nGO", two), [[3, 9], [10, 13], [13, 6]]);
+    let passing = "PROC a()\nIF n=1 THEN\nGOENDIF\nENDPROC\nPROC b()\nGOENDPROC\n";
+    assert_eq!(pairs("GOa;\nb;\nGO", passing), [[3, 10], [3, 14], [10, 14], [14, 6]]);
+    // From one iteration to the next, and out of the loop.
+    let repeated = "WHILE n<3 DO\na;\nb;\nENDWHILE\nGO";
+    assert_eq!(pairs(repeated, two), [[11, 14], [14, 7], [14, 10]]);
+    // What a label is reached from may be any call of the routine.
+    let jump = "a;\nGoto n;\nb;\nn:\nGO";
+    assert!(pairs(jump, two).contains(&[11, 7]));
+    // A function may move, too, and so may what a name computed at run time calls.
+    let function = "FUNC bool a()\nGOGORETURN TRUE;\nENDFUNC\n";
+    assert_eq!(pairs("GOok:=a();\nGO", function), [[3, 8], [9, 5]]);
+    assert!(pairs("GO%name%;\nGO", two).contains(&[9, 5]));
+    // However many calls there are.
+    let many: String = (0..300).map(|k| format!("r{k};\n")).collect();
+    let routines: String = (0..300).map(|k| format!("PROC r{k}()\nGOENDPROC\n")).collect();
+    let found = pairs(&many, &routines);
+    assert_eq!(found.len(), 299);
+    assert!(found.iter().all(|[before, behind]| before + 3 == *behind));
     // A routine without motions is no call that counts; one that calls itself ends.
     assert!(pairs("GOa;\nGO", "PROC a()\nn:=1;\nENDPROC\n").is_empty());
     assert_eq!(pairs("GOa;\nGO", "PROC a()\nGOIF n=1 a;\nENDPROC\n"), [[3, 8], [8, 5], [8, 8]]);

@@ -79,7 +79,7 @@ fn gross_errors_among_the_first_poses_hide_no_later_change() {
         let Reading::Position(p) = &mut dataset.rows[4].reading else { panic!("a position") };
         p.x += off_mm;
         let (tracker, alarms) = tracked(&dataset);
-        assert_eq!(tracker.state().accidents.min(1), 1, "{off_mm}");
+        assert!((1..=3).contains(&tracker.state().accidents), "{off_mm}: {}", tracker.state().accidents);
         let jump = alarms.iter().find(|alarm| alarm.course != Course::Drift).expect("the jump is found");
         assert!(jump.since_row.abs_diff(72) <= 2, "{off_mm}: {jump}");
         assert!((jump.shift.to_degrees() - 0.05).abs() < 0.01, "{off_mm}: {jump}");
@@ -136,6 +136,16 @@ fn a_sensor_set_up_anew_hides_no_change_of_the_arm_at_the_same_time() {
         };
         let dataset = spliced(&measured(2, None), &second, 60);
         let (tracker, alarms) = tracked(&dataset);
+        // A stop in the middle changes no bit, and the errors are those of the new frames.
+        let mut parts = Tracker::begin(model(), "hash", &dataset, &Options::default()).unwrap();
+        for n in [40, 66, 72, 90, 120] {
+            parts.process_file(&dataset.subset(&(0..n).collect::<Vec<_>>())).unwrap();
+            let text = parts.state().to_toml().unwrap();
+            parts = Tracker::resume(model(), State::from_toml(&text).unwrap(), "state.toml").unwrap();
+        }
+        assert!(parts.state().to_toml() == tracker.state().to_toml());
+        let largest = tracker.state().history.iter().map(|record| record.error_mm).fold(0.0, f64::max);
+        assert!(largest < 3.0, "{largest}");
         assert_eq!(alarms[0].course, Course::Mounted, "{alarms:?}");
         let moved =
             (tracker.model().model.links[2].theta_rad - model().model.links[2].theta_rad).to_degrees();

@@ -41,6 +41,7 @@ impl Interpreter<'_, '_, '_> {
                         self.visitor.record_call(CallSite { routine, modal, gripped });
                         self.join_switches(sets, state);
                     }
+                    self.after_calls(symbols.callees(self.unit.scope, name), true, state);
                     self.invalidate_called(name, kind, state);
                 }
                 _ => {}
