@@ -26,12 +26,12 @@
 //! model follows within a few poses ([`alarm`]).
 //!
 //! **Wrong arm.** First poses with residuals far above the model's held-out error are refused, and an arm that has changed before them
-//! is not taken for noise ([`first_noise`]): a filter that did would never detect a change.
+//! is not taken for noise (`first_noise`): a filter that did would never detect a change.
 //!
 //! **Slow changes.** A drift may stay below every bound, since the filter follows it. What counts for programs is the whole way from the
 //! model that they were corrected with: the [`Departure`], which is judged at the end of every run.
 //!
-//! **What no reading tells** of arm and sensor together stays as it was ([`gauge`]).
+//! **What no reading tells** of arm and sensor together stays as it was (`gauge`).
 //!
 //! **Interruption.** [`state`] stores the filter exactly: a track that was interrupted and resumed gives the same bits as one
 //! that was not.
