@@ -7,8 +7,6 @@
 use nalgebra::{DMatrix, DVector, Rotation3, Vector3};
 
 use super::tracker::Tracker;
-use crate::identification::calibration::CalibrationProblem;
-use crate::measurement::dataset::{Dataset, Sensor};
 use truegrind_arm::model::{Joints, Model};
 
 /// The arm as tracked against the model that the track began with.
@@ -61,14 +59,7 @@ impl Tracker {
         // track adds to it.
         let mut columns = DMatrix::zeros(rows, 1 + 2 * arm);
         fill(columns.column_mut(0).as_mut_slice(), &first, &now);
-        let problem = CalibrationProblem::new(
-            &Dataset::new("track", Sensor::Position, Vec::new()),
-            &self.initial.model,
-            &self.frames,
-            &self.parameters,
-            &[],
-            &[],
-        );
+        let problem = self.without_rows();
         let mut x = vec![0.0; self.parameters.len()];
         let tracked = self.filter.covariance().view((0, 0), (arm, arm)).into_owned();
         let scale = self.scatter(self.state.history.len()).unwrap_or(1.0).max(1.0);

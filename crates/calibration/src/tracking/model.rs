@@ -10,15 +10,13 @@ use truegrind_math::statistics::ErrorSummary;
 impl Tracker {
     /// The current arm and sensor frames.
     pub fn current(&self) -> (Model, Frames) {
-        let problem = CalibrationProblem::new(
-            &Dataset::new("track", Sensor::Position, Vec::new()),
-            &self.initial.model,
-            &self.frames,
-            &self.parameters,
-            &[],
-            &[],
-        );
-        problem.apply(self.filter.x.as_slice())
+        self.without_rows().apply(self.filter.x.as_slice())
+    }
+
+    /// The parameters alone.
+    pub(super) fn without_rows(&self) -> CalibrationProblem {
+        let none = Dataset::new("track", Sensor::Position, Vec::new());
+        CalibrationProblem::new(&none, &self.initial.model, &self.frames, &self.parameters, &[], &[])
     }
 
     /// The current model.

@@ -8,6 +8,7 @@
 //! to one invalidates the others. Data without a known assignment has its initial value where nothing writes it.
 
 mod assign;
+mod call;
 mod invalidate;
 
 use super::evaluate::{Context, Evaluator, Known};
@@ -410,28 +411,6 @@ impl Interpreter<'_, '_, '_> {
         before.any |= self.moved_between;
     }
 
-    /// Updates the reaching motions after a call of one of some routines; `may_skip`: or of none.
-    fn after_calls(&mut self, called: &[u32], may_skip: bool, state: &mut AbstractState) {
-        if !self.tracks_motions {
-            return;
-        }
-        let symbols = self.evaluator.symbols;
-        let moving = called.iter().filter(|routine| symbols.effects_of(**routine).moves);
-        let calls: Vec<u32> =
-            moving.map(|routine| self.visitor.record_moving_call(*routine, &state.reaching)).collect();
-        if calls.is_empty() {
-            return;
-        }
-        // A handler may resume after a failed call.
-        let also = (may_skip || self.resumes).then(|| state.reaching.clone());
-        let in_loop = state.reaching.clone();
-        state.reaching = ReachingMotions::after_calls(&calls);
-        state.reaching.leave_loop(&in_loop);
-        if let Some(also) = also {
-            state.reaching.join(&also);
-        }
-    }
-
     /// The displacement after PDispSet, PDispOn, PDispAdd or PDispOff.
     fn displacement_value(&self, node: u32, state: &AbstractState, name: &[u8]) -> Value {
         let tree = &self.evaluator.trees[self.unit.file as usize];
@@ -629,72 +608,6 @@ impl Interpreter<'_, '_, '_> {
             state.previous = None;
             self.after_motion(motion, &mut state.reaching);
         }
-    }
-
-    /// A call by a name computed at run time.
-    fn transfer_late_call(&mut self, state: &mut AbstractState) {
-        let symbols = self.evaluator.symbols;
-        if symbols.uses_position {
-            self.visitor.record_position_use(&state.reaching);
-        }
-        if self.resumes {
-            // RETRY may call it again after an error in it.
-            self.join_switches(symbols.late_switches_of(self.unit), state);
-        }
-        self.visitor.record_late_call(state.modal);
-        if symbols.late_callees_of(self.unit).is_empty() {
-            self.visitor.record_external_call(state.modal);
-        }
-        self.join_switches(symbols.late_switches_of(self.unit), state);
-        self.invalidate_nonlocal(state);
-        state.previous = None;
-        if self.tracks_motions {
-            let call = self.visitor.record_moving_late_call(&state.reaching);
-            state.reaching.join(&ReachingMotions::after_calls(&[call]));
-        }
-    }
-
-    /// A call of a routine of the program; of any of `called` where several modules declare the name.
-    fn transfer_routine_call(&mut self, called: &[u32], name: &[u8], state: &mut AbstractState) {
-        let symbols = self.evaluator.symbols;
-        let sets = |all: SwitchSet, routine: &u32| all.join(symbols.effects_of(*routine).switches);
-        let sets = called.iter().fold(SwitchSet::EMPTY, sets);
-        if self.resumes {
-            // An error may have left it anywhere, and RETRY may call it again.
-            self.join_switches(sets, state);
-        }
-        if called.iter().any(|routine| symbols.effects_of(*routine).uses_position) {
-            self.visitor.record_position_use(&state.reaching);
-        }
-        let all_move = called.iter().all(|routine| symbols.effects_of(*routine).moves);
-        self.after_calls(called, !all_move, state);
-        let mut exit = SwitchSet::EMPTY;
-        let mut gripped = None;
-        for &routine in called {
-            let AbstractState { modal, gripped: before, .. } = *state;
-            self.visitor.record_call(CallSite { routine, modal, gripped: before });
-            let end = self.visitor.exit_of(routine);
-            exit = exit.join(end.modal);
-            gripped.join(&end.gripped.map(|gripped| gripped.after(before)));
-        }
-        state.gripped = gripped.unwrap_or(state.gripped);
-        if exit == SwitchSet::EMPTY {
-            state.reachable = self.resumes;
-            return;
-        }
-        state.modal = exit.substitute_entry(state.modal);
-        if !exit.is_entry(Switch::Displacement) {
-            let value = if exit.is_off(Switch::Displacement) {
-                Value::from_frame(&Frame::IDENTITY)
-            } else {
-                Value::Unknown(Reason::Displacement)
-            };
-            state.known.insert(DISPLACEMENT, value);
-        }
-        if self.resumes {
-            self.join_switches(sets, state);
-        }
-        self.invalidate_called(name, Syntax::Call, state);
     }
 }
 
