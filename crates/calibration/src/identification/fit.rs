@@ -288,6 +288,11 @@ const OUTLIER_CUT: f64 = 10.0;
 /// Largest share of rejected rows: more is a systematic effect.
 const OUTLIER_SHARE: f64 = 0.1;
 
+/// σ of one coordinate or length over the median size of the errors: 1.4826 for |normal|; the norm of three coordinates has median 1.538 σ.
+pub(crate) fn sigma_per_median(sensor: Sensor) -> f64 {
+    if sensor == Sensor::Cable { 1.4826 } else { 1.0 / 1.538 }
+}
+
 /// Detects gross outliers by a robust fit of geometry.
 pub fn outliers(
     observed: &Observations,
@@ -308,8 +313,7 @@ pub fn outliers(
     let (mut model, mut frames) = (start.model.clone(), start.frames.clone());
     let mut scaled = vec![0.0; dataset.rows.len()];
     let mut sigma = 0.1;
-    // 1.4826 turns the median of |normal| into σ; the norm of three coordinates has median 1.538 σ.
-    let consistency = if dataset.sensor == Sensor::Cable { 1.4826 } else { 1.0 / 1.538 };
+    let consistency = sigma_per_median(dataset.sensor);
     let mut before: Option<CalibrationProblem> = None;
     let mut steps = StepBudget::of(observed, &parameters);
     for _ in 0..ROBUST_ROUNDS {

@@ -6,7 +6,9 @@
 use super::error::TrackError;
 use super::options::Options;
 use crate::identification::calibration::Frames;
-use crate::identification::fit::{Fitted, Observations, Start, errors_on, fit, frame_parameters};
+use crate::identification::fit::{
+    Fitted, Observations, Start, errors_on, fit, frame_parameters, sigma_per_median,
+};
 use crate::identification::register::register;
 use crate::identification::solver::SOLVERS;
 use crate::identification::tolerance::Tolerance;
@@ -39,7 +41,7 @@ const FOREIGN_MM: f64 = 0.05;
 const CHANCE: f64 = 1.25;
 
 /// The arm has changed if another geometry lowers the residuals of the first poses by this factor: lengths that one cable reads are
-/// fitted closely by any geometry.
+/// fitted closely by any geometry, and need more poses than the default.
 const CHANGED: f64 = 1.5;
 const CHANGED_CABLE: f64 = 2.5;
 
@@ -91,14 +93,13 @@ fn robust_registration(
     unexplained_mm: f64,
 ) -> Result<(Observations, Fitted), TrackError> {
     let count = observed.dataset.rows.len();
-    let consistency = if observed.dataset.sensor == Sensor::Cable { 1.4826 } else { 1.0 / 1.538 };
     let mut kept: Vec<usize> = (0..count).collect();
     loop {
         let here = observed.subset(&kept);
         let fitted = register(&here, &model.model, &Tolerance::default())?.fitted;
         let errors: Vec<f64> =
             errors_on(&here, &fitted.model, &fitted.frames).into_iter().map(f64::abs).collect();
-        let scale = consistency * median(&errors).unwrap_or(0.0);
+        let scale = sigma_per_median(here.dataset.sensor) * median(&errors).unwrap_or(0.0);
         let worst = (0..errors.len()).max_by(|a, b| errors[*a].total_cmp(&errors[*b]));
         match worst {
             Some(worst)
