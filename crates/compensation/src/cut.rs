@@ -6,8 +6,8 @@
 //!
 //! Predecessor of a motion: the one that the text executes before it ([`Motion::previous`]) and, where loops, branches and
 //! labels leave that open, the preceding one in the same routine. Mutually exclusive branches therefore form one cut, which
-//! refuses too much rather than too little. A cut extends into a called routine of RAPID and out of it ([`Listing::across_calls`]), so
-//! that the cuts of all callers may be one. Instructions whose path is not in the text (calls with targets, cycles) separate cuts, since the
+//! refuses too much rather than too little. A cut extends into a called routine or subprogram and out of it ([`Listing::across_calls`]),
+//! so that the cuts of all callers may be one. Instructions whose path is not in the text (calls with targets, cycles) separate cuts, since the
 //! motions after them belong to other cuts.
 
 use rayon::prelude::*;
@@ -60,16 +60,10 @@ pub(crate) fn of(listing: &Listing, treatment: Cuts) -> CutsOf {
         .enumerate()
         .map(|(index, motion)| {
             let stands_before = || {
-                let in_text = |before: &usize| {
-                    let before = &motions[*before];
-                    before.place.file == motion.place.file && before.routine == motion.routine
-                };
-                let before = index.checked_sub(1).filter(in_text)?;
-                // A block of which not even the kind is known, behind a call, may go on from the motion before it.
-                let bridged = motion.own_reason == Some(Reason::UnknownFlow);
-                let is_call = |at: &usize| bridged && motions[*at].own_reason == Some(Reason::Subprogram);
-                let before = (0..=before).rev().take_while(in_text).find(|at| !is_call(at))?;
-                Some(before as u32)
+                let before = index.checked_sub(1)?;
+                let in_text = motions[before].place.file == motion.place.file
+                    && motions[before].routine == motion.routine;
+                in_text.then_some(before as u32)
             };
             let start = motion.previous.or_else(stands_before)?;
             is_one_cut(start, index as u32).then_some(start)

@@ -31,6 +31,7 @@
 
 pub mod tree;
 mod dataflow;
+mod motion_set;
 pub mod shared;
 pub mod edit;
 pub mod label;

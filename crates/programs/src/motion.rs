@@ -484,7 +484,8 @@ pub struct Listing {
     pub external_calls: Vec<u32>,
     /// Calls of routines that no file declares (RAPID).
     pub outside_calls: Vec<OutsideCall>,
-    /// Motions that may follow each other across a call of a routine or its return: the earlier and the later one, sorted (RAPID).
+    /// Motions that may follow each other across a call of a routine or its return, and in NC files across a jump: the earlier and the
+    /// later one, sorted.
     pub across_calls: Vec<[u32; 2]>,
     /// Regions that could not be parsed.
     pub opaque: Vec<OpaqueRegion>,

@@ -248,6 +248,32 @@ fn a_cut_whose_rest_is_reached_by_jumps_or_calls_stays_whole() {
     }
 }
 
+/// Blocks with a G1 of their own before, in and behind a subprogram are one cut, from whichever side one of them cannot be corrected.
+#[test]
+fn a_cut_that_goes_on_in_a_subprogram_stays_whole() {
+    let head = "O1\n(truegrind angles wpr)\n(truegrind tool T1 t [[0,0,50],[1,0,0,0]])\n(truegrind frame G54 w [[400,0,250],[1,0,0,0]])\n\
+                G90 G21 G17 G54\nT1 M6\nG43.4 H1\n";
+    let at = |x: f64| format!("G1 X{x:.1} Y0. Z20. A180. B0. C0. F600.\n");
+    let cut = |[before, within, behind]: [f64; 3]| {
+        let first = format!("G0 X{before:.1} Y0. Z40. A180. B0. C0.\n");
+        let [before, within, behind] = [before, within, behind].map(at);
+        let source =
+            [head, &first, &before, "M98 P1000\n", &behind, "G0 Z60.\nM30\nO1000\n", &within, "M99\n"]
+                .concat();
+        let setup = Setup { angles: Some(Angles::Wpr), ..Setup::default() };
+        let program = Program::Nc(nc::Task::read(&[("p.nc", source.as_bytes())], &setup));
+        let found =
+            statuses(&compensate(&program, &known(), &Cell::default(), &Options::default(), None).unwrap());
+        // The first and last cutting block and that of the subprogram.
+        [found[1], found[3], found[5]]
+    };
+    assert_eq!(cut([-10.0, 0.0, 10.0]), [Changed; 3]);
+    // Out of reach.
+    for far in [[-10.0, 900.0, 10.0], [-10.0, 0.0, 900.0], [900.0, 0.0, 10.0]] {
+        assert_eq!(cut(far), [Refused; 3], "{far:?}");
+    }
+}
+
 #[test]
 fn a_routine_whose_frame_is_a_parameter_belongs_to_the_cuts_around_its_calls() {
     let [a, b] = [380.0, 395.0].map(|x| line(x, "z1"));

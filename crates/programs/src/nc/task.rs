@@ -23,6 +23,7 @@ mod prescan;
 mod tools;
 mod words;
 mod block_context;
+mod call_edges;
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc as Shared;
@@ -43,6 +44,7 @@ use crate::motion::{
 };
 use block::Block;
 pub(super) use block_context::{BlockArc, BlockContext, StartDependency, StateEvent};
+use call_edges::{CallEdges, FlowPoint};
 use file_effects::FileEffects;
 use file_scan::FileScan;
 
@@ -94,6 +96,7 @@ impl<'s> Task<'s> {
             events: Vec::new(),
             contexts: Vec::new(),
         };
+        let mut call_edges = CallEdges::default();
         for file in 0..files.len() {
             let mut interpreter =
                 Interpreter::new(&task.trees[file], file as u32, task.dialects[file], setup);
@@ -102,14 +105,17 @@ impl<'s> Task<'s> {
             interpreter.listing = std::mem::take(&mut task.listing);
             interpreter.events = std::mem::take(&mut task.events);
             interpreter.contexts = std::mem::take(&mut task.contexts);
+            interpreter.call_edges = std::mem::take(&mut call_edges);
             interpreter.file();
             task.angles.push(interpreter.angles);
             let open =
                 interpreter.listing.invalid_statements.iter_mut().filter(|comment| comment.file.is_empty());
             open.for_each(|comment| comment.file.clone_from(&task.names[file]));
             let Interpreter { listing, events, contexts, .. } = interpreter;
+            call_edges = interpreter.call_edges;
             (task.listing, task.events, task.contexts) = (listing, events, contexts);
         }
+        task.listing.across_calls = call_edges.solve(&task.names, task.listing.motions.len() as u32);
         task.leave_pinned_ends();
         task
     }
@@ -145,6 +151,7 @@ pub(super) struct Interpreter<'t, 's> {
     listing: Listing,
     events: Vec<StateEvent>,
     contexts: Vec<BlockContext>,
+    call_edges: CallEdges,
     instructions: BTreeMap<String, Shared<str>>,
     speeds: BTreeMap<u64, u32>,
     tool_index: HashMap<String, u32>,
@@ -166,12 +173,14 @@ struct Pass {
     synchronised_actions: bool,
     /// The state before the subprogram that is being read.
     state_before_subprogram: Option<ModalState>,
+    /// The program that a modal call calls after each motion.
+    modal_callee: Option<Variable>,
     /// The last block of the contour that is being read.
     contour_end: Option<u64>,
 }
 
 /// The lengths of the lists before a file.
-struct Lengths([usize; 7]);
+struct Lengths([usize; 8]);
 
 impl Transfer for Interpreter<'_, '_> {
     type State = ModalState;
@@ -237,6 +246,7 @@ impl<'t, 's> Interpreter<'t, 's> {
             listing: Listing { numbered: true, ..Listing::default() },
             events: Vec::new(),
             contexts: Vec::new(),
+            call_edges: CallEdges::default(),
             instructions: BTreeMap::new(),
             speeds: BTreeMap::new(),
             tool_index: HashMap::new(),
@@ -276,11 +286,13 @@ impl<'t, 's> Interpreter<'t, 's> {
         if !self.has_nc_blocks && self.listing.motions[lengths.0[0]..].iter().all(unread) {
             self.truncate_to(&lengths);
             self.events.push(StateEvent::FileStart);
+            self.flow(FlowPoint::File { restarts: false });
         }
     }
 
     fn interpret_file(&mut self) {
         self.events.push(StateEvent::FileStart);
+        self.flow(FlowPoint::File { restarts: self.scan.restarts_at_end });
         if self.scan.is_subprogram {
             self.start_subprogram();
         } else if self.scan.restarts_at_end {
@@ -299,12 +311,13 @@ impl<'t, 's> Interpreter<'t, 's> {
             listing.work_objects.len(),
             self.events.len(),
             self.contexts.len(),
+            self.call_edges.len(),
         ])
     }
 
     fn truncate_to(
         &mut self,
-        &Lengths([motions, speeds, zones, tools, objects, events, contexts]): &Lengths,
+        &Lengths([motions, speeds, zones, tools, objects, events, contexts, points]): &Lengths,
     ) {
         self.listing.motions.truncate(motions);
         self.listing.external_calls.retain(|call| (*call as usize) < motions);
@@ -314,6 +327,7 @@ impl<'t, 's> Interpreter<'t, 's> {
         self.listing.work_objects.truncate(objects);
         self.events.truncate(events);
         self.contexts.truncate(contexts);
+        self.call_edges.truncate(points);
         self.speeds.clear();
         self.tool_index.clear();
         self.frame_index = None;
@@ -413,6 +427,9 @@ impl<'t, 's> Interpreter<'t, 's> {
         }
         if self.is_reached_by_jumps(block) {
             self.join_unseen_predecessors();
+            let is_number = block.words.first().is_some_and(|word| word.address() == Some(b'N'));
+            // REPEAT repeats up to a label.
+            self.flow(if is_number { FlowPoint::Arrives } else { FlowPoint::Joins });
             self.state.mode = MotionMode::Unknown(Reason::UnknownFlow);
         }
         self.contour_of(block);
@@ -437,6 +454,7 @@ impl<'t, 's> Interpreter<'t, 's> {
             self.pass.synchronised_actions = true;
             self.state.variables.invalidate(Reason::UnknownVariable);
             self.join_unseen_predecessors();
+            self.flow(FlowPoint::Joins);
             return;
         }
         if self.scan.unknown_control {
@@ -496,7 +514,8 @@ impl<'t, 's> Interpreter<'t, 's> {
         };
         // M99 P100, and M96 and M46 of Haas, jump, perhaps past the next blocks.
         if block.m.iter().any(|m| matches!(m, 46 | 96 | 99)) {
-            self.branch();
+            let returns = block.m.contains(&99) && block.p.is_none();
+            self.branch_by(if returns { FlowPoint::Return } else { FlowPoint::Leaves });
         }
         if self.dialect == Dialect::Heidenhain && block.m.contains(&129) {
             // It takes effect at the end of its block.
@@ -504,6 +523,9 @@ impl<'t, 's> Interpreter<'t, 's> {
         }
         if block.m.iter().any(end) || block.words.iter().any(|word| word.is("RET")) {
             self.pass.program_ended = true;
+            if !block.m.contains(&99) {
+                self.flow(FlowPoint::Return);
+            }
         } else if block.m.contains(&6) {
             self.invalidate_pose();
         }

@@ -3,13 +3,20 @@
 use super::super::dialect::Dialect;
 use super::super::expression::{Evaluated, Variable, numbered};
 use super::super::modal_group::ModalGroup;
-use super::super::syntax::WordValue;
+use super::super::syntax::{Word, WordValue};
 use super::super::token::Token;
+use super::call_edges::program_of;
 use super::siemens_names::{AddressEffect, address_effect};
-use super::{Block, Interpreter, StateEvent};
+use super::{Block, FlowPoint, Interpreter, StateEvent};
 use crate::motion::Reason;
 
 impl Interpreter<'_, '_> {
+    /// Records a point at which control does not simply pass on to the next block.
+    pub(super) fn flow(&mut self, point: FlowPoint) {
+        let next = self.listing.motions.len() as u32;
+        self.call_edges.push(point, self.file, next, false);
+    }
+
     /// Whether a block has predecessors other than the block before it.
     pub(super) fn is_reached_by_jumps(&self, block: &Block<'_>) -> bool {
         let Some(first) = block.words.first() else { return false };
@@ -234,6 +241,7 @@ impl Interpreter<'_, '_> {
                 if !self.contexts.is_empty() {
                     self.join_unseen_predecessors();
                 }
+                self.flow(FlowPoint::Program(self.program_name(first)));
                 // Other words may follow on its line.
                 block.words.iter().filter(|word| word.address() != Some(b'N')).count() == 1
             }
@@ -242,10 +250,14 @@ impl Interpreter<'_, '_> {
                 if !self.contexts.is_empty() {
                     self.join_unseen_predecessors();
                 }
+                self.flow(FlowPoint::Program(self.program_name(first)));
                 true
             }
             (b"PROC", _) => {
                 self.join_unseen_predecessors();
+                let name = block.words.iter().skip_while(|word| !word.is("PROC")).nth(1);
+                let name = name.map(|word| word.name.to_ascii_uppercase());
+                self.flow(FlowPoint::Program(name.unwrap_or_default()));
                 true
             }
             (b"IF", _) => {
@@ -259,6 +271,7 @@ impl Interpreter<'_, '_> {
                 _,
             ) => {
                 self.join_unseen_predecessors();
+                self.flow(FlowPoint::Joins);
                 true
             }
             _ if name.starts_with(b"GOTO") => {
@@ -271,6 +284,8 @@ impl Interpreter<'_, '_> {
             }
             (b"MCALL", _) => {
                 let is_subprogram = block.words.iter().skip_while(|word| !word.is("MCALL")).nth(1);
+                let program = |word: &Word<'_>| program_of(&String::from_utf8_lossy(word.name));
+                self.pass.modal_callee = is_subprogram.map(program);
                 self.state.modal_call = is_subprogram.map(|word| {
                     let cycle = super::siemens_names::is_cycle(&word.name.to_ascii_uppercase());
                     if cycle { Reason::Cycle } else { Reason::Subprogram }
@@ -300,6 +315,7 @@ impl Interpreter<'_, '_> {
             b"SUB" => {
                 let state_before_subprogram = self.state.clone();
                 self.join_unseen_predecessors();
+                self.flow(FlowPoint::Program(self.word_text(&block.words[0])));
                 self.pass.state_before_subprogram = Some(state_before_subprogram);
             }
             // The main path bypasses a subprogram, whose state holds only where it is called.
@@ -311,38 +327,104 @@ impl Interpreter<'_, '_> {
                 self.frame_index = None;
                 self.tool_index.clear();
                 self.events.push(StateEvent::Join);
+                self.flow(FlowPoint::EndOfSubprogram);
             }
-            _ => self.join_unseen_predecessors(),
+            b"RETURN" => {
+                self.join_unseen_predecessors();
+                self.flow(FlowPoint::Return);
+            }
+            _ => {
+                self.join_unseen_predecessors();
+                self.flow(FlowPoint::Joins);
+            }
         }
     }
 
     /// A call is listed; the pose after it is unknown. A program that is not in the file may also change the modal
     /// state: it is assumed not to, and the call is listed in [`crate::motion::Listing::external_calls`].
     pub(super) fn subprogram(&mut self, block: &Block<'_>, name: &str) {
-        if !self.calls_own_file(block) {
+        let callee = self.callee(block);
+        let is_own = match &callee {
+            Some(name) => name.starts_with(LABEL) || self.scan.programs.contains(name),
+            None => true,
+        };
+        if !is_own {
             self.listing.external_calls.push(self.listing.motions.len() as u32);
         }
         self.list_left(block, name, Reason::Subprogram);
         self.join_unseen_predecessors();
+        let (next, may_skip) = (self.listing.motions.len() as u32, block.skippable);
+        self.call_edges.push(FlowPoint::Call { callee, may_skip }, self.file, next, true);
     }
 
-    /// Whether the program that a block calls is in the file.
-    fn calls_own_file(&self, block: &Block<'_>) -> bool {
-        let Some(first) = block.words.iter().find(|word| word.address() != Some(b'N')) else { return false };
-        let text = self.tree.source()[self.tree.range(first.first, first.end)].to_ascii_uppercase();
+    /// The program that a block calls, as [`FileScan::programs`](super::FileScan::programs) names it; `None` for a place in the same
+    /// program (M97, REPEAT), an empty name where it is computed.
+    pub(super) fn callee(&self, block: &Block<'_>) -> Option<Variable> {
+        let Some(first) = block.words.iter().find(|word| word.address() != Some(b'N')) else {
+            return Some(Variable::new());
+        };
+        let text = self.word_text(first);
+        let words = || text.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+        let node = self.tree.nodes.get(block.node);
+        let whole = || self.tree.source()[self.tree.range(node.first, node.end)].to_ascii_uppercase();
+        let quoted = || whole().split(|byte| *byte == b'"').nth(1).map(<[u8]>::to_vec);
         match self.dialect {
             Dialect::Heidenhain => {
-                text.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty()).nth(1) == Some(b"LBL")
+                let name = words().nth(2).map(<[u8]>::to_vec).unwrap_or_default();
+                match words().nth(1) {
+                    Some(b"LBL") => Some(label(&name)),
+                    Some(b"PGM") => Some(program_of(&String::from_utf8_lossy(&quoted().unwrap_or(name)))),
+                    // The program of cycle 12.
+                    _ => Some(Variable::new()),
+                }
             }
-            Dialect::Siemens => text.starts_with(b"REPEAT"),
-            Dialect::LinuxCnc if first.address() == Some(b'O') => self.scan.programs.contains(&text),
+            Dialect::Siemens if text.starts_with(b"REPEAT") => None,
+            Dialect::Siemens => {
+                let named = if [&b"CALL"[..], b"PCALL", b"EXTCALL"]
+                    .iter()
+                    .any(|call| first.name.eq_ignore_ascii_case(call))
+                {
+                    quoted()
+                } else {
+                    Some(text.split(|byte| *byte == b'(').next().unwrap_or_default().to_vec())
+                };
+                Some(program_of(&String::from_utf8_lossy(&named.unwrap_or_default())))
+            }
+            Dialect::LinuxCnc if first.address() == Some(b'O') => Some(text),
+            _ if block.m.contains(&97) => None,
             _ => {
                 let number = block.p.and_then(|index| self.literal(&block.words[index]));
                 // M98 P51000 calls O1000 five times.
-                let here =
-                    |p: f64| [p, p % 1e4].iter().any(|p| self.scan.programs.contains(&numbered(b"O", *p)));
-                block.m.contains(&97) || number.is_some_and(here)
+                let names = |p: f64| [p, p % 1e4].map(|p| numbered(b"O", p));
+                let [whole, last] = number.map(names).unwrap_or_default();
+                let is_own = |name: &Variable| self.scan.programs.contains(name);
+                Some(if is_own(&whole) || !is_own(&last) && number.is_some_and(|p| p < 1e4) {
+                    whole
+                } else {
+                    last
+                })
             }
         }
     }
+
+    /// The name of the program that begins with a word.
+    fn program_name(&self, first: &Word<'_>) -> Variable {
+        match self.literal(first) {
+            Some(number) => numbered(b"O", number),
+            None => self.word_text(first),
+        }
+    }
+
+    /// The text of a word, in upper case.
+    fn word_text(&self, word: &Word<'_>) -> Variable {
+        self.tree.source()[self.tree.range(word.first, word.end)].to_ascii_uppercase()
+    }
+}
+
+/// What the names of labels begin with.
+const LABEL: &[u8] = b"LBL ";
+
+/// The name of a label of Heidenhain.
+pub(super) fn label(name: &[u8]) -> Variable {
+    [LABEL, name].concat()
 }

@@ -6,7 +6,8 @@ use super::super::modal_group::ModalGroup;
 use super::super::modal_state::MotionMode;
 use super::super::syntax::{Word, WordValue};
 use super::super::token::Token;
-use super::{Block, Interpreter, StartDependency};
+use super::control_flow::label;
+use super::{Block, FlowPoint, Interpreter, StartDependency};
 use crate::motion::Reason;
 use truegrind_math::se3::Pose;
 
@@ -105,9 +106,10 @@ impl<'s> Interpreter<'_, 's> {
             b"FN" | b"Q" | b"QL" | b"QR" => self.function_block(block, first, &text, &words),
             b"LBL" if second != b"0" => {
                 self.join_unseen_predecessors();
+                self.flow(FlowPoint::Label(label(second)));
                 self.state.mode = MotionMode::Unknown(Reason::UnknownFlow);
             }
-            b"LBL" => self.branch(),
+            b"LBL" => self.branch_by(FlowPoint::Return),
             b"CALL" | b"SEL" if second == b"LBL" || second == b"PGM" || name == b"CALL" => {
                 self.subprogram(block, "CALL");
             }

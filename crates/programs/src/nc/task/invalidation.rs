@@ -7,7 +7,7 @@ use super::super::modal_state::{AssignedKinds, MotionMode};
 use super::super::syntax::WordValue;
 use super::super::token::Token;
 use super::siemens_names::code_name;
-use super::{Block, Interpreter, START_TOOL, StateEvent, start_offset};
+use super::{Block, FlowPoint, Interpreter, START_TOOL, StateEvent, start_offset};
 use crate::motion::Reason;
 
 impl Interpreter<'_, '_> {
@@ -89,8 +89,14 @@ impl Interpreter<'_, '_> {
 
     /// A branch: control flow may continue elsewhere in the file.
     pub(super) fn branch(&mut self) {
+        self.branch_by(FlowPoint::Leaves);
+    }
+
+    /// The same, by a jump or a return.
+    pub(super) fn branch_by(&mut self, point: FlowPoint) {
         self.pass.branched = true;
         self.events.push(StateEvent::Branch);
+        self.flow(point);
     }
 
     /// Records that a block which is never modified depends on the tool position.

@@ -10,7 +10,7 @@ use super::super::expression::Evaluated;
 use super::super::modal_group::{ARC_GROUPS, MOTION_GROUPS, ModalGroup, TOOL_GROUPS};
 use super::super::modal_state::{MotionMode, OrientationMode, all_known};
 use super::super::syntax::WordValue;
-use super::{Block, BlockArc, BlockContext, Interpreter, StartDependency, StateEvent};
+use super::{Block, BlockArc, BlockContext, FlowPoint, Interpreter, StartDependency, StateEvent};
 use crate::motion::{
     FARTHEST_MM, Modal, Motion, MotionKind, MotionTarget, Origin, Reason, RobTarget, Role, Span, Speed,
     SpeedValue, Switch, TargetValue, Zone, ZoneValue,
@@ -302,6 +302,8 @@ impl Interpreter<'_, '_> {
                 self.listing.external_calls.push(self.listing.motions.len() as u32 - 1);
             }
             self.join_unseen_predecessors();
+            let callee = Some(self.pass.modal_callee.clone().unwrap_or_default());
+            self.flow(FlowPoint::Call { callee, may_skip: false });
             self.state.modal_call = call;
         } else if (machine || block.unmodelled.is_some())
             && block.abc.iter().chain(&block.rpy).chain(&block.vector).any(Option::is_some)

@@ -55,6 +55,7 @@ impl Interpreter<'_, '_> {
             Action::Call => self.subprogram(block, "G65"),
             Action::ModalCall => {
                 self.subprogram(block, "G66");
+                self.pass.modal_callee = self.callee(block);
                 self.state.modal_call = Some(Reason::Subprogram);
             }
             Action::ModalCallEnd => {

@@ -5,6 +5,7 @@
 //! motion before a call is also the last behind it if the routine may end without a motion. What an error handler repeats is left out.
 
 use crate::dataflow::{Edge, Lattice, propagate};
+use crate::motion_set::MotionSet;
 use crate::rapid::reaching_motions::{Last, ReachingMotions};
 use crate::rapid::symbol::Symbols;
 
@@ -104,7 +105,7 @@ impl CallEdges {
         let passes = self.passing(symbols);
         let nodes = Nodes { units: self.ends.len() as u32, calls: self.calls.len() as u32 };
         let count = nodes.iteration(self.iterations.len() as u32) as usize;
-        let mut last = vec![Motions::default(); count];
+        let mut last = vec![MotionSet::default(); count];
         let mut edges: Vec<Edge<()>> = Vec::new();
         // What may be last according to a set of a unit: motions, and nodes.
         let sources = |unit: u32, reaching: &ReachingMotions, found: &mut dyn FnMut(Result<u32, u32>)| {
@@ -166,7 +167,7 @@ impl CallEdges {
         }
         edges.sort_unstable();
         edges.dedup();
-        last.iter_mut().for_each(Motions::normalise);
+        last.iter_mut().for_each(MotionSet::normalise);
         let height = last.iter().map(|motions| motions.0.len()).sum();
         propagate(&mut last, height, &mut edges, |(), motions| motions.clone());
         let mut out = Vec::new();
@@ -225,24 +226,5 @@ impl CallEdges {
                 return units;
             }
         }
-    }
-}
-
-/// A set of motions, sorted.
-#[derive(Debug, Clone, Default, PartialEq)]
-struct Motions(Vec<u32>);
-
-impl Motions {
-    fn normalise(&mut self) {
-        self.0.sort_unstable();
-        self.0.dedup();
-    }
-}
-
-/// The union.
-impl Lattice for Motions {
-    fn join(&mut self, other: &Self) {
-        self.0.extend_from_slice(&other.0);
-        self.normalise();
     }
 }

@@ -66,3 +66,68 @@ fn calls_of_programs_outside_the_file_are_listed() {
     assert_eq!(outside("a.h", klartext), [3, 6]);
     assert_eq!(outside("a.h", &klartext.replace("5 CYCL CALL", "5 L X+5 M99")), [3, 6]);
 }
+
+/// Motions that may follow each other across calls, returns, jumps and loops, as pairs of lines.
+#[test]
+fn motions_follow_each_other_across_calls() {
+    let pairs = |files: &[(&str, &str)]| -> Vec<[u32; 2]> {
+        let go = "G1 X1. Y2. Z3. A180. B0. C0. F600.\n";
+        let klartext = "L X+1 Y+2 Z+3 F600\n";
+        let expand =
+            |name: &str, text: &str| text.replace("GO\n", if name.ends_with(".h") { klartext } else { go });
+        let texts: Vec<(&str, String)> =
+            files.iter().map(|(name, text)| (*name, expand(name, text))).collect();
+        let files: Vec<(&str, &[u8])> = texts.iter().map(|(name, text)| (*name, text.as_bytes())).collect();
+        let task = Task::read(&files, &Setup::default());
+        let line = |motion: u32| {
+            let place = task.listing.motions[motion as usize].place;
+            place.file * 100 + place.line
+        };
+        task.listing.across_calls.iter().map(|pair| pair.map(line)).collect()
+    };
+    let one = |name: &str, text: &str| pairs(&[(name, text)]);
+    assert!(one("a.nc", "O1\nGO\nGO\nM30\n").is_empty());
+    // Lines 2 and 4 of the main program, 7 and 8 of the subprogram, called twice in the second.
+    assert_eq!(one("a.nc", "O1\nGO\nM98 P2\nGO\nM30\nO2\nGO\nGO\nM99\n"), [[2, 7], [8, 4]]);
+    assert_eq!(
+        one("a.nc", "O1\nGO\nM98 P20002\nM98 P2\nGO\nM30\nO2\nGO\nGO\nM99\n"),
+        [[2, 8], [9, 5], [9, 8]]
+    );
+    // A call that may be skipped, and a return that may be.
+    assert_eq!(one("a.nc", "O1\nGO\n/M98 P2\nGO\nM30\nO2\nGO\nGO\nM99\n"), [[2, 4], [2, 7], [8, 4]]);
+    assert_eq!(one("a.nc", "O1\nGO\nM98 P2\nGO\nM30\nO2\nGO\n/M99\nGO\nM99\n"), [[2, 7], [7, 4], [9, 4]]);
+    // A subprogram without motions, and one of no file, which may have none.
+    assert_eq!(one("a.nc", "O1\nGO\nM98 P2\nGO\nM98 P2\nGO\nM30\nO2\nM8\nM99\n"), [[2, 4], [4, 6]]);
+    assert_eq!(one("a.nc", "O1\nGO\nM98 P9\nGO\nM30\n"), [[2, 4]]);
+    // Through one that only calls.
+    assert_eq!(
+        one("a.nc", "O1\nGO\nM98 P2\nGO\nM30\nO2\nM98 P3\nM99\nO3\nGO\nGO\nM99\n"),
+        [[2, 10], [11, 4]]
+    );
+    // A loop, a jump back, and a main program that starts again.
+    assert!(one("a.nc", "O1\nWHILE[#1LT3]DO1\nGO\nM8\nGO\nEND1\nGO\nM30\n").contains(&[5, 3]));
+    assert!(one("a.nc", "O1\nN10\nGO\nGO\nIF[#1LT3]GOTO10\nGO\nM30\n").contains(&[4, 3]));
+    assert!(one("a.nc", "O1\nGO\nM97 P10\nGO\nM30\nN10 GO\nGO\nM99\n").contains(&[7, 4]));
+    assert!(one("a.mpf", "AGAIN:\nGO\nGO\nDONE:\nREPEAT AGAIN DONE\nGO\nM30\n").contains(&[3, 2]));
+    assert_eq!(one("a.nc", "O1\nGO\nM8\nGO\nM99\n"), [[4, 2]]);
+    // Subprograms of LinuxCNC, which the main program bypasses, and labels of Klartext, which it passes.
+    assert_eq!(
+        one("a.ngc", "GO\no<in> sub\nGO\nGO\no<in> endsub\nGO\no<in> call\nGO\nM2\n"),
+        [[1, 6], [4, 8], [6, 3]]
+    );
+    assert_eq!(
+        one("a.h", "BEGIN PGM A MM\nGO\nLBL 1\nGO\nGO\nLBL 0\nGO\nCALL LBL 1\nGO\nEND PGM A MM\n"),
+        [[5, 9], [7, 4]]
+    );
+    // Other files of the same run.
+    let called = ("SUB1.SPF", "GO\nGO\nM17\n");
+    assert_eq!(pairs(&[("a.mpf", "GO\nSUB1\nGO\nM30\n"), called]), [[1, 101], [102, 3]]);
+    assert_eq!(pairs(&[called, ("a.mpf", "GO\nCALL \"SUB1\"\nGO\nM30\n")]), [[2, 103], [101, 1]]);
+    assert_eq!(
+        pairs(&[
+            ("a.h", "BEGIN PGM A MM\nGO\nCALL PGM B.H\nGO\nEND PGM A MM\n"),
+            ("b.h", "BEGIN PGM B MM\nGO\nEND PGM B MM\n")
+        ]),
+        [[2, 102], [102, 4]]
+    );
+}
