@@ -1,17 +1,19 @@
 //! Lists of line numbers for a sentence.
 
+use std::path::Path;
+
 use truegrind_programs::motion::{Listing, Place};
 
 /// Line numbers of motions, the first few; `None` without any.
 pub(crate) fn lines_of(listing: &Listing, motions: &[u32]) -> Option<String> {
-    numbered(motions.iter().map(|motion| listing.motions[*motion as usize].place))
+    numbered(listing, motions.iter().map(|motion| listing.motions[*motion as usize].place))
 }
 
 /// How many lines are listed.
 const NAMED_LINES: usize = 8;
 
 /// Line numbers, the first few, by file where there are several; `None` without any.
-pub(crate) fn numbered(places: impl Iterator<Item = Place>) -> Option<String> {
+pub(crate) fn numbered(listing: &Listing, places: impl Iterator<Item = Place>) -> Option<String> {
     let mut files: Vec<(u32, Vec<String>)> = Vec::new();
     let (mut last, mut listed, mut more) = (None, 0, "");
     for place in places {
@@ -29,10 +31,11 @@ pub(crate) fn numbered(places: impl Iterator<Item = Place>) -> Option<String> {
             _ => files.push((place.file, vec![line])),
         }
     }
-    let is_one_file = files.iter().all(|(file, _)| *file == 0);
+    let is_one_file = listing.files.len() < 2;
     let of_file = |(file, lines): &(u32, Vec<String>)| {
         let word = if lines.len() == 1 { "line" } else { "lines" };
-        let place = if is_one_file { String::new() } else { format!(" of file {}", file + 1) };
+        let name = Path::new(&listing.files[*file as usize]).file_name().unwrap_or_default().display();
+        let place = if is_one_file { String::new() } else { format!(" of {name}") };
         format!("{word} {}{place}", lines.join(", "))
     };
     let named: Vec<String> = files.iter().map(of_file).collect();

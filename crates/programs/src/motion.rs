@@ -453,6 +453,8 @@ pub struct OpaqueRegion {
 /// ```
 #[derive(Debug, Clone, Default)]
 pub struct Listing {
+    /// The names of the files, as given.
+    pub files: Vec<String>,
     /// The motions, in the order of files and lines.
     pub motions: Vec<Motion>,
     /// Named targets that motions use.

@@ -138,7 +138,7 @@ fn outside_calls_note(listing: &Listing) -> Option<String> {
     let named = routines
         .iter()
         .take(NAMED)
-        .filter_map(|(name, places)| Some(format!("{name} ({})", numbered(places.iter().copied())?)));
+        .filter_map(|(name, places)| Some(format!("{name} ({})", numbered(listing, places.iter().copied())?)));
     let named: Vec<String> = named.collect();
     let more = routines.len().saturating_sub(NAMED);
     let more = if more > 0 { format!(" and {more} more") } else { String::new() };

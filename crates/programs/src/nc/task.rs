@@ -92,7 +92,11 @@ impl<'s> Task<'s> {
             trees,
             dialects,
             angles: Vec::new(),
-            listing: Listing { numbered: true, ..Listing::default() },
+            listing: Listing {
+                numbered: true,
+                files: files.iter().map(|(name, _)| (*name).to_owned()).collect(),
+                ..Listing::default()
+            },
             events: Vec::new(),
             contexts: Vec::new(),
         };

@@ -60,7 +60,8 @@ impl<'s> Task<'s> {
         let symbols = Box::new(Symbols::collect(&trees));
         let ((listing, loads, guarded), marks) =
             rayon::join(|| listing(&trees, &symbols), || trees.iter().map(mark::Places::of).collect());
-        let names = files.iter().map(|(name, _)| (*name).to_owned()).collect();
+        let names: Vec<String> = files.iter().map(|(name, _)| (*name).to_owned()).collect();
+        let listing = Listing { files: names.clone(), ..listing };
         let sources = files.iter().map(|(_, bytes)| *bytes).collect();
         Task { names, sources, trees, symbols, listing, loads, guarded, marks }
     }
