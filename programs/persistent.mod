@@ -1,4 +1,4 @@
-! Shows: persistent numbers, which stay on the controller: offsets by them remain in the program, what else they compute is left.
+! Shows: persistent data, which stay on the controller: offsets by them remain in the program, what else they compute is left.
 MODULE Persistent
   PERS num stock:=5;
   LOCAL PERS num wear{2}:=[0.2,0.3];
@@ -8,6 +8,8 @@ MODULE Persistent
   CONST robtarget pEdge:=[[500,0,300],[0,0.7071068,0.7071068,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];
   CONST robtarget pParts{2}:=[[[480,40,300],[0,0.7071068,0.7071068,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],
     [[480,80,300],[0,0.7071068,0.7071068,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]];
+  PERS robtarget pGiven:=[[480,60,300],[0,0.7071068,0.7071068,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];
+  PERS robtarget pSeen:=[[480,20,300],[0,0.7071068,0.7071068,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];
   PROC main()
     VAR robtarget pNow;
     MoveJ Offs(pEdge,0,0,lift),v100,fine,tool0;
@@ -19,6 +21,8 @@ MODULE Persistent
     pNow:=pEdge;
     pNow.trans.z:=300+stock;
     MoveL pNow,v100,fine,tool0;
+    MoveL pGiven,v100,fine,tool0;
+    MoveL Offs(pSeen,0,0,5),v100,fine,tool0;
     pass:=1;
     MoveL Offs(pEdge,0,20,pass),v100,fine,tool0;
   ENDPROC

@@ -122,6 +122,8 @@ pub struct Declaration {
     pub literal: Option<Span>,
     /// Whether it is an array.
     pub array: bool,
+    /// Whether it stays on the controller when the program ends (PERS), where an operator or another task may change it.
+    pub persistent: bool,
     /// Each use by a motion: (motion, target of that motion).
     pub uses: Vec<(u32, u32)>,
     /// Uses other than as a motion's own target argument (base of `Offs`, operand of an expression, argument of a
@@ -567,6 +569,24 @@ impl Listing {
     pub fn labels_of(&self, number: &str) -> impl Iterator<Item = &str> {
         let here = self.labels.iter().filter(move |(other, _)| super::label::same(other, number));
         here.map(|(_, label)| label.as_str())
+    }
+
+    /// Whether a target follows persistent data, so that only a change of its own numbers or of the first argument of its offset lets it
+    /// do so still.
+    pub fn follows_persistent(&self, target: &MotionTarget) -> bool {
+        match target.origin {
+            Origin::Offset(_) => true,
+            Origin::Declared(declaration) | Origin::Element { declaration, .. } => {
+                self.declarations[declaration as usize].persistent
+            }
+            Origin::Inline | Origin::Computed | Origin::Unknown => false,
+        }
+    }
+
+    /// Whether a target of a motion is itself declared as persistent.
+    pub fn has_persistent_target(&self, motion: &Motion) -> bool {
+        let is_declared = |target: &MotionTarget| !matches!(target.origin, Origin::Offset(_));
+        motion.targets.iter().any(|target| is_declared(target) && self.follows_persistent(target))
     }
 
     /// The tool of a motion.

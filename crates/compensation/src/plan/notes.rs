@@ -82,6 +82,16 @@ pub(crate) fn unchecked_notes(
             counted(by_persistent.len(), "motion is", "motions are")
         ));
     }
+    let to_persistent: Vec<u32> = (0..listing.motions.len() as u32)
+        .filter(|motion| listing.has_persistent_target(&listing.motions[*motion as usize]))
+        .collect();
+    if let Some(lines) = lines_of(listing, &to_persistent) {
+        out.push(format!(
+            "{} to persistent targets (PERS): the correction is that for the values in the files, and what an operator or another task \
+             writes there later is not corrected ({lines})",
+            counted(to_persistent.len(), "motion goes", "motions go")
+        ));
+    }
     if let Some(lines) = lines_of(listing, &listing.external_calls) {
         out.push(format!(
             "{} not in the same file: it is assumed to leave work offset, shifts, tool, units and tool centre point control \
@@ -135,10 +145,9 @@ fn outside_calls_note(listing: &Listing) -> Option<String> {
             None => routines.push((name, vec![call.place])),
         }
     }
-    let named = routines
-        .iter()
-        .take(NAMED)
-        .filter_map(|(name, places)| Some(format!("{name} ({})", numbered(listing, places.iter().copied())?)));
+    let named = routines.iter().take(NAMED).filter_map(|(name, places)| {
+        Some(format!("{name} ({})", numbered(listing, places.iter().copied())?))
+    });
     let named: Vec<String> = named.collect();
     let more = routines.len().saturating_sub(NAMED);
     let more = if more > 0 { format!(" and {more} more") } else { String::new() };

@@ -40,7 +40,7 @@ reasons! {
         HandedOver => "passed to a routine outside the given files, which may change it",
         RunTimeFunction => "result of a function known only at run time",
         RunTimeOffset => "offset by a value known only at run time",
-        Persistent => "computed from persistent data (PERS) that the program does not assign: the controller may hold another value than the file",
+        Persistent => "needs persistent data (PERS), of which the controller may hold another value than the file; declare as CONST what never changes",
         RunTimeIndex => "array element chosen at run time",
         IndexOutOfRange => "array index outside the declared array",
         WrongShape => "the value does not have the form that the instruction requires",

@@ -66,7 +66,7 @@ pub(super) fn index_of(position: f64) -> Option<usize> {
     (index >= 1.0).then(|| index as usize - 1)
 }
 
-/// What is read of persistent numbers that the program does not assign: the controller may hold others than the files state.
+/// What is read of persistent data that the program does not assign: the controller may hold others than the files state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Persistent {
     /// They are unknown.
@@ -85,11 +85,12 @@ pub struct Evaluator<'a, 's> {
     /// Their symbol table.
     pub symbols: &'a Symbols,
     elements: RefCell<HashMap<(u32, u32), Vec<Child>>>,
-    /// Values of declarations that refer to others.
-    initial: RefCell<HashMap<u32, Value>>,
+    /// Values of declarations that refer to others, and whether persistent data were read for them; by declaration, and whether persistent
+    /// data are taken as stated.
+    initial: RefCell<HashMap<(u32, bool), (Value, bool)>>,
     /// Functions of the program that the current expression has called.
     functions: Cell<u32>,
-    /// What is read of persistent numbers.
+    /// What is read of persistent data.
     persistent: Cell<Persistent>,
     /// Whether a function of the program got an unknown argument, whose evaluation may raise an error even if it is not used.
     may_raise: Cell<bool>,
@@ -163,10 +164,8 @@ impl<'a, 's> Evaluator<'a, 's> {
             SymbolKind::Data(_) if symbol.assigned && symbol.written_whole => {
                 Value::Unknown(symbol.unknown_reason)
             }
-            SymbolKind::Data(data)
-                if data.storage == Token::Pers && self.is_number(symbol) && !self.reads_persistent() =>
-            {
-                Value::Unknown(Reason::Persistent)
+            SymbolKind::Data(data) if self.is_persistent(symbol, data) && !self.reads_persistent() => {
+                Value::Unknown(if symbol.assigned { symbol.unknown_reason } else { Reason::Persistent })
             }
             SymbolKind::Data(data) => match data.value {
                 Some(initial) if context.depth < REFERENCE_DEPTH => {
@@ -192,13 +191,15 @@ impl<'a, 's> Evaluator<'a, 's> {
         }
     }
 
-    /// Whether data are numbers by which targets are computed, or arrays of them.
-    fn is_number(&self, symbol: &Symbol) -> bool {
-        let of = self.symbols.resolved_type(symbol.scope, &symbol.type_name);
-        matches!(of, b"num" | b"dnum" | b"pos" | b"orient")
+    /// Whether data stay on the controller when the program ends, where an operator or another task may change them. Tools, work
+    /// objects, loads, speeds and zones have to be persistent, or usually are: they are taken as stated.
+    fn is_persistent(&self, symbol: &Symbol, data: &Data) -> bool {
+        let of = || self.symbols.resolved_type(symbol.scope, &symbol.type_name);
+        data.storage == Token::Pers
+            && !matches!(of(), b"tooldata" | b"wobjdata" | b"loaddata" | b"speeddata" | b"zonedata")
     }
 
-    /// Whether persistent numbers are taken as stated; notes that one is read.
+    /// Whether persistent data are taken as stated; notes that some are read.
     fn reads_persistent(&self) -> bool {
         let stated = self.persistent.get() != Persistent::Unknown;
         if stated {
@@ -247,11 +248,23 @@ impl<'a, 's> Evaluator<'a, 's> {
         if !tree.kinds()[first as usize..end as usize].contains(&Token::Ident) {
             return self.value(there, initial);
         }
-        if let Some(value) = self.initial.borrow().get(&id) {
+        let before = self.persistent.get();
+        let key = (id, before != Persistent::Unknown);
+        if let Some((value, read)) = self.initial.borrow().get(&key) {
+            if *read {
+                self.persistent.set(Persistent::Read);
+            }
             return value.clone();
         }
+        if before == Persistent::Read {
+            self.persistent.set(Persistent::Stated);
+        }
         let value = self.value(there, initial);
-        self.initial.borrow_mut().insert(id, value.clone());
+        let read = self.persistent.get() == Persistent::Read;
+        if before == Persistent::Read {
+            self.persistent.set(before);
+        }
+        self.initial.borrow_mut().insert(key, (value.clone(), read));
         value
     }
 
@@ -357,9 +370,12 @@ impl<'a, 's> Evaluator<'a, 's> {
                 match index {
                     Some(Child::Node(index))
                         if !symbol.assigned
-                            && matches!(symbol.kind, SymbolKind::Data(_))
+                            && let SymbolKind::Data(data) = &symbol.kind
                             && !symbol.ambiguous =>
                     {
+                        if self.is_persistent(symbol, data) && !self.reads_persistent() {
+                            return Value::Unknown(Reason::Persistent);
+                        }
                         match self.element(context, id, index) {
                             Ok((file, element)) => {
                                 let at = self.declaration_context(context, symbol.scope, file);

@@ -54,7 +54,11 @@ impl Task<'_> {
     pub fn accepts(&self, changes: &[Change]) -> bool {
         changes.par_iter().with_min_len(PORTION).all(|change| {
             let motion = self.listing.motions.get(change.motion as usize);
-            motion.is_some_and(|motion| self.refusal(motion, change).is_none())
+            // Whether persistent targets can be edited in place depends on the other changes.
+            let is_accepted = |motion: &Motion| {
+                !self.listing.has_persistent_target(motion) && self.refusal(motion, change).is_none()
+            };
+            motion.is_some_and(is_accepted)
         })
     }
 
@@ -77,7 +81,9 @@ impl Task<'_> {
                     return Some(Reason::NoJointForm);
                 }
                 // Joints would not follow the data.
-                (NewTarget::Joint { .. }, _) if matches!(target.origin, Origin::Offset(_)) => {
+                (NewTarget::Joint { .. }, TargetValue::Cartesian(_))
+                    if self.listing.follows_persistent(target) =>
+                {
                     return Some(Reason::Persistent);
                 }
                 _ => {}
@@ -91,7 +97,7 @@ impl Task<'_> {
         }
         // Inserted targets would not follow the data.
         let follows =
-            |motion: &Motion| motion.targets.iter().any(|target| matches!(target.origin, Origin::Offset(_)));
+            |motion: &Motion| motion.targets.iter().any(|target| self.listing.follows_persistent(target));
         let previous = motion.previous.and_then(|index| self.listing.motions.get(index as usize));
         if follows(motion) || previous.is_some_and(follows) {
             return Some(Reason::NoInsertion);
@@ -391,6 +397,9 @@ impl<'r, 's> Rewriter<'r, 's> {
                 self.literal(declaration.place.file, literal, (&old, false), &group[0].fresh);
                 self.moved_bases.insert(index);
                 Outcome::InPlace
+            } else if declaration.persistent {
+                // A copy would not follow the data.
+                Outcome::Refused(Reason::Persistent)
             } else if declaration.array {
                 for update in &group {
                     let motion = &task.listing.motions[update.motion as usize];

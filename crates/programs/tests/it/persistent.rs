@@ -1,5 +1,5 @@
-//! Persistent numbers: the controller keeps them when a program ends, and an operator or another task changes them there. An offset by them
-//! remains in the program, and what else they compute is left.
+//! Persistent data: the controller keeps them when a program ends, and an operator or another task changes them there. An offset by them
+//! remains in the program, a target among them is changed where it is declared or not at all, and what else they compute is left.
 
 use truegrind_programs::motion::{MotionKind, Origin, Reason, RobTarget};
 use truegrind_programs::rapid::Task;
@@ -107,4 +107,67 @@ fn nothing_is_inserted_beside_and_no_joints_are_written() {
     assert_eq!(refusal(2), Outcome::InPlace);
     let joints = NewTarget::Joint { robot_deg: [0.0; 6] };
     assert_eq!(rewritten(&text, 0, joints).1, Outcome::Refused(Reason::Persistent));
+}
+
+/// Elements, components and records count as persistent, too, and so does the base of an offset.
+#[test]
+fn whatever_part_of_persistent_data_is_read_never_becomes_a_number() {
+    let data = format!(
+        "PERS num off{{2}}:=[1,2];\nPERS pose ps:=[[1,2,3],[1,0,0,0]];\nRECORD job\nrobtarget app;\nnum n;\nENDRECORD\n\
+         PERS robtarget pp:=[[500,-20,300],[0.5,0.5,-0.5,0.5],[0,0,0,0],{EXT}];\n\
+         PERS job jb:=[[[500,-20,300],[0.5,0.5,-0.5,0.5],[0,0,0,0],{EXT}],3];\nPROC main()"
+    );
+    let source = |lines: &str| source(lines).replace("PROC main()", &data);
+    // Offsets remain in the program.
+    for offset in [
+        "Offs(p,0,0,off{1})",
+        "Offs(p,0,0,ps.trans.z)",
+        "Offs(p,0,0,jb.n)",
+        "RelTool(p,0,0,-(off{1}+off{2}))",
+    ] {
+        let text = source(&format!("MoveL {offset},v100,fine,tool0;"));
+        let (out, outcome) = rewritten(&text, 0, moved([501.5, -20.25, 304.0]));
+        assert_eq!(outcome, Outcome::Inlined, "{offset}");
+        assert!(out.contains(&offset[offset.find(',').unwrap()..]), "{out}");
+    }
+    for lines in [
+        format!("MoveL [[500,-20,off{{1}}],[0.5,0.5,-0.5,0.5],[0,0,0,0],{EXT}],v100,fine,tool0;"),
+        "now:=p;\nnow.trans.z:=off{1};\nMoveL now,v100,fine,tool0;".to_owned(),
+        "MoveL jb.app,v100,fine,tool0;".to_owned(),
+        "MoveL Offs(pp,0,0,5),v100,fine,tool0;".to_owned(),
+        "MoveL Offs(p,pp.trans.x-500,0,0),v100,fine,tool0;\nMoveL Offs(pp,0,0,off{1}),v100,fine,tool0;"
+            .to_owned(),
+        "now:=pp;\nMoveL now,v100,fine,tool0;".to_owned(),
+    ] {
+        let text = source(&lines);
+        let task = Task::read(&[("m.mod", text.as_bytes())]);
+        let last = task.listing.motions.last().unwrap();
+        assert_eq!(last.reason(), Some(Reason::Persistent), "{lines}");
+    }
+}
+
+#[test]
+fn a_persistent_target_is_changed_where_it_is_declared_or_not_at_all() {
+    let declared =
+        format!("PERS robtarget pp:=[[500,-20,300],[0.5,0.5,-0.5,0.5],[0,0,0,0],{EXT}];\nPROC main()");
+    let source = |lines: &str| source(lines).replace("PROC main()", &declared);
+    let alone = source("MoveL pp,v100,fine,tool0;");
+    let (out, outcome) = rewritten(&alone, 0, moved([501.5, -20.25, 304.0]));
+    assert_eq!(outcome, Outcome::InPlace);
+    assert!(out.contains("PERS robtarget pp:=[[501.5") && out.contains("MoveL pp,"), "{out}");
+    // Another reader needs the old value, and a copy would not follow the data.
+    for other in ["now:=pp;", "MoveL Offs(pp,0,0,5),v100,fine,tool0;", "MoveL pp,v100,fine,tool0;"] {
+        let text = source(&format!("MoveL pp,v100,fine,tool0;\n{other}"));
+        let (out, outcome) = rewritten(&text, 0, moved([501.5, -20.25, 304.0]));
+        assert_eq!((outcome, out == text), (Outcome::Refused(Reason::Persistent), true), "{other}: {out}");
+    }
+    // Neither do joints in its place, nor a target inserted beside it.
+    let joints = NewTarget::Joint { robot_deg: [0.0; 6] };
+    assert_eq!(rewritten(&alone, 0, joints).1, Outcome::Refused(Reason::Persistent));
+    let two = source("MoveL p,v100,fine,tool0;\nMoveL pp,v100,fine,tool0;");
+    let task = Task::read(&[("m.mod", two.as_bytes())]);
+    let extra = Extra { kind: MotionKind::Linear, target: moved([500.0, -20.0, 299.0]), external: None };
+    let change = Change { motion: 1, targets: [moved([501.5, -20.25, 304.0])].into(), before: vec![extra] };
+    let done = task.rewrite(&[change], &RewriteOptions::default()).unwrap();
+    assert_eq!(done.outcomes, [Outcome::Refused(Reason::NoInsertion)]);
 }

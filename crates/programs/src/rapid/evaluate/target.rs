@@ -66,7 +66,7 @@ impl<'s> Evaluator<'_, 's> {
         (value, source)
     }
 
-    /// `Offs` or `RelTool` of a known target, perhaps by persistent numbers; `None` for anything else.
+    /// `Offs` or `RelTool` of a known target, perhaps by persistent data; `None` for anything else.
     fn offset_target(
         &self,
         context: Context<'_>,

@@ -15,7 +15,7 @@ use crate::rapid::instruction::{INSTRUCTIONS, Instruction, Slot};
 use crate::rapid::predefined;
 use crate::rapid::symbol::{SymbolKind, Unit};
 use crate::rapid::syntax::{Argument, RapidTree, Syntax, arguments, expressions, parts, text_of, tokens_of};
-use crate::rapid::token::{display, folded, same_name};
+use crate::rapid::token::{Token, display, folded, same_name};
 use crate::tree::Child;
 
 impl ListingBuilder<'_, '_> {
@@ -136,6 +136,7 @@ impl ListingBuilder<'_, '_> {
                 tree.span(first, end)
             }),
             array: data.is_some_and(|data| data.dimensions.is_some()),
+            persistent: data.is_some_and(|data| data.storage == Token::Pers),
             uses: Vec::new(),
             other_uses: Vec::new(),
         });
