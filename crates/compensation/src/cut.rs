@@ -34,6 +34,8 @@ pub enum Cuts {
 pub(crate) struct CutsOf {
     /// By motion; `None` outside cuts.
     of: Vec<Option<u32>>,
+    /// The same without regard to stops.
+    path_of: Vec<Option<u32>>,
     /// Consecutive motions of one cut: the second starts where the first ends. Only for [`Cuts::Partial`].
     runs_into: Vec<(u32, u32)>,
 }
@@ -43,17 +45,23 @@ impl CutsOf {
     pub(crate) fn root(&self, motion: u32) -> Option<u32> {
         self.of[motion as usize]
     }
+
+    /// Representative motion of the path on which a motion's cut lies: from one air move to the next, through stops, at which the tool
+    /// stays on the part. A line between two stops begins where the one before it ends, so that they are worth correcting together.
+    pub(crate) fn path(&self, motion: u32) -> Option<u32> {
+        self.path_of[motion as usize]
+    }
 }
 
 /// The cuts of a listing.
 pub(crate) fn of(listing: &Listing, treatment: Cuts) -> CutsOf {
     let motions = &listing.motions;
     let may_cut: Vec<bool> = motions.par_iter().with_min_len(MANY).map(may_cut).collect();
-    let is_one_cut = |start: u32, index: u32| {
+    let is_one_path = |start: u32, index: u32| {
         let [before, motion] = [start, index].map(|index| &motions[index as usize]);
-        may_cut[start as usize] && may_cut[index as usize] && goes_on(before, motion, listing)
+        may_cut[start as usize] && may_cut[index as usize] && listing.may_share_frames(before, motion)
     };
-    // The motion that each one goes on from, if they belong to one cut.
+    // The motion that each one goes on from, if they belong to one path.
     let starts: Vec<Option<u32>> = motions
         .par_iter()
         .with_min_len(MANY)
@@ -66,22 +74,35 @@ pub(crate) fn of(listing: &Listing, treatment: Cuts) -> CutsOf {
                 in_text.then_some(before as u32)
             };
             let start = motion.previous.or_else(stands_before)?;
-            is_one_cut(start, index as u32).then_some(start)
+            is_one_path(start, index as u32).then_some(start)
         })
         .collect();
     let mut root: Vec<u32> = (0..motions.len() as u32).collect();
+    let mut path_root = root.clone();
     let mut runs_into = Vec::new();
-    let across_calls = listing.across_calls.iter().filter(|[start, index]| is_one_cut(*start, *index));
+    let across_calls = listing.across_calls.iter().filter(|[start, index]| is_one_path(*start, *index));
     let in_text = (0_u32..).zip(starts).filter_map(|(index, start)| Some([start?, index]));
     for [start, index] in in_text.chain(across_calls.copied()) {
+        unite(&mut path_root, start, index);
+        if stops(&motions[start as usize], listing) {
+            continue;
+        }
         if treatment == Cuts::Partial {
             runs_into.push((start, index));
         }
-        let (a, b) = (find(&mut root, start), find(&mut root, index));
-        root[a.max(b) as usize] = a.min(b);
+        unite(&mut root, start, index);
     }
-    let of = (0_u32..).zip(may_cut).map(|(index, may_cut)| may_cut.then(|| find(&mut root, index))).collect();
-    CutsOf { of, runs_into }
+    let of_all = |mut root: Vec<u32>| {
+        let all = (0_u32..).zip(&may_cut);
+        all.map(|(index, may_cut)| may_cut.then(|| find(&mut root, index))).collect()
+    };
+    CutsOf { of: of_all(root), path_of: of_all(path_root), runs_into }
+}
+
+/// Joins the sets of two motions; the smaller one represents both.
+fn unite(root: &mut [u32], a: u32, b: u32) {
+    let (a, b) = (find(root, a), find(root, b));
+    root[a.max(b) as usize] = a.min(b);
 }
 
 /// Union-find representative, with path halving.
@@ -105,10 +126,9 @@ pub(crate) fn may_cut(motion: &Motion) -> bool {
     path && motion.own_reason != Some(Reason::Probe) && !motion.instruction.contains("Search")
 }
 
-/// Whether a motion goes on from the previous one without a stop, in frames that may be the same.
-fn goes_on(before: &Motion, motion: &Motion, listing: &Listing) -> bool {
-    let stops = listing.zone(before).is_some_and(|zone| zone.value.as_ref().is_ok_and(|zone| zone.fine));
-    !stops && listing.may_share_frames(before, motion)
+/// Whether the arm stops at the end of a motion.
+fn stops(motion: &Motion, listing: &Listing) -> bool {
+    listing.zone(motion).is_some_and(|zone| zone.value.as_ref().is_ok_and(|zone| zone.fine))
 }
 
 /// Why a motion remains unmodified, with its status.

@@ -79,7 +79,7 @@ impl<'a> SolvedProgram<'a> {
         let mut frame_table = FrameTable::of(listing, &arms, cell, options.loads.is_some());
         let program = OriginalProgram::of(listing, &arms, &frame_table);
         let cuts = cut::of(listing, options.cuts);
-        let mut assessment =
+        let assessment =
             assess(listing, &cuts, &program, &mut arms, &mut frame_table, options, &estimate.posterior);
         let solved_unchanged = assessment.risky();
         let solved = solve_targets(
@@ -92,9 +92,6 @@ impl<'a> SolvedProgram<'a> {
             &solved_unchanged,
         );
         let program = arms.conditions.has_play().then_some(program);
-        if program.is_none() {
-            assessment.free_registrations();
-        }
         Self { listing, options, arms, frame_table, program, cuts, assessment, solved, solved_unchanged }
     }
 

@@ -1,26 +1,28 @@
 //! Risk assessment of a program before correction: where the path over each work object lies, how likely the correction of
-//! each cut does harm, and the best registration of each cut, the reference for the sigma of its shape.
+//! each cut does harm, and the best registration of each part, the reference for the sigma of its shape.
 //!
 //! Everything follows from evenly spaced targets of the original program, with every joint at mid-play.
 
 use std::collections::BTreeMap;
 
-use nalgebra::{DVector, Vector3, Vector6};
+use nalgebra::{DVector, Matrix6xX};
 use rayon::prelude::*;
 
 use crate::condition::arm_conditions::ArmConditions;
 use crate::cut::CutsOf;
 use crate::frames::frame_pair::ResolvedFrames;
 use crate::plan::reason::OutcomeReason;
-use crate::risk::cut_risk::{self, CutRisk, Judgement};
+use crate::risk::cut_risk::{self, CutRisk, Judgement, PartRegistration};
 use crate::risk::placement::{
-    self, AssessedTarget, ObjectPlacement, PathDeviation, Placement, PlacementChoice, assess_placement,
-    evenly_spaced,
+    self, AssessedObject, AssessedTarget, ObjectPlacement, PathDeviation, Placement, PlacementChoice,
+    assess_placement, evenly_spaced,
 };
 use crate::risk::probability::probability_of_harm;
+use crate::risk::registration::Registration;
 use crate::risk::remedy_search::{self, UnknownPlacement};
 use crate::search_budget::MANY;
-use truegrind_arm::estimated::{CarriedFrame, Estimated, PosteriorComponent};
+use truegrind_arm::estimated::{CarriedFrame, Estimated, PosteriorComponent, RegisteredFrame};
+use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{Listing, WorkObject};
 
 /// Assessment of a program.
@@ -36,11 +38,10 @@ pub(crate) struct Assessment {
     posterior: Vec<PosteriorComponent>,
     /// The cut of each motion, as an index into `cuts`; empty without cuts.
     cut_of: Vec<Option<u32>>,
-    /// The best registration of each cut, in the base; absent where the robot holds the part. Its origin (mm), and the index of
-    /// its first twist.
-    registered: Vec<Option<(Vector3<f64>, usize)>>,
-    /// The twists of all registrations in one list, so that its memory is returned to the system as a whole.
-    twists: Vec<Vector6<f64>>,
+    /// The part of each cut, as an index into `registered`.
+    part_of_cut: Vec<usize>,
+    /// The best registration of each part, in the base; absent where the robot holds it.
+    registered: Vec<Option<RegisteredFrame>>,
 }
 
 impl Assessment {
@@ -55,22 +56,17 @@ impl Assessment {
         .collect()
     }
 
-    /// The reference frame of the shape of a motion's cut: it moves with the arm's parameters as the cut does.
+    /// The reference frame of the shape of a motion's cut: it moves with the arm's parameters as the path over the part does.
     pub(crate) fn registered(&self, motion: u32) -> Option<CarriedFrame<'_>> {
-        let (origin_mm, first) = self.registered[self.cut_index(motion)?]?;
-        let twists = self.twists.get(first..)?.get(..self.shares.first()?.toward.len())?;
-        Some(CarriedFrame { origin_mm, twists })
-    }
-
-    /// Frees the registrations, which only solving targets needs.
-    pub(crate) fn free_registrations(&mut self) {
-        self.twists = Vec::new();
+        let part = self.part_of_cut[self.cut_index(motion)?];
+        self.registered[part].as_ref().map(RegisteredFrame::carried)
     }
 
     /// Sigma of the shape of a motion's cut (RMS, mm), for parts that the robot holds.
     pub(crate) fn sigma_of_cut_mm(&self, motion: u32) -> Option<f64> {
         let cut_index = self.cut_index(motion)?;
-        (self.registered[cut_index].is_none()).then_some(self.cuts[cut_index].shape_sigma_mm)
+        let held = self.registered[self.part_of_cut[cut_index]].is_none();
+        held.then_some(self.cuts[cut_index].shape_sigma_mm)
     }
 
     /// Whether only the shape of a motion's cut is corrected.
@@ -120,7 +116,7 @@ impl AssessmentSample {
         let mut of_object: BTreeMap<u32, [Vec<u32>; 2]> = BTreeMap::new();
         let mut in_cuts: Vec<(u32, u32)> = Vec::with_capacity(listing.motions.len());
         for (index, object) in (0_u32..).zip(objects) {
-            let cut = cuts.root(index);
+            let cut = cuts.path(index);
             in_cuts.extend(cut.map(|root| (root, index)));
             if let Some(object) = object {
                 of_object.entry(part_of[object as usize]).or_default()[usize::from(cut.is_none())]
@@ -134,7 +130,7 @@ impl AssessmentSample {
         // Where a motion begins a cut: the end of one before it that is not part of the cut.
         let begin = |(root, index): (u32, u32)| {
             let motion = &listing.motions[index as usize];
-            let before = motion.previous.filter(|before| cuts.root(*before) != Some(root))?;
+            let before = motion.previous.filter(|before| cuts.path(*before) != Some(root))?;
             listing.motions[before as usize].same_frames(motion).then_some(before)
         };
         // Stable: the motions of a cut stay in order.
@@ -178,22 +174,25 @@ pub(crate) fn assess_program(
         cut_of: vec![None; listing.motions.len()],
         ..Assessment::default()
     };
-    let mut taken: BTreeMap<u32, Placement> = BTreeMap::new();
+    let mut parts: BTreeMap<u32, Part> = BTreeMap::new();
     for (object, motions) in &chosen.objects {
         let targets: Vec<AssessedTarget> = motions.iter().filter_map(|m| at(*m)).collect();
         let name = &listing.work_objects[*object as usize].name;
         let found = assess_placement(name, &targets, list, conditions, knowledge, posterior, choice);
-        let Some((mut placement, displaced)) = found else { continue };
+        let Some(AssessedObject { mut placement, displacement, registration, twists }) = found else {
+            continue;
+        };
         if placement.applied == Placement::Shape && choice.remedies {
             let max_risk = choice.max_risk;
             let unknown =
                 UnknownPlacement { targets: &targets, list: &*list, conditions, knowledge, max_risk };
             placement.remedy = remedy_search::remedy(&unknown);
         }
-        taken.insert(*object, placement.applied);
+        let applied = placement.applied;
         out.placements.push(placement);
-        if let (Some(motion), Some(first)) = (displaced, targets.first()) {
-            let reference = list[first.frames_index].real.object;
+        let frames_index = targets[0].frames_index;
+        if let Some(motion) = displacement {
+            let reference = list[frames_index].real.object;
             let of_part =
                 list.iter_mut().zip(objects).filter(|(_, of)| chosen.part_of[**of as usize] == *object);
             for (frames, _) in of_part {
@@ -205,34 +204,34 @@ pub(crate) fn assess_program(
                 };
             }
         }
+        let ResolvedFrames { real, carried, .. } = &list[frames_index];
+        out.registered.push((!real.holds_part).then(|| {
+            let twists_of = twists.column_iter().map(|twist| twist.into_owned()).collect();
+            let of_path = RegisteredFrame { origin_mm: registration.centre.coords, twists: twists_of };
+            cut_risk::in_base(of_path, &real.object, carried.as_ref())
+        }));
+        let index = out.registered.len() - 1;
+        parts.insert(*object, Part { index, applied, reference: real.object, registration, twists });
     }
     let list: &[ResolvedFrames] = list;
-    // A cut at a time: lists of its own, kept among those that only its assessment needs, would hold the memory of both.
-    let room = knowledge.order.len().max(1);
-    out.twists = vec![Vector6::zeros(); room * chosen.cuts.len()];
     let judged: Vec<Option<(JudgedCut, Judgement, f64)>> = chosen
         .cuts
         .par_iter()
-        .zip(out.twists.par_chunks_mut(room))
-        .map(|((motions, commanded), twists)| {
+        .map(|(motions, commanded)| {
             let targets: Vec<AssessedTarget> = commanded.iter().filter_map(|m| at(*m)).collect();
-            let frames = &list[targets.first()?.frames_index];
             let object = listing.motions[motions[0] as usize].work_object?;
-            let placement = *taken.get(&chosen.part_of[object as usize])?;
-            let off = PathDeviation::of(&targets, list, conditions, knowledge);
-            let (judgement, registered) = cut_risk::assess_cut(&off, knowledge, placement)?;
+            let Part { index, applied, reference, registration, twists } =
+                parts.get(&chosen.part_of[object as usize]).filter(|_| !targets.is_empty())?;
+            let off = PathDeviation::of_part(&targets, reference, list, conditions, knowledge);
+            let part = PartRegistration { registration, twists };
+            let judgement = cut_risk::assess_cut(&off, &part, knowledge, *applied);
             let weight = motions.len() as f64 / targets.len() as f64;
-            let origin_mm = (!frames.real.holds_part).then(|| {
-                let registered = cut_risk::in_base(registered, &frames.real.object, frames.carried.as_ref());
-                twists.iter_mut().zip(&registered.twists).for_each(|(twist, of_cut)| *twist = *of_cut);
-                registered.origin_mm
-            });
             let points = targets.len();
             let harm = probability_of_harm(judgement.square, &judgement.toward, posterior, points);
-            Some((JudgedCut { placement, points, weight, origin_mm }, judgement, harm))
+            Some((JudgedCut { placement: *applied, part: *index, points, weight }, judgement, harm))
         })
         .collect();
-    for (((motions, _), judged), first) in chosen.cuts.into_iter().zip(judged).zip((0..).step_by(room)) {
+    for ((motions, _), judged) in chosen.cuts.into_iter().zip(judged) {
         let Some((judged, judgement, probability_of_harm)) = judged else { continue };
         let left_for_risk = !(probability_of_harm <= choice.max_risk);
         let cut_index = out.cuts.len() as u32;
@@ -247,7 +246,7 @@ pub(crate) fn assess_program(
             left_for_risk,
             corrected: false,
         });
-        out.registered.push(judged.origin_mm.map(|origin_mm| (origin_mm, first)));
+        out.part_of_cut.push(judged.part);
         out.shares.push(CutContribution {
             points: judged.weight * judged.points as f64,
             square: judged.weight * judgement.square,
@@ -260,11 +259,24 @@ pub(crate) fn assess_program(
 /// How a cut was assessed.
 struct JudgedCut {
     placement: Placement,
+    /// Index into [`Assessment::registered`].
+    part: usize,
     points: usize,
     /// Motions per sampled point.
     weight: f64,
-    /// Origin of its registration (mm).
-    origin_mm: Option<Vector3<f64>>,
+}
+
+/// A part, while its cuts are assessed.
+struct Part {
+    /// Index into [`Assessment::registered`].
+    index: usize,
+    applied: Placement,
+    /// Its work object.
+    reference: Pose,
+    /// Registration of the path over it, in the work object.
+    registration: Registration,
+    /// Twists of the registration per unit of each parameter.
+    twists: Matrix6xX<f64>,
 }
 
 /// Contribution of a cut: points, |d|² (mm²), and Jᵀ d.

@@ -1,9 +1,9 @@
 //! The risk that a correction makes a cut worse than it was.
 //!
-//! If only the shape of a path is corrected, the residual after its best rigid registration is assessed. The probability is
-//! in `probability`.
+//! If only the shape is corrected, what the best rigid registration of the path over the whole part leaves of the cut is assessed: so it is
+//! written. The probability is in `probability`.
 
-use nalgebra::{DMatrix, DVector, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, Matrix6xX, Vector3, Vector6};
 
 use crate::risk::placement::{PathDeviation, Placement};
 use crate::risk::registration::Registration;
@@ -23,7 +23,7 @@ pub struct CutRisk {
     pub deviation_mm: f64,
     /// Predicted standard deviation of its correction (RMS, mm).
     pub sigma_mm: f64,
-    /// Predicted standard deviation of its shape, after its best rigid registration (RMS, mm).
+    /// Predicted standard deviation of its shape, after the best rigid registration of all cuts on the part (RMS, mm).
     pub shape_sigma_mm: f64,
     /// Probability that the correction makes it worse.
     pub probability_of_harm: f64,
@@ -47,51 +47,49 @@ pub(crate) struct Judgement {
 /// Most points by which a cut is assessed.
 pub(crate) const MOST_POINTS: usize = 32;
 
-/// Assesses the points of a cut; with the twists of its best registration per unit of each parameter, in the work object, and
-/// their reference point.
+/// The best registration of the path over a part, the reference of its shape.
+pub(crate) struct PartRegistration<'r> {
+    pub(crate) registration: &'r Registration,
+    /// Its twists per unit of each parameter.
+    pub(crate) twists: &'r Matrix6xX<f64>,
+}
+
+/// Assesses the points of a cut on a part, whose work object is displaced already where its shape alone is corrected.
 pub(crate) fn assess_cut(
     off: &PathDeviation,
+    part: &PartRegistration<'_>,
     knowledge: &Estimated,
     placement: Placement,
-) -> Option<(Judgement, RegisteredFrame)> {
-    let registration = Registration::of(&off.intended)?;
+) -> Judgement {
     let count = off.shifts.len();
-    let twists = registration.twists(&off.jacobian);
-    let twist = registration.twist(off.shifts.iter().copied());
-    let shape_shifts: Vec<Vector3<f64>> =
-        off.shifts.iter().enumerate().map(|(k, shift)| shift - registration.shift(&twist, k)).collect();
     let mut shape_jacobian = off.jacobian.clone();
-    for (mut column, twist) in shape_jacobian.column_iter_mut().zip(twists.column_iter()) {
+    for (mut column, twist) in shape_jacobian.column_iter_mut().zip(part.twists.column_iter()) {
         let twist = twist.into_owned();
-        for (k, velocity) in column.as_mut_slice().as_chunks_mut().0.iter_mut().enumerate() {
-            *velocity = (Vector3::from(*velocity) - registration.shift(&twist, k)).into();
+        let velocities = column.as_mut_slice().as_chunks_mut().0.iter_mut();
+        for (velocity, point) in velocities.zip(&off.intended) {
+            *velocity = (Vector3::from(*velocity) - part.registration.shift_at(&twist, point)).into();
         }
     }
     let of_shape = total_variance(&shape_jacobian, &knowledge.covariance);
-    let (shifts, jacobian, variance) = match placement {
-        Placement::Shape => (&shape_shifts, &shape_jacobian, of_shape),
-        _ => (&off.shifts, &off.jacobian, total_variance(&off.jacobian, &knowledge.covariance)),
+    let (jacobian, variance) = match placement {
+        Placement::Shape => (&shape_jacobian, of_shape),
+        _ => (&off.jacobian, total_variance(&off.jacobian, &knowledge.covariance)),
     };
-    let square = shifts.iter().map(Vector3::norm_squared).sum();
+    let square = off.shifts.iter().map(Vector3::norm_squared).sum();
     let toward = |column: &[f64]| -> f64 {
         let velocities = column.as_chunks().0.iter();
-        velocities.zip(shifts).map(|(velocity, shift)| Vector3::from(*velocity).dot(shift)).sum()
+        velocities.zip(&off.shifts).map(|(velocity, shift)| Vector3::from(*velocity).dot(shift)).sum()
     };
     let columns = jacobian.column_iter().map(|column| toward(column.as_slice()));
     let toward = DVector::from_iterator(jacobian.ncols(), columns);
     let rms = |sum: f64| (sum.max(0.0) / count as f64).sqrt();
-    let registered = RegisteredFrame {
-        origin_mm: registration.centre.coords,
-        twists: twists.column_iter().map(|twist| twist.into_owned()).collect(),
-    };
-    let judgement = Judgement {
+    Judgement {
         deviation_mm: rms(square),
         sigma_mm: rms(variance),
         shape_sigma_mm: rms(of_shape),
         square,
         toward,
-    };
-    Some((judgement, registered))
+    }
 }
 
 /// Σ tr(J C Jᵀ) over the points, whose Jacobians J are stacked (3 n × p), C the covariance of the parameters (p × p):
@@ -123,7 +121,7 @@ fn total_variance(jacobian: &DMatrix<f64>, covariance: &DMatrix<f64>) -> f64 {
     sum
 }
 
-/// The registration of a cut expressed in the base, for a stationary work object. Where that was taught, the registration is relative to
+/// The registration of a part expressed in the base, for a stationary work object. Where that was taught, the registration is relative to
 /// the taught frame, which moves with the arm's parameters itself.
 pub(crate) fn in_base(
     mut registered: RegisteredFrame,

@@ -6,7 +6,7 @@
 //! that best explains the path's deviations as the real position of the work object: what was taught or adjusted in place
 //! keeps its position, and only its shape is corrected. *Absolute* corrects both.
 
-use nalgebra::{DMatrix, Matrix3, Matrix6, Point3, Vector3, Vector6};
+use nalgebra::{DMatrix, Matrix3, Matrix6, Matrix6xX, Point3, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 
 use crate::condition::arm_conditions::ArmConditions;
@@ -127,17 +127,18 @@ impl PathDeviation {
         out
     }
 
-    /// The same of targets on one part, all in the work object of the first: a program displacement moves the frame in which they are
-    /// programmed, not the part.
+    /// The same of targets on one part, all in one work object: a program displacement moves the frame in which they are programmed,
+    /// not the part.
     pub(crate) fn of_part(
         targets: &[AssessedTarget],
+        reference: &Pose,
         list: &[ResolvedFrames],
         conditions: &ArmConditions<'_>,
         knowledge: &Estimated,
     ) -> Self {
         let mut out = Self::of(targets, list, conditions, knowledge);
         let object = |target: &AssessedTarget| list[target.frames_index].real.object;
-        let Some(reference) = targets.first().map(object) else { return out };
+        let reference = *reference;
         if targets.iter().all(|target| object(target) == reference) {
             return out;
         }
@@ -190,8 +191,18 @@ pub(crate) fn evenly_spaced<T: Copy>(items: &[T], most: usize) -> Vec<T> {
     (0..count).map(|k| items[k * items.len() / count]).collect()
 }
 
-/// Position of the path over one work object, from sampled targets, and the displacement of the work object that realises the
-/// requested placement, in the frame of the first target (`None`: no displacement).
+/// The path over one work object.
+pub(crate) struct AssessedObject {
+    pub(crate) placement: ObjectPlacement,
+    /// The displacement of the work object that realises the requested placement, in the frame of the first target (`None`: none).
+    pub(crate) displacement: Option<Pose>,
+    /// Its best registration, the reference of its shape, in the work object of the first target.
+    pub(crate) registration: Registration,
+    /// The twists of the registration per unit of each parameter.
+    pub(crate) twists: Matrix6xX<f64>,
+}
+
+/// The path over one work object, from sampled targets.
 pub(crate) fn assess_placement(
     name: &str,
     targets: &[AssessedTarget],
@@ -200,9 +211,10 @@ pub(crate) fn assess_placement(
     knowledge: &Estimated,
     posterior: &[PosteriorComponent],
     choice: PlacementChoice,
-) -> Option<(ObjectPlacement, Option<Pose>)> {
+) -> Option<AssessedObject> {
+    let reference = list[targets.first()?.frames_index].real.object;
     let taught = targets.iter().any(|target| list[target.frames_index].carried.is_some());
-    let off = PathDeviation::of_part(targets, list, conditions, knowledge);
+    let off = PathDeviation::of_part(targets, &reference, list, conditions, knowledge);
     let count = targets.len();
     let registration = Registration::of(&off.intended)?;
     let twist = registration.twist(off.shifts.iter().copied());
@@ -232,10 +244,9 @@ pub(crate) fn assess_placement(
         unlocated,
         remedy: None,
     };
-    if applied == Placement::Absolute || !deviation_mm.is_finite() {
-        return Some((placement, None));
-    }
-    Some((placement, Some(displacement(&registration, &off, twist))))
+    let stays = applied == Placement::Absolute || !deviation_mm.is_finite();
+    let displacement = (!stays).then(|| displacement(&registration, &off, twist));
+    Some(AssessedObject { placement, displacement, registration, twists })
 }
 
 /// The rigid motion that best maps the intended points to the reached ones: the linear solution, refined twice.

@@ -55,6 +55,11 @@ impl Registration {
         twist.fixed_rows::<3>(0) + twist.fixed_rows::<3>(3).cross(&self.levers[k])
     }
 
+    /// Displacement of any point by a twist about the centroid (mm).
+    pub(crate) fn shift_at(&self, twist: &Vector6<f64>, point: &Point3<f64>) -> Vector3<f64> {
+        twist.fixed_rows::<3>(0) + twist.fixed_rows::<3>(3).cross(&(point - self.centre))
+    }
+
     /// The twists that best explain the points' velocities, one column per column of `jacobian` (3 n × p).
     pub(crate) fn twists(&self, jacobian: &DMatrix<f64>) -> Matrix6xX<f64> {
         let mut out = Matrix6xX::zeros(jacobian.ncols());

@@ -245,7 +245,9 @@ impl UnknownPlacement<'_, '_> {
             None => frames.clone(),
         };
         let list: Vec<ResolvedFrames> = self.list.iter().map(against).collect();
-        PathDeviation::of_part(self.targets, &list, self.conditions, self.knowledge)
+        let reference = self.targets.first().map(|target| list[target.frames_index].real.object);
+        let reference = reference.unwrap_or_default();
+        PathDeviation::of_part(self.targets, &reference, &list, self.conditions, self.knowledge)
     }
 
     /// `count` of the measured poses.

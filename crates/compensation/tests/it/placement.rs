@@ -18,6 +18,18 @@ use truegrind_compensation::risk::placement::Placement;
 
 use super::{blade, estimated, nominal, perturbed, rewritten, run_on, worst};
 
+/// The blade, whose passes are set apart by air moves: the first motion behind each stop is one.
+fn passes() -> (Vec<u8>, Vec<Joints>) {
+    let (source, joints) = blade();
+    let mut stopped = false;
+    let lines = std::str::from_utf8(&source).unwrap().lines().map(|line| {
+        let out = if stopped { line.replace("MoveL ", "MoveJ ") } else { line.to_owned() };
+        stopped = if line.contains("Move") { line.contains(",fine,") } else { stopped };
+        out + "\n"
+    });
+    (lines.collect::<String>().into_bytes(), joints)
+}
+
 /// A correct model whose data did not determine the zero of joint 1.
 fn placed_somewhere(seed: u64, joints: &[Joints]) -> Estimated {
     let mut known = estimated(perturbed(seed, 1.0), joints);
@@ -192,37 +204,41 @@ impl Drawn {
     }
 }
 
-/// Position of an arm's tool at the motions of a cut.
-fn reached(model: &Model, plan: &Plan, cut: &CutRisk) -> (Vec<Vector3<f64>>, DVector<f64>) {
+/// Position of an arm's tool at the motions of all cuts, in their order.
+fn reached(model: &Model, plan: &Plan) -> (Vec<Vector3<f64>>, DVector<f64>) {
     let arm = model.at_condition(&truegrind_arm::condition::Condition::default());
     assert_eq!(plan.points.len(), plan.outcomes.len(), "every motion has a pose");
     let of = |motion: &u32| {
         let p = &plan.points[*motion as usize];
         (arm.forward(&p.joints_before.unwrap()) * p.flange_from_tool).translation.vector
     };
-    let all: Vec<Vector3<f64>> = cut.motions.iter().map(of).collect();
+    let all: Vec<Vector3<f64>> = plan.cuts.iter().flat_map(|cut| &cut.motions).map(of).collect();
     let values = all.iter().flat_map(|v| v.as_slice().to_vec()).collect::<Vec<f64>>();
     (all, DVector::from_vec(values))
 }
 
 #[test]
 fn the_sigma_of_the_shape_is_the_scatter_of_arms_that_are_drawn() {
-    let (source, joints) = blade();
+    let (source, joints) = passes();
     let mut drawn = Drawn::about(4, &joints, 1.0);
     let options = Options { max_risk: 1.0, ..with(Placement::Shape) };
     let (plan, _) = rewritten(&source, &drawn.known, &Cell::default(), &options);
     assert!(plan.cuts.len() > 5);
     let arms: Vec<Model> = (0..300).map(|_| drawn.arm()).collect();
-    for cut in plan.cuts.iter().step_by(3) {
-        let (places, middle) = reached(&drawn.known.model, &plan, cut);
-        let projector = rigid(&places);
-        let mut squares = DVector::zeros(middle.len());
-        for arm in &arms {
-            let off = reached(arm, &plan, cut).1 - &middle;
-            let shape = &off - &projector * &off;
-            squares += shape.component_mul(&shape);
-        }
-        let found = (squares.sum() / arms.len() as f64 / places.len() as f64).sqrt();
+    // The path over the part is registered as a whole.
+    let (places, middle) = reached(&drawn.known.model, &plan);
+    let projector = rigid(&places);
+    let mut all_squares = DVector::zeros(middle.len());
+    for arm in &arms {
+        let off = reached(arm, &plan).1 - &middle;
+        let shape = &off - &projector * &off;
+        all_squares += shape.component_mul(&shape);
+    }
+    let mut first = 0;
+    for cut in &plan.cuts {
+        let squares = all_squares.rows(first, 3 * cut.motions.len());
+        first += squares.len();
+        let found = (squares.sum() / arms.len() as f64 / cut.motions.len() as f64).sqrt();
         assert!((found / cut.shape_sigma_mm - 1.0).abs() < 0.12, "{found} against {}", cut.shape_sigma_mm);
         for (k, motion) in cut.motions.iter().enumerate().step_by(7) {
             let said = plan.outcomes[*motion as usize].shape_sigma_mm.get().unwrap();
@@ -234,7 +250,7 @@ fn the_sigma_of_the_shape_is_the_scatter_of_arms_that_are_drawn() {
 
 #[test]
 fn the_chance_that_a_cut_gets_worse_is_the_share_of_drawn_arms_on_which_it_does() {
-    let (source, joints) = blade();
+    let (source, joints) = passes();
     for (placement, scale) in [(Placement::Shape, 0.7), (Placement::Absolute, 3.0)] {
         let mut drawn = Drawn::about(7, &joints, scale);
         let options = Options { max_risk: 1.0, ..with(placement) };
@@ -242,19 +258,29 @@ fn the_chance_that_a_cut_gets_worse_is_the_share_of_drawn_arms_on_which_it_does(
         let arms: Vec<Model> = (0..400).map(|_| drawn.arm()).collect();
         let telling: Vec<&CutRisk> =
             plan.cuts.iter().filter(|c| (0.02..0.45).contains(&c.probability_of_harm)).collect();
+        let (places, estimate) = reached(&drawn.known.model, &plan);
+        let (_, told) = reached(&nominal(), &plan);
+        let projector = rigid(&places);
+        let counts = |d: DVector<f64>| if placement == Placement::Shape { &d - &projector * &d } else { d };
+        // Deviation of each arm from the estimate and from the nominal arm, of all cuts.
+        let off: Vec<[DVector<f64>; 2]> = arms
+            .iter()
+            .map(|arm| {
+                let truth = reached(arm, &plan).1;
+                [counts(&truth - &estimate), counts(&truth - &told)]
+            })
+            .collect();
+        let first = |cut: &CutRisk| -> usize {
+            let before = plan.cuts.iter().take_while(|other| other.motions != cut.motions);
+            before.map(|other| 3 * other.motions.len()).sum()
+        };
         let chances: Vec<f64> = plan.cuts.iter().map(|c| c.probability_of_harm).collect();
         assert!(telling.len() > 2, "{placement:?}: {chances:?} show nothing");
         for cut in telling {
-            let (places, estimate) = reached(&drawn.known.model, &plan, cut);
-            let (_, told) = reached(&nominal(), &plan, cut);
-            let projector = rigid(&places);
-            let counts = |d: DVector<f64>| {
-                if placement == Placement::Shape { &d - &projector * &d } else { d }
-            };
-            let worse = arms.iter().filter(|arm| {
-                let truth = reached(arm, &plan, cut).1;
-                counts(&truth - &estimate).norm() > counts(&truth - &told).norm()
-            });
+            let (first, count) = (first(cut), 3 * cut.motions.len());
+            let worse = off
+                .iter()
+                .filter(|[after, before]| after.rows(first, count).norm() > before.rows(first, count).norm());
             let share = worse.count() as f64 / arms.len() as f64;
             let sigma =
                 (cut.probability_of_harm * (1.0 - cut.probability_of_harm) / arms.len() as f64).sqrt();
@@ -270,7 +296,7 @@ fn the_chance_that_a_cut_gets_worse_is_the_share_of_drawn_arms_on_which_it_does(
 /// The class of fault: a correction that is as likely to follow the noise of the measurement as the arm.
 #[test]
 fn a_cut_that_would_too_likely_get_worse_is_left_whole_with_that_reason() {
-    let (source, joints) = blade();
+    let (source, joints) = passes();
     let drawn = Drawn::about(7, &joints, 2.0);
     let (plan, program) = rewritten(&source, &drawn.known, &Cell::default(), &with(Placement::Shape));
     let left: Vec<&CutRisk> = plan.cuts.iter().filter(|cut| cut.left_for_risk).collect();
