@@ -73,6 +73,8 @@ pub struct Plan {
     pub points: Vec<PathPoint>,
     /// Assumptions about tools, work objects, payload, backlash and configurations.
     pub notes: Vec<String>,
+    /// External axes that move or do not stand at 0, and of which the cell file does not say what they carry.
+    pub unstated_axes: Vec<char>,
     /// Steps between corrected motions and neighbours that are left; known once the program is rewritten.
     pub steps: Option<StepsToLeft>,
     /// How the position of each work object was treated.

@@ -149,6 +149,8 @@ pub struct Tool {
     pub value: Result<ToolValue, Reason>,
     /// Its declaration; `None` if it is built in or undeclared.
     pub place: Option<Place>,
+    /// Whether the program assigns it (RAPID): it may be a copy of another one.
+    pub assigned: bool,
 }
 
 /// The value of a tool.
@@ -173,6 +175,8 @@ pub struct WorkObject {
     pub value: Result<WorkObjectValue, Reason>,
     /// Its declaration; `None` for `wobj0` or if it is undeclared.
     pub place: Option<Place>,
+    /// Whether the program assigns it (RAPID): it may be a copy of another one.
+    pub assigned: bool,
     /// A known displacement within it that the program sets (PDispSet, TRANS, ROT). The object frame of `value`
     /// already includes it.
     pub displacement: Option<Frame>,

@@ -6,7 +6,7 @@ use std::collections::{HashMap, HashSet};
 use rayon::prelude::*;
 
 use crate::arms::Arms;
-use crate::cell::{Carries, Cell};
+use crate::cell::{Carries, Cell, CellFrame, FrameOrigin};
 use crate::configuration::{configured, monitored, unstated};
 use crate::frames::frame_pair::{FramePair, ResolveContext, ResolvedFrames, resolve_frames};
 use crate::frames::taught::Teaching;
@@ -17,7 +17,7 @@ use truegrind_arm::inverse::budget::{SearchBudget, with_budget};
 use truegrind_arm::model::Joints;
 use truegrind_math::option_f64::OptionF64;
 use truegrind_math::se3::Pose;
-use truegrind_programs::motion::{Listing, Motion, Reason, RobTarget, Switch, TargetValue, WorkObjectValue};
+use truegrind_programs::motion::{Listing, Motion, Reason, RobTarget, Switch, WorkObjectValue};
 
 /// Frame pairs by (tool, work object).
 pub(crate) struct FrameTable {
@@ -28,6 +28,10 @@ pub(crate) struct FrameTable {
     objects: Vec<u32>,
     /// External axes that carry the base.
     base: [bool; 6],
+    /// External axes of which targets state a value.
+    states: [bool; 6],
+    /// Axes that move or do not stand at 0, and of which the cell file does not say what they carry.
+    pub(crate) unstated_axes: Vec<char>,
     /// Assumptions about external axes, and contradictions with the cell file.
     assumed: Vec<String>,
     /// Joints where the program begins, as the cell file or the program states them.
@@ -42,6 +46,8 @@ impl FrameTable {
             list: Vec::new(),
             objects: Vec::new(),
             base: [false; 6],
+            states: [false; 6],
+            unstated_axes: Vec::new(),
             assumed: Vec::new(),
             start: cell.start(listing),
         };
@@ -60,6 +66,17 @@ impl FrameTable {
                 out.places.insert((tool, object), Err(OutcomeReason::Program(reason)));
                 continue;
             };
+            // A copy has the place of its original, perhaps displaced: the cell file states what it does not say.
+            let taught =
+                |stated: &[CellFrame]| stated.iter().any(|entry| entry.origin == FrameOrigin::Taught);
+            if t.assigned && teaching.stated.tool(t).is_none() && taught(&cell.tool) {
+                out.places.insert((tool, object), Err(OutcomeReason::Program(Reason::ToolAssigned)));
+                continue;
+            }
+            if o.assigned && teaching.stated.object(o).is_none() && taught(&cell.wobj) {
+                out.places.insert((tool, object), Err(OutcomeReason::Program(Reason::WorkObjectAssigned)));
+                continue;
+            }
             let here = first_motions.get(&(tool, object)).map_or(&[][..], Vec::as_slice);
             let found = with_budget(&mut budget, || {
                 let typical = || typical_joints(here, tv.frame.pose(), ov, arms, out.start.as_ref());
@@ -119,7 +136,7 @@ impl FrameTable {
         let links = &arms.nominal.arm().model.links;
         let flange = arms.nominal.arm().model.flange.translation.vector.norm();
         let longest = flange + links.iter().map(|link| link.a_mm.abs() + link.d_mm.abs()).sum::<f64>();
-        let (mut first, mut moves) = ([None; 6], [false; 6]);
+        let (mut first, mut moves, mut away) = ([None; 6], [false; 6], [false; 6]);
         let stated = |motion: &Motion| {
             let mut values = motion.targets.iter().filter_map(|target| target.value.as_ref().ok());
             values.any(|value| *value.external() != [OptionF64::NONE; 6])
@@ -128,16 +145,19 @@ impl FrameTable {
         let any = listing.motions.par_iter().with_min_len(search_budget::MANY).any(stated);
         for motion in listing.motions.iter().filter(|_| any) {
             let values = motion.targets.iter().filter_map(|target| target.value.as_ref().ok());
-            for target in values.filter_map(TargetValue::cartesian) {
-                if target.external == [OptionF64::NONE; 6] {
+            for target in values {
+                if *target.external() == [OptionF64::NONE; 6] {
                     continue;
                 }
-                let far = self.of_motion(motion).is_ok_and(|frames_index| {
-                    let flange = self.list[frames_index].commanded.flange_for(&target.pose());
-                    !(flange.translation.vector.norm() <= longest)
-                });
-                for (axis, value) in target.external.iter().enumerate() {
+                let far =
+                    target.cartesian().zip(self.of_motion(motion).ok()).is_some_and(|(target, index)| {
+                        let flange = self.list[index].commanded.flange_for(&target.pose());
+                        !(flange.translation.vector.norm() <= longest)
+                    });
+                for (axis, value) in target.external().iter().enumerate() {
                     let Some(value) = value.get() else { continue };
+                    self.states[axis] = true;
+                    away[axis] |= value != 0.0;
                     moves[axis] |= *first[axis].get_or_insert(value) != value;
                     self.base[axis] |= far && cell.carries(axis).is_none();
                 }
@@ -145,8 +165,11 @@ impl FrameTable {
         }
         for (axis, letter) in ('a'..='f').enumerate() {
             self.base[axis] |= cell.carries(axis) == Some(Carries::Base);
-            if !moves[axis] || cell.carries(axis).is_some() {
+            if !(moves[axis] || away[axis]) || cell.carries(axis).is_some() {
                 continue;
+            }
+            if !self.base[axis] {
+                self.unstated_axes.push(letter);
             }
             self.assumed.push(if self.base[axis] {
                 format!(
@@ -154,17 +177,21 @@ impl FrameTable {
                      to carry the robot's base (cell file, [[external]])"
                 )
             } else {
+                let state = if moves[axis] { "moves" } else { "does not stand at 0" };
                 format!(
-                    "external axis {letter} moves: assumed not to carry the robot's base (cell file, \
-                         [[external]])"
+                    "external axis {letter} {state}: assumed not to carry the robot's base; state what it carries (cell file, \
+                     [[external]])"
                 )
             });
         }
     }
 
-    /// The external axis of a target that carries the base.
+    /// The external axis that carries the base: one that the target states, or that another one of the program does, since a deactivated
+    /// axis stays where it was.
     pub(crate) fn moving_base(&self, target: &RobTarget) -> Option<OutcomeReason> {
-        let axis = (0..6).find(|&axis| self.base[axis] && target.external[axis].is_some())?;
+        let carries = |axis: &usize| self.base[*axis];
+        let stated = (0..6).filter(carries).find(|axis| target.external[*axis].is_some());
+        let axis = stated.or_else(|| (0..6).filter(carries).find(|axis| self.states[*axis]))?;
         Some(OutcomeReason::MovingBase { axis })
     }
 

@@ -223,7 +223,8 @@ fn planned(job: &Planner<'_>) -> Plan {
     notes.extend(beyond_noise_note(arms, outcomes.iter().filter_map(|outcome| outcome.shape_sigma_mm.get())));
     #[expect(clippy::filter_map_identity, reason = "works in place, unlike `flatten`: memory is at its peak")]
     let changes = changes.into_iter().filter_map(|change| change).collect();
-    let mut plan = Plan { notes, changes, outcomes, ..Plan::default() };
+    let unstated_axes = frame_table.unstated_axes.clone();
+    let mut plan = Plan { notes, changes, outcomes, unstated_axes, ..Plan::default() };
     plan.points.reserve_exact(portions.iter().map(|p| p.points.len()).sum());
     for mut portion in portions {
         plan.points.append(&mut portion.points);

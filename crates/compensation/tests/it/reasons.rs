@@ -12,6 +12,7 @@ use truegrind_compensation::options::{Circles, Options};
 use truegrind_compensation::plan::Plan;
 use truegrind_compensation::plan::planner::plan;
 use truegrind_compensation::plan::reason::OutcomeReason;
+use truegrind_programs::motion::Reason;
 use truegrind_programs::rapid::Task;
 
 use super::{estimated, nominal, perturbed};
@@ -297,9 +298,10 @@ fn an_axis_that_carries_the_base_refuses_its_motions() {
     let base = Some(OutcomeReason::MovingBase { axis: 0 });
     // Farther away than the arm is long: the axis must carry the base, also where it is at 0.
     let found = reasons(&Cell::default());
-    assert_eq!(found, [base, base, base, None]);
+    // And where the last target does not state it: a deactivated axis stays where it was.
+    assert_eq!(found, [base; 4]);
     let stated = |text: &str| Cell::from_toml(&format!("[[external]]\naxis = \"{text}")).unwrap();
-    assert_eq!(reasons(&stated("a\"\ncarries = \"base\"\n")), [base, base, base, None]);
+    assert_eq!(reasons(&stated("a\"\ncarries = \"base\"\n")), [base; 4]);
     let both = stated("b\"\ncarries = \"base\"\n");
     assert_eq!(reasons(&both)[3], Some(OutcomeReason::MovingBase { axis: 1 }));
     // Stated not to carry it: then the far target is out of reach.
@@ -312,6 +314,63 @@ fn an_axis_that_carries_the_base_refuses_its_motions() {
         notes.iter().any(|note| note.contains("external axis a") && note.contains("[[external]]")),
         "{notes:?}"
     );
+}
+
+/// An axis that stands away from 0 throughout may carry the base as well as one that moves.
+#[test]
+fn an_axis_that_stands_elsewhere_than_at_0_is_asked_for() {
+    let go = |axis: &str| {
+        let at = |x: f64| {
+            format!("MoveL [[{x},0,300],[0,0,1,0],[0,0,0,0],[{axis},9E9,9E9,9E9,9E9,9E9]],v20,z1,tool0;\n")
+        };
+        let text = format!("MODULE M\nPROC main()\n{}{}ENDPROC\nENDMODULE\n", at(380.0), at(390.0));
+        let plan = planned(text.as_bytes(), &known(), &Cell::default(), &Options::default());
+        (
+            plan.unstated_axes.clone(),
+            plan.notes.iter().any(|note| note.contains("external axis a does not stand at 0")),
+        )
+    };
+    assert_eq!(go("300"), (vec!['a'], true));
+    assert_eq!(go("0"), (vec![], false));
+    assert_eq!(go("9E9"), (vec![], false));
+}
+
+/// A copy of a taught frame has its place, not that of its numbers.
+#[test]
+fn a_copy_of_what_was_taught_is_not_metrology() {
+    let cell = Cell::from_toml(
+        "[[tool]]\nname = \"t1\"\norigin = \"taught\"\n[[wobj]]\nname = \"w1\"\norigin = \"taught\"\n",
+    )
+    .unwrap();
+    let metrology = Cell::from_toml(
+        "[[tool]]\nname = \"t1\"\norigin = \"metrology\"\n[[wobj]]\nname = \"w1\"\norigin = \"metrology\"\n",
+    )
+    .unwrap();
+    let tool = "[TRUE,[[0,0,50],[1,0,0,0]],[1,[0,0,20],[1,0,0,0],0,0,0]]";
+    let object = "[FALSE,TRUE,\"\",[[380,0,300],[1,0,0,0]],[[0,0,0],[1,0,0,0]]]";
+    let text = format!(
+        "MODULE M\nPERS tooldata t1:={tool};\nPERS tooldata t2:={tool};\nPERS wobjdata w1:={object};\nPERS wobjdata w2:={object};\n\
+         PROC main()\nw2:=w1;\nw2.oframe.trans:=[1,2,3];\nt2:=t1;\n{}{}{}ENDPROC\nENDMODULE\n",
+        go("tool0", "w2"),
+        go("t2", "wobj0"),
+        go("tool0", "wobj0"),
+    );
+    let reasons = |cell: &Cell| -> Vec<Option<OutcomeReason>> {
+        planned(text.as_bytes(), &known(), cell, &Options::default())
+            .outcomes
+            .iter()
+            .map(|o| o.reason())
+            .collect()
+    };
+    let [object, tool] =
+        [Reason::WorkObjectAssigned, Reason::ToolAssigned].map(|r| Some(OutcomeReason::Program(r)));
+    assert_eq!(reasons(&cell), [object, tool, None]);
+    assert_eq!(reasons(&metrology), [None; 3]);
+}
+
+fn go(tool: &str, object: &str) -> String {
+    let at = if object == "wobj0" { "[380,0,300]" } else { "[0,0,0]" };
+    format!("MoveJ [{at},[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v20,z1,{tool}\\WObj:={object};\n")
 }
 
 #[test]

@@ -365,7 +365,7 @@ impl<'t, 's> Interpreter<'t, 's> {
         }
         let tool = |(name, frame): &(String, Frame)| {
             let value = frame.within_reach().map(flange_tool);
-            Tool { name: name.clone(), value, place: None }
+            Tool { name: name.clone(), value, place: None, assigned: false }
         };
         self.tools = self.frames_by_name(&tools);
         self.frames = self.frames_by_name(&frames);

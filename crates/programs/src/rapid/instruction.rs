@@ -250,7 +250,7 @@ pub const INSTRUCTIONS: &[Instruction] = &[
     plain("ArcMoveJ", Joint, "TSZt"),
     rigid("ArcMoveC", Circular, "CTSZt"),
     plain("ArcMoveAbsJ", AbsoluteJoint, "JSZt"),
-    plain("FCPress1LStart", Linear, "TS*Zt"),
+    rigid("FCPress1LStart", Linear, "TS*Zt"),
     same("FCPressL", Linear, "TS.Zt"),
     rigid("FCPressC", Circular, "CTS.Zt"),
     rigid("FCPressEnd", Linear, "TSt"),

@@ -430,6 +430,7 @@ impl Interpreter<'_, '_> {
             name: name.clone(),
             value: self.tool_value(&name).and_then(Frame::within_reach).map(flange_tool),
             place: None,
+            assigned: false,
         };
         let index = intern(&mut self.listing.tools, tool);
         self.tool_index.insert(name, index);
@@ -457,7 +458,8 @@ impl Interpreter<'_, '_> {
             object_frame: within,
         });
         let displacement = self.state.programmable_frame.as_ref().map(Frame::from_pose);
-        let work_object = WorkObject { name: name.clone(), value, place: None, displacement };
+        let work_object =
+            WorkObject { name: name.clone(), value, place: None, assigned: false, displacement };
         let index = intern(&mut self.listing.work_objects, work_object);
         self.frame_index = Some((name, self.state.programmable_frame, index));
         index

@@ -89,6 +89,7 @@ impl<'s> ListingBuilder<'_, 's> {
             name: display(text),
             value: self.evaluated(unit, state, value).tool(),
             place: self.declared_at(unit, value),
+            assigned: self.varies(unit, value),
         };
         let index = intern(&mut self.listing.tools, tool);
         if !self.varies(unit, value) {
@@ -111,6 +112,7 @@ impl<'s> ListingBuilder<'_, 's> {
                 name: display(tree.text(symbol.name)),
                 value: self.evaluator.symbol_value(context, id).tool(),
                 place: Some(self.place(symbol.file, symbol.name)),
+                assigned: symbol.assigned,
             };
             self.listing.declared_tools.push(tool);
         }
@@ -142,6 +144,7 @@ impl<'s> ListingBuilder<'_, 's> {
             name: display(text),
             value: found,
             place: value.and_then(|value| self.declared_at(unit, value)),
+            assigned: value.is_some_and(|value| self.varies(unit, value)),
             displacement,
         };
         let index = intern(&mut self.listing.work_objects, work_object);
