@@ -157,7 +157,6 @@ pub fn corrected_task(
         joint_targets: options.joint_targets,
         condition,
         loads: options.payload.is_none().then(|| program.loads()),
-        flag_unknown_starts: true,
         points: false,
         cuts: if case.whole_cuts { Cuts::Whole } else { Cuts::Single },
         ..options::Options::default()

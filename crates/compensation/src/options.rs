@@ -63,10 +63,6 @@ pub struct Options {
     pub placement: Placement,
     /// A cut that the correction makes worse with a higher probability remains unmodified.
     pub max_risk: f64,
-    /// Whether each motion that relies on an unchecked configuration from an unknown start is flagged
-    /// ([`OutcomeReason::UnknownStart`](crate::plan::reason::OutcomeReason::UnknownStart)). Otherwise one note lists where
-    /// such sequences begin.
-    pub flag_unknown_starts: bool,
     /// Whether [`Plan::points`](crate::plan::Plan::points) is filled: needed for tables and pictures of the path, not for the
     /// rewrite.
     pub points: bool,
@@ -93,7 +89,6 @@ impl Default for Options {
             cuts: Cuts::Whole,
             placement: Placement::Auto,
             max_risk: 0.1,
-            flag_unknown_starts: false,
             points: true,
             remedies: true,
         }

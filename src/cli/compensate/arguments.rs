@@ -94,9 +94,9 @@ pub(crate) struct Arguments {
     /// Also rewrite joint targets (MoveAbsJ).
     #[arg(long)]
     joint_targets: bool,
-    /// Flag every motion whose configuration is programmed but not monitored (ConfL \Off, ConfJ \Off) and whose start the
-    /// program text does not determine. By default a note lists where such sequences begin.
-    #[arg(long)]
+    /// No longer needed: motions whose configuration is not monitored (ConfL \Off, ConfJ \Off) and whose start the program text does
+    /// not determine are always flagged.
+    #[arg(long, hide = true)]
     flag_open_starts: bool,
     #[command(flatten)]
     pub(super) cell: CellArguments,
@@ -208,7 +208,6 @@ impl Arguments {
             tolerance_mm: self.tolerance,
             max_correction_mm: self.max_correction,
             joint_targets: self.joint_targets,
-            flag_unknown_starts: self.flag_open_starts,
             cuts: if self.partial { Cuts::Partial } else { Cuts::Whole },
             placement: match self.placement {
                 PlacementArgument::Auto => Placement::Auto,

@@ -463,9 +463,7 @@ fn plan_motion<'a>(
     (outcome.path_deviation_mm, outcome.inserted) =
         (segment_plan.path_deviation_mm.into(), segment_plan.before.len() as u32);
     // All other flags hold only for the guessed configuration, so this one takes precedence.
-    let guessed = options.flag_unknown_starts
-        && motion.accepts_configuration
-        && solved_targets().any(|s| s.guess != BranchGuess::Known);
+    let guessed = motion.accepts_configuration && solved_targets().any(|s| s.guess != BranchGuess::Known);
     let mut flag = if guessed { Some(OutcomeReason::UnknownStart) } else { segment_plan.flag };
     if let Some(corner) = job.corner(motion, path, &segment_plan, last) {
         let deviation = outcome.path_deviation_mm.get();

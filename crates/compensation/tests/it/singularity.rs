@@ -493,7 +493,7 @@ fn motions_that_rest_on_a_guess_are_flagged_one_by_one() {
         "ConfL\\On;\n".into(),
         line(5),
     ]);
-    let options = Options { flag_unknown_starts: true, ..Options::default() };
+    let options = Options::default();
     let (plan, _) = rewritten(text.as_bytes(), &known(robot, 1), &Cell::default(), &options);
     let motions = &plan.outcomes;
     let open: Vec<bool> = motions.iter().map(|o| o.reason() == Some(OutcomeReason::UnknownStart)).collect();
@@ -535,7 +535,6 @@ fn a_configuration_checked_in_the_first_cycle_alone_is_flagged_where_the_second_
         let options = Options {
             tolerance_mm: 50.0,
             cuts: truegrind_compensation::cut::Cuts::Single,
-            flag_unknown_starts: true,
             ..Options::default()
         };
         let planned = plan(&task.listing, &known(robot, 2), &Cell::default(), &options);
@@ -577,7 +576,7 @@ fn an_unchecked_joint_motion_to_which_another_branch_is_nearer_is_a_guess() {
     let planned = |fourth: f64, emit: Emit| {
         let text = source(fourth);
         let task = Task::read(&[("p.mod", text.as_bytes())]);
-        let options = Options { flag_unknown_starts: true, emit, ..Options::default() };
+        let options = Options { emit, ..Options::default() };
         plan(&task.listing, &known, &Cell::default(), &options)
     };
     // From 50° it is 80° to -30° and 100° to 150° with the wrist as it is; from 100° it is 130° and 50°.
