@@ -495,6 +495,9 @@ pub struct Listing {
     /// Motions that may follow each other across a call of a routine or its return, and in NC files across a jump: the earlier and the
     /// later one, sorted.
     pub across_calls: Vec<[u32; 2]>,
+    /// All motions from which one without [`Motion::previous`] may begin, where these are known: behind branches, in loops, and
+    /// across calls (RAPID).
+    pub predecessors: BTreeMap<u32, Vec<u32>>,
     /// Regions that could not be parsed.
     pub opaque: Vec<OpaqueRegion>,
     /// The marks of earlier compensations, per file.

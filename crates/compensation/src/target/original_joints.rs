@@ -4,6 +4,8 @@
 //! is reached from the previous motion. Consecutive targets are solved together, so that the kinematics runs in lanes; runs
 //! are split by count alone, so the result does not depend on the number of threads.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use crate::arms::Arms;
@@ -57,7 +59,7 @@ pub(crate) enum BranchGuess {
 }
 
 /// Joints from which the next target is reached.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq)]
 struct ReferenceJoints {
     joints: Joints,
     /// Whether they are guessed.
@@ -147,9 +149,65 @@ fn originals<'a>(
     let mut budget = SearchBudget::of(search_budget::STARTS);
     let monitors: Vec<Switch> =
         listing.motions.par_iter().with_min_len(search_budget::MANY).map(monitored).collect();
+    let chains = chains(listing, &monitors);
+    let mut waiting = Vec::new();
+    for (at, chain) in chains.iter().enumerate() {
+        let start = Start::of(listing, chain.start, ranges, &out);
+        if start == Start::Waits {
+            waiting.push(at);
+        }
+        let run = ranges.of_motions(chain.clone());
+        let mut near = start.joints();
+        solve_run(&target_refs[run.clone()], &mut near, arms, frame_table, &mut budget, &mut out[run]);
+    }
+    // Chains that begin where the program branches or calls, once the joints at one of the motions before are known: whether those at
+    // the others lead to the same is seen below. The chains behind them follow.
+    for _ in 0..MOST_ROUNDS {
+        let (mut changed, mut still_waiting) = (false, Vec::new());
+        for at in std::mem::take(&mut waiting) {
+            let chain = &chains[at];
+            let start = Start::of(listing, chain.start, ranges, &out);
+            let Start::At(near) = start else {
+                still_waiting.push(at);
+                continue;
+            };
+            changed = true;
+            let mut near = Some(near);
+            for chain in std::iter::once(chain).chain(following(listing, &chains, at)) {
+                let run = ranges.of_motions(chain.clone());
+                if chain.start != chains[at].start {
+                    near = Start::of(listing, chain.start, ranges, &out).joints();
+                }
+                solve_run(
+                    &target_refs[run.clone()],
+                    &mut near,
+                    arms,
+                    frame_table,
+                    &mut budget,
+                    &mut out[run],
+                );
+            }
+        }
+        waiting = still_waiting;
+        if !changed {
+            break;
+        }
+    }
+    while guess_if_possibly_unmonitored(listing, &monitors, target_refs, ranges, arms, frame_table, &mut out)
+    {
+    }
+    out
+}
+
+/// Most times that chains wait for the joints before them.
+const MOST_ROUNDS: usize = 16;
+
+/// Consecutive motions whose configuration is not monitored, each reached from the one before it.
+fn chains(listing: &Listing, monitors: &[Switch]) -> Vec<Range<usize>> {
+    let chained = |m: usize| monitors[m] == Switch::Off && listing.motions[m].own_reason.is_none();
+    let mut out = Vec::new();
     let mut motion = 0;
     while motion < listing.motions.len() {
-        let chained = |m: usize| monitors[m] == Switch::Off && listing.motions[m].own_reason.is_none();
         if !chained(motion) {
             motion += 1;
             continue;
@@ -162,23 +220,64 @@ fn originals<'a>(
         {
             end += 1;
         }
-        let previous = listing.motions[motion].previous.map(|p| p as usize);
-        let mut near = previous.and_then(|p| {
-            let reached = &out[ranges.of_motion(p)];
-            reached.last().and_then(|start| start.as_ref().ok().map(ReferenceJoints::of))
-        });
-        let run = ranges.of_motions(motion..end);
-        solve_run(&target_refs[run.clone()], &mut near, arms, frame_table, &mut budget, &mut out[run]);
+        out.push(motion..end);
         motion = end;
     }
-    guess_if_possibly_unmonitored(listing, &monitors, target_refs, ranges, arms, frame_table, &mut out);
     out
+}
+
+/// The chains that go on from one without a branch: longer ones are cut into stretches.
+fn following<'c>(
+    listing: &'c Listing,
+    chains: &'c [Range<usize>],
+    at: usize,
+) -> impl Iterator<Item = &'c Range<usize>> {
+    let pairs = chains[at..].windows(2);
+    pairs
+        .take_while(|pair| listing.motions[pair[1].start].previous == Some(pair[0].end as u32 - 1))
+        .map(|pair| &pair[1])
+}
+
+/// Where a chain begins.
+#[derive(Clone, Copy, PartialEq)]
+enum Start {
+    At(ReferenceJoints),
+    /// Where one of the motions before it ends, none of which is known yet.
+    Waits,
+    Unknown,
+}
+
+impl Start {
+    fn of(listing: &Listing, motion: usize, ranges: &TargetRanges, out: &Originals<'_>) -> Self {
+        let end = |motion: u32| {
+            let reached = &out[ranges.of_motion(motion as usize)];
+            reached.last().and_then(|start| start.as_ref().ok().map(ReferenceJoints::of))
+        };
+        if let Some(previous) = listing.motions[motion].previous {
+            return end(previous).map_or(Self::Unknown, Self::At);
+        }
+        match listing.predecessors.get(&(motion as u32)) {
+            Some(before) => {
+                let known = before.iter().filter_map(|before| end(*before)).find(|end| !end.guessed);
+                known.map_or(Self::Waits, Self::At)
+            }
+            None => Self::Unknown,
+        }
+    }
+
+    fn joints(self) -> Option<ReferenceJoints> {
+        match self {
+            Self::At(near) => Some(near),
+            Self::Waits | Self::Unknown => None,
+        }
+    }
 }
 
 /// Where the configuration may or may not be checked, depending on the execution path, the branch counts as guessed as if
 /// unchecked: from an unknown start, from one that is guessed itself, where an unchecked motion ends at other joints, or where its way
-/// passes a singularity; and where a joint motion that is not checked keeps its branch though another one is nearer. What follows
-/// unchecked inherits the guess.
+/// passes a singularity; and where a joint motion that is not checked keeps its branch though another one is nearer. So it does where the
+/// program branches and the motions before lead to different joints. What follows unchecked inherits the guess. Whether anything became
+/// a guess.
 fn guess_if_possibly_unmonitored(
     listing: &Listing,
     monitors: &[Switch],
@@ -187,43 +286,57 @@ fn guess_if_possibly_unmonitored(
     arms: &Arms<'_>,
     frame_table: &FrameTable,
     out: &mut Originals<'_>,
-) {
+) -> bool {
+    let mut changed = false;
     for (index, monitored) in monitors.iter().enumerate() {
         let motion = &listing.motions[index];
         if *monitored == Switch::On || motion.own_reason.is_some() {
             continue;
         }
-        let previous = motion.previous.map(|previous| previous as usize);
-        let before = previous.map(|previous| out[ranges.of_motion(previous)].last());
-        let before = match (before, monitored) {
-            (Some(Some(Ok(start))), _) if start.guess != BranchGuess::Known => Some(BranchGuess::Inherited),
-            (Some(Some(Ok(start))), _)
-                if passes_singularity(motion, start, &out[ranges.of_motion(index)]) =>
-            {
-                Some(BranchGuess::Guessed)
+        let from = |previous: Option<u32>| {
+            let before = previous.map(|previous| out[ranges.of_motion(previous as usize)].last());
+            match (before, monitored) {
+                (Some(Some(Ok(start))), _) if start.guess != BranchGuess::Known => {
+                    Some(BranchGuess::Inherited)
+                }
+                (Some(Some(Ok(start))), _)
+                    if passes_singularity(motion, start, &out[ranges.of_motion(index)]) =>
+                {
+                    Some(BranchGuess::Guessed)
+                }
+                (Some(Some(Ok(start))), Switch::Off)
+                    if motion.kind == MotionKind::Joint
+                        && ranges.of_motion(index).any(|at| {
+                            let target = &target_refs[at];
+                            out[at].as_ref().is_ok_and(|here| {
+                                is_other_branch_nearer(start, here, target, arms, frame_table)
+                            })
+                        }) =>
+                {
+                    Some(BranchGuess::Guessed)
+                }
+                // Unchecked in any case: its own search has looked at its start, which was not yet known to be a guess.
+                (_, Switch::Off) if !listing.predecessors.contains_key(&(index as u32)) => None,
+                (Some(Some(Ok(start))), _) => {
+                    let here = ranges.of_motion(index);
+                    let same = same_unchecked(
+                        &start.joints,
+                        &target_refs[here.clone()],
+                        &out[here],
+                        arms,
+                        frame_table,
+                    );
+                    (!same).then_some(BranchGuess::Guessed)
+                }
+                _ => Some(BranchGuess::Guessed),
             }
-            (Some(Some(Ok(start))), Switch::Off)
-                if motion.kind == MotionKind::Joint
-                    && ranges.of_motion(index).any(|at| {
-                        let target = &target_refs[at];
-                        out[at]
-                            .as_ref()
-                            .is_ok_and(|here| is_other_branch_nearer(start, here, target, arms, frame_table))
-                    }) =>
-            {
-                Some(BranchGuess::Guessed)
-            }
-            // Unchecked in any case: its own search has looked at its start, which was not yet known to be a guess.
-            (_, Switch::Off) => None,
-            (Some(Some(Ok(start))), _) => {
-                let here = ranges.of_motion(index);
-                let same =
-                    same_unchecked(&start.joints, &target_refs[here.clone()], &out[here], arms, frame_table);
-                (!same).then_some(BranchGuess::Guessed)
-            }
-            _ => Some(BranchGuess::Guessed),
         };
-        let Some(guess) = before else { continue };
+        let before = listing.predecessors.get(&(index as u32)).filter(|_| motion.previous.is_none());
+        let guess = match before {
+            Some(before) => before.iter().find_map(|before| from(Some(*before))),
+            None => from(motion.previous),
+        };
+        let Some(guess) = guess else { continue };
         for at in ranges.of_motion(index) {
             let several = || {
                 CommandedFlange::of(&target_refs[at], frame_table)
@@ -231,12 +344,15 @@ fn guess_if_possibly_unmonitored(
             };
             if let Ok(here) = &mut out[at]
                 && (*monitored == Switch::Either || here.guess == BranchGuess::Known)
+                && here.guess != guess
                 && several()
             {
+                changed |= here.guess == BranchGuess::Known;
                 here.guess = guess;
             }
         }
     }
+    changed
 }
 
 /// Shortest joint motion for which another branch can be nearer (rad): the wrist that is turned over stands half a turn away.

@@ -556,6 +556,80 @@ fn a_configuration_checked_in_the_first_cycle_alone_is_flagged_where_the_second_
     assert_ne!(reasons(through, "")[2], unknown);
 }
 
+/// Where configurations are not checked, what is executed before decides: across calls, loops and branches, if all that may come before
+/// leads to the same joints.
+#[test]
+fn an_unchecked_configuration_follows_from_all_that_may_come_before() {
+    let robot = "abb-irb-120";
+    let sheet = sheet(robot);
+    let joints = |deg: [f64; 6]| Joints::from_fn(|j, _| f64::to_radians(deg[j]));
+    // The quarter turns are those of another branch than the one in which the arm stands.
+    let go = |deg: [f64; 6]| {
+        let pose = forward(&sheet, &joints(deg));
+        let (p, r) = (pose.translation.vector, pose.rotation);
+        format!(
+            "MoveL [[{:.4},{:.4},{:.4}],[{:.8},{:.8},{:.8},{:.8}],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v50,fine,tool0;\n",
+            p.x, p.y, p.z, r.w, r.i, r.j, r.k
+        )
+    };
+    let places = [
+        [7.0, 12.0, 4.0, 138.0, -31.0, 202.0],
+        [8.0, 13.0, 3.0, 137.0, -32.0, 203.0],
+        [9.0, 14.0, 2.0, 136.0, -33.0, 204.0],
+    ];
+    let [a, b, c] = places.map(go);
+    let home = "MoveAbsJ [[5,10,5,140,-30,200],[9E9,9E9,9E9,9E9,9E9,9E9]]\\NoEOffs,v50,fine,tool0;\n";
+    let other = "MoveAbsJ [[5,10,5,-40,30,20],[9E9,9E9,9E9,9E9,9E9,9E9]]\\NoEOffs,v50,fine,tool0;\n";
+    // Of the lines: whether each is a guess, and its fourth joint.
+    let lines = |main: &str, routines: &str| -> Vec<(bool, f64)> {
+        let text =
+            format!("MODULE M\n PROC main()\nConfL\\Off;\nConfJ\\Off;\n{main}ENDPROC\n{routines}ENDMODULE\n");
+        let task = Task::read(&[("p.mod", text.as_bytes())]);
+        assert!(task.listing.opaque.is_empty(), "{text}");
+        let options =
+            Options { cuts: truegrind_compensation::cut::Cuts::Single, points: true, ..Options::default() };
+        let plan = plan(&task.listing, &known(robot, 2), &Cell::default(), &options);
+        let guessed = |line: u32| {
+            let index = task.listing.motions.iter().position(|motion| motion.place.line == line).unwrap();
+            plan.outcomes[index].reason() == Some(OutcomeReason::UnknownStart)
+        };
+        let lines = plan.points.iter().filter(|point| point.instruction == "MoveL");
+        let fourth = |joints: Option<Joints>| joints.unwrap()[3].to_degrees().round();
+        lines.map(|point| (guessed(point.line), fourth(point.joints_before))).collect()
+    };
+    let inline = [(false, 138.0), (false, 137.0), (false, 136.0)];
+    assert_eq!(lines(&format!("{home}{a}{b}{c}"), ""), inline);
+    // In a routine, whichever stands first in the file, and behind it.
+    assert_eq!(
+        lines(&format!("{home}{a}side;\n{c}"), &format!("PROC side()\n{b}ENDPROC\n")),
+        [inline[0], inline[2], inline[1]]
+    );
+    let deep = format!("PROC outer()\nside;\nENDPROC\nPROC side()\n{a}{b}{c}ENDPROC\n");
+    assert_eq!(lines(&format!("{home}outer;\n"), &deep), inline);
+    // In loops and behind branches.
+    assert_eq!(lines(&format!("{home}FOR i FROM 1 TO 3 DO\n{a}{b}ENDFOR\n{c}"), ""), inline);
+    assert_eq!(lines(&format!("{home}IF n=1 THEN\n{a}ELSE\n{b}ENDIF\n{c}"), ""), inline);
+    // From two places with the same arm, and with another one; then what follows is a guess as well.
+    let side = format!("PROC side()\n{b}{c}ENDPROC\n");
+    assert_eq!(lines(&format!("{home}side;\n{home}side;\n"), &side), inline[1..]);
+    let two = lines(&format!("{home}side;\n{other}side;\n"), &side);
+    assert!(two.iter().all(|(guess, _)| *guess), "{two:?}");
+    let turned = lines(&format!("{home}IF n=1 THEN\n{other}ENDIF\n{a}{b}"), "");
+    assert!(turned.iter().all(|(guess, _)| *guess), "{turned:?}");
+    // A routine of no file may move the arm, a jump may come from anywhere, and a routine that nobody calls begins anywhere.
+    for (main, routines) in [
+        (format!("{home}Elsewhere;\n{a}"), String::new()),
+        (format!("{home}IF n=1 GOTO on;\n{other}on:\n{a}"), String::new()),
+        (home.to_owned(), format!("PROC alone()\n{a}ENDPROC\n")),
+        (format!("{home}side;\n"), format!("PROC side()\nElsewhere;\n{a}ENDPROC\n")),
+        (format!("{home}side;\n{a}"), "PROC side()\nElsewhere;\nENDPROC\n".to_owned()),
+    ] {
+        let found = lines(&main, &routines);
+        // Where the switch itself may be set or not, the target may be refused for its quarter turns.
+        assert!(found.iter().all(|(guess, _)| *guess), "{main}{routines}: {found:?}");
+    }
+}
+
 /// A joint motion whose configuration is not checked ends with the wrist turned over if that is nearer: which of the two the controller
 /// takes is a guess, and said to be one also where the correction is written as joints.
 #[test]

@@ -409,6 +409,7 @@ impl Interpreter<'_, '_, '_> {
         *before = ReachingMotions::after(motion);
         before.join(&also);
         before.any |= self.moved_between;
+        before.elsewhere |= self.moved_between || self.resumes;
     }
 
     /// The displacement after PDispSet, PDispOn, PDispAdd or PDispOff.
@@ -522,6 +523,7 @@ impl Interpreter<'_, '_, '_> {
                 // A search stops where its signal comes, and a handler may resume from anywhere.
                 state.previous = motion.filter(|_| !known.ends_early() && !self.moved_between);
                 self.after_motion(motion, &mut state.reaching);
+                state.reaching.elsewhere |= known.ends_early();
             }
             return;
         }
@@ -576,6 +578,7 @@ impl Interpreter<'_, '_, '_> {
                     return;
                 }
                 state.reaching.any |= self.tracks_motions;
+                state.reaching.elsewhere = true;
             }
         }
         state.previous = None;

@@ -31,6 +31,8 @@ pub(super) struct ReachingMotions {
     any_in_loop: bool,
     /// Or the last motion before the routine was called.
     pub(super) entry: bool,
+    /// Or something moved the robot that is no motion of the listing, or an error or interrupt led elsewhere.
+    pub(super) elsewhere: bool,
 }
 
 /// A larger set is any motion for what depends on the robot's position.
@@ -45,7 +47,11 @@ const FEW: usize = 8;
 impl ReachingMotions {
     /// This motion.
     pub(super) fn after(motion: Option<u32>) -> Self {
-        Self { last: motion.map(Last::Motion).into_iter().collect(), ..Self::default() }
+        Self {
+            last: motion.map(Last::Motion).into_iter().collect(),
+            elsewhere: motion.is_none(),
+            ..Self::default()
+        }
     }
 
     /// A motion in one of the routines called there.
@@ -60,7 +66,7 @@ impl ReachingMotions {
 
     /// Any motion, at a point that can be reached from anywhere in the routine.
     pub(super) fn at_any_point() -> Self {
-        Self { any: true, anywhere: true, ..Self::default() }
+        Self { any: true, anywhere: true, elsewhere: true, ..Self::default() }
     }
 
     /// At the head of a loop, after any number of iterations.
@@ -125,5 +131,6 @@ impl Lattice for ReachingMotions {
         }
         self.any_in_loop |= other.any_in_loop;
         self.entry |= other.entry;
+        self.elsewhere |= other.elsewhere;
     }
 }

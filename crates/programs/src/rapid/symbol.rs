@@ -15,7 +15,7 @@ use std::collections::{HashMap, HashSet};
 
 pub use self::effects::{SideEffects, Write, WriteKind};
 use super::instruction;
-use super::modal::SwitchSet;
+use super::modal::{Switch, SwitchSet};
 use super::syntax::{Data, RapidTree, RoutineHead, Syntax, data, parts, routine_head, text_of, token_kind};
 use super::token::{Token, display, fold, folded, same_name};
 use crate::motion::Reason;
@@ -178,7 +178,8 @@ pub struct Symbols {
     pub states_loads: bool,
     /// Whether any statement may depend on the robot's current position (PDispOn without \ExeP).
     pub(super) uses_position: bool,
-    /// Whether anything depends on which motions may be the last executed: the robot's position, or a call of a routine that moves.
+    /// Whether anything depends on which motions may be the last executed: the robot's position, a configuration that is not
+    /// monitored, or a call of a routine that moves.
     pub(super) tracks_motions: bool,
     /// Whether ExitCycle may restart main in the middle of a cycle.
     pub restarts_main: bool,
@@ -201,7 +202,9 @@ impl Symbols {
         symbols.collect_namesakes(trees);
         symbols.solve_effects(trees);
         symbols.uses_position = symbols.may_use_position();
-        symbols.tracks_motions = symbols.uses_position || symbols.calls_motions();
+        let sets = |switch: Switch| !symbols.all_switches.is_unset(switch);
+        let may_unmonitor = sets(Switch::ConfLinear) || sets(Switch::ConfJoint);
+        symbols.tracks_motions = symbols.uses_position || may_unmonitor || symbols.calls_motions();
         symbols
     }
 

@@ -93,7 +93,8 @@ fn listing(trees: &[RapidTree<'_>], symbols: &Symbols) -> (Listing, Loads, Vec<b
     builder.refuse_motions_before_displacement();
     builder.other_uses();
     builder.declared_tools();
-    builder.listing.across_calls = builder.call_edges.solve(symbols, &builder.units);
+    (builder.listing.across_calls, builder.listing.predecessors) =
+        builder.call_edges.solve(symbols, &builder.units, &builder.mains);
     let loads = if symbols.states_loads { builder.loads() } else { Loads::default() };
     (builder.listing, loads, builder.guarded)
 }
@@ -330,7 +331,8 @@ impl Visitor for ListingBuilder<'_, '_> {
             Some(known) => self.table_motion(unit, node, state, nesting, known),
             None => self.other_motion(unit, node, state, nesting)?,
         };
-        self.call_edges.arrive(self.unit, self.listing.motions.len() as u32, &state.reaching);
+        let index = self.listing.motions.len() as u32;
+        self.call_edges.arrive(self.unit, index, motion.previous.is_none(), &state.reaching);
         self.listing.motions.push(motion);
         self.guarded.push(nesting.guarded);
         self.modal.push(state.modal);

@@ -250,6 +250,33 @@ fn motions_follow_each_other_across_calls() {
     assert_eq!(pairs("GOa;\nGO", "PROC a()\nGOIF n=1 a;\nENDPROC\n"), [[3, 8], [8, 5], [8, 8]]);
 }
 
+/// All motions from which one may begin that has none before it in the text alone, as lines.
+#[test]
+fn what_comes_before_is_known_where_all_of_it_is() {
+    const GO: &str = "MoveL p,v100,fine,tool0;\n";
+    let before = |main: &str, routines: &str| {
+        let text = format!("MODULE A\nPROC main()\nConfL\\Off;\n{main}ENDPROC\n{routines}ENDMODULE\n")
+            .replace("GO", GO);
+        let task = truegrind_programs::rapid::Task::read(&[("a.mod", text.as_bytes())]);
+        let line = |motion: &u32| task.listing.motions[*motion as usize].place.line;
+        let found = task.listing.predecessors.iter();
+        found
+            .map(|(motion, before)| (line(motion), before.iter().map(line).collect()))
+            .collect::<Vec<(u32, Vec<u32>)>>()
+    };
+    assert_eq!(before("GOa;\nGO", "PROC a()\nGOGOENDPROC\n"), [(6, vec![10]), (9, vec![4])]);
+    assert_eq!(before("GOIF n=1 THEN\nGOENDIF\nGO", ""), [(8, vec![4, 6])]);
+    assert_eq!(before("GOFOR i FROM 1 TO 2 DO\nGOENDFOR\nGO", ""), [(6, vec![4, 6]), (8, vec![4, 6])]);
+    // Main begins anywhere, and so does what nobody calls; a routine of no file may move the arm, and an interrupt as well.
+    assert!(before("IF n=1 THEN\nGOENDIF\nGO", "PROC a()\nIF n=1 THEN\nGOENDIF\nGOENDPROC\n").is_empty());
+    assert!(before("GOElsewhere;\nGO", "").is_empty());
+    assert!(before("GOa;\nGO", "PROC a()\nGOElsewhere;\nENDPROC\n").iter().all(|(line, _)| *line == 9));
+    assert!(before("CONNECT i WITH t;\nGOa;\nGO", "PROC a()\nGOENDPROC\nTRAP t\nGOENDTRAP\n").is_empty());
+    // A handler that resumes leads to every motion of its routine.
+    let resumes = "PROC a()\nGOIF n=1 THEN\nGOENDIF\nGOERROR\nGOTRYNEXT;\nENDPROC\n";
+    assert!(before("GOa;\n", resumes).iter().all(|(line, _)| *line == 8));
+}
+
 /// What no file declares and RobotWare does not have is listed with its lines; own routines, instructions and functions are not.
 #[test]
 fn calls_of_routines_that_no_file_declares_are_listed() {

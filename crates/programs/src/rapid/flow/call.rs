@@ -47,6 +47,8 @@ impl Interpreter<'_, '_, '_> {
         self.invalidate_nonlocal(state);
         state.previous = None;
         if self.tracks_motions {
+            // A name may be that of a routine in no file.
+            state.reaching.elsewhere = true;
             let call = self.visitor.record_moving_late_call(&state.reaching);
             state.reaching.join(&ReachingMotions::after_calls(&[call]));
         }

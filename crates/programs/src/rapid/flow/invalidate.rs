@@ -149,10 +149,12 @@ impl Interpreter<'_, '_, '_> {
                 if predefined::waits(name) {
                     self.invalidate_shared(state);
                 }
+                state.reaching.elsewhere |= predefined::displaces(name).is_some();
                 predefined::displaces(name).is_some()
             }
             [] => {
                 self.invalidate_nonlocal(state);
+                state.reaching.elsewhere = true;
                 true
             }
         };

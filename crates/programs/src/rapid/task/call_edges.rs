@@ -4,10 +4,18 @@
 //! Method: context-insensitive interprocedural control flow (Nielson, Nielson, Hankin, Principles of Program Analysis, 1999, §2.5). The
 //! motion before a call is also the last behind it if the routine may end without a motion. What an error handler repeats is left out.
 
+use std::collections::BTreeMap;
+
 use crate::dataflow::{Edge, Lattice, propagate};
 use crate::motion_set::MotionSet;
 use crate::rapid::reaching_motions::{Last, ReachingMotions};
-use crate::rapid::symbol::Symbols;
+use crate::rapid::symbol::{Symbols, Unit};
+
+/// In a set: the robot may stand where none of the motions ends.
+const ELSEWHERE: u32 = u32::MAX;
+
+/// Motions with more before them have no list of them.
+const MOST_PREDECESSORS: usize = 64;
 
 /// A call of a routine that moves, or of any in a list. Behind the units come the lists of routines that computed names may call.
 #[derive(Debug)]
@@ -25,6 +33,8 @@ pub(super) struct CallEdges {
     iterations: Vec<(u32, ReachingMotions)>,
     /// Motions before which another routine may have moved the robot, with their units.
     arrivals: Vec<(u32, u32, ReachingMotions)>,
+    /// Whether each has several motions before it that the text may execute last.
+    branched: Vec<bool>,
     /// By unit or list: the motions that may be its last.
     ends: Vec<ReachingMotions>,
 }
@@ -63,6 +73,7 @@ impl CallEdges {
             calls: Vec::new(),
             iterations: Vec::new(),
             arrivals: Vec::new(),
+            branched: Vec::new(),
             ends: vec![ReachingMotions::default(); units],
         }
     }
@@ -84,10 +95,12 @@ impl CallEdges {
         self.iterations[iteration as usize].1.join(reaching);
     }
 
-    /// A motion after some motions.
-    pub(super) fn arrive(&mut self, unit: u32, motion: u32, before: &ReachingMotions) {
-        if before.crosses_call() {
+    /// A motion after some motions; `branched`: there is no single one before it in its routine.
+    pub(super) fn arrive(&mut self, unit: u32, motion: u32, branched: bool, before: &ReachingMotions) {
+        let branched = branched && !before.elsewhere && (before.entry || !before.known().is_empty());
+        if before.crosses_call() || branched {
             self.arrivals.push((unit, motion, before.clone()));
+            self.branched.push(branched);
         }
     }
 
@@ -96,11 +109,16 @@ impl CallEdges {
         self.ends[unit as usize].join(reaching);
     }
 
-    /// The motions that may follow each other across a call or a return or from one iteration to the next, sorted. `units`: of each
-    /// motion.
-    pub(super) fn solve(&self, symbols: &Symbols, units: &[u32]) -> Vec<[u32; 2]> {
-        if self.calls.is_empty() {
-            return Vec::new();
+    /// The motions that may follow each other across a call or a return or from one iteration to the next, sorted; and those before
+    /// each motion with several, where all of them are known. `units`: of each motion; `mains`: routines at which a program starts.
+    pub(super) fn solve(
+        &self,
+        symbols: &Symbols,
+        units: &[u32],
+        mains: &[u32],
+    ) -> (Vec<[u32; 2]>, BTreeMap<u32, Vec<u32>>) {
+        if self.calls.is_empty() && !self.branched.contains(&true) {
+            return Default::default();
         }
         let passes = self.passing(symbols);
         let nodes = Nodes { units: self.ends.len() as u32, calls: self.calls.len() as u32 };
@@ -129,7 +147,27 @@ impl CallEdges {
                 found(Err(nodes.entry(unit)));
             }
         };
+        // Units that no call enters: the program's start, its next cycle, interrupts.
+        let mut is_called = vec![false; self.ends.len()];
+        self.calls.iter().for_each(|call| is_called[call.callee as usize] = true);
+        for (list, routines) in symbols.late_lists.iter().enumerate() {
+            if is_called[symbols.units.len() + list] {
+                routines.iter().for_each(|routine| is_called[symbols.unit_of(*routine) as usize] = true);
+            }
+        }
+        for (unit, is_called) in (0..).zip(&is_called) {
+            let is_entered = |unit: &Unit| {
+                let starts = |routine: u32| mains.contains(&routine) || symbols.interrupts[routine as usize];
+                unit.routine.is_some_and(starts)
+            };
+            if !is_called || symbols.units.get(unit as usize).is_some_and(is_entered) {
+                last[nodes.entry(unit) as usize].0.push(ELSEWHERE);
+            }
+        }
         let mut flows_into = |node: u32, unit: u32, reaching: &ReachingMotions| {
+            if reaching.elsewhere {
+                last[node as usize].0.push(ELSEWHERE);
+            }
             sources(unit, reaching, &mut |found| match found {
                 Ok(motion) => last[node as usize].0.push(motion),
                 Err(from) => edges.push((from, node, ())),
@@ -171,16 +209,30 @@ impl CallEdges {
         let height = last.iter().map(|motions| motions.0.len()).sum();
         propagate(&mut last, height, &mut edges, |(), motions| motions.clone());
         let mut out = Vec::new();
-        for (unit, motion, before) in &self.arrivals {
-            sources(*unit, before, &mut |found| {
-                if let Err(node) = found {
-                    out.extend(last[node as usize].0.iter().map(|before| [*before, *motion]));
+        let mut predecessors = BTreeMap::new();
+        for ((unit, motion, before), branched) in self.arrivals.iter().zip(&self.branched) {
+            let mut all = MotionSet::default();
+            sources(*unit, before, &mut |found| match found {
+                Ok(motion) => all.0.push(motion),
+                Err(node) => {
+                    let known = last[node as usize].0.iter().filter(|before| **before != ELSEWHERE);
+                    out.extend(known.map(|before| [*before, *motion]));
+                    if *branched && all.0.len() <= MOST_PREDECESSORS {
+                        all.0.extend(&last[node as usize].0);
+                    }
                 }
             });
+            all.normalise();
+            if *branched && !all.0.contains(&ELSEWHERE) && (1..=MOST_PREDECESSORS).contains(&all.0.len()) {
+                predecessors.insert(*motion, all.0);
+            }
+        }
+        if self.calls.is_empty() {
+            return (Vec::new(), predecessors);
         }
         out.sort_unstable();
         out.dedup();
-        out
+        (out, predecessors)
     }
 
     /// Which units may end without a motion.
