@@ -136,7 +136,7 @@ fn a_path_as_nc_is_compensated_and_goes_where_it_shall() {
 }
 
 fn module(name: &str, count: usize, shift: f64) -> String {
-    let mut text = format!("MODULE {name}\n  PROC main()\n    ConfL\\Off;\n");
+    let mut text = format!("MODULE {name}\n  PROC main()\n    ! Points.\n");
     for k in 0..count {
         let _ = writeln!(
             text,
@@ -214,7 +214,7 @@ fn a_module_without_the_mark_of_its_task_is_not_called_compensated() {
         .unwrap();
     let main = |name: &str, more: &str| {
         let text = format!(
-            "MODULE {name}\n  PROC main()\n    ConfL\\Off;\n    MoveL p1,v100,fine,tool0;\n{more}  ENDPROC\nENDMODULE\n"
+            "MODULE {name}\n  PROC main()\n    ! Points.\n    MoveL p1,v100,fine,tool0;\n{more}  ENDPROC\nENDMODULE\n"
         );
         fs::write(at.join(format!("{name}.mod")), text).unwrap();
     };
@@ -246,10 +246,11 @@ fn what_cannot_be_read_is_not_called_done() {
     let (code, _, err) = run("none.mod");
     assert_eq!(code, 1, "{err}");
     assert!(err.contains("no motion found; 1 region could not be read"), "{err}");
-    let some = module("A", 5, 0.0).replace("    ConfL\\Off;\n", &format!("    ConfL\\Off;\n{broken}"));
+    let some = module("A", 5, 0.0).replace("    ! Points.\n", &format!("    ! Points.\n{broken}"));
     fs::write(at.join("some.mod"), some).unwrap();
     let (code, text, err) = run("some.mod");
-    assert_eq!(code, 0, "{err}");
+    assert_eq!(code, 1, "{err}");
+    assert!(text.contains("[warning] Corrected, but parts of the program could not be read"), "{text}");
     assert!(text.contains("1 region could not be read and is unchanged;"), "{text}");
 }
 
@@ -274,7 +275,7 @@ fn a_motion_that_is_right_already_is_left_for_that_reason() {
     let dir = workshop();
     let at = dir.path();
     // An arm that is not off at all.
-    fs::write(at.join("a.mod"), module("A", 3, 0.0)).unwrap();
+    fs::write(at.join("a.mod"), module("A", 3, 0.0).replace("! Points.", "ConfL\\Off;")).unwrap();
     let model = fs::read_to_string(at.join("model.toml")).unwrap();
     let mut exact = Estimated::from_toml(&model).unwrap();
     exact.model = exact.nominal.clone();
@@ -399,7 +400,7 @@ fn what_is_left_shows_everywhere() {
     let place = |x: f64| format!("[[{x:.1},10,450],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]");
     // The routine takes its target at run time.
     let body = format!(
-        "    ConfL\\Off;\n    MoveJ {},v100,fine,tool0;\n    MoveL {},v100,fine,tool0;\n    along {},3;\n    MoveL {},v100,fine,tool0;\n",
+        "    ! Points.\n    MoveJ {},v100,fine,tool0;\n    MoveL {},v100,fine,tool0;\n    along {},3;\n    MoveL {},v100,fine,tool0;\n",
         place(340.0),
         place(350.0),
         place(352.0),
@@ -452,7 +453,7 @@ fn what_is_left_shows_everywhere() {
 fn configurations_of_another_robot_are_not_called_out_of_reach() {
     let dir = workshop();
     let at = dir.path();
-    let text = module("A", 12, 0.0).replace("ConfL\\Off;", "ConfL\\On;").replace("[0,0,0,0]", "[2,0,0,0]");
+    let text = module("A", 12, 0.0).replace("[0,0,0,0]", "[2,0,0,0]");
     fs::write(at.join("a.mod"), text).unwrap();
     let (code, _, err) = truegrind(at, &["compensate", "a.mod", "--model", "model.toml", "-o", "b.mod"]);
     assert_eq!(code, 2, "{err}");
