@@ -80,6 +80,12 @@ fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], 
             (Status::Warning, headline)
         }
         _ if !alarms.is_empty() => (Status::Warning, processed),
+        _ if tracker.worse_fit().is_some() => (
+            Status::Warning,
+            format!(
+                "{processed}, but they fit less well than at the beginning: the programs are not known to remain valid"
+            ),
+        ),
         (Some(_), None) => (
             Status::Good,
             format!(
@@ -184,7 +190,14 @@ fn noise_sentences(tracker: &Tracker) -> Vec<String> {
             noise.seen_mm, noise.sigma_mm, noise.smallest_change_mm, 1.25 * noise.seen_mm
         )
     });
-    replaced.into_iter().chain(overstated).collect()
+    let worse = tracker.worse_fit().map(|ratio| {
+        format!(
+            "the latest readings fit {ratio:.1} times less well than the first ones, though within the noise that the track counts with: arm, \
+             sensor or target moved a little, or the poses lie elsewhere; if they lie as before, begin a new track with a --sigma of what the \
+             first ones scattered, which tells what moved"
+        )
+    });
+    worse.into_iter().chain(replaced).chain(overstated).collect()
 }
 
 /// Parameters that are listed.

@@ -5,6 +5,9 @@
 //! the first poses, the noise is judged by the innovations themselves: the σ under which their median is that of χ². Only a σ that is
 //! several times too large is replaced, and only where the poses spread as the model's did: a small part of the region does not show what
 //! the model leaves out elsewhere. A σ that the user stated stays.
+//!
+//! Under a σ that stays too large, no bound is exceeded; that the readings fit several times less well than at the beginning shows all the
+//! same.
 
 use super::bounds::window_bound;
 use super::state::PoseRecord;
@@ -31,6 +34,9 @@ const SETTLED: std::ops::Range<f64> = 0.7..1.4;
 /// The poses spread as the model's did where each joint scatters by this share of the model's.
 const SPREAD: f64 = 0.6;
 
+/// Readings fit less well where they scatter this many times as much as at the beginning.
+const WORSE: f64 = 2.0;
+
 /// Poses before the noise is judged in words.
 const FEW: usize = 30;
 
@@ -55,6 +61,14 @@ impl Tracker {
             seen_mm: scatter * self.state.sigma_mm,
             smallest_change_mm: self.smallest_change_mm()?,
         })
+    }
+
+    /// How many times less well the latest readings fit than those at the beginning of the track, under a noise that is too large to tell it
+    /// otherwise.
+    pub fn worse_fit(&self) -> Option<f64> {
+        let before = self.state.start_scatter.filter(|scatter| *scatter < FAR)?;
+        let ratio = self.scatter(2 * self.state.options.window.max(1))? / before;
+        (ratio > WORSE && self.state.alarms.is_empty()).then_some(ratio)
     }
 
     /// The noise that the first poses showed, and the larger one that the track began with (mm).
@@ -129,7 +143,7 @@ impl Tracker {
         Some(other)
     }
 
-    fn late_scatter(&self) -> Option<f64> {
+    pub(super) fn late_scatter(&self) -> Option<f64> {
         self.scatter(self.state.history.len().checked_sub(EARLY).filter(|late| *late > 0)?)
     }
 

@@ -136,6 +136,9 @@ pub struct State {
     /// Snapshot after the first poses, before any change: what the arm was when the track began.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) start: Option<Snapshot>,
+    /// Scatter of the first poses, in units of the noise that the track counts with.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) start_scatter: Option<f64>,
     /// The noise that the track began with, where the first poses showed it several times too large (mm).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) replaced_sigma_mm: Option<f64>,

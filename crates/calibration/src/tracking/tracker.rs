@@ -132,6 +132,7 @@ impl Tracker {
             reference: snapshot.clone(),
             middle: snapshot,
             start: None,
+            start_scatter: None,
             replaced_sigma_mm: None,
             region: model.region.clone(),
             quiet_until: 0,
@@ -255,6 +256,7 @@ impl Tracker {
         // The last pose before any alarm.
         if self.state.poses == self.state.options.first_poses + self.state.options.window.max(1) {
             self.judge_noise();
+            self.state.start_scatter = self.late_scatter();
             self.state.start = Some(Snapshot::of(&self.filter, self.state.history.len()));
         }
         if let Some(alarm) = self.alarm() {

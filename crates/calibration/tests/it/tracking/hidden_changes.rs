@@ -217,6 +217,9 @@ fn a_noise_that_is_several_times_too_large_is_replaced_by_what_the_first_poses_s
     let noise = tracker.overstated_noise().unwrap();
     assert!(alarms.is_empty() && tracker.replaced_noise_mm().is_none());
     assert!(noise.seen_mm < 0.04 && (0.2..0.5).contains(&noise.smallest_change_mm), "{noise:?}");
+    // Under it, readings that fit less well tell a change.
+    assert!(tracker.worse_fit().is_some_and(|ratio| ratio > 2.0), "{:?}", tracker.worse_fit());
+    assert_eq!(track(&measured(2, None), &stated).0.worse_fit(), None);
     // A stop between any two poses alters nothing.
     let (whole, _) = track(&dataset, &Options::default());
     let part = dataset.subset(&(0..44).collect::<Vec<_>>());
