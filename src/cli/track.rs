@@ -226,7 +226,8 @@ impl TrackContext<'_> {
         ));
         self.write(&tracker, fresh, &alarms, &datasets)?;
         let departed = tracker.departure().is_some_and(|departure| departure.is_significant);
-        Ok(failed || !alarms.is_empty() || departed || tracker.mostly_set_aside())
+        let is_worse = tracker.worse_fit().is_some();
+        Ok(failed || !alarms.is_empty() || departed || is_worse || tracker.mostly_set_aside())
     }
 
     /// The state of the last run.

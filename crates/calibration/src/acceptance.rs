@@ -2,8 +2,8 @@
 //!
 //! Method. The sensor's frame is fitted to four fifths of the poses, and each pose is judged with a frame fitted without it
 //! (five folds); or the frame is stated and nothing is fitted. The decision follows ISO 14253-1 for an expanded uncertainty
-//! U (k = 2): accepted if largest error plus U is within the tolerance, refused if the largest error exceeds the tolerance by
-//! more than U, undecided otherwise. Where U is unknown, nothing is accepted.
+//! U (k = 2), the larger of what is stated and what repeated poses scatter: accepted if largest error plus U is within the tolerance, refused if the largest error exceeds the tolerance by
+//! more than U, undecided otherwise. Where U is unknown, nothing is accepted; nor by poses that show too little of the arm ([`Tested`]).
 //! Pose accuracy and repeatability (ISO 9283: thirty cycles at five poses) are computed
 //! only if enough cycles were measured; path accuracy and repeatability (ten cycles) only from rows with a position on a
 //! path. Those rows are used for nothing else, because the arm was moving.
@@ -12,6 +12,7 @@ pub mod decision;
 mod error;
 pub mod orientation;
 pub mod path;
+mod tested;
 
 use nalgebra::Vector3;
 use truegrind_arm::condition::Condition;
@@ -33,6 +34,7 @@ use crate::measurement::split::{Split, folds, noise_floor, noise_floor_rad, pose
 
 pub use self::decision::{Decision, FEWEST_POSES, Uncertainty};
 pub use self::error::AcceptError;
+pub use self::tested::{LEAST_SHARE, Tested};
 
 /// Poses and cycles at each for pose accuracy and repeatability (ISO 9283).
 pub const ISO_POSES: usize = 5;
@@ -52,7 +54,8 @@ const MOVED_DEG: f64 = 10.0;
 pub struct Options {
     /// The largest error that is accepted (mm).
     pub tolerance_mm: f64,
-    /// Expanded uncertainty of the sensor, k = 2 (mm); if not stated, twice the scatter of repeated poses, if there are any.
+    /// Expanded uncertainty of the sensor, k = 2 (mm); twice the scatter of repeated poses, if there are any, where that is larger or
+    /// nothing is stated.
     pub uncertainty_mm: Option<f64>,
     /// The largest accepted orientation error (rad); without it the orientation is reported and not judged.
     pub tolerance_rad: Option<f64>,
@@ -125,6 +128,12 @@ pub struct Acceptance {
     pub uncertainty_mm: f64,
     /// Source of the uncertainty.
     pub uncertainty: Uncertainty,
+    /// The expanded uncertainty that was stated (mm).
+    pub stated_mm: Option<f64>,
+    /// Whether the sensor was registered with these poses, so that the placement of base and flange is not tested.
+    pub is_registered: bool,
+    /// How much of the arm the poses show.
+    pub tested: Tested,
     /// The largest error that is accepted (mm).
     pub tolerance_mm: f64,
     /// The decision from the position alone.
@@ -153,13 +162,21 @@ impl Acceptance {
         self.model.rmse > WORSE * self.nominal.rmse && further_mm > self.uncertainty_mm
     }
 
-    /// The decision over all stated tolerances. A model that is worse than the data sheet is not accepted; not evaluated if an orientation
+    /// Whether the nominal arm would be accepted by the position as well: then the poses do not show what the calibration gains.
+    pub fn is_nominal_within(&self) -> bool {
+        self.nominal.max + self.uncertainty_mm <= self.tolerance_mm
+    }
+
+    /// The decision over all stated tolerances. A model that is worse than the data sheet is not accepted, nor one by poses that show too
+    /// little of the arm; not evaluated if an orientation
     /// tolerance is stated but no orientation was measured.
     pub fn overall(&self) -> Decision {
         let orientation = self.orientation.as_ref().map_or(Decision::NotEvaluated, |found| found.decision);
         let decision = if self.orientation_asked { self.decision.and(orientation) } else { self.decision };
         match decision {
-            Decision::Accepted if self.is_worse_than_data_sheet() => Decision::Open,
+            Decision::Accepted if self.is_worse_than_data_sheet() || !self.tested.is_enough() => {
+                Decision::Open
+            }
             decision => decision,
         }
     }
@@ -219,6 +236,9 @@ pub fn accept(
         errors_mm: numbered(found),
         uncertainty_mm,
         uncertainty,
+        stated_mm: options.uncertainty_mm,
+        is_registered: options.frames.is_none(),
+        tested: Tested::of(dataset, estimated, &frames(&observed, &estimated.model, options)?),
         tolerance_mm: options.tolerance_mm,
         decision: Decision::of(groups.len(), model.max, (uncertainty_mm, uncertainty), options.tolerance_mm),
         orientation,

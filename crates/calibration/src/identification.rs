@@ -11,6 +11,7 @@ pub mod solver;
 pub mod fit;
 pub mod start;
 mod sessions;
+pub(crate) mod placement;
 pub mod stated_frame;
 pub mod benefit;
 pub mod beyond_noise;

@@ -28,6 +28,8 @@
 //! **Wrong arm.** First poses with residuals far above the model's held-out error are refused, and an arm that has changed before them
 //! is not taken for noise (`first_noise`): a filter that did would never detect a change.
 //!
+//! **Noise.** What the model left over is counted as noise. If the first poses scatter several times less, their own scatter is ([`noise`]).
+//!
 //! **Slow changes.** A drift may stay below every bound, since the filter follows it. What counts for programs is the whole way from the
 //! model that they were corrected with: the [`Departure`], which is judged at the end of every run.
 //!
@@ -55,6 +57,7 @@ mod gauge;
 pub mod locate;
 mod model;
 mod mounting;
+mod noise;
 mod options;
 mod response;
 pub mod state;
@@ -63,6 +66,7 @@ mod tracker;
 pub use alarm::{Alarm, Course};
 pub use departure::Departure;
 pub use error::{StateError, TrackError};
+pub use noise::Overstated;
 pub use options::Options;
 pub use state::State;
 pub use tracker::{PoseUpdate, Tracker, first_poses};

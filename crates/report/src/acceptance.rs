@@ -10,7 +10,7 @@ use truegrind_arm::estimated::Estimated;
 use truegrind_calibration::acceptance::orientation::Orientation;
 use truegrind_calibration::acceptance::path::{PATH_CYCLES, PATH_POINTS, PathFound};
 use truegrind_calibration::acceptance::{
-    Acceptance, Decision, FEWEST_POSES, ISO_CYCLES, ISO_POSES, Uncertainty,
+    Acceptance, Decision, FEWEST_POSES, ISO_CYCLES, ISO_POSES, LEAST_SHARE, Uncertainty,
 };
 use truegrind_calibration::measurement::dataset::{Dataset, Sensor};
 use truegrind_math::statistics::ErrorSummary;
@@ -96,9 +96,28 @@ fn verdict(found: &Acceptance, sensor: Sensor) -> Verdict {
             "the uncertainty is twice the scatter of repeated poses; it does not contain systematic errors of the sensor"
                 .to_owned(),
         ),
+        Uncertainty::AboveStated => reasons.push(format!(
+            "repeated poses scatter more than the stated uncertainty of {} mm allows: twice their scatter, {} mm, counts instead",
+            length(found.stated_mm.unwrap_or_default()),
+            length(found.uncertainty_mm)
+        )),
         Uncertainty::Stated => {}
     }
     reasons.extend(orientation_reason(found));
+    reasons.push(tested(found));
+    if found.is_registered {
+        reasons.push(
+            "the placement of the base and the flange was not tested: the sensor was registered with these poses; state --sensor-frame to \
+             test it"
+                .to_owned(),
+        );
+    }
+    if found.overall() == Decision::Accepted && found.is_nominal_within() {
+        reasons.push(format!(
+            "the nominal arm passes as well (largest error {} mm): these poses do not show what the calibration gains",
+            length(found.nominal.max)
+        ));
+    }
     if found.model.rmse > OTHER_ARM_MM {
         reasons.push(
             "no calibrated arm is so far off: check that these readings are of this arm, and their units"
@@ -126,6 +145,35 @@ fn verdict(found: &Acceptance, sensor: Sensor) -> Verdict {
     Verdict::new(status, headline, reasons)
 }
 
+/// Digits after the point that show a length (mm): three, or two significant ones where it is smaller.
+fn digits(mm: f64) -> usize {
+    if mm.abs() < 0.001 && mm != 0.0 { (1.0 - mm.abs().log10().floor()).min(9.0) as usize } else { 3 }
+}
+
+/// A length (mm) with as many digits as show it.
+fn length(mm: f64) -> String {
+    format!("{mm:.*}", digits(mm))
+}
+
+/// What the poses show of the arm.
+fn tested(found: &Acceptance) -> String {
+    let tested = &found.tested;
+    let [x, y, z] = tested.volume_mm;
+    let volume = format!(
+        "tested: a volume of {x:.0} × {y:.0} × {z:.0} mm; at its poses, links of ordinary tolerance move the target {:.1} % as much as over \
+         the poses of the fit, apart from placement",
+        100.0 * tested.share
+    );
+    if tested.is_enough() {
+        return volume;
+    }
+    format!(
+        "{volume}, where at least {:.0} % are required: measure at least {FEWEST_POSES} poses all over the volume in which the arm works, \
+         with different orientations",
+        100.0 * LEAST_SHARE
+    )
+}
+
 /// The decision, stated for the quantity that decides, or for both if both pass.
 fn headline(found: &Acceptance) -> (Status, String) {
     let overall = found.overall();
@@ -133,7 +181,7 @@ fn headline(found: &Acceptance) -> (Status, String) {
     if found.orientation_asked && overall == by_orientation && overall != found.decision {
         return orientation_headline(found);
     }
-    let (max, limit, u) = (found.model.max, found.tolerance_mm, found.uncertainty_mm);
+    let [max, limit, u] = [found.model.max, found.tolerance_mm, found.uncertainty_mm].map(length);
     match overall {
         Decision::Accepted => {
             let turn =
@@ -142,28 +190,37 @@ fn headline(found: &Acceptance) -> (Status, String) {
                 let [max, limit] = [max, limit].map(f64::to_degrees);
                 format!("; largest orientation error {max:.4}°, tolerance {limit:.4}°")
             });
-            let place = format!("Accepted: largest error {max:.3} mm, tolerance {limit:.3} mm");
-            (Status::Good, place + &turn)
+            let [x, y, z] = found.tested.volume_mm;
+            let placement =
+                if found.is_registered { ", apart from the placement of base and flange" } else { "" };
+            let place = format!("Accepted: largest error {max} mm, tolerance {limit} mm");
+            (Status::Good, format!("{place}{turn}; over {x:.0} × {y:.0} × {z:.0} mm{placement}"))
         }
         Decision::Refused => {
-            (Status::Bad, format!("Not accepted: largest error {max:.3} mm, tolerance {limit:.3} mm"))
+            (Status::Bad, format!("Not accepted: largest error {max} mm, tolerance {limit} mm"))
         }
+        Decision::Open if found.decision == Decision::Accepted && !found.tested.is_enough() => (
+            Status::Warning,
+            format!(
+                "Not decided: largest error {max} mm, tolerance {limit} mm, but the poses show only a small part of the arm"
+            ),
+        ),
         Decision::Open if found.decision == Decision::Accepted => (
             Status::Warning,
             format!(
-                "Not decided: largest error {max:.3} mm, tolerance {limit:.3} mm, but the model is worse than the data sheet"
+                "Not decided: largest error {max} mm, tolerance {limit} mm, but the model is worse than the data sheet"
             ),
         ),
         Decision::Open if found.uncertainty == Uncertainty::Unknown => (
             Status::Warning,
             format!(
-                "Not decided: largest error {max:.3} mm, tolerance {limit:.3} mm, but the sensor uncertainty is unknown"
+                "Not decided: largest error {max} mm, tolerance {limit} mm, but the sensor uncertainty is unknown"
             ),
         ),
         Decision::Open => (
             Status::Warning,
             format!(
-                "Not decided: the largest error {max:.3} mm is within the sensor uncertainty {u:.3} mm of the tolerance {limit:.3} mm"
+                "Not decided: the largest error {max} mm is within the sensor uncertainty {u} mm of the tolerance {limit} mm"
             ),
         ),
         Decision::NotEvaluated => (
@@ -208,6 +265,10 @@ fn orientation_reason(found: &Acceptance) -> Option<String> {
     turns.tolerance_rad?;
     match turns.uncertainty {
         Uncertainty::Stated => None,
+        Uncertainty::AboveStated => Some(format!(
+            "repeated poses scatter more than the stated orientation uncertainty allows: twice their scatter, {:.4}°, counts instead",
+            turns.uncertainty_rad.to_degrees()
+        )),
         Uncertainty::Repeats => Some(
             "the orientation uncertainty is twice the scatter of repeated poses; it does not contain systematic errors of the sensor"
                 .to_owned(),
@@ -224,15 +285,16 @@ fn figures(found: &Acceptance) -> Vec<KeyFigure> {
     let change = if share < 0.0 { "more" } else { "less" };
     let uncertainty = Some(found.uncertainty_mm).filter(|_| found.uncertainty != Uncertainty::Unknown);
     vec![
-        KeyFigure::new("Largest error", found.model.max, 3, "mm")
-            .note(format!("nominal arm: {:.3} mm", found.nominal.max)),
-        KeyFigure::new("RMS error", found.model.rmse, 3, "mm").note(format!(
-            "nominal arm: {:.3} mm ({:.0} % {change} now)",
-            found.nominal.rmse,
+        KeyFigure::new("Largest error", found.model.max, digits(found.model.max), "mm")
+            .note(format!("nominal arm: {} mm", length(found.nominal.max))),
+        KeyFigure::new("RMS error", found.model.rmse, digits(found.model.rmse), "mm").note(format!(
+            "nominal arm: {} mm ({:.0} % {change} now)",
+            length(found.nominal.rmse),
             share.abs()
         )),
-        KeyFigure::new("Tolerance", found.tolerance_mm, 3, "mm"),
-        KeyFigure::new("Uncertainty of the sensor", uncertainty, 3, "mm").note("expanded, k = 2"),
+        KeyFigure::new("Tolerance", found.tolerance_mm, digits(found.tolerance_mm), "mm"),
+        KeyFigure::new("Uncertainty of the sensor", uncertainty, digits(found.uncertainty_mm), "mm")
+            .note("expanded, k = 2"),
         KeyFigure::new("Poses", found.poses, 0, "").note("that the model was not fitted to"),
     ]
 }
@@ -241,20 +303,30 @@ fn figures(found: &Acceptance) -> Vec<KeyFigure> {
 pub fn table(found: &Acceptance, sensor: Sensor) -> Table {
     let signed = sensor == Sensor::Cable;
     let arms = [("data sheet, sensor registered", &found.nominal), ("estimated", &found.model)];
+    let all =
+        |of: fn(&ErrorSummary) -> f64| arms.iter().map(|(_, errors)| digits(of(errors))).max().unwrap_or(3);
     Table::of(
         "Errors",
         &arms.map(|(arm, errors)| (arm, errors, Some(errors.mean).filter(|_| signed))),
         [
             (Column::text("arm", "Arm"), |(arm, ..)| (*arm).into()),
-            (Column::number("rmse_mm", "RMSE", "mm", 3), |(_, errors, _)| errors.rmse.into()),
-            (Column::number("mean_absolute_mm", "mean |e|", "mm", 3), |(_, errors, _)| {
-                errors.mean_absolute.into()
+            (Column::number("rmse_mm", "RMSE", "mm", all(|errors| errors.rmse)), |(_, errors, _)| {
+                errors.rmse.into()
             }),
-            (Column::number("standard_deviation_mm", "SD", "mm", 3), |(_, errors, _)| {
-                errors.standard_deviation.into()
+            (
+                Column::number("mean_absolute_mm", "mean |e|", "mm", all(|errors| errors.mean_absolute)),
+                |(_, errors, _)| errors.mean_absolute.into(),
+            ),
+            (
+                Column::number("standard_deviation_mm", "SD", "mm", all(|errors| errors.standard_deviation)),
+                |(_, errors, _)| errors.standard_deviation.into(),
+            ),
+            (Column::number("max_mm", "max", "mm", all(|errors| errors.max)), |(_, errors, _)| {
+                errors.max.into()
             }),
-            (Column::number("max_mm", "max", "mm", 3), |(_, errors, _)| errors.max.into()),
-            (Column::number("mean_mm", "signed mean", "mm", 3), |(.., mean)| (*mean).into()),
+            (Column::number("mean_mm", "signed mean", "mm", all(|errors| errors.mean)), |(.., mean)| {
+                (*mean).into()
+            }),
         ],
     )
 }
@@ -434,7 +506,7 @@ fn method(found: &Acceptance, statement: &Statement) -> Vec<String> {
     };
     let uncertainty = match found.uncertainty {
         Uncertainty::Unknown => "unknown, so nothing is accepted".to_owned(),
-        _ => format!("{:.3} mm", found.uncertainty_mm),
+        _ => format!("{} mm", length(found.uncertainty_mm)),
     };
     let rule = format!(
         "Decision rule of ISO 14253-1: accepted if the largest error plus the uncertainty ({uncertainty}) is within the tolerance, not \
@@ -520,6 +592,7 @@ fn provenance(dataset: &Dataset, estimated: &Estimated, statement: &Statement) -
 pub fn json(found: &Acceptance, dataset: &Dataset, estimated: &Estimated, statement: &Statement) -> Value {
     let known = |uncertainty: Uncertainty| match uncertainty {
         Uncertainty::Stated => "stated",
+        Uncertainty::AboveStated => "repeated poses, larger than stated",
         Uncertainty::Repeats => "repeated poses",
         Uncertainty::Unknown => "unknown",
     };
@@ -556,6 +629,7 @@ pub fn json(found: &Acceptance, dataset: &Dataset, estimated: &Estimated, statem
         "coverage": found.coverage.map(|c| json!({
             "joint": c.joint + 1, "tested_deg": c.tested_deg, "fitted_deg": c.fitted_deg,
         })),
+        "tested": { "volume_mm": found.tested.volume_mm, "share": found.tested.share },
         "rows": found.rows,
         "nominal": found.nominal,
         "model": found.model,

@@ -61,33 +61,42 @@ fn sources(tracker: &Tracker) -> Vec<Source> {
 
 fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], model: &str) {
     let state = tracker.state();
-    let (status, headline) = match alarms.len() {
-        0 => (
-            Status::Good,
-            format!("{fresh} new poses processed, no change detected: the programs remain valid"),
-        ),
-        1 => (Status::Warning, format!("{fresh} new poses processed, one change detected")),
-        n => (Status::Warning, format!("{fresh} new poses processed, {n} changes detected")),
-    };
-    let mut reasons: Vec<String> = alarms.iter().map(ToString::to_string).collect();
     let departure = tracker.departure();
     let departed = departure.as_ref().filter(|departure| departure.is_significant);
-    let (status, headline) = match departed {
-        None => (status, headline),
-        Some(now) => (
-            Status::Warning,
-            match alarms.len() {
-                0 => format!(
-                    "{fresh} new poses processed, no sudden change, but the arm is {:.3} mm from the model that the track began with",
-                    now.rms_mm
-                ),
-                _ => format!(
-                    "{headline}; the arm is {:.3} mm from the model that the track began with",
-                    now.rms_mm
-                ),
-            },
-        ),
+    let changes = match alarms.len() {
+        0 => "no change detected in them".to_owned(),
+        1 => "one change detected".to_owned(),
+        n => format!("{n} changes detected"),
     };
+    let processed = format!("{fresh} new poses processed, {changes}");
+    let (status, headline) = match (&departure, departed) {
+        (_, Some(now)) => {
+            let but = if alarms.is_empty() { ", but" } else { ";" };
+            let headline = format!(
+                "{processed}{but} the arm is {:.3} mm from the model that the programs were corrected with: they are not known to \
+                 remain valid",
+                now.rms_mm
+            );
+            (Status::Warning, headline)
+        }
+        _ if !alarms.is_empty() => (Status::Warning, processed),
+        _ if tracker.worse_fit().is_some() => (
+            Status::Warning,
+            format!(
+                "{processed}, but they fit less well than at the beginning: the programs are not known to remain valid"
+            ),
+        ),
+        (Some(_), None) => (
+            Status::Good,
+            format!(
+                "{processed}, and the arm agrees with the model that the programs were corrected with: they remain valid"
+            ),
+        ),
+        (None, None) => (Status::Good, processed),
+    };
+    let mut reasons: Vec<String> = alarms.iter().map(ToString::to_string).collect();
+    let earlier = departed.filter(|_| alarms.is_empty()).and_then(|now| now.told.as_ref());
+    reasons.extend(earlier.map(|alarm| format!("told in an earlier run: {alarm}")));
     reasons.extend(departed.map(departure_sentence));
     let (status, headline) = if tracker.mostly_set_aside() {
         reasons.insert(
@@ -106,7 +115,8 @@ fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], 
         reasons.push(
             match departed {
                 Some(_) => {
-                    "what to do: correct the original programs with the new model, and begin a new track with it (--model, --state)"
+                    "what to do: measure the arm, identify it, and compensate the original programs again; until then, the model written \
+                     here is the best known. Begin a new track with the new model (--model, --state)"
                 }
                 None => {
                     "what to do: if the arm changed, correct the original programs with the new model; if sensor or target moved, mount \
@@ -116,6 +126,7 @@ fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], 
             .to_owned(),
         );
     }
+    reasons.extend(noise_sentences(tracker));
     page.push(Verdict::new(status, headline, reasons));
     let nis: Vec<f64> = state.history.iter().map(|s| s.nis).filter(|n| n.is_finite()).collect();
     // A single pose after remounting may have a NIS of a million, which would dominate the mean.
@@ -153,10 +164,40 @@ fn departure_sentence(now: &Departure) -> String {
         format!("{name} {:+.4} ± {:.4} {unit}", by * scale, sigma * scale)
     });
     let moved: Vec<String> = moved.collect();
+    if let Some([rms_mm, expected_mm]) = now.since_first_poses_mm {
+        out += &format!(
+            "; since the first poses of the track it moved by {rms_mm:.3} mm, where {expected_mm:.3} mm are expected"
+        );
+    }
     if !moved.is_empty() {
         out += &format!("; moved most: {}", moved.join(", "));
     }
     out
+}
+
+/// What the scatter of the readings says of the noise that the track counts with.
+fn noise_sentences(tracker: &Tracker) -> Vec<String> {
+    let replaced = tracker.replaced_noise_mm().map(|[now, before]| {
+        format!(
+            "the first poses scatter far less than the model left over ({before:.3} mm along each axis): the track counts with {now:.3} mm, \
+             so that smaller changes are seen"
+        )
+    });
+    let overstated = tracker.overstated_noise().map(|noise| {
+        format!(
+            "remark: the readings scatter by {:.3} mm along each axis, but the track counts with {:.3} mm (--sigma, or what the model left \
+             over): a sudden change that moves the readings by less than about {:.2} mm is not told; a new track with --sigma {:.3} is finer",
+            noise.seen_mm, noise.sigma_mm, noise.smallest_change_mm, 1.25 * noise.seen_mm
+        )
+    });
+    let worse = tracker.worse_fit().map(|ratio| {
+        format!(
+            "the latest readings fit {ratio:.1} times less well than the first ones, though within the noise that the track counts with: arm, \
+             sensor or target moved a little, or the poses lie elsewhere; if they lie as before, begin a new track with a --sigma of what the \
+             first ones scattered, which tells what moved"
+        )
+    });
+    worse.into_iter().chain(replaced).chain(overstated).collect()
 }
 
 /// Parameters that are listed.
@@ -205,7 +246,15 @@ pub fn json(tracker: &Tracker, fresh: usize, alarms: &[Alarm]) -> Value {
         "new_alarms": alarms,
         "alarms": state.alarms,
         "departure": tracker.departure().map(|now| {
-            json!({ "rms_mm": now.rms_mm, "expected_mm": now.expected_mm, "significant": now.is_significant })
+            let [since_mm, since_expected_mm] = now.since_first_poses_mm.map_or([None; 2], |of| of.map(Some));
+            json!({
+                "rms_mm": now.rms_mm, "expected_mm": now.expected_mm, "significant": now.is_significant,
+                "since_first_poses_mm": since_mm, "since_first_poses_expected_mm": since_expected_mm,
+            })
+        }),
+        "noise": json!({
+            "replaced_mm": tracker.replaced_noise_mm().map(|[_, before]| before),
+            "smallest_change_mm": tracker.smallest_change_mm(),
         }),
         "parameters": parameters,
     })

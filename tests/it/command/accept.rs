@@ -42,6 +42,18 @@ fn a_model_is_accepted_by_poses_of_its_own() {
     ];
     let (code, out, err) = accept("later.csv", &page);
     assert!(code == 0 && out.contains("[ok] Accepted: largest error 0."), "{out}{err}");
+    let unwrapped = |out: &str| out.split_whitespace().collect::<Vec<_>>().join(" ");
+    let words = unwrapped(&out);
+    for told in [
+        "apart from the placement of base and flange",
+        "the placement of the base and the flange was not tested",
+    ] {
+        assert!(words.contains(told), "{out}");
+    }
+    let (_, out, _) = accept("later.csv", &["100", "--sensor-uncertainty", "0.02"]);
+    assert!(unwrapped(&out).contains("the nominal arm passes as well"), "{out}");
+    let (_, out, _) = accept("later.csv", &["0.0004", "--sensor-uncertainty", "0.0002"]);
+    assert!(out.contains("tolerance 0.00040 mm"), "{out}");
     let html = fs::read_to_string(at.join("page.html")).unwrap();
     assert!(html.contains("120-503211") && html.contains("<svg"));
     assert!(html.contains("30 cycles at 5 poses are required, at most 1 were measured at one pose"));

@@ -23,6 +23,8 @@ pub enum Uncertainty {
     Stated,
     /// Twice the scatter of repeated poses.
     Repeats,
+    /// The same, and larger than what the user stated.
+    AboveStated,
     /// Unknown: nothing can be accepted.
     Unknown,
 }
@@ -55,9 +57,10 @@ impl Decision {
 }
 
 impl Uncertainty {
-    /// The expanded uncertainty (k = 2): as stated, else from the standard deviation of repeated readings, else 0.
+    /// The expanded uncertainty (k = 2): as stated or from the standard deviation of repeated readings, whichever is larger; else 0.
     pub(super) fn of(stated: Option<f64>, scatter: Option<f64>) -> (f64, Self) {
         match (stated, scatter) {
+            (Some(expanded), Some(sigma)) if 2.0 * sigma > expanded => (2.0 * sigma, Self::AboveStated),
             (Some(expanded), _) => (expanded, Self::Stated),
             (None, Some(sigma)) => (2.0 * sigma, Self::Repeats),
             (None, None) => (0.0, Self::Unknown),

@@ -3,10 +3,19 @@
 //! A drift may be slower than any bound of the innovations, since the filter follows it. Programs were corrected with the first model, so
 //! what counts for them is the whole way since. It is the displacement of the target over the measured region, after its best placement:
 //! a motion of the base and of the target's mounting is not the arm's shape.
+//!
+//! **Two distances.** From the first model, whose uncertainty can hide a change; and from the arm as the first poses of the track showed
+//! it, which is known better. The arm is another one where either is beyond what the uncertainties explain.
+//!
+//! **Bound.** With λₖ the mean squares that the axes of the covariances make of the displacement, the square of the distance is a sum of
+//! λₖ χ²₁: taken as χ² with g = (Σλ)²/Σλ² degrees of freedom (Satterthwaite 1946), and exceeded in 1 of 10 000 cases. After a change of the
+//! arm was told, it is another one as long as a distance is larger than expected at all.
 
-use nalgebra::{DMatrix, DVector, Rotation3, Vector3};
+use nalgebra::{DMatrix, Rotation3, Vector3};
 
+use super::alarm::{Alarm, Course};
 use super::tracker::Tracker;
+use crate::identification::placement::{fill, place};
 use truegrind_arm::model::{Joints, Model};
 
 /// The arm as tracked against the model that the track began with.
@@ -16,9 +25,13 @@ pub struct Departure {
     pub rms_mm: f64,
     /// What the uncertainties of the first model and of the track make of it (mm, 1σ).
     pub expected_mm: f64,
+    /// Displacement since the first poses of the track, and what the uncertainties make of it (mm).
+    pub since_first_poses_mm: Option<[f64; 2]>,
     /// Parameters that moved by more than four of the standard deviations that they began with: name, unit, by how much, and the present
     /// standard deviation; those that moved most first.
     pub parameters: Vec<(String, String, f64, f64)>,
+    /// An earlier or present alarm that tells a change of the arm.
+    pub told: Option<Alarm>,
     /// Whether the arm is another one now.
     pub is_significant: bool,
 }
@@ -26,9 +39,11 @@ pub struct Departure {
 /// Poses of the region that are compared.
 const POSES: usize = 200;
 
-/// A displacement counts beyond this many of its expected sizes, and beyond this share of the model's held-out error.
-const SIGMAS: f64 = 3.0;
+/// A displacement counts beyond this share of the model's held-out error, or of the track's noise.
 const SHARE: f64 = 0.5;
+
+/// Normal quantile of a displacement's bound: 1 in 10 000.
+const DEVIATIONS: f64 = 3.72;
 
 /// Parameters count beyond this many of their first standard deviations.
 const PARAMETER_SIGMAS: f64 = 4.0;
@@ -55,27 +70,34 @@ impl Tracker {
         let (first, now) = (placed(&self.initial.model), placed(&self.current().0));
         let arm = self.initial.order.len();
         let rows = 3 * poses.len();
-        // The displacement, and what one standard deviation along each axis of the covariances makes of it: that of the model, and what the
-        // track adds to it.
-        let mut columns = DMatrix::zeros(rows, 1 + 2 * arm);
-        fill(columns.column_mut(0).as_mut_slice(), &first, &now);
         let problem = self.without_rows();
         let mut x = vec![0.0; self.parameters.len()];
         let tracked = self.filter.covariance().view((0, 0), (arm, arm)).into_owned();
         let scale = self.scatter(self.state.history.len()).unwrap_or(1.0).max(1.0);
-        for (offset, covariance, scale) in [(1, &self.initial.covariance, 1.0), (1 + arm, &tracked, scale)] {
-            let axes = covariance.clone().symmetric_eigen();
-            for k in 0..arm {
-                let sigma = scale * axes.eigenvalues[k].max(0.0).sqrt();
-                x[..arm].copy_from_slice((axes.eigenvectors.column(k) * sigma).as_slice());
-                let moved = placed(&problem.apply(&x).0);
-                fill(columns.column_mut(offset + k).as_mut_slice(), &first, &moved);
+        // The displacement, and what one standard deviation along each axis of the covariances makes of it: that of the beginning, and what
+        // the track adds to it.
+        let mut distance = |from: &[(Vector3<f64>, Rotation3<f64>)], covariance: &DMatrix<f64>| {
+            let mut columns = DMatrix::zeros(rows, 1 + 2 * arm);
+            fill(columns.column_mut(0).as_mut_slice(), from, &now);
+            for (offset, covariance, scale) in [(1, covariance, 1.0), (1 + arm, &tracked, scale)] {
+                let axes = covariance.clone().symmetric_eigen();
+                for k in 0..arm {
+                    let sigma = scale * axes.eigenvalues[k].max(0.0).sqrt();
+                    x[..arm].copy_from_slice((axes.eigenvectors.column(k) * sigma).as_slice());
+                    let moved = placed(&problem.apply(&x).0);
+                    fill(columns.column_mut(offset + k).as_mut_slice(), &first, &moved);
+                }
             }
-        }
-        place(&mut columns, &first);
-        let rms = |square: f64| (square / poses.len() as f64).sqrt();
-        let rms_mm = rms(columns.column(0).norm_squared());
-        let expected_mm = rms(columns.columns(1, 2 * arm).norm_squared());
+            place(&mut columns, &first);
+            Distance::of(&columns, poses.len())
+        };
+        let whole = distance(&first, &self.initial.covariance);
+        let since = self.state.start.as_ref().and_then(|start| {
+            let covariance = start.covariance()?.view((0, 0), (arm, arm)).into_owned();
+            Some(distance(&placed(&self.without_rows().apply(&start.x).0), &covariance))
+        });
+        let noise_mm = self.state.sigma_mm * (self.state.sensor.scalars().min(3) as f64).sqrt();
+        let told = self.state.alarms.iter().rev().find(|alarm| self.tells_of_the_arm(alarm)).cloned();
         let sigmas = self.sigmas();
         let mut parameters: Vec<(f64, (String, String, f64, f64))> = self
             .initial
@@ -91,53 +113,57 @@ impl Tracker {
             .collect();
         parameters.sort_by(|a, b| b.0.total_cmp(&a.0));
         Some(Departure {
-            rms_mm,
-            expected_mm,
+            rms_mm: whole.rms_mm,
+            expected_mm: whole.expected_mm,
+            since_first_poses_mm: since.as_ref().map(|since| [since.rms_mm, since.expected_mm]),
             parameters: parameters.into_iter().map(|(_, told)| told).collect(),
-            is_significant: rms_mm > SIGMAS * expected_mm
-                && rms_mm > SHARE * self.initial.geometry.held_out.rmse,
+            is_significant: whole.is_beyond(SHARE * self.initial.geometry.held_out.rmse)
+                || since.as_ref().is_some_and(|since| since.is_beyond(SHARE * noise_mm))
+                || (told.is_some()
+                    && std::iter::once(&whole).chain(&since).any(|d| d.rms_mm > d.expected_mm)),
+            told,
         })
+    }
+}
+
+impl Tracker {
+    /// Whether an alarm tells a change of the arm, or one that nothing explains, rather than one of sensor or target.
+    fn tells_of_the_arm(&self, alarm: &Alarm) -> bool {
+        match alarm.course {
+            Course::Mounted | Course::Burst | Course::Scatter => false,
+            Course::Open | Course::Jump | Course::Drift => {
+                alarm.parameter.is_empty()
+                    || self.initial.order.iter().any(|parameter| parameter.to_string() == alarm.parameter)
+            }
+        }
+    }
+}
+
+/// A displacement, and what is expected of it.
+struct Distance {
+    rms_mm: f64,
+    expected_mm: f64,
+    bound_mm: f64,
+}
+
+impl Distance {
+    /// The first column is the displacement, each other one what an axis of the covariances makes of it.
+    fn of(columns: &DMatrix<f64>, poses: usize) -> Self {
+        let axes = columns.columns(1, columns.ncols() - 1);
+        // Σλ is the trace of the Gram matrix, Σλ² the square of its norm.
+        let gram = axes.tr_mul(&axes);
+        let freedom = (gram.trace().powi(2) / gram.norm_squared()).max(1.0);
+        let spread = 2.0 / (9.0 * freedom);
+        let factor = (1.0 - spread + DEVIATIONS * spread.sqrt()).powi(3).sqrt();
+        let rms = |square: f64| (square / poses as f64).sqrt();
+        let expected_mm = rms(gram.trace());
+        Self { rms_mm: rms(columns.column(0).norm_squared()), expected_mm, bound_mm: factor * expected_mm }
+    }
+
+    fn is_beyond(&self, smallest_mm: f64) -> bool {
+        self.rms_mm > self.bound_mm && self.rms_mm > smallest_mm
     }
 }
 
 /// Fewest poses of a comparison: placement has nine parameters.
 const FEWEST: usize = 8;
-
-/// The displacements of the target between two arms.
-fn fill(
-    column: &mut [f64],
-    first: &[(Vector3<f64>, Rotation3<f64>)],
-    now: &[(Vector3<f64>, Rotation3<f64>)],
-) {
-    for ((into, (first, _)), (now, _)) in column.chunks_exact_mut(3).zip(first).zip(now) {
-        into.copy_from_slice((now - first).as_slice());
-    }
-}
-
-/// Takes the best placement out of displacements: a small motion of the base, and one of the target on the flange.
-fn place(columns: &mut DMatrix<f64>, first: &[(Vector3<f64>, Rotation3<f64>)]) {
-    let mut motions = DMatrix::zeros(columns.nrows(), 9);
-    for (pose, (at, rotation)) in first.iter().enumerate() {
-        for axis in 0..3 {
-            motions[(3 * pose + axis, axis)] = 1.0;
-            let turned = Vector3::ith(axis, 1.0).cross(at);
-            motions.view_mut((3 * pose, 3 + axis), (3, 1)).copy_from(&turned);
-            motions.view_mut((3 * pose, 6 + axis), (3, 1)).copy_from(&rotation.matrix().column(axis));
-        }
-    }
-    for mut motion in motions.column_iter_mut() {
-        let length = motion.norm();
-        motion.unscale_mut(length.max(f64::MIN_POSITIVE));
-    }
-    // Not all nine are independent: a target on the axis of the base's turn moves with it.
-    let svd = motions.svd(true, false);
-    let Some(u) = svd.u else { return };
-    let largest = svd.singular_values.max();
-    for (k, value) in svd.singular_values.iter().enumerate() {
-        if *value > 1e-9 * largest {
-            let direction: DVector<f64> = u.column(k).into_owned();
-            let along = columns.tr_mul(&direction);
-            columns.ger(-1.0, &direction, &along, 1.0);
-        }
-    }
-}

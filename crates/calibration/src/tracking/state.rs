@@ -133,6 +133,15 @@ pub struct State {
     /// Snapshots at the beginning and in the middle of the history.
     pub(super) reference: Snapshot,
     pub(super) middle: Snapshot,
+    /// Snapshot after the first poses, before any change: what the arm was when the track began.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) start: Option<Snapshot>,
+    /// Scatter of the first poses, in units of the noise that the track counts with.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) start_scatter: Option<f64>,
+    /// The noise that the track began with, where the first poses showed it several times too large (mm).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) replaced_sigma_mm: Option<f64>,
     /// Measured region: the model's, extended by the track.
     pub region: Region,
     /// Pose number before which no further alarm is raised, after an unexplained one.

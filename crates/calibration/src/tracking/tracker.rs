@@ -131,6 +131,9 @@ impl Tracker {
             now: snapshot.clone(),
             reference: snapshot.clone(),
             middle: snapshot,
+            start: None,
+            start_scatter: None,
+            replaced_sigma_mm: None,
             region: model.region.clone(),
             quiet_until: 0,
             pending_since: 0,
@@ -161,8 +164,8 @@ impl Tracker {
         shape.anchor = state.outlets_mm.len().saturating_sub(1);
         let sensing = frame_parameters(&Dataset::new(file, state.sensor, vec![shape]));
         let parameters: Vec<Parameter> = model.order.iter().copied().chain(sensing).collect();
-        let snapshots = [&state.now, &state.reference, &state.middle];
-        if snapshots.iter().any(|s| s.x.len() != parameters.len()) {
+        let snapshots = [Some(&state.now), Some(&state.reference), Some(&state.middle), state.start.as_ref()];
+        if snapshots.iter().flatten().any(|s| s.x.len() != parameters.len()) {
             return Err(wrong(
                 "the number of parameters differs from the model's: it belongs to another model",
             ));
@@ -211,9 +214,11 @@ impl Tracker {
         let mut alarms = Vec::new();
         for (at, row) in observed.dataset.rows.iter().enumerate() {
             self.condition = *row.condition;
+            let sigma_mm = self.state.sigma_mm;
             let alarm = self.process_pose(&problem, at, record[at].clone());
-            if alarm.as_ref().is_some_and(|alarm| alarm.course == Course::Mounted) {
-                // The frames have changed, and with them the weights of rounded angles.
+            let is_mounted = alarm.as_ref().is_some_and(|alarm| alarm.course == Course::Mounted);
+            if is_mounted || self.state.sigma_mm != sigma_mm {
+                // The frames have changed, and with them the weights of rounded angles; or the noise.
                 record = self.pose_records(&observed);
                 problem = self.problem(&record);
             }
@@ -248,6 +253,12 @@ impl Tracker {
             extend_region(&mut self.state.region, &record.joints);
         }
         self.state.history.push(record);
+        // The last pose before any alarm.
+        if self.state.poses == self.state.options.first_poses + self.state.options.window.max(1) {
+            self.judge_noise();
+            self.state.start_scatter = self.late_scatter();
+            self.state.start = Some(Snapshot::of(&self.filter, self.state.history.len()));
+        }
         if let Some(alarm) = self.alarm() {
             self.state.alarms.push(alarm.clone());
             return Some(alarm);

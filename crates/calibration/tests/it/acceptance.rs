@@ -229,3 +229,58 @@ fn the_uncertainty_of_the_orientation_comes_from_repeats() {
     assert!((turns.uncertainty_rad - 2.0 * sigma).abs() < 1e-9, "{}", turns.uncertainty_rad);
     assert!(turns.model.max < 0.003 && turns.model.rmse > 0.0003, "{:?}", turns.model);
 }
+
+/// Whatever their number, poses that show little of an arm do not accept it; those of a usual working volume do.
+#[test]
+fn poses_of_a_small_part_of_the_arm_accept_nothing() {
+    let model = model(&dataset(rows(0.1, 120)));
+    // The series of the poses, drawn together about a pose.
+    let about = |share: f64| {
+        let nominal = robots::load("abb-irb-120").unwrap().model;
+        let centre = Joints::from([0.1, 0.3, 0.2, 0.1, 0.8, 0.2]);
+        let near = |row: Row| {
+            let q = centre + share * row.joints;
+            let place = nominal.at_condition(&Condition::default()).forward(&q).translation.vector;
+            Row::new(row.number, q, Reading::Position(place.add_scalar(0.01 * [-1.0, 1.0][row.number % 2])))
+        };
+        dataset(rows(0.7, 110).into_iter().map(near).collect())
+    };
+    let mut before = 1.0;
+    for (share, overall) in [
+        (0.6, Decision::Accepted),
+        (0.35, Decision::Accepted),
+        (0.02, Decision::Open),
+        (0.002, Decision::Open),
+    ] {
+        let found = accept(&about(share), &model, &options(1.0)).unwrap();
+        assert_eq!(
+            (found.decision, found.overall()),
+            (Decision::Accepted, overall),
+            "{share}: {:?}",
+            found.tested
+        );
+        assert!(found.tested.share < before && found.is_registered, "{share}: {:?}", found.tested);
+        assert!(found.is_nominal_within(), "the arm is that of the data sheet");
+        before = found.tested.share;
+    }
+}
+
+/// A stated uncertainty that repeated poses refute does not count.
+#[test]
+fn the_larger_of_the_stated_and_the_seen_uncertainty_counts() {
+    let model = model(&dataset(rows(0.1, 120)));
+    let mut twice = rows(0.7, 110);
+    for k in 0..110 {
+        let Reading::Position(at) = twice[k].reading.clone() else { panic!("a position") };
+        // Second readings 0.2 mm away.
+        let away = Vector3::from_fn(|axis, _| 0.2 * [-1.0, 1.0][(k / 3 + axis) % 2] / 3f64.sqrt());
+        twice.push(Row::new(110 + k, twice[k].joints, Reading::Position(at + away)));
+    }
+    let twice = dataset(twice);
+    let of = |uncertainty_mm| accept(&twice, &model, &Options { uncertainty_mm, ..options(0.25) }).unwrap();
+    let (unstated, low, high) = (of(None), of(Some(0.005)), of(Some(1.0)));
+    assert_eq!((low.uncertainty, low.stated_mm), (Uncertainty::AboveStated, Some(0.005)));
+    assert_eq!((low.uncertainty_mm, low.decision), (unstated.uncertainty_mm, unstated.decision));
+    assert_eq!((high.uncertainty, high.uncertainty_mm), (Uncertainty::Stated, 1.0));
+    assert_ne!(low.overall(), Decision::Accepted);
+}

@@ -166,3 +166,66 @@ fn copies_of_a_file_are_recognised() {
     assert_eq!(tracker.copy_of(&day), None);
     assert_eq!(tracker.copy_of(&Dataset { file: "copy.csv".to_owned(), ..day.subset(&[0, 1]) }), None);
 }
+
+/// A model with wide uncertainties, as of one with effects that it leaves out: they hide no change that came after the first poses.
+#[test]
+fn an_uncertain_first_model_hides_no_change_since_the_first_poses() {
+    let mut wide = model().clone();
+    wide.covariance *= 400.0;
+    let departure = |dataset: &Dataset| {
+        let mut tracker = Tracker::begin(&wide, "hash", dataset, &Options::default()).unwrap();
+        tracker.process_file(dataset).unwrap();
+        tracker.departure().unwrap()
+    };
+    for seed in 2..6 {
+        let calm = departure(&measured(seed, None));
+        assert!(!calm.is_significant && calm.told.is_none(), "{seed}: {calm:?}");
+    }
+    let moved = departure(&with_jump(70, zero_of_joint_3()));
+    let [since_mm, _] = moved.since_first_poses_mm.unwrap();
+    assert!(moved.rms_mm < 3.0 * moved.expected_mm, "the first model does not tell it: {moved:?}");
+    // 0.05° of joint 3 some 400 mm away, less the placement.
+    assert!(moved.is_significant && (0.1..0.5).contains(&since_mm), "{moved:?}");
+}
+
+/// What a model left over counts as noise until the first poses show less. The class: a noise several times too large, under which no
+/// change is seen.
+#[test]
+fn a_noise_that_is_several_times_too_large_is_replaced_by_what_the_first_poses_scatter() {
+    let mut coarse = model().clone();
+    coarse.geometry.held_out.rmse = 0.2;
+    let track = |dataset: &Dataset, options: &Options| {
+        let mut tracker = Tracker::begin(&coarse, "hash", dataset, options).unwrap();
+        let alarms = tracker.process_file(dataset).unwrap();
+        (tracker, alarms)
+    };
+    for seed in 2..8 {
+        let (calm, alarms) = track(&measured(seed, None), &Options::default());
+        assert!(alarms.is_empty() && calm.overstated_noise().is_none(), "{seed}: {alarms:?}");
+        assert!(!calm.departure().unwrap().is_significant, "{seed}");
+        let [now_mm, before_mm] = calm.replaced_noise_mm().unwrap();
+        // The recipe's noise is 0.015 mm.
+        assert!((0.013..0.025).contains(&now_mm) && before_mm > 0.11, "{seed}: {now_mm} {before_mm}");
+    }
+    let dataset = with_jump(70, LinkDeviation { joint: 2, theta_deg: 0.015, ..LinkDeviation::default() });
+    let (tracker, alarms) = track(&dataset, &Options::default());
+    assert_eq!(alarms.len(), 1, "{alarms:?}");
+    assert!(tracker.departure().unwrap().is_significant);
+    // One that the user stated stays, and is remarked on.
+    let stated = Options { sigma_mm: Some(0.12), ..Options::default() };
+    let (tracker, alarms) = track(&dataset, &stated);
+    let noise = tracker.overstated_noise().unwrap();
+    assert!(alarms.is_empty() && tracker.replaced_noise_mm().is_none());
+    assert!(noise.seen_mm < 0.04 && (0.2..0.5).contains(&noise.smallest_change_mm), "{noise:?}");
+    // Under it, readings that fit less well tell a change.
+    assert!(tracker.worse_fit().is_some_and(|ratio| ratio > 2.0), "{:?}", tracker.worse_fit());
+    assert_eq!(track(&measured(2, None), &stated).0.worse_fit(), None);
+    // A stop between any two poses alters nothing.
+    let (whole, _) = track(&dataset, &Options::default());
+    let part = dataset.subset(&(0..44).collect::<Vec<_>>());
+    let mut resumed = track(&part, &Options::default()).0;
+    resumed = Tracker::resume(&coarse, State::from_toml(&resumed.state().to_toml().unwrap()).unwrap(), "s")
+        .unwrap();
+    resumed.process_file(&dataset).unwrap();
+    assert_eq!(resumed.deviations(), whole.deviations());
+}
