@@ -115,7 +115,7 @@ pub fn diagnose(
     search.purge_validation(&mut confirmed);
     let structure = residual_tests::structure(&subject, &search.extended, &search.set_aside);
     let smoothed = search.fit_smooth_correction(&structure);
-    let summary = summary::summarise(&search, &confirmed, &structure, smoothed);
+    let summary = summary::summarise(&search, &confirmed, &structure, (smoothed, needed.is_some()));
     let few_poses = needed.map(|needed| few_poses_note(dataset, needed));
     let mut notes: Vec<String> = few_poses.iter().cloned().collect();
     notes.append(&mut search.notes);
