@@ -87,6 +87,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
         ..DataArguments::of(arguments.data.clone(), robot)
     };
     let (_, dataset) = read(&data)?;
+    arguments.stated.refuse_point_alone()?;
     let options = Options {
         tolerance_mm: arguments.tolerance,
         uncertainty_mm: arguments.sensor_uncertainty,

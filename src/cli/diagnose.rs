@@ -22,7 +22,7 @@ use super::identify::{DataArguments, FitArguments, PointsArguments, read, write_
 use super::outputs::Outputs;
 use super::progress::Spinner;
 use super::shares::Shares;
-use super::stated_frames::{FramePriorArguments, StatedFrameArguments};
+use super::stated_frames::{FramePriorArguments, Stated, StatedFrameArguments};
 use super::terminal::print_message;
 
 /// Arguments of `diagnose`.
@@ -153,7 +153,7 @@ pub(super) fn diagnose_rows(
     let stated = arguments.stated.frames(dataset)?;
     let (tolerance, frames) = arguments.prior.prior(
         [&options.tolerance, &options.arm_tolerance],
-        stated.as_ref(),
+        Stated { frames: stated.as_ref(), touched: arguments.stated.touched()? },
         frames,
         (dataset, nominal),
     )?;

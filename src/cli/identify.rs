@@ -30,7 +30,7 @@ use super::files::{self, Batch};
 use super::inputs::{self, NamedRobot, UrdfLinks};
 use super::outputs::Outputs;
 use super::progress::Spinner;
-use super::stated_frames::{FramePriorArguments, StatedFrameArguments};
+use super::stated_frames::{FramePriorArguments, Stated, StatedFrameArguments};
 use super::terminal::{print_message, print_message_lines, print_result, width};
 
 /// Convention of the logged angles.
@@ -245,7 +245,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitStatus> {
     let name = robot.sheet.name.clone();
     let found = watching(arguments.common.threads, &work, || {
         let frames = starting_frames(&dataset, &robot.model, &options.tolerance, options.fuse_readout)?;
-        let stated = options.stated_frames.as_ref();
+        let stated = Stated { frames: options.stated_frames.as_ref(), touched: arguments.stated.touched()? };
         let (tolerance, frames) =
             arguments.prior.prior([&options.tolerance; 2], stated, frames, (&dataset, &robot.model))?;
         let options = Options { tolerance, ..options.clone() };

@@ -6,7 +6,10 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use truegrind::arm::model::Model;
 use truegrind::calibration::identification::calibration::Frames;
 use truegrind::calibration::identification::identify::{Options, identify};
-use truegrind::calibration::identification::stated_frame::{contradiction, contradiction_beside_geometry};
+use truegrind::calibration::identification::stated_frame::{
+    beside, contradicted_target, contradiction, contradiction_beside_geometry, tolerance_beside,
+    with_touched_point,
+};
 use truegrind::calibration::identification::tolerance::Tolerance;
 use truegrind::calibration::measurement::dataset::{Dataset, Sensor};
 use truegrind::calibration::measurement::split;
@@ -25,7 +28,8 @@ pub(super) struct StatedFrameArguments {
     /// Zero offset of a cable: reading minus free length (mm). Once per cable.
     #[arg(long, value_name = "MM", allow_hyphen_values = true)]
     cable_zero: Vec<String>,
-    /// Measured point (hook, reflector, target) on the flange: x,y,z (mm) or x,y,z,qw,qx,qy,qz. Default: the flange.
+    /// Measured point (hook, reflector, target) on the flange: x,y,z (mm) or x,y,z,qw,qx,qy,qz. Alone it is where a fit begins, and where
+    /// the point stays if the poses do not show it (one orientation of the flange). Default: the flange.
     #[arg(long, value_name = "X,Y,Z[,Q…]", allow_hyphen_values = true)]
     touched_point: Option<String>,
 }
@@ -38,6 +42,9 @@ pub(super) struct FramePriorArguments {
     /// corrected.
     #[arg(long, value_name = "MM[,DEG]", allow_hyphen_values = true)]
     frame_sigma: Option<String>,
+    /// Uncertainty of --touched-point (mm, standard deviation). Default: 50 mm, as of a point that is not stated.
+    #[arg(long, value_name = "MM", allow_negative_numbers = true, requires = "touched_point")]
+    touched_sigma: Option<f64>,
 }
 
 impl FramePriorArguments {
@@ -46,17 +53,41 @@ impl FramePriorArguments {
     pub(super) fn prior(
         &self,
         [tolerance, of_arm]: [&Tolerance; 2],
-        stated: Option<&Frames>,
+        stated: Stated<'_>,
         found: Frames,
         (dataset, nominal): (&Dataset, &Model),
     ) -> anyhow::Result<(Tolerance, Frames)> {
+        let Stated { frames: stated, touched } = stated;
+        let mut tolerance = *tolerance;
+        if let Some(mm) = self.touched_sigma {
+            if !(mm > 0.0 && mm.is_finite()) {
+                bail!("--touched-sigma {mm}: expected a length above 0 in mm");
+            }
+            tolerance.target_mm = mm;
+        }
+        let found = match stated {
+            Some(stated) => beside(dataset, nominal, stated, touched.as_ref(), &found),
+            None => found,
+        };
+        if let Some(touched) = &touched
+            && (stated.is_none() || self.touched_sigma.is_some())
+            && let Some(contradiction) =
+                contradicted_target(dataset, nominal, touched, self.touched_sigma.unwrap_or(0.0), &found)
+        {
+            bail!("{contradiction}");
+        }
         let Some(text) = &self.frame_sigma else {
             if let Some(contradiction) =
                 stated.and_then(|stated| contradiction(dataset, nominal, stated, &found, 0.0))
             {
                 bail!("{contradiction}");
             }
-            return Ok((*tolerance, found));
+            let begins_there = stated.is_none() || self.touched_sigma.is_some();
+            let frames = match touched.filter(|_| begins_there) {
+                Some(touched) => with_touched_point(dataset, nominal, &touched, found),
+                None => found,
+            };
+            return Ok((tolerance, frames));
         };
         let Some(stated) = stated else {
             bail!("--frame-sigma needs --sensor-frame, or --outlet and --cable-zero");
@@ -73,7 +104,9 @@ impl FramePriorArguments {
             bail!("{contradiction}");
         }
         // Where this fit fails, the one that is asked for says why.
-        let free = Options { tolerance: *of_arm, ..Options::default() };
+        let of_arm = Tolerance { target_mm: tolerance.target_mm, ..*of_arm };
+        let of_arm = tolerance_beside(dataset, nominal, &of_arm);
+        let free = Options { tolerance: of_arm, ..Options::default() };
         let split = |rows: &Dataset| split::random(rows, free.held_out, free.seed);
         let geometry = identify(dataset, "", nominal, &found, &split, &free).map(|free| free.geometry);
         if let Ok(geometry) = geometry
@@ -87,9 +120,18 @@ impl FramePriorArguments {
         } else {
             stated.flange_from_target
         };
-        let tolerance = Tolerance { frame_mm: mm, frame_rad: deg.to_radians(), ..*tolerance };
+        let tolerance = Tolerance { frame_mm: mm, frame_rad: deg.to_radians(), ..tolerance };
         Ok((tolerance, Frames { flange_from_target, ..stated.clone() }))
     }
+}
+
+/// What is stated of sensor and target.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Stated<'a> {
+    /// The frames, where the sensor's place is stated.
+    pub(super) frames: Option<&'a Frames>,
+    /// The measured point, where it is stated.
+    pub(super) touched: Option<Pose>,
 }
 
 /// Data set that the frames must match.
@@ -114,6 +156,23 @@ impl StatedFrameArguments {
         self.frames_of(&measured)
     }
 
+    /// The stated point on the flange, if any.
+    ///
+    /// # Errors
+    /// It is no point.
+    pub(super) fn touched(&self) -> anyhow::Result<Option<Pose>> {
+        self.touched_point.as_deref().map(|text| pose("--touched-point", text)).transpose()
+    }
+
+    /// Refuses a point that stands alone, where frames are not fitted about it.
+    pub(super) fn refuse_point_alone(&self) -> anyhow::Result<()> {
+        let placed = self.sensor_frame.is_some() || !self.outlet.is_empty() || !self.cable_zero.is_empty();
+        if self.touched_point.is_some() && !placed {
+            bail!("--touched-point needs --sensor-frame, or --outlet and --cable-zero");
+        }
+        Ok(())
+    }
+
     /// The frames of a planned measurement. A tracker may stand anywhere; a cable needs its outlet.
     pub(super) fn planned(&self, sensor: Sensor) -> anyhow::Result<Frames> {
         let anchors = self.outlet.len().max(1);
@@ -136,9 +195,6 @@ impl StatedFrameArguments {
         let cable = !self.outlet.is_empty() || !self.cable_zero.is_empty();
         let framed = self.sensor_frame.is_some();
         if !cable && !framed {
-            if self.touched_point.is_some() {
-                bail!("--touched-point needs --sensor-frame, or --outlet and --cable-zero");
-            }
             return Ok(None);
         }
         let anchors = dataset.anchors;

@@ -3,6 +3,7 @@
 
 pub mod calibration;
 pub mod tolerance;
+pub(crate) mod unseen_target;
 pub mod prior_width;
 pub mod rounding;
 pub mod identifiability;

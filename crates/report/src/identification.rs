@@ -253,11 +253,24 @@ pub(super) fn benefit_figures(benefit: Option<&Benefit>) -> Vec<KeyFigure> {
     vec![
         KeyFigure::new("Programs before", benefit.nominal_mm, 3, "mm")
             .note("expected RMS deviation in the measured region, without placement of base and flange"),
-        KeyFigure::new("Programs after", benefit.estimated_mm, 3, "mm").note(format!(
-            "expected RMS deviation; better with a probability of {}",
-            percent_of(benefit.probability)
-        )),
+        programs_after(benefit),
     ]
+}
+
+/// Expected deviation of corrected programs: a range where what the readings still deviate may be noise or the arm's.
+fn programs_after(benefit: &Benefit) -> KeyFigure {
+    let probability = percent_of(benefit.probability);
+    let [least, most] =
+        [benefit.estimated_mm, benefit.estimated_at_most_mm].map(|mm| Precision::Decimals(3).format(mm));
+    let after = "Programs after";
+    if least == most {
+        return KeyFigure::new(after, benefit.estimated_mm, 3, "mm")
+            .note(format!("expected RMS deviation; better with a probability of {probability}"));
+    }
+    KeyFigure::new(after, format!("{least} to {most}"), 3, "mm").note(format!(
+        "expected RMS deviation, the more of what the readings still deviate is the arm's and not noise; better with a probability of \
+         {probability}"
+    ))
 }
 
 fn key_figures(found: &Identification) -> Vec<KeyFigure> {

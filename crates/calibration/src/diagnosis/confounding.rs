@@ -47,6 +47,9 @@ const TWO_JOINT_SHARE: f64 = 0.5;
 /// Share of the drift of stand or zero from which growth of the arm explains both.
 const GROWTH_SHARE: f64 = 0.25;
 
+/// Movement of the readings by a drift of the sensor over what it explains from which it may be a compensation.
+const COMPENSATED: f64 = 10.0;
+
 /// Residual in excess of the noise of repeated poses, estimated with so many degrees of freedom (mm RMS); 0 where it might be noise.
 pub(super) fn excess_over_noise_mm(left_mm: f64, noise_mm: f64, freedom: usize) -> f64 {
     if freedom == 0 {
@@ -69,7 +72,8 @@ impl Confounding<'_> {
         }
         let own = self.contributions.unique_rms_mm(causes);
         if all(&Cause::is_thermal) {
-            return self.by_other_thermal_cause(causes, own).into_iter().collect();
+            let compensated = self.by_compensation(causes, own);
+            return self.by_other_thermal_cause(causes, own).into_iter().chain(compensated).collect();
         }
         if all(&|cause| cause.rows().is_some()) {
             return self
@@ -125,6 +129,21 @@ impl Confounding<'_> {
             ));
         }
         out
+    }
+
+    /// A drift of the sensor that is many times what it explains: links and frames, or another cause, take up nearly all of it, so that its
+    /// size is what cancels theirs.
+    fn by_compensation(&self, causes: &[usize], own: f64) -> Option<String> {
+        if causes.iter().any(|&k| self.causes[k].is_in_arm()) {
+            return None;
+        }
+        let moved = self.contributions.movement_rms_mm(causes);
+        (moved > COMPENSATED * own).then(|| {
+            format!(
+                "it would move the readings by {moved:.4} mm and explains only {own:.4} mm, since links and frames take up the rest: its size may \
+                 be what cancels theirs"
+            )
+        })
     }
 
     /// A shift in some rows next to a larger empirical fault: rows in which the expansion of that is worst look shifted.

@@ -35,6 +35,21 @@ impl<'a> Contributions<'a> {
         self.in_mm(&self.sum(causes))
     }
 
+    /// How far `causes` together move the readings from where they are in the mean (mm RMS over the observations): what a constant shift
+    /// of the sensor is, is no movement.
+    pub fn movement_rms_mm(&self, causes: &[usize]) -> f64 {
+        let mm = &self.whole.design.slopes.mm;
+        let moved: Vec<f64> = self.sum(causes).iter().zip(mm).map(|(v, mm)| v * mm).collect();
+        let observations = self.whole.design.observations.max(1);
+        let per = (moved.len() / observations).max(1);
+        let square = |axis: usize| {
+            let along = || moved.iter().skip(axis).step_by(per);
+            let mean = along().sum::<f64>() / observations as f64;
+            along().map(|v| (v - mean).powi(2)).sum::<f64>()
+        };
+        ((0..per).map(square).sum::<f64>() / observations as f64).sqrt()
+    }
+
     /// Unique contribution of `causes` together (mm RMS over the observations): the part that links, frames and the other causes
     /// cannot absorb.
     pub fn unique_rms_mm(&self, causes: &[usize]) -> f64 {

@@ -17,14 +17,19 @@ use crate::measurement::split;
 /// model: a larger fault does not hide it.
 const ROUNDING_SHARE: f64 = 0.25;
 
+/// Step of angles below which it takes a fourth decimal (°).
+const FINE_DEG: f64 = 9e-4;
+
+/// Rounding of the angles, whose step is that of the digits in the file. Few poses leave links and target to their priors, so that what a step
+/// does to a reading is not known well enough for a name: `few_poses`.
 pub(super) fn rounding_finding(
     dataset: &Dataset,
     prepared: &Prepared,
     subject: &Subject<'_>,
     geometric: &Extended,
-    stages: &[StageError; 3],
+    (stages, few_poses): (&[StageError; 3], bool),
 ) -> Option<Finding> {
-    let step = dataset.angle_step_rad?;
+    let step = dataset.angle_step_rad.filter(|_| !few_poses)?;
     let logged = &prepared.logged;
     let shares = angle_shares(&logged.dataset, &geometric.model, &geometric.frames, &logged.angles);
     let coordinates = if dataset.sensor == Sensor::Cable { 1.0 } else { 3.0 };
@@ -66,7 +71,8 @@ pub(super) fn rounding_finding(
         }
     };
     let cause = format!(
-        "the log rounds joint angles to {:.3}°, which alone moves the target by {:.3} mm RMS",
+        "the log rounds joint angles to {:.*}°, which alone moves the target by {:.3} mm RMS",
+        if step.to_degrees() < FINE_DEG { 4 } else { 3 },
         step.to_degrees(),
         share.sqrt()
     );

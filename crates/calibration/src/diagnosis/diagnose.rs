@@ -34,6 +34,7 @@ use crate::identification::identify::{
 };
 use crate::identification::start::count_distinct_poses;
 use crate::identification::tolerance::Tolerance;
+use crate::identification::unseen_target::unseen_target;
 use crate::identification::verdict::{CONVERGED, VerdictBuilder};
 use crate::measurement::dataset::{Dataset, Sensor};
 use crate::measurement::split;
@@ -114,7 +115,7 @@ pub fn diagnose(
     search.purge_validation(&mut confirmed);
     let structure = residual_tests::structure(&subject, &search.extended, &search.set_aside);
     let smoothed = search.fit_smooth_correction(&structure);
-    let summary = summary::summarise(&search, &confirmed, &structure, smoothed);
+    let summary = summary::summarise(&search, &confirmed, &structure, (smoothed, needed.is_some()));
     let few_poses = needed.map(|needed| few_poses_note(dataset, needed));
     let mut notes: Vec<String> = few_poses.iter().cloned().collect();
     notes.append(&mut search.notes);
@@ -557,14 +558,15 @@ fn estimated(
         few_poses.map_or_else(|| Ok(benefit().map(|benefit: Benefit| benefit.with(beyond_noise))), Err);
     let parameters = parameter_table(fitted, nominal_arm);
     let judged = benefit.as_ref().map(Option::as_ref).map_err(|few| *few);
-    estimated.verdict = judge(fitted, rows.sensor, judged, &parameters, stages, options);
+    let unseen = unseen_target(handed, rows, &estimated);
+    estimated.verdict = judge(fitted, (rows.sensor, unseen), judged, &parameters, stages, options);
     (estimated, benefit.ok().flatten())
 }
 
 /// The verdict of an identification, plus: findings must not raise the held-out error of geometry. `benefit` says why it is not stated.
 fn judge(
     fitted: &Fitted,
-    sensor: Sensor,
+    (sensor, unseen_target): (Sensor, Option<String>),
     benefit: Result<Option<&Benefit>, &str>,
     parameters: &[EstimatedParameter],
     stages: &[StageError; 3],
@@ -587,6 +589,9 @@ fn judge(
     match benefit {
         Ok(benefit) => verdict.check_benefit(benefit, sensor),
         Err(few_poses) => verdict.doubt(few_poses),
+    }
+    if let Some(unseen_target) = unseen_target {
+        verdict.note(unseen_target);
     }
     verdict.check_limits(&options.limits, &stages[2].random);
     verdict.build()

@@ -1,6 +1,11 @@
 //! How far sensor or target moved, or links grew, during the measurement. The parameters of a drift are its asymptote, which a short log
 //! extrapolates, and terms with different time constants nearly cancel: what was seen is the change of their sum within the logged time.
+//! The shift of a sensor that turns too is that of its own place, metres from the arm, where a turn and a shift cancel that nobody saw apart:
+//! what was seen is how far the target moved against it, v + ω × r, r from the sensor to the middle of the readings.
 
+use nalgebra::Vector3;
+
+use crate::identification::calibration::Frames;
 use crate::measurement::dataset::{Dataset, Row};
 use crate::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
 use truegrind_arm::effect::Effect;
@@ -12,8 +17,8 @@ pub(super) fn is_in_time(disturbance: &Disturbance) -> bool {
 }
 
 /// One sentence for drifts of one quantity.
-pub(super) fn describe(drifts: &[&Disturbance], dataset: &Dataset) -> String {
-    let (moved_mm, hours) = movement(drifts, dataset);
+pub(super) fn describe(drifts: &[&Disturbance], dataset: &Dataset, frames: &Frames) -> String {
+    let (moved_mm, hours) = movement(drifts, dataset, frames);
     let size = format!("by {moved_mm:.2} mm during the {} of the measurement", span(hours));
     match drifts.first().map(|d| &d.kind) {
         Some(Kind::Target) => format!("the target creeps on the flange {size}"),
@@ -41,13 +46,34 @@ pub(super) fn describe_growth(terms: &[&Effect], dataset: &Dataset) -> String {
     )
 }
 
+/// The shift (mm) of a disturbance where the readings are that are `among` the rows.
+pub(super) fn shift_at_target(
+    disturbance: &Disturbance,
+    dataset: &Dataset,
+    frames: &Frames,
+    among: impl Fn(&Row) -> bool,
+) -> [f64; 3] {
+    let shift = Vector3::from_fn(|axis, _| disturbance.values.get(axis).copied().unwrap_or(0.0));
+    let (Kind::Frame { turning: true }, [_, _, _, x, y, z]) = (&disturbance.kind, &disturbance.values[..])
+    else {
+        return shift.into();
+    };
+    let rows: Vec<Vector3<f64>> =
+        dataset.rows.iter().filter(|row| among(row)).map(|row| row.reading.place_mm()).collect();
+    let middle = rows.iter().sum::<Vector3<f64>>() / rows.len().max(1) as f64;
+    let away = frames.base_from_sensor.rotation * middle;
+    (shift + Vector3::new(*x, *y, *z).cross(&away)).into()
+}
+
 /// How far the sum of `drifts` moved (mm), and the logged time span (h).
-fn movement(drifts: &[&Disturbance], dataset: &Dataset) -> (f64, f64) {
+fn movement(drifts: &[&Disturbance], dataset: &Dataset, frames: &Frames) -> (f64, f64) {
+    let shifts: Vec<[f64; 3]> =
+        drifts.iter().map(|drift| shift_at_target(drift, dataset, frames, |_| true)).collect();
     let (moved, hours) = largest_change(dataset, |row| {
         let mut sum = [0.0; 3];
-        for drift in drifts {
+        for (drift, shift) in drifts.iter().zip(&shifts) {
             let factor = drift.profile.at(row);
-            sum.iter_mut().zip(&drift.values).for_each(|(sum, value)| *sum += factor * value);
+            sum.iter_mut().zip(shift).for_each(|(sum, value)| *sum += factor * value);
         }
         sum
     });

@@ -126,14 +126,14 @@ impl FindingBuilder<'_> {
                 Cause::Arm(effect) if drift::is_growth_in_time(effect) => growth.push(effect),
                 other => {
                     let parameters = words::found_parameters(self.extended, index);
-                    others.push(words::describe_cause(other, &parameters, dataset));
+                    others.push(words::describe_cause(other, &parameters, dataset, &self.extended.frames));
                 }
             }
         }
         if drifts.len() < 2 && growth.len() < 2 {
             return;
         }
-        let moved = (!drifts.is_empty()).then(|| drift::describe(&drifts, dataset));
+        let moved = (!drifts.is_empty()).then(|| drift::describe(&drifts, dataset, &self.extended.frames));
         let grown = (!growth.is_empty()).then(|| drift::describe_growth(&growth, dataset));
         finding.cause = moved.into_iter().chain(grown).chain(others).collect::<Vec<_>>().join("; ");
     }
@@ -241,7 +241,12 @@ impl FindingBuilder<'_> {
         let picture = picture(self.subject, cause, &without, &self.whole.design);
         let finding = Finding {
             effect: cause.kind(),
-            cause: words::describe_cause(cause, &parameters, &self.subject.observed.dataset),
+            cause: words::describe_cause(
+                cause,
+                &parameters,
+                &self.subject.observed.dataset,
+                &self.extended.frames,
+            ),
             confidence: if clear { Confidence::Identified } else { Confidence::Ambiguous },
             rows: cause.rows(),
             row_list: None,

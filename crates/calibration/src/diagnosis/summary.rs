@@ -38,12 +38,13 @@ pub(super) struct Summary {
     pub(super) joint_scatter: Option<JointScatter>,
 }
 
-/// Summarises a search. `smoothed` is the held-out error without the smooth correction (mm), if there is one.
+/// Summarises a search. `smoothed` is the held-out error without the smooth correction (mm), if there is one; `few_poses`: there are too few to
+/// separate effects from geometry.
 pub(super) fn summarise(
     search: &Search<'_>,
     confirmed: &Confirmed,
     structure: &Structure,
-    smoothed: Option<f64>,
+    (smoothed, few_poses): (Option<f64>, bool),
 ) -> Summary {
     let context = search.context;
     let (subject, searched, prepared) = (&context.subject, &context.searched, context.prepared);
@@ -103,7 +104,7 @@ pub(super) fn summarise(
     let something_else =
         unexplained_finding.is_some().then(|| something_else(&searched.observed.dataset, confirmed));
     let of_the_record = [
-        rounding_finding(context.dataset, prepared, subject, &search.geometric, stages),
+        rounding_finding(context.dataset, prepared, subject, &search.geometric, (stages, few_poses)),
         mismatch_finding(context.dataset, prepared, &stages[2]),
         outlier_finding(context.dataset, &outliers, (off, empirical_mm), &stages[2]),
         unexplained_finding,

@@ -6,9 +6,11 @@ use super::decision;
 use super::drift;
 use super::extension::Extended;
 use super::finding::{Confidence, Finding, FoundParameter, Gain};
-use crate::measurement::dataset::{Dataset, Sensor};
+use crate::identification::calibration::Frames;
+use crate::measurement::dataset::{Dataset, Row, Sensor};
 use crate::measurement::sensor::disturbance::{Disturbance, Kind, Profile};
 use crate::measurement::sensor::empirical::{EmpiricalFault, Overturning, Pole};
+use nalgebra::Vector3;
 use truegrind_arm::effect::Effect;
 
 /// Values and standard deviations of the parameters of cause `index`.
@@ -102,8 +104,13 @@ pub(super) fn finding(
     }
 }
 
-/// One sentence that states the part and the size of a cause, found in `dataset`.
-pub fn describe_cause(cause: &Cause, parameters: &[FoundParameter], dataset: &Dataset) -> String {
+/// One sentence that states the part and the size of a cause, found in `dataset` with the sensor at `frames`.
+pub fn describe_cause(
+    cause: &Cause,
+    parameters: &[FoundParameter],
+    dataset: &Dataset,
+    frames: &Frames,
+) -> String {
     let last_row = dataset.rows.last().map_or(0, |row| row.number);
     let joint = cause.joints().first().map_or(0, |j| j + 1);
     let value = value_of(parameters, 0);
@@ -170,7 +177,7 @@ pub fn describe_cause(cause: &Cause, parameters: &[FoundParameter], dataset: &Da
             format!("the links grow by {:.1} µm per metre and kelvin", t.growth_per_k * 1e6)
         }
         Cause::Arm(growth @ Effect::ThermalDrift(_)) => drift::describe_growth(&[growth], dataset),
-        Cause::Measurement(d) => describe_disturbance(d, &when(cause.rows()), parameters, dataset),
+        Cause::Measurement(d) => describe_disturbance(d, &when(cause.rows()), parameters, (dataset, frames)),
     }
 }
 
@@ -179,9 +186,13 @@ fn describe_disturbance(
     d: &Disturbance,
     rows: &str,
     parameters: &[FoundParameter],
-    dataset: &Dataset,
+    (dataset, frames): (&Dataset, &Frames),
 ) -> String {
     let value = value_of(parameters, 0);
+    let at_target_mm = || {
+        let among = |row: &Row| d.profile.at(row) != 0.0;
+        Vector3::from(drift::shift_at_target(d, dataset, frames, among)).norm()
+    };
     match (&d.kind, &d.profile) {
         (Kind::Empirical(EmpiricalFault::Refraction), Profile::Temperature { .. }) => format!(
             "the tracker's beam is refracted more as the air warms up: {:.3} mm at 3 m per kelvin, growing with the square of the distance",
@@ -195,7 +206,7 @@ fn describe_disturbance(
         (Kind::Load { .. }, _) => {
             format!("{rows} the arm carried a load that was not logged")
         }
-        _ if drift::is_in_time(d) => drift::describe(&[d], dataset),
+        _ if drift::is_in_time(d) => drift::describe(&[d], dataset, frames),
         (Kind::Target, Profile::Temperature { .. }) => format!(
             "the target moves on the flange with temperature: {:.1} µm per kelvin",
             norm(parameters) * 1e3
@@ -205,7 +216,7 @@ fn describe_disturbance(
         }
         (_, Profile::Temperature { .. }) => format!(
             "the sensor moves relative to the base with temperature, by {:.1} µm per kelvin",
-            norm(parameters) * 1e3
+            at_target_mm() * 1e3
         ),
         (Kind::JointZero { joint }, _) => format!(
             "{rows} the zero of joint {} was off by {:.4}° against all other rows: its encoder lost counts, a belt slipped, or it was \
@@ -218,7 +229,7 @@ fn describe_disturbance(
             let moved = if dataset.sensor == Sensor::Cable { "its outlet" } else { "its stand" };
             format!(
                 "the sensor was displaced by {:.3} mm against the arm {rows}: {moved} or the base of the arm moved",
-                norm(parameters)
+                at_target_mm()
             )
         }
         (Kind::Target, _) => format!(

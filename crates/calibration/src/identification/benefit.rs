@@ -56,7 +56,9 @@ pub struct Benefit {
     pub nominal_mm: f64,
     /// Expected RMS position error of the estimated arm (mm).
     pub estimated_mm: f64,
-    /// The same if the sensor has no scale error (mm).
+    /// The same if all that the readings still deviate is the arm's and not noise (mm).
+    pub estimated_at_most_mm: f64,
+    /// `estimated_mm` if the sensor has no scale error (mm).
     pub estimated_without_scale_mm: f64,
     /// Whether the uncertainty of the sensor's scale was stated; otherwise it is assumed.
     pub scale_stated: bool,
@@ -86,6 +88,7 @@ impl Benefit {
         Self {
             nominal_mm: self.nominal_mm.hypot(further_mm),
             estimated_mm: self.estimated_mm.hypot(further_mm),
+            estimated_at_most_mm: self.estimated_mm.hypot(beyond_noise.most_mm()),
             estimated_without_scale_mm: self.estimated_without_scale_mm.hypot(further_mm),
             beyond_noise: Some(beyond_noise),
             ..self
@@ -202,9 +205,11 @@ pub fn benefit(
         }
     });
     let shares = fitted.sigmas().into_iter().zip(&fitted.priors);
+    let estimated_mm = mean(&|v| v.estimated, any).max(0.0).sqrt();
     Some(Benefit {
         nominal_mm: mean(&|v| v.nominal, any).max(0.0).sqrt(),
-        estimated_mm: mean(&|v| v.estimated, any).max(0.0).sqrt(),
+        estimated_mm,
+        estimated_at_most_mm: estimated_mm,
         estimated_without_scale_mm: known_or(
             mean(&|v| v.estimated, without_scale),
             mean(&|v| v.estimated, any),

@@ -103,6 +103,14 @@ impl BeyondNoise {
         }
     }
 
+    /// The error beyond the noise (mm) if all that is left is the arm's.
+    pub fn most_mm(self) -> f64 {
+        match self {
+            Self::Known(mm) => mm,
+            Self::AtMost(most_mm) | Self::Between { most_mm, .. } => most_mm,
+        }
+    }
+
     /// The error beyond the noise (mm), as far as that is known.
     pub fn known_mm(self) -> Option<f64> {
         match self {

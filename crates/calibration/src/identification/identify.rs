@@ -20,6 +20,7 @@ use crate::identification::sessions::set_up_anew;
 use crate::identification::solver::{Family, SOLVERS, Solver};
 use crate::identification::start::count_distinct_poses;
 use crate::identification::tolerance::Tolerance;
+use crate::identification::unseen_target::unseen_target;
 use crate::identification::verdict::{CONVERGED, Limits, VerdictBuilder};
 use crate::measurement::dataset::{Dataset, Sensor};
 use crate::measurement::split::{self, NoiseFloor, Split};
@@ -246,6 +247,7 @@ pub fn identify(
         sensor: dataset.sensor,
         still: still_joints(&estimated.region),
         set_up_anew: set_up_anew(&observed.dataset, &geometry),
+        unseen_target: unseen_target(&geometry, &observed.dataset, &estimated),
     };
     estimated.verdict = judge(&case, options);
     Ok(Identification {
@@ -623,6 +625,8 @@ struct VerdictInputs<'a> {
     still: Vec<usize>,
     /// What speaks against one frame for all sessions.
     set_up_anew: Option<String>,
+    /// That the poses do not show the target's place on the flange.
+    unseen_target: Option<String>,
 }
 
 /// Range below which a joint hardly moved (°).
@@ -667,6 +671,9 @@ fn judge(case: &VerdictInputs<'_>, options: &Options) -> Verdict {
             STILL_DEG,
             if case.still.len() == 1 { "it" } else { "them" }
         ));
+    }
+    if let Some(unseen_target) = &case.unseen_target {
+        verdict.note(unseen_target.as_str());
     }
     if case.outliers.too_many > 0 {
         verdict.note(format!(

@@ -53,8 +53,7 @@ pub fn candidate_frames(dataset: &Dataset, nominal: &Model) -> Result<Vec<Frames
     if count_distinct_poses(dataset, needed) < needed {
         return Err(none(what, needed));
     }
-    let posed = nominal.at_condition(&Condition::default());
-    let flanges: Vec<Pose> = dataset.rows.iter().map(|r| posed.forward(&r.joints)).collect();
+    let flanges = flanges(dataset, nominal);
     let mut frames = Frames::at_origin(dataset.anchors());
     match dataset.sensor {
         Sensor::Cable => {
@@ -90,17 +89,40 @@ pub fn candidate_frames(dataset: &Dataset, nominal: &Model) -> Result<Vec<Frames
             Ok(vec![frames])
         }
         Sensor::Pose => {
-            let measured: Vec<Pose> = dataset
-                .rows
-                .iter()
-                .filter_map(|r| if let Reading::Pose(p) = &r.reading { Some(**p) } else { None })
-                .collect();
-            let found = registration::poses(&flanges, &measured).ok_or_else(|| none("sensor frame", 3))?;
+            let found =
+                registration::poses(&flanges, &poses(dataset)).ok_or_else(|| none("sensor frame", 3))?;
             frames.base_from_sensor = found.base_from_sensor;
             frames.flange_from_target = found.flange_from_target;
             Ok(vec![frames])
         }
     }
+}
+
+/// Poses of the flange and readings of a position.
+pub(super) struct Places {
+    pub(super) flanges: Vec<Pose>,
+    pub(super) measured_mm: Vec<Vector3<f64>>,
+}
+
+/// The rows of a tracker or camera, if they do not show where on the flange its target is.
+pub(super) fn unseen_target(dataset: &Dataset, nominal: &Model) -> Option<Places> {
+    let (flanges, measured_mm) = (flanges(dataset, nominal), positions(dataset));
+    let held = match dataset.sensor {
+        Sensor::Cable => false,
+        Sensor::Position => registration::target_point(&flanges, &measured_mm)?.is_target_held,
+        Sensor::Pose => registration::poses(&flanges, &poses(dataset))?.is_target_held,
+    };
+    held.then_some(Places { flanges, measured_mm })
+}
+
+fn flanges(dataset: &Dataset, nominal: &Model) -> Vec<Pose> {
+    let posed = nominal.at_condition(&Condition::default());
+    dataset.rows.iter().map(|r| posed.forward(&r.joints)).collect()
+}
+
+fn poses(dataset: &Dataset) -> Vec<Pose> {
+    let pose = |reading: &Reading| if let Reading::Pose(p) = reading { Some(**p) } else { None };
+    dataset.rows.iter().filter_map(|r| pose(&r.reading)).collect()
 }
 
 /// Number of rows that differ in joint angles or cable, counted up to `enough`.

@@ -6,14 +6,20 @@
 //! What is left of the difference once geometry is fitted is judged in standard deviations. With Δ from the fitted to the stated frame,
 //! S the covariance of the fitted one and P that of the stated one, χ² = Δᵀ (S + P)⁻¹ Δ, and the stated one is off by
 //! P (S + P)⁻¹ Δ. What links or a scale error of the sensor take up is in S.
+//!
+//! Where the poses do not show the target's place on the flange, the frame that fits best holds for an assumed place. The stated frame is
+//! then judged beside the frame that fits best with the stated target, or with the one that the stated frame implies ([`beside`]).
 
-use nalgebra::{DMatrix, DVector, Point3, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, Point3, UnitQuaternion, Vector3, Vector6};
 
 use super::benefit::{mean_reading, widen_by_scale};
 use super::calibration::Frames;
 use super::fit::{Fitted, Observations, errors_on};
 use super::rounding::logged_covariance;
+use super::start::unseen_target;
+use super::tolerance::Tolerance;
 use crate::measurement::dataset::{Dataset, Sensor};
+use crate::measurement::registration::{known_target, target_in_known_frame};
 use truegrind_arm::model::Model;
 use truegrind_arm::parameter::Parameter;
 use truegrind_math::se3::{Pose, apply_twist};
@@ -22,10 +28,90 @@ use truegrind_math::statistics::median;
 /// Distance from the best frame that any arm may cause (mm), and as a multiple of the median error that is left with the best frame.
 const OF_ANY_ARM_MM: f64 = 2.0;
 const OF_THIS_ARM: f64 = 5.0;
+/// The same in one orientation of the flange (mm), where all that an arm is off by there looks like another frame: 0.3° at two metres.
+const IN_ONE_ORIENTATION_MM: f64 = 10.0;
 /// Standard deviations of the stated frame that it may be off.
 const SIGMAS: f64 = 6.0;
 /// Share of the distance that is left under another reading of the frame, below which that is the likely one.
 const EXPLAINS: f64 = 0.1;
+
+/// Standard deviation of a target (mm) that the poses do not show, where a stated frame is judged beside geometry: with 50 mm geometry moves it
+/// to gain what an arm is off by otherwise.
+const ASSUMED_TARGET_MM: f64 = 1.0;
+
+/// The tolerances with which geometry is fitted to judge a stated frame.
+pub fn tolerance_beside(dataset: &Dataset, nominal: &Model, tolerance: &Tolerance) -> Tolerance {
+    let held = unseen_target(dataset, nominal).is_some();
+    let target_mm = if held { tolerance.target_mm.min(ASSUMED_TARGET_MM) } else { tolerance.target_mm };
+    Tolerance { target_mm, ..*tolerance }
+}
+
+/// Distance of a target from the flange (mm) that no adapter has.
+const FAR_OFF_FLANGE_MM: f64 = 1000.0;
+
+/// The frames beside which a stated one is judged: `found` itself, the start from the readings of the arm `nominal`, where the poses show
+/// the target's place or that of a cable is asked for; otherwise those that fit the readings best with the target `touched`, or, without
+/// one, with the target that the stated frame implies.
+pub fn beside(
+    dataset: &Dataset,
+    nominal: &Model,
+    stated: &Frames,
+    touched: Option<&Pose>,
+    found: &Frames,
+) -> Frames {
+    let held = || {
+        let places = unseen_target(dataset, nominal)?;
+        let implied_mm =
+            || target_in_known_frame(&places.flanges, &places.measured_mm, &stated.base_from_sensor);
+        let target_mm = touched.map_or_else(implied_mm, |touched| touched.translation.vector);
+        if !(target_mm.norm() < FAR_OFF_FLANGE_MM) {
+            return None;
+        }
+        let fit = known_target(&places.flanges, &places.measured_mm, &target_mm)?;
+        let flange_from_target = Pose::from_parts(target_mm.into(), found.flange_from_target.rotation);
+        Some(Frames { base_from_sensor: fit.base_from_sensor, flange_from_target, ..found.clone() })
+    };
+    held().unwrap_or_else(|| found.clone())
+}
+
+/// The frames `found`, the start from the readings of the arm `nominal`, with the target at `touched`: the sensor's frame is registered
+/// again beside it where the poses do not show it. A target without a rotation keeps that of `found`.
+pub fn with_touched_point(dataset: &Dataset, nominal: &Model, touched: &Pose, found: Frames) -> Frames {
+    let target_mm = touched.translation.vector;
+    let rotation = if touched.rotation == UnitQuaternion::identity() {
+        found.flange_from_target.rotation
+    } else {
+        touched.rotation
+    };
+    let fit = unseen_target(dataset, nominal)
+        .and_then(|places| known_target(&places.flanges, &places.measured_mm, &target_mm));
+    let base_from_sensor = fit.map_or(found.base_from_sensor, |fit| fit.base_from_sensor);
+    Frames { base_from_sensor, flange_from_target: Pose::from_parts(target_mm.into(), rotation), ..found }
+}
+
+/// What speaks against the target `touched` on the flange beside `found`, the start from the readings of the arm `nominal`, where the poses
+/// show its place; `None` if nothing does.
+pub fn contradicted_target(
+    dataset: &Dataset,
+    nominal: &Model,
+    touched: &Pose,
+    sigma_mm: f64,
+    found: &Frames,
+) -> Option<String> {
+    if dataset.sensor == Sensor::Cable || unseen_target(dataset, nominal).is_some() {
+        return None;
+    }
+    let observed = Observations { dataset: dataset.clone(), angles: logged_covariance(dataset) };
+    let of_this_arm_mm = OF_THIS_ARM * median(&errors_on(&observed, nominal, found))?;
+    let at = found.flange_from_target.translation.vector;
+    let off_mm = (touched.translation.vector - at).norm();
+    (off_mm > OF_ANY_ARM_MM.max(of_this_arm_mm).max(SIGMAS * sigma_mm)).then(|| {
+        format!(
+            "--touched-point: the readings put the target {off_mm:.1} mm from there, at {:.1},{:.1},{:.1} on the flange: check that it is in mm in              the flange frame, and of this set-up",
+            at.x, at.y, at.z
+        )
+    })
+}
 
 /// What speaks against the stated frame, whose standard deviation is `sigma_mm`, beside the frame `found` from the readings of the arm
 /// `nominal`; `None` if nothing does. A cable's outlet is not judged: lengths determine it much less.
@@ -43,7 +129,9 @@ pub fn contradiction(
     let of_this_arm_mm = OF_THIS_ARM * median(&errors_on(&observed, nominal, found))?;
     let (stated, best) = (stated.base_from_sensor, found.base_from_sensor);
     let off_mm = rms_distance_mm(dataset, &stated, &best);
-    if off_mm <= OF_ANY_ARM_MM.max(of_this_arm_mm).max(SIGMAS * sigma_mm) {
+    let of_any_arm_mm =
+        if unseen_target(dataset, nominal).is_some() { IN_ONE_ORIENTATION_MM } else { OF_ANY_ARM_MM };
+    if off_mm <= of_any_arm_mm.max(of_this_arm_mm).max(SIGMAS * sigma_mm) {
         return None;
     }
     let in_metres = Pose::from_parts(Vector3::from(1e3 * stated.translation.vector).into(), stated.rotation);

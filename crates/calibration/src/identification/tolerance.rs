@@ -3,6 +3,7 @@
 //! The tolerances keep combinations of parameters that the data do not determine at their nominal values.
 
 use crate::identification::calibration::Frames;
+use crate::measurement::registration::TARGET_SIGMA_MM;
 use crate::measurement::sensor::disturbance::{Disturbance, Kind};
 use truegrind_arm::effect::Effect;
 use truegrind_arm::model::Model;
@@ -40,7 +41,7 @@ impl Default for Tolerance {
             length_mm: 1.0,
             angle_rad: 0.3_f64.to_radians(),
             zero_rad: 0.3_f64.to_radians(),
-            target_mm: 50.0,
+            target_mm: TARGET_SIGMA_MM,
             target_rad: 1.0,
             frame_mm: 2000.0,
             frame_rad: 3.0,

@@ -11,7 +11,9 @@
 //!   all directions, since poses near a plane do not distinguish an outlet from its mirror image.
 //!
 //! Shapes: n poses of the flange in the base and as many readings, paired by index. Stopping rule: see `fit`. Departures:
-//! rows are not weighted; every closed form has a second start for the cases in which it is degenerate.
+//! rows are not weighted; every closed form has a second start for the cases in which it is degenerate. Where the poses do not
+//! show the target's place on the flange, a fit without a prior puts it metres away, to gain what an arm is off by: it is then
+//! fitted again with one (`UnseenTarget`).
 //! Checked against known truth, and against the UR arms' residuals with frames alone.
 
 mod fit;
@@ -45,6 +47,8 @@ pub struct PointRegistration {
     pub target_mm: Vector3<f64>,
     /// Root mean square residual distance (mm).
     pub rmse_mm: f64,
+    /// Whether a direction of `target_mm` is held by its prior, since the poses do not show it.
+    pub is_target_held: bool,
 }
 
 /// Result of [`poses`]: a sensor's frame and the frame of its target.
@@ -58,6 +62,8 @@ pub struct PoseRegistration {
     pub rmse_mm: f64,
     /// Root mean square residual rotation (rad).
     pub rmse_rad: f64,
+    /// Whether a direction of the target's place is held by its prior, since the poses do not show it.
+    pub is_target_held: bool,
 }
 
 /// Result of [`cable`]: a cable's outlet.
@@ -116,6 +122,40 @@ pub fn points(base_mm: &[Vector3<f64>], sensor_mm: &[Vector3<f64>]) -> Option<Fr
     Some(FrameRegistration { base_from_sensor, rmse_mm: (square / n as f64).sqrt() })
 }
 
+/// Standard deviation of a target about the flange's origin (mm): a hook or a reflector has a stand-off.
+pub const TARGET_SIGMA_MM: f64 = 50.0;
+
+/// Residual below which rows count as exact (mm), where it weights a prior.
+const EXACT_MM: f64 = 1e-3;
+
+/// The prior of a target that the poses do not show.
+///
+/// An arm's errors follow its pose, so that many rows do not average them out: a residual of r mm in each of n rows moves the target by
+/// r/√(λ/n), λ the information on a direction beside the frame. Where that is more than [`TARGET_SIGMA_MM`], the prior knows more.
+struct UnseenTarget {
+    /// Weight of a row of the prior.
+    per_mm: f64,
+}
+
+impl UnseenTarget {
+    /// The prior where one is needed: `normal` are the equations at the fit, the target's place at `at`; residual `rmse_mm` in `n` rows.
+    fn of(normal: &Normal, at: usize, rmse_mm: f64, n: usize) -> Option<Self> {
+        let rmse_mm = rmse_mm.max(EXACT_MM);
+        let least = normal.least_information(at)? / n as f64;
+        let sees = least > 0.0 && rmse_mm / least.sqrt() <= TARGET_SIGMA_MM;
+        (!sees).then(|| Self { per_mm: rmse_mm * (n as f64).sqrt() / TARGET_SIGMA_MM })
+    }
+
+    /// Adds the prior's rows about the flange's origin to equations of `size` unknowns.
+    fn add(&self, target_mm: &Vector3<f64>, at: usize, size: usize, normal: &mut Normal) {
+        for k in 0..3 {
+            let mut row = vec![0.0; size];
+            row[at + k] = self.per_mm;
+            normal.add(&row, self.per_mm * target_mm[k]);
+        }
+    }
+}
+
 /// The sensor's frame and its unknown target on the flange.
 ///
 /// Where the orientation of the flange hardly changes, target and frame are not separately identifiable; the target then
@@ -149,8 +189,53 @@ pub fn target_point(base_from_flange: &[Pose], measured_mm: &[Vector3<f64>]) -> 
         let twist = Vector6::from_iterator(d.iter().take(6).copied());
         (apply_twist(&state.0, &twist), state.1 + Vector3::new(d[6], d[7], d[8]))
     };
-    let (cost, (base_from_sensor, target_mm)) = best_start(starts, 9, rows, step)?;
-    Some(PointRegistration { base_from_sensor, target_mm, rmse_mm: (cost / n as f64).sqrt() })
+    let (cost, found) = best_start(starts, 9, rows, step)?;
+    let mut normal = Normal::new(9);
+    rows(&found, &mut normal);
+    let rmse = |cost: f64| (cost / n as f64).sqrt();
+    let Some(unseen) = UnseenTarget::of(&normal, 6, rmse(cost), n) else {
+        let (base_from_sensor, target_mm) = found;
+        return Some(PointRegistration {
+            base_from_sensor,
+            target_mm,
+            rmse_mm: rmse(cost),
+            is_target_held: false,
+        });
+    };
+    let held = |state: &(Pose, Vector3<f64>), normal: &mut Normal| {
+        rows(state, normal);
+        unseen.add(&state.1, 6, 9, normal);
+    };
+    let starts = vec![(plain.base_from_sensor, Vector3::zeros()), found];
+    let (_, (base_from_sensor, target_mm)) = best_start(starts, 9, held, step)?;
+    let mut normal = Normal::new(9);
+    rows(&(base_from_sensor, target_mm), &mut normal);
+    let rmse_mm = rmse(normal.cost);
+    Some(PointRegistration { base_from_sensor, target_mm, rmse_mm, is_target_held: true })
+}
+
+/// The sensor's frame for a target whose place on the flange is known.
+pub fn known_target(
+    base_from_flange: &[Pose],
+    measured_mm: &[Vector3<f64>],
+    target_mm: &Vector3<f64>,
+) -> Option<FrameRegistration> {
+    let places: Vec<_> =
+        base_from_flange.iter().map(|flange| (flange * Point3::from(*target_mm)).coords).collect();
+    points(&places, measured_mm)
+}
+
+/// The target in the flange frame (mm) for a sensor whose frame is known: the mean of what the rows say.
+pub fn target_in_known_frame(
+    base_from_flange: &[Pose],
+    measured_mm: &[Vector3<f64>],
+    base_from_sensor: &Pose,
+) -> Vector3<f64> {
+    let n = base_from_flange.len().min(measured_mm.len()).max(1);
+    let on_flange =
+        |(flange, m): (&Pose, &Vector3<f64>)| flange.inverse() * (base_from_sensor * Point3::from(*m));
+    base_from_flange.iter().zip(measured_mm).map(|pair| on_flange(pair).coords).sum::<Vector3<f64>>()
+        / n as f64
 }
 
 /// R_B, b, t from Rᵢ t − R_B mᵢ − b = −pᵢ as if the nine entries of R_B were free.
@@ -225,20 +310,34 @@ pub fn poses(base_from_flange: &[Pose], sensor_from_target: &[Pose]) -> Option<P
         );
         (apply_twist(&state.0, &at(0)), target)
     };
-    let (_, (base_from_sensor, flange_from_target)) = best_start(starts, 12, rows, step)?;
-    let (mut square_mm, mut square_rad) = (0.0, 0.0);
-    for (f, m) in base_from_flange.iter().zip(sensor_from_target) {
-        let d = difference(&(base_from_sensor * m), &(f * flange_from_target));
-        square_mm += d.fixed_rows::<3>(0).norm_squared();
-        square_rad += d.fixed_rows::<3>(3).norm_squared();
-    }
-    let root = |square: f64| (square / n as f64).sqrt();
-    Some(PoseRegistration {
-        base_from_sensor,
-        flange_from_target,
-        rmse_mm: root(square_mm),
-        rmse_rad: root(square_rad),
-    })
+    let (_, found) = best_start(starts, 12, rows, step)?;
+    let residuals = |(base_from_sensor, flange_from_target): &(Pose, Pose)| {
+        let (mut square_mm, mut square_rad) = (0.0, 0.0);
+        for (f, m) in base_from_flange.iter().zip(sensor_from_target) {
+            let d = difference(&(base_from_sensor * m), &(f * flange_from_target));
+            square_mm += d.fixed_rows::<3>(0).norm_squared();
+            square_rad += d.fixed_rows::<3>(3).norm_squared();
+        }
+        [square_mm, square_rad].map(|square: f64| (square / n as f64).sqrt())
+    };
+    let mut normal = Normal::new(12);
+    rows(&found, &mut normal);
+    let unseen = UnseenTarget::of(&normal, 6, residuals(&found)[0], n);
+    let is_target_held = unseen.is_some();
+    let (base_from_sensor, flange_from_target) = match unseen {
+        None => found,
+        Some(unseen) => {
+            let held = |state: &(Pose, Pose), normal: &mut Normal| {
+                rows(state, normal);
+                unseen.add(&state.1.translation.vector, 6, 12, normal);
+            };
+            let at_flange = Pose::from_parts(Translation3::identity(), found.1.rotation);
+            let placed = known_target(base_from_flange, &measured, &Vector3::zeros())?.base_from_sensor;
+            best_start(vec![(placed, at_flange), found], 12, held, step)?.1
+        }
+    };
+    let [rmse_mm, rmse_rad] = residuals(&(base_from_sensor, flange_from_target));
+    Some(PoseRegistration { base_from_sensor, flange_from_target, rmse_mm, rmse_rad, is_target_held })
 }
 
 /// Both frames for a known rotation of the sensor: the target's rotation is the mean, both translations follow linearly.
@@ -439,6 +538,28 @@ fn best_start<S: Clone>(
 }
 
 impl Normal {
+    /// The least information on any direction of the three unknowns from `at` on, all others free; 0 where there is none. `None` where a
+    /// number is not finite.
+    fn least_information(&self, at: usize) -> Option<f64> {
+        if !self.matrix.iter().all(|v| v.is_finite()) {
+            return None;
+        }
+        let others: Vec<usize> = (0..self.gradient.len()).filter(|k| !(at..at + 3).contains(k)).collect();
+        let across = self.matrix.select_rows(&others).columns(at, 3).into_owned();
+        let own = self.matrix.view((at, at), (3, 3)).into_owned();
+        // Of an unknown of the others that the rows do not show nothing is taken off.
+        let eigen = SymmetricEigen::new(self.matrix.select_rows(&others).select_columns(&others));
+        let floor = eigen.eigenvalues.max() * 1e-14;
+        let mut left = own;
+        for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+            if *value > floor {
+                let share = across.tr_mul(&vector);
+                left -= &share * share.transpose() / *value;
+            }
+        }
+        Some(SymmetricEigen::new(left).eigenvalues.min().max(0.0))
+    }
+
     /// The minimum-norm least-squares step; eigenvalues below `relative` times the largest count as 0.
     fn least_norm_step(&self, relative: f64) -> Option<DVector<f64>> {
         let matrix: DMatrix<f64> = self.matrix.clone();

@@ -16,5 +16,6 @@ mod elimination;
 mod found;
 mod in_doubt;
 mod joint_scatter;
+mod one_orientation;
 mod parts;
 mod rules;

@@ -4,4 +4,5 @@ mod beyond_noise;
 mod calibration;
 mod prior_width;
 mod promise;
+pub(crate) mod unseen_target;
 mod verdict;

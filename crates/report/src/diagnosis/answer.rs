@@ -36,7 +36,14 @@ pub(super) fn verdict(diagnosis: &Diagnosis) -> Verdict {
     };
     let fits = &diagnosis.fits;
     let floor = match diagnosis.noise_floor_mm {
-        Some(floor) => format!("noise floor {floor:.3} mm"),
+        Some(floor) if diagnosis.is_noise_measured() => format!("noise floor {floor:.3} mm"),
+        // The rounding of the log is no noise of the sensor.
+        Some(floor) if floor < SHOWN_MM => {
+            "the noise floor is unknown, since too few poses were repeated".to_owned()
+        }
+        Some(floor) => format!(
+            "the rounding of the log alone makes {floor:.3} mm, the noise of the sensor is unknown, since too few poses were repeated"
+        ),
         None => format!("the noise floor is unknown, since {}", diagnosis.noise_floor_source),
     };
     let with_causes = if diagnosis.findings.is_empty() {
@@ -53,6 +60,9 @@ pub(super) fn verdict(diagnosis: &Diagnosis) -> Verdict {
         too_much_for_noise(diagnosis),
     )
 }
+
+/// Least length that three decimals show (mm).
+const SHOWN_MM: f64 = 5e-4;
 
 /// What an error that is too large for noise may come from, and what to check.
 fn too_much_for_noise(diagnosis: &Diagnosis) -> Vec<String> {

@@ -119,3 +119,27 @@ fn a_remainder_far_above_the_noise_floor_is_a_warning() {
     let (text, flagged) = summary(0.05, 0.02, repeated);
     assert!(!flagged && text.contains("[ok]"), "{text}");
 }
+
+/// What the rounding of the log makes is no noise of the sensor: the headline says so, or leaves it out where it shows no digit.
+#[test]
+fn the_headline_says_what_the_noise_floor_is_of() {
+    let mut found = diagnosed().0.clone();
+    let mut headline = |floor_mm: f64, source: &str| {
+        found.diagnosis.noise_floor_mm = Some(floor_mm);
+        found.diagnosis.noise_floor_source = source.to_owned();
+        let text = on_a_terminal(&view::summary(&found));
+        let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
+        text.split_once("explains [mm]").map_or(text.clone(), |(head, _)| head.to_owned())
+    };
+    let rounding = "rounding alone; too few poses were repeated";
+    let fine = headline(0.0002, rounding);
+    assert!(fine.contains("the noise floor is unknown, since too few poses were repeated"), "{fine}");
+    assert!(!fine.contains("0.000 mm"), "{fine}");
+    let coarse = headline(0.012, rounding);
+    assert!(
+        coarse.contains("the rounding of the log alone makes 0.012 mm, the noise of the sensor is unknown"),
+        "{coarse}"
+    );
+    let measured = headline(0.012, "20 repeated poses, 40 degrees of freedom");
+    assert!(measured.contains("noise floor 0.012 mm"), "{measured}");
+}

@@ -4,6 +4,8 @@ use truegrind_arm::estimated::{EstimatedParameter, Judgement, StageErrors};
 use truegrind_arm::link::LinkModel;
 use truegrind_arm::parameter::{LinkCoordinate, Parameter};
 use truegrind_arm::sensor::Sensor;
+use truegrind_calibration::identification::benefit::Benefit;
+use truegrind_calibration::identification::beyond_noise::BeyondNoise;
 use truegrind_calibration::identification::identifiability::Identifiability;
 use truegrind_calibration::identification::identify::Identification;
 use truegrind_calibration::identification::rounding::NotFused;
@@ -324,4 +326,27 @@ fn the_page_is_whole() {
     assert!(text.contains(&found.estimated.provenance.sha256));
     assert!(!text.contains("NaN"));
     assert_eq!(text, leave("identification.html", &view::document(found, dataset)), "same input, same bytes");
+}
+
+/// What the readings still deviate may be the arm's: where no poses were repeated the figure is a range, in the table, on the page and in
+/// the JSON.
+#[test]
+fn programs_after_is_a_range_where_the_noise_is_not_known() {
+    let (found, dataset) = identification();
+    let mut found = found.clone();
+    let alone = Benefit { estimated_mm: 0.061, estimated_at_most_mm: 0.061, ..found.benefit.unwrap() };
+    let mut text = |beyond: BeyondNoise| {
+        found.benefit = Some(alone.with(beyond));
+        let most_mm = view::json(&found, dataset)["benefit"]["estimated_at_most_mm"].as_f64().unwrap();
+        let pages = [view::summary(&found), view::document(&found, dataset)];
+        (pages.map(|page| terminal::document(&page, 100)), most_mm)
+    };
+    let (pages, most_mm) = text(BeyondNoise::AtMost(0.164));
+    assert!(pages.iter().all(|page| page.contains("0.061 to 0.175 mm")), "{}", pages[0]);
+    assert!((most_mm - 0.061_f64.hypot(0.164)).abs() < 1e-12, "{most_mm}");
+    let (pages, _) = text(BeyondNoise::Between { least_mm: 0.06, most_mm: 0.164 });
+    assert!(pages.iter().all(|page| page.contains("0.086 to 0.175 mm")), "{}", pages[0]);
+    let (pages, most_mm) = text(BeyondNoise::Known(0.06));
+    assert!(pages.iter().all(|page| !page.contains(" to 0.")), "{}", pages[0]);
+    assert!((most_mm - 0.061_f64.hypot(0.06)).abs() < 1e-12, "{most_mm}");
 }

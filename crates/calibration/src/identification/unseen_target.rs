@@ -1,0 +1,100 @@
+//! What to say where the poses do not show the place of the target on the flange.
+//!
+//! In one orientation of the flange another place of the target is another place of the sensor, so that it stays where its prior has it.
+//! The fit then describes the motion of the target, wherever it is. At a tip at r from it the arm's errors of orientation ω are added,
+//! ω × r, of which these poses show as little: with J the rotations that the arm's parameters cause at a pose, less their mean over the
+//! poses (which placing the work object takes up), and Σ the covariance of the parameters, the mean square over all directions of r is
+//! ⅔ |r|² trace(J Σ Jᵀ).
+
+use nalgebra::{DMatrix, Matrix3, SymmetricEigen};
+
+use super::fit::Fitted;
+use super::start;
+use crate::measurement::dataset::{Dataset, Sensor};
+use truegrind_arm::estimated::Estimated;
+use truegrind_arm::jacobian::{BaseAndTool, parameter_jacobian};
+use truegrind_arm::model::Joints;
+use truegrind_arm::parameter::Parameter;
+use truegrind_math::work::checkpoint;
+
+/// Share of its prior's standard deviation from which a direction counts as not seen.
+const UNSEEN_SHARE: f64 = 0.5;
+
+/// Distance of a tip from the target for which its further error is stated (mm).
+const TIP_MM: f64 = 100.0;
+
+/// Range of orientations below which they are one (°).
+const ONE_ORIENTATION_DEG: f64 = 5.0;
+
+/// The sentence; `None` where the poses or a stated frame show the target's place, or a cable measures: its length hardly ever does.
+pub(crate) fn unseen_target(fitted: &Fitted, dataset: &Dataset, estimated: &Estimated) -> Option<String> {
+    if dataset.sensor == Sensor::Cable {
+        return None;
+    }
+    let place = |parameter| fitted.parameters.iter().position(|p| *p == parameter);
+    let axes = [0, 1, 2];
+    let [x, y, z] = axes.map(|axis| place(Parameter::Target(axis)));
+    let places = [x?, y?, z?];
+    let covariance = fitted.estimate.covariance.as_ref()?;
+    let own = Matrix3::from_fn(|i, j| covariance[(places[i], places[j])]);
+    let sigma_mm = SymmetricEigen::new(own).eigenvalues.max().max(0.0).sqrt();
+    let prior_mm = fitted.priors[places[0]].sigma;
+    // What an arm's unmodelled errors look like moves an unseen target farther than its standard deviation says.
+    let is_frame_stated = place(Parameter::SensorFrame(0)).is_some_and(|k| fitted.priors[k].sigma < prior_mm);
+    let is_held = !is_frame_stated && start::unseen_target(dataset, &estimated.nominal).is_some();
+    if !is_held && sigma_mm <= UNSEEN_SHARE * prior_mm {
+        return None;
+    }
+    let moved_mm = axes.map(|k| fitted.estimate.x[places[k]].abs()).into_iter().fold(0.0, f64::max);
+    let at = fitted.frames.flange_from_target.translation.vector;
+    let range_deg = orientation_range_deg(dataset, estimated);
+    let poses = if range_deg < ONE_ORIENTATION_DEG {
+        format!("which hold the flange in one orientation (within {range_deg:.1}°)")
+    } else {
+        "which turn the flange about one axis only".to_owned()
+    };
+    Some(format!(
+        "the place of the target on the flange is not seen by these poses, {poses}: another place of the target is another place of the sensor. It \
+         is taken to be {:.0},{:.0},{:.0} mm and known to ± {:.0} mm only (--touched-point and --touched-sigma state it). The errors in mm here are \
+         those of the target; a tool whose tip is {TIP_MM:.0} mm from it may be off by a further {:.3} mm (1 sigma), and by as many times more as it \
+         is farther away. To see it, measure two or three more poses with the flange turned by 30° or more about different axes",
+        at.x,
+        at.y,
+        at.z,
+        sigma_mm.max(prior_mm).max(moved_mm),
+        tip_mm(estimated)
+    ))
+}
+
+/// Largest angle between the orientation of the flange in a row and that of the first (°).
+fn orientation_range_deg(dataset: &Dataset, estimated: &Estimated) -> f64 {
+    let arm = estimated.nominal.at_condition(&estimated.condition);
+    let mut rotations = dataset.rows.iter().map(|row| arm.forward(&row.joints).rotation);
+    let Some(first) = rotations.next() else { return 0.0 };
+    rotations.map(|rotation| rotation.angle_to(&first)).fold(0.0, f64::max).to_degrees()
+}
+
+/// Error that a tip has beside that of the target (mm, 1 σ, RMS over the measured region and all directions).
+fn tip_mm(estimated: &Estimated) -> f64 {
+    let arm = estimated.model.at_condition(&estimated.condition);
+    let ends = BaseAndTool { world_from_base: [0.0; 6], flange_from_tool: [0.0; 6] };
+    let rotations: Vec<DMatrix<f64>> = estimated
+        .region
+        .samples_deg
+        .iter()
+        .map(|q| {
+            checkpoint();
+            let q = Joints::from_fn(|i, _| q[i].to_radians());
+            let twists = parameter_jacobian(&ends, &arm, &q, &estimated.order);
+            DMatrix::from_fn(3, twists.ncols(), |i, k| twists[(3 + i, k)])
+        })
+        .collect();
+    let Some(sum) = rotations.iter().cloned().reduce(|a, b| a + b) else { return 0.0 };
+    let (count, mean) = (rotations.len() as f64, sum / rotations.len() as f64);
+    let square = |rotation: &DMatrix<f64>| {
+        let about_mean = rotation - &mean;
+        (&about_mean * &estimated.covariance * about_mean.transpose()).trace()
+    };
+    let mean_square = rotations.iter().map(square).sum::<f64>() / count;
+    TIP_MM * (2.0 / 3.0 * mean_square).max(0.0).sqrt()
+}
