@@ -2,9 +2,9 @@
 //!
 //! Method. The sensor's frame is fitted to four fifths of the poses, and each pose is judged with a frame fitted without it
 //! (five folds); or the frame is stated and nothing is fitted. The decision follows ISO 14253-1 for an expanded uncertainty
-//! U (k = 2), the larger of what is stated and what repeated poses scatter: accepted if largest error plus U is within the tolerance, refused if the largest error exceeds the tolerance by
-//! more than U, undecided otherwise. Where U is unknown, nothing is accepted; nor by poses that show too little of the arm ([`Tested`]).
-//! Pose accuracy and repeatability (ISO 9283: thirty cycles at five poses) are computed
+//! U (k = 2), the larger of what is stated and what repeated poses scatter: accepted if largest error plus U is within the
+//! tolerance, refused if the largest error exceeds it by more than U, undecided otherwise. Where U is unknown, nothing is accepted; nor by
+//! poses that show too little of the arm ([`Tested`]). Pose accuracy and repeatability (ISO 9283: thirty cycles at five poses) are computed
 //! only if enough cycles were measured; path accuracy and repeatability (ten cycles) only from rows with a position on a
 //! path. Those rows are used for nothing else, because the arm was moving.
 

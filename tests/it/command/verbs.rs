@@ -12,7 +12,8 @@ const FIT: [&str; 6] = [
     "--tolerance-angle",
     "--sensor-scale-sigma",
 ];
-const FRAMES: [&str; 4] = ["--sensor-frame", "--outlet", "--cable-zero", "--touched-point"];
+const FRAMES: [&str; 5] =
+    ["--sensor-frame", "--outlet", "--cable-zero", "--touched-point", "--touched-sigma"];
 const COMMON: [&str; 2] = ["--seed", "--threads"];
 const SHARES: [&str; 5] = ["--shard", "--resume", "--work", "--units", "--list-units"];
 const PROGRAMS: [&str; 3] = ["--each", "--together", "--outside"];
@@ -254,7 +255,6 @@ pub(super) fn verbs() -> Vec<Verb> {
                     "--tolerance",
                     "--max-correction",
                     "--joint-targets",
-                    "--flag-open-starts",
                     "--partial",
                     "--placement",
                     "--max-risk",

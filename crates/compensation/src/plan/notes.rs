@@ -5,6 +5,7 @@ use crate::condition::payload::{is_load_dependent, payload_at};
 use crate::line_list::{lines_of, numbered};
 use crate::options::Options;
 use crate::target::solved_target::SolvedTargets;
+use truegrind_programs::motion::load::Loads;
 use truegrind_programs::motion::{Listing, Motion, MotionKind, Origin, Place, Switch};
 
 /// How backlash enters this program.
@@ -171,6 +172,12 @@ fn grams(kg: f64) -> f64 {
     (kg * 1e3).round() / 1e3
 }
 
+/// How many motions have a load that is known only at run time, under a model whose deflection follows the load.
+pub(crate) fn unknown_loads(arms: &Arms<'_>, options: &Options) -> usize {
+    let load_dependent = arms.estimated.arm().model.effects.iter().any(is_load_dependent);
+    options.loads.as_ref().filter(|_| load_dependent).map_or(0, Loads::unknown)
+}
+
 /// Which payload was assumed.
 pub(crate) fn load_notes(listing: &Listing, arms: &Arms<'_>, options: &Options) -> Vec<String> {
     let model = arms.estimated.arm().model;
@@ -208,8 +215,9 @@ pub(crate) fn load_notes(listing: &Listing, arms: &Arms<'_>, options: &Options) 
         ));
     }
     if lumped {
+        let what = if load_dependent { "part of the compliance" } else { "compliance" };
         out.push(format!(
-            "compliance was identified without the masses of the arm: it applies to the payload of the \
+            "{what} was identified without the masses of the arm: it applies to the payload of the \
              measurement ({base}) and does not follow that of the program"
         ));
     }

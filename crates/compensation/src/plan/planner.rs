@@ -23,7 +23,7 @@ use crate::frames::frame_pair::FramePair;
 use crate::frames::frame_table::FrameTable;
 use crate::options::{Options, is_rewritable};
 use crate::plan::notes::{
-    backlash_note, beyond_noise_note, doubtful_effects_note, load_notes, unchecked_notes,
+    backlash_note, beyond_noise_note, doubtful_effects_note, load_notes, unchecked_notes, unknown_loads,
 };
 use crate::plan::reason::OutcomeReason;
 use crate::plan::{MotionOutcome, Plan};
@@ -224,7 +224,8 @@ fn planned(job: &Planner<'_>) -> Plan {
     #[expect(clippy::filter_map_identity, reason = "works in place, unlike `flatten`: memory is at its peak")]
     let changes = changes.into_iter().filter_map(|change| change).collect();
     let unstated_axes = frame_table.unstated_axes.clone();
-    let mut plan = Plan { notes, changes, outcomes, unstated_axes, ..Plan::default() };
+    let unknown_loads = unknown_loads(arms, options);
+    let mut plan = Plan { notes, changes, outcomes, unstated_axes, unknown_loads, ..Plan::default() };
     plan.points.reserve_exact(portions.iter().map(|p| p.points.len()).sum());
     for mut portion in portions {
         plan.points.append(&mut portion.points);

@@ -190,6 +190,19 @@ fn sides_and_loads_of_the_program_leave_nothing_and_the_middle_does() {
     }
 }
 
+/// Where only the run decides whether the part is gripped, the deflection is that of the tool alone: the plan says at how many motions.
+#[test]
+fn loads_known_only_at_run_time_are_counted() {
+    let perhaps = source().replace("GripLoad part;", "IF di1=1 GripLoad part;");
+    let unknown = |text: &str, arm: &Model| {
+        let loads = Task::read(&[("p.mod", text.as_bytes())]).loads();
+        rewrite(text, arm, &options(5.0, Some(loads))).0.unknown_loads
+    };
+    let stiff = perturbed(1, 0.5);
+    assert!(unknown(&perhaps, &worn(1)) > 2);
+    assert_eq!([unknown(&source(), &worn(1)), unknown(&perhaps, &stiff)], [0, 0]);
+}
+
 #[test]
 fn the_path_between_targets_takes_up_the_play_where_joints_turn() {
     let text = source();

@@ -31,10 +31,6 @@ pub fn verdict(plan: &Plan, listing: &Listing, is_written: bool) -> Verdict {
         }
         (0, 0) => (Status::NotEvaluated, "Nothing was corrected"),
         (0, _) => (Status::Bad, "Nothing could be corrected"),
-        _ if !listing.opaque.is_empty() => (
-            Status::Warning,
-            "Corrected, but parts of the program could not be read: check them before running the program",
-        ),
         _ if no_cut(plan, listing) => (
             Status::Warning,
             "No cut is corrected, only motions between cuts: the deviation of the workpiece stays",
@@ -43,6 +39,10 @@ pub fn verdict(plan: &Plan, listing: &Listing, is_written: bool) -> Verdict {
             Status::Warning,
             "Corrected, except for cuts where the model is too uncertain: these are unchanged",
         ),
+        (_, 0) if !listing.opaque.is_empty() => (
+            Status::Warning,
+            "Corrected, but parts of the program could not be read: check them before running the program",
+        ),
         (_, 0) if plan.steps.is_some() => (
             Status::Warning,
             "Corrected, but the path has steps beside motions that are left: check them before running the program",
@@ -50,6 +50,10 @@ pub fn verdict(plan: &Plan, listing: &Listing, is_written: bool) -> Verdict {
         (_, 0) if !plan.unstated_axes.is_empty() => (
             Status::Warning,
             "Corrected for a robot that stands still: state what the external axes carry before running the program",
+        ),
+        (_, 0) if plan.unknown_loads > 0 => (
+            Status::Warning,
+            "Corrected for the tool alone where the load is known only at run time (GripLoad): check it before running the program",
         ),
         (_, 0) if paths(plan, listing)[2] > 0 => (
             Status::Warning,

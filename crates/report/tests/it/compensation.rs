@@ -236,7 +236,7 @@ fn coverage_counts_and_never_rounds_to_all_or_nothing() {
 
 #[test]
 fn verdict_and_page_tell_what_to_look_at() {
-    let (mut plan, listing, files) = example();
+    let (mut plan, mut listing, files) = example();
     let text = terminal::document(&view::summary(&plan, &listing, &files), 200);
     assert!(text.contains("[warning] Corrected, but check the refused and flagged motions"), "{text}");
     assert!(text.contains("the path has a step of the size of the correction"), "{text}");
@@ -245,6 +245,18 @@ fn verdict_and_page_tell_what_to_look_at() {
     assert!(text.contains("written to out/grind.mod"), "{text}");
     let page = leave("compensation.html", &view::document(&plan, &listing, &files, &[]));
     assert!(page.contains(">Motions</h2>") && page.contains(">Regions that could not be read</h2>"));
+    plan.outcomes.iter_mut().for_each(|outcome| outcome.status = Status::Changed);
+    let text = terminal::document(&view::summary(&plan, &listing, &files), 200);
+    assert!(text.contains("[warning] Corrected, but parts of the program could not be read"), "{text}");
+    listing.opaque.clear();
+    for (axes, loads, sentence) in [
+        (vec!['a'], 0, "[warning] Corrected for a robot that stands still"),
+        (vec![], 2, "[warning] Corrected for the tool alone where the load is known only at run time"),
+    ] {
+        let plan = Plan { unstated_axes: axes, unknown_loads: loads, ..plan.clone() };
+        let text = terminal::document(&view::summary(&plan, &listing, &files), 200);
+        assert!(text.contains(sentence), "{text}");
+    }
     for (status, sentence) in [
         (Status::Changed, "[ok] All correctable motions are corrected"),
         (Status::Left, "[not evaluated] Nothing was corrected"),
