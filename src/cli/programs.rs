@@ -1,6 +1,6 @@
 //! Programs on the command line: modules of one task, task lists, NC files, folders.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Component, Path, PathBuf};
 
 use anyhow::{Context, bail};
@@ -32,7 +32,8 @@ pub(super) struct Grouping {
     /// Treat every named module as a separate program. By default the named modules form one task.
     #[arg(long, conflicts_with = "together")]
     each: bool,
-    /// Treat all RAPID modules below a folder as one task, as in a controller backup. By default each is a separate program.
+    /// Treat all RAPID modules below a folder as one task; in a controller backup, those of each task (RAPID/TASK1 and so on). By default
+    /// each is a separate program.
     #[arg(long)]
     together: bool,
     /// Allow a task list (.pgf) to name modules outside its own folder.
@@ -261,7 +262,7 @@ fn in_folder(folder: &Path, as_one: bool, jobs: &mut Vec<Job>) -> anyhow::Result
             .into_iter()
             .filter(|path| !is_list(path))
             .partition(|path| Language::by_name(&files::name(path)) == Some(Language::Rapid));
-        if !modules.is_empty() {
+        for modules in of_tasks(folder, modules)? {
             jobs.push(Job { paths: modules, under: under.clone() });
         }
         found = others;
@@ -277,6 +278,60 @@ fn in_folder(folder: &Path, as_one: bool, jobs: &mut Vec<Job>) -> anyhow::Result
             .map(|path| Job { paths: vec![path], under: under.clone() }),
     );
     Ok(())
+}
+
+/// The folder of the task in a controller backup in which a module lies: `…/RAPID/TASK1`.
+fn task_folder(path: &Path) -> Option<&Path> {
+    let is = |folder: &Path, test: &dyn Fn(&str) -> bool| {
+        folder.file_name().and_then(|name| name.to_str()).is_some_and(|name| test(&name.to_ascii_uppercase()))
+    };
+    path.ancestors().skip(1).find(|folder| {
+        is(folder, &|name| name.starts_with("TASK"))
+            && folder.parent().is_some_and(|parent| is(parent, &|name| name == "RAPID"))
+    })
+}
+
+/// The modules below a folder by task: all in one, or in a controller backup those of each of its tasks. Modules beside them (HOME) run in
+/// none of them, as far as the backup tells.
+///
+/// # Errors
+/// If several tasks move a robot: a model belongs to one arm.
+fn of_tasks(folder: &Path, modules: Vec<PathBuf>) -> anyhow::Result<Vec<Vec<PathBuf>>> {
+    let mut tasks: BTreeMap<PathBuf, Vec<PathBuf>> = BTreeMap::new();
+    let mut beside = Vec::new();
+    for path in modules {
+        match task_folder(&path).map(Path::to_path_buf) {
+            Some(task) => tasks.entry(task).or_default().push(path),
+            None => beside.push(path),
+        }
+    }
+    if tasks.is_empty() {
+        return Ok(if beside.is_empty() { Vec::new() } else { vec![beside] });
+    }
+    if !beside.is_empty() {
+        let names: Vec<String> = beside.iter().map(|path| path.display().to_string()).collect();
+        print_message(format_args!(
+            "note: in no task of the backup, and left as they are: {}; name them to correct them",
+            names.join(", ")
+        ));
+    }
+    if tasks.len() > 1 {
+        let mut moving = Vec::new();
+        for (task, paths) in &tasks {
+            let files = Programs::read(paths)?;
+            if !files.task(&Setup::default()).listing().motions.is_empty() {
+                moving.push(task.display().to_string());
+            }
+        }
+        if moving.len() > 1 {
+            bail!(
+                "{}: several tasks move a robot: {}. A model belongs to one arm: name the folder of its task",
+                folder.display(),
+                moving.join(", ")
+            );
+        }
+    }
+    Ok(tasks.into_values().collect())
 }
 
 impl Programs {

@@ -107,6 +107,40 @@ fn a_folder_is_done_in_parallel_past_what_cannot_be_done() {
     assert!(err.contains("failed: in/f.pgf") && err.contains("failed: in/g.nc"), "{err}");
 }
 
+/// A controller backup holds a folder for each task: what one sets is not set in another, and one model is that of one arm.
+#[test]
+fn a_backup_is_read_by_tasks() {
+    let dir = workshop();
+    let at = dir.path();
+    for folder in ["b/RAPID/TASK1/PROGMOD", "b/RAPID/TASK2/PROGMOD", "b/HOME"] {
+        fs::create_dir_all(at.join(folder)).unwrap();
+    }
+    let work = module("Work", 5, 0.0);
+    let other = "MODULE Other\n  PROC main()\n    PDispSet shift;\n  ENDPROC\nENDMODULE\n";
+    fs::write(at.join("b/RAPID/TASK1/PROGMOD/Work.mod"), &work).unwrap();
+    fs::write(at.join("b/RAPID/TASK2/PROGMOD/Other.mod"), other).unwrap();
+    fs::write(at.join("b/HOME/Old.mod"), &work).unwrap();
+    let run = |out: &str| {
+        truegrind(
+            at,
+            &["compensate", "b", "--model", "model.toml", "--together", "-o", out, "--json", "all.json"],
+        )
+    };
+    let (code, text, err) = run("out");
+    assert!(code == 0 || code == 1, "{text}\n{err}");
+    assert!(err.contains("in no task of the backup") && err.contains("Old.mod"), "{err}");
+    assert_ne!(fs::read_to_string(at.join("out/RAPID/TASK1/PROGMOD/Work.mod")).unwrap(), work);
+    // Two tasks that move are two arms, or an arm and something else.
+    fs::write(at.join("b/RAPID/TASK2/PROGMOD/Other.mod"), module("Other", 5, 0.0)).unwrap();
+    let (code, _, err) = run("two");
+    assert_eq!(code, 2, "{err}");
+    assert!(
+        err.contains("several tasks move a robot") && err.contains("TASK1") && err.contains("TASK2"),
+        "{err}"
+    );
+    assert!(!at.join("two").exists());
+}
+
 #[test]
 fn modules_of_a_folder_are_one_task_when_asked() {
     let dir = workshop();
