@@ -102,7 +102,7 @@ pub struct PathPoint {
     /// Predicted standard deviation of the position (mm), from the covariance of the estimate; of the shape where that alone is
     /// corrected.
     pub sigma_mm: Option<f64>,
-    /// Predicted standard deviation of the shape of its cut, after the best rigid registration (mm); absent outside cuts.
+    /// Predicted standard deviation of the shape of its cut, after the best rigid registration of all on the part (mm); absent outside cuts.
     pub shape_sigma_mm: Option<f64>,
     /// How the point leaves the region in which the arm was measured.
     pub outside: Option<Outside>,

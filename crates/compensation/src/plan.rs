@@ -32,7 +32,7 @@ pub struct MotionOutcome {
     pub after_mm: OptionF64,
     /// Predicted standard deviation of the end position (mm).
     pub sigma_mm: OptionF64,
-    /// Predicted standard deviation of the shape of its cut, after the best rigid registration (mm); absent outside cuts.
+    /// Predicted standard deviation of the shape of its cut, after the best rigid registration of all on the part (mm); absent outside cuts.
     pub shape_sigma_mm: OptionF64,
     /// Largest deviation from the intended path on the segment to this end that remains (mm).
     pub path_deviation_mm: OptionF64,

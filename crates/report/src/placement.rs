@@ -119,8 +119,8 @@ pub fn cut_table(plan: &Plan, listing: &Listing) -> Option<Table> {
         table.notes.push(format!("{more} more cuts with a smaller probability are not listed."));
     }
     table.notes.push(
-        "before: RMS deviation of the uncorrected cut (for shape: after its best rigid registration). 1σ: predicted standard \
-         deviation of its correction. worse: probability that the corrected cut deviates more than the uncorrected one."
+        "before: RMS deviation of the uncorrected cut (for shape: after the best rigid registration of all cuts on the part). 1σ: \
+         predicted standard deviation of its correction. worse: probability that the corrected cut deviates more than the uncorrected one."
             .to_owned(),
     );
     Some(table)

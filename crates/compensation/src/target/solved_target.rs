@@ -32,7 +32,7 @@ pub(crate) struct SolvedTarget<'a> {
     /// The same with direction and rotation; only where points are required.
     pub(crate) deviations: Option<Box<[Deviation; 2]>>,
     pub(crate) sigma_mm: f64,
-    /// Predicted standard deviation of the shape of its cut, after the best rigid registration; absent outside cuts.
+    /// Predicted standard deviation of the shape of its cut, after the best rigid registration of all on the part; absent outside cuts.
     pub(crate) shape_sigma_mm: OptionF64,
     /// Contribution to either from joints of unknown backlash side (mm).
     pub(crate) play_uncertainty_mm: f64,
