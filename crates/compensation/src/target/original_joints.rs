@@ -331,7 +331,9 @@ fn guess_if_possibly_unmonitored(
                 _ => Some(BranchGuess::Guessed),
             }
         };
-        let before = listing.predecessors.get(&(index as u32)).filter(|_| motion.previous.is_none());
+        // Where the check itself is open, the arm may arrive from an earlier cycle at which it stopped: then only one motion before counts.
+        let is_unchecked = *monitored == Switch::Off && motion.previous.is_none();
+        let before = listing.predecessors.get(&(index as u32)).filter(|_| is_unchecked);
         let guess = match before {
             Some(before) => before.iter().find_map(|before| from(Some(*before))),
             None => from(motion.previous),
