@@ -331,7 +331,8 @@ fn guess_if_possibly_unmonitored(
                 _ => Some(BranchGuess::Guessed),
             }
         };
-        // Where the check itself is open, the arm may arrive from an earlier cycle at which it stopped: then only one motion before counts.
+        // Where it is open whether the configuration is checked, a later cycle may arrive in another arm: without a single motion before it
+        // the branch is a guess.
         let is_unchecked = *monitored == Switch::Off && motion.previous.is_none();
         let before = listing.predecessors.get(&(index as u32)).filter(|_| is_unchecked);
         let guess = match before {
