@@ -8,6 +8,7 @@ use truegrind::compensation::cell::Used;
 use truegrind::compensation::cell::nc_setup::cell_setup;
 use truegrind::compensation::cell::robot_match::unreachable_motions;
 use truegrind::compensation::cell::robot_match::{cell_robot_mismatch, program_robot_mismatch};
+use truegrind::compensation::deviation::files_of;
 use truegrind::compensation::frames::surface_frames::surface_frame_contradictions;
 use truegrind::compensation::frames::taught::contradictions;
 use truegrind::compensation::risk::placement::Placement;
@@ -464,6 +465,7 @@ fn corrected(
     let corrected = sources.files.iter().zip(&rewritten.files).map(apply).collect::<Result<_, _>>()?;
     let report = PathReport {
         program: sources.name(),
+        files: files_of(listing),
         model: model.name.clone(),
         after: After::PredictedRemainder,
         missing: plan.missing_motions(listing),

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use serde_json::Value;
-use truegrind::compensation::deviation::{After, PathReport};
+use truegrind::compensation::deviation::{After, PathReport, files_of};
 use truegrind::compensation::plan::Plan;
 use truegrind::compensation::risk::prepared_estimate::PreparedEstimate;
 use truegrind::programs::reading::{Language, Program};
@@ -138,6 +138,7 @@ fn compensate_one(context: &CompensateContext<'_>, job: &Job) -> anyhow::Result<
         summary = Some(view::summary(planned, listing, files));
         let report = PathReport {
             program: programs.name(),
+            files: files_of(listing),
             model: context.corrector.map_or("nominal", |c| c.model).to_owned(),
             after: After::PredictedRemainder,
             missing: planned.missing_motions(listing),

@@ -236,6 +236,7 @@ fn model(arguments: &Arguments, file: &Path) -> anyhow::Result<Recording> {
             let reached = estimated.forward(&joints);
             PathPoint {
                 index,
+                file: 0,
                 line: 0,
                 instruction: "measured pose".to_owned(),
                 kind: MotionKind::AbsoluteJoint,
@@ -258,6 +259,7 @@ fn model(arguments: &Arguments, file: &Path) -> anyhow::Result<Recording> {
         .collect();
     let report = PathReport {
         program: "poses of the measured region".to_owned(),
+        files: Vec::new(),
         model: name.clone(),
         after: After::PredictedRemainder,
         points,

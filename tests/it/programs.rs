@@ -431,7 +431,7 @@ fn what_is_left_shows_everywhere() {
     let (code, report, err) =
         truegrind(at, &["deviation", "left.mod", "--model", "model.toml", "--intended", "in/left.mod"]);
     assert_eq!(code, 0, "{err}");
-    assert!(report.contains("[warning]") && report.contains("2 motions are not in this report"), "{report}");
+    assert!(report.contains("[warning]") && report.contains("2 motions have no deviation"), "{report}");
     // As many motions, and one of them leads elsewhere.
     fs::write(at.join("other.mod"), text.replace(&place(370.0), &place(240.0))).unwrap();
     let other = ["deviation", "other.mod", "--model", "model.toml", "--intended", "in/left.mod"];

@@ -11,7 +11,7 @@ use truegrind_arm::model::Joints;
 use truegrind_arm::region::Outside;
 use truegrind_math::se3::Pose;
 use truegrind_math::statistics::ErrorSummary;
-use truegrind_programs::motion::{Listing, MotionKind};
+use truegrind_programs::motion::{Listing, MotionKind, Place};
 
 /// Deviation of the tool at one point.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -75,6 +75,8 @@ pub(crate) const ON_SURFACE_MM: f64 = 0.5;
 pub struct PathPoint {
     /// Position in the path, from 0.
     pub index: usize,
+    /// File of the line, as an index into [`PathReport::files`].
+    pub file: u32,
     /// Line of the program, from 1; 0 for a point that no line of a program holds (between targets).
     pub line: u32,
     /// Instruction.
@@ -150,6 +152,8 @@ pub enum After {
 pub struct PathReport {
     /// Name of the program.
     pub program: String,
+    /// Names of its files; empty where there is but one.
+    pub files: Vec<String>,
     /// Name of the model (file, or method).
     pub model: String,
     /// What "after" means.
@@ -162,26 +166,56 @@ pub struct PathReport {
     pub held_out_mm: Option<f64>,
 }
 
-/// Motions of which a report has no point, since the program text does not tell where they lead.
+/// A motion of which a report has no point: the program text does not tell where it leads, or the arm does not reach it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct MissingMotion {
+    /// Points of the report before it.
+    pub points_before: usize,
+    /// See [`PathPoint::file`].
+    pub file: u32,
+    /// Line of the program, from 1.
+    pub line: u32,
+    /// Instruction.
+    pub instruction: String,
+    /// Outcome.
+    pub status: Status,
+    /// Reason for it, where one is known.
+    pub reason: Option<String>,
+}
+
+/// All of them.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct MissingMotions {
-    /// How many.
-    pub count: usize,
+    /// In the order of the program; at least one.
+    pub motions: Vec<MissingMotion>,
     /// Their lines, the first few.
     pub lines: String,
 }
 
 impl MissingMotions {
-    /// Motions of a listing; `None` without any. Waits and motions of external axes alone have no point either.
-    pub fn of(listing: &Listing, has_point: impl Fn(u32) -> bool) -> Option<Self> {
-        let without: Vec<u32> = (0..listing.motions.len() as u32)
-            .filter(|index| {
-                let motion = &listing.motions[*index as usize];
-                motion.kind != MotionKind::External && !motion.targets.is_empty() && !has_point(*index)
-            })
-            .collect();
-        Some(Self { count: without.len(), lines: lines_of(listing, &without)? })
+    /// Motions of a listing; `None` without any. Waits and motions of external axes alone have no point either. `outcome`: why a motion
+    /// has no point; `None` for one that has.
+    pub fn of(listing: &Listing, outcome: impl Fn(u32) -> Option<(Status, Option<String>)>) -> Option<Self> {
+        let (mut without, mut motions, mut points_before) = (Vec::new(), Vec::new(), 0);
+        for (index, motion) in (0_u32..).zip(&listing.motions) {
+            let Some((status, reason)) = outcome(index) else {
+                points_before += 1;
+                continue;
+            };
+            if motion.kind == MotionKind::External || motion.targets.is_empty() {
+                continue;
+            }
+            without.push(index);
+            let (Place { file, line, .. }, instruction) = (motion.place, motion.instruction.to_string());
+            motions.push(MissingMotion { points_before, file, line, instruction, status, reason });
+        }
+        Some(Self { motions, lines: lines_of(listing, &without)? })
     }
+}
+
+/// The files of a listing, as a report names them.
+pub fn files_of(listing: &Listing) -> Vec<String> {
+    if listing.files.len() > 1 { listing.files.clone() } else { Vec::new() }
 }
 
 /// The summary block of ltlm-2024 Table 8: five points, mean, SD. Trap of that table: its mean is signed.

@@ -88,10 +88,12 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Motions of which nothing is said, since the program text does not tell where they lead.
+    /// Motions without a point, with their outcomes.
     pub fn missing_motions(&self, listing: &Listing) -> Option<MissingMotions> {
-        MissingMotions::of(listing, |motion| {
-            self.outcomes.get(motion as usize).is_some_and(|outcome| outcome.before_mm.get().is_some())
+        MissingMotions::of(listing, |motion| match self.outcomes.get(motion as usize) {
+            Some(outcome) if outcome.before_mm.get().is_some() => None,
+            Some(outcome) => Some((outcome.status, outcome.reason().map(|reason| reason.to_string()))),
+            None => Some((Status::Left, None)),
         })
     }
 }

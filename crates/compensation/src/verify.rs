@@ -8,7 +8,9 @@ use nalgebra::{Point3, Vector3};
 use crate::arms::Arms;
 use crate::backlash::sides::{MotionEnd, ReachedEnd, backlash_sides};
 use crate::cell::Cell;
-use crate::deviation::{After, Deviation, MissingMotions, ON_SURFACE_MM, PathPoint, PathReport, Status};
+use crate::deviation::{
+    After, Deviation, MissingMotions, ON_SURFACE_MM, PathPoint, PathReport, Status, files_of,
+};
 use crate::frames::frame_table::FrameTable;
 use crate::plan::reason::OutcomeReason;
 use truegrind_arm::condition::Condition;
@@ -84,11 +86,11 @@ pub struct VerificationTask<'a> {
 pub fn verify(task: &VerificationTask<'_>, acting_arm: &ActingArm<'_>) -> PathReport {
     let mut arms = Arms::simulated(acting_arm.nominal, acting_arm.model, &acting_arm.condition);
     arms.knowledge = acting_arm.knowledge;
-    let before = run(task.original, task.loads[0], None, &mut arms, task.cell);
+    let (before, without_end) = run(task.original, task.loads[0], None, &mut arms, task.cell);
     // Where no word states the configuration, the arm starts both in the same one.
     let start = before.first().map(|end| end.joints);
     let after =
-        task.rewritten.map(|listing| (listing, run(listing, task.loads[1], start, &mut arms, task.cell)));
+        task.rewritten.map(|listing| (listing, run(listing, task.loads[1], start, &mut arms, task.cell).0));
     let partners = after.as_ref().map(|(_, runs)| align(&before, runs));
     let points = before
         .iter()
@@ -113,6 +115,7 @@ pub fn verify(task: &VerificationTask<'_>, acting_arm: &ActingArm<'_>) -> PathRe
             let linear = matches!(motion.kind, MotionKind::Linear | MotionKind::Circular);
             PathPoint {
                 index,
+                file: motion.place.file,
                 line: motion.place.line,
                 instruction: motion.instruction.to_string(),
                 kind: motion.kind,
@@ -141,12 +144,14 @@ pub fn verify(task: &VerificationTask<'_>, acting_arm: &ActingArm<'_>) -> PathRe
         .collect();
     PathReport {
         program: task.program.to_owned(),
+        files: files_of(task.original),
         model: task.name.to_owned(),
         after: task.after,
         points,
-        // The ends are in the order of the motions.
         missing: MissingMotions::of(task.original, |motion| {
-            before.binary_search_by_key(&(motion as usize), |end| end.motion).is_ok()
+            let (_, reason) =
+                without_end.get(without_end.binary_search_by_key(&motion, |(of, _)| *of).ok()?)?;
+            Some((Status::Left, Some(reason.to_string())))
         }),
         held_out_mm: acting_arm.knowledge.map(|k| k.geometry.held_out.rmse),
     }
@@ -159,34 +164,38 @@ fn is_same_target(first: &ExecutedEnd, second: &ExecutedEnd) -> bool {
     moved < 1e-9 && turned < 1e-9 && (first.joints - second.joints).amax() < 1e-9
 }
 
-/// Runs a program. `start` are the joints where it begins, unless cell file or program state them.
+/// Runs a program: the ends in the order of the motions, and the motions without one with the reason. `start` are the joints where it
+/// begins, unless cell file or program state them.
 fn run(
     listing: &Listing,
     loads: Option<&Loads>,
     start: Option<Joints>,
     arms: &mut Arms<'_>,
     cell: &Cell,
-) -> Vec<ExecutedEnd> {
+) -> (Vec<ExecutedEnd>, Vec<(u32, OutcomeReason)>) {
     let frame_table = FrameTable::of(listing, arms, cell, loads.is_some()).starting_at(start);
     let mut sent: Vec<CommandedEnd> = Vec::new();
+    let mut without_end = Vec::new();
     let mut near: Option<Joints> = None;
     for (index, motion) in listing.motions.iter().enumerate() {
         checkpoint();
-        if motion.own_reason.is_some() {
-            continue;
-        }
-        if let Ok(there) = commanded_end(index, listing, arms, &frame_table, near.as_ref()) {
-            near = Some(there.joints);
-            sent.push(there);
+        let end = match motion.own_reason {
+            Some(reason) => Err(OutcomeReason::Program(reason)),
+            None => commanded_end(index, listing, arms, &frame_table, near.as_ref()),
+        };
+        match end {
+            Ok(there) => {
+                near = Some(there.joints);
+                sent.push(there);
+            }
+            Err(reason) => without_end.push((index as u32, reason)),
         }
     }
     let condition_indices = condition_indices(listing, loads, &sent, arms, &frame_table);
     let joints: Vec<Joints> = sent.iter().map(|s| s.joints).collect();
     let flanges = arms.conditions.forward(&condition_indices, &joints);
-    sent.into_iter()
-        .zip(flanges)
-        .zip(condition_indices)
-        .map(|((sent, flange), condition_index)| {
+    let ends =
+        sent.into_iter().zip(flanges).zip(condition_indices).map(|((sent, flange), condition_index)| {
             let frames = &frame_table.list[sent.frames_index];
             ExecutedEnd {
                 motion: sent.motion,
@@ -198,8 +207,8 @@ fn run(
                 carried: frames.carried.clone(),
                 condition_index,
             }
-        })
-        .collect()
+        });
+    (ends.collect(), without_end)
 }
 
 /// Condition under which the arm arrives at each end.

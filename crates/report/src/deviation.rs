@@ -20,7 +20,9 @@ use super::document::{Block, Document, KeyFigure};
 use super::status::Status;
 use super::table::{Cell, Column, Table};
 use truegrind_arm::region::Outside;
-use truegrind_compensation::deviation::{After, Deviation, PathPoint, PathReport, Status as MotionStatus};
+use truegrind_compensation::deviation::{
+    After, Deviation, MissingMotion, PathPoint, PathReport, Status as MotionStatus,
+};
 
 pub use kept::{from_kept, kept};
 pub use summary::{block_table, registered_table};
@@ -34,12 +36,12 @@ const MAX_VERDICTS: usize = 5;
 /// Largest number of models with a key figure.
 const MODELS_IN_FIGURES: usize = 7;
 
-/// One row per path point of one program under one model, with all columns. Positions and vectors in the work object frame.
+/// One row per motion of one program under one model, with all columns. Positions and vectors in the work object frame.
 pub fn table(report: &PathReport) -> Table {
     let (word, key) = words(report.after);
-    let columns = point_columns((word, key), decimals(report.after));
+    let columns = point_columns((word, key), decimals(report.after), !report.files.is_empty());
     let mut table = Table::new(format!("Deviation of {} under {}", report.program, named(report)), columns);
-    report.points.iter().for_each(|point| table.push(point_cells(point)));
+    rows(report, !report.files.is_empty()).for_each(|row| table.push(row));
     table.notes = notes(report);
     table
 }
@@ -52,17 +54,19 @@ pub fn whole_table(reports: &[PathReport]) -> Table {
         Column::text("after_is", "After is"),
         Column::number("model_held_out_rmse_mm", "Held-out error", "mm", 3),
     ];
-    columns.extend(point_columns(("after", "after"), 4));
+    let files = reports.iter().any(|report| !report.files.is_empty());
+    columns.extend(point_columns(("after", "after"), 4, files));
     let mut table = Table::new("Deviation of path points", columns);
     for report in reports {
-        for point in &report.points {
+        let is_after_known = entries(report).map(|entry| entry.is_ok_and(|point| point.after.is_some()));
+        for (cells, is_after_known) in rows(report, files).zip(is_after_known) {
             let mut row: Vec<Cell> = vec![
                 report.program.as_str().into(),
                 report.model.as_str().into(),
-                if point.after.is_some() { meaning(report.after).into() } else { Cell::Missing },
+                if is_after_known { meaning(report.after).into() } else { Cell::Missing },
                 report.held_out_mm.into(),
             ];
-            row.extend(point_cells(point));
+            row.extend(cells);
             table.push(row);
         }
     }
@@ -72,15 +76,44 @@ pub fn whole_table(reports: &[PathReport]) -> Table {
     table
 }
 
-fn point_columns((word, key): (&str, &str), decimals: usize) -> Vec<Column> {
-    let mut columns = vec![
-        Column::count("index", "Point"),
+/// The motions of a report in the order of the program: those with a point, and those without.
+fn entries(report: &PathReport) -> impl Iterator<Item = Result<&PathPoint, &MissingMotion>> {
+    let mut missing = report.missing.iter().flat_map(|missing| &missing.motions).peekable();
+    let mut points = report.points.iter().enumerate().peekable();
+    std::iter::from_fn(move || {
+        let passed = points.peek().map_or(usize::MAX, |(passed, _)| *passed);
+        match missing.next_if(|motion| motion.points_before <= passed) {
+            Some(motion) => Some(Err(motion)),
+            None => points.next().map(|(_, point)| Ok(point)),
+        }
+    })
+}
+
+/// One row per motion. `files`: with the name of its file.
+fn rows(report: &PathReport, files: bool) -> impl Iterator<Item = Vec<Cell>> {
+    entries(report).map(move |entry| {
+        let (mut cells, file) = match entry {
+            Ok(point) => (point_cells(point), point.file),
+            Err(motion) => (missing_cells(motion), motion.file),
+        };
+        if files {
+            cells.insert(1, report.files.get(file as usize).map(String::as_str).into());
+        }
+        cells
+    })
+}
+
+/// `file`: with a column for the name of the file.
+fn point_columns((word, key): (&str, &str), decimals: usize, file: bool) -> Vec<Column> {
+    let mut columns = vec![Column::count("index", "Point")];
+    columns.extend(file.then(|| Column::text("file", "File")));
+    columns.extend([
         Column::count("line", "Line"),
         Column::text("instruction", "Instruction"),
         Column::number("x_mm", "x", "mm", 3),
         Column::number("y_mm", "y", "mm", 3),
         Column::number("z_mm", "z", "mm", 3),
-    ];
+    ]);
     for (side, key, decimals) in [("before", "before", 3), (word, key, decimals)] {
         for (part, name) in [("dx", "dx"), ("dy", "dy"), ("dz", "dz"), ("norm", "|d|"), ("normal", "normal")]
         {
@@ -117,6 +150,15 @@ fn point_cells(point: &PathPoint) -> Vec<Cell> {
     }
     let [sigma, status, reason] = outcome(point);
     row.extend([sigma, sigma_of(point).into(), status, reason]);
+    row
+}
+
+/// The row of a motion without a point, in the columns of [`point_cells`].
+fn missing_cells(motion: &MissingMotion) -> Vec<Cell> {
+    let mut row = vec![Cell::Missing, (motion.line as usize).into(), motion.instruction.as_str().into()];
+    // Three coordinates, two deviations of five numbers, σ and what it is of.
+    row.extend([const { Cell::Missing }; 15]);
+    row.extend([status_cell(motion.status), motion.reason.clone().into()]);
     row
 }
 

@@ -570,6 +570,7 @@ fn path_point(motion: &Motion, solved: &SolvedTarget<'_>, real: &FramePair, shap
     let base_from_object = real.base_from_object(&flange);
     PathPoint {
         index: 0,
+        file: motion.place.file,
         line: motion.place.line,
         instruction: motion.instruction.to_string(),
         kind: motion.kind,

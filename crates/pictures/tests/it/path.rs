@@ -85,6 +85,7 @@ fn parts(count: usize) -> Parts {
         assert!((told.forward(&joints).translation.vector - flange.translation.vector).norm() < 1e-6);
         points.push(PathPoint {
             index,
+            file: 0,
             line: 10 + index as u32,
             instruction: "MoveL".to_owned(),
             kind: MotionKind::Linear,
@@ -106,6 +107,7 @@ fn parts(count: usize) -> Parts {
     }
     let report = PathReport {
         program: "blade.mod".to_owned(),
+        files: Vec::new(),
         model: "ltlm".to_owned(),
         after: After::PredictedRemainder,
         points,

@@ -29,11 +29,12 @@ const KINDS: [(MotionKind, &str); 6] = [
 
 /// The record of a report.
 pub fn kept(report: &PathReport) -> Value {
-    let PathReport { program, model, after, points, missing, held_out_mm } = report;
+    let PathReport { program, files, model, after, points, missing, held_out_mm } = report;
     let mut last = [String::new(), String::new()];
     let points: Vec<Value> = points.iter().map(|point| of_point(point, &mut last)).collect();
     json!({
         "program": program,
+        "files": files,
         "model": model,
         "achieved": *after == After::Achieved,
         "held_out_mm": held_out_mm.map(exact),
@@ -48,6 +49,7 @@ pub fn from_kept(value: &Value) -> Option<PathReport> {
     let points = value["points"].as_array()?.iter();
     Some(PathReport {
         program: value["program"].as_str()?.to_owned(),
+        files: serde_json::from_value(value["files"].clone()).ok()?,
         model: value["model"].as_str()?.to_owned(),
         after: if value["achieved"].as_bool()? { After::Achieved } else { After::PredictedRemainder },
         held_out_mm: match &value["held_out_mm"] {
@@ -63,6 +65,7 @@ fn of_point(point: &PathPoint, last: &mut [String; 2]) -> Value {
     // Destructured by field, so that a new field cannot be forgotten.
     let PathPoint {
         index,
+        file,
         line,
         instruction,
         kind,
@@ -105,11 +108,11 @@ fn of_point(point: &PathPoint, last: &mut [String; 2]) -> Value {
         Some(Outside::Coverage { ratio }) => format!("coverage {}", exact(*ratio)),
     });
     let kind = KINDS.iter().find(|(known, _)| known == kind).map(|(_, word)| *word);
-    json!([index, line, instruction, kind, cutting, status, reason, words.join(" ")])
+    json!([index, file, line, instruction, kind, cutting, status, reason, words.join(" ")])
 }
 
 fn to_point(value: &Value, last: &mut [Option<Pose>; 2]) -> Option<PathPoint> {
-    let [index, line, instruction, kind, cutting, status, reason, words] = value.as_array()?.as_slice()
+    let [index, file, line, instruction, kind, cutting, status, reason, words] = value.as_array()?.as_slice()
     else {
         return None;
     };
@@ -146,6 +149,7 @@ fn to_point(value: &Value, last: &mut [Option<Pose>; 2]) -> Option<PathPoint> {
     let kind = kind.as_str()?;
     Some(PathPoint {
         index: usize::try_from(index.as_u64()?).ok()?,
+        file: u32::try_from(file.as_u64()?).ok()?,
         line: u32::try_from(line.as_u64()?).ok()?,
         instruction: instruction.as_str()?.to_owned(),
         kind: KINDS.iter().find(|(_, word)| *word == kind)?.0,

@@ -74,11 +74,14 @@ pub(super) fn verdict(reports: &[&PathReport]) -> Verdict {
         if status == Status::Good {
             status = Status::Warning;
         }
-        let (motions, lead) =
-            if missing.count == 1 { ("motion is", "it leads") } else { ("motions are", "they lead") };
+        let one = missing.motions.len() == 1;
+        let (motions, lead, them) =
+            if one { ("motion has", "it leads", "it") } else { ("motions have", "they lead", "them") };
         reasons.push(format!(
-            "{} {motions} not in this report, since the program text does not tell where {lead} ({})",
-            missing.count, missing.lines
+            "{} {motions} no deviation, since the program text does not tell where {lead} or the arm does not reach {them} ({}; --csv gives \
+             the reasons)",
+            missing.motions.len(),
+            missing.lines
         ));
     }
     if judged.is_empty() && matches!(status, Status::Good | Status::Warning) {

@@ -2,7 +2,9 @@
 
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use truegrind_arm::region::Outside;
-use truegrind_compensation::deviation::{After, Deviation, PathPoint, PathReport, Status};
+use truegrind_compensation::deviation::{
+    After, Deviation, MissingMotion, MissingMotions, PathPoint, PathReport, Status,
+};
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::MotionKind;
 use truegrind_report::deviation as view;
@@ -33,6 +35,7 @@ fn point(
 ) -> PathPoint {
     PathPoint {
         index,
+        file: 0,
         line: 10 + index as u32,
         instruction: "MoveL".to_owned(),
         kind: MotionKind::Linear,
@@ -56,6 +59,7 @@ fn point(
 fn report(model: &str, points: Vec<PathPoint>) -> PathReport {
     PathReport {
         program: "blade.mod".to_owned(),
+        files: Vec::new(),
         model: model.to_owned(),
         after: After::PredictedRemainder,
         points,
@@ -137,6 +141,41 @@ fn the_table_stands_in_the_work_object_with_every_column() {
 }
 
 /// Where only the shape of a cut is corrected its points have the σ of the shape; two numbers with one name are told apart.
+#[test]
+fn motions_without_a_point_stand_at_their_place_with_their_reason() {
+    let without = |points_before, file, line| MissingMotion {
+        points_before,
+        file,
+        line,
+        instruction: "MoveJ".to_owned(),
+        status: Status::Refused,
+        reason: Some("target is out of reach".to_owned()),
+    };
+    let motions = vec![without(0, 1, 3), without(1, 0, 7), without(1, 0, 8), without(3, 0, 9)];
+    let missing = Some(MissingMotions { motions, lines: "lines 3, 7, 8, 9".to_owned() });
+    let mut report = PathReport { missing, ..three(true) };
+    let places = |text: String| -> Vec<String> {
+        let place = |line: &str| line.split(',').take(3).collect::<Vec<_>>().join(",");
+        text.lines().skip(1).map(place).collect()
+    };
+    let text = csv::table(&view::table(&report));
+    assert!(text.lines().all(|line| line.split(',').count() == 20), "{text}");
+    assert!(text.contains("\n,7,MoveJ,,,,,,,,,,,,,,,,refused,target is out of reach"), "{text}");
+    assert_eq!(
+        places(text),
+        [",3,MoveJ", "0,10,MoveL", ",7,MoveJ", ",8,MoveJ", "1,11,MoveL", "2,,MoveL", ",9,MoveJ"]
+    );
+    // Of several files, each row names its own.
+    report.files = vec!["main.mod".to_owned(), "data.sys".to_owned()];
+    let of_files = csv::table(&view::table(&report));
+    assert_eq!(places(of_files)[..2], [",data.sys,3", "0,main.mod,10"]);
+    // A file of several programs: no row says what "after" is where there is none.
+    let other = PathReport { program: "other.mod".to_owned(), files: Vec::new(), ..three(true) };
+    let text = csv::table(&view::whole_table(&[report, other]));
+    assert!(text.contains("\nblade.mod,model.toml,,0.46,,data.sys,3,MoveJ,"), "{text}");
+    assert!(text.contains("\nother.mod,model.toml,predicted remainder,0.46,0,,10,MoveL,"), "{text}");
+}
+
 #[test]
 fn a_point_says_what_its_sigma_is_of() {
     let mut judged = three(true);

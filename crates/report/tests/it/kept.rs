@@ -4,7 +4,9 @@ use nalgebra::{Quaternion, Translation3, UnitQuaternion, Vector3, Vector6};
 use proptest::prelude::*;
 use serde_json::json;
 use truegrind_arm::region::Outside;
-use truegrind_compensation::deviation::{After, Deviation, MissingMotions, PathPoint, PathReport, Status};
+use truegrind_compensation::deviation::{
+    After, Deviation, MissingMotion, MissingMotions, PathPoint, PathReport, Status,
+};
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::MotionKind;
 use truegrind_report::batch::{Ended, Row};
@@ -58,6 +60,7 @@ prop_compose! {
         ];
         PathPoint {
             index: index as usize,
+            file: 1,
             line,
             instruction,
             kind: kinds[kind],
@@ -94,8 +97,16 @@ proptest! {
             rest.iter_mut().for_each(|point| point.base_from_object = first.base_from_object);
         }
         let after = if achieved { After::Achieved } else { After::PredictedRemainder };
-        let missing = Some(MissingMotions { count: 2, lines: "lines 3, 5".into() });
-        let report = PathReport { program: "a.mod".into(), model: "arm".into(), after, points, missing, held_out_mm };
+        let left = MissingMotion {
+            points_before: 2,
+            file: 1,
+            line: 3,
+            instruction: "MoveL".into(),
+            status: Status::Left,
+            reason: Some("out of reach".into()),
+        };
+        let missing = Some(MissingMotions { motions: vec![left], lines: "line 3".into() });
+        let report = PathReport { program: "a.mod".into(), files: vec!["b.mod".into()], model: "arm".into(), after, points, missing, held_out_mm };
         let text = serde_json::to_string(&kept(&report)).unwrap();
         let back = from_kept(&serde_json::from_str(&text).unwrap()).unwrap();
         // Signs of zeros too, which == does not tell.
