@@ -11,7 +11,7 @@ use truegrind_arm::model::Joints;
 use truegrind_arm::region::Outside;
 use truegrind_math::se3::Pose;
 use truegrind_math::statistics::ErrorSummary;
-use truegrind_programs::motion::{Listing, MotionKind, Place};
+use truegrind_programs::motion::{Listing, Motion, MotionKind, Place, Reason};
 
 /// Deviation of the tool at one point.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -193,8 +193,8 @@ pub struct MissingMotions {
 }
 
 impl MissingMotions {
-    /// Motions of a listing; `None` without any. Waits and motions of external axes alone have no point either. `outcome`: why a motion
-    /// has no point; `None` for one that has.
+    /// Motions of a listing; `None` without any. Waits, calls and motions of external axes alone have no point either. `outcome`: why a
+    /// motion has no point; `None` for one that has.
     pub fn of(listing: &Listing, outcome: impl Fn(u32) -> Option<(Status, Option<String>)>) -> Option<Self> {
         let (mut without, mut motions, mut points_before) = (Vec::new(), Vec::new(), 0);
         for (index, motion) in (0_u32..).zip(&listing.motions) {
@@ -202,7 +202,7 @@ impl MissingMotions {
                 points_before += 1;
                 continue;
             };
-            if motion.kind == MotionKind::External || motion.targets.is_empty() {
+            if !moves(motion) {
                 continue;
             }
             without.push(index);
@@ -211,6 +211,12 @@ impl MissingMotions {
         }
         Some(Self { motions, lines: lines_of(listing, &without)? })
     }
+}
+
+/// Whether a motion may move the tool: not a wait, a call, or a motion of external axes alone.
+fn moves(motion: &Motion) -> bool {
+    let elsewhere = matches!(motion.own_reason, None | Some(Reason::ExternalOnly | Reason::Subprogram));
+    motion.kind != MotionKind::External && !(motion.targets.is_empty() && elsewhere)
 }
 
 /// The files of a listing, as a report names them.

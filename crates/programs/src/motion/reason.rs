@@ -76,6 +76,7 @@ reasons! {
         BeforeDisplacement => "a displacement (PDispOn) is relative to the end of this motion",
         BeforeOrigin => "an unmodified block uses an origin set at the end of this motion (G92, G10 L20, PRESETON)",
         BeforeIncrement => "an unmodified block is relative to the end of this motion (increment, or a position read by the program)",
+        BeforeOmitted => "an unmodified block states not every axis: in the others it ends where this motion ends",
         PositionUnknown => "the position of an axis is unknown: not programmed since the start, a reference return, or a change of frame or tool",
         OrientationUnknown => "the tool orientation is unknown: no A, B, C and no tool vector stand before this block since the start, a call or a change of frame, or one that cannot be computed follows them; state all three again",
         UnknownConvention => "the convention of A, B and C is unknown: the robot file does not name one",

@@ -178,6 +178,7 @@ fn every_reason_to_leave_a_motion_has_a_sample() {
         Reason::WrongKind,
         Reason::BeforeOrigin,
         Reason::BeforeIncrement,
+        Reason::BeforeOmitted,
         Reason::LineTooLong,
     ];
     let missing: Vec<_> =

@@ -1,5 +1,5 @@
-//! Endpoints pinned because unmodified words depend on them: an origin set at the tool position (G92), an increment,
-//! a position that the program reads.
+//! Endpoints pinned because unmodified blocks depend on them: an origin set at the tool position (G92), an increment,
+//! a position that the program reads, an axis that the block does not state.
 //!
 //! Method: a reaching-definitions analysis over the events of a file. For each axis it tracks the set of modified
 //! motions on which the tool position, and the origin, depend. In an unmodified motion that cannot be restated, an
@@ -122,15 +122,17 @@ struct FileDependencies {
     /// The positions where origins are set.
     origins: [DependencySet; 3],
     /// What must not move, by cause.
-    pinned: [[DependencySet; AXES]; 2],
+    pinned: [[DependencySet; AXES]; CAUSES.len()],
     file_motions: std::ops::Range<u32>,
     /// Whether the axis directions may change anywhere in the file: joins then mix axes.
     mixes_axes: bool,
 }
 
-/// The two causes in [`FileDependencies::pinned`].
+/// The causes in [`FileDependencies::pinned`].
 const ORIGIN: usize = 0;
 const INCREMENT: usize = 1;
+const OMITTED: usize = 2;
+const CAUSES: [Reason; 3] = [Reason::BeforeOrigin, Reason::BeforeIncrement, Reason::BeforeOmitted];
 
 impl FileDependencies {
     fn pin_position(&mut self, dependency: usize, axis: usize) {
@@ -197,7 +199,7 @@ impl FileDependencies {
     }
 
     /// The motions that must not move, by cause.
-    fn pinned_motions(&self) -> [DependencySet; 2] {
+    fn pinned_motions(&self) -> [DependencySet; CAUSES.len()] {
         std::array::from_fn(|dependency| {
             let mut all = DependencySet::default();
             for (axis, pinned) in self.pinned[dependency].iter().enumerate() {
@@ -221,9 +223,7 @@ impl Task<'_> {
         let mut state = FileDependencies::default();
         let mut refused: Vec<(u32, Reason)> = Vec::new();
         let mut end = |state: &FileDependencies| {
-            for (set, reason) in
-                state.pinned_motions().iter().zip([Reason::BeforeOrigin, Reason::BeforeIncrement])
-            {
+            for (set, reason) in state.pinned_motions().iter().zip(CAUSES) {
                 let all = state.file_motions.clone().filter(|_| set.all_motions);
                 refused.extend(set.motions.iter().copied().chain(all).map(|motion| (motion, reason)));
             }
@@ -299,6 +299,9 @@ impl Task<'_> {
         let machine = reason == Some(Reason::MachineCoordinates);
         let returns = reason == Some(Reason::ReferenceReturn);
         let restates = context.can_restate && known && slots.axes.iter().any(Option::is_some);
+        let elsewhere = machine || returns || reason == Some(Reason::ExternalOnly);
+        let moves = motion.kind != MotionKind::Unknown || reason == Some(Reason::Cycle);
+        let gets_words = context.can_restate && slots.axes.iter().any(Option::is_some);
         let before = state.position;
         for (axis, was) in before.iter().enumerate() {
             let linear = axis < 3;
@@ -331,6 +334,10 @@ impl Task<'_> {
                     state.position[axis] =
                         if linear && !returns { state.origin[axis] } else { Dependencies::NONE };
                 }
+                // It ends where the motion before does in this axis.
+                // Where the motion before ended is not restated behind a join, at which it is open.
+                (None, _) if linear && gets_words && start.is_some() && !was.branches => {}
+                (None, _) if linear && moves && !elsewhere => state.pin_position(OMITTED, axis),
                 (None, _) => {}
             }
             if motion.conditional || context.may_omit_words {
@@ -345,7 +352,6 @@ impl Task<'_> {
                 state.pinned[INCREMENT][axis].add(&before[axis]);
             }
         }
-        let elsewhere = machine || returns || reason == Some(Reason::ExternalOnly);
         let absolute_centre = motion.kind == MotionKind::Circular && !known;
         if motion.kind == MotionKind::Unknown && !elsewhere || absolute_centre {
             // Its words, or the subprogram, may be relative to the origin in any axis.

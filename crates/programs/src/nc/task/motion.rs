@@ -49,7 +49,11 @@ impl Interpreter<'_, '_> {
 
     /// Lists a motion that is never modified.
     pub(super) fn list_left(&mut self, block: &Block<'_>, name: &str, reason: Reason) {
-        let mut motion = self.new_motion(block, name, MotionKind::Unknown);
+        self.list_left_as(block, (name, MotionKind::Unknown), reason);
+    }
+
+    fn list_left_as(&mut self, block: &Block<'_>, (name, kind): (&str, MotionKind), reason: Reason) {
+        let mut motion = self.new_motion(block, name, kind);
         motion.own_reason = Some(reason);
         let context = self.block_context(block, None);
         self.push(motion, context);
@@ -191,7 +195,7 @@ impl Interpreter<'_, '_> {
         let corner = self.dialect.paren_comments() && straight && bends;
         let circular = matches!(mode, MotionMode::Circular(_));
         if !(block.has_motion_words() || circular && bends || vector_words && has_centre) {
-            self.block_without_axes(block);
+            self.block_without_axes(block, mode);
             return;
         }
         let unknown = match mode {
@@ -380,7 +384,7 @@ impl Interpreter<'_, '_> {
     }
 
     /// A block without modelled axis words: it may move other axes, or could not be read.
-    fn block_without_axes(&mut self, block: &Block<'_>) {
+    fn block_without_axes(&mut self, block: &Block<'_>, mode: MotionMode) {
         if !block.opaque && self.calls_cycle(block) {
             return;
         }
@@ -388,10 +392,13 @@ impl Interpreter<'_, '_> {
             self.list_left(block, "?", Reason::Unreadable);
             self.invalidate_pose();
         } else if let Some(reason) = block.unmodelled {
-            self.list_left(block, "path", reason);
-            match reason {
-                Reason::Transformed => self.invalidate_position(),
-                _ => self.invalidate_pose(),
+            if reason == Reason::Transformed {
+                // A line or an arc to polar coordinates.
+                self.list_left_as(block, name_and_kind(mode, self.dialect == Dialect::Heidenhain), reason);
+                self.invalidate_position();
+            } else {
+                self.list_left(block, "path", reason);
+                self.invalidate_pose();
             }
         } else if block.other_axes {
             self.list_left(block, "axes", Reason::ExternalOnly);

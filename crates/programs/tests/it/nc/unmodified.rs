@@ -56,15 +56,16 @@ fn a_rotated_frame_mixes_the_axes_of_a_dependency() {
 /// The same after a jump: the dependencies of an unmodified path are tracked over every path to it.
 #[test]
 fn a_rotated_frame_mixes_the_axes_across_a_jump() {
-    let body = |turn: &str| {
+    let body = |line: &str, turn: &str| {
         format!(
-            "R2=5\nX10 Y5 Z1\nIF R2<>0 GOTOF M_1\nX11 Y6 Z2\nM_1:\nG1 X20 Z4\n{turn}\nY=R2\n\
-             CIP X40 Y0 I1=30 J1=10 K1=50"
+            "R2=5\nX10 Y5 Z1\nIF R2<>0 GOTOF M_1\nX11 Y6 Z2\nM_1:\nG1 {line}\n{turn}\nY=R2\n\
+             CIP X40 Y0 Z9 I1=30 J1=10 K1=50"
         )
     };
-    let kept = |turn: &str| rewritten(Siemens, &body(turn)).contains("X10 Y5 Z1\n");
-    assert!(kept("AROT Z90"));
-    assert!(!kept("G4 F1"), "without a turn X and Z are stated, and Y is");
+    let kept = |line: &str, turn: &str| rewritten(Siemens, &body(line, turn)).contains("X10 Y5 Z1\n");
+    assert!(kept("X20 Z4", "AROT Z90"));
+    assert!(kept("X20 Z4", "G4 F1"), "it ends in Y where the motions before do");
+    assert!(!kept("X20 Y7 Z4", "G4 F1"), "each axis is stated");
 }
 
 #[test]
@@ -160,14 +161,15 @@ fn angles_before_a_tool_vector_are_unknown_after_it() {
 }
 
 /// The class: a word that the control may ignore, because its variable has never been set, is taken as stated. The
-/// block might not move at all: no word is added to it, and what starts there depends on the motion before.
+/// block might not move at all: no word is added to it, and it and what starts there depend on the motion before.
 #[test]
 fn a_block_that_might_not_move_gets_no_words() {
     let head = "X4. Y5. Z6.\n";
     for block in ["G0 Y#149", "G1 X10. Y#149", "G1 A#149", "/G0 Y#149", "G0 Z-#149"] {
         let text = rewritten(Fanuc, &format!("{head}{block}\nG1 X7. Y8. Z9. A180. B0. C0."));
         let lines: Vec<&str> = text.lines().collect();
-        assert_eq!(lines[..2], ["X4.5000 Y4.7500 Z6.1250", block], "{text}");
+        // The block itself would end beside where it did.
+        assert_eq!(lines[..2], ["X4. Y5. Z6.", block], "{text}");
         assert_eq!(lines[2], "G1 X7.5000 Y7.7500 Z9.1250 A180. B0. C0.");
     }
     // An unmodified arc starts at the end of such a block, or of the one before it.
@@ -233,5 +235,29 @@ proptest! {
                 prop_assert!(!taken(index), "motion {}\n{}\n{}", index, source, text);
             }
         }
+    }
+}
+
+/// An unmodified block that gets no words ends in the axes that it omits where the motion before has led: holes of a cycle at the
+/// tool position, lines in polar coordinates, blocks behind a word that the reader does not know.
+#[test]
+fn a_motion_stays_whose_end_an_unmodified_block_takes_over() {
+    let stays = |dialect, body: &str| {
+        rewritten(dialect, body).lines().next().unwrap() == body.lines().next().unwrap()
+    };
+    for (dialect, body) in [
+        (Fanuc, "X4. Y5. Z6.\nG83 Z-5. Q1. R2. F200.\nG80\nG1 X9. Y9. Z9."),
+        (Fanuc, "X4. Y5. Z6.\nG81 X7. Z-5. R2. F200.\nG80\nG1 X9. Y9. Z9."),
+        (LinuxCnc, "X4 Y5 Z6\nG81 Z-5 R2 F200\nG80\nG1 X9 Y9 Z9"),
+        (Siemens, "X4 Y5 Z6\nG111 X0 Y-20\nAP=30 RP=10\nG1 X9 Y9 Z9"),
+    ] {
+        assert!(stays(dialect, body), "{body}");
+    }
+    // Where the cycle states its hole, nothing of the motion before is taken over.
+    for (dialect, body) in [
+        (Fanuc, "X4. Y5. Z6.\nG81 X7. Y8. Z-5. R2. F200.\nG80\nG1 X9. Y9. Z9."),
+        (Fanuc, "X4. Y5. Z6.\nG53 G0 Z0.\nG1 X9. Y9. Z9."),
+    ] {
+        assert!(!stays(dialect, body), "{body}");
     }
 }
