@@ -4,6 +4,7 @@ use std::path::Path;
 
 use anyhow::bail;
 use truegrind::programs::nc::dialect::Dialect;
+use truegrind::programs::nc::setup::control_of;
 use truegrind::programs::reading::Language;
 
 use super::files;
@@ -62,10 +63,10 @@ pub(super) fn refuse_other_language(output: &Path, source: &Path, bytes: &[u8]) 
             if is == Language::Rapid { "RAPID" } else { "an NC program" }
         );
     }
-    let original = Dialect::of_named(&from, bytes);
+    let original = control_of(&from, bytes);
     // A control reads the file by its extension, whatever it holds: Fanuc text in a file .mpf is no 840D program.
     let by_extension = Some(Dialect::of_named(&to, b"")).filter(|dialect| *dialect != Dialect::Iso);
-    let written = by_extension.unwrap_or_else(|| Dialect::of_named(&to, bytes));
+    let written = by_extension.unwrap_or_else(|| control_of(&to, bytes));
     if is == Language::Nc && known && original != written {
         bail!(
             "{}: this extension stands for {}, but {} is for {}: use the extension of the original",

@@ -24,7 +24,7 @@
 //! ```
 //!
 //! Before the first table may stand `robot = "abb-irb-120"`, the robot of the programs, which a model must be of, and for NC programs
-//! `angles = "wpr"`, what A, B and C mean, and `start_deg = [0, 0, 0, 0, 90, 0]`, the joints in which the arm starts, roughly.
+//! `control = "fanuc"`, the control that runs NC programs, `angles = "wpr"`, what A, B and C mean, and `start_deg = [0, 0, 0, 0, 90, 0]`, the joints in which the arm starts, roughly.
 //! A value may be `"?"`: it is still to
 //! be filled in, and nothing is corrected before it is ([`Cell::open`]).
 
@@ -42,7 +42,8 @@ use thiserror::Error;
 
 use truegrind_arm::model::Joints;
 use truegrind_math::se3::Pose;
-use truegrind_programs::motion::{FARTHEST_MM, Listing, Tool, WorkObject};
+use truegrind_programs::motion::{FARTHEST_MM, Listing, TargetValue, Tool, WorkObject};
+use truegrind_programs::nc::dialect::Dialect;
 use truegrind_programs::nc::orientation::Angles;
 use truegrind_programs::nc::setup;
 use truegrind_surfaces::SurfaceFile;
@@ -161,6 +162,12 @@ pub enum CellError {
         /// Sum of the squares.
         work: usize,
     },
+    /// A word for a control that is not known.
+    #[error("control = \"{found}\": expected one of {}", Dialect::WORDS.map(|(word, _)| word).join(", "))]
+    Control {
+        /// What the file has.
+        found: String,
+    },
     /// Joints at the start that are no angles in degrees.
     #[error("start_deg = {found}: expected six joint angles in degrees")]
     Start {
@@ -197,7 +204,7 @@ pub enum CellError {
         before: String,
     },
     /// A letter that no external axis has.
-    #[error("external axis '{axis}': expected one of a, b, c, d, e, f")]
+    #[error("external axis '{axis}': expected one of a, b, c, d, e, f (RAPID), u, v, w, e (NC)")]
     UnknownAxis {
         /// The letter.
         axis: char,
@@ -325,20 +332,23 @@ pub enum Carries {
     Other,
 }
 
+/// Letters of external axes: those of a RAPID target in its order, then those that NC programs alone have.
+pub const AXES: [char; 9] = ['a', 'b', 'c', 'd', 'e', 'f', 'u', 'v', 'w'];
+
 /// One external axis of a cell.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CellAxis {
-    /// Its letter in a target, `a` to `f`.
+    /// Its letter: `a` to `f` in a target of RAPID, `u`, `v`, `w` or `e` in a block of an NC program.
     pub axis: char,
     /// What it carries.
     pub carries: Carries,
 }
 
 impl CellAxis {
-    /// Its index among the external axes of a target.
+    /// Its index in [`AXES`].
     pub fn index(&self) -> Option<usize> {
-        ('a'..='f').position(|letter| letter == self.axis.to_ascii_lowercase())
+        AXES.iter().position(|letter| *letter == self.axis.to_ascii_lowercase())
     }
 }
 
@@ -353,6 +363,9 @@ pub struct Cell {
     /// the programs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub angles: Option<String>,
+    /// The control that runs NC programs: one of [`Dialect::WORDS`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub control: Option<String>,
     /// Joints as the controller shows them (°), roughly, in which the arm stands where a program begins: NC words state no
     /// configuration, and a place whose previous position is unknown is reached in the branch of these, by the nearest turns.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -393,6 +406,9 @@ impl Cell {
         let cell = Cell { open, ..cell };
         if let Some(found) = cell.angles.as_ref().filter(|word| Angles::of(word).is_none()) {
             return Err(CellError::Angles { found: found.clone() });
+        }
+        if let Some(found) = cell.control.as_ref().filter(|word| Dialect::stated(word).is_none()) {
+            return Err(CellError::Control { found: found.clone() });
         }
         if let Some(found) = cell.start_deg.filter(|start| !start.iter().all(|q| q.abs() <= setup::MOST_DEG))
         {
@@ -461,12 +477,17 @@ impl Cell {
         self.angles.as_deref().and_then(Angles::of)
     }
 
+    /// The control that runs NC programs, where the file states it.
+    pub fn control(&self) -> Option<Dialect> {
+        self.control.as_deref().and_then(Dialect::stated)
+    }
+
     /// Joints where a program begins (rad), if this file states them, or the program itself.
     pub(crate) fn start(&self, listing: &Listing) -> Option<Joints> {
         self.start_deg.or(listing.start_deg).map(|start| Joints::from(start.map(f64::to_radians)))
     }
 
-    /// What an external axis carries, by its index in a target.
+    /// What an external axis carries, by its index in [`AXES`].
     pub fn carries(&self, index: usize) -> Option<Carries> {
         self.external.iter().find(|axis| axis.index() == Some(index)).map(|axis| axis.carries)
     }
@@ -594,7 +615,10 @@ impl Used {
         }
         let moves = |axis: usize| {
             let mut targets = listing.motions.iter().flat_map(|motion| &motion.targets);
-            targets.any(|target| target.value.as_ref().is_ok_and(|value| value.external()[axis].is_some()))
+            let stated =
+                |value: &TargetValue| value.external().get(axis).is_some_and(|value| value.is_some());
+            listing.other_axes.contains_key(&AXES[axis].to_ascii_uppercase())
+                || targets.any(|target| target.value.as_ref().is_ok_and(stated))
         };
         let axes = cell.external.iter().enumerate();
         out.external.extend(axes.filter(|(_, a)| a.index().is_some_and(moves)).map(|(index, _)| index));
@@ -633,7 +657,10 @@ impl Used {
         out.extend(frames(FrameKind::Wobj, &cell.wobj, &self.wobj));
         let unused = cell.external.iter().enumerate().filter(|(index, _)| !self.external.contains(index));
         out.extend(unused.map(|(_, axis)| {
-            format!("cell file: external axis '{}' does not occur in any target of any program", axis.axis)
+            format!(
+                "cell file: external axis '{}' does not occur in any target or block of any program",
+                axis.axis
+            )
         }));
         out
     }

@@ -488,6 +488,11 @@ pub struct Listing {
     pub routines: Vec<Routine>,
     /// Whether it is of NC programs, with numbered tools and work offsets.
     pub numbered: bool,
+    /// The first motion of each NC file that could be corrected and whose control neither its words nor a comment show: it is read as plain
+    /// ISO 6983.
+    pub open_controls: Vec<Place>,
+    /// Letters of the axes that NC blocks name beside X, Y, Z, A, B and C, and the first of each.
+    pub other_axes: BTreeMap<char, Place>,
     /// Motions that call a program outside their file (NC).
     pub external_calls: Vec<u32>,
     /// Calls of routines that no file declares (RAPID).

@@ -1,4 +1,4 @@
-//! What cell file and robot file state that NC programs do not: angle convention, tools and work offsets.
+//! What cell file and robot file state that NC programs do not: control, angle convention, tools and work offsets.
 
 use crate::cell::{Cell, CellFrame};
 use truegrind_arm::robots::sheet::Orientation;
@@ -12,7 +12,7 @@ pub fn cell_setup(cell: &Cell, orientation: Option<Orientation>) -> Setup {
         list.iter().filter_map(|frame| Some((frame.name.clone(), Frame::from_pose(&frame.pose()?)))).collect()
     };
     Setup {
-        dialect: None,
+        dialect: cell.control(),
         angles: cell.angles().or_else(|| orientation.and_then(angle_convention)),
         tools: frames(&cell.tool),
         frames: frames(&cell.wobj),

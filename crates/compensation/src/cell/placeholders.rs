@@ -15,7 +15,7 @@ pub(crate) fn read<T: DeserializeOwned>(text: &str) -> Result<(T, Vec<String>), 
     }
     let mut table: Table = text.parse()?;
     let mut open = Vec::new();
-    for key in ["robot", "angles"] {
+    for key in ["robot", "control", "angles"] {
         if remove_placeholder(&mut table, key) {
             open.push(format!("{key} = \"?\": {}", expected(key)));
         }
@@ -62,6 +62,7 @@ fn remove_placeholder(table: &mut Table, key: &str) -> bool {
 fn expected(key: &str) -> &'static str {
     match key {
         "robot" => "write the robot's name, or remove the line",
+        "control" => "write fanuc, siemens, linuxcnc, heidenhain or iso: the control that runs the programs",
         "angles" => "write abc, wpr, rxyz or rotation-vector: the convention of A, B and C in the programs",
         "origin" => {
             "write \"metrology\" (its numbers are exact: CAD, a measuring machine, a tracker) or \"taught\" \

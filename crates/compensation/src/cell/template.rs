@@ -3,11 +3,12 @@
 //! It loads as written; nothing is corrected with it before every `"?"` is replaced
 //! ([`Cell::open`](crate::cell::Cell::open)).
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{Frame, Listing, Motion, Reason};
+use truegrind_programs::nc::dialect::Dialect;
 use truegrind_programs::nc::orientation::Angles;
 use truegrind_programs::nc::setup;
 use truegrind_programs::reading::Language;
@@ -70,9 +71,12 @@ pub fn cell_template(programs: &[TemplateProgram<'_>], robot: Option<&str>) -> C
             .filter(|((kind, _), _)| *kind == is_tool)
             .for_each(|(_, named)| out.frame(is_tool, named));
     }
-    for (_, letter) in ('a'..='f').enumerate().filter(|(axis, _)| axes[*axis]) {
+    let of_blocks = programs.iter().flat_map(|program| program.listing.other_axes.keys());
+    let of_blocks: BTreeSet<char> = of_blocks.map(char::to_ascii_lowercase).collect();
+    let of_targets = ('a'..='f').enumerate().filter(|(axis, _)| axes[*axis]).map(|(_, letter)| letter);
+    for letter in of_targets.chain(of_blocks) {
         out.line("", "");
-        out.line("[[external]]", "an external axis that targets move");
+        out.line("[[external]]", "an external axis that the programs move");
         out.line(&format!("axis = \"{letter}\""), "");
         out.ask("carries", "base (it carries the robot: a track, a gantry) | other");
     }
@@ -91,9 +95,10 @@ fn note(program: &TemplateProgram<'_>, motion: &Motion, found: &mut BTreeMap<Key
         (false, object.name.as_str(), commanded)
     });
     for (is_tool, name, commanded) in tool.into_iter().chain(object) {
-        // The controller's built-in frames, and what an NC control does not count as a tool (G49).
+        // The controller's built-in frames; no tool length (G49), or one that the text does not tell.
         let own = ["tool0", "wobj0"].iter().any(|own| name.eq_ignore_ascii_case(own));
-        if own || is_tool && program.language == Language::Nc && !name.starts_with(['T', 't']) {
+        let is_none = is_tool && program.language == Language::Nc && (name == "G49" || name.ends_with('?'));
+        if own || is_none {
             continue;
         }
         let key = match program.language {
@@ -175,6 +180,10 @@ impl Writer {
                 "# start_deg = [0, 0, 0, 0, 90, 0]",
                 "joints (°), roughly, in which the arm starts: NC states none",
             );
+        }
+        if programs.iter().any(|program| !program.listing.open_controls.is_empty()) {
+            let words = Dialect::WORDS.map(|(word, _)| word).join(" | ");
+            self.ask("control", &format!("which control runs the programs: {words}"));
         }
         if convention {
             let words = Angles::words().replace(", ", " | ");

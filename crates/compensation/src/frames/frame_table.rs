@@ -6,10 +6,11 @@ use std::collections::{HashMap, HashSet};
 use rayon::prelude::*;
 
 use crate::arms::Arms;
-use crate::cell::{Carries, Cell, CellFrame, FrameOrigin};
+use crate::cell::{AXES, Carries, Cell, CellFrame, FrameOrigin};
 use crate::configuration::{configured, monitored, unstated};
 use crate::frames::frame_pair::{FramePair, ResolveContext, ResolvedFrames, resolve_frames};
 use crate::frames::taught::Teaching;
+use crate::line_list::numbered;
 use crate::plan::reason::OutcomeReason;
 use crate::search_budget;
 use truegrind_arm::inverse::Inverse;
@@ -30,6 +31,8 @@ pub(crate) struct FrameTable {
     base: [bool; 6],
     /// External axes of which targets state a value.
     states: [bool; 6],
+    /// The axis of NC blocks that carries the base, as an index into [`AXES`]: it may stand elsewhere in any block.
+    base_of_blocks: Option<usize>,
     /// Axes that move or do not stand at 0, and of which the cell file does not say what they carry.
     pub(crate) unstated_axes: Vec<char>,
     /// Assumptions about external axes, and contradictions with the cell file.
@@ -47,6 +50,7 @@ impl FrameTable {
             objects: Vec::new(),
             base: [false; 6],
             states: [false; 6],
+            base_of_blocks: None,
             unstated_axes: Vec::new(),
             assumed: Vec::new(),
             start: cell.start(listing),
@@ -102,6 +106,7 @@ impl FrameTable {
             out.places.insert((tool, object), found);
         }
         out.external_axes(listing, arms, cell);
+        out.axes_of_blocks(listing, cell);
         out
     }
 
@@ -186,9 +191,30 @@ impl FrameTable {
         }
     }
 
+    /// The same for the axes that blocks of NC programs name. Their values are not read: what they carry must be stated.
+    fn axes_of_blocks(&mut self, listing: &Listing, cell: &Cell) {
+        for (&letter, place) in &listing.other_axes {
+            let index = AXES.iter().position(|axis| axis.eq_ignore_ascii_case(&letter));
+            match index.and_then(|index| cell.carries(index)) {
+                Some(Carries::Base) => self.base_of_blocks = index,
+                Some(Carries::Other) => {}
+                None => {
+                    let lines = numbered(listing, [*place].into_iter()).unwrap_or_default();
+                    self.unstated_axes.push(letter);
+                    self.assumed.push(format!(
+                        "axis {letter} ({lines}): assumed not to carry the robot's base; state what it carries (cell file, [[external]])"
+                    ));
+                }
+            }
+        }
+    }
+
     /// The external axis that carries the base: one that the target states, or that another one of the program does, since a deactivated
     /// axis stays where it was.
     pub(crate) fn moving_base(&self, target: &RobTarget) -> Option<OutcomeReason> {
+        if let Some(axis) = self.base_of_blocks {
+            return Some(OutcomeReason::MovingBase { axis });
+        }
         let carries = |axis: &usize| self.base[*axis];
         let stated = (0..6).filter(carries).find(|axis| target.external[*axis].is_some());
         let axis = stated.or_else(|| (0..6).filter(carries).find(|axis| self.states[*axis]))?;

@@ -101,6 +101,7 @@ pub(crate) fn unchecked_notes(
         ));
     }
     out.extend(outside_calls_note(listing));
+    out.extend(open_control_note(listing));
     let curve = |m: &u32| {
         let motion = &listing.motions[*m as usize];
         motion.own_reason.is_none()
@@ -135,6 +136,16 @@ pub(crate) fn unchecked_notes(
 }
 
 /// Calls of routines that are in none of the files, and what is assumed of them.
+/// NC files of which nothing shows the control, on which the meaning of X, Y, Z depends.
+fn open_control_note(listing: &Listing) -> Option<String> {
+    let lines = numbered(listing, listing.open_controls.iter().copied())?;
+    Some(format!(
+        "no word shows for which control the program is written: it is read as ISO 6983 with the tip of the tool at X Y Z, and numbers \
+         without a decimal point as mm (from {lines}); a Fanuc reads both otherwise. State the control in a comment of the program: \
+         (truegrind control fanuc), or linuxcnc, siemens, heidenhain, iso"
+    ))
+}
+
 fn outside_calls_note(listing: &Listing) -> Option<String> {
     /// How many routines are named.
     const NAMED: usize = 5;

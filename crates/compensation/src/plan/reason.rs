@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use crate::cell::AXES;
 use truegrind_arm::inverse::InverseError;
 use truegrind_arm::model::Limited;
 use truegrind_programs::motion::Reason;
@@ -322,7 +323,7 @@ impl fmt::Display for OutcomeReason {
             OutcomeReason::MovingBase { axis } => write!(
                 f,
                 "external axis {} carries the robot's base, whose position is not modelled",
-                char::from(b'a' + *axis as u8)
+                AXES.get(*axis).copied().unwrap_or('?')
             ),
             OutcomeReason::Inverse(error) => error.fmt(f),
             OutcomeReason::OutsideLimits { what } => write!(f, "{what} would exceed its limits"),

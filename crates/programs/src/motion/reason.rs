@@ -88,6 +88,7 @@ reasons! {
         NoTcpMode => "no tool centre point control (G43.4, TRAORI, M128): X Y Z are not the tool tip",
         Transformed => "coordinates are rotated, scaled, mirrored, polar or in a tilted plane",
         RadiusCompensation => "tool radius compensation is active (G41, G42)",
+        TurnAlone => "turns the tool alone: its feed is in degrees per minute, and X, Y, Z beside it would make it mm per minute",
         AlignedToNormal => "the control aligns the tool with the surface normal (LN without a tool vector under M128)",
         MachineCoordinates => "in machine coordinates (G53, SUPA, M91)",
         Cycle => "a canned cycle: its motions are not in the program",

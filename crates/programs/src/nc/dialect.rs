@@ -1,6 +1,6 @@
 //! Detection of the control that a file is written for.
 //!
-//! The dialects differ in the meaning of brackets, of numbers without a decimal point, and of orientation words.
+//! The dialects differ in the meaning of brackets, of numbers without a decimal point, of X Y Z under G43, and of orientation words.
 //! Detection looks for distinctive words in the first 64 KiB outside comments; a file without them is plain ISO 6983.
 
 /// A family of controls.
@@ -18,6 +18,9 @@ pub enum Dialect {
     Heidenhain,
 }
 
+/// The bytes of a file in which its control is looked for.
+pub(super) const SAMPLE: usize = 1 << 16;
+
 impl Dialect {
     /// Its name.
     pub fn text(self) -> &'static str {
@@ -28,6 +31,20 @@ impl Dialect {
             Dialect::Siemens => "Siemens",
             Dialect::Heidenhain => "Heidenhain",
         }
+    }
+
+    /// The words that state a control, in comments and cell files.
+    pub const WORDS: [(&str, Dialect); 5] = [
+        ("fanuc", Dialect::Fanuc),
+        ("siemens", Dialect::Siemens),
+        ("linuxcnc", Dialect::LinuxCnc),
+        ("heidenhain", Dialect::Heidenhain),
+        ("iso", Dialect::Iso),
+    ];
+
+    /// The control that a word states.
+    pub fn stated(word: &str) -> Option<Dialect> {
+        Self::WORDS.iter().find(|(known, _)| word.eq_ignore_ascii_case(known)).map(|(_, dialect)| *dialect)
     }
 
     /// Whether `( … )` is a comment.
@@ -54,7 +71,7 @@ impl Dialect {
 
     /// The dialect by the distinctive words of a file.
     pub fn of(source: &[u8]) -> Dialect {
-        let sample = &source[..source.len().min(1 << 16)];
+        let sample = &source[..source.len().min(SAMPLE)];
         let mut fanuc = false;
         for line in lines(sample) {
             let line = line.trim_ascii();
@@ -83,7 +100,7 @@ impl Dialect {
 }
 
 /// The lines of a text; old tapes end them with CR alone.
-fn lines(sample: &[u8]) -> impl Iterator<Item = &[u8]> {
+pub(super) fn lines(sample: &[u8]) -> impl Iterator<Item = &[u8]> {
     let end = if sample.contains(&b'\n') { b'\n' } else { b'\r' };
     sample.split(move |&byte| byte == end)
 }
@@ -91,7 +108,7 @@ fn lines(sample: &[u8]) -> impl Iterator<Item = &[u8]> {
 /// Whether a text has words that only a Fanuc has.
 fn only_fanuc(source: &[u8]) -> bool {
     const SIGNS: [&str; 6] = ["G43.4", "G43.5", "WHILE[", "G68.2", "G08P1", "G05P10000"];
-    let sample = &source[..source.len().min(1 << 16)];
+    let sample = &source[..source.len().min(SAMPLE)];
     lines(sample).any(|line| {
         let line = &line[..line.iter().position(|&byte| byte == b';').unwrap_or(line.len())];
         let code = without_comments(&line.to_ascii_uppercase());
@@ -180,13 +197,36 @@ fn linux_cnc(code: &[u8]) -> bool {
 }
 
 fn fanuc_sign(code: &[u8]) -> bool {
+    // A block number or the name of the program may stand beside it.
+    let code = code.trim_ascii_start();
+    let numbered = code.strip_prefix(b"N").map(|rest| {
+        let digits = rest.iter().take_while(|byte| byte.is_ascii_digit()).count();
+        rest[digits..].trim_ascii_start()
+    });
+    let code = numbered.unwrap_or(code);
     let program_number = matches!(code.first(), Some(b'O' | b':'))
         && code.len() > 1
         && code[1..].iter().take_while(|byte| byte.is_ascii_digit()).count() >= 1
         && code[1..].iter().all(|byte| byte.is_ascii_digit() || byte.is_ascii_whitespace());
     program_number
-        || ["G43.4", "G43.5", "G5.1", "G05.1", "G65", "M98", "GOTO", "WHILE[", "G68.2", "G08P1", "G05P10000"]
-            .iter()
-            .any(|sign| contains(code, sign))
+        || [
+            "G43.4",
+            "G43.5",
+            "G5.1",
+            "G05.1",
+            "G54.1",
+            "G65",
+            "M98",
+            "M198",
+            "GOTO",
+            "WHILE[",
+            "G68.2",
+            "G08P1",
+            "G05P10000",
+            "G154",
+            "G187",
+        ]
+        .iter()
+        .any(|sign| contains(code, sign))
         || code.first() == Some(&b'#')
 }

@@ -75,7 +75,8 @@ pub fn text(mark: &Mark, dialect: Dialect) -> String {
 /// The byte at which the mark is inserted: after the header lines.
 pub fn place(tree: &NcTree<'_>, dialect: Dialect) -> usize {
     let source = tree.source();
-    let mut place = 0;
+    // The mark of a text in UTF-8 is no part of its first line.
+    let mut place = if source.starts_with(b"\xEF\xBB\xBF") { 3 } else { 0 };
     let mut at = 0;
     let last = if source.contains(&b'\n') { b'\n' } else { b'\r' };
     while at < source.len() {

@@ -1,15 +1,16 @@
-//! What an NC file does not hold: the convention of A, B and C, work offsets, tools, and the joints in which the arm starts.
+//! What an NC file does not hold: its control, the convention of A, B and C, work offsets, tools, and the joints in which the arm starts.
 //!
 //! A cell or robot file may state it, or comment lines of the program, which the control ignores:
 //!
 //! ```text
+//! ; truegrind control linuxcnc
 //! ; truegrind angles wpr
 //! ; truegrind tool T1 tGrind [[0,0,150],[1,0,0,0]]
 //! ; truegrind frame G54 wPart [[500,0,300],[1,0,0,0]]
 //! ; truegrind start [0,10,-5,0,85,0]
 //! ```
 
-use super::dialect::Dialect;
+use super::dialect::{Dialect, SAMPLE, lines};
 use super::orientation::Angles;
 use crate::motion::{FARTHEST_MM, Frame, ToolValue};
 
@@ -18,7 +19,7 @@ pub use crate::label::{plain, same};
 /// What is known from other sources than the program. It overrides comments of the program.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Setup {
-    /// The dialect; detected if omitted.
+    /// The control; a comment of the program states it, or it is detected, if omitted.
     pub dialect: Option<Dialect>,
     /// The convention of A, B and C.
     pub angles: Option<Angles>,
@@ -54,6 +55,8 @@ pub(super) fn flange_tool(frame: Frame) -> ToolValue {
 /// A statement in a comment.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Statement {
+    /// `control fanuc`
+    Control(Dialect),
     /// `angles wpr`
     Angles(Angles),
     /// `tool T1 name [[…],[…]]`
@@ -72,6 +75,22 @@ pub(super) struct StatedFrame {
     /// Its name for people and cell files.
     pub(super) name: String,
     pub(super) frame: Frame,
+}
+
+/// The control of a file: the one that a comment states, else by its words and its name.
+pub fn control_of(name: &str, source: &[u8]) -> Dialect {
+    stated_control(source).unwrap_or_else(|| Dialect::of_named(name, source))
+}
+
+/// The control that a comment of a file states.
+pub(super) fn stated_control(source: &[u8]) -> Option<Dialect> {
+    lines(&source[..source.len().min(SAMPLE)]).find_map(|line| {
+        let comment = line.iter().position(|byte| matches!(byte, b';' | b'('))?;
+        match statement(&line[comment..]) {
+            Ok(Some(Statement::Control(dialect))) => Some(dialect),
+            _ => None,
+        }
+    })
 }
 
 /// Largest plausible joint angle (°).
@@ -96,6 +115,13 @@ pub(super) fn statement(comment: &[u8]) -> Result<Option<Statement>, String> {
         let [_, angles] = words[..] else { return Err(expected()) };
         return Angles::of(angles).map(|angles| Some(Statement::Angles(angles))).ok_or_else(expected);
     }
+    if what == "control" {
+        let known = || Dialect::WORDS.map(|(word, _)| word).join(", ");
+        let expected =
+            || format!("`truegrind control` with one of {}: the control that runs the program", known());
+        let [_, word] = words[..] else { return Err(expected()) };
+        return Dialect::stated(word).map(|dialect| Some(Statement::Control(dialect))).ok_or_else(expected);
+    }
     if what == "start" {
         let (_, list) = text.split_at(text.find('[').unwrap_or(text.len()));
         let near = |joints: &[f64; 6]| joints.iter().all(|angle| angle.abs() <= MOST_DEG);
@@ -105,9 +131,9 @@ pub(super) fn statement(comment: &[u8]) -> Result<Option<Statement>, String> {
     }
     if !matches!(&*what, "tool" | "frame") {
         // A misspelt statement must not be ignored like any comment.
-        let words = ["angles", "tool", "frame", "start"];
+        let words = ["control", "angles", "tool", "frame", "start"];
         let misspelt = words.into_iter().find(|word| what.starts_with(&word[..3]));
-        let known = "`truegrind angles …`, `truegrind tool …`, `truegrind frame …` or `truegrind start …`";
+        let known = "`truegrind control …`, `truegrind angles …`, `truegrind tool …`, `truegrind frame …` or `truegrind start …`";
         return misspelt.map_or(Ok(None), |_| Err(known.to_owned()));
     }
     let expected = || {

@@ -84,7 +84,7 @@ impl<'s> Task<'s> {
     pub fn read(files: &[(&str, &'s [u8])], setup: &Setup) -> Task<'s> {
         let dialects: Vec<Dialect> = files
             .iter()
-            .map(|(name, bytes)| setup.dialect.unwrap_or_else(|| Dialect::of_named(name, bytes)))
+            .map(|(name, bytes)| setup.dialect.unwrap_or_else(|| setup::control_of(name, bytes)))
             .collect();
         let trees: Vec<_> = files.iter().zip(&dialects).map(|((_, bytes), &d)| parse(bytes, d)).collect();
         let mut task = Task {
@@ -121,6 +121,14 @@ impl<'s> Task<'s> {
         }
         task.listing.across_calls = call_edges.solve(&task.names, task.listing.motions.len() as u32);
         task.leave_pinned_ends();
+        let is_stated =
+            |file: &usize| setup.dialect.is_some() || setup::stated_control(files[*file].1).is_some();
+        let open = (0..files.len()).filter(|file| task.dialects[*file] == Dialect::Iso && !is_stated(file));
+        let first = |file: usize| {
+            let mut motions = task.listing.motions.iter().filter(|motion| motion.place.file as usize == file);
+            motions.find(|motion| motion.reason().is_none()).map(|motion| motion.place)
+        };
+        task.listing.open_controls = open.filter_map(first).collect();
         task
     }
 }
@@ -345,6 +353,14 @@ impl<'t, 's> Interpreter<'t, 's> {
                 continue;
             }
             match statement(self.tree.text(token)) {
+                Ok(Some(Statement::Control(stated)))
+                    if stated == self.dialect || self.setup.dialect.is_some() => {}
+                Ok(Some(Statement::Control(_))) => {
+                    let expected =
+                        format!("{}, as stated before: one control runs the file", self.dialect.text());
+                    self.list_unusable_comment(token);
+                    self.list_invalid_statement(token, expected);
+                }
                 Ok(Some(Statement::Angles(angles))) => self.angles = self.setup.angles.or(Some(angles)),
                 Ok(Some(Statement::Tool(stated))) => tools.push((token, stated)),
                 Ok(Some(Statement::Frame(stated))) => frames.push((token, stated)),

@@ -612,3 +612,67 @@ fn a_comment_states_the_start_once() {
         assert!(found.to_string().contains(expected), "{found}");
     }
 }
+
+/// Without a word of its own, a file may be for a Fanuc, on which G43 leaves X, Y and Z at the end of the arm, or for a LinuxCNC.
+#[test]
+fn a_comment_states_the_control() {
+    let setup = "(truegrind angles wpr)\n(truegrind tool T1 t [[0,0,150],[1,0,0,0]])\n(truegrind frame G54 w [[500,0,200],[1,0,0,0]])\n";
+    let read = |name: &str, comments: &str, code: &str| {
+        let source = format!(
+            "%\n{comments}{setup}{code}G90 G21 G17 G54\nT1 M6\nG43 H1\nG1 X0. Y0. Z0. A180. B0. C0. F600.\nM30\n"
+        );
+        let task = Task::read(&[(name, source.as_bytes())], &Setup::default());
+        (task.dialects[0], task.listing)
+    };
+    let (dialect, listing) = read("p.nc", "", "");
+    assert_eq!((dialect, listing.open_controls.len()), (Dialect::Iso, 1));
+    assert_eq!(listing.open_controls[0].line, 8);
+    for (word, expected, reason) in [
+        ("fanuc", Dialect::Fanuc, Some(Reason::NoTcpMode)),
+        ("LinuxCNC", Dialect::LinuxCnc, None),
+        ("iso", Dialect::Iso, None),
+    ] {
+        let (dialect, listing) = read("p.nc", &format!("(truegrind control {word})\n"), "");
+        assert_eq!((dialect, listing.motions[0].reason()), (expected, reason), "{word}");
+        assert!(listing.open_controls.is_empty() && listing.invalid_statements.is_empty(), "{listing:?}");
+    }
+    // Words that no LinuxCNC has, and a program number behind a block number.
+    for code in ["N1 O0101\n", "G54.1 P2\n", "G187 P1\n"] {
+        assert_eq!(read("p.nc", "", code).0, Dialect::Fanuc, "{code}");
+    }
+    for (comments, expected) in [
+        ("(truegrind control haas)\n", "one of fanuc, siemens"),
+        ("(truegrind control)\n", "one of fanuc"),
+        ("(truegrind control fanuc)\n(truegrind control iso)\n", "one control runs the file"),
+    ] {
+        let (_, listing) = read("p.nc", comments, "");
+        let [found] = &listing.invalid_statements[..] else { panic!("{comments}: {listing:?}") };
+        assert!(found.to_string().contains(expected), "{found}");
+    }
+    // A cell file overrides the comment.
+    let source = b"(truegrind control fanuc)\nG1 X0 Y0 Z0\n";
+    let stated = Setup { dialect: Some(Dialect::LinuxCnc), ..Setup::default() };
+    let task = Task::read(&[("p.nc", source)], &stated);
+    assert!(task.dialects[0] == Dialect::LinuxCnc && task.listing.invalid_statements.is_empty());
+}
+
+#[test]
+fn further_axes_are_listed_with_their_first_block() {
+    for (dialect, block, letter) in [
+        (Dialect::Siemens, "G1 X9 U10", 'U'),
+        (Dialect::Heidenhain, "L X+9 W+5", 'W'),
+        (Dialect::LinuxCnc, "G1 X9 V1", 'V'),
+    ] {
+        let listing = listing_of(&format!("G1 X1 Y2 Z3\n{block}\n"), dialect);
+        assert_eq!(listing.other_axes.keys().copied().collect::<Vec<_>>(), [letter], "{block}");
+    }
+    // On a Fanuc they are increments of X, Y and Z, which are refused.
+    assert!(listing_of("G1 X1 U2\n", Dialect::Fanuc).other_axes.is_empty());
+}
+
+#[test]
+fn the_mark_stands_behind_that_of_utf_8() {
+    let source = "\u{feff}; first\nG1 X1 Y2 Z3\n";
+    let task = Task::read(&[("x.mpf", source.as_bytes())], &Setup::default());
+    assert_eq!(mark::place(&task.trees[0], Dialect::Siemens), 3);
+}

@@ -47,6 +47,10 @@ pub fn verdict(plan: &Plan, listing: &Listing, is_written: bool) -> Verdict {
             Status::Warning,
             "Corrected, but the path has steps beside motions that are left: check them before running the program",
         ),
+        (_, 0) if !listing.open_controls.is_empty() => (
+            Status::Warning,
+            "Corrected for a control that is not stated: state it before running the program",
+        ),
         (_, 0) if !plan.unstated_axes.is_empty() => (
             Status::Warning,
             "Corrected for a robot that stands still: state what the external axes carry before running the program",

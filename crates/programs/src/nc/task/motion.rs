@@ -9,7 +9,7 @@ use super::super::dialect::Dialect;
 use super::super::expression::Evaluated;
 use super::super::modal_group::{ARC_GROUPS, MOTION_GROUPS, ModalGroup, TOOL_GROUPS};
 use super::super::modal_state::{MotionMode, OrientationMode, all_known};
-use super::super::syntax::WordValue;
+use super::super::syntax::{Word, WordValue};
 use super::{Block, BlockArc, BlockContext, FlowPoint, Interpreter, StartDependency, StateEvent};
 use crate::motion::{
     FARTHEST_MM, Modal, Motion, MotionKind, MotionTarget, Origin, Reason, RobTarget, Role, Span, Speed,
@@ -194,6 +194,7 @@ impl Interpreter<'_, '_> {
         // On controls with `,R` and `,C`, R, I and K of a straight block may round or chamfer its corner.
         let corner = self.dialect.paren_comments() && straight && bends;
         let circular = matches!(mode, MotionMode::Circular(_));
+        self.note_other_axes(block);
         if !(block.has_motion_words() || circular && bends || vector_words && has_centre) {
             self.block_without_axes(block, mode);
             return;
@@ -226,6 +227,10 @@ impl Interpreter<'_, '_> {
             motion.own_reason = Some(Reason::UnsupportedPath);
         }
         motion.timed = !self.state.feed.per_minute && kind != MotionKind::Joint;
+        if motion.own_reason.is_none() && self.is_turn_at_a_feed(block, mode) {
+            motion.own_reason = Some(Reason::TurnAlone);
+            motion.speed = None;
+        }
         let splits = !motion.timed && self.can_split(block, &before);
         motion.insertable = splits && kind == MotionKind::Linear && !block.other_axes;
         motion.can_straighten = splits && arc.is_some() && !block.opaque;
@@ -372,6 +377,15 @@ impl Interpreter<'_, '_> {
             }
     }
 
+    /// Whether a block only turns the tool, at a feed in degrees per minute: a word of X, Y or Z would make it millimetres per minute.
+    fn is_turn_at_a_feed(&self, block: &Block<'_>, mode: MotionMode) -> bool {
+        self.dialect.paren_comments()
+            && mode == MotionMode::Linear
+            && self.state.feed.per_minute
+            && block.axes.iter().all(Option::is_none)
+            && block.abc.iter().any(Option::is_some)
+    }
+
     /// Whether U, V and W may be increments of X, Y and Z (lathes).
     fn has_incremental_uvw(&self) -> bool {
         matches!(self.dialect, Dialect::Fanuc | Dialect::Iso)
@@ -381,6 +395,23 @@ impl Interpreter<'_, '_> {
     fn modal_call(&self, block: &Block<'_>) -> Option<Reason> {
         let here = self.dialect == Dialect::Heidenhain && block.m.contains(&99);
         self.state.modal_call.or(here.then_some(Reason::Cycle))
+    }
+
+    /// Lists the further axes that a block names. On a Fanuc U, V and W are increments of X, Y and Z.
+    fn note_other_axes(&mut self, block: &Block<'_>) {
+        if !block.other_axes || self.has_incremental_uvw() {
+            return;
+        }
+        let letter = |word: &Word<'_>| match word.name.to_ascii_uppercase().as_slice() {
+            [letter @ (b'U'..=b'W' | b'E')] | [b'I', letter @ b'U'..=b'W'] => Some(char::from(*letter)),
+            _ => None,
+        };
+        for word in &block.words {
+            if let Some(letter) = letter(word) {
+                let place = self.place(word.first);
+                self.listing.other_axes.entry(letter).or_insert(place);
+            }
+        }
     }
 
     /// A block without modelled axis words: it may move other axes, or could not be read.

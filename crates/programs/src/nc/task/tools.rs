@@ -127,11 +127,15 @@ impl Interpreter<'_, '_> {
                 return true;
             }
             _ => match number {
-                None => self.change_tool_length(|tool| {
-                    if tool.length == ToolLength::None {
-                        tool.length = ToolLength::OfTool;
-                    }
-                }),
+                None => {
+                    // On LinuxCNC it is that of the loaded tool, elsewhere the last H stays.
+                    let of_tool = self.dialect == Dialect::LinuxCnc;
+                    self.change_tool_length(|tool| {
+                        if of_tool || tool.length == ToolLength::None {
+                            tool.length = ToolLength::OfTool;
+                        }
+                    });
+                }
                 Some(Some(number)) => {
                     let number = number.round() as u32;
                     // On LinuxCNC H is a tool number, elsewhere an index of an offset table.

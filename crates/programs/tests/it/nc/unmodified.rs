@@ -261,3 +261,19 @@ fn a_motion_stays_whose_end_an_unmodified_block_takes_over() {
         assert!(!stays(dialect, body), "{body}");
     }
 }
+
+/// A turn alone has its feed in degrees per minute: with a word of X, Y or Z it would be millimetres, and some ten times as fast.
+#[test]
+fn a_turn_alone_gets_no_words() {
+    for dialect in [LinuxCnc, Fanuc] {
+        let body = "G1 X4. Y5. Z6. F600.\nX5.\nA175.\nX6. Y6. Z6. A180. B0. C0.";
+        let text = rewritten(dialect, body);
+        let lines: Vec<&str> = text.lines().collect();
+        // The motion before stays as well, since the turn would take its end over.
+        assert_eq!(lines[1..3], ["X5. Y5.0000 Z6.0000", "A175."], "{text}");
+        assert!(lines[3].starts_with("X6.5"), "{text}");
+        // In rapid traverse no feed counts.
+        let rapid = rewritten(dialect, "G1 X4. Y5. Z6. F600.\nG0 A175.");
+        assert!(rapid.starts_with("G1 X4.5"), "{rapid}");
+    }
+}
