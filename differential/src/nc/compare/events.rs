@@ -223,12 +223,14 @@ impl Judge<'_> {
         }
     }
 
-    /// A motion that is left goes where it always went; what it does not say, where its start is not known, goes on from
-    /// where the motion before it ended.
+    /// A motion that is left goes where it always went, also in the axes that it does not say. Only moves to a place of the machine go on
+    /// there from where the motion before ended: nothing is cut by them.
     fn left(&mut self, old: &Move, new: &Move, reason: &str) {
         let line = old.line + 1;
         let stated = old.words.place.map(|say| matches!(say, Some(Say::To(_))));
-        if let Some(off) = apart(old.origin, old.to, new.origin, new.to, stated, LEFT_MM) {
+        let of_machine = reason.contains("machine coordinates") || reason.contains("reference point");
+        let asked = if of_machine { stated } else { [true; 3] };
+        if let Some(off) = apart(old.origin, old.to, new.origin, new.to, asked, LEFT_MM) {
             return self.wrong(line, "left-moved", format!("{off} ({reason})"));
         }
         for (axis, say) in old.words.turn.iter().enumerate() {

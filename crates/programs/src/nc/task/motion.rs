@@ -493,11 +493,11 @@ impl Interpreter<'_, '_> {
         }
         if self.dialect == Dialect::Heidenhain && block.radius.is_none() {
             let centre = [self.state.pole[0]?, self.state.pole[1]?];
-            return Arc::from_centre(plane, start, end, centre, positive).ok_or(Reason::WrongShape);
+            return Arc::from_centre(plane, start, end, centre, positive).ok_or(Reason::NoArc);
         }
         if let Some(index) = block.radius {
             let radius = self.evaluate_word(&block.words[index]).0? * unit;
-            return Arc::from_radius(plane, start, end, radius, positive).ok_or(Reason::WrongShape);
+            return Arc::from_radius(plane, start, end, radius, positive).ok_or(Reason::NoArc);
         }
         let mut centre = [0.0; 2];
         for (place, axis) in [plane.a, plane.b].into_iter().enumerate() {
@@ -518,7 +518,7 @@ impl Interpreter<'_, '_> {
         if block.centre[plane.a].is_none() && block.centre[plane.b].is_none() {
             return Err(Reason::MissingArgument);
         }
-        Arc::from_centre(plane, start, end, centre, positive).ok_or(Reason::WrongShape)
+        Arc::from_centre(plane, start, end, centre, positive).ok_or(Reason::NoArc)
     }
 
     /// The span from the first to the last target word.
