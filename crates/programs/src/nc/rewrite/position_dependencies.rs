@@ -12,6 +12,7 @@ use std::collections::{BTreeSet, HashMap};
 use super::keeps_endpoint;
 use super::word_slots::states_increment;
 use crate::motion::{MotionKind, Reason};
+use crate::nc::dialect::Dialect;
 use crate::nc::expression::literal;
 use crate::nc::syntax::{NcTree, Word, WordValue};
 use crate::nc::task::{StartDependency, StateEvent, Task};
@@ -300,13 +301,26 @@ impl Task<'_> {
         let returns = reason == Some(Reason::ReferenceReturn);
         let restates = context.can_restate && known && slots.axes.iter().any(Option::is_some);
         let elsewhere = machine || returns || reason == Some(Reason::ExternalOnly);
-        let moves = motion.kind != MotionKind::Unknown || reason == Some(Reason::Cycle);
-        let gets_words = context.can_restate && slots.axes.iter().any(Option::is_some);
+        let states_axis = slots.axes.iter().any(Option::is_some);
+        let moves = match motion.kind {
+            MotionKind::Unknown if reason == Some(Reason::Subprogram) => false,
+            // A word that was not read may have been that of an axis.
+            MotionKind::Unknown if reason == Some(Reason::UnknownWord) => {
+                states_axis || slots.mode.is_some() || dialect == Dialect::Heidenhain
+            }
+            MotionKind::Unknown => states_axis || reason == Some(Reason::Cycle),
+            _ => true,
+        };
+        let gets_words = context.can_restate && states_axis;
         let before = state.position;
         for (axis, was) in before.iter().enumerate() {
             let linear = axis < 3;
             let word = if linear { slots.axes[axis] } else { slots.angles[axis - 3] };
             let start = if linear { context.start[axis] } else { context.start_angles[axis - 3] };
+            if linear && context.may_omit_words && moves && !elsewhere {
+                // The control may ignore the word of an axis, so that it ends where the motion before does.
+                state.pin_position(OMITTED, axis);
+            }
             let increment =
                 word.map(|word| states_increment(tree, dialect, &word).unwrap_or(!context.absolute));
             match (word, increment) {
