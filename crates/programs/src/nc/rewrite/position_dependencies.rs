@@ -302,13 +302,14 @@ impl Task<'_> {
         let restates = context.can_restate && known && slots.axes.iter().any(Option::is_some);
         let elsewhere = machine || returns || reason == Some(Reason::ExternalOnly);
         let states_axis = slots.axes.iter().any(Option::is_some);
+        let states_any = states_axis || slots.angles.iter().any(Option::is_some);
         let moves = match motion.kind {
             MotionKind::Unknown if reason == Some(Reason::Subprogram) => false,
             // A word that was not read may have been that of an axis.
             MotionKind::Unknown if reason == Some(Reason::UnknownWord) => {
-                states_axis || slots.mode.is_some() || dialect == Dialect::Heidenhain
+                states_any || slots.mode.is_some() || dialect == Dialect::Heidenhain
             }
-            MotionKind::Unknown => states_axis || reason == Some(Reason::Cycle),
+            MotionKind::Unknown => states_any || reason == Some(Reason::Cycle),
             _ => true,
         };
         let gets_words = context.can_restate && states_axis;
