@@ -30,15 +30,49 @@ pub fn sentences(plan: &Plan, listing: &Listing) -> Vec<String> {
         .filter_map(|outcome| listing.work_object(listing.motions.get(outcome.motion as usize)?))
         .map(|object| object.name.as_str())
         .collect();
-    let of = |placement: &ObjectPlacement| match corrected.contains(placement.work_object.as_str()) {
-        true => sentence(placement, what),
-        false => format!(
-            "{what} {}: no motion with it is corrected; {}",
-            placement.work_object,
-            displacement(placement)
-        ),
+    let of = |placement: &ObjectPlacement| {
+        if names(placement).any(|name| corrected.contains(name)) {
+            return sentence(placement, what);
+        }
+        let with = if placement.others.is_empty() { "it" } else { "them" };
+        let named = named(placement, what);
+        format!("{named}: no motion with {with} is corrected; {}", displacement(placement))
     };
-    plan.placements.iter().map(of).collect()
+    let apart = apart(plan, what, |placement| names(placement).any(|name| corrected.contains(name)));
+    plan.placements.iter().map(of).chain(apart).collect()
+}
+
+/// What is said where the placement over some stationary objects is corrected and over others is not: the distances between them change.
+fn apart(plan: &Plan, what: &str, is_corrected: impl Fn(&ObjectPlacement) -> bool) -> Option<String> {
+    let stand = || plan.placements.iter().filter(|placement| !placement.held && is_corrected(placement));
+    let of = |applied: Placement| -> Vec<&str> {
+        stand().filter(|placement| placement.applied == applied).flat_map(names).collect()
+    };
+    let [moved, kept] = [Placement::Absolute, Placement::Shape].map(of);
+    let moved_mm = stand().filter(|placement| placement.applied == Placement::Absolute);
+    let most_mm = moved_mm.map(|placement| placement.deviation_mm).fold(0.0, f64::max);
+    (!moved.is_empty() && !kept.is_empty()).then(|| {
+        format!(
+            "the placement over {} is corrected, over {} it is not: the path over the one is displaced against the other by up to {most_mm:.3} mm. \
+             If these {what}s belong together, give them one user frame, or decide for both (--placement shape, --placement absolute)",
+            moved.join(", "),
+            kept.join(", ")
+        )
+    })
+}
+
+/// The work objects of a placement.
+fn names(placement: &ObjectPlacement) -> impl Iterator<Item = &str> {
+    std::iter::once(&placement.work_object).chain(&placement.others).map(String::as_str)
+}
+
+/// The same as the subject of a sentence.
+fn named(placement: &ObjectPlacement, what: &str) -> String {
+    let all: Vec<&str> = names(placement).collect();
+    match all.as_slice() {
+        [name] => format!("{what} {name}"),
+        all => format!("{what}s {} (one user frame)", all.join(", ")),
+    }
 }
 
 /// How far the path as a whole is displaced.
@@ -55,21 +89,21 @@ fn object_word(listing: &Listing) -> &'static str {
 }
 
 fn sentence(placement: &ObjectPlacement, what: &str) -> String {
-    let ObjectPlacement { work_object, applied, probability_of_harm, remedy, unlocated, .. } = placement;
-    let known = displacement(placement);
+    let ObjectPlacement { applied, probability_of_harm, remedy, unlocated, .. } = placement;
+    let (named, known) = (named(placement, what), displacement(placement));
     if *applied == Placement::Absolute {
-        return format!("{what} {work_object}: shape and placement are corrected; {known}");
+        return format!("{named}: shape and placement are corrected; {known}");
     }
     if *unlocated {
         return format!(
-            "{what} {work_object}: only the shape is corrected, not the placement, since the {what} was taught with this arm and its \
+            "{named}: only the shape is corrected, not the placement, since the {what} was taught with this arm and its \
              teaching points are not given; with them (cell file, teaching_deg) the placement becomes known; --placement absolute \
              takes the programmed frame as exact"
         );
     }
     let remedy = remedy.as_ref().map(|remedy| format!("{}; ", remedy_text(remedy, what))).unwrap_or_default();
     format!(
-        "{what} {work_object}: only the shape is corrected, not the placement; {known}; correcting that too would make the path worse \
+        "{named}: only the shape is corrected, not the placement; {known}; correcting that too would make the path worse \
          with a probability of {}; {remedy}--placement absolute corrects it anyway",
         percent_of(*probability_of_harm)
     )
@@ -211,9 +245,10 @@ fn remedy_json(remedy: &Remedy, what: &str) -> Value {
 /// The entries `placements` and `cuts` of the JSON report.
 pub fn json(plan: &Plan, listing: &Listing) -> [Value; 2] {
     let what = object_word(listing);
-    let placements = plan.placements.iter().map(|p| {
+    let each = plan.placements.iter().flat_map(|p| names(p).map(move |name| (p, name)));
+    let placements = each.map(|(p, name)| {
         json!({
-            "work_object": p.work_object, "corrected": word(p.applied), "off_mm": p.deviation_mm, "sigma_mm": p.sigma_mm,
+            "work_object": name, "corrected": word(p.applied), "off_mm": p.deviation_mm, "sigma_mm": p.sigma_mm,
             "chance_of_worse": p.probability_of_harm, "taught": p.taught, "remedy": p.remedy.as_ref().map(|remedy| remedy_json(remedy, what)),
         })
     });

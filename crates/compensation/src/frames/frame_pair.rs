@@ -66,6 +66,8 @@ pub(crate) struct ResolvedFrames {
     pub carried: Option<RegisteredFrame>,
     /// Whether the work object was taught with this arm by points that are not given, so that its real place is unknown.
     pub unlocated: bool,
+    /// Whether the work object was taught with this arm, by points that are given or not.
+    pub taught: bool,
     /// Assumptions, one sentence each.
     pub notes: Vec<String>,
 }
@@ -102,13 +104,13 @@ pub(crate) fn resolve_frames(
         tool_note(tool, &real_tool, &commanded, with),
         object_note(object, &real, &commanded, &real_object, with),
     ];
-    let unlocated = !commanded.holds_part
-        && real_object.taught.is_none()
-        && teaching.stated.object(object).is_some_and(|frame| frame.origin == FrameOrigin::Taught);
+    let taught = teaching.stated.object(object).is_some_and(|frame| frame.origin == FrameOrigin::Taught);
+    let unlocated = !commanded.holds_part && real_object.taught.is_none() && taught;
     // A frame on the flange moves with the arm: it has no position of its own in the base.
-    let taught = real_object.taught.filter(|_| !commanded.holds_part);
-    let carried = taught.zip(with.knowledge).and_then(|(t, k)| carried_frame(k, teaching.estimated, &t));
-    Ok(ResolvedFrames { commanded, real, carried, unlocated, notes: notes.into_iter().flatten().collect() })
+    let moves = real_object.taught.filter(|_| !commanded.holds_part);
+    let carried = moves.zip(with.knowledge).and_then(|(t, k)| carried_frame(k, teaching.estimated, &t));
+    let notes = notes.into_iter().flatten().collect();
+    Ok(ResolvedFrames { commanded, real, carried, unlocated, taught, notes })
 }
 
 fn built_in(name: &str) -> bool {

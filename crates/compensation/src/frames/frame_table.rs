@@ -1,7 +1,7 @@
 //! Frame table of a program: every pair of tool and work object once, and the external axes that carry the base.
 
 use std::cell::LazyCell;
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeSet, HashMap, HashSet};
 
 use rayon::prelude::*;
 
@@ -205,6 +205,12 @@ impl FrameTable {
     /// The work object of each frame pair of the list.
     pub(crate) fn objects(&self) -> Vec<u32> {
         self.objects.clone()
+    }
+
+    /// The work objects that were taught with this arm.
+    pub(crate) fn taught(&self) -> BTreeSet<u32> {
+        let taught = self.list.iter().zip(&self.objects).filter(|(frames, _)| frames.taught);
+        taught.map(|(_, object)| *object).collect()
     }
 
     pub(crate) fn notes(&self) -> Vec<String> {

@@ -180,7 +180,7 @@ fn assess(
     posterior: &[PosteriorComponent],
 ) -> Assessment {
     let Some(knowledge) = arms.knowledge else { return Assessment::default() };
-    let chosen = AssessmentSample::of(listing, cuts, |motion| program.knows(motion));
+    let chosen = AssessmentSample::of(listing, cuts, &frame_table.taught(), |motion| program.knows(motion));
     let loads = arms.loads(listing, options.loads.as_ref());
     let condition_indices: Vec<usize> = if loads.is_empty() {
         vec![arms.conditions.condition_index([0; 6], None); listing.motions.len()]

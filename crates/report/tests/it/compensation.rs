@@ -280,6 +280,8 @@ fn a_work_object_without_a_corrected_motion_is_not_called_corrected() {
         probability_of_harm: 0.01,
         taught: false,
         unlocated: false,
+        others: Vec::new(),
+        held: false,
         remedy: None,
     }];
     let said = |plan: &Plan| sentences(plan, &listing).join("\n");
@@ -290,4 +292,42 @@ fn a_work_object_without_a_corrected_motion_is_not_called_corrected() {
         text.contains("wobj0: no motion with it is corrected; the path as a whole is displaced by 2.131 mm"),
         "{text}"
     );
+}
+
+/// Work objects on one fixture are named together, and what is decided differently over objects that stand is said to move apart.
+#[test]
+fn work_objects_on_one_fixture_are_named_together() {
+    let (mut plan, listing, _) = example();
+    let placement = |name: &str, applied: Placement, deviation_mm: f64| ObjectPlacement {
+        work_object: name.to_owned(),
+        applied,
+        deviation_mm,
+        sigma_mm: 0.2,
+        probability_of_harm: 0.06,
+        taught: false,
+        unlocated: false,
+        others: Vec::new(),
+        held: false,
+        remedy: None,
+    };
+    let mut fixture = placement("wobj0", Placement::Absolute, 2.131);
+    fixture.others.push("wB".to_owned());
+    plan.placements = vec![fixture.clone()];
+    let text = sentences(&plan, &listing).join("\n");
+    assert!(
+        text.contains("work objects wobj0, wB (one user frame): shape and placement are corrected"),
+        "{text}"
+    );
+    assert!(!text.contains("belong together"), "{text}");
+    // Each has its entry in the JSON report.
+    let [placements, _] = truegrind_report::placement::json(&plan, &listing);
+    let names: Vec<_> = placements.as_array().unwrap().iter().map(|p| p["work_object"].clone()).collect();
+    assert_eq!(names, ["wobj0", "wB"]);
+    // Decided differently.
+    plan.placements[0].others.clear();
+    plan.placements.push(placement("wobj0", Placement::Shape, 1.5));
+    let text = sentences(&plan, &listing).join("\n");
+    assert!(text.contains("against the other by up to 2.131 mm"), "{text}");
+    plan.placements[1].held = true;
+    assert!(!sentences(&plan, &listing).join("\n").contains("belong together"));
 }
