@@ -160,6 +160,35 @@ fn steps_beside_what_is_left_are_counted() {
     assert_eq!(self::done(&module(&even), Cuts::Whole, 0.05).0.plan.steps, None);
 }
 
+/// A line from a joint target that is left is a wedge as high as the correction. It was "ok", since the ends of the line are right.
+#[test]
+fn lines_from_joint_targets_that_are_left_are_counted() {
+    let joint = |tool: &str| {
+        format!("MoveAbsJ [[0,0,10,0,80,0],[9E9,9E9,9E9,9E9,9E9,9E9]]\\NoEOffs,v100,fine,{tool};\n")
+    };
+    let steps = |body: &[String], joint_targets: bool| {
+        let data = "PERS tooldata long:=[TRUE,[[0,0,60],[1,0,0,0]],[1,[0,0,10],[1,0,0,0],0,0,0]];";
+        let source = module(&body.concat()).replace("PROC main", &format!("{data} PROC main"));
+        let program = Program::Rapid(Task::read(&[("p.mod", source.as_bytes())]));
+        let options = Options { joint_targets, ..Options::default() };
+        let done = compensate(&program, &known(), &Cell::default(), &options, None).unwrap();
+        let text = done.plan.steps.as_ref().map(|steps| steps.sentence(program.listing()));
+        (done.plan.steps.map(|steps| [steps.motions, steps.from_joint_targets]), text.unwrap_or_default())
+    };
+    let [a, b, c] = [380.0, 385.0, 390.0].map(|x| line(x, "fine"));
+    let begins = [joint("tool0"), a.clone(), b.clone()];
+    let (found, text) = steps(&begins, false);
+    assert_eq!(found, Some([vec![1], vec![1]]));
+    assert!(text.contains("line 5 starts at a joint target") && text.contains("--joint-targets"), "{text}");
+    assert_eq!(steps(&begins, true).0, None);
+    // In the middle, with another tool.
+    assert_eq!(steps(&[a.clone(), joint("long"), b.clone(), c.clone()], false).0, Some([vec![2], vec![2]]));
+    // Behind the last line the arm moves away; a joint motion to a corrected target lies between.
+    assert_eq!(steps(&[a.clone(), b.clone(), joint("tool0")], false).0, None);
+    let air = a.replace("MoveL", "MoveJ");
+    assert_eq!(steps(&[joint("tool0"), air, b, c], false).0, None);
+}
+
 #[test]
 fn another_tool_or_work_object_begins_another_cut() {
     let other = "MoveL [[385,0,300],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v20,z1,long;\n";
