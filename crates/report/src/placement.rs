@@ -185,19 +185,8 @@ pub fn left_at_risk(plan: &Plan) -> (usize, usize) {
     (plan.cuts.iter().filter(|cut| cut.left_for_risk).count(), plan.cuts.len())
 }
 
-/// Whether a work object is corrected in shape only, so that the 1σ of the shape is the relevant one.
-pub fn corrects_shape_only(plan: &Plan) -> bool {
-    plan.placements.iter().any(|placement| placement.applied == Placement::Shape)
-}
-
 fn rewritten(plan: &Plan) -> impl Iterator<Item = &MotionOutcome> {
     plan.outcomes.iter().filter(|outcome| matches!(outcome.status, Status::Changed | Status::Flagged))
-}
-
-/// Largest uncorrected deviation of the rewritten motions (mm), of the shape if only that is corrected; `None` if nothing is
-/// rewritten.
-pub fn before_mm(plan: &Plan) -> Option<f64> {
-    rewritten(plan).filter_map(|outcome| outcome.before_mm.get()).reduce(f64::max)
 }
 
 /// Largest uncorrected deviation of all motions (mm).
@@ -205,13 +194,40 @@ pub fn largest_mm(plan: &Plan) -> Option<f64> {
     plan.outcomes.iter().filter_map(|outcome| outcome.before_mm.get()).reduce(f64::max)
 }
 
-/// Largest expected deviation of the rewritten motions (mm): remainder of the solver and predicted 1σ.
-pub fn expected_mm(plan: &Plan) -> Option<f64> {
-    let shape = corrects_shape_only(plan);
-    let sigma = |outcome: &MotionOutcome| if shape { outcome.shape_sigma_mm } else { outcome.sigma_mm };
-    rewritten(plan)
-        .filter_map(|outcome| Some(outcome.after_mm.get()?.hypot(sigma(outcome).get()?)))
-        .reduce(f64::max)
+/// Largest deviation before and after over the rewritten motions of which the same is corrected.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BeforeAndAfter {
+    /// Whether that is the shape alone.
+    pub shape_only: bool,
+    /// Largest uncorrected deviation (mm), of the shape if only that is corrected.
+    pub before_mm: f64,
+    /// Largest expected deviation of the same motions (mm): remainder of the solver and predicted 1σ; absent if no σ is known.
+    pub expected_mm: Option<f64>,
+}
+
+/// Before and after of what is corrected in shape and placement, and of what is corrected in shape alone: the one contains the placement of the
+/// path, the other does not, so no figure of the one may stand beside one of the other. Motions outside cuts have no σ of a shape and do not
+/// count there.
+pub fn before_and_after(plan: &Plan, listing: &Listing) -> Vec<BeforeAndAfter> {
+    let shape: BTreeSet<&str> =
+        plan.placements.iter().filter(|p| p.applied == Placement::Shape).flat_map(names).collect();
+    let is_shape_only = |outcome: &MotionOutcome| {
+        let motion = listing.motions.get(outcome.motion as usize);
+        let object = motion.and_then(|motion| listing.work_object(motion));
+        object.is_some_and(|object| shape.contains(object.name.as_str()))
+    };
+    let of = |shape_only: bool| {
+        let sigma =
+            |outcome: &MotionOutcome| if shape_only { outcome.shape_sigma_mm } else { outcome.sigma_mm };
+        let expected = |outcome: &MotionOutcome| Some(outcome.after_mm.get()?.hypot(sigma(outcome).get()?));
+        let same = || rewritten(plan).filter(|outcome| is_shape_only(outcome) == shape_only);
+        let expected_mm = same().filter_map(expected).reduce(f64::max);
+        let counts = |outcome: &&MotionOutcome| expected_mm.is_none() || expected(outcome).is_some();
+        let before_mm =
+            same().filter(counts).filter_map(|outcome| outcome.before_mm.get()).reduce(f64::max)?;
+        Some(BeforeAndAfter { shape_only, before_mm, expected_mm })
+    };
+    [false, true].into_iter().filter_map(of).collect()
 }
 
 /// The probability that the corrected cuts get worse, as a sentence; `None` if unknown.

@@ -2,7 +2,7 @@
 
 use crate::deviation::status_word;
 use crate::document::{KeyFigure, Verdict};
-use crate::placement;
+use crate::placement::{self, BeforeAndAfter};
 use crate::status::Status;
 use truegrind_calibration::identification::verdict::percent_of;
 use truegrind_compensation::deviation::Status as MotionStatus;
@@ -68,7 +68,7 @@ pub fn verdict(plan: &Plan, listing: &Listing, is_written: bool) -> Verdict {
             "Corrected, but check the refused and flagged motions before running the program",
         ),
     };
-    let mut reasons: Vec<String> = deviations(plan, listing).into_iter().collect();
+    let mut reasons = deviations(plan, listing);
     reasons.push(coverage(plan));
     reasons.extend(left_paths(plan, listing).filter(|_| written > 0));
     if left > 0 {
@@ -156,34 +156,57 @@ fn left_paths(plan: &Plan, listing: &Listing) -> Option<String> {
     }
 }
 
-/// Deviation before and after, as a sentence; `None` if unknown.
-fn deviations(plan: &Plan, listing: &Listing) -> Option<String> {
-    let uncorrected = |mm: f64| format!("the uncorrected program deviates by up to {mm:.3} mm");
-    let Some(before) = placement::before_mm(plan).filter(|_| !no_cut(plan, listing)) else {
-        return placement::largest_mm(plan).map(uncorrected);
+/// Deviation before and after, in a sentence for each kind of correction; empty if unknown.
+fn deviations(plan: &Plan, listing: &Listing) -> Vec<String> {
+    let found = if no_cut(plan, listing) { Vec::new() } else { placement::before_and_after(plan, listing) };
+    if found.is_empty() {
+        let uncorrected = |mm: f64| format!("the uncorrected program deviates by up to {mm:.3} mm");
+        return placement::largest_mm(plan).map(uncorrected).into_iter().collect();
+    }
+    let of_kind = |of: &BeforeAndAfter| {
+        let kind = match (of.shape_only, found.len()) {
+            (true, _) => " (shape only)",
+            (false, 1) => "",
+            (false, _) => " (shape and placement)",
+        };
+        let (before, after) = (of.before_mm, of.expected_mm?);
+        Some(format!(
+            "largest deviation of the corrected motions{kind}: {before:.3} mm before, {after:.3} mm expected after (1σ)"
+        ))
     };
-    let after = placement::expected_mm(plan)?;
-    let shape = if placement::corrects_shape_only(plan) { " (shape only)" } else { "" };
-    Some(format!(
-        "largest deviation of the corrected motions{shape}: {before:.3} mm before, {after:.3} mm expected after (1σ)"
-    ))
+    found.iter().filter_map(of_kind).collect()
+}
+
+/// Largest deviations before and after.
+fn deviation_figures(plan: &Plan, listing: &Listing) -> Vec<KeyFigure> {
+    let before = |mm: Option<f64>, note: String| KeyFigure::new("Largest before", mm, 3, "mm").note(note);
+    let after = |mm: Option<f64>, note: String| KeyFigure::new("Expected after", mm, 3, "mm").note(note);
+    let nothing = |why: &str| {
+        vec![
+            before(placement::largest_mm(plan), "uncorrected, all motions".to_owned()),
+            after(None, why.to_owned()),
+        ]
+    };
+    if no_cut(plan, listing) {
+        return nothing("no cut is corrected");
+    }
+    let of_kind = |of: BeforeAndAfter| {
+        let what = if of.shape_only { "of the shape" } else { "shape and placement" };
+        let said = match of.expected_mm {
+            Some(_) => format!("{what}, 1σ: largest of the corrected motions"),
+            None => "the model has no σ here".to_owned(),
+        };
+        [before(Some(of.before_mm), format!("{what}, corrected motions")), after(of.expected_mm, said)]
+    };
+    match placement::before_and_after(plan, listing) {
+        found if found.is_empty() => nothing("nothing is corrected"),
+        found => found.into_iter().flat_map(of_kind).collect(),
+    }
 }
 
 pub(super) fn key_figures(plan: &Plan, listing: &Listing) -> Vec<KeyFigure> {
     let all = plan.outcomes.len();
-    let shape = if placement::corrects_shape_only(plan) { "of the shape" } else { "shape and placement" };
-    let corrected = !no_cut(plan, listing);
-    let mut figures = vec![match placement::before_mm(plan).filter(|_| corrected) {
-        Some(mm) => KeyFigure::new("Largest before", mm, 3, "mm").note(format!("{shape}, corrected motions")),
-        None => KeyFigure::new("Largest before", placement::largest_mm(plan), 3, "mm")
-            .note("uncorrected, all motions"),
-    }];
-    let expected = placement::expected_mm(plan).filter(|_| corrected);
-    figures.push(KeyFigure::new("Expected after", expected, 3, "mm").note(match expected {
-        Some(_) => format!("{shape}, 1σ: largest of the corrected motions"),
-        None if !corrected => "no cut is corrected".to_owned(),
-        None => "nothing is corrected, or the model has no σ".to_owned(),
-    }));
+    let mut figures = deviation_figures(plan, listing);
     if let Some(chance) = plan.probability_of_harm {
         figures.push(
             KeyFigure::new("Probability of worse", percent_of(chance), 0, "")

@@ -331,3 +331,57 @@ fn work_objects_on_one_fixture_are_named_together() {
     plan.placements[1].held = true;
     assert!(!sentences(&plan, &listing).join("\n").contains("belong together"));
 }
+
+/// Before and after stood side by side from different motions: the whole deviation of one object over the σ of the shape of another.
+#[test]
+fn before_and_after_are_stated_of_the_same_motions() {
+    let target = |x: f64| format!("[[{x},0,300],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]");
+    let source = format!(
+        "MODULE M\nPERS wobjdata wS:=[FALSE,TRUE,\"\",[[10,0,0],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];\nPROC main()\n\
+         MoveL {},v50,fine,tool0;\nMoveJ {},v50,fine,tool0\\WObj:=wS;\nMoveL {},v50,fine,tool0\\WObj:=wS;\nENDPROC\nENDMODULE\n",
+        target(400.0),
+        target(410.0),
+        target(420.0)
+    );
+    let listing = Task::read(&[("m.mod", source.as_bytes())]).listing;
+    let mut outcomes = vec![
+        outcome(0, Status::Changed, None),
+        outcome(1, Status::Changed, None),
+        outcome(2, Status::Changed, None),
+    ];
+    // Over wobj0 all is corrected; over wS the shape alone, of which a joint motion has none.
+    (outcomes[0].before_mm, outcomes[0].sigma_mm) = (1.2.into(), 0.558.into());
+    (outcomes[1].before_mm, outcomes[1].sigma_mm) = (0.9.into(), 0.6.into());
+    (outcomes[2].before_mm, outcomes[2].shape_sigma_mm) = (0.4.into(), 0.003.into());
+    let placement = |name: &str, applied: Placement| ObjectPlacement {
+        work_object: name.to_owned(),
+        applied,
+        deviation_mm: 1.0,
+        sigma_mm: 0.5,
+        probability_of_harm: 0.06,
+        taught: false,
+        unlocated: false,
+        others: Vec::new(),
+        held: false,
+        remedy: None,
+    };
+    let placements = vec![placement("wobj0", Placement::Absolute), placement("wS", Placement::Shape)];
+    let mut plan = Plan { outcomes, placements, ..Plan::default() };
+    let files = [ProgramFile { file: "m.mod".to_owned(), output: None }];
+    let said = |plan: &Plan| terminal::document(&view::summary(plan, &listing, &files), 400);
+    let text = said(&plan);
+    assert!(
+        text.contains(
+            "corrected motions (shape and placement): 1.200 mm before, 0.558 mm expected after (1σ)"
+        ),
+        "{text}"
+    );
+    assert!(
+        text.contains("corrected motions (shape only): 0.400 mm before, 0.003 mm expected after (1σ)"),
+        "{text}"
+    );
+    // One kind alone.
+    plan.placements[1].applied = Placement::Absolute;
+    let text = said(&plan);
+    assert!(text.contains("corrected motions: 1.200 mm before, 0.600 mm expected after (1σ)"), "{text}");
+}
