@@ -1,6 +1,7 @@
 //! A planned rewrite: the changes, and the outcome of every motion.
 
 pub mod listing_only_plan;
+mod measured_sigma;
 pub(crate) mod notes;
 pub mod planner;
 pub mod reason;

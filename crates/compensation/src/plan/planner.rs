@@ -22,6 +22,7 @@ use crate::feasibility::unchanged::{blocking_reason, unchanged_motions};
 use crate::frames::frame_pair::FramePair;
 use crate::frames::frame_table::FrameTable;
 use crate::options::{Options, is_rewritable};
+use crate::plan::measured_sigma;
 use crate::plan::notes::{
     backlash_note, beyond_noise_note, doubtful_effects_note, load_notes, unchecked_notes, unknown_loads,
 };
@@ -100,9 +101,11 @@ impl<'a> SolvedProgram<'a> {
     pub(crate) fn plan(&mut self, refused: &BTreeMap<u32, OutcomeReason>) -> Plan {
         let unchanged = self.unchanged_for(refused);
         let Self { listing, options, arms, frame_table, assessment, solved, .. } = self;
+        let measured_sigma_mm = measured_sigma::of(frame_table, solved, arms);
         let mut plan = planned(&Planner {
             listing,
             solved,
+            measured_sigma_mm: &measured_sigma_mm,
             unchanged: &unchanged,
             frame_table,
             assessment,
@@ -241,6 +244,8 @@ struct Planner<'a> {
     /// Motions that remain unmodified although their targets could be corrected.
     unchanged: &'a BTreeMap<u32, OutcomeReason>,
     frame_table: &'a FrameTable,
+    /// The largest σ over the measured poses, by frame pair (mm).
+    measured_sigma_mm: &'a [f64],
     assessment: &'a Assessment,
     arms: &'a Arms<'a>,
     options: &'a Options,
@@ -475,7 +480,7 @@ fn plan_motion<'a>(
     }
     let flag =
         flag.or_else(|| path.and_then(|path| too_fast(index, motion, listing, path, &segment_plan, arms)));
-    let flag = flag.or_else(|| solved_targets().find_map(|s| uncertainty_flag(s, arms)));
+    let flag = flag.or_else(|| solved_targets().find_map(|s| uncertainty_flag(s, job.measured_sigma_mm)));
     let new = |(target, solved): (&MotionTarget, &SolvedTarget<'_>)| match target.role {
         Role::Via if segment_plan.straight => NewTarget::Drop,
         _ => new_target(target, solved, motion, options),
@@ -519,7 +524,7 @@ fn too_fast(
     (ratio > 1.0).then_some(OutcomeReason::TooFast { joint, ratio })
 }
 
-fn uncertainty_flag(solved: &SolvedTarget<'_>, arms: &Arms<'_>) -> Option<OutcomeReason> {
+fn uncertainty_flag(solved: &SolvedTarget<'_>, measured_sigma_mm: &[f64]) -> Option<OutcomeReason> {
     match solved.outside.as_deref().copied() {
         Some(Outside::Joint { joint, by_deg }) => {
             return Some(OutcomeReason::JointNotMeasured { joint, by_deg });
@@ -527,12 +532,11 @@ fn uncertainty_flag(solved: &SolvedTarget<'_>, arms: &Arms<'_>) -> Option<Outcom
         Some(Outside::Coverage { ratio }) => return Some(OutcomeReason::NotCovered { ratio }),
         None => {}
     }
-    let reference = arms.knowledge.map_or(f64::INFINITY, |k| k.region.sigma_mm);
-    (solved.sigma_mm > SIGMA_GROWTH * reference)
+    (solved.sigma_mm > SIGMA_GROWTH * measured_sigma_mm[solved.frames_index])
         .then_some(OutcomeReason::Uncertain { sigma_mm: solved.sigma_mm })
 }
 
-/// A pose whose predicted σ exceeds the worst measured pose's by this factor is flagged.
+/// A pose whose predicted σ exceeds that of the same tool at the worst measured pose by this factor is flagged.
 const SIGMA_GROWTH: f64 = 2.0;
 
 fn new_target(

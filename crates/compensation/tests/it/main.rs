@@ -34,9 +34,9 @@ use truegrind_compensation::cell::{Cell, CellFrame, FrameOrigin};
 use truegrind_compensation::deviation::{After, PathReport, Status};
 use truegrind_compensation::frames::taught::{taught_frame, taught_tcp};
 use truegrind_compensation::options::{Emit, Options};
-use truegrind_compensation::plan::Plan;
 use truegrind_compensation::plan::planner::plan;
 use truegrind_compensation::plan::reason::OutcomeReason;
+use truegrind_compensation::plan::{MotionOutcome, Plan};
 use truegrind_compensation::verify::{ActingArm, VerificationTask, verify};
 use truegrind_math::se3::Pose;
 use truegrind_math::statistics::ErrorSummary;
@@ -225,6 +225,50 @@ fn a_joint_outside_its_measured_range_is_flagged() {
         })
         .fold(0.0, f64::max);
     assert!((by - 5.0).abs() < 0.3, "joint 5 leaves by {by}°");
+}
+
+/// A tool of 600 mm is more uncertain than the flange wherever it is: what counts is whether it is more uncertain than at the measured poses.
+#[test]
+fn a_long_tool_is_compared_with_itself_at_the_measured_poses() {
+    let (_, joints) = blade();
+    let mut known = estimated(perturbed(2, 0.3), &joints);
+    // Angles are known to 0.1 mrad, lengths exactly.
+    for (k, parameter) in known.order.iter().enumerate() {
+        let truegrind_arm::parameter::Parameter::Link { coordinate, .. } = parameter else { continue };
+        known.covariance[(k, k)] = if coordinate.is_length() { 0.0 } else { 1e-8 };
+    }
+    let same = known.clone();
+    let arm = same.model.at_condition(&same.condition);
+    let sigma_mm = |length_mm: f64, q: &Joints| {
+        same.position_sigma_mm(&arm, q, &Pose::translation(0.0, 0.0, length_mm), None)
+    };
+    let at_flange = joints.iter().map(|q| sigma_mm(0.0, q)).fold(0.0, f64::max);
+    assert!(joints.iter().any(|q| sigma_mm(600.0, q) > 2.0 * at_flange), "{at_flange}");
+    known.region.sigma_mm = at_flange;
+    let moves = joints.iter().step_by(7).map(|q| {
+        let q: Vec<String> = q.iter().map(|angle| angle.to_degrees().to_string()).collect();
+        let none = "[9E9,9E9,9E9,9E9,9E9,9E9]";
+        format!("MoveAbsJ [[{}],{none}]\\NoEOffs,v20,fine,long;\n", q.join(","))
+    });
+    let source = format!(
+        "MODULE M\nPERS tooldata long:=[TRUE,[[0,0,600],[1,0,0,0]],[1,[0,0,10],[1,0,0,0],0,0,0]];\nPROC main()\n{}ENDPROC\nENDMODULE\n",
+        moves.collect::<String>()
+    );
+    let options = Options { joint_targets: true, ..Options::default() };
+    let uncertain = |known: &Estimated| {
+        let (planned, _) = rewritten(source.as_bytes(), known, &Cell::default(), &options);
+        let is_uncertain = |o: &MotionOutcome| matches!(o.reason(), Some(OutcomeReason::Uncertain { .. }));
+        [planned.outcomes.iter().filter(|o| is_uncertain(o)).count(), planned.outcomes.len()]
+    };
+    let [flagged, all] = uncertain(&known);
+    assert!(flagged == 0 && all > 10, "{flagged} of {all}");
+    // Measured where joint 5 is straight and the arm upright alone, its tool is less uncertain there than on the blade.
+    let upright = Joints::new(0.0, 0.0, -1.5, 0.0, 0.0, 0.0);
+    let growth = joints.iter().map(|q| sigma_mm(600.0, q) / sigma_mm(600.0, &upright)).fold(0.0, f64::max);
+    known.region.samples_deg = vec![std::array::from_fn(|i| upright[i].to_degrees())];
+    known.region.spacing_deg = 1e6;
+    let [flagged, _] = uncertain(&known);
+    assert_eq!(flagged > 0, growth > 2.0, "{growth}");
 }
 
 #[test]
