@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::reason::OutcomeReason;
+use crate::cut::starts;
 use crate::deviation::Status;
 use crate::line_list::lines_of;
 use truegrind_programs::motion::{Listing, Motion, MotionKind, Reason, TargetValue};
@@ -106,14 +107,6 @@ impl StepsToLeft {
             "; {lines} {start} at a joint target that is left: {they} would not follow the intended line from there (--joint-targets corrects \
              joint targets too)"
         ))
-    }
-}
-
-/// The motions where one may begin, as far as they are known.
-fn starts(listing: &Listing, index: u32) -> Vec<u32> {
-    match listing.motions[index as usize].previous {
-        Some(previous) => vec![previous],
-        None => listing.predecessors.get(&index).cloned().unwrap_or_default(),
     }
 }
 

@@ -55,6 +55,8 @@ fn name(why: &OutcomeReason) -> &'static str {
         OutcomeReason::NoCircle => "no circle",
         // tests/it/segment.rs.
         OutcomeReason::StartOfUnchangedArc { .. } => "before circle",
+        // tests/it/cut.rs.
+        OutcomeReason::StartOfUnchangedCut { .. } => "before a cut",
         // tests/it/singularity.rs.
         OutcomeReason::StartOfSingularPath { .. } => "before singular way",
         OutcomeReason::FullCircle => "whole circle",
