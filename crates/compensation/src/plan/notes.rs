@@ -57,6 +57,16 @@ pub(crate) fn beyond_noise_note(arms: &Arms<'_>, sigmas_mm: impl Iterator<Item =
     ))
 }
 
+/// Lines and arcs that may start at several places.
+pub(crate) fn several_starts_note(listing: &Listing, motions: &[u32]) -> Option<String> {
+    let lines = lines_of(listing, motions)?;
+    Some(format!(
+        "{} at several places: the path from each is checked against --tolerance, and nothing is inserted; joint limits, singularities and speeds \
+         on the way are not checked ({lines})",
+        counted(motions.len(), "line or arc may start", "lines or arcs may start")
+    ))
+}
+
 /// What was not checked or was assumed, with line numbers.
 pub(crate) fn unchecked_notes(
     listing: &Listing,

@@ -24,7 +24,8 @@ use crate::frames::frame_table::FrameTable;
 use crate::options::{Options, is_rewritable};
 use crate::plan::measured_sigma;
 use crate::plan::notes::{
-    backlash_note, beyond_noise_note, doubtful_effects_note, load_notes, unchecked_notes, unknown_loads,
+    backlash_note, beyond_noise_note, doubtful_effects_note, load_notes, several_starts_note,
+    unchecked_notes, unknown_loads,
 };
 use crate::plan::reason::OutcomeReason;
 use crate::plan::{MotionOutcome, Plan};
@@ -223,6 +224,8 @@ fn planned(job: &Planner<'_>) -> Plan {
     notes.extend(load_notes(listing, arms, options));
     let unchecked: Vec<u32> = portions.iter().flat_map(|portion| portion.unchecked.iter().copied()).collect();
     notes.extend(unchecked_notes(listing, solved, &unchecked));
+    let from_several: Vec<u32> = portions.iter().flat_map(|portion| &portion.from_several).copied().collect();
+    notes.extend(several_starts_note(listing, &from_several));
     notes.extend(beyond_noise_note(arms, outcomes.iter().filter_map(|outcome| outcome.shape_sigma_mm.get())));
     #[expect(clippy::filter_map_identity, reason = "works in place, unlike `flatten`: memory is at its peak")]
     let changes = changes.into_iter().filter_map(|change| change).collect();
@@ -258,6 +261,8 @@ type OutputSlots<'p> = (&'p mut [MotionOutcome], &'p mut [Option<Change>]);
 struct PortionResult {
     /// Lines and arcs that are written although their path was not checked.
     unchecked: Vec<u32>,
+    /// Lines and arcs that may start at several places, from each of which their path was checked.
+    from_several: Vec<u32>,
     points: Vec<PathPoint>,
 }
 
@@ -292,6 +297,14 @@ struct PlannedMotion {
 }
 
 impl PlannedMotion {
+    /// Takes over the worst of the segments from several starts.
+    fn from_each_start(&mut self, worst: &SegmentPlan) {
+        self.outcome.path_deviation_mm = worst.path_deviation_mm.into();
+        if let Some(flag) = worst.flag.filter(|_| self.outcome.status == Status::Changed) {
+            self.flag(flag);
+        }
+    }
+
     /// Flags a motion that is written.
     fn flag(&mut self, why: OutcomeReason) {
         (self.outcome.status, self.outcome.reason) = (Status::Flagged, Some(Box::new(why)));
@@ -325,6 +338,7 @@ impl<'a> Planner<'a> {
         let mut last: Option<(u32, SegmentPlan)> = None;
         let mut out = PortionResult {
             unchecked: Vec::new(),
+            from_several: Vec::new(),
             points: Vec::with_capacity(if self.options.points { count } else { 0 }),
         };
         let slots = outcomes.iter_mut().zip(changes.iter_mut());
@@ -336,11 +350,17 @@ impl<'a> Planner<'a> {
             if budget.exhausted && worked.change.is_some() {
                 worked.flag(OutcomeReason::Inverse(InverseError::Abandoned));
             }
-            last = worked.segment_plan.map(|segment_plan| (index as u32, segment_plan));
+            last = worked.segment_plan.take().map(|segment_plan| (index as u32, segment_plan));
             let motion = &self.listing.motions[index];
             let curve = matches!(motion.kind, MotionKind::Linear | MotionKind::Circular);
             if curve && path.is_none() && worked.change.is_some() {
-                out.unchecked.push(index as u32);
+                match with_budget(budget, || self.from_each_start(index)) {
+                    Some(segment_plan) => {
+                        worked.from_each_start(&segment_plan);
+                        out.from_several.push(index as u32);
+                    }
+                    None => out.unchecked.push(index as u32),
+                }
             }
             (*outcome, *change) = (worked.outcome, worked.change);
             out.points.extend(worked.point.map(|point| *point));
@@ -354,7 +374,12 @@ impl<'a> Planner<'a> {
         if !matches!(motion.kind, MotionKind::Linear | MotionKind::Circular | MotionKind::Joint) {
             return None;
         }
-        let previous = motion.previous? as usize;
+        self.path_from(motion.previous? as usize, index)
+    }
+
+    /// The same from the end of a motion that may come before it.
+    fn path_from(&self, previous: usize, index: usize) -> Option<Segment<'a>> {
+        let motion = &self.listing.motions[index];
         let before = &self.listing.motions[previous];
         let targets = self.solved.of(previous);
         let changes = |target: &Result<SolvedTarget<'_>, OutcomeReason>| {
@@ -371,6 +396,24 @@ impl<'a> Planner<'a> {
         let schedule = self.solved.condition_schedule(index, to.condition_index);
         let from = if from.index == to.index { from } else { from.with_frames_of(&to) };
         Some(Segment { from, to, schedule })
+    }
+
+    /// The worst segment to the end of a motion that several motions may come before, without inserted targets: those of a line from one start
+    /// do not lie on the line from another. `None` unless all starts are known and corrected.
+    fn from_each_start(&self, index: usize) -> Option<SegmentPlan> {
+        let starts = self.listing.predecessors.get(&(index as u32))?.iter();
+        let paths: Vec<Segment<'a>> =
+            starts.map(|start| self.path_from(*start as usize, index)).collect::<Option<_>>()?;
+        let motion =
+            Motion { insertable: false, can_straighten: false, ..self.listing.motions[index].clone() };
+        let via = circle_point(self.solved.of(index));
+        let middles = midpoint_deviations(&paths.iter().collect::<Vec<_>>(), self.arms, self.options.emit);
+        let plans = paths.iter().zip(middles);
+        let plans = plans
+            .map(|(path, middle)| SegmentPlan::of(&motion, Some(path), via, middle, self.arms, self.options));
+        // A segment whose deviation is unknown is the worst.
+        let rank = |plan: &SegmentPlan| plan.path_deviation_mm.unwrap_or(f64::INFINITY);
+        plans.max_by(|a, b| rank(a).total_cmp(&rank(b)))
     }
 
     /// Deviation from the intended corner at the start of a motion, where the robot rounds it. `last`: segment plan of the

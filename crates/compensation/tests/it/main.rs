@@ -296,6 +296,50 @@ fn a_long_line_gets_targets_only_where_the_tolerance_would_be_broken() {
     assert!(worst(&report, true) < 1e-3, "{}", worst(&report, true));
 }
 
+/// A line of a routine that is called from two places was not checked, as if its start were unknown: the path from either is.
+#[test]
+fn a_line_from_two_known_places_is_judged_by_the_worse_path() {
+    let target =
+        |x: f64, y: f64, turns: &str| format!("[[{x},{y},300],[0,0,1,0],{turns},[9E9,9E9,9E9,9E9,9E9,9E9]]");
+    let source = |first: f64, second: &str| {
+        let start = |y: f64| format!("MoveJ {},v100,fine,tool0;\n", target(420.0, y, "[-1,0,-1,0]"));
+        let side = format!("MoveL {},v100,fine,tool0;\n", target(420.0, 250.0, "[0,0,0,0]"));
+        format!(
+            "MODULE M\nVAR robtarget seen;\nPROC main()\n{}side;\n{second}side;\nENDPROC\nPROC side()\n{side}ENDPROC\nENDMODULE\n",
+            start(first)
+        )
+    };
+    let actual = perturbed(5, 3.0);
+    let mut known = estimated(actual, &[Joints::zeros()]);
+    (known.region.min_deg, known.region.max_deg) = ([-400.0; 6], [400.0; 6]);
+    known.region.spacing_deg = 1e6;
+    let planned = |source: &str, tolerance_mm: f64| {
+        let task = Task::read(&[("p.mod", source.as_bytes())]);
+        let options = Options { tolerance_mm, ..Options::default() };
+        let plan = plan(&task.listing, &known, &Cell::default(), &options);
+        let line = task.listing.motions.iter().position(|motion| &*motion.instruction == "MoveL").unwrap();
+        (plan.outcomes[line].clone(), plan.notes.join("\n"))
+    };
+    let near = format!("MoveJ {},v100,fine,tool0;\n", target(420.0, 100.0, "[0,0,0,0]"));
+    let bend_mm = |source: &str| planned(source, 5.0).0.path_deviation_mm.get();
+    let far_mm = bend_mm(&source(-250.0, "")).unwrap();
+    assert!(far_mm > 0.02, "{far_mm}");
+    let both = source(-250.0, &near);
+    assert!((bend_mm(&both).unwrap() - far_mm).abs() < 1e-9, "{:?}", bend_mm(&both));
+    let (outcome, notes) = planned(&both, far_mm / 3.0);
+    let judged =
+        matches!(outcome.reason(), Some(OutcomeReason::PathDeviation { mm }) if (mm - far_mm).abs() < 1e-9);
+    assert!(outcome.status == Status::Flagged && judged && outcome.inserted == 0, "{outcome:?}");
+    assert!(
+        notes.contains("1 line or arc may start at several places")
+            && !notes.contains("unknown or not corrected")
+    );
+    // One of the places is not known.
+    let (outcome, notes) = planned(&source(-250.0, "MoveJ Offs(seen,0,0,0),v20,fine,tool0;\n"), far_mm / 3.0);
+    assert_eq!((outcome.path_deviation_mm.get(), outcome.status), (None, Status::Changed));
+    assert!(notes.contains("1 line or arc starts at a place that is unknown or not corrected"), "{notes}");
+}
+
 #[test]
 fn a_taught_work_object_carries_its_frame_to_the_estimated_arm() {
     let (source, joints) = blade();
