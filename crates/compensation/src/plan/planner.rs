@@ -230,7 +230,7 @@ fn planned(job: &Planner<'_>) -> Plan {
     #[expect(clippy::filter_map_identity, reason = "works in place, unlike `flatten`: memory is at its peak")]
     let changes = changes.into_iter().filter_map(|change| change).collect();
     let unstated_axes = frame_table.unstated_axes.clone();
-    let unknown_loads = unknown_loads(arms, options);
+    let unknown_loads = unknown_loads(arms, options, &outcomes);
     let mut plan = Plan { notes, changes, outcomes, unstated_axes, unknown_loads, ..Plan::default() };
     plan.points.reserve_exact(portions.iter().map(|p| p.points.len()).sum());
     for mut portion in portions {
