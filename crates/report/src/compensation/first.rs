@@ -35,6 +35,10 @@ pub fn verdict(plan: &Plan, listing: &Listing, is_written: bool) -> Verdict {
             Status::Warning,
             "No cut is corrected, only motions between cuts: the deviation of the workpiece stays",
         ),
+        _ if is_again(listing) => (
+            Status::Warning,
+            "Corrected once more: the corrections add up, and what deviates now is not known from this program",
+        ),
         (_, 0) if left > 0 => (
             Status::Warning,
             "Corrected, except for cuts where the model is too uncertain: these are unchanged",
@@ -77,7 +81,7 @@ pub fn verdict(plan: &Plan, listing: &Listing, is_written: bool) -> Verdict {
              more poses near them improves the model (`truegrind plan`)"
         ));
     }
-    reasons.extend(placement::risk(plan));
+    reasons.extend(placement::risk(plan).filter(|_| !is_again(listing)));
     if refused > 0 && written > 0 {
         reasons.push(
             "refused motions are unchanged: the path has a step of the size of the correction between them and their corrected neighbours"
@@ -156,11 +160,30 @@ fn left_paths(plan: &Plan, listing: &Listing) -> Option<String> {
     }
 }
 
+/// Whether the program was corrected before: its numbers are then no longer those that were intended, which before, after and risk refer to.
+fn is_again(listing: &Listing) -> bool {
+    listing.marks.iter().any(Option::is_some)
+}
+
 /// Deviation before and after, in a sentence for each kind of correction; empty if unknown.
 fn deviations(plan: &Plan, listing: &Listing) -> Vec<String> {
+    if is_again(listing) {
+        return vec![
+            "the program was corrected before (mark in the file): its numbers are not those that were intended, so deviations before and \
+             after and the risk cannot be stated; correct the original program instead"
+                .to_owned(),
+        ];
+    }
     let found = if no_cut(plan, listing) { Vec::new() } else { placement::before_and_after(plan, listing) };
     if found.is_empty() {
-        let uncorrected = |mm: f64| format!("the uncorrected program deviates by up to {mm:.3} mm");
+        let unknown = plan.outcomes.iter().filter(|outcome| outcome.before_mm.get().is_none()).count();
+        let where_known = match unknown {
+            0 => String::new(),
+            1 => " where it is known (not at 1 motion)".to_owned(),
+            _ => format!(" where it is known (not at {unknown} motions)"),
+        };
+        let uncorrected =
+            |mm: f64| format!("the uncorrected program deviates by up to {mm:.3} mm{where_known}");
         return placement::largest_mm(plan).map(uncorrected).into_iter().collect();
     }
     let of_kind = |of: &BeforeAndAfter| {
@@ -187,6 +210,9 @@ fn deviation_figures(plan: &Plan, listing: &Listing) -> Vec<KeyFigure> {
             after(None, why.to_owned()),
         ]
     };
+    if is_again(listing) {
+        return vec![before(None, "corrected before".to_owned()), after(None, "corrected before".to_owned())];
+    }
     if no_cut(plan, listing) {
         return nothing("no cut is corrected");
     }
@@ -207,7 +233,7 @@ fn deviation_figures(plan: &Plan, listing: &Listing) -> Vec<KeyFigure> {
 pub(super) fn key_figures(plan: &Plan, listing: &Listing) -> Vec<KeyFigure> {
     let all = plan.outcomes.len();
     let mut figures = deviation_figures(plan, listing);
-    if let Some(chance) = plan.probability_of_harm {
+    if let Some(chance) = plan.probability_of_harm.filter(|_| !is_again(listing)) {
         figures.push(
             KeyFigure::new("Probability of worse", percent_of(chance), 0, "")
                 .note("all corrected cuts together"),

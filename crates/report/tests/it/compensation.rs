@@ -9,7 +9,7 @@ use truegrind_compensation::plan::reason::OutcomeReason;
 use truegrind_compensation::plan::{MotionOutcome, Plan};
 use truegrind_compensation::risk::placement::{ObjectPlacement, Placement};
 use truegrind_math::option_f64::OptionF64;
-use truegrind_programs::motion::{Listing, Reason};
+use truegrind_programs::motion::{Listing, Mark, Reason};
 use truegrind_programs::rapid::Task;
 use truegrind_report::compensation::{self as view, ProgramFile};
 use truegrind_report::format::{csv, markdown, terminal};
@@ -384,4 +384,33 @@ fn before_and_after_are_stated_of_the_same_motions() {
     plan.placements[1].applied = Placement::Absolute;
     let text = said(&plan);
     assert!(text.contains("corrected motions: 1.200 mm before, 0.600 mm expected after (1σ)"), "{text}");
+}
+
+/// A program that was corrected before states numbers that were never intended: nothing refers to them.
+#[test]
+fn a_program_that_is_corrected_again_states_no_before_and_after() {
+    let (mut plan, mut listing, files) = example();
+    plan.probability_of_harm = Some(0.006);
+    let said =
+        |plan: &Plan, listing: &Listing| terminal::document(&view::summary(plan, listing, &files), 400);
+    let once = said(&plan, &listing);
+    assert!(
+        once.contains("expected after") && once.contains("probability that the corrected cuts"),
+        "{once}"
+    );
+    let mark = Mark { version: "0.1.0".to_owned(), model: "abc".to_owned(), partial: false };
+    listing.marks = vec![Some(mark), None];
+    let again = said(&plan, &listing);
+    assert!(again.contains("[warning] Corrected once more: the corrections add up"), "{again}");
+    assert!(!again.contains("expected after") && !again.contains("probability that"), "{again}");
+}
+
+/// The largest deviation of an uncorrected program is that of the motions with a known one.
+#[test]
+fn an_uncorrected_program_says_where_its_deviation_is_unknown() {
+    let (mut plan, listing, files) = example();
+    plan.outcomes.iter_mut().for_each(|outcome| outcome.status = Status::Left);
+    let text = terminal::document(&view::summary(&plan, &listing, &files), 400);
+    let expected = "the uncorrected program deviates by up to 1.500 mm where it is known (not at 1 motion)";
+    assert!(text.contains(expected), "{text}");
 }
