@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use crate::arms::Arms;
 use crate::cell::{Carries, Cell, CellFrame, FrameOrigin};
 use crate::configuration::{configured, monitored, unstated};
-use crate::frames::frame_pair::{FramePair, ResolveContext, ResolvedFrames, resolve_frames};
+use crate::frames::frame_pair::{FrameNote, FramePair, ResolveContext, ResolvedFrames, resolve_frames};
 use crate::frames::taught::Teaching;
 use crate::plan::reason::OutcomeReason;
 use crate::search_budget;
@@ -215,8 +215,9 @@ impl FrameTable {
 
     pub(crate) fn notes(&self) -> Vec<String> {
         let mut said = HashSet::new();
-        let all = self.assumed.iter().chain(self.list.iter().flat_map(|m| &m.notes));
-        all.filter(|note| said.insert(note.as_str())).cloned().collect()
+        let assumed = self.assumed.iter().filter(|note| said.insert(note.as_str())).cloned();
+        let of_frames = FrameNote::sentences(self.list.iter().flat_map(|frames| &frames.notes));
+        assumed.chain(of_frames).collect()
     }
 }
 
