@@ -298,7 +298,7 @@ struct PlannedMotion {
 
 impl PlannedMotion {
     /// Takes over the worst of the segments from several starts.
-    fn from_each_start(&mut self, worst: &SegmentPlan) {
+    fn take_worst(&mut self, worst: &SegmentPlan) {
         self.outcome.path_deviation_mm = worst.path_deviation_mm.into();
         if let Some(flag) = worst.flag.filter(|_| self.outcome.status == Status::Changed) {
             self.flag(flag);
@@ -354,9 +354,9 @@ impl<'a> Planner<'a> {
             let motion = &self.listing.motions[index];
             let curve = matches!(motion.kind, MotionKind::Linear | MotionKind::Circular);
             if curve && path.is_none() && worked.change.is_some() {
-                match with_budget(budget, || self.from_each_start(index)) {
+                match with_budget(budget, || self.worst_of_starts(index)) {
                     Some(segment_plan) => {
-                        worked.from_each_start(&segment_plan);
+                        worked.take_worst(&segment_plan);
                         out.from_several.push(index as u32);
                     }
                     None => out.unchecked.push(index as u32),
@@ -400,7 +400,7 @@ impl<'a> Planner<'a> {
 
     /// The worst segment to the end of a motion that several motions may come before, without inserted targets: those of a line from one start
     /// do not lie on the line from another. `None` unless all starts are known and corrected.
-    fn from_each_start(&self, index: usize) -> Option<SegmentPlan> {
+    fn worst_of_starts(&self, index: usize) -> Option<SegmentPlan> {
         let starts = self.listing.predecessors.get(&(index as u32))?.iter();
         let paths: Vec<Segment<'a>> =
             starts.map(|start| self.path_from(*start as usize, index)).collect::<Option<_>>()?;
