@@ -114,6 +114,14 @@ fn find(root: &mut [u32], mut index: u32) -> u32 {
     index
 }
 
+/// The motions where one may begin, as far as they are known.
+pub(crate) fn starts(listing: &Listing, index: u32) -> Vec<u32> {
+    match listing.motions[index as usize].previous {
+        Some(previous) => vec![previous],
+        None => listing.predecessors.get(&index).cloned().unwrap_or_default(),
+    }
+}
+
 /// Whether the tool may cut during a motion.
 pub(crate) fn may_cut(motion: &Motion) -> bool {
     let path = matches!(motion.kind, MotionKind::Linear | MotionKind::Circular)
@@ -132,7 +140,7 @@ fn stops(motion: &Motion, listing: &Listing) -> bool {
 }
 
 /// Why a motion remains unmodified, with its status.
-type Obstacle<'a> = &'a (dyn Fn(u32) -> Option<(Status, OutcomeReason)> + Sync);
+pub(crate) type Obstacle<'a> = &'a (dyn Fn(u32) -> Option<(Status, OutcomeReason)> + Sync);
 
 /// The motions that could be corrected but remain unmodified with the rest of their cut.
 pub(crate) fn rest_of_cuts(

@@ -1,5 +1,6 @@
 //! Motions that must stay unchanged, and why: bounds, joint limits, singularities, arcs, and the rest of a cut.
 
+pub(crate) mod approaches;
 pub(crate) mod arc_feasibility;
 pub(crate) mod correction_bounds;
 pub(crate) mod joint_limits;

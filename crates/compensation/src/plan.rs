@@ -1,6 +1,7 @@
 //! A planned rewrite: the changes, and the outcome of every motion.
 
 pub mod listing_only_plan;
+mod measured_sigma;
 pub(crate) mod notes;
 pub mod planner;
 pub mod reason;
@@ -75,7 +76,7 @@ pub struct Plan {
     pub notes: Vec<String>,
     /// External axes that move or do not stand at 0, and of which the cell file does not say what they carry.
     pub unstated_axes: Vec<char>,
-    /// How many motions have a load that is known only at run time, under a model whose deflection follows the load.
+    /// How many corrected motions have a load that is known only at run time, under a model whose deflection follows the load.
     pub unknown_loads: usize,
     /// Steps between corrected motions and neighbours that are left; known once the program is rewritten.
     pub steps: Option<StepsToLeft>,

@@ -2,6 +2,7 @@
 
 pub(crate) mod assessment;
 pub mod cut_risk;
+pub(crate) mod fixtures;
 pub(crate) mod measurement_information;
 pub mod placement;
 pub mod prepared_estimate;

@@ -84,6 +84,9 @@ impl Row {
             matches!(motion_status, MotionStatus::Changed | MotionStatus::Flagged)
         };
         let after = plan.outcomes.iter().filter(|o| written(o.status)).filter_map(|o| o.after_mm.get());
+        // Before and after of the same motions: those of which most is expected to remain.
+        let found = placement::before_and_after(plan, listing).into_iter();
+        let most = found.max_by(|a, b| a.expected_mm.unwrap_or(0.0).total_cmp(&b.expected_mm.unwrap_or(0.0)));
         Row {
             file,
             output,
@@ -96,9 +99,9 @@ impl Row {
                 count(MotionStatus::Left),
             ],
             opaque: listing.opaque.len(),
-            before_mm: placement::before_mm(plan).or_else(|| placement::largest_mm(plan)),
+            before_mm: most.map_or_else(|| placement::largest_mm(plan), |most| Some(most.before_mm)),
             after_mm: after.reduce(f64::max),
-            expected_mm: placement::expected_mm(plan),
+            expected_mm: most.and_then(|most| most.expected_mm),
             note: undeclared_note(listing),
             doubt: doubt(plan, listing).filter(|_| ended == Ended::Changed),
             reason: most_frequent_reason(plan),

@@ -421,6 +421,9 @@ fn split_reason(reason: &OutcomeReason) -> (String, Option<(f64, &'static str)>)
             by_deg,
             "°",
         ),
+        OutcomeReason::StartOfUnchangedCut { .. } => plain(
+            "a cut that remains unmodified starts where it ends: from a corrected start the first line of the cut would become a wedge",
+        ),
         OutcomeReason::PartOfCut { because, .. } => plain(&format!(
             "a cut is corrected as a whole or not at all, and another motion of this cut is not corrected: {because}"
         )),

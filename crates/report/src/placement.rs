@@ -30,15 +30,49 @@ pub fn sentences(plan: &Plan, listing: &Listing) -> Vec<String> {
         .filter_map(|outcome| listing.work_object(listing.motions.get(outcome.motion as usize)?))
         .map(|object| object.name.as_str())
         .collect();
-    let of = |placement: &ObjectPlacement| match corrected.contains(placement.work_object.as_str()) {
-        true => sentence(placement, what),
-        false => format!(
-            "{what} {}: no motion with it is corrected; {}",
-            placement.work_object,
-            displacement(placement)
-        ),
+    let of = |placement: &ObjectPlacement| {
+        if names(placement).any(|name| corrected.contains(name)) {
+            return sentence(placement, what);
+        }
+        let with = if placement.others.is_empty() { "it" } else { "them" };
+        let named = named(placement, what);
+        format!("{named}: no motion with {with} is corrected; {}", displacement(placement))
     };
-    plan.placements.iter().map(of).collect()
+    let apart = apart(plan, what, |placement| names(placement).any(|name| corrected.contains(name)));
+    plan.placements.iter().map(of).chain(apart).collect()
+}
+
+/// What is said where the placement over some stationary objects is corrected and over others is not: the distances between them change.
+fn apart(plan: &Plan, what: &str, is_corrected: impl Fn(&ObjectPlacement) -> bool) -> Option<String> {
+    let stand = || plan.placements.iter().filter(|placement| !placement.held && is_corrected(placement));
+    let of = |applied: Placement| -> Vec<&str> {
+        stand().filter(|placement| placement.applied == applied).flat_map(names).collect()
+    };
+    let [moved, kept] = [Placement::Absolute, Placement::Shape].map(of);
+    let moved_mm = stand().filter(|placement| placement.applied == Placement::Absolute);
+    let most_mm = moved_mm.map(|placement| placement.deviation_mm).fold(0.0, f64::max);
+    (!moved.is_empty() && !kept.is_empty()).then(|| {
+        format!(
+            "the placement over {} is corrected, over {} it is not: the path over the one is displaced against the other by up to {most_mm:.3} mm. \
+             If these {what}s belong together, give them one user frame, or decide for both (--placement shape, --placement absolute)",
+            moved.join(", "),
+            kept.join(", ")
+        )
+    })
+}
+
+/// The work objects of a placement.
+fn names(placement: &ObjectPlacement) -> impl Iterator<Item = &str> {
+    std::iter::once(&placement.work_object).chain(&placement.others).map(String::as_str)
+}
+
+/// The same as the subject of a sentence.
+fn named(placement: &ObjectPlacement, what: &str) -> String {
+    let all: Vec<&str> = names(placement).collect();
+    match all.as_slice() {
+        [name] => format!("{what} {name}"),
+        all => format!("{what}s {} (one user frame)", all.join(", ")),
+    }
 }
 
 /// How far the path as a whole is displaced.
@@ -55,21 +89,21 @@ fn object_word(listing: &Listing) -> &'static str {
 }
 
 fn sentence(placement: &ObjectPlacement, what: &str) -> String {
-    let ObjectPlacement { work_object, applied, probability_of_harm, remedy, unlocated, .. } = placement;
-    let known = displacement(placement);
+    let ObjectPlacement { applied, probability_of_harm, remedy, unlocated, .. } = placement;
+    let (named, known) = (named(placement, what), displacement(placement));
     if *applied == Placement::Absolute {
-        return format!("{what} {work_object}: shape and placement are corrected; {known}");
+        return format!("{named}: shape and placement are corrected; {known}");
     }
     if *unlocated {
         return format!(
-            "{what} {work_object}: only the shape is corrected, not the placement, since the {what} was taught with this arm and its \
+            "{named}: only the shape is corrected, not the placement, since the {what} was taught with this arm and its \
              teaching points are not given; with them (cell file, teaching_deg) the placement becomes known; --placement absolute \
              takes the programmed frame as exact"
         );
     }
     let remedy = remedy.as_ref().map(|remedy| format!("{}; ", remedy_text(remedy, what))).unwrap_or_default();
     format!(
-        "{what} {work_object}: only the shape is corrected, not the placement; {known}; correcting that too would make the path worse \
+        "{named}: only the shape is corrected, not the placement; {known}; correcting that too would make the path worse \
          with a probability of {}; {remedy}--placement absolute corrects it anyway",
         percent_of(*probability_of_harm)
     )
@@ -151,19 +185,8 @@ pub fn left_at_risk(plan: &Plan) -> (usize, usize) {
     (plan.cuts.iter().filter(|cut| cut.left_for_risk).count(), plan.cuts.len())
 }
 
-/// Whether a work object is corrected in shape only, so that the 1σ of the shape is the relevant one.
-pub fn corrects_shape_only(plan: &Plan) -> bool {
-    plan.placements.iter().any(|placement| placement.applied == Placement::Shape)
-}
-
 fn rewritten(plan: &Plan) -> impl Iterator<Item = &MotionOutcome> {
     plan.outcomes.iter().filter(|outcome| matches!(outcome.status, Status::Changed | Status::Flagged))
-}
-
-/// Largest uncorrected deviation of the rewritten motions (mm), of the shape if only that is corrected; `None` if nothing is
-/// rewritten.
-pub fn before_mm(plan: &Plan) -> Option<f64> {
-    rewritten(plan).filter_map(|outcome| outcome.before_mm.get()).reduce(f64::max)
 }
 
 /// Largest uncorrected deviation of all motions (mm).
@@ -171,13 +194,40 @@ pub fn largest_mm(plan: &Plan) -> Option<f64> {
     plan.outcomes.iter().filter_map(|outcome| outcome.before_mm.get()).reduce(f64::max)
 }
 
-/// Largest expected deviation of the rewritten motions (mm): remainder of the solver and predicted 1σ.
-pub fn expected_mm(plan: &Plan) -> Option<f64> {
-    let shape = corrects_shape_only(plan);
-    let sigma = |outcome: &MotionOutcome| if shape { outcome.shape_sigma_mm } else { outcome.sigma_mm };
-    rewritten(plan)
-        .filter_map(|outcome| Some(outcome.after_mm.get()?.hypot(sigma(outcome).get()?)))
-        .reduce(f64::max)
+/// Largest deviation before and after over the rewritten motions of which the same is corrected.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BeforeAndAfter {
+    /// Whether that is the shape alone.
+    pub shape_only: bool,
+    /// Largest uncorrected deviation (mm), of the shape if only that is corrected.
+    pub before_mm: f64,
+    /// Largest expected deviation of the same motions (mm): remainder of the solver and predicted 1σ; absent if no σ is known.
+    pub expected_mm: Option<f64>,
+}
+
+/// Before and after of what is corrected in shape and placement, and of what is corrected in shape alone: the one contains the placement of the
+/// path, the other does not, so no figure of the one may stand beside one of the other. Motions outside cuts have no σ of a shape and do not
+/// count there.
+pub fn before_and_after(plan: &Plan, listing: &Listing) -> Vec<BeforeAndAfter> {
+    let shape: BTreeSet<&str> =
+        plan.placements.iter().filter(|p| p.applied == Placement::Shape).flat_map(names).collect();
+    let is_shape_only = |outcome: &MotionOutcome| {
+        let motion = listing.motions.get(outcome.motion as usize);
+        let object = motion.and_then(|motion| listing.work_object(motion));
+        object.is_some_and(|object| shape.contains(object.name.as_str()))
+    };
+    let of = |shape_only: bool| {
+        let sigma =
+            |outcome: &MotionOutcome| if shape_only { outcome.shape_sigma_mm } else { outcome.sigma_mm };
+        let expected = |outcome: &MotionOutcome| Some(outcome.after_mm.get()?.hypot(sigma(outcome).get()?));
+        let same = || rewritten(plan).filter(|outcome| is_shape_only(outcome) == shape_only);
+        let expected_mm = same().filter_map(expected).reduce(f64::max);
+        let counts = |outcome: &&MotionOutcome| expected_mm.is_none() || expected(outcome).is_some();
+        let before_mm =
+            same().filter(counts).filter_map(|outcome| outcome.before_mm.get()).reduce(f64::max)?;
+        Some(BeforeAndAfter { shape_only, before_mm, expected_mm })
+    };
+    [false, true].into_iter().filter_map(of).collect()
 }
 
 /// The probability that the corrected cuts get worse, as a sentence; `None` if unknown.
@@ -211,9 +261,10 @@ fn remedy_json(remedy: &Remedy, what: &str) -> Value {
 /// The entries `placements` and `cuts` of the JSON report.
 pub fn json(plan: &Plan, listing: &Listing) -> [Value; 2] {
     let what = object_word(listing);
-    let placements = plan.placements.iter().map(|p| {
+    let each = plan.placements.iter().flat_map(|p| names(p).map(move |name| (p, name)));
+    let placements = each.map(|(p, name)| {
         json!({
-            "work_object": p.work_object, "corrected": word(p.applied), "off_mm": p.deviation_mm, "sigma_mm": p.sigma_mm,
+            "work_object": name, "corrected": word(p.applied), "off_mm": p.deviation_mm, "sigma_mm": p.sigma_mm,
             "chance_of_worse": p.probability_of_harm, "taught": p.taught, "remedy": p.remedy.as_ref().map(|remedy| remedy_json(remedy, what)),
         })
     });

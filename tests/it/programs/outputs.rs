@@ -235,10 +235,12 @@ fn dry_run_check_and_diff_write_no_program() {
     let (code, _, err) = truegrind(at, &["compensate", "b.mod", "--model", "other.toml", "-o", "c.mod"]);
     assert_eq!(code, 2);
     assert!(err.contains("--again") && !at.join("c.mod").exists(), "{err}");
-    let (code, _, err) =
+    let (code, out, err) =
         truegrind(at, &["compensate", "b.mod", "--model", "other.toml", "-o", "c.mod", "--again"]);
-    assert_eq!(code, 0, "{err}");
+    // It was asked for, but nobody knows what deviates now.
+    assert_eq!(code, 1, "{err}");
     assert!(err.contains("add up"), "{err}");
+    assert!(out.contains("[warning] Corrected once more") && !out.contains("expected after"), "{out}");
     let marked = fs::read_to_string(at.join("c.mod")).unwrap();
     assert_eq!(marked.matches("truegrind 0").count(), 1, "one mark, of the new model: {marked}");
     // A fragment carries no mark, and that is said.

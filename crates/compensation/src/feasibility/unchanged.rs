@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use crate::arms::Arms;
 use crate::cut::{self, Cuts, CutsOf};
 use crate::deviation::Status;
+use crate::feasibility::approaches;
 use crate::feasibility::arc_feasibility::infeasible_arcs;
 use crate::feasibility::half_turns::half_turns;
 use crate::feasibility::joint_lines::lines_without_start;
@@ -42,17 +43,22 @@ pub(crate) fn unchanged_motions(
         out.extend(lines_without_start(listing, solved, options, &out));
         let solved_so_far = &*solved;
         let kept = |motion: u32| blocking_reason(motion, listing, solved_so_far, options, &out);
+        let shift_mm = |motion: u32| {
+            let end = solved_so_far.of(motion as usize).last().and_then(|to| to.as_ref().ok());
+            end.map_or(0.0, SolvedTarget::shift_mm)
+        };
         let more = match options.cuts {
             Cuts::Whole => cut::rest_of_cuts(listing, cuts, &kept),
-            Cuts::Partial => cut::steps(listing, cuts, &kept, options.tolerance_mm, &|motion| {
-                solved
-                    .of(motion as usize)
-                    .last()
-                    .and_then(|to| to.as_ref().ok())
-                    .map_or(0.0, SolvedTarget::shift_mm)
-            }),
+            Cuts::Partial => cut::steps(listing, cuts, &kept, options.tolerance_mm, &shift_mm),
             Cuts::Single => Vec::new(),
         };
+        // Lines of NC programs have no stops, and their air moves are judged once they are written.
+        let approaches = if listing.numbered || options.cuts == Cuts::Single {
+            Vec::new()
+        } else {
+            approaches::of_cuts_left(listing, cuts, &kept, options.tolerance_mm, &shift_mm)
+        };
+        out.extend(approaches);
         out.extend(more);
         if out.len() == before && !forbidden {
             return out;

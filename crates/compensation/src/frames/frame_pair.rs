@@ -66,8 +66,99 @@ pub(crate) struct ResolvedFrames {
     pub carried: Option<RegisteredFrame>,
     /// Whether the work object was taught with this arm by points that are not given, so that its real place is unknown.
     pub unlocated: bool,
-    /// Assumptions, one sentence each.
-    pub notes: Vec<String>,
+    /// Whether the work object was taught with this arm, by points that are given or not.
+    pub taught: bool,
+    /// Assumptions.
+    pub notes: Vec<FrameNote>,
+}
+
+/// An assumption about a tool or work object.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct FrameNote {
+    /// What is assumed.
+    said: String,
+    /// What it would mean had the frame been taught; absent where that is no question.
+    taught: Option<WouldMove>,
+}
+
+/// How far a frame would move had it been taught with this arm.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum WouldMove {
+    /// No typical pose allows an estimate.
+    Unknown,
+    /// Its TCP.
+    Tool { mm: f64 },
+    /// The whole frame.
+    Object { mm: f64, deg: f64 },
+}
+
+impl FrameNote {
+    fn known(said: String) -> Self {
+        Self { said, taught: None }
+    }
+
+    /// One sentence for each assumption: the pairs of one tool with several work objects have estimates at different places, of which the
+    /// largest counts.
+    pub(crate) fn sentences<'n>(notes: impl Iterator<Item = &'n FrameNote>) -> Vec<String> {
+        let mut merged: Vec<(FrameNote, bool)> = Vec::new();
+        for note in notes {
+            match merged.iter_mut().find(|(other, _)| other.said == note.said) {
+                Some((other, several)) => {
+                    *several |= other.taught.is_some_and(|a| note.taught.is_some_and(|b| a.differs(&b)));
+                    other.taught = other.taught.zip(note.taught).map(|(a, b)| a.larger(b));
+                }
+                None => merged.push((note.clone(), false)),
+            }
+        }
+        merged.iter().map(|(note, several)| note.text(*several)).collect()
+    }
+
+    /// `several`: whether other places have smaller estimates.
+    fn text(&self, several: bool) -> String {
+        let about = if several { "up to about" } else { "about" };
+        let estimate = match self.taught {
+            None => return self.said.clone(),
+            Some(WouldMove::Unknown) => {
+                "how far it would move had it been taught cannot be estimated here".to_owned()
+            }
+            Some(WouldMove::Tool { mm }) => {
+                format!("had it been taught with this arm, its TCP would move by {about} {mm:.2} mm")
+            }
+            Some(WouldMove::Object { mm, deg }) => {
+                format!("had it been taught with this arm, it would move by {about} {mm:.2} mm and {deg:.3}°")
+            }
+        };
+        format!("{}; {estimate}", self.said)
+    }
+}
+
+impl WouldMove {
+    fn mm(&self) -> Option<f64> {
+        match *self {
+            Self::Unknown => None,
+            Self::Tool { mm } | Self::Object { mm, .. } => Some(mm),
+        }
+    }
+
+    /// Whether two estimates print differently.
+    fn differs(&self, other: &Self) -> bool {
+        self.mm().zip(other.mm()).is_some_and(|(a, b)| (a - b).abs() > 0.005)
+    }
+
+    fn larger(self, other: Self) -> Self {
+        match (self, other) {
+            (Self::Object { mm: a, deg: x }, Self::Object { mm: b, deg: y }) => {
+                Self::Object { mm: a.max(b), deg: x.max(y) }
+            }
+            (a, b) => {
+                if b.mm() > a.mm() {
+                    b
+                } else {
+                    a
+                }
+            }
+        }
+    }
 }
 
 /// Inputs for resolving a frame pair.
@@ -102,13 +193,13 @@ pub(crate) fn resolve_frames(
         tool_note(tool, &real_tool, &commanded, with),
         object_note(object, &real, &commanded, &real_object, with),
     ];
-    let unlocated = !commanded.holds_part
-        && real_object.taught.is_none()
-        && teaching.stated.object(object).is_some_and(|frame| frame.origin == FrameOrigin::Taught);
+    let taught = teaching.stated.object(object).is_some_and(|frame| frame.origin == FrameOrigin::Taught);
+    let unlocated = !commanded.holds_part && real_object.taught.is_none() && taught;
     // A frame on the flange moves with the arm: it has no position of its own in the base.
-    let taught = real_object.taught.filter(|_| !commanded.holds_part);
-    let carried = taught.zip(with.knowledge).and_then(|(t, k)| carried_frame(k, teaching.estimated, &t));
-    Ok(ResolvedFrames { commanded, real, carried, unlocated, notes: notes.into_iter().flatten().collect() })
+    let moves = real_object.taught.filter(|_| !commanded.holds_part);
+    let carried = moves.zip(with.knowledge).and_then(|(t, k)| carried_frame(k, teaching.estimated, &t));
+    let notes = notes.into_iter().flatten().collect();
+    Ok(ResolvedFrames { commanded, real, carried, unlocated, taught, notes })
 }
 
 fn built_in(name: &str) -> bool {
@@ -121,22 +212,26 @@ fn tool_note(
     real: &RealTool,
     commanded: &FramePair,
     with: &ResolveContext<'_>,
-) -> Option<String> {
+) -> Option<FrameNote> {
     let name = &tool.name;
     match with.teaching.stated.tool(tool) {
         Some(frame) if frame.origin == FrameOrigin::Metrology => None,
         Some(_) => Some(match real.moved_mm {
-            Some(shift) => format!("tool {name} was taught: re-evaluated, its TCP moves by {shift:.3} mm"),
-            None => format!(
-                "tool {name} was taught, but its teaching points are not given: taken as exact; {}",
-                tool_estimate(commanded, with)
-            ),
+            Some(shift) => FrameNote::known(format!(
+                "tool {name} was taught: re-evaluated, its TCP moves by {shift:.3} mm"
+            )),
+            None => FrameNote {
+                said: format!(
+                    "tool {name} was taught, but its teaching points are not given: taken as exact"
+                ),
+                taught: Some(tool_estimate(commanded, with)),
+            },
         }),
         None if built_in(name) => None,
-        None => Some(format!(
-            "tool {name}: origin not stated, taken as metrology (exact); {}",
-            tool_estimate(commanded, with)
-        )),
+        None => Some(FrameNote {
+            said: format!("tool {name}: origin not stated, taken as metrology (exact)"),
+            taught: Some(tool_estimate(commanded, with)),
+        }),
     }
 }
 
@@ -147,7 +242,7 @@ fn object_note(
     commanded: &FramePair,
     found: &RealObject,
     with: &ResolveContext<'_>,
-) -> Option<String> {
+) -> Option<FrameNote> {
     let name = &object.name;
     let what = if with.teaching.listing.numbered { "work offset" } else { "work object" };
     match with.teaching.stated.object(object) {
@@ -155,18 +250,24 @@ fn object_note(
         Some(_) if found.taught.is_some() => {
             let shift = (real.object.translation.vector - commanded.object.translation.vector).norm();
             let turn = real.object.rotation.angle_to(&commanded.object.rotation).to_degrees();
-            Some(format!("{what} {name} was taught: re-evaluated, it moves by {shift:.3} mm and {turn:.4}°"))
+            Some(FrameNote::known(format!(
+                "{what} {name} was taught: re-evaluated, it moves by {shift:.3} mm and {turn:.4}°"
+            )))
         }
-        Some(_) => Some(format!(
-            "{what} {name} was taught, but its teaching points are not given: only an absolute placement takes it as exact; {}",
-            object_estimate(commanded, with)
-        )),
+        Some(_) => Some(FrameNote {
+            said: format!(
+                "{what} {name} was taught, but its teaching points are not given: only an absolute placement takes it as exact"
+            ),
+            taught: Some(object_estimate(commanded, with)),
+        }),
         None if built_in(name) => None,
-        None => Some(format!(
-            "{what} {name}: origin not stated, taken as metrology (exact {}); {}",
-            if commanded.holds_part { "on the flange" } else { "in the robot's base" },
-            object_estimate(commanded, with)
-        )),
+        None => Some(FrameNote {
+            said: format!(
+                "{what} {name}: origin not stated, taken as metrology (exact {})",
+                if commanded.holds_part { "on the flange" } else { "in the robot's base" }
+            ),
+            taught: Some(object_estimate(commanded, with)),
+        }),
     }
 }
 
@@ -207,18 +308,14 @@ pub(crate) fn carried_through(
     Some(RegisteredFrame { origin_mm: frame.translation.vector, twists })
 }
 
-/// Where no typical pose allows an estimate.
-const NO_ESTIMATE: &str = "how far it would move had it been taught cannot be estimated here";
-
 /// How far a taught TCP would move: four orientations about a typical pose, TCP fixed under the nominal model. A stationary
 /// tool is touched once with the centre of the flange.
-fn tool_estimate(commanded: &FramePair, with: &ResolveContext<'_>) -> String {
+fn tool_estimate(commanded: &FramePair, with: &ResolveContext<'_>) -> WouldMove {
     let Teaching { nominal, estimated, .. } = with.teaching;
     let typical_at: &Joints = &with.typical_at;
     if commanded.holds_part {
         let flange = |arm: &PreparedModel<'_>| arm.forward(typical_at).translation.vector;
-        let shift = (flange(estimated) - flange(nominal)).norm();
-        return format!("had it been taught with this arm, its TCP would move by about {shift:.2} mm");
+        return WouldMove::Tool { mm: (flange(estimated) - flange(nominal)).norm() };
     }
     let turns = [[0.0, 0.0, 0.0], [0.5, 0.3, 0.0], [-0.5, 0.3, 0.6], [0.0, -0.5, -0.6]];
     let inverse = with.inverse;
@@ -231,16 +328,13 @@ fn tool_estimate(commanded: &FramePair, with: &ResolveContext<'_>) -> String {
         })
         .collect();
     match taught_tcp(estimated, &teaching) {
-        Some(tcp) => {
-            let shift = (tcp - commanded.tool.translation.vector).norm();
-            format!("had it been taught with this arm, its TCP would move by about {shift:.2} mm")
-        }
-        None => NO_ESTIMATE.to_owned(),
+        Some(tcp) => WouldMove::Tool { mm: (tcp - commanded.tool.translation.vector).norm() },
+        None => WouldMove::Unknown,
     }
 }
 
 /// How far a taught work object would move: its origin and 100 mm along x and y, touched near a typical pose.
-fn object_estimate(commanded: &FramePair, with: &ResolveContext<'_>) -> String {
+fn object_estimate(commanded: &FramePair, with: &ResolveContext<'_>) -> WouldMove {
     let Teaching { nominal, estimated, .. } = with.teaching;
     let typical_at: &Joints = &with.typical_at;
     let inverse = with.inverse;
@@ -256,11 +350,10 @@ fn object_estimate(commanded: &FramePair, with: &ResolveContext<'_>) -> String {
         })
         .collect();
     match <[Point3<f64>; 3]>::try_from(touched).ok().and_then(|p| taught_frame(&p)) {
-        Some(pose) => {
-            let shift = (pose.translation.vector - commanded.object.translation.vector).norm();
-            let turn = pose.rotation.angle_to(&commanded.object.rotation).to_degrees();
-            format!("had it been taught with this arm, it would move by about {shift:.2} mm and {turn:.3}°")
-        }
-        None => NO_ESTIMATE.to_owned(),
+        Some(pose) => WouldMove::Object {
+            mm: (pose.translation.vector - commanded.object.translation.vector).norm(),
+            deg: pose.rotation.angle_to(&commanded.object.rotation).to_degrees(),
+        },
+        None => WouldMove::Unknown,
     }
 }

@@ -1,14 +1,14 @@
 //! Frame table of a program: every pair of tool and work object once, and the external axes that carry the base.
 
 use std::cell::LazyCell;
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeSet, HashMap, HashSet};
 
 use rayon::prelude::*;
 
 use crate::arms::Arms;
 use crate::cell::{AXES, Carries, Cell, CellFrame, FrameOrigin};
 use crate::configuration::{configured, monitored, unstated};
-use crate::frames::frame_pair::{FramePair, ResolveContext, ResolvedFrames, resolve_frames};
+use crate::frames::frame_pair::{FrameNote, FramePair, ResolveContext, ResolvedFrames, resolve_frames};
 use crate::frames::taught::Teaching;
 use crate::line_list::numbered;
 use crate::plan::reason::OutcomeReason;
@@ -233,10 +233,17 @@ impl FrameTable {
         self.objects.clone()
     }
 
+    /// The work objects that were taught with this arm.
+    pub(crate) fn taught(&self) -> BTreeSet<u32> {
+        let taught = self.list.iter().zip(&self.objects).filter(|(frames, _)| frames.taught);
+        taught.map(|(_, object)| *object).collect()
+    }
+
     pub(crate) fn notes(&self) -> Vec<String> {
         let mut said = HashSet::new();
-        let all = self.assumed.iter().chain(self.list.iter().flat_map(|m| &m.notes));
-        all.filter(|note| said.insert(note.as_str())).cloned().collect()
+        let assumed = self.assumed.iter().filter(|note| said.insert(note.as_str())).cloned();
+        let of_frames = FrameNote::sentences(self.list.iter().flat_map(|frames| &frames.notes));
+        assumed.chain(of_frames).collect()
     }
 }
 

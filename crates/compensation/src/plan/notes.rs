@@ -2,10 +2,12 @@
 
 use crate::arms::Arms;
 use crate::condition::payload::{is_load_dependent, payload_at};
+use crate::deviation::Status;
 use crate::line_list::{lines_of, numbered};
 use crate::options::Options;
+use crate::plan::MotionOutcome;
 use crate::target::solved_target::SolvedTargets;
-use truegrind_programs::motion::load::Loads;
+use truegrind_programs::motion::load::Grip;
 use truegrind_programs::motion::{Listing, Motion, MotionKind, Origin, Place, Switch};
 
 /// How backlash enters this program.
@@ -54,6 +56,16 @@ pub(crate) fn beyond_noise_note(arms: &Arms<'_>, sigmas_mm: impl Iterator<Item =
     Some(format!(
         "the readings deviate from this model by {beyond:.3} mm RMS beyond their noise, from effects that it does not contain: programs may be \
          off by as much, which no σ here contains; `truegrind diagnose` looks for the causes"
+    ))
+}
+
+/// Lines and arcs that may start at several places.
+pub(crate) fn several_starts_note(listing: &Listing, motions: &[u32]) -> Option<String> {
+    let lines = lines_of(listing, motions)?;
+    Some(format!(
+        "{} at several places: the path from each is checked against --tolerance, and nothing is inserted; joint limits, singularities and speeds \
+         on the way are not checked ({lines})",
+        counted(motions.len(), "line or arc may start", "lines or arcs may start")
     ))
 }
 
@@ -183,10 +195,14 @@ fn grams(kg: f64) -> f64 {
     (kg * 1e3).round() / 1e3
 }
 
-/// How many motions have a load that is known only at run time, under a model whose deflection follows the load.
-pub(crate) fn unknown_loads(arms: &Arms<'_>, options: &Options) -> usize {
+/// How many corrected motions have a load that is known only at run time, under a model whose deflection follows the load. At what is left the
+/// load changes nothing.
+pub(crate) fn unknown_loads(arms: &Arms<'_>, options: &Options, outcomes: &[MotionOutcome]) -> usize {
     let load_dependent = arms.estimated.arm().model.effects.iter().any(is_load_dependent);
-    options.loads.as_ref().filter(|_| load_dependent).map_or(0, Loads::unknown)
+    let Some(loads) = options.loads.as_ref().filter(|_| load_dependent) else { return 0 };
+    let is_corrected = |outcome: &&MotionOutcome| matches!(outcome.status, Status::Changed | Status::Flagged);
+    let corrected = outcomes.iter().filter(is_corrected);
+    corrected.filter(|outcome| loads.grip(outcome.motion as usize) == Grip::Unknown).count()
 }
 
 /// Which payload was assumed.

@@ -22,8 +22,10 @@ use crate::feasibility::unchanged::{blocking_reason, unchanged_motions};
 use crate::frames::frame_pair::FramePair;
 use crate::frames::frame_table::FrameTable;
 use crate::options::{Options, is_rewritable};
+use crate::plan::measured_sigma;
 use crate::plan::notes::{
-    backlash_note, beyond_noise_note, doubtful_effects_note, load_notes, unchecked_notes, unknown_loads,
+    backlash_note, beyond_noise_note, doubtful_effects_note, load_notes, several_starts_note,
+    unchecked_notes, unknown_loads,
 };
 use crate::plan::reason::OutcomeReason;
 use crate::plan::{MotionOutcome, Plan};
@@ -100,9 +102,11 @@ impl<'a> SolvedProgram<'a> {
     pub(crate) fn plan(&mut self, refused: &BTreeMap<u32, OutcomeReason>) -> Plan {
         let unchanged = self.unchanged_for(refused);
         let Self { listing, options, arms, frame_table, assessment, solved, .. } = self;
+        let measured_sigma_mm = measured_sigma::of(frame_table, solved, arms);
         let mut plan = planned(&Planner {
             listing,
             solved,
+            measured_sigma_mm: &measured_sigma_mm,
             unchanged: &unchanged,
             frame_table,
             assessment,
@@ -180,7 +184,7 @@ fn assess(
     posterior: &[PosteriorComponent],
 ) -> Assessment {
     let Some(knowledge) = arms.knowledge else { return Assessment::default() };
-    let chosen = AssessmentSample::of(listing, cuts, |motion| program.knows(motion));
+    let chosen = AssessmentSample::of(listing, cuts, &frame_table.taught(), |motion| program.knows(motion));
     let loads = arms.loads(listing, options.loads.as_ref());
     let condition_indices: Vec<usize> = if loads.is_empty() {
         vec![arms.conditions.condition_index([0; 6], None); listing.motions.len()]
@@ -220,11 +224,13 @@ fn planned(job: &Planner<'_>) -> Plan {
     notes.extend(load_notes(listing, arms, options));
     let unchecked: Vec<u32> = portions.iter().flat_map(|portion| portion.unchecked.iter().copied()).collect();
     notes.extend(unchecked_notes(listing, solved, &unchecked));
+    let from_several: Vec<u32> = portions.iter().flat_map(|portion| &portion.from_several).copied().collect();
+    notes.extend(several_starts_note(listing, &from_several));
     notes.extend(beyond_noise_note(arms, outcomes.iter().filter_map(|outcome| outcome.shape_sigma_mm.get())));
     #[expect(clippy::filter_map_identity, reason = "works in place, unlike `flatten`: memory is at its peak")]
     let changes = changes.into_iter().filter_map(|change| change).collect();
     let unstated_axes = frame_table.unstated_axes.clone();
-    let unknown_loads = unknown_loads(arms, options);
+    let unknown_loads = unknown_loads(arms, options, &outcomes);
     let mut plan = Plan { notes, changes, outcomes, unstated_axes, unknown_loads, ..Plan::default() };
     plan.points.reserve_exact(portions.iter().map(|p| p.points.len()).sum());
     for mut portion in portions {
@@ -241,6 +247,8 @@ struct Planner<'a> {
     /// Motions that remain unmodified although their targets could be corrected.
     unchanged: &'a BTreeMap<u32, OutcomeReason>,
     frame_table: &'a FrameTable,
+    /// The largest σ over the measured poses, by frame pair (mm).
+    measured_sigma_mm: &'a [f64],
     assessment: &'a Assessment,
     arms: &'a Arms<'a>,
     options: &'a Options,
@@ -253,6 +261,8 @@ type OutputSlots<'p> = (&'p mut [MotionOutcome], &'p mut [Option<Change>]);
 struct PortionResult {
     /// Lines and arcs that are written although their path was not checked.
     unchecked: Vec<u32>,
+    /// Lines and arcs that may start at several places, from each of which their path was checked.
+    from_several: Vec<u32>,
     points: Vec<PathPoint>,
 }
 
@@ -287,6 +297,14 @@ struct PlannedMotion {
 }
 
 impl PlannedMotion {
+    /// Takes over the worst of the segments from several starts.
+    fn take_worst(&mut self, worst: &SegmentPlan) {
+        self.outcome.path_deviation_mm = worst.path_deviation_mm.into();
+        if let Some(flag) = worst.flag.filter(|_| self.outcome.status == Status::Changed) {
+            self.flag(flag);
+        }
+    }
+
     /// Flags a motion that is written.
     fn flag(&mut self, why: OutcomeReason) {
         (self.outcome.status, self.outcome.reason) = (Status::Flagged, Some(Box::new(why)));
@@ -320,6 +338,7 @@ impl<'a> Planner<'a> {
         let mut last: Option<(u32, SegmentPlan)> = None;
         let mut out = PortionResult {
             unchecked: Vec::new(),
+            from_several: Vec::new(),
             points: Vec::with_capacity(if self.options.points { count } else { 0 }),
         };
         let slots = outcomes.iter_mut().zip(changes.iter_mut());
@@ -331,11 +350,17 @@ impl<'a> Planner<'a> {
             if budget.exhausted && worked.change.is_some() {
                 worked.flag(OutcomeReason::Inverse(InverseError::Abandoned));
             }
-            last = worked.segment_plan.map(|segment_plan| (index as u32, segment_plan));
+            last = worked.segment_plan.take().map(|segment_plan| (index as u32, segment_plan));
             let motion = &self.listing.motions[index];
             let curve = matches!(motion.kind, MotionKind::Linear | MotionKind::Circular);
             if curve && path.is_none() && worked.change.is_some() {
-                out.unchecked.push(index as u32);
+                match with_budget(budget, || self.worst_of_starts(index)) {
+                    Some(segment_plan) => {
+                        worked.take_worst(&segment_plan);
+                        out.from_several.push(index as u32);
+                    }
+                    None => out.unchecked.push(index as u32),
+                }
             }
             (*outcome, *change) = (worked.outcome, worked.change);
             out.points.extend(worked.point.map(|point| *point));
@@ -349,7 +374,12 @@ impl<'a> Planner<'a> {
         if !matches!(motion.kind, MotionKind::Linear | MotionKind::Circular | MotionKind::Joint) {
             return None;
         }
-        let previous = motion.previous? as usize;
+        self.path_from(motion.previous? as usize, index)
+    }
+
+    /// The same from the end of a motion that may come before it.
+    fn path_from(&self, previous: usize, index: usize) -> Option<Segment<'a>> {
+        let motion = &self.listing.motions[index];
         let before = &self.listing.motions[previous];
         let targets = self.solved.of(previous);
         let changes = |target: &Result<SolvedTarget<'_>, OutcomeReason>| {
@@ -366,6 +396,24 @@ impl<'a> Planner<'a> {
         let schedule = self.solved.condition_schedule(index, to.condition_index);
         let from = if from.index == to.index { from } else { from.with_frames_of(&to) };
         Some(Segment { from, to, schedule })
+    }
+
+    /// The worst segment to the end of a motion that several motions may come before, without inserted targets: those of a line from one start
+    /// do not lie on the line from another. `None` unless all starts are known and corrected.
+    fn worst_of_starts(&self, index: usize) -> Option<SegmentPlan> {
+        let starts = self.listing.predecessors.get(&(index as u32))?.iter();
+        let paths: Vec<Segment<'a>> =
+            starts.map(|start| self.path_from(*start as usize, index)).collect::<Option<_>>()?;
+        let motion =
+            Motion { insertable: false, can_straighten: false, ..self.listing.motions[index].clone() };
+        let via = circle_point(self.solved.of(index));
+        let middles = midpoint_deviations(&paths.iter().collect::<Vec<_>>(), self.arms, self.options.emit);
+        let plans = paths.iter().zip(middles);
+        let plans = plans
+            .map(|(path, middle)| SegmentPlan::of(&motion, Some(path), via, middle, self.arms, self.options));
+        // A segment whose deviation is unknown is the worst.
+        let rank = |plan: &SegmentPlan| plan.path_deviation_mm.unwrap_or(f64::INFINITY);
+        plans.max_by(|a, b| rank(a).total_cmp(&rank(b)))
     }
 
     /// Deviation from the intended corner at the start of a motion, where the robot rounds it. `last`: segment plan of the
@@ -475,7 +523,7 @@ fn plan_motion<'a>(
     }
     let flag =
         flag.or_else(|| path.and_then(|path| too_fast(index, motion, listing, path, &segment_plan, arms)));
-    let flag = flag.or_else(|| solved_targets().find_map(|s| uncertainty_flag(s, arms)));
+    let flag = flag.or_else(|| solved_targets().find_map(|s| uncertainty_flag(s, job.measured_sigma_mm)));
     let new = |(target, solved): (&MotionTarget, &SolvedTarget<'_>)| match target.role {
         Role::Via if segment_plan.straight => NewTarget::Drop,
         _ => new_target(target, solved, motion, options),
@@ -519,7 +567,7 @@ fn too_fast(
     (ratio > 1.0).then_some(OutcomeReason::TooFast { joint, ratio })
 }
 
-fn uncertainty_flag(solved: &SolvedTarget<'_>, arms: &Arms<'_>) -> Option<OutcomeReason> {
+fn uncertainty_flag(solved: &SolvedTarget<'_>, measured_sigma_mm: &[f64]) -> Option<OutcomeReason> {
     match solved.outside.as_deref().copied() {
         Some(Outside::Joint { joint, by_deg }) => {
             return Some(OutcomeReason::JointNotMeasured { joint, by_deg });
@@ -527,12 +575,11 @@ fn uncertainty_flag(solved: &SolvedTarget<'_>, arms: &Arms<'_>) -> Option<Outcom
         Some(Outside::Coverage { ratio }) => return Some(OutcomeReason::NotCovered { ratio }),
         None => {}
     }
-    let reference = arms.knowledge.map_or(f64::INFINITY, |k| k.region.sigma_mm);
-    (solved.sigma_mm > SIGMA_GROWTH * reference)
+    (solved.sigma_mm > SIGMA_GROWTH * measured_sigma_mm[solved.frames_index])
         .then_some(OutcomeReason::Uncertain { sigma_mm: solved.sigma_mm })
 }
 
-/// A pose whose predicted σ exceeds the worst measured pose's by this factor is flagged.
+/// A pose whose predicted σ exceeds that of the same tool at the worst measured pose by this factor is flagged.
 const SIGMA_GROWTH: f64 = 2.0;
 
 fn new_target(

@@ -119,6 +119,11 @@ pub enum OutcomeReason {
         /// Line of that motion, 1-based.
         line: u32,
     },
+    /// A cut that remains unmodified starts here; from a corrected start its first line would become a wedge.
+    StartOfUnchangedCut {
+        /// Line of its first motion, 1-based.
+        line: u32,
+    },
     /// The next motion remains unmodified and starts here; from a corrected start it would pass too close to a singularity.
     StartOfSingularPath {
         /// Line of that motion, 1-based.
@@ -196,6 +201,10 @@ impl OutcomeReason {
                 "the circular motion of line {line} remains unmodified and starts here: from a corrected start it would be a \
                  different circle"
             ),
+            OutcomeReason::StartOfUnchangedCut { line } => write!(
+                f,
+                "the cut of line {line} remains unmodified and starts here: from a corrected start its first line would become a wedge"
+            ),
             OutcomeReason::StartOfSingularPath { line } => write!(
                 f,
                 "the motion of line {line} remains unmodified and starts here: from a corrected start it would pass too close to \
@@ -243,6 +252,7 @@ impl OutcomeReason {
             OutcomeReason::TooFast { .. } => "a joint exceeds its speed limit",
             OutcomeReason::NoCircle => "no circle through its points follows the intended path",
             OutcomeReason::StartOfUnchangedArc { .. } => "an unmodified circular motion starts where it ends",
+            OutcomeReason::StartOfUnchangedCut { .. } => "a cut that remains unmodified starts where it ends",
             OutcomeReason::StartOfSingularPath { .. } => {
                 "an unmodified motion near a singularity starts where it ends"
             }
@@ -361,6 +371,7 @@ impl fmt::Display for OutcomeReason {
                 joint + 1
             ),
             OutcomeReason::StartOfUnchangedArc { .. }
+            | OutcomeReason::StartOfUnchangedCut { .. }
             | OutcomeReason::StartOfSingularPath { .. }
             | OutcomeReason::StartOfLimitedPath { .. } => self.before_one_that_stays(f),
             OutcomeReason::JointNotMeasured { joint, by_deg } => write!(

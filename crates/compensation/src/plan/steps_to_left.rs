@@ -3,16 +3,20 @@
 use std::collections::BTreeSet;
 
 use super::reason::OutcomeReason;
+use crate::cut::starts;
 use crate::deviation::Status;
 use crate::line_list::lines_of;
 use truegrind_programs::motion::{Listing, Motion, MotionKind, Reason, TargetValue};
 use truegrind_programs::rewrite::{Change, NewTarget};
 
-/// Corrected lines and arcs beside lines and arcs that are left, in the order of the file, with the same tool and work object.
+/// Corrected lines and arcs beside lines and arcs that are left, in the order of the file, with the same tool and work object, and those
+/// that start at a joint motion that is left, with any.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StepsToLeft {
     /// The corrected motions.
     pub motions: Vec<u32>,
+    /// Those of them that start at a joint target that is left.
+    pub from_joint_targets: Vec<u32>,
     /// The largest of the steps (mm): how far the correction moves the end.
     pub largest_mm: f64,
 }
@@ -48,7 +52,20 @@ impl StepsToLeft {
             .filter(|[_, other]| left(*other as usize))
             .map(|[this, _]| this)
             .collect();
-        let mut found = Self { motions: Vec::new(), largest_mm: tolerance_mm };
+        // A joint motion leads to the start of the next one whatever its own tool and work object. Behind a line it is an air move, on which
+        // nothing is cut.
+        let starts_left = |index: u32, of: &dyn Fn(&Motion, Option<OutcomeReason>) -> bool| {
+            starts(listing, index).into_iter().any(|start| {
+                let (status, reason, _) = outcome(start as usize);
+                let is_left = status == Status::Left && reason != Some(OutcomeReason::NoChange);
+                is_left && of(&listing.motions[start as usize], reason)
+            })
+        };
+        let by_joints =
+            |start: &Motion, _| matches!(start.kind, MotionKind::AbsoluteJoint | MotionKind::Joint);
+        let is_joint_target = |_: &Motion, reason| reason == Some(OutcomeReason::JointTarget);
+        let mut found =
+            Self { motions: Vec::new(), from_joint_targets: Vec::new(), largest_mm: tolerance_mm };
         for change in changes {
             let motion = &listing.motions[change.motion as usize];
             let (status, _, before_mm) = outcome(change.motion as usize);
@@ -57,9 +74,14 @@ impl StepsToLeft {
             }
             let moved_mm = moved_mm(motion, change).or(before_mm).unwrap_or(0.0);
             if moved_mm > tolerance_mm
-                && (beside_left_across.contains(&change.motion) || beside_left(change.motion as usize))
+                && (beside_left_across.contains(&change.motion)
+                    || beside_left(change.motion as usize)
+                    || starts_left(change.motion, &by_joints))
             {
                 found.motions.push(change.motion);
+                if starts_left(change.motion, &is_joint_target) {
+                    found.from_joint_targets.push(change.motion);
+                }
                 found.largest_mm = found.largest_mm.max(moved_mm);
             }
         }
@@ -73,7 +95,18 @@ impl StepsToLeft {
              correction ({})",
             self.largest_mm,
             lines_of(listing, &self.motions).unwrap_or_default()
-        )
+        ) + &self.joint_targets(listing).unwrap_or_default()
+    }
+
+    /// What is said of those that start at a joint target.
+    fn joint_targets(&self, listing: &Listing) -> Option<String> {
+        let lines = lines_of(listing, &self.from_joint_targets)?;
+        let (start, they) =
+            if self.from_joint_targets.len() == 1 { ("starts", "it") } else { ("start", "they") };
+        Some(format!(
+            "; {lines} {start} at a joint target that is left: {they} would not follow the intended line from there (--joint-targets corrects \
+             joint targets too)"
+        ))
     }
 }
 

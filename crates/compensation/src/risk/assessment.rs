@@ -3,7 +3,7 @@
 //!
 //! Everything follows from evenly spaced targets of the original program, with every joint at mid-play.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{DVector, Matrix6xX};
 use rayon::prelude::*;
@@ -13,6 +13,7 @@ use crate::cut::CutsOf;
 use crate::frames::frame_pair::ResolvedFrames;
 use crate::plan::reason::OutcomeReason;
 use crate::risk::cut_risk::{self, CutRisk, Judgement, PartRegistration};
+use crate::risk::fixtures;
 use crate::risk::placement::{
     self, AssessedObject, AssessedTarget, ObjectPlacement, PathDeviation, Placement, PlacementChoice,
     assess_placement, evenly_spaced,
@@ -23,7 +24,7 @@ use crate::risk::remedy_search::{self, UnknownPlacement};
 use crate::search_budget::MANY;
 use truegrind_arm::estimated::{CarriedFrame, Estimated, PosteriorComponent, RegisteredFrame};
 use truegrind_math::se3::Pose;
-use truegrind_programs::motion::{Listing, WorkObject};
+use truegrind_programs::motion::Listing;
 
 /// Assessment of a program.
 #[derive(Debug, Clone, Default)]
@@ -100,16 +101,21 @@ pub(crate) struct EstimateContext<'a, 'm> {
 
 /// The sampled targets of each work object and of each cut, including the point where it begins.
 pub(crate) struct AssessmentSample {
-    /// The work object of each entry of the listing: the first of those of one name, which a program displacement sets apart.
+    /// The work object of each entry of the listing: the first of those on one fixture.
     part_of: Vec<u32>,
     objects: Vec<(u32, Vec<u32>)>,
     cuts: Vec<(Vec<u32>, Vec<u32>)>,
 }
 
 impl AssessmentSample {
-    /// From those motions for which `reached` holds.
-    pub(crate) fn of(listing: &Listing, cuts: &CutsOf, reached: impl Fn(usize) -> bool + Sync) -> Self {
-        let part_of = parts(listing);
+    /// From those motions for which `reached` holds. `taught`: the work objects that were taught with this arm.
+    pub(crate) fn of(
+        listing: &Listing,
+        cuts: &CutsOf,
+        taught: &BTreeSet<u32>,
+        reached: impl Fn(usize) -> bool + Sync,
+    ) -> Self {
+        let part_of = fixtures::of(listing, taught);
         let motions = listing.motions.par_iter().with_min_len(MANY).enumerate();
         let objects: Vec<Option<u32>> =
             motions.map(|(index, motion)| motion.work_object.filter(|_| reached(index))).collect();
@@ -146,17 +152,6 @@ impl AssessmentSample {
     }
 }
 
-/// For each work object of a listing the first that has its name and is held as it is: where a part lies is one question, however the
-/// program displaces its targets on it.
-fn parts(listing: &Listing) -> Vec<u32> {
-    let mut first: BTreeMap<(String, bool), u32> = BTreeMap::new();
-    let part = |(index, object): (u32, &WorkObject)| {
-        let held = object.value.as_ref().is_ok_and(|value| value.robhold);
-        *first.entry((object.name.to_ascii_lowercase(), held)).or_insert(index)
-    };
-    (0..).zip(&listing.work_objects).map(part).collect()
-}
-
 /// Assesses a program. `at`: the target at the end of a sampled motion. Work objects whose shape alone is
 /// corrected are displaced in `list` to where the path really lies.
 pub(crate) fn assess_program(
@@ -189,6 +184,7 @@ pub(crate) fn assess_program(
             placement.remedy = remedy_search::remedy(&unknown);
         }
         let applied = placement.applied;
+        placement.others = fixtures::other_names(listing, &chosen.part_of, *object);
         out.placements.push(placement);
         let frames_index = targets[0].frames_index;
         if let Some(motion) = displacement {

@@ -49,6 +49,10 @@ pub(crate) struct PlacementChoice {
 pub struct ObjectPlacement {
     /// Its name.
     pub work_object: String,
+    /// The other work objects on the same fixture, for which all of this holds as well.
+    pub others: Vec<String>,
+    /// Whether the robot holds it.
+    pub held: bool,
     /// [`Placement::Shape`] or [`Placement::Absolute`].
     pub applied: Placement,
     /// Deviation of the path as a whole from its intended position (RMS over its points, mm).
@@ -236,6 +240,8 @@ pub(crate) fn assess_placement(
     };
     let placement = ObjectPlacement {
         work_object: name.to_owned(),
+        others: Vec::new(),
+        held: list[targets[0].frames_index].real.holds_part,
         applied,
         deviation_mm,
         sigma_mm,

@@ -201,6 +201,12 @@ fn loads_known_only_at_run_time_are_counted() {
     let stiff = perturbed(1, 0.5);
     assert!(unknown(&perhaps, &worn(1)) > 2);
     assert_eq!([unknown(&source(), &worn(1)), unknown(&perhaps, &stiff)], [0, 0]);
+    // At joint targets, which are left, the load changes nothing.
+    let moves = |text: &str| text.replace("MoveL ", "MoveJ ");
+    let home = "MoveAbsJ [[0,0,10,0,80,0],[9E9,9E9,9E9,9E9,9E9,9E9]]\\NoEOffs,v20,fine,tool0;";
+    let before =
+        source().replacen("GripLoad part;", &format!("IF di1=1 GripLoad part;\n{home}\nGripLoad part;"), 1);
+    assert_eq!(unknown(&moves(&before), &worn(1)), 0);
 }
 
 #[test]

@@ -160,6 +160,62 @@ fn steps_beside_what_is_left_are_counted() {
     assert_eq!(self::done(&module(&even), Cuts::Whole, 0.05).0.plan.steps, None);
 }
 
+/// A cut that is left began at a corrected place: its first line became a wedge.
+#[test]
+fn the_approach_to_a_cut_that_is_left_stays_too() {
+    let air = line(365.0, "z10").replace("MoveL", "MoveJ");
+    let [a, b, c] = [(370.0, "z1"), (375.0, "fine"), (380.0, "z1")].map(|(x, zone)| line(x, zone));
+    // Out of reach.
+    let cut = c + &line(900.0, "fine");
+    let found = |body: &[&str]| done(&module(&body.concat()), Cuts::Whole, 0.05);
+    let (direct, bytes) = found(&[&air, &cut]);
+    assert_eq!(statuses(&direct), [Refused; 3]);
+    assert_eq!(direct.plan.outcomes[0].reason(), Some(OutcomeReason::StartOfUnchangedCut { line: 5 }));
+    assert_eq!(bytes, module(&[air.as_str(), &cut].concat()).as_bytes());
+    // By a line to a stop, and in the order of the file in a loop.
+    assert_eq!(statuses(&found(&[&air, &b, &cut]).0), [Refused; 4]);
+    assert_eq!(statuses(&found(&["WHILE TRUE DO\n", &air, &b, &cut, "ENDWHILE\n"]).0), [Refused; 4]);
+    // What ends a longer cut belongs to that, and what leads to a corrected one is needed there.
+    assert_eq!(statuses(&found(&[&air, &a, &b, &cut]).0), [Changed, Changed, Changed, Refused, Refused]);
+    let either = [&air, "IF bad THEN\n", &cut, "ELSE\n", &b, "ENDIF\n"].concat();
+    let source = module(&either).replace("VAR robtarget", "VAR bool bad;\nVAR robtarget");
+    assert_eq!(statuses(&done(&source, Cuts::Whole, 0.05).0), [Changed, Refused, Refused, Changed]);
+    // A correction below the tolerance makes no wedge.
+    assert_eq!(
+        statuses(&done(&module(&[air, cut].concat()), Cuts::Whole, 5.0).0),
+        [Changed, Refused, Refused]
+    );
+}
+
+/// A line from a joint target that is left is a wedge as high as the correction. It was "ok", since the ends of the line are right.
+#[test]
+fn lines_from_joint_targets_that_are_left_are_counted() {
+    let joint = |tool: &str| {
+        format!("MoveAbsJ [[0,0,10,0,80,0],[9E9,9E9,9E9,9E9,9E9,9E9]]\\NoEOffs,v100,fine,{tool};\n")
+    };
+    let steps = |body: &[String], joint_targets: bool| {
+        let data = "PERS tooldata long:=[TRUE,[[0,0,60],[1,0,0,0]],[1,[0,0,10],[1,0,0,0],0,0,0]];";
+        let source = module(&body.concat()).replace("PROC main", &format!("{data} PROC main"));
+        let program = Program::Rapid(Task::read(&[("p.mod", source.as_bytes())]));
+        let options = Options { joint_targets, ..Options::default() };
+        let done = compensate(&program, &known(), &Cell::default(), &options, None).unwrap();
+        let text = done.plan.steps.as_ref().map(|steps| steps.sentence(program.listing()));
+        (done.plan.steps.map(|steps| [steps.motions, steps.from_joint_targets]), text.unwrap_or_default())
+    };
+    let [a, b, c] = [380.0, 385.0, 390.0].map(|x| line(x, "fine"));
+    let begins = [joint("tool0"), a.clone(), b.clone()];
+    let (found, text) = steps(&begins, false);
+    assert_eq!(found, Some([vec![1], vec![1]]));
+    assert!(text.contains("line 5 starts at a joint target") && text.contains("--joint-targets"), "{text}");
+    assert_eq!(steps(&begins, true).0, None);
+    // In the middle, with another tool.
+    assert_eq!(steps(&[a.clone(), joint("long"), b.clone(), c.clone()], false).0, Some([vec![2], vec![2]]));
+    // Behind the last line the arm moves away; a joint motion to a corrected target lies between.
+    assert_eq!(steps(&[a.clone(), b.clone(), joint("tool0")], false).0, None);
+    let air = a.replace("MoveL", "MoveJ");
+    assert_eq!(steps(&[joint("tool0"), air, b, c], false).0, None);
+}
+
 #[test]
 fn another_tool_or_work_object_begins_another_cut() {
     let other = "MoveL [[385,0,300],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v20,z1,long;\n";
@@ -187,7 +243,8 @@ fn what_the_writer_refuses_keeps_its_cut_too() {
     // The line behind it would start where the uncorrected one ends.
     assert_eq!(statuses(&plan(Cuts::Single)), [Changed, Changed, Refused, Refused, Changed]);
     let whole = plan(Cuts::Whole);
-    assert_eq!(statuses(&whole), [Changed, Refused, Refused, Refused, Changed]);
+    // And the way to its start stays with it.
+    assert_eq!(statuses(&whole), [Refused, Refused, Refused, Refused, Changed]);
     let reasons: Vec<_> = whole.plan.outcomes.iter().map(|outcome| outcome.reason()).collect();
     assert!(matches!(reasons[1], Some(OutcomeReason::PartOfCut { line: 6, .. })), "{reasons:?}");
     assert_eq!(reasons[3], Some(OutcomeReason::LineWithoutStart));

@@ -34,9 +34,9 @@ use truegrind_compensation::cell::{Cell, CellFrame, FrameOrigin};
 use truegrind_compensation::deviation::{After, PathReport, Status};
 use truegrind_compensation::frames::taught::{taught_frame, taught_tcp};
 use truegrind_compensation::options::{Emit, Options};
-use truegrind_compensation::plan::Plan;
 use truegrind_compensation::plan::planner::plan;
 use truegrind_compensation::plan::reason::OutcomeReason;
+use truegrind_compensation::plan::{MotionOutcome, Plan};
 use truegrind_compensation::verify::{ActingArm, VerificationTask, verify};
 use truegrind_math::se3::Pose;
 use truegrind_math::statistics::ErrorSummary;
@@ -227,6 +227,50 @@ fn a_joint_outside_its_measured_range_is_flagged() {
     assert!((by - 5.0).abs() < 0.3, "joint 5 leaves by {by}°");
 }
 
+/// A tool of 600 mm is more uncertain than the flange wherever it is: what counts is whether it is more uncertain than at the measured poses.
+#[test]
+fn a_long_tool_is_compared_with_itself_at_the_measured_poses() {
+    let (_, joints) = blade();
+    let mut known = estimated(perturbed(2, 0.3), &joints);
+    // Angles are known to 0.1 mrad, lengths exactly.
+    for (k, parameter) in known.order.iter().enumerate() {
+        let truegrind_arm::parameter::Parameter::Link { coordinate, .. } = parameter else { continue };
+        known.covariance[(k, k)] = if coordinate.is_length() { 0.0 } else { 1e-8 };
+    }
+    let same = known.clone();
+    let arm = same.model.at_condition(&same.condition);
+    let sigma_mm = |length_mm: f64, q: &Joints| {
+        same.position_sigma_mm(&arm, q, &Pose::translation(0.0, 0.0, length_mm), None)
+    };
+    let at_flange = joints.iter().map(|q| sigma_mm(0.0, q)).fold(0.0, f64::max);
+    assert!(joints.iter().any(|q| sigma_mm(600.0, q) > 2.0 * at_flange), "{at_flange}");
+    known.region.sigma_mm = at_flange;
+    let moves = joints.iter().step_by(7).map(|q| {
+        let q: Vec<String> = q.iter().map(|angle| angle.to_degrees().to_string()).collect();
+        let none = "[9E9,9E9,9E9,9E9,9E9,9E9]";
+        format!("MoveAbsJ [[{}],{none}]\\NoEOffs,v20,fine,long;\n", q.join(","))
+    });
+    let source = format!(
+        "MODULE M\nPERS tooldata long:=[TRUE,[[0,0,600],[1,0,0,0]],[1,[0,0,10],[1,0,0,0],0,0,0]];\nPROC main()\n{}ENDPROC\nENDMODULE\n",
+        moves.collect::<String>()
+    );
+    let options = Options { joint_targets: true, ..Options::default() };
+    let uncertain = |known: &Estimated| {
+        let (planned, _) = rewritten(source.as_bytes(), known, &Cell::default(), &options);
+        let is_uncertain = |o: &MotionOutcome| matches!(o.reason(), Some(OutcomeReason::Uncertain { .. }));
+        [planned.outcomes.iter().filter(|o| is_uncertain(o)).count(), planned.outcomes.len()]
+    };
+    let [flagged, all] = uncertain(&known);
+    assert!(flagged == 0 && all > 10, "{flagged} of {all}");
+    // Measured where joint 5 is straight and the arm upright alone, its tool is less uncertain there than on the blade.
+    let upright = Joints::new(0.0, 0.0, -1.5, 0.0, 0.0, 0.0);
+    let growth = joints.iter().map(|q| sigma_mm(600.0, q) / sigma_mm(600.0, &upright)).fold(0.0, f64::max);
+    known.region.samples_deg = vec![std::array::from_fn(|i| upright[i].to_degrees())];
+    known.region.spacing_deg = 1e6;
+    let [flagged, _] = uncertain(&known);
+    assert_eq!(flagged > 0, growth > 2.0, "{growth}");
+}
+
 #[test]
 fn a_long_line_gets_targets_only_where_the_tolerance_would_be_broken() {
     let source = b"MODULE M\n PROC main()\n  MoveJ [[420,-250,300],[0,0,1,0],[-1,0,-1,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;\n  MoveL [[420,250,300],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;\n ENDPROC\nENDMODULE\n";
@@ -250,6 +294,50 @@ fn a_long_line_gets_targets_only_where_the_tolerance_would_be_broken() {
     let report = run_on(&actual, source, &text, &Cell::default());
     assert_eq!(report.points.len(), 2);
     assert!(worst(&report, true) < 1e-3, "{}", worst(&report, true));
+}
+
+/// A line of a routine that is called from two places was not checked, as if its start were unknown: the path from either is.
+#[test]
+fn a_line_from_two_known_places_is_judged_by_the_worse_path() {
+    let target =
+        |x: f64, y: f64, turns: &str| format!("[[{x},{y},300],[0,0,1,0],{turns},[9E9,9E9,9E9,9E9,9E9,9E9]]");
+    let source = |first: f64, second: &str| {
+        let start = |y: f64| format!("MoveJ {},v100,fine,tool0;\n", target(420.0, y, "[-1,0,-1,0]"));
+        let side = format!("MoveL {},v100,fine,tool0;\n", target(420.0, 250.0, "[0,0,0,0]"));
+        format!(
+            "MODULE M\nVAR robtarget seen;\nPROC main()\n{}side;\n{second}side;\nENDPROC\nPROC side()\n{side}ENDPROC\nENDMODULE\n",
+            start(first)
+        )
+    };
+    let actual = perturbed(5, 3.0);
+    let mut known = estimated(actual, &[Joints::zeros()]);
+    (known.region.min_deg, known.region.max_deg) = ([-400.0; 6], [400.0; 6]);
+    known.region.spacing_deg = 1e6;
+    let planned = |source: &str, tolerance_mm: f64| {
+        let task = Task::read(&[("p.mod", source.as_bytes())]);
+        let options = Options { tolerance_mm, ..Options::default() };
+        let plan = plan(&task.listing, &known, &Cell::default(), &options);
+        let line = task.listing.motions.iter().position(|motion| &*motion.instruction == "MoveL").unwrap();
+        (plan.outcomes[line].clone(), plan.notes.join("\n"))
+    };
+    let near = format!("MoveJ {},v100,fine,tool0;\n", target(420.0, 100.0, "[0,0,0,0]"));
+    let bend_mm = |source: &str| planned(source, 5.0).0.path_deviation_mm.get();
+    let far_mm = bend_mm(&source(-250.0, "")).unwrap();
+    assert!(far_mm > 0.02, "{far_mm}");
+    let both = source(-250.0, &near);
+    assert!((bend_mm(&both).unwrap() - far_mm).abs() < 1e-9, "{:?}", bend_mm(&both));
+    let (outcome, notes) = planned(&both, far_mm / 3.0);
+    let judged =
+        matches!(outcome.reason(), Some(OutcomeReason::PathDeviation { mm }) if (mm - far_mm).abs() < 1e-9);
+    assert!(outcome.status == Status::Flagged && judged && outcome.inserted == 0, "{outcome:?}");
+    assert!(
+        notes.contains("1 line or arc may start at several places")
+            && !notes.contains("unknown or not corrected")
+    );
+    // One of the places is not known.
+    let (outcome, notes) = planned(&source(-250.0, "MoveJ Offs(seen,0,0,0),v20,fine,tool0;\n"), far_mm / 3.0);
+    assert_eq!((outcome.path_deviation_mm.get(), outcome.status), (None, Status::Changed));
+    assert!(notes.contains("1 line or arc starts at a place that is unknown or not corrected"), "{notes}");
 }
 
 #[test]

@@ -32,10 +32,15 @@ fn passes() -> (Vec<u8>, Vec<Joints>) {
 
 /// A correct model whose data did not determine the zero of joint 1.
 fn placed_somewhere(seed: u64, joints: &[Joints]) -> Estimated {
+    placed_to(0.02, seed, joints)
+}
+
+/// A correct model that knows the zero of joint 1 to `sigma_rad`.
+fn placed_to(sigma_rad: f64, seed: u64, joints: &[Joints]) -> Estimated {
     let mut known = estimated(perturbed(seed, 1.0), joints);
     let turn = Parameter::Link { joint: 0, coordinate: LinkCoordinate::Theta };
     let k = known.order.iter().position(|p| *p == turn).unwrap();
-    known.covariance[(k, k)] = 0.02_f64.powi(2);
+    known.covariance[(k, k)] = sigma_rad.powi(2);
     known
 }
 
@@ -121,6 +126,77 @@ fn patterns_that_the_program_displaces_keep_their_distance() {
         assert!(shape(&before) > 0.02, "{}", shape(&before));
         assert!(shape(&after) < 2e-3, "{}", shape(&after));
     }
+}
+
+/// A square of lines over each of two work objects that stand 200 mm apart. `frames`: their user and object frames.
+fn two_objects(frames: [[[f64; 3]; 2]; 2]) -> String {
+    let frame = |[x, y, z]: [f64; 3]| format!("[[{x},{y},{z}],[1,0,0,0]]");
+    let declared = |name: &str, [user, object]: [[f64; 3]; 2]| {
+        format!("PERS wobjdata {name}:=[FALSE,TRUE,\"\",{},{}];\n", frame(user), frame(object))
+    };
+    let square = |name: &str| -> String {
+        let corners = [[0.0, 0.0], [40.0, 0.0], [40.0, 40.0], [0.0, 40.0]].map(|[x, y]| {
+            format!("MoveL [[{x},{y},0],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v20,fine,tool0\\WObj:={name};\n")
+        });
+        corners.concat()
+    };
+    let data = declared("wA", frames[0]) + &declared("wB", frames[1]);
+    format!("MODULE M\n{data}PROC main()\nConfL\\Off;\n{}{}ENDPROC\nENDMODULE\n", square("wA"), square("wB"))
+}
+
+/// Two work objects in one user frame lie on one fixture: their placement was decided for each, so that the distance between them got the whole
+/// error of the placement where one of them was corrected.
+#[test]
+fn work_objects_in_one_user_frame_are_placed_together() {
+    let (_, joints) = blade();
+    const FIXTURE: [f64; 3] = [380.0, -120.0, 300.0];
+    let together = two_objects([[FIXTURE, [0.0; 3]], [FIXTURE, [0.0, 200.0, 0.0]]]);
+    let separate = two_objects([[FIXTURE, [0.0; 3]], [[380.0, 80.0, 300.0], [0.0; 3]]]);
+    // Given in the base, they are two places of their own as well.
+    let in_base = two_objects([[[0.0; 3], FIXTURE], [[0.0; 3], [380.0, 80.0, 300.0]]]);
+    let mut seen = 0;
+    for seed in 0..8 {
+        // The shape is known well, the zero of joint 1 so well that the place of each object could be corrected or not.
+        let mut known = placed_to(1.2e-3, seed, &joints);
+        (known.region.min_deg, known.region.max_deg) = ([-400.0; 6], [400.0; 6]);
+        known.region.spacing_deg = 1e6;
+        let placed = |source: &str, cell: &Cell, max_risk: f64| {
+            let options = Options { max_risk, ..with(Placement::Auto) };
+            rewritten(source.as_bytes(), &known, cell, &options)
+        };
+        let none = Cell::default();
+        let harm = placed(&separate, &none, 1.0)
+            .0
+            .placements
+            .iter()
+            .map(|p| p.probability_of_harm)
+            .collect::<Vec<_>>();
+        // Half of the accepted risk lies between the two.
+        let between = harm[0] + harm[1];
+        if !(harm[0] - harm[1] > 1e-6 || harm[1] - harm[0] > 1e-6) {
+            continue;
+        }
+        let applied = |plan: &Plan| plan.placements.iter().map(|p| p.applied).collect::<Vec<_>>();
+        for source in [&separate, &in_base] {
+            let (plan, _) = placed(source, &none, between);
+            seen += usize::from(applied(&plan)[0] != applied(&plan)[1]);
+        }
+        let (plan, program) = placed(&together, &none, between);
+        let [placement] = plan.placements.as_slice() else { panic!("{:?}", plan.placements) };
+        assert_eq!((placement.work_object.as_str(), &placement.others), ("wA", &vec!["wB".to_owned()]));
+        let report = run_on(&known.model, together.as_bytes(), &program, &none);
+        let points = cut_points(&report);
+        let places: Vec<Vector3<f64>> = points.iter().map(|p| p.intended.translation.vector).collect();
+        let projector = rigid(&places);
+        let shape = |d: &DVector<f64>| (d - &projector * d).amax();
+        let (before, after) = (deviations(&points, false), deviations(&points, true));
+        assert!(shape(&before) > 0.005, "{}", shape(&before));
+        assert!(shape(&after) < 2e-3, "{}", shape(&after));
+        // One that was taught has a place that its own touches tell.
+        let taught = Cell { wobj: vec![CellFrame::of("wB", FrameOrigin::Taught)], ..Cell::default() };
+        assert_eq!(placed(&together, &taught, between).0.placements.len(), 2);
+    }
+    assert!(seen > 3, "{seen}");
 }
 
 #[test]

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::estimated::Estimated;
 use truegrind_arm::model::Joints;
+use truegrind_arm::parameter::{LinkCoordinate, Parameter};
 use truegrind_compensation::cell::Cell;
 use truegrind_compensation::cut::Cuts;
 use truegrind_compensation::deviation::Status;
@@ -54,6 +55,8 @@ fn name(why: &OutcomeReason) -> &'static str {
         OutcomeReason::NoCircle => "no circle",
         // tests/it/segment.rs.
         OutcomeReason::StartOfUnchangedArc { .. } => "before circle",
+        // tests/it/cut.rs.
+        OutcomeReason::StartOfUnchangedCut { .. } => "before a cut",
         // tests/it/singularity.rs.
         OutcomeReason::StartOfSingularPath { .. } => "before singular way",
         OutcomeReason::FullCircle => "whole circle",
@@ -99,6 +102,17 @@ fn known() -> Estimated {
     (known.region.min_deg, known.region.max_deg) = ([-400.0; 6], [400.0; 6]);
     known.region.spacing_deg = 1e6;
     known
+}
+
+/// Known but for the zero of joint 1, and measured where that hardly moves the flange.
+fn unsure() -> Estimated {
+    let mut arm = known();
+    let turn = Parameter::Link { joint: 0, coordinate: LinkCoordinate::Theta };
+    let k = arm.order.iter().position(|parameter| *parameter == turn).unwrap();
+    arm.covariance.fill(0.0);
+    arm.covariance[(k, k)] = 1e-8;
+    arm.region.samples_deg = vec![[0.0, 0.0, -90.0, 0.0, 0.0, 0.0]];
+    arm
 }
 
 /// Each motion on its own, so that its own reason shows and not that of its cut.
@@ -148,7 +162,7 @@ fn scene(name: &str, source: &[u8]) -> Vec<Plan> {
         "bound" => options.max_correction_mm = 1e-4,
         "turn" => options.max_rotation_rad = 1e-7,
         "singular" => options.min_singularity = 1.0,
-        "unsure" => arm.region.sigma_mm = 1e-12,
+        "unsure" => arm = unsure(),
         "elsewhere" => (arm.region.spacing_deg, arm.region.samples_deg) = (1.0, vec![[150.0; 6]]),
         "narrow" => arm.region.max_deg[1] = 5.0,
         "loose" => (options.tolerance_mm, options.circles) = (0.5, Circles::Segments),
@@ -224,9 +238,7 @@ fn every_reason_there_is_shows_in_a_program() {
         let source = ["MODULE M\nPROC main()\n", &line(380), &line(900), "ENDPROC\nENDMODULE\n"].concat();
         look(&planned_in_cuts(source.as_bytes(), &known(), &cell, &Options { cuts, ..fine() }));
     }
-    let mut unsure = known();
-    unsure.region.sigma_mm = 1e-12;
-    look(&planned(&refusals, &unsure, &cell, &fine()));
+    look(&planned(&refusals, &unsure(), &cell, &fine()));
     let mut elsewhere = known();
     elsewhere.region.spacing_deg = 1.0;
     elsewhere.region.samples_deg = vec![[150.0; 6]];

@@ -2,7 +2,7 @@
 
 use crate::deviation::status_word;
 use crate::document::{KeyFigure, Verdict};
-use crate::placement;
+use crate::placement::{self, BeforeAndAfter};
 use crate::status::Status;
 use truegrind_calibration::identification::verdict::percent_of;
 use truegrind_compensation::deviation::Status as MotionStatus;
@@ -34,6 +34,10 @@ pub fn verdict(plan: &Plan, listing: &Listing, is_written: bool) -> Verdict {
         _ if no_cut(plan, listing) => (
             Status::Warning,
             "No cut is corrected, only motions between cuts: the deviation of the workpiece stays",
+        ),
+        _ if is_again(listing) => (
+            Status::Warning,
+            "Corrected once more: the corrections add up, and what deviates now is not known from this program",
         ),
         (_, 0) if left > 0 => (
             Status::Warning,
@@ -72,7 +76,7 @@ pub fn verdict(plan: &Plan, listing: &Listing, is_written: bool) -> Verdict {
             "Corrected, but check the refused and flagged motions before running the program",
         ),
     };
-    let mut reasons: Vec<String> = deviations(plan, listing).into_iter().collect();
+    let mut reasons = deviations(plan, listing);
     reasons.push(coverage(plan));
     reasons.extend(left_paths(plan, listing).filter(|_| written > 0));
     if left > 0 {
@@ -81,7 +85,7 @@ pub fn verdict(plan: &Plan, listing: &Listing, is_written: bool) -> Verdict {
              more poses near them improves the model (`truegrind plan`)"
         ));
     }
-    reasons.extend(placement::risk(plan));
+    reasons.extend(placement::risk(plan).filter(|_| !is_again(listing)));
     if refused > 0 && written > 0 {
         reasons.push(
             "refused motions are unchanged: the path has a step of the size of the correction between them and their corrected neighbours"
@@ -160,35 +164,80 @@ fn left_paths(plan: &Plan, listing: &Listing) -> Option<String> {
     }
 }
 
-/// Deviation before and after, as a sentence; `None` if unknown.
-fn deviations(plan: &Plan, listing: &Listing) -> Option<String> {
-    let uncorrected = |mm: f64| format!("the uncorrected program deviates by up to {mm:.3} mm");
-    let Some(before) = placement::before_mm(plan).filter(|_| !no_cut(plan, listing)) else {
-        return placement::largest_mm(plan).map(uncorrected);
+/// Whether the program was corrected before: its numbers are then no longer those that were intended, which before, after and risk refer to.
+fn is_again(listing: &Listing) -> bool {
+    listing.marks.iter().any(Option::is_some)
+}
+
+/// Deviation before and after, in a sentence for each kind of correction; empty if unknown.
+fn deviations(plan: &Plan, listing: &Listing) -> Vec<String> {
+    if is_again(listing) {
+        return vec![
+            "the program was corrected before (mark in the file): its numbers are not those that were intended, so deviations before and \
+             after and the risk cannot be stated; correct the original program instead"
+                .to_owned(),
+        ];
+    }
+    let found = if no_cut(plan, listing) { Vec::new() } else { placement::before_and_after(plan, listing) };
+    if found.is_empty() {
+        let unknown = plan.outcomes.iter().filter(|outcome| outcome.before_mm.get().is_none()).count();
+        let where_known = match unknown {
+            0 => String::new(),
+            1 => " where it is known (not at 1 motion)".to_owned(),
+            _ => format!(" where it is known (not at {unknown} motions)"),
+        };
+        let uncorrected =
+            |mm: f64| format!("the uncorrected program deviates by up to {mm:.3} mm{where_known}");
+        return placement::largest_mm(plan).map(uncorrected).into_iter().collect();
+    }
+    let of_kind = |of: &BeforeAndAfter| {
+        let kind = match (of.shape_only, found.len()) {
+            (true, _) => " (shape only)",
+            (false, 1) => "",
+            (false, _) => " (shape and placement)",
+        };
+        let (before, after) = (of.before_mm, of.expected_mm?);
+        Some(format!(
+            "largest deviation of the corrected motions{kind}: {before:.3} mm before, {after:.3} mm expected after (1σ)"
+        ))
     };
-    let after = placement::expected_mm(plan)?;
-    let shape = if placement::corrects_shape_only(plan) { " (shape only)" } else { "" };
-    Some(format!(
-        "largest deviation of the corrected motions{shape}: {before:.3} mm before, {after:.3} mm expected after (1σ)"
-    ))
+    found.iter().filter_map(of_kind).collect()
+}
+
+/// Largest deviations before and after.
+fn deviation_figures(plan: &Plan, listing: &Listing) -> Vec<KeyFigure> {
+    let before = |mm: Option<f64>, note: String| KeyFigure::new("Largest before", mm, 3, "mm").note(note);
+    let after = |mm: Option<f64>, note: String| KeyFigure::new("Expected after", mm, 3, "mm").note(note);
+    let nothing = |why: &str| {
+        vec![
+            before(placement::largest_mm(plan), "uncorrected, all motions".to_owned()),
+            after(None, why.to_owned()),
+        ]
+    };
+    if is_again(listing) {
+        return vec![before(None, "corrected before".to_owned()), after(None, "corrected before".to_owned())];
+    }
+    if no_cut(plan, listing) {
+        return nothing("no cut is corrected");
+    }
+    let of_kind = |of: BeforeAndAfter| {
+        let what = if of.shape_only { "of the shape" } else { "shape and placement" };
+        let said = match of.expected_mm {
+            Some(_) => format!("{what}, 1σ: largest of the corrected motions"),
+            None => "the model has no σ here".to_owned(),
+        };
+        [before(Some(of.before_mm), format!("{what}, corrected motions")), after(of.expected_mm, said)]
+    };
+    match placement::before_and_after(plan, listing) {
+        found if found.is_empty() => nothing("nothing is corrected"),
+        found => found.into_iter().flat_map(of_kind).collect(),
+    }
 }
 
 pub(super) fn key_figures(plan: &Plan, listing: &Listing) -> Vec<KeyFigure> {
     let all = plan.outcomes.len();
-    let shape = if placement::corrects_shape_only(plan) { "of the shape" } else { "shape and placement" };
-    let corrected = !no_cut(plan, listing);
-    let mut figures = vec![match placement::before_mm(plan).filter(|_| corrected) {
-        Some(mm) => KeyFigure::new("Largest before", mm, 3, "mm").note(format!("{shape}, corrected motions")),
-        None => KeyFigure::new("Largest before", placement::largest_mm(plan), 3, "mm")
-            .note("uncorrected, all motions"),
-    }];
-    let expected = placement::expected_mm(plan).filter(|_| corrected);
-    figures.push(KeyFigure::new("Expected after", expected, 3, "mm").note(match expected {
-        Some(_) => format!("{shape}, 1σ: largest of the corrected motions"),
-        None if !corrected => "no cut is corrected".to_owned(),
-        None => "nothing is corrected, or the model has no σ".to_owned(),
-    }));
-    if let Some(chance) = plan.probability_of_harm {
+    let mut figures = deviation_figures(plan, listing);
+    if let Some(chance) = plan.probability_of_harm.filter(|_| !is_again(listing)) {
         figures.push(
             KeyFigure::new("Probability of worse", percent_of(chance), 0, "")
                 .note("all corrected cuts together"),

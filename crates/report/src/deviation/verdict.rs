@@ -89,7 +89,7 @@ pub(super) fn verdict(reports: &[&PathReport]) -> Verdict {
     }
     if judged.is_empty() && !reports.is_empty() {
         reasons.push(
-            "`truegrind compensate` with the same model corrects the program, down to about the predicted 1σ"
+            "`truegrind compensate` with the same model corrects what it can of the program, down to about the predicted 1σ"
                 .to_owned(),
         );
     }

@@ -9,7 +9,7 @@ use truegrind_compensation::plan::reason::OutcomeReason;
 use truegrind_compensation::plan::{MotionOutcome, Plan};
 use truegrind_compensation::risk::placement::{ObjectPlacement, Placement};
 use truegrind_math::option_f64::OptionF64;
-use truegrind_programs::motion::{Listing, Reason};
+use truegrind_programs::motion::{Listing, Mark, Reason};
 use truegrind_programs::rapid::Task;
 use truegrind_report::compensation::{self as view, ProgramFile};
 use truegrind_report::format::{csv, markdown, terminal};
@@ -280,6 +280,8 @@ fn a_work_object_without_a_corrected_motion_is_not_called_corrected() {
         probability_of_harm: 0.01,
         taught: false,
         unlocated: false,
+        others: Vec::new(),
+        held: false,
         remedy: None,
     }];
     let said = |plan: &Plan| sentences(plan, &listing).join("\n");
@@ -290,4 +292,125 @@ fn a_work_object_without_a_corrected_motion_is_not_called_corrected() {
         text.contains("wobj0: no motion with it is corrected; the path as a whole is displaced by 2.131 mm"),
         "{text}"
     );
+}
+
+/// Work objects on one fixture are named together, and what is decided differently over objects that stand is said to move apart.
+#[test]
+fn work_objects_on_one_fixture_are_named_together() {
+    let (mut plan, listing, _) = example();
+    let placement = |name: &str, applied: Placement, deviation_mm: f64| ObjectPlacement {
+        work_object: name.to_owned(),
+        applied,
+        deviation_mm,
+        sigma_mm: 0.2,
+        probability_of_harm: 0.06,
+        taught: false,
+        unlocated: false,
+        others: Vec::new(),
+        held: false,
+        remedy: None,
+    };
+    let mut fixture = placement("wobj0", Placement::Absolute, 2.131);
+    fixture.others.push("wB".to_owned());
+    plan.placements = vec![fixture.clone()];
+    let text = sentences(&plan, &listing).join("\n");
+    assert!(
+        text.contains("work objects wobj0, wB (one user frame): shape and placement are corrected"),
+        "{text}"
+    );
+    assert!(!text.contains("belong together"), "{text}");
+    // Each has its entry in the JSON report.
+    let [placements, _] = truegrind_report::placement::json(&plan, &listing);
+    let names: Vec<_> = placements.as_array().unwrap().iter().map(|p| p["work_object"].clone()).collect();
+    assert_eq!(names, ["wobj0", "wB"]);
+    // Decided differently.
+    plan.placements[0].others.clear();
+    plan.placements.push(placement("wobj0", Placement::Shape, 1.5));
+    let text = sentences(&plan, &listing).join("\n");
+    assert!(text.contains("against the other by up to 2.131 mm"), "{text}");
+    plan.placements[1].held = true;
+    assert!(!sentences(&plan, &listing).join("\n").contains("belong together"));
+}
+
+/// Before and after stood side by side from different motions: the whole deviation of one object over the σ of the shape of another.
+#[test]
+fn before_and_after_are_stated_of_the_same_motions() {
+    let target = |x: f64| format!("[[{x},0,300],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]");
+    let source = format!(
+        "MODULE M\nPERS wobjdata wS:=[FALSE,TRUE,\"\",[[10,0,0],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];\nPROC main()\n\
+         MoveL {},v50,fine,tool0;\nMoveJ {},v50,fine,tool0\\WObj:=wS;\nMoveL {},v50,fine,tool0\\WObj:=wS;\nENDPROC\nENDMODULE\n",
+        target(400.0),
+        target(410.0),
+        target(420.0)
+    );
+    let listing = Task::read(&[("m.mod", source.as_bytes())]).listing;
+    let mut outcomes = vec![
+        outcome(0, Status::Changed, None),
+        outcome(1, Status::Changed, None),
+        outcome(2, Status::Changed, None),
+    ];
+    // Over wobj0 all is corrected; over wS the shape alone, of which a joint motion has none.
+    (outcomes[0].before_mm, outcomes[0].sigma_mm) = (1.2.into(), 0.558.into());
+    (outcomes[1].before_mm, outcomes[1].sigma_mm) = (0.9.into(), 0.6.into());
+    (outcomes[2].before_mm, outcomes[2].shape_sigma_mm) = (0.4.into(), 0.003.into());
+    let placement = |name: &str, applied: Placement| ObjectPlacement {
+        work_object: name.to_owned(),
+        applied,
+        deviation_mm: 1.0,
+        sigma_mm: 0.5,
+        probability_of_harm: 0.06,
+        taught: false,
+        unlocated: false,
+        others: Vec::new(),
+        held: false,
+        remedy: None,
+    };
+    let placements = vec![placement("wobj0", Placement::Absolute), placement("wS", Placement::Shape)];
+    let mut plan = Plan { outcomes, placements, ..Plan::default() };
+    let files = [ProgramFile { file: "m.mod".to_owned(), output: None }];
+    let said = |plan: &Plan| terminal::document(&view::summary(plan, &listing, &files), 400);
+    let text = said(&plan);
+    assert!(
+        text.contains(
+            "corrected motions (shape and placement): 1.200 mm before, 0.558 mm expected after (1σ)"
+        ),
+        "{text}"
+    );
+    assert!(
+        text.contains("corrected motions (shape only): 0.400 mm before, 0.003 mm expected after (1σ)"),
+        "{text}"
+    );
+    // One kind alone.
+    plan.placements[1].applied = Placement::Absolute;
+    let text = said(&plan);
+    assert!(text.contains("corrected motions: 1.200 mm before, 0.600 mm expected after (1σ)"), "{text}");
+}
+
+/// A program that was corrected before states numbers that were never intended: nothing refers to them.
+#[test]
+fn a_program_that_is_corrected_again_states_no_before_and_after() {
+    let (mut plan, mut listing, files) = example();
+    plan.probability_of_harm = Some(0.006);
+    let said =
+        |plan: &Plan, listing: &Listing| terminal::document(&view::summary(plan, listing, &files), 400);
+    let once = said(&plan, &listing);
+    assert!(
+        once.contains("expected after") && once.contains("probability that the corrected cuts"),
+        "{once}"
+    );
+    let mark = Mark { version: "0.1.0".to_owned(), model: "abc".to_owned(), partial: false };
+    listing.marks = vec![Some(mark), None];
+    let again = said(&plan, &listing);
+    assert!(again.contains("[warning] Corrected once more: the corrections add up"), "{again}");
+    assert!(!again.contains("expected after") && !again.contains("probability that"), "{again}");
+}
+
+/// The largest deviation of an uncorrected program is that of the motions with a known one.
+#[test]
+fn an_uncorrected_program_says_where_its_deviation_is_unknown() {
+    let (mut plan, listing, files) = example();
+    plan.outcomes.iter_mut().for_each(|outcome| outcome.status = Status::Left);
+    let text = terminal::document(&view::summary(&plan, &listing, &files), 400);
+    let expected = "the uncorrected program deviates by up to 1.500 mm where it is known (not at 1 motion)";
+    assert!(text.contains(expected), "{text}");
 }

@@ -1,0 +1,62 @@
+//! Approaches to cuts that remain unmodified: they lead to where the first line of the cut begins, which from a corrected start would become a
+//! wedge as high as the correction.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+use crate::cut::{CutsOf, Obstacle, may_cut, starts};
+use crate::plan::reason::OutcomeReason;
+use crate::search_budget::MANY;
+use truegrind_programs::motion::{Listing, MotionKind};
+
+/// The motions that must not be corrected because a cut that remains unmodified begins where they end, `shift_mm` by more than
+/// `tolerance_mm`. Air moves, and a line from an air move to a stop; one that ends a longer cut belongs to that, and one that leads to a
+/// corrected cut as well is needed there.
+pub(crate) fn of_cuts_left(
+    listing: &Listing,
+    cuts: &CutsOf,
+    blocking_reason: Obstacle<'_>,
+    tolerance_mm: f64,
+    shift_mm: &dyn Fn(u32) -> f64,
+) -> Vec<(u32, OutcomeReason)> {
+    let is_left = |index: u32| blocking_reason(index).is_some();
+    let is_path = |index: u32| {
+        let motion = &listing.motions[index as usize];
+        may_cut(motion) && matches!(motion.kind, MotionKind::Linear | MotionKind::Circular)
+    };
+    let motions = (0..listing.motions.len() as u32).into_par_iter().with_min_len(MANY);
+    let left: Vec<u32> = motions.filter(|index| is_path(*index) && is_left(*index)).collect();
+    let mut found: BTreeMap<u32, OutcomeReason> = BTreeMap::new();
+    for index in left {
+        for start in starts(listing, index) {
+            if !is_left(start) && !(shift_mm(start) <= tolerance_mm) {
+                let line = listing.motions[index as usize].place.line;
+                found.entry(start).or_insert(OutcomeReason::StartOfUnchangedCut { line });
+            }
+        }
+    }
+    if found.is_empty() {
+        return Vec::new();
+    }
+    let mut motions_of_cut: BTreeMap<u32, usize> = BTreeMap::new();
+    for index in 0..listing.motions.len() as u32 {
+        if let Some(root) = cuts.root(index) {
+            *motions_of_cut.entry(root).or_default() += 1;
+        }
+        if is_path(index) && !is_left(index) {
+            starts(listing, index).iter().for_each(|start| {
+                found.remove(start);
+            });
+        }
+    }
+    let comes_by_air = |index: u32| {
+        let starts = starts(listing, index);
+        !starts.is_empty() && starts.iter().all(|start| !may_cut(&listing.motions[*start as usize]))
+    };
+    let is_approach = |index: u32| match cuts.root(index) {
+        None => true,
+        Some(root) => motions_of_cut[&root] == 1 && comes_by_air(index),
+    };
+    found.into_iter().filter(|(index, _)| is_approach(*index)).collect()
+}
