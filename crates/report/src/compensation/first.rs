@@ -9,7 +9,7 @@ use truegrind_compensation::deviation::Status as MotionStatus;
 use truegrind_compensation::plan::Plan;
 use truegrind_compensation::plan::reason::OutcomeReason;
 use truegrind_compensation::plan::steps_to_left::is_path;
-use truegrind_programs::motion::Listing;
+use truegrind_programs::motion::{Listing, Motion, Reason};
 
 /// All statuses in display order.
 const STATUSES: [MotionStatus; 4] =
@@ -67,6 +67,10 @@ pub fn verdict(plan: &Plan, listing: &Listing, is_written: bool) -> Verdict {
             Status::Warning,
             "Corrected, except for lines or arcs that are left: there the workpiece deviates as before",
         ),
+        (_, 0) if left_cycles(listing) > 0 => (
+            Status::Warning,
+            "Corrected, except for canned cycles: what they make deviates as before, and so it does from the rest",
+        ),
         (_, 0) if !is_written => {
             (Status::Good, "All correctable motions would be corrected; nothing was written")
         }
@@ -79,6 +83,12 @@ pub fn verdict(plan: &Plan, listing: &Listing, is_written: bool) -> Verdict {
     let mut reasons = deviations(plan, listing);
     reasons.push(coverage(plan));
     reasons.extend(left_paths(plan, listing).filter(|_| written > 0));
+    reasons.extend(match left_cycles(listing) {
+        1.. if written == 0 => None,
+        0 => None,
+        1 => Some("1 canned cycle is left: its motions are not in the program".to_owned()),
+        count => Some(format!("{count} canned cycles are left: their motions are not in the program")),
+    });
     if left > 0 {
         reasons.push(format!(
             "{left} of {cuts} cuts are unchanged, since their correction makes them worse with a probability above --max-risk; measuring \
@@ -162,6 +172,15 @@ fn left_paths(plan: &Plan, listing: &Listing) -> Option<String> {
             "{left} lines or arcs on which the tool may cut are left: there the deviation stays"
         )),
     }
+}
+
+/// Canned cycles that make something; those that set a plane or are defined for later make nothing.
+fn left_cycles(listing: &Listing) -> usize {
+    let makes = |motion: &&Motion| {
+        motion.own_reason == Some(Reason::Cycle)
+            && !["PLANE", "CYCLE800", "CYCL DEF"].contains(&&*motion.instruction)
+    };
+    listing.motions.iter().filter(makes).count()
 }
 
 /// Whether the program was corrected before: its numbers are then no longer those that were intended, which before, after and risk refer to.
