@@ -328,6 +328,9 @@ impl DeviationContext<'_> {
         }
         // The original defines the intended path.
         let cell = self.arguments;
+        if let Some(Runner { robot: Some(robot), nominal, .. }) = self.runners.first() {
+            cell.note_stated_overload(&task, robot, nominal);
+        }
         let loads = [original.as_ref().unwrap_or(&task), &task].map(|program| cell.loads(program));
         let reports: Vec<PathReport> = self
             .runners
