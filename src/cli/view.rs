@@ -264,6 +264,7 @@ fn model(arguments: &Arguments, file: &Path) -> anyhow::Result<Recording> {
         after: After::PredictedRemainder,
         points,
         missing: None,
+        differences: Vec::new(),
         held_out_mm: Some(arm.geometry.held_out.rmse),
     };
     let scene = PathScene {

@@ -188,6 +188,9 @@ pub struct MissingMotion {
 pub struct MissingMotions {
     /// In the order of the program; at least one.
     pub motions: Vec<MissingMotion>,
+    /// What the rewritten program has differently from the original beyond moved and inserted targets, each with its lines: with any of
+    /// these, the deviations after are not those of a corrected program.
+    pub differences: Vec<String>,
     /// Their lines, the first few.
     pub lines: String,
 }

@@ -389,6 +389,7 @@ fn model_json(report: &PathReport) -> Value {
         "model": report.model,
         "after_is": report.after,
         "model_held_out_rmse_mm": report.held_out_mm,
+        "differences": report.differences,
         "summary": { "before": block(BEFORE), "after": block(AFTER) },
         "points": points,
     })

@@ -93,7 +93,89 @@ pub(super) fn verdict(reports: &[&PathReport]) -> Verdict {
                 .to_owned(),
         );
     }
+    if let Some(report) = reports.iter().find(|report| !report.differences.is_empty()) {
+        return Verdict::new(Status::Bad, OTHER_PROGRAM.to_owned(), different(report, reasons));
+    }
     Verdict::new(status, headline(reports, &judged), reasons)
+}
+
+/// What is said of a program that is not the intended one with corrected targets.
+const OTHER_PROGRAM: &str = "The program differs from the intended one by more than a correction: the deviations after are not those of \
+    a corrected program";
+
+/// Differences that are listed.
+const MAX_DIFFERENCES: usize = 10;
+
+/// The differences of a program, before what else is to be said.
+fn different(report: &PathReport, reasons: Vec<String>) -> Vec<String> {
+    let mut out: Vec<String> = report.differences.iter().take(MAX_DIFFERENCES).cloned().collect();
+    let more = report.differences.len() - out.len();
+    out.extend((more > 0).then(|| format!("and {more} more differences (--json lists them)")));
+    out.extend(reasons);
+    out
+}
+
+fn at_least_warning(status: Status) -> Status {
+    if status == Status::Good { Status::Warning } else { status }
+}
+
+/// By how much a correction may bend a path without a word (mm RMS).
+const BENT_MM: f64 = 0.05;
+
+/// The shape of a path before and after, over all its cutting points (RMS, mm), where the correction bends it.
+fn bent(report: &PathReport) -> Option<[f64; 2]> {
+    let shape_mm = [report.registered_rms_mm(BEFORE)?, report.registered_rms_mm(AFTER)?];
+    (shape_mm[1] > shape_mm[0] + BENT_MM).then_some(shape_mm)
+}
+
+fn bent_words(before: f64, after: f64) -> String {
+    format!(
+        "bends the path: its shape goes from {before:.3} to {after:.3} mm RMS after the best rigid registration of all its cutting points"
+    )
+}
+
+/// The share of the largest deviation that must remain for a bent path to be worse: one that was displaced as a whole may be bent a little by
+/// what brings it near.
+const STAYS: f64 = 0.5;
+
+/// Words for a path that is worse after the correction: farther off, or bent and not much nearer. `before` and `after` are the largest
+/// deviations (mm).
+fn worse(report: &PathReport, before: f64, after: f64) -> Option<String> {
+    if only_shape(report).is_some() {
+        return None;
+    }
+    if after > before {
+        return Some(format!("makes the path worse: up to {}", known(Some(after))));
+    }
+    bent(report).filter(|_| after > STAYS * before).map(|[before, after]| bent_words(before, after))
+}
+
+/// Lines that are listed.
+const MAX_LINES: usize = 8;
+
+/// What is said of steps between corrected points and others.
+fn steps(report: &PathReport) -> Option<String> {
+    let steps = report.steps();
+    let [_, ..] = steps.points.as_slice() else { return None };
+    let mut lines: Vec<String> = steps.points.iter().map(|point| place(report, point)).collect();
+    lines.dedup();
+    let more = if lines.len() > MAX_LINES { " and more" } else { "" };
+    lines.truncate(MAX_LINES);
+    let word = if lines.len() == 1 { "line" } else { "lines" };
+    Some(format!(
+        "under {} the path has steps of up to {:.3} mm between points that are corrected and neighbours that are not ({word} {}{more})",
+        report.model,
+        steps.largest_mm,
+        lines.join(", ")
+    ))
+}
+
+/// The line of a point, with its file where there are several.
+fn place(report: &PathReport, point: &PathPoint) -> String {
+    match report.files.get(point.file as usize) {
+        Some(file) => format!("{} of {file}", point.line),
+        None => point.line.to_string(),
+    }
 }
 
 /// Deviation before and after.

@@ -65,6 +65,7 @@ fn report(model: &str, points: Vec<PathPoint>) -> PathReport {
         points,
         missing: None,
         held_out_mm: Some(0.46),
+        differences: Vec::new(),
     }
 }
 
