@@ -14,6 +14,7 @@ use truegrind::compensation::deviation::{After, PathReport};
 use truegrind::compensation::verify::{ActingArm, VerificationTask, verify};
 use truegrind::programs::nc::setup::Setup;
 use truegrind::report::deviation as view;
+use truegrind::report::status::Status;
 use truegrind::surfaces::SurfaceFile;
 use truegrind::units::done::Recorded;
 
@@ -259,7 +260,8 @@ impl Reports<'_> {
         )?;
         further(&mut batch, &name, &reports)?;
         batch.write()?;
-        Ok(if failed > 0 { ExitStatus::Flagged } else { ExitStatus::Done })
+        let is_doubtful = matches!(view::status(&reports), Status::Warning | Status::Bad);
+        Ok(if failed > 0 || is_doubtful { ExitStatus::Flagged } else { ExitStatus::Done })
     }
 }
 
