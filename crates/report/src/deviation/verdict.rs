@@ -89,8 +89,7 @@ pub(super) fn verdict(reports: &[&PathReport]) -> Verdict {
     }
     if judged.is_empty() && !reports.is_empty() {
         reasons.push(
-            "`truegrind compensate` with the same model corrects the program, down to about the predicted 1σ"
-                .to_owned(),
+            "`truegrind compensate` with the same model says which motions it corrects, and what remains of their deviation".to_owned(),
         );
     }
     if let Some(report) = reports.iter().find(|report| !report.differences.is_empty()) {
