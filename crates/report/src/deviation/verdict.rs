@@ -4,7 +4,7 @@ use super::side::{AFTER, BEFORE, Side};
 use super::words::{decimals, meaning};
 use crate::document::Verdict;
 use crate::status::Status;
-use truegrind_compensation::deviation::{PathReport, Status as MotionStatus};
+use truegrind_compensation::deviation::{PathPoint, PathReport, Status as MotionStatus};
 
 /// A report with its largest deviation (mm) before and after correction.
 type Judged<'a> = (&'a PathReport, f64, f64);
@@ -42,27 +42,30 @@ pub(super) fn verdict(reports: &[&PathReport]) -> Verdict {
                  it lies as a whole: {place_mm:.3} mm RMS (`compensate --placement` decides that)",
                 report.model
             ));
-        } else if after > before {
-            status = if judged.iter().all(|(_, before, after)| after > before) {
-                Status::Bad
-            } else {
-                Status::Warning
-            };
-            reasons.push(format!("{} makes the path worse: up to {}", report.model, known(Some(*after))));
+        } else if let Some(words) = worse(report, *before, *after) {
+            let all = judged.iter().all(|(report, before, after)| worse(report, *before, *after).is_some());
+            status = if all { Status::Bad } else { Status::Warning };
+            reasons.push(format!("{} {words}", report.model));
+        } else if let Some([before, after]) = bent(report) {
+            status = at_least_warning(status);
+            reasons.push(format!("{} {}", report.model, bent_words(before, after)));
+        }
+        if let Some(words) = steps(report) {
+            status = at_least_warning(status);
+            reasons.push(words);
         }
         // A model that corrects no cut has no correction whose certainty could be judged.
         let corrects = report.cut().any(|p| !matches!(p.status, MotionStatus::Left));
         if !corrects {
             let because = report.cut().find_map(|p| p.reason.as_ref());
             let because = because.map_or_else(String::new, |reason| format!(": {reason}"));
+            status = at_least_warning(status);
             reasons.push(format!("{} corrects no cut{because}", report.model));
         } else if let (Some(sigma), Some(rms)) = (report.sigma_rms_mm(), rms(report, BEFORE))
             && sigma > rms
             && only_shape.is_none()
         {
-            if status == Status::Good {
-                status = Status::Warning;
-            }
+            status = at_least_warning(status);
             reasons.push(format!(
                 "under {} the predicted 1σ of {sigma:.3} mm exceeds the deviation that it corrects, {rms:.3} mm RMS: the \
                  model does not know enough here to say that the correction helps",
@@ -71,9 +74,7 @@ pub(super) fn verdict(reports: &[&PathReport]) -> Verdict {
         }
     }
     if let Some(missing) = reports.iter().find_map(|report| report.missing.as_ref()) {
-        if status == Status::Good {
-            status = Status::Warning;
-        }
+        status = at_least_warning(status);
         let one = missing.motions.len() == 1;
         let (motions, lead, them) =
             if one { ("motion has", "it leads", "it") } else { ("motions have", "they lead", "them") };
