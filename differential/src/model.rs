@@ -202,13 +202,33 @@ fn toml(arm: &Arm, sheet: &Sheet) -> String {
             );
         }
     }
-    let _ = write!(
-        out,
-        "\n[covariance]\norder = [\"link1.a\"]\nlower = [[1e-18]]\n\n[[parameter]]\nname = \"link1.a\"\nunit = \
-         \"mm\"\nnominal = {:?}\nvalue = {:?}\nsigma = 1e-9\nprior_sigma = 1.0\ndetermined = 1.0\n",
-        arm.nominal[0].a, arm.actual[0].a
-    );
+    parameters(&mut out, arm);
     out
+}
+
+/// The estimated links as parameters that are known exactly.
+fn parameters(out: &mut String, arm: &Arm) {
+    let coordinates = |link: &Link, joint: usize| {
+        let second = if joint == 1 { ("beta", "rad", link.beta) } else { ("d", "mm", link.d) };
+        [("a", "mm", link.a), second, ("alpha", "rad", link.alpha), ("theta", "rad", link.theta)]
+    };
+    let (mut order, mut lower, mut list) = (Vec::new(), Vec::new(), String::new());
+    for (joint, (nominal, actual)) in arm.nominal.iter().zip(&arm.actual).enumerate() {
+        let both = coordinates(nominal, joint).into_iter().zip(coordinates(actual, joint));
+        for ((coordinate, unit, nominal), (_, _, value)) in both {
+            let name = format!("link{}.{coordinate}", joint + 1);
+            let _ = write!(
+                list,
+                "\n[[parameter]]\nname = \"{name}\"\nunit = \"{unit}\"\nnominal = {nominal:?}\nvalue = {value:?}\nsigma = 1e-9\n\
+                 prior_sigma = 1.0\ndetermined = 1.0\n"
+            );
+            let mut row = vec![0.0; order.len()];
+            row.push(1e-18);
+            lower.push(row);
+            order.push(name);
+        }
+    }
+    let _ = write!(out, "\n[covariance]\norder = {order:?}\nlower = {lower:?}\n{list}");
 }
 
 fn chain(out: &mut String, name: &str, links: &[Link; 6], arm: &Arm, sheet: &Sheet) {

@@ -470,6 +470,7 @@ fn corrected(
         after: After::PredictedRemainder,
         missing: plan.missing_motions(listing),
         points: std::mem::take(&mut plan.points),
+        differences: Vec::new(),
         held_out_mm: Some(arm.geometry.held_out.rmse),
     };
     let unused = Used::by(listing, &cell).notes(&cell, surface.as_ref());

@@ -10,12 +10,12 @@ use truegrind::arm::effect::Effect;
 use truegrind::arm::estimated::Estimated;
 use truegrind::arm::model::Model;
 use truegrind::compensation::cell::{Cell, Used};
+use truegrind::compensation::condition::overload::{overload, rated_payload_kg, stated_overload};
 use truegrind::compensation::frames::surface_frames::surface_frame_contradictions;
 use truegrind::compensation::frames::taught::contradictions;
 use truegrind::programs::motion::Listing;
 use truegrind::programs::motion::load::Loads;
 use truegrind::programs::reading::Program;
-use truegrind::robots;
 use truegrind::surfaces::SurfaceFile;
 
 use super::files;
@@ -96,14 +96,20 @@ impl CellArguments {
 
     /// Notes a payload above the rated one of the catalogue: perhaps it is in another unit.
     fn note_overload(&self, model: Option<&Estimated>) {
-        let sheet = model.and_then(|arm| Some(robots::load(&arm.robot).ok()?.sheet));
-        let rated = sheet.and_then(|sheet| Some((sheet.payload_kg?, sheet.name)));
-        if let (Some(kg), Some((rated, name))) = (self.payload, rated)
+        let Some(robot) = model.map(|arm| arm.robot.as_str()) else { return };
+        if let (Some(kg), Some(rated)) = (self.payload, rated_payload_kg(robot))
             && kg > rated
         {
-            print_message(format_args!(
-                "note: --payload {kg}: {name} is rated for {rated} kg; check that the mass is right and in kg"
-            ));
+            print_message(format_args!("note: --payload {kg}: {}", overload(kg, robot, rated)));
+        }
+    }
+
+    /// Notes the loads of a program that are above the rated payload.
+    pub(super) fn note_stated_overload(&self, program: &Program<'_>, robot: &str, nominal: &Model) {
+        let loads = self.loads(program);
+        if let Some(note) = loads.and_then(|loads| stated_overload(program.listing(), &loads, robot, nominal))
+        {
+            print_message(format_args!("note: {note}"));
         }
     }
 

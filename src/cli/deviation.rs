@@ -14,6 +14,7 @@ use truegrind::compensation::deviation::{After, PathReport};
 use truegrind::compensation::verify::{ActingArm, VerificationTask, verify};
 use truegrind::programs::nc::setup::Setup;
 use truegrind::report::deviation as view;
+use truegrind::report::status::Status;
 use truegrind::surfaces::SurfaceFile;
 use truegrind::units::done::Recorded;
 
@@ -247,7 +248,7 @@ impl Reports<'_> {
             reports.extend(found.reports);
         }
         if reports.is_empty() && !self.is_part {
-            bail!("none of {programs} programs has a motion whose target the program text determines");
+            bail!("none of {programs} programs has a motion whose deviation is known");
         }
         let name = name_of(programs, &reports);
         self.outputs.print(&view::summary(&name, &reports))?;
@@ -259,7 +260,8 @@ impl Reports<'_> {
         )?;
         further(&mut batch, &name, &reports)?;
         batch.write()?;
-        Ok(if failed > 0 { ExitStatus::Flagged } else { ExitStatus::Done })
+        let is_doubtful = matches!(view::status(&reports), Status::Warning | Status::Bad);
+        Ok(if failed > 0 || is_doubtful { ExitStatus::Flagged } else { ExitStatus::Done })
     }
 }
 
@@ -328,6 +330,9 @@ impl DeviationContext<'_> {
         }
         // The original defines the intended path.
         let cell = self.arguments;
+        if let Some(Runner { robot: Some(robot), nominal, .. }) = self.runners.first() {
+            cell.note_stated_overload(&task, robot, nominal);
+        }
         let loads = [original.as_ref().unwrap_or(&task), &task].map(|program| cell.loads(program));
         let reports: Vec<PathReport> = self
             .runners
@@ -353,7 +358,7 @@ impl DeviationContext<'_> {
             })
             .collect();
         if reports.iter().all(|report| report.points.is_empty()) {
-            bail!("{name}: no motion has a target that the program text determines");
+            bail!("{name}: {}", why_no_point(&reports));
         }
         if original.is_some() {
             refuse_unrelated(&name, &reports)?;
@@ -364,6 +369,36 @@ impl DeviationContext<'_> {
         }
         Ok(ProgramReports { name: job.name(), reports, used: Some(used), failed: None })
     }
+}
+
+/// Reasons that are told of a program without a point.
+const MAX_REASONS: usize = 4;
+
+/// Why no motion of a program has a deviation: the most frequent reasons, each with its first line.
+pub(super) fn why_no_point(reports: &[PathReport]) -> String {
+    let missing = reports.iter().find_map(|report| report.missing.as_ref());
+    let motions = missing.map_or(&[][..], |missing| &missing.motions);
+    if motions.is_empty() {
+        return "it has no motion of the tool".to_owned();
+    }
+    let mut reasons: Vec<(&str, usize, u32)> = Vec::new();
+    for motion in motions {
+        let reason = motion.reason.as_deref().unwrap_or("the program text does not tell where it leads");
+        match reasons.iter_mut().find(|(known, ..)| *known == reason) {
+            Some((_, count, _)) => *count += 1,
+            None => reasons.push((reason, 1, motion.line)),
+        }
+    }
+    reasons.sort_by_key(|(_, count, _)| std::cmp::Reverse(*count));
+    let told: Vec<String> = reasons
+        .iter()
+        .take(MAX_REASONS)
+        .map(|(reason, count, line)| {
+            let motions = if *count == 1 { "motion" } else { "motions" };
+            format!("{count} {motions} from line {line}: {reason}")
+        })
+        .collect();
+    format!("the deviation of none of its {} motions is known: {}", motions.len(), told.join("; "))
 }
 
 /// No correction moves a target so far (mm).

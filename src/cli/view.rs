@@ -23,6 +23,7 @@ use truegrind::programs::reading::Language;
 
 use super::cell_arguments::{CellArguments, note_unused_entries, refuse_contradictions};
 use super::computation::{Common, on_threads};
+use super::deviation::why_no_point;
 use super::exit_status::ExitStatus;
 use super::files::{self, Batch};
 use super::inputs::{NamedModel, StatedRobot};
@@ -264,6 +265,7 @@ fn model(arguments: &Arguments, file: &Path) -> anyhow::Result<Recording> {
         after: After::PredictedRemainder,
         points,
         missing: None,
+        differences: Vec::new(),
         held_out_mm: Some(arm.geometry.held_out.rmse),
     };
     let scene = PathScene {
@@ -323,7 +325,7 @@ fn program(arguments: &Arguments, paths: &[PathBuf]) -> anyhow::Result<Recording
         &acting,
     );
     if report.points.is_empty() {
-        bail!("{program}: no motion has a reachable target that the program text determines");
+        bail!("{program}: {}", why_no_point(std::slice::from_ref(&report)));
     }
     let is = if knowledge.is_some() { "estimated arm" } else { "nominal arm" };
     let arms = Arms { real: acting.model, is, nominal: &nominal, robot: arguments.robot.named() };

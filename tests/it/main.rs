@@ -6,6 +6,7 @@
 mod command;
 mod programs;
 mod layers;
+mod literals;
 mod units;
 mod keys;
 mod keys_of_runs;

@@ -279,6 +279,8 @@ fn a_motion_that_is_right_already_is_left_for_that_reason() {
     let model = fs::read_to_string(at.join("model.toml")).unwrap();
     let mut exact = Estimated::from_toml(&model).unwrap();
     exact.model = exact.nominal.clone();
+    // The list says what was identified, which this arm is not.
+    exact.parameters.clear();
     // Measured everywhere.
     (exact.region.min_deg, exact.region.max_deg) = ([-400.0; 6], [400.0; 6]);
     (exact.region.spacing_deg, exact.region.sigma_mm) = (1e4, 1e3);
@@ -430,7 +432,7 @@ fn what_is_left_shows_everywhere() {
     assert!(err.contains("--intended"), "{err}");
     let (code, report, err) =
         truegrind(at, &["deviation", "left.mod", "--model", "model.toml", "--intended", "in/left.mod"]);
-    assert_eq!(code, 0, "{err}");
+    assert_eq!(code, 1, "{err}");
     assert!(report.contains("[warning]") && report.contains("2 motions have no deviation"), "{report}");
     // As many motions, and one of them leads elsewhere.
     fs::write(at.join("other.mod"), text.replace(&place(370.0), &place(240.0))).unwrap();
@@ -441,12 +443,57 @@ fn what_is_left_shows_everywhere() {
     // What is as it was is not called corrected.
     let same = ["deviation", "in/left.mod", "--model", "model.toml", "--intended", "in/left.mod", "--json"];
     let (code, report, err) = truegrind(at, &same);
-    assert_eq!(code, 0, "{err}");
+    assert_eq!(code, 1, "nothing is corrected: {err}");
     let points = json(&report)["programs"][0]["models"][0]["points"].as_array().unwrap().clone();
     assert!(!points.is_empty() && points.iter().all(|point| point["status"] == "left"), "{points:?}");
     // Corrected with this model: nothing would change.
     let (code, _, err) = truegrind(at, &["compensate", "left.mod", "--model", "model.toml", "--check"]);
     assert_eq!(code, 0, "{err}");
+}
+
+/// A program beside the original that it was made from: what someone changed afterwards is told by line, and no run of it is ok.
+#[test]
+fn a_program_that_was_edited_after_its_correction_is_not_ok() {
+    let dir = workshop();
+    let at = dir.path();
+    let original = module("A", 5, 0.0);
+    fs::write(at.join("a.mod"), &original).unwrap();
+    let arguments =
+        ["compensate", "a.mod", "--model", "model.toml", "-o", "b.mod", "--placement", "absolute"];
+    let (code, text, err) = truegrind(at, &[&arguments[..], &["--max-risk", "1"]].concat());
+    assert!(code < 2, "{text}{err}");
+    let corrected = fs::read_to_string(at.join("b.mod")).unwrap();
+    assert_ne!(corrected, original);
+    let judge = |text: &str| {
+        fs::write(at.join("c.mod"), text).unwrap();
+        truegrind(at, &["deviation", "c.mod", "--intended", "a.mod", "--model", "model.toml"])
+    };
+    let (code, text, err) = judge(&corrected);
+    assert!(code == 0 && text.contains("[ok]"), "{text}{err}");
+    let line = corrected.lines().filter(|line| line.contains("MoveL")).nth(1).unwrap();
+    let number = corrected.lines().position(|other| other == line).unwrap() + 1;
+    let displaced = format!("    PDispSet [[0,0,5],[1,0,0,0]];\n{line}");
+    let (code, text, err) = judge(&corrected.replacen(line, &displaced, 1));
+    assert_eq!(code, 1, "{text}{err}");
+    assert!(text.contains("[failed] The program differs") && text.contains("program displacement"), "{text}");
+    assert!(text.contains(&format!("{}", number + 1)), "{text}");
+    // Worse than before.
+    let x = line.split("[[").nth(1).unwrap().split(',').next().unwrap();
+    let far: f64 = x.parse::<f64>().unwrap() + 9.0;
+    let (code, text, err) = judge(&corrected.replacen(line, &line.replacen(x, &far.to_string(), 1), 1));
+    assert!(code == 1 && text.contains("[failed]") && text.contains("makes the path worse"), "{text}{err}");
+}
+
+/// What is missing is named; that the text does not tell where a motion leads is another reason.
+#[test]
+fn a_program_without_a_known_deviation_is_told_why() {
+    let dir = workshop();
+    let at = dir.path();
+    fs::write(at.join("a.mod"), module("A", 5, 0.0).replace("tool0", "tNowhere")).unwrap();
+    let (code, _, err) = truegrind(at, &["deviation", "a.mod", "--model", "model.toml"]);
+    assert_eq!(code, 2, "{err}");
+    assert!(err.contains("the deviation of none of its") && err.contains("tool"), "{err}");
+    assert!(!err.contains("program text determines"), "{err}");
 }
 
 #[test]

@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 use thiserror::Error;
 
 use crate::cell::Cell;
+use crate::condition::overload::stated_overload;
 use crate::cut::{Cuts, may_cut};
 use crate::deviation::Status;
 use crate::frames::taught::contradictions;
@@ -106,7 +107,7 @@ pub fn compensate_prepared(
             // Frees the solved targets while the edits are made; no second plan is needed.
             let ((), rewritten) =
                 rayon::join(|| drop(targets), || program.rewrite(&planned.changes, &rewrite));
-            return Ok(agreed(planned, rewritten?, &BTreeMap::new(), program, options));
+            return Ok(agreed(planned, rewritten?, &BTreeMap::new(), (program, arm), options));
         }
         let rewritten = program.rewrite(&planned.changes, &rewrite)?;
         let found = refusals(&planned, &rewritten, listing);
@@ -114,7 +115,7 @@ pub fn compensate_prepared(
         // sides of later ones, or the start of a line that is written as joints.
         let alone = options.cuts == Cuts::Single && !play && options.emit == Emit::Targets;
         if found.is_empty() || alone {
-            return Ok(agreed(planned, rewritten, &found, program, options));
+            return Ok(agreed(planned, rewritten, &found, (program, arm), options));
         }
         for (motion, reason) in found {
             refused.entry(motion).or_insert(reason);
@@ -175,7 +176,7 @@ fn agreed(
     mut planned: Plan,
     rewritten: Rewritten,
     refused: &BTreeMap<u32, OutcomeReason>,
-    program: &Program<'_>,
+    (program, arm): (&Program<'_>, &Estimated),
     options: &Options,
 ) -> Compensated {
     reconcile(&mut planned, &rewritten, refused);
@@ -185,6 +186,10 @@ fn agreed(
     };
     planned.steps = StepsToLeft::of(program.listing(), &planned.changes, &outcome, options.tolerance_mm);
     planned.notes.extend(undeclared::notes(program.listing(), program.language()));
+    let loads = options.loads.as_ref();
+    planned
+        .notes
+        .extend(loads.and_then(|loads| stated_overload(program.listing(), loads, &arm.robot, &arm.nominal)));
     if program.language() == Language::Rapid
         && let Some(off) = single_precision(&planned.changes)
     {

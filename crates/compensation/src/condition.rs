@@ -1,4 +1,5 @@
 //! The condition of the arm at each target: what it carries and from which side its joints arrive.
 
 pub(crate) mod arm_conditions;
+pub mod overload;
 pub mod payload;

@@ -3,6 +3,8 @@
 //! Frames: the *intended* pose is where the program's author wants the TCP, in the base. A deviation is reached minus
 //! intended, its vector in the axes of the work object, in which programs and parts are measured.
 
+use std::collections::BTreeSet;
+
 use nalgebra::{Isometry3, Matrix3, Point3, SVD, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -125,6 +127,11 @@ impl PathPoint {
         }
     }
 
+    /// Whether it is rewritten.
+    pub fn is_corrected(&self) -> bool {
+        matches!(self.status, Status::Changed | Status::Flagged)
+    }
+
     /// Whether its σ is that of the shape alone.
     pub fn is_sigma_of_shape(&self) -> bool {
         self.shape_sigma_mm.is_some() && self.sigma_mm == self.shape_sigma_mm
@@ -135,6 +142,25 @@ impl PathPoint {
         let plain = |word: &&str| !(word.contains('.') && word.bytes().any(|b| b.is_ascii_digit()));
         self.reason.as_ref().map(|reason| reason.split(' ').filter(plain).collect::<Vec<_>>().join(" "))
     }
+}
+
+/// How much more two neighbours may differ in their deviation after the correction than before, without a step between them (mm).
+const STEP_MM: f64 = 0.05;
+
+/// Steps between points that are corrected and neighbours that are not.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Steps<'a> {
+    /// The corrected points.
+    pub points: Vec<&'a PathPoint>,
+    /// The largest step (mm).
+    pub largest_mm: f64,
+}
+
+/// By how much the deviation changes from one point to the next (mm); in the axes of the base, since they may have different work objects.
+fn jump_mm(pair: &[PathPoint], which: fn(&PathPoint) -> Option<Deviation>) -> Option<f64> {
+    let [a, b] = [&pair[0], &pair[1]]
+        .map(|point| which(point).map(|deviation| point.base_from_object.rotation * deviation.vector_mm));
+    Some((a? - b?).norm())
 }
 
 /// Meaning of the column "after" of a table.
@@ -162,6 +188,9 @@ pub struct PathReport {
     pub points: Vec<PathPoint>,
     /// Motions without a point, if any.
     pub missing: Option<MissingMotions>,
+    /// What the rewritten program has differently from the original beyond moved and inserted targets, each with its lines: with any of
+    /// these, the deviations after are not those of a corrected program.
+    pub differences: Vec<String>,
     /// Held-out error of the model [mm RMSE], where it has one.
     pub held_out_mm: Option<f64>,
 }
@@ -240,11 +269,32 @@ impl PathReport {
         self.points.iter().filter(move |point| point.cutting || !any)
     }
 
-    /// The points by which the shape of a path is judged: those of the cut, without what is left or refused where anything is corrected.
-    pub fn shape_points(&self) -> impl Iterator<Item = &PathPoint> {
-        let is_corrected = |point: &PathPoint| matches!(point.status, Status::Changed | Status::Flagged);
-        let any = self.cut().any(is_corrected);
-        self.cut().filter(move |point| is_corrected(point) || !any)
+    /// Steps of the path between points of the cut that are corrected and neighbours that are not.
+    pub fn steps(&self) -> Steps<'_> {
+        let apart: BTreeSet<usize> = self
+            .missing
+            .iter()
+            .flat_map(|missing| &missing.motions)
+            .map(|motion| motion.points_before)
+            .collect();
+        let any = self.points.iter().any(|point| point.cutting);
+        let mut found = Steps { points: Vec::new(), largest_mm: 0.0 };
+        for (behind, pair) in (1..).zip(self.points.windows(2)) {
+            let [a, b] = [&pair[0], &pair[1]];
+            let is_cut = (a.cutting && b.cutting) || !any;
+            if !is_cut || a.is_corrected() == b.is_corrected() || apart.contains(&behind) {
+                continue;
+            }
+            let (Some(before_mm), Some(after_mm)) = (jump_mm(pair, |p| p.before), jump_mm(pair, |p| p.after))
+            else {
+                continue;
+            };
+            if after_mm > before_mm + STEP_MM {
+                found.points.push(if a.is_corrected() { a } else { b });
+                found.largest_mm = found.largest_mm.max(after_mm);
+            }
+        }
+        found
     }
 
     /// Signed deviations of the cut points that have one, before or after.
@@ -277,11 +327,11 @@ impl PathReport {
         Some(Block { five_mm, all: ErrorSummary::of(values) })
     }
 
-    /// RMS of the deviation vectors after the best rigid motion (mm): the shape error of the path, for a base that was not
-    /// measured in the work object. `None` for fewer than three points.
+    /// RMS of the deviation vectors of the cut after the best rigid motion (mm): the shape error of the path, for a base that was not
+    /// measured in the work object. Points that are not corrected count too: the part has them all. `None` for fewer than three points.
     pub fn registered_rms_mm(&self, which: fn(&PathPoint) -> Option<Deviation>) -> Option<f64> {
         let pairs: Vec<Pair> = self
-            .shape_points()
+            .cut()
             .filter_map(|p| {
                 let intended = p.base_from_object.inverse() * Point3::from(p.intended.translation.vector);
                 which(p).map(|d| (intended, intended + d.vector_mm))

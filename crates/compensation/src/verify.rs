@@ -3,8 +3,15 @@
 //! The controller computes joints with the nominal arm; the acting arm (estimated, or a simulated actual one) moves with
 //! those joints, arriving from their backlash sides. Intended poses come from the original program.
 
+mod alignment;
+mod differences;
+mod executed_end;
+
 use nalgebra::{Point3, Vector3};
 
+use self::alignment::align;
+use self::differences::Compared;
+use self::executed_end::{ExecutedEnd, by_motion};
 use crate::arms::Arms;
 use crate::backlash::sides::{MotionEnd, ReachedEnd, backlash_sides};
 use crate::cell::Cell;
@@ -30,22 +37,6 @@ struct CommandedEnd {
     /// Commanded pose in the work object.
     commanded: Pose,
     joints: Joints,
-}
-
-/// End of a motion as executed.
-#[derive(Debug, Clone)]
-struct ExecutedEnd {
-    motion: usize,
-    /// Commanded pose in the work object.
-    commanded: Pose,
-    joints: Joints,
-    /// Reached pose in the work object.
-    reached: Pose,
-    base_from_object: Pose,
-    flange_from_tool: Pose,
-    carried: Option<RegisteredFrame>,
-    /// Condition under which the arm arrived.
-    condition_index: usize,
 }
 
 /// The arm that runs a program.
@@ -91,7 +82,15 @@ pub fn verify(task: &VerificationTask<'_>, acting_arm: &ActingArm<'_>) -> PathRe
     let start = before.first().map(|end| end.joints);
     let after =
         task.rewritten.map(|listing| (listing, run(listing, task.loads[1], start, &mut arms, task.cell).0));
-    let partners = after.as_ref().map(|(_, runs)| align(&before, runs));
+    let ends = by_motion(&before, task.original.motions.len());
+    let after = after.as_ref().map(|(listing, runs)| (*listing, by_motion(runs, listing.motions.len())));
+    let partners = after.as_ref().map(|(_, after)| align(&ends, after));
+    let differences = match (&after, &partners) {
+        (Some((rewritten, after)), Some(partners)) => {
+            Compared { original: task.original, rewritten, partners, before: &ends, after }.differences()
+        }
+        _ => Vec::new(),
+    };
     let points = before
         .iter()
         .enumerate()
@@ -106,7 +105,7 @@ pub fn verify(task: &VerificationTask<'_>, acting_arm: &ActingArm<'_>) -> PathRe
                 Deviation::between(&first.commanded, reached, &Pose::identity(), normal.as_ref())
             };
             let second = match (&after, &partners) {
-                (Some((_, runs)), Some(partners)) => partners[index].map(|k| &runs[k]),
+                (Some((_, after)), Some(partners)) => partners[first.motion].and_then(|k| after[k]),
                 _ => None,
             };
             let same = second.is_some_and(|second| is_same_target(first, second));
@@ -153,6 +152,7 @@ pub fn verify(task: &VerificationTask<'_>, acting_arm: &ActingArm<'_>) -> PathRe
                 without_end.get(without_end.binary_search_by_key(&motion, |(of, _)| *of).ok()?)?;
             Some((Status::Left, Some(reason.to_string())))
         }),
+        differences,
         held_out_mm: acting_arm.knowledge.map(|k| k.geometry.held_out.rmse),
     }
 }
@@ -279,44 +279,4 @@ fn commanded_end(
         }
     };
     Ok(CommandedEnd { motion: index, frames_index, commanded, joints })
-}
-
-/// The rewritten end that belongs to each original one: one to one for equal numbers; with inserted targets, the monotone
-/// matching of least total distance, by dynamic programming over the inserted targets.
-fn align(before: &[ExecutedEnd], after: &[ExecutedEnd]) -> Vec<Option<usize>> {
-    let (n, m) = (before.len(), after.len());
-    if n == m {
-        return (0..n).map(Some).collect();
-    }
-    if m < n || n == 0 {
-        return vec![None; n];
-    }
-    let extra = m - n;
-    let distance = |i: usize, k: usize| {
-        (before[i].commanded.translation.vector - after[k].commanded.translation.vector).norm()
-    };
-    // cost[e]: least total distance with ends 0..=i matched and e of the extra ends skipped so far.
-    let mut cost: Vec<f64> = (0..=extra).map(|e| distance(0, e)).collect();
-    let mut from: Vec<Vec<usize>> = vec![(0..=extra).collect()];
-    for i in 1..n {
-        let mut next = vec![f64::INFINITY; extra + 1];
-        let mut origin = vec![0; extra + 1];
-        let mut best = (f64::INFINITY, 0);
-        for e in 0..=extra {
-            if cost[e] < best.0 {
-                best = (cost[e], e);
-            }
-            next[e] = best.0 + distance(i, i + e);
-            origin[e] = best.1;
-        }
-        cost = next;
-        from.push(origin);
-    }
-    let mut e = (0..=extra).min_by(|a, b| cost[*a].total_cmp(&cost[*b])).unwrap_or(0);
-    let mut out = vec![None; n];
-    for i in (0..n).rev() {
-        out[i] = Some(i + e);
-        e = from[i][e];
-    }
-    out
 }

@@ -264,6 +264,21 @@ pub fn summary(name: &str, reports: &[PathReport]) -> Document {
     page
 }
 
+/// The worst status of all programs; the status of the exit code.
+pub fn status(reports: &[PathReport]) -> Status {
+    let worst = |a: Status, b: Status| if severity(b) > severity(a) { b } else { a };
+    by_program(reports).iter().map(|(_, reports)| verdict(reports).status).fold(Status::Good, worst)
+}
+
+/// How bad a status is. Without a corrected path there is nothing to be judged, which is no fault.
+fn severity(status: Status) -> u8 {
+    match status {
+        Status::Bad => 2,
+        Status::Warning | Status::Found => 1,
+        Status::Good | Status::NotEvaluated => 0,
+    }
+}
+
 /// The page: one section per program with all its models.
 pub fn document(reports: &[PathReport]) -> Document {
     let programs = by_program(reports);
@@ -389,6 +404,7 @@ fn model_json(report: &PathReport) -> Value {
         "model": report.model,
         "after_is": report.after,
         "model_held_out_rmse_mm": report.held_out_mm,
+        "differences": report.differences,
         "summary": { "before": block(BEFORE), "after": block(AFTER) },
         "points": points,
     })

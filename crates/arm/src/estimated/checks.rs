@@ -1,13 +1,15 @@
 //! Checks of a model file before its numbers are used: a number that is not finite would give a σ of 0, and an invalid covariance
 //! a σ of any size.
 
+use std::collections::HashMap;
+
 use nalgebra::{DMatrix, Matrix3};
 
 use super::{Estimated, EstimatedParameter, Provenance, StageErrors, WidthUncertainty};
 use crate::bounds::{self, Bound, InvalidValue, JOINT_DEG, LENGTH_MM, MASS_KG};
 use crate::condition::Condition;
 use crate::model::Model;
-use crate::parameter::{Parameter, link_coordinates};
+use crate::parameter::{LinkCoordinate, Parameter, link_coordinates};
 use crate::region::Region;
 use truegrind_math::statistics::ErrorSummary;
 
@@ -52,6 +54,7 @@ pub(super) fn check(model: &Estimated) -> Result<(), InvalidValue> {
     for parameter in &model.parameters {
         number(parameter).map_err(|invalid| invalid.within(&format!("parameter {}", parameter.name)))?;
     }
+    estimated_links(model)?;
     if let Some(widths) = &model.width_uncertainty {
         width_uncertainty(widths).map_err(|invalid| invalid.within("width_uncertainty"))?;
     }
@@ -98,6 +101,52 @@ fn arms(nominal: &Model, estimated: &Model) -> Result<(), InvalidValue> {
     }
     Ok(())
 }
+
+/// How far a link of the estimated arm may be from its parameter (mm, rad): a file states angles in degrees and parameters in radians,
+/// and someone may have rounded them.
+const SAME_LINK: f64 = 1e-6;
+
+/// What to do about links that contradict their parameters.
+const ONE_ESTIMATE: &str = "the same: the estimated arm is the nominal one with the values of its parameters, and their covariance is of \
+    that arm; use the file as it was written, or identify the arm anew";
+
+/// The links of the estimated arm must be what the file says was identified: the nominal ones with the values of the parameters. Programs
+/// follow the links, while their stated uncertainty is that of the parameters.
+fn estimated_links(model: &Estimated) -> Result<(), InvalidValue> {
+    let values: HashMap<&str, f64> =
+        model.parameters.iter().map(|parameter| (parameter.name.as_str(), parameter.value)).collect();
+    for joint in 0..6 {
+        let [nominal, estimated] = [&model.nominal.links[joint], &model.model.links[joint]];
+        for coordinate in ALL_COORDINATES {
+            let parameter = Parameter::Link { joint, coordinate };
+            let (name, found) = (parameter.to_string(), estimated.get(coordinate));
+            let (stated, of) = match values.get(name.as_str()) {
+                Some(value) => (*value, format!("parameter {name} of")),
+                // The list of parameters may be omitted.
+                None if model.order.contains(&parameter) => continue,
+                None => (nominal.get(coordinate), format!("{name}, which is no parameter, nominally of")),
+            };
+            if !((found - stated).abs() <= SAME_LINK) {
+                let unit = parameter.unit();
+                let number = bounds::display_number;
+                return Err(InvalidValue::new(
+                    format!("estimated.link {}", joint + 1),
+                    format!("{} {unit} beside {of} {} {unit}", number(found), number(stated)),
+                    ONE_ESTIMATE,
+                ));
+            }
+        }
+    }
+    Ok(())
+}
+
+const ALL_COORDINATES: [LinkCoordinate; 5] = [
+    LinkCoordinate::A,
+    LinkCoordinate::D,
+    LinkCoordinate::Alpha,
+    LinkCoordinate::Theta,
+    LinkCoordinate::Beta,
+];
 
 fn stage(errors: &StageErrors) -> Result<(), InvalidValue> {
     let summary = |errors: &ErrorSummary| {

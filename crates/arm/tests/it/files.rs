@@ -109,8 +109,14 @@ fn complete() -> Estimated {
             .map(|parameter| EstimatedParameter {
                 name: parameter.to_string(),
                 unit: parameter.unit().into(),
-                nominal: 0.5,
-                value: 0.25,
+                nominal: match *parameter {
+                    Parameter::Link { joint, coordinate } => nominal().links[joint].get(coordinate),
+                    _ => 0.5,
+                },
+                value: match *parameter {
+                    Parameter::Link { joint, coordinate } => model.links[joint].get(coordinate),
+                    _ => 0.25,
+                },
                 sigma: 0.125,
                 prior_sigma: Some(0.5),
                 determined: 0.75,
@@ -228,6 +234,36 @@ fn faults_of_a_model_are_named() {
     // A map that is no map of joints: its rows depend on each other.
     let error = refused("joint_map = [[1.0, 0.0,", "joint_map = [[0.0, 1.0,");
     assert!(error.contains("joint_map: found a matrix of determinant"), "{error}");
+}
+
+/// The class: two statements of one number. Programs follow the links, and their uncertainty is that of the parameters.
+#[test]
+fn links_that_contradict_the_parameters_are_refused() {
+    let text = complete().to_toml().unwrap();
+    let estimated = text.find("[estimated]").unwrap();
+    let edited = |from: &str, to: &str| {
+        let (before, after) = text.split_at(estimated);
+        assert!(after.contains(from), "{from}");
+        Estimated::from_toml(&format!("{before}{}", after.replacen(from, to, 1)))
+    };
+    let error = edited("a_mm = 270.3", "a_mm = 273.3").unwrap_err().to_string();
+    assert_eq!(
+        error.split(": the estimated arm is").next().unwrap(),
+        "estimated.link 2: found 273.3 mm beside parameter link2.a of 270.3 mm, expected the same"
+    );
+    // The parameter alone, and a link that no parameter stands for.
+    let error = edited("value = 270.3", "value = 271.3").unwrap_err().to_string();
+    assert!(error.contains("270.3 mm beside parameter link2.a of 271.3 mm"), "{error}");
+    let error = edited("d_mm = 302.0", "d_mm = 305.0").unwrap_err().to_string();
+    assert!(
+        error.contains("estimated.link 4: found 305 mm beside link4.d, which is no parameter"),
+        "{error}"
+    );
+    // Rounding as of an editor is none, and without the list only links that no covariance is of are judged.
+    assert!(edited("a_mm = 270.3", "a_mm = 270.3000001").is_ok());
+    let mut model = complete();
+    model.parameters.clear();
+    assert!(Estimated::from_toml(&model.to_toml().unwrap()).is_ok());
 }
 
 #[test]

@@ -107,7 +107,8 @@ pub fn contradicted_target(
     let off_mm = (touched.translation.vector - at).norm();
     (off_mm > OF_ANY_ARM_MM.max(of_this_arm_mm).max(SIGMAS * sigma_mm)).then(|| {
         format!(
-            "--touched-point: the readings put the target {off_mm:.1} mm from there, at {:.1},{:.1},{:.1} on the flange: check that it is in mm in              the flange frame, and of this set-up",
+            "--touched-point: the readings put the target {off_mm:.1} mm from there, at {:.1},{:.1},{:.1} on the flange: check that it is in mm in \
+             the flange frame, and of this set-up",
             at.x, at.y, at.z
         )
     })

@@ -5,6 +5,7 @@
 
 mod frame_change;
 mod cut;
+mod differences;
 mod doubtful_effects;
 mod segment;
 mod circles;
@@ -117,7 +118,9 @@ fn run_on(actual: &Model, original: &[u8], program: &[u8], cell: &Cell) -> PathR
     let nominal = nominal();
     let acting =
         ActingArm { nominal: &nominal, model: actual, knowledge: None, condition: Condition::default() };
-    verify(&judged, &acting)
+    let report = verify(&judged, &acting);
+    assert!(report.differences.is_empty(), "a correction alone: {:?}", report.differences);
+    report
 }
 
 fn worst(report: &PathReport, after: bool) -> f64 {

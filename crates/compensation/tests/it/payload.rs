@@ -1,5 +1,6 @@
 //! Payloads that programs state.
 
+use truegrind_compensation::condition::overload::stated_overload;
 use truegrind_compensation::condition::payload::payload_at;
 use truegrind_programs::motion::load::{Grip, Load, Loads};
 use truegrind_programs::rapid::Task;
@@ -115,4 +116,26 @@ fn what_a_computed_name_or_an_interrupt_begins_with_is_not_known() {
     let late = body.replace("%\"go\"%", "CallByVar \"g\",1");
     let (_, loads) = grips(&late.replace("go", "g1"));
     assert_eq!(loads.unknown(), 1, "{:?}", loads.grips);
+}
+
+/// The class: a mass in another unit. Tool and load together count, and \TLoad.
+#[test]
+fn masses_above_the_rated_payload_are_told_with_the_unit_that_fits() {
+    let told = |body: &str, robot: &str| {
+        let (task, loads) = grips(body);
+        stated_overload(&task.listing, &loads, robot, &super::nominal())
+    };
+    let both = "PROC main()\n m;\n GripLoad part;\n m;\n GripLoad load0;\n m;\nENDPROC\n";
+    let note = told(both, "abb-irb-120").unwrap();
+    assert!(note.contains("up to 5 kg") && note.contains("(line 8)"), "{note}");
+    assert!(
+        note.contains("abb-irb-120 is rated for 3 kg") && note.contains("in pounds it would be 2.268 kg"),
+        "{note}"
+    );
+    assert_eq!(told(both, "kuka-kr6-r900-sixx"), None);
+    assert_eq!(told(both, "an-arm-of-my-own"), None);
+    assert_eq!(told("PROC main()\n m;\nENDPROC\n", "abb-irb-120"), None);
+    let grams = both.replace("GripLoad part", "GripLoad [1500,[0,0,20],[1,0,0,0],0,0,0]");
+    let note = told(&grams, "abb-irb-120");
+    assert!(note.is_none_or(|note| note.contains("in grams it would be 1.502 kg")));
 }

@@ -112,6 +112,7 @@ fn parts(count: usize) -> Parts {
         after: After::PredictedRemainder,
         points,
         missing: None,
+        differences: Vec::new(),
         held_out_mm: Some(0.08),
     };
     Parts { nominal, actual, reports: vec![report], triangles: surface.tessellate(20), base_from_object }

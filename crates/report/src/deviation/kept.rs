@@ -29,7 +29,7 @@ const KINDS: [(MotionKind, &str); 6] = [
 
 /// The record of a report.
 pub fn kept(report: &PathReport) -> Value {
-    let PathReport { program, files, model, after, points, missing, held_out_mm } = report;
+    let PathReport { program, files, model, after, points, missing, differences, held_out_mm } = report;
     let mut last = [String::new(), String::new()];
     let points: Vec<Value> = points.iter().map(|point| of_point(point, &mut last)).collect();
     json!({
@@ -39,6 +39,7 @@ pub fn kept(report: &PathReport) -> Value {
         "achieved": *after == After::Achieved,
         "held_out_mm": held_out_mm.map(exact),
         "missing": missing,
+        "differences": differences,
         "points": points,
     })
 }
@@ -57,6 +58,7 @@ pub fn from_kept(value: &Value) -> Option<PathReport> {
             number => Some(number.as_str()?.parse().ok()?),
         },
         missing: serde_json::from_value(value["missing"].clone()).ok()?,
+        differences: serde_json::from_value(value["differences"].clone()).ok()?,
         points: points.map(|point| to_point(point, &mut last)).collect::<Option<_>>()?,
     })
 }

@@ -80,7 +80,7 @@ pub(super) fn registered(reports: &[&PathReport], programs: bool) -> Table {
     let mut table = Table::new("Absolute deviation, and shape of the path alone", columns);
     let both = |report: &PathReport, side: Side| {
         let squares: Vec<f64> =
-            report.shape_points().filter_map(|p| side(p).map(|d| d.vector_mm.norm_squared())).collect();
+            report.cut().filter_map(|p| side(p).map(|d| d.vector_mm.norm_squared())).collect();
         let rms = (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt());
         rms.map(|rms| (rms, report.registered_rms_mm(side)))
     };
@@ -90,7 +90,7 @@ pub(super) fn registered(reports: &[&PathReport], programs: bool) -> Table {
         table.push(cells);
     }
     table.notes.push(
-        "RMS over the points of the cut that are corrected, or over all if none is. Registration removes the best rigid motion; the rest is the shape error of the path, \
+        "RMS over all points of the cut, corrected or not. Registration removes the best rigid motion; the rest is the shape error of the path, \
          which matters if the base was not measured in the work object."
             .to_owned(),
     );

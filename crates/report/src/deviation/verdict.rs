@@ -4,7 +4,7 @@ use super::side::{AFTER, BEFORE, Side};
 use super::words::{decimals, meaning};
 use crate::document::Verdict;
 use crate::status::Status;
-use truegrind_compensation::deviation::{PathReport, Status as MotionStatus};
+use truegrind_compensation::deviation::{PathPoint, PathReport, Status as MotionStatus};
 
 /// A report with its largest deviation (mm) before and after correction.
 type Judged<'a> = (&'a PathReport, f64, f64);
@@ -42,27 +42,30 @@ pub(super) fn verdict(reports: &[&PathReport]) -> Verdict {
                  it lies as a whole: {place_mm:.3} mm RMS (`compensate --placement` decides that)",
                 report.model
             ));
-        } else if after > before {
-            status = if judged.iter().all(|(_, before, after)| after > before) {
-                Status::Bad
-            } else {
-                Status::Warning
-            };
-            reasons.push(format!("{} makes the path worse: up to {}", report.model, known(Some(*after))));
+        } else if let Some(words) = worse(report, *before, *after) {
+            let all = judged.iter().all(|(report, before, after)| worse(report, *before, *after).is_some());
+            status = if all { Status::Bad } else { Status::Warning };
+            reasons.push(format!("{} {words}", report.model));
+        } else if let Some([before, after]) = bent(report) {
+            status = at_least_warning(status);
+            reasons.push(format!("{} {}", report.model, bent_words(before, after)));
+        }
+        if let Some(words) = steps(report) {
+            status = at_least_warning(status);
+            reasons.push(words);
         }
         // A model that corrects no cut has no correction whose certainty could be judged.
         let corrects = report.cut().any(|p| !matches!(p.status, MotionStatus::Left));
         if !corrects {
             let because = report.cut().find_map(|p| p.reason.as_ref());
             let because = because.map_or_else(String::new, |reason| format!(": {reason}"));
+            status = at_least_warning(status);
             reasons.push(format!("{} corrects no cut{because}", report.model));
         } else if let (Some(sigma), Some(rms)) = (report.sigma_rms_mm(), rms(report, BEFORE))
             && sigma > rms
             && only_shape.is_none()
         {
-            if status == Status::Good {
-                status = Status::Warning;
-            }
+            status = at_least_warning(status);
             reasons.push(format!(
                 "under {} the predicted 1σ of {sigma:.3} mm exceeds the deviation that it corrects, {rms:.3} mm RMS: the \
                  model does not know enough here to say that the correction helps",
@@ -71,9 +74,7 @@ pub(super) fn verdict(reports: &[&PathReport]) -> Verdict {
         }
     }
     if let Some(missing) = reports.iter().find_map(|report| report.missing.as_ref()) {
-        if status == Status::Good {
-            status = Status::Warning;
-        }
+        status = at_least_warning(status);
         let one = missing.motions.len() == 1;
         let (motions, lead, them) =
             if one { ("motion has", "it leads", "it") } else { ("motions have", "they lead", "them") };
@@ -89,11 +90,92 @@ pub(super) fn verdict(reports: &[&PathReport]) -> Verdict {
     }
     if judged.is_empty() && !reports.is_empty() {
         reasons.push(
-            "`truegrind compensate` with the same model corrects what it can of the program, down to about the predicted 1σ"
-                .to_owned(),
+            "`truegrind compensate` with the same model says which motions it corrects, and what remains of their deviation".to_owned(),
         );
     }
+    if let Some(report) = reports.iter().find(|report| !report.differences.is_empty()) {
+        return Verdict::new(Status::Bad, OTHER_PROGRAM.to_owned(), different(report, reasons));
+    }
     Verdict::new(status, headline(reports, &judged), reasons)
+}
+
+/// What is said of a program that is not the intended one with corrected targets.
+const OTHER_PROGRAM: &str = "The program differs from the intended one by more than a correction: the deviations after are not those of \
+    a corrected program";
+
+/// Differences that are listed.
+const MAX_DIFFERENCES: usize = 10;
+
+/// The differences of a program, before what else is to be said.
+fn different(report: &PathReport, reasons: Vec<String>) -> Vec<String> {
+    let mut out: Vec<String> = report.differences.iter().take(MAX_DIFFERENCES).cloned().collect();
+    let more = report.differences.len() - out.len();
+    out.extend((more > 0).then(|| format!("and {more} more differences (--json lists them)")));
+    out.extend(reasons);
+    out
+}
+
+fn at_least_warning(status: Status) -> Status {
+    if status == Status::Good { Status::Warning } else { status }
+}
+
+/// By how much a correction may bend a path without a word (mm RMS).
+const BENT_MM: f64 = 0.05;
+
+/// The shape of a path before and after, over all its cutting points (RMS, mm), where the correction bends it.
+fn bent(report: &PathReport) -> Option<[f64; 2]> {
+    let shape_mm = [report.registered_rms_mm(BEFORE)?, report.registered_rms_mm(AFTER)?];
+    (shape_mm[1] > shape_mm[0] + BENT_MM).then_some(shape_mm)
+}
+
+fn bent_words(before: f64, after: f64) -> String {
+    format!(
+        "bends the path: its shape goes from {before:.3} to {after:.3} mm RMS after the best rigid registration of all its cutting points"
+    )
+}
+
+/// The share of the largest deviation that must remain for a bent path to be worse: one that was displaced as a whole may be bent a little by
+/// what brings it near.
+const STAYS: f64 = 0.5;
+
+/// Words for a path that is worse after the correction: farther off, or bent and not much nearer. `before` and `after` are the largest
+/// deviations (mm).
+fn worse(report: &PathReport, before: f64, after: f64) -> Option<String> {
+    if only_shape(report).is_some() {
+        return None;
+    }
+    if after > before {
+        return Some(format!("makes the path worse: up to {}", known(Some(after))));
+    }
+    bent(report).filter(|_| after > STAYS * before).map(|[before, after]| bent_words(before, after))
+}
+
+/// Lines that are listed.
+const MAX_LINES: usize = 8;
+
+/// What is said of steps between corrected points and others.
+fn steps(report: &PathReport) -> Option<String> {
+    let steps = report.steps();
+    let [_, ..] = steps.points.as_slice() else { return None };
+    let mut lines: Vec<String> = steps.points.iter().map(|point| place(report, point)).collect();
+    lines.dedup();
+    let more = if lines.len() > MAX_LINES { " and more" } else { "" };
+    lines.truncate(MAX_LINES);
+    let word = if lines.len() == 1 { "line" } else { "lines" };
+    Some(format!(
+        "under {} the path has steps of up to {:.3} mm between points that are corrected and neighbours that are not ({word} {}{more})",
+        report.model,
+        steps.largest_mm,
+        lines.join(", ")
+    ))
+}
+
+/// The line of a point, with its file where there are several.
+fn place(report: &PathReport, point: &PathPoint) -> String {
+    match report.files.get(point.file as usize) {
+        Some(file) => format!("{} of {file}", point.line),
+        None => point.line.to_string(),
+    }
 }
 
 /// Deviation before and after.

@@ -9,6 +9,7 @@ use truegrind_math::se3::Pose;
 use truegrind_programs::motion::MotionKind;
 use truegrind_report::deviation as view;
 use truegrind_report::format::{csv, markdown, terminal};
+use truegrind_report::status::Status as ViewStatus;
 use truegrind_report::table::Cell;
 
 use super::examples::leave;
@@ -64,6 +65,7 @@ fn report(model: &str, points: Vec<PathPoint>) -> PathReport {
         after: After::PredictedRemainder,
         points,
         missing: None,
+        differences: Vec::new(),
         held_out_mm: Some(0.46),
     }
 }
@@ -457,4 +459,72 @@ fn a_corrected_shape_at_an_uncorrected_place_is_no_failure() {
     let bent_more = report("arm", worse.collect());
     let page = terminal::document(&view::summary("blade.mod", std::slice::from_ref(&bent_more)), 100);
     assert!(page.contains("worse"), "{page}");
+}
+
+/// A line of fifteen points of which the first four were left: the other eleven are where they shall be, and the part has a step.
+#[test]
+fn a_path_that_is_corrected_in_part_is_judged_as_a_whole() {
+    let before = |k: usize| [-0.9, 0.9 - 0.01 * k as f64, 1.6];
+    let path = |corrected: fn(usize) -> bool| {
+        let points = (0..15).map(|k| {
+            let after = if corrected(k) { [0.0; 3] } else { before(k) };
+            let mut point =
+                point(k, [20.0 * k as f64, 100.0, 3.0 * (k % 3) as f64], Some(before(k)), Some(after), false);
+            point.status = if corrected(k) { Status::Changed } else { Status::Left };
+            point
+        });
+        report("arm", points.collect())
+    };
+    let page = |report: &PathReport| {
+        let page = terminal::document(&view::summary("blade.mod", std::slice::from_ref(report)), 100);
+        page.split_whitespace().collect::<Vec<_>>().join(" ")
+    };
+    let mut part = path(|k| k > 3);
+    let text = page(&part);
+    assert!(text.contains("[failed]"), "{text}");
+    assert!(text.contains("bends the path: its shape goes from 0.0"), "{text}");
+    assert!(
+        text.contains("steps of up to 2.0") && text.contains("neighbours that are not (line 14)"),
+        "{text}"
+    );
+    let table = view::registered_table(std::slice::from_ref(&part));
+    let Cell::Number(registered) = table.rows[1][2] else { panic!("{:?}", table.rows) };
+    assert!(registered > 0.5, "{registered}");
+    // Nothing is said of neighbours that a motion without a point separates, but the whole is still bent.
+    let motion = MissingMotion {
+        points_before: 4,
+        file: 0,
+        line: 13,
+        instruction: "MoveL".to_owned(),
+        status: Status::Left,
+        reason: None,
+    };
+    part.missing = Some(MissingMotions { motions: vec![motion], lines: "line 13".to_owned() });
+    let text = page(&part);
+    assert!(!text.contains("steps of") && text.contains("[failed]"), "{text}");
+    // All of them, and none.
+    let text = page(&path(|_| true));
+    assert!(text.contains("[ok]") && !text.contains("steps"), "{text}");
+    let text = page(&path(|_| false));
+    assert!(text.contains("[warning]") && text.contains("corrects no cut"), "{text}");
+}
+
+/// Figures of a program that is not the intended one with corrected targets are not its figures.
+#[test]
+fn a_program_that_differs_by_more_than_a_correction_fails_with_its_lines() {
+    let mut report = raster("arm", After::PredictedRemainder, 0.0);
+    report.points.iter_mut().for_each(|point| (point.status, point.reason) = (Status::Changed, None));
+    let status = |report: &PathReport| view::status(std::slice::from_ref(report));
+    assert_eq!(status(&report), ViewStatus::Good);
+    report.differences = (0..14).map(|k| format!("line {k}: MoveJ, and MoveL in the original")).collect();
+    assert_eq!(status(&report), ViewStatus::Bad);
+    let page = terminal::document(&view::summary("blade.mod", std::slice::from_ref(&report)), 100);
+    assert!(page.contains("[failed] The program differs from the intended one"), "{page}");
+    assert!(page.contains("line 0: MoveJ") && page.contains("and 4 more differences"), "{page}");
+    let json = view::json(std::slice::from_ref(&report));
+    assert_eq!(json["programs"][0]["models"][0]["differences"].as_array().unwrap().len(), 14);
+    // Nothing was corrected: nothing is judged.
+    let mut plain = raster("arm", After::PredictedRemainder, 0.0);
+    plain.points.iter_mut().for_each(|point| (point.after, point.status) = (None, Status::Left));
+    assert_eq!(status(&plain), ViewStatus::Good);
 }

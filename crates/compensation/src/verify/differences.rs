@@ -1,0 +1,263 @@
+//! What a rewritten program has differently from its original, beyond the targets that a correction moves and inserts.
+//!
+//! Each program's targets are compared in its own tool and work object: a program whose tool, work object or displacement is another one,
+//! or that has motions of its own, reaches the numbers of the original elsewhere, and its figures mean nothing.
+
+use nalgebra::Vector3;
+
+use super::executed_end::ExecutedEnd;
+use crate::line_list::lines_of;
+use crate::segment::curve::Curve;
+use truegrind_math::se3::Pose;
+use truegrind_programs::motion::{Frame, Listing, Motion, MotionKind, Role, Tool, WorkObject};
+
+/// How much farther than its neighbours an inserted target may be off the intended path (mm): a program may be verified with another
+/// model than the one that corrected it.
+const FREE_MM: f64 = 0.2;
+/// The same, per deviation of its neighbours.
+const FREE_SHARE: f64 = 0.5;
+/// How much a circle point may be moved otherwise than the end of its motion, beyond the size of that correction (mm).
+const FREE_CIRCLE_POINT_MM: f64 = 0.5;
+
+/// Two programs, with the ends of their motions.
+pub(super) struct Compared<'a> {
+    pub(super) original: &'a Listing,
+    pub(super) rewritten: &'a Listing,
+    /// The rewritten motion of each original one.
+    pub(super) partners: &'a [Option<usize>],
+    pub(super) before: &'a [Option<&'a ExecutedEnd>],
+    pub(super) after: &'a [Option<&'a ExecutedEnd>],
+}
+
+/// What differs, each with the motions of the rewritten program where it does.
+#[derive(Default)]
+struct Found(Vec<(String, Vec<u32>)>);
+
+impl Found {
+    fn push(&mut self, motion: usize, what: String) {
+        match self.0.iter_mut().find(|(known, _)| *known == what) {
+            Some((_, motions)) => motions.push(motion as u32),
+            None => self.0.push((what, vec![motion as u32])),
+        }
+    }
+}
+
+impl Compared<'_> {
+    /// What differs, by line of the rewritten program.
+    pub(super) fn differences(&self) -> Vec<String> {
+        let [original, rewritten] = [self.original, self.rewritten];
+        let mut sentences = Vec::new();
+        if rewritten.motions.len() < original.motions.len() {
+            let [has, of] = [rewritten, original].map(|listing| listing.motions.len());
+            sentences.push(format!("it has {has} motions, and the original {of}: motions are lost"));
+            return sentences;
+        }
+        if rewritten.opaque.len() != original.opaque.len() {
+            let [has, of] = [rewritten, original].map(|listing| listing.opaque.len());
+            sentences.push(format!("{has} regions of it cannot be read, and {of} of the original"));
+        }
+        let mut found = Found::default();
+        for (index, partner) in self.partners.iter().enumerate() {
+            if let Some(partner) = *partner {
+                self.compare_pair(index, partner, &mut found);
+            }
+        }
+        self.find_added(&mut found);
+        sentences.extend(found.0.into_iter().map(|(what, motions)| {
+            let lines = lines_of(rewritten, &motions).unwrap_or_default();
+            format!("{lines}: {what}")
+        }));
+        sentences
+    }
+
+    fn compare_pair(&self, index: usize, partner: usize, found: &mut Found) {
+        let [original, rewritten] = [self.original, self.rewritten];
+        let [was, is] = [&original.motions[index], &rewritten.motions[partner]];
+        if !is_possible_form(was, is) {
+            found.push(partner, format!("{}, and {} in the original", is.instruction, was.instruction));
+        }
+        if !stands_alike([original, rewritten], [was, is]) {
+            let what = "the motion stands in another routine, branch or loop than in the original";
+            found.push(partner, what.to_owned());
+        }
+        let [had, has] = [original.tool(was), rewritten.tool(is)];
+        if !is_same_tool(had, has) {
+            found.push(partner, format!("tool {}, and in the original {}", tool_words(has), tool_words(had)));
+        }
+        let [had, has] = [original.work_object(was), rewritten.work_object(is)];
+        let displacement = |object: Option<&WorkObject>| object.and_then(|object| object.displacement);
+        if displacement(had) != displacement(has) || was.modal.displacement != is.modal.displacement {
+            found.push(partner, "another program displacement than in the original".to_owned());
+        } else if !is_same_object(had, has) {
+            let [has, had] = [has, had].map(object_words);
+            found.push(partner, format!("work object {has}, and in the original {had}"));
+        }
+        if self.before[index].is_some() && self.after[partner].is_none() {
+            let what = "the program text does not tell where the motion leads or the arm does not reach it, other than in the original";
+            found.push(partner, what.to_owned());
+        }
+        if let Some(mm) = self.circle_point_moved_mm(index, partner) {
+            found.push(
+                partner,
+                format!("the circle point is moved by {mm:.1} mm, unlike the end of the motion"),
+            );
+        }
+    }
+
+    /// How far a circle point is moved (mm), where it is not as the end of its motion is.
+    fn circle_point_moved_mm(&self, index: usize, partner: usize) -> Option<f64> {
+        let via = |motion: &Motion| {
+            let via = motion.targets.iter().find(|target| target.role == Role::Via)?;
+            Some(via.value.ok()?.cartesian()?.pose().translation.vector)
+        };
+        let [was, is] = [via(&self.original.motions[index])?, via(&self.rewritten.motions[partner])?];
+        let end = correction(self.before[index]?, self.after[partner]?);
+        let moved = is - was;
+        ((moved - end).norm() > end.norm() + FREE_CIRCLE_POINT_MM).then(|| moved.norm())
+    }
+
+    /// Motions that belong to none of the original and are no targets inserted on its path.
+    fn find_added(&self, found: &mut Found) {
+        let mut next = 0;
+        let mut owner: Vec<Option<usize>> = vec![None; self.after.len()];
+        for (index, partner) in self.partners.iter().enumerate() {
+            let Some(partner) = *partner else { continue };
+            owner[next..partner].fill(Some(index));
+            next = partner + 1;
+        }
+        let mut is_partner = vec![false; self.after.len()];
+        self.partners.iter().flatten().for_each(|partner| is_partner[*partner] = true);
+        for added in (0..self.after.len()).filter(|motion| !is_partner[*motion]) {
+            match owner[added].and_then(|index| self.off_path_mm(added, index)) {
+                Some((mm, bound_mm)) if mm <= bound_mm => {}
+                Some((mm, _)) => found.push(
+                    added,
+                    format!("an added motion, whose end is {mm:.1} mm off the path of the original"),
+                ),
+                None => found.push(added, "an added motion, on no path of the original".to_owned()),
+            }
+        }
+    }
+
+    /// How far an inserted target leads off the way of an original motion (mm), and how far it may; `None` where it cannot have been
+    /// inserted on it.
+    fn off_path_mm(&self, added: usize, index: usize) -> Option<(f64, f64)> {
+        let (was, inserted) = (&self.original.motions[index], &self.rewritten.motions[added]);
+        let partner = self.partners[index]?;
+        let owner = &self.rewritten.motions[partner];
+        if !matches!(was.kind, MotionKind::Linear | MotionKind::Circular)
+            || !inserted.same_frames(owner)
+            || inserted.routine != owner.routine
+        {
+            return None;
+        }
+        let start_index = was.previous.map(|previous| previous as usize).or(index.checked_sub(1))?;
+        let (start, end) = (self.before[start_index]?, self.before[index]?);
+        // The start may be stated in another work object.
+        let from = end.base_from_object.inverse() * start.base_from_object * start.commanded;
+        let way = way(was, from, end.commanded)?;
+        let mm = distance_mm(&way, &self.after[added]?.reached);
+        let deviation = |before: &ExecutedEnd, partner: Option<usize>| {
+            let reached = self.after[partner?]?.reached.translation.vector;
+            Some((reached - before.commanded.translation.vector).norm())
+        };
+        let beside =
+            [deviation(start, self.partners[start_index]), deviation(end, Some(partner))].into_iter();
+        let beside_mm = beside.flatten().fold(0.0, f64::max);
+        Some((mm, (1.0 + FREE_SHARE) * beside_mm + FREE_MM))
+    }
+}
+
+/// How a correction moves the end of a motion, in the work object (mm).
+fn correction(before: &ExecutedEnd, after: &ExecutedEnd) -> Vector3<f64> {
+    after.commanded.translation.vector - before.commanded.translation.vector
+}
+
+/// The way of a motion.
+fn way(motion: &Motion, from: Pose, to: Pose) -> Option<Curve> {
+    if motion.kind == MotionKind::Linear {
+        return Some(Curve::line(from, to));
+    }
+    let via = motion.targets.iter().find(|target| target.role == Role::Via)?;
+    Curve::round(from, &via.value.ok()?.cartesian()?.pose(), to, motion)
+}
+
+/// Distance of a pose from a way between its ends (mm).
+fn distance_mm(way: &Curve, pose: &Pose) -> f64 {
+    let at = pose.translation.vector;
+    let share = if way.arc().is_some() {
+        way.passes(pose)
+    } else {
+        let along = way.to.translation.vector - way.from.translation.vector;
+        let square = along.norm_squared();
+        if square > 0.0 {
+            ((at - way.from.translation.vector).dot(&along) / square).clamp(0.0, 1.0)
+        } else {
+            0.0
+        }
+    };
+    (way.at(share).translation.vector - at).norm()
+}
+
+/// Whether a correction can write a motion so: it writes joints for poses, and straight pieces for circles.
+fn is_possible_form(was: &Motion, is: &Motion) -> bool {
+    let kind = match was.kind {
+        MotionKind::Linear | MotionKind::Joint => [was.kind, was.kind, MotionKind::AbsoluteJoint],
+        MotionKind::Circular => [MotionKind::Circular, MotionKind::Linear, MotionKind::AbsoluteJoint],
+        other => [other; 3],
+    };
+    kind.contains(&is.kind) && was.rapid == is.rapid
+}
+
+/// Whether two motions stand in the same routine, and both in a branch or loop or not.
+fn stands_alike([original, rewritten]: [&Listing; 2], [was, is]: [&Motion; 2]) -> bool {
+    let routine = |listing: &Listing, motion: &Motion| {
+        motion.routine.map(|routine| listing.routines[routine as usize].name.to_lowercase())
+    };
+    routine(original, was) == routine(rewritten, is)
+        && (was.conditional, was.in_loop) == (is.conditional, is.in_loop)
+}
+
+fn is_same_tool(a: Option<&Tool>, b: Option<&Tool>) -> bool {
+    match (a, b) {
+        (Some(a), Some(b)) => a.name.eq_ignore_ascii_case(&b.name) && a.value == b.value,
+        (None, None) => true,
+        _ => false,
+    }
+}
+
+fn is_same_object(a: Option<&WorkObject>, b: Option<&WorkObject>) -> bool {
+    match (a, b) {
+        (Some(a), Some(b)) => a.name.eq_ignore_ascii_case(&b.name) && a.value == b.value,
+        (None, None) => true,
+        _ => false,
+    }
+}
+
+fn tool_words(tool: Option<&Tool>) -> String {
+    let Some(tool) = tool else { return "none".to_owned() };
+    match &tool.value {
+        Ok(value) => {
+            let at = if value.robhold { "" } else { ", stationary" };
+            format!("{} at {}, {} kg{at}", tool.name, frame_words(&value.frame), value.mass_kg)
+        }
+        Err(_) => format!("{}, whose value is not known", tool.name),
+    }
+}
+
+fn object_words(object: Option<&WorkObject>) -> String {
+    let Some(object) = object else { return "none".to_owned() };
+    match &object.value {
+        Ok(value) => format!(
+            "{} with user frame {} and object frame {}",
+            object.name,
+            frame_words(&value.user_frame),
+            frame_words(&value.object_frame)
+        ),
+        Err(_) => format!("{}, whose value is not known", object.name),
+    }
+}
+
+fn frame_words(frame: &Frame) -> String {
+    format!("{:?} mm {:?}", frame.position_mm, frame.quaternion)
+}

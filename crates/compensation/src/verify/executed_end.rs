@@ -1,0 +1,30 @@
+//! Where a motion ends when an arm runs it.
+
+use truegrind_arm::estimated::RegisteredFrame;
+use truegrind_arm::model::Joints;
+use truegrind_math::se3::Pose;
+
+/// End of a motion as executed.
+#[derive(Debug, Clone)]
+pub(crate) struct ExecutedEnd {
+    pub(crate) motion: usize,
+    /// Commanded pose in the work object.
+    pub(crate) commanded: Pose,
+    pub(crate) joints: Joints,
+    /// Reached pose in the work object.
+    pub(crate) reached: Pose,
+    pub(crate) base_from_object: Pose,
+    pub(crate) flange_from_tool: Pose,
+    pub(crate) carried: Option<RegisteredFrame>,
+    /// Condition under which the arm arrived.
+    pub(crate) condition_index: usize,
+}
+
+/// The ends of a program by motion; `None` for a motion without one.
+pub(crate) fn by_motion(ends: &[ExecutedEnd], motions: usize) -> Vec<Option<&ExecutedEnd>> {
+    let mut out = vec![None; motions];
+    for end in ends {
+        out[end.motion] = Some(end);
+    }
+    out
+}

@@ -1,0 +1,146 @@
+//! A program that was corrected differs from its original in its targets alone; whatever else differs is told by line.
+
+use truegrind_arm::condition::Condition;
+use truegrind_arm::model::Joints;
+use truegrind_compensation::cell::Cell;
+use truegrind_compensation::deviation::{After, PathReport};
+use truegrind_compensation::options::{Circles, Emit, Options};
+use truegrind_compensation::verify::{ActingArm, VerificationTask, verify};
+use truegrind_programs::rapid::Task;
+
+use super::{estimated, nominal, perturbed, rewritten};
+
+const PLACE: &str = "[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]";
+
+/// Lines of 40 mm and an arc, in a work object, between motions whose targets only the run time tells.
+fn program() -> String {
+    let at = |x: f64, y: f64, z: f64| format!("[[{x:.1},{y:.1},{z:.1}],{PLACE}");
+    let mut text =
+        "MODULE M\n  PERS tooldata tS:=[TRUE,[[0,0,50],[1,0,0,0]],[1,[0,0,50],[1,0,0,0],0,0,0]];\n  \
+         PERS wobjdata wB:=[FALSE,TRUE,\"\",[[300,10,200],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];\n  PROC main()\n"
+            .to_owned();
+    text += &format!("    MoveJ {},v100,fine,tS\\WObj:=wB;\n", at(0.0, 0.0, 60.0));
+    for k in 0..6 {
+        text += &format!("    MoveL {},v100,z1,tS\\WObj:=wB;\n", at(20.0, 16.0 * f64::from(k), 20.0));
+    }
+    text +=
+        &format!("    MoveC {},{},v100,fine,tS\\WObj:=wB;\n", at(40.0, 100.0, 20.0), at(60.0, 80.0, 20.0));
+    text += &format!("    MoveL {},v100,z1,tS\\WObj:=wB;\n", at(60.0, 0.0, 20.0));
+    text += "    unknownMotion;\n  ENDPROC\nENDMODULE\n";
+    text
+}
+
+fn corrected(options: &Options) -> String {
+    let known = estimated(perturbed(3, 1.0), &[Joints::zeros()]);
+    let (_, text) = rewritten(program().as_bytes(), &known, &Cell::default(), options);
+    String::from_utf8(text).unwrap()
+}
+
+/// A tolerance for which nothing is inserted.
+fn plain() -> Options {
+    Options { tolerance_mm: 0.5, ..Options::default() }
+}
+
+fn judged(original: &str, program: &str) -> PathReport {
+    let [before, after] = [original, program].map(|text| Task::read(&[("p.mod", text.as_bytes())]).listing);
+    let (nominal, actual) = (nominal(), perturbed(3, 1.0));
+    let task = VerificationTask {
+        original: &before,
+        rewritten: Some(&after),
+        cell: &Cell::default(),
+        surface: None,
+        program: "p.mod",
+        name: "test",
+        after: After::PredictedRemainder,
+        loads: [None, None],
+    };
+    let acting =
+        ActingArm { nominal: &nominal, model: &actual, knowledge: None, condition: Condition::default() };
+    verify(&task, &acting)
+}
+
+#[test]
+fn whatever_a_correction_writes_is_no_difference() {
+    let plain = plain();
+    for (options, inserts) in [
+        (plain.clone(), false),
+        (Options { tolerance_mm: 0.001, ..plain.clone() }, true),
+        (Options { circles: Circles::Segments, tolerance_mm: 0.02, ..plain.clone() }, true),
+        (Options { emit: Emit::Joints, circles: Circles::Segments, tolerance_mm: 0.02, ..plain }, true),
+    ] {
+        let text = corrected(&options);
+        assert_ne!(text, program());
+        assert_eq!(text.matches("Move").count() > program().matches("Move").count(), inserts, "{text}");
+        let report = judged(&program(), &text);
+        assert!(report.differences.is_empty(), "{:?} {text}", report.differences);
+        let worst = report.points.iter().map(|point| point.after.unwrap().norm_mm()).fold(0.0, f64::max);
+        assert!(worst < 1e-3, "{worst}");
+    }
+}
+
+/// Each edit of a corrected program with the words that tell it and their line.
+fn edits(text: &str) -> Vec<(String, &'static str, usize)> {
+    let lines: Vec<&str> = text.lines().collect();
+    let first = lines.iter().position(|line| line.contains("MoveL")).unwrap();
+    let last = lines.iter().rposition(|line| line.contains("MoveL")).unwrap();
+    let insert = |at: usize, line: &str| [&lines[..at], &[line], &lines[at..]].concat().join("\n");
+    let replace = |at: usize, from: &str, to: &str| {
+        let line = lines[at].replacen(from, to, 1);
+        [&lines[..at], &[line.as_str()], &lines[at + 1..]].concat().join("\n")
+    };
+    let off = format!("    MoveL [[21,30,28],{PLACE},v100,z1,tS\\WObj:=wB;");
+    let beyond = format!("    MoveL [[60,10,20],{PLACE},v100,z1,tS\\WObj:=wB;");
+    // The main routine is repeated, so a displacement may hold in its first motion too.
+    vec![
+        (insert(first + 2, &off), "an added motion, whose end is", first + 3),
+        (insert(last + 1, &beyond), "an added motion, on no path", last + 2),
+        (insert(first, "    PDispSet [[0,0,5],[1,0,0,0]];"), "another program displacement", 5),
+        (
+            text.replace("[[0,0,50],[1,0,0,0]],[1,", "[[0,0,52],[1,0,0,0]],[1,"),
+            "tool tS at [0.0, 0.0, 52.0] mm",
+            5,
+        ),
+        (text.replace("[[300,10,200]", "[[300,10,205]"), "work object wB", 5),
+        (replace(first + 2, "tS", "tool0"), "tool tool0", first + 3),
+        (replace(first + 2, "MoveL", "MoveJ"), "MoveJ, and MoveL in the original", first + 3),
+    ]
+}
+
+#[test]
+fn what_else_differs_is_told_by_line() {
+    for (tolerance_mm, inserts) in [(0.5, false), (0.001, true)] {
+        let text = corrected(&Options { tolerance_mm, ..Options::default() });
+        assert_eq!(text.matches("Move").count() > program().matches("Move").count(), inserts, "{text}");
+        let edits = edits(&text);
+        // Of an inserted target the tool and the kind are those of no motion of the original.
+        let count = if inserts { 5 } else { edits.len() };
+        for (edited, words, line) in &edits[..count] {
+            assert_ne!(edited, &text, "{words}");
+            let found = judged(&program(), edited).differences;
+            let sentence = found.iter().find(|sentence| sentence.contains(words));
+            let sentence = sentence.unwrap_or_else(|| panic!("{words}: {found:?}\n{edited}"));
+            let lines = sentence.split(':').next().unwrap();
+            let first = lines.split([' ', ',']).nth(1).unwrap();
+            assert!(inserts || first == line.to_string(), "{line}: {sentence}\n{edited}");
+        }
+    }
+    // A target that the program text no longer tells, and a motion that is lost.
+    let text = corrected(&plain());
+    let unknown = text.replacen("MoveL [[", "MoveL Offs(pNowhere,[[", 1);
+    assert!(!judged(&program(), &unknown).differences.is_empty());
+    let lost: Vec<&str> = text.lines().enumerate().filter(|(k, _)| *k != 7).map(|(_, line)| line).collect();
+    let found = judged(&program(), &lost.join("\n")).differences;
+    assert!(found.iter().any(|sentence| sentence.contains("motions are lost")), "{found:?}");
+}
+
+/// The circle point decides where the circle lies, and no motion ends there.
+#[test]
+fn a_circle_point_that_moves_otherwise_than_its_motion_is_told() {
+    let text = corrected(&plain());
+    let line = text.lines().find(|line| line.contains("MoveC")).unwrap();
+    let number = line.split("[[").nth(1).unwrap().split(',').next().unwrap();
+    let moved: f64 = number.parse::<f64>().unwrap() + 8.0;
+    let edited = text.replace(line, &line.replacen(number, &moved.to_string(), 1));
+    let found = judged(&program(), &edited).differences;
+    assert!(found.len() == 1 && found[0].contains("the circle point is moved by"), "{found:?}");
+}
