@@ -1,7 +1,7 @@
 //! Optimal experiment design: informative measurement poses, their order, and the program that visits them.
 //!
 //! - [`candidate`]: random reachable poses visible to the sensor; [`cable`]: clearance of a cable from the arm;
-//!   [`keep_out`]: collision checks against floor and boxes;
+//!   [`keep_out`]: collision checks against floor, boxes and the arm's own bodies (`own_bodies`);
 //! - [`rows`]: whitened Jacobian of the readings;
 //! - [`design`]: D-optimal choice among the candidates;
 //! - [`field`]: choice for an error that no cause of a diagnosis explains;
@@ -13,6 +13,7 @@
 
 mod blank;
 mod options;
+mod own_bodies;
 mod roadmap;
 mod setup;
 pub mod candidate;

@@ -188,7 +188,10 @@ fn verdict(plan: &Plan) -> Verdict {
         );
     }
     let (status, headline) = match rough {
-        0 => (Status::Good, "The program may run: links and target stay clear of the stated obstacles"),
+        0 => (
+            Status::Good,
+            "The program may run: links and target stay clear of the stated obstacles and of the arm itself",
+        ),
         _ => (Status::Warning, "The program may run if the cable is unhooked between some poses"),
     };
     Verdict::new(status, headline, reasons)
