@@ -4,11 +4,11 @@ use nalgebra::{DMatrix, DVector};
 
 use super::alarm::{Alarm, Course, Part};
 use super::bounds::{accident_bound, window_bound};
-use super::locate::{Change, Explanation, Form, Group, GroupChange, locate};
+use super::locate::{ALTERNATIVE_MARGIN, Change, Explanation, Form, Group, GroupChange, locate};
 use super::mounting::Beside;
 use super::state::{Snapshot, extend_region};
 use super::tracker::Tracker;
-use truegrind_arm::parameter::Parameter;
+use truegrind_arm::parameter::{LinkCoordinate, Parameter};
 use truegrind_estimation::problem::Problem;
 use truegrind_math::statistics::median;
 
@@ -175,7 +175,7 @@ impl Tracker {
             parts: Vec::new(),
         };
         if let Some(together) = &found.together {
-            self.describe_group(&mut alarm, &groups[together.group], together);
+            self.describe_group(&mut alarm, &groups[together.group], together, found);
         }
         Some(alarm)
     }
@@ -226,7 +226,7 @@ impl Tracker {
     }
 
     /// Describes the displacement of a group in an alarm.
-    fn describe_group(&self, alarm: &mut Alarm, group: &Group, together: &GroupChange) {
+    fn describe_group(&self, alarm: &mut Alarm, group: &Group, together: &GroupChange, found: &Explanation) {
         let part = |(a, (k, _)): (usize, &(usize, f64))| Part {
             parameter: self.parameters[*k].to_string(),
             unit: self.parameters[*k].unit().to_owned(),
@@ -236,7 +236,14 @@ impl Tracker {
         alarm.parts = group.members.iter().enumerate().map(part).collect();
         (alarm.shift, alarm.sigma) = self.displacement(group, together);
         (alarm.parameter, alarm.unit, alarm.course) = (group.name.clone(), "mm".to_owned(), Course::Jump);
-        alarm.alternatives.clear();
+        let rivals = group.covers.iter().filter(|(k, largest)| {
+            let near = |change: &&Change| change.parameter == *k && change.shift.abs() <= *largest;
+            std::iter::once(&found.best)
+                .chain(&found.alternatives)
+                .filter(near)
+                .any(|change| change.ratio > together.ratio - ALTERNATIVE_MARGIN)
+        });
+        alarm.alternatives = rivals.map(|(k, _)| self.parameters[*k].to_string()).collect();
     }
 
     /// RMS displacement of the changed poses' readings (mm), and its standard deviation. The displacement of a frame's origin would be
@@ -273,7 +280,7 @@ impl Tracker {
         for (k, parameter) in self.parameters.iter().enumerate() {
             let name = match parameter {
                 Parameter::SensorFrame(_) => "the sensor against the arm's base".to_owned(),
-                Parameter::Target(_) => "the touched point".to_owned(),
+                Parameter::Target(_) => TOUCHED_POINT.to_owned(),
                 Parameter::Outlet { anchor: 0, .. } => "the outlet".to_owned(),
                 Parameter::Outlet { anchor, .. } => format!("outlet {}", anchor + 1),
                 _ => continue,
@@ -281,8 +288,14 @@ impl Tracker {
             let reach = if parameter.is_length() { REACH_MM } else { REACH_RAD };
             match groups.iter_mut().find(|g| g.name == name) {
                 Some(group) => group.members.push((k, reach)),
-                None => groups.push(Group { name, members: vec![(k, reach)] }),
+                None => groups.push(Group { name, members: vec![(k, reach)], covers: Vec::new() }),
             }
+        }
+        // Whatever is fixed to the last link moves with it: no reading tells a bent flange or a lost zero of joint 6 from a moved target.
+        if let Some(target) = groups.iter_mut().find(|group| group.name == TOUCHED_POINT) {
+            let carried = self.parameters.iter().enumerate();
+            target.covers =
+                carried.filter_map(|(k, parameter)| Some((k, largest_of_last_link(parameter)?))).collect();
         }
         groups
     }
@@ -367,3 +380,24 @@ impl Tracker {
         (self.state.reference, self.state.middle) = (snapshot.clone(), snapshot);
     }
 }
+
+/// Largest change of a parameter of the last link that is a likely rival of a moved target; `None` for other parameters. A joint may lose
+/// its zero by degrees; a flange is not bent by as much without more being broken.
+fn largest_of_last_link(parameter: &Parameter) -> Option<f64> {
+    match parameter {
+        Parameter::Link { joint: 5, coordinate } => Some(match coordinate {
+            LinkCoordinate::Theta => ZERO_LOST_RAD,
+            LinkCoordinate::Alpha | LinkCoordinate::Beta => BENT_RAD,
+            LinkCoordinate::A | LinkCoordinate::D => BENT_MM,
+        }),
+        _ => None,
+    }
+}
+
+/// Sizes up to which the last link or its joint are likely to have changed (rad, mm).
+const ZERO_LOST_RAD: f64 = 0.09;
+const BENT_RAD: f64 = 0.003;
+const BENT_MM: f64 = 0.3;
+
+/// What the target is called.
+const TOUCHED_POINT: &str = "the touched point";

@@ -229,3 +229,33 @@ fn a_noise_that_is_several_times_too_large_is_replaced_by_what_the_first_poses_s
     resumed.process_file(&dataset).unwrap();
     assert_eq!(resumed.deviations(), whole.deviations());
 }
+
+/// A reflector that was exchanged or bumped moves the readings exactly as a bend of the last link does. The class: a flange bent by degrees
+/// in the model for programs, since one parameter explained a moved target.
+#[test]
+fn a_reflector_that_was_exchanged_bends_no_link() {
+    const POINT: &str = "reflector_mm = [38.2, 12.6, 61.3]";
+    let offsets: [[f64; 3]; 6] = [
+        [1.25, 5.47, 5.39],
+        [-0.59, -1.82, -3.67],
+        [4.04, 1.84, 0.05],
+        [0.25, 0.36, 6.62],
+        [-0.5, -3.5, 8.1],
+        [0.05, -0.15, 0.1],
+    ];
+    for offset in offsets {
+        let to = format!("reflector_mm = [{}, {}, {}]", 38.2 + offset[0], 12.6 + offset[1], 61.3 + offset[2]);
+        let dataset = spliced(&measured(2, None), &measured_with(2, POINT, &to), 70);
+        let (tracker, alarms) = tracked(&dataset);
+        assert_eq!(alarms.len(), 1, "{offset:?}: {alarms:?}");
+        assert_eq!(alarms[0].parameter, "the touched point", "{offset:?}: {}", alarms[0]);
+        let length = offset.iter().map(|v| v * v).sum::<f64>().sqrt();
+        assert!((alarms[0].shift - length).abs() < 0.05 && alarms[0].sigma < 0.05, "{}", alarms[0]);
+        let (after, before) = (tracker.model().model.links[5], model().model.links[5]);
+        for (after, before) in [(after.alpha_rad, before.alpha_rad), (after.theta_rad, before.theta_rad)] {
+            assert!((after - before).to_degrees().abs() < 0.02, "{offset:?}: {} for {}", after, before);
+        }
+        assert!((after.d_mm - before.d_mm).abs() < 0.05, "{offset:?}");
+        assert!(!tracker.departure().unwrap().is_significant, "{offset:?}");
+    }
+}
