@@ -8,6 +8,7 @@ use super::locate::{ALTERNATIVE_MARGIN, Change, Explanation, Form, Group, GroupC
 use super::mounting::Beside;
 use super::state::{Snapshot, extend_region};
 use super::tracker::Tracker;
+use super::turn::SENSOR;
 use truegrind_arm::parameter::{LinkCoordinate, Parameter};
 use truegrind_estimation::problem::Problem;
 use truegrind_math::statistics::median;
@@ -279,7 +280,7 @@ impl Tracker {
         let mut groups: Vec<Group> = Vec::new();
         for (k, parameter) in self.parameters.iter().enumerate() {
             let name = match parameter {
-                Parameter::SensorFrame(_) => "the sensor against the arm's base".to_owned(),
+                Parameter::SensorFrame(_) => SENSOR.to_owned(),
                 Parameter::Target(_) => TOUCHED_POINT.to_owned(),
                 Parameter::Outlet { anchor: 0, .. } => "the outlet".to_owned(),
                 Parameter::Outlet { anchor, .. } => format!("outlet {}", anchor + 1),
