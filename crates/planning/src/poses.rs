@@ -84,8 +84,8 @@ pub struct Quality {
     pub log_det: f64,
     /// The same for as many random candidates, mean of ten draws.
     pub random_log_det: f64,
-    /// Predicted standard deviation of a reading under the fitted arm, root mean square over candidates that were not chosen
-    /// (mm). Unobservable parameters have no effect on it.
+    /// Predicted standard deviation of a reading under the fitted arm, of a length or of each coordinate as the noise is stated, root mean
+    /// square over candidates that were not chosen (mm). Unobservable parameters have no effect on it.
     pub reading_sigma_mm: f64,
     /// The same after as many random candidates, mean of ten draws (mm).
     pub random_reading_sigma_mm: f64,

@@ -202,6 +202,7 @@ fn alarm_of(found: &Remount, old: &Pose, poses: &[PoseRecord], per: usize) -> Al
             Mounted::Target => "the touched point".to_owned(),
             Mounted::Sensor => SENSOR.to_owned(),
         },
+        label: None,
         unit: "mm".to_owned(),
         course: Course::Mounted,
         shift: (found.pose.translation.vector - old.translation.vector).norm(),

@@ -156,6 +156,7 @@ impl Tracker {
             since_row: onset.row,
             since_time_h: onset.time_h,
             parameter: name(best.parameter),
+            label: self.label(best.parameter),
             unit: self.parameters[best.parameter].unit().to_owned(),
             course: match (found.other_form, best.form) {
                 (Some(_), _) => Course::Open,
@@ -198,6 +199,7 @@ impl Tracker {
             since_row: first.row,
             since_time_h: first.time_h,
             parameter: String::new(),
+            label: None,
             unit: String::new(),
             course,
             shift: 0.0,
@@ -226,6 +228,15 @@ impl Tracker {
         None
     }
 
+    /// What a parameter of an effect is, in words.
+    fn label(&self, k: usize) -> Option<String> {
+        let Parameter::Effect { index, parameter } = self.parameters[k] else { return None };
+        let effect = self.initial.model.effects.get(index)?;
+        let of = effect.joint().map_or(String::new(), |joint| format!(" of joint {}", joint + 1));
+        let named = effect.parameters().get(parameter).map(|parameter| parameter.name)?;
+        Some(format!("{}{of} ({named})", effect.name().replace('-', " ")))
+    }
+
     /// Describes the displacement of a group in an alarm.
     fn describe_group(&self, alarm: &mut Alarm, group: &Group, together: &GroupChange, found: &Explanation) {
         let part = |(a, (k, _)): (usize, &(usize, f64))| Part {
@@ -237,6 +248,7 @@ impl Tracker {
         alarm.parts = group.members.iter().enumerate().map(part).collect();
         (alarm.shift, alarm.sigma) = self.displacement(group, together);
         (alarm.parameter, alarm.unit, alarm.course) = (group.name.clone(), "mm".to_owned(), Course::Jump);
+        alarm.label = None;
         let rivals = group.covers.iter().filter(|(k, largest)| {
             let near = |change: &&Change| change.parameter == *k && change.shift.abs() <= *largest;
             std::iter::once(&found.best)
