@@ -380,6 +380,20 @@ fn thin_sheets_are_not_passed_between_two_looks() {
     assert!(away >= 0.0, "{away} mm");
 }
 
+/// The class: a σ that is stated for each coordinate and predicted for the length of all three.
+#[test]
+fn the_predicted_sigma_is_that_of_each_coordinate() {
+    let jacobian = ReadingJacobian {
+        readings: DMatrix::identity(3, 3),
+        per_row: 3,
+        parameters: Vec::new(),
+        scale: vec![1.0; 3],
+        interest: Vec::new(),
+    };
+    let sigma = jacobian.reading_sigma(&DMatrix::identity(3, 3), &[0]).unwrap();
+    assert!((sigma - 1.0).abs() < 1e-12, "{sigma}");
+}
+
 /// The class: poses, and motions between them, at which the flange or the target is inside the arm's own column, upper arm or forearm.
 #[test]
 fn no_pose_and_no_motion_runs_into_the_arm_itself() {

@@ -328,3 +328,27 @@ fn a_reflector_that_was_exchanged_bends_no_link() {
         assert!(!tracker.departure().unwrap().is_significant, "{offset:?}");
     }
 }
+
+/// The class: "jumped by -0.0000 ± 0.0000", and a displacement with a standard deviation larger than itself.
+#[test]
+fn alarms_show_the_digits_that_tell_something() {
+    let moved = LinkDeviation { joint: 2, theta_deg: 0.05, ..LinkDeviation::default() };
+    let alarm = tracked(&with_jump(70, moved)).1.remove(0);
+    let said = |shift: f64, sigma: f64| {
+        let unit = "1/K".to_owned();
+        let label = Some("thermal drift (growth per kelvin)".to_owned());
+        Alarm { shift, sigma, unit, label, parameter: "effect2.1".to_owned(), ..alarm.clone() }.to_string()
+    };
+    let small = said(-3.14e-6, 4.2e-7);
+    assert!(small.starts_with("thermal drift (growth per kelvin) "), "{small}");
+    assert!(small.contains("by (-3.14 ± 0.42)e-6 1/K since"), "{small}");
+    assert!(said(0.05, 0.00123).contains("by 0.0500 ± 0.0012 1/K"), "{}", said(0.05, 0.00123));
+    let part = truegrind_calibration::tracking::alarm::Part {
+        parameter: "target.x".to_owned(),
+        unit: "mm".to_owned(),
+        shift: 2.0,
+        sigma: 4.0,
+    };
+    let whole = Alarm { shift: 2.83, sigma: 4.46, unit: "mm".to_owned(), parts: vec![part], ..alarm };
+    assert!(whole.to_string().contains("by how much the poses do not tell yet"), "{whole}");
+}
